@@ -1,0 +1,1 @@
+"""Aerobat plans, flies and proves aggressive maneuvers for multirotors."""

@@ -1,0 +1,46 @@
+"""Read-only float64 arrays: values are immutable for real."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from aerobat.errors import SpecError
+
+Array = NDArray[np.float64]
+
+
+def frozen(value: ArrayLike, name: str, shape: Sequence[int | None] | None = None) -> Array:
+    """A write-protected float64 copy of `value`; refuses NaN, infinities and any shape but `shape`.
+
+    `shape` gives the trailing axes, None standing for any size: (None, 3) wants (..., n, 3), and
+    None for the whole of it takes any shape. Raises SpecError, naming `name`.
+    """
+    array = frozen_bounds(value, name, shape)
+    if not np.isfinite(array).all():
+        raise SpecError(f"{name} must be finite numbers; it contains a NaN or an infinity")
+    return array
+
+
+def frozen_bounds(value: ArrayLike, name: str, shape: Sequence[int | None] | None = None) -> Array:
+    """As `frozen`, but infinities may stand for bounds that do not bind. Raises SpecError."""
+    try:
+        array = np.array(value, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise SpecError(f"{name} must be numbers, got {value!r}") from None
+    if shape is not None and not _fits(array.shape, shape):
+        wanted = ", ".join("n" if size is None else str(size) for size in shape)
+        raise SpecError(f"{name} must have the shape ({wanted}), got {array.shape}")
+    if np.isnan(array).any():
+        raise SpecError(f"{name} must be numbers; it contains a NaN")
+    array.flags.writeable = False
+    return array
+
+
+def _fits(shape: tuple[int, ...], wanted: Sequence[int | None]) -> bool:
+    trailing = shape[len(shape) - len(wanted) :]
+    return len(shape) >= len(wanted) and all(
+        w is None or s == w for s, w in zip(trailing, wanted, strict=True)
+    )

@@ -1,0 +1,121 @@
+"""Rotations as unit Hamilton quaternions (w, x, y, z), body to world; leading axes broadcast.
+
+Conventions: Solà, "Quaternion kinematics for the error-state Kalman filter", arXiv:1711.02508.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from aerobat.arrays import Array
+
+IDENTITY: Array = np.array([1.0, 0.0, 0.0, 0.0])
+IDENTITY.flags.writeable = False
+
+
+def multiply(p: ArrayLike, q: ArrayLike) -> Array:
+    """Hamilton product p ⊗ q, (..., 4)."""
+    pw, px, py, pz = np.moveaxis(np.asarray(p, dtype=float), -1, 0)
+    qw, qx, qy, qz = np.moveaxis(np.asarray(q, dtype=float), -1, 0)
+    return np.stack(
+        [
+            pw * qw - px * qx - py * qy - pz * qz,
+            pw * qx + px * qw + py * qz - pz * qy,
+            pw * qy - px * qz + py * qw + pz * qx,
+            pw * qz + px * qy - py * qx + pz * qw,
+        ],
+        axis=-1,
+    )
+
+
+def conjugate(q: ArrayLike) -> Array:
+    """The inverse rotation q*, (..., 4)."""
+    return np.asarray(q, dtype=float) * np.array([1.0, -1.0, -1.0, -1.0])
+
+
+def normalize(q: ArrayLike) -> Array:
+    """q / |q|, (..., 4)."""
+    q = np.asarray(q, dtype=float)
+    return np.asarray(q / np.linalg.norm(q, axis=-1, keepdims=True))
+
+
+def rotate(q: ArrayLike, v: ArrayLike) -> Array:
+    """q ⊗ v ⊗ q*: body vectors (..., 3) to the world for q = q_world_body."""
+    q, v = np.asarray(q, dtype=float), np.asarray(v, dtype=float)
+    vector = q[..., 1:]
+    t = 2.0 * np.cross(vector, v)
+    return np.asarray(v + q[..., :1] * t + np.cross(vector, t))
+
+
+def unrotate(q: ArrayLike, v: ArrayLike) -> Array:
+    """q* ⊗ v ⊗ q: world vectors (..., 3) to the body for q = q_world_body."""
+    return rotate(conjugate(q), v)
+
+
+def exp(phi: ArrayLike) -> Array:
+    """The quaternion of a rotation vector phi [rad], (..., 3) -> (..., 4)."""
+    phi = np.asarray(phi, dtype=float)
+    angle = np.linalg.norm(phi, axis=-1, keepdims=True)
+    # sin(a/2)/a through NumPy's sinc, finite at zero
+    return np.concatenate([np.cos(angle / 2), 0.5 * np.sinc(angle / (2 * np.pi)) * phi], axis=-1)
+
+
+def log(q: ArrayLike) -> Array:
+    """The shortest rotation vector of q [rad], angle in [0, π], (..., 4) -> (..., 3)."""
+    q = np.asarray(q, dtype=float)
+    q = np.where(q[..., :1] < 0, -q, q)
+    sine = np.linalg.norm(q[..., 1:], axis=-1, keepdims=True)
+    half = np.arctan2(sine, q[..., :1])
+    factor = np.where(sine > 1e-12, 2 * half / np.where(sine > 1e-12, sine, 1.0), 2.0)
+    return np.asarray(factor * q[..., 1:])
+
+
+def box_minus(q: ArrayLike, p: ArrayLike) -> Array:
+    """Log(p* ⊗ q): the rotation from p to q as a vector in p's body axes [rad], (..., 3)."""
+    return log(multiply(conjugate(p), q))
+
+
+def angle_between(p: ArrayLike, q: ArrayLike) -> Array:
+    """The angle of the relative rotation [rad], in [0, π], (...)."""
+    return np.asarray(np.linalg.norm(box_minus(q, p), axis=-1))
+
+
+def axes(q: ArrayLike) -> Array:
+    """The rotation matrix of q, (..., 4) -> (..., 3, 3); its columns are the body axes in the world."""
+    q = np.asarray(q, dtype=float)
+    return np.stack([rotate(q, e) for e in np.eye(3)], axis=-1)
+
+
+def thrust_axis(q: ArrayLike) -> Array:
+    """The body's z axis in the world, b3, (..., 4) -> (..., 3)."""
+    return rotate(q, np.array([0.0, 0.0, 1.0]))
+
+
+def about_axis(axis: ArrayLike, angle: ArrayLike) -> Array:
+    """The rotation by `angle` [rad] (...) about the unit vector `axis` (..., 3)."""
+    half = np.asarray(angle, dtype=float)[..., None] / 2
+    sine = np.sin(half) * np.asarray(axis, dtype=float)
+    return np.concatenate([np.broadcast_to(np.cos(half), (*sine.shape[:-1], 1)), sine], axis=-1)
+
+
+def smallest_rotation(a: ArrayLike, b: ArrayLike) -> Array:
+    """The smallest rotation that takes unit vector a to unit vector b, (..., 3) -> (..., 4).
+
+    Opposite vectors leave its axis open; any axis normal to a is then as small, and one is chosen.
+    """
+    a, b = np.broadcast_arrays(np.asarray(a, dtype=float), np.asarray(b, dtype=float))
+    # half-way vector h: q = (a·h, a × h), accurate for all angles but exactly π
+    h = a + b
+    norm = np.linalg.norm(h, axis=-1, keepdims=True)
+    opposite = norm < 1e-12
+    h = np.where(opposite, _any_normal(a), h / np.where(opposite, 1.0, norm))
+    return normalize(np.concatenate([np.sum(a * h, axis=-1, keepdims=True), np.cross(a, h)], axis=-1))
+
+
+def _any_normal(a: Array) -> Array:
+    """A unit vector normal to a: for a = ±z it is -y, so that the smallest flip is a half roll."""
+    # remove from the candidate axis least aligned with a its part along a
+    candidate = np.where(np.abs(a[..., 1:2]) < 0.9, [0.0, -1.0, 0.0], [1.0, 0.0, 0.0])
+    normal = candidate - np.sum(candidate * a, axis=-1, keepdims=True) * a
+    return np.asarray(normal / np.linalg.norm(normal, axis=-1, keepdims=True))

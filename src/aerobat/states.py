@@ -1,0 +1,52 @@
+"""Words that the packages share: what a body does, what a trajectory asks, what acts on a body.
+
+Every field may carry leading axes (time, vehicles); they broadcast.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from aerobat.arrays import Array
+
+GRAVITY = 9.81  # [m/s²], unless a vehicle or a problem says otherwise
+
+
+@dataclass(frozen=True)
+class BodyState:
+    """The state of a rigid body."""
+
+    position: Array  # [m] world, (..., 3)
+    velocity: Array  # [m/s] world, (..., 3)
+    q_world_body: Array  # unit quaternion (w, x, y, z), (..., 4)
+    omega_body: Array  # [rad/s] body axes, (..., 3)
+
+
+@dataclass(frozen=True)
+class FlatState:
+    """Position and its derivatives, the flat outputs of a multirotor; all world frame, (..., 3)."""
+
+    position: Array  # [m]
+    velocity: Array  # [m/s]
+    acceleration: Array  # [m/s²]
+    jerk: Array  # [m/s³]
+    snap: Array  # [m/s⁴]
+
+
+@dataclass(frozen=True)
+class Wrench:
+    """What the rotors do to the body: collective thrust along +z and moments, body frame."""
+
+    thrust: Array  # [N], (...)
+    moment_body: Array  # [N·m], (..., 3)
+
+
+@dataclass(frozen=True)
+class Setpoint:
+    """What a trajectory asks of a vehicle: the flat state and all that flatness derives from it."""
+
+    flat: FlatState
+    q_world_body: Array  # (..., 4), sign continuous along time
+    omega_body: Array  # [rad/s], (..., 3)
+    omega_dot_body: Array  # [rad/s²], (..., 3)
+    wrench: Wrench
