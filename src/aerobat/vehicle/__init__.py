@@ -1,0 +1,25 @@
+"""What flies: vehicles, their rotors, and what the rotors do to the body."""
+
+from aerobat.vehicle.allocation import (
+    allocate,
+    allocation_matrix,
+    collective_range,
+    mixer,
+    rotor_thrusts,
+    wrench,
+)
+from aerobat.vehicle.files import load_vehicle, vehicle_names
+from aerobat.vehicle.vehicle import Rotor, Vehicle
+
+__all__ = [
+    "Rotor",
+    "Vehicle",
+    "allocate",
+    "allocation_matrix",
+    "collective_range",
+    "load_vehicle",
+    "mixer",
+    "rotor_thrusts",
+    "vehicle_names",
+    "wrench",
+]
