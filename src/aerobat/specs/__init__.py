@@ -1,0 +1,38 @@
+"""What is wanted: gates, maneuvers as lists of stages, problems. No optimization happens here."""
+
+from aerobat.specs.files import load_problem, problem_names, write_problem
+from aerobat.specs.gate import Gate, tilted_gate
+from aerobat.specs.maneuver import (
+    Condition,
+    Course,
+    Flip,
+    HalfFlip,
+    Line,
+    Maneuver,
+    Quantity,
+    Stage,
+    Staged,
+)
+from aerobat.specs.problem import PAPER_LIMITS, EndState, Limits, Problem, rest
+
+__all__ = [
+    "PAPER_LIMITS",
+    "Condition",
+    "Course",
+    "EndState",
+    "Flip",
+    "Gate",
+    "HalfFlip",
+    "Limits",
+    "Line",
+    "Maneuver",
+    "Problem",
+    "Quantity",
+    "Stage",
+    "Staged",
+    "load_problem",
+    "problem_names",
+    "rest",
+    "tilted_gate",
+    "write_problem",
+]

@@ -1,0 +1,113 @@
+"""The layout of a problem's TOML file; angles in degrees, as people type them."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, FiniteFloat
+
+Vector = tuple[FiniteFloat, FiniteFloat, FiniteFloat]
+Positive = Annotated[FiniteFloat, Field(gt=0)]
+PerAxis = Positive | tuple[Positive, Positive, Positive]
+
+
+class _Table(BaseModel):
+    model_config = ConfigDict(extra="forbid", strict=False)
+
+
+class EndTable(_Table):
+    """[start] and [goal], world frame, SI."""
+
+    position: Vector
+    velocity: Vector = (0.0, 0.0, 0.0)
+    acceleration: Vector = (0.0, 0.0, 0.0)
+
+
+class GateTable(_Table):
+    """[gate]: where it is, where one passes it to, how it is tilted, how large its opening is."""
+
+    position: Vector
+    heading_deg: FiniteFloat = 0.0
+    elevation_deg: FiniteFloat = 0.0
+    tilt_deg: FiniteFloat = 0.0
+    width: Positive = 1.0
+    height: Positive = 0.6
+
+
+class LimitsTable(_Table):
+    """[limits]: position between two corners, the others by magnitude per axis."""
+
+    lower: Vector | None = None
+    upper: Vector | None = None
+    velocity: PerAxis | None = None
+    acceleration: PerAxis | None = None
+    jerk: PerAxis | None = None
+    snap: PerAxis | None = None
+    crackle: PerAxis | None = None
+
+
+class ConditionTable(_Table):
+    """One linear condition of a stage; `equals` stands for both bounds."""
+
+    quantity: Literal["position", "velocity", "acceleration", "specific_thrust"]
+    direction: Vector
+    lower: FiniteFloat | None = None
+    upper: FiniteFloat | None = None
+    equals: FiniteFloat | None = None
+
+
+class StageTable(_Table):
+    """[[maneuver.stages]]"""
+
+    name: Annotated[str, Field(min_length=1)]
+    at: Annotated[FiniteFloat, Field(ge=0, lt=1)] | None = None
+    conditions: list[ConditionTable] = []
+
+
+class FlipTable(_Table):
+    """kind = "flip"."""
+
+    kind: Literal["flip"]
+    axis_deg: FiniteFloat = 0.0
+    lateral: Positive | None = None
+    inverted: Positive | None = None
+    signed: bool = True
+    ordered: bool = True
+
+
+class HalfFlipTable(_Table):
+    """kind = "half-flip"."""
+
+    kind: Literal["half-flip"]
+    lateral: Positive | None = None
+
+
+class LineTable(_Table):
+    """kind = "line"."""
+
+    kind: Literal["line"]
+
+
+class StagesTable(_Table):
+    """kind = "stages": any maneuver, spelled out."""
+
+    kind: Literal["stages"]
+    stages: Annotated[list[StageTable], Field(min_length=1)]
+    always: list[ConditionTable] = []
+    ordered: bool = True
+
+
+class ProblemTable(_Table):
+    """The whole file."""
+
+    name: Annotated[str, Field(pattern=r"^[\w][\w .-]*$")]
+    description: str = ""
+    yaw_deg: FiniteFloat = 0.0
+    gravity: Positive | None = None
+    start: EndTable
+    goal: EndTable
+    gate: GateTable | None = None
+    maneuver: Annotated[FlipTable | HalfFlipTable | LineTable | StagesTable, Field(discriminator="kind")] = (
+        LineTable(kind="line")
+    )
+    limits: LimitsTable = LimitsTable()
