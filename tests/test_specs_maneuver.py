@@ -7,7 +7,18 @@ from hypothesis import strategies as st
 
 from aerobat import so3
 from aerobat.errors import SpecError
-from aerobat.specs import Condition, Course, Flip, HalfFlip, Line, Quantity, Staged, load_problem, tilted_gate
+from aerobat.specs import (
+    Condition,
+    Course,
+    Flip,
+    HalfFlip,
+    Line,
+    Passing,
+    Quantity,
+    Staged,
+    load_problem,
+    tilted_gate,
+)
 from aerobat.specs.maneuver import Stage
 
 G = 9.81
@@ -15,7 +26,7 @@ G = 9.81
 
 def holds(stage: Stage, acceleration: np.ndarray) -> bool:
     """Whether the stage's conditions on the thrust hold at an acceleration."""
-    thrust = acceleration + [0.0, 0.0, G]
+    thrust = np.add(acceleration, [0.0, 0.0, G])
     return all(
         c.lower - 1e-9 <= c.direction @ thrust <= c.upper + 1e-9
         for c in stage.conditions
@@ -33,7 +44,7 @@ accelerations = st.tuples(*[st.sampled_from([-40.0, -25.0, -18.0, 0.0, 18.0, 30.
 
 @given(accelerations)
 def test_the_flip_in_paper_mode_is_the_papers_section_ii_a(thrust: tuple[float, float, float]) -> None:
-    """Its stages hold exactly where the paper's implications hold, for thrusts on a grid that hits equalities."""
+    """Its stages hold exactly where the paper's implications do, on a grid that hits the equalities."""
     x, y, z = thrust  # of a + g e3
     acceleration = np.array([x, y, z - G])
     stages = flip_of_the_paper().stages
@@ -44,7 +55,16 @@ def test_the_flip_in_paper_mode_is_the_papers_section_ii_a(thrust: tuple[float, 
 def test_the_paper_imposes_no_order_and_fixes_only_the_gate() -> None:
     course = flip_of_the_paper()
     assert not course.ordered
-    assert [s.at for s in course.stages] == [None, None, 0.5, None, None]
+    assert [s.fixed_interval(20) for s in course.stages] == [None, None, 10, None, None]
+
+
+def test_a_flip_of_ours_meets_its_gate_half_way_squarely_and_in_its_direction() -> None:
+    problem = load_problem("flip-roll")
+    gate = problem.maneuver.course(problem.gate, 50.0).stages[2]
+    assert gate.fixed_interval(20) == 9  # ends at half the duration
+    velocity = {tuple(c.direction): (c.lower, c.upper) for c in gate.conditions if c.quantity == "velocity"}
+    assert velocity[(0.0, 1.0, 0.0)] == (0.0, np.inf)
+    assert sorted(velocity.values()) == [(0.0, 0.0), (0.0, 0.0), (0.0, np.inf)]
 
 
 @given(st.floats(-180, 180), st.floats(10.0, 60.0))
@@ -80,7 +100,7 @@ def test_the_half_flip_ties_lateral_to_vertical_thrust_by_the_tangent_of_the_til
     (stage,) = HalfFlip(lateral=18.0).course(gate, 50.0).stages
     fitting = np.array([along, -lateral, lateral / np.tan(tilt) - G])
     assert holds(stage, fitting)
-    assert not holds(stage, fitting + [0, 0, 1.0])
+    assert not holds(stage, np.add(fitting, [0, 0, 1.0]))
     assert not holds(stage, np.array([along, -17.9, 17.9 / np.tan(tilt) - G]))
 
 
@@ -94,7 +114,7 @@ def test_the_half_flip_never_turns_over() -> None:
 def test_a_line_asks_nothing_but_the_gate_it_may_have() -> None:
     assert Line().course(None, 50.0).stages == ()
     (stage,) = Line().course(tilted_gate(np.ones(3)), 50.0).stages
-    assert {c.quantity for c in stage.conditions} == {Quantity.POSITION}
+    assert {c.quantity for c in stage.conditions} == {Quantity.POSITION, Quantity.VELOCITY}
 
 
 def test_a_spelled_out_maneuver_may_pass_the_problems_gate() -> None:
@@ -118,6 +138,7 @@ def test_a_spelled_out_maneuver_may_pass_the_problems_gate() -> None:
         lambda: Condition("position", (0.0, 0.0, 0.0), 0.0),
         lambda: Condition("velocity", (1.0, 0.0, 0.0), 2.0, 1.0),
         lambda: Stage("late", (), at=1.0),
+        lambda: Passing(speed=-1.0),
     ],
 )
 def test_a_maneuver_that_cannot_be_is_refused(wrong) -> None:

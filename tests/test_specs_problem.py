@@ -44,7 +44,7 @@ SPELLED_OUT = Problem(
     maneuver=Staged(
         (
             Stage("kick", (Condition("specific_thrust", (1, 0, -1), 0.0, 0.0),)),
-            Stage("gate", (Condition("velocity", (1, 0, 0), lower=2.0),), at=0.25),
+            Stage("gate", (Condition("velocity", (1, 0, 0), lower=2.0),), at=0.25, late=1),
         ),
         always=(Condition("position", (0, 0, 1), lower=0.0),),
         ordered=False,
@@ -57,9 +57,7 @@ SPELLED_OUT = Problem(
 )
 
 
-@pytest.mark.parametrize(
-    "problem", [*map(load_problem, problem_names()), SPELLED_OUT], ids=lambda p: p.name
-)
+@pytest.mark.parametrize("problem", [*map(load_problem, problem_names()), SPELLED_OUT], ids=lambda p: p.name)
 def test_a_problem_survives_its_file(problem: Problem, tmp_path: Path) -> None:
     write_problem(problem, tmp_path / "problem.toml")
     assert same(load_problem(tmp_path / "problem.toml"), problem)
@@ -108,7 +106,9 @@ def test_a_flip_without_a_gate_is_refused() -> None:
         Problem("lost", rest((0, 0, 0)), rest((0, 0, 0)), Flip())
 
 
-@pytest.mark.parametrize("bad", [{"velocity": 0.0}, {"jerk": -1.0}, {"snap": (1, 2)}, {"lower": (5, 5, 5), "upper": (1, 9, 9)}])
+@pytest.mark.parametrize(
+    "bad", [{"velocity": 0.0}, {"jerk": -1.0}, {"snap": (1, 2)}, {"lower": (5, 5, 5), "upper": (1, 9, 9)}]
+)
 def test_limits_that_exclude_everything_are_refused(bad: dict) -> None:
     with pytest.raises(SpecError, match=r"limits\."):
         Limits(**bad)

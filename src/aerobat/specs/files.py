@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from importlib.resources import files
 from math import degrees, inf, radians
 from pathlib import Path
@@ -19,7 +20,7 @@ from aerobat.documents import (
 )
 from aerobat.errors import SpecError
 from aerobat.specs.gate import Gate, tilted_gate
-from aerobat.specs.maneuver import Condition, Flip, HalfFlip, Line, Maneuver, Quantity, Stage, Staged
+from aerobat.specs.maneuver import Condition, Flip, HalfFlip, Line, Maneuver, Passing, Quantity, Stage, Staged
 from aerobat.specs.problem import DERIVATIVES, EndState, Limits, Problem
 
 if TYPE_CHECKING:
@@ -78,14 +79,14 @@ def _gate(table: schema.GateTable) -> Gate:
 def _maneuver(
     table: schema.FlipTable | schema.HalfFlipTable | schema.LineTable | schema.StagesTable,
 ) -> Maneuver:
-    options = table.model_dump(exclude={"kind"})
+    options = table.model_dump(exclude={"kind", "passing"})
     match table.kind:
         case "flip":
-            return Flip(**options)
+            return Flip(**options, passing=_passing(table.passing))
         case "half-flip":
-            return HalfFlip(**options)
+            return HalfFlip(**options, passing=_passing(table.passing))
         case "line":
-            return Line()
+            return Line(_passing(table.passing))
         case "stages":
             return Staged(
                 tuple(_stage(s, f"maneuver.stages[{i}]") for i, s in enumerate(table.stages)),
@@ -94,8 +95,12 @@ def _maneuver(
             )
 
 
+def _passing(table: schema.PassingTable) -> Passing:
+    return Passing(**table.model_dump())
+
+
 def _stage(table: schema.StageTable, name: str) -> Stage:
-    return Stage(table.name, _conditions(table.conditions, f"{name}.conditions"), table.at)
+    return Stage(table.name, _conditions(table.conditions, f"{name}.conditions"), table.at, table.late)
 
 
 def _conditions(tables: list[schema.ConditionTable], name: str) -> tuple[Condition, ...]:
@@ -152,16 +157,11 @@ def _gate_table(gate: Gate) -> dict[str, Any]:
 def _maneuver_table(maneuver: Maneuver) -> dict[str, Any]:
     match maneuver:
         case Flip():
-            options = {
-                "axis_deg": maneuver.axis_deg,
-                "lateral": maneuver.lateral,
-                "inverted": maneuver.inverted,
-                "signed": maneuver.signed,
-                "ordered": maneuver.ordered,
-            }
+            options = asdict(maneuver)
             return {"kind": "flip"} | {k: v for k, v in options.items() if v is not None}
         case HalfFlip():
-            return {"kind": "half-flip"} | ({} if maneuver.lateral is None else {"lateral": maneuver.lateral})
+            options = asdict(maneuver)
+            return {"kind": "half-flip"} | {k: v for k, v in options.items() if v is not None}
         case Staged():
             return {
                 "kind": "stages",
@@ -169,12 +169,12 @@ def _maneuver_table(maneuver: Maneuver) -> dict[str, Any]:
                 "always": [_condition_table(c) for c in maneuver.always],
                 "stages": [
                     {"name": s.name, "conditions": [_condition_table(c) for c in s.conditions]}
-                    | ({} if s.at is None else {"at": s.at})
+                    | ({} if s.at is None else {"at": s.at, "late": s.late})
                     for s in maneuver.stages
                 ],
             }
         case Line():
-            return {"kind": "line"}
+            return {"kind": "line"} | asdict(maneuver)
     raise SpecError(f"a maneuver of the type {type(maneuver).__name__} has no place in a problem file")
 
 

@@ -41,7 +41,7 @@ class Gate:
     @property
     def lateral(self) -> Array:
         """The unit vector across the opening, to the left of who passes upright, (3,)."""
-        return np.cross(self.up, self.normal)
+        return unit(np.cross(self.up, self.normal), "gate.lateral")
 
     @property
     def corners(self) -> Array:

@@ -72,20 +72,25 @@ class Condition:
 class Stage:
     """Conditions that hold together at the end of one interval.
 
-    `at` fixes that interval: the end of interval ⌊at · N⌋, counted from 0, of N (the paper's gate is at
-    N/2, at = 0.5). Without it the search chooses the interval. `gate` tells that the stage is a passage.
+    `at` fixes it to the last interval that ends by this fraction of the duration, or `late` intervals after
+    that one; without it the search chooses. `gate` tells that the stage is a passage.
     """
 
     name: str
     conditions: tuple[Condition, ...]
     at: float | None = None
+    late: int = 0
     gate: Gate | None = None
 
     def __post_init__(self) -> None:
         """Check."""
         object.__setattr__(self, "conditions", tuple(self.conditions))
-        if self.at is not None and not 0.0 <= self.at < 1.0:
-            raise SpecError(f"stage '{self.name}': at must be from 0 up to 1, a fraction of the duration")
+        if self.at is not None and not 0.0 < self.at < 1.0:
+            raise SpecError(f"stage '{self.name}': at must be between 0 and 1, a fraction of the duration")
+
+    def fixed_interval(self, intervals: int) -> int | None:
+        """The interval, counted from 0, at whose end the stage is fixed when there are so many; or None."""
+        return None if self.at is None else int(self.at * intervals + 1e-9) - 1 + self.late
 
 
 @dataclass(frozen=True)
@@ -112,6 +117,38 @@ class Maneuver(Protocol):
 
 
 @dataclass(frozen=True)
+class Passing:
+    """How a gate is passed, beyond meeting its centre.
+
+    A `square` passage moves along the gate's direction of passage, at `speed` or faster, and not across it,
+    so that a vehicle of some size fits through. The gate is met at half the duration when `centred`, and
+    otherwise one interval later, at the end of interval N/2, as in the authors' reference code; there
+    the velocity is free.
+    """
+
+    square: bool = True
+    speed: float = 0.0  # [m/s]
+    centred: bool = True
+
+    def __post_init__(self) -> None:
+        """Check."""
+        if not 0.0 <= self.speed < inf:
+            raise SpecError(f"maneuver.speed must be a speed in m/s, zero or more, got {self.speed}")
+
+    def stage(self, gate: Gate | None, conditions: Sequence[Condition]) -> Stage:
+        """The stage of passing `gate` with `conditions` on top. Raises SpecError without a gate."""
+        if gate is None:
+            raise _no_gate()
+        velocity = [Condition(Quantity.VELOCITY, gate.normal, lower=self.speed)]
+        velocity += [Condition(Quantity.VELOCITY, across, 0.0, 0.0) for across in (gate.lateral, gate.up)]
+        asked = (*_centre(gate), *(velocity if self.square else ()), *conditions)
+        return Stage("gate", asked, at=0.5, late=0 if self.centred else 1, gate=gate)
+
+
+PAPER_PASSING = Passing(square=False, centred=False)
+
+
+@dataclass(frozen=True)
 class Flip:
     """A full turn about a horizontal axis, upside down in the gate (paper, Sections II-A to II-C).
 
@@ -119,7 +156,7 @@ class Flip:
     for thrust along that direction: none across it in the plane of the turn, and at least `lateral`
     (at 45°, 90°, 270°, 315°) or `inverted` (in the gate) along it, in m/s²; by default shares of what
     the vehicle can give. As the paper prints it (`signed` and `ordered` False) the stages at 45° and 315°
-    take either sign and the solver may turn either way.
+    take either sign and the solver may turn either way. The gate is passed as `Passing` says.
     """
 
     axis_deg: float = 0.0  # heading of the axis of the turn, right-handed: 0 turns about +x, 90 about +y
@@ -127,6 +164,7 @@ class Flip:
     inverted: float | None = None  # [m/s²]
     signed: bool = True
     ordered: bool = True
+    passing: Passing = Passing()
     needs_gate: ClassVar[bool] = True
 
     LATERAL_SHARE: ClassVar[float] = 0.2  # of the greatest specific thrust
@@ -157,14 +195,14 @@ class Flip:
             )
         }
         stages = tuple(
-            passage(gate, conditions) if name == "gate" else Stage(name, conditions)
+            self.passing.stage(gate, conditions) if name == "gate" else Stage(name, conditions)
             for name, conditions in turn.items()
         )
         return Course(stages, ordered=self.ordered)
 
     def as_in_paper(self) -> Flip:
         """Unsigned, unordered, with ε_l = 18 and ε_z = 25 m/s²."""
-        return replace(self, lateral=PAPER_LATERAL, inverted=PAPER_INVERTED, signed=False, ordered=False)
+        return Flip(self.axis_deg, PAPER_LATERAL, PAPER_INVERTED, False, False, PAPER_PASSING)
 
 
 @dataclass(frozen=True)
@@ -176,6 +214,7 @@ class HalfFlip:
     """
 
     lateral: float | None = None  # [m/s²]
+    passing: Passing = Passing()
     needs_gate: ClassVar[bool] = True
 
     THRUST_SHARE: ClassVar[float] = 0.2  # of the greatest specific thrust
@@ -187,9 +226,10 @@ class HalfFlip:
     def course(self, gate: Gate | None, max_specific_thrust: float) -> Course:
         """One stage, the gate, and upright thrust at all times: (a_z + g) tan α = a_y, α = 90° included."""
         if gate is None:
-            return Course()
+            raise _no_gate()
         conditions = thrust_along(gate.up, gate.normal, self._least(gate, max_specific_thrust))
-        return Course((passage(gate, conditions),), (Condition(Quantity.SPECIFIC_THRUST, UP, lower=0.0),))
+        upright = Condition(Quantity.SPECIFIC_THRUST, UP, lower=0.0)
+        return Course((self.passing.stage(gate, conditions),), (upright,))
 
     def _least(self, gate: Gate, max_specific_thrust: float) -> float:
         """The least thrust along the gate's upright [m/s²]."""
@@ -206,22 +246,23 @@ class HalfFlip:
 
     def as_in_paper(self) -> HalfFlip:
         """With ε_y = 18 m/s²."""
-        return replace(self, lateral=PAPER_LATERAL)
+        return HalfFlip(PAPER_LATERAL, PAPER_PASSING)
 
 
 @dataclass(frozen=True)
 class Line:
     """From start to goal, through the gate at mid-time if there is one, with no attitude asked."""
 
+    passing: Passing = Passing()
     needs_gate: ClassVar[bool] = False
 
     def course(self, gate: Gate | None, max_specific_thrust: float) -> Course:
         """No stage but the gate."""
-        return Course(() if gate is None else (passage(gate, ()),))
+        return Course(() if gate is None else (self.passing.stage(gate, ()),))
 
     def as_in_paper(self) -> Line:
-        """Itself."""
-        return self
+        """With the gate passed as there."""
+        return Line(PAPER_PASSING)
 
 
 @dataclass(frozen=True)
@@ -239,9 +280,11 @@ class Staged:
         object.__setattr__(self, "always", tuple(self.always))
 
     def course(self, gate: Gate | None, max_specific_thrust: float) -> Course:
-        """Its stages as they stand; a stage named 'gate' passes the problem's gate."""
+        """Its stages as they stand; one named 'gate' also passes the centre of the problem's gate."""
         stages = tuple(
-            passage(gate, s.conditions, s.at) if gate is not None and s.name == "gate" else s
+            replace(s, conditions=(*_centre(gate), *s.conditions), gate=gate)
+            if gate is not None and s.name == "gate"
+            else s
             for s in self.stages
         )
         return Course(stages, self.always, self.ordered)
@@ -260,14 +303,14 @@ def thrust_along(direction: Array, axis: Array, at_least: float) -> tuple[Condit
     return (across, Condition(Quantity.SPECIFIC_THRUST, along, lower=at_least))
 
 
-def passage(gate: Gate | None, conditions: Sequence[Condition], at: float | None = 0.5) -> Stage:
-    """The stage of passing the gate's centre with `conditions` on top."""
-    if gate is None:
-        raise SpecError("the maneuver passes a gate: give the problem a [gate] table")
-    centre = tuple(
+def _centre(gate: Gate) -> tuple[Condition, ...]:
+    return tuple(
         Condition(Quantity.POSITION, e, x, x) for e, x in zip(np.eye(3), gate.position.tolist(), strict=True)
     )
-    return Stage("gate", (*centre, *conditions), at, gate)
+
+
+def _no_gate() -> SpecError:
+    return SpecError("the maneuver passes a gate: give the problem a [gate] table")
 
 
 def _check_thrust(value: float | None, name: str) -> None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, fields, replace
-
 from typing import Any
 
 import numpy as np
@@ -109,7 +108,7 @@ class Problem:
             raise SpecError(f"gravity must be a positive acceleration in m/s², got {self.gravity}")
         if self.maneuver.needs_gate and self.gate is None:
             raise SpecError(
-                f"problem '{self.name}': its maneuver passes a gate, so it needs a [gate] table with a position"
+                f"problem '{self.name}': its maneuver passes a gate; add a [gate] table with a position"
             )
         self._check_within_limits()
 

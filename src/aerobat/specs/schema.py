@@ -60,8 +60,17 @@ class StageTable(_Table):
     """[[maneuver.stages]]"""
 
     name: Annotated[str, Field(min_length=1)]
-    at: Annotated[FiniteFloat, Field(ge=0, lt=1)] | None = None
+    at: Annotated[FiniteFloat, Field(gt=0, lt=1)] | None = None
+    late: int = 0
     conditions: list[ConditionTable] = []
+
+
+class PassingTable(_Table):
+    """[maneuver.passing]: how the gate is passed."""
+
+    square: bool = True
+    speed: Annotated[FiniteFloat, Field(ge=0)] = 0.0
+    centred: bool = True
 
 
 class FlipTable(_Table):
@@ -73,6 +82,7 @@ class FlipTable(_Table):
     inverted: Positive | None = None
     signed: bool = True
     ordered: bool = True
+    passing: PassingTable = PassingTable()
 
 
 class HalfFlipTable(_Table):
@@ -80,12 +90,14 @@ class HalfFlipTable(_Table):
 
     kind: Literal["half-flip"]
     lateral: Positive | None = None
+    passing: PassingTable = PassingTable()
 
 
 class LineTable(_Table):
     """kind = "line"."""
 
     kind: Literal["line"]
+    passing: PassingTable = PassingTable()
 
 
 class StagesTable(_Table):

@@ -1,0 +1,30 @@
+"""A maneuver of one's own: a list of stages, each a set of linear conditions, some at a time that the solver picks.
+
+A dive: fall with the thrust horizontal somewhere on the way, then pull out through a gate at speed.
+"""
+
+import numpy as np
+
+import aerobat as ab
+
+vehicle = ab.load_vehicle("agile-quad")
+knife_edge = ab.Stage(
+    "knife edge",
+    (
+        ab.Condition("specific_thrust", (0, 0, 1), lower=0.0, upper=0.0),
+        ab.Condition("specific_thrust", (1, 0, 0), lower=0.3 * vehicle.max_specific_thrust),
+    ),
+)
+gate = ab.Stage("gate", (ab.Condition("velocity", (1, 0, 0), lower=6.0),), at=0.6)
+dive = ab.Problem(
+    name="dive",
+    start=ab.rest((0, 0, 8)),
+    goal=ab.rest((12, 0, 3)),
+    maneuver=ab.Staged((knife_edge, gate)),
+    gate=ab.tilted_gate(np.array([7.0, 0.0, 3.0])),
+    limits=ab.Limits(lower=(-5, -1, 0.5), upper=(20, 1, 10), velocity=12.0),
+)
+
+plan = ab.plan(dive, vehicle=vehicle)
+print(plan)
+print(ab.score(ab.fly(plan.trajectory, vehicle), dive, vehicle))

@@ -1,0 +1,101 @@
+"""Trajectories as CSV in the layout of the paper's reference code, and back.
+
+The layout is that of `fliptraj.csv`: no header, comma-separated rows of twelve numbers, position, velocity,
+acceleration and jerk (x, y, z each, SI units, world axes), at a fixed rate, 100 Hz there. That code drops
+the rest of every segment that is no whole number of periods; here the last row is always the trajectory's
+end. Where its step is shorter than a period, every row has a thirteenth number, its time [s]: code that takes
+the first twelve columns, as the reference code does, reads both.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+from pathlib import Path
+
+import numpy as np
+
+from aerobat.arrays import Array
+from aerobat.errors import SpecError
+from aerobat.trajectory import Trajectory
+from aerobat.trajectory.polynomial import hermite
+
+COLUMNS = 12
+SAME_TIME = 1e-12  # [s], a step this near to a period is one
+
+
+def write_csv(trajectory: Trajectory, path: str | os.PathLike[str], rate: float = 100.0) -> None:
+    """Write rows of p, v, a, j at `rate` [1/s] and at the very end, digits enough to read them back exactly.
+
+    At a knot the row shows the later segment. The file appears whole or not at all. Raises SpecError for a
+    rate that is not positive, and where the file cannot be written.
+    """
+    times = trajectory.sample(rate)
+    rows = np.concatenate([trajectory.evaluate(times, k) for k in range(4)], axis=1)
+    if abs(times[-1] - (len(times) - 1) / rate) > SAME_TIME:
+        rows = np.column_stack([rows, times])
+    _write_whole(Path(path), "".join(",".join(map(repr, row)) + "\n" for row in rows.tolist()))
+
+
+def read_csv(path: str | os.PathLike[str], rate: float = 100.0) -> Trajectory:
+    """The trajectory of degree 7 through p, v, a, j of all rows, `rate` [1/s] apart unless times are given.
+
+    Between rows it differs from what was written by the error of that interpolation. Raises SpecError, naming
+    the line, for rows that are not 12 or 13 finite numbers, all as many, with rising times from 0.
+    """
+    if not (math.isfinite(rate) and rate > 0):
+        raise SpecError(f"rate must be a positive number of rows a second, got {rate!r}")
+    rows = _parse(Path(path))
+    times = rows[:, COLUMNS] if rows.shape[1] > COLUMNS else np.arange(len(rows)) / rate
+    steps = np.diff(times)
+    if times[0] != 0 or not (steps > 0).all():
+        line = 1 if times[0] != 0 else 2 + int(np.argmax(steps <= 0))
+        raise SpecError(f"{path}: line {line}: times, the thirteenth numbers, must start at 0 and rise")
+    scale = steps[:, None, None] ** np.arange(4)[:, None]
+    derivatives = rows[:, :COLUMNS].reshape(-1, 4, 3)
+    return Trajectory(steps, hermite(scale * derivatives[:-1], scale * derivatives[1:]))
+
+
+def _parse(path: Path) -> Array:
+    """The file's numbers, (rows, 12 or 13)."""
+    try:
+        text = path.read_text(encoding="utf-8")
+    except OSError as error:
+        raise SpecError(f"{path}: cannot be read: {error.strerror}") from None
+    except UnicodeDecodeError:
+        raise SpecError(f"{path}: is not a text file") from None
+    lines = text.splitlines()
+    rows = [_parse_row(line, f"{path}: line {number}") for number, line in enumerate(lines, 1)]
+    if len(rows) < 2:
+        raise SpecError(f"{path}: a trajectory needs at least two lines of numbers, got {len(rows)}")
+    if not text.endswith("\n"):
+        raise SpecError(f"{path}: line {len(rows)} is cut off, it has no line end")
+    for number, row in enumerate(rows, 1):
+        if len(row) != len(rows[0]):
+            raise SpecError(f"{path}: line {number} has {len(row)} numbers, line 1 has {len(rows[0])}")
+    return np.array(rows)
+
+
+def _parse_row(line: str, where: str) -> list[float]:
+    try:
+        row = [float(word) for word in line.split(",")]
+    except ValueError:
+        raise SpecError(f"{where} must be numbers with commas between, got {line[:60]!r}") from None
+    if len(row) not in (COLUMNS, COLUMNS + 1):
+        raise SpecError(f"{where} must have 12 numbers, or 13 with a time, got {len(row)}")
+    if not all(map(math.isfinite, row)):
+        raise SpecError(f"{where} must have finite numbers only, got {line[:60]!r}")
+    return row
+
+
+def _write_whole(path: Path, text: str) -> None:
+    """Write under a name of the moment, then rename: no reader ever sees half a file."""
+    temporary = path.with_name(f".{path.name}.{os.getpid()}")
+    try:
+        try:
+            temporary.write_text(text, encoding="utf-8", newline="\n")
+            os.replace(temporary, path)
+        finally:
+            temporary.unlink(missing_ok=True)
+    except OSError as error:
+        raise SpecError(f"{path}: cannot be written: {error.strerror}") from None

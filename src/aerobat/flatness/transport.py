@@ -1,0 +1,235 @@
+"""Carrying a frame along a thrust direction without spin: no pole, no drift.
+
+Between samples the specific thrust f is the quintic through its values and two derivatives at both ends
+(exact for trajectories of degree 7 or less), kept as Bézier control points: they bound the curve, so that
+halving intervals until each stays inside a cone is a proof, not a guess. On such a piece the frame turns
+by the smallest rotation from one thrust direction to the next, then about the direction by the area
+between the curve and that great arc (Hanson and Ma, "Parallel transport approach to curve framing", 1995).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import comb
+
+import numpy as np
+from numpy.typing import NDArray
+
+from aerobat import so3
+from aerobat.arrays import Array
+
+CONE = 0.5  # a piece stays within this fraction of |f| of its start: 30 degrees
+MAX_HALVINGS = 60  # far more than the cone asks of any sane curve
+CROSSING_ROUNDS = 10  # each divides by 16: to the last digit
+UP = np.array([0.0, 0.0, 1.0])
+
+
+@dataclass(frozen=True)
+class Span:
+    """A stretch of time [s]."""
+
+    start: float
+    end: float
+
+
+@dataclass(frozen=True)
+class Frames:
+    """Attitudes along a thrust curve, at its samples and at the nodes put between them."""
+
+    times: Array  # [s], (M,), never falling
+    thrust: Array  # f, f', f'' at every node, (M, 3, 3)
+    q_world_body: Array  # (M, 4), sign continuous
+    determined: NDArray[np.bool_]  # |f| reaches the floor, so that there is a thrust direction, (M,)
+    samples: NDArray[np.intp]  # where among the nodes the samples are, (T,)
+    undetermined: tuple[Span, ...]
+
+
+@dataclass(frozen=True)
+class _Pieces:
+    """Quintic pieces of a curve in their order: (n, 6, 3) control points on parts of sample intervals."""
+
+    interval: NDArray[np.intp]  # (n,)
+    offset: Array  # where in its interval a piece starts, in [0, 1), (n,)
+    length: Array  # its part of the interval, (n,)
+    control: Array  # (n, 6, 3)
+
+    def __getitem__(self, rows: NDArray[np.bool_] | NDArray[np.intp]) -> _Pieces:
+        return _Pieces(self.interval[rows], self.offset[rows], self.length[rows], self.control[rows])
+
+    def halves(self) -> _Pieces:
+        """Both halves of every piece."""
+        half = self.length / 2
+        return _joined(
+            [
+                _Pieces(self.interval, self.offset, half, LOWER_HALF @ self.control),
+                _Pieces(self.interval, self.offset + half, half, UPPER_HALF @ self.control),
+            ]
+        )
+
+
+def frames(times: Array, thrust: Array, floor: float, yaw: float) -> Frames:
+    """Carry a frame along the specific thrust; times (T,), thrust f, f', f'' (T, 3, 3), floor on |f| [m/s²].
+
+    It starts as the smallest rotation from the vertical to f, turned about f by `yaw`. Where |f| is below
+    the floor it stays as it was; beyond, the smallest rotation takes it on. Repeated times are allowed.
+    """
+    pieces = _subdivided(times, thrust, floor)
+    samples = np.append(np.flatnonzero(pieces.offset == 0.0), len(pieces.offset))
+    nodes, node_thrust = _nodes(times, thrust, pieces, samples)
+    magnitude = _norm(node_thrust[:, 0])
+    determined = magnitude >= floor
+    directions = _held_directions(node_thrust[:, 0], magnitude, determined)
+    smooth = determined[1:] & determined[:-1]
+    q = _carry(directions, np.where(smooth[:, None, None], pieces.control, directions[:-1, None]), yaw)
+    return Frames(nodes, node_thrust, q, determined, samples, _spans(nodes, pieces, determined, floor))
+
+
+def _carry(directions: Array, control: Array, yaw: float) -> Array:
+    """Attitudes at unit thrust directions (M, 3) along the pieces between them, (M - 1, 6, 3) -> (M, 4)."""
+    chart = _chart(directions)
+    first = so3.multiply(so3.smallest_rotation(UP, directions[0]), so3.about_axis(UP, np.array(yaw)))
+    # any frame of the right direction differs from the chart's by an angle about it: angles add up
+    arcs = so3.multiply(so3.smallest_rotation(directions[:-1], directions[1:]), chart[:-1])
+    carried = np.concatenate([first[None], arcs])
+    angles = _angle_about_up(so3.multiply(so3.conjugate(chart), carried))
+    angles[1:] += _area(directions[:-1], control)
+    q = so3.multiply(chart, so3.about_axis(UP, np.cumsum(angles)))
+    turned = np.append(np.dot(q[0], first), np.sum(q[1:] * q[:-1], axis=-1)) < 0
+    return np.asarray(q * np.cumprod(np.where(turned, -1.0, 1.0))[:, None])
+
+
+def onward(q_world_body: Array, thrust: Array, ahead: Array, step: Array) -> Array:
+    """Carry attitudes (n, 4) over one `step` (n,) [s] each, from f, f', f'' (n, 3, 3) to those ahead.
+
+    For steps inside the cone that `frames` keeps between its nodes, at determined thrust.
+    """
+    start, end = (f[:, 0] / _norm(f[:, 0])[:, None] for f in (thrust, ahead))
+    twist = so3.about_axis(end, _area(start, _hermite(thrust, ahead, step)))
+    return so3.multiply(twist, so3.multiply(so3.smallest_rotation(start, end), q_world_body))
+
+
+def _area(start: Array, control: Array) -> Array:
+    """Area on the unit sphere between each curve (n, 6, 3) and the great arc from `start` (n, 3), its b3.
+
+    ∫ start·(f × f') / (r (r + start·f)) with r = |f|, from A = (1 − cos θ) dφ in polar angles about start.
+    """
+    ux, uy, uz = start.T[:, :, None]
+    x, y, z = (GAUSS_VALUES @ control).transpose(2, 0, 1)
+    dx, dy, dz = (GAUSS_SLOPES @ control).transpose(2, 0, 1)
+    r = np.sqrt(x * x + y * y + z * z)
+    swept = ux * (y * dz - z * dy) + uy * (z * dx - x * dz) + uz * (x * dy - y * dx)
+    return np.asarray((swept / (r * (r + ux * x + uy * y + uz * z))) @ GAUSS_WEIGHTS)
+
+
+def _chart(directions: Array) -> Array:
+    """Some attitude with each thrust direction, well conditioned on the whole sphere, (M, 3) -> (M, 4).
+
+    Above the horizon the smallest rotation from upright; below, from inverted by a half turn about x.
+    """
+    x, y, z = directions.T
+    u, zero = 1 + np.abs(z), np.zeros_like(z)
+    chart = np.where(z < 0, [-y, u, zero, x], [u, -y, x, zero]) / np.sqrt(2 * u)
+    return np.asarray(chart.T)
+
+
+def _angle_about_up(q: Array) -> Array:
+    return np.asarray(2 * np.arctan2(q[..., 3], q[..., 0]))
+
+
+def _subdivided(times: Array, thrust: Array, floor: float) -> _Pieces:
+    """The curve's pieces, halved until each stays in a cone about its start or below the floor."""
+    count = len(times) - 1
+    control = _hermite(thrust[:-1], thrust[1:], np.diff(times))
+    pending = _Pieces(np.arange(count), np.zeros(count), np.ones(count), control)
+    done = []
+    for _ in range(MAX_HALVINGS):
+        rough = _rough(pending.control, floor)
+        done.append(pending[~rough])
+        pending = pending[rough].halves()
+        if not rough.any():
+            break
+    pieces = _joined([*done, pending])
+    return pieces[np.lexsort((pieces.offset, pieces.interval))]
+
+
+def _rough(control: Array, floor: float) -> NDArray[np.bool_]:
+    """Whether a piece may leave the cone about its start, and rises above the floor."""
+    spread = _norm(control - control[:, :1]).max(axis=1)
+    sizes = _norm(control)
+    return np.asarray((spread > CONE * sizes[:, 0]) & (sizes.max(axis=1) > floor))
+
+
+def _hermite(thrust: Array, ahead: Array, step: Array) -> Array:
+    """Control points (n, 6, 3) of the quintics from f, f', f'' (n, 3, 3) to those `step` (n,) ahead."""
+    h = step[:, None]
+    (f0, d0, c0), (f1, d1, c1) = (side.swapaxes(0, 1) for side in (thrust, ahead))
+    left, right = f0 + h / 5 * d0, f1 - h / 5 * d1
+    inner = (left + h / 5 * d0 + h**2 / 20 * c0, right - h / 5 * d1 + h**2 / 20 * c1)
+    return np.stack([f0, left, *inner, right, f1], axis=1)
+
+
+def _nodes(times: Array, thrust: Array, pieces: _Pieces, samples: NDArray[np.intp]) -> tuple[Array, Array]:
+    """Times (M,) and thrust (M, 3, 3) at the starts of all pieces and at the end; exact at the samples."""
+    steps = np.diff(times)[pieces.interval]
+    nodes = np.append(times[pieces.interval] + pieces.offset * steps, times[-1])
+    length = np.where(steps > 0, pieces.length * steps, np.inf)[:, None]
+    b0, b1, b2 = pieces.control[:, :3].swapaxes(0, 1)
+    started = np.stack([b0, 5 * (b1 - b0) / length, 20 * (b2 - 2 * b1 + b0) / length**2], axis=1)
+    node_thrust = np.concatenate([started, thrust[-1:]])
+    node_thrust[samples] = thrust
+    return nodes, node_thrust
+
+
+def _held_directions(f: Array, magnitude: Array, determined: NDArray[np.bool_]) -> Array:
+    """f/|f|, and where that is undetermined the last one that was; upwards before the first, (M, 3)."""
+    last = np.maximum.accumulate(np.where(determined, np.arange(len(f)), -1))
+    directions = f / np.where(determined, magnitude, 1.0)[:, None]
+    return np.where(last[:, None] >= 0, directions[last], UP)
+
+
+def _spans(times: Array, pieces: _Pieces, determined: NDArray[np.bool_], floor: float) -> tuple[Span, ...]:
+    """The stretches whose nodes are below the floor, to where the curve crosses it."""
+    edges = np.diff(np.concatenate([[0], ~determined, [0]]).astype(int))
+    crossings = [
+        float(times[i] + _crossing(pieces.control[i], floor) * (times[i + 1] - times[i]))
+        for i in np.flatnonzero(edges[1:-1])
+    ]
+    start = [] if determined[0] else [float(times[0])]
+    end = [] if determined[-1] else [float(times[-1])]
+    bounds = iter([*start, *crossings, *end])
+    return tuple(Span(first, last) for first, last in zip(bounds, bounds, strict=True))
+
+
+def _crossing(control: Array, floor: float) -> float:
+    """Where in [0, 1] a piece whose ends are on both sides of the floor crosses it."""
+    low, high = 0.0, 1.0
+    for _ in range(CROSSING_ROUNDS):
+        s = np.linspace(low, high, 17)
+        above = _norm(_bernstein(5, s) @ control) >= floor
+        past = max(int(np.argmax(above != above[0])), 1)
+        low, high = float(s[past - 1]), float(s[past])
+    return (low + high) / 2
+
+
+def _joined(parts: list[_Pieces]) -> _Pieces:
+    names = ("interval", "offset", "length", "control")
+    return _Pieces(*(np.concatenate([getattr(part, name) for part in parts]) for name in names))
+
+
+def _norm(vectors: Array) -> Array:
+    return np.asarray(np.sqrt(np.einsum("...i,...i->...", vectors, vectors)))
+
+
+def _bernstein(degree: int, s: Array) -> Array:
+    """Bernstein polynomials at the parameters s (k,), (k, degree + 1)."""
+    return np.stack([comb(degree, i) * s**i * (1 - s) ** (degree - i) for i in range(degree + 1)], axis=1)
+
+
+# de Casteljau's halves: control points of [0, 1/2] are means of the first ones with binomial weights
+LOWER_HALF = np.array([[comb(i, j) / 2**i for j in range(6)] for i in range(6)])
+UPPER_HALF = LOWER_HALF[::-1, ::-1].copy()
+
+_ABSCISSAE, _WEIGHTS = np.polynomial.legendre.leggauss(8)
+GAUSS_WEIGHTS = _WEIGHTS / 2
+GAUSS_VALUES = _bernstein(5, (_ABSCISSAE + 1) / 2)
+GAUSS_SLOPES = 5 * _bernstein(4, (_ABSCISSAE + 1) / 2) @ np.diff(np.eye(6), axis=0)

@@ -1,0 +1,148 @@
+"""How well a flight went: tracking errors, the passage of the gate, saturation."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from aerobat import so3
+from aerobat.arrays import Array
+from aerobat.errors import SpecError
+from aerobat.flight import Flight
+from aerobat.specs.gate import Gate
+from aerobat.specs.problem import Problem
+from aerobat.vehicle import Vehicle
+
+PASSAGE_WINDOW = 0.25  # [s] around the planned passage in which the flown one is looked for
+
+
+@dataclass(frozen=True)
+class Passage:
+    """How a vehicle passed a gate: at its nearest approach to the opening's centre."""
+
+    time: float  # [s]
+    miss: float  # [m] distance from the centre
+    speed: float  # [m/s]
+    attitude_error_deg: float  # angle between the thrust axis and the gate's upright
+    clearance: float | None  # [m] from the outermost rotor tip to the frame; negative: a collision
+
+
+@dataclass(frozen=True)
+class Score:
+    """A flight in numbers; the gate's are None when the problem has no gate."""
+
+    max_position_error_m: float
+    rms_position_error_m: float
+    max_attitude_error_deg: float
+    rms_attitude_error_deg: float
+    gate_miss_m: float | None
+    gate_speed_m_s: float | None
+    gate_attitude_error_deg: float | None
+    gate_clearance_m: float | None
+    saturated_fraction: float  # of the control periods, any rotor's command clipped
+    outcome: str  # a sentence
+
+    def __str__(self) -> str:
+        """One line for people."""
+        return (
+            f"{self.outcome}; position error {100 * self.max_position_error_m:.2f} cm at most, "
+            f"attitude error {self.rms_attitude_error_deg:.2f}° RMS, "
+            f"saturated {100 * self.saturated_fraction:.1f} % of the time"
+        )
+
+
+def score(flight: Flight, problem: Problem, vehicle: Vehicle | None = None) -> Score:
+    """Score one flight of a plan for `problem`; with the vehicle, its clearance in the gate too.
+
+    Errors are against the set-points in the flight: position as a distance [m], attitude as the angle of
+    the relative rotation [deg]. Raises SpecError for a batch of flights.
+    """
+    if flight.states.position.ndim != 2:
+        raise SpecError("score takes one flight at a time; of a batch, score flight[k]")
+    position = position_error(flight)
+    attitude = np.rad2deg(attitude_error(flight))
+    passage = None if problem.gate is None else gate_passage(flight, problem.gate, vehicle)
+    return Score(
+        max_position_error_m=float(position.max()),
+        rms_position_error_m=_rms(position),
+        max_attitude_error_deg=float(attitude.max()),
+        rms_attitude_error_deg=_rms(attitude),
+        gate_miss_m=passage and passage.miss,
+        gate_speed_m_s=passage and passage.speed,
+        gate_attitude_error_deg=passage and passage.attitude_error_deg,
+        gate_clearance_m=passage and passage.clearance,
+        saturated_fraction=float(np.mean(flight.saturated)),
+        outcome=_outcome(flight, passage),
+    )
+
+
+def position_error(flight: Flight) -> Array:
+    """|p − p_ref| [m], (..., T)."""
+    return np.asarray(np.linalg.norm(flight.states.position - flight.setpoint.flat.position, axis=-1))
+
+
+def attitude_error(flight: Flight) -> Array:
+    """The angle between flown and asked attitude [rad], (..., T)."""
+    return so3.angle_between(flight.states.q_world_body, flight.setpoint.q_world_body)
+
+
+def gate_passage(flight: Flight, gate: Gate, vehicle: Vehicle | None = None) -> Passage:
+    """The flown path's nearest approach to the gate's centre, around the time of the planned one."""
+    planned = np.linalg.norm(flight.setpoint.flat.position - gate.position, axis=-1)
+    window = np.abs(flight.times - flight.times[int(np.argmin(planned))]) <= PASSAGE_WINDOW
+    times = flight.times[window]
+    k, fraction = _nearest(flight.states.position[window] - gate.position)
+    nxt = min(k + 1, len(times) - 1)
+
+    def at(values: Array) -> Array:
+        inside = values[window]
+        return np.asarray(inside[k] + fraction * (inside[nxt] - inside[k]))
+
+    attitude = so3.normalize(at(flight.states.q_world_body))
+    offset = at(flight.states.position) - gate.position
+    return Passage(
+        time=float(times[k] + fraction * (times[nxt] - times[k])),
+        miss=float(np.linalg.norm(offset)),
+        speed=float(np.linalg.norm(at(flight.states.velocity))),
+        attitude_error_deg=float(np.rad2deg(np.arccos(np.clip(so3.thrust_axis(attitude) @ gate.up, -1, 1)))),
+        clearance=None if vehicle is None else _clearance(gate, vehicle, offset, attitude),
+    )
+
+
+def _nearest(points: Array) -> tuple[int, float]:
+    """Where a polyline (T, 3) comes nearest to the origin: the piece and the fraction along it."""
+    if len(points) == 1:
+        return 0, 0.0
+    steps = np.diff(points, axis=0)
+    squares = np.maximum(np.sum(steps**2, axis=1), 1e-300)
+    fractions = np.clip(-np.sum(points[:-1] * steps, axis=1) / squares, 0.0, 1.0)
+    distances = np.linalg.norm(points[:-1] + fractions[:, None] * steps, axis=1)
+    k = int(np.argmin(distances))
+    return k, float(fractions[k])
+
+
+def _clearance(gate: Gate, vehicle: Vehicle, offset: Array, attitude: Array) -> float:
+    """From the frame to the nearest edge of a rotor's disc [m], in the plane of the gate."""
+    hubs = offset + so3.rotate(attitude, np.array([r.position_body for r in vehicle.rotors]))
+    radii = np.array([r.radius for r in vehicle.rotors])
+    spin_axis = so3.thrust_axis(attitude)
+    clearances = [
+        half - np.max(np.abs(hubs @ axis) + radii * np.sqrt(max(0.0, 1.0 - float(axis @ spin_axis) ** 2)))
+        for axis, half in ((gate.lateral, gate.width / 2), (gate.up, gate.height / 2))
+    ]
+    return float(min(clearances))
+
+
+def _outcome(flight: Flight, passage: Passage | None) -> str:
+    if flight.diverged is not None:
+        return flight.diverged
+    if passage is None:
+        return "flown to the end"
+    if passage.clearance is not None and passage.clearance < 0.0:
+        return f"hit the gate's frame, {100 * -passage.clearance:.1f} cm too wide at {passage.time:.2f} s"
+    return f"through the gate at {passage.speed:.1f} m/s, {1000 * passage.miss:.1f} mm off its centre"
+
+
+def _rms(values: Array) -> float:
+    return float(np.sqrt(np.mean(values**2)))

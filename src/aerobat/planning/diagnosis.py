@@ -1,0 +1,69 @@
+"""Why nothing feasible was found: which bound binds, and what would free it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from aerobat.planning.feasibility import RotorMargin
+from aerobat.planning.formulation import Formulation
+from aerobat.planning.result import Attempt
+from aerobat.programs import solver
+from aerobat.specs.problem import DERIVATIVES, UNITS
+from aerobat.vehicle import Vehicle
+
+PROBES = 4  # durations at which a relaxed problem is tried
+
+
+def why_infeasible(
+    formulation: Formulation,
+    attempts: Sequence[Attempt],
+    margins: Sequence[RotorMargin],
+    vehicle: Vehicle | None,
+) -> str:
+    """One sentence: the rotors, when some program had a solution, otherwise the bounds that exclude all."""
+    tried = [a.dt for a in attempts]
+    said = f"'{formulation.problem.name}' has no plan at any dt from {min(tried):.3g} to {max(tried):.3g} s"
+    if margins and vehicle is not None:
+        best = max(margins, key=lambda m: m.margin)
+        return (
+            f"{said} that {vehicle.name} can fly: at best, {best}; lower the maneuver's thrusts, "
+            "move the gate nearer, or take a stronger vehicle"
+        )
+    binding = list(_binding(formulation, tried))
+    if not binding:
+        return (
+            f"{said}: its stages, goal and limits exclude each other, and dropping any one of them does not "
+            "help; use more intervals or ask less"
+        )
+    return f"{said}: {' or '.join(binding)} binds; widen or drop it, and there is one"
+
+
+def _binding(formulation: Formulation, dts: Sequence[float]) -> Iterator[str]:
+    """Each bound whose removal, alone, makes some duration feasible."""
+    probes = np.unique(np.quantile(dts, np.linspace(0.0, 1.0, PROBES), method="nearest"))
+    for name, relaxed in _relaxations(formulation):
+        search = solver("builtin")
+        if any(search.solve(relaxed.program(float(dt))).x is not None for dt in probes):
+            yield name
+
+
+def _relaxations(formulation: Formulation) -> Iterator[tuple[str, Formulation]]:
+    problem, course = formulation.problem, formulation.course
+    for derivative in range(formulation.chain.order + 1):
+        bound = problem.limits.of(derivative)[1]
+        if np.isfinite(np.concatenate(problem.limits.of(derivative))).any():
+            name = f"limits.{DERIVATIVES[derivative]} ({np.min(bound):g} {UNITS[derivative]})"
+            if derivative == 0:
+                name = "the volume between limits.lower and limits.upper"
+            yield (
+                name,
+                replace(formulation, problem=replace(problem, limits=problem.limits.without(derivative))),
+            )
+    for i, stage in enumerate(course.stages):
+        others = course.stages[:i] + course.stages[i + 1 :]
+        yield f"the stage '{stage.name}'", replace(formulation, course=replace(course, stages=others))
+    if course.always:
+        yield "what holds at every interval", replace(formulation, course=replace(course, always=()))

@@ -1,0 +1,194 @@
+"""Problem → program: the paper's (1) as a convex QP over the inputs, plus stages assigned to intervals.
+
+The variables are the normalised inputs of the integrator chain, axis by axis: x = (w_x, w_y, w_z), 3N of them
+with w = dt^r u. The matrices do not depend on dt; only the bounds do.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from functools import cached_property
+from math import inf
+
+import numpy as np
+from numpy.typing import NDArray
+
+from aerobat.arrays import Array, frozen
+from aerobat.errors import SpecError
+from aerobat.planning.integrator import INPUTS, IntegratorChain
+from aerobat.programs import AssignmentProgram, SlottedStage
+from aerobat.specs.maneuver import Condition, Course, Quantity, Stage
+from aerobat.specs.problem import DERIVATIVES, Problem
+
+Indices = NDArray[np.intp]
+
+
+@dataclass(frozen=True)
+class Row:
+    """direction · (derivative of position at the end of an interval), or the input over it."""
+
+    interval: int
+    derivative: int
+    direction: tuple[float, float, float]
+
+
+@dataclass(frozen=True)
+class Formulation:
+    """A problem on N intervals of a chain of integrators, for any dt.
+
+    As in the authors' reference code, bounds on the state and the stages hold at the ends of intervals
+    0..N−2, bounds on the input on all N; the goal is met at the end of the last.
+
+    Raises SpecError when there are fewer interval ends than stages, or a limit on a derivative above the
+    input.
+    """
+
+    problem: Problem
+    course: Course
+    chain: IntegratorChain
+    gravity: float  # [m/s²]
+
+    def __post_init__(self) -> None:
+        """Check."""
+        ends, stages = self.chain.intervals - 1, len(self.course.stages)
+        if ends < max(stages, 1) or not all(self._slots(s) for s in self.course.stages):
+            raise SpecError(
+                f"intervals: {self.chain.intervals} leave {ends} interval ends between start and goal for "
+                f"the {stages} stages of '{self.problem.name}'; use at least {max(2 * stages, 3)}"
+            )
+        for derivative in range(self.chain.order + 1, len(DERIVATIVES)):
+            if np.isfinite(self.problem.limits.of(derivative)[1]).any():
+                raise SpecError(
+                    f"limits.{DERIVATIVES[derivative]} cannot be held when the input is "
+                    f"{INPUTS[self.chain.order]}; plan with --order {derivative} or drop it"
+                )
+
+    def program(self, dt: float) -> AssignmentProgram:
+        """The program at one dt [s]; its matrices are the same arrays for all dt."""
+        scale, free = dt**self._derivatives, self._free(dt)
+        lower, upper = self._bounds
+        goal = self.problem.goal.derivatives(self.chain.order) * self.chain.scales(dt)[:, None]
+        reached = self.chain.free(self.initial, dt)[-1]
+        return AssignmentProgram(
+            equality=self._equality,
+            target=(goal - reached).T.ravel(),
+            rows=self._matrix,
+            lower=lower * scale - free,
+            upper=upper * scale - free,
+            stages=tuple(self._assigned(i, scale, free) for i in range(len(self.course.stages))),
+            precedence=self._precedence,
+        )
+
+    def inputs(self, x: Array, dt: float) -> Array:
+        """The inputs in SI units, (N, 3), of a program's solution."""
+        return x.reshape(3, -1).T / dt**self.chain.order
+
+    def cost(self, program_cost: float, dt: float) -> float:
+        """The paper's Σ|u|² in SI units of a program's cost."""
+        return program_cost / dt ** (2 * self.chain.order)
+
+    @cached_property
+    def initial(self) -> Array:
+        """The start's derivatives below the order in SI units, (r, 3)."""
+        return self.problem.start.derivatives(self.chain.order)
+
+    @cached_property
+    def _equality(self) -> Array:
+        """The goal: every derivative below the order at the end of the last interval."""
+        return frozen(np.kron(np.eye(3), self.chain.forced[-1]), "equality")
+
+    @cached_property
+    def _precedence(self) -> tuple[tuple[int, int], ...]:
+        stages = len(self.course.stages)
+        return tuple((i, i + 1) for i in range(stages - 1)) if self.course.ordered else ()
+
+    @cached_property
+    def _rows(self) -> dict[Row, tuple[float, float]]:
+        """Every row that bounds or stages speak of, with its standing bounds in SI units."""
+        rows: dict[Row, tuple[float, float]] = {}
+        for row, lower, upper in (*self._limit_rows(), *self._path_rows()):
+            low, high = rows.get(row, (-inf, inf))
+            rows[row] = (max(low, lower), min(high, upper))
+        for stage in self.course.stages:
+            for interval in self._slots(stage):
+                for condition in stage.conditions:
+                    rows.setdefault(_row(condition, interval), (-inf, inf))
+        return rows
+
+    def _limit_rows(self) -> Iterable[tuple[Row, float, float]]:
+        for derivative in range(self.chain.order + 1):
+            intervals = self.chain.intervals if derivative == self.chain.order else self.chain.intervals - 1
+            for axis, low, high in zip(np.eye(3).tolist(), *self.problem.limits.of(derivative), strict=True):
+                if low > -inf or high < inf:
+                    for interval in range(intervals):
+                        yield Row(interval, derivative, tuple(axis)), float(low), float(high)
+
+    def _path_rows(self) -> Iterable[tuple[Row, float, float]]:
+        for condition in self.course.always:
+            for interval in range(self.chain.intervals - 1):
+                yield _row(condition, interval), *self._kinematic_bounds(condition)
+
+    def _kinematic_bounds(self, condition: Condition) -> tuple[float, float]:
+        """Bounds on the derivative itself: the specific thrust less gravity is the acceleration."""
+        thrust = condition.quantity is Quantity.SPECIFIC_THRUST
+        weight = self.gravity * float(condition.direction[2]) if thrust else 0.0
+        return condition.lower - weight, condition.upper - weight
+
+    @cached_property
+    def _derivatives(self) -> Array:
+        return np.array([row.derivative for row in self._rows], dtype=float)
+
+    @cached_property
+    def _directions(self) -> Array:
+        return np.array([row.direction for row in self._rows]).reshape(-1, 3)
+
+    @cached_property
+    def _bounds(self) -> tuple[Array, Array]:
+        bounds = np.array(list(self._rows.values())).reshape(-1, 2)
+        return bounds[:, 0], bounds[:, 1]
+
+    @cached_property
+    def _matrix(self) -> Array:
+        """All rows over the inputs, (m, 3N)."""
+        response = np.concatenate([self.chain.forced, np.eye(self.chain.intervals)[:, None]], axis=1)
+        intervals = [row.interval for row in self._rows]
+        per_axis = response[intervals, self._derivatives.astype(int)]
+        matrix = self._directions[:, :, None] * per_axis[:, None, :]
+        return frozen(matrix.reshape(len(self._rows), 3 * self.chain.intervals), "rows")
+
+    def _free(self, dt: float) -> Array:
+        """What each row is without input, normalised, (m,)."""
+        free = np.concatenate(
+            [self.chain.free(self.initial, dt), np.zeros((self.chain.intervals, 1, 3))], axis=1
+        )
+        intervals = [row.interval for row in self._rows]
+        return np.sum(free[intervals, self._derivatives.astype(int)] * self._directions, axis=-1)
+
+    def _slots(self, stage: Stage) -> range:
+        """The intervals at whose ends a stage may hold; none when it is fixed outside them."""
+        ends, fixed = range(self.chain.intervals - 1), stage.fixed_interval(self.chain.intervals)
+        if fixed is None:
+            return ends
+        return range(fixed, fixed + 1) if fixed in ends else range(0)
+
+    @cached_property
+    def _stage_rows(self) -> tuple[Indices, ...]:
+        """For each stage the rows of its conditions, (slots, conditions)."""
+        index = {row: i for i, row in enumerate(self._rows)}
+        tables = (
+            [[index[_row(c, n)] for c in stage.conditions] for n in self._slots(stage)]
+            for stage in self.course.stages
+        )
+        return tuple(np.array(table, dtype=np.intp) for table in tables)
+
+    def _assigned(self, i: int, scale: Array, free: Array) -> SlottedStage:
+        stage, rows = self.course.stages[i], self._stage_rows[i]
+        si = np.array([self._kinematic_bounds(c) for c in stage.conditions]).reshape(-1, 2)
+        lower, upper = (si[:, side] * scale[rows] - free[rows] for side in (0, 1))
+        return SlottedStage(stage.name, tuple(self._slots(stage)), rows, lower, upper)
+
+
+def _row(condition: Condition, interval: int) -> Row:
+    x, y, z = condition.direction.tolist()
+    return Row(interval, condition.quantity.derivative, (x, y, z))

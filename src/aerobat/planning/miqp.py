@@ -1,0 +1,189 @@
+"""The paper's planner (Section II): a mixed-integer QP over a chain of integrators, at the smallest dt."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from aerobat.errors import Infeasible, SpecError
+from aerobat.planning.diagnosis import why_infeasible
+from aerobat.planning.feasibility import RotorMargin, rotor_margin
+from aerobat.planning.formulation import Formulation
+from aerobat.planning.integrator import IntegratorChain
+from aerobat.planning.result import Attempt, PlacedStage, Plan
+from aerobat.planning.search import Bisection, Grid, Search
+from aerobat.programs import AssignmentResult, Solver, solver
+from aerobat.specs.maneuver import Course
+from aerobat.specs.problem import Problem
+from aerobat.states import GRAVITY
+from aerobat.trajectory import Trajectory
+from aerobat.vehicle import Vehicle
+
+# without a vehicle, stages that ask a share of its thrust assume what a hexarotor in the paper's class has
+ASSUMED_THRUST_TO_WEIGHT = 5.0
+
+Progress = Callable[[Attempt], None]
+
+
+@dataclass(frozen=True)
+class Miqp:
+    """How to plan: the integrator's order (3 jerk, 4 snap, 5 crackle input), N, the search on dt, the solver.
+
+    Without a `search`, dt is the first feasible of the paper's grid when there is no vehicle, and
+    otherwise the smallest, to half a percent, at which the rotors can do it.
+    """
+
+    order: int = 4
+    intervals: int = 20
+    search: Search | None = None
+    backend: str = "builtin"
+    time_limit: float | None = None  # [s] per program; the best plan found by then is taken, with its gap
+
+    def __post_init__(self) -> None:
+        """Check by building what they describe."""
+        IntegratorChain(self.order, self.intervals)
+        if self.time_limit is not None and not self.time_limit >= 0.0:
+            raise SpecError(f"time_limit must be a number of seconds, zero or more, got {self.time_limit}")
+
+    def plan(
+        self, problem: Problem, vehicle: Vehicle | None = None, progress: Progress | None = None
+    ) -> Plan:
+        """The plan of the smallest dt that the search finds.
+
+        With a vehicle, its rotor thrusts stay within limits along the whole trajectory. Raises
+        Infeasible, naming the bound that binds, SpecError for input that makes no sense, and
+        BackendMissing when the solver is not installed.
+        """
+        formulation = formulate(problem, self.order, self.intervals, vehicle)
+        planning = _Planning(self, formulation, vehicle, solver(self.backend), progress)
+        found = self._search(formulation, vehicle).smallest(planning.attempt)
+        if found is None:
+            raise Infeasible(
+                why_infeasible(formulation, planning.attempts, planning.margins, vehicle), planning.attempts
+            )
+        return planning.result(found)
+
+    def _search(self, formulation: Formulation, vehicle: Vehicle | None) -> Search:
+        if self.search is not None:
+            return self.search
+        if vehicle is None:
+            return Grid()
+        first = _fastest_conceivable(formulation.problem, vehicle) / self.intervals
+        return Bisection(first, last=max(4.0, 2.0 * first))
+
+
+def formulate(problem: Problem, order: int, intervals: int, vehicle: Vehicle | None = None) -> Formulation:
+    """The problem's program for any dt, its stages' thrusts scaled to the vehicle.
+
+    Raises Infeasible when a stage asks more thrust than the vehicle has.
+    """
+    gravity = problem.gravity or (GRAVITY if vehicle is None else vehicle.gravity)
+    thrust = ASSUMED_THRUST_TO_WEIGHT * gravity if vehicle is None else vehicle.max_specific_thrust
+    course = problem.maneuver.course(problem.gate, thrust)
+    if vehicle is not None:
+        _check_thrust(course, vehicle)
+    return Formulation(problem, course, IntegratorChain(order, intervals), gravity)
+
+
+@dataclass(frozen=True)
+class _Found:
+    dt: float
+    trajectory: Trajectory
+    cost: float
+    answer: AssignmentResult
+    margin: RotorMargin | None
+
+
+@dataclass
+class _Planning:
+    """One run of the search: tries durations and keeps the record."""
+
+    config: Miqp
+    formulation: Formulation
+    vehicle: Vehicle | None
+    solver: Solver
+    progress: Progress | None
+    attempts: list[Attempt] = field(default_factory=list)
+    margins: list[RotorMargin] = field(default_factory=list)
+    slots: tuple[int, ...] | None = None
+
+    def attempt(self, dt: float) -> _Found | None:
+        """Solve at one dt; None where the program has no solution or the rotors cannot follow it."""
+        program = self.formulation.program(dt)
+        answer = self.solver.solve(program, time_limit=self.config.time_limit, start=self.slots)
+        if answer.x is None:
+            return self._record(dt, answer, None, "the program has no solution")
+        self.slots = answer.slots
+        inputs = self.formulation.inputs(answer.x, dt)
+        trajectory = Trajectory.from_inputs(self.formulation.initial, inputs, dt)
+        margin = None
+        if self.vehicle is not None:
+            margin = rotor_margin(trajectory, self.vehicle, self.formulation.problem.yaw)
+            self.margins.append(margin)
+        found = _Found(dt, trajectory, self.formulation.cost(answer.cost, dt), answer, margin)
+        if margin is not None and not margin.feasible:
+            return self._record(dt, answer, None, str(margin), found.cost)
+        return self._record(dt, answer, found, "feasible", found.cost)
+
+    def _record(
+        self,
+        dt: float,
+        answer: AssignmentResult,
+        found: _Found | None,
+        outcome: str,
+        cost: float | None = None,
+    ) -> _Found | None:
+        duration = dt * self.config.intervals
+        attempt = Attempt(dt, duration, found is not None, outcome, cost, answer.nodes, answer.time)
+        self.attempts.append(attempt)
+        if self.progress is not None:
+            self.progress(attempt)
+        return found
+
+    def result(self, found: _Found) -> Plan:
+        """The plan of what the search settled on."""
+        stages = (
+            PlacedStage(stage.name, slot, (slot + 1) * found.dt, stage.gate)
+            for stage, slot in zip(self.formulation.course.stages, found.answer.slots or (), strict=True)
+        )
+        return Plan(
+            problem=self.formulation.problem,
+            trajectory=found.trajectory,
+            planner="miqp",
+            order=self.config.order,
+            intervals=self.config.intervals,
+            dt=found.dt,
+            cost=found.cost,
+            gap=found.answer.gap,
+            backend=self.config.backend,
+            nodes=sum(a.nodes for a in self.attempts),
+            solve_time=sum(a.solve_time for a in self.attempts),
+            stages=tuple(stages),
+            attempts=tuple(self.attempts),
+            vehicle=None if self.vehicle is None else self.vehicle.name,
+            margin=found.margin,
+        )
+
+
+def _check_thrust(course: Course, vehicle: Vehicle) -> None:
+    """Refuse at once what no duration can mend."""
+    for stage in course.stages:
+        for condition in stage.conditions:
+            asked = condition.least_thrust
+            if asked > vehicle.max_specific_thrust:
+                where = "inverted" if condition.direction[2] < -0.99 else "along its attitude"
+                raise Infeasible(
+                    f"the stage '{stage.name}' asks {asked:.3g} m/s² {where}, {vehicle.name} gives "
+                    f"{vehicle.max_specific_thrust:.3g}; lower what it asks or take a stronger vehicle"
+                )
+
+
+def _fastest_conceivable(problem: Problem, vehicle: Vehicle) -> float:
+    """Half the time that full thrust would take straight through the gate [s]: where the search starts."""
+    points = [problem.start.position, problem.goal.position]
+    if problem.gate is not None:
+        points.insert(1, problem.gate.position)
+    length = float(np.linalg.norm(np.diff(points, axis=0), axis=1).sum())
+    return max(np.sqrt(length / vehicle.max_specific_thrust), 0.1)

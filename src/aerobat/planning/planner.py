@@ -1,0 +1,38 @@
+"""plan(): a problem in, a plan out, whichever the planner."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Protocol
+
+from aerobat.planning.miqp import Miqp
+from aerobat.planning.result import Attempt, Plan
+from aerobat.specs.problem import Problem
+from aerobat.vehicle import Vehicle
+
+
+class Planner(Protocol):
+    """Whatever turns a problem into a plan."""
+
+    def plan(
+        self,
+        problem: Problem,
+        vehicle: Vehicle | None = None,
+        progress: Callable[[Attempt], None] | None = None,
+    ) -> Plan:
+        """The plan, or Infeasible."""
+        ...
+
+
+def plan(
+    problem: Problem,
+    planner: Planner | None = None,
+    vehicle: Vehicle | None = None,
+    progress: Callable[[Attempt], None] | None = None,
+) -> Plan:
+    """Plan a problem, by default with `Miqp()`; with a vehicle, a plan that its rotors can fly.
+
+    `progress` is called with every attempt as it ends. Raises Infeasible, whose message names the bound
+    that binds and whose `attempts` hold the evidence, and SpecError for input that makes no sense.
+    """
+    return (planner or Miqp()).plan(problem, vehicle, progress)

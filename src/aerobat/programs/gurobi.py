@@ -1,0 +1,157 @@
+"""Gurobi, the general solver that the paper used, as a cross-check."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import inf
+from typing import Any, ClassVar
+
+import numpy as np
+
+from aerobat.errors import AerobatError
+from aerobat.programs.assignment import AssignmentProgram, AssignmentResult, Status, certified
+from aerobat.programs.switches import Switch, chosen_slots, slots_taken, standing_bounds, switches
+
+_TOO_LARGE = 10010  # Gurobi's error number for a model beyond the size of the licence
+_STRICT = {"FeasibilityTol": 1e-9, "IntFeasTol": 1e-9, "MIPGap": 1e-9}
+
+
+@dataclass(frozen=True)
+class Gurobi:
+    """One binary for each stage and slot; the bounds of a placement are switched on by big-M.
+
+    The licence that comes with the package takes `free_variables` variables, a full one any number.
+    """
+
+    name: ClassVar[str] = "gurobi"
+    free_variables: ClassVar[int] = 200  # with a quadratic objective
+
+    threads: int = 1
+    tighten: bool = True  # the M's, by one linear program each; their time counts
+
+    def solve(
+        self,
+        program: AssignmentProgram,
+        *,
+        time_limit: float | None = None,
+        start: Sequence[int] | None = None,
+    ) -> AssignmentResult:
+        """The cheapest assignment, or the best one found within `time_limit` [s].
+
+        `start` are slots that may be good. The result's time is the sum of Gurobi's Runtimes. Raises
+        AerobatError where the licence is missing or too small for the program.
+        """
+        import gurobipy
+
+        try:
+            with gurobipy.Env(empty=True) as env:
+                env.setParam(
+                    "OutputFlag", 0
+                )  # before it starts: the licence's banner goes to standard output
+                env.setParam("Threads", self.threads)
+                env.start()
+                with gurobipy.Model(env=env) as model:
+                    model.Params.TimeLimit = inf if time_limit is None else time_limit
+                    claim = _Run(gurobipy, model, program).claim(self.tighten, start)
+        except gurobipy.GurobiError as error:
+            raise AerobatError(_explained(error, program)) from None
+        return certified(program, claim)
+
+
+class _Run:
+    """One program in one Gurobi model."""
+
+    def __init__(self, gurobipy: Any, model: Any, program: AssignmentProgram) -> None:
+        self._gurobipy, self._grb, self._model, self._program = gurobipy, gurobipy.GRB, model, program
+        self._time = 0.0
+        for name, value in _STRICT.items():
+            model.setParam(name, value)
+        self._x = model.addMVar(program.variables, lb=-inf)
+        self._bounds = dict(zip((-1, 1), standing_bounds(program), strict=True))
+        model.addConstr(program.equality @ self._x == program.target)
+        for sign, bounds in self._bounds.items():
+            given = np.isfinite(bounds)
+            model.addConstr((sign * program.rows[given]) @ self._x <= sign * bounds[given])
+
+    def claim(self, tighten: bool, start: Sequence[int] | None) -> AssignmentResult:
+        """Build, solve, read."""
+        program, needed = self._program, list(switches(self._program))
+        most = {(s.row, s.sign): float(s.sign * self._bounds[s.sign][s.row]) for s in needed}
+        if tighten:
+            for row, sign in most:
+                self._model.setObjective((sign * program.rows[row]) @ self._x, self._grb.MAXIMIZE)
+                if self._optimize() == "optimal":
+                    most[row, sign] = min(most[row, sign], self._model.ObjVal)
+        binaries = self._add_binaries(start)
+        for switch in needed:
+            self._add_switch(switch, binaries[switch.stage, switch.slot], most[switch.row, switch.sign])
+        self._set_cost()
+        status = self._optimize()
+        if not self._model.SolCount:
+            return self._nothing("unknown" if status == "optimal" else status)
+        slots = chosen_slots(program, {key: binary.X for key, binary in binaries.items()})
+        found: Status = "optimal" if status == "optimal" else "time_limit"
+        return self._result(found, self._x.X, slots, self._model.ObjBound)
+
+    def _set_cost(self) -> None:
+        program, x = self._program, self._x
+        cost = x @ x if program.hessian is None else 0.5 * (x @ program.hessian @ x)
+        if program.gradient is not None:
+            cost = cost + program.gradient @ x
+        self._model.setObjective(cost + program.constant, self._grb.MINIMIZE)
+
+    def _add_binaries(self, start: Sequence[int] | None) -> dict[tuple[int, int], Any]:
+        model, total, program = self._model, self._gurobipy.quicksum, self._program
+        keys = [(i, slot) for i, stage in enumerate(program.stages) for slot in stage.slots]
+        binaries = {key: model.addVar(vtype=self._grb.BINARY) for key in keys}
+        for i, stage in enumerate(program.stages):
+            model.addConstr(total(binaries[i, slot] for slot in stage.slots) == 1)
+            if start is not None:
+                for slot in stage.slots:
+                    binaries[i, slot].Start = float(slot == start[i])
+        for users in slots_taken(program):
+            model.addConstr(total(binaries[user] for user in users) <= 1)
+        for i, j in program.precedence:
+            first, second = (total(s * binaries[k, s] for s in program.stages[k].slots) for k in (i, j))
+            model.addConstr(first + 1 <= second)
+        return binaries
+
+    def _add_switch(self, switch: Switch, binary: Any, most: float) -> None:
+        row, bound = (switch.sign * self._program.rows[switch.row]) @ self._x, switch.sign * switch.bound
+        if most < inf:
+            self._model.addConstr(row <= most + (bound - most) * binary)
+        else:
+            self._model.addGenConstrIndicator(binary, True, row.item() <= bound)
+
+    def _optimize(self) -> Status:
+        self._model.optimize()
+        self._time += self._model.Runtime
+        self._model.Params.TimeLimit = max(0.0, self._model.Params.TimeLimit - self._model.Runtime)
+        meaning: dict[int, Status] = {
+            self._grb.OPTIMAL: "optimal",
+            self._grb.INFEASIBLE: "infeasible",
+            self._grb.INF_OR_UNBD: "infeasible",  # the cost has a minimum
+            self._grb.TIME_LIMIT: "time_limit",
+        }
+        return meaning.get(self._model.Status, "unknown")
+
+    def _nothing(self, status: Status) -> AssignmentResult:
+        bound = inf if status == "infeasible" else -inf
+        return self._result("unknown" if status == "time_limit" else status, None, None, bound)
+
+    def _result(
+        self, status: Status, x: Any, slots: tuple[int, ...] | None, bound: float
+    ) -> AssignmentResult:
+        nodes = int(self._model.NodeCount) if self._model.IsMIP else 0
+        return AssignmentResult(status, x, slots, inf, bound, nodes, self._time, Gurobi.name)
+
+
+def _explained(error: Any, program: AssignmentProgram) -> str:
+    if error.errno != _TOO_LARGE:
+        return f"Gurobi failed: {error}"
+    size = program.variables + sum(len(stage.slots) for stage in program.stages)
+    return (
+        f"Gurobi's free licence takes {Gurobi.free_variables} variables with a quadratic objective and this "
+        f"program has {size}; use fewer intervals, a full licence, or the 'builtin' backend"
+    )

@@ -1,0 +1,168 @@
+"""The equalities eliminated: what is left is the shortest vector that satisfies the range rows.
+
+With H = L Lᵀ and w = Lᵀ x + L⁻¹ f the cost is ½|w|² plus a constant. The equalities G w = d leave
+w = G⁺ d + Z y, Z an orthonormal basis of the null space of G, so that
+
+    cost = ½|y|² + ½|G⁺ d|² + constant,      rows:  lower <= M y <= upper,   |M_i| = 1.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from math import inf
+
+import numpy as np
+
+from aerobat.arrays import Array
+from aerobat.programs.assignment import AssignmentProgram, Indices, Mask
+
+UNBOUNDED = 1e30  # an infinite bound, as DAQP writes it
+_VANISHED = 1e-9  # a row shorter than this share of its length has no free direction left
+_RANK = 1e-11  # singular values below this share of the largest are zero
+_CONSISTENT = (
+    1e-7  # residual of redundant equalities and of rows without freedom, relative to max(1, |bound|)
+)
+
+
+@dataclass(frozen=True, eq=False)
+class Bounds:
+    """Bounds of the rows M y; what a program's right-hand sides become."""
+
+    lower: Array  # (m + 1,)
+    upper: Array  # (m + 1,)
+    base: float  # the cost at y = 0
+    shift: Array  # (m + 1,) the rows at y = 0, as the program scales them
+    origin: Array  # (n,) x at y = 0
+    consistent: bool  # False where equalities, or rows without freedom, contradict each other
+
+
+@dataclass(frozen=True, eq=False)
+class Part:
+    """Some variables, and the rows that speak of them and of no others."""
+
+    columns: Mask  # (n,)
+    equalities: Mask  # (p,)
+    rows: Mask  # (m,)
+
+
+class Reduction:
+    """Some variables of a program that no row links to the others, in the null space of their equalities.
+
+    Depends on the program's matrices alone; `bounds` brings the bounds in. One all-zero row, `zero`, is
+    appended to the range rows: whatever has fewer rows than its fellows points there.
+    """
+
+    def __init__(self, program: AssignmentProgram, part: Part, pinned: Mask) -> None:
+        """`pinned` (m,) marks the range rows that are equalities, whatever dt."""
+        self.columns, self.ranges = np.flatnonzero(part.columns), np.flatnonzero(part.rows)
+        self.equalities = np.flatnonzero(part.equalities)
+        self.pinned = np.flatnonzero(part.rows & pinned)
+        unwhiten, offset = _whitening(program, self.columns)
+        self._eliminate(program, unwhiten, offset)
+        self._project(program, unwhiten, pinned[self.ranges])
+
+    def _eliminate(self, program: AssignmentProgram, unwhiten: Array, offset: Array) -> None:
+        stacked = np.concatenate([program.equality[self.equalities], program.rows[self.pinned]])
+        stacked = stacked[:, self.columns]
+        length = np.linalg.norm(stacked @ unwhiten, axis=1)
+        self._unit = 1.0 / np.where(length > 0.0, length, 1.0)
+        equality = (stacked @ unwhiten) * self._unit[:, None]
+        left, singular, right = np.linalg.svd(equality, full_matrices=True)
+        rank = int((singular > _RANK * singular.max(initial=0.0)).sum())
+        pseudo_inverse = right[:rank].T @ (left[:, :rank] / singular[:rank]).T
+        self._least = pseudo_inverse
+        self._inconsistency = np.eye(len(equality)) - equality @ pseudo_inverse
+        self._offset_cost = -0.5 * float(offset @ offset)
+        self._centre = -unwhiten @ offset
+        self._centre_equality = stacked @ self._centre
+        self._from_target = unwhiten @ pseudo_inverse
+        self.basis = right[rank:].T
+        self.from_free = unwhiten @ self.basis
+
+    def _project(self, program: AssignmentProgram, unwhiten: Array, pinned: Mask) -> None:
+        rows = program.rows[np.ix_(self.ranges, self.columns)]
+        projected, length = rows @ self.from_free, np.linalg.norm(rows @ unwhiten, axis=1)
+        norm = np.linalg.norm(projected, axis=1)
+        constant = (norm <= _VANISHED * length) | pinned
+        norm[constant] = 1.0
+        projected[constant] = 0.0
+        self.constant, self.norm = np.append(constant, True), np.append(norm, 1.0)
+        self.zero = len(rows)  # the appended row
+        self.rows = np.ascontiguousarray(
+            np.vstack([projected / norm[:, None], np.zeros(self.from_free.shape[1])])
+        )
+        self._rows_from_target = rows @ self._from_target
+        self._rows_centre = rows @ self._centre
+
+    def bounds(self, program: AssignmentProgram, lower: Array, upper: Array) -> Bounds:
+        """What is left of the program's targets and of the given bounds (m,) of its range rows."""
+        target = np.concatenate([program.target[self.equalities], lower[self.pinned]])
+        target = (target - self._centre_equality) * self._unit
+        least, missed = self._least @ target, np.abs(self._inconsistency @ target)
+        shift = np.append(self._rows_centre + self._rows_from_target @ target, 0.0)
+        fixed = Bounds(
+            lower=np.append(lower[self.ranges], -inf),
+            upper=np.append(upper[self.ranges], inf),
+            base=self._offset_cost + 0.5 * float(least @ least),
+            shift=shift,
+            origin=self._centre + self._from_target @ target,
+            consistent=bool((missed <= _CONSISTENT * max(1.0, np.abs(target).max(initial=0.0))).all()),
+        )
+        return self._scaled(fixed)
+
+    def _scaled(self, bounds: Bounds) -> Bounds:
+        lower = self.scaled(bounds.lower, bounds)
+        upper = self.scaled(bounds.upper, bounds)
+        slack = self.slack(bounds)
+        fits = (lower <= slack) & (upper >= -slack) | ~self.constant
+        return replace(
+            bounds,
+            lower=np.where(self.constant, -UNBOUNDED, lower),
+            upper=np.where(self.constant, UNBOUNDED, upper),
+            consistent=bounds.consistent and bool(fits.all()),
+        )
+
+    def scaled(self, bound: Array, at: Bounds, rows: Indices | slice = slice(None)) -> Array:
+        """`bound`, of the program's rows, as a bound of M y."""
+        scaled: Array = np.clip((bound - at.shift[rows]) / self.norm[rows], -UNBOUNDED, UNBOUNDED)
+        return scaled
+
+    def lifted(self, at: Bounds, y: Array) -> Array:
+        """The variables x of this part at y."""
+        x: Array = at.origin + self.from_free @ y
+        return x
+
+    def slack(self, at: Bounds) -> Array:
+        """How far a row without freedom may miss its bounds, (m + 1,)."""
+        slack: Array = _CONSISTENT * np.maximum(1.0, np.abs(at.shift))
+        return slack
+
+
+def parts(program: AssignmentProgram, rows: Indices) -> tuple[Part, Part]:
+    """The program split in two that share nothing: all that range rows `rows` are linked to, and the rest."""
+    links = [program.equality != 0.0, program.rows != 0.0]
+    if program.hessian is not None:
+        links.append(program.hessian != 0.0)
+    incidence = np.concatenate(links)
+    columns = np.any(incidence[len(program.equality) + rows], axis=0)
+    while True:
+        touched = np.any(incidence[:, columns], axis=1)
+        linked = np.any(incidence[touched], axis=0) | columns
+        if (linked == columns).all():
+            break
+        columns = linked
+    equalities, ranges = (
+        touched[: len(program.equality)],
+        touched[len(program.equality) :][: len(program.rows)],
+    )
+    ranges[rows] = True
+    return Part(columns, equalities, ranges), Part(~columns, ~equalities, ~ranges)
+
+
+def _whitening(program: AssignmentProgram, columns: Indices) -> tuple[Array, Array]:
+    """L⁻ᵀ and L⁻¹ f for these variables."""
+    gradient = np.zeros(len(columns)) if program.gradient is None else program.gradient[columns]
+    if program.hessian is None:
+        return np.eye(len(columns)) / np.sqrt(2.0), gradient / np.sqrt(2.0)
+    inverse = np.linalg.inv(np.linalg.cholesky(program.hessian[np.ix_(columns, columns)]))
+    return inverse.T, inverse @ gradient

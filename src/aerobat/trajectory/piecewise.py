@@ -1,0 +1,176 @@
+"""Trajectory: a piecewise polynomial position, all its derivatives and their exact extremes."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from aerobat.arrays import Array, frozen
+from aerobat.errors import SpecError
+from aerobat.states import FlatState
+from aerobat.trajectory import polynomial
+
+TIME_TOLERANCE = 1e-9  # [s], by which a time may miss the ends of a trajectory
+KNOT_TOLERANCE = 1e-12  # [s], a time that misses a knot by rounding is meant to be on it
+
+
+@dataclass(frozen=True)
+class Extremum:
+    """The extreme value of a quantity along a trajectory, and where it is taken."""
+
+    value: float
+    time: float  # [s]
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Trajectory:
+    """Position over time, p(t) = Σ_k c_k s^k with s = (t - knot)/T on each segment; starts at t = 0.
+
+    Neighbouring segments need not agree in any derivative: at a knot the values of the segment that
+    begins there count, and `on_segments` shows both sides. Raises SpecError for durations that are not
+    positive, numbers that are not finite and shapes that do not match.
+    """
+
+    durations: Array  # [s], (S,)
+    coefficients: Array  # [m], (S, degree + 1, 3), powers of normalised time rising
+
+    def __post_init__(self) -> None:
+        """Copy, check and write-protect the arrays."""
+        durations = frozen(self.durations, "durations", (None,))
+        coefficients = frozen(self.coefficients, "coefficients", (None, None, 3))
+        if durations.ndim != 1 or durations.size == 0 or not (durations > 0).all():
+            raise SpecError("durations must be a list of at least one positive number of seconds")
+        if coefficients.ndim != 3 or coefficients.shape[0] != len(durations) or coefficients.shape[1] == 0:
+            raise SpecError(
+                f"coefficients must have the shape (segments, degree + 1, 3) with {len(durations)} "
+                f"segments as in durations, got {coefficients.shape}"
+            )
+        object.__setattr__(self, "durations", durations)
+        object.__setattr__(self, "coefficients", coefficients)
+
+    @classmethod
+    def from_inputs(cls, initial: ArrayLike, inputs: ArrayLike, dt: float) -> Trajectory:
+        """Integrate exactly a chain of r integrators whose input is constant on each interval.
+
+        `initial` (r, 3) holds position, velocity, ... at t = 0, `inputs` (N, 3) the r-th derivative of
+        position on each interval of `dt` seconds (paper, Section II: r = 3, jerk). Raises SpecError.
+        """
+        state = frozen(initial, "initial", (None, 3))
+        inputs = frozen(inputs, "inputs", (None, 3))
+        dt = float(frozen(dt, "dt", ()))
+        if state.ndim != 2 or inputs.ndim != 2 or not len(state) or not len(inputs) or dt <= 0:
+            raise SpecError("from_inputs needs initial (r, 3), inputs (N, 3) and a positive dt")
+        # scaled by dt^k/k! the derivatives at an interval's start are its coefficients, and
+        # those at its end are the same polynomial expanded about s = 1
+        order = len(state)
+        scale = np.array([dt**k / math.factorial(k) for k in range(order + 1)])[:, None]
+        pascal = np.array([[math.comb(j, k) for j in range(order + 1)] for k in range(order)], dtype=float)
+        coefficients = np.empty((len(inputs), order + 1, 3))
+        coefficients[:, order] = scale[order] * inputs
+        coefficients[0, :order] = scale[:order] * state
+        for n in range(1, len(inputs)):
+            coefficients[n, :order] = pascal @ coefficients[n - 1]
+        return cls(np.full(len(inputs), dt), coefficients)
+
+    def __repr__(self) -> str:
+        """Say in a few words what this trajectory is."""
+        return f"Trajectory({self.segments} segments of degree {self.degree}, {self.duration:.6g} s)"
+
+    @property
+    def segments(self) -> int:
+        """The number of polynomial segments."""
+        return len(self.durations)
+
+    @property
+    def degree(self) -> int:
+        """The degree of the polynomials."""
+        return int(self.coefficients.shape[1]) - 1
+
+    @cached_property
+    def knots(self) -> Array:
+        """Times at which segments begin, and the end [s], (S + 1,)."""
+        knots = np.concatenate([[0.0], np.cumsum(self.durations)])
+        knots.flags.writeable = False
+        return knots
+
+    @property
+    def duration(self) -> float:
+        """The time from start to end [s]."""
+        return float(self.knots[-1])
+
+    def evaluate(self, t: ArrayLike, derivative: int = 0) -> Array:
+        """d^k p/dt^k at the times t [s] (...), world frame, (..., 3); at a knot of the later segment.
+
+        Raises SpecError for a time outside [0, duration], a nanosecond of rounding aside.
+        """
+        segment, s = self._locate(t)
+        return polynomial.evaluate(self._rates(derivative)[segment], s)
+
+    def flat(self, t: ArrayLike) -> FlatState:
+        """Position to snap at the times t [s] (...). Raises SpecError as `evaluate` does."""
+        segment, s = self._locate(t)
+        return FlatState(*(polynomial.evaluate(self._rates(k)[segment], s) for k in range(5)))
+
+    def on_segments(self, s: ArrayLike, derivative: int = 0) -> Array:
+        """d^k p/dt^k at the normalised times s (k,) of every segment, (S, k, 3).
+
+        With 0 and 1 among s, both sides of every knot are there.
+        """
+        return polynomial.evaluate(self._rates(derivative)[:, None], s)
+
+    def sample(self, rate: float) -> Array:
+        """Times 0, 1/rate, 2/rate, ... [s], and the end as the last even if its step is shorter."""
+        if not (math.isfinite(rate) and rate > 0):
+            raise SpecError(f"rate must be a positive number of samples a second, got {rate!r}")
+        whole_steps = max(math.floor((self.duration - TIME_TOLERANCE) * rate), 0)
+        return np.append(np.arange(whole_steps + 1) / rate, self.duration)
+
+    def jumps(self, derivative: int) -> Array:
+        """|jump| of d^k p/dt^k at each inner knot, (S - 1,)."""
+        ends = self.on_segments([0.0, 1.0], derivative)
+        return np.asarray(np.linalg.norm(ends[1:, 0] - ends[:-1, 1], axis=-1))
+
+    def effort(self, derivative: int) -> float:
+        """∫ |d^k p/dt^k|² dt over the whole trajectory, exactly."""
+        quadratic = polynomial.gram(self.degree, derivative)
+        per_segment = np.einsum("sid,ij,sjd->s", self.coefficients, quadratic, self.coefficients)
+        return float(np.sum(per_segment / self.durations ** (2 * derivative - 1)))
+
+    def peak(self, derivative: int) -> Extremum:
+        """The largest |d^k p/dt^k| over continuous time, from roots of its squared norm's derivative."""
+        return self._extrema(self._rates(derivative))[1]
+
+    def specific_thrust_range(self, gravity: float) -> tuple[Extremum, Extremum]:
+        """The least and the largest |a + g e3| [m/s²] over continuous time, exactly."""
+        thrust = self._rates(2).copy()
+        thrust[:, 0, 2] += gravity
+        return self._extrema(thrust)
+
+    def _rates(self, derivative: int) -> Array:
+        """Coefficients of d^k p/dt^k on each segment, (S, K, 3)."""
+        scale = self.durations[:, None, None] ** derivative
+        return np.asarray(polynomial.differentiate(self.coefficients, derivative) / scale)
+
+    def _locate(self, t: ArrayLike) -> tuple[NDArray[np.intp], Array]:
+        """The segment of each time and the normalised time in it. Raises SpecError outside the trajectory."""
+        times = np.asarray(t, dtype=float)
+        if not ((times >= -TIME_TOLERANCE) & (times <= self.duration + TIME_TOLERANCE)).all():
+            raise SpecError(f"times must lie in [0, {self.duration:.9g}] s, the trajectory's span")
+        times = np.clip(times, 0.0, self.duration)
+        segment = np.asarray(np.searchsorted(self.knots[1:-1] - KNOT_TOLERANCE, times, side="right"))
+        return segment, (times - self.knots[segment]) / self.durations[segment]
+
+    def _extrema(self, coefficients: Array) -> tuple[Extremum, Extremum]:
+        """The least and the largest norm of segment polynomials (S, K, 3), with their times."""
+        s = polynomial.stationary_points(coefficients)
+        norms = np.linalg.norm(polynomial.evaluate(coefficients[:, None], s), axis=-1)
+        times = self.knots[:-1, None] + s * self.durations[:, None]
+        least, largest = norms.argmin(), norms.argmax()
+        return (
+            Extremum(float(norms.flat[least]), float(times.flat[least])),
+            Extremum(float(norms.flat[largest]), float(times.flat[largest])),
+        )

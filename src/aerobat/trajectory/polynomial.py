@@ -1,0 +1,115 @@
+"""Vector polynomials p(s) = Σ c_k s^k in normalised time s ∈ [0, 1]; leading axes broadcast.
+
+Coefficients have the shape (..., K, D): K = degree + 1 powers, rising, of D components. Derivatives
+are with respect to s here; a segment of duration T divides the k-th one by T^k.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from aerobat.arrays import Array
+
+NEGLIGIBLE = 1e-11  # a leading coefficient this small beside the largest spoils a companion matrix
+
+
+def differentiate(coefficients: Array, order: int = 1) -> Array:
+    """Coefficients of the `order`-th derivative, (..., K, D) -> (..., max(K - order, 1), D)."""
+    size = coefficients.shape[-2]
+    if order >= size:
+        return np.zeros_like(coefficients[..., :1, :])
+    factors = np.array([math.perm(power, order) for power in range(order, size)], dtype=float)
+    return np.asarray(factors[:, None] * coefficients[..., order:, :])
+
+
+def evaluate(coefficients: Array, s: ArrayLike) -> Array:
+    """p(s) by Horner's rule; s (...) broadcasts with the leading axes: (..., K, D) -> (..., D)."""
+    s = np.asarray(s, dtype=float)[..., None]
+    value = coefficients[..., -1, :] + 0.0 * s
+    for power in range(coefficients.shape[-2] - 2, -1, -1):
+        value *= s
+        value += coefficients[..., power, :]
+    return np.asarray(value)
+
+
+def hermite(left: Array, right: Array) -> Array:
+    """The polynomials of degree 2r - 1 with given derivatives 0..r-1 at s = 0 and s = 1.
+
+    Derivatives are with respect to s: (..., r, D) twice -> (..., 2r, D).
+    """
+    count = left.shape[-2]
+    at_end = np.array(
+        [[math.perm(power, k) for power in range(2 * count)] for k in range(count)], dtype=float
+    )
+    low = left / np.array([math.factorial(k) for k in range(count)])[:, None]
+    high = np.linalg.inv(at_end[:, count:]) @ (right - at_end[:, :count] @ low)
+    return np.concatenate([low, high], axis=-2)
+
+
+def gram(degree: int, derivative: int) -> Array:
+    """Q with ∫₀¹ (dᵏp/dsᵏ)² ds = cᵀ Q c for the coefficients c of one component, (K, K)."""
+    powers = np.arange(degree + 1)
+    factors = np.array([math.perm(power, derivative) for power in range(degree + 1)], dtype=float)
+    exponents = powers[:, None] + powers[None, :] - 2 * derivative + 1
+    products = np.outer(factors, factors)  # zero wherever the exponent is below one
+    return np.asarray(np.where(products > 0, products / np.maximum(exponents, 1), 0.0))
+
+
+def squared_norm(coefficients: Array) -> Array:
+    """Coefficients of |p(s)|², (..., K, D) -> (..., 2K - 1)."""
+    size = coefficients.shape[-2]
+    products = coefficients @ np.swapaxes(coefficients, -1, -2)
+    result = np.zeros((*coefficients.shape[:-2], 2 * size - 1))
+    for power in range(size):
+        result[..., power : power + size] += products[..., power, :]
+    return result
+
+
+def stationary_points(coefficients: Array) -> Array:
+    """Where |p(s)|² may be extreme on [0, 1]: both ends and every interior root of its derivative.
+
+    (S, K, D) -> (S, n), a fixed number per polynomial: complex roots give their real part and roots
+    outside are moved to the nearer end, which adds harmless candidates and needs no tolerance. Each
+    root comes again after one Newton step, which restores the digits that eigenvalues lose.
+    """
+    squares = squared_norm(coefficients)
+    slopes = differentiate(squares[..., None])[..., 0]
+    roots = np.clip(_roots(slopes), 0.0, 1.0)
+    ends = np.broadcast_to([0.0, 1.0], (len(roots), 2))
+    return np.concatenate([ends, roots, np.clip(_newton_step(slopes, roots), 0.0, 1.0)], axis=1)
+
+
+def _newton_step(coefficients: Array, s: Array) -> Array:
+    """One Newton step from each s (S, n) towards a root of its scalar polynomial (S, m)."""
+    vectors = coefficients[:, None, :, None]
+    value, slope = (evaluate(differentiate(vectors, order), s)[..., 0] for order in (0, 1))
+    useful = np.abs(slope) > np.abs(value)  # a longer step leaves [0, 1]
+    return np.asarray(s - np.divide(value, slope, out=np.zeros_like(s), where=useful))
+
+
+def _roots(coefficients: Array) -> Array:
+    """Real parts of the roots of scalar polynomials, (S, m) rising powers -> (S, max(m - 1, 0)).
+
+    Polynomials of lower true degree fill up with zeros. Eigenvalues of companion matrices, one batch
+    for each true degree, for a companion matrix needs a leading coefficient that is not zero.
+    """
+    roots = np.zeros((len(coefficients), max(coefficients.shape[1] - 1, 0)))
+    degrees = _true_degrees(coefficients)
+    for degree in np.unique(degrees[degrees > 0]):
+        rows = np.flatnonzero(degrees == degree)
+        companion = np.zeros((len(rows), degree, degree))
+        companion[:, np.arange(1, degree), np.arange(degree - 1)] = 1.0
+        companion[:, :, -1] = -coefficients[rows, :degree] / coefficients[rows, degree, None]
+        roots[rows, :degree] = np.linalg.eigvals(companion).real
+    return roots
+
+
+def _true_degrees(coefficients: Array) -> NDArray[np.intp]:
+    """The highest power whose coefficient is not negligible, zero for constants: (S, m) -> (S,)."""
+    magnitudes = np.abs(coefficients)
+    largest = magnitudes.max(axis=1, keepdims=True, initial=0.0)
+    powers = np.arange(coefficients.shape[1])
+    return np.asarray(np.where(magnitudes > NEGLIGIBLE * largest, powers, 0).max(axis=1, initial=0))

@@ -1,0 +1,200 @@
+"""Whatever is wrong with the input: one sentence, exit code 2, nothing written."""
+
+from __future__ import annotations
+
+import copy
+import tomllib
+from collections.abc import Callable
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+
+import pytest
+import tomli_w
+
+from aerobat import cli
+
+Document = dict[str, Any]
+NAN, INF = float("nan"), float("inf")
+
+
+def preset(room: str, name: str) -> Document:
+    return tomllib.loads((files(f"aerobat.{room}") / "presets" / f"{name}.toml").read_text("utf-8"))
+
+
+def setting(path: str, value: Any) -> Callable[[Document], None]:
+    """Set the field at a dotted path; digits index lists."""
+
+    def change(document: Document) -> None:
+        *parents, last = [int(p) if p.isdigit() else p for p in path.split(".")]
+        for part in parents:
+            document = document[part]
+        document[last] = value
+
+    return change
+
+
+def dropping(path: str) -> Callable[[Document], None]:
+    def change(document: Document) -> None:
+        *parents, last = path.split(".")
+        for part in parents:
+            document = document[part]
+        del document[last]
+
+    return change
+
+
+VEHICLE_FAULTS = {
+    "negative mass": (setting("mass", -1.0), "mass"),
+    "no mass": (dropping("mass"), "mass"),
+    "mass in words": (setting("mass", "heavy"), "mass"),
+    "mass not a number": (setting("mass", NAN), "mass"),
+    "infinite mass": (setting("mass", INF), "mass"),
+    "too heavy to hover": (setting("mass", 100.0), "mass"),
+    "flat inertia": (setting("inertia", [0.001, 0.001, 0.0]), "inertia"),
+    "inertia of no body": (setting("inertia", [0.001, 0.001, 0.01]), "inertia"),
+    "two moments of inertia": (setting("inertia", [0.001, 0.001]), "inertia"),
+    "unknown key": (setting("colour", "red"), "colour"),
+    "unknown key of a rotor": (setting("rotors.0.max_trust", 5.0), "max_trust"),
+    "three rotors": (lambda d: d["rotors"].pop(), "rotors"),
+    "no rotors": (dropping("rotors"), "rotors"),
+    "a spin of two": (setting("rotors.0.spin", 2), "spin"),
+    "all rotors at one place": (
+        lambda d: [r.update(position_body=[0.1, 0.1, 0.0]) for r in d["rotors"]],
+        "rotors",
+    ),
+    "thrust range upside down": (setting("rotor_defaults.min_thrust", 50.0), "thrust"),
+    "negative lag": (setting("rotor_defaults.lag", -0.01), "lag"),
+    "position of two numbers": (setting("rotors.1.position_body", [0.1, 0.1]), "position_body"),
+}
+
+PROBLEM_FAULTS = {
+    "no start": (dropping("start"), "start"),
+    "no goal position": (dropping("goal.position"), "goal.position"),
+    "start not a number": (setting("start.position", [NAN, 0.0, 0.0]), "start.position"),
+    "start in the plane": (setting("start.position", [0.0, 0.0]), "start.position"),
+    "unknown maneuver": (setting("maneuver.kind", "loop"), "maneuver.kind"),
+    "maneuver without kind": (dropping("maneuver.kind"), "maneuver.kind"),
+    "unknown key": (setting("maneuver.axis", 3.0), "maneuver.axis"),
+    "unknown table": (setting("obstacles", {}), "obstacles"),
+    "flip without gate": (dropping("gate"), "gate"),
+    "gate without width": (setting("gate.width", 0.0), "gate.width"),
+    "negative limit": (setting("limits.velocity", -10.0), "limits.velocity"),
+    "limit in words": (setting("limits.velocity", "fast"), "limits.velocity"),
+    "goal outside the volume": (setting("limits.lower", [1.0, -9.0, -9.0]), "start.position"),
+    "volume upside down": (
+        lambda d: d["limits"].update(lower=[9.0, 9.0, 9.0], upper=[-9.0, -9.0, -9.0]),
+        "limits",
+    ),
+    "start too fast": (setting("start.velocity", [11.0, 0.0, 0.0]), "start.velocity"),
+    "weightless": (setting("gravity", 0.0), "gravity"),
+    "name with a slash": (setting("name", "a/b"), "name"),
+    "infinite yaw": (setting("yaw_deg", INF), "yaw_deg"),
+    "snap limit for a chain of jerk": (setting("limits.snap", 100.0), "limits.snap"),
+    "stages of nothing": (setting("maneuver", {"kind": "stages", "stages": []}), "maneuver.stages"),
+    "stage after the end": (
+        setting("maneuver", {"kind": "stages", "stages": [{"name": "late", "at": 1.5}]}),
+        "at",
+    ),
+    "backward through the gate": (setting("maneuver.passing", {"speed": -2.0}), "maneuver.passing.speed"),
+    "condition without bounds": (
+        setting(
+            "maneuver",
+            {
+                "kind": "stages",
+                "stages": [
+                    {"name": "s", "conditions": [{"quantity": "position", "direction": [1.0, 0.0, 0.0]}]}
+                ],
+            },
+        ),
+        "lower",
+    ),
+}
+
+ARGUMENT_FAULTS = {
+    "unknown problem": (["fly", "flip-rol"], "flip-roll"),
+    "no such file": (["fly", "nowhere.toml"], "nowhere.toml"),
+    "a folder for a file": (["fly", "./"], "./"),
+    "unknown vehicle": (["fly", "line", "--vehicle", "agile-qad"], "agile-quad"),
+    "unknown backend": (["plan", "line", "--backend", "gurobbi"], "gurobi"),
+    "order 6": (["plan", "line", "--order", "6"], "order"),
+    "order in words": (["plan", "line", "--order", "snap"], "order"),
+    "no intervals": (["plan", "line", "--intervals", "0"], "intervals"),
+    "two intervals for five stages": (["plan", "flip-roll", "--intervals", "2"], "intervals"),
+    "paper with order 4": (["plan", "line", "--paper", "--order", "4"], "--paper"),
+    "angle of a flip": (["plan", "flip-roll", "--angle", "45"], "--angle"),
+    "angle past 90": (["plan", "half-flip", "--angle", "120"], "--angle"),
+    "angle not a number": (["plan", "half-flip", "--angle", "nan"], "--angle"),
+    "unknown option": (["plan", "line", "--fast"], "--fast"),
+    "unknown command": (["loop", "line"], "loop"),
+    "no problem": (["fly"], "problem"),
+    "negative noise": (["fly", "line", "--noise", "-1"], "noise"),
+    "negative seed": (["fly", "line", "--seed", "-1"], "seed"),
+    "negative time": (["plan", "line", "--time-limit", "-1"], "time_limit"),
+    "output over a file": (["plan", "line", "--out", "taken"], "taken"),
+}
+
+
+def refused(arguments: list[str], monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> str:
+    """The sentence with which the command line refuses."""
+    before = snapshot(Path())
+    monkeypatch.setattr("sys.argv", ["aerobat", *arguments])
+    with pytest.raises(SystemExit) as stop:
+        cli.main()
+    out, err = capsys.readouterr()
+    assert stop.value.code == 2, err
+    assert out == ""
+    assert err.startswith("aerobat: ")
+    assert err.count("\n") == 1
+    assert snapshot(Path()) == before
+    return err
+
+
+def snapshot(folder: Path) -> dict[str, bytes]:
+    return {str(p): p.read_bytes() if p.is_file() else b"" for p in folder.rglob("*")}
+
+
+@pytest.fixture(autouse=True)
+def _elsewhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("taken").write_text("a file")
+
+
+@pytest.mark.parametrize("fault", VEHICLE_FAULTS)
+def test_a_malformed_vehicle_is_refused_by_its_field(fault: str, monkeypatch, capsys) -> None:
+    change, field = VEHICLE_FAULTS[fault]
+    document = copy.deepcopy(preset("vehicle", "agile-quad"))
+    change(document)
+    Path("vehicle.toml").write_text(tomli_w.dumps(document))
+    assert field in refused(["fly", "line", "--vehicle", "vehicle.toml"], monkeypatch, capsys)
+
+
+@pytest.mark.parametrize("fault", PROBLEM_FAULTS)
+def test_a_malformed_problem_is_refused_by_its_field(fault: str, monkeypatch, capsys) -> None:
+    change, field = PROBLEM_FAULTS[fault]
+    document = copy.deepcopy(preset("specs", "flip-roll"))
+    change(document)
+    Path("problem.toml").write_text(tomli_w.dumps(document))
+    assert field in refused(["fly", "problem.toml", "--order", "3"], monkeypatch, capsys)
+
+
+@pytest.mark.parametrize("fault", ARGUMENT_FAULTS)
+def test_an_argument_that_makes_no_sense_is_refused_by_its_name(fault: str, monkeypatch, capsys) -> None:
+    arguments, named = ARGUMENT_FAULTS[fault]
+    assert named in refused(arguments, monkeypatch, capsys)
+
+
+@pytest.mark.parametrize("cut", [1, 40, 150, 300])
+@pytest.mark.parametrize("room", ["vehicle", "specs"])
+def test_a_truncated_file_is_refused(room: str, cut: int, monkeypatch, capsys) -> None:
+    name = {"vehicle": "agile-quad", "specs": "flip-roll"}[room]
+    whole = (files(f"aerobat.{room}") / "presets" / f"{name}.toml").read_bytes()
+    Path("half.toml").write_bytes(whole[:-cut])
+    arguments = ["plan", "half.toml"] if room == "specs" else ["plan", "line", "--vehicle", "half.toml"]
+    assert "half.toml" in refused(arguments, monkeypatch, capsys)
+
+
+@pytest.mark.parametrize("content", [b"", b"\xff\xfe\x00", b"{}", b"[start\n", b"x = " + b"[" * 5000])
+def test_a_file_that_is_no_problem_is_refused(content: bytes, monkeypatch, capsys) -> None:
+    Path("noise.toml").write_bytes(content)
+    assert "noise.toml" in refused(["plan", "noise.toml"], monkeypatch, capsys)

@@ -1,0 +1,187 @@
+"""The rotors' margin against dense sampling, closed forms and what must not change it."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.interpolate import CubicSpline
+
+from aerobat import so3
+from aerobat.flatness import reference_of
+from aerobat.planning.feasibility import rotor_margin
+from aerobat.states import FlatState
+from aerobat.trajectory import Trajectory
+from aerobat.vehicle import load_vehicle, mixer
+
+seeds = st.integers(0, 2**32 - 1)
+QUAD = load_vehicle("agile-quad")
+HEXA = load_vehicle("hexarotor")
+UP = np.array([0.0, 0.0, 1.0])
+
+
+def tumbling(seed, order=4, segments=10, dt=0.1):
+    """Piecewise constant inputs whose acceleration walks at random, through inversion and low thrust."""
+    rng = np.random.default_rng(seed)
+    size = rng.uniform(5.0, 30.0)
+    times = np.arange(segments + 1) * dt
+    walk = CubicSpline(times, rng.normal(size=(segments + 1, 3)) * size - 9.81 * UP)
+    middle = times[:-1] + dt / 2
+    initial = [np.zeros(3), np.zeros(3), *(walk(0.0, k) for k in range(order - 2))]
+    inputs = walk(middle, order - 2) if order < 5 else walk(middle, 3)
+    return Trajectory.from_inputs(np.array(initial), inputs, dt)
+
+
+def densely(trajectory, vehicle, count):
+    """Rotor thrusts at `count` times of every segment, both ends included, (segments, count, rotors)."""
+    s = np.linspace(0.0, 1.0, count)
+    flat = FlatState(*(trajectory.on_segments(s, k).reshape(-1, 3) for k in range(5)))
+    times = trajectory.knots[:-1, None] + s * trajectory.durations[:, None]
+    return reference_of(times.ravel(), flat, vehicle).rotor_thrusts.reshape(len(times), count, -1)
+
+
+def largest(sampled):
+    """The largest value of densely sampled curves, a parabola through three samples at each maximum."""
+    left, at, right = sampled[:, :-2], sampled[:, 1:-1], sampled[:, 2:]
+    bend = np.minimum(left - 2 * at + right, -1e-300)
+    tops = np.where((at >= left) & (at >= right), at - (right - left) ** 2 / (8 * bend), at)
+    return max(sampled.max(), tops.max())
+
+
+@pytest.mark.parametrize("order", [3, 4, 5])
+@pytest.mark.parametrize("vehicle", [QUAD, HEXA], ids=lambda vehicle: vehicle.name)
+def test_margin_is_that_of_dense_sampling(order, vehicle):
+    for seed in range(2):
+        trajectory = tumbling(seed, order)
+        found = rotor_margin(trajectory, vehicle)
+        thrusts = densely(trajectory, vehicle, 10_000)
+        scale = np.abs(thrusts).max()
+        assert found.max_thrust == pytest.approx(largest(thrusts), abs=1e-6 * scale)
+        assert found.min_thrust == pytest.approx(-largest(-thrusts), abs=1e-6 * scale)
+        assert found.margin == min(found.low_margin, found.high_margin)
+        assert found.low_margin == pytest.approx(found.min_thrust - vehicle.min_thrusts[0])
+        assert found.high_margin == pytest.approx(vehicle.max_thrusts[0] - found.max_thrust)
+
+
+@settings(max_examples=25)
+@given(seed=seeds, order=st.integers(3, 5))
+def test_no_sample_goes_beyond_the_extremes(seed, order):
+    trajectory = tumbling(seed, order, segments=5)
+    found, thrusts = rotor_margin(trajectory, QUAD), densely(trajectory, QUAD, 1000)
+    if found.undetermined:
+        return
+    scale = np.abs(thrusts).max()
+    assert thrusts.max() <= found.max_thrust + 1e-8 * scale
+    assert thrusts.min() >= found.min_thrust - 1e-8 * scale
+
+
+def test_a_long_segment_of_high_degree_is_searched_all_along():
+    rng = np.random.default_rng(5)
+    sizes = np.array([0, 0, 20, 60, 90, 90, 60, 40, 20, 10])[:, None]
+    trajectory = Trajectory([3.0], rng.normal(size=(1, 10, 3)) * sizes)
+    found, thrusts = rotor_margin(trajectory, QUAD), densely(trajectory, QUAD, 50_000)
+    scale = np.abs(thrusts).max()
+    assert found.max_thrust == pytest.approx(largest(thrusts), abs=1e-6 * scale)
+    assert found.min_thrust == pytest.approx(-largest(-thrusts), abs=1e-6 * scale)
+
+
+def test_the_extremes_are_taken_where_they_are_said_to_be():
+    trajectory = tumbling(2, 5)
+    found = rotor_margin(trajectory, QUAD)
+    for thrust, time, rotor in (
+        (found.min_thrust, found.min_time, found.min_rotor),
+        (found.max_thrust, found.max_time, found.max_rotor),
+    ):
+        times = np.append(np.linspace(0.0, time, 4000)[:-1], time)
+        there = reference_of(times, trajectory.flat(times), QUAD).rotor_thrusts[-1, rotor]
+        assert there == pytest.approx(thrust, rel=1e-4)
+
+
+@settings(max_examples=25)
+@given(seed=seeds)
+def test_straight_up_and_down_the_rotors_share_the_acceleration(seed):
+    # no rotation: thrust = m (a + g) shared by the mixer, its extremes those of a quintic's second derivative
+    coefficients = np.zeros((1, 6, 3))
+    coefficients[0, :, 2] = np.random.default_rng(seed).normal(size=6) * 0.1
+    trajectory = Trajectory([1.0], coefficients)
+    found = rotor_margin(trajectory, HEXA)
+    least, most = trajectory.specific_thrust_range(HEXA.gravity)
+    if found.undetermined or least.value < 1.0:
+        return
+    shares = HEXA.mass * mixer(HEXA)[:, 0]
+    assert found.min_thrust == pytest.approx(shares.min() * least.value, rel=1e-9)
+    assert found.max_thrust == pytest.approx(shares.max() * most.value, rel=1e-9)
+    assert found.bounded_moments
+
+
+@pytest.mark.parametrize("vehicle", [QUAD, HEXA], ids=lambda vehicle: vehicle.name)
+def test_hover_leaves_the_margin_of_its_weight(vehicle):
+    found = rotor_margin(Trajectory([2.0], np.zeros((1, 5, 3))), vehicle, yaw=1.0)
+    shares = vehicle.mass * vehicle.gravity * mixer(vehicle)[:, 0]
+    assert found.min_thrust == pytest.approx(shares.min())
+    assert found.max_thrust == pytest.approx(shares.max())
+    assert found.feasible
+    assert found.undetermined == ()
+
+
+def test_feasibility_changes_where_a_limit_meets_the_extreme():
+    trajectory = tumbling(3)
+    extremes = rotor_margin(trajectory, QUAD)
+
+    def limited(low, high):
+        rotors = tuple(
+            replace(rotor, min_thrust=extremes.min_thrust + low, max_thrust=extremes.max_thrust + high)
+            for rotor in QUAD.rotors
+        )
+        return rotor_margin(trajectory, replace(QUAD, rotors=rotors))
+
+    assert limited(-1e-6, 1e-6).feasible
+    assert limited(-1e-6, 1e-6).margin == pytest.approx(1e-6, rel=1e-3)
+    assert not limited(1e-6, 1e-6).feasible
+    assert not limited(-1e-6, -1e-6).feasible
+    assert "too little" in str(limited(1.0, 1.0))
+    assert "too much" in str(limited(-1.0, -1.0))
+    assert "within limits by 1.00 N" in str(limited(-1.0, 1.0))
+
+
+def test_unequal_rotors_are_each_held_to_their_own_limits():
+    trajectory = tumbling(3)
+    thrusts = densely(trajectory, QUAD, 2000)
+    weak = int(thrusts.max(axis=(0, 1)).argmin())
+    rotors = [replace(rotor, max_thrust=1e3, min_thrust=-1e3) for rotor in QUAD.rotors]
+    rotors[weak] = replace(rotors[weak], max_thrust=15.0, min_thrust=-15.0)
+    found = rotor_margin(trajectory, replace(QUAD, rotors=tuple(rotors)))
+    assert (found.max_rotor, found.min_rotor) == (weak, weak)
+    assert found.max_thrust == pytest.approx(thrusts[..., weak].max(), rel=1e-3)
+    assert found.high_margin == pytest.approx(15.0 - found.max_thrust)
+
+
+@settings(max_examples=15)
+@given(seed=seeds, heading=st.floats(-3.1, 3.1))
+def test_turning_trajectory_and_vehicle_together_changes_nothing(seed, heading):
+    trajectory = tumbling(seed, segments=5)
+    turned = Trajectory(
+        trajectory.durations, so3.rotate(so3.about_axis(UP, heading), trajectory.coefficients)
+    )
+    before, after = rotor_margin(trajectory, QUAD), rotor_margin(turned, QUAD, yaw=heading)
+    scale = max(abs(before.min_thrust), abs(before.max_thrust))
+    assert after.min_thrust == pytest.approx(before.min_thrust, abs=1e-6 * scale)
+    assert after.max_thrust == pytest.approx(before.max_thrust, abs=1e-6 * scale)
+
+
+def test_vanishing_thrust_is_infeasible_and_said_so():
+    # straight up, then thrust reverses through zero
+    coefficients = np.zeros((1, 5, 3))
+    coefficients[0, 2:4, 2] = [(10 - QUAD.gravity) / 2, -20 / 6]
+    found = rotor_margin(Trajectory([1.0], coefficients), QUAD)
+    assert len(found.undetermined) == 1
+    assert not found.feasible
+    assert "thrust vanishes at 0.500 s" in str(found)
+
+
+@pytest.mark.parametrize(("order", "bounded"), [(3, False), (4, True), (5, True)])
+def test_only_jerk_inputs_ask_for_unbounded_moments(order, bounded):
+    found = rotor_margin(tumbling(1, order), QUAD)
+    assert found.bounded_moments is bounded
+    assert ("jerk jumps" in str(found)) is not bounded

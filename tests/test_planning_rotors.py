@@ -1,0 +1,136 @@
+"""With a vehicle, the plan is the fastest that its rotors can fly; what cannot be says which bound binds."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from aerobat.errors import Infeasible, SpecError
+from aerobat.planning import Bisection, Miqp, plan, rotor_margin
+from aerobat.specs import EndState, Flip, HalfFlip, Limits, Problem, load_problem, rest, tilted_gate
+from aerobat.vehicle import Vehicle, load_vehicle
+
+MANEUVERS = ["flip-roll", "flip-roll-translation", "flip-pitch", "half-flip", "line"]
+
+
+@pytest.fixture(scope="module")
+def quad() -> Vehicle:
+    return load_vehicle("agile-quad")
+
+
+@pytest.mark.parametrize("name", MANEUVERS)
+@pytest.mark.parametrize("order", [4, 5])
+@pytest.mark.parametrize("vehicle", ["agile-quad", "hexarotor", "crazyflie"])
+def test_a_plan_keeps_every_rotor_within_its_limits(name: str, order: int, vehicle: str) -> None:
+    craft = load_vehicle(vehicle)
+    found = plan(load_problem(name), Miqp(order=order), craft)
+    thrusts = rotor_margin(found.trajectory, craft)
+    assert thrusts.feasible
+    assert thrusts.min_thrust >= craft.min_thrusts.min()
+    assert thrusts.max_thrust <= craft.max_thrusts.max()
+
+
+@pytest.mark.parametrize("name", MANEUVERS)
+def test_no_shorter_duration_that_was_tried_flies(name: str, quad: Vehicle) -> None:
+    found = plan(load_problem(name), Miqp(search=Bisection(tolerance=0.01)), quad)
+    assert all(not a.feasible for a in found.attempts if a.dt < found.dt)
+    assert any(found.dt / 1.0101 <= a.dt < found.dt for a in found.attempts)
+
+
+@pytest.mark.parametrize("axis_deg", [0.0, 37.0, 90.0, 200.0])
+def test_flips_about_any_horizontal_axis_are_the_same_flip_turned(axis_deg: float, quad: Vehicle) -> None:
+    """Without per-axis limits nothing tells one heading from another."""
+    roll = replace(load_problem("flip-roll"), limits=Limits())
+    heading = np.deg2rad(axis_deg + 90.0)  # thrust swings to the left of the axis, where the gate leads
+    gate = tilted_gate(roll.gate.position, heading + np.pi, tilt=np.pi)
+    turned = replace(roll, gate=gate, maneuver=Flip(axis_deg))
+    planner = Miqp(search=Bisection(0.1, 0.2))
+    assert plan(turned, planner, quad).cost == pytest.approx(plan(roll, planner, quad).cost, rel=1e-5)
+
+
+@pytest.mark.parametrize("tilt_deg", [-90.0, -60.0, -20.0, 0.0, 15.0, 45.0, 80.0, 90.0])
+def test_the_half_flip_passes_a_gate_at_any_tilt_with_its_thrust_along_the_upright(
+    tilt_deg: float, quad: Vehicle
+) -> None:
+    problem = load_problem("half-flip")
+    problem = replace(problem, gate=problem.gate.tilted(np.deg2rad(tilt_deg)))
+    found = plan(problem, vehicle=quad)
+    (gate,) = found.stages
+    thrust = found.trajectory.evaluate(gate.time, 2) + [0.0, 0.0, quad.gravity]  # noqa: RUF005
+    sideways = thrust - (thrust @ problem.gate.normal) * problem.gate.normal
+    np.testing.assert_allclose(sideways / np.linalg.norm(sideways), problem.gate.up, atol=1e-5)
+
+
+def test_the_gate_is_passed_squarely(quad: Vehicle) -> None:
+    found = plan(load_problem("flip-roll"), vehicle=quad)
+    gate = next(s for s in found.stages if s.gate)
+    velocity = found.trajectory.evaluate(gate.time, 1)
+    assert velocity @ gate.gate.normal == pytest.approx(np.linalg.norm(velocity), rel=1e-9)
+
+
+def test_a_gate_that_asks_more_thrust_than_there_is_says_both_numbers(quad: Vehicle) -> None:
+    problem = replace(load_problem("flip-roll"), maneuver=Flip(180.0, inverted=45.0))
+    with pytest.raises(Infeasible, match=r"'gate' asks 45 m/s² inverted, agile-quad gives 32\.4"):
+        plan(problem, vehicle=quad)
+
+
+def test_the_limit_that_binds_is_named() -> None:
+    problem = replace(load_problem("line"), limits=Limits(velocity=0.1))
+    with pytest.raises(Infeasible, match=r"limits.velocity \(0.1 m/s\) binds") as failure:
+        plan(problem, Miqp(search=Bisection(0.05, 0.5)))
+    assert len(failure.value.attempts) > 3
+    assert not any(a.feasible for a in failure.value.attempts)
+
+
+def test_a_vehicle_too_weak_for_the_maneuver_is_told_which_rotor_lacks_what() -> None:
+    weak = load_vehicle("agile-quad")
+    weak = replace(weak, rotors=tuple(replace(r, max_thrust=2.2) for r in weak.rotors))
+    with pytest.raises(Infeasible, match=r"agile-quad can fly: at best, .*rotor"):
+        plan(load_problem("flip-roll"), vehicle=weak)
+
+
+@pytest.mark.parametrize("intervals", [2, 3, 4])
+def test_too_few_intervals_for_the_stages_is_a_sentence(intervals: int) -> None:
+    with pytest.raises(SpecError, match="intervals"):
+        plan(load_problem("flip-roll").as_in_paper(), Miqp(order=3, intervals=intervals))
+
+
+def test_two_intervals_suffice_for_nothing_to_do() -> None:
+    still = Problem("still", rest((1.0, 2.0, 3.0)), rest((1.0, 2.0, 3.0)))
+    found = plan(still, Miqp(intervals=2))
+    assert found.cost == pytest.approx(0.0, abs=1e-12)
+
+
+def test_a_gate_at_the_start_is_planned_like_any_other(quad: Vehicle) -> None:
+    problem = load_problem("flip-roll")
+    gate = replace(problem.gate, position=problem.start.position)
+    found = plan(replace(problem, gate=gate), vehicle=quad)
+    placed = next(s for s in found.stages if s.gate)
+    np.testing.assert_allclose(found.trajectory.evaluate(placed.time), problem.start.position, atol=1e-6)
+
+
+@pytest.mark.parametrize("yaw", [np.pi, -np.pi, np.pi / 2])
+def test_a_symmetric_vehicle_flies_the_same_plan_at_any_multiple_of_90_degrees_of_yaw(
+    yaw: float, quad: Vehicle
+) -> None:
+    straight, turned = (
+        plan(replace(load_problem("flip-roll"), yaw=angle), vehicle=quad) for angle in (0.0, yaw)
+    )
+    assert turned.duration == pytest.approx(straight.duration, rel=1e-9)
+
+
+def test_a_moving_start_and_goal_are_met(quad: Vehicle) -> None:
+    ends = EndState((0, 0, 1), (3, 0, 0), (0, 1, 0)), EndState((6, 1, 2), (0, 2, 0), (0, 0, 1))
+    found = plan(Problem("moving", *ends, limits=Limits(velocity=8.0)), vehicle=quad)
+    for end, t in zip(ends, (0.0, found.duration), strict=True):
+        for derivative in range(4):
+            wanted = end.derivatives(4)[derivative]
+            np.testing.assert_allclose(found.trajectory.evaluate(t, derivative), wanted, atol=1e-5)
+
+
+def test_the_half_flip_of_the_example_passes_its_gate_at_twice_the_papers_speed(quad: Vehicle) -> None:
+    found = plan(load_problem("examples/fast-half-flip.toml"), vehicle=quad)
+    assert isinstance(found.problem.maneuver, HalfFlip)
+    (gate,) = found.stages
+    assert np.linalg.norm(found.trajectory.evaluate(gate.time, 1)) >= 16.0
+    assert found.margin.feasible
