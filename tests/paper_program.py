@@ -116,7 +116,9 @@ def _gate(
 ) -> SlottedStage:
     position = [rows.add(rows.state(axis, POSITION, node)) for axis in (X, Y, Z)]
     at = list(m.gate)
-    return SlottedStage("gate", (node,), np.array([ranges + position]), np.array(low + at), np.array(high + at))
+    return SlottedStage(
+        "gate", (node,), np.array([ranges + position]), np.array(low + at), np.array(high + at)
+    )
 
 
 def _program(
@@ -127,4 +129,6 @@ def _program(
     final = [rows.state(axis, derivative, last) for axis in (X, Y, Z) for derivative in range(3)]
     target = [value for axis in (X, Y, Z) for value in (m.end[axis], 0.0, 0.0)]
     low, high = np.array(rows.bounds).T
-    return AssignmentProgram(np.array(final), np.array(target), np.array(rows.matrix), low, high, stages, order)
+    return AssignmentProgram(
+        np.array(final), np.array(target), np.array(rows.matrix), low, high, stages, order
+    )

@@ -114,7 +114,7 @@ PROBLEM_FAULTS = {
 ARGUMENT_FAULTS = {
     "unknown problem": (["fly", "flip-rol"], "flip-roll"),
     "no such file": (["fly", "nowhere.toml"], "nowhere.toml"),
-    "a folder for a file": (["fly", "./"], "./"),
+    "a folder for a file": (["fly", "folder.toml"], "folder.toml"),
     "unknown vehicle": (["fly", "line", "--vehicle", "agile-qad"], "agile-quad"),
     "unknown backend": (["plan", "line", "--backend", "gurobbi"], "gurobi"),
     "order 6": (["plan", "line", "--order", "6"], "order"),
@@ -135,12 +135,11 @@ ARGUMENT_FAULTS = {
 }
 
 
-def refused(arguments: list[str], monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> str:
+def refused(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> str:
     """The sentence with which the command line refuses."""
     before = snapshot(Path())
-    monkeypatch.setattr("sys.argv", ["aerobat", *arguments])
     with pytest.raises(SystemExit) as stop:
-        cli.main()
+        cli.main(arguments)
     out, err = capsys.readouterr()
     assert stop.value.code == 2, err
     assert out == ""
@@ -158,43 +157,44 @@ def snapshot(folder: Path) -> dict[str, bytes]:
 def _elsewhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     Path("taken").write_text("a file")
+    Path("folder.toml").mkdir()
 
 
 @pytest.mark.parametrize("fault", VEHICLE_FAULTS)
-def test_a_malformed_vehicle_is_refused_by_its_field(fault: str, monkeypatch, capsys) -> None:
+def test_a_malformed_vehicle_is_refused_by_its_field(fault: str, capsys) -> None:
     change, field = VEHICLE_FAULTS[fault]
     document = copy.deepcopy(preset("vehicle", "agile-quad"))
     change(document)
     Path("vehicle.toml").write_text(tomli_w.dumps(document))
-    assert field in refused(["fly", "line", "--vehicle", "vehicle.toml"], monkeypatch, capsys)
+    assert field in refused(["fly", "line", "--vehicle", "vehicle.toml"], capsys)
 
 
 @pytest.mark.parametrize("fault", PROBLEM_FAULTS)
-def test_a_malformed_problem_is_refused_by_its_field(fault: str, monkeypatch, capsys) -> None:
+def test_a_malformed_problem_is_refused_by_its_field(fault: str, capsys) -> None:
     change, field = PROBLEM_FAULTS[fault]
     document = copy.deepcopy(preset("specs", "flip-roll"))
     change(document)
     Path("problem.toml").write_text(tomli_w.dumps(document))
-    assert field in refused(["fly", "problem.toml", "--order", "3"], monkeypatch, capsys)
+    assert field in refused(["fly", "problem.toml", "--order", "3"], capsys)
 
 
 @pytest.mark.parametrize("fault", ARGUMENT_FAULTS)
-def test_an_argument_that_makes_no_sense_is_refused_by_its_name(fault: str, monkeypatch, capsys) -> None:
+def test_an_argument_that_makes_no_sense_is_refused_by_its_name(fault: str, capsys) -> None:
     arguments, named = ARGUMENT_FAULTS[fault]
-    assert named in refused(arguments, monkeypatch, capsys)
+    assert named in refused(arguments, capsys)
 
 
-@pytest.mark.parametrize("cut", [1, 40, 150, 300])
+@pytest.mark.parametrize("kept", [0.1, 0.3, 0.5])
 @pytest.mark.parametrize("room", ["vehicle", "specs"])
-def test_a_truncated_file_is_refused(room: str, cut: int, monkeypatch, capsys) -> None:
+def test_a_truncated_file_is_refused(room: str, kept: float, capsys) -> None:
     name = {"vehicle": "agile-quad", "specs": "flip-roll"}[room]
     whole = (files(f"aerobat.{room}") / "presets" / f"{name}.toml").read_bytes()
-    Path("half.toml").write_bytes(whole[:-cut])
+    Path("half.toml").write_bytes(whole[: int(kept * len(whole))])
     arguments = ["plan", "half.toml"] if room == "specs" else ["plan", "line", "--vehicle", "half.toml"]
-    assert "half.toml" in refused(arguments, monkeypatch, capsys)
+    assert "half.toml" in refused(arguments, capsys)
 
 
 @pytest.mark.parametrize("content", [b"", b"\xff\xfe\x00", b"{}", b"[start\n", b"x = " + b"[" * 5000])
-def test_a_file_that_is_no_problem_is_refused(content: bytes, monkeypatch, capsys) -> None:
+def test_a_file_that_is_no_problem_is_refused(content: bytes, capsys) -> None:
     Path("noise.toml").write_bytes(content)
-    assert "noise.toml" in refused(["plan", "noise.toml"], monkeypatch, capsys)
+    assert "noise.toml" in refused(["plan", "noise.toml"], capsys)

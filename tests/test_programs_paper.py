@@ -6,9 +6,9 @@ from functools import cache
 
 import numpy as np
 import pytest
-from paper_program import FLIP_PITCH, FLIP_ROLL, FLIP_TRANSLATION, HALF_FLIP, Maneuver, flip, half_flip
 
 from aerobat.programs import AssignmentProgram, solver
+from paper_program import FLIP_PITCH, FLIP_ROLL, FLIP_TRANSLATION, HALF_FLIP, Maneuver, flip, half_flip
 
 # sums of squared jerks for N = 20 on which three exact solvers agreed to ten digits
 FLIPS = [(FLIP_ROLL, 273196.1243), (FLIP_PITCH, 273196.1243), (FLIP_TRANSLATION, 280399.0114)]

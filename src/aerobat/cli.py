@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from math import isfinite, radians
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-from cyclopts import App, CycloptsError, Group, Parameter
+from cyclopts import App, CycloptsError, Group, Parameter, validators
 
 from aerobat.errors import AerobatError, Infeasible, SpecError
 
@@ -41,12 +41,13 @@ app = App(
 )
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class PlanningOptions:
     """Options that both commands share."""
 
-    vehicle: Annotated[str, Parameter(group=planning)] = "agile-quad"
-    """The vehicle: a name that `aerobat vehicles` lists, or a TOML file."""
+    vehicle: Annotated[str | None, Parameter(group=planning)] = None
+    """The vehicle: a name that `aerobat vehicles` lists, or a TOML file. Default: agile-quad, or hexarotor
+    with --paper."""
 
     order: Annotated[int | None, Parameter(group=planning)] = None
     """The derivative that is piecewise constant: 3 jerk (the paper's), 4 snap, 5 crackle. Default: 4, or 3
@@ -61,7 +62,7 @@ class PlanningOptions:
     time_limit: Annotated[float | None, Parameter(group=planning)] = None
     """Seconds for each program; the best plan found by then is taken and its gap reported."""
 
-    paper: Annotated[bool, Parameter(group=planning, negative="")] = False
+    paper: Annotated[bool, Parameter(group=planning, negative="", show_default=False)] = False
     """Exactly the paper's formulation with its reference parameters: order 3, bounds per axis, unsigned and
     unordered stages, dt the first feasible of 50 steps from 0.1 to 4 s, no vehicle in planning."""
 
@@ -71,18 +72,18 @@ class PlanningOptions:
     out: Annotated[Path | None, Parameter(group=output)] = None
     """The folder to write to. Default: out/PROBLEM."""
 
-    json: Annotated[bool, Parameter(group=output, negative="")] = False
+    json: Annotated[bool, Parameter(group=output, negative="", show_default=False)] = False
     """Print the report as JSON on standard output, and nothing else."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class FlyingOptions:
     """Options of the flight."""
 
-    noise: Annotated[float, Parameter(group=flying)] = 0.0
+    noise: Annotated[float, Parameter(group=flying, validator=validators.Number(gte=0))] = 0.0
     """The error of the state that the controller sees: 0 none, 1 that of motion capture and IMU fused."""
 
-    seed: Annotated[int, Parameter(group=flying)] = 0
+    seed: Annotated[int, Parameter(group=flying, validator=validators.Number(gte=0))] = 0
     """The seed of that noise: the same seed, the same flight."""
 
 
@@ -146,10 +147,14 @@ def problems() -> None:
     show(problems_table(load_problem(name) for name in problem_names()))
 
 
-def main() -> None:
-    """Run the command line; whatever is foreseen ends in one sentence on standard error, and an exit code."""
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Run the command line on `arguments`, by default those of the process.
+
+    Whatever is foreseen ends in one sentence on standard error, and an exit code.
+    """
+    tokens = sys.argv[1:] if arguments is None else arguments
     try:
-        app(exit_on_error=False, print_error=False)
+        app(tokens, exit_on_error=False, print_error=False, result_action="return_value")
     except CycloptsError as error:
         _exit(" ".join(str(error).split()), BAD_INPUT)
     except Infeasible as error:
@@ -169,7 +174,8 @@ def _read(name: str, options: PlanningOptions) -> tuple[Problem, Vehicle]:
     from aerobat.specs import HalfFlip, load_problem
     from aerobat.vehicle import load_vehicle
 
-    problem, vehicle = load_problem(name), load_vehicle(options.vehicle)
+    problem = load_problem(name)
+    vehicle = load_vehicle(options.vehicle or ("hexarotor" if options.paper else "agile-quad"))
     if options.angle is not None:
         if problem.gate is None or not isinstance(problem.maneuver, HalfFlip):
             raise SpecError(

@@ -14,10 +14,17 @@ IDENTITY: Array = np.array([1.0, 0.0, 0.0, 0.0])
 IDENTITY.flags.writeable = False
 
 
+def cross(a: ArrayLike, b: ArrayLike) -> Array:
+    """a × b, (..., 3); several times faster than np.cross on few vectors."""
+    ax, ay, az = _components(a)
+    bx, by, bz = _components(b)
+    return np.stack([ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx], axis=-1)
+
+
 def multiply(p: ArrayLike, q: ArrayLike) -> Array:
     """Hamilton product p ⊗ q, (..., 4)."""
-    pw, px, py, pz = np.moveaxis(np.asarray(p, dtype=float), -1, 0)
-    qw, qx, qy, qz = np.moveaxis(np.asarray(q, dtype=float), -1, 0)
+    pw, px, py, pz = _components(p)
+    qw, qx, qy, qz = _components(q)
     return np.stack(
         [
             pw * qw - px * qx - py * qy - pz * qz,
@@ -44,8 +51,8 @@ def rotate(q: ArrayLike, v: ArrayLike) -> Array:
     """q ⊗ v ⊗ q*: body vectors (..., 3) to the world for q = q_world_body."""
     q, v = np.asarray(q, dtype=float), np.asarray(v, dtype=float)
     vector = q[..., 1:]
-    t = 2.0 * np.cross(vector, v)
-    return np.asarray(v + q[..., :1] * t + np.cross(vector, t))
+    t = 2.0 * cross(vector, v)
+    return np.asarray(v + q[..., :1] * t + cross(vector, t))
 
 
 def unrotate(q: ArrayLike, v: ArrayLike) -> Array:
@@ -110,7 +117,7 @@ def smallest_rotation(a: ArrayLike, b: ArrayLike) -> Array:
     norm = np.linalg.norm(h, axis=-1, keepdims=True)
     opposite = norm < 1e-12
     h = np.where(opposite, _any_normal(a), h / np.where(opposite, 1.0, norm))
-    return normalize(np.concatenate([np.sum(a * h, axis=-1, keepdims=True), np.cross(a, h)], axis=-1))
+    return normalize(np.concatenate([np.sum(a * h, axis=-1, keepdims=True), cross(a, h)], axis=-1))
 
 
 def _any_normal(a: Array) -> Array:
@@ -119,3 +126,8 @@ def _any_normal(a: Array) -> Array:
     candidate = np.where(np.abs(a[..., 1:2]) < 0.9, [0.0, -1.0, 0.0], [1.0, 0.0, 0.0])
     normal = candidate - np.sum(candidate * a, axis=-1, keepdims=True) * a
     return np.asarray(normal / np.linalg.norm(normal, axis=-1, keepdims=True))
+
+
+def _components(vectors: ArrayLike) -> tuple[Array, ...]:
+    array = np.asarray(vectors, dtype=float)
+    return tuple(array[..., i] for i in range(array.shape[-1]))

@@ -17,6 +17,7 @@ import numpy as np
 
 from aerobat.arrays import Array
 from aerobat.errors import SpecError
+from aerobat.storage import whole_file
 from aerobat.trajectory import Trajectory
 from aerobat.trajectory.polynomial import hermite
 
@@ -34,7 +35,8 @@ def write_csv(trajectory: Trajectory, path: str | os.PathLike[str], rate: float 
     rows = np.concatenate([trajectory.evaluate(times, k) for k in range(4)], axis=1)
     if abs(times[-1] - (len(times) - 1) / rate) > SAME_TIME:
         rows = np.column_stack([rows, times])
-    _write_whole(Path(path), "".join(",".join(map(repr, row)) + "\n" for row in rows.tolist()))
+    with whole_file(path) as temporary:
+        temporary.write_text("".join(",".join(map(repr, row)) + "\n" for row in rows.tolist()))
 
 
 def read_csv(path: str | os.PathLike[str], rate: float = 100.0) -> Trajectory:
@@ -86,16 +88,3 @@ def _parse_row(line: str, where: str) -> list[float]:
     if not all(map(math.isfinite, row)):
         raise SpecError(f"{where} must have finite numbers only, got {line[:60]!r}")
     return row
-
-
-def _write_whole(path: Path, text: str) -> None:
-    """Write under a name of the moment, then rename: no reader ever sees half a file."""
-    temporary = path.with_name(f".{path.name}.{os.getpid()}")
-    try:
-        try:
-            temporary.write_text(text, encoding="utf-8", newline="\n")
-            os.replace(temporary, path)
-        finally:
-            temporary.unlink(missing_ok=True)
-    except OSError as error:
-        raise SpecError(f"{path}: cannot be written: {error.strerror}") from None

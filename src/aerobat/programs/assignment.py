@@ -26,7 +26,7 @@ Indices = NDArray[np.intp]
 Mask = NDArray[np.bool_]
 Status = Literal["optimal", "time_limit", "infeasible", "unknown"]
 
-TOLERANCE = 1e-6  # the violation of a row, relative to max(1, |bound|), that a solution may have
+TOLERANCE = 1e-6  # the violation of a row a x <= b, relative to |a| |x| + |b|, that a solution may have
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,7 +55,7 @@ class SlottedStage:
         _set(self, slots=slots, rows=rows)
         for side in ("lower", "upper"):
             name = f"stage '{self.name}': {side}"
-            _set(self, **{side: _broadcast(frozen_bounds(getattr(self, side), name), rows.shape, name)})
+            _set(self, **{side: _broadcast(_bounds(getattr(self, side), name, side), rows.shape, name)})
 
     def index(self, slot: int) -> int:
         """The place of `slot` among `slots`; raises SpecError where the stage cannot sit there."""
@@ -91,8 +91,8 @@ class AssignmentProgram:
         equality = _matrix(self.equality, "equality", rows.shape[1])
         _set(self, rows=rows, equality=equality)
         _set(self, target=frozen(self.target, "target", (len(equality),)))
-        _set(self, lower=frozen_bounds(self.lower, "lower", (len(rows),)))
-        _set(self, upper=frozen_bounds(self.upper, "upper", (len(rows),)))
+        _set(self, lower=_bounds(self.lower, "lower", "lower", (len(rows),)))
+        _set(self, upper=_bounds(self.upper, "upper", "upper", (len(rows),)))
         if self.hessian is not None:
             _set(self, hessian=_positive_definite(_matrix(self.hessian, "hessian", self.variables)))
         if self.gradient is not None:
@@ -144,6 +144,14 @@ class AssignmentProgram:
         linear = 0.0 if self.gradient is None else self.gradient @ x
         return float(quadratic + linear + self.constant)
 
+    @cached_property
+    def _unconstrained(self) -> float:
+        """|x| at the least cost of all."""
+        if self.gradient is None:
+            return 0.0
+        least = self.gradient / 2.0 if self.hessian is None else np.linalg.solve(self.hessian, self.gradient)
+        return float(np.linalg.norm(least))
+
     def admits(self, slots: Sequence[int]) -> bool:
         """Whether `slots`, one a stage, are the stages' own, distinct and in order."""
         own = all(slot in stage.slots for stage, slot in zip(self.stages, slots, strict=True))
@@ -160,16 +168,20 @@ class AssignmentProgram:
         return lower, upper
 
     def violation(self, x: Array, slots: Sequence[int]) -> float:
-        """The largest residual of any row relative to max(1, |bound|), the stages sitting in `slots`.
+        """The largest residual of any row a x <= b, relative to |a| |x| + |b|, the stages sitting in `slots`.
 
-        Infinite when `slots` are not admitted.
+        |x| is taken no smaller than where the cost alone would lead. Infinite when `slots` are not admitted.
         """
         if not self.admits(slots):
             return inf
         lower, upper = self.tightened(slots)
         reached, missed = self.rows @ x, np.abs(self.equality @ x - self.target)
-        pairs = ((lower - reached, lower), (reached - upper, upper), (missed, self.target))
-        return max(float(_relative(residual, bound).max(initial=0.0)) for residual, bound in pairs)
+        size = max(float(np.linalg.norm(x)), self._unconstrained)
+        return max(
+            _relative(lower - reached, self.rows, size, lower),
+            _relative(reached - upper, self.rows, size, upper),
+            _relative(missed, self.equality, size, self.target),
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -189,7 +201,7 @@ class AssignmentResult:
     nodes: int  # relaxations solved
     time: float  # [s], as the solver itself reports it
     backend: str
-    max_violation: float = 0.0  # of any row, relative to max(1, |bound|)
+    max_violation: float = 0.0  # of any row a x <= b, relative to |a| |x| + |b|
 
     @property
     def gap(self) -> float:
@@ -212,8 +224,11 @@ def certified(program: AssignmentProgram, claim: AssignmentResult) -> Assignment
     return replace(claim, x=x, cost=cost, bound=min(claim.bound, cost), max_violation=violation)
 
 
-def _relative(residual: Array, bound: Array) -> Array:
-    return residual / np.maximum(1.0, np.abs(np.where(np.isfinite(bound), bound, 0.0)))
+def _relative(residual: Array, rows: Array, size: float, bound: Array) -> float:
+    """The largest residual above zero, each relative to its row, its bound and the size of the variables."""
+    over = np.flatnonzero(residual > 0.0)
+    scale = np.linalg.norm(rows[over], axis=1) * size + np.abs(bound[over])
+    return float((residual[over] / scale).max(initial=0.0))
 
 
 def _set(value: object, **fields: object) -> None:
@@ -228,6 +243,13 @@ def _matrix(value: ArrayLike, name: str, columns: int | None) -> Array:
         if fits and not value.flags.writeable and np.isfinite(value).all():
             return value
     return frozen(value, name, (None, columns))
+
+
+def _bounds(value: ArrayLike, name: str, side: str, shape: tuple[int] | None = None) -> Array:
+    bounds, never = frozen_bounds(value, name, shape), inf if side == "lower" else -inf
+    if (bounds == never).any():
+        raise SpecError(f"{name} must not be {never}, which nothing satisfies")
+    return bounds
 
 
 def _positive_definite(hessian: Array) -> Array:

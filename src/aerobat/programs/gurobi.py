@@ -11,7 +11,14 @@ import numpy as np
 
 from aerobat.errors import AerobatError
 from aerobat.programs.assignment import AssignmentProgram, AssignmentResult, Status, certified
-from aerobat.programs.switches import Switch, chosen_slots, slots_taken, standing_bounds, switches
+from aerobat.programs.switches import (
+    Switch,
+    chosen_slots,
+    conditioned,
+    slots_taken,
+    standing_bounds,
+    switches,
+)
 
 _TOO_LARGE = 10010  # Gurobi's error number for a model beyond the size of the licence
 _STRICT = {"FeasibilityTol": 1e-9, "IntFeasTol": 1e-9, "MIPGap": 1e-9}
@@ -19,7 +26,8 @@ _STRICT = {"FeasibilityTol": 1e-9, "IntFeasTol": 1e-9, "MIPGap": 1e-9}
 
 @dataclass(frozen=True)
 class Gurobi:
-    """One binary for each stage and slot; the bounds of a placement are switched on by big-M.
+    """One binary for each stage and slot; the bounds of a placement are switched on by big-M where there are
+    standing bounds, which is faster than indicator constraints, and by those elsewhere.
 
     The licence that comes with the package takes `free_variables` variables, a full one any number.
     """
@@ -28,7 +36,6 @@ class Gurobi:
     free_variables: ClassVar[int] = 200  # with a quadratic objective
 
     threads: int = 1
-    tighten: bool = True  # the M's, by one linear program each; their time counts
 
     def solve(
         self,
@@ -39,11 +46,12 @@ class Gurobi:
     ) -> AssignmentResult:
         """The cheapest assignment, or the best one found within `time_limit` [s].
 
-        `start` are slots that may be good. The result's time is the sum of Gurobi's Runtimes. Raises
+        `start` are slots that may be good. The result's time is Gurobi's own Runtime. Raises
         AerobatError where the licence is missing or too small for the program.
         """
         import gurobipy
 
+        scaled = conditioned(program)
         try:
             with gurobipy.Env(empty=True) as env:
                 env.setParam(
@@ -53,10 +61,10 @@ class Gurobi:
                 env.start()
                 with gurobipy.Model(env=env) as model:
                     model.Params.TimeLimit = inf if time_limit is None else time_limit
-                    claim = _Run(gurobipy, model, program).claim(self.tighten, start)
+                    claim = _Run(gurobipy, model, scaled.program).claim(start)
         except gurobipy.GurobiError as error:
             raise AerobatError(_explained(error, program)) from None
-        return certified(program, claim)
+        return certified(program, scaled.restored(claim))
 
 
 class _Run:
@@ -64,7 +72,6 @@ class _Run:
 
     def __init__(self, gurobipy: Any, model: Any, program: AssignmentProgram) -> None:
         self._gurobipy, self._grb, self._model, self._program = gurobipy, gurobipy.GRB, model, program
-        self._time = 0.0
         for name, value in _STRICT.items():
             model.setParam(name, value)
         self._x = model.addMVar(program.variables, lb=-inf)
@@ -74,25 +81,28 @@ class _Run:
             given = np.isfinite(bounds)
             model.addConstr((sign * program.rows[given]) @ self._x <= sign * bounds[given])
 
-    def claim(self, tighten: bool, start: Sequence[int] | None) -> AssignmentResult:
+    def claim(self, start: Sequence[int] | None) -> AssignmentResult:
         """Build, solve, read."""
-        program, needed = self._program, list(switches(self._program))
-        most = {(s.row, s.sign): float(s.sign * self._bounds[s.sign][s.row]) for s in needed}
-        if tighten:
-            for row, sign in most:
-                self._model.setObjective((sign * program.rows[row]) @ self._x, self._grb.MAXIMIZE)
-                if self._optimize() == "optimal":
-                    most[row, sign] = min(most[row, sign], self._model.ObjVal)
+        program, model = self._program, self._model
         binaries = self._add_binaries(start)
-        for switch in needed:
-            self._add_switch(switch, binaries[switch.stage, switch.slot], most[switch.row, switch.sign])
+        for switch in switches(program):
+            self._add_switch(switch, binaries[switch.stage, switch.slot])
         self._set_cost()
-        status = self._optimize()
-        if not self._model.SolCount:
-            return self._nothing("unknown" if status == "optimal" else status)
+        model.optimize()
+        status = self._status()
+        if not model.SolCount:
+            proven = status == "infeasible"
+            return self._result("infeasible" if proven else "unknown", None, None, inf if proven else -inf)
         slots = chosen_slots(program, {key: binary.X for key, binary in binaries.items()})
-        found: Status = "optimal" if status == "optimal" else "time_limit"
-        return self._result(found, self._x.X, slots, self._model.ObjBound)
+        return self._result(status, self._x.X, slots, model.ObjBound)
+
+    def _status(self) -> Status:
+        meaning: dict[int, Status] = {
+            self._grb.OPTIMAL: "optimal",
+            self._grb.INFEASIBLE: "infeasible",
+            self._grb.INF_OR_UNBD: "infeasible",  # the cost has a minimum
+        }
+        return meaning.get(self._model.Status, "time_limit")
 
     def _set_cost(self) -> None:
         program, x = self._program, self._x
@@ -117,34 +127,19 @@ class _Run:
             model.addConstr(first + 1 <= second)
         return binaries
 
-    def _add_switch(self, switch: Switch, binary: Any, most: float) -> None:
-        row, bound = (switch.sign * self._program.rows[switch.row]) @ self._x, switch.sign * switch.bound
+    def _add_switch(self, switch: Switch, binary: Any) -> None:
+        sign, bound = switch.sign, switch.sign * switch.bound
+        row, most = (sign * self._program.rows[switch.row]) @ self._x, sign * self._bounds[sign][switch.row]
         if most < inf:
             self._model.addConstr(row <= most + (bound - most) * binary)
         else:
             self._model.addGenConstrIndicator(binary, True, row.item() <= bound)
 
-    def _optimize(self) -> Status:
-        self._model.optimize()
-        self._time += self._model.Runtime
-        self._model.Params.TimeLimit = max(0.0, self._model.Params.TimeLimit - self._model.Runtime)
-        meaning: dict[int, Status] = {
-            self._grb.OPTIMAL: "optimal",
-            self._grb.INFEASIBLE: "infeasible",
-            self._grb.INF_OR_UNBD: "infeasible",  # the cost has a minimum
-            self._grb.TIME_LIMIT: "time_limit",
-        }
-        return meaning.get(self._model.Status, "unknown")
-
-    def _nothing(self, status: Status) -> AssignmentResult:
-        bound = inf if status == "infeasible" else -inf
-        return self._result("unknown" if status == "time_limit" else status, None, None, bound)
-
     def _result(
         self, status: Status, x: Any, slots: tuple[int, ...] | None, bound: float
     ) -> AssignmentResult:
         nodes = int(self._model.NodeCount) if self._model.IsMIP else 0
-        return AssignmentResult(status, x, slots, inf, bound, nodes, self._time, Gurobi.name)
+        return AssignmentResult(status, x, slots, inf, bound, nodes, self._model.Runtime, Gurobi.name)
 
 
 def _explained(error: Any, program: AssignmentProgram) -> str:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from math import inf
 
 import numpy as np
@@ -12,9 +13,9 @@ from aerobat.arrays import Array
 from aerobat.programs.assignment import AssignmentProgram, Indices, Mask
 from aerobat.programs.dual_steps import dual_steps
 from aerobat.programs.least_distance import Point
-from aerobat.programs.reduction import Bounds, Reduction
+from aerobat.programs.reduction import Bounds, Reduction, in_units
 
-_HOLDS = 1e-9  # a placement violated by less, on rows of unit length, holds already
+_HOLDS = 1e-9  # a placement violated by less, in units of the solution's least size, holds already
 _SHORT = 1e-9  # a row whose square off the active rows is below this counts as this long
 
 
@@ -25,6 +26,10 @@ class PlacedBounds:
     lower: Array  # (P, k)
     upper: Array  # (P, k)
     possible: Mask  # (P,) False where a placement contradicts the standing bounds or a fixed stage
+
+    def over(self, unit: float) -> PlacedBounds:
+        """The same for y in units of `unit`."""
+        return PlacedBounds(in_units(self.lower, unit), in_units(self.upper, unit), self.possible)
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,16 +82,21 @@ class Placements:
         """The placements' bounds for the program's stages, within the standing ones."""
         lower = self._padded([stage.lower for stage in program.stages if len(stage.slots) > 1], -inf)
         upper = self._padded([stage.upper for stage in program.stages if len(stage.slots) > 1], inf)
-        lower = np.maximum(reduction.scaled(lower, standing, self.rows), standing.lower[self.rows])
-        upper = np.minimum(reduction.scaled(upper, standing, self.rows), standing.upper[self.rows])
-        constant = reduction.constant[self.rows]
-        slack = np.where(constant, reduction.slack(standing)[self.rows], 0.0)
-        contradicts = (lower > upper + slack) | (constant & ((lower > slack) | (upper < -slack)))
-        possible = ~np.any(contradicts, axis=1)
+        lower = np.maximum(reduction.scaled(lower, standing.shift, self.rows), standing.lower[self.rows])
+        upper = np.minimum(reduction.scaled(upper, standing.shift, self.rows), standing.upper[self.rows])
+        constant, slack = reduction.constant[self.rows], standing.slack[self.rows]
+        fits = np.where(constant, (lower <= slack) & (upper >= -slack), lower <= upper)
+        possible = np.all(fits, axis=1)
         for i, stage in enumerate(program.stages):
             if len(stage.slots) == 1:
                 possible &= _beside(program, self.stage, self.slot, i, stage.slots[0])
         return PlacedBounds(np.where(constant, -inf, lower), np.where(constant, inf, upper), possible)
+
+    def size(self, placed: PlacedBounds) -> float:
+        """No solution has a shorter y: at y = 0 some stage, wherever it sits, violates a row by this much."""
+        missed = np.maximum(placed.lower, -placed.upper).max(axis=1, initial=0.0)
+        least = [missed[a:b][placed.possible[a:b]].min(initial=inf) for a, b in pairwise(self.starts)]
+        return max((float(size) for size in least if size < inf), default=0.0)
 
     def prospects(self, point: Point, placed: PlacedBounds, among: Indices) -> Prospects:
         """What adding any one of the placements `among` to the point's bounds costs at least.

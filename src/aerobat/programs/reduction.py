@@ -26,14 +26,26 @@ _CONSISTENT = (
 
 @dataclass(frozen=True, eq=False)
 class Bounds:
-    """Bounds of the rows M y; what a program's right-hand sides become."""
+    """lower <= M y <= upper, y in units of `unit`: what a program's right-hand sides become."""
 
     lower: Array  # (m + 1,)
     upper: Array  # (m + 1,)
-    base: float  # the cost at y = 0
-    shift: Array  # (m + 1,) the rows at y = 0, as the program scales them
+    base: float  # the cost at y = 0, in units of unit²
+    shift: Array  # (m + 1,) the program's rows at y = 0
+    slack: Array  # (m + 1,) how far rows without freedom may miss their bounds
     origin: Array  # (n,) x at y = 0
+    size: float  # no solution has a shorter w
     consistent: bool  # False where equalities, or rows without freedom, contradict each other
+    unit: float = 1.0
+
+    def over(self, unit: float) -> Bounds:
+        """The same in units of `unit`, infinities as DAQP writes them: its tolerances are absolute."""
+        lower, upper = in_units(self.lower, unit), in_units(self.upper, unit)
+        return replace(self, lower=lower, upper=upper, base=self.base / unit**2, unit=unit)
+
+    def cost(self, value: float) -> float:
+        """The cost where ½|y|² is `value`."""
+        return self.unit**2 * (self.base + value)
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,7 +84,7 @@ class Reduction:
         pseudo_inverse = right[:rank].T @ (left[:, :rank] / singular[:rank]).T
         self._least = pseudo_inverse
         self._inconsistency = np.eye(len(equality)) - equality @ pseudo_inverse
-        self._offset_cost = -0.5 * float(offset @ offset)
+        self._offset = float(np.linalg.norm(offset))
         self._centre = -unwhiten @ offset
         self._centre_equality = stacked @ self._centre
         self._from_target = unwhiten @ pseudo_inverse
@@ -81,9 +93,9 @@ class Reduction:
 
     def _project(self, program: AssignmentProgram, unwhiten: Array, pinned: Mask) -> None:
         rows = program.rows[np.ix_(self.ranges, self.columns)]
-        projected, length = rows @ self.from_free, np.linalg.norm(rows @ unwhiten, axis=1)
+        projected, self._length = rows @ self.from_free, np.linalg.norm(rows @ unwhiten, axis=1)
         norm = np.linalg.norm(projected, axis=1)
-        constant = (norm <= _VANISHED * length) | pinned
+        constant = (norm <= _VANISHED * self._length) | pinned
         norm[constant] = 1.0
         projected[constant] = 0.0
         self.constant, self.norm = np.append(constant, True), np.append(norm, 1.0)
@@ -99,43 +111,39 @@ class Reduction:
         target = np.concatenate([program.target[self.equalities], lower[self.pinned]])
         target = (target - self._centre_equality) * self._unit
         least, missed = self._least @ target, np.abs(self._inconsistency @ target)
+        size = float(np.linalg.norm(least))
         shift = np.append(self._rows_centre + self._rows_from_target @ target, 0.0)
-        fixed = Bounds(
-            lower=np.append(lower[self.ranges], -inf),
-            upper=np.append(upper[self.ranges], inf),
-            base=self._offset_cost + 0.5 * float(least @ least),
+        slack = np.append(_CONSISTENT * self._length * np.hypot(size, self._offset), 0.0)
+        low = self.scaled(np.append(lower[self.ranges], -inf), shift)
+        high = self.scaled(np.append(upper[self.ranges], inf), shift)
+        fits = (low <= slack) & (high >= -slack) | ~self.constant
+        low, high = np.where(self.constant, -inf, low), np.where(self.constant, inf, high)
+        return Bounds(
+            lower=low,
+            upper=high,
+            base=0.5 * (size**2 - self._offset**2),
             shift=shift,
+            slack=slack,
             origin=self._centre + self._from_target @ target,
-            consistent=bool((missed <= _CONSISTENT * max(1.0, np.abs(target).max(initial=0.0))).all()),
-        )
-        return self._scaled(fixed)
-
-    def _scaled(self, bounds: Bounds) -> Bounds:
-        lower = self.scaled(bounds.lower, bounds)
-        upper = self.scaled(bounds.upper, bounds)
-        slack = self.slack(bounds)
-        fits = (lower <= slack) & (upper >= -slack) | ~self.constant
-        return replace(
-            bounds,
-            lower=np.where(self.constant, -UNBOUNDED, lower),
-            upper=np.where(self.constant, UNBOUNDED, upper),
-            consistent=bounds.consistent and bool(fits.all()),
+            size=max(size, low.max(initial=0.0), -high.min(initial=0.0)),
+            consistent=bool(fits.all() and (missed <= _CONSISTENT * np.abs(target).max(initial=0.0)).all()),
         )
 
-    def scaled(self, bound: Array, at: Bounds, rows: Indices | slice = slice(None)) -> Array:
-        """`bound`, of the program's rows, as a bound of M y."""
-        scaled: Array = np.clip((bound - at.shift[rows]) / self.norm[rows], -UNBOUNDED, UNBOUNDED)
+    def scaled(self, bound: Array, shift: Array, rows: Indices | slice = slice(None)) -> Array:
+        """`bound`, of the program's rows, which are `shift` at y = 0, as a bound of M y."""
+        scaled: Array = (bound - shift[rows]) / self.norm[rows]
         return scaled
 
     def lifted(self, at: Bounds, y: Array) -> Array:
         """The variables x of this part at y."""
-        x: Array = at.origin + self.from_free @ y
+        x: Array = at.origin + self.from_free @ (at.unit * y)
         return x
 
-    def slack(self, at: Bounds) -> Array:
-        """How far a row without freedom may miss its bounds, (m + 1,)."""
-        slack: Array = _CONSISTENT * np.maximum(1.0, np.abs(at.shift))
-        return slack
+
+def in_units(bound: Array, unit: float) -> Array:
+    """`bound` / `unit`, infinities as DAQP writes them."""
+    scaled: Array = np.clip(bound / unit, -UNBOUNDED, UNBOUNDED)
+    return scaled
 
 
 def parts(program: AssignmentProgram, rows: Indices) -> tuple[Part, Part]:

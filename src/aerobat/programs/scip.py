@@ -10,9 +10,16 @@ from typing import Any, ClassVar
 import numpy as np
 
 from aerobat.programs.assignment import AssignmentProgram, AssignmentResult, Status, certified
-from aerobat.programs.switches import Switch, chosen_slots, slots_taken, standing_bounds, switches
+from aerobat.programs.switches import (
+    Switch,
+    chosen_slots,
+    conditioned,
+    slots_taken,
+    standing_bounds,
+    switches,
+)
 
-_MEANING: dict[str, Status] = {"optimal": "optimal", "infeasible": "infeasible", "timelimit": "time_limit"}
+_MEANING: dict[str, Status] = {"optimal": "optimal", "infeasible": "infeasible"}
 
 
 @dataclass(frozen=True)
@@ -35,7 +42,8 @@ class Scip:
         model.hideOutput()
         if time_limit is not None:
             model.setParam("limits/time", time_limit)
-        return certified(program, _Run(pyscipopt, model, program).claim())
+        scaled = conditioned(program)
+        return certified(program, scaled.restored(_Run(pyscipopt, model, scaled.program).claim()))
 
 
 class _Run:
@@ -61,10 +69,10 @@ class _Run:
             self._add_switch(switch, binaries[switch.stage, switch.slot])
         self._set_cost()
         model.optimize()
-        status = _MEANING.get(model.getStatus(), "unknown")
+        status = _MEANING.get(model.getStatus(), "time_limit")
         if not model.getNSols():
-            status = status if status == "infeasible" else "unknown"
-            return self._result(status, None, None, inf if status == "infeasible" else -inf)
+            proven = status == "infeasible"
+            return self._result("infeasible" if proven else "unknown", None, None, inf if proven else -inf)
         slots = chosen_slots(program, {key: model.getVal(binary) for key, binary in binaries.items()})
         x = np.array([model.getVal(variable) for variable in self._x])
         return self._result(status, x, slots, model.getDualbound())

@@ -17,7 +17,7 @@ from aerobat.programs.reduction import Bounds, Reduction, parts
 from aerobat.programs.tree import Tree
 
 _MATRICES = ("rows", "equality", "hessian", "gradient")
-_EQUAL = 1e-12  # bounds closer than this, relative to max(1, |bound|), make an equality
+_EQUAL = 1e-12  # bounds closer than this, relative to the larger, make an equality
 _CROSSED = 1e-9  # a lower bound above the upper by more, on the same scale, makes a contradiction
 
 
@@ -51,7 +51,8 @@ class StageSearch:
     ) -> AssignmentResult:
         fixed = {i: stage.slots[0] for i, stage in enumerate(program.stages) if len(stage.slots) == 1}
         lower, upper = program.tightened([fixed.get(i) for i in range(len(program.stages))])
-        scale = np.maximum(1.0, np.abs(np.where(np.isfinite(upper), upper, 0.0)))
+        larger = np.maximum(np.abs(lower), np.abs(upper))
+        scale = np.where(np.isfinite(larger), larger, 0.0)
         if (lower - upper > _CROSSED * scale).any() or not _in_order(program, fixed):
             return _nothing("infeasible", inf)
         pinned = upper - lower <= _EQUAL * scale
@@ -60,6 +61,7 @@ class StageSearch:
         kept = self._kept
         coupled = kept.coupled.bounds(program, lower, upper)
         apart = kept.apart.bounds(program, lower, upper)
+        apart = apart.over(apart.size or 1.0)
         if not (coupled.consistent and apart.consistent):
             return _nothing("infeasible", inf)
         try:
@@ -111,24 +113,27 @@ class _Posed:
         """What a search finds by `deadline`."""
         kept, program = self.kept, self.program
         placed = kept.placements.bounds(program, kept.coupled, self.coupled)
-        tree = Tree(kept.placements, placed, kept.solver, self.coupled)
+        unit = max(self.coupled.size, kept.placements.size(placed)) or 1.0
+        coupled = self.coupled.over(unit)
+        tree = Tree(kept.placements, placed.over(unit), kept.solver, coupled)
         if start is not None:
             tree.try_slots({i: slot for i, slot in enumerate(start) if i not in self.fixed})
         tree.search(deadline)
-        base = program.constant + self.coupled.base + self.apart.base + self.alone.value
+        base = program.constant + self.apart.cost(self.alone.value)
+        bound = base + coupled.cost(tree.bound)
         if tree.best is None:
-            return replace(_nothing(tree.status, base + tree.bound), nodes=tree.nodes)
+            return replace(_nothing(tree.status, bound), nodes=tree.nodes)
         point, chosen = tree.best
         x = np.zeros(program.variables)
-        x[kept.coupled.columns] = kept.coupled.lifted(self.coupled, point.y)
+        x[kept.coupled.columns] = kept.coupled.lifted(coupled, point.y)
         x[kept.apart.columns] = kept.apart.lifted(self.apart, self.alone.y)
         slots = self.fixed | {int(kept.placements.stage[p]): int(kept.placements.slot[p]) for p in chosen}
         return AssignmentResult(
             status=tree.status,
             x=x,
             slots=tuple(slots[i] for i in range(len(program.stages))),
-            cost=base + point.value,
-            bound=base + tree.bound,
+            cost=base + coupled.cost(point.value),
+            bound=bound,
             nodes=tree.nodes,
             time=0.0,
             backend=StageSearch.name,

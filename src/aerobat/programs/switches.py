@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+
+import numpy as np
 
 from aerobat.arrays import Array
-from aerobat.programs.assignment import AssignmentProgram
+from aerobat.programs.assignment import AssignmentProgram, AssignmentResult
 
 StageSlot = tuple[int, int]
 
@@ -20,6 +22,54 @@ class Switch:
     row: int
     sign: int  # 1: an upper bound, -1: a lower bound
     bound: float
+
+
+@dataclass(frozen=True, eq=False)
+class Conditioned:
+    """A program with unit rows and variables of order one, since general solvers' tolerances are absolute."""
+
+    program: AssignmentProgram
+    unit: float  # of the variables
+
+    def restored(self, claim: AssignmentResult) -> AssignmentResult:
+        """What a claim says of the program that was conditioned."""
+        x = None if claim.x is None else self.unit * claim.x
+        return replace(claim, x=x, bound=self.unit**2 * claim.bound)
+
+
+def conditioned(program: AssignmentProgram) -> Conditioned:
+    """The program for solvers whose tolerances are absolute."""
+    lengths, rows = _unit_rows(program.rows)
+    equality_lengths, equality = _unit_rows(program.equality)
+    target = program.target / equality_lengths
+    lower, upper = (bound / lengths for bound in standing_bounds(program))
+    pinned = lower == upper
+    known = np.concatenate([target, lower[pinned]])
+    least = np.linalg.lstsq(np.concatenate([equality, rows[pinned]]), known)[0]
+    unit = np.abs(least).max(initial=0.0) or np.maximum(lower, -upper).max(initial=0.0) or 1.0
+    stages = (
+        replace(s, lower=s.lower / (unit * lengths[s.rows]), upper=s.upper / (unit * lengths[s.rows]))
+        for s in program.stages
+    )
+    scaled = replace(
+        program,
+        rows=rows,
+        lower=program.lower / (unit * lengths),
+        upper=program.upper / (unit * lengths),
+        equality=equality,
+        target=target / unit,
+        stages=tuple(stages),
+        gradient=None if program.gradient is None else program.gradient / unit,
+        constant=program.constant / unit**2,
+    )
+    return Conditioned(scaled, float(unit))
+
+
+def _unit_rows(matrix: Array) -> tuple[Array, Array]:
+    """The length of each row, 1 for those that are zero, and the rows divided by it."""
+    lengths = np.linalg.norm(matrix, axis=1)
+    lengths = np.where(lengths > 0.0, lengths, 1.0)
+    return lengths, matrix / lengths[:, None]
 
 
 def standing_bounds(program: AssignmentProgram) -> tuple[Array, Array]:

@@ -12,7 +12,7 @@ PerAxis = Positive | tuple[Positive, Positive, Positive]
 
 
 class _Table(BaseModel):
-    model_config = ConfigDict(extra="forbid", strict=False)
+    model_config = ConfigDict(extra="forbid", defer_build=True)
 
 
 class EndTable(_Table):
@@ -119,7 +119,5 @@ class ProblemTable(_Table):
     start: EndTable
     goal: EndTable
     gate: GateTable | None = None
-    maneuver: Annotated[FlipTable | HalfFlipTable | LineTable | StagesTable, Field(discriminator="kind")] = (
-        LineTable(kind="line")
-    )
+    maneuver: Annotated[FlipTable | HalfFlipTable | LineTable | StagesTable, Field(discriminator="kind")]
     limits: LimitsTable = LimitsTable()

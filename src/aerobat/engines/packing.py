@@ -1,0 +1,92 @@
+"""Between arrays with a last axis of components and the kernels' tuples of components."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from aerobat.arrays import Array
+from aerobat.engines.trees import Tree
+from aerobat.kernels.allocation import Mixer
+from aerobat.kernels.control import Model
+from aerobat.kernels.controller import Controller
+from aerobat.kernels.integrator import Airframe
+from aerobat.kernels.motors import Rotors
+from aerobat.kernels.rigid_body import Body, Inertial
+from aerobat.states import BodyState
+from aerobat.vehicle import Vehicle
+from aerobat.vehicle.allocation import collective_range, mixer
+
+_FREE_ERROR = 0.06  # [rad] of attitude that must not saturate a hovering vehicle's rotors
+_SHORTEST_LAG = 1e-9  # [s] a rotor without lag follows within it
+
+
+def components(array: Array) -> Tree:
+    """(..., n) -> a tuple of n leaves of shape (...)."""
+    return tuple(np.ascontiguousarray(np.moveaxis(array, -1, 0)))
+
+
+def joined(leaves: Tree) -> Array:
+    """n leaves of shape (...) -> (..., n)."""
+    return np.stack(leaves, axis=-1)
+
+
+def bodies(state: BodyState) -> Body:
+    """A state with leaves of components."""
+    return Body(
+        components(state.position),
+        components(state.velocity),
+        components(state.q_world_body),
+        components(state.omega_body),
+    )
+
+
+def body_states(body: Body) -> BodyState:
+    """The inverse of `bodies`."""
+    return BodyState(*(joined(part) for part in body))
+
+
+def airframes(vehicles: Sequence[Vehicle]) -> Airframe:
+    """What the kernels read of vehicles with as many rotors each; leaves (vehicles,)."""
+    inertia = np.array([vehicle.inertia for vehicle in vehicles])
+    inertial = Inertial(
+        np.array([vehicle.mass for vehicle in vehicles]),
+        _matrix(inertia),
+        _matrix(np.linalg.inv(inertia)),
+        components(np.array([vehicle.drag_body for vehicle in vehicles])),
+        np.array([vehicle.gravity for vehicle in vehicles]),
+    )
+    lags = np.array([vehicle.lags for vehicle in vehicles])
+    rotors = Rotors(
+        components(np.array([vehicle.min_thrusts for vehicle in vehicles])),
+        components(np.array([vehicle.max_thrusts for vehicle in vehicles])),
+        components(1.0 / np.maximum(lags, _SHORTEST_LAG)),
+        _matrix(np.array([vehicle.allocation for vehicle in vehicles])),
+    )
+    return Airframe(inertial, rotors)
+
+
+def models(controller: Controller, vehicles: Sequence[Vehicle]) -> Model:
+    """What a controller believes of vehicles with as many rotors each, and its gains; leaves (vehicles,)."""
+    columns = _matrix(np.array([mixer(vehicle).T for vehicle in vehicles]))
+    level = components(np.array([collective_range(vehicle) for vehicle in vehicles]))
+    agility = np.array([_agility(vehicle) for vehicle in vehicles])
+    return Model(airframes(vehicles), Mixer(*columns, *level), controller.gains(agility))
+
+
+def _agility(vehicle: Vehicle) -> float:
+    """The highest frequency [rad/s] of an attitude loop that a vehicle has the rotors for.
+
+    Hovering, they then meet their limits only at larger errors of roll or pitch than the free one.
+    """
+    hover = vehicle.mass * vehicle.gravity * mixer(vehicle)[:, 0]
+    room = np.minimum(hover - vehicle.min_thrusts, vehicle.max_thrusts - hover)
+    torque = np.abs(vehicle.allocation[1:3]) @ room
+    acceleration = torque / np.diag(vehicle.inertia)[:2]
+    return float(np.sqrt(acceleration.min() / _FREE_ERROR))
+
+
+def _matrix(matrices: Array) -> Tree:
+    """(vehicles, rows, columns) -> rows of columns of leaves (vehicles,)."""
+    return tuple(components(row) for row in np.moveaxis(matrices, 1, 0))

@@ -1,0 +1,95 @@
+"""The nonlinear dynamics of a rigid body (paper, eqs. (3) and (4)), and one step of RK4 along them."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from aerobat.kernels.ops import Matrix, Ops, Quaternion, Scalar, Vector
+from aerobat.kernels.vectors import (
+    add_scaled,
+    axes,
+    cross,
+    multiply,
+    normalize,
+    subtract,
+    to_body,
+    to_world,
+    transform,
+)
+
+
+class Body(NamedTuple):
+    """The state of a rigid body, or its time derivative."""
+
+    position: Vector  # [m] world
+    velocity: Vector  # [m/s] world
+    q_world_body: Quaternion
+    omega_body: Vector  # [rad/s] body
+
+
+class Inertial(NamedTuple):
+    """What a rigid body is."""
+
+    mass: Scalar  # [kg]
+    inertia: Matrix  # [kg·m²] body
+    inverse_inertia: Matrix
+    drag_body: Vector  # [kg/s]: force_body = −drag_body ∘ velocity_body
+    gravity: Scalar  # [m/s²]
+
+
+class Load(NamedTuple):
+    """What the rotors do to the body."""
+
+    thrust: Scalar  # [N] along b3
+    moment_body: Vector  # [N·m]
+
+
+def derivative(inertial: Inertial, body: Body, load: Load) -> Body:
+    """The time derivative of a body's state.
+
+    Eq. (3) in the Hamilton convention, body to world: v' = q ⊗ F ⊗ q* / m − g·e3, with the body drag in F.
+    Eq. (4): ω' = J⁻¹ (M − ω × Jω). Attitude: q' = ½ q ⊗ (0, ω).
+    """
+    body_axes = axes(body.q_world_body)
+    u, v, w = to_body(body_axes, body.velocity)
+    dx, dy, dz = inertial.drag_body
+    ax, ay, az = to_world(body_axes, (-dx * u, -dy * v, load.thrust - dz * w))
+    lightness = 1.0 / inertial.mass
+    p, q, r = body.omega_body
+    gyroscopic = cross(body.omega_body, transform(inertial.inertia, body.omega_body))
+    return Body(
+        body.velocity,
+        (ax * lightness, ay * lightness, az * lightness - inertial.gravity),
+        multiply(body.q_world_body, (0.0, 0.5 * p, 0.5 * q, 0.5 * r)),
+        transform(inertial.inverse_inertia, subtract(load.moment_body, gyroscopic)),
+    )
+
+
+def step(ops: Ops, inertial: Inertial, body: Body, loads: tuple[Load, Load, Load], dt: Scalar) -> Body:
+    """The state after `dt` [s] of classical RK4, under the loads at its start, middle and end.
+
+    Of order four if the loads are exact there; the quaternion is normalised once, at the end.
+    """
+    start, middle, end = loads
+    k1 = derivative(inertial, body, start)
+    k2 = derivative(inertial, _along(body, 0.5 * dt, k1), middle)
+    k3 = derivative(inertial, _along(body, 0.5 * dt, k2), middle)
+    k4 = derivative(inertial, _along(body, dt, k3), end)
+    new = Body(
+        *(
+            tuple(x + dt * (a + 2.0 * (b + c) + d) / 6.0 for x, a, b, c, d in zip(*components, strict=True))
+            for components in zip(body, k1, k2, k3, k4, strict=True)
+        )
+    )
+    return new._replace(q_world_body=normalize(ops, new.q_world_body))
+
+
+def _along(body: Body, dt: Scalar, rate: Body) -> Body:
+    w, x, y, z = body.q_world_body
+    dw, dx, dy, dz = rate.q_world_body
+    return Body(
+        add_scaled(body.position, dt, rate.position),
+        add_scaled(body.velocity, dt, rate.velocity),
+        (w + dt * dw, x + dt * dx, y + dt * dy, z + dt * dz),
+        add_scaled(body.omega_body, dt, rate.omega_body),
+    )

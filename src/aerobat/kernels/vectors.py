@@ -1,0 +1,127 @@
+"""Vectors, matrices and quaternions in components; the scalar twins of `aerobat.so3`."""
+
+from __future__ import annotations
+
+from aerobat.kernels.ops import Matrix, Ops, Quaternion, Scalar, Vector
+
+ZERO: Vector = (0.0, 0.0, 0.0)
+_TINY = 1e-300  # keeps 0/0 away and changes no other quotient
+
+
+def add(a: Vector, b: Vector) -> Vector:
+    """a + b."""
+    return a[0] + b[0], a[1] + b[1], a[2] + b[2]
+
+
+def subtract(a: Vector, b: Vector) -> Vector:
+    """a − b."""
+    return a[0] - b[0], a[1] - b[1], a[2] - b[2]
+
+
+def scale(s: Scalar, a: Vector) -> Vector:
+    """s·a."""
+    return s * a[0], s * a[1], s * a[2]
+
+
+def add_scaled(a: Vector, s: Scalar, b: Vector) -> Vector:
+    """a + s·b."""
+    return a[0] + s * b[0], a[1] + s * b[1], a[2] + s * b[2]
+
+
+def dot(a: Vector, b: Vector) -> Scalar:
+    """a · b."""
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+def length(ops: Ops, a: Vector) -> Scalar:
+    """|a|."""
+    return ops.sqrt(dot(a, a))
+
+
+def cross(a: Vector, b: Vector) -> Vector:
+    """a × b."""
+    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
+
+
+def transform(m: Matrix, a: Vector) -> Vector:
+    """The matrix-vector product m·a."""
+    return dot(m[0], a), dot(m[1], a), dot(m[2], a)
+
+
+def within(ops: Ops, a: Vector, longest: Scalar) -> Vector:
+    """`a`, shortened to the length `longest` where it is longer; its direction is kept."""
+    return scale(longest / (ops.maximum(length(ops, a), longest) + _TINY), a)
+
+
+def multiply(p: Quaternion, q: Quaternion) -> Quaternion:
+    """The Hamilton product p ⊗ q."""
+    pw, px, py, pz = p
+    qw, qx, qy, qz = q
+    return (
+        pw * qw - px * qx - py * qy - pz * qz,
+        pw * qx + px * qw + py * qz - pz * qy,
+        pw * qy - px * qz + py * qw + pz * qx,
+        pw * qz + px * qy - py * qx + pz * qw,
+    )
+
+
+def conjugate(q: Quaternion) -> Quaternion:
+    """The inverse rotation q*."""
+    return q[0], -q[1], -q[2], -q[3]
+
+
+def normalize(ops: Ops, q: Quaternion) -> Quaternion:
+    """q / |q|."""
+    w, x, y, z = q
+    inverse = 1.0 / ops.sqrt(w * w + x * x + y * y + z * z)
+    return w * inverse, x * inverse, y * inverse, z * inverse
+
+
+def axes(q: Quaternion) -> tuple[Vector, Vector, Vector]:
+    """The body axes b1, b2, b3 in the world, for q = q_world_body: columns of the rotation matrix."""
+    w, x, y, z = q
+    xx, yy, zz = 2.0 * x * x, 2.0 * y * y, 2.0 * z * z
+    xy, xz, yz = 2.0 * x * y, 2.0 * x * z, 2.0 * y * z
+    wx, wy, wz = 2.0 * w * x, 2.0 * w * y, 2.0 * w * z
+    return (
+        (1.0 - yy - zz, xy + wz, xz - wy),
+        (xy - wz, 1.0 - xx - zz, yz + wx),
+        (xz + wy, yz - wx, 1.0 - xx - yy),
+    )
+
+
+def to_body(body_axes: tuple[Vector, Vector, Vector], a: Vector) -> Vector:
+    """A world vector in body axes, Rᵀ·a."""
+    b1, b2, b3 = body_axes
+    return dot(b1, a), dot(b2, a), dot(b3, a)
+
+
+def to_world(body_axes: tuple[Vector, Vector, Vector], a: Vector) -> Vector:
+    """A body vector in world axes, R·a."""
+    b1, b2, b3 = body_axes
+    return add_scaled(add_scaled(scale(a[0], b1), a[1], b2), a[2], b3)
+
+
+def thrust_axis(q: Quaternion) -> Vector:
+    """The body's z axis in the world, b3."""
+    w, x, y, z = q
+    return 2.0 * (x * z + w * y), 2.0 * (y * z - w * x), 1.0 - 2.0 * (x * x + y * y)
+
+
+def smallest_rotation(ops: Ops, a: Vector, b: Vector, normal: Vector) -> Quaternion:
+    """The smallest rotation that takes unit vector a to unit vector b.
+
+    Opposite vectors leave its axis open: the half turn about `normal`, a unit vector normal to a, is taken.
+    """
+    # half-way vector h = (a + b)/|a + b|: q = (a·h, a × h), accurate for all angles but exactly π
+    h = add(a, b)
+    square = dot(h, h)
+    opposite = square < 1e-24
+    shrink = 1.0 / ops.sqrt(ops.select(opposite, 1.0, square))
+    x, y, z = cross(a, h)
+    return (
+        ops.select(opposite, 0.0, dot(a, h) * shrink),
+        ops.select(opposite, normal[0], x * shrink),
+        ops.select(opposite, normal[1], y * shrink),
+        ops.select(opposite, normal[2], z * shrink),
+    )

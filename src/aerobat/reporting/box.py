@@ -1,0 +1,159 @@
+"""The room around a scene: floor, two back walls, and scales along its edges."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from aerobat.arrays import Array
+from aerobat.reporting.camera import Camera
+from aerobat.reporting.canvas import size_of
+from aerobat.reporting.scene import Shape, paint
+from aerobat.reporting.style import HAIR, NORMAL, PAPER, SMALL
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+LEAST_SIDE = np.array([0.35, 0.35, 0.12])  # of a room, relative to its longest
+ROUND = np.array([1.0, 2.0, 5.0])
+MARGIN = 0.5  # [in] for the scales around a room
+NUMBERS = 0.15  # [in] from an edge to the numbers along it
+NAMES = np.array([0.3, 0.2])  # [in] from the numbers to the axis' name, to the side and up or down
+LEAST_PITCH = 0.26  # [in] between the numbers of a scale
+
+
+@dataclass(frozen=True, eq=False)
+class Room:
+    """An upright box around everything in a scene."""
+
+    lower: Array  # [m], (3,)
+    upper: Array  # [m], (3,)
+
+    @property
+    def corners(self) -> Array:
+        """All eight corners [m], (8, 3)."""
+        grid = np.meshgrid(*np.stack([self.lower, self.upper], axis=1), indexing="ij")
+        return np.stack(grid, axis=-1).reshape(-1, 3)
+
+    def ticks(self, axis: int) -> Array:
+        """Round numbers along an axis [m], as dense as on the longest one where at least two fit."""
+        lengths = self.upper - self.lower
+        step = min(round_step(lengths.max() / 5.0), round_step(lengths[axis] / 2.5))
+        first = np.ceil(self.lower[axis] / step - 1e-9)
+        last = np.floor(self.upper[axis] / step + 1e-9)
+        return np.arange(first, last + 1) * step + 0.0  # no minus zero
+
+    def front(self, camera: Camera) -> Array:
+        """The coordinates of the sides that face the viewer [m], (3,)."""
+        return np.where(camera.toward > 0, self.upper, self.lower)
+
+    def back(self, camera: Camera) -> Array:
+        """The coordinates of the sides behind the scene [m], (3,)."""
+        return np.where(camera.toward > 0, self.lower, self.upper)
+
+
+def room_around(points: Array, pad: float) -> Room:
+    """The room around points (n, 3), `pad` [m] wider, and no side much shorter than the longest."""
+    lower, upper = points.min(axis=0) - pad, points.max(axis=0) + pad
+    short = np.maximum(LEAST_SIDE * (upper - lower).max() - (upper - lower), 0.0)
+    share = np.array([0.5, 0.5, 0.0])  # the floor stays right below
+    return Room(lower - share * short, upper + (1.0 - share) * short)
+
+
+def round_step(length: float) -> float:
+    """The largest of 1, 2, 5, 10, ... (and their tenths) that is not above `length`."""
+    decade = 10.0 ** np.floor(np.log10(length))
+    return float(decade * ROUND[ROUND * decade <= length * (1 + 1e-9)].max())
+
+
+def draw_room(axes: Axes, room: Room, camera: Camera) -> None:
+    """Draw floor, walls and scales, and fit the axes to them with their aspect kept."""
+    per_metre = _fit(axes, room, camera)
+    paint(axes, _walls(room, camera), camera, zorder=1.0)
+    for axis in range(3):
+        _scale(axes, room, camera, axis, per_metre)
+
+
+def _fit(axes: Axes, room: Room, camera: Camera) -> float:
+    """Centre the room in the axes and return the scale [in/m]."""
+    picture = camera.project(room.corners)
+    low, high = picture.min(axis=0), picture.max(axis=0)
+    size = size_of(axes)
+    per_metre = float(((size - 2 * MARGIN) / (high - low)).min())
+    centre, half = (low + high) / 2, size / per_metre / 2
+    axes.set(xlim=(centre[0] - half[0], centre[0] + half[0]), ylim=(centre[1] - half[1], centre[1] + half[1]))
+    axes.set_axis_off()
+    return per_metre
+
+
+def _walls(room: Room, camera: Camera) -> list[Shape]:
+    """Floor and back walls with the lines of their grids."""
+    back = room.back(camera)
+    back[2] = room.lower[2]
+    shapes, lines = [], []
+    for normal in range(3):
+        first, second = (axis for axis in range(3) if axis != normal)
+        shapes.append(Shape(_rectangle(room, normal, back[normal]), face=PAPER if normal == 2 else "#fbfcfd"))
+        for along, across in ((first, second), (second, first)):
+            for tick in room.ticks(across):
+                ends = np.tile(back, (2, 1))
+                ends[:, along] = room.lower[along], room.upper[along]
+                ends[:, across] = tick
+                lines.append(Shape(ends, edge=HAIR, width=0.7, raised=1e3))
+    return shapes + lines
+
+
+def _rectangle(room: Room, normal: int, level: float) -> Array:
+    first, second = (axis for axis in range(3) if axis != normal)
+    points = np.full((4, 3), level)
+    points[:, first] = np.array([room.lower, room.upper, room.upper, room.lower])[:, first]
+    points[:, second] = np.array([room.lower, room.lower, room.upper, room.upper])[:, second]
+    return points
+
+
+def _scale(axes: Axes, room: Room, camera: Camera, axis: int, per_metre: float) -> None:
+    """Numbers and the axis' name along one edge of the room."""
+    edge, outward = _edge(room, camera, axis)
+    ticks = room.ticks(axis)
+    points = np.tile(edge, (len(ticks), 1))
+    points[:, axis] = ticks
+    places = camera.project(points)
+    if len(ticks) > 1:
+        pitch = max(float(np.linalg.norm(places[1] - places[0])) * per_metre, 1e-6)  # an axis seen end-on
+        keep = slice(None, None, max(1, int(np.ceil(LEAST_PITCH / pitch))))
+        places, ticks = places[keep], ticks[keep]
+    for place, tick in zip(places + NUMBERS * outward / per_metre, ticks, strict=True):
+        axes.text(place[0], place[1], f"{tick:g}", size=SMALL, ha="center", va="center")
+    place = camera.project(_name_point(room, edge, axis))
+    if axis == 2:
+        place = place + np.array([-NUMBERS, NUMBERS]) / per_metre
+    else:
+        place = place + (NUMBERS + NAMES) * outward / per_metre
+    axes.text(place[0], place[1], f"{'xyz'[axis]} [m]", size=NORMAL, ha="center", va="center")
+
+
+def _name_point(room: Room, edge: Array, axis: int) -> Array:
+    """Where on an edge the axis' name stands: at the top of the upright one, half-way along the others."""
+    point = edge.copy()
+    point[axis] = room.upper[axis] if axis == 2 else (room.lower[axis] + room.upper[axis]) / 2
+    return point
+
+
+def _edge(room: Room, camera: Camera, axis: int) -> tuple[Array, Array]:
+    """A point of the edge that carries an axis' scale (3,), and the way out of the picture there (2,)."""
+    edge = room.front(camera)
+    edge[2] = room.lower[2]
+    if axis == 2:  # the leftmost of the upright edges
+        sides = [np.array([a, b, 0.0]) for a in _ends(room, 0) for b in _ends(room, 1)]
+        return min(sides, key=lambda side: float(camera.project(side)[0])), np.array([-1.0, 0.0])
+    other = 1 - axis
+    inward = np.zeros(3)
+    inward[other] = np.sign(camera.toward[other])
+    outward = camera.project(inward)
+    return edge, outward / max(float(np.linalg.norm(outward)), 1e-9)
+
+
+def _ends(room: Room, axis: int) -> tuple[float, float]:
+    return float(room.lower[axis]), float(room.upper[axis])

@@ -1,0 +1,87 @@
+"""Orthographic views of the world, and the one from which a maneuver is best seen."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from aerobat.arrays import Array
+from aerobat.specs.gate import Gate
+
+AZIMUTHS = np.deg2rad(np.arange(-180.0, 180.0, 5.0))
+ELEVATIONS = np.deg2rad([20.0, 27.0])
+OBLIQUE = 0.3  # the least horizontal component of a view that looks deep
+CUSTOMARY = np.deg2rad(-60.0)  # where a viewer stands when nothing speaks for another place: x to the right
+
+
+@dataclass(frozen=True)
+class Camera:
+    """A viewer infinitely far away, at an azimuth about +z (from +x) and an elevation [rad]."""
+
+    azimuth: float
+    elevation: float = 0.0
+
+    @property
+    def toward(self) -> Array:
+        """The unit vector from the scene to the viewer, (3,)."""
+        level = np.cos(self.elevation)
+        return np.array([level * np.cos(self.azimuth), level * np.sin(self.azimuth), np.sin(self.elevation)])
+
+    @property
+    def screen(self) -> Array:
+        """The world directions of right and up on the picture, (2, 3)."""
+        right = np.array([-np.sin(self.azimuth), np.cos(self.azimuth), 0.0])
+        return np.array([right, np.cross(self.toward, right)])
+
+    def project(self, points: Array) -> Array:
+        """Where world points [m] come to lie on the picture [m], (..., 3) -> (..., 2)."""
+        return np.asarray(points @ self.screen.T)
+
+    def nearness(self, points: Array) -> Array:
+        """How far toward the viewer points lie [m], (..., 3) -> (...)."""
+        return np.asarray(points @ self.toward)
+
+
+def best_view(path: Array, gate: Gate | None, room: Array, size: Array) -> Camera:
+    """The view in which a path (T, 3) spreads widest and the gate's opening is seen, not its edge.
+
+    It fits the corners of a room (8, 3) into a picture of `size` (2,). Of views that show both as well, the
+    one in which the path leads to the right, then the customary one.
+    """
+    cameras = [Camera(float(a), float(e)) for a in AZIMUTHS for e in ELEVATIONS]
+    scores = _spread(path, room, size, cameras)
+    scores *= _openness(gate, cameras) * _depth(cameras) * _custom(path, cameras)
+    return cameras[int(np.argmax(scores))]
+
+
+def _spread(path: Array, room: Array, size: Array, cameras: list[Camera]) -> Array:
+    """The area over which the path spreads in each picture, (cameras,)."""
+    covariance = np.cov(path.T)
+    covariance = covariance + 1e-3 * (np.trace(covariance) + 1e-9) * np.eye(3)  # a straight path spreads too
+    screens = np.array([camera.screen for camera in cameras])
+    areas = np.sqrt(np.linalg.det(screens @ covariance @ np.swapaxes(screens, -1, -2)))
+    scales = (size / np.ptp(room @ np.swapaxes(screens, -1, -2), axis=1)).min(axis=1)
+    return np.asarray(areas * scales**2)
+
+
+def _openness(gate: Gate | None, cameras: list[Camera]) -> Array:
+    """How open the gate looks, (cameras,); the root lets the path weigh more than the gate."""
+    if gate is None:
+        return np.ones(len(cameras))
+    return np.sqrt(np.abs([camera.toward @ gate.normal for camera in cameras]))
+
+
+def _depth(cameras: list[Camera]) -> Array:
+    """Views straight along a horizontal axis look flat, (cameras,)."""
+    sideways = [np.abs(camera.toward[:2]).min() for camera in cameras]
+    return np.asarray(np.minimum(np.array(sideways) / OBLIQUE, 1.0) ** 0.5)
+
+
+def _custom(path: Array, cameras: list[Camera]) -> Array:
+    """Small preferences among equals, (cameras,)."""
+    travel = path[-1] - path[0]
+    travel = travel / max(float(np.linalg.norm(travel)), 1.0)
+    onward = np.array([camera.screen[0] @ travel for camera in cameras])
+    customary = np.cos([camera.azimuth - CUSTOMARY for camera in cameras])
+    return np.asarray(1.0 + 0.15 * onward + 0.02 * customary)

@@ -1,0 +1,120 @@
+"""What scenes are made of: vehicles in their attitudes, gates as frames around their openings."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from aerobat import so3
+from aerobat.arrays import Array
+from aerobat.reporting.camera import Camera
+from aerobat.reporting.scene import Colour, Shape
+from aerobat.reporting.style import BLUE, FAINT, INK, RED, YELLOW
+from aerobat.specs.gate import Gate
+from aerobat.vehicle import Vehicle
+
+TURN = np.linspace(0.0, 2.0 * np.pi, 19)
+CIRCLE = np.stack([np.cos(TURN), np.sin(TURN), np.zeros_like(TURN)], axis=-1)
+AXIS = 0.45  # the length of a drawn thrust axis, as a share of the vehicle's span
+FRAME = 0.12  # the thickness of a gate's bars, as a share of the opening's shorter side
+EDGE_ON = 0.2  # a gate whose normal is this square to the view is seen edge-on
+MAST = 0.35  # the height of a rotor above its arm, as a share of the rotor's radius
+LIGHT = np.array([0.3, -0.5, 0.81])  # where light comes from in shaded pictures
+SHADES = {YELLOW: ("#8f6a12", "#f0c964")}  # darkest and lightest side of a bar
+STEPS = (1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0, 15.0, 20.0, 30.0, 50.0, 100.0)
+
+
+def span(vehicle: Vehicle) -> float:
+    """The largest distance between rotor tips through the centre [m]."""
+    return 2.0 * max(float(np.linalg.norm(r.position_body[:2])) + r.radius for r in vehicle.rotors)
+
+
+def enlargement(vehicle: Vehicle, size: float) -> float:
+    """The round factor by which a vehicle is drawn larger than it is, to span about `size` [m]."""
+    return min((step for step in STEPS if step * span(vehicle) >= 0.85 * size), default=STEPS[-1])
+
+
+def vehicle_shapes(
+    vehicle: Vehicle, position: Array, q_world_body: Array, scale: float, tint: str = INK, weight: float = 1.0
+) -> list[Shape]:
+    """A vehicle at a position (3,) in an attitude (4,): arms and masts, then a disc for each rotor."""
+    shapes, discs = [], []
+    for rotor in vehicle.rotors:
+        top = rotor.position_body + np.array([0.0, 0.0, MAST * rotor.radius])
+        arm = np.array([[0.0, 0.0, 0.0], rotor.position_body, top])
+        disc = top + rotor.radius * CIRCLE
+        arm, disc = (position + scale * so3.rotate(q_world_body, part) for part in (arm, disc))
+        shapes.append(Shape(arm, edge=INK, width=1.3 * weight))
+        discs.append(Shape(disc, face=(tint, 0.35), edge=(tint, 0.95), width=0.7 * weight))
+    return shapes + discs
+
+
+def thrust_axis_shape(vehicle: Vehicle, position: Array, q_world_body: Array, scale: float) -> Shape:
+    """A line from a vehicle along its thrust axis."""
+    tip = position + AXIS * scale * span(vehicle) * so3.thrust_axis(q_world_body)
+    return Shape(np.array([position, tip]), edge=INK, width=0.9)
+
+
+def side_tint(q_world_body: Array, camera: Camera) -> str:
+    """Blue for a vehicle seen from above, red for one seen from below: upright tells from inverted."""
+    return BLUE if float(so3.thrust_axis(q_world_body) @ camera.toward) >= 0.0 else RED
+
+
+def gate_bars(gate: Gate) -> list[Array]:
+    """The four bars of a gate's frame, each the corners of its faces [m], (4 faces, 4, 3).
+
+    The inner edges of the frame are the opening, `Gate.corners`; the bars lie outside it and are as deep
+    as they are thick, half before the gate's plane and half behind.
+    """
+    thickness = FRAME * min(gate.width, gate.height)
+    inner = gate.corners
+    sides = np.sign((inner - gate.position) @ np.array([gate.lateral, gate.up]).T)
+    outer = inner + thickness * sides @ np.array([gate.lateral, gate.up])
+    depth = gate.normal * thickness / 2
+    bars = []
+    for a, b in ((0, 1), (1, 2), (2, 3), (3, 0)):
+        section = [(inner, depth), (outer, depth), (outer, -depth), (inner, -depth)]
+        rims = [np.array([ring[a] + shift, ring[b] + shift]) for ring, shift in section]
+        faces = zip(rims, [*rims[1:], rims[0]], strict=True)
+        bars.append(np.array([[*first, *second[::-1]] for first, second in faces]))
+    return bars
+
+
+def gate_shapes(gate: Gate) -> list[Shape]:
+    """A gate as a shaded frame around its opening."""
+    return [
+        Shape(face, face=_shade(face), edge=_shade(face), width=0.4)
+        for bar in gate_bars(gate)
+        for face in bar
+    ]
+
+
+def gate_section(gate: Gate, camera: Camera) -> list[Shape]:
+    """A gate as `gate_shapes`; seen along its own plane, bars that would close the opening are pale."""
+    if abs(float(gate.normal @ camera.toward)) > EDGE_ON:
+        return gate_shapes(gate)
+    shapes = []
+    for bar in gate_bars(gate):
+        ends = bar[0, 1] - bar[0, 0]
+        across = float(np.linalg.norm(camera.project(ends))) > 0.5 * float(np.linalg.norm(ends))
+        shapes += [Shape(face, face=(YELLOW, 0.12) if across else _shade(face)) for face in bar]
+    return sorted(shapes, key=lambda shape: isinstance(shape.face, str))
+
+
+def _shade(face: Array) -> Colour:
+    """The colour of a face (4, 3) in the scene's light."""
+    from matplotlib.colors import to_hex, to_rgb
+
+    normal = np.cross(face[1] - face[0], face[3] - face[0])
+    light = abs(float(normal @ LIGHT)) / max(float(np.linalg.norm(normal)), 1e-12)
+    dark, bright = (np.array(to_rgb(c)) for c in SHADES[YELLOW])
+    return to_hex(dark + min(light, 1.0) * (bright - dark))
+
+
+def shadow(points: Array, floor: float) -> Array:
+    """Points straight below on the floor [m], (..., 3)."""
+    return np.concatenate([points[..., :2], np.full((*points.shape[:-1], 1), floor)], axis=-1)
+
+
+def drop_line(point: Array, floor: float) -> Shape:
+    """A thin line from a point down to the floor."""
+    return Shape(np.array([point, shadow(point, floor)]), edge=FAINT, width=0.7)

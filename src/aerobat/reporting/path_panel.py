@@ -1,0 +1,127 @@
+"""The path in space with the vehicle's attitude along it (paper, Fig. 5, upper part)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from aerobat.arrays import Array
+from aerobat.reporting.box import draw_room, room_around
+from aerobat.reporting.camera import Camera, best_view
+from aerobat.reporting.canvas import HEADING, legend, size_of
+from aerobat.reporting.glyphs import (
+    drop_line,
+    enlargement,
+    gate_bars,
+    gate_shapes,
+    shadow,
+    side_tint,
+    span,
+    thrust_axis_shape,
+    vehicle_shapes,
+)
+from aerobat.reporting.motion import Motion
+from aerobat.reporting.scene import Shape, paint, polyline
+from aerobat.reporting.style import BAND, BLUE, HAIR, INK, RED
+from aerobat.specs.gate import Gate
+from aerobat.vehicle import Vehicle
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+POSES = 20  # time steps at which the vehicle is drawn, fewer where it would cover itself
+SIZE = 0.085  # of the vehicle as drawn, relative to the path's extent
+BELOW = 0.06  # by which a planned path is painted under a flown one, likewise
+FLOWN_WIDTH, PLANNED_WIDTH = 1.3, 4.0  # [pt]
+ALONE_WIDTH = 1.6  # [pt] of a planned path that nobody flew
+
+
+def draw_path(
+    axes: Axes, planned: Motion, flown: Sequence[Motion], vehicle: Vehicle, gate: Gate | None
+) -> str:
+    """Draw planned and flown paths, the first vehicle along its path, the gate, start and end.
+
+    Returns a note on how the vehicle is drawn.
+    """
+    scale = enlargement(vehicle, SIZE * planned.extent)
+    reach = scale * span(vehicle)
+    room = room_around(_everything(planned, flown, gate), 0.6 * reach)
+    camera = best_view(planned.path, gate, room.corners, size_of(axes))
+    draw_room(axes, room, camera)
+    poses = flown[0] if flown else planned
+    samples, step = pose_samples(poses, reach, gate)
+    shapes = [
+        *_paths(planned, flown, float(room.lower[2])),
+        *_gate(gate, float(room.lower[2])),
+        *(shape for k in samples for shape in _pose(vehicle, poses, k, camera, scale)),
+    ]
+    paint(axes, shapes, camera)
+    _mark_ends(axes, camera.project(planned.position[[0, -1]]), bool(flown))
+    size = "" if scale == 1.0 else f", {scale:g} times its size"
+    return f"vehicle every {step:.2f} s{size}; blue seen from above, red from below"
+
+
+def pose_samples(motion: Motion, size: float, gate: Gate | None) -> tuple[list[int], float]:
+    """At which samples to draw the vehicle: equal steps of time [s], one of them in the gate.
+
+    Those at which it would cover one already drawn are left out.
+    """
+    step = float(np.ptp(motion.times)) / POSES
+    passage = motion.passage(gate)
+    asked = np.arange(passage % step, motion.times[-1] + 1e-9, step)
+    kept = [int(np.abs(motion.times - passage).argmin())]
+    for k in np.searchsorted(motion.times, asked - 1e-9).clip(0, len(motion.times) - 1).tolist():
+        if np.linalg.norm(motion.position[kept] - motion.position[k], axis=-1).min() > 0.5 * size:
+            kept.append(k)
+    return sorted(kept), step
+
+
+def _pose(vehicle: Vehicle, motion: Motion, k: int, camera: Camera, scale: float) -> list[Shape]:
+    q = motion.q_world_body[k]
+    position, tint = motion.position[k], side_tint(q, camera)
+    axis = thrust_axis_shape(vehicle, position, q, scale)
+    return [axis, *vehicle_shapes(vehicle, position, q, scale, tint)]
+
+
+def _paths(planned: Motion, flown: Sequence[Motion], floor: float) -> list[Shape]:
+    """The planned path as a band with its shadow, the flown one as a line on it, many as thin lines."""
+    course = planned.path
+    shapes = [Shape(shadow(course, floor), edge=HAIR, width=3.0, raised=-1e3)]
+    width = PLANNED_WIDTH if flown else ALONE_WIDTH
+    shapes += polyline(course, BAND, width, raised=-BELOW * planned.extent)
+    if len(flown) == 1:
+        return shapes + polyline(flown[0].path, INK, FLOWN_WIDTH)
+    opacity = max(0.08, len(flown) ** -0.5) if flown else 1.0
+    return shapes + [s for motion in flown for s in polyline(motion.path, (INK, opacity), 0.6, piece=16)]
+
+
+def _gate(gate: Gate | None, floor: float) -> list[Shape]:
+    """The gate, with a line down to the floor from the middle of its lower edge."""
+    if gate is None:
+        return []
+    lowest = np.sort(gate.corners[:, 2])[:2].mean()
+    foot = gate.position + np.array([0.0, 0.0, lowest - gate.position[2]])
+    return [*gate_shapes(gate), drop_line(foot, floor)]
+
+
+def _everything(planned: Motion, flown: Sequence[Motion], gate: Gate | None) -> Array:
+    """All that the room has to hold, (n, 3)."""
+    points = [planned.path, *(motion.path for motion in flown)]
+    if gate is not None:
+        points.append(np.concatenate(gate_bars(gate)).reshape(-1, 3))
+    return np.concatenate(points)
+
+
+def _mark_ends(axes: Axes, places: Array, flown: bool) -> None:
+    """The end as a red disc, the start as a smaller blue one: both show where they coincide; and a legend."""
+    axes.plot([], [], color=BAND, linewidth=PLANNED_WIDTH if flown else ALONE_WIDTH, label="planned")
+    if flown:
+        axes.plot([], [], color=INK, linewidth=FLOWN_WIDTH, label="flown")
+    for place, colour, size, name in ((places[0], BLUE, 5.5, "start"), (places[1], RED, 10.0, "end")):
+        axes.plot(
+            *place[:, None], "o", color=colour, mec="white", mew=0.8, markersize=size, label=name,
+            zorder=6.0 - 0.1 * size,
+        )  # fmt: skip
+    legend(axes, above=HEADING)

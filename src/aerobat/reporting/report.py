@@ -1,0 +1,69 @@
+"""The report: a plan and its flight as plain data, the same facts for machines and for people."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+from aerobat.metrics import Score
+from aerobat.planning import Plan
+from aerobat.storage import whole_file
+
+
+def report(plan: Plan, score: Score | None = None, vehicle: str | None = None) -> dict[str, Any]:
+    """What report.json holds; units are in the keys. `flight` is missing when nothing was flown."""
+    facts: dict[str, Any] = {
+        "problem": plan.problem.name,
+        "vehicle": vehicle or plan.vehicle,
+        "plan": _plan(plan),
+    }
+    if score is not None:
+        facts["flight"] = asdict(score)
+    return facts
+
+
+def write_report(facts: dict[str, Any], path: str | Path) -> None:
+    """Write the report as JSON, whole or not at all."""
+    with whole_file(path) as temporary:
+        temporary.write_text(to_json(facts) + "\n", encoding="utf-8")
+
+
+def to_json(facts: dict[str, Any]) -> str:
+    """The report as JSON text."""
+    return json.dumps(facts, indent=2, ensure_ascii=False, allow_nan=False)
+
+
+def _plan(plan: Plan) -> dict[str, Any]:
+    margin = plan.margin
+    return {
+        "planner": plan.planner,
+        "order": plan.order,
+        "intervals": plan.intervals,
+        "dt_s": plan.dt,
+        "duration_s": plan.duration,
+        "cost": plan.cost,
+        "gap": plan.gap,
+        "backend": plan.backend,
+        "nodes": plan.nodes,
+        "solve_time_s": plan.solve_time,
+        "stages": [{"name": s.name, "interval": s.interval, "time_s": s.time} for s in plan.stages],
+        "attempts": [
+            {
+                "dt_s": a.dt,
+                "duration_s": a.duration,
+                "feasible": a.feasible,
+                "outcome": a.outcome,
+                "cost": a.cost,
+                "nodes": a.nodes,
+                "solve_time_s": a.solve_time,
+            }
+            for a in plan.attempts
+        ],
+        "min_rotor_thrust_n": margin and margin.min_thrust,
+        "max_rotor_thrust_n": margin and margin.max_thrust,
+        "rotor_margin_n": margin and margin.margin,
+        "bounded_moments": None if margin is None else margin.bounded_moments,
+        "rotor_feasible": None if margin is None else margin.feasible and margin.bounded_moments,
+    }

@@ -1,0 +1,60 @@
+"""A small 3D painter: flat shapes in the world, drawn far ones first, as one matplotlib collection."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from aerobat.arrays import Array
+from aerobat.reporting.camera import Camera
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.collections import PolyCollection
+
+Colour = str | tuple[str, float]  # a name, or a name and its opacity
+NOTHING = "none"
+
+
+@dataclass(frozen=True, eq=False)
+class Shape:
+    """A flat polygon, or a line when it has no face."""
+
+    points: Array  # [m] world, (n, 3)
+    face: Colour = NOTHING
+    edge: Colour = NOTHING
+    width: float = 0.0  # [pt] of the edge
+    raised: float = 0.0  # [m] toward the viewer, for the order of painting only
+
+
+def polyline(points: Array, edge: Colour, width: float, raised: float = 0.0, piece: int = 4) -> list[Shape]:
+    """A line (T, 3) in short pieces, so that it can pass behind one thing and before another."""
+    starts = range(0, len(points) - 1, piece)
+    return [Shape(points[k : k + piece + 1], edge=edge, width=width, raised=raised) for k in starts]
+
+
+def paint(axes: Axes, shapes: Sequence[Shape], camera: Camera, zorder: float = 2.0) -> PolyCollection:
+    """Add shapes to axes whose data coordinates are the camera's picture [m]."""
+    from matplotlib.collections import PolyCollection
+
+    counts = np.array([len(shape.points) for shape in shapes])
+    points = np.concatenate([shape.points for shape in shapes])
+    starts = np.concatenate([[0], np.cumsum(counts)[:-1]])
+    nearness = np.add.reduceat(camera.nearness(points), starts) / counts
+    order = np.argsort(nearness + [shape.raised for shape in shapes], kind="stable")
+    outlines = np.split(camera.project(points), starts[1:])
+    collection = PolyCollection(
+        [outlines[k] for k in order],
+        closed=False,
+        facecolors=[shapes[k].face for k in order],
+        edgecolors=[shapes[k].edge for k in order],
+        linewidths=[shapes[k].width for k in order],
+        capstyle="round",
+        joinstyle="round",
+        zorder=zorder,
+    )
+    axes.add_collection(collection, autolim=False)
+    return collection

@@ -1,0 +1,171 @@
+"""The attitudes of a maneuver's stages, in the plane of the turn (paper, Fig. 3)."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from aerobat.arrays import Array
+from aerobat.planning import Plan
+from aerobat.reporting.camera import Camera
+from aerobat.reporting.canvas import size_of
+from aerobat.reporting.glyphs import enlargement, gate_section, span, vehicle_shapes
+from aerobat.reporting.scene import Shape, paint
+from aerobat.reporting.spreading import spread_out
+from aerobat.reporting.style import BAND, BLUE, FAINT, INK, MUTED, NORMAL, RED, SMALL
+from aerobat.reporting.turn import Moment, Snapshots, TurnPlane, snapshots, turn_plane
+from aerobat.vehicle import Vehicle
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+ARROW = 1.0  # [in] the longest arrow
+KEY = 0.4  # [in] the longest key arrow
+KEY_HEIGHT = 0.38  # [in] of the keys above the axes
+VEHICLE = 0.6  # [in] a vehicle, about
+COLUMN = 0.62  # [in] kept free for names on either side of a tall panel
+ROW = 0.5  # [in] kept free for names at the foot of a wide panel
+# [in] from a hair line's end to the text, for each alignment of it
+GAPS = {"right": np.array([-0.04, 0.0]), "left": np.array([0.04, 0.0]), "center": np.array([0.0, -0.04])}
+COMPONENTS = np.eye(2)  # lateral, vertical
+PITCH_UP, PITCH_ACROSS = 0.5, 0.55  # [in] between names
+KEYS = np.array([0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0])  # [m/s²] that a key may show
+
+
+def draw_stages(axes: Axes, plan: Plan, vehicle: Vehicle) -> str:
+    """Draw the stages in the plane of the turn; return a note on what is shown."""
+    shots = snapshots(plan, vehicle)
+    plane, gate = turn_plane(plan, shots.thrust), plan.problem.gate
+    camera = plane.camera
+    frame = camera.project(np.concatenate([shots.position, *([] if gate is None else [gate.corners])]))
+    inches = _fit(axes, frame, VEHICLE, span(vehicle))  # per metre
+    scale = enlargement(vehicle, VEHICLE / inches)
+    shots = shots.only(_apart(shots, camera, 0.85 * scale * span(vehicle)))
+    places, thrust = camera.project(shots.position), camera.project(shots.thrust)
+    arrow = ARROW / max(float(np.abs(thrust).max()), 1e-9)  # [in] per m/s²
+    tips = places + thrust * arrow / inches
+    inches = _fit(axes, np.concatenate([frame, tips]), 0.6 * inches * scale * span(vehicle), span(vehicle))
+    axes.set(xlabel=plane.label, ylabel="z [m]")
+    path = plan.trajectory.evaluate(np.linspace(0.0, plan.duration, 241))
+    axes.plot(*camera.project(path).T, color=BAND, linewidth=1.6)
+    if gate is not None:
+        paint(axes, gate_section(gate, camera), camera, zorder=1.5)
+    paint(axes, _vehicles(vehicle, shots, scale), camera, zorder=2.2)
+    _draw_sums(axes, places, thrust * arrow / inches)
+    _draw_components(axes, places, thrust * arrow, arrow, plane)
+    _draw_names(axes, shots.moments, places, thrust, 0.55 * scale * span(vehicle))
+    size = "" if scale == 1.0 else f"; vehicle {scale:g} times its size"
+    return ("a stage holds at the end of interval n" if plan.stages else "equal steps of time") + size
+
+
+def _apart(shots: Snapshots, camera: Camera, distance: float) -> list[int]:
+    """The stages, and of the steps of time between them those that are drawn clear of all others."""
+    places = camera.project(shots.position)
+    kept = [k for k, moment in enumerate(shots.moments) if moment.interval is not None]
+    for k in range(len(places)):
+        if k not in kept and all(np.linalg.norm(places[i] - places[k]) > distance for i in kept):
+            kept.append(k)
+    return sorted(kept)
+
+
+def _fit(axes: Axes, points: Array, pad: float, least: float) -> float:
+    """Fit points (n, 2) [m], `pad` [in] around, and names beside them; return both axes' scale [in/m].
+
+    A side shorter than `least` [m] is shown that long.
+    """
+    size = size_of(axes)
+    left, foot = (COLUMN, 0.0) if size[1] >= size[0] else (0.0, ROW)
+    free = size - (2 * left, foot)
+    low, high = points.min(axis=0), points.max(axis=0)
+    inches = float(((free - np.minimum(2 * pad, 0.5 * free)) / np.maximum(high - low, least)).min())
+    centre, half = (low + high) / 2 - np.array([0.0, foot / 2]) / inches, size / 2 / inches
+    axes.set(xlim=(centre[0] - half[0], centre[0] + half[0]), ylim=(centre[1] - half[1], centre[1] + half[1]))
+    return inches
+
+
+def _vehicles(vehicle: Vehicle, shots: Snapshots, scale: float) -> list[Shape]:
+    poses = zip(shots.position, shots.q_world_body, strict=True)
+    return [shape for p, q in poses for shape in vehicle_shapes(vehicle, p, q, scale, weight=1.5)]
+
+
+def _draw_sums(axes: Axes, places: Array, sums: Array) -> None:
+    """The thrust in the plane (k, 2) [m] as a line from each vehicle, in a rectangle of its components."""
+    from matplotlib.collections import LineCollection
+
+    tips = places + sums
+    sides = np.concatenate([np.stack([places + sums * part, tips], axis=1) for part in COMPONENTS])
+    for lines, style in (
+        (np.stack([places, tips], axis=1), {"colors": INK, "linewidths": 0.9}),
+        (sides, {"colors": FAINT, "linewidths": 0.8, "linestyles": [(0, (2, 2))]}),
+    ):
+        axes.add_collection(LineCollection(list(lines), zorder=2.1, **style), autolim=False)
+
+
+def _draw_components(axes: Axes, places: Array, arrows: Array, unit: float, plane: TurnPlane) -> None:
+    """The thrust's components (k, 2) [in] as arrows from the vehicles, with keys; 1 m/s² is `unit` long."""
+    size = size_of(axes)
+    key = max(KEYS[KEYS * unit <= KEY], default=KEYS[0])
+    names = (f"$a_{plane.name}$", "$a_z + g$")
+    for part, colour, name, place in zip(COMPONENTS, (BLUE, RED), names, (1.25, 2.8), strict=True):
+        quiver = axes.quiver(
+            *places.T, *(arrows * part).T, color=colour, units="inches", scale_units="inches", angles="uv",
+            scale=1.0, width=0.024, headwidth=4.2, headlength=4.6, headaxislength=4.2, minlength=0, zorder=3,
+        )  # fmt: skip
+        axes.quiverkey(
+            quiver, 1.0 - place / size[0], 1.0 + KEY_HEIGHT / size[1], key * unit, f"{name}  {key:g} m/s²",
+            labelpos="E", labelsep=0.06, labelcolor=INK, fontproperties={"size": SMALL}, coordinates="axes",
+        )  # fmt: skip
+
+
+def _draw_names(axes: Axes, moments: tuple[Moment, ...], places: Array, thrust: Array, clear: float) -> None:
+    """Names, times and intervals beside the vehicles or below them, with a hair line to each."""
+    from matplotlib.collections import LineCollection
+
+    size = size_of(axes)
+    inches = size[0] / float(np.ptp(axes.get_xlim()))  # per metre
+    corner = np.array([axes.get_xlim()[0], axes.get_ylim()[0]])
+    beside = size[1] >= size[0]
+    layout = names_beside if beside else names_below
+    anchors = layout((places - corner) * inches, thrust, size) / inches + corner
+    away = anchors - places
+    reach = np.linalg.norm(away, axis=1, keepdims=True)
+    starts = places + away * np.minimum(clear / np.maximum(reach, 1e-9), 1.0)
+    lines = np.stack([starts, anchors], axis=1)[reach[:, 0] > clear + 0.12 / inches]
+    axes.add_collection(LineCollection(list(lines), colors=FAINT, linewidths=0.7, zorder=2.0), autolim=False)
+    for moment, anchor, direction in zip(moments, anchors, away, strict=True):
+        side = "center" if not beside else "right" if direction[0] < 0 else "left"
+        _write_name(axes, moment, anchor, side)
+
+
+def _write_name(axes: Axes, moment: Moment, anchor: Array, side: str) -> None:
+    """A stage's name in bold over its time and interval; a step of time has its time only."""
+    x, y = anchor + GAPS[side] / size_of(axes) * [np.ptp(axes.get_xlim()), np.ptp(axes.get_ylim())]
+    below = side == "center"
+    if moment.interval is None:
+        up = "top" if below else "center"
+        axes.text(x, y, f"{moment.time:.2f} s", size=SMALL, color=MUTED, ha=side, va=up)
+        return
+    axes.text(x, y, moment.name, size=NORMAL, weight="bold", ha=side, va="top" if below else "bottom")
+    facts = f"{moment.time:.2f} s\nn = {moment.interval}"
+    axes.text(x, y, "\n" * below + facts, size=SMALL, color=MUTED, linespacing=1.15, ha=side, va="top")
+
+
+def names_beside(places: Array, thrust: Array, size: Array) -> Array:
+    """Where names go in columns left and right of a picture, each on the side its thrust points away from.
+
+    All in inches from the lower left corner of a picture of `size` (2,); (k, 2) -> (k, 2).
+    """
+    lateral = np.where(np.abs(thrust[:, 0]) > 0.2 * np.abs(thrust).max(), thrust[:, 0], 0.0)
+    off_centre = places[:, 0] - places[:, 0].mean()
+    left = np.where(lateral == 0.0, off_centre < -1e-3 * size[0], lateral > 0.0)
+    anchors = np.where(left[:, None], [COLUMN, 0.0], [size[0] - COLUMN, 0.0])
+    for side in (left, ~left):
+        anchors[side, 1] = spread_out(places[side, 1], PITCH_UP, 0.3, size[1] - 0.3)
+    return anchors
+
+
+def names_below(places: Array, thrust: Array, size: Array) -> Array:
+    """Where names go in a row at the foot of a picture, in inches, as in `names_beside`."""
+    across = spread_out(places[:, 0], PITCH_ACROSS, 0.3, size[0] - 0.3)
+    return np.stack([across, np.full_like(across, ROW)], axis=1)

@@ -1,0 +1,82 @@
+"""Short tables for a terminal."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from rich.console import Console
+from rich.table import Table
+
+from aerobat.metrics import Score
+from aerobat.planning import Plan
+from aerobat.specs import Problem
+from aerobat.vehicle import Vehicle
+
+
+def summary_table(plan: Plan, score: Score | None, vehicle: str) -> Table:
+    """The plan and its flight, a fact a row."""
+    table = Table(title=f"{plan.problem.name} · {vehicle}", title_justify="left", show_header=False, box=None)
+    table.add_column(style="bold", no_wrap=True)
+    table.add_column(no_wrap=True)
+    table.add_column()
+    for heading, facts in (("plan", _plan_facts(plan)), ("flight", _flight_facts(score))):
+        for i, (name, fact) in enumerate(facts):
+            table.add_row(heading if i == 0 else "", name, fact)
+    return table
+
+
+def vehicles_table(vehicles: Iterable[Vehicle]) -> Table:
+    """What can fly."""
+    table = Table("vehicle", "mass", "rotors", "thrust/weight", "what it is", box=None, pad_edge=False)
+    for v in vehicles:
+        mass = f"{v.mass:.3g} kg"
+        table.add_row(v.name, mass, str(len(v.rotors)), f"{v.thrust_to_weight:.2f}", v.description)
+    return table
+
+
+def problems_table(problems: Iterable[Problem]) -> Table:
+    """What can be flown."""
+    table = Table("problem", "what it is", box=None, pad_edge=False)
+    for problem in problems:
+        table.add_row(problem.name, problem.description)
+    return table
+
+
+def show(table: Table) -> None:
+    """Print a table to standard output, full width in a pipe."""
+    console = Console()
+    console.print(table, width=None if console.is_terminal else 120)
+
+
+def _plan_facts(plan: Plan) -> Iterable[tuple[str, str]]:
+    yield "planner", f"{plan.planner}, order {plan.order}, {plan.intervals} intervals, {plan.backend}"
+    yield "duration", f"{plan.duration:.3f} s, dt {plan.dt:.4f} s after {len(plan.attempts)} attempts"
+    proven = "optimal" if plan.gap < 1e-6 else f"within {100 * plan.gap:.2g} % of the optimum"
+    yield "cost", f"{plan.cost:.7g}, {proven}"
+    yield "nodes", f"{plan.nodes}, solved in {1000 * plan.solve_time:.0f} ms"
+    if plan.stages:
+        yield "stages", ", ".join(f"{s.name} in {s.interval}" for s in plan.stages) + " (interval)"
+    if plan.margin is not None:
+        yield "rotors", str(plan.margin)
+
+
+def _flight_facts(score: Score | None) -> Iterable[tuple[str, str]]:
+    if score is None:
+        return
+    yield "outcome", score.outcome
+    yield "position error", _pair(100 * score.max_position_error_m, 100 * score.rms_position_error_m, "cm")
+    yield "attitude error", _pair(score.max_attitude_error_deg, score.rms_attitude_error_deg, "°")
+    if score.gate_miss_m is not None:
+        clearance = "" if score.gate_clearance_m is None else f", {100 * score.gate_clearance_m:.0f} cm clear"
+        yield (
+            "gate",
+            (
+                f"{1000 * score.gate_miss_m:.1f} mm off, {score.gate_attitude_error_deg:.2f}° off, "
+                f"at {score.gate_speed_m_s:.2f} m/s{clearance}"
+            ),
+        )
+    yield "saturated", f"{100 * score.saturated_fraction:.1f} % of the time"
+
+
+def _pair(largest: float, rms: float, unit: str) -> str:
+    return f"{largest:.2f} {unit} at most, {rms:.2f} {unit} RMS"

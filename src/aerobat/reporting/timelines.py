@@ -1,0 +1,136 @@
+"""What happens over time: tracking errors, rotor thrusts and limits, specific thrust (paper, Fig. 5)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from aerobat.arrays import Array
+from aerobat.flight import Flight
+from aerobat.metrics import attitude_error, position_error
+from aerobat.planning import PlacedStage, Plan
+from aerobat.reporting.canvas import size_of
+from aerobat.reporting.spreading import spread_out
+from aerobat.reporting.style import BLUE, FAINT, INK, MUTED, RED, SMALL, YELLOW
+from aerobat.reporting.turn import snapshots, turn_plane
+from aerobat.vehicle import Vehicle
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+SPIN_RAMPS = {1: ("#00315f", "#6fa3d4"), -1: ("#8e1730", "#e89aa8")}  # dark to light, by the sense of turning
+LENGTHS = (("m", 1.0), ("cm", 1e-2), ("mm", 1e-3))
+NAME_WIDTH = 0.36  # [in] that a stage's name takes
+
+
+def draw_position_error(axes: Axes, flight: Flight) -> None:
+    """The distance between flown and planned position, in the unit that suits its largest value."""
+    error = position_error(flight)
+    unit, least = next((u for u in LENGTHS if error.max() >= u[1]), LENGTHS[-1])
+    draw_series(axes, flight.times, error / least, INK)
+    axes.set(ylabel=f"position error [{unit}]", ylim=(0.0, _top(error / least, 0.01)))
+
+
+def draw_attitude_error(axes: Axes, flight: Flight) -> None:
+    """The angle between flown and planned attitude."""
+    error = np.rad2deg(attitude_error(flight))
+    draw_series(axes, flight.times, error, INK)
+    axes.set(ylabel="attitude error [°]", ylim=(0.0, _top(error, 0.01)))
+
+
+def draw_rotor_thrusts(axes: Axes, times: Array, thrusts: Array, vehicle: Vehicle) -> None:
+    """Every rotor's thrust (..., T, n) [N], blue or red by its sense of turning, with the limits dashed."""
+    colours = rotor_colours(vehicle)
+    for i, colour in enumerate(colours):
+        draw_series(axes, times, thrusts[..., i], colour, width=1.0, label=f"{i + 1}" if i else "rotor 1")
+    limits = sorted({*vehicle.min_thrusts.tolist(), *vehicle.max_thrusts.tolist()})
+    for limit in limits:
+        label = "limits" if limit == limits[-1] else ""
+        axes.axhline(limit, color=INK, linewidth=0.9, linestyle=(0, (4, 2)), label=label)
+    low = min(float(thrusts.min()), float(vehicle.min_thrusts.min()))
+    high = max(float(thrusts.max()), float(vehicle.max_thrusts.max()))
+    axes.set(ylabel="rotor thrust [N]", ylim=(low - 0.08 * (high - low), high + 0.08 * (high - low)))
+
+
+def rotor_colours(vehicle: Vehicle) -> list[str]:
+    """A colour a rotor: shades of blue for counter-clockwise ones, of red for clockwise ones."""
+    from matplotlib.colors import to_hex, to_rgb
+
+    colours = [""] * len(vehicle.rotors)
+    for spin, (dark, light) in SPIN_RAMPS.items():
+        same = [i for i, rotor in enumerate(vehicle.rotors) if rotor.spin == spin]
+        for share, i in zip(np.linspace(0.0, 1.0, max(len(same), 2)), same, strict=False):
+            colours[i] = to_hex((1 - share) * np.array(to_rgb(dark)) + share * np.array(to_rgb(light)))
+    return colours
+
+
+def draw_specific_thrust(axes: Axes, plan: Plan, vehicle: Vehicle) -> None:
+    """a_z + g and the lateral acceleration in the plane of the turn, with dots at the stages."""
+    plane = turn_plane(plan, snapshots(plan, vehicle).thrust)
+    times = plan.trajectory.sample(200.0)
+    stages = np.array([stage.time for stage in plan.stages])
+    for at, style in ((times, "-"), (stages, "o")):
+        thrust = plan.trajectory.evaluate(at, 2) + np.array([0.0, 0.0, vehicle.gravity])
+        parts = plane.camera.project(thrust)
+        for column, colour, name in ((1, RED, "$a_z + g$"), (0, BLUE, f"$a_{plane.name}$")):
+            label = name if style == "-" else ""
+            axes.plot(at, parts[:, column], style, color=colour, markersize=3.5, label=label)
+    axes.axhline(0.0, color=FAINT, linewidth=0.8)
+    axes.set(ylabel="specific thrust [m/s²]")
+
+
+def draw_series(
+    axes: Axes, times: Array, values: Array, colour: str, width: float = 1.3, label: str = ""
+) -> None:
+    """One line (T,), or a bundle of thin ones (..., T)."""
+    lines = values.reshape(-1, values.shape[-1])
+    if len(lines) == 1:
+        axes.plot(times, lines[0], color=colour, linewidth=width, label=label)
+        return
+    from matplotlib.collections import LineCollection
+
+    opacity = max(0.1, len(lines) ** -0.5)
+    bundle = np.stack([np.broadcast_to(times, lines.shape), lines], axis=-1)
+    axes.add_collection(
+        LineCollection(list(bundle), colors=[(colour, opacity)], linewidths=0.6), autolim=False
+    )
+    axes.plot([], [], color=colour, linewidth=width, label=label)
+
+
+def mark_stages(axes: Axes, stages: Sequence[PlacedStage], duration: float, named: bool) -> None:
+    """Upright lines at the stages' times, the gate's in its colour, with names above the axes if asked."""
+    from matplotlib.collections import LineCollection
+
+    axes.set_xlim(0.0, duration)
+    if not stages:
+        return
+    times = np.array([stage.time for stage in stages])
+    gates = [stage.gate is not None for stage in stages]
+    axes.add_collection(
+        LineCollection(
+            [[(t, 0.0), (t, 1.0)] for t in times],
+            colors=[YELLOW if gate else FAINT for gate in gates],
+            linewidths=[1.8 if gate else 0.8 for gate in gates],
+            transform=axes.get_xaxis_transform(),
+            zorder=1.5,
+        ),
+        autolim=False,
+    )
+    if not named:
+        return
+    width = size_of(axes)[0]
+    places = spread_out(times / duration * width, NAME_WIDTH, 0.0, width) / width * duration
+    for stage, place in zip(stages, places, strict=True):
+        axes.annotate(
+            stage.name, (stage.time, 1.0), (place, 1.0 + 0.1 / size_of(axes)[1]), size=SMALL, ha="center",
+            color=INK if stage.gate is not None else MUTED, xycoords=axes.get_xaxis_transform(),
+            textcoords=axes.get_xaxis_transform(), va="bottom",
+            arrowprops={"arrowstyle": "-", "color": FAINT, "linewidth": 0.7, "shrinkA": 0.0, "shrinkB": 0.0},
+        )  # fmt: skip
+
+
+def _top(values: Array, least: float) -> float:
+    """The upper end of an axis that starts at zero; what is smaller than `least` is noise."""
+    return max(1.12 * float(values.max()), least)

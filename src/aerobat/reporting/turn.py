@@ -1,0 +1,92 @@
+"""What a figure of a maneuver's stages shows: which moments, in which plane, with what thrust."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from aerobat.arrays import Array
+from aerobat.flatness import reference
+from aerobat.planning import Plan
+from aerobat.reporting.camera import Camera
+from aerobat.specs import Flip
+from aerobat.vehicle import Vehicle
+
+FEWEST = 5  # moments shown; where a maneuver has fewer stages, equal steps of time join them
+STEPS = 8
+ROUND_HEADING = 15.0  # [deg]
+
+
+@dataclass(frozen=True)
+class TurnPlane:
+    """The vertical plane in which the specific thrust turns, at a heading [deg] of its horizontal axis."""
+
+    heading_deg: float
+
+    @property
+    def camera(self) -> Camera:
+        """The view straight onto the plane, its horizontal axis to the right."""
+        return Camera(float(np.deg2rad(self.heading_deg - 90.0)))
+
+    @property
+    def name(self) -> str:
+        """What the horizontal axis is called: x, y, or h (a heading that is then to be told)."""
+        return {0.0: "x", 90.0: "y"}.get(self.heading_deg, "h")
+
+    @property
+    def label(self) -> str:
+        """The horizontal axis' label with its unit."""
+        return f"{self.name} [m]" if self.name != "h" else f"h [m], horizontal at {self.heading_deg:.4g}°"
+
+
+@dataclass(frozen=True)
+class Moment:
+    """One instant of a maneuver: a stage, or a step of time between stages (no interval)."""
+
+    name: str
+    time: float  # [s]
+    interval: int | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Snapshots:
+    """Moments of a plan with what the vehicle is asked there."""
+
+    moments: tuple[Moment, ...]
+    position: Array  # [m], (k, 3)
+    q_world_body: Array  # (k, 4)
+    thrust: Array  # [m/s²] specific thrust a + g e3, (k, 3)
+
+    def only(self, kept: list[int]) -> Snapshots:
+        """Some of the moments."""
+        moments = tuple(self.moments[k] for k in kept)
+        return Snapshots(moments, self.position[kept], self.q_world_body[kept], self.thrust[kept])
+
+
+def snapshots(plan: Plan, vehicle: Vehicle) -> Snapshots:
+    """What `plan` asks of `vehicle` at its stages, and where those are few, at equal steps of time."""
+    shown = [Moment(stage.name, stage.time, stage.interval) for stage in plan.stages]
+    if len(shown) < FEWEST:
+        steps = np.linspace(0.0, plan.duration, STEPS + 1).tolist()
+        shown += [Moment("", t) for t in steps if all(abs(t - m.time) > 0.5 * steps[1] for m in shown)]
+    shown.sort(key=lambda moment: moment.time)  # stages may come in any order
+    times = [moment.time for moment in shown]
+    setpoint = reference(plan.trajectory, vehicle, times=times, yaw=plan.problem.yaw).setpoint
+    thrust = setpoint.flat.acceleration + np.array([0.0, 0.0, vehicle.gravity])
+    return Snapshots(tuple(shown), setpoint.flat.position, setpoint.q_world_body, thrust)
+
+
+def turn_plane(plan: Plan, thrust: Array) -> TurnPlane:
+    """The plane square to a flip's axis; else that in which the specific thrust (k, 3) varies most."""
+    if isinstance(plan.problem.maneuver, Flip):
+        return TurnPlane(_as_line(plan.problem.maneuver.axis_deg - 90.0))
+    level = thrust[:, :2] - thrust[:, :2].mean(axis=0)
+    _, _, directions = np.linalg.svd(level)
+    heading = np.rad2deg(np.arctan2(directions[0, 1], directions[0, 0]))
+    return TurnPlane(_as_line(ROUND_HEADING * round(heading / ROUND_HEADING)))
+
+
+def _as_line(heading_deg: float) -> float:
+    """A heading without a sense of direction, from -45° up to 135°, so that x and y point right."""
+    return float((heading_deg + 45.0) % 180.0 - 45.0)

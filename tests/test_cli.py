@@ -1,0 +1,138 @@
+"""The main job from one command: what it prints, what it writes, how it ends."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from aerobat import cli
+from aerobat.exporting.csv import read_csv
+from aerobat.flight import load_flight
+from aerobat.specs import problem_names
+from aerobat.vehicle import vehicle_names
+
+PLAN_KEYS = {
+    "planner", "order", "intervals", "dt_s", "duration_s", "cost", "backend", "nodes", "solve_time_s",
+    "stages", "attempts", "min_rotor_thrust_n", "max_rotor_thrust_n", "rotor_feasible",
+}  # fmt: skip
+FLIGHT_KEYS = {
+    "max_position_error_m", "rms_position_error_m", "max_attitude_error_deg", "rms_attitude_error_deg",
+    "gate_miss_m", "gate_speed_m_s", "gate_attitude_error_deg", "saturated_fraction", "outcome",
+}  # fmt: skip
+
+
+@pytest.fixture(autouse=True)
+def _elsewhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+
+
+def run(capsys: pytest.CaptureFixture[str], *arguments: str) -> tuple[int, str, str]:
+    """Exit code, standard output and standard error."""
+    code = 0
+    try:
+        cli.main(arguments)
+    except SystemExit as stop:
+        code = stop.code or 0
+    return code, *capsys.readouterr()
+
+
+def test_fly_writes_the_plan_the_flight_the_picture_and_the_report(capsys) -> None:
+    code, out, err = run(capsys, "fly", "flip-roll")
+    assert (code, err) == (0, "")
+    folder = Path("out/flip-roll")
+    assert sorted(p.name for p in folder.iterdir()) == ["flight.npz", "plan.csv", "report.json", "report.png"]
+    report = json.loads((folder / "report.json").read_text())
+    assert report["plan"].keys() >= PLAN_KEYS
+    assert report["flight"].keys() >= FLIGHT_KEYS
+    assert report["problem"] == "flip-roll"
+    assert report["vehicle"] == "agile-quad"
+    assert report["plan"]["rotor_feasible"] is True
+    assert read_csv(folder / "plan.csv").duration == pytest.approx(report["plan"]["duration_s"])
+    assert load_flight(folder / "flight.npz").times[-1] == pytest.approx(report["plan"]["duration_s"])
+    assert (folder / "report.png").read_bytes().startswith(b"\x89PNG")
+    for word in ("planner", "stages", "rotors", "position error", "gate", "saturated"):
+        assert word in out
+
+
+@pytest.mark.parametrize("problem", problem_names())
+def test_json_is_the_report_and_nothing_else(problem: str, capsys) -> None:
+    code, out, err = run(capsys, "fly", problem, "--json", "--out", "here")
+    assert (code, err) == (0, "")
+    assert json.loads(out) == json.loads(Path("here/report.json").read_text())
+
+
+def test_plan_stops_after_planning(capsys) -> None:
+    code, out, _ = run(capsys, "plan", "half-flip", "--json")
+    assert code == 0
+    assert "flight" not in json.loads(out)
+    written = sorted(p.name for p in Path("out/half-flip").iterdir())
+    assert written == ["plan.csv", "report.json", "report.png"]
+
+
+def test_paper_mode_prints_the_known_optimum(capsys) -> None:
+    _, out, _ = run(capsys, "fly", "flip-roll", "--paper", "--json")
+    report = json.loads(out)
+    assert report["plan"]["cost"] == pytest.approx(273196.1243, rel=1e-9)
+    assert (report["plan"]["order"], report["plan"]["dt_s"]) == (3, 0.1)
+    assert report["vehicle"] == "hexarotor"
+    assert report["flight"]["max_position_error_m"] < 0.05
+
+
+def test_the_gates_tilt_is_what_angle_says(capsys) -> None:
+    _, out, _ = run(capsys, "fly", "half-flip", "--angle", "40", "--json")
+    states = load_flight("out/half-flip/flight.npz").states
+    gate = json.loads(out)["plan"]["stages"][0]["time_s"]
+    k = int(np.argmin(np.abs(load_flight("out/half-flip/flight.npz").times - gate)))
+    w, x, y, z = states.q_world_body[k]
+    thrust = np.array([2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y)])
+    assert np.rad2deg(np.arctan2(-thrust[1], thrust[2])) == pytest.approx(40.0, abs=1.0)
+
+
+def test_what_there_is_is_listed(capsys) -> None:
+    _, out, _ = run(capsys, "vehicles")
+    assert all(name in out for name in vehicle_names())
+    _, out, _ = run(capsys, "problems")
+    assert all(name in out for name in problem_names())
+
+
+def test_an_infeasible_problem_ends_with_its_sentence_and_nothing_written(capsys) -> None:
+    Path("hard.toml").write_text(
+        'name = "hard"\n[start]\nposition = [0.0, 0.0, 0.0]\n[goal]\nposition = [0.0, 0.0, 0.0]\n'
+        "[gate]\nposition = [0.0, 0.0, 5.0]\ntilt_deg = 180.0\n[maneuver]\nkind = 'flip'\ninverted = 45.0\n"
+    )
+    code, out, err = run(capsys, "fly", "hard.toml")
+    assert (code, out) == (3, "")
+    assert err == (
+        "aerobat: the stage 'gate' asks 45 m/s² inverted, agile-quad gives 32.4; "
+        "lower what it asks or take a stronger vehicle\n"
+    )
+    assert not Path("out").exists()
+
+
+def test_help_tells_every_command_and_option(capsys) -> None:
+    _, out, _ = run(capsys, "--help")
+    assert all(command in out for command in ("fly", "plan", "vehicles", "problems", "Exit codes"))
+    _, out, _ = run(capsys, "fly", "--help")
+    options = "vehicle order intervals backend paper angle out json seed noise time-limit"
+    assert all(f"--{option}" in out for option in options.split())
+
+
+def test_nothing_heavy_is_imported_before_it_is_needed() -> None:
+    heavy = ["scipy", "matplotlib", "pydantic", "daqp", "gurobipy", "pyscipopt", "rich"]
+    probe = f"import sys, aerobat, aerobat.cli; print([m for m in {heavy} if m in sys.modules])"
+    done = subprocess.run([sys.executable, "-c", probe], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "[]"
+
+
+def test_the_main_job_needs_neither_pyplot_nor_scipy() -> None:
+    probe = (
+        "import sys\nfrom aerobat.cli import main\nmain(['fly', 'line', '--json'])\n"
+        "print([m for m in ('scipy', 'matplotlib.pyplot', 'gurobipy') if m in sys.modules], file=sys.stderr)"
+    )
+    done = subprocess.run([sys.executable, "-c", probe], capture_output=True, text=True, check=True)
+    assert done.stderr.strip() == "[]"

@@ -1,0 +1,304 @@
+"""Whole pages: they show what was planned and flown, labelled, without one text over another."""
+
+import subprocess
+import sys
+from dataclasses import replace
+from itertools import combinations
+
+import matplotlib
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from matplotlib.colors import to_rgba
+from matplotlib.quiver import Quiver, QuiverKey
+
+import aerobat as ab
+from aerobat import so3
+from aerobat.reporting import path_panel
+from aerobat.reporting.figures import draw, report_figure, save_figure
+from aerobat.reporting.style import BLUE, RED
+from aerobat.reporting.turn import snapshots, turn_plane
+from aerobat.states import BodyState
+from reporting_cases import PROBLEMS, flown, planned
+
+pytestmark = pytest.mark.filterwarnings("error")  # drawing warns of nothing
+CASES = [(problem, "agile-quad") for problem in PROBLEMS] + [
+    ("flip-roll", "hexarotor"),
+    ("half-flip", "crazyflie"),
+]
+
+
+def page(problem, vehicle="agile-quad"):
+    return report_figure(planned(problem, vehicle), ab.load_vehicle(vehicle), flown(problem, vehicle))
+
+
+def pages(problem, vehicle):
+    plan, body, flight = planned(problem, vehicle), ab.load_vehicle(vehicle), flown(problem, vehicle)
+    return [report_figure(plan, body, flight), report_figure(plan, body), draw(flight, plan), draw(flight)]
+
+
+def panel_of(figure, quantity):
+    return next(axes for axes in figure.axes if axes.get_ylabel().startswith(quantity))
+
+
+def stages_panel(figure):
+    return next(axes for axes in figure.axes if axes.get_ylabel() == "z [m]")
+
+
+def texts_of(figure, monkeypatch):
+    """Every text that is really drawn, with its box in pixels."""
+    drawn = []
+
+    def draw_and_note(text, renderer):
+        if text.get_visible() and text.get_text().strip():
+            drawn.append((text.get_text(), text.get_window_extent(renderer)))
+        draw_text(text, renderer)
+
+    draw_text = matplotlib.text.Text.draw
+    monkeypatch.setattr(matplotlib.text.Text, "draw", draw_and_note)
+    figure.canvas.draw()
+    monkeypatch.undo()
+    return drawn
+
+
+@pytest.mark.parametrize(("problem", "vehicle"), CASES)
+def test_no_text_lies_over_another_or_beyond_the_page(problem, vehicle, monkeypatch):
+    shown = pages(problem, vehicle)
+    for figure in shown if problem == "line" else shown[:1]:
+        texts = texts_of(figure, monkeypatch)
+        assert len(texts) > 20
+        for name, box in texts:
+            assert box.min.min() >= 0, name
+            assert (box.max <= figure.bbox.max).all(), name
+        for (one, a), (other, b) in combinations(texts, 2):
+            across, up = np.minimum(a.max, b.max) - np.maximum(a.min, b.min)
+            assert across < 2 or up < 4, (one, other)  # pixels; boxes reach a little beyond their letters
+
+
+@pytest.mark.parametrize("problem", PROBLEMS)
+def test_every_axis_says_its_quantity_and_unit(problem):
+    for figure in pages(problem, "agile-quad"):
+        for axes in figure.axes:
+            if not axes.axison:
+                assert {f"{name} [m]" for name in "xyz"} <= {text.get_text() for text in axes.texts}
+                continue
+            assert "[" in axes.get_ylabel()
+            numbers = axes.xaxis.get_tick_params()["labelbottom"]
+            assert not numbers or "[" in axes.get_xlabel()
+
+
+def test_a_saved_page_is_a_picture_1600_pixels_wide(tmp_path):
+    save_figure(page("flip-roll"), tmp_path / "page.png")
+    content = (tmp_path / "page.png").read_bytes()
+    assert content.startswith(b"\x89PNG")
+    assert 1600 <= int.from_bytes(content[16:20], "big") <= 1620
+
+
+def test_drawn_errors_are_those_of_the_flight():
+    flight = flown("half-flip")
+    figure = page("half-flip")
+    distance = np.linalg.norm(flight.states.position - flight.setpoint.flat.position, axis=1)
+    position = panel_of(figure, "position error")
+    unit = {"[m]": 1.0, "[cm]": 1e-2, "[mm]": 1e-3}[position.get_ylabel().split()[-1]]
+    times, drawn = position.get_lines()[0].get_data()
+    np.testing.assert_allclose(times, flight.times)
+    np.testing.assert_allclose(unit * np.asarray(drawn), distance, rtol=1e-12)
+    relative = so3.multiply(so3.conjugate(flight.setpoint.q_world_body), flight.states.q_world_body)
+    angle = 2 * np.arctan2(np.linalg.norm(relative[:, 1:], axis=1), np.abs(relative[:, 0]))
+    drawn = panel_of(figure, "attitude error").get_lines()[0].get_ydata()
+    np.testing.assert_allclose(drawn, np.rad2deg(angle), atol=1e-6)
+
+
+@pytest.mark.parametrize("vehicle", ["agile-quad", "hexarotor"])
+def test_rotor_thrusts_are_drawn_with_the_vehicle_s_limits(vehicle):
+    flight, body = flown("flip-roll", vehicle), ab.load_vehicle(vehicle)
+    lines = panel_of(page("flip-roll", vehicle), "rotor thrust").get_lines()
+    rotors, limits = lines[: len(body.rotors)], lines[len(body.rotors) :]
+    for i, line in enumerate(rotors):
+        np.testing.assert_allclose(line.get_ydata(), flight.thrusts[:, i])
+    assert {line.get_ydata()[0] for line in limits} == {
+        *body.min_thrusts.tolist(),
+        *body.max_thrusts.tolist(),
+    }
+    assert all(line.get_linestyle() == "--" for line in limits)
+
+
+def test_stages_are_marked_at_their_times_in_every_timeline():
+    plan = planned("flip-roll")
+    figure = page("flip-roll")
+    for quantity in ("position error", "attitude error", "specific thrust", "rotor thrust"):
+        marks = panel_of(figure, quantity).collections[0].get_segments()
+        np.testing.assert_allclose([mark[0][0] for mark in marks], [stage.time for stage in plan.stages])
+
+
+@pytest.mark.parametrize("problem", PROBLEMS)
+def test_arrows_are_the_specific_thrust_at_the_scale_of_their_keys(problem):
+    plan, vehicle = planned(problem), ab.load_vehicle("agile-quad")
+    axes = stages_panel(page(problem))
+    quivers = {q.get_facecolor()[0].tobytes(): q for q in axes.collections if isinstance(q, Quiver)}
+    keys = {key.Q: key for key in axes.get_children() if isinstance(key, QuiverKey)}
+    asked = snapshots(plan, vehicle)
+    plane = turn_plane(plan, asked.thrust)
+    for colour, column in ((BLUE, 0), (RED, 1)):
+        quiver = quivers[np.array(to_rgba(colour)).tobytes()]
+        value = float(keys[quiver].label.split()[-2])
+        drawn = (quiver.U, quiver.V)[column] * value / keys[quiver].U
+        expected = plane.camera.project(asked.thrust)[:, column]
+        for place, thrust in zip(quiver.get_offsets(), drawn, strict=True):
+            k = np.linalg.norm(plane.camera.project(asked.position) - place, axis=1).argmin()
+            assert thrust == pytest.approx(expected[k], abs=1e-6)
+
+
+def test_stages_may_come_in_any_order():
+    plan = planned("flip-roll")
+    disordered = replace(plan, stages=plan.stages[::-1])
+    one, other = (
+        stages_panel(report_figure(p, ab.load_vehicle("agile-quad"))).texts for p in (plan, disordered)
+    )
+    assert sorted(text.get_text() for text in one) == sorted(text.get_text() for text in other)
+
+
+def test_a_hover_is_drawn_like_any_other_plan(tmp_path):
+    spot = ab.rest([1.0, 2.0, 3.0])
+    hover = replace(ab.load_problem("line"), start=spot, goal=spot)
+    vehicle = ab.load_vehicle("agile-quad")
+    plan = ab.plan(hover, vehicle=vehicle)
+    save_figure(report_figure(plan, vehicle, ab.fly(plan.trajectory, vehicle)), tmp_path / "hover.png")
+
+
+def test_all_stages_are_drawn_where_they_are_planned():
+    plan = planned("flip-pitch")
+    axes = stages_panel(page("flip-pitch"))
+    assert axes.get_xlabel() == "x [m]"
+    assert axes.get_aspect() == "auto"
+    assert {stage.name for stage in plan.stages} <= {text.get_text() for text in axes.texts}
+    quiver = next(q for q in axes.collections if isinstance(q, Quiver))
+    expected = [plan.trajectory.evaluate(stage.time)[[0, 2]] for stage in plan.stages]
+    np.testing.assert_allclose(quiver.get_offsets(), expected, atol=1e-9)
+    size = axes.figure.get_size_inches() * axes.get_position().size
+    assert np.ptp(axes.get_xlim()) / size[0] == pytest.approx(np.ptp(axes.get_ylim()) / size[1])
+
+
+@given(st.floats(-720.0, 720.0))
+def test_the_plane_of_a_flip_is_square_to_its_axis(axis_deg):
+    plan = planned("flip-roll")
+    plan = replace(plan, problem=replace(plan.problem, maneuver=ab.Flip(axis_deg=axis_deg)))
+    plane = turn_plane(plan, np.zeros((3, 3)))
+    axis = np.array([np.cos(np.deg2rad(axis_deg)), np.sin(np.deg2rad(axis_deg)), 0.0])
+    lateral, up = plane.camera.screen
+    np.testing.assert_allclose([lateral @ axis, up[2]], [0.0, 1.0], atol=1e-9)
+
+
+@given(st.floats(-180.0, 180.0), st.integers(0, 1000))
+def test_any_other_plane_is_where_the_thrust_moves_most(heading_deg, seed):
+    rng = np.random.default_rng(seed)
+    along = np.array([np.cos(np.deg2rad(heading_deg)), np.sin(np.deg2rad(heading_deg)), 0.0])
+    thrust = np.outer(rng.uniform(-20, 20, 6), along) + rng.uniform(-0.1, 0.1, (6, 3))
+    plane = turn_plane(planned("line"), thrust)
+    assert abs(plane.camera.screen[0] @ along) > np.cos(np.deg2rad(9.0))
+
+
+def test_vehicles_along_the_path_stand_as_the_flight_stood(monkeypatch):
+    painted = []
+    monkeypatch.setattr(path_panel, "paint", lambda axes, shapes, camera: painted.extend(shapes))
+    flight, gate = flown("flip-roll"), planned("flip-roll").problem.gate
+    page("flip-roll")
+    axes = [shape.points for shape in painted if len(shape.points) == 2 and shape.width == 0.9]
+    assert len(axes) >= 10
+    times = []
+    for foot, tip in axes:
+        k = np.linalg.norm(flight.states.position - foot, axis=1).argmin()
+        np.testing.assert_allclose(foot, flight.states.position[k])
+        upward = so3.thrust_axis(flight.states.q_world_body[k])
+        np.testing.assert_allclose((tip - foot) / np.linalg.norm(tip - foot), upward, atol=1e-9)
+        times.append(flight.times[k])
+    steps = np.diff(times) / (planned("flip-roll").duration / path_panel.POSES)
+    np.testing.assert_allclose(steps, np.round(steps), atol=0.1)  # whole steps, to a row of the flight
+    assert min(np.linalg.norm(foot - gate.position) for foot, _ in axes) < 0.05  # one of them in the gate
+
+
+def batch_of(flight, count):
+    """As many flights as `count`, each a little beside the other."""
+    shifts = 0.01 * np.arange(count)[:, None, None]
+    states = {k: np.broadcast_to(v, (count, *v.shape)) for k, v in vars(flight.states).items()}
+    states["position"] = states["position"] + shifts
+
+    def many(array):
+        return np.broadcast_to(array, (count, *np.shape(array)))
+
+    return replace(
+        flight,
+        states=BodyState(**states),
+        **{
+            k: many(getattr(flight, k))
+            for k in ("commands", "thrusts", "saturated", "min_thrusts", "max_thrusts")
+        },
+        ends=many(flight.ends),
+        outcomes=flight.outcomes * count,
+        vehicles=flight.vehicles * count,
+    )
+
+
+def test_a_batch_of_flights_is_drawn_whole():
+    batch = batch_of(flown("flip-roll"), 7)
+    figure = draw(batch, planned("flip-roll"))
+    assert any("7 flights" in text.get_text() for text in figure.texts)
+    bundle = next(c for c in panel_of(figure, "position error").collections if len(c.get_segments()) == 7)
+    tops = [segment[:, 1].max() for segment in bundle.get_segments()]
+    np.testing.assert_allclose(np.diff(tops), 0.01 * np.sqrt(3) / 0.01, rtol=0.05)  # [cm]
+
+
+def test_a_flight_that_went_astray_does_not_shrink_the_picture():
+    flight = flown("flip-roll")
+    position = flight.states.position.copy()
+    position[len(position) // 2 :] += 1000.0
+    stray = replace(flight, states=replace(flight.states, position=position))
+    ordinary, lost = (draw(f, planned("flip-roll")).axes[0].get_ylim() for f in (flight, stray))
+    assert np.ptp(lost) < 2.0 * np.ptp(ordinary)
+
+
+def test_a_flight_can_be_drawn_alone_when_its_vehicle_is_a_preset():
+    assert draw(flown("line")).texts[0].get_text() == "flight of agile-quad"
+    stranger = replace(flown("line"), vehicles=("my-own",))
+    with pytest.raises(ab.SpecError, match="my-own"):
+        draw(stranger)
+    assert draw(stranger, vehicle=ab.load_vehicle("agile-quad")).axes
+
+
+def test_the_reader_s_own_matplotlib_settings_change_nothing():
+    plain = page("line")
+    with matplotlib.rc_context({"font.size": 30.0, "axes.labelsize": 30.0, "lines.linewidth": 9.0}):
+        before = dict(matplotlib.rcParams)
+        styled = page("line")
+        assert dict(matplotlib.rcParams) == before
+    for one, other in zip(plain.axes, styled.axes, strict=True):
+        assert one.yaxis.label.get_size() == other.yaxis.label.get_size()
+        assert [line.get_linewidth() for line in one.lines] == [line.get_linewidth() for line in other.lines]
+
+
+@pytest.mark.parametrize("ending", [".png", ".pdf", ".svg"])
+def test_the_same_data_give_the_same_file(ending, tmp_path):
+    first, second = tmp_path / f"a{ending}", tmp_path / "deeper" / f"b{ending}"
+    for path in (first, second):
+        save_figure(draw(flown("line")), path)
+    assert first.read_bytes() == second.read_bytes()
+
+
+@pytest.mark.parametrize("name", ["page.xyz", "page", "page.png.txt"])
+def test_an_unknown_ending_is_refused_in_a_sentence(name, tmp_path):
+    with pytest.raises(ab.SpecError, match=r"\.png, \.pdf, \.svg") as caught:
+        save_figure(page("line"), tmp_path / name)
+    assert "\n" not in str(caught.value)
+    assert not list(tmp_path.iterdir())
+
+
+def test_drawing_never_imports_pyplot(tmp_path):
+    flown("line").save(tmp_path / "flight.npz")
+    code = (
+        "import sys, aerobat as ab, aerobat.reporting.figures\n"
+        "assert 'matplotlib' not in sys.modules\n"
+        "ab.draw(ab.load_flight('flight.npz')).savefig('flight.png')\n"
+        "assert 'matplotlib.pyplot' not in sys.modules"
+    )
+    subprocess.run([sys.executable, "-c", code], check=True, cwd=tmp_path)
