@@ -1,4 +1,4 @@
-"""A maneuver of one's own: a list of stages, each a set of linear conditions, some at a time that the solver picks.
+"""A maneuver of one's own: a list of stages, each a set of linear conditions, some where the solver likes.
 
 A dive: fall with the thrust horizontal somewhere on the way, then pull out through a gate at speed.
 """

@@ -15,5 +15,6 @@ print(plan)
 flight = ab.fly(plan.trajectory, vehicle, seed=0)
 print(ab.score(flight, problem, vehicle))
 
+out.mkdir(parents=True, exist_ok=True)
 ab.draw(flight).savefig(out / "flip.pdf")
 ab.write_csv(plan.trajectory, out / "flip.csv", rate=100)

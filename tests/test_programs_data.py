@@ -112,6 +112,12 @@ def test_stages_that_cannot_share_slots_or_be_ordered_are_infeasible() -> None:
         assert solver(backend).solve(circle).status == "infeasible"
 
 
+@pytest.mark.parametrize("backend", ["builtin", "gurobi"])
+def test_a_start_without_a_slot_for_each_stage_is_refused(backend: str) -> None:
+    with pytest.raises(SpecError, match="start must have one slot for each of the 1 stages"):
+        solver(backend).solve(AssignmentProgram(**GOOD), start=())
+
+
 def test_an_unknown_backend_is_answered_with_a_suggestion() -> None:
     with pytest.raises(SpecError, match="did you mean 'gurobi'"):
         solver("gurobbi")

@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from itertools import product
+from itertools import count, product
 from math import inf
+from typing import Any
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from aerobat.programs import AssignmentProgram, AssignmentResult, SlottedStage, solver
-from aerobat.programs.least_distance import LeastDistance
+from aerobat.programs import AssignmentProgram, AssignmentResult, SlottedStage, solver, stage_search, tree
+from aerobat.programs.least_distance import LeastDistance, NotConverged, Point
 from aerobat.programs.placements import Placements
 from aerobat.programs.reduction import Reduction, parts
 from paper_program import FLIP_ROLL, flip
@@ -181,9 +182,9 @@ def test_no_completion_costs_less_than_its_prospect(seed: int) -> None:
     program = deep_program(seed)
     part, _ = parts(program, np.concatenate([stage.rows.ravel() for stage in program.stages]))
     reduction = Reduction(program, part, np.zeros(len(program.rows), dtype=bool))
-    standing = reduction.bounds(program, program.lower, program.upper)
+    standing = reduction.bounds(program, program.lower, program.upper).over(1.0)
     placements, nearest = Placements(program, reduction), LeastDistance(reduction.rows)
-    placed = placements.bounds(program, reduction, standing)
+    placed = placements.bounds(program, reduction, standing).over(1.0)
     rng, lower, upper = np.random.default_rng(seed), standing.lower, standing.upper
     for p in rng.permutation(15)[:3]:
         point = nearest.solve(lower, upper)
@@ -192,11 +193,11 @@ def test_no_completion_costs_less_than_its_prospect(seed: int) -> None:
         prospects = placements.prospects(point, placed, np.arange(15))
         assert (prospects.least >= point.value).all()
         for q in range(15):
-            own = tightened(lower, upper, placements.rows[q], placed.lower[q], placed.upper[q])
+            own = tightened(lower, upper, placements.rows[:, q], placed.lower[:, q], placed.upper[:, q])
             exact = nearest.solve(*own)
             assert exact is None or prospects.least[q] <= exact.value * (1 + 1e-9)
             assert not prospects.holds[q] or (exact is not None and exact.value <= point.value * (1 + 1e-9))
-        lower, upper = tightened(lower, upper, placements.rows[p], placed.lower[p], placed.upper[p])
+        lower, upper = tightened(lower, upper, placements.rows[:, p], placed.lower[:, p], placed.upper[:, p])
 
 
 def tightened(
@@ -245,6 +246,19 @@ def test_without_time_a_start_is_still_a_solution_with_its_gap() -> None:
     assert result.gap == pytest.approx((result.cost - result.bound) / result.cost)
 
 
+@pytest.mark.parametrize("ticks", range(1, 40, 3))
+def test_when_time_runs_out_the_optimum_is_between_bound_and_cost(
+    ticks: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    clock = count()
+    for module in (stage_search, tree):
+        monkeypatch.setattr(module, "perf_counter", lambda: float(next(clock)))
+    result = solver().solve(flip(FLIP_ROLL), time_limit=ticks)
+    assert result.bound * (1 - 1e-9) <= 273196.1243 <= result.cost * (1 + 1e-9)
+    assert result.status in ({"optimal"} if result.gap < 1e-9 else {"time_limit", "unknown"})
+    assert (result.x is not None) == (ticks > 6)  # one dive down four stages
+
+
 @pytest.mark.parametrize(
     "start", [(5, 6, 10, 13, 7), (1, 2, 10, 3, 4), (5, 5, 10, 5, 5), (99, 99, 99, 99, 99)]
 )
@@ -252,3 +266,25 @@ def test_a_start_good_or_bad_does_not_change_the_answer(start: tuple[int, ...]) 
     result = solver().solve(flip(FLIP_ROLL), start=start)
     assert result.status == "optimal"
     assert result.cost == pytest.approx(273196.1243, rel=1e-9)
+
+
+@pytest.mark.parametrize("failing", range(1, 12))
+def test_a_relaxation_that_cannot_be_solved_leaves_a_gap_and_no_false_claim(
+    failing: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    calls, solve, program = count(), LeastDistance.solve, deep_program(8)
+    cost = solver().solve(program).cost
+
+    def faulty(*arguments: Any, **options: Any) -> Point | None:
+        if next(calls) == failing:
+            raise NotConverged
+        return solve(*arguments, **options)
+
+    monkeypatch.setattr(LeastDistance, "solve", faulty)
+    result = solver().solve(program)
+    assert result.bound <= cost * (1 + 1e-9)
+    assert result.cost >= cost * (1 - 1e-9)
+    if result.status == "optimal":
+        assert result.cost == pytest.approx(cost)
+    else:
+        assert result.status in ("time_limit", "unknown")

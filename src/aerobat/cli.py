@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Annotated
 from cyclopts import App, CycloptsError, Group, Parameter, validators
 
 from aerobat.errors import AerobatError, Infeasible, SpecError
+from aerobat.reporting.illustrator import Illustrator
 
 if TYPE_CHECKING:
     from aerobat.flight import Flight
@@ -108,10 +109,11 @@ def fly(problem: str, options: Common = PlanningOptions(), aloft: Aloft = Flying
     from aerobat.simulation import StateNoise
 
     noise = StateNoise.fused().scaled(aloft.noise) if aloft.noise else None
-    task, vehicle = _read(problem, options)
-    plan = _plan(task, vehicle, options)
-    flight = fly_trajectory(plan.trajectory, vehicle, yaw=task.yaw, noise=noise, seed=aloft.seed)
-    _finish(plan, vehicle, options, flight, score(flight, task, vehicle))
+    with Illustrator() as illustrator:
+        task, vehicle = _read(problem, options)
+        plan = _plan(task, vehicle, options)
+        flight = fly_trajectory(plan.trajectory, vehicle, yaw=task.yaw, noise=noise, seed=aloft.seed)
+        _finish(illustrator, plan, vehicle, options, flight, score(flight, task, vehicle))
 
 
 @app.command
@@ -125,8 +127,9 @@ def plan(problem: str, options: Common = PlanningOptions()) -> None:
     problem
         A name that `aerobat problems` lists, or a problem's TOML file.
     """
-    task, vehicle = _read(problem, options)
-    _finish(_plan(task, vehicle, options), vehicle, options)
+    with Illustrator() as illustrator:
+        task, vehicle = _read(problem, options)
+        _finish(illustrator, _plan(task, vehicle, options), vehicle, options)
 
 
 @app.command
@@ -178,9 +181,7 @@ def _read(name: str, options: PlanningOptions) -> tuple[Problem, Vehicle]:
     vehicle = load_vehicle(options.vehicle or ("hexarotor" if options.paper else "agile-quad"))
     if options.angle is not None:
         if problem.gate is None or not isinstance(problem.maneuver, HalfFlip):
-            raise SpecError(
-                f"--angle tilts the gate of a half-flip; '{problem.name}' is none, leave it out"
-            )
+            raise SpecError(f"--angle tilts the gate of a half-flip; '{problem.name}' is none, leave it out")
         if not (isfinite(options.angle) and abs(options.angle) <= 90.0):
             raise SpecError(f"--angle must be from -90 to 90 degrees, got {options.angle}")
         problem = replace(problem, gate=problem.gate.tilted(radians(options.angle)))
@@ -196,9 +197,7 @@ def _plan(problem: Problem, vehicle: Vehicle, options: PlanningOptions) -> Plan:
     from aerobat.planning import plan as plan_problem
 
     if options.paper and options.order not in (None, 3):
-        raise SpecError(
-            f"--paper plans with order 3 (jerk), got --order {options.order}; leave one out"
-        )
+        raise SpecError(f"--paper plans with order 3 (jerk), got --order {options.order}; leave one out")
     order = options.order or (3 if options.paper else 4)
     planner = Miqp(order, options.intervals, backend=options.backend, time_limit=options.time_limit)
     with _progress() as progress:
@@ -221,6 +220,7 @@ def _progress() -> Iterator[Callable[[Attempt], None] | None]:
 
 
 def _finish(
+    illustrator: Illustrator,
     plan: Plan,
     vehicle: Vehicle,
     options: PlanningOptions,
@@ -229,17 +229,17 @@ def _finish(
 ) -> None:
     """Write what was made, then say what it is."""
     from aerobat.exporting.csv import write_csv
-    from aerobat.reporting.figures import report_figure, save_figure
-    from aerobat.reporting.report import report, to_json, write_report
+    from aerobat.reporting.report import report, to_json
+    from aerobat.storage import write_whole
 
+    illustrator.begin(plan, vehicle, flight, score)
     folder = options.out or Path("out") / plan.problem.name
     facts = report(plan, score, vehicle.name)
-    figure = report_figure(plan, vehicle, flight, score)
     write_csv(plan.trajectory, folder / "plan.csv")
     if flight is not None:
         flight.save(folder / "flight.npz")
-    save_figure(figure, folder / "report.png")
-    write_report(facts, folder / "report.json")
+    write_whole(folder / "report.json", to_json(facts) + "\n")
+    write_whole(folder / "report.png", illustrator.picture())
     if options.json:
         print(to_json(facts))
         return

@@ -83,7 +83,7 @@ def fly(
     flown, believed, batch = _crew(vehicle, model, start)
     asked = reference(trajectory, believed[0], rate=rate, yaw=yaw)
     setpoint, times = asked.setpoint, asked.times
-    later = np.minimum(times + control.effect_delay(controller, 1.0 / rate), times[-1])
+    later = np.minimum(times + controller.effect_delay(1.0 / rate), times[-1])
     ahead = reference(trajectory, believed[0], times=later, yaw=yaw).setpoint
     periods = np.diff(times, append=times[-1])
     given = _Given(airframes(flown), models(controller, believed), _started(start, setpoint, len(flown)))
@@ -215,6 +215,8 @@ def _flight(
         return values if batch else values[0]
 
     def kept(values: Any) -> Any:
+        if (ends == ends.max()).all():
+            return each(values[:, : ends.max() + 1])
         index = shown.reshape(*shown.shape, *(1,) * (values.ndim - 2))
         return each(np.take_along_axis(values, index, axis=1))
 

@@ -12,7 +12,7 @@ from aerobat.errors import SpecError
 
 
 @contextmanager
-def whole_file(path: str | Path) -> Iterator[Path]:
+def whole_file(path: str | os.PathLike[str]) -> Iterator[Path]:
     """A temporary path beside `path`, renamed to it when the block ends well, removed when it does not.
 
     Missing parent folders are made. Raises SpecError when the place cannot be written.
@@ -33,6 +33,12 @@ def whole_file(path: str | Path) -> Iterator[Path]:
         raise SpecError(f"cannot write {target}: {error.strerror or error}") from None
     finally:
         temporary.unlink(missing_ok=True)
+
+
+def write_whole(path: str | os.PathLike[str], content: str | bytes) -> None:
+    """Write a file's whole content, or nothing. Raises SpecError when the place cannot be written."""
+    with whole_file(path) as temporary:
+        temporary.write_bytes(content.encode() if isinstance(content, str) else content)
 
 
 def _umask() -> int:

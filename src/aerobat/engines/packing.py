@@ -19,6 +19,7 @@ from aerobat.vehicle import Vehicle
 from aerobat.vehicle.allocation import collective_range, mixer
 
 _FREE_ERROR = 0.06  # [rad] of attitude that must not saturate a hovering vehicle's rotors
+_SLACK = 1e-12  # [-] of a rotor's range, for rounding
 _SHORTEST_LAG = 1e-9  # [s] a rotor without lag follows within it
 
 
@@ -61,6 +62,7 @@ def airframes(vehicles: Sequence[Vehicle]) -> Airframe:
     rotors = Rotors(
         components(np.array([vehicle.min_thrusts for vehicle in vehicles])),
         components(np.array([vehicle.max_thrusts for vehicle in vehicles])),
+        components(_SLACK * np.array([vehicle.max_thrusts - vehicle.min_thrusts for vehicle in vehicles])),
         components(1.0 / np.maximum(lags, _SHORTEST_LAG)),
         _matrix(np.array([vehicle.allocation for vehicle in vehicles])),
     )

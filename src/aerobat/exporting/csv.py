@@ -17,7 +17,7 @@ import numpy as np
 
 from aerobat.arrays import Array
 from aerobat.errors import SpecError
-from aerobat.storage import whole_file
+from aerobat.storage import write_whole
 from aerobat.trajectory import Trajectory
 from aerobat.trajectory.polynomial import hermite
 
@@ -35,8 +35,7 @@ def write_csv(trajectory: Trajectory, path: str | os.PathLike[str], rate: float 
     rows = np.concatenate([trajectory.evaluate(times, k) for k in range(4)], axis=1)
     if abs(times[-1] - (len(times) - 1) / rate) > SAME_TIME:
         rows = np.column_stack([rows, times])
-    with whole_file(path) as temporary:
-        temporary.write_text("".join(",".join(map(repr, row)) + "\n" for row in rows.tolist()))
+    write_whole(path, "".join(",".join(map(repr, row)) + "\n" for row in rows.tolist()))
 
 
 def read_csv(path: str | os.PathLike[str], rate: float = 100.0) -> Trajectory:

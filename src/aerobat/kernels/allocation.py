@@ -9,7 +9,6 @@ from aerobat.kernels.motors import Rotors, clamp
 from aerobat.kernels.ops import Ops, PerRotor, Scalar, clip
 from aerobat.kernels.rigid_body import Load
 
-_SLACK = 1e-12  # [-] of a rotor's range: what rounding puts past a limit, changes too small to meet one
 _BEARING = 1e-9  # [-] a rotor with a smaller share of the collective thrust bears nothing
 
 
@@ -34,8 +33,7 @@ def demand(mixer: Mixer, load: Load) -> PerRotor:
 def fits(rotors: Rotors, thrusts: PerRotor) -> Scalar:
     """Whether thrusts [N] are within all limits."""
     inside: Scalar = True
-    for f, low, high in zip(thrusts, rotors.min_thrust, rotors.max_thrust, strict=True):
-        slack = _SLACK * (high - low)
+    for f, low, high, slack in zip(thrusts, rotors.min_thrust, rotors.max_thrust, rotors.slack, strict=True):
         inside = inside & (f >= low - slack) & (f <= high + slack)
     return inside
 
@@ -74,10 +72,10 @@ def _lowered(ops: Ops, rotors: Rotors, mixer: Mixer, thrust: Scalar, tilting: Pe
 
 def _as_far_as_fits(ops: Ops, rotors: Rotors, base: PerRotor, change: PerRotor) -> PerRotor:
     """base + s·change with the largest s in [0, 1] within limits, for a base within them."""
-    shares = []
-    for f, df, low, high in zip(base, change, rotors.min_thrust, rotors.max_thrust, strict=True):
+    limits = zip(rotors.min_thrust, rotors.max_thrust, rotors.slack, strict=True)
+    share: Scalar = 1.0
+    for f, df, (low, high, slack) in zip(base, change, limits, strict=True):
         room = ops.maximum(ops.select(df > 0.0, high - f, f - low), 0.0)
-        size, slack = ops.maximum(df, -df), _SLACK * (high - low)
-        shares.append(ops.select(size > slack, room / ops.maximum(size, slack), 1.0))
-    share = reduce(ops.minimum, shares, 1.0)
+        size = ops.maximum(df, -df)
+        share = ops.minimum(share, ops.select(size > slack, room / ops.maximum(size, slack), 1.0))
     return tuple(f + share * df for f, df in zip(base, change, strict=True))

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from aerobat.kernels.controller import Gains
-from aerobat.kernels.ops import Matrix, Ops, Quaternion, Scalar, Vector
+from aerobat.kernels.ops import Axes, Matrix, Ops, Quaternion, Scalar, Vector
 from aerobat.kernels.position_loop import Ahead, Outer, Target
 from aerobat.kernels.rigid_body import Body
 from aerobat.kernels.vectors import (
@@ -65,10 +65,10 @@ def desired(ops: Ops, outer: Outer, target: Target) -> Attitude:
     return Attitude(f, q, add_scaled(swing, dot(nominal, target.omega), b3))
 
 
-def error(ops: Ops, body: Body, attitude: Attitude) -> Error:
+def error(ops: Ops, body: Body, body_axes: Axes, attitude: Attitude) -> Error:
     """How far the body is from its desired attitude and rates; the same for q and −q."""
     w, *vector = multiply(conjugate(body.q_world_body), attitude.q_world_body)
-    omega = to_body(axes(body.q_world_body), attitude.omega)
+    omega = to_body(body_axes, attitude.omega)
     sign = ops.select(w < 0.0, -1.0, 1.0)
     return Error(scale(sign, tuple(vector)), subtract(omega, body.omega_body))
 
@@ -88,8 +88,7 @@ def moment(gains: Gains, inertia: Matrix, error: Error, integral: Vector) -> Vec
     return transform(inertia, add_scaled(acceleration, gains.attitude_integral, integral))
 
 
-def reference_moment(inertia: Matrix, body: Body, ahead: Ahead) -> Vector:
+def reference_moment(inertia: Matrix, body_axes: Axes, ahead: Ahead) -> Vector:
     """The moment that the reference asks [N·m], J ω' + ω × Jω, with its rates in the body's own axes."""
-    body_axes = axes(body.q_world_body)
     omega, omega_dot = to_body(body_axes, ahead.omega), to_body(body_axes, ahead.omega_dot)
     return add(transform(inertia, omega_dot), cross(omega, transform(inertia, omega)))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, fields
 from typing import Any, NamedTuple
 
@@ -28,12 +29,12 @@ class Controller:
     integral_gain: float = 10.0  # [1/s³]
     max_integral: float = 0.5  # [m·s] longest integral of the position error
     max_feedback: float = 15.0  # [m/s²] largest feedback acceleration
-    jerk_filter: float = 0.05  # [s] time constant of the filter on the feedback acceleration's derivative
+    jerk_filter: float = 0.1  # [s] time constant of the filter on the feedback acceleration's derivative
     attitude_frequency: float = 25.0  # [rad/s] ω_n of the attitude loop
     attitude_damping: float = 0.85  # [-] ζ of the attitude loop
     attitude_integral_gain: float = 1000.0  # [1/s³]
     max_attitude_integral: float = 0.05  # [rad·s]
-    lead_filter: float = 0.008  # [s] time constant that the lead leaves in place of the rotors' lag
+    lead_filter: float = 0.01  # [s] time constant that the lead leaves in place of the rotors' lag
     moment_feedforward: bool = True  # the moment that the reference asks, J ω' + ω × Jω
     motor_lag_lead: bool = True  # commands that lead the rotors' lag
     yaw_shed_first: bool = True  # on saturation, give up the yaw moment before roll and pitch
@@ -45,6 +46,15 @@ class Controller:
                 _require_switch(field.name, value)
             else:
                 _require_gain(field.name, value)
+
+    def effect_delay(self, period: float) -> float:
+        """How long commands given every `period` [s] take, on the average, to become thrust [s].
+
+        The lead leaves a first-order filter in place of the rotors' lag; sampled, it delays a ramp so long.
+        """
+        if not self.motor_lag_lead:
+            return 0.0
+        return period / -math.expm1(-period / max(self.lead_filter, _SMALLEST))
 
     def gains(self, agility: Scalar) -> Gains:
         """The gains for a vehicle that the attitude loop's frequency must not exceed `agility` [rad/s]."""

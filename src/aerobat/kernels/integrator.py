@@ -30,8 +30,9 @@ def advance(ops: Ops, airframe: Airframe, motion: Motion, commands: PerRotor, dt
     The rotors are solved exactly, so RK4 sees their true load at each of its stages: order four jointly.
     """
     wanted = motors.clamp(ops, airframe.rotors, commands)
-    middle = motors.follow(ops, airframe.rotors, motion.thrusts, wanted, 0.5 * dt)
-    end = motors.follow(ops, airframe.rotors, motion.thrusts, wanted, dt)
+    halfway = motors.decays(ops, airframe.rotors, 0.5 * dt)
+    middle = motors.follow(motion.thrusts, wanted, halfway)
+    end = motors.follow(middle, wanted, halfway)
     at_start, at_middle, at_end = (
         motors.load(airframe.rotors, thrusts) for thrusts in (motion.thrusts, middle, end)
     )

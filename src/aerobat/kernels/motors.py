@@ -13,7 +13,8 @@ class Rotors(NamedTuple):
 
     min_thrust: PerRotor  # [N]
     max_thrust: PerRotor  # [N]
-    lag_rate: PerRotor  # [1/s], 1/τ; infinite for a rotor without lag
+    slack: PerRotor  # [N] by which rounding may push a thrust past a limit
+    lag_rate: PerRotor  # [1/s], 1/τ
     allocation: tuple[PerRotor, PerRotor, PerRotor, PerRotor]  # collective, Mx, My, Mz a newton of thrust
 
 
@@ -25,15 +26,17 @@ def clamp(ops: Ops, rotors: Rotors, thrusts: PerRotor) -> PerRotor:
     )
 
 
-def follow(ops: Ops, rotors: Rotors, thrusts: PerRotor, commands: PerRotor, dt: Scalar) -> PerRotor:
-    """Thrusts [N] after `dt` [s] of f' = (u − f)/τ under held commands u: the exact solution.
+def decays(ops: Ops, rotors: Rotors, dt: Scalar) -> PerRotor:
+    """What is left of each rotor's distance from a held command after `dt` [s], e^(−dt/τ)."""
+    return tuple(ops.exp(-dt * rate) for rate in rotors.lag_rate)
 
-    Exact, it stays stable for any lag, however short.
+
+def follow(thrusts: PerRotor, commands: PerRotor, decays: PerRotor) -> PerRotor:
+    """Thrusts [N] a while later, by f' = (u − f)/τ under held commands u [N].
+
+    The exact solution, stable for any lag, however short.
     """
-    return tuple(
-        u + (f - u) * ops.exp(-dt * rate)
-        for f, u, rate in zip(thrusts, commands, rotors.lag_rate, strict=True)
-    )
+    return tuple(u + (f - u) * left for f, u, left in zip(thrusts, commands, decays, strict=True))
 
 
 def load(rotors: Rotors, thrusts: PerRotor) -> Load:

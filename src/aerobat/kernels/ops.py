@@ -12,6 +12,7 @@ Scalar: TypeAlias = Any  # whatever an engine computes with; every operation is 
 Vector: TypeAlias = tuple[Scalar, Scalar, Scalar]
 Quaternion: TypeAlias = tuple[Scalar, Scalar, Scalar, Scalar]  # Hamilton, (w, x, y, z)
 Matrix: TypeAlias = tuple[Vector, Vector, Vector]  # rows
+Axes: TypeAlias = tuple[Vector, Vector, Vector]  # b1, b2, b3 in the world
 PerRotor: TypeAlias = tuple[Scalar, ...]
 
 

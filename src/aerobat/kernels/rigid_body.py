@@ -9,8 +9,8 @@ from aerobat.kernels.vectors import (
     add_scaled,
     axes,
     cross,
-    multiply,
     normalize,
+    spinning,
     subtract,
     to_body,
     to_world,
@@ -55,12 +55,11 @@ def derivative(inertial: Inertial, body: Body, load: Load) -> Body:
     dx, dy, dz = inertial.drag_body
     ax, ay, az = to_world(body_axes, (-dx * u, -dy * v, load.thrust - dz * w))
     lightness = 1.0 / inertial.mass
-    p, q, r = body.omega_body
     gyroscopic = cross(body.omega_body, transform(inertial.inertia, body.omega_body))
     return Body(
         body.velocity,
         (ax * lightness, ay * lightness, az * lightness - inertial.gravity),
-        multiply(body.q_world_body, (0.0, 0.5 * p, 0.5 * q, 0.5 * r)),
+        spinning(body.q_world_body, body.omega_body),
         transform(inertial.inverse_inertia, subtract(load.moment_body, gyroscopic)),
     )
 
@@ -75,9 +74,10 @@ def step(ops: Ops, inertial: Inertial, body: Body, loads: tuple[Load, Load, Load
     k2 = derivative(inertial, _along(body, 0.5 * dt, k1), middle)
     k3 = derivative(inertial, _along(body, 0.5 * dt, k2), middle)
     k4 = derivative(inertial, _along(body, dt, k3), end)
+    sixth = dt / 6.0
     new = Body(
         *(
-            tuple(x + dt * (a + 2.0 * (b + c) + d) / 6.0 for x, a, b, c, d in zip(*components, strict=True))
+            tuple(x + sixth * (a + 2.0 * (b + c) + d) for x, a, b, c, d in zip(*components, strict=True))
             for components in zip(body, k1, k2, k3, k4, strict=True)
         )
     )
@@ -85,10 +85,11 @@ def step(ops: Ops, inertial: Inertial, body: Body, loads: tuple[Load, Load, Load
 
 
 def _along(body: Body, dt: Scalar, rate: Body) -> Body:
+    """The state `dt` [s] along a rate; its position, on which no rate depends, is left behind."""
     w, x, y, z = body.q_world_body
     dw, dx, dy, dz = rate.q_world_body
     return Body(
-        add_scaled(body.position, dt, rate.position),
+        body.position,
         add_scaled(body.velocity, dt, rate.velocity),
         (w + dt * dw, x + dt * dx, y + dt * dy, z + dt * dz),
         add_scaled(body.omega_body, dt, rate.omega_body),

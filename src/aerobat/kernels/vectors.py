@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from aerobat.kernels.ops import Matrix, Ops, Quaternion, Scalar, Vector
+from aerobat.kernels.ops import Axes, Matrix, Ops, Quaternion, Scalar, Vector
 
 ZERO: Vector = (0.0, 0.0, 0.0)
 _TINY = 1e-300  # keeps 0/0 away and changes no other quotient
@@ -65,6 +65,13 @@ def multiply(p: Quaternion, q: Quaternion) -> Quaternion:
     )
 
 
+def spinning(q: Quaternion, omega_body: Vector) -> Quaternion:
+    """The rate of change of an attitude, q' = ½ q ⊗ (0, ω)."""
+    w, x, y, z = q
+    a, b, c = scale(0.5, omega_body)
+    return -x * a - y * b - z * c, w * a + y * c - z * b, w * b + z * a - x * c, w * c + x * b - y * a
+
+
 def conjugate(q: Quaternion) -> Quaternion:
     """The inverse rotation q*."""
     return q[0], -q[1], -q[2], -q[3]
@@ -77,12 +84,13 @@ def normalize(ops: Ops, q: Quaternion) -> Quaternion:
     return w * inverse, x * inverse, y * inverse, z * inverse
 
 
-def axes(q: Quaternion) -> tuple[Vector, Vector, Vector]:
+def axes(q: Quaternion) -> Axes:
     """The body axes b1, b2, b3 in the world, for q = q_world_body: columns of the rotation matrix."""
     w, x, y, z = q
-    xx, yy, zz = 2.0 * x * x, 2.0 * y * y, 2.0 * z * z
-    xy, xz, yz = 2.0 * x * y, 2.0 * x * z, 2.0 * y * z
-    wx, wy, wz = 2.0 * w * x, 2.0 * w * y, 2.0 * w * z
+    x2, y2, z2 = 2.0 * x, 2.0 * y, 2.0 * z
+    xx, yy, zz = x * x2, y * y2, z * z2
+    xy, xz, yz = x * y2, x * z2, y * z2
+    wx, wy, wz = w * x2, w * y2, w * z2
     return (
         (1.0 - yy - zz, xy + wz, xz - wy),
         (xy - wz, 1.0 - xx - zz, yz + wx),
@@ -90,22 +98,16 @@ def axes(q: Quaternion) -> tuple[Vector, Vector, Vector]:
     )
 
 
-def to_body(body_axes: tuple[Vector, Vector, Vector], a: Vector) -> Vector:
+def to_body(body_axes: Axes, a: Vector) -> Vector:
     """A world vector in body axes, Rᵀ·a."""
     b1, b2, b3 = body_axes
     return dot(b1, a), dot(b2, a), dot(b3, a)
 
 
-def to_world(body_axes: tuple[Vector, Vector, Vector], a: Vector) -> Vector:
+def to_world(body_axes: Axes, a: Vector) -> Vector:
     """A body vector in world axes, R·a."""
     b1, b2, b3 = body_axes
     return add_scaled(add_scaled(scale(a[0], b1), a[1], b2), a[2], b3)
-
-
-def thrust_axis(q: Quaternion) -> Vector:
-    """The body's z axis in the world, b3."""
-    w, x, y, z = q
-    return 2.0 * (x * z + w * y), 2.0 * (y * z - w * x), 1.0 - 2.0 * (x * x + y * y)
 
 
 def smallest_rotation(ops: Ops, a: Vector, b: Vector, normal: Vector) -> Quaternion:

@@ -22,6 +22,7 @@ from aerobat.specs.maneuver import Condition, Course, Quantity, Stage
 from aerobat.specs.problem import DERIVATIVES, Problem
 
 Indices = NDArray[np.intp]
+AXES = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
 
 @dataclass(frozen=True)
@@ -119,10 +120,10 @@ class Formulation:
     def _limit_rows(self) -> Iterable[tuple[Row, float, float]]:
         for derivative in range(self.chain.order + 1):
             intervals = self.chain.intervals if derivative == self.chain.order else self.chain.intervals - 1
-            for axis, low, high in zip(np.eye(3).tolist(), *self.problem.limits.of(derivative), strict=True):
+            for axis, low, high in zip(AXES, *self.problem.limits.of(derivative), strict=True):
                 if low > -inf or high < inf:
                     for interval in range(intervals):
-                        yield Row(interval, derivative, tuple(axis)), float(low), float(high)
+                        yield Row(interval, derivative, axis), float(low), float(high)
 
     def _path_rows(self) -> Iterable[tuple[Row, float, float]]:
         for condition in self.course.always:
@@ -163,7 +164,8 @@ class Formulation:
             [self.chain.free(self.initial, dt), np.zeros((self.chain.intervals, 1, 3))], axis=1
         )
         intervals = [row.interval for row in self._rows]
-        return np.sum(free[intervals, self._derivatives.astype(int)] * self._directions, axis=-1)
+        per_axis = free[intervals, self._derivatives.astype(int)]
+        return np.asarray(np.sum(per_axis * self._directions, axis=-1))
 
     def _slots(self, stage: Stage) -> range:
         """The intervals at whose ends a stage may hold; none when it is fixed outside them."""

@@ -48,7 +48,7 @@ class IntegratorChain:
             np.clip(elapsed + 1, 0, None) ** (r - d) - np.clip(elapsed, 0, None) ** (r - d) for d in range(r)
         ]
         weights = np.array([1.0 / factorial(r - d) for d in range(r)])
-        return np.stack(powers, axis=1) * weights[:, None]
+        return np.asarray(np.stack(powers, axis=1) * weights[:, None])
 
     def free(self, initial: Array, dt: float) -> Array:
         """What the initial state (r, 3) in SI units leads to without input, normalised, (N, r, 3)."""

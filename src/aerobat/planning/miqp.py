@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from math import sqrt
 
 import numpy as np
 
@@ -186,4 +187,4 @@ def _fastest_conceivable(problem: Problem, vehicle: Vehicle) -> float:
     if problem.gate is not None:
         points.insert(1, problem.gate.position)
     length = float(np.linalg.norm(np.diff(points, axis=0), axis=1).sum())
-    return max(np.sqrt(length / vehicle.max_specific_thrust), 0.1)
+    return max(sqrt(length / vehicle.max_specific_thrust), 0.1)

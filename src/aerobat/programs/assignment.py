@@ -157,6 +157,13 @@ class AssignmentProgram:
         own = all(slot in stage.slots for stage, slot in zip(self.stages, slots, strict=True))
         return own and len(set(slots)) == len(slots) and all(slots[i] < slots[j] for i, j in self.precedence)
 
+    def check_start(self, start: Sequence[int] | None) -> None:
+        """Raise SpecError unless `start` is None or has one slot a stage."""
+        if start is not None and len(start) != len(self.stages):
+            raise SpecError(
+                f"start must have one slot for each of the {len(self.stages)} stages, got {start}"
+            )
+
     def tightened(self, slots: Sequence[int | None]) -> tuple[Array, Array]:
         """The range rows' bounds (lower, upper) with stage i in slots[i]; None leaves that stage out."""
         lower, upper = self.lower.copy(), self.upper.copy()

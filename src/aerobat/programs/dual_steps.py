@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+from math import inf
+
 import numpy as np
 
 from aerobat.arrays import Array
@@ -11,56 +14,73 @@ _STEPS = 3  # more hardly raise the bounds
 _TINY = 1e-300
 
 
-def dual_steps(
-    inverse: Array, multipliers: Array, equal: Mask, give: Array, slope: Array, curvature: Array
-) -> tuple[Array, Array]:
-    """Multipliers of w active rows, (w, P), and how far each of P additions is pushed, (P,).
+@dataclass(frozen=True, eq=False, slots=True)
+class Ascent:
+    """Additions on their way up: pushed by t, one raises the dual objective by slope · t − ½ curvature · t².
 
-    Addition p raises the dual objective by slope[p] · t − ½ curvature[p] · t² when it is pushed by t, while
-    the multipliers fall by give[:, p] · t. A step ends at the top, or where a multiplier is zero; its row is
-    then dropped and the next step goes on without it (Goldfarb and Idnani 1983). `inverse` (w, w) is that of
-    the active rows' Gram matrix; rows that are `equal`ities have multipliers of either sign and never drop.
+    Meanwhile the multipliers of the w active rows fall by give · t.
     """
-    reached = np.repeat(multipliers[:, None], len(slope), axis=1)
-    pushed = np.zeros(len(slope))
-    loose = np.repeat(~equal[:, None], len(slope), axis=1)
-    dropped: list[tuple[Array, Indices]] = []  # the inverse's columns that left it, row dropped
-    moving = np.arange(len(slope))
-    for _ in range(_STEPS):
-        top = slope / np.maximum(curvature, _TINY)
-        soonest, first = _first_to_vanish(reached[:, moving], give, loose[:, moving])
-        step = np.minimum(top, 1.0 / np.maximum(soonest, _TINY))
-        reached[:, moving] -= step * give
+
+    give: Array  # (w, q)
+    slope: Array  # (q,)
+    curvature: Array  # (q,) positive
+
+
+def dual_steps(inverse: Array, multipliers: Array, equal: Mask, ascent: Ascent) -> tuple[Array, Array]:
+    """Multipliers of the active rows for each addition, (w, q), and how far it is pushed, (q,).
+
+    A step ends at the top, or where a multiplier is zero; its row is then dropped and the next step goes on
+    without it (Goldfarb and Idnani 1983). `inverse` (w, w) is that of the active rows' Gram matrix; rows that
+    are `equal`ities have multipliers of either sign and never drop.
+    """
+    left = np.where(equal, inf, multipliers)[:, None]  # to fall, until the row drops
+    pushed, stopped = _step(left, ascent)
+    held = multipliers[:, None] - pushed * ascent.give
+    if not stopped.size:
+        return held, pushed
+    moving, step, dropped = np.arange(len(pushed)), pushed, list[tuple[Array, Indices]]()
+    for _ in range(_STEPS - 1):
+        rate = (ascent.give / left)[:, stopped]
+        left = (left - step * ascent.give)[:, stopped]
+        moving, row, each = moving[stopped], rate.argmax(axis=0), np.arange(len(stopped))
+        left[row, each] = inf
+        left[left == 0.0] = inf  # a tie: the sign is mended below
+        dropped = [(column[:, stopped], earlier[stopped]) for column, earlier in dropped]
+        ascent = _without(inverse, row, dropped, _further(ascent, stopped, step))
+        step, stopped = _step(left, ascent)
+        held[:, moving] -= step * ascent.give
         pushed[moving] += step
-        stopped = np.flatnonzero(step < top)
         if not stopped.size:
             break
-        slope, curvature = (slope - step * curvature)[stopped], curvature[stopped]
-        moving, row, give = moving[stopped], first[stopped], give[:, stopped]
-        dropped = [(column[:, stopped], row_[stopped]) for column, row_ in dropped]
-        each = np.arange(len(moving))
-        column = inverse[:, row]
-        for earlier, row_ in dropped:
-            column = column - earlier * (earlier[row, each] / earlier[row_, each])
-        pivot = np.maximum(column[row, each], _TINY)
-        given = give[row, each]
-        give = give - column * (given / pivot)
-        curvature = curvature + given**2 / pivot
-        give[row, each], loose[row, moving] = 0.0, False
-        dropped.append((column, row))
-    return _feasible(reached, multipliers, equal), pushed
-
-
-def _first_to_vanish(multipliers: Array, give: Array, loose: Mask) -> tuple[Array, Indices]:
-    """For each addition, 1 / (the push at which a first multiplier is zero), 0 for never, and its row."""
-    if not len(give):
-        return np.zeros(give.shape[1]), np.zeros(give.shape[1], dtype=np.intp)
-    rate = np.divide(give, multipliers, out=np.zeros_like(give), where=loose & (multipliers != 0.0))
-    row = rate.argmax(axis=0)
-    return rate[row, np.arange(len(row))], row
-
-
-def _feasible(reached: Array, multipliers: Array, equal: Mask) -> Array:
-    """Rounding must not turn a multiplier's sign."""
     sign = np.where(equal, 0.0, np.sign(multipliers))[:, None]
-    return np.where(reached * sign < 0.0, 0.0, reached)
+    return np.where(held * sign < 0.0, 0.0, held), pushed
+
+
+def _step(left: Array, ascent: Ascent) -> tuple[Array, Indices]:
+    """How far each addition goes, and which of them a multiplier stops."""
+    top = ascent.slope / ascent.curvature
+    soonest = (ascent.give / left).max(axis=0, initial=_TINY)
+    step = np.minimum(top, 1.0 / soonest)
+    return step, (step < top).nonzero()[0]
+
+
+def _further(ascent: Ascent, some: Indices, step: Array) -> Ascent:
+    """Some of the additions after a step."""
+    slope = (ascent.slope - step * ascent.curvature)[some]
+    return Ascent(ascent.give[:, some], slope, ascent.curvature[some])
+
+
+def _without(inverse: Array, row: Indices, dropped: list[tuple[Array, Indices]], ascent: Ascent) -> Ascent:
+    """The ascent once `row` is dropped, beside those `dropped` before, to which it is added.
+
+    Each dropped row goes with its column of the inverse, less what the earlier ones took of it.
+    """
+    each = np.arange(len(row))
+    column = inverse[:, row]
+    for taken, earlier in dropped:
+        column = column - taken * (taken[row, each] / taken[earlier, each])
+    dropped.append((column, row))
+    pivot, given = np.maximum(column[row, each], _TINY), ascent.give[row, each]
+    give = ascent.give - column * (given / pivot)
+    give[row, each] = 0.0
+    return Ascent(give, ascent.slope, ascent.curvature + given**2 / pivot)

@@ -26,10 +26,11 @@ _STRICT = {"FeasibilityTol": 1e-9, "IntFeasTol": 1e-9, "MIPGap": 1e-9}
 
 @dataclass(frozen=True)
 class Gurobi:
-    """One binary for each stage and slot; the bounds of a placement are switched on by big-M where there are
-    standing bounds, which is faster than indicator constraints, and by those elsewhere.
+    """One binary for each stage and slot.
 
-    The licence that comes with the package takes `free_variables` variables, a full one any number.
+    The bounds of a placement are switched on by big-M where there are standing bounds, which takes less time
+    than indicator constraints, and by those where there are none. The licence that comes with the package
+    takes `free_variables` variables, a full one any number.
     """
 
     name: ClassVar[str] = "gurobi"
@@ -51,12 +52,11 @@ class Gurobi:
         """
         import gurobipy
 
+        program.check_start(start)
         scaled = conditioned(program)
         try:
             with gurobipy.Env(empty=True) as env:
-                env.setParam(
-                    "OutputFlag", 0
-                )  # before it starts: the licence's banner goes to standard output
+                env.setParam("OutputFlag", 0)  # before it starts, or it prints the licence's banner
                 env.setParam("Threads", self.threads)
                 env.start()
                 with gurobipy.Model(env=env) as model:

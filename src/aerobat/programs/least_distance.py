@@ -14,7 +14,7 @@ from aerobat.programs.assignment import Indices
 from aerobat.programs.reduction import UNBOUNDED
 
 # DAQP's marks on a row
-_FREE, _AT_UPPER, _AT_LOWER, _IGNORED = 0, 1, 3, 4
+_AT_UPPER, _AT_LOWER, _IGNORED = 1, 3, 4
 _SOLVED, _EXCLUDED = 1, -1
 _PRIMAL_TOLERANCE = 1e-9  # on rows of unit length
 _CAREFUL = {"pivot_tol": 1e-4, "sing_tol": 1e-13, "dual_tol": 1e-10}  # tried when the ordinary settings fail
@@ -56,13 +56,14 @@ class LeastDistance:
     ) -> Point | None:
         """The minimiser, or None where there is none with ½|y|² <= limit.
 
-        `guess` is a point of similar bounds, whose active rows are tried first. Raises NotConverged.
+        Infinite bounds are ±UNBOUNDED. `guess` is a point of similar bounds, whose active rows are tried
+        first. Raises NotConverged.
         """
         if not self._variables:
             nothing = np.zeros(0)
             return Point(nothing, 0.0, lower, upper, np.zeros(0, dtype=np.intp), nothing)
-        ignored = (lower <= -UNBOUNDED) & (upper >= UNBOUNDED)
-        cold = np.where(ignored, _IGNORED, _FREE).astype(np.intc)
+        unbounded = upper - lower >= 2.0 * UNBOUNDED
+        cold = np.multiply(unbounded, _IGNORED, dtype=np.intc)
         y, flag, multipliers = self._run(lower, upper, _warmed(cold, guess), limit)
         if flag not in (_SOLVED, _EXCLUDED):
             y, flag, multipliers = self._run(lower, upper, cold, limit)

@@ -9,7 +9,7 @@ w = G⁺ d + Z y, Z an orthonormal basis of the null space of G, so that
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from math import inf
+from math import inf, sqrt
 
 import numpy as np
 
@@ -18,6 +18,7 @@ from aerobat.programs.assignment import AssignmentProgram, Indices, Mask
 
 UNBOUNDED = 1e30  # an infinite bound, as DAQP writes it
 _VANISHED = 1e-9  # a row shorter than this share of its length has no free direction left
+_ROOT = sqrt(2.0)
 _RANK = 1e-11  # singular values below this share of the largest are zero
 _CONSISTENT = (
     1e-7  # residual of redundant equalities and of rows without freedom, relative to max(1, |bound|)
@@ -69,31 +70,31 @@ class Reduction:
         self.columns, self.ranges = np.flatnonzero(part.columns), np.flatnonzero(part.rows)
         self.equalities = np.flatnonzero(part.equalities)
         self.pinned = np.flatnonzero(part.rows & pinned)
-        unwhiten, offset = _whitening(program, self.columns)
-        self._eliminate(program, unwhiten, offset)
-        self._project(program, unwhiten, pinned[self.ranges])
+        whitening = _Whitening(program, self.columns)
+        self._eliminate(program, whitening)
+        self._project(program, whitening, pinned[self.ranges])
 
-    def _eliminate(self, program: AssignmentProgram, unwhiten: Array, offset: Array) -> None:
+    def _eliminate(self, program: AssignmentProgram, whitening: _Whitening) -> None:
         stacked = np.concatenate([program.equality[self.equalities], program.rows[self.pinned]])
         stacked = stacked[:, self.columns]
-        length = np.linalg.norm(stacked @ unwhiten, axis=1)
+        equality = whitening.rows(stacked)
+        length = np.linalg.norm(equality, axis=1)
         self._unit = 1.0 / np.where(length > 0.0, length, 1.0)
-        equality = (stacked @ unwhiten) * self._unit[:, None]
+        equality = equality * self._unit[:, None]
         left, singular, right = np.linalg.svd(equality, full_matrices=True)
         rank = int((singular > _RANK * singular.max(initial=0.0)).sum())
         pseudo_inverse = right[:rank].T @ (left[:, :rank] / singular[:rank]).T
         self._least = pseudo_inverse
         self._inconsistency = np.eye(len(equality)) - equality @ pseudo_inverse
-        self._offset = float(np.linalg.norm(offset))
-        self._centre = -unwhiten @ offset
+        self._offset = float(np.linalg.norm(whitening.offset))
+        self._centre = -whitening.lifted(whitening.offset)
         self._centre_equality = stacked @ self._centre
-        self._from_target = unwhiten @ pseudo_inverse
-        self.basis = right[rank:].T
-        self.from_free = unwhiten @ self.basis
+        self._from_target = whitening.lifted(pseudo_inverse)
+        self.from_free = whitening.lifted(right[rank:].T)
 
-    def _project(self, program: AssignmentProgram, unwhiten: Array, pinned: Mask) -> None:
+    def _project(self, program: AssignmentProgram, whitening: _Whitening, pinned: Mask) -> None:
         rows = program.rows[np.ix_(self.ranges, self.columns)]
-        projected, self._length = rows @ self.from_free, np.linalg.norm(rows @ unwhiten, axis=1)
+        projected, self._length = rows @ self.from_free, np.linalg.norm(whitening.rows(rows), axis=1)
         norm = np.linalg.norm(projected, axis=1)
         constant = (norm <= _VANISHED * self._length) | pinned
         norm[constant] = 1.0
@@ -167,10 +168,21 @@ def parts(program: AssignmentProgram, rows: Indices) -> tuple[Part, Part]:
     return Part(columns, equalities, ranges), Part(~columns, ~equalities, ~ranges)
 
 
-def _whitening(program: AssignmentProgram, columns: Indices) -> tuple[Array, Array]:
-    """L⁻ᵀ and L⁻¹ f for these variables."""
-    gradient = np.zeros(len(columns)) if program.gradient is None else program.gradient[columns]
-    if program.hessian is None:
-        return np.eye(len(columns)) / np.sqrt(2.0), gradient / np.sqrt(2.0)
-    inverse = np.linalg.inv(np.linalg.cholesky(program.hessian[np.ix_(columns, columns)]))
-    return inverse.T, inverse @ gradient
+class _Whitening:
+    """x = L⁻ᵀ (w − offset), with L = √2 where the program has no hessian."""
+
+    def __init__(self, program: AssignmentProgram, columns: Indices) -> None:
+        gradient = np.zeros(len(columns)) if program.gradient is None else program.gradient[columns]
+        self._inverse: Array | None = None
+        self.offset = gradient / _ROOT  # L⁻¹ f
+        if program.hessian is not None:
+            self._inverse = np.linalg.inv(np.linalg.cholesky(program.hessian[np.ix_(columns, columns)]))
+            self.offset = self._inverse @ gradient
+
+    def rows(self, matrix: Array) -> Array:
+        """Rows over x as rows over w."""
+        return matrix / _ROOT if self._inverse is None else matrix @ self._inverse.T
+
+    def lifted(self, vectors: Array) -> Array:
+        """L⁻ᵀ times vectors w, its columns."""
+        return vectors / _ROOT if self._inverse is None else self._inverse.T @ vectors

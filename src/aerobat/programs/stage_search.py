@@ -41,6 +41,7 @@ class StageSearch:
 
         `start`, slots that may be good, is tried first: what costs more is then not searched.
         """
+        program.check_start(start)
         began = perf_counter()
         deadline = inf if time_limit is None else began + time_limit
         result = certified(program, self._claim(program, deadline, start))

@@ -33,6 +33,7 @@ class _Node:
     chosen: tuple[int, ...]  # placements
     pending: tuple[int, ...]  # stages, counting those with several slots, that are not placed
     open: Mask  # (P,) placements that may join those chosen
+    inherited: Prospects | None  # of its parent
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -40,6 +41,7 @@ class _Children:
     """Relaxations to be solved: a node with one placement more, the cheapest first."""
 
     node: _Node
+    prospects: Prospects  # of the node
     pending: tuple[int, ...]
     placements: list[int]
     bounds: list[float]
@@ -86,7 +88,7 @@ class Tree:
             chosen.append(int(fitting[0]))
             open_ = open_ & of.compatible[fitting[0]]
         lower, upper = self._tightened(self._standing.lower, self._standing.upper, chosen)
-        point = self._solve(lower, upper, None, 0.0)
+        point = self._solve(lower, upper, None, inf)
         if point is not None:
             self.best = (point, tuple(chosen))
 
@@ -97,52 +99,75 @@ class Tree:
             return
         root = self._solve(self._standing.lower, self._standing.upper, None, 0.0)
         if root is not None:
-            self._push(_Node(root, (), tuple(range(len(self._placements.free))), self._placed.possible))
+            pending = tuple(range(len(self._placements.free)))
+            node = _Node(root, (), pending, self._placed.possible, None)
+            self._push(node)
+            if deadline < inf:
+                self._dive(node, deadline)
         while self._heap and self._improves(self._heap[0][0]) and perf_counter() < deadline:
             _, _, item, at = heappop(self._heap)
-            node = item if isinstance(item, _Node) else self._child(item, at)
-            if node is None:
+            if isinstance(item, _Children):
+                self._push_child(item, at + 1)
+            found = item if isinstance(item, _Node) else self._solved(item, at)
+            if found is None:
                 continue
-            if self._heap and node.point.value > self._heap[0][0]:
-                self._push(node)  # others may cost less
+            if self._heap and found.point.value > self._heap[0][0]:
+                self._push(found)  # others may cost less
             else:
-                self._visit(node)
+                children = self._visited(found)
+                if children is not None:
+                    self._push_child(children, 0)
 
-    def _visit(self, node: _Node) -> None:
-        """Take the node's point for the best, or branch."""
+    def _dive(self, node: _Node | None, deadline: float) -> None:
+        """Some assignment, fast, should time run out: best-first finds none before it finds the best."""
+        while node is not None and perf_counter() < deadline:
+            children = self._visited(node)
+            if children is None:
+                return
+            solved = (self._solved(children, at) for at in range(len(children.bounds)))
+            node = next((child for child in solved if child is not None or perf_counter() >= deadline), None)
+
+    def _visited(self, node: _Node) -> _Children | None:
+        """The node's children; None where it has none, or where its point is the best so far."""
         if not node.pending:
             self.best = (node.point, node.chosen)
-            return
-        prospects = self._placements.prospects(node.point, self._placed, np.flatnonzero(node.open))
+            return None
+        prospects = self._prospects(node)
         complete = self._completed(node, prospects)
-        if complete is None:
-            self._branch(node, prospects)
-        else:
+        if complete is not None:
             self.best = (node.point, complete)
+            return None
+        return self._branched(node, prospects)
 
-    def _branch(self, node: _Node, prospects: Prospects) -> None:
-        """Branch on the stage whose cheapest placement costs most."""
+    def _prospects(self, node: _Node) -> Prospects:
+        """The node's prospects, or its parent's where they will do: before the last stage a QP costs less."""
+        if node.inherited is not None and len(node.pending) == 1:
+            return node.inherited.among_open(node.open)
+        return self._placements.prospects(node.point, self._placed, np.flatnonzero(node.open))
+
+    def _branched(self, node: _Node, prospects: Prospects) -> _Children | None:
+        """The placements of the stage whose cheapest one costs most; None where a stage has none left."""
         starts = np.searchsorted(prospects.stage, (*node.pending, len(self._placements.free))).tolist()
         spans = [slice(a, b) for a, b in pairwise(starts)]
         if any(span.start == span.stop for span in spans):
-            return  # a stage is left without a slot
+            return None
         dearest = max(range(len(spans)), key=lambda i: prospects.least[spans[i]].min())
         least = prospects.least[spans[dearest]]
         order = np.argsort(least, kind="stable")
         pending = (*node.pending[:dearest], *node.pending[dearest + 1 :])
         placements = prospects.among[spans[dearest]][order].tolist()
-        self._push_child(_Children(node, pending, placements, least[order].tolist()), 0)
+        return _Children(node, prospects, pending, placements, least[order].tolist())
 
-    def _child(self, children: _Children, at: int) -> _Node | None:
-        """Solve a child; None where it cannot beat the best. Its next sibling takes its place in line."""
-        self._push_child(children, at + 1)
+    def _solved(self, children: _Children, at: int) -> _Node | None:
+        """One of the children; None where it cannot beat the best."""
         parent, placement = children.node, children.placements[at]
         lower, upper = self._tightened(parent.point.lower, parent.point.upper, [placement])
         point = self._solve(lower, upper, parent.point, children.bounds[at])
         if point is None:
             return None
         open_ = parent.open & self._placements.compatible[placement]
-        return _Node(point, (*parent.chosen, placement), children.pending, open_)
+        chosen = (*parent.chosen, placement)
+        return _Node(point, chosen, children.pending, open_, children.prospects)
 
     def _completed(self, node: _Node, prospects: Prospects) -> tuple[int, ...] | None:
         """Placements, one for each stage, that the node's point satisfies as it is; None without."""
@@ -166,9 +191,9 @@ class Tree:
     def _tightened(self, lower: Array, upper: Array, chosen: list[int]) -> tuple[Array, Array]:
         lower, upper = lower.copy(), upper.copy()
         for p in chosen:
-            rows = self._placements.rows[p]
-            np.maximum.at(lower, rows, self._placed.lower[p])  # a row may be there twice
-            np.minimum.at(upper, rows, self._placed.upper[p])
+            rows = self._placements.rows[:, p]
+            np.maximum.at(lower, rows, self._placed.lower[:, p])  # a row may be there twice
+            np.minimum.at(upper, rows, self._placed.upper[:, p])
         return lower, upper
 
     def _solve(self, lower: Array, upper: Array, guess: Point | None, bound: float) -> Point | None:

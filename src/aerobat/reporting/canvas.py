@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
 
@@ -20,7 +21,7 @@ if TYPE_CHECKING:
 
 # What each format is told: no dates, so that the same data give the same file, and for PNG a fast deflate.
 _OPTIONS: dict[str, dict[str, Any]] = {
-    ".png": {"pil_kwargs": {"compress_level": 3}},
+    ".png": {"pil_kwargs": {"compress_level": 1}},
     ".pdf": {"metadata": {"CreationDate": None}},
     ".svg": {"metadata": {"Date": None}},
 }
@@ -98,5 +99,17 @@ def save_figure(figure: Figure, path: str | Path) -> None:
         raise SpecError(
             f"cannot save a figure as '{path}'; give it a name that ends in {', '.join(_OPTIONS)}"
         )
-    with whole_file(path) as temporary, house_style():
-        figure.savefig(temporary, format=ending[1:], dpi=figure.dpi, **_OPTIONS[ending])
+    with whole_file(path) as temporary:
+        _write(figure, temporary, ending)
+
+
+def png(figure: Figure) -> bytes:
+    """A figure as the bytes of a PNG file."""
+    file = BytesIO()
+    _write(figure, file, ".png")
+    return file.getvalue()
+
+
+def _write(figure: Figure, file: Path | BytesIO, ending: str) -> None:
+    with house_style():
+        figure.savefig(file, format=ending[1:], dpi=figure.dpi, **_OPTIONS[ending])

@@ -20,6 +20,7 @@ from aerobat.reporting.canvas import (
     house_style,
     legend,
     panel,
+    png,
     save_figure,
     size_of,
 )
@@ -33,7 +34,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-__all__ = ["draw", "report_figure", "save_figure"]
+__all__ = ["draw", "png", "report_figure", "save_figure"]
 
 Place = tuple[float, float, float, float]  # [in] left, bottom, width, height
 

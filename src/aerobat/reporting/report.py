@@ -4,12 +4,10 @@ from __future__ import annotations
 
 import json
 from dataclasses import asdict
-from pathlib import Path
 from typing import Any
 
 from aerobat.metrics import Score
 from aerobat.planning import Plan
-from aerobat.storage import whole_file
 
 
 def report(plan: Plan, score: Score | None = None, vehicle: str | None = None) -> dict[str, Any]:
@@ -22,12 +20,6 @@ def report(plan: Plan, score: Score | None = None, vehicle: str | None = None) -
     if score is not None:
         facts["flight"] = asdict(score)
     return facts
-
-
-def write_report(facts: dict[str, Any], path: str | Path) -> None:
-    """Write the report as JSON, whole or not at all."""
-    with whole_file(path) as temporary:
-        temporary.write_text(to_json(facts) + "\n", encoding="utf-8")
 
 
 def to_json(facts: dict[str, Any]) -> str:

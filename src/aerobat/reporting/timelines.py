@@ -74,7 +74,7 @@ def draw_specific_thrust(axes: Axes, plan: Plan, vehicle: Vehicle) -> None:
     for at, style in ((times, "-"), (stages, "o")):
         thrust = plan.trajectory.evaluate(at, 2) + np.array([0.0, 0.0, vehicle.gravity])
         parts = plane.camera.project(thrust)
-        for column, colour, name in ((1, RED, "$a_z + g$"), (0, BLUE, f"$a_{plane.name}$")):
+        for column, colour, name in ((1, RED, "a + g along z"), (0, BLUE, f"a along {plane.name}")):
             label = name if style == "-" else ""
             axes.plot(at, parts[:, column], style, color=colour, markersize=3.5, label=label)
     axes.axhline(0.0, color=FAINT, linewidth=0.8)

@@ -1,0 +1,48 @@
+"""Tracking of every maneuver: rotor-feasible plans of order 4 and 5, and the paper's plans of order 3.
+
+uv run python benchmarks/tracking.py
+"""
+
+from collections.abc import Iterator
+
+import aerobat as ab
+
+COLUMNS = (
+    "vehicle",
+    "problem",
+    "plan",
+    "duration s",
+    "position error cm",
+    "attitude error ° RMS",
+    "gate miss mm",
+    "gate speed m/s",
+)
+
+
+def main() -> None:
+    print(f"| {' | '.join(COLUMNS)} |")
+    print("|" + " --- |" * len(COLUMNS))
+    for vehicle, problem, plan, kind in plans():
+        result = ab.score(ab.fly(plan.trajectory, vehicle), problem, vehicle)
+        gate = "– | –"
+        if result.gate_miss_m is not None:
+            gate = f"{1000 * result.gate_miss_m:.1f} | {result.gate_speed_m_s:.1f}"
+        print(
+            f"| {vehicle.name} | {problem.name} | {kind} | {plan.duration:.2f} "
+            f"| {100 * result.max_position_error_m:.2f} | {result.rms_attitude_error_deg:.2f} | {gate} |"
+        )
+
+
+def plans() -> Iterator[tuple[ab.Vehicle, ab.Problem, ab.Plan, str]]:
+    for name in ("agile-quad", "hexarotor"):
+        vehicle = ab.load_vehicle(name)
+        for problem in map(ab.load_problem, ab.problem_names()):
+            for order in (4, 5):
+                yield vehicle, problem, ab.plan(problem, ab.Miqp(order=order), vehicle), f"order {order}"
+    for problem in map(ab.load_problem, ab.problem_names()):
+        paper = problem.as_in_paper()
+        yield vehicle, paper, ab.plan(paper, ab.Miqp(order=3)), "paper"
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,223 @@
+"""What the tracking controller owes, whatever it flies: symmetries, equilibrium, limits, recovery."""
+
+from dataclasses import fields, replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from aerobat import so3
+from aerobat.engines.batch import ArrayOps
+from aerobat.engines.floats import FloatOps
+from aerobat.engines.packing import airframes, components, joined, models
+from aerobat.engines.trees import rows
+from aerobat.errors import SpecError
+from aerobat.flight import Flight
+from aerobat.flying import fly
+from aerobat.kernels.allocation import demand, fits, nearest
+from aerobat.kernels.controller import Controller
+from aerobat.kernels.rigid_body import Load
+from aerobat.states import BodyState, Wrench
+from aerobat.trajectory import Trajectory
+from aerobat.vehicle import (
+    Vehicle,
+    allocate,
+    collective_range,
+    load_vehicle,
+    rotor_thrusts,
+    vehicle_names,
+    wrench,
+)
+
+VEHICLES = vehicle_names()
+HERE = np.array([1.0, -2.0, 3.0])
+
+
+def hover(duration: float) -> Trajectory:
+    return Trajectory(np.array([duration]), HERE[None, None])
+
+
+def swerve() -> Trajectory:
+    """A brisk move through 2 s of polynomials of degree 9, at rest at both ends."""
+    s = np.polynomial.Polynomial([0, 0, 0, 0, 0, 126, -420, 540, -315, 70]).coef
+    return Trajectory(np.array([2.0]), s[None, :, None] * np.array([2.5, 1.5, -1.0]))
+
+
+def start_at(position=HERE, velocity=(0.0, 0.0, 0.0), q=so3.IDENTITY, omega=(0.0, 0.0, 0.0)) -> BodyState:
+    return BodyState(*(np.array(part, dtype=float) for part in (position, velocity, q, omega)))
+
+
+def error(flight: Flight) -> np.ndarray:
+    return np.linalg.norm(flight.states.position - flight.setpoint.flat.position, axis=-1)
+
+
+@pytest.mark.parametrize("name", VEHICLES)
+def test_a_hover_is_an_equilibrium(name: str) -> None:
+    vehicle = load_vehicle(name)
+    flight = fly(hover(2.0), vehicle)
+    weight = vehicle.mass * vehicle.gravity
+    np.testing.assert_allclose(flight.states.position, np.broadcast_to(HERE, (1001, 3)), atol=1e-12)
+    np.testing.assert_allclose(flight.commands.sum(axis=-1), weight, rtol=1e-12)
+    assert not flight.saturated.any()
+
+
+@pytest.mark.parametrize("name", ["agile-quad", "hexarotor"])
+def test_the_sign_of_the_quaternion_is_nothing_to_the_flight(name: str) -> None:
+    q = so3.exp([0.5, -0.4, 0.3])
+    flights = [fly(swerve(), load_vehicle(name), start=start_at([0.1, 0, 0], q=sign * q)) for sign in (1, -1)]
+    np.testing.assert_array_equal(flights[0].states.position, flights[1].states.position)
+    np.testing.assert_array_equal(flights[0].commands, flights[1].commands)
+
+
+@settings(max_examples=10)
+@given(st.floats(-np.pi, np.pi))
+def test_turned_about_the_vertical_everything_turns(angle: float) -> None:
+    """Trajectory, start and yaw turned by an angle: the same flight, turned; off its path, with drag."""
+    vehicle = replace(load_vehicle("hexarotor"), drag_body=np.array([0.2, 0.1, 0.3]))
+    turn = so3.about_axis([0.0, 0.0, 1.0], angle)
+    path, start = swerve(), start_at([0.1, 0.2, -0.1], [0.0, 0.3, 0.0], so3.exp([0.2, 0.1, 0.3]), [1.0, 0, 0])
+    straight = fly(path, vehicle, start=start)
+    turned = fly(
+        Trajectory(path.durations, so3.rotate(turn, path.coefficients)),
+        vehicle,
+        yaw=angle,
+        start=BodyState(
+            so3.rotate(turn, start.position),
+            so3.rotate(turn, start.velocity),
+            so3.multiply(turn, start.q_world_body),
+            start.omega_body,
+        ),
+    )
+    expected = so3.rotate(turn, straight.states.position)
+    np.testing.assert_allclose(turned.states.position, expected, rtol=0, atol=1e-9)
+    np.testing.assert_allclose(turned.thrusts, straight.thrusts, rtol=0, atol=1e-7)
+
+
+@pytest.mark.parametrize("name", ["agile-quad", "hexarotor", "crazyflie"])
+@pytest.mark.parametrize("tilt_deg", [45, 90, 135, 180])
+def test_thrown_into_the_air_in_any_attitude_it_comes_back(name: str, tilt_deg: int) -> None:
+    q = so3.about_axis([0.8, 0.6, 0.0], np.deg2rad(tilt_deg))
+    flight = fly(hover(6.0), load_vehicle(name), start=start_at(q=q))
+    assert flight.diverged is None
+    assert error(flight)[-1] < 0.15
+
+
+@pytest.mark.parametrize("name", VEHICLES)
+def test_a_wrong_mass_leaves_no_lasting_error(name: str) -> None:
+    vehicle = load_vehicle(name)
+    heavy = replace(vehicle, mass=1.05 * vehicle.mass)
+    flight = fly(hover(12.0), heavy, model=vehicle)
+    assert error(flight).max() > 1e-3
+    assert error(flight)[-1] < 0.05 * error(flight).max()
+
+
+@pytest.mark.parametrize("switch", ["moment_feedforward", "motor_lag_lead"])
+def test_each_feed_forward_brings_the_vehicle_nearer_to_its_path(switch: str) -> None:
+    vehicle = load_vehicle("agile-quad")
+    off = fly(swerve(), vehicle, controller=Controller(**{switch: False}))
+    assert error(off).max() > 5 * error(fly(swerve(), vehicle)).max()
+
+
+def test_drag_that_the_controller_knows_of_is_made_up_for() -> None:
+    vehicle = load_vehicle("agile-quad")
+    dragged = replace(vehicle, drag_body=np.array([0.3, 0.3, 0.3]))
+    unknown = error(fly(swerve(), dragged, model=vehicle)).max()
+    assert unknown > 0.01
+    assert error(fly(swerve(), dragged)).max() < 0.1 * unknown
+
+
+def test_commands_keep_within_limits_and_say_when_limits_changed_them() -> None:
+    vehicle = load_vehicle("hexarotor")
+    flight = fly(
+        hover(2.0), vehicle, start=start_at(HERE + np.array([1.0, 1.0, -1.0]), q=so3.exp([2.0, 0.0, 0.0]))
+    )
+    assert ((flight.commands >= vehicle.min_thrusts) & (flight.commands <= vehicle.max_thrusts)).all()
+    inside = (flight.commands > vehicle.min_thrusts) & (flight.commands < vehicle.max_thrusts)
+    assert flight.saturated.any()
+    assert not flight.saturated.all()
+    assert not inside.all(axis=-1)[flight.saturated].all()
+    assert flight.saturated[(~inside).any(axis=-1)].all()
+
+
+# ---- allocation, tick by tick
+
+
+def on(vehicle: Vehicle, load: Wrench) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Whether a batch of loads fits, the thrusts that make them, and those nearest within limits."""
+    count = len(load.thrust)
+    airframe, mixer = airframes([vehicle] * count), models(Controller(), [vehicle] * count).mixer
+    asked = Load(load.thrust, components(load.moment_body))
+    exact = demand(mixer, asked)
+    limited = joined(nearest(ArrayOps, airframe.rotors, mixer, asked))
+    one, one_mixer = next(rows((airframe.rotors, mixer), iter))
+    alone = nearest(FloatOps, one, one_mixer, next(rows(asked, iter)))
+    np.testing.assert_allclose(alone, limited[0], rtol=0, atol=1e-12 * vehicle.max_thrusts.max())
+    return fits(airframe.rotors, exact), joined(exact), limited
+
+
+@given(st.sampled_from(VEHICLES), st.integers(0, 2**32 - 1), st.floats(0.1, 10.0))
+def test_thrusts_are_those_of_the_vehicles_own_allocation(name: str, seed: int, strength: float) -> None:
+    """Exactly where they fit; else about the collective thrust that is left for roll and pitch."""
+    vehicle = load_vehicle(name)
+    rng, n, full = np.random.default_rng(seed), len(vehicle.rotors), vehicle.max_thrusts
+    load = wrench(vehicle, full * rng.uniform(0.5 - strength, 0.5 + strength, (40, n)))
+    whole, exact, limited = on(vehicle, load)
+    made = wrench(vehicle, limited)
+    close = {"rtol": 0, "atol": 1e-9 * full.max()}
+    np.testing.assert_allclose(exact, rotor_thrusts(vehicle, load), **close)
+    np.testing.assert_allclose(allocate(vehicle, load)[whole], exact[whole], **close)
+    about_it = Wrench(made.thrust, load.moment_body)
+    np.testing.assert_allclose(limited[~whole], allocate(vehicle, about_it)[~whole], **close)
+
+
+@given(st.sampled_from(VEHICLES), st.integers(0, 2**32 - 1), st.floats(0.1, 10.0))
+def test_collective_thrust_is_lowered_for_roll_and_pitch_and_never_raised(
+    name: str, seed: int, strength: float
+) -> None:
+    vehicle = load_vehicle(name)
+    rng, n = np.random.default_rng(seed), len(vehicle.rotors)
+    low, high = collective_range(vehicle)
+    load = wrench(vehicle, strength * vehicle.max_thrusts * rng.normal(size=(40, n)))
+    load = Wrench(rng.uniform(low, high, 40), load.moment_body)
+    load = Wrench(load.thrust, load.moment_body * [1, 1, 0])
+    _, _, limited = on(vehicle, load)
+    made, kept = wrench(vehicle, limited), wrench(vehicle, allocate(vehicle, load))
+    tolerance = 1e-9 * vehicle.max_thrusts.max()
+    assert (made.thrust <= load.thrust + tolerance).all()
+
+    def tilt(load: Wrench) -> np.ndarray:
+        return np.linalg.norm(load.moment_body[:, :2], axis=-1)
+
+    assert (tilt(made) >= tilt(kept) - tolerance).all()
+    whole = tilt(kept) >= tilt(load) - tolerance
+    np.testing.assert_allclose(made.thrust[whole], load.thrust[whole], rtol=0, atol=10 * tolerance)
+
+
+# ---- settings
+
+
+@pytest.mark.parametrize("field", [f.name for f in fields(Controller) if f.type == "float"])
+@pytest.mark.parametrize("value", [-1.0, np.nan, np.inf, "fast", None, True])
+def test_a_gain_that_is_no_gain_is_refused_by_name(field: str, value: object) -> None:
+    with pytest.raises(SpecError, match=rf"^controller\.{field} must be a finite number"):
+        Controller(**{field: value})
+
+
+def test_a_switch_is_on_or_off() -> None:
+    with pytest.raises(SpecError, match=r"^controller\.yaw_shed_first must be True or False, got 1"):
+        Controller(yaw_shed_first=1)
+
+
+def test_filters_of_no_length_are_no_filters() -> None:
+    sharp = Controller(lead_filter=0.0, jerk_filter=0.0, max_integral=0.0)
+    assert error(fly(swerve(), load_vehicle("agile-quad"), controller=sharp)).max() < 1e-3
+
+
+def test_a_vehicle_with_weak_rotors_gets_slower_loops_of_the_same_shape() -> None:
+    controller = Controller()
+    usual, half = controller.gains(100.0), controller.gains(controller.attitude_frequency / 2)
+    assert usual.stiffness == 2 * controller.attitude_frequency**2
+    assert half.position == pytest.approx(usual.position / 4)
+    assert half.velocity == pytest.approx(usual.velocity / 2)
+    assert half.stiffness / half.damping**2 == pytest.approx(usual.stiffness / usual.damping**2)

@@ -1,0 +1,209 @@
+"""One and many, floats and arrays: the same flights; noise and outcomes."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from aerobat import so3
+from aerobat.engines import FLOATS, NUMPY, choose
+from aerobat.errors import SpecError
+from aerobat.flight import COMPLETE, Flight
+from aerobat.flying import fly
+from aerobat.kernels.controller import Controller
+from aerobat.simulation import StateNoise
+from aerobat.states import BodyState
+from aerobat.trajectory import Trajectory
+from aerobat.vehicle import load_vehicle
+
+QUAD, HEXA = load_vehicle("agile-quad"), load_vehicle("hexarotor")
+SERIES = ("commands", "thrusts", "saturated")
+AT_REST = Trajectory(np.array([1.0]), np.zeros((1, 1, 3)))
+
+
+def loops(duration: float) -> Trajectory:
+    """Rising and falling with a swing to the side, four segments, continuous up to snap."""
+    s = np.array([0, 0, 0, 0, 0, 126, -420, 540, -315, 70], dtype=float)
+    ends = np.array([[0, 0, 0], [1, 0.5, 2], [2, -0.5, 1], [1, 0, 0], [0, 0, 0]], dtype=float)
+    coefficients = s[None, :, None] * np.diff(ends, axis=0)[:, None, :]
+    coefficients[:, 0] += ends[:-1]
+    return Trajectory(np.full(4, duration / 4), coefficients)
+
+
+def near(count: int, seed: int = 0) -> BodyState:
+    """Starts about the origin, none like another."""
+    rng = np.random.default_rng(seed)
+    scatter = [scale * rng.normal(size=(count, 3)) for scale in (0.1, 0.2, 0.3, 0.5)]
+    return BodyState(scatter[0], scatter[1], so3.exp(scatter[2]), scatter[3])
+
+
+def one(states: BodyState, k: int) -> BodyState:
+    return BodyState(**{name: value[k] for name, value in vars(states).items()})
+
+
+def assert_same(a: Flight, b: Flight, atol: float = 0.0) -> None:
+    for x, y in zip(vars(a.states).values(), vars(b.states).values(), strict=True):
+        np.testing.assert_allclose(x, y, rtol=0, atol=atol)
+    for name in SERIES:  # commands answer a state's rounding with the controller's gains
+        np.testing.assert_allclose(getattr(a, name), getattr(b, name), rtol=0, atol=1e3 * atol)
+    assert (a.outcomes, a.vehicles) == (b.outcomes, b.vehicles)
+    np.testing.assert_array_equal(a.times, b.times)
+
+
+@pytest.mark.parametrize("vehicle", [QUAD, HEXA], ids=["4 rotors", "6 rotors"])
+def test_floats_and_arrays_agree_to_rounding_over_3000_steps(vehicle) -> None:
+    noise = StateNoise.fused()
+    flights = [fly(loops(6.0), vehicle, engine=name, noise=noise, seed=4) for name in ("floats", "numpy")]
+    assert len(flights[0].times) == 3001
+    assert [flight.engine for flight in flights] == ["floats", "numpy"]
+    assert_same(*flights, atol=1e-12)
+
+
+@pytest.mark.parametrize("engine", ["floats", "numpy"])
+def test_each_vehicle_of_a_batch_flies_as_it_would_alone(engine: str) -> None:
+    """Different vehicles, starts and noise, all in one call."""
+    rng = np.random.default_rng(3)
+    vehicles = [replace(HEXA, name=f"no. {k}", mass=HEXA.mass * rng.uniform(0.9, 1.1)) for k in range(4)]
+    starts, noise = near(4), StateNoise.fused()
+    batch = fly(loops(4.0), vehicles, start=starts, noise=noise, seed=11, engine=engine)
+    assert batch.states.position.shape == (4, 2001, 3)
+    for k, vehicle in enumerate(vehicles):
+        alone = fly(
+            loops(4.0),
+            vehicle,
+            start=one(starts, k),
+            noise=noise,
+            seed=np.random.SeedSequence(11, spawn_key=(k,)),
+            engine="floats",
+        )
+        assert_same(batch[k], alone, atol=1e-12)
+
+
+def test_one_vehicle_takes_many_starts() -> None:
+    starts = near(3)
+    batch = fly(AT_REST, QUAD, start=starts)
+    assert batch.vehicles == ("agile-quad",) * 3
+    for k in range(3):
+        assert_same(batch[k], fly(AT_REST, QUAD, start=one(starts, k)))
+
+
+def test_quadrotors_of_any_size_fly_in_one_batch() -> None:
+    crazyflie = load_vehicle("crazyflie")
+    batch = fly(loops(6.0), [QUAD, crazyflie])
+    assert batch.outcomes == (COMPLETE, COMPLETE)
+    assert_same(batch[1], fly(loops(6.0), crazyflie))
+    np.testing.assert_array_equal(batch.max_thrusts, [QUAD.max_thrusts, crazyflie.max_thrusts])
+
+
+def test_few_vehicles_are_flown_by_floats_and_many_by_arrays() -> None:
+    assert choose("auto", 1) is FLOATS
+    assert choose("auto", 100) is NUMPY
+    assert fly(AT_REST, QUAD).engine == "floats"
+    assert fly(AT_REST, [QUAD] * 30).engine == "numpy"
+
+
+def test_observed_errors_have_the_stated_spread() -> None:
+    """On each axis, of each quantity; and no vehicle's errors are another's."""
+    noise = StateNoise(position=0.01, velocity=0.1, attitude=0.02, omega=0.3)
+    errors = noise.drawn([np.random.default_rng(k) for k in range(4)], 5000)
+    assert errors.position.std() == pytest.approx(0.01, rel=0.02)
+    assert errors.velocity.std() == pytest.approx(0.1, rel=0.02)
+    assert so3.log(errors.q_world_body).std() == pytest.approx(0.02, rel=0.02)
+    assert errors.omega_body.std() == pytest.approx(0.3, rel=0.02)
+    assert abs(np.corrcoef(errors.position[:, 0, 0], errors.position[:, 1, 0])[0, 1]) < 0.05
+
+
+def test_noise_as_of_a_good_observer_costs_millimetres() -> None:
+    clean, noisy = (fly(loops(8.0), HEXA, noise=noise, seed=2) for noise in (None, StateNoise.fused()))
+    gap = np.linalg.norm(noisy.states.position - clean.states.position, axis=-1)
+    assert 1e-5 < gap.max() < 0.005
+
+
+@pytest.mark.parametrize("engine", ["floats", "numpy"])
+def test_divergence_is_an_outcome_and_ends_the_flight(engine: str) -> None:
+    spinning = BodyState(
+        np.zeros(3), np.array([20.0, 0.0, 0.0]), so3.exp([2.5, 0, 0]), np.array([30.0, 5.0, 0.0])
+    )
+    flight = fly(loops(3.0), HEXA, start=spinning, engine=engine)
+    error = np.linalg.norm(flight.states.position - flight.setpoint.flat.position, axis=-1)
+    assert flight.diverged == f"diverged at {flight.times[-1]:.2f} s: position error above 5 m"
+    assert flight.times[-1] == flight.ends < 3.0
+    assert error[-1] > 5.0 >= error[:-1].max()
+
+
+def test_a_state_that_is_no_number_any_more_ends_the_flight_before_it() -> None:
+    wild = BodyState(np.zeros(3), np.zeros(3), so3.IDENTITY, np.array([1e200, 1e200, 0.0]))
+    flight = fly(AT_REST, HEXA, start=wild)
+    assert flight.diverged == "diverged at 0.00 s: its state is no longer a number"
+    assert len(flight.times) == 1
+
+
+def test_in_a_batch_a_diverged_vehicle_stays_where_it_ended() -> None:
+    starts = BodyState(
+        np.zeros((2, 3)),
+        np.zeros((2, 3)),
+        np.stack([so3.IDENTITY] * 2),
+        np.array([[0, 0, 0], [1e200, 1e200, 0]]),
+    )
+    batch = fly(AT_REST, HEXA, start=starts)
+    assert batch.outcomes[0] == COMPLETE
+    assert batch.outcomes[1].startswith("diverged")
+    assert (batch.states.position[1] == batch.states.position[1, 0]).all()
+    assert batch[0].diverged is None
+    assert len(batch[0].times) == 501
+    assert len(batch[1].times) == 1
+
+
+def test_the_last_step_may_be_shorter_and_the_flight_ends_with_the_trajectory() -> None:
+    flight = fly(loops(4.0007), QUAD)
+    assert flight.times[-1] == pytest.approx(4.0007, abs=1e-12)
+    assert np.diff(flight.times)[-1] == pytest.approx(0.0007, abs=1e-12)
+    np.testing.assert_allclose(flight.states.position[-1], np.zeros(3), atol=0.005)
+
+
+def test_a_slow_controller_does_not_coarsen_the_physics() -> None:
+    falling = BodyState(np.zeros(3), np.zeros(3), so3.IDENTITY, np.array([4.0, -3.0, 2.0]))
+    slow, fast = (fly(AT_REST, QUAD, start=falling, rate=rate) for rate in (250.0, 500.0))
+    assert np.abs(slow.states.position - fast.states.position[::2]).max() < 0.01
+
+
+@pytest.mark.parametrize(
+    ("arguments", "sentence"),
+    [
+        ({"vehicle": []}, "vehicle must be at least one"),
+        ({"vehicle": [QUAD, HEXA]}, "need as many rotors"),
+        ({"model": HEXA}, "need as many rotors"),
+        ({"vehicle": [QUAD, replace(QUAD, gravity=1.62)]}, "same gravity"),
+        ({"engine": "abacus"}, "engine must be one of auto, floats, numpy"),
+        ({"rate": 0.0}, "rate must be a positive"),
+        ({"rate": np.nan}, "rate must be a positive"),
+        ({"yaw": np.inf}, "yaw must be finite"),
+        ({"seed": -1, "noise": StateNoise.fused()}, "seed must be a whole number"),
+        ({"vehicle": [QUAD] * 2, "start": near(3)}, "start must carry one leading axis of 2"),
+        ({"start": replace(near(3), velocity=np.zeros((2, 3)))}, "same leading axis of 3"),
+        ({"start": one(replace(near(1), q_world_body=np.array([[2.0, 0, 0, 0]])), 0)}, "unit quaternion"),
+        (
+            {"start": one(replace(near(1), position=np.full((1, 3), np.nan)), 0)},
+            "start.position must be numbers",
+        ),
+    ],
+)
+def test_arguments_that_do_not_fit_are_refused_in_one_sentence(arguments: dict, sentence: str) -> None:
+    with pytest.raises(SpecError, match=sentence) as caught:
+        fly(**{"trajectory": AT_REST, "vehicle": QUAD, **arguments})
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("field", ["position", "velocity", "attitude", "omega"])
+@pytest.mark.parametrize("value", [-1.0, np.nan, "much"])
+def test_noise_that_is_no_spread_is_refused_by_name(field: str, value: object) -> None:
+    with pytest.raises(SpecError, match=rf"^noise\.{field} must be"):
+        StateNoise(**{field: value})
+
+
+def test_a_controller_of_its_own_is_flown() -> None:
+    loose = fly(
+        loops(3.0), QUAD, start=one(near(1), 0), controller=Controller(position_gain=4.0, velocity_gain=3.0)
+    )
+    tight = fly(loops(3.0), QUAD, start=one(near(1), 0))
+    assert np.abs(loose.states.position - tight.states.position).max() > 0.01
