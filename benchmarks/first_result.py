@@ -1,6 +1,6 @@
 """How long the main job takes against importing NumPy and Matplotlib, each in a fresh process, in turn.
 
-    uv run python benchmarks/first_result.py [RUNS]
+uv run python benchmarks/first_result.py [RUNS]
 """
 
 import statistics
@@ -16,7 +16,7 @@ def main() -> None:
     runs = int(sys.argv[1]) if len(sys.argv) > 1 else 7
     with tempfile.TemporaryDirectory() as folder:
         job = [sys.executable, "-m", "aerobat.cli", "fly", "flip-roll", "--out", folder]
-        pairs = [(seconds(job), seconds(IMPORTS)) for _ in range(runs + 1)][1:]  # the first fills the disk cache
+        pairs = [(seconds(job), seconds(IMPORTS)) for _ in range(runs + 1)][1:]  # after a warm-up
     jobs, imports = zip(*pairs, strict=True)
     ratio = statistics.median(a / b for a, b in pairs)
     print(f"aerobat fly flip-roll           {statistics.median(jobs):.2f} s (median of {runs})")

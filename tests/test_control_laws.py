@@ -8,27 +8,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from aerobat import so3
-from aerobat.engines.batch import ArrayOps
-from aerobat.engines.floats import FloatOps
-from aerobat.engines.packing import airframes, components, joined, models
-from aerobat.engines.trees import rows
 from aerobat.errors import SpecError
 from aerobat.flight import Flight
 from aerobat.flying import fly
-from aerobat.kernels.allocation import demand, fits, nearest
 from aerobat.kernels.controller import Controller
-from aerobat.kernels.rigid_body import Load
-from aerobat.states import BodyState, Wrench
+from aerobat.states import BodyState
 from aerobat.trajectory import Trajectory
-from aerobat.vehicle import (
-    Vehicle,
-    allocate,
-    collective_range,
-    load_vehicle,
-    rotor_thrusts,
-    vehicle_names,
-    wrench,
-)
+from aerobat.vehicle import load_vehicle, vehicle_names
 
 VEHICLES = vehicle_names()
 HERE = np.array([1.0, -2.0, 3.0])
@@ -138,60 +124,6 @@ def test_commands_keep_within_limits_and_say_when_limits_changed_them() -> None:
     assert not flight.saturated.all()
     assert not inside.all(axis=-1)[flight.saturated].all()
     assert flight.saturated[(~inside).any(axis=-1)].all()
-
-
-# ---- allocation, tick by tick
-
-
-def on(vehicle: Vehicle, load: Wrench) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Whether a batch of loads fits, the thrusts that make them, and those nearest within limits."""
-    count = len(load.thrust)
-    airframe, mixer = airframes([vehicle] * count), models(Controller(), [vehicle] * count).mixer
-    asked = Load(load.thrust, components(load.moment_body))
-    exact = demand(mixer, asked)
-    limited = joined(nearest(ArrayOps, airframe.rotors, mixer, asked))
-    one, one_mixer = next(rows((airframe.rotors, mixer), iter))
-    alone = nearest(FloatOps, one, one_mixer, next(rows(asked, iter)))
-    np.testing.assert_allclose(alone, limited[0], rtol=0, atol=1e-12 * vehicle.max_thrusts.max())
-    return fits(airframe.rotors, exact), joined(exact), limited
-
-
-@given(st.sampled_from(VEHICLES), st.integers(0, 2**32 - 1), st.floats(0.1, 10.0))
-def test_thrusts_are_those_of_the_vehicles_own_allocation(name: str, seed: int, strength: float) -> None:
-    """Exactly where they fit; else about the collective thrust that is left for roll and pitch."""
-    vehicle = load_vehicle(name)
-    rng, n, full = np.random.default_rng(seed), len(vehicle.rotors), vehicle.max_thrusts
-    load = wrench(vehicle, full * rng.uniform(0.5 - strength, 0.5 + strength, (40, n)))
-    whole, exact, limited = on(vehicle, load)
-    made = wrench(vehicle, limited)
-    close = {"rtol": 0, "atol": 1e-9 * full.max()}
-    np.testing.assert_allclose(exact, rotor_thrusts(vehicle, load), **close)
-    np.testing.assert_allclose(allocate(vehicle, load)[whole], exact[whole], **close)
-    about_it = Wrench(made.thrust, load.moment_body)
-    np.testing.assert_allclose(limited[~whole], allocate(vehicle, about_it)[~whole], **close)
-
-
-@given(st.sampled_from(VEHICLES), st.integers(0, 2**32 - 1), st.floats(0.1, 10.0))
-def test_collective_thrust_is_lowered_for_roll_and_pitch_and_never_raised(
-    name: str, seed: int, strength: float
-) -> None:
-    vehicle = load_vehicle(name)
-    rng, n = np.random.default_rng(seed), len(vehicle.rotors)
-    low, high = collective_range(vehicle)
-    load = wrench(vehicle, strength * vehicle.max_thrusts * rng.normal(size=(40, n)))
-    load = Wrench(rng.uniform(low, high, 40), load.moment_body)
-    load = Wrench(load.thrust, load.moment_body * [1, 1, 0])
-    _, _, limited = on(vehicle, load)
-    made, kept = wrench(vehicle, limited), wrench(vehicle, allocate(vehicle, load))
-    tolerance = 1e-9 * vehicle.max_thrusts.max()
-    assert (made.thrust <= load.thrust + tolerance).all()
-
-    def tilt(load: Wrench) -> np.ndarray:
-        return np.linalg.norm(load.moment_body[:, :2], axis=-1)
-
-    assert (tilt(made) >= tilt(kept) - tolerance).all()
-    whole = tilt(kept) >= tilt(load) - tolerance
-    np.testing.assert_allclose(made.thrust[whole], load.thrust[whole], rtol=0, atol=10 * tolerance)
 
 
 # ---- settings

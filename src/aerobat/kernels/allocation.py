@@ -1,4 +1,4 @@
-"""Rotor thrusts that fit within limits, at every tick; the scalar twin of `aerobat.vehicle.allocation`."""
+"""Rotor thrusts that fit within limits, at every tick."""
 
 from __future__ import annotations
 

@@ -1,7 +1,6 @@
 """What flies: vehicles, their rotors, and what the rotors do to the body."""
 
 from aerobat.vehicle.allocation import (
-    allocate,
     allocation_matrix,
     collective_range,
     mixer,
@@ -14,7 +13,6 @@ from aerobat.vehicle.vehicle import Rotor, Vehicle
 __all__ = [
     "Rotor",
     "Vehicle",
-    "allocate",
     "allocation_matrix",
     "collective_range",
     "load_vehicle",

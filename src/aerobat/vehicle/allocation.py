@@ -23,8 +23,7 @@ from aerobat.states import Wrench
 if TYPE_CHECKING:
     from aerobat.vehicle.vehicle import Rotor, Vehicle
 
-# [-] of a rotor's range: thrusts that rounding puts past a limit, changes too small to meet one.
-_SLACK = 1e-12
+_SLACK = 1e-12  # a rotor with a smaller share of the collective thrust bears none of it
 
 
 def allocation_matrix(rotors: Sequence[Rotor]) -> Array:
@@ -60,36 +59,3 @@ def collective_range(vehicle: Vehicle) -> tuple[float, float]:
     moving = np.abs(direction) > _SLACK
     ends = np.sort([vehicle.min_thrusts[moving], vehicle.max_thrusts[moving]] / direction[moving], axis=0)
     return float(ends[0].max()), float(ends[1].min())
-
-
-def allocate(vehicle: Vehicle, wrench: Wrench) -> Array:
-    """Rotor thrusts within their limits [N], (..., n), that make a wrench, or as much of it as fits.
-
-    Where the least-norm thrusts fit, they are the answer and the wrench is made exactly. Elsewhere the
-    collective comes first, then roll and pitch, and yaw last:
-
-        f = T m0 + a (Mx m1 + My m2) + b Mz m3    with m0..m3 the columns of the mixer,
-
-    T brought into `collective_range`, a the largest in [0, 1] that fits without yaw, then b the largest in
-    [0, 1] that fits. Roll and pitch are whole (a = 1) wherever giving up yaw makes them fit. A redundant
-    vehicle (n > 4) may reach some of these wrenches by thrusts of a larger norm; those are not searched for.
-    """
-    lower, upper = vehicle.min_thrusts, vehicle.max_thrusts
-    slack = _SLACK * (upper - lower)
-    exact = rotor_thrusts(vehicle, wrench)
-    fits = ((exact >= lower - slack) & (exact <= upper + slack)).all(axis=-1, keepdims=True)
-
-    inverse, moment = mixer(vehicle), np.asarray(wrench.moment_body, dtype=float)
-    collective = np.clip(wrench.thrust, *collective_range(vehicle))[..., None] * inverse[:, 0]
-    tilted = _as_far_as_fits(collective, moment[..., :2] @ inverse[:, 1:3].T, lower, upper)
-    turned = _as_far_as_fits(tilted, moment[..., 2:] * inverse[:, 3], lower, upper)
-    return np.clip(np.where(fits, exact, turned), lower, upper)
-
-
-def _as_far_as_fits(base: Array, change: Array, lower: Array, upper: Array) -> Array:
-    """base + s·change with the largest s in [0, 1] within limits, (..., n), for a base within them."""
-    room = np.maximum(np.where(change > 0, upper - base, base - lower), 0.0)
-    size = np.abs(change)
-    matters = size > _SLACK * (upper - lower)
-    share = np.where(matters, room / np.where(matters, size, 1.0), 1.0).min(axis=-1, keepdims=True)
-    return np.asarray(base + np.minimum(share, 1.0) * change)
