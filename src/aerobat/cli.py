@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Annotated
 from cyclopts import App, CycloptsError, Group, Parameter, validators
 
 from aerobat.errors import AerobatError, Infeasible, SpecError
-from aerobat.reporting.illustrator import Illustrator
+from aerobat.reporting.illustrator import Illustrator, unhurried_collector
 
 if TYPE_CHECKING:
     from aerobat.flight import Flight
@@ -104,12 +104,12 @@ def fly(problem: str, options: Common = PlanningOptions(), aloft: Aloft = Flying
     problem
         A name that `aerobat problems` lists, or a problem's TOML file.
     """
-    from aerobat.flying import fly as fly_trajectory
-    from aerobat.metrics import score
-    from aerobat.simulation import StateNoise
-
-    noise = StateNoise.fused().scaled(aloft.noise) if aloft.noise else None
     with Illustrator() as illustrator:
+        from aerobat.flying import fly as fly_trajectory
+        from aerobat.metrics import score
+        from aerobat.simulation import StateNoise
+
+        noise = StateNoise.fused().scaled(aloft.noise) if aloft.noise else None
         task, vehicle = _read(problem, options)
         plan = _plan(task, vehicle, options)
         flight = fly_trajectory(plan.trajectory, vehicle, yaw=task.yaw, noise=noise, seed=aloft.seed)
@@ -155,6 +155,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
 
     Whatever is foreseen ends in one sentence on standard error, and an exit code.
     """
+    unhurried_collector()
     tokens = sys.argv[1:] if arguments is None else arguments
     try:
         app(tokens, exit_on_error=False, print_error=False, result_action="return_value")

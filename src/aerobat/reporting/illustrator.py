@@ -5,7 +5,10 @@ Loading and drawing take longer than all the rest of the main job; side by side 
 
 from __future__ import annotations
 
+import gc
+import os
 import pickle
+import signal
 import subprocess
 import sys
 from importlib import import_module
@@ -50,7 +53,7 @@ class Illustrator:
         """The page as PNG, once it is drawn. Raises AerobatError when the process failed."""
         with self._pipe(self._process.stdout) as stdout:
             picture = stdout.read()
-        if self._process.wait() != 0 or not picture:
+        if self._process.wait() or not picture:
             raise AerobatError("the picture could not be drawn; the process that draws it said why above")
         return picture
 
@@ -61,9 +64,21 @@ class Illustrator:
         return pipe
 
 
+def unhurried_collector() -> None:
+    """Let cyclic garbage lie longer: a short process spends a tenth of its time looking for it."""
+    gc.set_threshold(100_000, 50, 50)
+
+
 def main() -> None:
     """Load first, then wait for what to draw; end quietly when nothing comes."""
-    for name in ("matplotlib.backends.backend_agg", "matplotlib.collections", "aerobat.planning"):
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # an interrupt is for the first process to answer
+    unhurried_collector()
+    for name in (
+        "matplotlib.figure",
+        "matplotlib.backends.backend_agg",
+        "aerobat.planning",
+        "aerobat.flight",
+    ):
         import_module(name)
     from aerobat.reporting.figures import png, report_figure
 
@@ -72,6 +87,8 @@ def main() -> None:
     except EOFError:
         return
     sys.stdout.buffer.write(png(report_figure(*page)))
+    sys.stdout.buffer.flush()
+    os._exit(0)  # the picture is out, and somebody waits: no time for taking matplotlib apart
 
 
 if __name__ == "__main__":
