@@ -82,6 +82,19 @@ def test_the_limit_that_binds_is_named() -> None:
     assert not any(a.feasible for a in failure.value.attempts)
 
 
+def test_running_out_of_time_is_not_called_infeasible() -> None:
+    with pytest.raises(Infeasible, match=r"in the time given.*--time-limit") as failure:
+        plan(load_problem("flip-roll"), Miqp(search=Bisection(0.1, 0.12), time_limit=0.0))
+    assert {a.status for a in failure.value.attempts} == {"unknown"}
+
+
+def test_an_optimal_plan_reports_its_bound(quad: Vehicle) -> None:
+    found = plan(load_problem("flip-roll"), vehicle=quad)
+    assert found.status == "optimal"
+    assert found.bound == pytest.approx(found.cost, rel=1e-9)
+    assert found.gap < 1e-9
+
+
 def test_a_vehicle_too_weak_for_the_maneuver_is_told_which_rotor_lacks_what() -> None:
     weak = load_vehicle("agile-quad")
     weak = replace(weak, rotors=tuple(replace(r, max_thrust=2.2) for r in weak.rotors))

@@ -19,7 +19,7 @@ from aerobat.specs import (
     load_problem,
     tilted_gate,
 )
-from aerobat.specs.maneuver import Stage
+from aerobat.specs.stage import Stage
 
 G = 9.81
 

@@ -32,6 +32,10 @@ def why_infeasible(
             f"{said} that {vehicle.name} can fly: at best, {best}; lower the maneuver's thrusts, "
             "move the gate nearer, or take a stronger vehicle"
         )
+    if any(a.status == "unknown" for a in attempts):
+        return (
+            f"{said} that was found in the time given; allow more with --time-limit, or use fewer intervals"
+        )
     binding = list(_binding(formulation, tried))
     if not binding:
         return (

@@ -18,8 +18,8 @@ from aerobat.arrays import Array, frozen
 from aerobat.errors import SpecError
 from aerobat.planning.integrator import INPUTS, IntegratorChain
 from aerobat.programs import AssignmentProgram, SlottedStage
-from aerobat.specs.maneuver import Condition, Course, Quantity, Stage
 from aerobat.specs.problem import DERIVATIVES, Problem
+from aerobat.specs.stage import Condition, Course, Quantity, Stage
 
 Indices = NDArray[np.intp]
 AXES = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))

@@ -16,8 +16,8 @@ from aerobat.planning.integrator import IntegratorChain
 from aerobat.planning.result import Attempt, PlacedStage, Plan
 from aerobat.planning.search import Bisection, Grid, Search
 from aerobat.programs import AssignmentResult, Solver, solver
-from aerobat.specs.maneuver import Course
 from aerobat.specs.problem import Problem
+from aerobat.specs.stage import Course
 from aerobat.states import GRAVITY
 from aerobat.trajectory import Trajectory
 from aerobat.vehicle import Vehicle
@@ -115,7 +115,9 @@ class _Planning:
         program = self.formulation.program(dt)
         answer = self.solver.solve(program, time_limit=self.config.time_limit, start=self.slots)
         if answer.x is None:
-            return self._record(dt, answer, None, "the program has no solution")
+            late = answer.status == "unknown"
+            outcome = "no solution was found in time" if late else "the program has no solution"
+            return self._record(dt, answer, None, outcome)
         self.slots = answer.slots
         inputs = self.formulation.inputs(answer.x, dt)
         trajectory = Trajectory.from_inputs(self.formulation.initial, inputs, dt)
@@ -137,7 +139,8 @@ class _Planning:
         cost: float | None = None,
     ) -> _Found | None:
         duration = dt * self.config.intervals
-        attempt = Attempt(dt, duration, found is not None, outcome, cost, answer.nodes, answer.time)
+        feasible = found is not None
+        attempt = Attempt(dt, duration, feasible, answer.status, outcome, cost, answer.nodes, answer.time)
         self.attempts.append(attempt)
         if self.progress is not None:
             self.progress(attempt)
@@ -157,6 +160,8 @@ class _Planning:
             intervals=self.config.intervals,
             dt=found.dt,
             cost=found.cost,
+            status=found.answer.status,
+            bound=self.formulation.cost(found.answer.bound, found.dt),
             gap=found.answer.gap,
             backend=self.config.backend,
             nodes=sum(a.nodes for a in self.attempts),

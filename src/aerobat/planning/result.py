@@ -17,6 +17,7 @@ class Attempt:
     dt: float  # [s] per interval
     duration: float  # [s]
     feasible: bool
+    status: str  # of the program: optimal, time_limit (the best found by then), infeasible, unknown
     outcome: str  # a sentence
     cost: float | None  # Σ|u|², the input's units squared
     nodes: int
@@ -44,7 +45,9 @@ class Plan:
     intervals: int
     dt: float  # [s]
     cost: float  # Σ|u|²
-    gap: float  # relative, proven; 0 at the optimum
+    status: str  # optimal, or time_limit: the best found by then
+    bound: float  # Σ|u|² of any solution at this dt is at least this, proven
+    gap: float  # (cost − bound) / cost
     backend: str
     nodes: int  # over all attempts
     solve_time: float  # [s] over all attempts, in the solver

@@ -2,19 +2,9 @@
 
 from aerobat.specs.files import load_problem, problem_names, write_problem
 from aerobat.specs.gate import Gate, tilted_gate
-from aerobat.specs.maneuver import (
-    Condition,
-    Course,
-    Flip,
-    HalfFlip,
-    Line,
-    Maneuver,
-    Passing,
-    Quantity,
-    Stage,
-    Staged,
-)
+from aerobat.specs.maneuver import Flip, HalfFlip, Line, Maneuver, Passing, Staged
 from aerobat.specs.problem import PAPER_LIMITS, EndState, Limits, Problem, rest
+from aerobat.specs.stage import Condition, Course, Quantity, Stage
 
 __all__ = [
     "PAPER_LIMITS",

@@ -20,8 +20,9 @@ from aerobat.documents import (
 )
 from aerobat.errors import SpecError
 from aerobat.specs.gate import Gate, tilted_gate
-from aerobat.specs.maneuver import Condition, Flip, HalfFlip, Line, Maneuver, Passing, Quantity, Stage, Staged
+from aerobat.specs.maneuver import Flip, HalfFlip, Line, Maneuver, Passing, Staged
 from aerobat.specs.problem import DERIVATIVES, EndState, Limits, Problem
+from aerobat.specs.stage import Condition, Quantity, Stage
 
 if TYPE_CHECKING:
     from aerobat.specs import schema
