@@ -79,6 +79,11 @@ def test_a_vehicle_wider_than_the_opening_hits_the_frame(cruise: Flight, quad: V
     assert "hit the gate's frame" in result.outcome
 
 
+def test_a_flight_beside_the_opening_misses_the_gate(cruise: Flight, quad: Vehicle) -> None:
+    gate = tilted_gate(np.array([4.0, 0.7, 1.0]), width=1.0, height=1.0)
+    assert score(cruise, problem(gate), quad).outcome.startswith("missed the gate, 0.70 m off")
+
+
 def test_a_flight_that_diverges_says_when_and_why(quad: Vehicle) -> None:
     runaway = Trajectory(np.array([2.0]), np.array([[[0.0, 0, 1], [0, 0, 0], [200.0, 0, 0]]]))
     flight = fly(runaway, quad)

@@ -23,6 +23,7 @@ class Passage:
 
     time: float  # [s]
     miss: float  # [m] distance from the centre
+    inside: bool  # whether the centre of mass went through the opening
     speed: float  # [m/s]
     attitude_error_deg: float  # angle between the thrust axis and the gate's upright
     clearance: float | None  # [m] from the outermost rotor tip to the frame; negative: a collision
@@ -104,6 +105,7 @@ def gate_passage(flight: Flight, gate: Gate, vehicle: Vehicle | None = None) -> 
     return Passage(
         time=float(times[k] + fraction * (times[nxt] - times[k])),
         miss=float(np.linalg.norm(offset)),
+        inside=bool(abs(offset @ gate.lateral) < gate.width / 2 and abs(offset @ gate.up) < gate.height / 2),
         speed=float(np.linalg.norm(at(flight.states.velocity))),
         attitude_error_deg=float(np.rad2deg(np.arccos(np.clip(so3.thrust_axis(attitude) @ gate.up, -1, 1)))),
         clearance=None if vehicle is None else _clearance(gate, vehicle, offset, attitude),
@@ -139,6 +141,8 @@ def _outcome(flight: Flight, passage: Passage | None) -> str:
         return flight.diverged
     if passage is None:
         return "flown to the end"
+    if not passage.inside:
+        return f"missed the gate, {passage.miss:.2f} m off its centre at {passage.time:.2f} s"
     if passage.clearance is not None and passage.clearance < 0.0:
         return f"hit the gate's frame, {100 * -passage.clearance:.1f} cm too wide at {passage.time:.2f} s"
     return f"through the gate at {passage.speed:.1f} m/s, {1000 * passage.miss:.1f} mm off its centre"

@@ -42,7 +42,7 @@ def why_infeasible(
             f"{said}: its stages, goal and limits exclude each other, and dropping any one of them does not "
             "help; use more intervals or ask less"
         )
-    return f"{said}: {' or '.join(binding)} binds; widen or drop it, and there is one"
+    return f"{said}: {' or '.join(binding)} binds; widen or drop it, or use more intervals"
 
 
 def _binding(formulation: Formulation, dts: Sequence[float]) -> Iterator[str]:

@@ -107,7 +107,7 @@ def _draw_components(axes: Axes, places: Array, arrows: Array, unit: float, plan
     size = size_of(axes)
     key = max(KEYS[KEYS * unit <= KEY], default=KEYS[0])
     names = (f"a along {plane.name}", "a + g along z")
-    for part, colour, name, place in zip(COMPONENTS, (BLUE, RED), names, (1.25, 2.8), strict=True):
+    for part, colour, name, place in zip(COMPONENTS, (BLUE, RED), names, (1.3, 3.05), strict=True):
         quiver = axes.quiver(
             *places.T, *(arrows * part).T, color=colour, units="inches", scale_units="inches", angles="uv",
             scale=1.0, width=0.024, headwidth=4.2, headlength=4.6, headaxislength=4.2, minlength=0, zorder=3,
