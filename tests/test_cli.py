@@ -55,7 +55,7 @@ def test_fly_writes_the_plan_the_flight_the_picture_and_the_report(capsys) -> No
     assert read_csv(folder / "plan.csv").duration == pytest.approx(report["plan"]["duration_s"])
     assert load_flight(folder / "flight.npz").times[-1] == pytest.approx(report["plan"]["duration_s"])
     assert (folder / "report.png").read_bytes().startswith(b"\x89PNG")
-    for word in ("planner", "stages", "rotors", "position error", "gate", "saturated"):
+    for word in ("planner", "stage intervals", "rotors", "position error", "gate", "saturated"):
         assert word in out
 
 

@@ -236,11 +236,12 @@ def _finish(
     illustrator.begin(plan, vehicle, flight, score)
     folder = options.out or Path("out") / plan.problem.name
     facts = report(plan, score, vehicle.name)
+    picture = illustrator.picture()  # before anything is written: all files or none
     write_csv(plan.trajectory, folder / "plan.csv")
     if flight is not None:
         flight.save(folder / "flight.npz")
     write_whole(folder / "report.json", to_json(facts) + "\n")
-    write_whole(folder / "report.png", illustrator.picture())
+    write_whole(folder / "report.png", picture)
     if options.json:
         print(to_json(facts))
         return

@@ -55,7 +55,7 @@ def _plan_facts(plan: Plan) -> Iterable[tuple[str, str]]:
     yield "cost", f"{plan.cost:.7g}, {proven}"
     yield "nodes", f"{plan.nodes}, solved in {1000 * plan.solve_time:.0f} ms"
     if plan.stages:
-        yield "stages", "interval " + ", ".join(f"{s.interval} ({s.name})" for s in plan.stages)
+        yield "stage intervals", ", ".join(f"{s.name} {s.interval}" for s in plan.stages)
     if plan.margin is not None:
         yield "rotors", str(plan.margin)
 
