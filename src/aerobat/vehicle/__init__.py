@@ -1,7 +1,6 @@
 """What flies: vehicles, their rotors, and what the rotors do to the body."""
 
 from aerobat.vehicle.allocation import (
-    allocation_matrix,
     collective_range,
     mixer,
     rotor_thrusts,
@@ -13,7 +12,6 @@ from aerobat.vehicle.vehicle import Rotor, Vehicle
 __all__ = [
     "Rotor",
     "Vehicle",
-    "allocation_matrix",
     "collective_range",
     "load_vehicle",
     "mixer",

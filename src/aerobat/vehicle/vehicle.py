@@ -12,7 +12,6 @@ from numpy.typing import ArrayLike
 from aerobat.arrays import Array, frozen
 from aerobat.errors import SpecError
 from aerobat.states import GRAVITY
-from aerobat.vehicle.allocation import allocation_matrix
 
 _ROUNDING = 1e-9  # [-] relative: inertias are written with a few digits
 
@@ -105,8 +104,18 @@ class Vehicle:
 
     @cached_property
     def allocation(self) -> Array:
-        """The map from rotor thrusts to (T, Mx, My, Mz), (4, n)."""
-        return frozen(allocation_matrix(self.rotors), "allocation")
+        """The map from rotor thrusts [N] to thrust and moments (T [N], Mx, My, Mz [N·m]), (4, n).
+
+        With rotor i at (x, y, z) in body axes, thrust f_i along +z, spin s_i and torque coefficient c_i,
+
+            T = Σ f_i    Mx = Σ y_i f_i    My = -Σ x_i f_i    Mz = -Σ s_i c_i f_i
+
+        since r × f e3 = (y f, -x f, 0), and since a rotor that turns counter-clockwise (s = +1) drives the
+        body clockwise. Sections III and V-C of the paper use such a matrix.
+        """
+        x, y, _ = np.array([rotor.position_body for rotor in self.rotors]).T
+        drag_torque = [-rotor.spin * rotor.torque_coefficient for rotor in self.rotors]
+        return frozen([np.ones_like(x), y, -x, drag_torque], "allocation")
 
     @property
     def max_specific_thrust(self) -> float:
