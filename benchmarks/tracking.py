@@ -34,7 +34,7 @@ def main() -> None:
 
 
 def plans() -> Iterator[tuple[ab.Vehicle, ab.Problem, ab.Plan, str]]:
-    for name in ("agile-quad", "hexarotor"):
+    for name in ("crazyflie", "agile-quad", "hexarotor"):
         vehicle = ab.load_vehicle(name)
         for problem in map(ab.load_problem, ab.problem_names()):
             for order in (4, 5):

@@ -18,6 +18,7 @@ from aerobat.vehicle import load_vehicle, mixer
 seeds = st.integers(0, 2**32 - 1)
 QUAD = load_vehicle("agile-quad")
 HEXA = load_vehicle("hexarotor")
+DRAGGED = replace(QUAD, name="dragged", drag_body=np.array([0.3, 0.3, 0.1]))
 UP = np.array([0.0, 0.0, 1.0])
 
 
@@ -50,7 +51,7 @@ def largest(sampled):
 
 
 @pytest.mark.parametrize("order", [3, 4, 5])
-@pytest.mark.parametrize("vehicle", [QUAD, HEXA], ids=lambda vehicle: vehicle.name)
+@pytest.mark.parametrize("vehicle", [QUAD, HEXA, DRAGGED], ids=lambda vehicle: vehicle.name)
 def test_margin_is_that_of_dense_sampling(order, vehicle):
     for seed in range(2):
         trajectory = tumbling(seed, order)

@@ -1,5 +1,7 @@
 """Laws of differential flatness: round trips through inverted flight, rates, frames and zero thrust."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -119,24 +121,27 @@ def test_body_rates_and_accelerations_are_those_of_the_attitude(seed, yaw):
     assert np.abs(omega[..., 2]).max() == 0.0
 
 
-def test_flying_the_moments_open_loop_follows_the_trajectory():
+@pytest.mark.parametrize("drag", [(0.0, 0.0, 0.0), (0.3, 0.3, 0.3), (0.3, 0.3, 0.05)])
+def test_flying_the_moments_open_loop_follows_the_trajectory(drag):
     # the rigid body's equations, written out once more, driven by rotor thrusts alone
     rng = np.random.default_rng(7)
     sizes = np.array([2, 2, 6, 8, 8, 6, 4, 2, 1, 1])[:, None]
     trajectory = Trajectory([1.2], rng.normal(size=(1, 10, 3)) * sizes)
     times = np.linspace(0.0, 1.2, 4001)
-    flown = reference(trajectory, VEHICLE, times=times, yaw=0.4)
+    vehicle = replace(VEHICLE, drag_body=np.array(drag))
+    flown = reference(trajectory, vehicle, times=times, yaw=0.4)
     assert so3.thrust_axis(flown.setpoint.q_world_body)[:, 2].min() < 0.3
     thrusts = CubicSpline(times, flown.rotor_thrusts)
-    inertia = VEHICLE.inertia
+    inertia = vehicle.inertia
 
     def dynamics(t, x):
         q, omega = x[6:10], x[10:]
-        acting = wrench(VEHICLE, thrusts(t))
+        acting = wrench(vehicle, thrusts(t))
+        force = acting.thrust * UP - vehicle.drag_body * so3.unrotate(q, x[3:6])
         return np.concatenate(
             [
                 x[3:6],
-                so3.rotate(q, acting.thrust * UP) / VEHICLE.mass - GRAVITY,
+                so3.rotate(q, force) / vehicle.mass - GRAVITY,
                 0.5 * so3.multiply(q, np.append(0.0, omega)),
                 np.linalg.solve(inertia, acting.moment_body - np.cross(omega, inertia @ omega)),
             ]

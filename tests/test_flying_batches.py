@@ -88,7 +88,7 @@ def test_one_vehicle_takes_many_starts() -> None:
 
 
 def test_quadrotors_of_any_size_fly_in_one_batch() -> None:
-    crazyflie = load_vehicle("crazyflie")
+    crazyflie = replace(load_vehicle("crazyflie"), drag_body=np.zeros(3))
     batch = fly(loops(6.0), [QUAD, crazyflie])
     assert batch.outcomes == (COMPLETE, COMPLETE)
     assert_same(batch[1], fly(loops(6.0), crazyflie))
@@ -174,6 +174,7 @@ def test_a_slow_controller_does_not_coarsen_the_physics() -> None:
         ({"vehicle": [QUAD, HEXA]}, "need as many rotors"),
         ({"model": HEXA}, "need as many rotors"),
         ({"vehicle": [QUAD, replace(QUAD, gravity=1.62)]}, "same gravity"),
+        ({"vehicle": [QUAD, replace(QUAD, drag_body=np.ones(3))]}, "differ in drag per mass"),
         ({"engine": "abacus"}, "engine must be one of auto, floats, numpy"),
         ({"rate": 0.0}, "rate must be a positive"),
         ({"rate": np.nan}, "rate must be a positive"),

@@ -37,6 +37,16 @@ def test_rotor_feasible_plans_are_tracked_to_millimetres(name: str, order: int, 
 
 
 @pytest.mark.parametrize("maneuver", MANEUVERS)
+def test_a_vehicle_with_drag_and_slow_motors_is_tracked_to_a_centimetre(maneuver: str) -> None:
+    """The Crazyflie: 72 ms of lag, and at 5 m/s a seventh of its weight in drag."""
+    vehicle, problem = load_vehicle("crazyflie"), load_problem(maneuver)
+    assert vehicle.drag_body.all()
+    result = score(fly(planned(problem, vehicle).trajectory, vehicle), problem, vehicle)
+    assert result.max_position_error_m < 0.01
+    assert result.rms_attitude_error_deg < 0.5
+
+
+@pytest.mark.parametrize("maneuver", MANEUVERS)
 def test_the_papers_plans_are_tracked_to_centimetres_at_a_thrust_to_weight_of_five(maneuver: str) -> None:
     vehicle, problem = load_vehicle("hexarotor"), load_problem(maneuver).as_in_paper()
     assert vehicle.thrust_to_weight == pytest.approx(5.0)

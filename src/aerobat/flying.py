@@ -13,7 +13,7 @@ from aerobat.arrays import Array, frozen
 from aerobat.engines.engine import Init, Step
 from aerobat.engines.packing import airframes, bodies, body_states, components, joined, models
 from aerobat.errors import SpecError
-from aerobat.flatness import reference
+from aerobat.flatness import lateral_drag, reference
 from aerobat.flight import COMPLETE, Flight, first_rows
 from aerobat.kernels import control
 from aerobat.kernels.control import Commands, Memory, Model
@@ -142,6 +142,11 @@ def _crew(
         )
     if len({each.gravity for each in believed}) > 1:
         raise SpecError("vehicle: all vehicles of one flight need the same gravity; fly others apart")
+    if len({lateral_drag(each) for each in believed}) > 1:
+        raise SpecError(
+            "vehicle: vehicles that differ in drag per mass need different attitudes; fly them apart, "
+            "or give one model for all"
+        )
     return flown, believed, bool(starts) or not isinstance(vehicle, Vehicle)
 
 

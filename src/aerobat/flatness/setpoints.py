@@ -1,13 +1,15 @@
 """From a trajectory to everything a vehicle must do to fly it: attitude, rates, moments, rotor thrusts.
 
-With the specific thrust f = a + g e3 and its direction b3 = f/|f|,
+With the specific thrust f = a + g e3 + (d/m) v, drag made up for, and its direction b3 = f/|f|,
 
     b3'  = (f' − b3 n') / n                  n = |f|,  n' = b3·f'
     b3'' = (f'' − 2 n' b3' − n'' b3) / n     n'' = b3·f'' + b3'·f'
     ω = b3 × b3',   ω' = b3 × b3''           world axes, no spin about b3
     M = J ω' + ω × J ω                       body axes, ω_body = Rᵀ ω, ω'_body = Rᵀ ω'
 
-No step divides by 1 + b3_z: upside down is as good as any other attitude. Drag is left to feedback.
+No step divides by 1 + b3_z: upside down is as good as any other attitude. Linear drag with coefficients
+d across and d_z along the body's z keeps the vehicle flat (Faessler, Franchi, Scaramuzza, RA-L 2018; of
+unequal ones across the mean is taken): the thrust is T = m|f| + (d_z − d) b3·v.
 """
 
 from __future__ import annotations
@@ -59,7 +61,7 @@ def reference(
     flat = trajectory.flat(asked)
     # both sides of every knot join the times asked for, which show the later side
     seams = np.concatenate([trajectory.knots[1:], trajectory.knots[:-1]])
-    thrust = np.concatenate([_thrust_at_seams(trajectory, vehicle.gravity), _thrust(flat, vehicle.gravity)])
+    thrust = np.concatenate([_thrust_at_seams(trajectory, vehicle), _thrust(flat, vehicle)])
     side = np.repeat([0, 1, 2], [trajectory.segments, trajectory.segments, len(asked)])
     order = np.lexsort((side, np.concatenate([seams, asked])))
     path = _frames(np.concatenate([seams, asked])[order], thrust[order], vehicle, yaw)
@@ -77,7 +79,7 @@ def reference_of(times: ArrayLike, flat: FlatState, vehicle: Vehicle, yaw: float
     flat = FlatState(*(frozen(getattr(flat, name), name, (len(asked), 3)) for name in names))
     if any(series.ndim != 2 for series in vars(flat).values()):
         raise SpecError("the flat states must be one series, with a row for each time and no further axes")
-    path = _frames(asked, _thrust(flat, vehicle.gravity), vehicle, yaw)
+    path = _frames(asked, _thrust(flat, vehicle), vehicle, yaw)
     return _assembled(asked, flat, path, path.samples, vehicle)
 
 
@@ -98,27 +100,41 @@ def body_rates(thrust: Array, q_world_body: Array, determined: NDArray[np.bool_]
     return turned[..., 0, :], turned[..., 1, :]
 
 
-def wrench_for(thrust: Array, omega: Array, omega_dot: Array, vehicle: Vehicle) -> Wrench:
-    """Collective thrust m|f| and moment J ω' + ω × J ω; ω, ω' (..., 3) in body axes."""
-    moment = omega_dot @ vehicle.inertia.T + np.cross(omega, omega @ vehicle.inertia.T)
-    return Wrench(vehicle.mass * np.linalg.norm(thrust[..., 0, :], axis=-1), moment)
+def wrench_for(thrust: Array, velocity: Array, omega: Array, omega_dot: Array, vehicle: Vehicle) -> Wrench:
+    """Collective thrust m|f| + (d_z − d) b3·v and moment J ω' + ω × J ω; ω, ω' (..., 3) in body axes."""
+    moment = omega_dot @ vehicle.inertia.T + so3.cross(omega, omega @ vehicle.inertia.T)
+    f = thrust[..., 0, :]
+    size = np.linalg.norm(f, axis=-1)
+    along = np.sum(f * velocity, axis=-1) / np.where(size > 0.0, size, 1.0)
+    difference = vehicle.drag_body[2] / vehicle.mass - lateral_drag(vehicle)
+    return Wrench(vehicle.mass * (size + difference * along), moment)
 
 
-def specific_thrust(acceleration: Array, jerk: Array, snap: Array, gravity: float) -> Array:
-    """f = a + g e3 and its two derivatives, (..., 3, 3)."""
+def specific_thrust(
+    vehicle: Vehicle, velocity: Array, acceleration: Array, jerk: Array, snap: Array
+) -> Array:
+    """f = a + g e3 + (d/m) v and its two derivatives, (..., 3, 3), of the flat outputs' (..., 3)."""
+    drag = lateral_drag(vehicle)
     thrust = np.stack([acceleration, jerk, snap], axis=-2)
-    thrust[..., 0, 2] += gravity
+    if drag:
+        thrust += drag * np.stack([velocity, acceleration, jerk], axis=-2)
+    thrust[..., 0, 2] += vehicle.gravity
     return thrust
 
 
-def _thrust(flat: FlatState, gravity: float) -> Array:
-    return specific_thrust(flat.acceleration, flat.jerk, flat.snap, gravity)
+def lateral_drag(vehicle: Vehicle) -> float:
+    """The drag coefficient across the thrust axis per mass, d/m [1/s]."""
+    return float(vehicle.drag_body[:2].mean()) / vehicle.mass
 
 
-def _thrust_at_seams(trajectory: Trajectory, gravity: float) -> Array:
+def _thrust(flat: FlatState, vehicle: Vehicle) -> Array:
+    return specific_thrust(vehicle, flat.velocity, flat.acceleration, flat.jerk, flat.snap)
+
+
+def _thrust_at_seams(trajectory: Trajectory, vehicle: Vehicle) -> Array:
     """f, f', f'' at the ends of all segments, then at their starts, (2S, 3, 3)."""
-    a, j, s = (trajectory.on_segments([1.0, 0.0], k).swapaxes(0, 1).reshape(-1, 3) for k in (2, 3, 4))
-    return specific_thrust(a, j, s, gravity)
+    v, a, j, s = (trajectory.on_segments([1.0, 0.0], k).swapaxes(0, 1).reshape(-1, 3) for k in (1, 2, 3, 4))
+    return specific_thrust(vehicle, v, a, j, s)
 
 
 def _frames(times: Array, thrust: Array, vehicle: Vehicle, yaw: float) -> Frames:
@@ -130,7 +146,7 @@ def _assembled(
 ) -> Reference:
     thrust, q = path.thrust[nodes], path.q_world_body[nodes]
     omega, omega_dot = body_rates(thrust, q, path.determined[nodes])
-    wrench = wrench_for(thrust, omega, omega_dot, vehicle)
+    wrench = wrench_for(thrust, flat.velocity, omega, omega_dot, vehicle)
     setpoint = Setpoint(flat, q, omega, omega_dot, wrench)
     rotors = rotor_thrusts(vehicle, wrench)
     for array in (*vars(flat).values(), q, omega, omega_dot, wrench.thrust, wrench.moment_body, rotors):

@@ -26,7 +26,7 @@ JUMP = 1e-6  # a jump of jerk beyond this fraction of its peak is one
 
 @dataclass(frozen=True)
 class RotorMargin:
-    """How far the rotors stay from their limits along a trajectory, by flatness, drag left out.
+    """How far the rotors stay from their limits along a trajectory, by flatness.
 
     `min_thrust` is the least thrust of the rotor that comes closest to its lower limit, `max_thrust` the
     largest of the one that comes closest to its upper limit: with equal rotors, of all of them.
@@ -121,10 +121,10 @@ class _Path:
     def along(cls, trajectory: Trajectory, vehicle: Vehicle, yaw: float) -> _Path:
         count = PIECES_PER_DEGREE * max(trajectory.degree, 1) + 1
         s = np.linspace(0.0, 1.0, count)
-        a, j, snap = (trajectory.on_segments(s, k).reshape(-1, 3) for k in (2, 3, 4))
+        v, a, j, snap = (trajectory.on_segments(s, k).reshape(-1, 3) for k in (1, 2, 3, 4))
         times = trajectory.knots[:-1, None] + s * trajectory.durations[:, None]
         floor = UNDETERMINED * vehicle.gravity
-        path = frames(times.ravel(), specific_thrust(a, j, snap, vehicle.gravity), floor, yaw)
+        path = frames(times.ravel(), specific_thrust(vehicle, v, a, j, snap), floor, yaw)
         starts = path.samples[::count]
         return cls(
             trajectory, vehicle, path, np.searchsorted(starts, np.arange(len(path.times)), "right") - 1
@@ -132,7 +132,8 @@ class _Path:
 
     def least_gaps(self) -> tuple[_Gap, ...]:
         """The least distances to lower and to upper limits over rotors and continuous time."""
-        sampled = self._gaps(self.frames.thrust, self.frames.q_world_body, self.frames.determined)
+        path, velocity = self.frames, self.trajectory.evaluate(self.frames.times, 1)
+        sampled = self._gaps(path.thrust, velocity, path.q_world_body, path.determined)
         found = self._candidates(sampled)
         times = self._vertices(found)
         refined = self._between(found, times[:, None])[:, 0]
@@ -182,18 +183,18 @@ class _Path:
         """The candidates' gaps [N] at times (c, k) between their neighbours, (c, k)."""
         base = (found.nodes[:, None] - (times < self.frames.times[found.nodes, None])).ravel()
         at = times.ravel()
-        a, j, s = (self.trajectory.evaluate(at, k) for k in (2, 3, 4))
-        thrust = specific_thrust(a, j, s, self.vehicle.gravity)
+        v, a, j, s = (self.trajectory.evaluate(at, k) for k in (1, 2, 3, 4))
+        thrust = specific_thrust(self.vehicle, v, a, j, s)
         step = at - self.frames.times[base]
         q = onward(self.frames.q_world_body[base], self.frames.thrust[base], thrust, step)
-        gaps = self._gaps(thrust, q, np.ones(len(at), dtype=bool))
+        gaps = self._gaps(thrust, v, q, np.ones(len(at), dtype=bool))
         gaps = gaps.reshape(*times.shape, 2 * len(self.vehicle.rotors))
         return np.take_along_axis(gaps, found.columns[:, None, None], axis=-1)[..., 0]
 
-    def _gaps(self, thrust: Array, q: Array, determined: NDArray[np.bool_]) -> Array:
+    def _gaps(self, thrust: Array, velocity: Array, q: Array, determined: NDArray[np.bool_]) -> Array:
         """Distances of all rotors' thrusts from their lower, then from their upper limits [N], (..., 2n)."""
         omega, omega_dot = body_rates(thrust, q, determined)
-        rotors = rotor_thrusts(self.vehicle, wrench_for(thrust, omega, omega_dot, self.vehicle))
+        rotors = rotor_thrusts(self.vehicle, wrench_for(thrust, velocity, omega, omega_dot, self.vehicle))
         return np.concatenate([rotors - self.vehicle.min_thrusts, self.vehicle.max_thrusts - rotors], axis=-1)
 
 
