@@ -16,6 +16,8 @@ from aerobat.specs import (
     Problem,
     Stage,
     Staged,
+    Waypoint,
+    Waypoints,
     load_problem,
     problem_names,
     rest,
@@ -27,7 +29,7 @@ from aerobat.specs import (
 def same(a: object, b: object) -> bool:
     """Equal field by field, arrays to 1e-12."""
     if isinstance(a, np.ndarray):
-        return bool(np.allclose(a, b, atol=1e-12, rtol=0, equal_nan=False))
+        return bool(np.allclose(a, b, atol=1e-12, rtol=0, equal_nan=True))  # NaN: a component left free
     if isinstance(a, tuple):
         return len(a) == len(b) and all(same(x, y) for x, y in zip(a, b, strict=True))
     if hasattr(a, "__dataclass_fields__"):
@@ -57,7 +59,23 @@ SPELLED_OUT = Problem(
 )
 
 
-@pytest.mark.parametrize("problem", [*map(load_problem, problem_names()), SPELLED_OUT], ids=lambda p: p.name)
+THROUGH_WAYPOINTS = replace(
+    SPELLED_OUT,
+    name="through-waypoints",
+    maneuver=Waypoints(
+        (
+            Waypoint(position=(np.nan, np.nan, 2.0), velocity=(1.0, np.nan, 0.0), time=0.5),
+            Waypoint(gate=True, up=(0.0, 1.0, -1.0), time=0.75),
+            Waypoint(position=(1.0, 2.0, 3.0), up=(0.0, 0.0, -2.0), thrust=12.0, time=1.5),
+            Waypoint(acceleration=(0.0, np.nan, -9.0), time=2.0),
+        ),
+        duration=3.0,
+    ),
+)
+PROBLEMS = [*map(load_problem, problem_names()), SPELLED_OUT, THROUGH_WAYPOINTS]
+
+
+@pytest.mark.parametrize("problem", PROBLEMS, ids=lambda p: p.name)
 def test_a_problem_survives_its_file(problem: Problem, tmp_path: Path) -> None:
     write_problem(problem, tmp_path / "problem.toml")
     assert same(load_problem(tmp_path / "problem.toml"), problem)
@@ -73,6 +91,7 @@ def test_the_built_in_problems_are_the_reference_codes() -> None:
         "flip-roll-translation": [2.5, 0, 5.5],
         "half-flip": [2.5, 2, 3.5],
         "line": None,
+        "section-v": None,
     }
     assert goals == {
         "flip-roll": [0, 0, 0],
@@ -80,6 +99,7 @@ def test_the_built_in_problems_are_the_reference_codes() -> None:
         "flip-roll-translation": [5, 0, 0],
         "half-flip": [5, 0, 0],
         "line": [10, 0, 0],
+        "section-v": [6, 0, 0],
     }
 
 

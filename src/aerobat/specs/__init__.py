@@ -5,6 +5,7 @@ from aerobat.specs.gate import Gate, tilted_gate
 from aerobat.specs.maneuver import Flip, HalfFlip, Line, Maneuver, Passing, Staged
 from aerobat.specs.problem import PAPER_LIMITS, EndState, Limits, Problem, rest
 from aerobat.specs.stage import Condition, Course, Quantity, Stage
+from aerobat.specs.waypoints import Waypoint, Waypoints
 
 __all__ = [
     "PAPER_LIMITS",
@@ -22,6 +23,8 @@ __all__ = [
     "Quantity",
     "Stage",
     "Staged",
+    "Waypoint",
+    "Waypoints",
     "load_problem",
     "problem_names",
     "rest",

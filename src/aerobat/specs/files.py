@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from aerobat.arrays import Array
 from aerobat.documents import (
     document_names,
     in_document,
@@ -23,6 +24,7 @@ from aerobat.specs.gate import Gate, tilted_gate
 from aerobat.specs.maneuver import Flip, HalfFlip, Line, Maneuver, Passing, Staged
 from aerobat.specs.problem import DERIVATIVES, EndState, Limits, Problem
 from aerobat.specs.stage import Condition, Quantity, Stage
+from aerobat.specs.waypoints import FREE, GIVEN, Waypoint, Waypoints
 
 if TYPE_CHECKING:
     from aerobat.specs import schema
@@ -78,7 +80,11 @@ def _gate(table: schema.GateTable) -> Gate:
 
 
 def _maneuver(
-    table: schema.FlipTable | schema.HalfFlipTable | schema.LineTable | schema.StagesTable,
+    table: schema.FlipTable
+    | schema.HalfFlipTable
+    | schema.LineTable
+    | schema.StagesTable
+    | schema.WaypointsTable,
 ) -> Maneuver:
     options = table.model_dump(exclude={"kind", "passing"})
     match table.kind:
@@ -94,6 +100,27 @@ def _maneuver(
                 _conditions(table.always, "maneuver.always"),
                 table.ordered,
             )
+        case "waypoints":
+            waypoints = (_waypoint(w, f"maneuver.waypoints[{i}].") for i, w in enumerate(table.waypoints))
+            return Waypoints(tuple(waypoints), table.duration)
+
+
+def _waypoint(table: schema.WaypointTable, name: str) -> Waypoint:
+    with within(name):
+        return Waypoint(
+            position=_components(table.position),
+            velocity=_components(table.velocity),
+            acceleration=_components(table.acceleration),
+            up=None if table.up is None else np.array(table.up),
+            thrust=table.thrust,
+            time=table.time,
+            gate=table.gate,
+        )
+
+
+def _components(vector: schema.Vector | schema.PartialVector) -> Array:
+    values = vector if isinstance(vector, tuple) else (vector.x, vector.y, vector.z)
+    return np.array([FREE if x is None else x for x in values])
 
 
 def _passing(table: schema.PassingTable) -> Passing:
@@ -174,9 +201,25 @@ def _maneuver_table(maneuver: Maneuver) -> dict[str, Any]:
                     for s in maneuver.stages
                 ],
             }
+        case Waypoints():
+            options = {} if maneuver.duration is None else {"duration": maneuver.duration}
+            waypoints = [_waypoint_table(w) for w in maneuver.waypoints]
+            return {"kind": "waypoints"} | options | {"waypoints": waypoints}
         case Line():
             return {"kind": "line"} | asdict(maneuver)
     raise SpecError(f"a maneuver of the type {type(maneuver).__name__} has no place in a problem file")
+
+
+def _waypoint_table(waypoint: Waypoint) -> dict[str, Any]:
+    table: dict[str, Any] = {}
+    for quantity in GIVEN:
+        values = zip("xyz", getattr(waypoint, quantity.value).tolist(), strict=True)
+        if given := {axis: value for axis, value in values if not np.isnan(value)}:
+            table[quantity.value] = given
+    if waypoint.up is not None:
+        table["up"] = waypoint.up.tolist()
+    options = {"thrust": waypoint.thrust, "time": waypoint.time, "gate": waypoint.gate or None}
+    return table | {name: value for name, value in options.items() if value is not None}
 
 
 def _condition_table(condition: Condition) -> dict[str, Any]:

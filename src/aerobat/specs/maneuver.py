@@ -59,10 +59,10 @@ class Passing:
     def stage(self, gate: Gate | None, conditions: Sequence[Condition]) -> Stage:
         """The stage of passing `gate` with `conditions` on top. Raises SpecError without a gate."""
         if gate is None:
-            raise _no_gate()
+            raise no_gate()
         velocity = [Condition(Quantity.VELOCITY, gate.normal, lower=self.speed)]
         velocity += [Condition(Quantity.VELOCITY, across, 0.0, 0.0) for across in (gate.lateral, gate.up)]
-        asked = (*_centre(gate), *(velocity if self.square else ()), *conditions)
+        asked = (*at_centre(gate), *(velocity if self.square else ()), *conditions)
         return Stage("gate", asked, at=0.5, late=0 if self.centred else 1, gate=gate)
 
 
@@ -147,7 +147,7 @@ class HalfFlip:
     def course(self, gate: Gate | None, max_specific_thrust: float) -> Course:
         """One stage, the gate, and upright thrust at all times: (a_z + g) tan α = a_y, α = 90° included."""
         if gate is None:
-            raise _no_gate()
+            raise no_gate()
         conditions = thrust_along(gate.up, gate.normal, self._least(gate, max_specific_thrust))
         upright = Condition(Quantity.SPECIFIC_THRUST, UP, lower=0.0)
         return Course((self.passing.stage(gate, conditions),), (upright,))
@@ -203,7 +203,7 @@ class Staged:
     def course(self, gate: Gate | None, max_specific_thrust: float) -> Course:
         """Its stages as they stand; one named 'gate' also passes the centre of the problem's gate."""
         stages = tuple(
-            replace(s, conditions=(*_centre(gate), *s.conditions), gate=gate)
+            replace(s, conditions=(*at_centre(gate), *s.conditions), gate=gate)
             if gate is not None and s.name == "gate"
             else s
             for s in self.stages
@@ -224,13 +224,15 @@ def thrust_along(direction: Array, axis: Array, at_least: float) -> tuple[Condit
     return (across, Condition(Quantity.SPECIFIC_THRUST, along, lower=at_least))
 
 
-def _centre(gate: Gate) -> tuple[Condition, ...]:
+def at_centre(gate: Gate) -> tuple[Condition, ...]:
+    """Meeting the centre of a gate's opening."""
     return tuple(
         Condition(Quantity.POSITION, e, x, x) for e, x in zip(np.eye(3), gate.position.tolist(), strict=True)
     )
 
 
-def _no_gate() -> SpecError:
+def no_gate() -> SpecError:
+    """What to say to a maneuver that lacks its gate."""
     return SpecError("the maneuver passes a gate: give the problem a [gate] table")
 
 

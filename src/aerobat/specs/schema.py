@@ -109,6 +109,34 @@ class StagesTable(_Table):
     ordered: bool = True
 
 
+class PartialVector(_Table):
+    """Some components of a vector; those left out are free."""
+
+    x: FiniteFloat | None = None
+    y: FiniteFloat | None = None
+    z: FiniteFloat | None = None
+
+
+class WaypointTable(_Table):
+    """[[maneuver.waypoints]]: what is given there; the rest is free."""
+
+    position: Vector | PartialVector = PartialVector()
+    velocity: Vector | PartialVector = PartialVector()
+    acceleration: Vector | PartialVector = PartialVector()
+    up: Vector | None = None
+    thrust: Positive | None = None
+    time: Positive | None = None
+    gate: bool = False
+
+
+class WaypointsTable(_Table):
+    """kind = "waypoints"."""
+
+    kind: Literal["waypoints"]
+    waypoints: Annotated[list[WaypointTable], Field(min_length=1)]
+    duration: Positive | None = None
+
+
 class ProblemTable(_Table):
     """The whole file."""
 
@@ -119,5 +147,7 @@ class ProblemTable(_Table):
     start: EndTable
     goal: EndTable
     gate: GateTable | None = None
-    maneuver: Annotated[FlipTable | HalfFlipTable | LineTable | StagesTable, Field(discriminator="kind")]
+    maneuver: Annotated[
+        FlipTable | HalfFlipTable | LineTable | StagesTable | WaypointsTable, Field(discriminator="kind")
+    ]
     limits: LimitsTable = LimitsTable()
