@@ -1,8 +1,15 @@
-"""Plans and flights that the tests of figures share, each made once."""
+"""What tests of figures share: plans and flights, each made once, and what makes a page legible."""
 
 from __future__ import annotations
 
 from functools import lru_cache
+from itertools import combinations
+
+import matplotlib
+import numpy as np
+import pytest
+from matplotlib.figure import Figure
+from matplotlib.transforms import Bbox
 
 import aerobat as ab
 
@@ -19,3 +26,31 @@ def planned(problem: str, vehicle: str = "agile-quad") -> ab.Plan:
 def flown(problem: str, vehicle: str = "agile-quad") -> ab.Flight:
     """A flight of that plan, at a rate that keeps tests short."""
     return ab.fly(planned(problem, vehicle).trajectory, ab.load_vehicle(vehicle), rate=200.0)
+
+
+def require_legible(figure: Figure, monkeypatch: pytest.MonkeyPatch) -> None:
+    """No text of a page lies over another one or beyond the page."""
+    texts = texts_of(figure, monkeypatch)
+    assert len(texts) > 20
+    for name, box in texts:
+        assert box.min.min() >= 0, name
+        assert (box.max <= figure.bbox.max).all(), name
+    for (one, a), (other, b) in combinations(texts, 2):
+        across, up = np.minimum(a.max, b.max) - np.maximum(a.min, b.min)
+        assert across < 2 or up < 4, (one, other)  # pixels; boxes reach a little beyond their letters
+
+
+def texts_of(figure: Figure, monkeypatch: pytest.MonkeyPatch) -> list[tuple[str, Bbox]]:
+    """Every text that is really drawn, with its box in pixels."""
+    drawn = []
+
+    def draw_and_note(text, renderer):  # type: ignore[no-untyped-def]
+        if text.get_visible() and text.get_text().strip():
+            drawn.append((text.get_text(), text.get_window_extent(renderer)))
+        draw_text(text, renderer)
+
+    draw_text = matplotlib.text.Text.draw
+    monkeypatch.setattr(matplotlib.text.Text, "draw", draw_and_note)
+    figure.canvas.draw()
+    monkeypatch.undo()
+    return drawn

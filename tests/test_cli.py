@@ -45,13 +45,15 @@ def test_fly_writes_the_plan_the_flight_the_picture_and_the_report(capsys) -> No
     code, out, err = run(capsys, "fly", "flip-roll")
     assert (code, err) == (0, "")
     folder = Path("out/flip-roll")
-    assert sorted(p.name for p in folder.iterdir()) == ["flight.npz", "plan.csv", "report.json", "report.png"]
+    written = ["flight.npz", "plan.csv", "plan.npz", "report.json", "report.png"]
+    assert sorted(p.name for p in folder.iterdir()) == written
     report = json.loads((folder / "report.json").read_text())
     assert report["plan"].keys() >= PLAN_KEYS
     assert report["flight"].keys() >= FLIGHT_KEYS
     assert report["problem"] == "flip-roll"
     assert report["vehicle"] == "agile-quad"
     assert report["plan"]["rotor_feasible"] is True
+    assert report["plan"]["certificate"]["certified"] is True
     assert read_csv(folder / "plan.csv").duration == pytest.approx(report["plan"]["duration_s"])
     assert load_flight(folder / "flight.npz").times[-1] == pytest.approx(report["plan"]["duration_s"])
     assert (folder / "report.png").read_bytes().startswith(b"\x89PNG")
@@ -71,7 +73,7 @@ def test_plan_stops_after_planning(capsys) -> None:
     assert code == 0
     assert "flight" not in json.loads(out)
     written = sorted(p.name for p in Path("out/half-flip").iterdir())
-    assert written == ["plan.csv", "report.json", "report.png"]
+    assert written == ["plan.csv", "plan.npz", "report.json", "report.png"]
 
 
 def test_paper_mode_prints_the_known_optimum(capsys) -> None:
@@ -116,14 +118,14 @@ def test_an_infeasible_problem_ends_with_its_sentence_and_nothing_written(capsys
 
 def test_help_tells_every_command_and_option(capsys) -> None:
     _, out, _ = run(capsys, "--help")
-    assert all(command in out for command in ("fly", "plan", "vehicles", "problems", "Exit codes"))
+    assert all(command in out for command in ("fly", "plan", "check", "compare", "vehicles", "Exit codes"))
     _, out, _ = run(capsys, "fly", "--help")
-    options = "vehicle order intervals backend paper angle out json seed noise time-limit"
+    options = "vehicle planner order intervals segments stop-after backend paper angle out json seed noise"
     assert all(f"--{option}" in out for option in options.split())
 
 
 def test_nothing_heavy_is_imported_before_it_is_needed() -> None:
-    heavy = ["scipy", "matplotlib", "pydantic", "daqp", "gurobipy", "pyscipopt", "rich"]
+    heavy = ["scipy", "casadi", "matplotlib", "pydantic", "daqp", "gurobipy", "pyscipopt", "rich"]
     probe = f"import sys, aerobat, aerobat.cli; print([m for m in {heavy} if m in sys.modules])"
     done = subprocess.run([sys.executable, "-c", probe], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "[]"
@@ -132,7 +134,7 @@ def test_nothing_heavy_is_imported_before_it_is_needed() -> None:
 def test_the_main_job_needs_neither_pyplot_nor_scipy() -> None:
     probe = (
         "import sys\nfrom aerobat.cli import main\nmain(['fly', 'line', '--json'])\n"
-        "print([m for m in ('scipy', 'matplotlib.pyplot', 'gurobipy') if m in sys.modules], file=sys.stderr)"
+        "print([m for m in ('scipy', 'casadi', 'matplotlib.pyplot') if m in sys.modules], file=sys.stderr)"
     )
     done = subprocess.run([sys.executable, "-c", probe], capture_output=True, text=True, check=True)
     assert done.stderr.strip() == "[]"

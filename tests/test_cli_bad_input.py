@@ -97,6 +97,26 @@ PROBLEM_FAULTS = {
         "at",
     ),
     "backward through the gate": (setting("maneuver.passing", {"speed": -2.0}), "maneuver.passing.speed"),
+    "no waypoints": (setting("maneuver", {"kind": "waypoints", "waypoints": []}), "maneuver.waypoints"),
+    "an empty waypoint": (
+        setting("maneuver", {"kind": "waypoints", "waypoints": [{"time": 1.0}]}),
+        "maneuver.waypoints[0]",
+    ),
+    "a waypoint in w": (
+        setting("maneuver", {"kind": "waypoints", "waypoints": [{"position": {"w": 1.0}}]}),
+        "maneuver.waypoints[0].position",
+    ),
+    "a thrust without attitude": (
+        setting("maneuver", {"kind": "waypoints", "waypoints": [{"gate": True, "thrust": 9.0}]}),
+        "thrust",
+    ),
+    "waypoints back in time": (
+        setting(
+            "maneuver",
+            {"kind": "waypoints", "duration": 0.5, "waypoints": [{"position": {"z": 1.0}, "time": 1.0}]},
+        ),
+        "times",
+    ),
     "condition without bounds": (
         setting(
             "maneuver",
@@ -132,6 +152,29 @@ ARGUMENT_FAULTS = {
     "negative seed": (["fly", "line", "--seed", "-1"], "seed"),
     "negative time": (["plan", "line", "--time-limit", "-1"], "time_limit"),
     "output over a file": (["plan", "line", "--out", "taken"], "taken"),
+    "unknown planner": (["plan", "line", "--planner", "magic"], "planner"),
+    "segments of another planner": (["plan", "line", "--segments", "4"], "--segments"),
+    "a solver for the closed form": (
+        ["plan", "line", "--planner", "min-snap", "--backend", "scip"],
+        "--backend",
+    ),
+    "the paper's program by another planner": (
+        ["plan", "line", "--planner", "free-knots", "--paper"],
+        "--paper",
+    ),
+    "no segments": (["plan", "line", "--planner", "free-knots", "--segments", "0"], "segments"),
+    "closed form of order 6": (["plan", "line", "--planner", "min-snap", "--order", "6"], "order"),
+    "stopped before it began": (
+        ["plan", "line", "--planner", "min-snap", "--stop-after", "-1"],
+        "stop_after",
+    ),
+    "no plan to check": (["check", "nowhere.npz"], "nowhere.npz"),
+    "a file that holds no plan": (["check", "taken"], "taken"),
+    "a folder without a plan": (["check", "folder.toml"], "plan.npz"),
+    "a vehicle to check with that is none": (["check", "taken", "--vehicle", "agile-qad"], "agile-quad"),
+    "a limit below zero": (["check", "taken", "--max-speed", "-1"], "max-speed"),
+    "rows at no rate": (["check", "taken", "--rate", "0"], "rate"),
+    "a comparison of nothing": (["compare", "flip-rol"], "flip-roll"),
 }
 
 

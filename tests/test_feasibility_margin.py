@@ -10,6 +10,7 @@ from scipy.interpolate import CubicSpline
 
 from aerobat import so3
 from aerobat.flatness import reference_of
+from aerobat.flatness.setpoints import specific_thrust
 from aerobat.planning.feasibility import rotor_margin
 from aerobat.states import FlatState
 from aerobat.trajectory import Trajectory
@@ -185,4 +186,19 @@ def test_vanishing_thrust_is_infeasible_and_said_so():
 def test_only_jerk_inputs_ask_for_unbounded_moments(order, bounded):
     found = rotor_margin(tumbling(1, order), QUAD)
     assert found.bounded_moments is bounded
-    assert ("jerk jumps" in str(found)) is not bounded
+    assert ("body rates jump" in str(found)) is not bounded
+
+
+@pytest.mark.parametrize("vehicle", [QUAD, DRAGGED], ids=lambda vehicle: vehicle.name)
+@pytest.mark.parametrize("across", [0.0, 1e-3])
+def test_jerk_may_jump_along_the_thrust_axis_only(vehicle, across):
+    """There it is a kink in the thrust's size; across, however little, body rates jump with it."""
+    before = np.array([[0.0, 0.0, 0.0], [3.0, 1.0, 0.0], [4.0, -2.0, 1.0], [2.0, 0.0, -3.0], [0.0, 0.5, 1.0]])
+    first = Trajectory([1.0], before[None])
+    ends = [first.on_segments([1.0], k)[0, 0] for k in range(4)]
+    thrust = specific_thrust(vehicle, *ends[1:], np.zeros(3))[0]
+    axis = thrust / np.linalg.norm(thrust)
+    after = [*ends[:3], ends[3] + 40.0 * axis + across * 40.0 * np.cross(axis, UP), np.zeros(3)]
+    after = np.array(after) * (0.2 ** np.arange(5) / [1, 1, 2, 6, 24])[:, None]
+    found = rotor_margin(Trajectory([1.0, 0.2], np.stack([before, after])), vehicle)
+    assert found.bounded_moments is (across == 0.0)

@@ -1,12 +1,13 @@
 """With a vehicle, the plan is the fastest that its rotors can fly; what cannot be says which bound binds."""
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
 
 from aerobat.errors import Infeasible, SpecError
-from aerobat.planning import Bisection, Miqp, plan, rotor_margin
+from aerobat.planning import Bisection, Miqp, RotorMargin, plan, rotor_margin
 from aerobat.specs import EndState, Flip, HalfFlip, Limits, Problem, load_problem, rest, tilted_gate
 from aerobat.vehicle import Vehicle, load_vehicle
 
@@ -28,6 +29,7 @@ def test_a_plan_keeps_every_rotor_within_its_limits(name: str, order: int, vehic
     assert thrusts.feasible
     assert thrusts.min_thrust >= craft.min_thrusts.min()
     assert thrusts.max_thrust <= craft.max_thrusts.max()
+    assert found.certificate.certified
 
 
 @pytest.mark.parametrize("name", MANEUVERS)
@@ -147,3 +149,17 @@ def test_the_half_flip_of_the_example_passes_its_gate_at_twice_the_papers_speed(
     (gate,) = found.stages
     assert np.linalg.norm(found.trajectory.evaluate(gate.time, 1)) >= 16.0
     assert found.margin.feasible
+
+
+def test_what_a_refined_search_overlooks_the_proof_does_not(quad: Vehicle, monkeypatch) -> None:
+    """A margin that is 0.2 N too good, as a search between samples might be: the plan holds all the same."""
+
+    def hopeful(*arguments: Any) -> RotorMargin:
+        margin = rotor_margin(*arguments)
+        return replace(margin, low_margin=margin.low_margin + 0.2, high_margin=margin.high_margin + 0.2)
+
+    monkeypatch.setattr("aerobat.planning.miqp.rotor_margin", hopeful)
+    found = plan(load_problem("flip-roll"), vehicle=quad)
+    assert found.certificate is not None
+    assert found.certificate.certified
+    assert found.certificate.margin < 0.1

@@ -64,6 +64,16 @@ def test_the_smallest_rotation_takes_one_vector_to_the_other_by_the_angle_betwee
     assert so3.angle_between(so3.IDENTITY, q) == pytest.approx(angle, abs=1e-7)
 
 
+@pytest.mark.parametrize("offset", [1e-13, 1e-12, 1e-11, 1e-10, 1e-9, 1e-8, 1e-6, 1e-4])
+def test_the_smallest_rotation_is_accurate_next_to_the_opposite(offset: float) -> None:
+    rng = np.random.default_rng(0)
+    a = rng.normal(size=(1000, 3))
+    a /= np.linalg.norm(a, axis=1, keepdims=True)
+    b = offset * rng.normal(size=a.shape) - a
+    b /= np.linalg.norm(b, axis=1, keepdims=True)
+    np.testing.assert_allclose(so3.rotate(so3.smallest_rotation(a, b), a), b, atol=1e-11)
+
+
 @pytest.mark.parametrize("axis", [*np.eye(3), *-np.eye(3), np.array([0.6, 0.0, -0.8])])
 def test_the_smallest_rotation_to_the_opposite_is_half_a_turn(axis: np.ndarray) -> None:
     np.testing.assert_allclose(so3.rotate(so3.smallest_rotation(axis, -axis), axis), -axis, atol=1e-12)

@@ -1,12 +1,29 @@
+from .certification import Certificate, Envelope, certify
+from .comparison import Comparison, compare
 from .errors import AerobatError, BackendMissing, Infeasible, SpecError
 from .exporting.csv import read_csv, write_csv
+from .exporting.reading import read_trajectory
 from .flatness import Reference, reference
 from .flight import Flight, load_flight
 from .flying import fly
 from .kernels.controller import Controller
 from .metrics import Score, score
-from .planning import Bisection, Grid, Miqp, Plan, RotorMargin, plan, rotor_margin
+from .planning import (
+    Bisection,
+    FreeKnots,
+    Grid,
+    MinSnap,
+    Miqp,
+    Plan,
+    RotorMargin,
+    Stretch,
+    TimeOptimal,
+    plan,
+    rotor_margin,
+)
+from .reporting.comparison import comparison_figure
 from .reporting.figures import draw
+from .reporting.tracking_page import tracking_figure
 from .simulation import StateNoise
 from .specs import (
     Condition,
@@ -21,6 +38,8 @@ from .specs import (
     Quantity,
     Stage,
     Staged,
+    Waypoint,
+    Waypoints,
     load_problem,
     problem_names,
     rest,
@@ -28,7 +47,7 @@ from .specs import (
     write_problem,
 )
 from .states import BodyState, FlatState, Setpoint, Wrench
-from .trajectory import Trajectory
+from .trajectory import Rule, Trajectory, load_trajectory, minimum_effort, save_trajectory
 from .vehicle import Rotor, Vehicle, load_vehicle, vehicle_names
 
 __all__ = [
@@ -36,18 +55,23 @@ __all__ = [
     "BackendMissing",
     "Bisection",
     "BodyState",
+    "Certificate",
+    "Comparison",
     "Condition",
     "Controller",
     "EndState",
+    "Envelope",
     "FlatState",
     "Flight",
     "Flip",
+    "FreeKnots",
     "Gate",
     "Grid",
     "HalfFlip",
     "Infeasible",
     "Limits",
     "Line",
+    "MinSnap",
     "Miqp",
     "Passing",
     "Plan",
@@ -56,28 +80,41 @@ __all__ = [
     "Reference",
     "Rotor",
     "RotorMargin",
+    "Rule",
     "Score",
     "Setpoint",
     "SpecError",
     "Stage",
     "Staged",
     "StateNoise",
+    "Stretch",
+    "TimeOptimal",
     "Trajectory",
     "Vehicle",
+    "Waypoint",
+    "Waypoints",
     "Wrench",
+    "certify",
+    "compare",
+    "comparison_figure",
     "draw",
     "fly",
     "load_flight",
     "load_problem",
+    "load_trajectory",
     "load_vehicle",
+    "minimum_effort",
     "plan",
     "problem_names",
     "read_csv",
+    "read_trajectory",
     "reference",
     "rest",
     "rotor_margin",
+    "save_trajectory",
     "score",
     "tilted_gate",
+    "tracking_figure",
     "vehicle_names",
     "write_csv",
     "write_problem",

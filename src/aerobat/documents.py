@@ -197,17 +197,19 @@ def _untagged(field: str, context: Mapping[str, Any]) -> str:
 def _place(model: type[BaseModel], location: Sequence[str | int]) -> tuple[str, list[str]]:
     """The dotted name of pydantic's location as a user would write it, and the keys known there.
 
-    Where a table is one of several kinds, pydantic inserts the kind's tag, which no file spells: left out.
+    Where a table is one of several kinds, pydantic inserts the kind's tag or the name of our class for it,
+    which no file spells: left out. A tag may read like a key of its table.
     """
     name, models = "", [model]
     for part in location:
         fields = {key: field for each in models for key, field in each.model_fields.items()}
+        kinds = [each for each in models if _tagged(each, part) or each.__name__ == part]
         if isinstance(part, int):
             name += f"[{part}]"
-        elif part in fields:
+        elif part in fields and not (kinds and len(models) > 1):
             name, models = _joined(name, part), _models_in(fields[part].annotation)
         else:
-            models = [each for each in models if _tagged(each, part)]
+            models = kinds
     return name, [key for each in models for key in each.model_fields]
 
 
@@ -218,7 +220,7 @@ def _models_in(annotation: Any) -> list[type[BaseModel]]:
     return [model for argument in get_args(annotation) for model in _models_in(argument)]
 
 
-def _tagged(model: type[BaseModel], tag: str) -> bool:
+def _tagged(model: type[BaseModel], tag: str | int) -> bool:
     return any(tag in get_args(field.annotation) for field in model.model_fields.values())
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import zipfile
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,7 +12,7 @@ from numpy.typing import NDArray
 from aerobat.arrays import Array, frozen
 from aerobat.errors import SpecError
 from aerobat.states import BodyState, FlatState, Setpoint, Wrench
-from aerobat.storage import whole_file
+from aerobat.storage import read_arrays, whole_file
 
 COMPLETE = "flown to the end"  # the outcome of a flight that did not diverge
 _OWN = ("times", "commands", "thrusts", "min_thrusts", "max_thrusts", "ends")
@@ -127,7 +126,7 @@ class Flight:
 
 def load_flight(path: str | Path) -> Flight:
     """Read a flight that `Flight.save` wrote. Raises SpecError, one sentence, for any other file."""
-    content = _read(Path(path))
+    content = read_arrays(path, "flight")
     try:
         if str(content["format"]) != _FORMAT:
             raise SpecError(f"its format is {content['format']}, not {_FORMAT}")
@@ -148,20 +147,6 @@ def load_flight(path: str | Path) -> Flight:
 
 def _sentences(array: NDArray[np.generic]) -> tuple[str, ...]:
     return tuple(str(text) for text in np.atleast_1d(array).tolist())
-
-
-def _read(path: Path) -> Mapping[str, Array]:
-    try:
-        with np.load(path, allow_pickle=False) as file:
-            return dict(file)
-    except FileNotFoundError:
-        raise SpecError(f"flight file {path}: there is no such file; check the path") from None
-    except OSError as error:
-        raise SpecError(f"flight file {path}: it cannot be read ({error.strerror or error})") from None
-    except (ValueError, TypeError, EOFError, zipfile.BadZipFile):
-        raise SpecError(
-            f"flight file {path}: it is not a whole .npz file of a flight; save it again"
-        ) from None
 
 
 def first_rows(setpoint: Setpoint, count: int) -> Setpoint:

@@ -112,12 +112,13 @@ def smallest_rotation(a: ArrayLike, b: ArrayLike) -> Array:
     Opposite vectors leave its axis open; any axis normal to a is then as small, and one is chosen.
     """
     a, b = np.broadcast_arrays(np.asarray(a, dtype=float), np.asarray(b, dtype=float))
-    # half-way vector h: q = (a·h, a × h), accurate for all angles but exactly π
+    # half-way vector h = (a + b)/|a + b|: q = (a·h, a × h) with a·h = |a + b|/2, which stays accurate where
+    # a + b is hardly more than rounding
     h = a + b
     norm = np.linalg.norm(h, axis=-1, keepdims=True)
     opposite = norm < 1e-12
     h = np.where(opposite, _any_normal(a), h / np.where(opposite, 1.0, norm))
-    return normalize(np.concatenate([np.sum(a * h, axis=-1, keepdims=True), cross(a, h)], axis=-1))
+    return normalize(np.concatenate([np.where(opposite, 0.0, norm / 2.0), cross(a, h)], axis=-1))
 
 
 def _any_normal(a: Array) -> Array:

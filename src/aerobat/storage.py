@@ -1,12 +1,17 @@
-"""Files that are whole or absent: written under a temporary name, then renamed."""
+"""Files that are whole or absent: written under a temporary name, then renamed; arrays read back."""
 
 from __future__ import annotations
 
 import os
 import tempfile
+import zipfile
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
 
 from aerobat.errors import SpecError
 
@@ -39,6 +44,21 @@ def write_whole(path: str | os.PathLike[str], content: str | bytes) -> None:
     """Write a file's whole content, or nothing. Raises SpecError when the place cannot be written."""
     with whole_file(path) as temporary:
         temporary.write_bytes(content.encode() if isinstance(content, str) else content)
+
+
+def read_arrays(path: str | os.PathLike[str], what: str) -> dict[str, NDArray[Any]]:
+    """The arrays of an .npz file that holds a `what`. Raises SpecError, one sentence, for any other file."""
+    try:
+        with np.load(path, allow_pickle=False) as file:
+            return dict(file)
+    except FileNotFoundError:
+        raise SpecError(f"{what} file {path}: there is no such file; check the path") from None
+    except OSError as error:
+        raise SpecError(f"{what} file {path}: it cannot be read ({error.strerror or error})") from None
+    except (ValueError, TypeError, EOFError, zipfile.BadZipFile):
+        raise SpecError(
+            f"{what} file {path}: it is not a whole .npz file of a {what}; save it again"
+        ) from None
 
 
 def _umask() -> int:

@@ -115,14 +115,15 @@ def smallest_rotation(ops: Ops, a: Vector, b: Vector, normal: Vector) -> Quatern
 
     Opposite vectors leave its axis open: the half turn about `normal`, a unit vector normal to a, is taken.
     """
-    # half-way vector h = (a + b)/|a + b|: q = (a·h, a × h), accurate for all angles but exactly π
+    # half-way vector h = (a + b)/|a + b|: q = (a·h, a × h) with a·h = |a + b|/2, which stays accurate where
+    # a + b is hardly more than rounding
     h = add(a, b)
     square = dot(h, h)
     opposite = square < 1e-24
     shrink = 1.0 / ops.sqrt(ops.select(opposite, 1.0, square))
     x, y, z = cross(a, h)
     return (
-        ops.select(opposite, 0.0, dot(a, h) * shrink),
+        ops.select(opposite, 0.0, 0.5 * square * shrink),
         ops.select(opposite, normal[0], x * shrink),
         ops.select(opposite, normal[1], y * shrink),
         ops.select(opposite, normal[2], z * shrink),

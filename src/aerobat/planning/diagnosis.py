@@ -24,7 +24,7 @@ def why_infeasible(
     vehicle: Vehicle | None,
 ) -> str:
     """One sentence: the rotors, when some program had a solution, otherwise the bounds that exclude all."""
-    tried = [a.dt for a in attempts]
+    tried = [a.duration / formulation.chain.intervals for a in attempts]
     said = f"'{formulation.problem.name}' has no plan at any dt from {min(tried):.3g} to {max(tried):.3g} s"
     if margins and vehicle is not None:
         best = max(margins, key=lambda m: m.margin)

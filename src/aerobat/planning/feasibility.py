@@ -13,6 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from aerobat.arrays import Array, frozen
+from aerobat.certification.continuity import discontinuities
+from aerobat.certification.motion import Motion
 from aerobat.flatness.setpoints import UNDETERMINED, body_rates, specific_thrust, wrench_for
 from aerobat.flatness.transport import Frames, Span, frames, onward
 from aerobat.trajectory import Trajectory
@@ -21,7 +23,6 @@ from aerobat.vehicle import Vehicle, rotor_thrusts
 PIECES_PER_DEGREE = 4  # nodes put on each segment beforehand, per degree of its polynomial
 CANDIDATES = 24  # local extremes looked into
 ROUNDING = 1e-12  # relative differences of thrust that mean nothing
-JUMP = 1e-6  # a jump of jerk beyond this fraction of its peak is one
 
 
 @dataclass(frozen=True)
@@ -41,7 +42,7 @@ class RotorMargin:
     low_margin: float  # [N] from the lower limit, negative: below it
     high_margin: float  # [N] from the upper limit, negative: above it
     undetermined: tuple[Span, ...]  # where thrust vanishes, and with it the attitude
-    bounded_moments: bool  # False if jerk jumps: body rates jump with it, which no moment can do
+    bounded_moments: bool  # False if attitude or body rates jump, which no moment can do
 
     @property
     def margin(self) -> float:
@@ -52,8 +53,8 @@ class RotorMargin:
     def feasible(self) -> bool:
         """Whether every rotor stays within its limits within all segments, the attitude always determined.
 
-        Jumps of jerk between segments, which integrator order 3 has everywhere, are not held against it:
-        look at `bounded_moments`.
+        Jumps of body rates between segments, which integrator order 3 has everywhere, are not held against
+        it: look at `bounded_moments`.
         """
         return self.margin >= 0 and not self.undetermined
 
@@ -69,7 +70,7 @@ class RotorMargin:
         if self.undetermined:
             words += f"; thrust vanishes at {self.undetermined[0].start:.3f} s, so no attitude is determined"
         if not self.bounded_moments:
-            words += "; jerk jumps between segments, where moments are unbounded"
+            words += "; body rates jump between segments, where moments are unbounded"
         return words
 
 
@@ -87,7 +88,7 @@ def rotor_margin(trajectory: Trajectory, vehicle: Vehicle, yaw: float = 0.0) -> 
         low_margin=low.value,
         high_margin=high.value,
         undetermined=path.frames.undetermined,
-        bounded_moments=_bounded_moments(trajectory),
+        bounded_moments=_bounded_moments(trajectory, vehicle),
     )
 
 
@@ -207,12 +208,13 @@ def _least_at(dense: Array) -> Array:
     return np.asarray(DENSE[k] + np.clip(shift, -1.0, 1.0) * (DENSE[1] - DENSE[0]))
 
 
-def _bounded_moments(trajectory: Trajectory) -> bool:
-    """Whether acceleration and jerk are continuous across knots, rounding aside."""
-    return all(
-        trajectory.jumps(k).max(initial=0.0) <= JUMP * np.abs(trajectory.on_segments([0.0, 1.0], k)).max()
-        for k in (2, 3)
-    )
+def _bounded_moments(trajectory: Trajectory, vehicle: Vehicle) -> bool:
+    """Whether attitude and body rates are continuous across knots, where the attitude is determined.
+
+    Jerk may jump along the thrust axis: that is a kink in the thrust's size.
+    """
+    motion = Motion.of(trajectory, vehicle, trajectory.degree)
+    return not discontinuities(motion, UNDETERMINED * vehicle.gravity)
 
 
 CHEBYSHEV = np.polynomial.chebyshev.chebpts1(9)

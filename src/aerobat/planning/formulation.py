@@ -18,7 +18,7 @@ from aerobat.arrays import Array, frozen
 from aerobat.errors import SpecError
 from aerobat.planning.integrator import INPUTS, IntegratorChain
 from aerobat.programs import AssignmentProgram, SlottedStage
-from aerobat.specs.problem import DERIVATIVES, Problem
+from aerobat.specs.problem import DERIVATIVES, Limits, Problem
 from aerobat.specs.stage import Condition, Course, Quantity, Stage
 
 Indices = NDArray[np.intp]
@@ -49,6 +49,7 @@ class Formulation:
     course: Course
     chain: IntegratorChain
     gravity: float  # [m/s²]
+    limits: Limits | None = None  # tighter than the problem's, whose they are by default
 
     def __post_init__(self) -> None:
         """Check."""
@@ -59,7 +60,7 @@ class Formulation:
                 f"the {stages} stages of '{self.problem.name}'; use at least {max(2 * stages, 3)}"
             )
         for derivative in range(self.chain.order + 1, len(DERIVATIVES)):
-            if np.isfinite(self.problem.limits.of(derivative)[1]).any():
+            if np.isfinite(self.bounds.of(derivative)[1]).any():
                 raise SpecError(
                     f"limits.{DERIVATIVES[derivative]} cannot be held when the input is "
                     f"{INPUTS[self.chain.order]}; plan with --order {derivative} or drop it"
@@ -88,6 +89,11 @@ class Formulation:
     def cost(self, program_cost: float, dt: float) -> float:
         """The paper's Σ|u|² in SI units of a program's cost."""
         return program_cost / dt ** (2 * self.chain.order)
+
+    @property
+    def bounds(self) -> Limits:
+        """What is imposed at the interval ends."""
+        return self.problem.limits if self.limits is None else self.limits
 
     @cached_property
     def initial(self) -> Array:
@@ -120,7 +126,7 @@ class Formulation:
     def _limit_rows(self) -> Iterable[tuple[Row, float, float]]:
         for derivative in range(self.chain.order + 1):
             intervals = self.chain.intervals if derivative == self.chain.order else self.chain.intervals - 1
-            for axis, low, high in zip(AXES, *self.problem.limits.of(derivative), strict=True):
+            for axis, low, high in zip(AXES, *self.bounds.of(derivative), strict=True):
                 if low > -inf or high < inf:
                     for interval in range(intervals):
                         yield Row(interval, derivative, axis), float(low), float(high)

@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from math import sqrt
 
 import numpy as np
 
+from aerobat.certification import Certificate, Verdict
 from aerobat.errors import Infeasible, SpecError
 from aerobat.planning.diagnosis import why_infeasible
+from aerobat.planning.drawing_in import drawn_in
 from aerobat.planning.feasibility import RotorMargin, rotor_margin
 from aerobat.planning.formulation import Formulation
 from aerobat.planning.integrator import IntegratorChain
+from aerobat.planning.proof import certificate_for
 from aerobat.planning.result import Attempt, PlacedStage, Plan
 from aerobat.planning.search import Bisection, Grid, Search
 from aerobat.programs import AssignmentResult, Solver, solver
@@ -24,6 +27,8 @@ from aerobat.vehicle import Vehicle
 
 # without a vehicle, stages that ask a share of its thrust assume what a hexarotor in the paper's class has
 ASSUMED_THRUST_TO_WEIGHT = 5.0
+ROUNDS = 4  # of searching, at most, with bounds drawn in by what was exceeded
+UNPROVEN = 1e-4  # [N] beyond what is exceeded, kept from rotor limits that the certificate cannot confirm
 
 Progress = Callable[[Attempt], None]
 
@@ -32,8 +37,10 @@ Progress = Callable[[Attempt], None]
 class Miqp:
     """How to plan: the integrator's order (3 jerk, 4 snap, 5 crackle input), N, the search on dt, the solver.
 
-    Without a `search`, dt is the first feasible of the paper's grid when there is no vehicle, and
-    otherwise the smallest, to half a percent, at which the rotors can do it.
+    Without a `search`, dt is the first feasible of the paper's grid when there is no vehicle, and otherwise
+    the smallest, to half a percent, at which the rotors can do it. With a vehicle the problem's limits hold
+    between interval ends too, and all limits by proof: where a plan exceeds any, bounds are drawn in by as
+    much, and the search begins again.
     """
 
     order: int = 4
@@ -59,12 +66,25 @@ class Miqp:
         """
         formulation = formulate(problem, self.order, self.intervals, vehicle)
         planning = _Planning(self, formulation, vehicle, solver(self.backend), progress)
+        found = self._smallest(planning)
+        if vehicle is None:
+            return planning.result(found, None)
+        for _ in range(ROUNDS):
+            certificate = certificate_for(found.trajectory, problem, vehicle)
+            if not planning.draw_in(found.trajectory, certificate):
+                break
+            found = self._smallest(planning)
+        return planning.result(found, certificate)
+
+    def _smallest(self, planning: _Planning) -> _Found:
+        """What the search finds. Raises Infeasible when that is nothing."""
+        formulation, vehicle = planning.formulation, planning.vehicle
         found = self._search(formulation, vehicle).smallest(planning.attempt)
         if found is None:
             raise Infeasible(
                 why_infeasible(formulation, planning.attempts, planning.margins, vehicle), planning.attempts
             )
-        return planning.result(found)
+        return found
 
     def _search(self, formulation: Formulation, vehicle: Vehicle | None) -> Search:
         if self.search is not None:
@@ -109,6 +129,19 @@ class _Planning:
     attempts: list[Attempt] = field(default_factory=list)
     margins: list[RotorMargin] = field(default_factory=list)
     slots: tuple[int, ...] | None = None
+    spare: float = 0.0  # [N] that is kept from the rotors' limits
+
+    def draw_in(self, trajectory: Trajectory, certificate: Certificate) -> bool:
+        """Draw bounds in by what a trajectory exceeds, or is not proven to hold; whether there was any."""
+        bounds, limits = self.formulation.bounds, self.formulation.problem.limits
+        # the input itself is constant on each interval and exceeds nothing
+        inside = drawn_in(bounds, limits, trajectory, self.formulation.chain.order)
+        self.formulation = replace(self.formulation, limits=inside)
+        worst = certificate.worst
+        if worst is None or worst.verdict is Verdict.HOLDS:
+            return inside is not bounds
+        self.spare += UNPROVEN + abs(worst.margin or 0.0)
+        return True
 
     def attempt(self, dt: float) -> _Found | None:
         """Solve at one dt; None where the program has no solution or the rotors cannot follow it."""
@@ -126,7 +159,7 @@ class _Planning:
             margin = rotor_margin(trajectory, self.vehicle, self.formulation.problem.yaw)
             self.margins.append(margin)
         found = _Found(dt, trajectory, self.formulation.cost(answer.cost, dt), answer, margin)
-        if margin is not None and not margin.feasible:
+        if margin is not None and not (margin.feasible and margin.margin >= self.spare):
             return self._record(dt, answer, None, str(margin), found.cost)
         return self._record(dt, answer, found, "feasible", found.cost)
 
@@ -140,13 +173,13 @@ class _Planning:
     ) -> _Found | None:
         duration = dt * self.config.intervals
         feasible = found is not None
-        attempt = Attempt(dt, duration, feasible, answer.status, outcome, cost, answer.nodes, answer.time)
+        attempt = Attempt(duration, feasible, answer.status, outcome, cost, answer.nodes, answer.time, dt)
         self.attempts.append(attempt)
         if self.progress is not None:
             self.progress(attempt)
         return found
 
-    def result(self, found: _Found) -> Plan:
+    def result(self, found: _Found, certificate: Certificate | None) -> Plan:
         """The plan of what the search settled on."""
         stages = (
             PlacedStage(stage.name, slot, (slot + 1) * found.dt, stage.gate)
@@ -157,19 +190,17 @@ class _Planning:
             trajectory=found.trajectory,
             planner="miqp",
             order=self.config.order,
-            intervals=self.config.intervals,
             dt=found.dt,
             cost=found.cost,
             status=found.answer.status,
             bound=self.formulation.cost(found.answer.bound, found.dt),
             gap=found.answer.gap,
             backend=self.config.backend,
-            nodes=sum(a.nodes for a in self.attempts),
-            solve_time=sum(a.solve_time for a in self.attempts),
             stages=tuple(stages),
             attempts=tuple(self.attempts),
             vehicle=None if self.vehicle is None else self.vehicle.name,
             margin=found.margin,
+            certificate=certificate,
         )
 
 

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from typing import Protocol
 
 from aerobat.planning.miqp import Miqp
+from aerobat.planning.proof import proven
 from aerobat.planning.result import Attempt, Plan
 from aerobat.specs.problem import Problem
 from aerobat.vehicle import Vehicle
@@ -30,9 +31,10 @@ def plan(
     vehicle: Vehicle | None = None,
     progress: Callable[[Attempt], None] | None = None,
 ) -> Plan:
-    """Plan a problem, by default with `Miqp()`; with a vehicle, a plan that its rotors can fly.
+    """Plan a problem, by default with `Miqp()`; with a vehicle, a plan for its rotors and its certificate.
 
     `progress` is called with every attempt as it ends. Raises Infeasible, whose message names the bound
     that binds and whose `attempts` hold the evidence, and SpecError for input that makes no sense.
     """
-    return (planner or Miqp()).plan(problem, vehicle, progress)
+    found = (planner or Miqp()).plan(problem, vehicle, progress)
+    return found if vehicle is None or found.certificate is not None else proven(found, vehicle)

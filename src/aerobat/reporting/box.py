@@ -125,7 +125,7 @@ def _scale(axes: Axes, room: Room, camera: Camera, axis: int, per_metre: float) 
         keep = slice(None, None, max(1, int(np.ceil(LEAST_PITCH / pitch))))
         places, ticks = places[keep], ticks[keep]
     for place, tick in zip(places + NUMBERS * outward / per_metre, ticks, strict=True):
-        axes.text(place[0], place[1], f"{tick:g}", size=SMALL, ha="center", va="center")
+        axes.text(place[0], place[1], f"{tick:g}".replace("-", "−"), size=SMALL, ha="center", va="center")
     place = camera.project(_name_point(room, edge, axis))
     if axis == 2:
         place = place + np.array([-NUMBERS, NUMBERS]) / per_metre

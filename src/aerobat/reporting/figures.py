@@ -8,21 +8,19 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from aerobat.arrays import Array
 from aerobat.flight import Flight
 from aerobat.metrics import Score, attitude_error, position_error
-from aerobat.planning import PlacedStage, Plan
+from aerobat.planning import Plan
 from aerobat.reporting import timelines
 from aerobat.reporting.canvas import (
-    HEADING,
     blank_page,
     heading,
     headline,
     house_style,
-    legend,
     panel,
     png,
     save_figure,
-    size_of,
 )
 from aerobat.reporting.motion import Motion, asked_motion, flown_motions, plan_reference
 from aerobat.reporting.path_panel import draw_path
@@ -31,14 +29,13 @@ from aerobat.reporting.style import PAGE_WIDTH
 from aerobat.vehicle import Vehicle, load_vehicle
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 __all__ = ["draw", "png", "report_figure", "save_figure"]
 
 Place = tuple[float, float, float, float]  # [in] left, bottom, width, height
 
-FLAT = 0.35  # a path whose height is less than this share of its length is drawn across the whole page
+FLAT = 0.3  # a path whose height is less than this share of its length is drawn across the whole page
 HEAD = 0.57  # [in] the page's title
 FACT = 0.19  # [in] each line of facts under it
 TITLES = 0.62  # [in] above timelines, for their title and the stages' names
@@ -98,20 +95,20 @@ def draw(flight: Flight, plan: Plan | None = None, vehicle: Vehicle | None = Non
     vehicle = load_vehicle(flight.vehicles[0]) if vehicle is None else vehicle
     flown = flown_motions(flight)
     planned = asked_motion(flight if plan is None else plan_reference(plan, vehicle))
-    page = BENEATH if _is_flat(planned) else BESIDE
+    page = BENEATH if is_flat(planned.position) else BESIDE
     of = f"{'flight' if len(flown) == 1 else f'{len(flown)} flights'} of {vehicle.name}"
     with house_style():
         figure = blank_page(PAGE_WIDTH, page.height + HEAD + FACT)
         headline(figure, of if plan is None else f"{plan.problem.name} · {of}", [_error_facts(flight)])
         path = panel(figure, *page.path)
-        gate = None if plan is None else plan.problem.gate
-        heading(path, "Path and attitude", draw_path(path, planned, flown, vehicle, gate))
+        gate, stages = (None, ()) if plan is None else (plan.problem.gate, plan.stages)
+        heading(path, "Path and attitude", draw_path(path, planned, flown, vehicle, gate, stages))
         lines = [panel(figure, *place) for place in (page.position, page.attitude, page.rotors)]
         timelines.draw_position_error(lines[0], flight)
         timelines.draw_attitude_error(lines[1], flight)
         timelines.draw_rotor_thrusts(lines[2], flight.times, flight.thrusts, vehicle)
         for column in [lines] if page is BESIDE else [[axes] for axes in lines]:
-            _finish(column, "", () if plan is None else plan.stages, float(planned.times[-1]))
+            timelines.finish_column(column, "", stages, float(planned.times[-1]))
     return figure
 
 
@@ -127,7 +124,7 @@ def report_figure(
 
 
 def _report_page(plan: Plan, vehicle: Vehicle, flight: Flight, score: Score | None) -> Figure:
-    facts = [_plan_facts(plan), _error_facts(flight) if score is None else _flight_facts(score)]
+    facts = [plan_facts(plan), _error_facts(flight) if score is None else flight_facts(score)]
     figure, rows = _page(
         plan, vehicle, asked_motion(plan_reference(plan, vehicle)), flown_motions(flight), 2, facts
     )
@@ -136,20 +133,20 @@ def _report_page(plan: Plan, vehicle: Vehicle, flight: Flight, score: Score | No
     timelines.draw_attitude_error(errors[1], flight)
     timelines.draw_specific_thrust(thrusts[0], plan, vehicle)
     timelines.draw_rotor_thrusts(thrusts[1], flight.times, flight.thrusts, vehicle)
-    _finish(errors, "Tracking error", plan.stages, plan.duration)
-    _finish(thrusts, "Thrust", plan.stages, plan.duration)
+    timelines.finish_column(errors, "Tracking error", plan.stages, plan.duration)
+    timelines.finish_column(thrusts, "Thrust", plan.stages, plan.duration)
     return figure
 
 
 def _plan_page(plan: Plan, vehicle: Vehicle) -> Figure:
     asked = plan_reference(plan, vehicle)
-    facts = [_plan_facts(plan), *([] if plan.margin is None else [f"rotors {plan.margin}"])]
+    facts = [plan_facts(plan), *([] if plan.margin is None else [f"rotors {plan.margin}"])]
     figure, rows = _page(plan, vehicle, asked_motion(asked), [], 1, facts)
     specific, rotors = (panel(figure, x, rows[0], WIDTH, ROW) for x in COLUMNS)
     timelines.draw_specific_thrust(specific, plan, vehicle)
     timelines.draw_rotor_thrusts(rotors, asked.times, asked.rotor_thrusts, vehicle)
-    _finish([specific], "Thrust", plan.stages, plan.duration)
-    _finish([rotors], "Thrust of each rotor", plan.stages, plan.duration)
+    timelines.finish_column([specific], "Thrust", plan.stages, plan.duration)
+    timelines.finish_column([rotors], "Thrust of each rotor", plan.stages, plan.duration)
     return figure
 
 
@@ -157,7 +154,7 @@ def _page(
     plan: Plan, vehicle: Vehicle, planned: Motion, flown: Sequence[Motion], rows: int, facts: Sequence[str]
 ) -> tuple[Figure, list[float]]:
     """A page with headline and pictures, and the bottoms [in] of its rows of timelines, top row first."""
-    pictures = STACKED if _is_flat(planned) else SIDE_BY_SIDE
+    pictures = STACKED if is_flat(planned.position) else SIDE_BY_SIDE
     foot = AXIS + PITCH * (rows - 1) + ROW + TITLES
     figure = blank_page(PAGE_WIDTH, foot + pictures.height + HEAD + FACT * len(facts))
     headline(figure, f"{plan.problem.name} · {vehicle.name}", facts)
@@ -165,45 +162,44 @@ def _page(
         panel(figure, left, foot + bottom, width, height)
         for left, bottom, width, height in (pictures.path, pictures.stages)
     )
-    heading(path, "Path and attitude", draw_path(path, planned, flown, vehicle, plan.problem.gate))
+    note = draw_path(path, planned, flown, vehicle, plan.problem.gate, plan.stages)
+    heading(path, "Path and attitude", note)
     heading(stages, "Stages" if plan.stages else "Attitudes", draw_stages(stages, plan, vehicle))
     return figure, [AXIS + PITCH * k for k in reversed(range(rows))]
 
 
-def _is_flat(motion: Motion) -> bool:
-    return bool(np.ptp(motion.position[:, 2]) < FLAT * motion.extent)
+def is_flat(positions: Array) -> bool:
+    """Whether a path (T, 3) is much longer than high."""
+    extents = np.ptp(positions, axis=0)
+    return bool(extents[2] < FLAT * extents.max())
 
 
-def _finish(column: Sequence[Axes], title: str, stages: Sequence[PlacedStage], duration: float) -> None:
-    """The title of a column of timelines, their stages, legends and common time axis."""
-    for axes in column:
-        timelines.mark_stages(axes, stages, duration, named=axes is column[0])
-        legend(axes, above=HEADING if axes is column[0] else 0.06)
-        axes.yaxis.set_label_coords(-0.52 / float(size_of(axes)[0]), 0.5)  # in line down the column
-        if axes is not column[-1]:
-            axes.tick_params(labelbottom=False)
-    column[-1].set_xlabel("time [s]")
-    heading(column[0], title)
-
-
-def _plan_facts(plan: Plan) -> str:
+def plan_facts(plan: Plan) -> str:
+    """How a plan came about, in a line."""
+    dt = "" if plan.dt is None else f" of {plan.dt:.4f} s"
     return (
-        f"{plan.duration:.3f} s in {plan.intervals} intervals of {plan.dt:.4f} s, order {plan.order}, "
+        f"{plan.planner}: {plan.duration:.3f} s in {plan.intervals} intervals{dt}, order {plan.order}, "
         f"cost {plan.cost:.6g} ({plan.backend}, {plan.nodes} nodes, {1000 * plan.solve_time:.0f} ms)"
     )
 
 
-def _flight_facts(score: Score) -> str:
+def flight_facts(score: Score) -> str:
+    """How a flight went, in a line."""
     return (
-        f"{score.outcome}; position error at most {100 * score.max_position_error_m:.2f} cm, "
+        f"{score.outcome}; position error at most {length(score.max_position_error_m)}, "
         f"attitude error at most {score.max_attitude_error_deg:.2f}°, "
         f"{score.rms_attitude_error_deg:.2f}° RMS, "
         f"saturated {100 * score.saturated_fraction:.1f} % of the time"
     )
 
 
+def length(metres: float) -> str:
+    """A length with the unit that suits it."""
+    return f"{metres:.2f} m" if metres >= 1.0 else f"{100 * metres:.2f} cm"
+
+
 def _error_facts(flight: Flight) -> str:
     return (
-        f"position error at most {100 * position_error(flight).max():.2f} cm, "
+        f"position error at most {length(float(position_error(flight).max()))}, "
         f"attitude error at most {np.rad2deg(attitude_error(flight).max()):.2f}°"
     )

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from aerobat.arrays import Array
+from aerobat.planning import PlacedStage
 from aerobat.reporting.box import draw_room, room_around
 from aerobat.reporting.camera import Camera, best_view
 from aerobat.reporting.canvas import HEADING, legend, size_of
@@ -39,9 +40,14 @@ ALONE_WIDTH = 1.6  # [pt] of a planned path that nobody flew
 
 
 def draw_path(
-    axes: Axes, planned: Motion, flown: Sequence[Motion], vehicle: Vehicle, gate: Gate | None
+    axes: Axes,
+    planned: Motion,
+    flown: Sequence[Motion],
+    vehicle: Vehicle,
+    gate: Gate | None,
+    stages: Sequence[PlacedStage] = (),
 ) -> str:
-    """Draw planned and flown paths, the first vehicle along its path, the gate, start and end.
+    """Draw planned and flown paths, the first vehicle along its path, the gate, other stages, start and end.
 
     Returns a note on how the vehicle is drawn.
     """
@@ -58,7 +64,9 @@ def draw_path(
         *(shape for k in samples for shape in _pose(vehicle, poses, k, camera, scale)),
     ]
     paint(axes, shapes, camera)
-    _mark_ends(axes, camera.project(planned.position[[0, -1]]), bool(flown))
+    _name_paths(axes, bool(flown))
+    _mark_stages(axes, camera, planned, [stage for stage in stages if stage.gate is None])
+    mark_ends(axes, camera.project(planned.position[[0, -1]]))
     size = "" if scale == 1.0 else f", {scale:g} times its size"
     return f"vehicle every {step:.2f} s{size}; blue seen from above, red from below"
 
@@ -114,11 +122,27 @@ def _everything(planned: Motion, flown: Sequence[Motion], gate: Gate | None) -> 
     return np.concatenate(points)
 
 
-def _mark_ends(axes: Axes, places: Array, flown: bool) -> None:
-    """The end as a red disc, the start as a smaller blue one: both show where they coincide; and a legend."""
+def _name_paths(axes: Axes, flown: bool) -> None:
+    """What the band and the line are, for the legend."""
     axes.plot([], [], color=BAND, linewidth=PLANNED_WIDTH if flown else ALONE_WIDTH, label="planned")
     if flown:
         axes.plot([], [], color=INK, linewidth=FLOWN_WIDTH, label="flown")
+
+
+def _mark_stages(axes: Axes, camera: Camera, planned: Motion, stages: Sequence[PlacedStage]) -> None:
+    """A diamond on the planned path at each stage; in the legend its name, or what many are."""
+    if stages:
+        rows = np.searchsorted(planned.times, [stage.time for stage in stages]).clip(
+            0, len(planned.times) - 1
+        )
+        axes.plot(
+            *camera.project(planned.position[rows]).T, "D", color="white", mec=INK, mew=1.1, markersize=5.5,
+            label=stages[0].name if len(stages) == 1 else "stages", zorder=5.0,
+        )  # fmt: skip
+
+
+def mark_ends(axes: Axes, places: Array) -> None:
+    """The end as a red disc, the start as a smaller blue one: both show where they coincide; and a legend."""
     for place, colour, size, name in ((places[0], BLUE, 5.5, "start"), (places[1], RED, 10.0, "end")):
         axes.plot(
             *place[:, None], "o", color=colour, mec="white", mew=0.8, markersize=size, label=name,

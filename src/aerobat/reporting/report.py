@@ -22,8 +22,8 @@ def report(plan: Plan, score: Score | None = None, vehicle: str | None = None) -
     return facts
 
 
-def to_json(facts: dict[str, Any]) -> str:
-    """The report as JSON text."""
+def to_json(facts: dict[str, Any] | list[dict[str, Any]]) -> str:
+    """A report, or a list of rows, as JSON text."""
     return json.dumps(facts, indent=2, ensure_ascii=False, allow_nan=False)
 
 
@@ -61,4 +61,5 @@ def _plan(plan: Plan) -> dict[str, Any]:
         "rotor_margin_n": margin and margin.margin,
         "bounded_moments": None if margin is None else margin.bounded_moments,
         "rotor_feasible": None if margin is None else margin.feasible and margin.bounded_moments,
+        "certificate": plan.certificate and plan.certificate.record(),
     }

@@ -24,12 +24,13 @@ ARROW = 1.0  # [in] the longest arrow
 KEY = 0.4  # [in] the longest key arrow
 KEY_HEIGHT = 0.38  # [in] of the keys above the axes
 VEHICLE = 0.6  # [in] a vehicle, about
-COLUMN = 0.62  # [in] kept free for names on either side of a tall panel
+COLUMN = 0.62  # [in] kept free for names on either side of a tall panel, at least
+LETTER = 0.082  # [in] the width of a name's letter
 ROW = 0.5  # [in] kept free for names at the foot of a wide panel
 # [in] from a hair line's end to the text, for each alignment of it
 GAPS = {"right": np.array([-0.04, 0.0]), "left": np.array([0.04, 0.0]), "center": np.array([0.0, -0.04])}
 COMPONENTS = np.eye(2)  # lateral, vertical
-PITCH_UP, PITCH_ACROSS = 0.5, 0.55  # [in] between names
+PITCH_UP = 0.5  # [in] between names, one above the other
 KEYS = np.array([0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0])  # [m/s²] that a key may show
 
 
@@ -39,13 +40,15 @@ def draw_stages(axes: Axes, plan: Plan, vehicle: Vehicle) -> str:
     plane, gate = turn_plane(plan, shots.thrust), plan.problem.gate
     camera = plane.camera
     frame = camera.project(np.concatenate([shots.position, *([] if gate is None else [gate.corners])]))
-    inches = _fit(axes, frame, VEHICLE, span(vehicle))  # per metre
+    column = _column(shots.moments)
+    inches = _fit(axes, frame, VEHICLE, span(vehicle), column)  # per metre
     scale = enlargement(vehicle, VEHICLE / inches)
     shots = shots.only(_apart(shots, camera, 0.85 * scale * span(vehicle)))
     places, thrust = camera.project(shots.position), camera.project(shots.thrust)
     arrow = ARROW / max(float(np.abs(thrust).max()), 1e-9)  # [in] per m/s²
     tips = places + thrust * arrow / inches
-    inches = _fit(axes, np.concatenate([frame, tips]), 0.6 * inches * scale * span(vehicle), span(vehicle))
+    pad = 0.6 * inches * scale * span(vehicle)
+    inches = _fit(axes, np.concatenate([frame, tips]), pad, span(vehicle), column)
     axes.set(xlabel=plane.label, ylabel="z [m]")
     path = plan.trajectory.evaluate(np.linspace(0.0, plan.duration, 241))
     axes.plot(*camera.project(path).T, color=BAND, linewidth=1.6)
@@ -69,13 +72,19 @@ def _apart(shots: Snapshots, camera: Camera, distance: float) -> list[int]:
     return sorted(kept)
 
 
-def _fit(axes: Axes, points: Array, pad: float, least: float) -> float:
+def _column(moments: tuple[Moment, ...]) -> float:
+    """The room [in] that the longest name takes."""
+    return max(COLUMN, LETTER * max(len(moment.name) for moment in moments))
+
+
+def _fit(axes: Axes, points: Array, pad: float, least: float, column: float) -> float:
     """Fit points (n, 2) [m], `pad` [in] around, and names beside them; return both axes' scale [in/m].
 
-    A side shorter than `least` [m] is shown that long.
+    Names take `column` [in] on either side of a tall panel. What is shorter than `least` [m] is shown that
+    long.
     """
     size = size_of(axes)
-    left, foot = (COLUMN, 0.0) if size[1] >= size[0] else (0.0, ROW)
+    left, foot = (column, 0.0) if size[1] >= size[0] else (0.0, ROW)
     free = size - (2 * left, foot)
     low, high = points.min(axis=0), points.max(axis=0)
     inches = float(((free - np.minimum(2 * pad, 0.5 * free)) / np.maximum(high - low, least)).min())
@@ -127,7 +136,7 @@ def _draw_names(axes: Axes, moments: tuple[Moment, ...], places: Array, thrust: 
     corner = np.array([axes.get_xlim()[0], axes.get_ylim()[0]])
     beside = size[1] >= size[0]
     layout = names_beside if beside else names_below
-    anchors = layout((places - corner) * inches, thrust, size) / inches + corner
+    anchors = layout((places - corner) * inches, thrust, size, _column(moments)) / inches + corner
     away = anchors - places
     reach = np.linalg.norm(away, axis=1, keepdims=True)
     starts = places + away * np.minimum(clear / np.maximum(reach, 1e-9), 1.0)
@@ -151,21 +160,22 @@ def _write_name(axes: Axes, moment: Moment, anchor: Array, side: str) -> None:
     axes.text(x, y, "\n" * below + facts, size=SMALL, color=MUTED, linespacing=1.15, ha=side, va="top")
 
 
-def names_beside(places: Array, thrust: Array, size: Array) -> Array:
+def names_beside(places: Array, thrust: Array, size: Array, column: float) -> Array:
     """Where names go in columns left and right of a picture, each on the side its thrust points away from.
 
-    All in inches from the lower left corner of a picture of `size` (2,); (k, 2) -> (k, 2).
+    All in inches from the lower left corner of a picture of `size` (2,), names up to `column` wide;
+    (k, 2) -> (k, 2).
     """
     lateral = np.where(np.abs(thrust[:, 0]) > 0.2 * np.abs(thrust).max(), thrust[:, 0], 0.0)
     off_centre = places[:, 0] - places[:, 0].mean()
     left = np.where(lateral == 0.0, off_centre < -1e-3 * size[0], lateral > 0.0)
-    anchors = np.where(left[:, None], [COLUMN, 0.0], [size[0] - COLUMN, 0.0])
+    anchors = np.where(left[:, None], [column, 0.0], [size[0] - column, 0.0])
     for side in (left, ~left):
         anchors[side, 1] = spread_out(places[side, 1], PITCH_UP, 0.3, size[1] - 0.3)
     return anchors
 
 
-def names_below(places: Array, thrust: Array, size: Array) -> Array:
+def names_below(places: Array, thrust: Array, size: Array, column: float) -> Array:
     """Where names go in a row at the foot of a picture, in inches, as in `names_beside`."""
-    across = spread_out(places[:, 0], PITCH_ACROSS, 0.3, size[0] - 0.3)
+    across = spread_out(places[:, 0], column, 0.3, size[0] - 0.3)
     return np.stack([across, np.full_like(across, ROW)], axis=1)

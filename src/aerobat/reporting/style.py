@@ -9,6 +9,7 @@ from typing import Any
 BLUE = "#004488"
 YELLOW = "#ddaa33"
 RED = "#c8334e"
+SKY = "#6fa3d4"  # a light blue
 INK = "#1c2b39"
 MUTED = "#66788a"
 FAINT = "#a9b6c2"

@@ -7,6 +7,7 @@ from collections.abc import Iterable
 from rich.console import Console
 from rich.table import Table
 
+from aerobat.certification import Certificate, Side
 from aerobat.metrics import Score
 from aerobat.planning import Plan
 from aerobat.specs import Problem
@@ -48,16 +49,43 @@ def show(table: Table) -> None:
     console.print(table, width=None if console.is_terminal else 120)
 
 
+def certificate_table(certificate: Certificate, title: str) -> Table:
+    """What is proven, a limit a row, and what quantities without a limit reach at most."""
+    headings = ("quantity", "reaches", "at", "limit", "margin", "verdict")
+    table = Table(*headings, title=title, title_justify="left", box=None, pad_edge=False)
+    for finding in certificate.findings:
+        if finding.limit is None and finding.side is Side.LEAST:
+            continue
+        limit = "–" if finding.limit is None else f"{finding.limit:.4g} {finding.unit}"
+        margin = "" if finding.margin is None else f"{finding.margin:.3g} {finding.unit}"
+        verdict = "" if finding.limit is None else finding.verdict.value
+        reached = f"{finding.side.value} {finding.value:.4g} {finding.unit}"
+        table.add_row(finding.quantity, reached, f"{finding.time:.3f} s", limit, margin, verdict)
+    table.caption = ("" if certificate.certified else "not certified: ") + certificate.why
+    table.caption_justify = "left"
+    return table
+
+
 def _plan_facts(plan: Plan) -> Iterable[tuple[str, str]]:
     yield "planner", f"{plan.planner}, order {plan.order}, {plan.intervals} intervals, {plan.backend}"
-    yield "duration", f"{plan.duration:.3f} s, dt {plan.dt:.4f} s after {len(plan.attempts)} attempts"
-    proven = "optimal" if plan.gap < 1e-6 else f"within {100 * plan.gap:.2g} % of the optimum"
-    yield "cost", f"{plan.cost:.7g}, {proven}"
+    dt = "" if plan.dt is None else f"dt {plan.dt:.4f} s "
+    yield "duration", f"{plan.duration:.3f} s, {dt}after {len(plan.attempts)} attempts"
+    yield "cost", f"{plan.cost:.7g}, {_optimality(plan)}"
     yield "nodes", f"{plan.nodes}, solved in {1000 * plan.solve_time:.0f} ms"
-    if plan.stages:
+    if plan.stages and plan.dt is not None:
         yield "stage intervals", ", ".join(f"{s.name} {s.interval}" for s in plan.stages)
+    elif plan.stages:
+        yield "stages", ", ".join(f"{s.name} at {s.time:.2f} s" for s in plan.stages)
     if plan.margin is not None:
         yield "rotors", str(plan.margin)
+    if plan.certificate is not None:
+        yield "proof", ("" if plan.certificate.certified else "not certified: ") + plan.certificate.why
+
+
+def _optimality(plan: Plan) -> str:
+    if plan.gap is None or plan.gap < 1e-6:
+        return plan.status
+    return f"within {100 * plan.gap:.2g} % of the optimum"
 
 
 def _flight_facts(score: Score | None) -> Iterable[tuple[str, str]]:

@@ -11,7 +11,7 @@ from aerobat.arrays import Array
 from aerobat.flight import Flight
 from aerobat.metrics import attitude_error, position_error
 from aerobat.planning import PlacedStage, Plan
-from aerobat.reporting.canvas import size_of
+from aerobat.reporting.canvas import HEADING, heading, legend, size_of
 from aerobat.reporting.spreading import spread_out
 from aerobat.reporting.style import BLUE, FAINT, INK, MUTED, RED, SMALL, YELLOW
 from aerobat.reporting.turn import snapshots, turn_plane
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 SPIN_RAMPS = {1: ("#00315f", "#6fa3d4"), -1: ("#8e1730", "#e89aa8")}  # dark to light, by the sense of turning
 LENGTHS = (("m", 1.0), ("cm", 1e-2), ("mm", 1e-3))
-NAME_WIDTH = 0.36  # [in] that a stage's name takes
+NAME_WIDTH, LETTER = 0.36, 0.065  # [in] that a stage's name takes at least, and by the letter
 
 
 def draw_position_error(axes: Axes, flight: Flight) -> None:
@@ -44,7 +44,7 @@ def draw_rotor_thrusts(axes: Axes, times: Array, thrusts: Array, vehicle: Vehicl
     """Every rotor's thrust (..., T, n) [N], blue or red by its sense of turning, with the limits dashed."""
     colours = rotor_colours(vehicle)
     for i, colour in enumerate(colours):
-        draw_series(axes, times, thrusts[..., i], colour, width=1.0, label=f"{i + 1}" if i else "rotor 1")
+        draw_series(axes, times, thrusts[..., i], colour, width=1.0, label=f"{i}" if i else "rotor 0")
     limits = sorted({*vehicle.min_thrusts.tolist(), *vehicle.max_thrusts.tolist()})
     for limit in limits:
         label = "limits" if limit == limits[-1] else ""
@@ -121,7 +121,8 @@ def mark_stages(axes: Axes, stages: Sequence[PlacedStage], duration: float, name
     if not named:
         return
     width = size_of(axes)[0]
-    places = spread_out(times / duration * width, NAME_WIDTH, 0.0, width) / width * duration
+    pitch = max(NAME_WIDTH, LETTER * max(len(stage.name) for stage in stages))
+    places = spread_out(times / duration * width, pitch, 0.0, width) / width * duration
     for stage, place in zip(stages, places, strict=True):
         axes.annotate(
             stage.name, (stage.time, 1.0), (place, 1.0 + 0.1 / size_of(axes)[1]), size=SMALL, ha="center",
@@ -129,6 +130,18 @@ def mark_stages(axes: Axes, stages: Sequence[PlacedStage], duration: float, name
             textcoords=axes.get_xaxis_transform(), va="bottom",
             arrowprops={"arrowstyle": "-", "color": FAINT, "linewidth": 0.7, "shrinkA": 0.0, "shrinkB": 0.0},
         )  # fmt: skip
+
+
+def finish_column(column: Sequence[Axes], title: str, stages: Sequence[PlacedStage], duration: float) -> None:
+    """The title of a column of timelines, their stages, legends and common time axis."""
+    for axes in column:
+        mark_stages(axes, stages, duration, named=axes is column[0])
+        legend(axes, above=HEADING if axes is column[0] else 0.06)
+        axes.yaxis.set_label_coords(-0.52 / float(size_of(axes)[0]), 0.5)  # in line down the column
+        if axes is not column[-1]:
+            axes.tick_params(labelbottom=False)
+    column[-1].set_xlabel("time [s]")
+    heading(column[0], title)
 
 
 def _top(values: Array, least: float) -> float:

@@ -16,6 +16,7 @@ from aerobat.vehicle import Vehicle
 FEWEST = 5  # moments shown; where a maneuver has fewer stages, equal steps of time join them
 STEPS = 8
 ROUND_HEADING = 15.0  # [deg]
+THIN = 0.02  # of a path's extent: what spreads less to its sides lies in a plane
 
 
 @dataclass(frozen=True)
@@ -85,6 +86,16 @@ def turn_plane(plan: Plan, thrust: Array) -> TurnPlane:
     _, _, directions = np.linalg.svd(level)
     heading = np.rad2deg(np.arctan2(directions[0, 1], directions[0, 0]))
     return TurnPlane(_as_line(ROUND_HEADING * round(heading / ROUND_HEADING)))
+
+
+def plane_of(points: Array) -> TurnPlane | None:
+    """The vertical plane in which points (n, 3) lie; None where they spread to its sides."""
+    level = points[:, :2] - points[:, :2].mean(axis=0)
+    _, _, directions = np.linalg.svd(level, full_matrices=False)
+    if np.ptp(level @ directions[1]) > THIN * np.ptp(points, axis=0).max():
+        return None
+    along = directions[0] if np.ptp(level) > 0.0 else np.array([1.0, 0.0])
+    return TurnPlane(_as_line(round(float(np.rad2deg(np.arctan2(along[1], along[0]))), 1)))
 
 
 def _as_line(heading_deg: float) -> float:

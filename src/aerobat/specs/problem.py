@@ -79,6 +79,17 @@ class Limits:
         bounds: dict[str, Any] = {DERIVATIVES[derivative]: np.inf}
         return replace(self, **bounds)
 
+    def drawn_in(self, derivative: int, below: Array, above: Array) -> Limits:
+        """The same limits, one derivative's tighter: by `below` at its lower ends, `above` at its upper ones.
+
+        Raises SpecError when nothing is left between them.
+        """
+        if derivative == 0:
+            return replace(self, lower=self.lower + below, upper=self.upper - above)
+        bound = self.of(derivative)[1] - np.maximum(below, above)
+        tighter: dict[str, Any] = {DERIVATIVES[derivative]: bound}
+        return replace(self, **tighter)
+
 
 PAPER_LIMITS = Limits(velocity=10.0, acceleration=90.0, jerk=200.0)  # the authors' reference code
 

@@ -1,5 +1,7 @@
-"""How position varies over time: piecewise polynomials and their extremes."""
+"""How position varies over time: piecewise polynomials, their extremes, and those of minimum effort."""
 
+from aerobat.trajectory.files import load_trajectory, save_trajectory
+from aerobat.trajectory.minimum_effort import Rule, minimum_effort
 from aerobat.trajectory.piecewise import Extremum, Trajectory
 
-__all__ = ["Extremum", "Trajectory"]
+__all__ = ["Extremum", "Rule", "Trajectory", "load_trajectory", "minimum_effort", "save_trajectory"]

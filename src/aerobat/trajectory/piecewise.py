@@ -144,6 +144,15 @@ class Trajectory:
         """The largest |d^k p/dt^k| over continuous time, from roots of its squared norm's derivative."""
         return self._extrema(self._rates(derivative))[1]
 
+    def component_range(self, derivative: int) -> tuple[Array, Array]:
+        """The least and the largest of each component of d^k p/dt^k over continuous time, each (3,)."""
+        values = []
+        for axis in range(3):
+            component = self._rates(derivative)[..., axis : axis + 1]
+            s = polynomial.stationary_points(component)  # of its square: a zero among them does no harm
+            values.append(polynomial.evaluate(component[:, None], s).ravel())
+        return np.min(values, axis=1), np.max(values, axis=1)
+
     def specific_thrust_range(self, gravity: float) -> tuple[Extremum, Extremum]:
         """The least and the largest |a + g e3| [m/s²] over continuous time, exactly."""
         thrust = self._rates(2).copy()

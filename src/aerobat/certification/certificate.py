@@ -1,0 +1,141 @@
+"""Certificate: what has been proven about a trajectory, and what refutes it."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+from enum import StrEnum
+
+from aerobat.flatness import Span
+
+
+class Verdict(StrEnum):
+    """What is known about a limit over continuous time."""
+
+    HOLDS = "holds"  # proven, or there is no limit
+    VIOLATED = "violated"  # at the time given
+    UNDECIDED = "undecided"  # nearer to its limit than can be told, or attitude undetermined on the way
+
+
+class Side(StrEnum):
+    """Which extreme of a quantity is meant."""
+
+    LEAST = "least"
+    MOST = "most"
+
+
+@dataclass(frozen=True)
+class Finding:
+    """The least or the most of one quantity, enclosed between `value` and `bound`."""
+
+    quantity: str  # "speed", "tilt", "thrust", "body rate", "moment", "rotor 0", "velocity x", ...
+    unit: str
+    side: Side
+    value: float  # reached at `time`
+    bound: float  # proven: nowhere beyond
+    time: float  # [s]
+    limit: float | None
+    verdict: Verdict
+
+    @property
+    def margin(self) -> float | None:
+        """The proven distance to the limit; where it is violated how far beyond, negative."""
+        if self.limit is None:
+            return None
+        extreme = self.value if self.verdict is Verdict.VIOLATED else self.bound
+        margin = self.limit - extreme if self.side is Side.MOST else extreme - self.limit
+        return max(margin, 0.0) if self.verdict is Verdict.HOLDS else margin
+
+    def __str__(self) -> str:
+        """One sentence without its full stop."""
+        change = "rises" if self.side is Side.MOST else "falls"
+        value = round(self.value, 9) + 0.0  # what is zero but for rounding reads as zero
+        reached = f"{self.quantity} {change} to {value:.4g} {self.unit} at {self.time:.3f} s"
+        margin = self.margin
+        if self.limit is None or margin is None:
+            return reached
+        if self.verdict is Verdict.VIOLATED:
+            where = "above" if self.side is Side.MOST else "below"
+            return f"{reached}, {-margin:.2g} {self.unit} {where} its limit"
+        if self.verdict is Verdict.UNDECIDED and margin < 0:
+            return f"{reached}, nearer to its limit than can be told"
+        return f"{reached}, {margin:.2g} {self.unit} within its limit"
+
+
+@dataclass(frozen=True)
+class Discontinuity:
+    """A jump between two segments that no finite forces and moments can make."""
+
+    quantity: str  # "position", "velocity", "thrust direction" or "body rate"
+    unit: str
+    size: float
+    time: float  # [s]
+
+    def __str__(self) -> str:
+        """One sentence without its full stop."""
+        means = "force" if self.quantity in ("position", "velocity") else "moment"
+        size = f"{self.size:.2g} {self.unit}"
+        return f"{self.quantity} jumps by {size} at {self.time:.3f} s, which no {means} can do"
+
+
+@dataclass(frozen=True)
+class Certificate:
+    """What holds along the whole of a trajectory, between samples and knots too, and what does not."""
+
+    findings: tuple[Finding, ...]
+    undetermined: tuple[Span, ...]  # where thrust vanishes, and with it the attitude
+    discontinuities: tuple[Discontinuity, ...]
+
+    @property
+    def certified(self) -> bool:
+        """Whether all limits are proven to hold, attitude determined throughout and moments finite."""
+        holds = all(finding.verdict is Verdict.HOLDS for finding in self.findings)
+        return holds and not self.undetermined and not self.discontinuities
+
+    @property
+    def worst(self) -> Finding | None:
+        """The rotor thrust with the smallest margin; None if no attitude is ever determined."""
+        rotors = [finding for finding in self.findings if finding.quantity.startswith("rotor ")]
+        return min(rotors, key=_margin, default=None)
+
+    @property
+    def margin(self) -> float | None:
+        """By how much [N] the rotors are proven to stay within their limits; negative: beyond by so much.
+
+        Of the times at which attitude is determined; None if there are none.
+        """
+        return self.worst.margin if self.worst else None
+
+    @property
+    def why(self) -> str:
+        """What decides, in one sentence without its full stop."""
+        violated = [f for f in self.findings if f.verdict is Verdict.VIOLATED]
+        if self.discontinuities:
+            return str(self.discontinuities[0])
+        if violated:
+            return str(self.worst if self.worst in violated else violated[0])
+        if self.undetermined:
+            at = f"{self.undetermined[0].start:.3f} s"
+            return f"cannot decide: thrust reaches zero at {at}, where no attitude is determined"
+        for finding in self.findings:
+            if finding.verdict is Verdict.UNDECIDED:
+                return f"cannot decide: {finding}"
+        return f"certified: {self.worst}"
+
+    def record(self) -> dict[str, object]:
+        """Plain data: dictionaries, lists, numbers, strings and None."""
+        return {
+            "certified": self.certified,
+            "why": self.why,
+            "margin_n": self.margin,
+            "findings": [{**asdict(finding), "margin": finding.margin} for finding in self.findings],
+            "undetermined": [asdict(span) for span in self.undetermined],
+            "discontinuities": [asdict(jump) for jump in self.discontinuities],
+        }
+
+    def __str__(self) -> str:
+        """The outcome in one sentence."""
+        return self.why
+
+
+def _margin(finding: Finding) -> float:
+    return float("inf") if finding.margin is None else finding.margin

@@ -1,0 +1,57 @@
+"""Chebyshev series on [-1, 1]: interpolation, halving, and how large they are off the real line."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+from numpy.polynomial import chebyshev
+
+from aerobat.arrays import Array
+
+ROUNDING = 1e-14  # of the sum of absolute values behind a polynomial's value: Horner's rule and its argument
+
+
+@dataclass(frozen=True)
+class Basis:
+    """What interpolation of one degree K needs; series are rows of K + 1 coefficients c of Σ c_k T_k."""
+
+    nodes: Array  # Chebyshev points, both ends among them, (K + 1,)
+    analysis: Array  # values at the nodes -> coefficients, (K + 1, K + 1)
+    halves: Array  # coefficients -> those of either half, stretched to [-1, 1], (2, K + 1, K + 1)
+
+    @property
+    def degree(self) -> int:
+        """K."""
+        return len(self.nodes) - 1
+
+    @property
+    def lebesgue(self) -> float:
+        """By how much interpolation magnifies errors of values, at most (Trefethen, ATAP, theorem 15.2)."""
+        return float(1 + 2 / np.pi * np.log(self.degree + 1))
+
+
+@lru_cache(maxsize=16)
+def basis(degree: int) -> Basis:
+    """The basis of a degree >= 1."""
+    nodes = np.asarray(-np.cos(np.pi * np.arange(degree + 1) / degree))
+    analysis = np.linalg.inv(chebyshev.chebvander(nodes, degree))
+    halves = [analysis @ chebyshev.chebvander((nodes + side) / 2, degree) for side in (-1, 1)]
+    return Basis(nodes, np.asarray(analysis), np.array(halves))
+
+
+def growth(degree: int, rho: Array) -> Array:
+    """The largest |T_k| on Bernstein ellipses, (ρᵏ + ρ⁻ᵏ)/2, (K + 1, R); one for ρ = 1, the interval."""
+    return np.asarray(np.cosh(np.multiply.outer(np.arange(degree + 1), np.log(rho))))
+
+
+def integral(values: Array, basis: Basis) -> Array:
+    """∫ from -1 to each node of what has these values at the nodes, along the last axis, (..., K + 1)."""
+    series = chebyshev.chebint(values @ basis.analysis.T, lbnd=-1, axis=-1)
+    return np.asarray(series @ chebyshev.chebvander(basis.nodes, basis.degree + 1).T)
+
+
+def evaluate(coefficients: Array, at: Array) -> Array:
+    """Each series (N, K + 1) at its own point (N,)."""
+    return np.asarray(chebyshev.chebval(at, coefficients.T, tensor=False))

@@ -1,0 +1,101 @@
+"""Extremes that are asked for, and their answers: findings."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from aerobat.arrays import Array
+from aerobat.certification.certificate import Finding, Side, Verdict
+from aerobat.certification.extremes import Family, greatest
+from aerobat.certification.motion import Pieces
+from aerobat.trajectory import Trajectory
+
+ROUNDING = 1e-13  # of the sizes of a series' terms: halving it some ten times and summing it
+
+
+@dataclass(frozen=True)
+class Question:
+    """How large (or, with the sign -1, how small) a function gets that is given by series on pieces."""
+
+    quantity: str
+    unit: str
+    side: Side
+    limit: float  # infinite where there is none
+    column: int  # of the series
+    sign: int
+    read: Callable[[float], float]  # from the greatest value of sign times function to what people read
+    slack: float = 0.0  # beyond the limit by so much it counts as met
+
+    def answer(self, least: float, most: float, time: float, everywhere: bool) -> Finding:
+        """The finding, if the greatest value is in [least, most]; `everywhere`: no time was left out."""
+        value, bound = self.read(least), self.read(most)
+        limit = None if math.isinf(self.limit) else self.limit
+        inwards = 1 if self.side is Side.MOST else -1
+        verdict = Verdict.UNDECIDED
+        if limit is None or (everywhere and inwards * (limit - bound) >= -self.slack):
+            verdict = Verdict.HOLDS
+        elif inwards * (limit - value) < -self.slack:
+            verdict = Verdict.VIOLATED
+        return Finding(self.quantity, self.unit, self.side, value, bound, time, limit, verdict)
+
+
+@dataclass(frozen=True)
+class Interpolated:
+    """Functions as Chebyshev series on pieces of a trajectory."""
+
+    trajectory: Trajectory
+    pieces: Pieces
+    series: Array  # (P, K + 1, Q)
+    error: Array  # at most, (P, Q)
+    scale: Array  # what is large, (Q,)
+    tightness: float  # of enclosures, as `extremes.Family` has it
+    everywhere: bool  # whether the pieces make up the whole trajectory
+
+    def answers(self, questions: Sequence[Question]) -> list[Finding]:
+        """A finding for each question; none at all if there are no pieces."""
+        count = len(self.pieces.segment)
+        if not (count and questions):
+            return []
+        columns = np.array([question.column for question in questions])
+        signed = self.series[..., columns] * np.array([question.sign for question in questions])
+        family = Family(
+            signed.swapaxes(1, 2).reshape(-1, signed.shape[1]),
+            (self.error[:, columns] + ROUNDING * np.abs(signed).sum(axis=1)).ravel(),
+            np.tile(np.arange(len(questions)), count),
+            self.scale[columns],
+            self.tightness,
+        )
+        found = greatest(family)
+        times = self.pieces[found.member // len(questions)].times(self.trajectory, found.position)
+        ranges = zip(questions, found.least.tolist(), found.most.tolist(), times.tolist(), strict=True)
+        return [question.answer(least, most, time, self.everywhere) for question, least, most, time in ranges]
+
+
+def both_sides(quantity: str, unit: str, column: int, lower: float, upper: float) -> list[Question]:
+    """How small and how large a function gets."""
+    return [
+        Question(quantity, unit, Side.LEAST, float(lower), column, -1, _negated),
+        Question(quantity, unit, Side.MOST, float(upper), column, 1, _plain),
+    ]
+
+
+def root(value: float) -> float:
+    """A magnitude, read from its square."""
+    return math.sqrt(max(value, 0.0))
+
+
+def angle(value: float) -> float:
+    """An angle [rad], read from the negative of its cosine."""
+    return math.acos(min(max(-value, -1.0), 1.0))
+
+
+def _plain(value: float) -> float:
+    return value
+
+
+def _negated(value: float) -> float:
+    return -value

@@ -1,0 +1,5 @@
+"""`python -m aerobat.cli` is `aerobat`."""
+
+from aerobat.cli import main
+
+main()

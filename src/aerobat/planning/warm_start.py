@@ -1,0 +1,69 @@
+"""A plan of another planner as the first guess of an optimal control: its phases, its motion, its plane."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from aerobat.arrays import Array
+from aerobat.flatness import reference
+from aerobat.planning.collocation import Mesh, Motion
+from aerobat.planning.result import Plan
+from aerobat.specs.stage import Course, Stage
+from aerobat.trajectory import Trajectory
+from aerobat.vehicle import Vehicle
+
+FLAT = 1e-6  # of its extent: how far a path may leave a plane and still be in it
+
+
+@dataclass(frozen=True, eq=False)
+class Guess:
+    """A trajectory, and when it passes a course's stages."""
+
+    trajectory: Trajectory
+    stages: tuple[Stage, ...]  # in the order of their times
+    times: tuple[float, ...]  # [s] of the stages, rising
+
+    @classmethod
+    def of(cls, plan: Plan, course: Course) -> Guess:
+        """A plan's trajectory, and the order of the course's stages in it if it leaves that open."""
+        times = [placed.time for placed in plan.stages]
+        order = sorted(range(len(times)), key=times.__getitem__)
+        return cls(plan.trajectory, tuple(course.stages[i] for i in order), tuple(times[i] for i in order))
+
+    @property
+    def phases(self) -> Array:
+        """From the start to the first stage, ..., from the last to the end [s], (P,)."""
+        return np.diff([0.0, *self.times, self.trajectory.duration])
+
+    def slowed(self, factor: float) -> Guess:
+        """The same path, flown longer by a factor."""
+        trajectory = Trajectory(factor * self.trajectory.durations, self.trajectory.coefficients)
+        return replace(self, trajectory=trajectory, times=tuple(factor * t for t in self.times))
+
+    def shared(self, intervals: int, least: int) -> tuple[int, ...]:
+        """About so many intervals, shared among phases by their durations, each given the least or more."""
+        share = np.rint(intervals * self.phases / self.trajectory.duration).astype(int)
+        return tuple(np.maximum(share, least).tolist())
+
+    def motion(self, mesh: Mesh, vehicle: Vehicle, yaw: float) -> Motion:
+        """What the vehicle does along it at the mesh's nodes, by flatness; inputs within their scale."""
+        knots = np.concatenate([[0.0], np.cumsum(self.phases @ mesh.shares)])
+        asked = reference(
+            self.trajectory, vehicle, np.minimum(knots, self.trajectory.duration), yaw=yaw
+        ).setpoint
+        flat, rates = asked.flat, asked.omega_body[:, :2]
+        states = np.concatenate([flat.position, flat.velocity, asked.q_world_body, rates], axis=1).T
+        inputs = np.concatenate([asked.wrench.thrust[:, None], asked.omega_dot_body[:, :2]], axis=1).T
+        most = 2.0 * mesh.input_scale[:, None]
+        inputs = np.clip(inputs, -most, most)
+        return Motion(self.phases, states, inputs[:, :-1], inputs[:, 1:])
+
+    def plane(self) -> Array | None:
+        """The normal of the vertical plane that it stays in, (3,); None when it stays in none."""
+        across = self.trajectory.coefficients[..., :2].reshape(-1, 2) - self.trajectory.coefficients[0, 0, :2]
+        _, extents, directions = np.linalg.svd(across)
+        if extents[1] > FLAT * max(extents[0], FLAT):
+            return None
+        return np.array([*directions[1], 0.0])

@@ -1,0 +1,147 @@
+"""Smooth nonlinear programs, stated in CasADi's symbols and solved by IPOPT's interior-point method.
+
+CasADi is optional: whatever needs it asks `symbolics()`, which says how to install it where it is missing.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import cached_property
+from importlib import import_module
+from importlib.util import find_spec
+from math import inf
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from aerobat.arrays import Array, frozen, frozen_bounds
+from aerobat.errors import BackendMissing, SpecError
+
+_SILENT = {"print_time": False, "show_eval_warnings": False, "ipopt.print_level": 0, "ipopt.sb": "yes"}
+_FOUND = ("Solve_Succeeded", "Solved_To_Acceptable_Level")
+_SENTENCES = {
+    "Solve_Succeeded": "solved to the tolerance",
+    "Solved_To_Acceptable_Level": "solved to a looser tolerance, short of the one asked",
+    "Infeasible_Problem_Detected": "converged to a point where no small change lessens the violation",
+    "Maximum_Iterations_Exceeded": "stopped at the limit of iterations",
+    "Maximum_CpuTime_Exceeded": "stopped at the limit of time",
+    "Maximum_WallTime_Exceeded": "stopped at the limit of time",
+    "Diverging_Iterates": "diverged",
+    "Restoration_Failed": "could not come nearer to satisfying the constraints",
+    "Search_Direction_Becomes_Too_Small": "stopped with steps too small to go on",
+    "Invalid_Number_Detected": "stopped where a function has no finite value",
+}
+
+
+def symbolics() -> Any:
+    """The casadi module. Raises BackendMissing, with the command that installs it, where it is not there."""
+    if find_spec("casadi") is None:
+        raise BackendMissing('nonlinear programs need CasADi; install it with pip install "aerobat[casadi]"')
+    return import_module("casadi")
+
+
+@dataclass(frozen=True, eq=False)
+class NonlinearProgram:
+    """Minimize f(x) subject to lower ≤ g(x) ≤ upper and least ≤ x ≤ most.
+
+    Raises SpecError when bounds cross or do not fit the symbols; infinite bounds do not bind.
+    """
+
+    variables: Any  # x, a column of n CasADi symbols (SX or MX)
+    objective: Any  # f, an expression of them
+    constraints: Any  # g, a column of m expressions
+    lower: Array  # (m,), or one number for all
+    upper: Array
+    least: Array = field(default_factory=lambda: np.array(-inf))  # (n,), or one number for all
+    most: Array = field(default_factory=lambda: np.array(inf))
+
+    def __post_init__(self) -> None:
+        """Check and broadcast."""
+        for names, symbols in ((("lower", "upper"), self.constraints), (("least", "most"), self.variables)):
+            size = int(symbols.numel())
+            for name in names:
+                object.__setattr__(self, name, _bound(getattr(self, name), name, size))
+            low, high = (getattr(self, name) for name in names)
+            if (low > high).any():
+                raise SpecError(f"{names[0]} must not exceed {names[1]}; entry {np.argmax(low > high)} does")
+
+    @cached_property
+    def values(self) -> Any:
+        """The CasADi function x -> (f, g)."""
+        return symbolics().Function("values", [self.variables], [self.objective, self.constraints])
+
+    def cost(self, x: Array) -> float:
+        """f(x)."""
+        return float(self.values(x)[0])
+
+    def violation(self, x: Array) -> float:
+        """By how much the worst constraint or bound is violated at x; infinite where x or g is not finite."""
+        g = np.asarray(self.values(x)[1], dtype=float).reshape(-1)
+        if not (np.isfinite(x).all() and np.isfinite(g).all()):
+            return inf
+        parts = (self.lower - g, g - self.upper, self.least - x, x - self.most)
+        return max(float(np.max(part, initial=0.0)) for part in parts)
+
+
+@dataclass(frozen=True, eq=False)
+class NonlinearResult:
+    """The point that a solve ended at; cost and violation are recomputed from the program."""
+
+    x: Array  # (n,)
+    cost: float
+    violation: float  # of the worst constraint or bound, in its own unit
+    converged: bool  # IPOPT found an optimum, and the violation is within what was allowed
+    status: str  # a sentence
+    iterations: int
+    time: float  # [s], derivatives included
+
+
+def solve(
+    program: NonlinearProgram,
+    start: ArrayLike,
+    *,
+    iterations: int = 500,
+    tolerance: float = 1e-8,
+    allowed_violation: float = 1e-6,
+    barrier: float | None = None,
+    time_limit: float | None = None,
+    exact_hessian: bool = True,
+) -> NonlinearResult:
+    """A local minimum near `start` (n,), by IPOPT with CasADi's exact derivatives.
+
+    `tolerance` is IPOPT's, on the scaled optimality conditions. `barrier` is the first barrier parameter (0.1
+    by default): 1e-4 or less keeps a start that is nearly optimal. Without the `exact_hessian` it is built up
+    by BFGS updates. Raises SpecError for a start of the wrong size, BackendMissing without CasADi.
+    """
+    began = perf_counter()
+    first = frozen(start, "start", (int(program.variables.numel()),))
+    options: dict[str, Any] = {**_SILENT, "ipopt.max_iter": iterations, "ipopt.tol": tolerance}
+    options |= {} if time_limit is None else {"ipopt.max_wall_time": time_limit}
+    options |= {} if exact_hessian else {"ipopt.hessian_approximation": "limited-memory"}
+    if barrier is not None:
+        options |= {"ipopt.mu_init": barrier, "ipopt.bound_push": 1e-6, "ipopt.bound_frac": 1e-6}
+    symbols = {"x": program.variables, "f": program.objective, "g": program.constraints}
+    solver = symbolics().nlpsol("program", "ipopt", symbols, options)
+    bounds = {"lbg": program.lower, "ubg": program.upper, "lbx": program.least, "ubx": program.most}
+    x = np.asarray(solver(x0=first, **bounds)["x"], dtype=float).reshape(-1)
+    x.flags.writeable = False
+    reported = str(solver.stats()["return_status"])
+    violation = program.violation(x)
+    return NonlinearResult(
+        x,
+        program.cost(x),
+        violation,
+        reported in _FOUND and violation <= allowed_violation,
+        _SENTENCES.get(reported, f"stopped: {reported.replace('_', ' ').lower()}"),
+        int(solver.stats()["iter_count"]),
+        perf_counter() - began,
+    )
+
+
+def _bound(value: ArrayLike, name: str, size: int) -> Array:
+    bound = frozen_bounds(value, name)
+    if bound.shape not in ((), (size,)):
+        raise SpecError(f"{name} must be one number or {size}, got the shape {bound.shape}")
+    return frozen_bounds(np.broadcast_to(bound, (size,)), name)

@@ -1,0 +1,202 @@
+"""Planners side by side: as rows of data, as a table, and as a picture on a common time axis."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import cycle
+from textwrap import fill
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from rich.table import Table
+from rich.text import Text
+
+from aerobat.comparison import Comparison, Entry
+from aerobat.flight import COMPLETE
+from aerobat.planning import Plan
+from aerobat.reporting.canvas import MARGIN, blank_page, heading, headline, house_style, panel
+from aerobat.reporting.figures import AXIS, COLUMNS, FACT, HEAD, TITLES, is_flat, length
+from aerobat.reporting.motion import plan_reference
+from aerobat.reporting.overlay import NamedPath, draw_overlay
+from aerobat.reporting.style import (
+    BLUE,
+    INK,
+    MUTED,
+    NORMAL,
+    PAGE_WIDTH,
+    RED,
+    SKY,
+    SMALL,
+    TITLE,
+    YELLOW,
+)
+from aerobat.reporting.tracks import draw_limits, fit_to_limits
+from aerobat.vehicle import Vehicle
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+NONE = "–"  # in place of a number that there is not
+COLOURS = (INK, YELLOW, SKY, BLUE, RED)  # of planners, in their order
+VERTICES = 200  # of a drawn path
+TAIL = 1.02  # where the time axis ends, relative to the longest duration
+
+PATHS = {True: 3.2, False: 4.8}  # [in] the height of the paths' picture, where they are flat or not
+TIMELINE = 5.5  # [in] the width of a timeline
+ROW = 0.85  # [in] its height
+PITCH = 1.3  # [in] of a planner's row, with its name
+REASON_PITCH = 0.75  # [in] of one that has no plan
+PLACES = (6.6, 7.5, 8.25, 9.2, 10.2)  # [in] where a row's facts begin
+SENTENCE = 72  # letters to a line beside a timeline
+PARAGRAPH = 150  # letters to a line across the page
+
+
+def comparison_rows(comparison: Comparison) -> list[dict[str, Any]]:
+    """Plain data, a row a planner; None where there is no plan, and for ratios where none is time-optimal."""
+    return [
+        {
+            "planner": entry.planner,
+            "segments": entry.plan and entry.plan.intervals,
+            "duration_s": entry.plan and entry.plan.duration,
+            "ratio": comparison.ratio(entry),
+            "certified": None if entry.plan is None else entry.certified,
+            "min_margin_n": _margin(entry.plan),
+            "planning_s": entry.planning_time,
+            "max_position_error_m": entry.score and entry.score.max_position_error_m,
+        }
+        for entry in comparison.entries
+    ]
+
+
+def comparison_table(comparison: Comparison) -> Table:
+    """The same for people, in 80 columns; below it, the outcomes that are worth a sentence."""
+    title = f"{comparison.problem.name} · {comparison.vehicle.name}"
+    table = Table(title=title, title_justify="left", caption_justify="left", box=None, pad_edge=False)
+    table.add_column("planner", no_wrap=True)
+    for name in ("segments", *_facts(comparison, comparison.entries[0]), "took"):
+        table.add_column(name, justify="right", no_wrap=True)
+    for entry in comparison.entries:
+        segments = NONE if entry.plan is None else str(entry.plan.intervals)
+        spent = f"{entry.planning_time:.2f} s"
+        table.add_row(entry.planner, segments, *_facts(comparison, entry).values(), spent)
+    told = [f"{_name(entry)}: {entry.outcome}" for entry in comparison.entries if entry.outcome != COMPLETE]
+    table.caption = Text("\n".join(told)) if told else None  # as it stands: brackets are no markup
+    return table
+
+
+def comparison_figure(comparison: Comparison) -> Figure:
+    """One page: all paths in one picture, then each planner's rotor thrusts on a common time axis.
+
+    Thrusts are what flatness asks, limits are dashed. A planner without a plan has its reason instead.
+    """
+    entries = comparison.entries
+    colours = [colour for colour, _ in zip(cycle(COLOURS), entries, strict=False)]
+    paths = [_path(e, e.plan, colour) for e, colour in zip(entries, colours, strict=True) if e.plan]
+    rows = AXIS + sum(map(_pitch, entries))
+    height = PATHS[is_flat(np.concatenate([path.position for path in paths]))]
+    with house_style():
+        figure = blank_page(PAGE_WIDTH, rows + AXIS + MARGIN + height + TITLES + HEAD + FACT)
+        fact = f"{len(paths)} of {len(entries)} planners found a plan"
+        headline(figure, f"{comparison.problem.name} · planners for {comparison.vehicle.name}", [fact])
+        axes = panel(figure, COLUMNS[0], rows + AXIS + MARGIN, PAGE_WIDTH - COLUMNS[0] - MARGIN, height)
+        draw_overlay(axes, paths, comparison.problem.gate)
+        heading(axes, "Paths")
+        _draw_rows(figure, comparison, colours, rows)
+    return figure
+
+
+def _margin(plan: Plan | None) -> float | None:
+    """By how much [N] the rotors stay within their limits, proven where there is a proof."""
+    if plan is None:
+        return None
+    if plan.certificate is not None:
+        return plan.certificate.margin
+    return None if plan.margin is None else plan.margin.margin
+
+
+def _facts(comparison: Comparison, entry: Entry) -> dict[str, str]:
+    """A planner's result in words, by what they say."""
+    plan, ratio, margin = entry.plan, comparison.ratio(entry), _margin(entry.plan)
+    certified = "yes" if entry.certified else "no"
+    return {
+        "duration": NONE if plan is None else f"{plan.duration:.3f} s",
+        "ratio": NONE if ratio is None else f"{ratio:.2f}",
+        "certified": NONE if plan is None else certified,
+        "margin": NONE if margin is None else f"{margin:.2g} N",
+        "error": NONE if entry.score is None else length(entry.score.max_position_error_m),
+    }
+
+
+def _name(entry: Entry) -> str:
+    """What tells a planner from others of its kind."""
+    if entry.plan is None:
+        return entry.planner
+    return f"{entry.planner}, {entry.plan.intervals} segments"
+
+
+def _path(entry: Entry, plan: Plan, colour: str) -> NamedPath:
+    times = np.linspace(0.0, plan.duration, VERTICES)
+    return NamedPath(_name(entry), colour, plan.trajectory.evaluate(times))
+
+
+def _pitch(entry: Entry) -> float:
+    return REASON_PITCH if entry.plan is None else PITCH
+
+
+def _draw_rows(figure: Figure, comparison: Comparison, colours: Sequence[str], top: float) -> None:
+    """A row a planner from `top` [in] downward: its timeline and facts, or why it has no plan."""
+    timelines: list[Axes] = []
+    for x, name in zip(PLACES, _facts(comparison, comparison.entries[0]), strict=True):
+        _write(figure, x, top, name, size=SMALL, color=MUTED)
+    for entry, colour in zip(comparison.entries, colours, strict=True):
+        top -= _pitch(entry)
+        if entry.plan is None:
+            _write_reason(figure, entry, top)
+            continue
+        axes = panel(figure, COLUMNS[0], top, TIMELINE, ROW)
+        _draw_thrusts(axes, entry.plan, comparison.vehicle, colour)
+        heading(axes, "", _name(entry))
+        _write_facts(figure, comparison, entry, top)
+        timelines.append(axes)
+    _share_scales(timelines)
+
+
+def _draw_thrusts(axes: Axes, plan: Plan, vehicle: Vehicle, colour: str) -> None:
+    """What flatness asks of all rotors, up to the plan's end."""
+    asked = plan_reference(plan, vehicle)
+    axes.plot(asked.times, asked.rotor_thrusts, color=colour, linewidth=1.1)
+    axes.axvline(plan.duration, color=colour, linewidth=2.4)
+    limits = sorted({*vehicle.min_thrusts.tolist(), *vehicle.max_thrusts.tolist()})
+    draw_limits(axes, limits)
+    fit_to_limits(axes, limits, asked.rotor_thrusts)
+    axes.set(ylabel="thrust [N]", xlim=(0.0, TAIL * plan.duration))
+
+
+def _share_scales(timelines: Sequence[Axes]) -> None:
+    """One scale of time and one of thrust for all."""
+    ends = np.array([[*axes.get_xlim(), *axes.get_ylim()] for axes in timelines])
+    for axes in timelines:
+        axes.set(xlim=(0.0, ends[:, 1].max()), ylim=(ends[:, 2].min(), ends[:, 3].max()))
+        axes.tick_params(labelbottom=axes is timelines[-1])
+    timelines[-1].set_xlabel("time [s]")
+
+
+def _write_facts(figure: Figure, comparison: Comparison, entry: Entry, bottom: float) -> None:
+    """Numbers beside a timeline, and what became of the flight below them."""
+    for x, (name, fact) in zip(PLACES, _facts(comparison, entry).items(), strict=True):
+        wrong = name == "certified" and not entry.certified
+        _write(figure, x, bottom + 0.6, fact, size=TITLE, color=RED if wrong else INK)
+    told = fill(f"planned in {entry.planning_time:.2f} s; {entry.outcome}", SENTENCE)
+    _write(figure, PLACES[0], bottom + 0.42, told, size=SMALL, color=MUTED, va="top")
+
+
+def _write_reason(figure: Figure, entry: Entry, bottom: float) -> None:
+    _write(figure, COLUMNS[0], bottom + 0.4, _name(entry), size=SMALL, color=MUTED)
+    _write(figure, COLUMNS[0], bottom + 0.3, fill(entry.outcome, PARAGRAPH), size=NORMAL, va="top")
+
+
+def _write(figure: Figure, x: float, y: float, text: str, **options: Any) -> None:
+    """Text at a place on the page [in]."""
+    across, up = figure.get_size_inches()
+    figure.text(x / across, y / up, text, **options)

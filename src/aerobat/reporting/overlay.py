@@ -1,0 +1,66 @@
+"""Several paths in one picture, each in its colour."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from aerobat.arrays import Array
+from aerobat.reporting.box import draw_room, room_around
+from aerobat.reporting.camera import Camera, best_view
+from aerobat.reporting.canvas import size_of
+from aerobat.reporting.glyphs import gate_bars, gate_shapes
+from aerobat.reporting.path_panel import mark_ends
+from aerobat.reporting.scene import paint
+from aerobat.reporting.turn import TurnPlane, plane_of
+from aerobat.specs.gate import Gate
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+AROUND = 0.25  # [in] free around paths that lie in a plane
+
+
+@dataclass(frozen=True, eq=False)
+class NamedPath:
+    """A path with what tells it from others."""
+
+    name: str
+    colour: str
+    position: Array  # [m], (T, 3), as many as of the others
+
+
+def draw_overlay(axes: Axes, paths: Sequence[NamedPath], gate: Gate | None) -> None:
+    """Draw paths from one start to one goal: in the vertical plane that holds them, or in space."""
+    points = np.concatenate([path.position for path in paths])
+    if gate is not None:
+        points = np.concatenate([points, np.concatenate(gate_bars(gate)).reshape(-1, 3)])
+    plane = plane_of(points)
+    camera = _room(axes, points, gate) if plane is None else _sheet(axes, points, plane)
+    if gate is not None:
+        paint(axes, gate_shapes(gate), camera, zorder=1.5)
+    pictures = [camera.project(path.position) for path in paths]
+    for path, picture in zip(paths, pictures, strict=True):
+        axes.plot(*picture.T, color=path.colour, linewidth=1.7, label=path.name)
+    mark_ends(axes, pictures[0][[0, -1]])
+
+
+def _room(axes: Axes, points: Array, gate: Gate | None) -> Camera:
+    room = room_around(points, 0.02 * float(np.ptp(points, axis=0).max()))
+    camera = best_view(points, gate, room.corners, size_of(axes))
+    draw_room(axes, room, camera)
+    return camera
+
+
+def _sheet(axes: Axes, points: Array, plane: TurnPlane) -> Camera:
+    """Fit the plane into the axes, the same scale along both."""
+    picture = plane.camera.project(points)
+    low, high = picture.min(axis=0), picture.max(axis=0)
+    size = size_of(axes)
+    per_inch = max(float(((high - low) / (size - 2 * AROUND)).max()), 1e-3)
+    (left, bottom), (right, top) = ((low + high + sign * size * per_inch) / 2 for sign in (-1.0, 1.0))
+    axes.set(xlim=(left, right), ylim=(bottom, top), xlabel=plane.label, ylabel="z [m]")
+    return plane.camera

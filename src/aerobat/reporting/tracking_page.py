@@ -1,0 +1,150 @@
+"""One plan and how its flight kept to it: motion, forces, moments and rotors (paper, Figs. 8 to 10)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from aerobat.errors import SpecError
+from aerobat.flatness import Reference, reference
+from aerobat.flight import Flight
+from aerobat.metrics import score
+from aerobat.planning import Plan
+from aerobat.reporting import timelines
+from aerobat.reporting.canvas import blank_page, heading, headline, house_style, panel
+from aerobat.reporting.figures import (
+    AXIS,
+    FACT,
+    HEAD,
+    TITLES,
+    Place,
+    flight_facts,
+    plan_facts,
+)
+from aerobat.reporting.motion import asked_motion, flown_motions
+from aerobat.reporting.path_panel import draw_path
+from aerobat.reporting.style import PAGE_WIDTH
+from aerobat.reporting.tracks import Track, draw_track, effort_tracks, motion_tracks, rotor_tracks, shade
+from aerobat.vehicle import Vehicle
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+ROTORS = 1.45  # [in] the height of the rotors' timelines
+EFFORTS = 2.3  # [in] of errors, collective thrust and moments
+THIRDS = (0.74, 4.5, 8.3)  # [in] where these begin from the left
+THIRD = 2.97  # [in] their width
+GAP = 0.27  # [in] between timelines, one above the other
+ROTOR_GAP = 0.3  # [in] between them, side by side
+NEXT = AXIS + TITLES  # [in] from one block of timelines to the one above
+FOOT = AXIS + ROTORS + NEXT + EFFORTS + NEXT  # [in] below path, positions and velocities
+PATH: Place = (0.3, FOOT - 0.15, 6.1, 6.25)
+POSITIONS: Place = (7.1, FOOT + 3.6, 4.17, 2.5)
+VELOCITIES: Place = (7.1, FOOT, 4.17, 2.5)
+HEIGHT = FOOT + 6.75  # [in] of the page below its headline
+RATE = 1000.0  # [1/s] at which asked values are taken: they may peak sharply
+
+
+@dataclass(frozen=True)
+class Columns:
+    """What timelines of a page share."""
+
+    figure: Figure
+    plan: Plan
+    asked: Reference
+    flight: Flight
+
+    def finished(self, column: Sequence[Axes], title: str) -> None:
+        """Complete a column with title, stages and time axis."""
+        timelines.finish_column(column, title, self.plan.stages, self.plan.duration)
+
+    def draw_tracks(self, place: Place, tracks: Sequence[Track], title: str, named: bool = False) -> None:
+        """Tracks one above the other, with names for a legend if asked."""
+        column = stacked(self.figure, place, len(tracks))
+        for axes, track in zip(column, tracks, strict=True):
+            self.draw_track(axes, track, named and axes is column[0])
+        self.finished(column, title)
+
+    def draw_track(self, axes: Axes, track: Track, named: bool = False) -> None:
+        """One of them."""
+        draw_track(axes, track, self.asked.times, self.flight.times, named)
+
+    def draw_errors(self, place: Place) -> None:
+        """Errors of position and attitude."""
+        column = stacked(self.figure, place, 2)
+        timelines.draw_position_error(column[0], self.flight)
+        timelines.draw_attitude_error(column[1], self.flight)
+        for axes in column:
+            shade(axes, self.flight.times, self.flight.saturated)
+        self.finished(column, "Tracking error")
+
+
+def tracking_figure(plan: Plan, vehicle: Vehicle, flight: Flight) -> Figure:
+    """One page on what a plan asks and what its flight gave (paper, Figs. 8, 9 and 10).
+
+    The path with the vehicle's attitude; positions and velocities; tracking errors; collective thrust,
+    moments about the body's axes and every rotor's thrust. Asked (by flatness) is a band, flown is a line;
+    limits are dashed, those of thrust and moments being what rotors within theirs give of each by itself; a
+    shade shows where rotors are saturated. What does not move is left out. An axis that values would stretch
+    far beyond its limits is cut off and says so. Raises SpecError for a batch of flights.
+    """
+    if flight.ends.ndim:
+        raise SpecError("tracking_figure draws one flight; of a batch, give flight[k]")
+    asked = reference(plan.trajectory, vehicle, rate=RATE, yaw=plan.problem.yaw)
+    facts = _facts(plan, vehicle, flight)
+    with house_style():
+        figure = blank_page(PAGE_WIDTH, HEIGHT + HEAD + FACT * len(facts))
+        headline(figure, f"{plan.problem.name} · tracking by {vehicle.name}", facts)
+        path = panel(figure, *PATH)
+        motions = asked_motion(asked), flown_motions(flight)
+        note = draw_path(path, *motions, vehicle, plan.problem.gate, plan.stages)
+        heading(path, "Path and attitude", note)
+        columns = Columns(figure, plan, asked, flight)
+        positions, velocities = motion_tracks(asked, flight)
+        thrust, *moments = effort_tracks(asked, flight, vehicle)
+        errors, middle, right = ((x, AXIS + ROTORS + NEXT, THIRD, EFFORTS) for x in THIRDS)
+        columns.draw_tracks(POSITIONS, positions, "Position", named=True)
+        columns.draw_tracks(VELOCITIES, velocities, "Velocity")
+        columns.draw_errors(errors)
+        columns.draw_tracks(middle, [thrust], "Collective thrust")
+        columns.draw_tracks(right, moments, "Moments about the body's axes")
+        _draw_rotors(columns, rotor_tracks(asked, flight, vehicle))
+    return figure
+
+
+def stacked(figure: Figure, place: Place, count: int) -> list[Axes]:
+    """So many timelines in one place, the top one first."""
+    left, bottom, width, height = place
+    pitch = (height + GAP) / count
+    return [panel(figure, left, bottom + k * pitch, width, pitch - GAP) for k in reversed(range(count))]
+
+
+def _facts(plan: Plan, vehicle: Vehicle, flight: Flight) -> list[str]:
+    rotors = None if plan.margin is None else f"rotors asked for {plan.margin}"
+    proof = rotors if plan.certificate is None else plan.certificate.why
+    flown = flight_facts(score(flight, plan.problem, vehicle))
+    return [plan_facts(plan), *([] if proof is None else [proof]), flown]
+
+
+def _draw_rotors(columns: Columns, tracks: Sequence[Track]) -> None:
+    """All rotors side by side on one scale."""
+    row = _side_by_side(columns.figure, len(tracks))
+    for i, (axes, track) in enumerate(zip(row, tracks, strict=True)):
+        columns.draw_track(axes, track)
+        timelines.mark_stages(axes, columns.plan.stages, columns.plan.duration, named=False)
+        axes.set_xlabel("time [s]")
+        heading(axes, "" if i else "Thrust of each rotor", f"rotor {i}")
+    ends = [axes.get_ylim() for axes in row]
+    for axes in row:
+        axes.set_ylim(min(low for low, _ in ends), max(high for _, high in ends))
+    for axes in row[1:]:
+        axes.set_ylabel("")
+        axes.tick_params(labelleft=False)
+
+
+def _side_by_side(figure: Figure, count: int) -> list[Axes]:
+    """So many timelines across the foot of the page, the left one first."""
+    pitch = (THIRDS[-1] + THIRD - THIRDS[0] + ROTOR_GAP) / count
+    return [panel(figure, THIRDS[0] + k * pitch, AXIS, pitch - ROTOR_GAP, ROTORS) for k in range(count)]

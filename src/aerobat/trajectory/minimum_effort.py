@@ -1,0 +1,133 @@
+"""Closed-form minimum-effort polynomials through waypoints (paper, Section V-B; Cutler and How, 2012).
+
+Of all curves that take the given derivatives at the knots, the one with the least ∫ |d^s p/dt^s|² dt: jerk
+for s = 3, snap for 4, crackle for 5. It consists of polynomials of degree 2s - 1, and where derivative
+d < s is free at a knot its derivative 2s - 1 - d is continuous there (at an end of the course: zero).
+"""
+
+from __future__ import annotations
+
+import math
+from enum import StrEnum
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from aerobat.arrays import Array, frozen
+from aerobat.errors import SpecError
+from aerobat.trajectory.knot_conditions import KnotConditions, Mask
+from aerobat.trajectory.piecewise import Trajectory
+
+ORDERS = {3: "jerk", 4: "snap", 5: "crackle"}
+AXES = "xyz"
+
+
+class Rule(StrEnum):
+    """Which continuity gives way at an inner knot for a derivative that is given there."""
+
+    VARIATIONAL = "variational"  # derivative 2s - 1 - d for a given derivative d: least effort
+    HIGHEST = (
+        "highest"  # the highest that remains, as in Cutler and How: more effort, low ones stay continuous
+    )
+
+
+def minimum_effort(given: ArrayLike, durations: ArrayLike, rule: Rule = Rule.VARIATIONAL) -> Trajectory:
+    """Polynomials of degree 2s - 1 on n segments, through what is given at their n + 1 knots.
+
+    `given` (n + 1, s, 3) holds derivatives 0 to s - 1 of position [m/s^d], world frame, NaN where one is
+    free; `durations` (n,) are in seconds. By the variational rule the result is the minimizer of
+    ∫ |d^s p/dt^s|² dt, `Trajectory.effort(s)`; the axes do not know each other. Time and memory grow
+    linearly with n. The paper's curves, of degree 9, have s = 5.
+
+    Raises SpecError for shapes other than these, durations that are not positive, infinities, an end
+    without a position, too little given to determine the curve, and durations that differ by more orders
+    of magnitude than float64 can resolve.
+    """
+    lengths = _positive(durations)
+    values, known = _split(given, len(lengths))
+    coefficients = np.empty((len(lengths), 2 * known.shape[1], 3))
+    for axes in _alike(known):
+        pattern = known[..., axes[0]]
+        _check_determined(pattern, lengths, AXES[axes[0]])
+        coefficients[..., axes] = _conditions(pattern, lengths, _checked(rule)).solve(values[..., axes])
+    return Trajectory(lengths, coefficients)
+
+
+def _conditions(known: Mask, durations: Array, rule: Rule) -> KnotConditions:
+    """The conditions at all knots for components of which `known` (n + 1, s) is given."""
+    order = known.shape[1]
+    given = np.concatenate([known, np.zeros_like(known)], axis=1)
+    variational = ~given & ~given[:, ::-1]
+    continuous = variational.copy() if rule is Rule.VARIATIONAL else _without_highest(given)
+    # beyond an end of the course lies nothing to join: free derivatives make others vanish
+    ends = [0, -1]
+    continuous[ends] = variational[ends] & (np.arange(2 * order) >= order)
+    return KnotConditions(durations, given, continuous)
+
+
+def _without_highest(given: Mask) -> Mask:
+    """At each knot, the derivatives not given but for as many of the highest as there are given."""
+    from_top = np.cumsum(~given[:, ::-1], axis=1)[:, ::-1]
+    return np.asarray(~given & (from_top > given.sum(axis=1, keepdims=True)))
+
+
+def _check_determined(known: Mask, durations: Array, axis: str) -> None:
+    """Refuse (n + 1, s) givens on all of which some polynomial of degree below s vanishes: it costs nothing.
+
+    Values with all derivatives below those given at the same knot (Hermite's) determine such a polynomial
+    by their number; others (Birkhoff's) by the rank of their matrix.
+    """
+    order = known.shape[1]
+    if np.logical_and.accumulate(known, axis=1).sum() >= order:
+        return
+    times = np.append(0.0, np.cumsum(durations / durations.sum()))
+    rows = [
+        [math.perm(power, d) * times[knot] ** max(power - d, 0) for power in range(order)]
+        for knot, d in np.argwhere(known)
+    ]
+    missing = order - int(np.linalg.matrix_rank(np.array(rows)))
+    if missing:
+        raise SpecError(
+            f"given leaves the curve along {axis} undetermined; give {missing} more of its derivatives "
+            f"for minimum {ORDERS[order]}, at the ends for instance"
+        )
+
+
+def _alike(known: Mask) -> list[list[int]]:
+    """The axes in groups of which the same is given."""
+    groups: dict[bytes, list[int]] = {}
+    for axis in range(3):
+        groups.setdefault(known[..., axis].tobytes(), []).append(axis)
+    return list(groups.values())
+
+
+def _positive(durations: ArrayLike) -> Array:
+    lengths = frozen(durations, "durations", (None,))
+    if lengths.ndim != 1 or lengths.size == 0 or not (lengths > 0).all():
+        raise SpecError("durations must be a list of at least one positive number of seconds")
+    return lengths
+
+
+def _split(given: ArrayLike, segments: int) -> tuple[Array, Mask]:
+    """What is given, zero where free, and where it is, both (n + 1, s, 3)."""
+    try:
+        array = np.array(given, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise SpecError("given must be an array of numbers, NaN where a derivative is free") from None
+    shape = array.shape
+    if shape[:1] + shape[2:] != (segments + 1, 3) or shape[1] not in ORDERS:
+        raise SpecError(
+            "given must have the shape (knots, derivatives, 3) with 3, 4 or 5 derivatives and "
+            f"{segments + 1} knots, one more than durations, got {shape}"
+        )
+    known = ~np.isnan(array)
+    if not known[[0, -1], 0].all():
+        raise SpecError("given must hold the position at both ends, in all three components")
+    return frozen(np.where(known, array, 0.0), "given"), known
+
+
+def _checked(rule: Rule) -> Rule:
+    try:
+        return Rule(rule)
+    except ValueError:
+        raise SpecError(f"rule must be one of {', '.join(Rule)}, got {rule!r}") from None

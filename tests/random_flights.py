@@ -1,0 +1,125 @@
+"""Random vehicles on random trajectories in 3D, their rotors near the limits, to judge certificates."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from aerobat import so3
+from aerobat.certification import Certificate
+from aerobat.errors import SpecError
+from aerobat.flatness import reference
+from aerobat.trajectory import Trajectory
+from aerobat.trajectory.polynomial import hermite
+from aerobat.vehicle import Rotor, Vehicle
+
+MARGINS = (-0.2, 0.2)  # of a rotor's range, between which the margin is sought
+HALVINGS = 14
+
+
+@dataclass(frozen=True)
+class Flight:
+    """A vehicle, a trajectory and a yaw."""
+
+    vehicle: Vehicle
+    trajectory: Trajectory
+    yaw: float
+
+
+@dataclass(frozen=True)
+class Sampled:
+    """What dense sampling says."""
+
+    margin: float  # the least distance from a limit, in ranges of that rotor
+    determined: bool
+
+
+def random_flight(seed: int) -> Flight:
+    """One with its time scaled so that the rotors come as close to their limits as drawn."""
+    rng = np.random.default_rng(seed)
+    vehicle = irregular(rng)
+    trajectory, yaw, wanted = tour(rng), rng.uniform(-3, 3), rng.uniform(*MARGINS)
+    low, high = np.log([0.02, 50.0])
+    for _ in range(HALVINGS):
+        middle = (low + high) / 2
+        near = Flight(vehicle, stretched(trajectory, np.exp(middle)), yaw)
+        low, high = (middle, high) if sampled(near, 300).margin < wanted else (low, middle)
+    return replace(near, trajectory=stretched(trajectory, np.exp(high)))
+
+
+def irregular(rng: np.random.Generator) -> Vehicle:
+    """Four or six rotors, no two alike, products of inertia, drag on every second, unequal by axes."""
+    count, size, strength = int(rng.choice([4, 6])), 10 ** rng.uniform(-1.5, 0), 10 ** rng.uniform(-1, 1.5)
+    masses = rng.normal(size=(6, 3)) * size * rng.uniform(0.2, 0.8)
+    inertia = (np.sum(masses**2) * np.eye(3) - masses.T @ masses) / 6
+    rotors = tuple(rotor(rng, size, strength, i, count) for i in range(count))
+    mass = rng.uniform(0.1, 0.67) * sum(made.max_thrust for made in rotors) / 9.81
+    drag = rng.choice([0.0, 1.0]) * mass * rng.uniform(0.0, 0.5, 3)
+    try:
+        return Vehicle("random", mass, mass * (inertia + inertia.T) / 2, rotors, drag)
+    except SpecError:  # it cannot hover
+        return irregular(rng)
+
+
+def rotor(rng: np.random.Generator, size: float, strength: float, index: int, count: int) -> Rotor:
+    """One of a ring of `count`."""
+    angle = 2 * np.pi * index / count + rng.uniform(-0.2, 0.2)
+    return Rotor(
+        position_body=size * rng.uniform(0.8, 1.2) * np.array([np.cos(angle), np.sin(angle), 0.0]),
+        spin=(1, -1)[index % 2],
+        min_thrust=strength * rng.uniform(-0.05, 0.05),
+        max_thrust=strength * rng.uniform(0.8, 1.2),
+        torque_coefficient=size * rng.uniform(0.1, 0.5),
+        lag=0.02,
+        radius=0.1,
+    )
+
+
+def tour(rng: np.random.Generator) -> Trajectory:
+    """Up to 8 segments through random states, or 20 intervals of constant snap."""
+    if rng.uniform() < 0.25:
+        initial = rng.normal(size=(4, 3)) * [[1.0], [1.0], [3.0], [5.0]]
+        return Trajectory.from_inputs(initial, 30 * rng.normal(size=(20, 3)), 0.1)
+    segments, order = int(rng.integers(1, 9)), int(rng.integers(4, 7))
+    size = np.array([3.0, 3.0, 4.0, 6.0, 10.0, 20.0])[:order, None]
+    states = size * rng.normal(size=(segments + 1, order, 3))
+    durations = rng.uniform(0.4, 1.6, segments)
+    scale = durations[:, None, None] ** np.arange(order)[:, None]
+    return Trajectory(durations, hermite(scale * states[:-1], scale * states[1:]))
+
+
+def stretched(trajectory: Trajectory, factor: float) -> Trajectory:
+    """The same path, flown so many times slower."""
+    return Trajectory(factor * trajectory.durations, trajectory.coefficients)
+
+
+def moved(flight: Flight, heading: float, shift: np.ndarray) -> Flight:
+    """The same flight elsewhere, into another direction."""
+    turn = so3.about_axis(np.array([0.0, 0.0, 1.0]), np.array(heading))
+    coefficients = so3.rotate(turn, flight.trajectory.coefficients)
+    coefficients[:, 0] += shift
+    return replace(
+        flight, trajectory=Trajectory(flight.trajectory.durations, coefficients), yaw=flight.yaw + heading
+    )
+
+
+def sampled(flight: Flight, points: int) -> Sampled:
+    """The margin at equally spaced times, in chunks that fit the processor's cache."""
+    times = np.linspace(0.0, flight.trajectory.duration, points)
+    parts = [at(flight, part, times[::100]) for part in np.array_split(times, 1 + points // 5000)]
+    return Sampled(min(part.margin for part in parts), all(part.determined for part in parts))
+
+
+def at(flight: Flight, times: np.ndarray, before: np.ndarray) -> Sampled:
+    """The margin at some times; those of `before` that precede them help to carry the attitude there."""
+    asked = np.concatenate([before[before < times[0]], times])
+    found = reference(flight.trajectory, flight.vehicle, times=asked, yaw=flight.yaw)
+    low, high = flight.vehicle.min_thrusts, flight.vehicle.max_thrusts
+    gaps = np.minimum(found.rotor_thrusts - low, high - found.rotor_thrusts) / (high - low)
+    return Sampled(float(gaps.min()), not found.undetermined)
+
+
+def certified_margin(flight: Flight, certificate: Certificate) -> float:
+    """The margin that a certificate states, in ranges of that rotor."""
+    low, high = flight.vehicle.min_thrusts, flight.vehicle.max_thrusts
+    rotors = [f for f in certificate.findings if f.quantity.startswith("rotor ")]
+    return min(f.margin / (high - low)[int(f.quantity.split()[1])] for f in rotors)

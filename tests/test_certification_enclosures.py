@@ -1,0 +1,106 @@
+"""The bounds behind a certificate contain what they bound."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.polynomial import chebyshev as npcheb
+
+from aerobat.certification import chebyshev, ellipses, quantities
+from aerobat.certification.attitude import Turning
+from aerobat.certification.extremes import Family, greatest
+from aerobat.certification.motion import Motion, Pieces
+from random_flights import random_flight
+
+seeds = st.integers(0, 2**32 - 1)
+FINE = np.linspace(-1.0, 1.0, 4001)
+TIGHTNESS = 1e-7
+
+
+@settings(max_examples=60)
+@given(seed=seeds, degree=st.integers(1, 24), decay=st.floats(0.0, 1.5))
+def test_the_greatest_value_of_series_is_enclosed_tightly_and_found(seed, degree, decay):
+    rng = np.random.default_rng(seed)
+    members, groups = 12, 3
+    coefficients = rng.normal(size=(members, degree + 1)) * np.exp(-decay * np.arange(degree + 1))
+    error, group = 1e-3 * rng.uniform(size=members), rng.integers(0, groups, members)
+    group[:groups] = np.arange(groups)
+    found = greatest(Family(coefficients, error, group, np.ones(groups), TIGHTNESS))
+    sampled = npcheb.chebval(FINE, coefficients.T)
+    for g in range(groups):
+        own = group == g
+        tolerance = TIGHTNESS * max(1, abs(found.most[g]))
+        assert found.most[g] >= (sampled.max(axis=1) + error)[own].max() - 1e-12
+        assert found.least[g] >= (sampled.max(axis=1) - error)[own].max() - tolerance
+        assert found.most[g] - found.least[g] <= 2 * error[own].max() + 1.1 * tolerance
+        member = found.member[g]
+        assert own[member]
+        taken = npcheb.chebval(found.position[g], coefficients[member]) - error[member]
+        assert taken == pytest.approx(found.least[g], abs=1e-12)
+
+
+@given(value=st.floats(-5, 5), count=st.integers(1, 9))
+def test_of_equal_greatest_values_the_earliest_is_told(value, count):
+    flat = np.zeros((count, 5))
+    flat[:, 0] = value
+    found = greatest(Family(flat, np.zeros(count), np.zeros(count, dtype=int), np.ones(1), TIGHTNESS))
+    assert (found.member[0], found.position[0]) == (0, -1.0)
+    assert found.least[0] == found.most[0] == pytest.approx(value)
+
+
+@settings(max_examples=25)
+@given(seed=seeds, degree=st.integers(2, 24))
+def test_halves_and_integrals_are_those_of_the_polynomial(seed, degree):
+    basis = chebyshev.basis(degree)
+    coefficients = np.random.default_rng(seed).normal(size=degree + 1)
+    for half, side in zip(basis.halves, (-1, 1), strict=True):
+        whole = npcheb.chebval((FINE + side) / 2, coefficients)
+        np.testing.assert_allclose(npcheb.chebval(FINE, half @ coefficients), whole, atol=1e-11)
+    values = npcheb.chebval(basis.nodes, coefficients)
+    expected = npcheb.chebval(basis.nodes, npcheb.chebint(coefficients, lbnd=-1))
+    np.testing.assert_allclose(chebyshev.integral(values, basis), expected, atol=1e-11)
+
+
+@settings(max_examples=25)
+@given(seed=seeds, rho=st.floats(1.0, 30.0), degree=st.integers(0, 20))
+def test_growth_bounds_chebyshev_polynomials_on_ellipses(seed, rho, degree):
+    z = rho * np.exp(1j * np.linspace(0, 2 * np.pi, 999))
+    sizes = np.abs(npcheb.chebvander((z + 1 / z) / 2, degree)).max(axis=0)
+    bound = chebyshev.growth(degree, np.array([rho]))[:, 0]
+    assert (sizes <= bound * (1 + 1e-9)).all()
+    np.testing.assert_allclose(sizes, bound, rtol=1e-3)
+
+
+@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("degree", [11, 14, 20])
+def test_interpolation_is_as_near_as_its_bound_says_on_coarse_pieces_too(seed, degree):
+    # the same pieces with a far higher degree stand for the truth
+    flight = random_flight(seed)
+    segments = flight.trajectory.segments
+    coarse, truth = (Motion.of(flight.trajectory, flight.vehicle, k) for k in (degree, 60))
+    for parts in (4, 16, 64):
+        start = np.tile(np.arange(parts) / parts, segments)
+        pieces = Pieces(np.repeat(np.arange(segments), parts), start, np.full(len(start), 1 / parts))
+        norms = coarse.norms(coarse.series(coarse.on(pieces)), pieces)
+        usable = ellipses.regular(norms)
+        pieces, norms = pieces[usable], norms[usable]
+        if not len(pieces.segment):
+            continue
+        found = ellipses.accuracy(
+            norms, pieces.seconds(flight.trajectory), coarse.sums[pieces.segment], flight.vehicle
+        )
+        middle = truth.at(pieces.segment, (pieces.start + pieces.length / 2)[:, None])[:, 0, 1]
+        interpolants, exact = (piecewise(motion, pieces, middle) for motion in (coarse, truth))
+        nodes = npcheb.chebvander(truth.basis.nodes, coarse.basis.degree)
+        off = np.abs(nodes @ coarse.basis.analysis @ interpolants - exact).max(axis=1)
+        twist = found.twist_remainder + coarse.basis.lebesgue * found.twist_rounding
+        allowed = found.remainder + 4 * (found.rounding + twist[:, None] * found.turning)
+        assert (off <= allowed).all()
+        assert (np.abs(exact).max(axis=1) <= found.size * (1 + 1e-9)).all()
+
+
+def piecewise(motion: Motion, pieces: Pieces, near: np.ndarray) -> np.ndarray:
+    """The quantities at the basis's nodes, every piece in a frame of its own, about the thrust `near` it."""
+    values = motion.on(pieces)
+    turning = Turning.along(values[..., 1:, :], near, pieces.seconds(motion.trajectory), motion.basis)
+    return quantities.values(motion.vehicle, values, *turning.body(turning.twist))

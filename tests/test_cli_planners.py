@@ -1,0 +1,105 @@
+"""Planners, proofs and comparisons from the command line."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from aerobat import cli
+from aerobat.exporting.csv import write_csv
+from aerobat.trajectory import load_trajectory
+
+ROW_KEYS = {
+    "planner", "segments", "duration_s", "ratio", "certified", "min_margin_n", "planning_s",
+    "max_position_error_m",
+}  # fmt: skip
+
+
+@pytest.fixture(autouse=True)
+def _elsewhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+
+
+def run(capsys: pytest.CaptureFixture[str], *arguments: str) -> tuple[int, str, str]:
+    """Exit code, standard output and standard error."""
+    code = 0
+    try:
+        cli.main(arguments)
+    except SystemExit as stop:
+        code = stop.code or 0
+    return code, *capsys.readouterr()
+
+
+@pytest.mark.parametrize("planner", ["miqp", "min-snap", "free-knots", "time-optimal"])
+def test_each_planner_flies_the_papers_second_example(planner: str, capsys) -> None:
+    arguments = ["fly", "section-v", "--vehicle", "section-v", "--planner", planner, "--json"]
+    code, out, err = run(capsys, *arguments)
+    assert (code, err) == (0, "")
+    report = json.loads(out)
+    assert report["plan"]["planner"] == planner
+    assert report["flight"]["max_position_error_m"] < 0.02
+    assert report["plan"]["certificate"]["certified"] is True
+    assert load_trajectory("out/section-v/plan.npz").duration == pytest.approx(report["plan"]["duration_s"])
+
+
+def test_stopped_early_the_rotors_saturate_and_the_report_says_so(capsys) -> None:
+    arguments = ["--planner", "min-snap", "--vehicle", "section-v", "--stop-after", "6"]
+    code, out, err = run(capsys, "fly", "section-v", *arguments, "--json")
+    assert (code, err) == (0, "")
+    report = json.loads(out)
+    assert report["plan"]["status"] == "stopped"
+    assert report["plan"]["certificate"]["certified"] is False
+    assert report["flight"]["saturated_fraction"] > 0.02
+    assert report["flight"]["max_position_error_m"] > 0.05
+    _, out, _ = run(capsys, "fly", "section-v", *arguments)
+    assert "not certified" in out
+
+
+def test_check_proves_a_plan_from_its_file_its_folder_and_its_csv(capsys) -> None:
+    run(capsys, "plan", "flip-roll", "--json")
+    for plan in ("out/flip-roll", "out/flip-roll/plan.npz"):
+        code, out, err = run(capsys, "check", plan, "--json")
+        assert (code, err) == (0, "")
+        assert json.loads(out)["certified"] is True
+    trajectory = load_trajectory("out/flip-roll/plan.npz")
+    write_csv(trajectory, "fine.csv", rate=1 / trajectory.durations[0])  # a row a knot: nothing is lost
+    code, out, _ = run(capsys, "check", "fine.csv", "--rate", str(1 / trajectory.durations[0]))
+    assert code == 0
+    assert "certified" in out
+
+
+def test_check_refuses_by_limit_time_and_size(capsys) -> None:
+    run(capsys, "plan", "flip-roll", "--json")
+    code, out, _ = run(capsys, "check", "out/flip-roll", "--vehicle", "crazyflie")
+    assert code == 1
+    assert "not certified: rotor" in " ".join(out.split())
+    for limit, quantity in (
+        ("--max-speed=3", "speed"),
+        ("--max-tilt=90", "tilt"),
+        ("--max-rate=90", "body rate"),
+    ):
+        code, out, _ = run(capsys, "check", "out/flip-roll", limit, "--json")
+        assert code == 1
+        found = json.loads(out)
+        violated = [f for f in found["findings"] if f["verdict"] == "violated"]
+        assert [f["quantity"] for f in violated] == [quantity]
+        assert violated[0]["margin"] < 0.0
+        assert quantity in found["why"]
+
+
+def test_compare_puts_all_planners_side_by_side(capsys) -> None:
+    code, out, err = run(capsys, "compare", "section-v", "--vehicle", "section-v", "--json")
+    assert (code, err) == (0, "")
+    rows = json.loads(out)
+    assert [r["planner"] for r in rows] == ["miqp", "min-snap", "free-knots", "free-knots", "time-optimal"]
+    assert all(row.keys() >= ROW_KEYS for row in rows)
+    assert rows == json.loads(Path("out/section-v/compare.json").read_text())
+    assert Path("out/section-v/compare.png").read_bytes().startswith(b"\x89PNG")
+    ratios = np.array([row["ratio"] for row in rows])
+    assert ratios[-1] == 1.0
+    assert (ratios[:-1] > 1.0).all()
+    assert ratios[1] > ratios[0] > ratios[2] > ratios[3]  # each planner knows more of the rotors
+    assert all(row["certified"] for row in rows)

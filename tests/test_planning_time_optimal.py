@@ -1,0 +1,189 @@
+"""Time-optimal plans: the known least times, the physics integrated anew, stages and limits that hold."""
+
+import importlib.util
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from aerobat.errors import BackendMissing, Infeasible, SpecError
+from aerobat.flying import fly
+from aerobat.planning import Plan
+from aerobat.planning.time_optimal import TimeOptimal
+from aerobat.specs import EndState, Limits, Line, Problem, Quantity, Waypoint, Waypoints, load_problem, rest
+from aerobat.vehicle import Vehicle, load_vehicle
+from rigid_body_replay import replayed
+
+QUAD = load_vehicle("agile-quad")
+
+
+def section_v(max_thrust: float, inertia: float) -> Vehicle:
+    """The vehicle of Section V with rotors from 0 N."""
+    vehicle = load_vehicle("section-v")
+    rotors = tuple(replace(rotor, min_thrust=0.0, max_thrust=max_thrust) for rotor in vehicle.rotors)
+    return replace(vehicle, inertia=inertia * np.eye(3), rotors=rotors)
+
+
+@pytest.fixture(scope="module")
+def flip() -> Plan:
+    return TimeOptimal().plan(load_problem("flip-roll"), QUAD)
+
+
+@pytest.fixture(scope="module")
+def half_flip() -> Plan:
+    return TimeOptimal(intervals=40).plan(load_problem("half-flip"), QUAD)
+
+
+@pytest.mark.parametrize(
+    ("max_thrust", "inertia", "least"),
+    [(18.0, 0.12, 1.842), (6.5, 0.12, 2.342), (18.0, 0.012, 1.134), (6.5, 0.012, 1.942)],
+    ids=["A", "B", "D", "E"],
+)
+def test_section_v_takes_its_least_time_and_a_rigid_body_without_control_arrives(max_thrust, inertia, least):
+    """Least times of the planar problem by multiple shooting of the rigid body; feed-forward alone after."""
+    vehicle, problem = section_v(max_thrust, inertia), load_problem("section-v")
+    found = TimeOptimal().plan(problem, vehicle)
+    assert found.duration == pytest.approx(least, rel=5e-3)
+    assert found.certificate.certified
+    assert np.ptp(found.trajectory.coefficients[..., 1]) < 1e-5
+    assert found.trajectory.evaluate(found.stages[0].time)[2] == pytest.approx(-2.0, abs=1e-6)
+    position, velocity = replayed(found.trajectory, vehicle)
+    assert np.linalg.norm(position - problem.goal.position) < 1e-3
+    assert np.linalg.norm(velocity) < 1e-3
+
+
+def test_in_space_there_is_a_faster_way_than_in_the_plane():
+    vehicle = section_v(18.0, 0.012)
+    in_space = TimeOptimal(intervals=40, planar=False).plan(load_problem("section-v"), vehicle)
+    assert in_space.duration < 1.11
+
+
+def test_a_maneuver_that_lies_in_no_plane_is_planned_in_space():
+    bent = Waypoints((Waypoint(position=(1.0, 1.0, 0.0)),))
+    problem = Problem("bent", rest((0, 0, 0)), rest((2, 0, 0)), bent)
+    found = TimeOptimal(intervals=20).plan(problem, QUAD)
+    assert found.trajectory.evaluate(found.stages[0].time) == pytest.approx([1.0, 1.0, 0.0], abs=1e-6)
+
+
+def test_more_intervals_change_little(half_flip):
+    coarser = TimeOptimal(intervals=28).plan(half_flip.problem, QUAD)
+    assert coarser.trajectory.segments < half_flip.trajectory.segments
+    assert coarser.duration == pytest.approx(half_flip.duration, rel=0.015)
+
+
+@pytest.mark.parametrize("name", ["flip", "half_flip"])
+def test_a_flip_is_certified_and_flown_within_2_cm(name, request):
+    found = request.getfixturevalue(name)
+    assert found.certificate.certified
+    assert found.margin.feasible
+    assert found.margin.bounded_moments
+    assert found.attempts[-1].feasible
+    flown = fly(found.trajectory, QUAD)
+    assert np.linalg.norm(flown.states.position - flown.setpoint.flat.position, axis=-1).max() < 0.02
+
+
+@pytest.mark.parametrize("name", ["flip", "half_flip"])
+def test_every_stage_holds_where_it_is_said_to(name, request):
+    found = request.getfixturevalue(name)
+    course = found.problem.maneuver.course(found.problem.gate, QUAD.max_specific_thrust)
+    assert len(found.stages) == len(course.stages)
+    for placed, stage in zip(found.stages, course.stages, strict=True):
+        flat = found.trajectory.on_segments([1.0], 0)[placed.interval, 0]
+        assert found.trajectory.evaluate(placed.time) == pytest.approx(flat)
+        for condition in stage.conditions:
+            value = quantity(found, condition.quantity, placed.time) @ condition.direction
+            assert condition.lower - 1e-5 <= value <= condition.upper + 1e-5
+
+
+def quantity(found: Plan, which: Quantity, time: float) -> np.ndarray:
+    weight = np.array([0.0, 0.0, QUAD.gravity]) * (which is Quantity.SPECIFIC_THRUST)
+    return found.trajectory.evaluate(time, which.derivative) + weight
+
+
+def test_the_half_flip_passes_its_gate_squarely_and_banked_as_the_gate_is(half_flip):
+    (passage,) = half_flip.stages
+    gate = passage.gate
+    velocity = half_flip.trajectory.evaluate(passage.time, 1)
+    thrust = quantity(half_flip, Quantity.SPECIFIC_THRUST, passage.time)
+    assert half_flip.trajectory.evaluate(passage.time) == pytest.approx(gate.position, abs=1e-6)
+    assert velocity == pytest.approx(gate.normal * np.linalg.norm(velocity), abs=1e-5)
+    assert thrust @ gate.up > 0.2 * QUAD.max_specific_thrust - 1e-5
+    assert thrust @ gate.lateral == pytest.approx(0.0, abs=1e-5)
+
+
+def test_lagging_rotors_can_follow(flip):
+    """Thrust is continuous, and at both ends that of hovering."""
+    weight = np.array([0.0, 0.0, QUAD.gravity])
+    thrust = np.linalg.norm(flip.trajectory.on_segments([0.0, 1.0], 2) + weight, axis=-1)
+    assert thrust[1:, 0] == pytest.approx(thrust[:-1, 1], abs=1e-6)
+    assert thrust[[0, -1], [0, 1]] == pytest.approx(QUAD.gravity, abs=1e-6)
+
+
+def test_limits_hold_between_nodes_and_cost_time():
+    limits = Limits(upper=np.array([np.inf, np.inf, 0.05]), velocity=5.0, acceleration=20.0, jerk=150.0)
+    free = Problem("dash", rest((0, 0, 0)), rest((4, 0, 0)))
+    bound = TimeOptimal(intervals=20).plan(replace(free, limits=limits), QUAD)
+    for derivative in range(4):
+        (lower, upper), (least, most) = limits.of(derivative), bound.trajectory.component_range(derivative)
+        assert (lower - 1e-9 <= least).all()
+        assert (most <= upper + 1e-9).all()
+    assert bound.certificate.certified
+    assert bound.duration > TimeOptimal(intervals=20).plan(free, QUAD).duration
+
+
+def test_ends_in_motion_are_met():
+    start = EndState(np.zeros(3), np.array([2.0, 0.0, 0.0]), np.array([0.0, 1.0, 0.0]))
+    goal = EndState(np.array([6.0, 1.0, 1.0]), np.array([0.0, -1.0, 0.0]))
+    path = TimeOptimal(intervals=30).plan(Problem("moving", start, goal), QUAD).trajectory
+    for end, state in ((0.0, start), (path.duration, goal)):
+        for derivative, value in enumerate(state.derivatives(3)):
+            assert path.evaluate(end, derivative) == pytest.approx(value, abs=1e-5)
+
+
+def test_a_reserve_is_kept_from_every_rotors_limits_and_costs_time():
+    vehicle, problem = section_v(18.0, 0.12), load_problem("section-v")
+    plans = [TimeOptimal(20, reserve).plan(problem, vehicle) for reserve in (0.0, 0.05)]
+    assert plans[1].margin.margin > 0.04 * 18.0
+    assert plans[1].duration > plans[0].duration
+
+
+def test_what_cannot_be_asked_is_refused():
+    problem = load_problem("flip-roll")
+    with pytest.raises(SpecError, match="needs a vehicle"):
+        TimeOptimal().plan(problem)
+    with pytest.raises(SpecError, match=r"limits\.crackle"):
+        TimeOptimal().plan(replace(problem, limits=Limits(crackle=1e5)), QUAD)
+    falling = EndState(np.zeros(3), acceleration=np.array([0.0, 0.0, -QUAD.gravity]))
+    with pytest.raises(SpecError, match=r"start\.acceleration asks no thrust"):
+        TimeOptimal().plan(Problem("falling", falling, rest((1, 0, 0)), Line()), QUAD)
+
+
+@pytest.mark.parametrize(
+    ("options", "sentence"),
+    [
+        ({"intervals": 3}, "intervals must be 4 or more, got 3"),
+        ({"reserve": 0.6}, "reserve must be a part"),
+        ({"reserve": float("nan")}, "reserve must be a part"),
+        ({"iterations": 0}, "iterations must be 1 or more"),
+    ],
+)
+def test_options_that_make_no_sense_are_refused(options, sentence):
+    with pytest.raises(SpecError, match=sentence):
+        TimeOptimal(**options)
+
+
+def test_a_search_that_ends_with_nothing_says_where_and_what_to_change():
+    seen = []
+    with pytest.raises(Infeasible, match=r"limit of iterations; ask less .* or give more") as raised:
+        TimeOptimal(iterations=2).plan(load_problem("line"), QUAD, seen.append)
+    assert list(raised.value.attempts) == seen
+    assert len(seen) == 2
+
+
+def test_without_casadi_the_remedy_is_the_command_that_installs_it(monkeypatch):
+    find = importlib.util.find_spec
+    monkeypatch.setattr(
+        "aerobat.programs.nonlinear.find_spec", lambda name: None if name == "casadi" else find(name)
+    )
+    with pytest.raises(BackendMissing, match=r'pip install "aerobat\[casadi\]"'):
+        TimeOptimal().plan(load_problem("line"), QUAD)

@@ -1,0 +1,115 @@
+"""Planners side by side: the rows say what the plans are, and table and picture say what the rows say."""
+
+from dataclasses import replace
+from functools import lru_cache
+
+import numpy as np
+import pytest
+from matplotlib.collections import PolyCollection
+from rich.console import Console
+
+import aerobat as ab
+from aerobat.comparison import Comparison, Entry
+from aerobat.reporting.comparison import comparison_rows, comparison_table
+from reporting_cases import flown, planned, require_legible
+
+pytestmark = pytest.mark.filterwarnings("error")  # drawing warns of nothing
+KEYS = [
+    "planner", "segments", "duration_s", "ratio",
+    "certified", "min_margin_n", "planning_s", "max_position_error_m",
+]  # fmt: skip
+REASON = "the planner free-knots needs CasADi, which is not installed; pip install 'aerobat[casadi]'"
+NONE = Entry("free-knots", None, None, None, 0.25, REASON)
+
+
+@lru_cache
+def section_v():
+    """A plan, one stopped early, one that takes the time-optimal one's part, and a planner without any."""
+    problem, vehicle = ab.load_problem("section-v"), ab.load_vehicle("section-v")
+    planners = (("miqp", ab.Miqp()), ("min-snap", ab.MinSnap(stop_after=6)), ("time-optimal", ab.MinSnap()))
+    made = ab.compare(problem, vehicle, planners).entries
+    return Comparison(problem, vehicle, (*made[:2], NONE, *made[2:]))
+
+
+def flip():
+    plan, flight, vehicle = planned("flip-roll"), flown("flip-roll"), ab.load_vehicle("agile-quad")
+    entry = Entry("miqp", plan, flight, ab.score(flight, plan.problem, vehicle), 0.1, "through the gate")
+    return Comparison(plan.problem, vehicle, (entry, NONE))
+
+
+def told(comparison):
+    console = Console(width=80)
+    with console.capture() as capture:
+        console.print(comparison_table(comparison))
+    return capture.get()
+
+
+def test_rows_hold_what_the_plans_and_flights_are():
+    comparison = section_v()
+    rows = comparison_rows(comparison)
+    assert [list(row) for row in rows] == [KEYS] * 4
+    for row, entry in zip(rows, comparison.entries, strict=True):
+        assert (row["planner"], row["planning_s"]) == (entry.planner, entry.planning_time)
+        if entry.plan is None:
+            continue
+        assert row["segments"] == entry.plan.trajectory.segments
+        assert row["duration_s"] == entry.plan.trajectory.duration
+        assert row["ratio"] == pytest.approx(entry.plan.trajectory.duration / 3.1)
+        error = entry.flight.states.position - entry.flight.setpoint.flat.position
+        assert row["max_position_error_m"] == pytest.approx(np.linalg.norm(error, axis=1).max())
+    assert [row["certified"] for row in rows] == [True, False, None, True]
+    assert rows[1]["min_margin_n"] == pytest.approx(-11.54, abs=0.01)  # rotor 1 is asked for -11.74 N
+    assert rows[3]["min_margin_n"] == pytest.approx(0.063, abs=0.001)
+
+
+def test_a_planner_without_a_plan_has_none_for_what_there_is_not():
+    row = comparison_rows(section_v())[2]
+    assert {key for key, value in row.items() if value is not None} == {"planner", "planning_s"}
+
+
+def test_there_is_no_ratio_without_a_time_optimal_plan():
+    assert [row["ratio"] for row in comparison_rows(flip())] == [None, None]
+
+
+def test_the_table_fits_a_terminal_and_tells_why_there_is_no_plan():
+    text = told(section_v())
+    assert max(map(len, text.splitlines())) <= 80
+    assert "3.100 s" in text
+    assert " ".join(REASON.split()) in " ".join(text.split())  # its brackets are no markup
+
+
+@pytest.mark.parametrize("comparison", [section_v, flip])
+def test_no_text_lies_over_another_or_beyond_the_page(comparison, monkeypatch):
+    require_legible(ab.comparison_figure(comparison()), monkeypatch)
+
+
+def test_many_planners_fit_the_page(monkeypatch):
+    comparison = section_v()
+    more = tuple(replace(entry, planner="free-knots") for entry in comparison.entries[:2])
+    many = replace(comparison, entries=(*comparison.entries, *more))
+    require_legible(ab.comparison_figure(many), monkeypatch)
+
+
+def test_every_plan_has_its_path_and_its_thrusts_between_the_limits_on_one_time_axis():
+    comparison = section_v()
+    plans = [entry.plan for entry in comparison.entries if entry.plan is not None]
+    paths, *rows = ab.comparison_figure(comparison).axes
+    assert len(rows) == len(plans)
+    assert len({(axes.get_xlim(), axes.get_ylim()) for axes in rows}) == 1
+    for axes, line, plan in zip(rows, paths.get_lines(), plans, strict=False):
+        times = np.linspace(0.0, plan.duration, len(line.get_xdata()))
+        drawn = np.column_stack(line.get_data())
+        np.testing.assert_allclose(drawn, plan.trajectory.evaluate(times)[:, [0, 2]], atol=1e-9)
+        rotors = axes.get_lines()[:4]
+        assert {rotor.get_color() for rotor in rotors} == {line.get_color()}
+        asked = ab.reference(plan.trajectory, comparison.vehicle, times=rotors[0].get_xdata()).rotor_thrusts
+        np.testing.assert_allclose(np.column_stack([rotor.get_ydata() for rotor in rotors]), asked, atol=1e-9)
+        dashed = [one.get_ydata()[0] for one in axes.get_lines() if one.get_linestyle() == "--"]
+        assert dashed == [-0.2, 18.0]
+    assert len({line.get_color() for line in paths.get_lines()[: len(plans)]}) == len(plans)
+
+
+def test_the_gate_is_in_the_picture_of_the_paths():
+    paths = ab.comparison_figure(flip()).axes[0]
+    gate = max((c for c in paths.collections if isinstance(c, PolyCollection)), key=lambda c: c.get_zorder())
+    assert len(gate.get_paths()) == 16  # four bars of four faces
