@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from aerobat.errors import SpecError
-from aerobat.planning.integrator import IntegratorChain
+from aerobat.planning.miqp.integrator import IntegratorChain
 from aerobat.trajectory import Trajectory
 
 

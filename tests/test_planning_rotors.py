@@ -158,7 +158,7 @@ def test_what_a_refined_search_overlooks_the_proof_does_not(quad: Vehicle, monke
         margin = rotor_margin(*arguments)
         return replace(margin, low_margin=margin.low_margin + 0.2, high_margin=margin.high_margin + 0.2)
 
-    monkeypatch.setattr("aerobat.planning.miqp.rotor_margin", hopeful)
+    monkeypatch.setattr("aerobat.planning.miqp.miqp.rotor_margin", hopeful)
     found = plan(load_problem("flip-roll"), vehicle=quad)
     assert found.certificate is not None
     assert found.certificate.certified

@@ -9,7 +9,7 @@ import pytest
 from aerobat.errors import BackendMissing, Infeasible, SpecError
 from aerobat.flying import fly
 from aerobat.planning import Plan
-from aerobat.planning.time_optimal import TimeOptimal
+from aerobat.planning.optimal_control.time_optimal import TimeOptimal
 from aerobat.specs import EndState, Limits, Line, Problem, Quantity, Waypoint, Waypoints, load_problem, rest
 from aerobat.vehicle import Vehicle, load_vehicle
 from rigid_body_replay import replayed

@@ -8,7 +8,7 @@ import numpy as np
 
 from aerobat.arrays import Array
 from aerobat.flatness import reference
-from aerobat.planning.collocation import Mesh, Motion
+from aerobat.planning.optimal_control.collocation import Mesh, Motion
 from aerobat.planning.result import Plan
 from aerobat.specs.stage import Course, Stage
 from aerobat.trajectory import Trajectory

@@ -13,7 +13,7 @@ from aerobat.arrays import Array
 from aerobat.certification import Certificate
 from aerobat.errors import Infeasible, SpecError
 from aerobat.planning.feasibility import RotorMargin, rotor_margin
-from aerobat.planning.knots import first_times, given_at_knots, unmet
+from aerobat.planning.polynomials.knots import first_times, given_at_knots, unmet
 from aerobat.planning.proof import certificate_for
 from aerobat.planning.result import Attempt, PlacedStage, Plan
 from aerobat.planning.search import Bisection, Grid, Search

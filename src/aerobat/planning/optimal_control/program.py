@@ -12,8 +12,16 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from aerobat.arrays import Array
-from aerobat.planning.collocation import Collocation, Mesh, Motion
-from aerobat.planning.spinless_body import ATTITUDE, INPUTS, POSITION, RATES, STATES, VELOCITY, SpinlessBody
+from aerobat.planning.optimal_control.collocation import Collocation, Mesh, Motion
+from aerobat.planning.optimal_control.spinless_body import (
+    ATTITUDE,
+    INPUTS,
+    POSITION,
+    RATES,
+    STATES,
+    VELOCITY,
+    SpinlessBody,
+)
 from aerobat.programs.nonlinear import NonlinearProgram, symbolics
 from aerobat.specs.problem import Limits
 from aerobat.specs.stage import Condition, Quantity

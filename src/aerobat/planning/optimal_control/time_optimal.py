@@ -20,7 +20,7 @@ from aerobat.flatness import lateral_drag
 from aerobat.planning.drawing_in import SPARE, drawn_in
 from aerobat.planning.feasibility import RotorMargin, rotor_margin
 from aerobat.planning.miqp import Miqp
-from aerobat.planning.optimal_control import DERIVATIVES, Bounds, End, OptimalControl
+from aerobat.planning.optimal_control.program import DERIVATIVES, Bounds, End, OptimalControl
 from aerobat.planning.proof import certificate_for
 from aerobat.planning.result import Attempt, PlacedStage, Plan
 from aerobat.planning.warm_start import Guess

@@ -14,12 +14,12 @@ import numpy as np
 from aerobat.certification import Certificate, Verdict
 from aerobat.errors import Infeasible, SpecError
 from aerobat.flatness import lateral_drag
-from aerobat.planning.knot_bounds import Bound, path_bounds
-from aerobat.planning.knot_program import KnotProgram
-from aerobat.planning.knot_rounds import COARSE, RESERVE, Round
-from aerobat.planning.knot_samples import Excess, cut
-from aerobat.planning.min_snap import MinSnap
 from aerobat.planning.miqp import Miqp
+from aerobat.planning.polynomials.knot_bounds import Bound, path_bounds
+from aerobat.planning.polynomials.knot_program import KnotProgram
+from aerobat.planning.polynomials.knot_rounds import COARSE, RESERVE, Round
+from aerobat.planning.polynomials.knot_samples import Excess, cut
+from aerobat.planning.polynomials.min_snap import MinSnap
 from aerobat.planning.proof import certificate_for
 from aerobat.planning.result import Attempt, PlacedStage, Plan
 from aerobat.planning.warm_start import Guess

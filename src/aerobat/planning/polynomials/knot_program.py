@@ -18,9 +18,9 @@ from typing import Any
 import numpy as np
 
 from aerobat.arrays import Array
-from aerobat.planning.knot_bounds import Bound
-from aerobat.planning.knot_variables import DEGREE, GIVEN, Frame, KnotVariables
-from aerobat.planning.rotor_rows import RotorRows
+from aerobat.planning.polynomials.knot_bounds import Bound
+from aerobat.planning.polynomials.knot_variables import DEGREE, GIVEN, Frame, KnotVariables
+from aerobat.planning.polynomials.rotor_rows import RotorRows
 from aerobat.planning.warm_start import Guess
 from aerobat.programs.nonlinear import NonlinearProgram, NonlinearResult, solve, symbolics
 from aerobat.specs.problem import Problem

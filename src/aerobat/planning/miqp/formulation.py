@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from aerobat.arrays import Array, frozen
 from aerobat.errors import SpecError
-from aerobat.planning.integrator import INPUTS, IntegratorChain
+from aerobat.planning.miqp.integrator import INPUTS, IntegratorChain
 from aerobat.programs import AssignmentProgram, SlottedStage
 from aerobat.specs.problem import DERIVATIVES, Limits, Problem
 from aerobat.specs.stage import Condition, Course, Quantity, Stage

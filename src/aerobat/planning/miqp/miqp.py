@@ -10,11 +10,11 @@ import numpy as np
 
 from aerobat.certification import Certificate, Verdict
 from aerobat.errors import Infeasible, SpecError
-from aerobat.planning.diagnosis import why_infeasible
 from aerobat.planning.drawing_in import drawn_in
 from aerobat.planning.feasibility import RotorMargin, rotor_margin
-from aerobat.planning.formulation import Formulation
-from aerobat.planning.integrator import IntegratorChain
+from aerobat.planning.miqp.diagnosis import why_infeasible
+from aerobat.planning.miqp.formulation import Formulation
+from aerobat.planning.miqp.integrator import IntegratorChain
 from aerobat.planning.proof import certificate_for
 from aerobat.planning.result import Attempt, PlacedStage, Plan
 from aerobat.planning.search import Bisection, Grid, Search

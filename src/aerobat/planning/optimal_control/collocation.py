@@ -21,7 +21,7 @@ from typing import Any
 import numpy as np
 
 from aerobat.arrays import Array
-from aerobat.planning.spinless_body import INPUTS, POSITION, STATES, VELOCITY, SpinlessBody
+from aerobat.planning.optimal_control.spinless_body import INPUTS, POSITION, STATES, VELOCITY, SpinlessBody
 from aerobat.programs.nonlinear import symbolics
 from aerobat.trajectory import Trajectory, polynomial
 

@@ -9,8 +9,8 @@ import numpy as np
 from aerobat.arrays import Array
 from aerobat.flatness import reference
 from aerobat.planning.feasibility import RotorMargin, rotor_margin
-from aerobat.planning.knot_bounds import Bound
-from aerobat.planning.knot_variables import GIVEN
+from aerobat.planning.polynomials.knot_bounds import Bound
+from aerobat.planning.polynomials.knot_variables import GIVEN
 from aerobat.trajectory import Trajectory, polynomial
 from aerobat.vehicle import Vehicle
 

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from aerobat.planning.feasibility import RotorMargin
-from aerobat.planning.formulation import Formulation
+from aerobat.planning.miqp.formulation import Formulation
 from aerobat.planning.result import Attempt
 from aerobat.programs import solver
 from aerobat.specs.problem import DERIVATIVES, UNITS

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from aerobat.planning.knot_samples import Excess, Samples
+from aerobat.planning.polynomials.knot_samples import Excess, Samples
 from aerobat.planning.warm_start import Guess
 
 COARSE = 2  # segments to begin with
