@@ -7,7 +7,7 @@ import pytest
 
 from aerobat import so3
 from aerobat.engines import FLOATS, NUMPY, choose
-from aerobat.errors import SpecError
+from aerobat.errors import BackendMissing, SpecError
 from aerobat.flight import COMPLETE, Flight
 from aerobat.flying import fly
 from aerobat.kernels.controller import Controller
@@ -17,6 +17,7 @@ from aerobat.trajectory import Trajectory
 from aerobat.vehicle import load_vehicle
 
 QUAD, HEXA = load_vehicle("agile-quad"), load_vehicle("hexarotor")
+EXACT = ("floats", "numpy", "compiled", "jax")  # in float64
 SERIES = ("commands", "thrusts", "saturated")
 AT_REST = Trajectory(np.array([1.0]), np.zeros((1, 1, 3)))
 
@@ -51,15 +52,16 @@ def assert_same(a: Flight, b: Flight, atol: float = 0.0) -> None:
 
 
 @pytest.mark.parametrize("vehicle", [QUAD, HEXA], ids=["4 rotors", "6 rotors"])
-def test_floats_and_arrays_agree_to_rounding_over_3000_steps(vehicle) -> None:
+@pytest.mark.parametrize("engine", ["numpy", "compiled", "jax"])
+def test_engines_agree_with_floats_to_rounding_over_3000_steps(engine: str, vehicle) -> None:
     noise = StateNoise.fused()
-    flights = [fly(loops(6.0), vehicle, engine=name, noise=noise, seed=4) for name in ("floats", "numpy")]
+    flights = [fly(loops(6.0), vehicle, engine=name, noise=noise, seed=4) for name in ("floats", engine)]
     assert len(flights[0].times) == 3001
-    assert [flight.engine for flight in flights] == ["floats", "numpy"]
+    assert [flight.engine for flight in flights] == ["floats", engine]
     assert_same(*flights, atol=1e-12)
 
 
-@pytest.mark.parametrize("engine", ["floats", "numpy"])
+@pytest.mark.parametrize("engine", EXACT)
 def test_each_vehicle_of_a_batch_flies_as_it_would_alone(engine: str) -> None:
     """Different vehicles, starts and noise, all in one call."""
     rng = np.random.default_rng(3)
@@ -95,11 +97,17 @@ def test_quadrotors_of_any_size_fly_in_one_batch() -> None:
     np.testing.assert_array_equal(batch.max_thrusts, [QUAD.max_thrusts, crazyflie.max_thrusts])
 
 
-def test_few_vehicles_are_flown_by_floats_and_many_by_arrays() -> None:
-    assert choose("auto", 1) is FLOATS
-    assert choose("auto", 100) is NUMPY
+def test_short_flights_are_flown_by_floats_and_the_rest_by_what_is_fastest(monkeypatch) -> None:
+    assert choose("auto", 1, 1000) is FLOATS
+    assert choose("auto", 100, 1000).name == "compiled"
     assert fly(AT_REST, QUAD).engine == "floats"
-    assert fly(AT_REST, [QUAD] * 30).engine == "numpy"
+    assert fly(AT_REST, [QUAD] * 30).engine == "compiled"
+    monkeypatch.setattr("aerobat.engines.find_spec", lambda name: None)
+    assert choose("auto", 1, 10_000) is FLOATS
+    assert choose("auto", 100, 1000) is NUMPY
+    for engine, extra in (("compiled", "fast"), ("jax", "jax")):
+        with pytest.raises(BackendMissing, match=rf'pip install "aerobat\[{extra}\]"'):
+            choose(engine, 1, 1000)
 
 
 def test_observed_errors_have_the_stated_spread() -> None:
@@ -119,7 +127,7 @@ def test_noise_as_of_a_good_observer_costs_millimetres() -> None:
     assert 1e-5 < gap.max() < 0.005
 
 
-@pytest.mark.parametrize("engine", ["floats", "numpy"])
+@pytest.mark.parametrize("engine", EXACT)
 def test_divergence_is_an_outcome_and_ends_the_flight(engine: str) -> None:
     spinning = BodyState(
         np.zeros(3), np.array([20.0, 0.0, 0.0]), so3.exp([2.5, 0, 0]), np.array([30.0, 5.0, 0.0])
@@ -175,7 +183,7 @@ def test_a_slow_controller_does_not_coarsen_the_physics() -> None:
         ({"model": HEXA}, "need as many rotors"),
         ({"vehicle": [QUAD, replace(QUAD, gravity=1.62)]}, "same gravity"),
         ({"vehicle": [QUAD, replace(QUAD, drag_body=np.ones(3))]}, "differ in drag per mass"),
-        ({"engine": "abacus"}, "engine must be one of auto, floats, numpy"),
+        ({"engine": "abacus"}, "engine must be one of auto, floats, numpy, compiled, jax, jax-float32"),
         ({"rate": 0.0}, "rate must be a positive"),
         ({"rate": np.nan}, "rate must be a positive"),
         ({"yaw": np.inf}, "yaw must be finite"),

@@ -72,3 +72,19 @@ def test_a_vector_is_shortened_to_the_limit_and_keeps_its_direction(ops) -> None
     np.testing.assert_allclose(vectors.within(ops, (3.0, 0.0, 4.0), 2.0), (1.2, 0.0, 1.6), rtol=1e-15)
     assert vectors.within(ops, (0.3, 0.0, 0.4), 2.0) == (0.3, 0.0, 0.4)
     assert vectors.within(ops, (0.0, 0.0, 0.0), 0.0) == (0.0, 0.0, 0.0)
+
+
+@given(SEEDS)
+def test_angles_between_attitudes_are_those_of_so3(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    p, turn = unit(rng, 4), rng.normal(size=(COUNT, 3)) * 10.0 ** rng.uniform(-9, 0.5, (COUNT, 1))
+    q = so3.multiply(p, so3.exp(turn))
+    angles = each(lambda ops, p, q: (vectors.angle_between(ops, p, q),), p, q)[:, 0]
+    np.testing.assert_allclose(angles, so3.angle_between(p, q), rtol=0, atol=1e-14)
+
+
+def test_the_arc_tangent_is_right_to_the_last_digit_but_one() -> None:
+    y, x = np.abs(np.random.default_rng(0).normal(size=(2, 100_000)))
+    np.testing.assert_allclose(vectors.arc_tangent(ArrayOps, y, x), np.arctan2(y, x), rtol=5e-16)
+    assert vectors.arc_tangent(FloatOps, 0.0, 1.0) == 0.0
+    assert vectors.arc_tangent(FloatOps, 1.0, 0.0) == pytest.approx(np.pi / 2)

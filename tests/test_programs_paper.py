@@ -25,6 +25,14 @@ def test_flips_have_the_known_optimum(maneuver: Maneuver, cost: float, backend: 
     assert result.max_violation < 1e-9
 
 
+@pytest.mark.parametrize("maneuver", [FLIP_ROLL, FLIP_PITCH, FLIP_TRANSLATION])
+@pytest.mark.parametrize(("intervals", "most"), [(20, 8), (40, 8), (80, 30), (160, 60)])
+def test_a_flip_is_proven_optimal_with_few_relaxations(maneuver: Maneuver, intervals: int, most: int) -> None:
+    result = solver().solve(flip(maneuver, intervals, dt=2.0 / intervals))
+    assert result.status == "optimal"
+    assert result.nodes <= most
+
+
 @pytest.mark.parametrize("backend", ["builtin", "gurobi", "scip"])
 def test_the_half_flip_is_infeasible_at_the_first_dt_and_has_the_known_optimum_at_the_second(
     backend: str,

@@ -85,10 +85,10 @@ def assert_same(result: AssignmentResult, cost: float) -> None:
     assert result.cost == pytest.approx(cost, rel=1e-6, abs=1e-6)
 
 
-def deep_program(seed: int) -> AssignmentProgram:
-    """Three stages of five slots that compete for few variables: many nodes."""
+def deep_program(seed: int, kinds: int = 3) -> AssignmentProgram:
+    """Stages of five slots that compete for few variables: many nodes."""
     rng = np.random.default_rng(seed)
-    n, slots, kinds = 6, 5, 3
+    n, slots = 6, 5
     rows = rng.normal(size=(n + slots * kinds, n))
     rows[:n] = np.eye(n)
     low = np.full(len(rows), -inf)
@@ -119,6 +119,12 @@ def test_a_deep_search_equals_the_enumeration_of_all_assignments(seed: int) -> N
     result = solver().solve(program)
     assert_same(result, enumerated(program))
     assert result.nodes < 60  # of the hundred assignments, more or less, and their relaxations
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_gurobi_agrees_on_a_deeper_search(seed: int) -> None:
+    program = deep_program(seed, kinds=5)
+    assert_same(solver().solve(program), solver("gurobi").solve(program).cost)
 
 
 @given(programs())
@@ -177,7 +183,7 @@ def test_the_units_of_a_flip_do_not_matter(backend: str, factor: float) -> None:
 
 
 @pytest.mark.parametrize("seed", range(20))
-def test_no_completion_costs_less_than_its_prospect(seed: int) -> None:
+def test_no_completion_costs_less_than_the_prospects_of_its_placements(seed: int) -> None:
     """Where the search does not look there is nothing to find."""
     program = deep_program(seed)
     part, _ = parts(program, np.concatenate([stage.rows.ravel() for stage in program.stages]))
@@ -190,13 +196,21 @@ def test_no_completion_costs_less_than_its_prospect(seed: int) -> None:
         point = nearest.solve(lower, upper)
         if point is None:
             return
-        prospects = placements.prospects(point, placed, np.arange(15))
+        prospects = placements.prospects(point, placed, placements.all(placed))
+        assert prospects.moves is not None
+        together = placements.together(point, prospects, prospects.moves, np.arange(15))
         assert (prospects.least >= point.value).all()
         for q in range(15):
             own = tightened(lower, upper, placements.rows[:, q], placed.lower[:, q], placed.upper[:, q])
             exact = nearest.solve(*own)
             assert exact is None or prospects.least[q] <= exact.value * (1 + 1e-9)
-            assert not prospects.holds[q] or (exact is not None and exact.value <= point.value * (1 + 1e-9))
+            satisfied = exact is not None and exact.value <= point.value * (1 + 1e-9)
+            assert satisfied or not prospects.moves.none[q]
+            for other in np.flatnonzero(placements.compatible[q]):
+                rows, low, high = (of[:, other] for of in (placements.rows, placed.lower, placed.upper))
+                both = nearest.solve(*tightened(*own, rows, low, high))
+                assert both is None or together[q, other] <= both.value * (1 + 1e-9)
+        assert np.isinf(together[~placements.compatible]).all()
         lower, upper = tightened(lower, upper, placements.rows[:, p], placed.lower[:, p], placed.upper[:, p])
 
 

@@ -24,6 +24,7 @@ from .planning import (
 from .reporting.comparison import comparison_figure
 from .reporting.figures import draw
 from .reporting.tracking_page import tracking_figure
+from .sensitivity import Gradient, Sensitivity, gradient
 from .simulation import StateNoise
 from .specs import (
     Condition,
@@ -66,6 +67,7 @@ __all__ = [
     "Flip",
     "FreeKnots",
     "Gate",
+    "Gradient",
     "Grid",
     "HalfFlip",
     "Infeasible",
@@ -82,6 +84,7 @@ __all__ = [
     "RotorMargin",
     "Rule",
     "Score",
+    "Sensitivity",
     "Setpoint",
     "SpecError",
     "Stage",
@@ -99,6 +102,7 @@ __all__ = [
     "comparison_figure",
     "draw",
     "fly",
+    "gradient",
     "load_flight",
     "load_problem",
     "load_trajectory",

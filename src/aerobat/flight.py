@@ -15,6 +15,7 @@ from aerobat.states import BodyState, FlatState, Setpoint, Wrench
 from aerobat.storage import read_arrays, whole_file
 
 COMPLETE = "flown to the end"  # the outcome of a flight that did not diverge
+DIVERGED = 5.0  # [m] of position error: no controller is expected back from there
 _OWN = ("times", "commands", "thrusts", "min_thrusts", "max_thrusts", "ends")
 _REST = ("saturated", "outcomes", "vehicles", "engine")
 _PREFIX = "setpoint_"
@@ -94,7 +95,7 @@ class Flight:
         return Flight(
             times=self.times[rows],
             states=BodyState(**{k: getattr(self.states, k)[vehicle, rows] for k in _TRUTH}),
-            setpoint=first_rows(self.setpoint, rows.stop),
+            setpoint=rows_of(self.setpoint, rows),
             commands=self.commands[vehicle, rows],
             thrusts=self.thrusts[vehicle, rows],
             saturated=self.saturated[vehicle, rows],
@@ -124,6 +125,12 @@ class Flight:
             np.savez(file, format=_FORMAT, **arrays)
 
 
+def divergence(time: float, sound: bool) -> str:
+    """The outcome of a flight that diverged at a time [s], its state still `sound` or no longer a number."""
+    reason = f"position error above {DIVERGED:g} m" if sound else "its state is no longer a number"
+    return f"diverged at {time:.2f} s: {reason}"
+
+
 def load_flight(path: str | Path) -> Flight:
     """Read a flight that `Flight.save` wrote. Raises SpecError, one sentence, for any other file."""
     content = read_arrays(path, "flight")
@@ -149,9 +156,9 @@ def _sentences(array: NDArray[np.generic]) -> tuple[str, ...]:
     return tuple(str(text) for text in np.atleast_1d(array).tolist())
 
 
-def first_rows(setpoint: Setpoint, count: int) -> Setpoint:
-    """The first `count` rows of a series of set-points."""
-    return _setpoint({name: values[:count] for name, values in _setpoint_arrays(setpoint).items()})
+def rows_of(setpoint: Setpoint, rows: slice | NDArray[np.intp]) -> Setpoint:
+    """Some rows of a series of set-points."""
+    return _setpoint({name: values[rows] for name, values in _setpoint_arrays(setpoint).items()})
 
 
 def _setpoint_arrays(setpoint: Setpoint) -> dict[str, Array]:

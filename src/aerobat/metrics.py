@@ -5,11 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from aerobat import so3
 from aerobat.arrays import Array
 from aerobat.errors import SpecError
-from aerobat.flight import Flight
+from aerobat.flight import COMPLETE, Flight, divergence
+from aerobat.kernels.tally import Tally
 from aerobat.specs.gate import Gate
 from aerobat.specs.problem import Problem
 from aerobat.vehicle import Vehicle
@@ -74,8 +76,36 @@ def score(flight: Flight, problem: Problem, vehicle: Vehicle | None = None) -> S
         gate_attitude_error_deg=None if passage is None else passage.attitude_error_deg,
         gate_clearance_m=None if passage is None else passage.clearance,
         saturated_fraction=float(np.mean(flight.saturated)),
-        outcome=_outcome(flight, passage),
+        outcome=_outcome(flight.outcomes[0], passage),
     )
+
+
+def tally_score(tally: Tally, problem: Problem, vehicle: Vehicle) -> Score:
+    """The score of a flight that was added up as it was flown, from its last tally in plain numbers."""
+    passage = None
+    if problem.gate is not None and tally.nearest_square < np.inf:
+        time, *near = tally.nearest
+        passage = _passage(problem.gate, vehicle, time, *map(np.array, near))
+    ticks = max(tally.ticks, 1.0)
+    ended = COMPLETE if tally.flying else divergence(tally.stop, bool(tally.sound))
+    return Score(
+        max_position_error_m=float(np.sqrt(tally.max_square)),
+        rms_position_error_m=float(np.sqrt(tally.sum_square / ticks)),
+        max_attitude_error_deg=float(np.rad2deg(tally.max_angle)),
+        rms_attitude_error_deg=float(np.rad2deg(np.sqrt(tally.sum_square_angle / ticks))),
+        gate_miss_m=None if passage is None else passage.miss,
+        gate_speed_m_s=None if passage is None else passage.speed,
+        gate_attitude_error_deg=None if passage is None else passage.attitude_error_deg,
+        gate_clearance_m=None if passage is None else passage.clearance,
+        saturated_fraction=tally.saturated / ticks,
+        outcome=_outcome(ended, passage),
+    )
+
+
+def passage_window(times: Array, position: Array, gate: Gate) -> NDArray[np.bool_]:
+    """At which times (T,) [s] a flight along set-points (T, 3) [m] is looked at for its passage of a gate."""
+    planned = np.linalg.norm(position - gate.position, axis=-1)
+    return np.asarray(np.abs(times - times[int(np.argmin(planned))]) <= PASSAGE_WINDOW)
 
 
 def position_error(flight: Flight) -> Array:
@@ -90,8 +120,7 @@ def attitude_error(flight: Flight) -> Array:
 
 def gate_passage(flight: Flight, gate: Gate, vehicle: Vehicle | None = None) -> Passage:
     """The flown path's nearest approach to the gate's centre, around the time of the planned one."""
-    planned = np.linalg.norm(flight.setpoint.flat.position - gate.position, axis=-1)
-    window = np.abs(flight.times - flight.times[int(np.argmin(planned))]) <= PASSAGE_WINDOW
+    window = passage_window(flight.times, flight.setpoint.flat.position, gate)
     times = flight.times[window]
     k, fraction = _nearest(flight.states.position[window] - gate.position)
     nxt = min(k + 1, len(times) - 1)
@@ -100,13 +129,21 @@ def gate_passage(flight: Flight, gate: Gate, vehicle: Vehicle | None = None) -> 
         inside = values[window]
         return np.asarray(inside[k] + fraction * (inside[nxt] - inside[k]))
 
-    attitude = so3.normalize(at(flight.states.q_world_body))
     offset = at(flight.states.position) - gate.position
+    time = float(times[k] + fraction * (times[nxt] - times[k]))
+    return _passage(gate, vehicle, time, offset, at(flight.states.velocity), at(flight.states.q_world_body))
+
+
+def _passage(
+    gate: Gate, vehicle: Vehicle | None, time: float, offset: Array, velocity: Array, attitude: Array
+) -> Passage:
+    """Of a vehicle `offset` [m] from the gate's centre, its attitude not quite of unit length."""
+    attitude = so3.normalize(attitude)
     return Passage(
-        time=float(times[k] + fraction * (times[nxt] - times[k])),
+        time=time,
         miss=float(np.linalg.norm(offset)),
         inside=bool(abs(offset @ gate.lateral) < gate.width / 2 and abs(offset @ gate.up) < gate.height / 2),
-        speed=float(np.linalg.norm(at(flight.states.velocity))),
+        speed=float(np.linalg.norm(velocity)),
         attitude_error_deg=float(np.rad2deg(np.arccos(np.clip(so3.thrust_axis(attitude) @ gate.up, -1, 1)))),
         clearance=None if vehicle is None else _clearance(gate, vehicle, offset, attitude),
     )
@@ -136,11 +173,9 @@ def _clearance(gate: Gate, vehicle: Vehicle, offset: Array, attitude: Array) -> 
     return float(min(clearances))
 
 
-def _outcome(flight: Flight, passage: Passage | None) -> str:
-    if flight.diverged is not None:
-        return flight.diverged
-    if passage is None:
-        return "flown to the end"
+def _outcome(flown: str, passage: Passage | None) -> str:
+    if flown != COMPLETE or passage is None:
+        return flown
     if not passage.inside:
         return f"missed the gate, {passage.miss:.2f} m off its centre at {passage.time:.2f} s"
     if passage.clearance is not None and passage.clearance < 0.0:

@@ -30,6 +30,12 @@ TAKES: dict[str, dict[str, str]] = {
     "free-knots": {"segments": "segments", "reserve": "reserve"},
     "time-optimal": {"reserve": "reserve", "in_space": ""},
 }
+KINDS = {
+    "miqp": "Miqp",
+    "min-snap": "MinSnap",
+    "free-knots": "FreeKnots",
+    "time-optimal": "TimeOptimal",
+}  # whose module is loaded when it is asked for
 FLOWN_RESERVE = 0.03  # of each rotor's range, where a time-optimal plan is to be flown
 
 
@@ -68,17 +74,11 @@ def make_plan(problem: Problem, vehicle: Vehicle, options: PlanningOptions) -> P
 
 def make_planner(options: PlanningOptions) -> Planner:
     """The planner that the options name. Raises SpecError for options that belong to another."""
-    from aerobat.planning import FreeKnots, MinSnap, Miqp, TimeOptimal
+    from aerobat import planning
 
     _check_options(options)
     if options.paper and options.order not in (None, 3):
         raise SpecError(f"--paper plans with order 3 (jerk), got --order {options.order}; leave one out")
-    kinds: dict[str, Callable[..., Planner]] = {
-        "miqp": Miqp,
-        "min-snap": MinSnap,
-        "free-knots": FreeKnots,
-        "time-optimal": TimeOptimal,
-    }
     defaults: dict[str, dict[str, Any]] = {
         "miqp": {"order": 3} if options.paper else {},
         "min-snap": {},
@@ -89,7 +89,8 @@ def make_planner(options: PlanningOptions) -> Planner:
     for option, name in TAKES[options.planner].items():
         if name and getattr(options, option) is not None:
             given[name] = getattr(options, option)
-    return kinds[options.planner](**given)
+    planner: Planner = getattr(planning, KINDS[options.planner])(**given)
+    return planner
 
 
 def _check_options(options: PlanningOptions) -> None:

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Container
 from typing import Any
 
 import numpy as np
 
-from aerobat.engines.engine import Engine, Init, Step
-from aerobat.engines.trees import Tree, rows, stacked
+from aerobat.engines.engine import Engine, Init, Step, told
+from aerobat.engines.trees import Tree, leaves, rows, stacked
 
 
 class FloatOps:
@@ -33,19 +34,22 @@ class FloatOps:
         return x if condition else y
 
 
-def scan(init: Init, step: Step, parameters: Tree, inputs: Tree) -> Tree:
+def scan(init: Init, step: Step, parameters: Tree, inputs: Tree, every: int = 1) -> Tree:
     """The loop over time of each vehicle, one after another; see `engine.Scan`."""
+    due = set(told(len(leaves(inputs)[0]), every).tolist())
     vehicles = enumerate(rows(parameters, lambda leaf: iter(leaf.tolist())))
-    return stacked([_flown(init, step, parameter, inputs, k) for k, parameter in vehicles], np.stack)
+    return stacked([_flown(init, step, parameter, inputs, k, due) for k, parameter in vehicles], np.stack)
 
 
-def _flown(init: Init, step: Step, parameter: Tree, inputs: Tree, vehicle: int) -> Tree:
+def _flown(init: Init, step: Step, parameter: Tree, inputs: Tree, vehicle: int, due: Container[int]) -> Tree:
     carry, outputs = None, []
-    for row in rows(inputs, lambda leaf: iter((leaf if leaf.ndim == 1 else leaf[:, vehicle]).tolist())):
+    ticks = rows(inputs, lambda leaf: iter((leaf if leaf.ndim == 1 else leaf[:, vehicle]).tolist()))
+    for tick, row in enumerate(ticks):
         if carry is None:
             carry = init(FloatOps, parameter, row)
         carry, output = step(FloatOps, parameter, carry, row)
-        outputs.append(output)
+        if tick in due:
+            outputs.append(output)
     return stacked(outputs, np.array)
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
@@ -69,12 +70,17 @@ def airframes(vehicles: Sequence[Vehicle]) -> Airframe:
     return Airframe(inertial, rotors)
 
 
-def models(controller: Controller, vehicles: Sequence[Vehicle]) -> Model:
-    """What a controller believes of vehicles with as many rotors each, and its gains; leaves (vehicles,)."""
-    columns = _matrix(np.array([mixer(vehicle).T for vehicle in vehicles]))
-    level = components(np.array([collective_range(vehicle) for vehicle in vehicles]))
-    agility = np.array([_agility(vehicle) for vehicle in vehicles])
-    return Model(airframes(vehicles), Mixer(*columns, *level), controller.gains(agility))
+def models(controller: Controller, vehicles: Sequence[Vehicle], ops: Any = np) -> Model:
+    """What a controller believes of vehicles with as many rotors each, and its gains; leaves (vehicles,).
+
+    `ops` are of the arithmetic of the controller's numbers; see `Controller.gains`.
+    """
+    # vehicle by vehicle: each of these asks for the vehicle's mixer, which is kept for a while
+    each = [(mixer(vehicle).T, collective_range(vehicle), _agility(vehicle)) for vehicle in vehicles]
+    columns, level, agility = (np.array(values) for values in zip(*each, strict=True))
+    return Model(
+        airframes(vehicles), Mixer(*_matrix(columns), *components(level)), controller.gains(agility, ops)
+    )
 
 
 def _agility(vehicle: Vehicle) -> float:

@@ -27,5 +27,17 @@ def stacked(trees: Sequence[Tree], join: Callable[[Sequence[Any]], Any]) -> Tree
     return join(trees)
 
 
+def leaves(tree: Tree) -> list[Any]:
+    """The leaves of a tree, from left to right."""
+    return [leaf for child in tree for leaf in leaves(child)] if isinstance(tree, tuple) else [tree]
+
+
+def refilled(tree: Tree, values: Iterator[Any]) -> Tree:
+    """The tree with other leaves, from left to right."""
+    if isinstance(tree, tuple):
+        return _like(tree, [refilled(child, values) for child in tree])
+    return next(values)
+
+
 def _like(tree: tuple[Any, ...], children: list[Any]) -> Tree:
     return type(tree)(*children) if hasattr(tree, "_fields") else tuple(children)

@@ -56,11 +56,14 @@ class Controller:
             return 0.0
         return period / -math.expm1(-period / max(self.lead_filter, _SMALLEST))
 
-    def gains(self, agility: Scalar) -> Gains:
-        """The gains for a vehicle that the attitude loop's frequency must not exceed `agility` [rad/s]."""
-        frequency = np.minimum(self.attitude_frequency, agility)
+    def gains(self, agility: Scalar, ops: Any = np) -> Gains:
+        """The gains for a vehicle that the attitude loop's frequency must not exceed `agility` [rad/s].
+
+        `ops` are of the arithmetic of the controller's own numbers: dual ones have dual gains.
+        """
+        frequency = ops.minimum(self.attitude_frequency, agility)
         slower = frequency / max(self.attitude_frequency, _SMALLEST)
-        like = np.ones_like(slower)
+        like = np.ones_like(agility)
         return Gains(
             position=self.position_gain * slower**2,
             velocity=self.velocity_gain * slower,

@@ -2,10 +2,30 @@
 
 from __future__ import annotations
 
+import math
+from functools import reduce
+
 from aerobat.kernels.ops import Axes, Matrix, Ops, Quaternion, Scalar, Vector
 
 ZERO: Vector = (0.0, 0.0, 0.0)
 _TINY = 1e-300  # keeps 0/0 away and changes no other quotient
+# the arc tangent is x + x³ P(x²)/Q(x²) for |x| ≤ tan(π/8), highest power first (Cephes library, S. Moshier)
+_ARC_P = (
+    -0.8750608600031904,
+    -16.157537187333652,
+    -75.00855792314705,
+    -122.88666844901361,
+    -64.85021904942025,
+)
+_ARC_Q = (
+    1.0,
+    24.858464901423062,
+    165.02700983169885,
+    432.88106049129027,
+    485.3903996359137,
+    194.5506571482614,
+)
+_EIGHTH = 0.4142135623730951  # tan(π/8)
 
 
 def add(a: Vector, b: Vector) -> Vector:
@@ -108,6 +128,23 @@ def to_world(body_axes: Axes, a: Vector) -> Vector:
     """A body vector in world axes, R·a."""
     b1, b2, b3 = body_axes
     return add_scaled(add_scaled(scale(a[0], b1), a[1], b2), a[2], b3)
+
+
+def angle_between(ops: Ops, p: Quaternion, q: Quaternion) -> Scalar:
+    """The angle of the rotation from attitude p to attitude q [rad], in [0, π]."""
+    w, *vector = multiply(conjugate(p), q)
+    return 2.0 * arc_tangent(ops, length(ops, tuple(vector)), ops.maximum(w, -w))
+
+
+def arc_tangent(ops: Ops, y: Scalar, x: Scalar) -> Scalar:
+    """The angle [rad] in [0, π/2] whose tangent is y/x, for y and x of zero or more, not both zero."""
+    ratio = ops.minimum(x, y) / ops.maximum(x, y)
+    large = ratio > _EIGHTH
+    t = ops.select(large, (ratio - 1.0) / (ratio + 1.0), ratio)
+    square = t * t
+    p, q = reduce(lambda v, c: v * square + c, _ARC_P), reduce(lambda v, c: v * square + c, _ARC_Q)
+    angle = ops.select(large, 0.25 * math.pi, 0.0) + (t + t * square * p / q)
+    return ops.select(y > x, 0.5 * math.pi - angle, angle)
 
 
 def smallest_rotation(ops: Ops, a: Vector, b: Vector, normal: Vector) -> Quaternion:

@@ -7,12 +7,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from aerobat.arrays import Array
-from aerobat.flatness import reference
-from aerobat.planning.optimal_control.collocation import Mesh, Motion
 from aerobat.planning.result import Plan
 from aerobat.specs.stage import Course, Stage
 from aerobat.trajectory import Trajectory
-from aerobat.vehicle import Vehicle
 
 FLAT = 1e-6  # of its extent: how far a path may leave a plane and still be in it
 
@@ -46,19 +43,6 @@ class Guess:
         """About so many intervals, shared among phases by their durations, each given the least or more."""
         share = np.rint(intervals * self.phases / self.trajectory.duration).astype(int)
         return tuple(np.maximum(share, least).tolist())
-
-    def motion(self, mesh: Mesh, vehicle: Vehicle, yaw: float) -> Motion:
-        """What the vehicle does along it at the mesh's nodes, by flatness; inputs within their scale."""
-        knots = np.concatenate([[0.0], np.cumsum(self.phases @ mesh.shares)])
-        asked = reference(
-            self.trajectory, vehicle, np.minimum(knots, self.trajectory.duration), yaw=yaw
-        ).setpoint
-        flat, rates = asked.flat, asked.omega_body[:, :2]
-        states = np.concatenate([flat.position, flat.velocity, asked.q_world_body, rates], axis=1).T
-        inputs = np.concatenate([asked.wrench.thrust[:, None], asked.omega_dot_body[:, :2]], axis=1).T
-        most = 2.0 * mesh.input_scale[:, None]
-        inputs = np.clip(inputs, -most, most)
-        return Motion(self.phases, states, inputs[:, :-1], inputs[:, 1:])
 
     def plane(self) -> Array | None:
         """The normal of the vertical plane that it stays in, (3,); None when it stays in none."""

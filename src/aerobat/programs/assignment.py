@@ -183,10 +183,10 @@ class AssignmentProgram:
             return inf
         lower, upper = self.tightened(slots)
         reached, missed = self.rows @ x, np.abs(self.equality @ x - self.target)
+        below, above = lower - reached, reached - upper
         size = max(float(np.linalg.norm(x)), self._unconstrained)
         return max(
-            _relative(lower - reached, self.rows, size, lower),
-            _relative(reached - upper, self.rows, size, upper),
+            _relative(np.maximum(below, above), self.rows, size, np.where(below > above, lower, upper)),
             _relative(missed, self.equality, size, self.target),
         )
 
@@ -234,8 +234,14 @@ def certified(program: AssignmentProgram, claim: AssignmentResult) -> Assignment
 def _relative(residual: Array, rows: Array, size: float, bound: Array) -> float:
     """The largest residual above zero, each relative to its row, its bound and the size of the variables."""
     over = np.flatnonzero(residual > 0.0)
-    scale = np.linalg.norm(rows[over], axis=1) * size + np.abs(bound[over])
+    scale = lengths(rows[over]) * size + np.abs(bound[over])
     return float((residual[over] / scale).max(initial=0.0))
+
+
+def lengths(rows: Array) -> Array:
+    """The Euclidean length of each row."""
+    squares: Array = np.einsum("ij,ij->i", rows, rows)
+    return np.sqrt(squares)
 
 
 def _set(value: object, **fields: object) -> None:

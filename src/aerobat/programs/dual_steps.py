@@ -26,8 +26,10 @@ class Ascent:
     curvature: Array  # (q,) positive
 
 
-def dual_steps(inverse: Array, multipliers: Array, equal: Mask, ascent: Ascent) -> tuple[Array, Array]:
-    """Multipliers of the active rows for each addition, (w, q), and how far it is pushed, (q,).
+def dual_steps(
+    inverse: Array, multipliers: Array, equal: Mask, ascent: Ascent
+) -> tuple[Array, Array, Indices]:
+    """Multipliers of the active rows for each addition, (w, q), how far it is pushed, (q,), which fall short.
 
     A step ends at the top, or where a multiplier is zero; its row is then dropped and the next step goes on
     without it (Goldfarb and Idnani 1983). `inverse` (w, w) is that of the active rows' Gram matrix; rows that
@@ -37,7 +39,7 @@ def dual_steps(inverse: Array, multipliers: Array, equal: Mask, ascent: Ascent) 
     pushed, stopped = _step(left, ascent)
     held = multipliers[:, None] - pushed * ascent.give
     if not stopped.size:
-        return held, pushed
+        return held, pushed, stopped
     moving, step, dropped = np.arange(len(pushed)), pushed, list[tuple[Array, Indices]]()
     for _ in range(_STEPS - 1):
         rate = (ascent.give / left)[:, stopped]
@@ -52,8 +54,9 @@ def dual_steps(inverse: Array, multipliers: Array, equal: Mask, ascent: Ascent) 
         pushed[moving] += step
         if not stopped.size:
             break
+    still = moving[stopped]
     sign = np.where(equal, 0.0, np.sign(multipliers))[:, None]
-    return np.where(held * sign < 0.0, 0.0, held), pushed
+    return np.where(held * sign < 0.0, 0.0, held), pushed, still
 
 
 def _step(left: Array, ascent: Ascent) -> tuple[Array, Indices]:

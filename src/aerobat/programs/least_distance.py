@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import daqp
@@ -42,14 +43,15 @@ class LeastDistance:
     def __init__(self, rows: Array) -> None:
         """Keep the rows."""
         self._rows = rows
-        self._variables = rows.shape[1]
-        self._model: Any = daqp.Model()
-        if self._variables:
-            unbounded = np.full(len(rows), UNBOUNDED)
-            # no linear term, not a zero one: DAQP would multiply it by all rows at every change of bounds
-            self._model.setup(np.eye(self._variables), None, rows, unbounded, -unbounded)
-            self._ordinary = {**self._model.settings, "primal_tol": _PRIMAL_TOLERANCE}
-            self._model.settings = self._ordinary
+
+    @cached_property
+    def _model(self) -> Any:
+        model = daqp.Model()
+        unbounded = np.full(len(self._rows), UNBOUNDED)
+        # no linear term, not a zero one: DAQP would multiply it by all rows at every change of bounds
+        model.setup(np.eye(self._rows.shape[1]), None, self._rows, unbounded, -unbounded)
+        model.settings = {"primal_tol": _PRIMAL_TOLERANCE}
+        return model
 
     def solve(
         self, lower: Array, upper: Array, guess: Point | None = None, limit: float = UNBOUNDED
@@ -59,18 +61,21 @@ class LeastDistance:
         Infinite bounds are ±UNBOUNDED. `guess` is a point of similar bounds, whose active rows are tried
         first. Raises NotConverged.
         """
-        if not self._variables:
+        if lower.max(initial=0.0) <= 0.0 <= upper.min(initial=0.0):
             nothing = np.zeros(0)
-            return Point(nothing, 0.0, lower, upper, np.zeros(0, dtype=np.intp), nothing)
+            return Point(
+                np.zeros(self._rows.shape[1]), 0.0, lower, upper, np.zeros(0, dtype=np.intp), nothing
+            )
         unbounded = upper - lower >= 2.0 * UNBOUNDED
         cold = np.multiply(unbounded, _IGNORED, dtype=np.intc)
         y, flag, multipliers = self._run(lower, upper, _warmed(cold, guess), limit)
         if flag not in (_SOLVED, _EXCLUDED):
             y, flag, multipliers = self._run(lower, upper, cold, limit)
         if flag not in (_SOLVED, _EXCLUDED):
+            ordinary = self._model.settings
             self._model.settings = _CAREFUL
             y, flag, multipliers = self._run(lower, upper, cold, limit)
-            self._model.settings = self._ordinary
+            self._model.settings = ordinary
         if flag not in (_SOLVED, _EXCLUDED):
             raise NotConverged
         if flag == _EXCLUDED:

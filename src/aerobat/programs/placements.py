@@ -35,20 +35,41 @@ class PlacedBounds:
         return PlacedBounds(lower, upper, self.possible & np.all(lower <= upper + _HOLDS, axis=0))
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, slots=True)
+class Moves:
+    """How q placements move a point's multipliers: the w active ones, and those of their own k rows.
+
+    By a share θ of its move the dual objective rises by slope · θ − ½ curvature · θ².
+    """
+
+    rows: Array  # (w, n) active
+    change: Array  # (w, q) of the active multipliers
+    fall: Array  # (w, q) the share of the active multipliers that is given up, zero for equalities
+    use: Indices  # (k, q) the placements' rows, among those used
+    own: Array  # (k, q) their multipliers
+    slope: Array  # (q,)
+    curvature: Array  # (q,)
+    stopped: frozenset[int]  # of the q, which might raise the objective further
+    none: Mask  # (q,) the point satisfies the placement as it is
+
+
+@dataclass(frozen=True, eq=False, slots=True)
 class Prospects:
     """What a point says of some placements."""
 
     among: Indices  # (q,) the placements, sorted by stage
     stage: Indices  # (q,) their stages, counting those with several slots
     least: Array  # (q,) no point that satisfies the placement too has a smaller ½|y|²
-    holds: Mask  # (q,) the point itself satisfies it
+    moves: Moves | None = None  # that tell; None when it is inherited from another point
 
-    def among_open(self, open_: Mask) -> Prospects:
-        """Those of a point further on, whose bounds are tighter: of the placements still open."""
-        left = open_[self.among]
-        nothing = np.zeros(int(left.sum()), dtype=bool)
-        return Prospects(self.among[left], self.stage[left], self.least[left], nothing)
+    def some(self, open_: Mask, limit: float) -> Prospects:
+        """Those of the placements in `open_` (P,) that may cost less than `limit`, for points further on."""
+        left = open_[self.among] & (self.least < limit)
+        return Prospects(self.among[left], self.stage[left], self.least[left])
+
+    def cover(self, stages: Sequence[int]) -> bool:
+        """Whether every one of `stages`, which are all there are, has a placement."""
+        return len(set(self.stage.tolist())) == len(stages)
 
 
 class Placements:
@@ -62,7 +83,8 @@ class Placements:
         """`reduction` has all rows of those stages."""
         self.free = tuple(i for i, stage in enumerate(program.stages) if len(stage.slots) > 1)
         stages = [program.stages[i] for i in self.free]
-        self._width = max((stage.rows.shape[1] for stage in stages), default=0)
+        self._widths = np.array([stage.rows.shape[1] for stage in stages], dtype=np.intp)
+        self._width = int(self._widths.max(initial=0))
         counts = [len(stage.slots) for stage in stages]
         self.stage = np.repeat(np.array(self.free, dtype=np.intp), counts)
         self.order = np.repeat(np.arange(len(stages)), counts)  # the place of the stage in `free`
@@ -73,13 +95,14 @@ class Placements:
         place = np.full(len(program.rows), reduction.zero)
         place[reduction.ranges] = np.arange(len(reduction.ranges))
         self.rows = self._padded([place[stage.rows] for stage in stages], reduction.zero).astype(np.intp)
-        used, use = np.unique(self.rows, return_inverse=True)
-        self._use = use.reshape(self.rows.shape)  # where each row is among those used
-        self._matrix, self._used = reduction.rows, reduction.rows[used]
+        is_used = np.zeros(len(reduction.rows), dtype=bool)
+        is_used[self.rows] = True
+        self._use = (is_used.cumsum() - 1)[self.rows]  # where each row is among those used
+        self._matrix, self._used = reduction.rows, reduction.rows[is_used]
         self._gram = reduction.rows @ self._used.T
-        self._square = (self._used**2).sum(axis=1)
-        own = self._used[self._use]  # (k, P, n)
-        self._pairs = np.einsum("apn,bpn->abp", own, own)
+        products = self._gram[is_used]
+        self._square = products.diagonal()
+        self._pairs = products[self._use[:, None], self._use]  # (k, k, P)
 
     def _padded(self, blocks: Sequence[Array | Indices], filler: float) -> Array:
         """The stages' blocks (slots, rows) side by side, (k, P)."""
@@ -107,44 +130,106 @@ class Placements:
         least = [missed[a:b][placed.possible[a:b]].min(initial=inf) for a, b in pairwise(self.starts)]
         return max((float(size) for size in least if size < inf), default=0.0)
 
-    def prospects(self, point: Point, placed: PlacedBounds, among: Indices) -> Prospects:
-        """What adding any one of the placements `among` to the point's bounds costs at least.
+    def all(self, placed: PlacedBounds) -> Prospects:
+        """All possible placements, of which nothing is known."""
+        among = np.flatnonzero(placed.possible)
+        return Prospects(among, self.order[among], np.zeros(len(among)))
+
+    def beside(self, placed: Sequence[int], spared: Sequence[int] = ()) -> Mask:
+        """The placements that may join those `placed`, without those `spared`, (P,)."""
+        open_: Mask = self.compatible[placed[0]]
+        for p in placed[1:]:
+            open_ = open_ & self.compatible[p]
+        if spared:
+            open_ = open_.copy()
+            open_[list(spared)] = False
+        return open_
+
+    def prospects(self, point: Point, placed: PlacedBounds, inherited: Prospects) -> Prospects:
+        """What adding any one of the placements inherited to the point's bounds costs at least.
 
         From the point's multipliers a placement's violated rows push, each by its violation over its square
         off the active rows, and the active rows give way. The bound is the dual objective −½|Mᵀλ|² − λᵀb at
         the multipliers so reached: dual feasible, hence a bound whatever the steps were.
         """
-        active, lower, upper = self._active(point, among), placed.lower[:, among], placed.upper[:, among]
-        reached = (self._used @ point.y)[self._use[:, among]]
-        nearest = np.minimum(np.maximum(reached, lower), upper)
-        violation = reached - nearest  # (k, q), positive above the upper bound
-        push = violation / active.square
-        straight = (self._pairs[:, :, among] * push * push[:, None]).sum(axis=(0, 1))
-        give, against = (active.rates * push).sum(axis=1), (active.cross * push).sum(axis=1)  # (w, q)
-        slope = (violation * push).sum(axis=0)
-        curvature = np.maximum(straight - (against * give).sum(axis=0), _SHORT * slope + _TINY)
-        ascent = Ascent(give, slope, curvature)
-        held, pushed = dual_steps(active.inverse, point.multipliers, active.equal, ascent)
-        dual = -(held * (0.5 * (active.gram @ held) + pushed * against + active.bound)).sum(axis=0)
-        dual -= pushed * ((push * nearest).sum(axis=0) + (0.5 + _ROUNDING) * pushed * straight)
-        holds = np.all(np.abs(violation) <= _HOLDS, axis=0)
-        return Prospects(among, self.order[among], np.maximum(dual, point.value), holds)
+        active = self._active(point)
+        asked = self._asked(point, placed, inherited, active)
+        give = active.inverse @ asked.against
+        slope = np.einsum("kq,kq->q", asked.violation, asked.push)
+        curvature = asked.straight - np.einsum("wq,wq->q", asked.against, give)
+        ascent = Ascent(give, slope, np.maximum(curvature, _SHORT * slope + _TINY))
+        held, pushed, stopped = dual_steps(active.inverse, point.multipliers, active.equal, ascent)
+        against = pushed * asked.against + active.bound
+        dual = -np.einsum("wq,wq->q", held, 0.5 * (active.gram @ held) + against)
+        linear = np.einsum("kq,kq->q", asked.push, asked.nearest)
+        dual -= pushed * (linear + (0.5 + _ROUNDING) * pushed * asked.straight)
+        least = np.maximum(np.maximum(dual, inherited.least), point.value)
+        change, rise = held - point.multipliers[:, None], pushed * slope
+        moves = Moves(
+            rows=active.rows,
+            change=change,
+            fall=change / np.where(active.equal, -inf, -point.multipliers)[:, None],
+            use=asked.use,
+            own=pushed * asked.push,
+            slope=rise,
+            curvature=2.0 * np.maximum(rise - (dual - point.value), 0.0),
+            stopped=frozenset(stopped.tolist()),
+            none=np.all(np.abs(asked.violation) <= _HOLDS, axis=0),
+        )
+        return Prospects(inherited.among, inherited.stage, least, moves)
 
-    def _active(self, point: Point, among: Indices) -> _Active:
+    def together(self, point: Point, prospects: Prospects, moves: Moves, some: Indices) -> Array:
+        """What adding one of `some` (c,) and another of the prospects' q placements costs at least, (c, q).
+
+        Both move the multipliers by the same share θ of what they would alone: the best one that keeps the
+        signs of the active multipliers. Infinite where the two cannot stand together.
+        """
+        moved = moves.change[:, some].T @ moves.rows
+        moved += np.einsum("kc,kcn->cn", moves.own[:, some], self._used[moves.use[:, some]])
+        crossed = np.einsum("ckq,kq->cq", (moved @ self._used.T).take(moves.use, axis=1), moves.own)
+        crossed += (moved @ moves.rows.T) @ moves.change
+        slope = moves.slope[some, None] + moves.slope
+        apart = moves.curvature[some, None] + moves.curvature
+        curvature = apart + 2.0 * crossed
+        fallen = (moves.fall[:, some, None] + moves.fall[:, None]).max(axis=0, initial=1.0)
+        share = np.minimum(slope / np.maximum(curvature, slope + _TINY), 1.0 / fallen)  # 1 at most
+        rise = share * (slope - share * (0.5 * curvature + _ROUNDING * apart))
+        alone = np.maximum(prospects.least[some, None], prospects.least)
+        bounds: Array = np.maximum(point.value + rise, alone)
+        bounds[~self.compatible[prospects.among[some, None], prospects.among]] = inf
+        return bounds
+
+    def _asked(self, point: Point, placed: PlacedBounds, inherited: Prospects, active: _Active) -> _Asked:
+        among, width = inherited.among, self._widths[inherited.stage].max(initial=0)
+        use = self._use[:width].take(among, axis=1)
+        lower, upper = (bound[:width].take(among, axis=1) for bound in (placed.lower, placed.upper))
+        reached = (self._used @ point.y).take(use)
+        nearest = np.minimum(np.maximum(reached, lower), upper)
+        violation = reached - nearest
+        push = violation / active.square.take(use)
+        pairs = self._pairs[:width, :width].take(among, axis=2)
+        return _Asked(
+            use=use,
+            nearest=nearest,
+            violation=violation,
+            push=push,
+            against=np.einsum("wkq,kq->wq", active.cross.take(use, axis=1), push),
+            straight=np.einsum("abq,aq,bq->q", pairs, push, push),
+        )
+
+    def _active(self, point: Point) -> _Active:
         lower, upper = point.lower[point.active], point.upper[point.active]
         rows = self._matrix[point.active]
         gram = rows @ rows.T
-        inverse = np.linalg.inv(gram)
+        inverse = np.asarray(np.linalg.inv(gram), dtype=np.float64)
         cross = self._gram[point.active]
-        rates = inverse @ cross
-        square = np.maximum(self._square - (cross * rates).sum(axis=0), _SHORT)
-        use = self._use[:, among]
+        square = self._square - np.einsum("wu,wu->u", cross, inverse @ cross)
         return _Active(
+            rows=rows,
             gram=gram,
             inverse=inverse,
-            cross=cross[:, use],
-            rates=rates[:, use],
-            square=square[use],
+            cross=cross,
+            square=np.maximum(square, _SHORT),
             bound=np.where(point.multipliers > 0.0, upper, lower)[:, None],
             equal=lower == upper,
         )
@@ -152,22 +237,35 @@ class Placements:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class _Active:
-    """The w rows that hold a point, and how the rows of q placements see them."""
+    """The w rows that hold a point, and how the u rows that placements use see them."""
 
+    rows: Array  # (w, n)
     gram: Array  # (w, w)
     inverse: Array  # of it
-    cross: Array  # (w, k, q) products with the placements' rows
-    rates: Array  # (w, k, q) by how much their multipliers give way to each
-    square: Array  # (k, q) of the placements' rows off these
+    cross: Array  # (w, u) products with the placements' rows
+    square: Array  # (u,) of the placements' rows off these
     bound: Array  # (w, 1) that holds
     equal: Mask  # (w,) whether it is an equality
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class _Asked:
+    """What q placements of k rows ask of a point."""
+
+    use: Indices  # (k, q) their rows, among those used
+    nearest: Array  # (k, q) to what the point reaches, within their bounds
+    violation: Array  # (k, q) of them, positive above the upper bound
+    push: Array  # (k, q) of their rows' multipliers
+    against: Array  # (w, q) by it, what the active rows see
+    straight: Array  # (q,) its square
 
 
 def _beside(
     program: AssignmentProgram, stage: Indices, slot: Indices, other: Indices | int, taken: Indices | int
 ) -> Mask:
     """Whether stages may stand in slots while others stand in theirs: others, in other slots, in order."""
-    before, after = program.before[stage, other], program.before[other, stage]
-    ordered = (~before | (slot < taken)) & (~after | (slot > taken))
-    result: Mask = ordered & (stage != other) & (slot != taken)
+    result: Mask = (stage != other) & (slot != taken)
+    if program.precedence:
+        result &= (slot < taken) | ~program.before[stage, other]
+        result &= (slot > taken) | ~program.before[other, stage]
     return result

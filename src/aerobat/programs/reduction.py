@@ -14,7 +14,7 @@ from math import inf, sqrt
 import numpy as np
 
 from aerobat.arrays import Array
-from aerobat.programs.assignment import AssignmentProgram, Indices, Mask
+from aerobat.programs.assignment import AssignmentProgram, Indices, Mask, lengths
 
 UNBOUNDED = 1e30  # an infinite bound, as DAQP writes it
 _VANISHED = 1e-9  # a row shorter than this share of its length has no free direction left
@@ -78,7 +78,7 @@ class Reduction:
         stacked = np.concatenate([program.equality[self.equalities], program.rows[self.pinned]])
         stacked = stacked[:, self.columns]
         equality = whitening.rows(stacked)
-        length = np.linalg.norm(equality, axis=1)
+        length = lengths(equality)
         self._unit = 1.0 / np.where(length > 0.0, length, 1.0)
         equality = equality * self._unit[:, None]
         left, singular, right = np.linalg.svd(equality, full_matrices=True)
@@ -93,17 +93,16 @@ class Reduction:
         self.from_free = whitening.lifted(right[rank:].T)
 
     def _project(self, program: AssignmentProgram, whitening: _Whitening, pinned: Mask) -> None:
-        rows = program.rows[np.ix_(self.ranges, self.columns)]
-        projected, self._length = rows @ self.from_free, np.linalg.norm(whitening.rows(rows), axis=1)
-        norm = np.linalg.norm(projected, axis=1)
+        rows = program.rows[self.ranges][:, self.columns]
+        projected, self._length = rows @ self.from_free, lengths(whitening.rows(rows))
+        norm = lengths(projected)
         constant = (norm <= _VANISHED * self._length) | pinned
         norm[constant] = 1.0
         projected[constant] = 0.0
         self.constant, self.norm = np.append(constant, True), np.append(norm, 1.0)
         self.zero = len(rows)  # the appended row
-        self.rows = np.ascontiguousarray(
-            np.vstack([projected / norm[:, None], np.zeros(self.from_free.shape[1])])
-        )
+        self.rows = np.zeros((len(rows) + 1, projected.shape[1]))
+        np.divide(projected, norm[:, None], out=self.rows[:-1])
         self._rows_from_target = rows @ self._from_target
         self._rows_centre = rows @ self._centre
 
@@ -149,14 +148,14 @@ def in_units(bound: Array, unit: float) -> Array:
 
 def parts(program: AssignmentProgram, rows: Indices) -> tuple[Part, Part]:
     """The program split in two that share nothing: all that range rows `rows` are linked to, and the rest."""
-    links = [program.equality != 0.0, program.rows != 0.0]
+    links = [np.abs(program.equality), np.abs(program.rows)]
     if program.hessian is not None:
-        links.append(program.hessian != 0.0)
+        links.append(np.abs(program.hessian))
     incidence = np.concatenate(links)
-    columns = np.any(incidence[len(program.equality) + rows], axis=0)
+    columns: Mask = np.any(incidence[len(program.equality) + rows], axis=0)
     while True:
-        touched = np.any(incidence[:, columns], axis=1)
-        linked = np.any(incidence[touched], axis=0) | columns
+        touched = incidence @ columns > 0.0
+        linked = columns | (touched @ incidence > 0.0)
         if (linked == columns).all():
             break
         columns = linked

@@ -1,28 +1,31 @@
 """Best-first branch and bound over the placements of stages.
 
 A node places some stages and drops the others, which can only lower the cost; its relaxation is a convex QP.
-Branching on a stage gives one child a placement. Few children reach the QP solver: a bound for all of them at
-once (`Placements.prospects`) tells that most cost too much, and each waits in line behind cheaper siblings.
+Few children reach the QP solver: bounds for all of them at once (`Placements.prospects`), and for pairs
+(`Placements.together`), tell that most cost too much, and each waits in line behind cheaper siblings.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from heapq import heappop, heappush
-from itertools import count, pairwise
+from itertools import count
 from math import inf
 from time import perf_counter
 
 import numpy as np
 
 from aerobat.arrays import Array
-from aerobat.programs.assignment import Indices, Mask, Status
+from aerobat.programs.assignment import Indices, Status
+from aerobat.programs.fan import Branch, Fan
 from aerobat.programs.least_distance import LeastDistance, NotConverged, Point
 from aerobat.programs.placements import PlacedBounds, Placements, Prospects
 from aerobat.programs.reduction import UNBOUNDED, Bounds
 
 _CLOSED = 1e-10  # relative gap at which the search ends
+_FEW = 4  # placements of the last stage, of which no prospects are made
+_DIVES = 2  # a dive whenever the number of QPs has grown so many times
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -32,19 +35,7 @@ class _Node:
     point: Point
     chosen: tuple[int, ...]  # placements
     pending: tuple[int, ...]  # stages, counting those with several slots, that are not placed
-    open: Mask  # (P,) placements that may join those chosen
-    inherited: Prospects | None  # of its parent
-
-
-@dataclass(frozen=True, eq=False, slots=True)
-class _Children:
-    """Relaxations to be solved: a node with one placement more, the cheapest first."""
-
-    node: _Node
-    prospects: Prospects  # of the node
-    pending: tuple[int, ...]
-    placements: list[int]
-    bounds: list[float]
+    inherited: Prospects  # of its parent, for the placements that may join those chosen
 
 
 class Tree:
@@ -59,7 +50,7 @@ class Tree:
     ) -> None:
         """`standing` are the bounds of the rows, with no stage placed."""
         self._placements, self._placed, self._solver, self._standing = placements, placed, solver, standing
-        self._heap: list[tuple[float, int, _Node | _Children, int]] = []
+        self._heap: list[tuple[float, int, _Node, Fan | None]] = []
         self._ticket = count()
         self._unresolved = inf  # the least bound of a relaxation that the QP solver could not settle
         self.best: tuple[Point, tuple[int, ...]] | None = None
@@ -86,7 +77,7 @@ class Tree:
             if not fitting.size:
                 return
             chosen.append(int(fitting[0]))
-            open_ = open_ & of.compatible[fitting[0]]
+            open_ = open_ & of.beside(chosen[-1:])
         lower, upper = self._tightened(self._standing.lower, self._standing.upper, chosen)
         point = self._solve(lower, upper, None, inf)
         if point is not None:
@@ -98,36 +89,56 @@ class Tree:
             self._unresolved = 0.0
             return
         root = self._solve(self._standing.lower, self._standing.upper, None, 0.0)
-        if root is not None:
-            pending = tuple(range(len(self._placements.free)))
-            node = _Node(root, (), pending, self._placed.possible, None)
-            self._push(node)
-            if deadline < inf:
-                self._dive(node, deadline)
+        pending = tuple(range(len(self._placements.free)))
+        every = self._placements.all(self._placed)
+        if root is not None and every.cover(pending):
+            self._dive(_Node(root, (), pending, every), deadline)
+        dive = _DIVES * self.nodes
         while self._heap and self._improves(self._heap[0][0]) and perf_counter() < deadline:
-            _, _, item, at = heappop(self._heap)
-            if isinstance(item, _Children):
-                self._push_child(item, at + 1)
-            found = item if isinstance(item, _Node) else self._solved(item, at)
-            if found is None:
+            node = self._next()
+            if node is None:
                 continue
-            if self._heap and found.point.value > self._heap[0][0]:
-                self._push(found)  # others may cost less
+            if self.nodes >= dive:
+                self._dive(node, deadline)
+                dive = _DIVES * self.nodes
+            elif self._heap and node.point.value > self._heap[0][0]:
+                self._wait(node.point.value, node)  # others may cost less
             else:
-                children = self._visited(found)
-                if children is not None:
-                    self._push_child(children, 0)
+                fan = self._visited(node)
+                if fan is not None:
+                    self._wait(fan.bound, node, fan)
+
+    def _next(self) -> _Node | None:
+        """The cheapest node there is; None where what waited comes to nothing, or to more than the next."""
+        _, _, node, fan = heappop(self._heap)
+        if fan is None:
+            return node
+        bound = fan.settle()
+        if self._improves(bound) and not (self._heap and bound > self._heap[0][0]):
+            branch = fan.pop(self._limit, in_pairs=False)
+            self._wait(fan.bound, node, fan)
+            return self._child(node, fan.prospects, branch)
+        self._wait(bound, node, fan)
+        return None
 
     def _dive(self, node: _Node | None, deadline: float) -> None:
-        """Some assignment, fast, should time run out: best-first finds none before it finds the best."""
-        while node is not None and perf_counter() < deadline:
-            children = self._visited(node)
-            if children is None:
-                return
-            solved = (self._solved(children, at) for at in range(len(children.bounds)))
-            node = next((child for child in solved if child is not None or perf_counter() >= deadline), None)
+        """Down to some assignment, the cheapest child at every turn; all others are left in the heap.
 
-    def _visited(self, node: _Node) -> _Children | None:
+        What costs more is not searched any more, and should time run out there is something to show.
+        """
+        while node is not None and perf_counter() < deadline:
+            fan = self._visited(node)
+            if fan is None:
+                return
+            child = None
+            while child is None and self._improves(fan.settle()) and perf_counter() < deadline:
+                child = self._child(node, fan.prospects, fan.pop(self._limit, in_pairs=True))
+            self._wait(fan.bound, node, fan)
+            node = child
+        if node is not None:
+            self._wait(node.point.value, node)
+
+    def _visited(self, node: _Node) -> Fan | None:
         """The node's children; None where it has none, or where its point is the best so far."""
         if not node.pending:
             self.best = (node.point, node.chosen)
@@ -137,41 +148,31 @@ class Tree:
         if complete is not None:
             self.best = (node.point, complete)
             return None
-        return self._branched(node, prospects)
+        return Fan(self._placements, node.point, prospects)
 
     def _prospects(self, node: _Node) -> Prospects:
-        """The node's prospects, or its parent's where they will do: before the last stage a QP costs less."""
-        if node.inherited is not None and len(node.pending) == 1:
-            return node.inherited.among_open(node.open)
-        return self._placements.prospects(node.point, self._placed, np.flatnonzero(node.open))
+        """The node's prospects, or its parent's where they will do: a few QPs cost less."""
+        if node.chosen and len(node.pending) == 1 and len(node.inherited.among) <= _FEW:
+            return node.inherited
+        return self._placements.prospects(node.point, self._placed, node.inherited)
 
-    def _branched(self, node: _Node, prospects: Prospects) -> _Children | None:
-        """The placements of the stage whose cheapest one costs most; None where a stage has none left."""
-        starts = np.searchsorted(prospects.stage, (*node.pending, len(self._placements.free))).tolist()
-        spans = [slice(a, b) for a, b in pairwise(starts)]
-        if any(span.start == span.stop for span in spans):
+    def _child(self, node: _Node, prospects: Prospects, branch: Branch) -> _Node | None:
+        """One child of a node with these prospects; None where it cannot beat the best."""
+        placed = self._placements.order[list(branch.placed)].tolist()
+        pending = tuple(stage for stage in node.pending if stage not in placed)
+        open_ = self._placements.beside(branch.placed, branch.spared)
+        inherited = prospects.some(open_, self._limit)
+        if not inherited.cover(pending):
             return None
-        dearest = max(range(len(spans)), key=lambda i: prospects.least[spans[i]].min())
-        least = prospects.least[spans[dearest]]
-        order = np.argsort(least, kind="stable")
-        pending = (*node.pending[:dearest], *node.pending[dearest + 1 :])
-        placements = prospects.among[spans[dearest]][order].tolist()
-        return _Children(node, prospects, pending, placements, least[order].tolist())
-
-    def _solved(self, children: _Children, at: int) -> _Node | None:
-        """One of the children; None where it cannot beat the best."""
-        parent, placement = children.node, children.placements[at]
-        lower, upper = self._tightened(parent.point.lower, parent.point.upper, [placement])
-        point = self._solve(lower, upper, parent.point, children.bounds[at])
-        if point is None:
-            return None
-        open_ = parent.open & self._placements.compatible[placement]
-        chosen = (*parent.chosen, placement)
-        return _Node(point, chosen, children.pending, open_, children.prospects)
+        lower, upper = self._tightened(node.point.lower, node.point.upper, branch.placed)
+        point = self._solve(lower, upper, node.point, branch.bound)
+        return None if point is None else _Node(point, node.chosen + branch.placed, pending, inherited)
 
     def _completed(self, node: _Node, prospects: Prospects) -> tuple[int, ...] | None:
         """Placements, one for each stage, that the node's point satisfies as it is; None without."""
-        holding = prospects.among[prospects.holds]
+        if prospects.moves is None:
+            return None
+        holding = prospects.among[prospects.moves.none]
         if len(holding) < len(node.pending):
             return None
         return self._matched(node.chosen, node.pending, holding)
@@ -188,7 +189,7 @@ class Tree:
                 return complete
         return None
 
-    def _tightened(self, lower: Array, upper: Array, chosen: list[int]) -> tuple[Array, Array]:
+    def _tightened(self, lower: Array, upper: Array, chosen: Sequence[int]) -> tuple[Array, Array]:
         lower, upper = lower.copy(), upper.copy()
         for p in chosen:
             rows = self._placements.rows[:, p]
@@ -211,9 +212,6 @@ class Tree:
     def _improves(self, bound: float) -> bool:
         return bound < self._limit - _CLOSED * (self._limit + abs(self._standing.base))
 
-    def _push(self, node: _Node) -> None:
-        heappush(self._heap, (node.point.value, next(self._ticket), node, 0))
-
-    def _push_child(self, children: _Children, at: int) -> None:
-        if at < len(children.bounds) and self._improves(children.bounds[at]):
-            heappush(self._heap, (children.bounds[at], next(self._ticket), children, at))
+    def _wait(self, bound: float, node: _Node, fan: Fan | None = None) -> None:
+        if self._improves(bound):
+            heappush(self._heap, (bound, next(self._ticket), node, fan))

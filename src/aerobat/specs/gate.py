@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -38,7 +39,7 @@ class Gate:
             if not 0.0 < getattr(self, name) < np.inf:
                 raise SpecError(f"gate.{name} must be a positive length in metres, got {getattr(self, name)}")
 
-    @property
+    @cached_property
     def lateral(self) -> Array:
         """The unit vector across the opening, to the left of who passes upright, (3,)."""
         return unit(np.cross(self.up, self.normal), "gate.lateral")

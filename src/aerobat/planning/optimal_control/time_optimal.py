@@ -20,6 +20,7 @@ from aerobat.flatness import lateral_drag
 from aerobat.planning.drawing_in import SPARE, drawn_in
 from aerobat.planning.feasibility import RotorMargin, rotor_margin
 from aerobat.planning.miqp import Miqp
+from aerobat.planning.optimal_control.first_motion import first_motion
 from aerobat.planning.optimal_control.program import DERIVATIVES, Bounds, End, OptimalControl
 from aerobat.planning.proof import certificate_for
 from aerobat.planning.result import Attempt, PlacedStage, Plan
@@ -163,7 +164,7 @@ class _Run:
         """Solve, and draw bounds at nodes in by what is exceeded between nodes, until nothing is."""
         mesh, inside, barrier = self._control.mesh, _Inside(self._problem.limits), None
         spare = SPARE * float(np.max(self._vehicle.max_thrusts - self._vehicle.min_thrusts))
-        x = mesh.pack(self._guess.motion(mesh, self._vehicle, self._problem.yaw))
+        x = mesh.pack(first_motion(self._guess, mesh, self._vehicle, self._problem.yaw))
         for _ in range(ROUNDS):
             found = self._solved(x, inside, barrier)
             if found is None or found.certificate.certified:

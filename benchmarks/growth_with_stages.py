@@ -1,0 +1,110 @@
+"""How the built-in search grows with stages and gates: flips through gates in a row, crossing times free.
+
+    uv run python benchmarks/growth_with_stages.py [--runs N] [--most GATES] [--others SECONDS]
+
+`examples/two-flips.toml`, four ordered stages a gate, and the same with one gate and with more, each gate
+adding 20 intervals of 0.1 s, order 3; beside it the paper's flip in roll, N = 20, its gate at a fixed time.
+Then the two flips, once, on fewer and on more intervals. With --others, Gurobi and SCIP on 16 of them, so
+much time each.
+"""
+
+import argparse
+import os
+import statistics
+import time
+from dataclasses import replace
+from pathlib import Path
+
+os.environ["OPENBLAS_NUM_THREADS"] = "1"  # one thread for everyone, before NumPy starts its own
+
+import numpy as np
+
+from aerobat.errors import AerobatError
+from aerobat.planning.miqp import formulate
+from aerobat.programs import AssignmentProgram, solver
+from aerobat.specs import Staged, load_problem
+from aerobat.specs.stage import Quantity, Stage
+from paper_programs import paper_program
+
+EXAMPLE = Path(__file__).parents[1] / "examples" / "two-flips.toml"
+APART = 5.0  # [m] from gate to gate, along x
+PER_GATE = 4  # stages
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
+    parser.add_argument("--runs", type=int, default=5, help="runs of each, in turn (5)")
+    parser.add_argument("--most", type=int, default=3, metavar="GATES", help="gates in a row, at most (3)")
+    parser.add_argument("--others", type=float, metavar="SECONDS", help="time limit for Gurobi and SCIP")
+    options = parser.parse_args()
+    programs = {"paper's flip": paper_program("flip-roll")}
+    programs |= {f"{n} free": flips(n, 20 * n, 2.0 * n) for n in range(1, options.most + 1)}
+    seconds: dict[str, list[float]] = {name: [] for name in programs}
+    nodes: dict[str, int] = {}
+    for _ in range(options.runs + 1):
+        for name, program in programs.items():
+            began = time.perf_counter()
+            nodes[name] = solved(program)
+            seconds[name].append(time.perf_counter() - began)
+    medians = {name: statistics.median(times[1:]) for name, times in seconds.items()}  # after a warm-up
+    one = medians["paper's flip"]
+    print(f"{'gates':14}{'N':>5}{'stages':>8}{'QPs':>7}{'time':>12}{'ratio':>8}")
+    for name, program in programs.items():
+        n, stages = program.variables // 3, len(program.stages)
+        took = medians[name]
+        print(f"{name:14}{n:5}{stages:8}{nodes[name]:7}{1e3 * took:9.1f} ms{took / one:8.0f}")
+    for intervals in (20, 40, 80):
+        began = time.perf_counter()
+        relaxations = solved(flips(2, intervals, 4.0))
+        seconds_taken = time.perf_counter() - began
+        print(f"two flips in 4 s on N = {intervals}: {relaxations} QPs, {seconds_taken:.2f} s")
+    if options.others is not None:
+        others(options.others)
+
+
+def others(limit: float) -> None:
+    short = flips(2, 16, 4.0)
+    for name in ("builtin", "gurobi", "scip"):
+        try:
+            result = solver(name).solve(short, time_limit=limit)
+        except AerobatError as error:
+            print(f"{name}: {error}")
+            continue
+        print(f"two flips, N = 16, {name}: {result.status}, cost {result.cost:.9g}, {result.time:.3f} s")
+
+
+def flips(gates: int, intervals: int, duration: float) -> AssignmentProgram:
+    """So many flips, the first as the example's first, the last one leading to the example's goal, moved."""
+    example = load_problem(EXAMPLE)
+    if not isinstance(example.maneuver, Staged):
+        raise SystemExit(f"{EXAMPLE.name} is not a list of stages")
+    one = example.maneuver.stages[:PER_GATE]
+    stages = tuple(moved(stage, i * APART) for i in range(gates) for stage in one)
+    shift = np.array([(gates - 2) * APART, 0.0, 0.0])
+    goal = replace(example.goal, position=example.goal.position + shift)
+    limits = replace(example.limits, upper=example.limits.upper + np.maximum(shift, 0.0))
+    maneuver = replace(example.maneuver, stages=stages)
+    problem = replace(example, goal=goal, limits=limits, maneuver=maneuver)
+    return formulate(problem, 3, intervals).program(duration / intervals)
+
+
+def moved(stage: Stage, x: float) -> Stage:
+    conditions = (
+        replace(c, lower=c.lower + x * c.direction[0], upper=c.upper + x * c.direction[0])
+        if c.quantity is Quantity.POSITION
+        else c
+        for c in stage.conditions
+    )
+    return replace(stage, conditions=tuple(conditions))
+
+
+def solved(program: AssignmentProgram) -> int:
+    """QPs until the optimum is proven."""
+    result = solver().solve(program)
+    if result.status != "optimal":
+        raise SystemExit(f"the built-in search answered {result.status}")
+    return result.nodes
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,278 @@
+"""A loop in LLVM's intermediate language: all ticks of all vehicles, a few of them side by side.
+
+A value is one number for all vehicles or, where they differ, a vector with a lane for each of `width`
+vehicles. No operation is fused with another or reordered, and the exponential is spelt out, so that neither
+the machine, nor the width, nor the size of a batch changes a bit of what comes out.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from itertools import compress
+from math import factorial, inf
+from typing import Any
+
+from llvmlite import ir
+
+from aerobat.engines.loops import Loop
+from aerobat.engines.tracing import Operation
+
+NUMBER, LOGICAL, INTEGER = ir.DoubleType(), ir.IntType(1), ir.IntType(64)
+ARRAYS = ("shared parameters", "parameters", "shared inputs", "inputs", "outputs")
+COUNTS = ("lanes", "ticks", "every", "begin", "end")
+
+LOG2_E = 1.4426950408889634
+LN2 = (6.93147180369123816490e-01, 1.90821492927058770002e-10)  # the first ends in zeros: k · LN2[0] is exact
+ROUNDING = 6755399441055744.0  # 1.5 · 2^52 leaves no room for a fraction beside it
+NORMAL = (-708.0, 709.0)  # where the exponential is a normal number
+SERIES = [1.0 / factorial(k) for k in range(14)]  # of the exponential: enough for |x| ≤ ln 2 / 2
+BIAS, MANTISSA = 1023, 52  # of a float64's exponent; its bits below that
+
+
+@dataclass(frozen=True)
+class Layout:
+    """How many vehicles fly side by side, and which parameters and inputs are one number for all.
+
+    The function's arrays, all of float64: shared parameters (s,), parameters (p, lanes), shared inputs
+    (ticks, r), inputs (ticks, i, lanes), outputs (ticks told, o, lanes). Told are the first tick, each
+    `every` ticks after it, and the last. Its lanes `begin` to `end` fly, multiples of the width.
+    """
+
+    width: int
+    shared_parameters: tuple[bool, ...]
+    shared_inputs: tuple[bool, ...]
+    steady_inputs: tuple[bool, ...] = ()  # shared, and at most ticks the same as before
+
+
+def module(loop: Loop, layout: Layout) -> str:
+    """The text of a module whose function `loop` takes the addresses of ARRAYS, and COUNTS."""
+    whole = ir.Module("aerobat")
+    arguments = [ir.PointerType()] * len(ARRAYS) + [INTEGER] * len(COUNTS)
+    function = ir.Function(whole, ir.FunctionType(ir.VoidType(), arguments), "loop")
+    _Emitter(loop, layout, function).emit()
+    return str(whole)
+
+
+class _Emitter:
+    """Writes one function."""
+
+    def __init__(self, loop: Loop, layout: Layout, function: ir.Function) -> None:
+        self._loop, self._layout = loop, layout
+        self._given = dict(zip((*ARRAYS, *COUNTS), function.args, strict=True))
+        self._builder = ir.IRBuilder(function.append_basic_block())
+        self._values: dict[int, Any] = {}  # by their numbers in the trace
+        self._widened: dict[Any, Any] = {}
+
+    def emit(self) -> None:
+        """Blocks of lanes, one after another, each through all ticks."""
+        given, loop, layout = self._given, self._loop, self._layout
+        with self._counting(given["begin"], given["end"], layout.width) as lane:
+            self._load("parameters", loop.parameters, layout.shared_parameters, INTEGER(0), lane)
+            self._load("inputs", loop.inputs, layout.shared_inputs, INTEGER(0), lane)
+            self._compute(loop.before)
+            carry = [self._slot(value) for value in self._wide(loop.first)]
+            with self._counting(INTEGER(0), given["ticks"], 1) as tick:
+                self._tick(carry, tick, lane)
+        self._builder.ret_void()
+
+    def _tick(self, carry: Sequence[Any], tick: Any, lane: Any) -> None:
+        b, loop = self._builder, self._loop
+        for number, slot in zip(loop.carry, carry, strict=True):
+            self._values[number] = b.load(slot, typ=slot.allocated_type)
+        self._load("inputs", loop.inputs, self._layout.shared_inputs, tick, lane)
+        steady = list(compress(loop.inputs, self._layout.steady_inputs))
+        lasting = loop.lasting(steady)
+        self._refresh(steady, lasting, tick)
+        self._compute(number for number in loop.during if number not in lasting)
+        self._tell(tick, lane)
+        for value, slot in zip(self._wide(loop.following), carry, strict=True):
+            b.store(value, slot)
+
+    def _refresh(self, steady: Sequence[int], lasting: Sequence[int], tick: Any) -> None:
+        """The values that last from tick to tick, computed anew when a steady input changes."""
+        b, values = self._builder, self._values
+        columns = sum(self._layout.shared_inputs)
+        places = dict(
+            zip(compress(self._loop.inputs, self._layout.shared_inputs), range(columns), strict=True)
+        )
+        begins = changed = b.icmp_signed("==", tick, INTEGER(0))
+        before = b.select(begins, tick, b.sub(tick, INTEGER(1)))
+        for number in steady:
+            address = self._address("shared inputs", before, columns, places[number], None)
+            was = b.load(address, typ=INTEGER, align=8)  # bits: 0.0 and -0.0 are equal
+            changed = b.or_(changed, b.icmp_signed("!=", b.bitcast(values[number], INTEGER), was))
+        widened, slots = dict(self._widened), {}
+        with b.if_then(changed):
+            self._compute(lasting)
+            for number in lasting:
+                slots[number] = self._slot(values[number])
+        self._widened = widened  # what was widened in there is not known out here
+        for number, slot in slots.items():
+            values[number] = b.load(slot, typ=slot.allocated_type)
+
+    def _tell(self, tick: Any, lane: Any) -> None:
+        """Store the outputs, if it is time to."""
+        b, every = self._builder, self._given["every"]
+        outputs = [self._as_number(value) for value in self._wide(self._loop.outputs)]
+        last = b.icmp_signed("==", b.add(tick, INTEGER(1)), self._given["ticks"])
+        due = b.icmp_signed("==", b.srem(tick, every), INTEGER(0))
+        with b.if_then(b.or_(due, last)):
+            row = b.sdiv(b.add(tick, b.sub(every, INTEGER(1))), every)
+            for index, value in enumerate(outputs):
+                b.store(value, self._address("outputs", row, len(outputs), index, lane), align=8)
+
+    def _compute(self, numbers: Iterable[int]) -> None:
+        operations = self._loop.trace.operations
+        for number in numbers:
+            operation = operations[number]
+            if operation.name == "constant":
+                self._values[number] = _constant(operation.content)
+            elif operation.name != "input":
+                arguments = [self._values[i] for i in operation.arguments]
+                if any(map(_is_wide, arguments)):
+                    arguments = [self._widen(argument) for argument in arguments]
+                self._values[number] = self._apply(operation, arguments)
+
+    def _apply(self, operation: Operation, arguments: Sequence[Any]) -> Any:
+        """What an operation makes of arguments that are all wide, or none."""
+        b = self._builder
+        match operation.name, arguments:
+            case "add", (x, y):
+                return b.fadd(x, y)
+            case "subtract", (x, y):
+                return b.fsub(x, y)
+            case "multiply", (x, y):
+                return b.fmul(x, y)
+            case "divide", (x, y):
+                return b.fdiv(x, y)
+            case "negate", (x,):
+                return b.fneg(x)
+            case "sqrt", (x,):
+                return b.call(self._square_root(x.type), [x])
+            case "exp", (x,):
+                return self._exponential(x)
+            case "minimum", (x, y):
+                return b.select(b.fcmp_ordered("<", x, y), x, y)
+            case "maximum", (x, y):
+                return b.select(b.fcmp_ordered(">", x, y), x, y)
+            case "less", (x, y):
+                return b.fcmp_ordered("<", x, y)
+            case "less_equal", (x, y):
+                return b.fcmp_ordered("<=", x, y)
+            case "and", (x, y):
+                return b.and_(x, y)
+            case "select", (condition, x, y):
+                return b.select(condition, x, y)
+        raise NotImplementedError(operation.name)
+
+    def _square_root(self, type_: Any) -> Any:
+        suffix = f"v{type_.count}f64" if isinstance(type_, ir.VectorType) else "f64"
+        signature = ir.FunctionType(type_, [type_])
+        return self._builder.module.declare_intrinsic(f"llvm.sqrt.{suffix}", (), signature)
+
+    def _exponential(self, x: Any) -> Any:
+        """e^x = 2^k e^r with k the integer nearest to x / ln 2: a series for e^r, the bits of 2^k."""
+        b, like = self._builder, x.type
+
+        def c(value: float) -> Any:
+            return _filled(like, NUMBER(value))
+
+        low, high = b.fcmp_ordered("<", x, c(NORMAL[0])), b.fcmp_ordered(">", x, c(NORMAL[1]))
+        inside = b.select(low, c(NORMAL[0]), b.select(high, c(NORMAL[1]), x))
+        k = b.fsub(b.fadd(b.fmul(inside, c(LOG2_E)), c(ROUNDING)), c(ROUNDING))
+        r = b.fsub(b.fsub(inside, b.fmul(k, c(LN2[0]))), b.fmul(k, c(LN2[1])))
+        series = c(SERIES[-1])
+        for coefficient in SERIES[-2::-1]:
+            series = b.fadd(b.fmul(series, r), c(coefficient))
+        integers = _shaped(like, INTEGER)
+        biased = b.add(b.fptosi(k, integers), _filled(integers, INTEGER(BIAS)))
+        power = b.bitcast(b.shl(biased, _filled(integers, INTEGER(MANTISSA))), like)
+        return b.select(low, c(0.0), b.select(high, c(inf), b.fmul(series, power)))
+
+    def _load(self, name: str, numbers: Sequence[int], shared: Sequence[bool], tick: Any, lane: Any) -> None:
+        """The parameters, or one tick's inputs."""
+        counts = {True: sum(shared), False: len(shared) - sum(shared)}
+        indices = {True: 0, False: 0}
+        for number, same in zip(numbers, shared, strict=True):
+            array = f"shared {name}" if same else name
+            address = self._address(array, tick, counts[same], indices[same], None if same else lane)
+            type_ = NUMBER if same else self._wide_type(NUMBER)
+            self._values[number] = self._builder.load(address, typ=type_, align=8)
+            indices[same] += 1
+
+    def _address(self, array: str, row: Any, columns: int, column: int, lane: Any | None) -> Any:
+        """Of array[row, column], or of array[row, column, lane]."""
+        b = self._builder
+        place = b.add(b.mul(row, INTEGER(columns)), INTEGER(column))
+        if lane is not None:
+            place = b.add(b.mul(place, self._given["lanes"]), lane)
+        return b.gep(self._given[array], [place], source_etype=NUMBER)
+
+    @contextmanager
+    def _counting(self, begin: Any, end: Any, step: int) -> Iterator[Any]:
+        """What is written inside runs for begin, begin + step, ..., below end."""
+        b = self._builder
+        slot = self._slot(begin)
+        test, body, after = (b.append_basic_block() for _ in range(3))
+        b.branch(test)
+        b.position_at_end(test)
+        index = b.load(slot, typ=INTEGER)
+        b.cbranch(b.icmp_signed("<", index, end), body, after)
+        b.position_at_end(body)
+        yield index
+        b.store(b.add(index, INTEGER(step)), slot)
+        b.branch(test)
+        b.position_at_end(after)
+
+    def _slot(self, value: Any) -> Any:
+        """A place in memory that holds a value to begin with."""
+        with self._builder.goto_entry_block():
+            slot = self._builder.alloca(value.type)
+        self._builder.store(value, slot)
+        return slot
+
+    def _wide(self, numbers: Iterable[int]) -> list[Any]:
+        return [self._widen(self._values[number]) for number in numbers]
+
+    def _widen(self, value: Any) -> Any:
+        """A value with a lane for each vehicle."""
+        width, b = self._layout.width, self._builder
+        if _is_wide(value) or width == 1:
+            return value
+        wide = self._wide_type(value.type)
+        if isinstance(value, ir.Constant):
+            return _filled(wide, value)
+        if value not in self._widened:
+            lane = b.insert_element(ir.Constant(wide, ir.Undefined), value, INTEGER(0))
+            first = ir.Constant(ir.VectorType(ir.IntType(32), width), None)
+            self._widened[value] = b.shuffle_vector(lane, lane, first)
+        return self._widened[value]
+
+    def _wide_type(self, type_: Any) -> Any:
+        return ir.VectorType(type_, self._layout.width) if self._layout.width > 1 else type_
+
+    def _as_number(self, value: Any) -> Any:
+        """True and false as 1 and 0."""
+        if _shaped(value.type, LOGICAL) != value.type:
+            return value
+        return self._builder.uitofp(value, _shaped(value.type, NUMBER))
+
+
+def _constant(content: Any) -> Any:
+    return LOGICAL(int(content)) if isinstance(content, bool) else NUMBER(content)
+
+
+def _is_wide(value: Any) -> bool:
+    return isinstance(value.type, ir.VectorType)
+
+
+def _shaped(like: Any, type_: Any) -> Any:
+    """A type in as many lanes as another."""
+    return ir.VectorType(type_, like.count) if isinstance(like, ir.VectorType) else type_
+
+
+def _filled(type_: Any, constant: Any) -> Any:
+    """A constant in every lane of a type."""
+    return ir.Constant(type_, [constant] * type_.count) if isinstance(type_, ir.VectorType) else constant

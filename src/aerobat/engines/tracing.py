@@ -1,0 +1,196 @@
+"""A kernel run once on symbols: a flat list of operations, for engines that compile and for people to read.
+
+Values are numbered in the order of their computation. Constants are folded and common sub-expressions
+computed once, neither in a way that would change a result's bits. A kernel that branches on a value cannot
+be traced; the error names its line.
+"""
+
+from __future__ import annotations
+
+import math
+import operator
+import traceback
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+FUNCTIONS: dict[str, Callable[..., Any]] = {
+    "add": operator.add,
+    "subtract": operator.sub,
+    "multiply": operator.mul,
+    "divide": operator.truediv,
+    "negate": operator.neg,
+    "sqrt": math.sqrt,
+    "exp": math.exp,
+    "minimum": min,
+    "maximum": max,
+    "less": operator.lt,
+    "less_equal": operator.le,
+    "and": operator.and_,
+    "select": lambda condition, x, y: x if condition else y,
+}
+_COMMUTATIVE = {"add", "multiply", "and"}
+_LOGICAL = {"less", "less_equal", "and"}
+
+
+class BranchError(TypeError):
+    """A kernel asked a symbol for its value, which it does not have."""
+
+
+@dataclass(frozen=True)
+class Operation:
+    """One value of a trace: an input, a constant, or a function of earlier values."""
+
+    name: str  # input, constant, or one of FUNCTIONS
+    arguments: tuple[int, ...] = ()  # the numbers of earlier values
+    content: float | bool | str = ""  # a constant's value, an input's name
+    logical: bool = False  # true or false, not a number
+
+    def __str__(self) -> str:
+        """As it stands in a listing."""
+        if self.name in ("input", "constant"):
+            return f"{self.name} {self.content}"
+        return f"{self.name} {' '.join(f'%{i}' for i in self.arguments)}"
+
+
+@dataclass
+class Trace:
+    """What symbols write down when they are computed with."""
+
+    operations: list[Operation] = field(default_factory=list)
+    _numbers: dict[Any, int] = field(default_factory=dict)
+
+    def __str__(self) -> str:
+        """One line for each value."""
+        return "\n".join(f"%{i} = {operation}" for i, operation in enumerate(self.operations))
+
+    def input(self, name: str, logical: bool = False) -> Symbol:
+        """A new symbol."""
+        return Symbol(self, self._number(Operation("input", (), name, logical)))
+
+    def symbol(self, value: Any) -> Symbol:
+        """A symbol as it is; a number as a constant."""
+        if isinstance(value, Symbol):
+            return value
+        logical = isinstance(value, bool)
+        constant = Operation("constant", (), value if logical else float(value), logical)
+        return Symbol(self, self._number(constant))
+
+    def apply(self, name: str, *arguments: Any) -> Symbol:
+        """A function of symbols and numbers."""
+        numbers = tuple(self.symbol(argument).number for argument in arguments)
+        known = [self.operations[number] for number in numbers]
+        if all(operation.name == "constant" for operation in known):
+            return self.symbol(FUNCTIONS[name](*(operation.content for operation in known)))
+        unchanged = _unchanged(name, numbers, known)
+        if unchanged is not None:
+            return Symbol(self, unchanged)
+        if name in _COMMUTATIVE:
+            numbers = tuple(sorted(numbers))
+        logical = name in _LOGICAL or (name == "select" and known[1].logical)
+        return Symbol(self, self._number(Operation(name, numbers, "", logical)))
+
+    def needed(self, roots: Iterable[int]) -> set[int]:
+        """The values that others are computed from, these included."""
+        found: set[int] = set()
+        waiting = list(roots)
+        while waiting:
+            number = waiting.pop()
+            if number not in found:
+                found.add(number)
+                waiting.extend(self.operations[number].arguments)
+        return found
+
+    def _number(self, operation: Operation) -> int:
+        # 0.0 and -0.0 are equal, True and 1.0 too: the text tells them apart
+        key = (operation.name, operation.arguments, repr(operation.content))
+        number = self._numbers.setdefault(key, len(self.operations))
+        if number == len(self.operations):
+            self.operations.append(operation)
+        return number
+
+
+def _unchanged(name: str, numbers: Sequence[int], known: Sequence[Operation]) -> int | None:
+    """The argument that is the function's value whatever the others are, if there is one."""
+    match name, [operation.content if operation.name == "constant" else None for operation in known]:
+        case ("multiply" | "divide", [_, 1.0]) | ("and", [_, True]):
+            return numbers[0]
+        case ("multiply", [1.0, _]) | ("and", [True, _]) | ("select", [True, _, _]):
+            return numbers[1] if name == "select" or name in _COMMUTATIVE else None
+        case ("select", [False, _, _]):
+            return numbers[2]
+    if name == "select" and numbers[1] == numbers[2]:
+        return numbers[1]
+    return None
+
+
+def _binary(name: str, swapped: bool = False) -> Callable[[Symbol, Any], Symbol]:
+    def method(self: Symbol, other: Any) -> Symbol:
+        return self.trace.apply(name, other, self) if swapped else self.trace.apply(name, self, other)
+
+    return method
+
+
+class Symbol:
+    """A number to come: arithmetic with it is written down."""
+
+    __slots__ = ("number", "trace")
+    __array_ufunc__ = None  # NumPy leaves arithmetic with it to it
+
+    def __init__(self, trace: Trace, number: int) -> None:
+        self.trace, self.number = trace, number
+
+    __add__, __radd__ = _binary("add"), _binary("add", swapped=True)
+    __sub__, __rsub__ = _binary("subtract"), _binary("subtract", swapped=True)
+    __mul__, __rmul__ = _binary("multiply"), _binary("multiply", swapped=True)
+    __truediv__, __rtruediv__ = _binary("divide"), _binary("divide", swapped=True)
+    __and__, __rand__ = _binary("and"), _binary("and", swapped=True)
+    __lt__, __gt__ = _binary("less"), _binary("less", swapped=True)
+    __le__, __ge__ = _binary("less_equal"), _binary("less_equal", swapped=True)
+
+    def __neg__(self) -> Symbol:
+        return self.trace.apply("negate", self)
+
+    def __bool__(self) -> bool:
+        raise _branch()
+
+    def __float__(self) -> float:
+        raise _branch()
+
+    def __iter__(self) -> Iterator[Any]:
+        raise _branch()
+
+
+def _branch() -> BranchError:
+    line = traceback.extract_stack(limit=3)[0]
+    return BranchError(
+        f"{line.filename}, line {line.lineno}: `{line.line}` needs the value of a symbol; "
+        "kernels take ops.select where others branch"
+    )
+
+
+@dataclass(frozen=True)
+class TraceOps:
+    """Arithmetic of a trace's symbols."""
+
+    trace: Trace
+
+    def sqrt(self, x: Any) -> Symbol:
+        """The square root."""
+        return self.trace.apply("sqrt", x)
+
+    def exp(self, x: Any) -> Symbol:
+        """The exponential."""
+        return self.trace.apply("exp", x)
+
+    def minimum(self, x: Any, y: Any) -> Symbol:
+        """The smaller of two."""
+        return self.trace.apply("minimum", x, y)
+
+    def maximum(self, x: Any, y: Any) -> Symbol:
+        """The larger of two."""
+        return self.trace.apply("maximum", x, y)
+
+    def select(self, condition: Any, x: Any, y: Any) -> Symbol:
+        """`x` if the condition holds, else `y`."""
+        return self.trace.apply("select", condition, x, y)

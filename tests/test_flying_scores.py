@@ -1,0 +1,144 @@
+"""Flights that are scored as they are flown: the same scores, and nothing kept."""
+
+import subprocess
+import sys
+from dataclasses import asdict, replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from aerobat import so3
+from aerobat.errors import SpecError
+from aerobat.flying import fly
+from aerobat.metrics import Score, score
+from aerobat.planning import Plan, plan
+from aerobat.simulation import StateNoise
+from aerobat.specs import load_problem
+from aerobat.states import BodyState
+from aerobat.vehicle import Vehicle, load_vehicle
+
+EXACT = ("floats", "numpy", "compiled", "jax")  # in float64
+QUAD = load_vehicle("agile-quad")
+
+
+@pytest.fixture(scope="module")
+def flip() -> Plan:
+    return plan(load_problem("flip-roll"), vehicle=QUAD)
+
+
+def dispersed(count: int, spread: float = 0.03) -> list[Vehicle]:
+    rng = np.random.default_rng(1)
+
+    def alike(vehicle: Vehicle, k: int) -> Vehicle:
+        thrust, mass, inertia = 1.0 + spread * rng.normal(size=3)
+        rotors = tuple(replace(r, max_thrust=r.max_thrust * thrust) for r in vehicle.rotors)
+        return replace(
+            vehicle,
+            name=f"no. {k}",
+            mass=mass * vehicle.mass,
+            inertia=inertia * vehicle.inertia,
+            rotors=rotors,
+        )
+
+    return [alike(QUAD, k) for k in range(count)]
+
+
+def assert_same(a: Score, b: Score, tolerance: float) -> None:
+    for (name, x), y in zip(asdict(a).items(), asdict(b).values(), strict=True):
+        assert x == (
+            y if isinstance(y, str) or y is None else pytest.approx(y, abs=tolerance, rel=tolerance)
+        ), name
+
+
+@pytest.mark.parametrize("engine", EXACT)
+def test_scores_are_those_of_the_logged_flights(engine: str, flip: Plan) -> None:
+    vehicles, noise = dispersed(6), StateNoise.fused()
+    logged = fly(flip.trajectory, vehicles, model=QUAD, noise=noise, engine="floats")
+    scores = fly(flip.trajectory, vehicles, model=QUAD, noise=noise, engine=engine, scored=flip.problem)
+    for k, vehicle in enumerate(vehicles):
+        assert_same(scores[k], score(logged[k], flip.problem, vehicle), 1e-9)
+
+
+def test_a_flight_without_a_gate_is_scored_by_its_errors_alone() -> None:
+    line = plan(load_problem("line"), vehicle=QUAD)
+    (alone,) = fly(line.trajectory, QUAD, scored=line.problem)
+    assert_same(alone, score(fly(line.trajectory, QUAD), line.problem, QUAD), 1e-12)
+    assert alone.gate_miss_m is None
+
+
+@pytest.mark.parametrize("engine", EXACT)
+def test_a_vehicle_that_diverges_does_so_in_its_score_too(engine: str, flip: Plan) -> None:
+    at = np.zeros((2, 3))
+    upside_down = np.array([[1.0, 0, 0, 0], [0.0, 1, 0, 0]])
+    start = BodyState(at, np.array([[0.0, 0, 0], [0, 0, -40]]), upside_down, at)
+    flights = fly(flip.trajectory, QUAD, start=start)
+    scores = fly(flip.trajectory, QUAD, start=start, scored=flip.problem, engine=engine)
+    assert scores[1].outcome == flights[1].diverged
+    assert scores[1].max_position_error_m == pytest.approx(
+        score(flights[1], flip.problem).max_position_error_m, rel=1e-9
+    )
+    assert scores[0].outcome.startswith("through the gate")
+
+
+FLEET = """
+from test_flying_scores import QUAD, assert_same, dispersed, fly, load_problem, near, plan, started
+
+problem = load_problem("flip-roll")
+trajectory, fleet, starts = plan(problem, vehicle=QUAD).trajectory, dispersed(10_000), near(10_000, 0.1)
+scores = fly(trajectory, fleet, start=starts, model=QUAD, scored=problem)
+assert len(scores) == 10_000
+for k in range(0, 10_000, 500):
+    alone = fly(trajectory, fleet[k], start=started(starts, k), model=QUAD, scored=problem, engine="floats")
+    assert_same(scores[k], alone[0], 1e-9)
+print(next(line.split()[1] for line in open("/proc/self/status") if line.startswith("VmHWM")))
+"""
+
+
+def near(count: int, spread: float) -> BodyState:
+    """Starts about the origin."""
+    rng = np.random.default_rng(2)
+    position, velocity, turn, omega = spread * rng.normal(size=(4, count, 3))
+    return BodyState(position, velocity, so3.exp(turn), omega)
+
+
+def started(states: BodyState, k: int) -> BodyState:
+    return BodyState(**{name: values[k] for name, values in vars(states).items()})
+
+
+def test_ten_thousand_flights_take_little_memory_and_are_those_of_floats() -> None:
+    done = subprocess.run(
+        [sys.executable, "-c", FLEET], cwd=Path(__file__).parent, capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stderr
+    assert int(done.stdout) < 500_000  # kB, the libraries included
+
+
+def test_scores_do_not_depend_on_what_flies_beside(flip: Plan) -> None:
+    """To the last bit, whatever the size of the batch."""
+    vehicles = dispersed(21)
+    scores = fly(flip.trajectory, vehicles, model=QUAD, scored=flip.problem, engine="compiled")
+    for count in (1, 3, 16, 20):
+        assert (
+            fly(flip.trajectory, vehicles[:count], model=QUAD, scored=flip.problem, engine="compiled")
+            == (scores[:count])
+        )
+
+
+@pytest.mark.parametrize("engine", EXACT)
+def test_a_slower_log_is_part_of_the_full_one(engine: str, flip: Plan) -> None:
+    full = fly(flip.trajectory, [QUAD] * 2, engine=engine)
+    slow = fly(flip.trajectory, [QUAD] * 2, engine=engine, log_rate=62.5)
+    rows = np.searchsorted(full.times, slow.times)
+    np.testing.assert_array_equal(rows[:-1], 8 * np.arange(len(rows) - 1))
+    assert slow.times[-1] == full.times[-1]
+    np.testing.assert_array_equal(slow.states.position, full.states.position[:, rows])
+    np.testing.assert_array_equal(slow.setpoint.q_world_body, full.setpoint.q_world_body[rows])
+
+
+@pytest.mark.parametrize("log_rate", [0.0, -1.0, np.nan, 1000.0, 333.0])
+def test_a_log_that_does_not_fit_the_rate_is_refused(log_rate: float, flip: Plan) -> None:
+    with pytest.raises(SpecError, match=r"log_rate must be rate \(500\) over a whole number"):
+        fly(flip.trajectory, QUAD, log_rate=log_rate)
+    with pytest.raises(SpecError, match="a scored flight keeps no rows"):
+        fly(flip.trajectory, QUAD, log_rate=500.0, scored=flip.problem)
