@@ -279,3 +279,13 @@ def test_drawing_never_imports_pyplot(tmp_path):
         "assert 'matplotlib.pyplot' not in sys.modules"
     )
     subprocess.run([sys.executable, "-c", code], check=True, cwd=tmp_path)
+
+
+def test_stages_are_numbered_where_their_names_have_no_room(monkeypatch):
+    quad = ab.load_vehicle("agile-quad")
+    found = ab.plan(ab.load_problem("examples/two-flips.toml"), ab.Miqp(order=4), quad)
+    figure = report_figure(found, quad, ab.fly(found.trajectory, quad))
+    shown = {text.get_text() for text in panel_of(figure, "position error").texts}
+    assert {str(k) for k in range(1, 9)} <= shown
+    assert not {stage.name for stage in found.stages} & shown
+    require_legible(figure, monkeypatch)

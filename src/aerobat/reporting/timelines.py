@@ -100,7 +100,10 @@ def draw_series(
 
 
 def mark_stages(axes: Axes, stages: Sequence[PlacedStage], duration: float, named: bool) -> None:
-    """Upright lines at the stages' times, the gate's in its colour, with names above the axes if asked."""
+    """Upright lines at the stages' times, the gate's in its colour, with names above the axes if asked.
+
+    Where there is no room for all names, stages are numbered in their order.
+    """
     from matplotlib.collections import LineCollection
 
     axes.set_xlim(0.0, duration)
@@ -121,11 +124,14 @@ def mark_stages(axes: Axes, stages: Sequence[PlacedStage], duration: float, name
     if not named:
         return
     width = size_of(axes)[0]
-    pitch = max(NAME_WIDTH, LETTER * max(len(stage.name) for stage in stages))
+    names = [stage.name for stage in stages]
+    pitch = max(NAME_WIDTH, LETTER * max(map(len, names)))
+    if pitch * (len(names) - 1) > width:
+        names, pitch = [str(k) for k in range(1, len(names) + 1)], NAME_WIDTH
     places = spread_out(times / duration * width, pitch, 0.0, width) / width * duration
-    for stage, place in zip(stages, places, strict=True):
+    for stage, name, place in zip(stages, names, places, strict=True):
         axes.annotate(
-            stage.name, (stage.time, 1.0), (place, 1.0 + 0.1 / size_of(axes)[1]), size=SMALL, ha="center",
+            name, (stage.time, 1.0), (place, 1.0 + 0.1 / size_of(axes)[1]), size=SMALL, ha="center",
             color=INK if stage.gate is not None else MUTED, xycoords=axes.get_xaxis_transform(),
             textcoords=axes.get_xaxis_transform(), va="bottom",
             arrowprops={"arrowstyle": "-", "color": FAINT, "linewidth": 0.7, "shrinkA": 0.0, "shrinkB": 0.0},
