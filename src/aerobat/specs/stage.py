@@ -50,6 +50,15 @@ class Condition:
                 f"condition.lower must not exceed condition.upper, got {self.lower} and {self.upper}"
             )
 
+    def kinematic_bounds(self, gravity: float) -> tuple[float, float]:
+        """Bounds on the derivative of position itself: specific thrust less gravity is the acceleration."""
+        weight = self.weight(gravity)
+        return self.lower - weight, self.upper - weight
+
+    def weight(self, gravity: float) -> float:
+        """What gravity [m/s²] adds to the derivative of position along the direction to make the quantity."""
+        return gravity * float(self.direction[2]) if self.quantity is Quantity.SPECIFIC_THRUST else 0.0
+
     @property
     def least_thrust(self) -> float:
         """The least specific thrust [m/s²] that satisfies the condition; zero when it asks none."""

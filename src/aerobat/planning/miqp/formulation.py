@@ -19,7 +19,7 @@ from aerobat.errors import SpecError
 from aerobat.planning.miqp.integrator import INPUTS, IntegratorChain
 from aerobat.programs import AssignmentProgram, SlottedStage
 from aerobat.specs.problem import DERIVATIVES, Limits, Problem
-from aerobat.specs.stage import Condition, Course, Quantity, Stage
+from aerobat.specs.stage import Condition, Course, Stage
 
 Indices = NDArray[np.intp]
 AXES = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
@@ -134,13 +134,7 @@ class Formulation:
     def _path_rows(self) -> Iterable[tuple[Row, float, float]]:
         for condition in self.course.always:
             for interval in range(self.chain.intervals - 1):
-                yield _row(condition, interval), *self._kinematic_bounds(condition)
-
-    def _kinematic_bounds(self, condition: Condition) -> tuple[float, float]:
-        """Bounds on the derivative itself: the specific thrust less gravity is the acceleration."""
-        thrust = condition.quantity is Quantity.SPECIFIC_THRUST
-        weight = self.gravity * float(condition.direction[2]) if thrust else 0.0
-        return condition.lower - weight, condition.upper - weight
+                yield _row(condition, interval), *condition.kinematic_bounds(self.gravity)
 
     @cached_property
     def _derivatives(self) -> Array:
@@ -192,7 +186,7 @@ class Formulation:
 
     def _assigned(self, i: int, scale: Array, free: Array) -> SlottedStage:
         stage, rows = self.course.stages[i], self._stage_rows[i]
-        si = np.array([self._kinematic_bounds(c) for c in stage.conditions]).reshape(-1, 2)
+        si = np.array([c.kinematic_bounds(self.gravity) for c in stage.conditions]).reshape(-1, 2)
         lower, upper = (si[:, side] * scale[rows] - free[rows] for side in (0, 1))
         return SlottedStage(stage.name, tuple(self._slots(stage)), rows, lower, upper)
 

@@ -24,7 +24,7 @@ from aerobat.planning.optimal_control.spinless_body import (
 )
 from aerobat.programs.nonlinear import NonlinearProgram, symbolics
 from aerobat.specs.problem import Limits
-from aerobat.specs.stage import Condition, Quantity
+from aerobat.specs.stage import Condition
 from aerobat.vehicle import Vehicle
 
 SHORTEST_PHASE = 1e-3  # [s]
@@ -125,11 +125,9 @@ class OptimalControl:
                 self._hold(rows, condition, values)
 
     def _hold(self, rows: _Rows, condition: Condition, values: Any) -> None:
-        """A condition on values (3, m) of its derivative: specific thrust less gravity is acceleration."""
-        thrust = condition.quantity is Quantity.SPECIFIC_THRUST
-        weight = self.gravity * float(condition.direction[2]) if thrust else 0.0
+        """A condition on values (3, m) of its derivative."""
         along = symbolics().DM(condition.direction).T @ values
-        rows.hold(along, condition.lower - weight, condition.upper - weight)
+        rows.hold(along, *condition.kinematic_bounds(self.gravity))
 
     def _around(self, collocation: Collocation, derivative: int, node: int) -> Iterator[Any]:
         """A derivative up to acceleration at an inner node, (3, 1); on both sides where it may jump."""

@@ -9,7 +9,7 @@ import numpy as np
 
 from aerobat.arrays import Array
 from aerobat.specs.problem import DERIVATIVES, Problem
-from aerobat.specs.stage import Condition, Course, Quantity
+from aerobat.specs.stage import Condition, Course
 from aerobat.trajectory import Trajectory
 
 
@@ -24,15 +24,9 @@ class Bound:
 
     @classmethod
     def of(cls, condition: Condition, gravity: float) -> Bound:
-        """A condition's bound: specific thrust less gravity is the acceleration."""
-        weight = gravity * float(condition.direction[2])
-        offset = weight if condition.quantity is Quantity.SPECIFIC_THRUST else 0.0
-        return cls(
-            condition.quantity.derivative,
-            condition.direction,
-            condition.lower - offset,
-            condition.upper - offset,
-        )
+        """What a condition asks of its derivative."""
+        bounds = condition.kinematic_bounds(gravity)
+        return cls(condition.quantity.derivative, condition.direction, *bounds)
 
     @property
     def scale(self) -> float:

@@ -10,7 +10,7 @@ import numpy as np
 
 from aerobat.arrays import Array
 from aerobat.specs.problem import Problem
-from aerobat.specs.stage import Condition, Course, Quantity, Stage
+from aerobat.specs.stage import Course, Stage
 from aerobat.specs.waypoints import Waypoints
 from aerobat.trajectory import Trajectory
 
@@ -52,19 +52,14 @@ def unmet(course: Course, trajectory: Trajectory, gravity: float) -> str | None:
     values = [trajectory.evaluate(trajectory.knots[1:-1], k) for k in range(3)]
     for stage, flat in zip(course.stages, np.stack(values, axis=1), strict=True):
         for condition in stage.conditions:
-            value = float(condition.direction @ _quantity(condition, flat, gravity))
+            derivative = flat[condition.quantity.derivative]
+            value = float(condition.direction @ derivative) + condition.weight(gravity)
             if not condition.lower - MISSED <= value <= condition.upper + MISSED:
                 return (
                     f"the stage '{stage.name}' asks {condition.quantity.value} between {condition.lower:.4g} "
                     f"and {condition.upper:.4g}, the closed form gives {value:.4g}"
                 )
     return None
-
-
-def _quantity(condition: Condition, flat: Array, gravity: float) -> Array:
-    value = flat[condition.quantity.derivative]
-    weight = gravity if condition.quantity is Quantity.SPECIFIC_THRUST else 0.0
-    return np.asarray(value + np.array([0.0, 0.0, weight]))
 
 
 def _fixed(stage: Stage, derivative: int, gravity: float) -> Array:
@@ -88,6 +83,4 @@ def _equalities(stage: Stage, derivative: int, gravity: float) -> Iterator[tuple
             value = float(np.clip(hover, condition.lower, condition.upper))
         elif condition.lower < condition.upper:
             continue
-        if condition.quantity is Quantity.SPECIFIC_THRUST:
-            value -= gravity * float(condition.direction[2])
-        yield condition.direction, value
+        yield condition.direction, value - condition.weight(gravity)
