@@ -16,7 +16,7 @@ os.environ["OPENBLAS_NUM_THREADS"] = "1"  # one thread for everyone, before NumP
 import numpy as np
 
 from aerobat.errors import AerobatError
-from aerobat.programs import AssignmentProgram, solver
+from aerobat.optimization import AssignmentProgram, solver
 from paper_programs import paper_program
 
 INTERVALS = (20, 40, 80, 160)

@@ -20,10 +20,10 @@ os.environ["OPENBLAS_NUM_THREADS"] = "1"  # one thread for everyone, before NumP
 import numpy as np
 
 from aerobat.errors import AerobatError
+from aerobat.optimization import AssignmentProgram, solver
 from aerobat.planning.miqp import formulate
-from aerobat.programs import AssignmentProgram, solver
-from aerobat.specs import Staged, load_problem
-from aerobat.specs.stage import Quantity, Stage
+from aerobat.problem import Staged, load_problem
+from aerobat.problem.stage import Quantity, Stage
 from paper_programs import paper_program
 
 EXAMPLE = Path(__file__).parents[1] / "examples" / "two-flips.toml"

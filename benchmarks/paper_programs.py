@@ -1,8 +1,8 @@
 """The programs that the benchmarks solve: the paper's maneuvers with its numbers."""
 
+from aerobat.optimization import AssignmentProgram
 from aerobat.planning.miqp import formulate
-from aerobat.programs import AssignmentProgram
-from aerobat.specs import load_problem
+from aerobat.problem import load_problem
 
 FLIPS = ("flip-roll", "flip-pitch", "flip-roll-translation")
 

@@ -16,7 +16,7 @@ import time
 
 os.environ["OPENBLAS_NUM_THREADS"] = "1"  # one thread for everyone, before NumPy starts its own
 
-from aerobat.programs import AssignmentProgram, solver
+from aerobat.optimization import AssignmentProgram, solver
 from paper_programs import FLIPS, paper_program
 
 

@@ -18,9 +18,9 @@ import numpy as np
 
 from aerobat.errors import Infeasible
 from aerobat.planning import MinSnap, Miqp, Plan, Planner, Stretch, plan
-from aerobat.planning.optimal_control.time_optimal import TimeOptimal
-from aerobat.planning.polynomials.free_knots import FreeKnots
-from aerobat.specs import Waypoint, Waypoints, load_problem
+from aerobat.planning.polynomial.free_knots import FreeKnots
+from aerobat.planning.time_optimal.time_optimal import TimeOptimal
+from aerobat.problem import Waypoint, Waypoints, load_problem
 from aerobat.vehicle import Vehicle, load_vehicle
 
 # rotors up to [N], inertia [kg·m²], anchor [s]

@@ -10,7 +10,7 @@ from math import inf
 
 import numpy as np
 
-from aerobat.programs import AssignmentProgram, SlottedStage
+from aerobat.optimization import AssignmentProgram, SlottedStage
 
 GRAVITY = 9.81
 X, Y, Z = range(3)

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from aerobat.certification import Certificate, Envelope, Finding, Side, Verdict, certify
 from aerobat.errors import SpecError
 from aerobat.planning import plan
-from aerobat.specs import Limits, load_problem
+from aerobat.problem import Limits, load_problem
 from aerobat.trajectory import Trajectory
 from aerobat.trajectory.minimum_effort import minimum_effort
 from aerobat.vehicle import load_vehicle

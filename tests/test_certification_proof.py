@@ -10,10 +10,10 @@ import pytest
 from aerobat import so3
 from aerobat.certification import Certificate, Envelope, Side, Verdict, certify
 from aerobat.errors import SpecError
-from aerobat.exporting import read_csv, write_csv
 from aerobat.flatness import reference
+from aerobat.interchange import read_csv, write_csv
 from aerobat.planning import Miqp, plan, rotor_margin
-from aerobat.specs import Limits, load_problem
+from aerobat.problem import Limits, load_problem
 from aerobat.trajectory import Trajectory
 from aerobat.trajectory.minimum_effort import minimum_effort
 from aerobat.vehicle import load_vehicle

@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 
 from aerobat import cli
-from aerobat.exporting.csv import read_csv
 from aerobat.flight import load_flight
-from aerobat.specs import problem_names
+from aerobat.interchange.csv import read_csv
+from aerobat.problem import problem_names
 from aerobat.vehicle import vehicle_names
 
 PLAN_KEYS = {

@@ -215,7 +215,7 @@ def test_a_malformed_vehicle_is_refused_by_its_field(fault: str, capsys) -> None
 @pytest.mark.parametrize("fault", PROBLEM_FAULTS)
 def test_a_malformed_problem_is_refused_by_its_field(fault: str, capsys) -> None:
     change, field = PROBLEM_FAULTS[fault]
-    document = copy.deepcopy(preset("specs", "flip-roll"))
+    document = copy.deepcopy(preset("problem", "flip-roll"))
     change(document)
     Path("problem.toml").write_text(tomli_w.dumps(document))
     assert field in refused(["fly", "problem.toml", "--order", "3"], capsys)
@@ -228,12 +228,12 @@ def test_an_argument_that_makes_no_sense_is_refused_by_its_name(fault: str, caps
 
 
 @pytest.mark.parametrize("kept", [0.1, 0.3, 0.5])
-@pytest.mark.parametrize("room", ["vehicle", "specs"])
+@pytest.mark.parametrize("room", ["vehicle", "problem"])
 def test_a_truncated_file_is_refused(room: str, kept: float, capsys) -> None:
-    name = {"vehicle": "agile-quad", "specs": "flip-roll"}[room]
+    name = {"vehicle": "agile-quad", "problem": "flip-roll"}[room]
     whole = (files(f"aerobat.{room}") / "presets" / f"{name}.toml").read_bytes()
     Path("half.toml").write_bytes(whole[: int(kept * len(whole))])
-    arguments = ["plan", "half.toml"] if room == "specs" else ["plan", "line", "--vehicle", "half.toml"]
+    arguments = ["plan", "half.toml"] if room == "problem" else ["plan", "line", "--vehicle", "half.toml"]
     assert "half.toml" in refused(arguments, capsys)
 
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from aerobat import cli
-from aerobat.exporting.csv import write_csv
+from aerobat.interchange.csv import write_csv
 from aerobat.trajectory import load_trajectory
 
 ROW_KEYS = {

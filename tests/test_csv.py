@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from aerobat.errors import SpecError
-from aerobat.exporting import read_csv, write_csv
+from aerobat.interchange import read_csv, write_csv
 from aerobat.trajectory import Trajectory
 
 seeds = st.integers(0, 2**32 - 1)

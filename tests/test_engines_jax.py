@@ -9,7 +9,7 @@ from aerobat.engines import FLOATS
 from aerobat.engines.engine import Engine, told
 from aerobat.flying import fly
 from aerobat.planning import Miqp, plan
-from aerobat.specs import load_problem
+from aerobat.problem import load_problem
 from aerobat.vehicle import load_vehicle
 
 jax = pytest.importorskip("jax")

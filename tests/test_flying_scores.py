@@ -13,8 +13,8 @@ from aerobat.errors import SpecError
 from aerobat.flying import fly
 from aerobat.metrics import Score, score
 from aerobat.planning import Plan, plan
+from aerobat.problem import load_problem
 from aerobat.simulation import StateNoise
-from aerobat.specs import load_problem
 from aerobat.states import BodyState
 from aerobat.vehicle import Vehicle, load_vehicle
 

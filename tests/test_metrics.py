@@ -10,7 +10,7 @@ from aerobat.errors import SpecError
 from aerobat.flight import Flight
 from aerobat.flying import fly
 from aerobat.metrics import gate_passage, score
-from aerobat.specs import Problem, rest, tilted_gate
+from aerobat.problem import Problem, rest, tilted_gate
 from aerobat.states import BodyState
 from aerobat.trajectory import Trajectory
 from aerobat.vehicle import Vehicle, load_vehicle

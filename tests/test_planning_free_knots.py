@@ -7,11 +7,11 @@ import pytest
 
 from aerobat.errors import SpecError
 from aerobat.planning import MinSnap, Plan
-from aerobat.planning.polynomials.free_knots import FreeKnots
-from aerobat.planning.polynomials.knot_samples import cut
-from aerobat.planning.polynomials.min_snap import Stretch
+from aerobat.planning.polynomial.free_knots import FreeKnots
+from aerobat.planning.polynomial.knot_samples import cut
+from aerobat.planning.polynomial.min_snap import Stretch
 from aerobat.planning.proof import certificate_for
-from aerobat.specs import EndState, Limits, Problem, Waypoint, Waypoints, load_problem
+from aerobat.problem import EndState, Limits, Problem, Waypoint, Waypoints, load_problem
 from aerobat.vehicle import Vehicle, load_vehicle
 
 pytest.importorskip("casadi")

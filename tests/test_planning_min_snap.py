@@ -8,7 +8,7 @@ import pytest
 from aerobat.errors import Infeasible, SpecError
 from aerobat.flatness import reference
 from aerobat.planning import MinSnap, Plan, Stretch, plan
-from aerobat.specs import HalfFlip, Passing, Problem, Waypoint, Waypoints, load_problem, rest
+from aerobat.problem import HalfFlip, Passing, Problem, Waypoint, Waypoints, load_problem, rest
 from aerobat.vehicle import load_vehicle
 
 

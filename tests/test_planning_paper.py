@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from aerobat.planning import Grid, Miqp, Plan, plan
-from aerobat.specs import Limits, load_problem
+from aerobat.problem import Limits, load_problem
 
 AT_100_MS = {"flip-roll": 273196.1243, "flip-pitch": 273196.1243, "flip-roll-translation": 280399.0114}
 HALF_FLIP = 14713.1747

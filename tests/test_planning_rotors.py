@@ -8,7 +8,7 @@ import pytest
 
 from aerobat.errors import Infeasible, SpecError
 from aerobat.planning import Bisection, Miqp, RotorMargin, plan, rotor_margin
-from aerobat.specs import EndState, Flip, HalfFlip, Limits, Problem, load_problem, rest, tilted_gate
+from aerobat.problem import EndState, Flip, HalfFlip, Limits, Problem, load_problem, rest, tilted_gate
 from aerobat.vehicle import Vehicle, load_vehicle
 
 MANEUVERS = ["flip-roll", "flip-roll-translation", "flip-pitch", "half-flip", "line"]

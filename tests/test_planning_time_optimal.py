@@ -9,8 +9,8 @@ import pytest
 from aerobat.errors import BackendMissing, Infeasible, SpecError
 from aerobat.flying import fly
 from aerobat.planning import Plan
-from aerobat.planning.optimal_control.time_optimal import TimeOptimal
-from aerobat.specs import EndState, Limits, Line, Problem, Quantity, Waypoint, Waypoints, load_problem, rest
+from aerobat.planning.time_optimal.time_optimal import TimeOptimal
+from aerobat.problem import EndState, Limits, Line, Problem, Quantity, Waypoint, Waypoints, load_problem, rest
 from aerobat.vehicle import Vehicle, load_vehicle
 from rigid_body_replay import replayed
 
@@ -183,7 +183,7 @@ def test_a_search_that_ends_with_nothing_says_where_and_what_to_change():
 def test_without_casadi_the_remedy_is_the_command_that_installs_it(monkeypatch):
     find = importlib.util.find_spec
     monkeypatch.setattr(
-        "aerobat.programs.nonlinear.find_spec", lambda name: None if name == "casadi" else find(name)
+        "aerobat.optimization.nonlinear.find_spec", lambda name: None if name == "casadi" else find(name)
     )
     with pytest.raises(BackendMissing, match=r'pip install "aerobat\[casadi\]"'):
         TimeOptimal().plan(load_problem("line"), QUAD)

@@ -9,10 +9,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from aerobat.optimization import AssignmentProgram, solver
 from aerobat.planning.miqp import formulate
-from aerobat.programs import AssignmentProgram, solver
-from aerobat.specs import Staged, load_problem
-from aerobat.specs.stage import Condition, Quantity
+from aerobat.problem import Staged, load_problem
+from aerobat.problem.stage import Condition, Quantity
 from aerobat.trajectory import Trajectory
 
 EXAMPLE = Path(__file__).parents[1] / "examples" / "two-flips.toml"

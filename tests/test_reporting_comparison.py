@@ -9,8 +9,8 @@ from matplotlib.collections import PolyCollection
 from rich.console import Console
 
 import aerobat as ab
-from aerobat.comparison import Comparison, Entry
 from aerobat.reporting.comparison import comparison_rows, comparison_table
+from aerobat.studies.compare import Comparison, Entry
 from reporting_cases import flown, planned, require_legible
 
 pytestmark = pytest.mark.filterwarnings("error")  # drawing warns of nothing

@@ -8,6 +8,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from aerobat import so3
+from aerobat.problem import tilted_gate
 from aerobat.reporting.box import draw_room, room_around
 from aerobat.reporting.camera import Camera, best_view
 from aerobat.reporting.glyphs import (
@@ -20,7 +21,6 @@ from aerobat.reporting.glyphs import (
 )
 from aerobat.reporting.scene import Shape, paint
 from aerobat.reporting.spreading import spread_out
-from aerobat.specs import tilted_gate
 from aerobat.vehicle import load_vehicle, vehicle_names
 
 angles = st.floats(-np.pi, np.pi)

@@ -15,9 +15,9 @@ from aerobat.errors import SpecError
 from aerobat.flying import fly
 from aerobat.kernels.controller import Controller
 from aerobat.metrics import attitude_error, position_error
+from aerobat.problem import load_problem
 from aerobat.sensitivity import Sensitivity, gradient
 from aerobat.simulation import StateNoise
-from aerobat.specs import load_problem
 from aerobat.states import BodyState
 from aerobat.vehicle import Vehicle, load_vehicle
 from test_flying_batches import loops, near, one

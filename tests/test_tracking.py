@@ -10,8 +10,8 @@ from aerobat.flying import fly
 from aerobat.kernels.controller import Controller
 from aerobat.metrics import score
 from aerobat.planning import Miqp, Plan, plan
+from aerobat.problem import Problem, load_problem
 from aerobat.simulation import StateNoise
-from aerobat.specs import Problem, load_problem
 from aerobat.vehicle import Vehicle, load_vehicle
 
 MANEUVERS = ["flip-roll", "flip-roll-translation", "flip-pitch", "half-flip", "line"]

@@ -1,11 +1,10 @@
 from .certification import Certificate, Envelope, certify
-from .comparison import Comparison, compare
 from .errors import AerobatError, BackendMissing, Infeasible, SpecError
-from .exporting.csv import read_csv, write_csv
-from .exporting.reading import read_trajectory
 from .flatness import Reference, reference
 from .flight import Flight, load_flight
 from .flying import fly
+from .interchange.csv import read_csv, write_csv
+from .interchange.read import read_trajectory
 from .kernels.controller import Controller
 from .metrics import Score, score
 from .planning import (
@@ -21,12 +20,7 @@ from .planning import (
     plan,
     rotor_margin,
 )
-from .reporting.comparison import comparison_figure
-from .reporting.figures import draw
-from .reporting.tracking_page import tracking_figure
-from .sensitivity import Gradient, Sensitivity, gradient
-from .simulation import StateNoise
-from .specs import (
+from .problem import (
     Condition,
     EndState,
     Flip,
@@ -47,7 +41,13 @@ from .specs import (
     tilted_gate,
     write_problem,
 )
+from .reporting.comparison import comparison_figure
+from .reporting.figures import draw
+from .reporting.tracking_page import tracking_figure
+from .sensitivity import Gradient, Sensitivity, gradient
+from .simulation import StateNoise
 from .states import BodyState, FlatState, Setpoint, Wrench
+from .studies.compare import Comparison, compare
 from .trajectory import Rule, Trajectory, load_trajectory, minimum_effort, save_trajectory
 from .vehicle import Rotor, Vehicle, load_vehicle, vehicle_names
 

@@ -25,9 +25,9 @@ from aerobat.kernels.position_loop import Ahead, Target
 from aerobat.kernels.rigid_body import Body
 from aerobat.kernels.tally import Asked, Bounds, Tally
 from aerobat.metrics import passage_window
+from aerobat.problem.gate import Gate
 from aerobat.simulation import StateNoise, plant
 from aerobat.simulation.noise import observed
-from aerobat.specs.gate import Gate
 from aerobat.states import BodyState, Setpoint
 from aerobat.trajectory import Trajectory
 from aerobat.vehicle import Vehicle

@@ -18,8 +18,8 @@ from aerobat.errors import SpecError
 from aerobat.flight import COMPLETE, DIVERGED, Flight, divergence, rows_of
 from aerobat.kernels.controller import Controller
 from aerobat.metrics import Score, tally_score
+from aerobat.problem.problem import Problem
 from aerobat.simulation import StateNoise
-from aerobat.specs.problem import Problem
 from aerobat.states import BodyState, Setpoint
 from aerobat.trajectory import Trajectory
 from aerobat.vehicle import Vehicle

@@ -12,8 +12,8 @@ from aerobat.arrays import Array
 from aerobat.errors import SpecError
 from aerobat.flight import COMPLETE, Flight, divergence
 from aerobat.kernels.tally import Tally
-from aerobat.specs.gate import Gate
-from aerobat.specs.problem import Problem
+from aerobat.problem.gate import Gate
+from aerobat.problem.problem import Problem
 from aerobat.vehicle import Vehicle
 
 PASSAGE_WINDOW = 0.25  # [s] around the planned passage in which the flown one is looked for

@@ -8,7 +8,7 @@ import numpy as np
 
 from aerobat.arrays import frozen_bounds
 from aerobat.errors import SpecError
-from aerobat.specs import Limits
+from aerobat.problem import Limits
 
 
 @dataclass(frozen=True)

@@ -16,7 +16,7 @@ from aerobat.certification.certificate import Finding, Side
 from aerobat.certification.envelope import Envelope
 from aerobat.certification.motion import Pieces
 from aerobat.certification.questions import Interpolated, Question, both_sides, root
-from aerobat.specs.problem import DERIVATIVES, UNITS, Limits
+from aerobat.problem.problem import DERIVATIVES, UNITS, Limits
 from aerobat.trajectory import Trajectory, polynomial
 
 AXES = "xyz"

@@ -98,7 +98,7 @@ def check(plan: Path, options: Checked = CheckOptions()) -> None:
         `aerobat plan` or `aerobat fly` wrote.
     """
     from aerobat.certification import Envelope, certify
-    from aerobat.exporting import read_trajectory
+    from aerobat.interchange import read_trajectory
     from aerobat.reporting.report import to_json
     from aerobat.reporting.tables import certificate_table, show
     from aerobat.vehicle import load_vehicle
@@ -131,12 +131,12 @@ def compare(problem: str, options: Tasked = TaskOptions()) -> None:
     problem
         A name that `aerobat problems` lists, or a problem's TOML file.
     """
-    from aerobat.comparison import compare as compare_planners
     from aerobat.reporting.comparison import comparison_figure, comparison_rows, comparison_table
     from aerobat.reporting.figures import png
     from aerobat.reporting.report import to_json
     from aerobat.reporting.tables import show
     from aerobat.storage import write_whole
+    from aerobat.studies.compare import compare as compare_planners
 
     task, vehicle = read_task(problem, options)
     with planning_progress() as progress:
@@ -165,8 +165,8 @@ def vehicles() -> None:
 @app.command
 def problems() -> None:
     """List the built-in problems."""
+    from aerobat.problem import load_problem, problem_names
     from aerobat.reporting.tables import problems_table, show
-    from aerobat.specs import load_problem, problem_names
 
     show(problems_table(load_problem(name) for name in problem_names()))
 
@@ -204,7 +204,7 @@ def _finish(
     score: Score | None = None,
 ) -> None:
     """Write what was made, then say what it is."""
-    from aerobat.exporting.csv import write_csv
+    from aerobat.interchange.csv import write_csv
     from aerobat.reporting.report import report, to_json
     from aerobat.storage import write_whole
     from aerobat.trajectory import save_trajectory

@@ -14,7 +14,7 @@ from aerobat.errors import SpecError
 
 if TYPE_CHECKING:
     from aerobat.planning import Attempt, Plan, Planner
-    from aerobat.specs import Problem
+    from aerobat.problem import Problem
     from aerobat.vehicle import Vehicle
 
 # which planner takes which option, by its name there
@@ -41,7 +41,7 @@ FLOWN_RESERVE = 0.03  # of each rotor's range, where a time-optimal plan is to b
 
 def read_task(name: str, options: TaskOptions, paper: bool = False) -> tuple[Problem, Vehicle]:
     """The problem and the vehicle that a command names."""
-    from aerobat.specs import HalfFlip, load_problem
+    from aerobat.problem import HalfFlip, load_problem
     from aerobat.vehicle import load_vehicle
 
     problem = load_problem(name)

@@ -1,12 +1,12 @@
 from .feasibility import RotorMargin, rotor_margin
 from .miqp import Miqp
-from .optimal_control.time_optimal import TimeOptimal
 from .planner import Planner, plan
-from .polynomials.free_knots import FreeKnots
-from .polynomials.min_snap import MinSnap, Stretch
+from .polynomial.free_knots import FreeKnots
+from .polynomial.min_snap import MinSnap, Stretch
 from .proof import proven
 from .result import Attempt, PlacedStage, Plan
 from .search import Bisection, Grid
+from .time_optimal.time_optimal import TimeOptimal
 
 __all__ = [
     "Attempt",

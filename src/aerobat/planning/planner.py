@@ -8,7 +8,7 @@ from typing import Protocol
 from aerobat.planning.miqp import Miqp
 from aerobat.planning.proof import proven
 from aerobat.planning.result import Attempt, Plan
-from aerobat.specs.problem import Problem
+from aerobat.problem.problem import Problem
 from aerobat.vehicle import Vehicle
 
 

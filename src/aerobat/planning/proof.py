@@ -7,7 +7,7 @@ from dataclasses import replace
 from aerobat.certification import Certificate, Envelope, certify
 from aerobat.planning.feasibility import rotor_margin
 from aerobat.planning.result import Plan
-from aerobat.specs.problem import Problem
+from aerobat.problem.problem import Problem
 from aerobat.trajectory import Trajectory
 from aerobat.vehicle import Vehicle
 

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from aerobat.planning.feasibility import RotorMargin
-from aerobat.specs.gate import Gate
-from aerobat.specs.problem import Problem
+from aerobat.problem.gate import Gate
+from aerobat.problem.problem import Problem
 from aerobat.trajectory import Trajectory
 
 if TYPE_CHECKING:

@@ -8,7 +8,7 @@ import numpy as np
 
 from aerobat.arrays import Array
 from aerobat.planning.result import Plan
-from aerobat.specs.stage import Course, Stage
+from aerobat.problem.stage import Course, Stage
 from aerobat.trajectory import Trajectory
 
 FLAT = 1e-6  # of its extent: how far a path may leave a plane and still be in it

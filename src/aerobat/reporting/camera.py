@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from aerobat.arrays import Array
-from aerobat.specs.gate import Gate
+from aerobat.problem.gate import Gate
 
 AZIMUTHS = np.deg2rad(np.arange(-180.0, 180.0, 5.0))
 ELEVATIONS = np.deg2rad([20.0, 27.0])

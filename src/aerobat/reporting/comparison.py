@@ -11,7 +11,6 @@ import numpy as np
 from rich.table import Table
 from rich.text import Text
 
-from aerobat.comparison import Comparison, Entry
 from aerobat.flight import COMPLETE
 from aerobat.planning import Plan
 from aerobat.reporting.canvas import MARGIN, blank_page, heading, headline, house_style, panel
@@ -31,6 +30,7 @@ from aerobat.reporting.style import (
     YELLOW,
 )
 from aerobat.reporting.tracks import draw_limits, fit_to_limits
+from aerobat.studies.compare import Comparison, Entry
 from aerobat.vehicle import Vehicle
 
 if TYPE_CHECKING:

@@ -6,10 +6,10 @@ import numpy as np
 
 from aerobat import so3
 from aerobat.arrays import Array
+from aerobat.problem.gate import Gate
 from aerobat.reporting.camera import Camera
 from aerobat.reporting.scene import Colour, Shape
 from aerobat.reporting.style import BLUE, FAINT, INK, RED, YELLOW
-from aerobat.specs.gate import Gate
 from aerobat.vehicle import Vehicle
 
 TURN = np.linspace(0.0, 2.0 * np.pi, 19)

@@ -10,7 +10,7 @@ from aerobat.arrays import Array
 from aerobat.flatness import Reference, reference
 from aerobat.flight import Flight
 from aerobat.planning import Plan
-from aerobat.specs.gate import Gate
+from aerobat.problem.gate import Gate
 from aerobat.vehicle import Vehicle
 
 RATE = 250.0  # [1/s] at which a plan is shown

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from aerobat.arrays import Array
+from aerobat.problem.gate import Gate
 from aerobat.reporting.box import draw_room, room_around
 from aerobat.reporting.camera import Camera, best_view
 from aerobat.reporting.canvas import size_of
@@ -16,7 +17,6 @@ from aerobat.reporting.glyphs import gate_bars, gate_shapes
 from aerobat.reporting.path_panel import mark_ends
 from aerobat.reporting.scene import paint
 from aerobat.reporting.turn import TurnPlane, plane_of
-from aerobat.specs.gate import Gate
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

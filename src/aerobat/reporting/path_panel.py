@@ -9,6 +9,7 @@ import numpy as np
 
 from aerobat.arrays import Array
 from aerobat.planning import PlacedStage
+from aerobat.problem.gate import Gate
 from aerobat.reporting.box import draw_room, room_around
 from aerobat.reporting.camera import Camera, best_view
 from aerobat.reporting.canvas import HEADING, legend, size_of
@@ -26,7 +27,6 @@ from aerobat.reporting.glyphs import (
 from aerobat.reporting.motion import Motion
 from aerobat.reporting.scene import Shape, paint, polyline
 from aerobat.reporting.style import BAND, BLUE, HAIR, INK, RED
-from aerobat.specs.gate import Gate
 from aerobat.vehicle import Vehicle
 
 if TYPE_CHECKING:

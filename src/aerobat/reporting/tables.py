@@ -10,7 +10,7 @@ from rich.table import Table
 from aerobat.certification import Certificate, Side
 from aerobat.metrics import Score
 from aerobat.planning import Plan
-from aerobat.specs import Problem
+from aerobat.problem import Problem
 from aerobat.vehicle import Vehicle
 
 

@@ -9,8 +9,8 @@ import numpy as np
 from aerobat.arrays import Array
 from aerobat.flatness import reference
 from aerobat.planning import Plan
+from aerobat.problem import Flip
 from aerobat.reporting.camera import Camera
-from aerobat.specs import Flip
 from aerobat.vehicle import Vehicle
 
 FEWEST = 5  # moments shown; where a maneuver has fewer stages, equal steps of time join them

@@ -7,11 +7,11 @@ from dataclasses import replace
 
 import numpy as np
 
+from aerobat.optimization import solver
 from aerobat.planning.feasibility import RotorMargin
 from aerobat.planning.miqp.formulation import Formulation
 from aerobat.planning.result import Attempt
-from aerobat.programs import solver
-from aerobat.specs.problem import DERIVATIVES, UNITS
+from aerobat.problem.problem import DERIVATIVES, UNITS
 from aerobat.vehicle import Vehicle
 
 PROBES = 4  # durations at which a relaxed problem is tried

@@ -16,10 +16,10 @@ from numpy.typing import NDArray
 
 from aerobat.arrays import Array, frozen
 from aerobat.errors import SpecError
+from aerobat.optimization import AssignmentProgram, SlottedStage
 from aerobat.planning.miqp.integrator import INPUTS, IntegratorChain
-from aerobat.programs import AssignmentProgram, SlottedStage
-from aerobat.specs.problem import DERIVATIVES, Limits, Problem
-from aerobat.specs.stage import Condition, Course, Stage
+from aerobat.problem.problem import DERIVATIVES, Limits, Problem
+from aerobat.problem.stage import Condition, Course, Stage
 
 Indices = NDArray[np.intp]
 AXES = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))

@@ -10,7 +10,7 @@ import numpy as np
 
 from aerobat.certification import Certificate, Verdict
 from aerobat.errors import Infeasible, SpecError
-from aerobat.planning.drawing_in import drawn_in
+from aerobat.optimization import AssignmentResult, Solver, solver
 from aerobat.planning.feasibility import RotorMargin, rotor_margin
 from aerobat.planning.miqp.diagnosis import why_infeasible
 from aerobat.planning.miqp.formulation import Formulation
@@ -18,9 +18,9 @@ from aerobat.planning.miqp.integrator import IntegratorChain
 from aerobat.planning.proof import certificate_for
 from aerobat.planning.result import Attempt, PlacedStage, Plan
 from aerobat.planning.search import Bisection, Grid, Search
-from aerobat.programs import AssignmentResult, Solver, solver
-from aerobat.specs.problem import Problem
-from aerobat.specs.stage import Course
+from aerobat.planning.tighten import drawn_in
+from aerobat.problem.problem import Problem
+from aerobat.problem.stage import Course
 from aerobat.states import GRAVITY
 from aerobat.trajectory import Trajectory
 from aerobat.vehicle import Vehicle

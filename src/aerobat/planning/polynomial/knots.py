@@ -1,0 +1,86 @@
+"""What a problem gives at the knots of a polynomial path, and when to pass them at first."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from itertools import pairwise
+from math import sqrt
+
+import numpy as np
+
+from aerobat.arrays import Array
+from aerobat.problem.problem import Problem
+from aerobat.problem.stage import Course, Stage
+from aerobat.problem.waypoints import Waypoints
+from aerobat.trajectory import Trajectory
+
+SHARE = 0.3  # of the specific thrust, that accelerates along a leg when times are guessed
+SHORTEST = 0.2  # [s] that a leg is given at first
+MISSED = 1e-6  # in SI units: by how much a condition may be missed through rounding
+
+
+def given_at_knots(problem: Problem, course: Course, order: int, gravity: float) -> Array:
+    """Position and its derivatives below `order` at start, stages and goal, (K, order, 3); NaN: free.
+
+    The closed form takes each axis alone and equalities only. So conditions in oblique directions fix, by
+    least norm, every component that they touch; a lower bound on thrust fixes the thrust to it, or to the
+    hover's if that is more; other inequalities are left free, to be checked afterwards.
+    """
+    given = np.full((len(course.stages) + 2, order, 3), np.nan)
+    given[0], given[-1] = problem.start.derivatives(order), problem.goal.derivatives(order)
+    for knot, stage in enumerate(course.stages, 1):
+        for derivative in range(3):
+            given[knot, derivative] = _fixed(stage, derivative, gravity)
+    return given
+
+
+def first_times(problem: Problem, given: Array, max_specific_thrust: float) -> Array:
+    """Durations between knots to begin with [s], (K - 1,): the problem's own, or a guess from distances."""
+    if isinstance(problem.maneuver, Waypoints) and problem.maneuver.times is not None:
+        return np.diff([0.0, *problem.maneuver.times])
+    placed = np.flatnonzero(~np.isnan(given[:, 0]).any(axis=1))
+    durations = np.empty(len(given) - 1)
+    for a, b in pairwise(placed.tolist()):
+        length = float(np.linalg.norm(given[b, 0] - given[a, 0]))
+        leg = max(2.0 * sqrt(length / (SHARE * max_specific_thrust)), SHORTEST)
+        durations[a:b] = leg / (b - a)
+    return durations
+
+
+def unmet(course: Course, trajectory: Trajectory, gravity: float) -> str | None:
+    """The first stage that a trajectory with a knot a stage misses, in a sentence; or None."""
+    values = [trajectory.evaluate(trajectory.knots[1:-1], k) for k in range(3)]
+    for stage, flat in zip(course.stages, np.stack(values, axis=1), strict=True):
+        for condition in stage.conditions:
+            derivative = flat[condition.quantity.derivative]
+            value = float(condition.direction @ derivative) + condition.weight(gravity)
+            if not condition.lower - MISSED <= value <= condition.upper + MISSED:
+                return (
+                    f"the stage '{stage.name}' asks {condition.quantity.value} between {condition.lower:.4g} "
+                    f"and {condition.upper:.4g}, the closed form gives {value:.4g}"
+                )
+    return None
+
+
+def _fixed(stage: Stage, derivative: int, gravity: float) -> Array:
+    """The components (3,) that a stage fixes of one derivative, NaN where it leaves them free."""
+    rows = list(_equalities(stage, derivative, gravity))
+    if not rows:
+        return np.full(3, np.nan)
+    directions = np.array([direction for direction, _ in rows])
+    solution = np.linalg.lstsq(directions, np.array([value for _, value in rows]), rcond=None)[0]
+    return np.where(directions.any(axis=0), solution, np.nan)
+
+
+def _equalities(stage: Stage, derivative: int, gravity: float) -> Iterator[tuple[Array, float]]:
+    """Directions and values of what a stage fixes of one derivative."""
+    for condition in stage.conditions:
+        if condition.quantity.derivative != derivative:
+            continue
+        value = condition.lower
+        if condition.least_thrust > 0.0 and condition.lower < condition.upper:
+            hover = gravity * float(np.linalg.norm(condition.direction))
+            value = float(np.clip(hover, condition.lower, condition.upper))
+        elif condition.lower < condition.upper:
+            continue
+        yield condition.direction, value - condition.weight(gravity)

@@ -1,0 +1,1 @@
+"""Questions about many plans or flights, each answered by one function."""

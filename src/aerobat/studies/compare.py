@@ -1,0 +1,92 @@
+"""compare(): one problem, every planner, side by side: how fast, how sure, how well flown."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from time import perf_counter
+
+from aerobat.errors import BackendMissing, Infeasible
+from aerobat.flight import Flight
+from aerobat.flying import fly
+from aerobat.metrics import Score, score
+from aerobat.planning import Attempt, FreeKnots, MinSnap, Miqp, Plan, Planner, TimeOptimal, plan
+from aerobat.problem.problem import Problem
+from aerobat.vehicle import Vehicle
+
+PLANNERS: tuple[tuple[str, Planner], ...] = (
+    ("miqp", Miqp()),
+    ("min-snap", MinSnap()),
+    ("free-knots", FreeKnots(segments=2)),
+    ("free-knots", FreeKnots(segments=8)),
+    ("time-optimal", TimeOptimal()),
+)
+
+
+@dataclass(frozen=True)
+class Entry:
+    """What one planner made of the problem: a plan and its flight, or the reason why there is none."""
+
+    planner: str
+    plan: Plan | None
+    flight: Flight | None
+    score: Score | None
+    planning_time: float  # [s]
+    outcome: str  # a sentence
+
+    @property
+    def certified(self) -> bool:
+        """Whether there is a plan, proven to stay within the vehicle's limits."""
+        certificate = None if self.plan is None else self.plan.certificate
+        return certificate is not None and certificate.certified
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """All planners on one problem and one vehicle."""
+
+    problem: Problem
+    vehicle: Vehicle
+    entries: tuple[Entry, ...]
+
+    def ratio(self, entry: Entry) -> float | None:
+        """An entry's duration over the time-optimal plan's, where there are both."""
+        optimal = next((e.plan for e in self.entries if e.planner == "time-optimal"), None)
+        return None if optimal is None or entry.plan is None else entry.plan.duration / optimal.duration
+
+
+def compare(
+    problem: Problem,
+    vehicle: Vehicle,
+    planners: Sequence[tuple[str, Planner]] = PLANNERS,
+    progress: Callable[[Attempt], None] | None = None,
+) -> Comparison:
+    """Plan a problem with each planner, named, and fly each plan.
+
+    A planner that finds none, or whose solver is not installed, has an entry that says so. Raises Infeasible
+    when no planner finds any, SpecError for input that makes no sense.
+    """
+    entries = tuple(_entry(name, planner, problem, vehicle, progress) for name, planner in planners)
+    if all(entry.plan is None for entry in entries):
+        raise Infeasible(
+            f"no planner finds a plan for '{problem.name}' on {vehicle.name}: {entries[0].outcome}"
+        )
+    return Comparison(problem, vehicle, entries)
+
+
+def _entry(
+    name: str,
+    planner: Planner,
+    problem: Problem,
+    vehicle: Vehicle,
+    progress: Callable[[Attempt], None] | None,
+) -> Entry:
+    started = perf_counter()
+    try:
+        found = plan(problem, planner, vehicle, progress)
+    except (Infeasible, BackendMissing) as error:
+        return Entry(name, None, None, None, perf_counter() - started, str(error))
+    spent = perf_counter() - started
+    flight = fly(found.trajectory, vehicle, yaw=problem.yaw)
+    flown = score(flight, problem, vehicle)
+    return Entry(name, found, flight, flown, spent, flown.outcome)

@@ -1,0 +1,143 @@
+"""Problems: from files and back, and what they refuse."""
+
+from dataclasses import fields, replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from aerobat.errors import SpecError
+from aerobat.problem import (
+    Condition,
+    EndState,
+    Flip,
+    Limits,
+    Line,
+    Problem,
+    Stage,
+    Staged,
+    Waypoint,
+    Waypoints,
+    load_problem,
+    problem_names,
+    rest,
+    tilted_gate,
+    write_problem,
+)
+
+
+def same(a: object, b: object) -> bool:
+    """Equal field by field, arrays to 1e-12."""
+    if isinstance(a, np.ndarray):
+        return bool(np.allclose(a, b, atol=1e-12, rtol=0, equal_nan=True))  # NaN: a component left free
+    if isinstance(a, tuple):
+        return len(a) == len(b) and all(same(x, y) for x, y in zip(a, b, strict=True))
+    if hasattr(a, "__dataclass_fields__"):
+        return type(a) is type(b) and all(same(getattr(a, f.name), getattr(b, f.name)) for f in fields(a))
+    if isinstance(a, float):
+        return a == pytest.approx(b, abs=1e-12)
+    return a == b
+
+
+SPELLED_OUT = Problem(
+    "spelled-out",
+    start=EndState((0, 0, 1), (1, 0, 0), (0, 0.5, 0)),
+    goal=rest((3, 0, 1)),
+    maneuver=Staged(
+        (
+            Stage("kick", (Condition("specific_thrust", (1, 0, -1), 0.0, 0.0),)),
+            Stage("gate", (Condition("velocity", (1, 0, 0), lower=2.0),), at=0.25, late=1),
+        ),
+        always=(Condition("position", (0, 0, 1), lower=0.0),),
+        ordered=False,
+    ),
+    gate=tilted_gate(np.array([1.0, 0, 2]), heading=0.3, tilt=-0.7, width=0.8, height=0.4),
+    limits=Limits(lower=(-9, -9, 0), upper=(9, 9, 9), velocity=(8, 8, 6), snap=500.0),
+    yaw=np.pi,
+    gravity=9.80665,
+    description="every key of the format",
+)
+
+
+THROUGH_WAYPOINTS = replace(
+    SPELLED_OUT,
+    name="through-waypoints",
+    maneuver=Waypoints(
+        (
+            Waypoint(position=(np.nan, np.nan, 2.0), velocity=(1.0, np.nan, 0.0), time=0.5),
+            Waypoint(gate=True, up=(0.0, 1.0, -1.0), time=0.75),
+            Waypoint(position=(1.0, 2.0, 3.0), up=(0.0, 0.0, -2.0), thrust=12.0, time=1.5),
+            Waypoint(acceleration=(0.0, np.nan, -9.0), time=2.0),
+        ),
+        duration=3.0,
+    ),
+)
+PROBLEMS = [*map(load_problem, problem_names()), SPELLED_OUT, THROUGH_WAYPOINTS]
+
+
+@pytest.mark.parametrize("problem", PROBLEMS, ids=lambda p: p.name)
+def test_a_problem_survives_its_file(problem: Problem, tmp_path: Path) -> None:
+    write_problem(problem, tmp_path / "problem.toml")
+    assert same(load_problem(tmp_path / "problem.toml"), problem)
+
+
+def test_the_built_in_problems_are_the_reference_codes() -> None:
+    """Gates and goals of the authors' public code."""
+    gates = {name: load_problem(name).gate for name in problem_names()}
+    goals = {name: load_problem(name).goal.position.tolist() for name in problem_names()}
+    assert {n: None if g is None else g.position.tolist() for n, g in gates.items()} == {
+        "flip-roll": [0, 0, 5.5],
+        "flip-pitch": [0, 0, 5.5],
+        "flip-roll-translation": [2.5, 0, 5.5],
+        "half-flip": [2.5, 2, 3.5],
+        "line": None,
+        "section-v": None,
+    }
+    assert goals == {
+        "flip-roll": [0, 0, 0],
+        "flip-pitch": [0, 0, 0],
+        "flip-roll-translation": [5, 0, 0],
+        "half-flip": [5, 0, 0],
+        "line": [10, 0, 0],
+        "section-v": [6, 0, 0],
+    }
+
+
+def test_paper_mode_brings_the_reference_codes_limits() -> None:
+    limits = load_problem("line").as_in_paper().limits
+    assert [limits.of(d)[1].tolist() for d in (1, 2, 3)] == [[10.0] * 3, [90.0] * 3, [200.0] * 3]
+
+
+@pytest.mark.parametrize("place", ["start", "goal"])
+def test_an_end_outside_the_limits_is_refused_by_its_field_and_axis(place: str) -> None:
+    inside = load_problem("line")
+    limits = Limits(lower=(-1, -1, -1), upper=(20, 1, 1))
+    with pytest.raises(SpecError, match=rf"{place}.position: its y component, 2 m.*widen"):
+        replace(inside, limits=limits, **{place: rest((0, 2, 0))})
+
+
+def test_a_start_too_fast_for_the_limits_is_refused() -> None:
+    with pytest.raises(SpecError, match=r"start.velocity: its x component, 11 m/s"):
+        replace(load_problem("line"), start=EndState((0, 0, 0), (11, 0, 0)))
+
+
+def test_a_flip_without_a_gate_is_refused() -> None:
+    with pytest.raises(SpecError, match=r"\[gate\]"):
+        Problem("lost", rest((0, 0, 0)), rest((0, 0, 0)), Flip())
+
+
+@pytest.mark.parametrize(
+    "bad", [{"velocity": 0.0}, {"jerk": -1.0}, {"snap": (1, 2)}, {"lower": (5, 5, 5), "upper": (1, 9, 9)}]
+)
+def test_limits_that_exclude_everything_are_refused(bad: dict) -> None:
+    with pytest.raises(SpecError, match=r"limits\."):
+        Limits(**bad)
+
+
+def test_a_value_is_immutable_for_real() -> None:
+    source = np.zeros(3)
+    problem = Problem("still", EndState(source), rest((1, 0, 0)), Line())
+    source[:] = 7.0
+    assert problem.start.position.tolist() == [0, 0, 0]
+    with pytest.raises(ValueError, match="read-only"):
+        problem.start.position[0] = 1.0

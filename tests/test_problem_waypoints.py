@@ -1,0 +1,73 @@
+"""Waypoints: what is given becomes conditions, what is free asks nothing, nonsense is refused."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from aerobat.errors import SpecError
+from aerobat.problem import Quantity, Waypoint, Waypoints, tilted_gate
+
+FREE = np.nan
+components = st.lists(st.one_of(st.just(FREE), st.floats(-50, 50)), min_size=3, max_size=3)
+
+
+def course(*waypoints: Waypoint, gate=None):
+    return Waypoints(waypoints).course(gate, 40.0)
+
+
+@given(components, components, components)
+def test_each_given_component_is_one_equality_a_free_one_none(position, velocity, acceleration) -> None:
+    values = {"position": position, "velocity": velocity, "acceleration": acceleration}
+    if np.isnan(np.concatenate([*values.values()])).all():
+        with pytest.raises(SpecError, match="nothing is given"):
+            Waypoint(**values)
+        return
+    (stage,) = course(Waypoint(**values)).stages
+    asked = {(c.quantity.value, int(np.argmax(c.direction))): (c.lower, c.upper) for c in stage.conditions}
+    assert asked == {
+        (name, axis): (x, x) for name, xs in values.items() for axis, x in enumerate(xs) if not np.isnan(x)
+    }
+
+
+@given(st.lists(st.floats(-1, 1), min_size=3, max_size=3).filter(lambda d: np.linalg.norm(d) > 0.1))
+def test_an_attitude_holds_exactly_for_thrust_along_it(direction) -> None:
+    """With a thrust, for that thrust alone; without, for at least a fifth of what the vehicle has."""
+    up = np.array(direction) / np.linalg.norm(direction)
+    for waypoint, least in ((Waypoint(up=direction, thrust=12.0), 12.0), (Waypoint(up=direction), 8.0)):
+        (stage,) = course(waypoint).stages
+        for thrust, holds in ((least * up, True), (0.9 * least * up, False), (-least * up, False)):
+            met = [c.lower - 1e-9 <= c.direction @ thrust <= c.upper + 1e-9 for c in stage.conditions]
+            assert all(met) == holds
+            assert {c.quantity for c in stage.conditions} == {Quantity.SPECIFIC_THRUST}
+
+
+def test_waypoints_are_passed_in_order_and_the_gate_at_its_centre() -> None:
+    gate = tilted_gate(np.array([1.0, 2.0, 3.0]))
+    passed = course(Waypoint(position=(0, 0, 1)), Waypoint(gate=True), gate=gate)
+    assert passed.ordered
+    assert [s.name for s in passed.stages] == ["waypoint 1", "gate"]
+    assert [s.at for s in passed.stages] == [None, None]
+    assert [c.lower for c in passed.stages[1].conditions] == [1.0, 2.0, 3.0]
+    with pytest.raises(SpecError, match=r"\[gate\]"):
+        course(Waypoint(gate=True))
+
+
+@pytest.mark.parametrize(
+    ("wrong", "sentence"),
+    [
+        (lambda: Waypoint(position=(0, 0)), "position must be three numbers"),
+        (lambda: Waypoint(position=(0, 0, np.inf)), "position must be three numbers"),
+        (lambda: Waypoint(thrust=5.0), "thrust must be .* needs up"),
+        (lambda: Waypoint(up=(0, 0, 1), thrust=-5.0), "thrust must be a positive"),
+        (lambda: Waypoint(up=(0, 0, 0)), "up must be a direction"),
+        (lambda: Waypoint(up=(0, 0, 1), acceleration=(0, 0, 1)), "give one of them"),
+        (lambda: Waypoint(position=(0, 0, 1), time=0.0), "time must be a positive"),
+        (lambda: Waypoints(()), "must hold at least one"),
+        (lambda: Waypoints((Waypoint(position=(0, 0, 1)),), duration=np.inf), "duration must be a positive"),
+        (lambda: Waypoints((Waypoint(position=(0, 0, 1), time=2.0),), duration=1.0), "times must rise"),
+    ],
+)
+def test_nonsense_is_refused_in_a_sentence_that_names_it(wrong, sentence) -> None:
+    with pytest.raises(SpecError, match=sentence):
+        wrong()
