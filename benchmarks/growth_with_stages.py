@@ -22,7 +22,7 @@ import numpy as np
 from aerobat.errors import AerobatError
 from aerobat.optimization import AssignmentProgram, solver
 from aerobat.planning.miqp import formulate
-from aerobat.problem import Staged, load_problem
+from aerobat.problem import CustomManeuver, load_problem
 from aerobat.problem.stage import Quantity, Stage
 from paper_programs import paper_program
 
@@ -76,7 +76,7 @@ def others(limit: float) -> None:
 def flips(gates: int, intervals: int, duration: float) -> AssignmentProgram:
     """So many flips, the first as the example's first, the last one leading to the example's goal, moved."""
     example = load_problem(EXAMPLE)
-    if not isinstance(example.maneuver, Staged):
+    if not isinstance(example.maneuver, CustomManeuver):
         raise SystemExit(f"{EXAMPLE.name} is not a list of stages")
     one = example.maneuver.stages[:PER_GATE]
     stages = tuple(moved(stage, i * APART) for i in range(gates) for stage in one)

@@ -18,10 +18,10 @@ knife_edge = ab.Stage(
 gate = ab.Stage("gate", (ab.Condition("velocity", (1, 0, 0), lower=6.0),), at=0.6)
 dive = ab.Problem(
     name="dive",
-    start=ab.rest((0, 0, 8)),
-    goal=ab.rest((12, 0, 3)),
-    maneuver=ab.Staged((knife_edge, gate)),
-    gate=ab.tilted_gate(np.array([7.0, 0.0, 3.0])),
+    start=ab.at_rest((0, 0, 8)),
+    goal=ab.at_rest((12, 0, 3)),
+    maneuver=ab.CustomManeuver((knife_edge, gate)),
+    gates=(ab.tilted_gate(np.array([7.0, 0.0, 3.0])),),
     limits=ab.Limits(lower=(-5, -1, 0.5), upper=(20, 1, 10), velocity=12.0),
 )
 

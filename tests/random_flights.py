@@ -18,11 +18,10 @@ HALVINGS = 14
 
 @dataclass(frozen=True)
 class Flight:
-    """A vehicle, a trajectory and a yaw."""
+    """A vehicle and a trajectory."""
 
     vehicle: Vehicle
     trajectory: Trajectory
-    yaw: float
 
 
 @dataclass(frozen=True)
@@ -37,11 +36,13 @@ def random_flight(seed: int) -> Flight:
     """One with its time scaled so that the rotors come as close to their limits as drawn."""
     rng = np.random.default_rng(seed)
     vehicle = irregular(rng)
-    trajectory, yaw, wanted = tour(rng), rng.uniform(-3, 3), rng.uniform(*MARGINS)
+    trajectory = tour(rng)
+    trajectory = replace(trajectory, heading=rng.uniform(-3, 3))
+    wanted = rng.uniform(*MARGINS)
     low, high = np.log([0.02, 50.0])
     for _ in range(HALVINGS):
         middle = (low + high) / 2
-        near = Flight(vehicle, stretched(trajectory, np.exp(middle)), yaw)
+        near = Flight(vehicle, stretched(trajectory, np.exp(middle)))
         low, high = (middle, high) if sampled(near, 300).margin < wanted else (low, middle)
     return replace(near, trajectory=stretched(trajectory, np.exp(high)))
 
@@ -55,7 +56,9 @@ def irregular(rng: np.random.Generator) -> Vehicle:
     mass = rng.uniform(0.1, 0.67) * sum(made.max_thrust for made in rotors) / 9.81
     drag = rng.choice([0.0, 1.0]) * mass * rng.uniform(0.0, 0.5, 3)
     try:
-        return Vehicle("random", mass, mass * (inertia + inertia.T) / 2, rotors, drag)
+        made = Vehicle("random", mass, mass * (inertia + inertia.T) / 2, rotors, drag)
+        made.require_hover(9.81)
+        return made
     except SpecError:  # it cannot hover
         return irregular(rng)
 
@@ -89,7 +92,7 @@ def tour(rng: np.random.Generator) -> Trajectory:
 
 def stretched(trajectory: Trajectory, factor: float) -> Trajectory:
     """The same path, flown so many times slower."""
-    return Trajectory(factor * trajectory.durations, trajectory.coefficients)
+    return replace(trajectory, durations=factor * trajectory.durations)
 
 
 def moved(flight: Flight, heading: float, shift: np.ndarray) -> Flight:
@@ -97,9 +100,8 @@ def moved(flight: Flight, heading: float, shift: np.ndarray) -> Flight:
     turn = so3.about_axis(np.array([0.0, 0.0, 1.0]), np.array(heading))
     coefficients = so3.rotate(turn, flight.trajectory.coefficients)
     coefficients[:, 0] += shift
-    return replace(
-        flight, trajectory=Trajectory(flight.trajectory.durations, coefficients), yaw=flight.yaw + heading
-    )
+    turned = Trajectory(flight.trajectory.durations, coefficients, flight.trajectory.heading + heading)
+    return replace(flight, trajectory=turned)
 
 
 def sampled(flight: Flight, points: int) -> Sampled:
@@ -112,7 +114,7 @@ def sampled(flight: Flight, points: int) -> Sampled:
 def at(flight: Flight, times: np.ndarray, before: np.ndarray) -> Sampled:
     """The margin at some times; those of `before` that precede them help to carry the attitude there."""
     asked = np.concatenate([before[before < times[0]], times])
-    found = reference(flight.trajectory, flight.vehicle, times=asked, yaw=flight.yaw)
+    found = reference(flight.trajectory, flight.vehicle, times=asked)
     low, high = flight.vehicle.min_thrusts, flight.vehicle.max_thrusts
     gaps = np.minimum(found.rotor_thrusts - low, high - found.rotor_thrusts) / (high - low)
     return Sampled(float(gaps.min()), not found.undetermined)

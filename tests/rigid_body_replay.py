@@ -7,6 +7,7 @@ from scipy.integrate import solve_ivp
 from aerobat import so3
 from aerobat.arrays import Array
 from aerobat.flatness import reference
+from aerobat.states import STANDARD_GRAVITY
 from aerobat.trajectory import Trajectory
 from aerobat.vehicle import Vehicle
 
@@ -41,7 +42,7 @@ def _wrenches(trajectory: Trajectory, vehicle: Vehicle) -> list[Array]:
 def _rate(x: Array, wrench: Array, vehicle: Vehicle) -> Array:
     v, R, omega = x[3:6], x[6:15].reshape(3, 3), x[15:]
     force = np.array([0.0, 0.0, wrench[0]]) - vehicle.drag_body * (R.T @ v)
-    acceleration = R @ force / vehicle.mass - np.array([0.0, 0.0, vehicle.gravity])
+    acceleration = R @ force / vehicle.mass - np.array([0.0, 0.0, STANDARD_GRAVITY])
     turning = np.cross(omega, np.eye(3)).T
     torque = wrench[1:] - np.cross(omega, vehicle.inertia @ omega)
     return np.concatenate([v, acceleration, (R @ turning).ravel(), np.linalg.solve(vehicle.inertia, torque)])

@@ -13,13 +13,14 @@ from aerobat.certification import Certificate, Envelope, Finding, Side, Verdict,
 from aerobat.errors import SpecError
 from aerobat.planning import plan
 from aerobat.problem import Limits, load_problem
+from aerobat.states import STANDARD_GRAVITY
 from aerobat.trajectory import Trajectory
 from aerobat.trajectory.minimum_effort import minimum_effort
 from aerobat.vehicle import load_vehicle
 from random_flights import certified_margin, irregular, random_flight, sampled, stretched
 
 VEHICLE = load_vehicle("agile-quad")
-WEIGHT = VEHICLE.mass * VEHICLE.gravity
+WEIGHT = VEHICLE.mass * STANDARD_GRAVITY
 REST = [[0.0, 0.0, 0.0]] * 4
 
 
@@ -96,7 +97,9 @@ def test_a_plan_that_runs_along_its_velocity_limit_is_certified():
 
 def test_a_rotor_nearer_to_its_limit_than_can_be_told_is_said_to_be():
     full = VEHICLE.rotors[0].max_thrust
-    climb = Trajectory([1.0], [[[0, 0, 0], [0, 0, 0], [0, 0, (4 * full / WEIGHT - 1) * VEHICLE.gravity / 2]]])
+    climb = Trajectory(
+        [1.0], [[[0, 0, 0], [0, 0, 0], [0, 0, (4 * full / WEIGHT - 1) * STANDARD_GRAVITY / 2]]]
+    )
     certificate = certify(climb, VEHICLE)
     expected = (
         f"cannot decide: rotor 0 rises to {full:.4g} N at 0.000 s, nearer to its limit than can be told"
@@ -114,12 +117,12 @@ def test_a_hover_of_many_unequal_durations_is_certified(vehicle, place):
 
 def test_wildly_unequal_durations_change_no_extreme():
     flight = random_flight(3)
-    whole = certify(flight.trajectory, flight.vehicle, flight.yaw)
+    whole = certify(flight.trajectory, flight.vehicle)
     cuts = np.array([0.0, 1e-5, 0.3, 0.3 + 1e-4, 0.9, 1.0])
     parts = [cut_out(flight.trajectory, a, b) for a, b in pairwise(cuts)]
     durations = np.outer(flight.trajectory.durations, np.diff(cuts)).ravel()
     pieces = Trajectory(durations, np.stack(parts, axis=1).reshape(len(durations), -1, 3))
-    again = certify(pieces, flight.vehicle, flight.yaw)
+    again = certify(pieces, flight.vehicle)
     assert again.certified == whole.certified
     assert certified_margin(flight, again) == pytest.approx(certified_margin(flight, whole), abs=1e-6)
 
@@ -133,7 +136,7 @@ def cut_out(trajectory: Trajectory, start: float, end: float) -> np.ndarray:
 
 def test_free_fall_in_the_middle_leaves_the_question_open_and_names_the_time():
     # vertical: thrust falls to nothing at 1 s and comes back, never turning
-    g = VEHICLE.gravity
+    g = STANDARD_GRAVITY
     upwards = [0.0, 0.0, 0.0, -8 * g / 3, 16 * g / 12]  # its acceleration is g ((t - 1)² - 1)
     certificate = certify(Trajectory([2.0], np.multiply.outer([upwards], [0.0, 0.0, 1.0])), VEHICLE)
     assert certificate.why == "cannot decide: thrust reaches zero at 0.968 s, where no attitude is determined"
@@ -143,7 +146,7 @@ def test_free_fall_in_the_middle_leaves_the_question_open_and_names_the_time():
 
 
 def test_thrust_just_above_nothing_is_decided():
-    g = VEHICLE.gravity
+    g = STANDARD_GRAVITY
     falling = Trajectory([1.0], [[[0, 0, 0], [0, 0, 0], [0, 0, -0.998 * g / 2]]])
     assert certify(falling, VEHICLE).certified
     assert certify(falling, VEHICLE).margin == pytest.approx(0.002 * WEIGHT / 4, abs=1e-6)
@@ -170,7 +173,7 @@ def test_six_unlike_rotors_skew_inertia_and_drag_are_judged_as_sampling_judges_t
     flight, verdicts = replace(random_flight(11), vehicle=vehicle), set()
     for factor in np.geomspace(0.2, 20.0, 15):
         at_pace = replace(flight, trajectory=stretched(flight.trajectory, factor))
-        certificate, samples = certify(at_pace.trajectory, vehicle, flight.yaw), sampled(at_pace, 5000)
+        certificate, samples = certify(at_pace.trajectory, vehicle), sampled(at_pace, 5000)
         assert certificate.certified == (samples.margin >= 0 and samples.determined)
         verdicts.add(certificate.certified)
     assert verdicts == {False, True}

@@ -9,11 +9,13 @@ import pytest
 
 from aerobat import so3
 from aerobat.certification import Certificate, Envelope, Side, Verdict, certify
+from aerobat.environment import Environment
 from aerobat.errors import SpecError
 from aerobat.flatness import reference
 from aerobat.interchange import read_csv, write_csv
 from aerobat.planning import Miqp, plan, rotor_margin
 from aerobat.problem import Limits, load_problem
+from aerobat.states import STANDARD_GRAVITY
 from aerobat.trajectory import Trajectory
 from aerobat.trajectory.minimum_effort import minimum_effort
 from aerobat.vehicle import load_vehicle
@@ -25,7 +27,7 @@ TIGHT = 1e-6  # of a rotor's range
 
 
 def certificate_of(flight: Flight, envelope: Envelope | None = None) -> Certificate:
-    return certify(flight.trajectory, flight.vehicle, flight.yaw, envelope)
+    return certify(flight.trajectory, flight.vehicle, envelope=envelope)
 
 
 def reversed_in_time(trajectory: Trajectory) -> Trajectory:
@@ -37,7 +39,7 @@ def reversed_in_time(trajectory: Trajectory) -> Trajectory:
 
 def extremes_of(flight: Flight, times: np.ndarray) -> dict[tuple[str, Side], np.ndarray]:
     """Every quantity at some times, by flatness."""
-    found = reference(flight.trajectory, flight.vehicle, times=times, yaw=flight.yaw)
+    found = reference(flight.trajectory, flight.vehicle, times=times)
     setpoint, most = found.setpoint, Side.MOST
     series = {
         ("speed", most): np.linalg.norm(setpoint.flat.velocity, axis=1),
@@ -101,10 +103,10 @@ def test_neither_place_nor_heading_changes_the_margin(seed):
 def test_without_drag_the_way_back_in_time_asks_the_same_of_the_rotors(seed):
     flight = random_flight(seed)
     flight = replace(flight, vehicle=replace(flight.vehicle, drag_body=np.zeros(3)))
-    end = reference(flight.trajectory, flight.vehicle, rate=500.0, yaw=flight.yaw).setpoint.q_world_body[-1]
+    end = reference(flight.trajectory, flight.vehicle, rate=500.0).setpoint.q_world_body[-1]
     upright = so3.smallest_rotation(UP, so3.thrust_axis(end))
-    yaw = so3.log(so3.multiply(so3.conjugate(upright), end))[2]
-    backwards = Flight(flight.vehicle, reversed_in_time(flight.trajectory), yaw)
+    heading = so3.log(so3.multiply(so3.conjugate(upright), end))[2]
+    backwards = Flight(flight.vehicle, replace(reversed_in_time(flight.trajectory), heading=heading))
     before, after = certificate_of(flight), certificate_of(backwards)
     assert certified_margin(backwards, after) == pytest.approx(certified_margin(flight, before), abs=1e-4)
 
@@ -130,11 +132,11 @@ def test_a_plan_whose_jerk_jumps_is_refused_for_its_body_rates():
     assert len(certificate.discontinuities) > 10
 
 
-@pytest.mark.parametrize("yaw", [0.0, 1.0])
-def test_a_hover_has_exactly_its_margin(yaw):
-    hover = certify(Trajectory([1.0], np.zeros((1, 1, 3))), VEHICLE, yaw)
+@pytest.mark.parametrize("heading", [0.0, 1.0])
+def test_a_hover_has_exactly_its_margin(heading):
+    hover = certify(Trajectory([1.0], np.zeros((1, 1, 3)), heading), VEHICLE)
     assert hover.certified
-    assert hover.margin == pytest.approx(VEHICLE.mass * VEHICLE.gravity / 4, abs=1e-9)
+    assert hover.margin == pytest.approx(VEHICLE.mass * STANDARD_GRAVITY / 4, abs=1e-9)
     most = {finding.quantity: finding.bound for finding in hover.findings if finding.side is Side.MOST}
     assert most["speed"] == most["body rate"] == most["moment"] == 0.0
     assert most["tilt"] < 1e-6
@@ -142,15 +144,15 @@ def test_a_hover_has_exactly_its_margin(yaw):
 
 
 def test_inverted_flight_is_certified_where_it_holds():
-    upside_down = Trajectory([1.0], [[[0, 0, 0], [0, 0, 0], [0, 0, -VEHICLE.gravity]]])
+    upside_down = Trajectory([1.0], [[[0, 0, 0], [0, 0, 0], [0, 0, -STANDARD_GRAVITY]]])
     certificate = certify(upside_down, VEHICLE)
     assert certificate.certified
-    assert certificate.margin == pytest.approx(VEHICLE.mass * VEHICLE.gravity / 4, abs=1e-9)
+    assert certificate.margin == pytest.approx(VEHICLE.mass * STANDARD_GRAVITY / 4, abs=1e-9)
 
 
 @pytest.mark.parametrize(("first", "last"), [(-1.0, -1.0), (0.0, -1.0), (0.0, -2.0), (-0.5, -1.5)])
 def test_vanishing_thrust_leaves_the_attitude_and_so_the_question_open(first, last):
-    g = VEHICLE.gravity
+    g = STANDARD_GRAVITY
     upwards = [0, 0, g * first / 2, g * (last - first) / 6]
     vertical = Trajectory([1.0], np.multiply.outer([upwards], UP))
     certificate, expected = certify(vertical, VEHICLE), reference(vertical, VEHICLE, rate=100.0).undetermined
@@ -163,7 +165,7 @@ def test_vanishing_thrust_leaves_the_attitude_and_so_the_question_open(first, la
 
 
 def test_a_violation_counts_even_where_thrust_vanishes_elsewhere():
-    g = VEHICLE.gravity
+    g = STANDARD_GRAVITY
     rising = Trajectory([1.0], [[[0, 0, 0], [0, 0, 0], [0, 0, -g / 2], [0, 0, 6 * g / 6]]])
     certificate = certify(rising, VEHICLE)
     assert certificate.undetermined
@@ -225,10 +227,10 @@ def test_an_envelope_refuses_limits_that_are_not_positive(limit):
         Envelope(body_rate=limit)
 
 
-@pytest.mark.parametrize("yaw", [np.nan, np.inf, "north", [0.0, 1.0]])
-def test_a_yaw_that_is_no_number_is_refused(yaw):
-    with pytest.raises(SpecError, match="yaw must be"):
-        certify(Trajectory([1.0], np.zeros((1, 1, 3))), VEHICLE, yaw=yaw)
+@pytest.mark.parametrize("heading", [np.nan, np.inf, "north", [0.0, 1.0]])
+def test_a_heading_that_is_no_number_is_refused(heading):
+    with pytest.raises(SpecError, match="heading must be"):
+        Trajectory([1.0], np.zeros((1, 1, 3)), heading)
 
 
 @pytest.mark.parametrize(
@@ -246,7 +248,9 @@ def test_the_example_of_section_v_has_the_published_extremes(iteration, thrust, 
     given[1] = np.nan
     given[1, 0, 2], given[2, 0, 0] = -2.0, 6.0
     shift = 0.1 * (iteration - 1)
-    certificate = certify(minimum_effort(given, [0.5 + shift, 1.5]), load_vehicle("section-v"))
+    certificate = certify(
+        minimum_effort(given, [0.5 + shift, 1.5]), load_vehicle("section-v"), Environment(gravity=9.80665)
+    )
     values = {(finding.quantity, finding.side): finding.value for finding in certificate.findings}
     found = [values["thrust", Side.LEAST], values["thrust", Side.MOST]]
     found += [values["moment", Side.MOST], values["body rate", Side.MOST]]

@@ -105,7 +105,8 @@ def test_what_there_is_is_listed(capsys) -> None:
 def test_an_infeasible_problem_ends_with_its_sentence_and_nothing_written(capsys) -> None:
     Path("hard.toml").write_text(
         'name = "hard"\n[start]\nposition = [0.0, 0.0, 0.0]\n[goal]\nposition = [0.0, 0.0, 0.0]\n'
-        "[gate]\nposition = [0.0, 0.0, 5.0]\ntilt_deg = 180.0\n[maneuver]\nkind = 'flip'\ninverted = 45.0\n"
+        "[gate]\nposition = [0.0, 0.0, 5.0]\ntilt_deg = 180.0\n[maneuver]\nkind = 'flip'\n"
+        "min_inverted_thrust = 45.0\n"
     )
     code, out, err = run(capsys, "fly", "hard.toml")
     assert (code, out) == (3, "")

@@ -12,7 +12,7 @@ from aerobat.errors import SpecError
 from aerobat.flight import Flight
 from aerobat.flying import fly
 from aerobat.kernels.controller import Controller
-from aerobat.states import BodyState
+from aerobat.states import STANDARD_GRAVITY, BodyState
 from aerobat.trajectory import Trajectory
 from aerobat.vehicle import load_vehicle, vehicle_names
 
@@ -42,7 +42,7 @@ def error(flight: Flight) -> np.ndarray:
 def test_a_hover_is_an_equilibrium(name: str) -> None:
     vehicle = load_vehicle(name)
     flight = fly(hover(2.0), vehicle)
-    weight = vehicle.mass * vehicle.gravity
+    weight = vehicle.mass * STANDARD_GRAVITY
     np.testing.assert_allclose(flight.states.position, np.broadcast_to(HERE, (1001, 3)), atol=1e-12)
     np.testing.assert_allclose(flight.commands.sum(axis=-1), weight, rtol=1e-12)
     assert not flight.saturated.any()
@@ -59,15 +59,14 @@ def test_the_sign_of_the_quaternion_is_nothing_to_the_flight(name: str) -> None:
 @settings(max_examples=10)
 @given(st.floats(-np.pi, np.pi))
 def test_turned_about_the_vertical_everything_turns(angle: float) -> None:
-    """Trajectory, start and yaw turned by an angle: the same flight, turned; off its path, with drag."""
+    """Trajectory, start and heading turned by an angle: the same flight, turned; off its path, with drag."""
     vehicle = replace(load_vehicle("hexarotor"), drag_body=np.array([0.2, 0.1, 0.3]))
     turn = so3.about_axis([0.0, 0.0, 1.0], angle)
     path, start = swerve(), start_at([0.1, 0.2, -0.1], [0.0, 0.3, 0.0], so3.exp([0.2, 0.1, 0.3]), [1.0, 0, 0])
     straight = fly(path, vehicle, start=start)
     turned = fly(
-        Trajectory(path.durations, so3.rotate(turn, path.coefficients)),
+        Trajectory(path.durations, so3.rotate(turn, path.coefficients), angle),
         vehicle,
-        yaw=angle,
         start=BodyState(
             so3.rotate(turn, start.position),
             so3.rotate(turn, start.velocity),

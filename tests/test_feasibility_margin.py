@@ -9,10 +9,11 @@ from hypothesis import strategies as st
 from scipy.interpolate import CubicSpline
 
 from aerobat import so3
+from aerobat.environment import Environment
 from aerobat.flatness import reference_of
 from aerobat.flatness.setpoints import specific_thrust
 from aerobat.planning.feasibility import rotor_margin
-from aerobat.states import FlatState
+from aerobat.states import STANDARD_GRAVITY, FlatState
 from aerobat.trajectory import Trajectory
 from aerobat.vehicle import load_vehicle, mixer
 
@@ -108,7 +109,7 @@ def test_straight_up_and_down_the_rotors_share_the_acceleration(seed):
     coefficients[0, :, 2] = np.random.default_rng(seed).normal(size=6) * 0.1
     trajectory = Trajectory([1.0], coefficients)
     found = rotor_margin(trajectory, HEXA)
-    least, most = trajectory.specific_thrust_range(HEXA.gravity)
+    least, most = trajectory.specific_thrust_range(STANDARD_GRAVITY)
     if found.undetermined or least.value < 1.0:
         return
     shares = HEXA.mass * mixer(HEXA)[:, 0]
@@ -119,8 +120,8 @@ def test_straight_up_and_down_the_rotors_share_the_acceleration(seed):
 
 @pytest.mark.parametrize("vehicle", [QUAD, HEXA], ids=lambda vehicle: vehicle.name)
 def test_hover_leaves_the_margin_of_its_weight(vehicle):
-    found = rotor_margin(Trajectory([2.0], np.zeros((1, 5, 3))), vehicle, yaw=1.0)
-    shares = vehicle.mass * vehicle.gravity * mixer(vehicle)[:, 0]
+    found = rotor_margin(Trajectory([2.0], np.zeros((1, 5, 3)), heading=1.0), vehicle)
+    shares = vehicle.mass * STANDARD_GRAVITY * mixer(vehicle)[:, 0]
     assert found.min_thrust == pytest.approx(shares.min())
     assert found.max_thrust == pytest.approx(shares.max())
     assert found.feasible
@@ -166,7 +167,7 @@ def test_turning_trajectory_and_vehicle_together_changes_nothing(seed, heading):
     turned = Trajectory(
         trajectory.durations, so3.rotate(so3.about_axis(UP, heading), trajectory.coefficients)
     )
-    before, after = rotor_margin(trajectory, QUAD), rotor_margin(turned, QUAD, yaw=heading)
+    before, after = rotor_margin(trajectory, QUAD), rotor_margin(replace(turned, heading=heading), QUAD)
     scale = max(abs(before.min_thrust), abs(before.max_thrust))
     assert after.min_thrust == pytest.approx(before.min_thrust, abs=1e-6 * scale)
     assert after.max_thrust == pytest.approx(before.max_thrust, abs=1e-6 * scale)
@@ -175,7 +176,7 @@ def test_turning_trajectory_and_vehicle_together_changes_nothing(seed, heading):
 def test_vanishing_thrust_is_infeasible_and_said_so():
     # straight up, then thrust reverses through zero
     coefficients = np.zeros((1, 5, 3))
-    coefficients[0, 2:4, 2] = [(10 - QUAD.gravity) / 2, -20 / 6]
+    coefficients[0, 2:4, 2] = [(10 - STANDARD_GRAVITY) / 2, -20 / 6]
     found = rotor_margin(Trajectory([1.0], coefficients), QUAD)
     assert len(found.undetermined) == 1
     assert not found.feasible
@@ -196,7 +197,7 @@ def test_jerk_may_jump_along_the_thrust_axis_only(vehicle, across):
     before = np.array([[0.0, 0.0, 0.0], [3.0, 1.0, 0.0], [4.0, -2.0, 1.0], [2.0, 0.0, -3.0], [0.0, 0.5, 1.0]])
     first = Trajectory([1.0], before[None])
     ends = [first.on_segments([1.0], k)[0, 0] for k in range(4)]
-    thrust = specific_thrust(vehicle, *ends[1:], np.zeros(3))[0]
+    thrust = specific_thrust(vehicle, Environment(), *ends[1:], np.zeros(3))[0]
     axis = thrust / np.linalg.norm(thrust)
     after = [*ends[:3], ends[3] + 40.0 * axis + across * 40.0 * np.cross(axis, UP), np.zeros(3)]
     after = np.array(after) * (0.2 ** np.arange(5) / [1, 1, 2, 6, 24])[:, None]

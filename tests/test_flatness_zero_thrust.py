@@ -5,14 +5,15 @@ import pytest
 
 from aerobat import so3
 from aerobat.flatness import reference
+from aerobat.states import STANDARD_GRAVITY
 from aerobat.trajectory import Trajectory
 from aerobat.vehicle import load_vehicle
 
 VEHICLE = load_vehicle("agile-quad")
-GRAVITY = np.array([0.0, 0.0, VEHICLE.gravity])
+GRAVITY = np.array([0.0, 0.0, STANDARD_GRAVITY])
 
 
-def through_zero(miss, slope=10.0, gravity=VEHICLE.gravity):
+def through_zero(miss, slope=10.0, gravity=STANDARD_GRAVITY):
     """Thrust (miss, 0, slope (1 − t)) over 2 s: upright, then nearly none at 1 s, then inverted."""
     coefficients = np.zeros((1, 4, 3))
     coefficients[0, 2] = np.array([miss, 0, slope - gravity]) * 2
@@ -24,7 +25,7 @@ def through_zero(miss, slope=10.0, gravity=VEHICLE.gravity):
 @pytest.mark.parametrize("miss", [0.0, 1e-9, 5e-3, 9.5e-3])
 def test_vanishing_thrust_is_reported_between_samples_too_and_attitude_held(miss, rate):
     found = reference(through_zero(miss), VEHICLE, rate=rate)
-    half = np.sqrt((1e-3 * VEHICLE.gravity) ** 2 - miss**2) / 10
+    half = np.sqrt((1e-3 * STANDARD_GRAVITY) ** 2 - miss**2) / 10
     (span,) = found.undetermined
     assert span.start == pytest.approx(1 - half, abs=1e-9)
     assert span.end == pytest.approx(1 + half, abs=1e-9)
@@ -46,11 +47,13 @@ def test_a_near_miss_of_zero_thrust_is_a_fast_flip_about_one_axis():
 
 
 def test_free_fall_holds_the_attitude_for_its_whole_span():
-    fall = Trajectory.from_inputs(np.zeros((3, 3)), [[0, 0, -2 * VEHICLE.gravity], [0, 0, 0], [5, 0, 0]], 0.5)
+    fall = Trajectory.from_inputs(
+        np.zeros((3, 3)), [[0, 0, -2 * STANDARD_GRAVITY], [0, 0, 0], [5, 0, 0]], 0.5
+    )
     found = reference(fall, VEHICLE, rate=200.0)
     (span,) = found.undetermined
     assert span.start == pytest.approx(0.4995)
-    assert span.end == pytest.approx(1.0 + 1e-3 * VEHICLE.gravity / 5)
+    assert span.end == pytest.approx(1.0 + 1e-3 * STANDARD_GRAVITY / 5)
     inside = (found.times >= span.start) & (found.times <= span.end)
     np.testing.assert_allclose(found.setpoint.q_world_body[inside], [[1, 0, 0, 0]] * inside.sum(), atol=1e-12)
     whole = reference(Trajectory([1.0], [np.array([[0, 0, 0], [3, 0, 0], -GRAVITY / 2])]), VEHICLE, rate=50.0)

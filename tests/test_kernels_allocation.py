@@ -12,7 +12,7 @@ from aerobat.kernels.allocation import demand, fits, nearest
 from aerobat.kernels.controller import Controller
 from aerobat.kernels.motors import clamp
 from aerobat.kernels.rigid_body import Load
-from aerobat.states import Wrench
+from aerobat.states import STANDARD_GRAVITY, Wrench
 from aerobat.vehicle import Vehicle, collective_range, load_vehicle, rotor_thrusts, wrench
 from random_vehicles import (
     SAMPLES,
@@ -125,4 +125,4 @@ def test_a_collective_out_of_reach_is_brought_to_the_nearest_that_can_be_held(ma
     load = wrench(vehicle, thrusts)
     np.testing.assert_allclose(load.thrust, [low, low, high, high], rtol=0, atol=1e-9 * span(vehicle))
     np.testing.assert_allclose(load.moment_body, 0, rtol=0, atol=1e-9 * span(vehicle))
-    assert low <= vehicle.mass * vehicle.gravity <= high
+    assert low <= vehicle.mass * STANDARD_GRAVITY <= high

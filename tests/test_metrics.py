@@ -10,7 +10,7 @@ from aerobat.errors import SpecError
 from aerobat.flight import Flight
 from aerobat.flying import fly
 from aerobat.metrics import gate_passage, score
-from aerobat.problem import Problem, rest, tilted_gate
+from aerobat.problem import Problem, at_rest, tilted_gate
 from aerobat.states import BodyState
 from aerobat.trajectory import Trajectory
 from aerobat.vehicle import Vehicle, load_vehicle
@@ -38,7 +38,7 @@ def moved(flight: Flight, offset: tuple[float, float, float], turn: tuple[float,
 
 
 def problem(gate) -> Problem:
-    return Problem("cruise", rest((0, 0, 1)), rest((8, 0, 1)), gate=gate)
+    return Problem("cruise", at_rest((0, 0, 1)), at_rest((8, 0, 1)), gates=() if gate is None else (gate,))
 
 
 def test_errors_are_the_distances_and_angles_by_which_a_flight_is_off(cruise: Flight) -> None:

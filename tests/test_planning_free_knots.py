@@ -12,6 +12,7 @@ from aerobat.planning.polynomial.knot_samples import cut
 from aerobat.planning.polynomial.min_snap import Stretch
 from aerobat.planning.proof import certificate_for
 from aerobat.problem import EndState, Limits, Problem, Waypoint, Waypoints, load_problem
+from aerobat.states import STANDARD_GRAVITY
 from aerobat.vehicle import Vehicle, load_vehicle
 
 pytest.importorskip("casadi")
@@ -129,13 +130,13 @@ def test_stages_of_a_flip_hold() -> None:
     plan = FreeKnots().plan(problem, quad)
     assert certified(plan)
     assert plan.status == "locally optimal"
-    course = problem.maneuver.course(problem.gate, quad.max_specific_thrust)
+    course = problem.stages(quad.max_specific_thrust)
     for stage, placed in zip(course.stages, plan.stages, strict=True):
         assert placed.name == stage.name
         for condition in stage.conditions:
             value = plan.trajectory.evaluate(placed.time, condition.quantity.derivative)
             if condition.quantity.value == "specific_thrust":
-                value = value + np.array([0.0, 0.0, problem.gravity or quad.gravity])
+                value = value + np.array([0.0, 0.0, problem.gravity or STANDARD_GRAVITY])
             along = float(condition.direction @ value)
             assert condition.lower - 1e-3 <= along <= condition.upper + 1e-3
 

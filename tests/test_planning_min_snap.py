@@ -8,7 +8,8 @@ import pytest
 from aerobat.errors import Infeasible, SpecError
 from aerobat.flatness import reference
 from aerobat.planning import MinSnap, Plan, Stretch, plan
-from aerobat.problem import HalfFlip, Passing, Problem, Waypoint, Waypoints, load_problem, rest
+from aerobat.problem import GatePassage, HalfFlip, Problem, Waypoint, Waypoints, at_rest, load_problem
+from aerobat.states import STANDARD_GRAVITY
 from aerobat.vehicle import load_vehicle
 
 
@@ -59,7 +60,7 @@ def test_a_path_through_waypoints_meets_them_all_and_is_certified(order: int) ->
         Waypoint(position=(4.0, 1.0, 1.5), up=(1.0, 0.0, 1.0), thrust=15.0),
         Waypoint(position=(6.0, 0.0, np.nan), acceleration=(0.0, np.nan, np.nan)),
     )
-    problem = Problem("slalom", rest((0, 0, 1)), rest((8, 0, 1)), Waypoints(waypoints))
+    problem = Problem("slalom", at_rest((0, 0, 1)), at_rest((8, 0, 1)), Waypoints(waypoints))
     vehicle = load_vehicle("agile-quad")
     if order == 3:  # jerk jumps at the knots, and body rates with it: no moment can do that
         with pytest.raises(Infeasible, match="closed-form"):
@@ -73,7 +74,7 @@ def test_a_path_through_waypoints_meets_them_all_and_is_certified(order: int) ->
         for values, given in ((p, waypoint.position), (v, waypoint.velocity), (a, waypoint.acceleration)):
             told = ~np.isnan(given)
             np.testing.assert_allclose(values[knot][told], given[told], atol=1e-9)
-    thrust = a[2] + [0.0, 0.0, vehicle.gravity]
+    thrust = a[2] + [0.0, 0.0, STANDARD_GRAVITY]
     np.testing.assert_allclose(thrust, 15.0 * np.array([1.0, 0.0, 1.0]) / np.sqrt(2.0), atol=1e-9)
 
 
@@ -81,16 +82,16 @@ def test_a_gate_is_passed_with_its_attitude() -> None:
     problem, vehicle = load_problem("half-flip"), load_vehicle("agile-quad")
     found = plan(problem, MinSnap(), vehicle)
     (stage,) = found.stages
-    assert stage.gate is not None
+    gate = problem.gate(stage.gate)
     setpoint = reference(found.trajectory, vehicle, times=[stage.time]).setpoint
-    np.testing.assert_allclose(setpoint.flat.position[0], stage.gate.position, atol=1e-9)
-    thrust = setpoint.flat.acceleration[0] + [0.0, 0.0, vehicle.gravity]
-    np.testing.assert_allclose(thrust / np.linalg.norm(thrust), stage.gate.up, atol=1e-9)
+    np.testing.assert_allclose(setpoint.flat.position[0], gate.position, atol=1e-9)
+    thrust = setpoint.flat.acceleration[0] + [0.0, 0.0, STANDARD_GRAVITY]
+    np.testing.assert_allclose(thrust / np.linalg.norm(thrust), gate.up, atol=1e-9)
 
 
 def test_what_the_closed_form_cannot_see_is_checked_and_told() -> None:
     """It knows no inequality: a gate asked to be passed fast is missed, in a sentence."""
-    fast = replace(load_problem("half-flip"), maneuver=HalfFlip(passing=Passing(speed=30.0)))
+    fast = replace(load_problem("half-flip"), maneuver=HalfFlip(passage=GatePassage(speed=30.0)))
     with pytest.raises(Infeasible, match=r"'gate' asks velocity between 30.*closed form gives") as error:
         plan(fast, MinSnap(), load_vehicle("agile-quad"))
     assert error.value.attempts

@@ -56,7 +56,7 @@ def test_a_plan_meets_its_ends_and_the_papers_bounds(name: str) -> None:
 @pytest.mark.parametrize("name", ["flip-roll", "flip-pitch", "flip-roll-translation", "half-flip"])
 def test_every_stage_holds_where_the_plan_says(name: str) -> None:
     found = in_paper(name)
-    course = found.problem.maneuver.course(found.problem.gate, 50.0)
+    course = found.problem.stages(50.0)
     g = np.array([0.0, 0.0, 9.81])
     for stage, placed in zip(course.stages, found.stages, strict=True):
         assert placed.time == pytest.approx((placed.interval + 1) * found.dt)
@@ -81,4 +81,4 @@ def test_the_papers_gate_is_passed_at_the_end_of_interval_n_over_2(order: int, i
     problem = replace(load_problem("half-flip").as_in_paper(), limits=Limits(velocity=10.0))
     found = plan(problem, Miqp(order=order, intervals=intervals))
     passed = found.trajectory.evaluate((intervals // 2 + 1) * found.dt)
-    np.testing.assert_allclose(passed, problem.gate.position, atol=1e-5)
+    np.testing.assert_allclose(passed, problem.gates[0].position, atol=1e-5)

@@ -8,7 +8,8 @@ import pytest
 
 from aerobat.errors import Infeasible, SpecError
 from aerobat.planning import Bisection, Miqp, RotorMargin, plan, rotor_margin
-from aerobat.problem import EndState, Flip, HalfFlip, Limits, Problem, load_problem, rest, tilted_gate
+from aerobat.problem import EndState, Flip, HalfFlip, Limits, Problem, at_rest, load_problem, tilted_gate
+from aerobat.states import STANDARD_GRAVITY
 from aerobat.vehicle import Vehicle, load_vehicle
 
 MANEUVERS = ["flip-roll", "flip-roll-translation", "flip-pitch", "half-flip", "line"]
@@ -44,8 +45,8 @@ def test_flips_about_any_horizontal_axis_are_the_same_flip_turned(axis_deg: floa
     """Without per-axis limits nothing tells one heading from another."""
     roll = replace(load_problem("flip-roll"), limits=Limits())
     heading = np.deg2rad(axis_deg + 90.0)  # thrust swings to the left of the axis, where the gate leads
-    gate = tilted_gate(roll.gate.position, heading + np.pi, tilt=np.pi)
-    turned = replace(roll, gate=gate, maneuver=Flip(axis_deg))
+    gate = tilted_gate(roll.gates[0].position, heading + np.pi, tilt=np.pi)
+    turned = replace(roll, gates=(gate,), maneuver=Flip(axis_deg))
     planner = Miqp(search=Bisection(0.1, 0.2))
     assert plan(turned, planner, quad).cost == pytest.approx(plan(roll, planner, quad).cost, rel=1e-5)
 
@@ -55,23 +56,25 @@ def test_the_half_flip_passes_a_gate_at_any_tilt_with_its_thrust_along_the_uprig
     tilt_deg: float, quad: Vehicle
 ) -> None:
     problem = load_problem("half-flip")
-    problem = replace(problem, gate=problem.gate.tilted(np.deg2rad(tilt_deg)))
+    gate = problem.gates[0].tilted(np.deg2rad(tilt_deg))
+    problem = replace(problem, gates=(gate,))
     found = plan(problem, vehicle=quad)
     (gate,) = found.stages
-    thrust = found.trajectory.evaluate(gate.time, 2) + [0.0, 0.0, quad.gravity]  # noqa: RUF005
-    sideways = thrust - (thrust @ problem.gate.normal) * problem.gate.normal
-    np.testing.assert_allclose(sideways / np.linalg.norm(sideways), problem.gate.up, atol=1e-5)
+    thrust = found.trajectory.evaluate(gate.time, 2) + [0.0, 0.0, STANDARD_GRAVITY]  # noqa: RUF005
+    sideways = thrust - (thrust @ gate.normal) * gate.normal
+    np.testing.assert_allclose(sideways / np.linalg.norm(sideways), gate.up, atol=1e-5)
 
 
 def test_the_gate_is_passed_squarely(quad: Vehicle) -> None:
     found = plan(load_problem("flip-roll"), vehicle=quad)
-    gate = next(s for s in found.stages if s.gate)
-    velocity = found.trajectory.evaluate(gate.time, 1)
-    assert velocity @ gate.gate.normal == pytest.approx(np.linalg.norm(velocity), rel=1e-9)
+    passage = next(s for s in found.stages if s.gate)
+    velocity = found.trajectory.evaluate(passage.time, 1)
+    normal = found.problem.gate(passage.gate).normal
+    assert velocity @ normal == pytest.approx(np.linalg.norm(velocity), rel=1e-9)
 
 
 def test_a_gate_that_asks_more_thrust_than_there_is_says_both_numbers(quad: Vehicle) -> None:
-    problem = replace(load_problem("flip-roll"), maneuver=Flip(180.0, inverted=45.0))
+    problem = replace(load_problem("flip-roll"), maneuver=Flip(180.0, min_inverted_thrust=45.0))
     with pytest.raises(Infeasible, match=r"'gate' asks 45 m/s² inverted, agile-quad gives 32\.4"):
         plan(problem, vehicle=quad)
 
@@ -111,25 +114,25 @@ def test_too_few_intervals_for_the_stages_is_a_sentence(intervals: int) -> None:
 
 
 def test_two_intervals_suffice_for_nothing_to_do() -> None:
-    still = Problem("still", rest((1.0, 2.0, 3.0)), rest((1.0, 2.0, 3.0)))
+    still = Problem("still", at_rest((1.0, 2.0, 3.0)), at_rest((1.0, 2.0, 3.0)))
     found = plan(still, Miqp(intervals=2))
     assert found.cost == pytest.approx(0.0, abs=1e-12)
 
 
 def test_a_gate_at_the_start_is_planned_like_any_other(quad: Vehicle) -> None:
     problem = load_problem("flip-roll")
-    gate = replace(problem.gate, position=problem.start.position)
-    found = plan(replace(problem, gate=gate), vehicle=quad)
+    gate = replace(problem.gates[0], position=problem.start.position)
+    found = plan(replace(problem, gates=(gate,)), vehicle=quad)
     placed = next(s for s in found.stages if s.gate)
     np.testing.assert_allclose(found.trajectory.evaluate(placed.time), problem.start.position, atol=1e-6)
 
 
-@pytest.mark.parametrize("yaw", [np.pi, -np.pi, np.pi / 2])
-def test_a_symmetric_vehicle_flies_the_same_plan_at_any_multiple_of_90_degrees_of_yaw(
-    yaw: float, quad: Vehicle
+@pytest.mark.parametrize("heading", [np.pi, -np.pi, np.pi / 2])
+def test_a_symmetric_vehicle_flies_the_same_plan_at_any_multiple_of_90_degrees_of_heading(
+    heading: float, quad: Vehicle
 ) -> None:
     straight, turned = (
-        plan(replace(load_problem("flip-roll"), yaw=angle), vehicle=quad) for angle in (0.0, yaw)
+        plan(replace(load_problem("flip-roll"), heading=angle), vehicle=quad) for angle in (0.0, heading)
     )
     assert turned.duration == pytest.approx(straight.duration, rel=1e-9)
 

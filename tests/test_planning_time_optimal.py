@@ -10,7 +10,18 @@ from aerobat.errors import BackendMissing, Infeasible, SpecError
 from aerobat.flying import fly
 from aerobat.planning import Plan
 from aerobat.planning.time_optimal.time_optimal import TimeOptimal
-from aerobat.problem import EndState, Limits, Line, Problem, Quantity, Waypoint, Waypoints, load_problem, rest
+from aerobat.problem import (
+    EndState,
+    Limits,
+    Line,
+    Problem,
+    Quantity,
+    Waypoint,
+    Waypoints,
+    at_rest,
+    load_problem,
+)
+from aerobat.states import STANDARD_GRAVITY
 from aerobat.vehicle import Vehicle, load_vehicle
 from rigid_body_replay import replayed
 
@@ -60,7 +71,7 @@ def test_in_space_there_is_a_faster_way_than_in_the_plane():
 
 def test_a_maneuver_that_lies_in_no_plane_is_planned_in_space():
     bent = Waypoints((Waypoint(position=(1.0, 1.0, 0.0)),))
-    problem = Problem("bent", rest((0, 0, 0)), rest((2, 0, 0)), bent)
+    problem = Problem("bent", at_rest((0, 0, 0)), at_rest((2, 0, 0)), bent)
     found = TimeOptimal(intervals=20).plan(problem, QUAD)
     assert found.trajectory.evaluate(found.stages[0].time) == pytest.approx([1.0, 1.0, 0.0], abs=1e-6)
 
@@ -85,7 +96,7 @@ def test_a_flip_is_certified_and_flown_within_2_cm(name, request):
 @pytest.mark.parametrize("name", ["flip", "half_flip"])
 def test_every_stage_holds_where_it_is_said_to(name, request):
     found = request.getfixturevalue(name)
-    course = found.problem.maneuver.course(found.problem.gate, QUAD.max_specific_thrust)
+    course = found.problem.stages(QUAD.max_specific_thrust)
     assert len(found.stages) == len(course.stages)
     for placed, stage in zip(found.stages, course.stages, strict=True):
         flat = found.trajectory.on_segments([1.0], 0)[placed.interval, 0]
@@ -96,13 +107,13 @@ def test_every_stage_holds_where_it_is_said_to(name, request):
 
 
 def quantity(found: Plan, which: Quantity, time: float) -> np.ndarray:
-    weight = np.array([0.0, 0.0, QUAD.gravity]) * (which is Quantity.SPECIFIC_THRUST)
+    weight = np.array([0.0, 0.0, STANDARD_GRAVITY]) * (which is Quantity.SPECIFIC_THRUST)
     return found.trajectory.evaluate(time, which.derivative) + weight
 
 
 def test_the_half_flip_passes_its_gate_squarely_and_banked_as_the_gate_is(half_flip):
     (passage,) = half_flip.stages
-    gate = passage.gate
+    gate = half_flip.problem.gate(passage.gate)
     velocity = half_flip.trajectory.evaluate(passage.time, 1)
     thrust = quantity(half_flip, Quantity.SPECIFIC_THRUST, passage.time)
     assert half_flip.trajectory.evaluate(passage.time) == pytest.approx(gate.position, abs=1e-6)
@@ -113,15 +124,15 @@ def test_the_half_flip_passes_its_gate_squarely_and_banked_as_the_gate_is(half_f
 
 def test_lagging_rotors_can_follow(flip):
     """Thrust is continuous, and at both ends that of hovering."""
-    weight = np.array([0.0, 0.0, QUAD.gravity])
+    weight = np.array([0.0, 0.0, STANDARD_GRAVITY])
     thrust = np.linalg.norm(flip.trajectory.on_segments([0.0, 1.0], 2) + weight, axis=-1)
     assert thrust[1:, 0] == pytest.approx(thrust[:-1, 1], abs=1e-6)
-    assert thrust[[0, -1], [0, 1]] == pytest.approx(QUAD.gravity, abs=1e-6)
+    assert thrust[[0, -1], [0, 1]] == pytest.approx(STANDARD_GRAVITY, abs=1e-6)
 
 
 def test_limits_hold_between_nodes_and_cost_time():
     limits = Limits(upper=np.array([np.inf, np.inf, 0.05]), velocity=5.0, acceleration=20.0, jerk=150.0)
-    free = Problem("dash", rest((0, 0, 0)), rest((4, 0, 0)))
+    free = Problem("dash", at_rest((0, 0, 0)), at_rest((4, 0, 0)))
     bound = TimeOptimal(intervals=20).plan(replace(free, limits=limits), QUAD)
     for derivative in range(4):
         (lower, upper), (least, most) = limits.of(derivative), bound.trajectory.component_range(derivative)
@@ -153,9 +164,9 @@ def test_what_cannot_be_asked_is_refused():
         TimeOptimal().plan(problem)
     with pytest.raises(SpecError, match=r"limits\.crackle"):
         TimeOptimal().plan(replace(problem, limits=Limits(crackle=1e5)), QUAD)
-    falling = EndState(np.zeros(3), acceleration=np.array([0.0, 0.0, -QUAD.gravity]))
+    falling = EndState(np.zeros(3), acceleration=np.array([0.0, 0.0, -STANDARD_GRAVITY]))
     with pytest.raises(SpecError, match=r"start\.acceleration asks no thrust"):
-        TimeOptimal().plan(Problem("falling", falling, rest((1, 0, 0)), Line()), QUAD)
+        TimeOptimal().plan(Problem("falling", falling, at_rest((1, 0, 0)), Line()), QUAD)
 
 
 @pytest.mark.parametrize(

@@ -11,7 +11,7 @@ import pytest
 
 from aerobat.optimization import AssignmentProgram, solver
 from aerobat.planning.miqp import formulate
-from aerobat.problem import Staged, load_problem
+from aerobat.problem import CustomManeuver, load_problem
 from aerobat.problem.stage import Condition, Quantity
 from aerobat.trajectory import Trajectory
 
@@ -61,7 +61,7 @@ def varied(seed: int) -> AssignmentProgram:
     """Other thrusts, limits, duration and order of integrator; some have no solution."""
     rng = np.random.default_rng(seed)
     example = load_problem(EXAMPLE)
-    assert isinstance(example.maneuver, Staged)
+    assert isinstance(example.maneuver, CustomManeuver)
     stages = tuple(
         replace(stage, conditions=tuple(stronger(c, factor) for c in stage.conditions))
         for stage, factor in zip(example.maneuver.stages, rng.uniform(0.5, 2.5, 8), strict=True)

@@ -6,21 +6,22 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from aerobat.environment import Environment
 from aerobat.errors import SpecError
 from aerobat.problem import (
     Condition,
+    CustomManeuver,
     EndState,
     Flip,
     Limits,
     Line,
     Problem,
     Stage,
-    Staged,
     Waypoint,
     Waypoints,
+    at_rest,
     load_problem,
     problem_names,
-    rest,
     tilted_gate,
     write_problem,
 )
@@ -42,19 +43,28 @@ def same(a: object, b: object) -> bool:
 SPELLED_OUT = Problem(
     "spelled-out",
     start=EndState((0, 0, 1), (1, 0, 0), (0, 0.5, 0)),
-    goal=rest((3, 0, 1)),
-    maneuver=Staged(
+    goal=at_rest((3, 0, 1)),
+    maneuver=CustomManeuver(
         (
             Stage("kick", (Condition("specific_thrust", (1, 0, -1), 0.0, 0.0),)),
-            Stage("gate", (Condition("velocity", (1, 0, 0), lower=2.0),), at=0.25, late=1),
+            Stage(
+                "gate",
+                (Condition("velocity", (1, 0, 0), lower=2.0),),
+                at=0.25,
+                interval_offset=1,
+                gate="gate",
+            ),
         ),
-        always=(Condition("position", (0, 0, 1), lower=0.0),),
+        path_constraints=(Condition("position", (0, 0, 1), lower=0.0),),
         ordered=False,
     ),
-    gate=tilted_gate(np.array([1.0, 0, 2]), heading=0.3, tilt=-0.7, width=0.8, height=0.4),
+    gates=(
+        tilted_gate(np.array([1.0, 0, 2]), heading=0.3, tilt=-0.7, width=0.8, height=0.4),
+        tilted_gate(np.array([2.0, 0, 2]), name="second"),
+    ),
     limits=Limits(lower=(-9, -9, 0), upper=(9, 9, 9), velocity=(8, 8, 6), snap=500.0),
-    yaw=np.pi,
-    gravity=9.80665,
+    heading=np.pi,
+    environment=Environment(gravity=9.80665, wind=(1.0, 0.0, -0.5), ground=-1.0),
     description="every key of the format",
 )
 
@@ -65,7 +75,7 @@ THROUGH_WAYPOINTS = replace(
     maneuver=Waypoints(
         (
             Waypoint(position=(np.nan, np.nan, 2.0), velocity=(1.0, np.nan, 0.0), time=0.5),
-            Waypoint(gate=True, up=(0.0, 1.0, -1.0), time=0.75),
+            Waypoint(gate="second", up=(0.0, 1.0, -1.0), time=0.75),
             Waypoint(position=(1.0, 2.0, 3.0), up=(0.0, 0.0, -2.0), thrust=12.0, time=1.5),
             Waypoint(acceleration=(0.0, np.nan, -9.0), time=2.0),
         ),
@@ -83,7 +93,7 @@ def test_a_problem_survives_its_file(problem: Problem, tmp_path: Path) -> None:
 
 def test_the_built_in_problems_are_the_reference_codes() -> None:
     """Gates and goals of the authors' public code."""
-    gates = {name: load_problem(name).gate for name in problem_names()}
+    gates = {name: next(iter(load_problem(name).gates), None) for name in problem_names()}
     goals = {name: load_problem(name).goal.position.tolist() for name in problem_names()}
     assert {n: None if g is None else g.position.tolist() for n, g in gates.items()} == {
         "flip-roll": [0, 0, 5.5],
@@ -113,7 +123,7 @@ def test_an_end_outside_the_limits_is_refused_by_its_field_and_axis(place: str) 
     inside = load_problem("line")
     limits = Limits(lower=(-1, -1, -1), upper=(20, 1, 1))
     with pytest.raises(SpecError, match=rf"{place}.position: its y component, 2 m.*widen"):
-        replace(inside, limits=limits, **{place: rest((0, 2, 0))})
+        replace(inside, limits=limits, **{place: at_rest((0, 2, 0))})
 
 
 def test_a_start_too_fast_for_the_limits_is_refused() -> None:
@@ -122,8 +132,8 @@ def test_a_start_too_fast_for_the_limits_is_refused() -> None:
 
 
 def test_a_flip_without_a_gate_is_refused() -> None:
-    with pytest.raises(SpecError, match=r"\[gate\]"):
-        Problem("lost", rest((0, 0, 0)), rest((0, 0, 0)), Flip())
+    with pytest.raises(SpecError, match=r"\[\[gates\]\]"):
+        Problem("lost", at_rest((0, 0, 0)), at_rest((0, 0, 0)), Flip())
 
 
 @pytest.mark.parametrize(
@@ -136,7 +146,7 @@ def test_limits_that_exclude_everything_are_refused(bad: dict) -> None:
 
 def test_a_value_is_immutable_for_real() -> None:
     source = np.zeros(3)
-    problem = Problem("still", EndState(source), rest((1, 0, 0)), Line())
+    problem = Problem("still", EndState(source), at_rest((1, 0, 0)), Line())
     source[:] = 7.0
     assert problem.start.position.tolist() == [0, 0, 0]
     with pytest.raises(ValueError, match="read-only"):

@@ -9,13 +9,13 @@ from aerobat import so3
 from aerobat.errors import SpecError
 from aerobat.problem import (
     Condition,
-    Course,
+    CustomManeuver,
     Flip,
+    GatePassage,
     HalfFlip,
     Line,
-    Passing,
     Quantity,
-    Staged,
+    StageSequence,
     load_problem,
     tilted_gate,
 )
@@ -34,9 +34,9 @@ def holds(stage: Stage, acceleration: np.ndarray) -> bool:
     )
 
 
-def flip_of_the_paper() -> Course:
+def flip_of_the_paper() -> StageSequence:
     problem = load_problem("flip-roll").as_in_paper()
-    return problem.maneuver.course(problem.gate, 50.0)
+    return problem.stages(50.0)
 
 
 accelerations = st.tuples(*[st.sampled_from([-40.0, -25.0, -18.0, 0.0, 18.0, 30.0])] * 3)
@@ -60,7 +60,7 @@ def test_the_paper_imposes_no_order_and_fixes_only_the_gate() -> None:
 
 def test_a_flip_of_ours_meets_its_gate_half_way_squarely_and_in_its_direction() -> None:
     problem = load_problem("flip-roll")
-    gate = problem.maneuver.course(problem.gate, 50.0).stages[2]
+    gate = problem.stages(50.0).stages[2]
     assert gate.fixed_interval(20) == 9  # ends at half the duration
     velocity = {tuple(c.direction): (c.lower, c.upper) for c in gate.conditions if c.quantity == "velocity"}
     assert velocity[(0.0, 1.0, 0.0)] == (0.0, np.inf)
@@ -72,8 +72,8 @@ def test_a_flip_asks_the_same_turn_about_any_horizontal_axis(axis_deg: float, th
     gate = tilted_gate(np.zeros(3), tilt=np.pi)
     axis = np.deg2rad(axis_deg)
     spun = so3.about_axis(np.array([0, 0, 1.0]), axis)
-    reference = Flip(0.0).course(gate, thrust)
-    turned = Flip(axis_deg).course(gate, thrust)
+    reference = Flip(0.0).stages([gate], thrust)
+    turned = Flip(axis_deg).stages([gate], thrust)
     for a, b in zip(reference.stages, turned.stages, strict=True):
         for ca, cb in zip(a.conditions, b.conditions, strict=True):
             if ca.quantity is Quantity.SPECIFIC_THRUST:
@@ -83,7 +83,7 @@ def test_a_flip_asks_the_same_turn_about_any_horizontal_axis(axis_deg: float, th
 
 def test_signed_stages_refuse_the_inverted_thrust_that_the_papers_accept() -> None:
     signed = load_problem("flip-roll")
-    first = signed.maneuver.course(signed.gate, 50.0).stages[0]
+    first = signed.stages(50.0).stages[0]
     upright, inverted = np.array([0, 30.0, 30.0 - G]), np.array([0, -30.0, -30.0 - G])
     assert holds(first, upright)
     assert not holds(first, inverted)
@@ -97,7 +97,7 @@ def test_the_half_flip_ties_lateral_to_vertical_thrust_by_the_tangent_of_the_til
     """(a_z + g) tan α = a_y, a_y ≥ ε_y; our tilt is to the right, the paper's α to the left."""
     tilt = np.deg2rad(tilt_deg)
     gate = tilted_gate(np.zeros(3), tilt=tilt)
-    (stage,) = HalfFlip(lateral=18.0).course(gate, 50.0).stages
+    (stage,) = HalfFlip(min_lateral_thrust=18.0).stages([gate], 50.0).stages
     fitting = np.array([along, -lateral, lateral / np.tan(tilt) - G])
     assert holds(stage, fitting)
     assert not holds(stage, np.add(fitting, [0, 0, 1.0]))
@@ -106,39 +106,39 @@ def test_the_half_flip_ties_lateral_to_vertical_thrust_by_the_tangent_of_the_til
 
 def test_the_half_flip_never_turns_over() -> None:
     problem = load_problem("half-flip")
-    (always,) = problem.maneuver.course(problem.gate, 50.0).always
+    (always,) = problem.stages(50.0).path_constraints
     assert (always.quantity, always.lower) == (Quantity.SPECIFIC_THRUST, 0.0)
     np.testing.assert_array_equal(always.direction, [0.0, 0.0, 1.0])
 
 
 def test_a_line_asks_nothing_but_the_gate_it_may_have() -> None:
-    assert Line().course(None, 50.0).stages == ()
-    (stage,) = Line().course(tilted_gate(np.ones(3)), 50.0).stages
+    assert Line().stages([], 50.0).stages == ()
+    (stage,) = Line().stages([tilted_gate(np.ones(3))], 50.0).stages
     assert {c.quantity for c in stage.conditions} == {Quantity.POSITION, Quantity.VELOCITY}
 
 
 def test_a_spelled_out_maneuver_may_pass_the_problems_gate() -> None:
     gate = tilted_gate(np.ones(3))
     kick = Stage("kick", (Condition("specific_thrust", (1.0, 0.0, 0.0), lower=5.0),))
-    course = Staged((kick, Stage("gate", (), 0.4))).course(gate, 50.0)
+    course = CustomManeuver((kick, Stage("gate", (), 0.4, gate="gate"))).stages([gate], 50.0)
     assert course.stages[0] is kick
-    assert (course.stages[1].gate, course.stages[1].at) == (gate, 0.4)
+    assert (course.stages[1].gate, course.stages[1].at) == (gate.name, 0.4)
 
 
 @pytest.mark.parametrize(
     "wrong",
     [
         lambda: Flip(axis_deg=np.inf),
-        lambda: Flip(lateral=-1.0),
-        lambda: Flip(inverted=0.0),
-        lambda: HalfFlip(lateral=np.nan),
-        lambda: HalfFlip(18.0).course(tilted_gate(np.zeros(3)), 50.0),
-        lambda: HalfFlip().course(tilted_gate(np.zeros(3), tilt=np.pi), 50.0),
-        lambda: Flip().course(None, 50.0),
+        lambda: Flip(min_lateral_thrust=-1.0),
+        lambda: Flip(min_inverted_thrust=0.0),
+        lambda: HalfFlip(min_lateral_thrust=np.nan),
+        lambda: HalfFlip(18.0).stages([tilted_gate(np.zeros(3))], 50.0),
+        lambda: HalfFlip().stages([tilted_gate(np.zeros(3), tilt=np.pi)], 50.0),
+        lambda: Flip().stages([], 50.0),
         lambda: Condition("position", (0.0, 0.0, 0.0), 0.0),
         lambda: Condition("velocity", (1.0, 0.0, 0.0), 2.0, 1.0),
         lambda: Stage("late", (), at=1.0),
-        lambda: Passing(speed=-1.0),
+        lambda: GatePassage(speed=-1.0),
     ],
 )
 def test_a_maneuver_that_cannot_be_is_refused(wrong) -> None:

@@ -12,8 +12,8 @@ FREE = np.nan
 components = st.lists(st.one_of(st.just(FREE), st.floats(-50, 50)), min_size=3, max_size=3)
 
 
-def course(*waypoints: Waypoint, gate=None):
-    return Waypoints(waypoints).course(gate, 40.0)
+def sequence(*waypoints: Waypoint, gates=()):
+    return Waypoints(waypoints).stages(gates, 40.0)
 
 
 @given(components, components, components)
@@ -23,7 +23,7 @@ def test_each_given_component_is_one_equality_a_free_one_none(position, velocity
         with pytest.raises(SpecError, match="nothing is given"):
             Waypoint(**values)
         return
-    (stage,) = course(Waypoint(**values)).stages
+    (stage,) = sequence(Waypoint(**values)).stages
     asked = {(c.quantity.value, int(np.argmax(c.direction))): (c.lower, c.upper) for c in stage.conditions}
     assert asked == {
         (name, axis): (x, x) for name, xs in values.items() for axis, x in enumerate(xs) if not np.isnan(x)
@@ -35,7 +35,7 @@ def test_an_attitude_holds_exactly_for_thrust_along_it(direction) -> None:
     """With a thrust, for that thrust alone; without, for at least a fifth of what the vehicle has."""
     up = np.array(direction) / np.linalg.norm(direction)
     for waypoint, least in ((Waypoint(up=direction, thrust=12.0), 12.0), (Waypoint(up=direction), 8.0)):
-        (stage,) = course(waypoint).stages
+        (stage,) = sequence(waypoint).stages
         for thrust, holds in ((least * up, True), (0.9 * least * up, False), (-least * up, False)):
             met = [c.lower - 1e-9 <= c.direction @ thrust <= c.upper + 1e-9 for c in stage.conditions]
             assert all(met) == holds
@@ -44,13 +44,13 @@ def test_an_attitude_holds_exactly_for_thrust_along_it(direction) -> None:
 
 def test_waypoints_are_passed_in_order_and_the_gate_at_its_centre() -> None:
     gate = tilted_gate(np.array([1.0, 2.0, 3.0]))
-    passed = course(Waypoint(position=(0, 0, 1)), Waypoint(gate=True), gate=gate)
+    passed = sequence(Waypoint(position=(0, 0, 1)), Waypoint(gate="gate"), gates=[gate])
     assert passed.ordered
     assert [s.name for s in passed.stages] == ["waypoint 1", "gate"]
     assert [s.at for s in passed.stages] == [None, None]
     assert [c.lower for c in passed.stages[1].conditions] == [1.0, 2.0, 3.0]
-    with pytest.raises(SpecError, match=r"\[gate\]"):
-        course(Waypoint(gate=True))
+    with pytest.raises(SpecError, match="no gate named 'gate'"):
+        sequence(Waypoint(gate="gate"))
 
 
 @pytest.mark.parametrize(

@@ -137,7 +137,7 @@ def test_stages_may_come_in_any_order():
 
 
 def test_a_hover_is_drawn_like_any_other_plan(tmp_path):
-    spot = ab.rest([1.0, 2.0, 3.0])
+    spot = ab.at_rest([1.0, 2.0, 3.0])
     hover = replace(ab.load_problem("line"), start=spot, goal=spot)
     vehicle = ab.load_vehicle("agile-quad")
     plan = ab.plan(hover, vehicle=vehicle)
@@ -179,7 +179,7 @@ def test_any_other_plane_is_where_the_thrust_moves_most(heading_deg, seed):
 def test_vehicles_along_the_path_stand_as_the_flight_stood(monkeypatch):
     painted = []
     monkeypatch.setattr(path_panel, "paint", lambda axes, shapes, camera: painted.extend(shapes))
-    flight, gate = flown("flip-roll"), planned("flip-roll").problem.gate
+    flight, gate = flown("flip-roll"), planned("flip-roll").problem.gates[0]
     page("flip-roll")
     axes = [shape.points for shape in painted if len(shape.points) == 2 and shape.width == 0.9]
     assert len(axes) >= 10

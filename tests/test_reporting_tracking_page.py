@@ -120,7 +120,7 @@ def test_every_rotor_is_drawn_with_its_limits(stop_after):
     figure, plan, flight = page_of(stop_after)
     for i, axes in enumerate(rotor_panels(figure, 4)):
         (asked_at, asked), (_, given), limits = lines(axes, 2)
-        expected = ab.reference(plan.trajectory, VEHICLE, times=asked_at, yaw=PROBLEM.yaw).rotor_thrusts
+        expected = ab.reference(plan.trajectory, VEHICLE, times=asked_at).rotor_thrusts
         np.testing.assert_allclose(asked, expected[:, i], atol=1e-9)
         np.testing.assert_array_equal(given, flight.thrusts[:, i])
         np.testing.assert_allclose(limits, [-0.2, 18.0])

@@ -8,12 +8,15 @@ from hypothesis import given as drawn
 from hypothesis import settings
 from hypothesis import strategies as st
 
+from aerobat.environment import Environment
 from aerobat.errors import SpecError
 from aerobat.flatness import reference
 from aerobat.planning import rotor_margin
 from aerobat.trajectory import Rule, Trajectory, minimum_effort, polynomial
 from aerobat.vehicle import load_vehicle
 from minimum_effort_reference import exact_coefficients
+
+CODE = Environment(gravity=9.80665)  # of the authors' evalTrajFeasibility.m
 
 seeds = st.integers(0, 2**32 - 1)
 orders = st.integers(3, 5)
@@ -274,9 +277,10 @@ def test_in_the_papers_example_x_is_one_smoothstep_through_the_free_knot(k):
 )
 def test_the_papers_iterations_ask_of_the_vehicle_what_is_known(k, thrust, moment, rate, rotors):
     vehicle, trajectory = load_vehicle("section-v"), section_v(k)
-    asked = reference(trajectory, vehicle, times=np.linspace(0.0, trajectory.duration, 40_001)).setpoint
-    margin = rotor_margin(trajectory, vehicle)
-    least, largest = trajectory.specific_thrust_range(vehicle.gravity)
+    times = np.linspace(0.0, trajectory.duration, 40_001)
+    asked = reference(trajectory, vehicle, times=times, environment=CODE).setpoint
+    margin = rotor_margin(trajectory, vehicle, CODE)
+    least, largest = trajectory.specific_thrust_range(CODE.gravity)
     found = (vehicle.mass * least.value, vehicle.mass * largest.value)
     assert found == pytest.approx(thrust, abs=0.006)
     moments = np.linalg.norm(asked.wrench.moment_body, axis=-1)

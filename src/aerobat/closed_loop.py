@@ -13,6 +13,7 @@ from aerobat import so3
 from aerobat.arrays import Array, frozen
 from aerobat.engines.engine import Init, Step
 from aerobat.engines.packing import airframes, bodies, components, models
+from aerobat.environment import Environment
 from aerobat.errors import SpecError
 from aerobat.flatness import lateral_drag, reference
 from aerobat.flight import DIVERGED
@@ -72,6 +73,7 @@ class Prepared:
     ticks: Tick
     times: Array  # [s]
     setpoint: Setpoint
+    environment: Environment
     vehicles: tuple[Vehicle, ...]  # that fly
     believed: tuple[Vehicle, ...]  # that their controllers believe in
     batch: bool  # whether one was asked for
@@ -93,7 +95,7 @@ def prepare(
     trajectory: Trajectory,
     vehicle: Vehicle | Sequence[Vehicle],
     *,
-    yaw: float,
+    environment: Environment,
     controller: Controller,
     rate: float,
     start: BodyState | None,
@@ -103,23 +105,28 @@ def prepare(
 ) -> Prepared:
     """All that a flight takes; see `flying.fly`. Raises SpecError for arguments that do not fit together."""
     flown, believed, batch = _crew(vehicle, model, start)
-    asked = reference(trajectory, believed[0], rate=rate, yaw=yaw)
+    asked = reference(trajectory, believed[0], rate=rate, environment=environment)
     setpoint, times = asked.setpoint, asked.times
     later = np.minimum(times + controller.effect_delay(1.0 / rate), times[-1])
-    ahead = reference(trajectory, believed[0], times=later, yaw=yaw).setpoint
+    ahead = reference(trajectory, believed[0], times=later, environment=environment).setpoint
     # all but the last period alike to the last bit, so that an engine may see that they are
     periods = np.append(np.full(len(times) - 2, 1.0 / rate), [times[-1] - times[-2], 0.0])
     ticks = Tick(
-        _target(setpoint, ahead, believed[0].gravity),
+        _target(setpoint, ahead, environment.gravity),
         np.append(periods[0], periods[:-1]),
         periods,
         () if noise is None else bodies(noise.drawn(_generators(seed, len(flown), batch), len(times))),
     )
     return Prepared(
-        given=Given(airframes(flown), models(controller, believed), _started(start, setpoint, len(flown))),
+        given=Given(
+            airframes(flown, environment),
+            models(controller, believed, environment),
+            _started(start, setpoint, len(flown)),
+        ),
         ticks=ticks,
         times=times,
         setpoint=setpoint,
+        environment=environment,
         vehicles=tuple(flown),
         believed=tuple(believed),
         batch=batch,
@@ -205,8 +212,6 @@ def _crew(
         raise SpecError(
             "vehicle: all vehicles of one flight, and their model, need as many rotors; fly others apart"
         )
-    if len({each.gravity for each in believed}) > 1:
-        raise SpecError("vehicle: all vehicles of one flight need the same gravity; fly others apart")
     if len({lateral_drag(each) for each in believed}) > 1:
         raise SpecError(
             "vehicle: vehicles that differ in drag per mass need different attitudes; fly them apart, "

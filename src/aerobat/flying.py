@@ -14,6 +14,7 @@ from aerobat.closed_loop import Prepared, Row, added_up, prepare
 from aerobat.engines import Engine
 from aerobat.engines.packing import body_states, joined
 from aerobat.engines.trees import rows
+from aerobat.environment import Environment
 from aerobat.errors import SpecError
 from aerobat.flight import COMPLETE, DIVERGED, Flight, divergence, rows_of
 from aerobat.kernels.controller import Controller
@@ -30,7 +31,7 @@ def fly(
     trajectory: Trajectory,
     vehicle: Vehicle | Sequence[Vehicle],
     *,
-    yaw: float = ...,
+    environment: Environment | None = ...,
     controller: Controller = ...,
     rate: float = ...,
     start: BodyState | None = ...,
@@ -48,7 +49,7 @@ def fly(
     trajectory: Trajectory,
     vehicle: Vehicle | Sequence[Vehicle],
     *,
-    yaw: float = ...,
+    environment: Environment | None = ...,
     controller: Controller = ...,
     rate: float = ...,
     start: BodyState | None = ...,
@@ -65,7 +66,7 @@ def fly(
     trajectory: Trajectory,
     vehicle: Vehicle | Sequence[Vehicle],
     *,
-    yaw: float = 0.0,
+    environment: Environment | None = None,
     controller: Controller = Controller(),  # noqa: B008 - frozen
     rate: float = 500.0,
     start: BodyState | None = None,
@@ -82,7 +83,7 @@ def fly(
     axis. Vehicle k of a batch flies as it would alone with the seed `SeedSequence(seed, spawn_key=(k,))`.
     Divergence (5 m off, or no longer a number) ends a flight and is its outcome, not an error.
 
-    `yaw` [rad] turns the attitude about the thrust axis. `rate` [1/s] is the controller's. `start` is the
+    `environment` is by default a calm day on Earth. `rate` [1/s] is the controller's. `start` is the
     true state at first, by default what the trajectory asks. `noise` is the error of the state that the
     controller sees. `engine` is "floats", "numpy", "compiled", "jax", or "auto" for the fastest that is
     installed. `model` is the vehicle that controller and set-points take to be flying, by default the one
@@ -94,7 +95,7 @@ def fly(
     flight = prepare(
         trajectory,
         vehicle,
-        yaw=yaw,
+        environment=environment or Environment(),
         controller=controller,
         rate=rate,
         start=start,
@@ -116,7 +117,11 @@ def fly(
 
 def _scores(flight: Prepared, problem: Problem, engine: Engine) -> tuple[Score, ...]:
     """Of each vehicle, from its last tally."""
-    tallies = engine.scan(*added_up(*flight.loop), *flight.judged(problem.gate), len(flight.times))
+    tallies = engine.scan(
+        *added_up(*flight.loop),
+        *flight.judged(problem.gates[0] if problem.gates else None),
+        len(flight.times),
+    )
     last = rows(tallies, lambda leaf: iter(leaf[:, -1].tolist()))
     return tuple(tally_score(tally, problem, each) for tally, each in zip(last, flight.vehicles, strict=True))
 

@@ -65,7 +65,7 @@ def score(flight: Flight, problem: Problem, vehicle: Vehicle | None = None) -> S
         raise SpecError("score takes one flight at a time; of a batch, score flight[k]")
     position = position_error(flight)
     attitude = np.rad2deg(attitude_error(flight))
-    passage = None if problem.gate is None else gate_passage(flight, problem.gate, vehicle)
+    passage = gate_passage(flight, problem.gates[0], vehicle) if problem.gates else None
     return Score(
         max_position_error_m=float(position.max()),
         rms_position_error_m=_rms(position),
@@ -83,9 +83,9 @@ def score(flight: Flight, problem: Problem, vehicle: Vehicle | None = None) -> S
 def tally_score(tally: Tally, problem: Problem, vehicle: Vehicle) -> Score:
     """The score of a flight that was added up as it was flown, from its last tally in plain numbers."""
     passage = None
-    if problem.gate is not None and tally.nearest_square < np.inf:
+    if problem.gates and tally.nearest_square < np.inf:
         time, *near = tally.nearest
-        passage = _passage(problem.gate, vehicle, time, *map(np.array, near))
+        passage = _passage(problem.gates[0], vehicle, time, *map(np.array, near))
     ticks = max(tally.ticks, 1.0)
     ended = COMPLETE if tally.flying else divergence(tally.stop, bool(tally.sound))
     return Score(

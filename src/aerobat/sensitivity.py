@@ -20,6 +20,7 @@ from aerobat.engines.duals import Dual, DualOps, differentiated, dual
 from aerobat.engines.engine import Init, Step
 from aerobat.engines.packing import body_states, components, models
 from aerobat.engines.trees import Tree, leaves, refilled
+from aerobat.environment import Environment
 from aerobat.errors import SpecError
 from aerobat.kernels.controller import Controller, Gains
 from aerobat.kernels.integrator import Airframe
@@ -86,7 +87,7 @@ def gradient(
     vehicle: Vehicle | Sequence[Vehicle],
     of: str | Sequence[str],
     *,
-    yaw: float = 0.0,
+    environment: Environment | None = None,
     controller: Controller = Controller(),  # noqa: B008 - frozen
     rate: float = 500.0,
     start: BodyState | None = None,
@@ -115,7 +116,7 @@ def gradient(
     flight = prepare(
         trajectory,
         vehicle,
-        yaw=yaw,
+        environment=environment or Environment(),
         controller=controller,
         rate=rate,
         start=start,
@@ -223,7 +224,7 @@ def _moved(flight: Prepared, controller: Controller, name: str, unit: Array) -> 
     vehicles = len(flight.vehicles)
     still: Given = refilled(flight.given, map(np.zeros, repeat(vehicles)))
     if name in _GAINS:
-        gains = _gains(controller, flight.believed, name)
+        gains = _gains(controller, flight, name)
         return still._replace(model=still.model._replace(gains=gains))
     if name.startswith("start."):
         return still._replace(start=_start(still.start, flight.given.start, name, unit))
@@ -232,9 +233,11 @@ def _moved(flight: Prepared, controller: Controller, name: str, unit: Array) -> 
     return still._replace(airframe=_inertial(still.airframe, flight.vehicles, name, unit))
 
 
-def _gains(controller: Controller, believed: Sequence[Vehicle], name: str) -> Gains:
+def _gains(controller: Controller, flight: Prepared, name: str) -> Gains:
+    believed = flight.believed
     number: Any = Dual(getattr(controller, name), 1.0)
-    gains = models(replace(controller, **{name: number}), believed, DualOps(ArrayOps)).gains
+    dual_controller = replace(controller, **{name: number})
+    gains = models(dual_controller, believed, flight.environment, DualOps(ArrayOps)).gains
     slopes = (dual(gain).slope for gain in gains)
     return Gains(*(np.zeros(len(believed)) if x is None else x + np.zeros(len(believed)) for x in slopes))
 

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 from aerobat.arrays import Array
 
-GRAVITY = 9.81  # [m/s²], unless a vehicle or a problem says otherwise
+STANDARD_GRAVITY = 9.81  # [m/s²] as the paper has it
 
 
 @dataclass(frozen=True)

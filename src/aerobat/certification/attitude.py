@@ -56,14 +56,14 @@ class Turning:
         twist = seconds[:, None] / 2 * chebyshev.integral(spin, basis)
         return cls(axes, values[..., 0, :] / n[..., None], rate, acceleration, twist)
 
-    def carried(self, yaw: float) -> Array:
+    def carried(self, heading: float) -> Array:
         """φ at all nodes (P, N) of a frame that each piece takes over from the one before it.
 
-        It starts as the smallest rotation from the vertical to b3, turned by `yaw`; where directions of
+        It starts as the smallest rotation from the vertical to b3, turned by `heading`; where directions of
         neighbours differ it takes the smallest rotation.
         """
         first, last = (_frames(self.axes, self.direction[:, node]) for node in (0, -1))
-        turned = so3.about_axis(UP, np.array(yaw))
+        turned = so3.about_axis(UP, np.array(heading))
         upright = so3.multiply(so3.smallest_rotation(UP, self.direction[0, 0]), turned)
         onto = so3.smallest_rotation(self.direction[:-1, -1], self.direction[1:, 0])
         handed = so3.rotate(onto, last[:-1, :, 0])

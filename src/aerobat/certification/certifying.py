@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from aerobat.arrays import frozen
 from aerobat.certification import ellipses, quantities
 from aerobat.certification.attitude import Turning
 from aerobat.certification.certificate import Certificate, Finding
@@ -18,7 +17,7 @@ from aerobat.certification.kinematics import kinematic_findings
 from aerobat.certification.motion import Motion, Pieces
 from aerobat.certification.questions import Interpolated
 from aerobat.certification.resolution import resolve
-from aerobat.errors import SpecError
+from aerobat.environment import Environment
 from aerobat.flatness.setpoints import UNDETERMINED
 from aerobat.trajectory import Trajectory
 from aerobat.vehicle import Vehicle
@@ -28,40 +27,47 @@ TIGHTNESS = 1e-7  # of a rotor's range: how near the proven bounds are to what i
 
 
 def certify(
-    trajectory: Trajectory, vehicle: Vehicle, yaw: float = 0.0, envelope: Envelope | None = None
+    trajectory: Trajectory,
+    vehicle: Vehicle,
+    environment: Environment | None = None,
+    envelope: Envelope | None = None,
 ) -> Certificate:
     """Prove that a vehicle can fly a trajectory within its limits at every instant, or refute it.
 
-    Quantities are those of `flatness.reference`, `yaw` [rad] as there: the thrust of every rotor and their
+    Quantities are those of `flatness.reference`: the thrust of every rotor and their
     sum, tilt, body rate, moment and speed, and per axis what `envelope.limits` bounds. Bounds are proven
     over continuous time, rounding included. A limit nearer than about 1e-7 of a rotor's range stays
     undecided, as does all that needs an attitude where thrust, and with it the attitude, is undetermined;
     speed and what `envelope.limits` bounds may meet their limits exactly (`kinematics.MET`).
-    Raises SpecError for a yaw that is no finite number and for derivatives beyond all reason.
+    Raises SpecError for derivatives beyond all reason.
+
+    Args:
+        trajectory: The path and its heading.
+        vehicle: What flies it.
+        environment: Gravity and wind, by default those of a calm day on Earth.
+        envelope: What else it shall stay within, by default nothing.
     """
     envelope = Envelope() if envelope is None else envelope
-    angle = frozen(yaw, "yaw")
-    if angle.ndim:
-        raise SpecError(f"yaw must be one angle in rad, got {angle}")
-    motion = Motion.of(trajectory, vehicle, DEGREE)
-    floor = UNDETERMINED * vehicle.gravity
+    environment = Environment() if environment is None else environment
+    motion = Motion.of(trajectory, vehicle, environment, DEGREE)
+    floor = UNDETERMINED * environment.gravity
     resolution = resolve(motion, floor)
     findings: list[Finding] = []
     if len(resolution.pieces.segment):
-        flown = _interpolated(motion, resolution.pieces, float(angle), everywhere=not resolution.vanishing)
+        flown = _interpolated(motion, resolution.pieces, everywhere=not resolution.vanishing)
         findings += flown.answers(quantities.questions(vehicle, envelope))
     findings += kinematic_findings(trajectory, envelope)
     return Certificate(tuple(findings), resolution.vanishing, discontinuities(motion, floor))
 
 
-def _interpolated(motion: Motion, pieces: Pieces, yaw: float, everywhere: bool) -> Interpolated:
+def _interpolated(motion: Motion, pieces: Pieces, everywhere: bool) -> Interpolated:
     """All quantities along pieces that follow each other, in the frame that is carried along them."""
     vehicle, basis = motion.vehicle, motion.basis
     values = motion.on(pieces)
     series = motion.series(values)
     seconds = pieces.seconds(motion.trajectory)
     turning = Turning.along(values[..., 1:, :], series[:, 0, 1], seconds, basis)
-    omega, omega_dot = turning.body(turning.carried(yaw))
+    omega, omega_dot = turning.body(turning.carried(motion.trajectory.heading))
     found = ellipses.accuracy(motion.norms(series, pieces), seconds, motion.sums[pieces.segment], vehicle)
     angle = np.cumsum(found.twist_remainder + basis.lebesgue * found.twist_rounding)
     error = found.remainder + basis.lebesgue * (found.rounding + angle[:, None] * found.turning)

@@ -23,6 +23,7 @@ from aerobat.arrays import Array
 from aerobat.certification import quantities
 from aerobat.certification.chebyshev import ROUNDING, growth
 from aerobat.certification.quantities import Sizes
+from aerobat.flatness.setpoints import axial_drag
 from aerobat.vehicle import Vehicle
 
 RHO = np.array([1.0, 1.6, 2.0, 2.5, 3.2, 4.0, 5.5, 8.0, 14.0, 30.0, 80.0])
@@ -97,7 +98,7 @@ def _bounds(norms: Array, half: Array, vehicle: Vehicle) -> _Bounds:
     frame = (1 + away * (1 + ratio) / beside) * np.exp(np.where(usable, curl, 0.0))  # |x, y|
     omega = frame * jerk * inverse
     omega_dot = frame * inverse * (snap + 2 * ratio * jerk**2 * inverse)
-    axial = abs(quantities.axial_drag(vehicle))
+    axial = abs(axial_drag(vehicle))
     thrust = vehicle.mass * (mean * np.where(RHO > 1, 1 - root, 1 + delta) + axial * ratio * speed)
     return _Bounds(usable, Sizes(thrust, ratio, omega, omega_dot), twist)
 
@@ -112,7 +113,7 @@ def _rounded(sizes: Sizes, least: Array, norms: Array, off: Array, vehicle: Vehi
     omega, omega_dot = sizes.omega, sizes.omega_dot
     speed = norms[..., 0].sum(axis=1)
     return Sizes(
-        thrust=vehicle.mass * (off[:, 1] + abs(quantities.axial_drag(vehicle)) * (off[:, 0] + 2 * f * speed)),
+        thrust=vehicle.mass * (off[:, 1] + abs(axial_drag(vehicle)) * (off[:, 0] + 2 * f * speed)),
         upright=2 * f,
         omega=df + 2 * f * omega,
         omega_dot=ddf + 4 * df * omega + 2 * f * (omega_dot + 4 * omega**2),

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from aerobat.arrays import Array
 from aerobat.certification import chebyshev
+from aerobat.environment import Environment
 from aerobat.errors import SpecError
 from aerobat.flatness.setpoints import lateral_drag, specific_thrust
 from aerobat.trajectory import Trajectory, polynomial
@@ -52,16 +53,17 @@ def joined(parts: list[Pieces]) -> Pieces:
 
 @dataclass(frozen=True)
 class Motion:
-    """Velocity v and specific thrust f, f', f'' of a vehicle on a trajectory: four vector polynomials."""
+    """Airspeed v and specific thrust f, f', f'' of a vehicle on a trajectory: four vector polynomials."""
 
     trajectory: Trajectory
     vehicle: Vehicle
+    environment: Environment
     rates: Array  # velocity to snap in powers of normalised time, (S, K, 12)
     sums: Array  # sums of the absolute values of what v, f, f', f'' are summed from, (S, 4)
     basis: chebyshev.Basis
 
     @classmethod
-    def of(cls, trajectory: Trajectory, vehicle: Vehicle, degree: int) -> Motion:
+    def of(cls, trajectory: Trajectory, vehicle: Vehicle, environment: Environment, degree: int) -> Motion:
         """The motion, to be interpolated with a degree of at least `degree`. Raises SpecError if violent."""
         _check(trajectory)
         size = max(trajectory.degree, 1)
@@ -71,20 +73,24 @@ class Motion:
             rates[:, : rate.shape[1], k] = rate / trajectory.durations[:, None, None] ** (k + 1)
         velocity, acceleration, jerk, snap = np.linalg.norm(rates, axis=-1).sum(axis=1).T
         drag = lateral_drag(vehicle)
+        airspeed = velocity + np.linalg.norm(environment.wind)
         sums = [
-            velocity,
-            acceleration + vehicle.gravity + drag * velocity,
+            airspeed,
+            acceleration + environment.gravity + drag * airspeed,
             jerk + drag * acceleration,
             snap + drag * jerk,
         ]
         basis = chebyshev.basis(max(degree, size))
-        return cls(trajectory, vehicle, rates.reshape(*rates.shape[:2], 12), np.stack(sums, axis=1), basis)
+        flattened = rates.reshape(*rates.shape[:2], 12)
+        return cls(trajectory, vehicle, environment, flattened, np.stack(sums, axis=1), basis)
 
     def at(self, segment: NDArray[np.intp], s: Array) -> Array:
         """v, f, f', f'' at normalised times s (..., k) of segments (...), (..., k, 4, 3)."""
         rates = polynomial.evaluate(self.rates[segment][..., None, :, :], s)
         v, a, j, snap = np.moveaxis(rates.reshape(*s.shape, 4, 3), -2, 0)
-        return np.concatenate([v[..., None, :], specific_thrust(self.vehicle, v, a, j, snap)], axis=-2)
+        airspeed = v - self.environment.wind
+        thrust = specific_thrust(self.vehicle, self.environment, airspeed, a, j, snap)
+        return np.concatenate([airspeed[..., None, :], thrust], axis=-2)
 
     def on(self, pieces: Pieces) -> Array:
         """v, f, f', f'' at the basis's nodes on pieces, (P, K + 1, 4, 3)."""

@@ -14,7 +14,7 @@ from aerobat.arrays import Array
 from aerobat.certification.certificate import Side
 from aerobat.certification.envelope import Envelope
 from aerobat.certification.questions import Question, angle, both_sides, root
-from aerobat.flatness.setpoints import lateral_drag, wrench_for
+from aerobat.flatness.setpoints import wrench_for
 from aerobat.vehicle import Vehicle, mixer, rotor_thrusts
 
 
@@ -33,8 +33,8 @@ def values(vehicle: Vehicle, motion: Array, omega: Array, omega_dot: Array) -> A
 
     `motion` holds v, f, f', f'' (..., 4, 3), world; ω and ω' (..., 3) are in body axes.
     """
-    velocity, thrust = motion[..., 0, :], motion[..., 1:, :]
-    wrench = wrench_for(thrust, velocity, omega, omega_dot, vehicle)
+    airspeed, thrust = motion[..., 0, :], motion[..., 1:, :]
+    wrench = wrench_for(thrust, airspeed, omega, omega_dot, vehicle)
     upright = thrust[..., 0, 2] / np.linalg.norm(thrust[..., 0, :], axis=-1)
     others = [wrench.thrust, upright, _square(omega), _square(wrench.moment_body)]
     return np.concatenate([rotor_thrusts(vehicle, wrench), np.stack(others, axis=-1)], axis=-1)
@@ -72,11 +72,6 @@ def questions(vehicle: Vehicle, envelope: Envelope) -> list[Question]:
         Question("body rate", "rad/s", Side.MOST, envelope.body_rate, count + 2, 1, root),
         Question("moment", "N·m", Side.MOST, envelope.moment, count + 3, 1, root),
     ]
-
-
-def axial_drag(vehicle: Vehicle) -> float:
-    """By how much the drag coefficient along the thrust exceeds that across it, per mass [1/s]."""
-    return float(vehicle.drag_body[2]) / vehicle.mass - lateral_drag(vehicle)
 
 
 def _stacked(vehicle: Vehicle, thrust: Array, moment: Array, *others: Array) -> Array:

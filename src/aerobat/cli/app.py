@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Sequence
+from dataclasses import replace
 from math import inf, radians
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -64,7 +65,9 @@ def fly(problem: str, options: Planned = PlanningOptions(), aloft: Aloft = Flyin
         noise = StateNoise.fused().scaled(aloft.noise) if aloft.noise else None
         task, vehicle = read_task(problem, options, options.paper)
         plan = make_plan(task, vehicle, options)
-        flight = fly_trajectory(plan.trajectory, vehicle, yaw=task.yaw, noise=noise, seed=aloft.seed)
+        flight = fly_trajectory(
+            plan.trajectory, vehicle, environment=task.environment, noise=noise, seed=aloft.seed
+        )
         _finish(illustrator, plan, vehicle, options, flight, score(flight, task, vehicle))
 
 
@@ -110,7 +113,10 @@ def check(plan: Path, options: Checked = CheckOptions()) -> None:
         body_rate=inf if options.max_rate is None else radians(options.max_rate),
         moment=options.max_moment or inf,
     )
-    certificate = certify(read_trajectory(plan, options.rate), vehicle, radians(options.yaw), envelope)
+    trajectory = read_trajectory(plan, options.rate)
+    if options.heading is not None:
+        trajectory = replace(trajectory, heading=radians(options.heading))
+    certificate = certify(trajectory, vehicle, envelope=envelope)
     if options.json:
         print(to_json(certificate.record()))
     else:

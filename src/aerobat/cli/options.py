@@ -96,8 +96,9 @@ class CheckOptions:
     vehicle: Annotated[str, Parameter(group=limiting)] = "agile-quad"
     """The vehicle: a name that `aerobat vehicles` lists, or a TOML file."""
 
-    yaw: Annotated[float, Parameter(group=limiting)] = 0.0
-    """The heading at the start in degrees; it is then carried along the path without spin."""
+    heading: Annotated[float | None, Parameter(group=limiting)] = None
+    """The heading at the start in degrees, carried along the path without spin. Default: the
+    file's own, 0 of a CSV file."""
 
     rate: Annotated[float, Parameter(group=limiting, validator=Positive)] = 100.0
     """Rows a second of a CSV file without times."""

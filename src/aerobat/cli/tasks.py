@@ -47,15 +47,13 @@ def read_task(name: str, options: TaskOptions, paper: bool = False) -> tuple[Pro
     problem = load_problem(name)
     vehicle = load_vehicle(options.vehicle or ("hexarotor" if paper else "agile-quad"))
     if options.angle is not None:
-        if problem.gate is None or not isinstance(problem.maneuver, HalfFlip):
+        if not isinstance(problem.maneuver, HalfFlip):
             raise SpecError(f"--angle tilts the gate of a half-flip; '{problem.name}' is none, leave it out")
         if not (isfinite(options.angle) and abs(options.angle) <= 90.0):
             raise SpecError(f"--angle must be from -90 to 90 degrees, got {options.angle}")
-        problem = replace(problem, gate=problem.gate.tilted(radians(options.angle)))
+        problem = replace(problem, gates=tuple(gate.tilted(radians(options.angle)) for gate in problem.gates))
     if paper:
         problem = problem.as_in_paper()
-    if problem.gravity is not None:
-        vehicle = replace(vehicle, gravity=problem.gravity)
     return problem, vehicle
 
 

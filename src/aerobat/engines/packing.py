@@ -9,6 +9,7 @@ import numpy as np
 
 from aerobat.arrays import Array
 from aerobat.engines.trees import Tree
+from aerobat.environment import Environment
 from aerobat.kernels.allocation import Mixer
 from aerobat.kernels.control import Model
 from aerobat.kernels.controller import Controller
@@ -49,7 +50,7 @@ def body_states(body: Body) -> BodyState:
     return BodyState(*(joined(part) for part in body))
 
 
-def airframes(vehicles: Sequence[Vehicle]) -> Airframe:
+def airframes(vehicles: Sequence[Vehicle], environment: Environment) -> Airframe:
     """What the kernels read of vehicles with as many rotors each; leaves (vehicles,)."""
     inertia = np.array([vehicle.inertia for vehicle in vehicles])
     inertial = Inertial(
@@ -57,7 +58,8 @@ def airframes(vehicles: Sequence[Vehicle]) -> Airframe:
         _matrix(inertia),
         _matrix(np.linalg.inv(inertia)),
         components(np.array([vehicle.drag_body for vehicle in vehicles])),
-        np.array([vehicle.gravity for vehicle in vehicles]),
+        np.full(len(vehicles), environment.gravity),
+        components(np.broadcast_to(environment.wind, (len(vehicles), 3))),
     )
     lags = np.array([vehicle.lags for vehicle in vehicles])
     rotors = Rotors(
@@ -70,25 +72,32 @@ def airframes(vehicles: Sequence[Vehicle]) -> Airframe:
     return Airframe(inertial, rotors)
 
 
-def models(controller: Controller, vehicles: Sequence[Vehicle], ops: Any = np) -> Model:
+def models(
+    controller: Controller, vehicles: Sequence[Vehicle], environment: Environment, ops: Any = np
+) -> Model:
     """What a controller believes of vehicles with as many rotors each, and its gains; leaves (vehicles,).
 
     `ops` are of the arithmetic of the controller's numbers; see `Controller.gains`.
     """
     # vehicle by vehicle: each of these asks for the vehicle's mixer, which is kept for a while
-    each = [(mixer(vehicle).T, collective_range(vehicle), _agility(vehicle)) for vehicle in vehicles]
+    each = [
+        (mixer(vehicle).T, collective_range(vehicle), _agility(vehicle, environment.gravity))
+        for vehicle in vehicles
+    ]
     columns, level, agility = (np.array(values) for values in zip(*each, strict=True))
     return Model(
-        airframes(vehicles), Mixer(*_matrix(columns), *components(level)), controller.gains(agility, ops)
+        airframes(vehicles, environment),
+        Mixer(*_matrix(columns), *components(level)),
+        controller.gains(agility, ops),
     )
 
 
-def _agility(vehicle: Vehicle) -> float:
+def _agility(vehicle: Vehicle, gravity: float) -> float:
     """The highest frequency [rad/s] of an attitude loop that a vehicle has the rotors for.
 
     Hovering, they then meet their limits only at larger errors of roll or pitch than the free one.
     """
-    hover = vehicle.mass * vehicle.gravity * mixer(vehicle)[:, 0]
+    hover = vehicle.mass * gravity * mixer(vehicle)[:, 0]
     room = np.minimum(hover - vehicle.min_thrusts, vehicle.max_thrusts - hover)
     torque = np.abs(vehicle.allocation[1:3]) @ room
     acceleration = torque / np.diag(vehicle.inertia)[:2]

@@ -1,6 +1,13 @@
 """Differential flatness: what a vehicle must do to fly a trajectory, inverted or not."""
 
-from aerobat.flatness.setpoints import Reference, lateral_drag, reference, reference_of
+from aerobat.flatness.setpoints import (
+    Reference,
+    axial_drag,
+    end_thrust,
+    lateral_drag,
+    reference,
+    reference_of,
+)
 from aerobat.flatness.transport import Span
 
-__all__ = ["Reference", "Span", "lateral_drag", "reference", "reference_of"]
+__all__ = ["Reference", "Span", "axial_drag", "end_thrust", "lateral_drag", "reference", "reference_of"]

@@ -1,6 +1,7 @@
 """From a trajectory to everything a vehicle must do to fly it: attitude, rates, moments, rotor thrusts.
 
-With the specific thrust f = a + g e3 + (d/m) v, drag made up for, and its direction b3 = f/|f|,
+With the velocity v in the air, relative to the wind, the specific thrust f = a + g e3 + (d/m) v, drag made
+up for, and its direction b3 = f/|f|,
 
     b3'  = (f' − b3 n') / n                  n = |f|,  n' = b3·f'
     b3'' = (f'' − 2 n' b3' − n'' b3) / n     n'' = b3·f'' + b3'·f'
@@ -21,6 +22,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from aerobat import so3
 from aerobat.arrays import Array, frozen
+from aerobat.environment import Environment
 from aerobat.errors import SpecError
 from aerobat.flatness.transport import Frames, Span, frames
 from aerobat.states import FlatState, Setpoint, Wrench
@@ -47,40 +49,52 @@ def reference(
     vehicle: Vehicle,
     times: ArrayLike | None = None,
     rate: float | None = None,
-    yaw: float = 0.0,
+    environment: Environment | None = None,
 ) -> Reference:
     """What `trajectory` asks of `vehicle` at the times given [s], or at `rate` [1/s] and the very end.
 
     The attitude starts, at the trajectory's start, as the smallest rotation from upright to the thrust,
-    turned about it by `yaw` [rad], and is carried along without spin, so that it does not depend on the
-    times asked for. Raises SpecError unless one of times and rate is given, rising and in the trajectory.
+    turned about it by the trajectory's heading, and is carried along without spin, so that it does not depend
+    on the times asked for. The environment is by default one without wind. Raises SpecError unless one of
+    times and rate is given, rising and in the trajectory.
     """
     if (times is None) == (rate is None):
         raise SpecError("reference needs either times or a rate, not both")
+    environment = environment or Environment()
     asked = _rising(trajectory.sample(rate) if rate is not None else times)
     flat = trajectory.flat(asked)
     # both sides of every knot join the times asked for, which show the later side
     seams = np.concatenate([trajectory.knots[1:], trajectory.knots[:-1]])
-    thrust = np.concatenate([_thrust_at_seams(trajectory, vehicle), _thrust(flat, vehicle)])
+    thrust = np.concatenate(
+        [_thrust_at_seams(trajectory, vehicle, environment), _thrust(flat, vehicle, environment)]
+    )
     side = np.repeat([0, 1, 2], [trajectory.segments, trajectory.segments, len(asked)])
     order = np.lexsort((side, np.concatenate([seams, asked])))
-    path = _frames(np.concatenate([seams, asked])[order], thrust[order], vehicle, yaw)
-    return _assembled(asked, flat, path, path.samples[np.argsort(order)[len(seams) :]], vehicle)
+    path = _frames(np.concatenate([seams, asked])[order], thrust[order], environment, trajectory.heading)
+    nodes = path.samples[np.argsort(order)[len(seams) :]]
+    return _assembled(asked, flat, path, nodes, vehicle, environment)
 
 
-def reference_of(times: ArrayLike, flat: FlatState, vehicle: Vehicle, yaw: float = 0.0) -> Reference:
-    """What a series of flat states (T, 3) at `times` (T,) [s] asks of `vehicle`; yaw as in `reference`.
+def reference_of(
+    times: ArrayLike,
+    flat: FlatState,
+    vehicle: Vehicle,
+    environment: Environment | None = None,
+    heading: float = 0.0,
+) -> Reference:
+    """What a series of flat states (T, 3) at `times` (T,) [s] asks of `vehicle`; as `reference` otherwise.
 
     Between samples the thrust is taken as the quintic that fits both; where a derivative jumps, give the
     time twice, with the states of both sides. Raises SpecError for falling times and shapes that differ.
     """
+    environment = environment or Environment()
     asked = _rising(times)
     names = ("position", "velocity", "acceleration", "jerk", "snap")
     flat = FlatState(*(frozen(getattr(flat, name), name, (len(asked), 3)) for name in names))
     if any(series.ndim != 2 for series in vars(flat).values()):
         raise SpecError("the flat states must be one series, with a row for each time and no further axes")
-    path = _frames(asked, _thrust(flat, vehicle), vehicle, yaw)
-    return _assembled(asked, flat, path, path.samples, vehicle)
+    path = _frames(asked, _thrust(flat, vehicle, environment), environment, heading)
+    return _assembled(asked, flat, path, path.samples, vehicle, environment)
 
 
 def body_rates(thrust: Array, q_world_body: Array, determined: NDArray[np.bool_]) -> tuple[Array, Array]:
@@ -100,25 +114,35 @@ def body_rates(thrust: Array, q_world_body: Array, determined: NDArray[np.bool_]
     return turned[..., 0, :], turned[..., 1, :]
 
 
-def wrench_for(thrust: Array, velocity: Array, omega: Array, omega_dot: Array, vehicle: Vehicle) -> Wrench:
-    """Collective thrust m|f| + (d_z − d) b3·v and moment J ω' + ω × J ω; ω, ω' (..., 3) in body axes."""
+def wrench_for(thrust: Array, airspeed: Array, omega: Array, omega_dot: Array, vehicle: Vehicle) -> Wrench:
+    """Collective thrust m|f| + (d_z − d) b3·v and moment J ω' + ω × J ω; ω, ω' (..., 3) in body axes.
+
+    `airspeed` is the velocity v relative to the wind, world.
+    """
     moment = omega_dot @ vehicle.inertia.T + so3.cross(omega, omega @ vehicle.inertia.T)
     f = thrust[..., 0, :]
     size = np.linalg.norm(f, axis=-1)
-    along = np.sum(f * velocity, axis=-1) / np.where(size > 0.0, size, 1.0)
-    difference = vehicle.drag_body[2] / vehicle.mass - lateral_drag(vehicle)
-    return Wrench(vehicle.mass * (size + difference * along), moment)
+    along = np.sum(f * airspeed, axis=-1) / np.where(size > 0.0, size, 1.0)
+    return Wrench(vehicle.mass * (size + axial_drag(vehicle) * along), moment)
 
 
 def specific_thrust(
-    vehicle: Vehicle, velocity: Array, acceleration: Array, jerk: Array, snap: Array
+    vehicle: Vehicle,
+    environment: Environment,
+    airspeed: Array,
+    acceleration: Array,
+    jerk: Array,
+    snap: Array,
 ) -> Array:
-    """f = a + g e3 + (d/m) v and its two derivatives, (..., 3, 3), of the flat outputs' (..., 3)."""
+    """f = a + g e3 + (d/m) v and its two derivatives, (..., 3, 3), of the flat outputs' (..., 3).
+
+    `airspeed` is the velocity v relative to the wind, world.
+    """
     drag = lateral_drag(vehicle)
     thrust = np.stack([acceleration, jerk, snap], axis=-2)
     if drag:
-        thrust += drag * np.stack([velocity, acceleration, jerk], axis=-2)
-    thrust[..., 0, 2] += vehicle.gravity
+        thrust += drag * np.stack([airspeed, acceleration, jerk], axis=-2)
+    thrust[..., 0, 2] += environment.gravity
     return thrust
 
 
@@ -127,26 +151,43 @@ def lateral_drag(vehicle: Vehicle) -> float:
     return float(vehicle.drag_body[:2].mean()) / vehicle.mass
 
 
-def _thrust(flat: FlatState, vehicle: Vehicle) -> Array:
-    return specific_thrust(vehicle, flat.velocity, flat.acceleration, flat.jerk, flat.snap)
+def axial_drag(vehicle: Vehicle) -> float:
+    """By how much the drag coefficient along the thrust exceeds that across it, per mass [1/s]."""
+    return float(vehicle.drag_body[2]) / vehicle.mass - lateral_drag(vehicle)
 
 
-def _thrust_at_seams(trajectory: Trajectory, vehicle: Vehicle) -> Array:
+def end_thrust(velocity: Array, acceleration: Array, vehicle: Vehicle, environment: Environment) -> Array:
+    """Specific thrust f [m/s²] (..., 3) at a velocity and an acceleration of a path, world."""
+    airspeed = velocity - environment.wind
+    return np.asarray(acceleration + environment.weight + lateral_drag(vehicle) * airspeed)
+
+
+def _thrust(flat: FlatState, vehicle: Vehicle, environment: Environment) -> Array:
+    airspeed = flat.velocity - environment.wind
+    return specific_thrust(vehicle, environment, airspeed, flat.acceleration, flat.jerk, flat.snap)
+
+
+def _thrust_at_seams(trajectory: Trajectory, vehicle: Vehicle, environment: Environment) -> Array:
     """f, f', f'' at the ends of all segments, then at their starts, (2S, 3, 3)."""
     v, a, j, s = (trajectory.on_segments([1.0, 0.0], k).swapaxes(0, 1).reshape(-1, 3) for k in (1, 2, 3, 4))
-    return specific_thrust(vehicle, v, a, j, s)
+    return specific_thrust(vehicle, environment, v - environment.wind, a, j, s)
 
 
-def _frames(times: Array, thrust: Array, vehicle: Vehicle, yaw: float) -> Frames:
-    return frames(times, thrust, UNDETERMINED * vehicle.gravity, float(frozen(yaw, "yaw", ())))
+def _frames(times: Array, thrust: Array, environment: Environment, heading: float) -> Frames:
+    return frames(times, thrust, UNDETERMINED * environment.gravity, float(frozen(heading, "heading", ())))
 
 
 def _assembled(
-    times: Array, flat: FlatState, path: Frames, nodes: NDArray[np.intp], vehicle: Vehicle
+    times: Array,
+    flat: FlatState,
+    path: Frames,
+    nodes: NDArray[np.intp],
+    vehicle: Vehicle,
+    environment: Environment,
 ) -> Reference:
     thrust, q = path.thrust[nodes], path.q_world_body[nodes]
     omega, omega_dot = body_rates(thrust, q, path.determined[nodes])
-    wrench = wrench_for(thrust, flat.velocity, omega, omega_dot, vehicle)
+    wrench = wrench_for(thrust, flat.velocity - environment.wind, omega, omega_dot, vehicle)
     setpoint = Setpoint(flat, q, omega, omega_dot, wrench)
     rotors = rotor_thrusts(vehicle, wrench)
     for array in (*vars(flat).values(), q, omega, omega_dot, wrench.thrust, wrench.moment_body, rotors):

@@ -67,10 +67,10 @@ class _Pieces:
         )
 
 
-def frames(times: Array, thrust: Array, floor: float, yaw: float) -> Frames:
+def frames(times: Array, thrust: Array, floor: float, heading: float) -> Frames:
     """Carry a frame along the specific thrust; times (T,), thrust f, f', f'' (T, 3, 3), floor on |f| [m/s²].
 
-    It starts as the smallest rotation from the vertical to f, turned about f by `yaw`. Where |f| is below
+    It starts as the smallest rotation from the vertical to f, turned about f by `heading`. Where |f| is below
     the floor it stays as it was; beyond, the smallest rotation takes it on. Repeated times are allowed.
     """
     pieces = _subdivided(times, thrust, floor)
@@ -80,14 +80,14 @@ def frames(times: Array, thrust: Array, floor: float, yaw: float) -> Frames:
     determined = magnitude >= floor
     directions = _held_directions(node_thrust[:, 0], magnitude, determined)
     smooth = determined[1:] & determined[:-1]
-    q = _carry(directions, np.where(smooth[:, None, None], pieces.control, directions[:-1, None]), yaw)
+    q = _carry(directions, np.where(smooth[:, None, None], pieces.control, directions[:-1, None]), heading)
     return Frames(nodes, node_thrust, q, determined, samples, _spans(nodes, pieces, determined, floor))
 
 
-def _carry(directions: Array, control: Array, yaw: float) -> Array:
+def _carry(directions: Array, control: Array, heading: float) -> Array:
     """Attitudes at unit thrust directions (M, 3) along the pieces between them, (M - 1, 6, 3) -> (M, 4)."""
     chart = _chart(directions)
-    first = so3.multiply(so3.smallest_rotation(UP, directions[0]), so3.about_axis(UP, np.array(yaw)))
+    first = so3.multiply(so3.smallest_rotation(UP, directions[0]), so3.about_axis(UP, np.array(heading)))
     # any frame of the right direction differs from the chart's by an angle about it: angles add up
     arcs = so3.multiply(so3.smallest_rotation(directions[:-1], directions[1:]), chart[:-1])
     carried = np.concatenate([first[None], arcs])

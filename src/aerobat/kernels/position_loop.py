@@ -68,6 +68,6 @@ def _answer(
 def _drag(inertial: Inertial, target: Target) -> Vector:
     """The acceleration by drag that is expected along the trajectory [m/s²], world."""
     body_axes = axes(target.q_world_body)
-    u, v, w = to_body(body_axes, target.velocity)
+    u, v, w = to_body(body_axes, subtract(target.velocity, inertial.wind))
     dx, dy, dz = inertial.drag_body
     return scale(-1.0 / inertial.mass, to_world(body_axes, (dx * u, dy * v, dz * w)))

@@ -33,8 +33,9 @@ class Inertial(NamedTuple):
     mass: Scalar  # [kg]
     inertia: Matrix  # [kg·m²] body
     inverse_inertia: Matrix
-    drag_body: Vector  # [kg/s]: force_body = −drag_body ∘ velocity_body
+    drag_body: Vector  # [kg/s]: force_body = −drag_body ∘ airspeed_body
     gravity: Scalar  # [m/s²]
+    wind: Vector  # [m/s] velocity of the air, world
 
 
 class Load(NamedTuple):
@@ -51,7 +52,7 @@ def derivative(inertial: Inertial, body: Body, load: Load) -> Body:
     Eq. (4): ω' = J⁻¹ (M − ω × Jω). Attitude: q' = ½ q ⊗ (0, ω).
     """
     body_axes = axes(body.q_world_body)
-    u, v, w = to_body(body_axes, body.velocity)
+    u, v, w = to_body(body_axes, subtract(body.velocity, inertial.wind))
     dx, dy, dz = inertial.drag_body
     ax, ay, az = to_world(body_axes, (-dx * u, -dy * v, load.thrust - dz * w))
     lightness = 1.0 / inertial.mass

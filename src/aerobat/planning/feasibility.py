@@ -12,9 +12,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from aerobat.arrays import Array, frozen
+from aerobat.arrays import Array
 from aerobat.certification.continuity import discontinuities
 from aerobat.certification.motion import Motion
+from aerobat.environment import Environment
 from aerobat.flatness.setpoints import UNDETERMINED, body_rates, specific_thrust, wrench_for
 from aerobat.flatness.transport import Frames, Span, frames, onward
 from aerobat.trajectory import Trajectory
@@ -74,9 +75,12 @@ class RotorMargin:
         return words
 
 
-def rotor_margin(trajectory: Trajectory, vehicle: Vehicle, yaw: float = 0.0) -> RotorMargin:
-    """The rotors' margin along the whole trajectory; `yaw` [rad] turns the vehicle about its thrust axis."""
-    path = _Path.along(trajectory, vehicle, float(frozen(yaw, "yaw", ())))
+def rotor_margin(
+    trajectory: Trajectory, vehicle: Vehicle, environment: Environment | None = None
+) -> RotorMargin:
+    """The rotors' margin along the whole trajectory."""
+    environment = environment or Environment()
+    path = _Path.along(trajectory, vehicle, environment)
     low, high = path.least_gaps()
     return RotorMargin(
         min_thrust=float(vehicle.min_thrusts[low.rotor]) + low.value,
@@ -88,7 +92,7 @@ def rotor_margin(trajectory: Trajectory, vehicle: Vehicle, yaw: float = 0.0) -> 
         low_margin=low.value,
         high_margin=high.value,
         undetermined=path.frames.undetermined,
-        bounded_moments=_bounded_moments(trajectory, vehicle),
+        bounded_moments=_bounded_moments(trajectory, vehicle, environment),
     )
 
 
@@ -115,26 +119,33 @@ class _Path:
 
     trajectory: Trajectory
     vehicle: Vehicle
+    environment: Environment
     frames: Frames
     segment: NDArray[np.intp]  # of every node, (M,)
 
     @classmethod
-    def along(cls, trajectory: Trajectory, vehicle: Vehicle, yaw: float) -> _Path:
+    def along(cls, trajectory: Trajectory, vehicle: Vehicle, environment: Environment) -> _Path:
         count = PIECES_PER_DEGREE * max(trajectory.degree, 1) + 1
         s = np.linspace(0.0, 1.0, count)
         v, a, j, snap = (trajectory.on_segments(s, k).reshape(-1, 3) for k in (1, 2, 3, 4))
         times = trajectory.knots[:-1, None] + s * trajectory.durations[:, None]
-        floor = UNDETERMINED * vehicle.gravity
-        path = frames(times.ravel(), specific_thrust(vehicle, v, a, j, snap), floor, yaw)
+        floor = UNDETERMINED * environment.gravity
+        thrust = specific_thrust(vehicle, environment, v - environment.wind, a, j, snap)
+        path = frames(times.ravel(), thrust, floor, trajectory.heading)
         starts = path.samples[::count]
         return cls(
-            trajectory, vehicle, path, np.searchsorted(starts, np.arange(len(path.times)), "right") - 1
+            trajectory,
+            vehicle,
+            environment,
+            path,
+            np.searchsorted(starts, np.arange(len(path.times)), "right") - 1,
         )
 
     def least_gaps(self) -> tuple[_Gap, ...]:
         """The least distances to lower and to upper limits over rotors and continuous time."""
-        path, velocity = self.frames, self.trajectory.evaluate(self.frames.times, 1)
-        sampled = self._gaps(path.thrust, velocity, path.q_world_body, path.determined)
+        path = self.frames
+        airspeed = self.trajectory.evaluate(path.times, 1) - self.environment.wind
+        sampled = self._gaps(path.thrust, airspeed, path.q_world_body, path.determined)
         found = self._candidates(sampled)
         times = self._vertices(found)
         refined = self._between(found, times[:, None])[:, 0]
@@ -185,17 +196,18 @@ class _Path:
         base = (found.nodes[:, None] - (times < self.frames.times[found.nodes, None])).ravel()
         at = times.ravel()
         v, a, j, s = (self.trajectory.evaluate(at, k) for k in (1, 2, 3, 4))
-        thrust = specific_thrust(self.vehicle, v, a, j, s)
+        airspeed = v - self.environment.wind
+        thrust = specific_thrust(self.vehicle, self.environment, airspeed, a, j, s)
         step = at - self.frames.times[base]
         q = onward(self.frames.q_world_body[base], self.frames.thrust[base], thrust, step)
-        gaps = self._gaps(thrust, v, q, np.ones(len(at), dtype=bool))
+        gaps = self._gaps(thrust, airspeed, q, np.ones(len(at), dtype=bool))
         gaps = gaps.reshape(*times.shape, 2 * len(self.vehicle.rotors))
         return np.take_along_axis(gaps, found.columns[:, None, None], axis=-1)[..., 0]
 
-    def _gaps(self, thrust: Array, velocity: Array, q: Array, determined: NDArray[np.bool_]) -> Array:
+    def _gaps(self, thrust: Array, airspeed: Array, q: Array, determined: NDArray[np.bool_]) -> Array:
         """Distances of all rotors' thrusts from their lower, then from their upper limits [N], (..., 2n)."""
         omega, omega_dot = body_rates(thrust, q, determined)
-        rotors = rotor_thrusts(self.vehicle, wrench_for(thrust, velocity, omega, omega_dot, self.vehicle))
+        rotors = rotor_thrusts(self.vehicle, wrench_for(thrust, airspeed, omega, omega_dot, self.vehicle))
         return np.concatenate([rotors - self.vehicle.min_thrusts, self.vehicle.max_thrusts - rotors], axis=-1)
 
 
@@ -208,13 +220,13 @@ def _least_at(dense: Array) -> Array:
     return np.asarray(DENSE[k] + np.clip(shift, -1.0, 1.0) * (DENSE[1] - DENSE[0]))
 
 
-def _bounded_moments(trajectory: Trajectory, vehicle: Vehicle) -> bool:
+def _bounded_moments(trajectory: Trajectory, vehicle: Vehicle, environment: Environment) -> bool:
     """Whether attitude and body rates are continuous across knots, where the attitude is determined.
 
     Jerk may jump along the thrust axis: that is a kink in the thrust's size.
     """
-    motion = Motion.of(trajectory, vehicle, trajectory.degree)
-    return not discontinuities(motion, UNDETERMINED * vehicle.gravity)
+    motion = Motion.of(trajectory, vehicle, environment, trajectory.degree)
+    return not discontinuities(motion, UNDETERMINED * environment.gravity)
 
 
 CHEBYSHEV = np.polynomial.chebyshev.chebpts1(9)

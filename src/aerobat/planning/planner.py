@@ -36,5 +36,7 @@ def plan(
     `progress` is called with every attempt as it ends. Raises Infeasible, whose message names the bound
     that binds and whose `attempts` hold the evidence, and SpecError for input that makes no sense.
     """
+    if vehicle is not None:
+        vehicle.require_hover(problem.environment.gravity)
     found = (planner or Miqp()).plan(problem, vehicle, progress)
     return found if vehicle is None or found.certificate is not None else proven(found, vehicle)

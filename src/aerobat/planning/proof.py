@@ -14,13 +14,14 @@ from aerobat.vehicle import Vehicle
 
 def certificate_for(trajectory: Trajectory, problem: Problem, vehicle: Vehicle) -> Certificate:
     """The certificate of a trajectory for the vehicle's limits and the problem's, over continuous time."""
-    return certify(trajectory, vehicle, problem.yaw, Envelope(limits=problem.limits))
+    return certify(trajectory, vehicle, problem.environment, Envelope(limits=problem.path_limits))
 
 
 def proven(plan: Plan, vehicle: Vehicle) -> Plan:
     """The plan with the margin and the certificate of a vehicle, whichever it was made for."""
     return replace(
         plan,
-        margin=rotor_margin(plan.trajectory, vehicle, plan.problem.yaw),
+        vehicle=vehicle,
+        margin=rotor_margin(plan.trajectory, vehicle, plan.problem.environment),
         certificate=certificate_for(plan.trajectory, plan.problem, vehicle),
     )

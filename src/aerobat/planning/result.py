@@ -6,9 +6,9 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from aerobat.planning.feasibility import RotorMargin
-from aerobat.problem.gate import Gate
 from aerobat.problem.problem import Problem
 from aerobat.trajectory import Trajectory
+from aerobat.vehicle import Vehicle
 
 if TYPE_CHECKING:
     from aerobat.certification import Certificate
@@ -35,7 +35,7 @@ class PlacedStage:
     name: str
     interval: int  # counted from 0; the stage holds at its end
     time: float  # [s]
-    gate: Gate | None = None
+    gate: str | None = None  # the name of the gate that is passed there
 
 
 @dataclass(frozen=True)
@@ -54,7 +54,7 @@ class Plan:
     dt: float | None = None  # [s] of the intervals, where they are equal
     bound: float | None = None  # the cost of any solution at this dt is at least this, proven
     gap: float | None = None  # (cost − bound) / cost
-    vehicle: str | None = None
+    vehicle: Vehicle | None = None  # what it was planned or certified for
     margin: RotorMargin | None = None
     certificate: Certificate | None = None  # for the vehicle, over continuous time
 

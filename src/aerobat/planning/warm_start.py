@@ -8,7 +8,7 @@ import numpy as np
 
 from aerobat.arrays import Array
 from aerobat.planning.result import Plan
-from aerobat.problem.stage import Course, Stage
+from aerobat.problem.stage import Stage, StageSequence
 from aerobat.trajectory import Trajectory
 
 FLAT = 1e-6  # of its extent: how far a path may leave a plane and still be in it
@@ -16,18 +16,18 @@ FLAT = 1e-6  # of its extent: how far a path may leave a plane and still be in i
 
 @dataclass(frozen=True, eq=False)
 class Guess:
-    """A trajectory, and when it passes a course's stages."""
+    """A trajectory, and when it passes a sequence's stages."""
 
     trajectory: Trajectory
     stages: tuple[Stage, ...]  # in the order of their times
     times: tuple[float, ...]  # [s] of the stages, rising
 
     @classmethod
-    def of(cls, plan: Plan, course: Course) -> Guess:
-        """A plan's trajectory, and the order of the course's stages in it if it leaves that open."""
+    def of(cls, plan: Plan, sequence: StageSequence) -> Guess:
+        """A plan's trajectory, and the order of the sequence's stages in it if it leaves that open."""
         times = [placed.time for placed in plan.stages]
         order = sorted(range(len(times)), key=times.__getitem__)
-        return cls(plan.trajectory, tuple(course.stages[i] for i in order), tuple(times[i] for i in order))
+        return cls(plan.trajectory, tuple(sequence.stages[i] for i in order), tuple(times[i] for i in order))
 
     @property
     def phases(self) -> Array:
@@ -36,7 +36,7 @@ class Guess:
 
     def slowed(self, factor: float) -> Guess:
         """The same path, flown longer by a factor."""
-        trajectory = Trajectory(factor * self.trajectory.durations, self.trajectory.coefficients)
+        trajectory = replace(self.trajectory, durations=factor * self.trajectory.durations)
         return replace(self, trajectory=trajectory, times=tuple(factor * t for t in self.times))
 
     def shared(self, intervals: int, least: int) -> tuple[int, ...]:

@@ -2,32 +2,32 @@
 
 from aerobat.problem.files import load_problem, problem_names, write_problem
 from aerobat.problem.gate import Gate, tilted_gate
-from aerobat.problem.maneuver import Flip, HalfFlip, Line, Maneuver, Passing, Staged
-from aerobat.problem.problem import PAPER_LIMITS, EndState, Limits, Problem, rest
-from aerobat.problem.stage import Condition, Course, Quantity, Stage
+from aerobat.problem.maneuver import CustomManeuver, Flip, GatePassage, HalfFlip, Line, Maneuver
+from aerobat.problem.problem import PAPER_LIMITS, EndState, Limits, Problem, at_rest
+from aerobat.problem.stage import Condition, Quantity, Stage, StageSequence
 from aerobat.problem.waypoints import Waypoint, Waypoints
 
 __all__ = [
     "PAPER_LIMITS",
     "Condition",
-    "Course",
+    "CustomManeuver",
     "EndState",
     "Flip",
     "Gate",
+    "GatePassage",
     "HalfFlip",
     "Limits",
     "Line",
     "Maneuver",
-    "Passing",
     "Problem",
     "Quantity",
     "Stage",
-    "Staged",
+    "StageSequence",
     "Waypoint",
     "Waypoints",
+    "at_rest",
     "load_problem",
     "problem_names",
-    "rest",
     "tilted_gate",
     "write_problem",
 ]

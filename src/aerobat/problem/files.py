@@ -19,9 +19,10 @@ from aerobat.documents import (
     within,
     write_document,
 )
+from aerobat.environment import Environment
 from aerobat.errors import SpecError
 from aerobat.problem.gate import Gate, tilted_gate
-from aerobat.problem.maneuver import Flip, HalfFlip, Line, Maneuver, Passing, Staged
+from aerobat.problem.maneuver import CustomManeuver, Flip, GatePassage, HalfFlip, Line, Maneuver
 from aerobat.problem.problem import DERIVATIVES, EndState, Limits, Problem
 from aerobat.problem.stage import Condition, Quantity, Stage
 from aerobat.problem.waypoints import FREE, GIVEN, Waypoint, Waypoints
@@ -61,11 +62,11 @@ def _problem(table: schema.ProblemTable) -> Problem:
         description=table.description,
         start=_end(table.start, "start"),
         goal=_end(table.goal, "goal"),
-        gate=None if table.gate is None else _gate(table.gate),
+        gates=_gates(table),
         maneuver=_maneuver(table.maneuver),
         limits=Limits(**{k: np.array(v) for k, v in table.limits.model_dump(exclude_none=True).items()}),
-        yaw=radians(table.yaw_deg),
-        gravity=table.gravity,
+        heading=radians(table.heading_deg),
+        environment=Environment(**table.environment.model_dump()),
     )
 
 
@@ -74,9 +75,17 @@ def _end(table: schema.EndTable, name: str) -> EndState:
         return EndState(np.array(table.position), np.array(table.velocity), np.array(table.acceleration))
 
 
+def _gates(table: schema.ProblemTable) -> tuple[Gate, ...]:
+    if table.gate is not None and table.gates:
+        raise SpecError("gate and gates are both given; give all gates as tables [[gates]]")
+    return tuple(_gate(each) for each in (table.gates if table.gate is None else [table.gate]))
+
+
 def _gate(table: schema.GateTable) -> Gate:
     heading, elevation, tilt = (radians(a) for a in (table.heading_deg, table.elevation_deg, table.tilt_deg))
-    return tilted_gate(np.array(table.position), heading, elevation, tilt, table.width, table.height)
+    return tilted_gate(
+        np.array(table.position), heading, elevation, tilt, table.width, table.height, table.name
+    )
 
 
 def _maneuver(
@@ -86,18 +95,18 @@ def _maneuver(
     | schema.StagesTable
     | schema.WaypointsTable,
 ) -> Maneuver:
-    options = table.model_dump(exclude={"kind", "passing"})
+    options = table.model_dump(exclude={"kind", "passage"})
     match table.kind:
         case "flip":
-            return Flip(**options, passing=_passing(table.passing))
+            return Flip(**options, passage=_passage(table.passage))
         case "half-flip":
-            return HalfFlip(**options, passing=_passing(table.passing))
+            return HalfFlip(**options, passage=_passage(table.passage))
         case "line":
-            return Line(_passing(table.passing))
+            return Line(_passage(table.passage))
         case "stages":
-            return Staged(
+            return CustomManeuver(
                 tuple(_stage(s, f"maneuver.stages[{i}]") for i, s in enumerate(table.stages)),
-                _conditions(table.always, "maneuver.always"),
+                _conditions(table.path_constraints, "maneuver.path_constraints"),
                 table.ordered,
             )
         case "waypoints":
@@ -123,12 +132,13 @@ def _components(vector: schema.Vector | schema.PartialVector) -> Array:
     return np.array([FREE if x is None else x for x in values])
 
 
-def _passing(table: schema.PassingTable) -> Passing:
-    return Passing(**table.model_dump())
+def _passage(table: schema.PassageTable) -> GatePassage:
+    return GatePassage(**table.model_dump())
 
 
 def _stage(table: schema.StageTable, name: str) -> Stage:
-    return Stage(table.name, _conditions(table.conditions, f"{name}.conditions"), table.at, table.late)
+    conditions = _conditions(table.conditions, f"{name}.conditions")
+    return Stage(table.name, conditions, table.at, table.interval_offset, table.gate)
 
 
 def _conditions(tables: list[schema.ConditionTable], name: str) -> tuple[Condition, ...]:
@@ -153,14 +163,13 @@ def _document(problem: Problem) -> dict[str, Any]:
     document: dict[str, Any] = {"name": problem.name}
     if problem.description:
         document["description"] = problem.description
-    document["yaw_deg"] = degrees(problem.yaw)
-    if problem.gravity is not None:
-        document["gravity"] = problem.gravity
+    document["heading_deg"] = degrees(problem.heading)
+    document["environment"] = _environment_table(problem.environment)
     for end in ("start", "goal"):
         state: EndState = getattr(problem, end)
         document[end] = {name: getattr(state, name).tolist() for name in DERIVATIVES[:3]}
-    if problem.gate is not None:
-        document["gate"] = _gate_table(problem.gate)
+    if problem.gates:
+        document["gates"] = [_gate_table(gate) for gate in problem.gates]
     document["maneuver"] = _maneuver_table(problem.maneuver)
     document["limits"] = {
         name: bound.tolist()
@@ -168,6 +177,11 @@ def _document(problem: Problem) -> dict[str, Any]:
         if np.isfinite(bound := np.asarray(getattr(problem.limits, name))).all()
     }
     return document
+
+
+def _environment_table(environment: Environment) -> dict[str, Any]:
+    table = {"gravity": environment.gravity, "wind": environment.wind.tolist()}
+    return table if environment.ground is None else table | {"ground": environment.ground}
 
 
 def _gate_table(gate: Gate) -> dict[str, Any]:
@@ -179,6 +193,7 @@ def _gate_table(gate: Gate) -> dict[str, Any]:
         "tilt_deg": tilt,
         "width": gate.width,
         "height": gate.height,
+        "name": gate.name,
     }
 
 
@@ -190,15 +205,16 @@ def _maneuver_table(maneuver: Maneuver) -> dict[str, Any]:
         case HalfFlip():
             options = asdict(maneuver)
             return {"kind": "half-flip"} | {k: v for k, v in options.items() if v is not None}
-        case Staged():
+        case CustomManeuver():
             return {
                 "kind": "stages",
                 "ordered": maneuver.ordered,
-                "always": [_condition_table(c) for c in maneuver.always],
+                "path_constraints": [_condition_table(c) for c in maneuver.path_constraints],
                 "stages": [
                     {"name": s.name, "conditions": [_condition_table(c) for c in s.conditions]}
-                    | ({} if s.at is None else {"at": s.at, "late": s.late})
-                    for s in maneuver.stages
+                    | ({} if s.at is None else {"at": s.at, "interval_offset": s.interval_offset})
+                    | ({} if s.gate is None else {"gate": s.gate})
+                    for s in maneuver.sequence
                 ],
             }
         case Waypoints():
@@ -218,7 +234,7 @@ def _waypoint_table(waypoint: Waypoint) -> dict[str, Any]:
             table[quantity.value] = given
     if waypoint.up is not None:
         table["up"] = waypoint.up.tolist()
-    options = {"thrust": waypoint.thrust, "time": waypoint.time, "gate": waypoint.gate or None}
+    options = {"thrust": waypoint.thrust, "time": waypoint.time, "gate": waypoint.gate}
     return table | {name: value for name, value in options.items() if value is not None}
 
 

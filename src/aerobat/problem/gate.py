@@ -27,9 +27,12 @@ class Gate:
     up: Array  # unit, world, normal to `normal`
     width: float = 1.0  # [m] along `lateral`
     height: float = 0.6  # [m] along `up`
+    name: str = "gate"
 
     def __post_init__(self) -> None:
         """Check and normalise."""
+        if not self.name.strip() or not self.name.isprintable():
+            raise SpecError(f"gate.name must be one line of text, got {self.name!r}")
         object.__setattr__(self, "position", frozen(self.position, "gate.position", (3,)))
         object.__setattr__(self, "normal", unit(self.normal, "gate.normal"))
         object.__setattr__(self, "up", unit(self.up, "gate.up"))
@@ -66,7 +69,7 @@ class Gate:
     def tilted(self, tilt: float) -> Gate:
         """The same gate with another tilt [rad]."""
         heading, elevation, _ = self.angles
-        return tilted_gate(self.position, heading, elevation, tilt, self.width, self.height)
+        return tilted_gate(self.position, heading, elevation, tilt, self.width, self.height, self.name)
 
 
 def tilted_gate(
@@ -76,6 +79,7 @@ def tilted_gate(
     tilt: float = 0.0,
     width: float = 1.0,
     height: float = 0.6,
+    name: str = "gate",
 ) -> Gate:
     """The gate at `position` [m] that is passed toward `heading`, climbing at `elevation`, rolled by `tilt`.
 
@@ -91,7 +95,7 @@ def tilted_gate(
         ),
     )
     frame = so3.axes(turn)
-    return Gate(position, frame[:, 0], frame[:, 2], width, height)
+    return Gate(position, frame[:, 0], frame[:, 2], width, height, name)
 
 
 def unit(direction: Array, name: str) -> Array:

@@ -9,9 +9,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from aerobat.arrays import Array, frozen, frozen_bounds
+from aerobat.documents import within
+from aerobat.environment import Environment
 from aerobat.errors import SpecError
 from aerobat.problem.gate import Gate
-from aerobat.problem.maneuver import Line, Maneuver
+from aerobat.problem.maneuver import Line, Maneuver, named_gate
+from aerobat.problem.stage import StageSequence
 
 DERIVATIVES = ("position", "velocity", "acceleration", "jerk", "snap", "crackle")
 UNITS = ("m", "m/s", "m/s²", "m/s³", "m/s⁴", "m/s⁵")
@@ -105,33 +108,34 @@ class Problem:
     start: EndState
     goal: EndState
     maneuver: Maneuver = field(default_factory=Line)
-    gate: Gate | None = None
+    gates: tuple[Gate, ...] = ()
     limits: Limits = field(default_factory=Limits)
-    yaw: float = 0.0  # [rad] heading at the start, carried along without spin
-    gravity: float | None = None  # [m/s²]; None: the vehicle's, or 9.81
+    heading: float = 0.0  # [rad] about the thrust axis at the start, carried along without spin
+    environment: Environment = field(default_factory=Environment)
     description: str = ""
 
     def __post_init__(self) -> None:
         """Check."""
-        if not np.isfinite(self.yaw):
-            raise SpecError("yaw_deg must be a finite angle in degrees")
-        if self.gravity is not None and not 0.0 < self.gravity < np.inf:
-            raise SpecError(f"gravity must be a positive acceleration in m/s², got {self.gravity}")
-        if self.maneuver.needs_gate and self.gate is None:
-            raise SpecError(
-                f"problem '{self.name}': its maneuver passes a gate; add a [gate] table with a position"
-            )
+        if not np.isfinite(self.heading):
+            raise SpecError("heading_deg must be a finite angle in degrees")
+        object.__setattr__(self, "gates", tuple(self.gates))
+        names = [gate.name for gate in self.gates]
+        for i, name in enumerate(names):
+            if name in names[:i]:
+                raise SpecError(f"gates[{i}].name: there are two gates named '{name}'; rename one")
+        with within(f"problem '{self.name}': "):
+            self.stages(1.0)
         self._check_within_limits()
 
     def _check_within_limits(self) -> None:
         for derivative, quantity in enumerate(DERIVATIVES[:3]):
             for end, state in (("start", self.start), ("goal", self.goal)):
                 self._check_point(f"{end}.{quantity}", state.derivatives(3)[derivative], derivative)
-        if self.gate is not None:
-            self._check_point("gate.position", self.gate.position, 0)
+        for gate in self.gates:
+            self._check_point(f"{gate.name}.position", gate.position, 0)
 
     def _check_point(self, name: str, value: Array, derivative: int) -> None:
-        lower, upper = self.limits.of(derivative)
+        lower, upper = self.path_limits.of(derivative)
         for axis, x, low, high in zip("xyz", value, lower, upper, strict=True):
             if not low <= x <= high:
                 limit = "lower and limits.upper" if derivative == 0 else DERIVATIVES[derivative]
@@ -140,11 +144,30 @@ class Problem:
                     f"[{low:g}, {high:g}]; move it or widen limits.{limit}"
                 )
 
+    @property
+    def path_limits(self) -> Limits:
+        """The limits, and the ground below."""
+        ground = self.environment.ground
+        if ground is None:
+            return self.limits
+        return replace(self.limits, lower=np.maximum(self.limits.lower, [-np.inf, -np.inf, ground]))
+
+    def stages(self, max_specific_thrust: float) -> StageSequence:
+        """The maneuver's stages through the problem's gates, for a vehicle that has so much thrust [m/s²].
+
+        Raises SpecError for gates that do not suit the maneuver.
+        """
+        return self.maneuver.stages(self.gates, max_specific_thrust)
+
+    def gate(self, name: str) -> Gate:
+        """The gate of that name. Raises SpecError when there is none."""
+        return named_gate(self.gates, name)
+
     def as_in_paper(self) -> Problem:
         """The same problem as the paper formulates it, with the reference code's limits and ε."""
         return replace(self, maneuver=self.maneuver.as_in_paper(), limits=PAPER_LIMITS)
 
 
-def rest(position: ArrayLike) -> EndState:
+def at_rest(position: ArrayLike) -> EndState:
     """At rest at `position` [m], (3,)."""
     return EndState(np.asarray(position, dtype=float))

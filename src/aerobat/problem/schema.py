@@ -6,6 +6,8 @@ from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, FiniteFloat
 
+from aerobat.states import STANDARD_GRAVITY
+
 Vector = tuple[FiniteFloat, FiniteFloat, FiniteFloat]
 Positive = Annotated[FiniteFloat, Field(gt=0)]
 PerAxis = Positive | tuple[Positive, Positive, Positive]
@@ -24,7 +26,7 @@ class EndTable(_Table):
 
 
 class GateTable(_Table):
-    """[gate]: where it is, where one passes it to, how it is tilted, how large its opening is."""
+    """[[gates]]: where it is, where one passes it to, how it is tilted, how large its opening is."""
 
     position: Vector
     heading_deg: FiniteFloat = 0.0
@@ -32,6 +34,15 @@ class GateTable(_Table):
     tilt_deg: FiniteFloat = 0.0
     width: Positive = 1.0
     height: Positive = 0.6
+    name: Annotated[str, Field(min_length=1)] = "gate"
+
+
+class EnvironmentTable(_Table):
+    """[environment], world frame, SI."""
+
+    gravity: Positive = STANDARD_GRAVITY
+    wind: Vector = (0.0, 0.0, 0.0)
+    ground: FiniteFloat | None = None
 
 
 class LimitsTable(_Table):
@@ -61,14 +72,15 @@ class StageTable(_Table):
 
     name: Annotated[str, Field(min_length=1)]
     at: Annotated[FiniteFloat, Field(gt=0, lt=1)] | None = None
-    late: int = 0
+    interval_offset: int = 0
+    gate: str | None = None
     conditions: list[ConditionTable] = []
 
 
-class PassingTable(_Table):
-    """[maneuver.passing]: how the gate is passed."""
+class PassageTable(_Table):
+    """[maneuver.passage]: how the gate is passed."""
 
-    square: bool = True
+    perpendicular: bool = True
     speed: Annotated[FiniteFloat, Field(ge=0)] = 0.0
     centred: bool = True
 
@@ -78,26 +90,26 @@ class FlipTable(_Table):
 
     kind: Literal["flip"]
     axis_deg: FiniteFloat = 0.0
-    lateral: Positive | None = None
-    inverted: Positive | None = None
+    min_lateral_thrust: Positive | None = None
+    min_inverted_thrust: Positive | None = None
     signed: bool = True
     ordered: bool = True
-    passing: PassingTable = PassingTable()
+    passage: PassageTable = PassageTable()
 
 
 class HalfFlipTable(_Table):
     """kind = "half-flip"."""
 
     kind: Literal["half-flip"]
-    lateral: Positive | None = None
-    passing: PassingTable = PassingTable()
+    min_lateral_thrust: Positive | None = None
+    passage: PassageTable = PassageTable()
 
 
 class LineTable(_Table):
     """kind = "line"."""
 
     kind: Literal["line"]
-    passing: PassingTable = PassingTable()
+    passage: PassageTable = PassageTable()
 
 
 class StagesTable(_Table):
@@ -105,7 +117,7 @@ class StagesTable(_Table):
 
     kind: Literal["stages"]
     stages: Annotated[list[StageTable], Field(min_length=1)]
-    always: list[ConditionTable] = []
+    path_constraints: list[ConditionTable] = []
     ordered: bool = True
 
 
@@ -126,7 +138,7 @@ class WaypointTable(_Table):
     up: Vector | None = None
     thrust: Positive | None = None
     time: Positive | None = None
-    gate: bool = False
+    gate: str | None = None
 
 
 class WaypointsTable(_Table):
@@ -142,11 +154,12 @@ class ProblemTable(_Table):
 
     name: Annotated[str, Field(pattern=r"^[\w][\w .-]*$")]
     description: str = ""
-    yaw_deg: FiniteFloat = 0.0
-    gravity: Positive | None = None
+    heading_deg: FiniteFloat = 0.0
     start: EndTable
     goal: EndTable
-    gate: GateTable | None = None
+    gate: GateTable | None = None  # short for one table [[gates]]
+    gates: list[GateTable] = []
+    environment: EnvironmentTable = EnvironmentTable()
     maneuver: Annotated[
         FlipTable | HalfFlipTable | LineTable | StagesTable | WaypointsTable, Field(discriminator="kind")
     ]

@@ -1,4 +1,4 @@
-"""Stages: linear conditions that hold together at the end of one interval; a course is a list of them."""
+"""Stages: linear conditions that hold together at one interval's end; a maneuver is a sequence of them."""
 
 from __future__ import annotations
 
@@ -10,7 +10,6 @@ import numpy as np
 
 from aerobat.arrays import Array, frozen
 from aerobat.errors import SpecError
-from aerobat.problem.gate import Gate
 
 
 class Quantity(StrEnum):
@@ -60,7 +59,7 @@ class Condition:
         return gravity * float(self.direction[2]) if self.quantity is Quantity.SPECIFIC_THRUST else 0.0
 
     @property
-    def least_thrust(self) -> float:
+    def min_thrust(self) -> float:
         """The least specific thrust [m/s²] that satisfies the condition; zero when it asks none."""
         if self.quantity is not Quantity.SPECIFIC_THRUST:
             return 0.0
@@ -71,15 +70,15 @@ class Condition:
 class Stage:
     """Conditions that hold together at the end of one interval.
 
-    `at` fixes it to the last interval that ends by this fraction of the duration, or `late` intervals after
-    that one; without it the search chooses. `gate` tells that the stage is a passage.
+    `at` fixes it to the last interval that ends by this fraction of the duration, or `interval_offset`
+    intervals after that one; without it the search chooses. `gate` names the gate that it passes.
     """
 
     name: str
     conditions: tuple[Condition, ...]
     at: float | None = None
-    late: int = 0
-    gate: Gate | None = None
+    interval_offset: int = 0
+    gate: str | None = None
 
     def __post_init__(self) -> None:
         """Check."""
@@ -89,13 +88,13 @@ class Stage:
 
     def fixed_interval(self, intervals: int) -> int | None:
         """The interval, counted from 0, at whose end the stage is fixed when there are so many; or None."""
-        return None if self.at is None else int(self.at * intervals + 1e-9) - 1 + self.late
+        return None if self.at is None else int(self.at * intervals + 1e-9) - 1 + self.interval_offset
 
 
 @dataclass(frozen=True)
-class Course:
+class StageSequence:
     """A maneuver made explicit: its stages, what holds at every interval's end, and whether order counts."""
 
     stages: tuple[Stage, ...] = ()
-    always: tuple[Condition, ...] = ()
+    path_constraints: tuple[Condition, ...] = ()
     ordered: bool = True

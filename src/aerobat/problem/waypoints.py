@@ -2,22 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
 from math import inf
-from typing import ClassVar
 
 import numpy as np
 
 from aerobat.arrays import Array
 from aerobat.errors import SpecError
 from aerobat.problem.gate import Gate, unit
-from aerobat.problem.maneuver import at_centre, no_gate
-from aerobat.problem.stage import Condition, Course, Quantity, Stage
+from aerobat.problem.maneuver import at_centre, named_gate
+from aerobat.problem.stage import Condition, Quantity, Stage, StageSequence
 
 FREE = np.nan  # a component that is not given
-THRUST_SHARE = 0.2  # of the greatest specific thrust: the least along an attitude that names no thrust
+THRUST_FRACTION = 0.2  # of the greatest specific thrust: the least along an attitude that names no thrust
 GIVEN = (Quantity.POSITION, Quantity.VELOCITY, Quantity.ACCELERATION)
 
 
@@ -30,7 +29,7 @@ class Waypoint:
     """What is given where one passes by, world frame; components that are NaN are free.
 
     `up` asks that the thrust points there, with exactly `thrust` per mass, or, without it, with at least a
-    share of what the vehicle has. A `gate` passes the centre of the problem's gate. `time` is when to pass by
+    share of what the vehicle has. A `gate` is passed through its centre, by name. `time` is when to pass by
     at first, for planners that begin from times.
 
     Raises SpecError when nothing is given, a number is infinite, or acceleration and attitude both are.
@@ -42,7 +41,7 @@ class Waypoint:
     up: Array | None = None  # direction of the thrust, (3,)
     thrust: float | None = None  # [m/s²] |a + g e3|
     time: float | None = None  # [s]
-    gate: bool = False
+    gate: str | None = None
 
     def __post_init__(self) -> None:
         """Check and keep read-only copies."""
@@ -56,7 +55,7 @@ class Waypoint:
         if self.up is not None and not np.isnan(self.acceleration).all():
             raise SpecError("acceleration and up both fix the attitude; give one of them")
         free = all(np.isnan(getattr(self, q.value)).all() for q in GIVEN)
-        if free and self.up is None and not self.gate:
+        if free and self.up is None and self.gate is None:
             raise SpecError("nothing is given; give at least one component of the position")
         if self.time is not None and not 0.0 < self.time < inf:
             raise SpecError(f"time must be a positive number of seconds, got {self.time}")
@@ -72,7 +71,7 @@ class Waypoint:
         if self.thrust is None:
             for axis in _across(self.up):
                 yield Condition(Quantity.SPECIFIC_THRUST, axis, 0.0, 0.0)
-            yield Condition(Quantity.SPECIFIC_THRUST, self.up, lower=THRUST_SHARE * max_specific_thrust)
+            yield Condition(Quantity.SPECIFIC_THRUST, self.up, lower=THRUST_FRACTION * max_specific_thrust)
             return
         for direction, value in zip(np.eye(3), (self.thrust * self.up).tolist(), strict=True):
             yield Condition(Quantity.SPECIFIC_THRUST, direction, value, value)
@@ -90,7 +89,6 @@ class Waypoints:
 
     waypoints: tuple[Waypoint, ...]
     duration: float | None = None  # [s]
-    needs_gate: ClassVar[bool] = False
 
     def __post_init__(self) -> None:
         """Check."""
@@ -109,22 +107,23 @@ class Waypoints:
         times = [*(w.time for w in self.waypoints), self.duration]
         return None if None in times else tuple(t for t in times if t is not None)
 
-    def course(self, gate: Gate | None, max_specific_thrust: float) -> Course:
+    def stages(self, gates: Sequence[Gate], max_specific_thrust: float) -> StageSequence:
         """A stage a waypoint, in order, each at a time that the planner chooses."""
-        return Course(tuple(self._stage(i, gate, max_specific_thrust) for i in range(len(self.waypoints))))
+        return StageSequence(
+            tuple(self._stage(i, gates, max_specific_thrust) for i in range(len(self.waypoints)))
+        )
 
     def as_in_paper(self) -> Waypoints:
         """Itself: Section II of the paper prints no such maneuver."""
         return self
 
-    def _stage(self, i: int, gate: Gate | None, max_specific_thrust: float) -> Stage:
+    def _stage(self, i: int, gates: Sequence[Gate], max_specific_thrust: float) -> Stage:
         waypoint = self.waypoints[i]
         conditions = tuple(waypoint.conditions(max_specific_thrust))
-        if not waypoint.gate:
+        if waypoint.gate is None:
             return Stage(f"waypoint {i + 1}", conditions)
-        if gate is None:
-            raise no_gate()
-        return Stage("gate", (*at_centre(gate), *conditions), gate=gate)
+        gate = named_gate(gates, waypoint.gate)
+        return Stage(gate.name, (*at_centre(gate), *conditions), gate=gate.name)
 
 
 def _components(values: Array, name: str) -> Array:

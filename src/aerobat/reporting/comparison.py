@@ -100,7 +100,7 @@ def comparison_figure(comparison: Comparison) -> Figure:
         fact = f"{len(paths)} of {len(entries)} planners found a plan"
         headline(figure, f"{comparison.problem.name} · planners for {comparison.vehicle.name}", [fact])
         axes = panel(figure, COLUMNS[0], rows + AXIS + MARGIN, PAGE_WIDTH - COLUMNS[0] - MARGIN, height)
-        draw_overlay(axes, paths, comparison.problem.gate)
+        draw_overlay(axes, paths, next(iter(comparison.problem.gates), None))
         heading(axes, "Paths")
         _draw_rows(figure, comparison, colours, rows)
     return figure

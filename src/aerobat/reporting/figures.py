@@ -101,7 +101,7 @@ def draw(flight: Flight, plan: Plan | None = None, vehicle: Vehicle | None = Non
         figure = blank_page(PAGE_WIDTH, page.height + HEAD + FACT)
         headline(figure, of if plan is None else f"{plan.problem.name} · {of}", [_error_facts(flight)])
         path = panel(figure, *page.path)
-        gate, stages = (None, ()) if plan is None else (plan.problem.gate, plan.stages)
+        gate, stages = (None, ()) if plan is None else (next(iter(plan.problem.gates), None), plan.stages)
         heading(path, "Path and attitude", draw_path(path, planned, flown, vehicle, gate, stages))
         lines = [panel(figure, *place) for place in (page.position, page.attitude, page.rotors)]
         timelines.draw_position_error(lines[0], flight)
@@ -162,7 +162,7 @@ def _page(
         panel(figure, left, foot + bottom, width, height)
         for left, bottom, width, height in (pictures.path, pictures.stages)
     )
-    note = draw_path(path, planned, flown, vehicle, plan.problem.gate, plan.stages)
+    note = draw_path(path, planned, flown, vehicle, next(iter(plan.problem.gates), None), plan.stages)
     heading(path, "Path and attitude", note)
     heading(stages, "Stages" if plan.stages else "Attitudes", draw_stages(stages, plan, vehicle))
     return figure, [AXIS + PITCH * k for k in reversed(range(rows))]

@@ -53,7 +53,7 @@ class Motion:
 
 def plan_reference(plan: Plan, vehicle: Vehicle) -> Reference:
     """What a plan asks of a vehicle from start to goal, sampled for drawing."""
-    return reference(plan.trajectory, vehicle, rate=RATE, yaw=plan.problem.yaw)
+    return reference(plan.trajectory, vehicle, rate=RATE, environment=plan.problem.environment)
 
 
 def asked_motion(asked: Reference | Flight) -> Motion:

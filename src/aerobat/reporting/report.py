@@ -14,7 +14,7 @@ def report(plan: Plan, score: Score | None = None, vehicle: str | None = None) -
     """What report.json holds; units are in the keys. `flight` is missing when nothing was flown."""
     facts: dict[str, Any] = {
         "problem": plan.problem.name,
-        "vehicle": vehicle or plan.vehicle,
+        "vehicle": vehicle or (None if plan.vehicle is None else plan.vehicle.name),
         "plan": _plan(plan),
     }
     if score is not None:

@@ -37,7 +37,7 @@ KEYS = np.array([0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0])  # [m/s
 def draw_stages(axes: Axes, plan: Plan, vehicle: Vehicle) -> str:
     """Draw the stages in the plane of the turn; return a note on what is shown."""
     shots = snapshots(plan, vehicle)
-    plane, gate = turn_plane(plan, shots.thrust), plan.problem.gate
+    plane, gate = turn_plane(plan, shots.thrust), next(iter(plan.problem.gates), None)
     camera = plane.camera
     frame = camera.project(np.concatenate([shots.position, *([] if gate is None else [gate.corners])]))
     column = _column(shots.moments)

@@ -72,7 +72,7 @@ def draw_specific_thrust(axes: Axes, plan: Plan, vehicle: Vehicle) -> None:
     times = plan.trajectory.sample(200.0)
     stages = np.array([stage.time for stage in plan.stages])
     for at, style in ((times, "-"), (stages, "o")):
-        thrust = plan.trajectory.evaluate(at, 2) + np.array([0.0, 0.0, vehicle.gravity])
+        thrust = plan.trajectory.evaluate(at, 2) + plan.problem.environment.weight
         parts = plane.camera.project(thrust)
         for column, colour, name in ((1, RED, "a + g along z"), (0, BLUE, f"a along {plane.name}")):
             label = name if style == "-" else ""

@@ -92,14 +92,14 @@ def tracking_figure(plan: Plan, vehicle: Vehicle, flight: Flight) -> Figure:
     """
     if flight.ends.ndim:
         raise SpecError("tracking_figure draws one flight; of a batch, give flight[k]")
-    asked = reference(plan.trajectory, vehicle, rate=RATE, yaw=plan.problem.yaw)
+    asked = reference(plan.trajectory, vehicle, rate=RATE, environment=plan.problem.environment)
     facts = _facts(plan, vehicle, flight)
     with house_style():
         figure = blank_page(PAGE_WIDTH, HEIGHT + HEAD + FACT * len(facts))
         headline(figure, f"{plan.problem.name} · tracking by {vehicle.name}", facts)
         path = panel(figure, *PATH)
         motions = asked_motion(asked), flown_motions(flight)
-        note = draw_path(path, *motions, vehicle, plan.problem.gate, plan.stages)
+        note = draw_path(path, *motions, vehicle, next(iter(plan.problem.gates), None), plan.stages)
         heading(path, "Path and attitude", note)
         columns = Columns(figure, plan, asked, flight)
         positions, velocities = motion_tracks(asked, flight)

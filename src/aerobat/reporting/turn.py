@@ -73,8 +73,8 @@ def snapshots(plan: Plan, vehicle: Vehicle) -> Snapshots:
         shown += [Moment("", t) for t in steps if all(abs(t - m.time) > 0.5 * steps[1] for m in shown)]
     shown.sort(key=lambda moment: moment.time)  # stages may come in any order
     times = [moment.time for moment in shown]
-    setpoint = reference(plan.trajectory, vehicle, times=times, yaw=plan.problem.yaw).setpoint
-    thrust = setpoint.flat.acceleration + np.array([0.0, 0.0, vehicle.gravity])
+    setpoint = reference(plan.trajectory, vehicle, times=times, environment=plan.problem.environment).setpoint
+    thrust = setpoint.flat.acceleration + plan.problem.environment.weight
     return Snapshots(tuple(shown), setpoint.flat.position, setpoint.q_world_body, thrust)
 
 

@@ -87,6 +87,6 @@ def _entry(
     except (Infeasible, BackendMissing) as error:
         return Entry(name, None, None, None, perf_counter() - started, str(error))
     spent = perf_counter() - started
-    flight = fly(found.trajectory, vehicle, yaw=problem.yaw)
+    flight = fly(found.trajectory, vehicle, environment=problem.environment)
     flown = score(flight, problem, vehicle)
     return Entry(name, found, flight, flown, spent, flown.outcome)

@@ -10,26 +10,34 @@ from aerobat.errors import SpecError
 from aerobat.storage import read_arrays, whole_file
 from aerobat.trajectory.piecewise import Trajectory
 
-_FORMAT = "aerobat-trajectory-1"
+_FORMAT = "aerobat-trajectory-2"
+_WITHOUT_HEADING = "aerobat-trajectory-1"  # read with heading 0
 
 
 def save_trajectory(trajectory: Trajectory, path: str | Path) -> None:
-    """Write durations (S,) and coefficients (S, degree + 1, 3) as a NumPy .npz file, whole or not at all.
+    """Write durations (S,), coefficients (S, degree + 1, 3) and heading as an .npz file, whole or not at all.
 
     Raises SpecError when the file cannot be written.
     """
     with whole_file(path) as temporary, temporary.open("wb") as file:
-        np.savez(file, format=_FORMAT, durations=trajectory.durations, coefficients=trajectory.coefficients)
+        np.savez(
+            file,
+            format=_FORMAT,
+            durations=trajectory.durations,
+            coefficients=trajectory.coefficients,
+            heading=trajectory.heading,
+        )
 
 
 def load_trajectory(path: str | Path) -> Trajectory:
     """Read what `save_trajectory` wrote, exactly. Raises SpecError, one sentence, for any other file."""
     content = read_arrays(path, "trajectory")
     found = str(content.get("format", "something else"))
-    if found != _FORMAT:
+    if found not in (_FORMAT, _WITHOUT_HEADING):
         raise SpecError(f"trajectory file {path}: it holds {found}, not {_FORMAT}; give a plan.npz or a CSV")
     try:
-        return Trajectory(content["durations"], content["coefficients"])
+        heading = float(content["heading"]) if found == _FORMAT else 0.0
+        return Trajectory(content["durations"], content["coefficients"], heading)
     except KeyError as error:
         raise SpecError(f"trajectory file {path}: it has no array {error.args[0]!r}; save it again") from None
     except SpecError as error:

@@ -31,13 +31,15 @@ class Rule(StrEnum):
     )
 
 
-def minimum_effort(given: ArrayLike, durations: ArrayLike, rule: Rule = Rule.VARIATIONAL) -> Trajectory:
+def minimum_effort(
+    given: ArrayLike, durations: ArrayLike, rule: Rule = Rule.VARIATIONAL, heading: float = 0.0
+) -> Trajectory:
     """Polynomials of degree 2s - 1 on n segments, through what is given at their n + 1 knots.
 
     `given` (n + 1, s, 3) holds derivatives 0 to s - 1 of position [m/s^d], world frame, NaN where one is
     free; `durations` (n,) are in seconds. By the variational rule the result is the minimizer of
     ∫ |d^s p/dt^s|² dt, `Trajectory.effort(s)`; the axes do not know each other. Time and memory grow
-    linearly with n. The paper's curves, of degree 9, have s = 5.
+    linearly with n. The paper's curves, of degree 9, have s = 5. The `heading` [rad] is the trajectory's.
 
     Raises SpecError for shapes other than these, durations that are not positive, infinities, an end
     without a position, too little given to determine the curve, and durations that differ by more orders
@@ -50,7 +52,7 @@ def minimum_effort(given: ArrayLike, durations: ArrayLike, rule: Rule = Rule.VAR
         pattern = known[..., axes[0]]
         _check_determined(pattern, lengths, AXES[axes[0]])
         coefficients[..., axes] = _conditions(pattern, lengths, _checked(rule)).solve(values[..., axes])
-    return Trajectory(lengths, coefficients)
+    return Trajectory(lengths, coefficients, heading)
 
 
 def _conditions(known: Mask, durations: Array, rule: Rule) -> KnotConditions:

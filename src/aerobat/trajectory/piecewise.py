@@ -1,4 +1,4 @@
-"""Trajectory: a piecewise polynomial position, all its derivatives and their exact extremes."""
+"""Trajectory: a piecewise polynomial position with its heading, all derivatives and their exact extremes."""
 
 from __future__ import annotations
 
@@ -33,10 +33,14 @@ class Trajectory:
     Neighbouring segments need not agree in any derivative: at a knot the values of the segment that
     begins there count, and `on_segments` shows both sides. Raises SpecError for durations that are not
     positive, numbers that are not finite and shapes that do not match.
+
+    At the start the attitude is the smallest rotation from upright to the thrust, turned about it by the
+    heading, and from there it is carried along without spin.
     """
 
     durations: Array  # [s], (S,)
     coefficients: Array  # [m], (S, degree + 1, 3), powers of normalised time rising
+    heading: float = 0.0  # [rad] about the thrust axis at the start
 
     def __post_init__(self) -> None:
         """Copy, check and write-protect the arrays."""
@@ -51,9 +55,15 @@ class Trajectory:
             )
         object.__setattr__(self, "durations", durations)
         object.__setattr__(self, "coefficients", coefficients)
+        heading = frozen(self.heading, "heading")
+        if heading.ndim:
+            raise SpecError(f"heading must be one angle in rad, got {heading}")
+        object.__setattr__(self, "heading", float(heading))
 
     @classmethod
-    def from_inputs(cls, initial: ArrayLike, inputs: ArrayLike, dt: float) -> Trajectory:
+    def from_inputs(
+        cls, initial: ArrayLike, inputs: ArrayLike, dt: float, heading: float = 0.0
+    ) -> Trajectory:
         """Integrate exactly a chain of r integrators whose input is constant on each interval.
 
         `initial` (r, 3) holds position, velocity, ... at t = 0, `inputs` (N, 3) the r-th derivative of
@@ -74,7 +84,7 @@ class Trajectory:
         coefficients[0, :order] = scale[:order] * state
         for n in range(1, len(inputs)):
             coefficients[n, :order] = pascal @ coefficients[n - 1]
-        return cls(np.full(len(inputs), dt), coefficients)
+        return cls(np.full(len(inputs), dt), coefficients, heading)
 
     def __repr__(self) -> str:
         """Say in a few words what this trajectory is."""

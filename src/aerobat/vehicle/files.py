@@ -1,7 +1,7 @@
 """Vehicles from TOML files; the presets are such files too.
 
 A file holds mass, inertia (three principal moments or a 3 x 3 matrix), optionally name, description,
-drag_body and gravity, and one [[rotors]] table a rotor with position_body and spin; what the rotors share
+and drag_body, and one [[rotors]] table a rotor with position_body and spin; what the rotors share
 stands once in [rotor_defaults]. Units are SI, the keys are those of Vehicle and Rotor.
 """
 
@@ -15,7 +15,6 @@ import numpy as np
 
 from aerobat.documents import document_names, in_document, read_document, resolve_document, within
 from aerobat.errors import SpecError
-from aerobat.states import GRAVITY
 from aerobat.vehicle.vehicle import Rotor, Vehicle
 
 if TYPE_CHECKING:
@@ -51,7 +50,6 @@ def _vehicle(table: VehicleTable, default_name: str) -> Vehicle:
         inertia=np.diag(inertia) if inertia.ndim == 1 else inertia,
         rotors=tuple(_rotor(rotor, i, table.rotor_defaults) for i, rotor in enumerate(table.rotors)),
         drag_body=np.array(table.drag_body),
-        gravity=GRAVITY if table.gravity is None else table.gravity,
         description=table.description,
     )
 

@@ -45,6 +45,5 @@ class VehicleTable(_Table):
         Annotated[Vector, Tag("vector")] | Annotated[Matrix, Tag("matrix")], Discriminator(_rows)
     ]  # principal moments along the body axes, or the whole matrix
     drag_body: Vector = [0.0, 0.0, 0.0]
-    gravity: float | None = None
     rotor_defaults: RotorDefaults = RotorDefaults()
     rotors: list[RotorTable]

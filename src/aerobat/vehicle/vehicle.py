@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from aerobat.arrays import Array, frozen
 from aerobat.errors import SpecError
-from aerobat.states import GRAVITY
+from aerobat.states import STANDARD_GRAVITY
 
 _ROUNDING = 1e-9  # [-] relative: inertias are written with a few digits
 
@@ -61,7 +61,7 @@ class Vehicle:
     """A multirotor: one rigid body, n >= 4 rotors, linear drag.
 
     Compared and hashed by identity. Raises SpecError, beginning with the field's name, for what cannot be a
-    vehicle or could not hold a hover.
+    vehicle; whether it can hover depends on where, see `require_hover`.
     """
 
     name: str
@@ -69,13 +69,11 @@ class Vehicle:
     inertia: Array  # [kg·m²] about the centre of mass in body axes, (3, 3)
     rotors: tuple[Rotor, ...]
     drag_body: Array = field(default_factory=lambda: np.zeros(3))  # [kg/s] force_body = -drag_body·v_body
-    gravity: float = GRAVITY  # [m/s²] where it flies
     description: str = ""  # where its numbers come from
 
     def __post_init__(self) -> None:
-        for name, unit in (("mass", "kg"), ("gravity", "m/s²")):
-            _set(self, name, _number(getattr(self, name), name))
-            _check_positive(getattr(self, name), name, unit)
+        _set(self, "mass", _number(self.mass, "mass"))
+        _check_positive(self.mass, "mass", "kg")
         _set(self, "inertia", _array(self.inertia, "inertia", (3, 3)))
         _set(self, "drag_body", _array(self.drag_body, "drag_body", (3,)))
         _set(self, "rotors", tuple(self.rotors))
@@ -85,7 +83,7 @@ class Vehicle:
             raise SpecError(f"drag_body must not be negative, got {self.drag_body.tolist()} kg/s")
         _check_rotors(self.rotors)
         _check_rank(self.allocation)
-        self._check_hover()
+        self._check_balance()
 
     @cached_property
     def min_thrusts(self) -> Array:
@@ -124,8 +122,8 @@ class Vehicle:
 
     @property
     def thrust_to_weight(self) -> float:
-        """All rotors at full thrust, in weights [-]."""
-        return self.max_specific_thrust / self.gravity
+        """All rotors at full thrust, in weights on Earth [-]."""
+        return self.max_specific_thrust / STANDARD_GRAVITY
 
     def __str__(self) -> str:
         about_axes = ", ".join(f"{value:.3g}" for value in np.diag(self.inertia))
@@ -136,12 +134,13 @@ class Vehicle:
         source = " ".join(self.description.split())  # one line, however it was written
         return f"{facts}; {source}" if source else facts
 
-    def _check_hover(self) -> None:
-        weight = self.mass * self.gravity
+    def require_hover(self, gravity: float) -> None:
+        """Raise SpecError, naming the rotors, unless they can hold a level hover under `gravity` [m/s²]."""
+        weight = self.mass * gravity
         total = self.max_thrusts.sum()
         if total <= weight:
             raise SpecError(
-                f"rotors cannot lift the vehicle: their max_thrust adds up to {total:.4g} N, its weight is "
+                f"rotors cannot lift {self.name}: their max_thrust adds up to {total:.4g} N, its weight is "
                 f"{weight:.4g} N; raise max_thrust or lower mass"
             )
         hover = weight * np.linalg.pinv(self.allocation)[:, 0]
@@ -151,6 +150,17 @@ class Vehicle:
             raise SpecError(
                 f"rotors cannot hold a level hover: it takes {hover[i]:.4g} N of rotors[{i}], which gives "
                 f"{self.min_thrusts[i]:.4g} to {self.max_thrusts[i]:.4g} N; check position_body, spin, limits"
+            )
+
+    def _check_balance(self) -> None:
+        """Refuse rotors that can hold a level hover under no gravity whatever."""
+        fractions = np.linalg.pinv(self.allocation)[:, 0]  # of the weight that each rotor bears
+        wrong = (fractions <= _ROUNDING) & (self.min_thrusts >= 0.0)
+        if wrong.any():
+            i = int(np.argmax(wrong))
+            raise SpecError(
+                f"rotors cannot hold a level hover: rotors[{i}] would bear {fractions[i]:.2g} of the weight, "
+                f"but gives {self.min_thrusts[i]:.4g} N or more; check position_body, spin, limits"
             )
 
 

@@ -55,19 +55,24 @@ def _binding(formulation: Formulation, dts: Sequence[float]) -> Iterator[str]:
 
 
 def _relaxations(formulation: Formulation) -> Iterator[tuple[str, Formulation]]:
-    problem, course = formulation.problem, formulation.course
+    problem, sequence = formulation.problem, formulation.sequence
     for derivative in range(formulation.chain.order + 1):
-        bound = problem.limits.of(derivative)[1]
-        if np.isfinite(np.concatenate(problem.limits.of(derivative))).any():
+        bound = problem.path_limits.of(derivative)[1]
+        if np.isfinite(np.concatenate(problem.path_limits.of(derivative))).any():
             name = f"limits.{DERIVATIVES[derivative]} ({np.min(bound):g} {UNITS[derivative]})"
             if derivative == 0:
                 name = "the volume between limits.lower and limits.upper"
             yield (
                 name,
-                replace(formulation, problem=replace(problem, limits=problem.limits.without(derivative))),
+                replace(
+                    formulation, problem=replace(problem, limits=problem.path_limits.without(derivative))
+                ),
             )
-    for i, stage in enumerate(course.stages):
-        others = course.stages[:i] + course.stages[i + 1 :]
-        yield f"the stage '{stage.name}'", replace(formulation, course=replace(course, stages=others))
-    if course.always:
-        yield "what holds at every interval", replace(formulation, course=replace(course, always=()))
+    for i, stage in enumerate(sequence.stages):
+        others = sequence.stages[:i] + sequence.stages[i + 1 :]
+        yield f"the stage '{stage.name}'", replace(formulation, sequence=replace(sequence, stages=others))
+    if sequence.path_constraints:
+        yield (
+            "what holds at every interval",
+            replace(formulation, sequence=replace(sequence, path_constraints=())),
+        )

@@ -19,7 +19,7 @@ from aerobat.errors import SpecError
 from aerobat.optimization import AssignmentProgram, SlottedStage
 from aerobat.planning.miqp.integrator import INPUTS, IntegratorChain
 from aerobat.problem.problem import DERIVATIVES, Limits, Problem
-from aerobat.problem.stage import Condition, Course, Stage
+from aerobat.problem.stage import Condition, Stage, StageSequence
 
 Indices = NDArray[np.intp]
 AXES = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
@@ -46,15 +46,14 @@ class Formulation:
     """
 
     problem: Problem
-    course: Course
+    sequence: StageSequence
     chain: IntegratorChain
-    gravity: float  # [m/s²]
     limits: Limits | None = None  # tighter than the problem's, whose they are by default
 
     def __post_init__(self) -> None:
         """Check."""
-        ends, stages = self.chain.intervals - 1, len(self.course.stages)
-        if ends < max(stages, 1) or not all(self._slots(s) for s in self.course.stages):
+        ends, stages = self.chain.intervals - 1, len(self.sequence.stages)
+        if ends < max(stages, 1) or not all(self._slots(s) for s in self.sequence.stages):
             raise SpecError(
                 f"intervals: {self.chain.intervals} leave {ends} interval ends between start and goal for "
                 f"the {stages} stages of '{self.problem.name}'; use at least {max(2 * stages, 3)}"
@@ -78,7 +77,7 @@ class Formulation:
             rows=self._matrix,
             lower=lower * scale - free,
             upper=upper * scale - free,
-            stages=tuple(self._assigned(i, scale, free) for i in range(len(self.course.stages))),
+            stages=tuple(self._assigned(i, scale, free) for i in range(len(self.sequence.stages))),
             precedence=self._precedence,
         )
 
@@ -93,7 +92,7 @@ class Formulation:
     @property
     def bounds(self) -> Limits:
         """What is imposed at the interval ends."""
-        return self.problem.limits if self.limits is None else self.limits
+        return self.problem.path_limits if self.limits is None else self.limits
 
     @cached_property
     def initial(self) -> Array:
@@ -107,8 +106,8 @@ class Formulation:
 
     @cached_property
     def _precedence(self) -> tuple[tuple[int, int], ...]:
-        stages = len(self.course.stages)
-        return tuple((i, i + 1) for i in range(stages - 1)) if self.course.ordered else ()
+        stages = len(self.sequence.stages)
+        return tuple((i, i + 1) for i in range(stages - 1)) if self.sequence.ordered else ()
 
     @cached_property
     def _rows(self) -> dict[Row, tuple[float, float]]:
@@ -117,7 +116,7 @@ class Formulation:
         for row, lower, upper in (*self._limit_rows(), *self._path_rows()):
             low, high = rows.get(row, (-inf, inf))
             rows[row] = (max(low, lower), min(high, upper))
-        for stage in self.course.stages:
+        for stage in self.sequence.stages:
             for interval in self._slots(stage):
                 for condition in stage.conditions:
                     rows.setdefault(_row(condition, interval), (-inf, inf))
@@ -132,9 +131,9 @@ class Formulation:
                         yield Row(interval, derivative, axis), float(low), float(high)
 
     def _path_rows(self) -> Iterable[tuple[Row, float, float]]:
-        for condition in self.course.always:
+        for condition in self.sequence.path_constraints:
             for interval in range(self.chain.intervals - 1):
-                yield _row(condition, interval), *condition.kinematic_bounds(self.gravity)
+                yield _row(condition, interval), *condition.kinematic_bounds(self.problem.environment.gravity)
 
     @cached_property
     def _derivatives(self) -> Array:
@@ -180,13 +179,15 @@ class Formulation:
         index = {row: i for i, row in enumerate(self._rows)}
         tables = (
             [[index[_row(c, n)] for c in stage.conditions] for n in self._slots(stage)]
-            for stage in self.course.stages
+            for stage in self.sequence.stages
         )
         return tuple(np.array(table, dtype=np.intp) for table in tables)
 
     def _assigned(self, i: int, scale: Array, free: Array) -> SlottedStage:
-        stage, rows = self.course.stages[i], self._stage_rows[i]
-        si = np.array([c.kinematic_bounds(self.gravity) for c in stage.conditions]).reshape(-1, 2)
+        stage, rows = self.sequence.stages[i], self._stage_rows[i]
+        si = np.array(
+            [c.kinematic_bounds(self.problem.environment.gravity) for c in stage.conditions]
+        ).reshape(-1, 2)
         lower, upper = (si[:, side] * scale[rows] - free[rows] for side in (0, 1))
         return SlottedStage(stage.name, tuple(self._slots(stage)), rows, lower, upper)
 

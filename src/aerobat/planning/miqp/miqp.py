@@ -20,8 +20,7 @@ from aerobat.planning.result import Attempt, PlacedStage, Plan
 from aerobat.planning.search import Bisection, Grid, Search
 from aerobat.planning.tighten import drawn_in
 from aerobat.problem.problem import Problem
-from aerobat.problem.stage import Course
-from aerobat.states import GRAVITY
+from aerobat.problem.stage import StageSequence
 from aerobat.trajectory import Trajectory
 from aerobat.vehicle import Vehicle
 
@@ -100,12 +99,12 @@ def formulate(problem: Problem, order: int, intervals: int, vehicle: Vehicle | N
 
     Raises Infeasible when a stage asks more thrust than the vehicle has.
     """
-    gravity = problem.gravity or (GRAVITY if vehicle is None else vehicle.gravity)
+    gravity = problem.environment.gravity
     thrust = ASSUMED_THRUST_TO_WEIGHT * gravity if vehicle is None else vehicle.max_specific_thrust
-    course = problem.maneuver.course(problem.gate, thrust)
+    sequence = problem.stages(thrust)
     if vehicle is not None:
-        _check_thrust(course, vehicle)
-    return Formulation(problem, course, IntegratorChain(order, intervals), gravity)
+        _check_thrust(sequence, vehicle)
+    return Formulation(problem, sequence, IntegratorChain(order, intervals))
 
 
 @dataclass(frozen=True)
@@ -133,7 +132,7 @@ class _Planning:
 
     def draw_in(self, trajectory: Trajectory, certificate: Certificate) -> bool:
         """Draw bounds in by what a trajectory exceeds, or is not proven to hold; whether there was any."""
-        bounds, limits = self.formulation.bounds, self.formulation.problem.limits
+        bounds, limits = self.formulation.bounds, self.formulation.problem.path_limits
         # the input itself is constant on each interval and exceeds nothing
         inside = drawn_in(bounds, limits, trajectory, self.formulation.chain.order)
         self.formulation = replace(self.formulation, limits=inside)
@@ -153,10 +152,12 @@ class _Planning:
             return self._record(dt, answer, None, outcome)
         self.slots = answer.slots
         inputs = self.formulation.inputs(answer.x, dt)
-        trajectory = Trajectory.from_inputs(self.formulation.initial, inputs, dt)
+        trajectory = Trajectory.from_inputs(
+            self.formulation.initial, inputs, dt, self.formulation.problem.heading
+        )
         margin = None
         if self.vehicle is not None:
-            margin = rotor_margin(trajectory, self.vehicle, self.formulation.problem.yaw)
+            margin = rotor_margin(trajectory, self.vehicle, self.formulation.problem.environment)
             self.margins.append(margin)
         found = _Found(dt, trajectory, self.formulation.cost(answer.cost, dt), answer, margin)
         if margin is not None and not (margin.feasible and margin.margin >= self.spare):
@@ -183,7 +184,7 @@ class _Planning:
         """The plan of what the search settled on."""
         stages = (
             PlacedStage(stage.name, slot, (slot + 1) * found.dt, stage.gate)
-            for stage, slot in zip(self.formulation.course.stages, found.answer.slots or (), strict=True)
+            for stage, slot in zip(self.formulation.sequence.stages, found.answer.slots or (), strict=True)
         )
         return Plan(
             problem=self.formulation.problem,
@@ -198,17 +199,17 @@ class _Planning:
             backend=self.config.backend,
             stages=tuple(stages),
             attempts=tuple(self.attempts),
-            vehicle=None if self.vehicle is None else self.vehicle.name,
+            vehicle=self.vehicle,
             margin=found.margin,
             certificate=certificate,
         )
 
 
-def _check_thrust(course: Course, vehicle: Vehicle) -> None:
+def _check_thrust(sequence: StageSequence, vehicle: Vehicle) -> None:
     """Refuse at once what no duration can mend."""
-    for stage in course.stages:
+    for stage in sequence.stages:
         for condition in stage.conditions:
-            asked = condition.least_thrust
+            asked = condition.min_thrust
             if asked > vehicle.max_specific_thrust:
                 where = "inverted" if condition.direction[2] < -0.99 else "along its attitude"
                 raise Infeasible(
@@ -218,9 +219,8 @@ def _check_thrust(course: Course, vehicle: Vehicle) -> None:
 
 
 def _fastest_conceivable(problem: Problem, vehicle: Vehicle) -> float:
-    """Half the time that full thrust would take straight through the gate [s]: where the search starts."""
-    points = [problem.start.position, problem.goal.position]
-    if problem.gate is not None:
-        points.insert(1, problem.gate.position)
+    """Half the time that full thrust would take straight through the gates [s]: where the search starts."""
+    gates = [gate.position for gate in problem.gates]
+    points = [problem.start.position, *gates, problem.goal.position]
     length = float(np.linalg.norm(np.diff(points, axis=0), axis=1).sum())
     return max(sqrt(length / vehicle.max_specific_thrust), 0.1)

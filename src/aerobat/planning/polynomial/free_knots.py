@@ -13,7 +13,7 @@ import numpy as np
 
 from aerobat.certification import Certificate, Verdict
 from aerobat.errors import Infeasible, SpecError
-from aerobat.flatness import lateral_drag
+from aerobat.flatness import end_thrust
 from aerobat.optimization.nonlinear import NonlinearResult, symbolics
 from aerobat.planning.miqp import Miqp
 from aerobat.planning.polynomial.knot_bounds import Bound, path_bounds
@@ -25,7 +25,7 @@ from aerobat.planning.proof import certificate_for
 from aerobat.planning.result import Attempt, PlacedStage, Plan
 from aerobat.planning.warm_start import Guess
 from aerobat.problem.problem import Problem
-from aerobat.problem.stage import Course
+from aerobat.problem.stage import StageSequence
 from aerobat.problem.waypoints import Waypoints
 from aerobat.vehicle import Vehicle
 
@@ -117,7 +117,7 @@ class _Run:
     config: FreeKnots
     problem: Problem
     vehicle: Vehicle
-    course: Course
+    sequence: StageSequence
     gravity: float  # [m/s²] as the stages mean it
     bounds: tuple[Bound, ...]
     progress: Progress | None
@@ -126,10 +126,10 @@ class _Run:
 
     @classmethod
     def of(cls, config: FreeKnots, problem: Problem, vehicle: Vehicle, progress: Progress | None) -> _Run:
-        gravity = problem.gravity or vehicle.gravity
-        course = problem.maneuver.course(problem.gate, vehicle.max_specific_thrust)
-        bounds = path_bounds(problem, course, gravity)
-        return cls(config, problem, vehicle, course, gravity, bounds, progress)
+        gravity = problem.environment.gravity
+        sequence = problem.stages(vehicle.max_specific_thrust)
+        bounds = path_bounds(problem, sequence, gravity)
+        return cls(config, problem, vehicle, sequence, gravity, bounds, progress)
 
     def starts(self) -> Iterator[Plan]:
         """Plans to begin from, the best first; the last knows no rotors."""
@@ -142,7 +142,7 @@ class _Run:
 
     def descend(self, start: Plan) -> None:
         """Free the knots of a plan: first of few segments, then of as many as are wanted."""
-        guess = Guess.of(start, self.course)
+        guess = Guess.of(start, self.sequence)
         if not self._judged(guess, start).certified:
             guess = self._slowed(guess, start)
         for segments in sorted({COARSE, self.config.segments}):
@@ -169,7 +169,7 @@ class _Run:
             backend="ipopt" if start is None else start.backend,
             stages=tuple(stages),
             attempts=tuple(self.attempts),
-            vehicle=self.vehicle.name,
+            vehicle=self.vehicle,
             margin=found.excess.margin,
             certificate=found.certificate,
         )
@@ -200,7 +200,7 @@ class _Run:
         )
 
     def _excess(self, guess: Guess) -> Excess:
-        return Excess.of(guess.trajectory, self.vehicle, self.problem.yaw, self.bounds)
+        return Excess.of(guess.trajectory, self.vehicle, self.problem.environment, self.bounds)
 
     def _judged(self, guess: Guess, start: Plan | None = None) -> _Judged:
         """What a guess comes to; the best that is certified is kept."""
@@ -261,10 +261,9 @@ class _Run:
 
 def _check(problem: Problem, vehicle: Vehicle) -> None:
     """Refuse ends without an attitude."""
-    weight = np.array([0.0, 0.0, vehicle.gravity])
     for name, state in (("start", problem.start), ("goal", problem.goal)):
-        thrust = state.acceleration + weight + lateral_drag(vehicle) * state.velocity
-        if np.linalg.norm(thrust) < FREE_FALL * vehicle.gravity:
+        thrust = end_thrust(state.velocity, state.acceleration, vehicle, problem.environment)
+        if np.linalg.norm(thrust) < FREE_FALL * problem.environment.gravity:
             raise SpecError(
                 f"{name}.acceleration asks no thrust, which leaves the attitude there open; change it"
             )

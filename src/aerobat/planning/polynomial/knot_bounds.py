@@ -9,7 +9,7 @@ import numpy as np
 
 from aerobat.arrays import Array
 from aerobat.problem.problem import DERIVATIVES, Problem
-from aerobat.problem.stage import Condition, Course
+from aerobat.problem.stage import Condition, StageSequence
 from aerobat.trajectory import Trajectory
 
 
@@ -45,12 +45,12 @@ class Bound:
         return float(self.excess(trajectory.evaluate(time, self.derivative)))
 
 
-def path_bounds(problem: Problem, course: Course, gravity: float) -> tuple[Bound, ...]:
-    """What holds along the whole path: the problem's limits, and what its course asks always."""
+def path_bounds(problem: Problem, sequence: StageSequence, gravity: float) -> tuple[Bound, ...]:
+    """What holds along the whole path: the problem's limits, and what its sequence asks always."""
     limits = (
         Bound(derivative, axis, float(low), float(high))
         for derivative in range(len(DERIVATIVES))
-        for axis, low, high in zip(np.eye(3), *problem.limits.of(derivative), strict=True)
+        for axis, low, high in zip(np.eye(3), *problem.path_limits.of(derivative), strict=True)
         if low > -inf or high < inf
     )
-    return (*limits, *(Bound.of(condition, gravity) for condition in course.always))
+    return (*limits, *(Bound.of(condition, gravity) for condition in sequence.path_constraints))

@@ -70,7 +70,7 @@ class KnotProgram:
             self.vehicle,
             self.guess,
             tuple(segments.tolist()),
-            Frame.around(self.guess),
+            Frame.around(self.guess, self.problem.environment.wind),
             self.radius,
             self.still_ends,
         )
@@ -92,7 +92,7 @@ class KnotProgram:
     def _rotors(self) -> _Rows:
         """Limits of rotors and the floor of thrust at all samples."""
         ca, trajectory, variables = symbolics(), self.guess.trajectory, self._variables
-        rotors = RotorRows(self.vehicle, variables.frame.axes, self.problem.yaw)
+        rotors = RotorRows(self.vehicle, variables.frame.axes, self.problem.environment, self.problem.heading)
         moving = [
             ca.vertcat(*((ca.DM(_powers(s, k)) @ variables.coefficients[i]).T for k in range(1, GIVEN)))
             for i, s in enumerate(self.samples)

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from aerobat.arrays import Array
+from aerobat.environment import Environment
 from aerobat.flatness import reference
 from aerobat.planning.feasibility import RotorMargin, rotor_margin
 from aerobat.planning.polynomial.knot_bounds import Bound
@@ -30,10 +31,12 @@ class Excess:
     margin: RotorMargin
 
     @classmethod
-    def of(cls, trajectory: Trajectory, vehicle: Vehicle, yaw: float, bounds: tuple[Bound, ...]) -> Excess:
+    def of(
+        cls, trajectory: Trajectory, vehicle: Vehicle, environment: Environment, bounds: tuple[Bound, ...]
+    ) -> Excess:
         """Of rotor thrusts and of bounds along a trajectory."""
-        s, margin = np.linspace(0.0, 1.0, DENSE), rotor_margin(trajectory, vehicle, yaw)
-        over = [_rotors(trajectory, vehicle, yaw, s)]
+        s, margin = np.linspace(0.0, 1.0, DENSE), rotor_margin(trajectory, vehicle, environment)
+        over = [_rotors(trajectory, vehicle, environment, s)]
         over += [bound.excess(trajectory.on_segments(s, bound.derivative)) / bound.scale for bound in bounds]
         values = np.max(over, axis=0)
         beside = np.pad(values, ((0, 0), (1, 1)), constant_values=-np.inf)
@@ -77,14 +80,14 @@ def cut(trajectory: Trajectory, segments: int) -> Trajectory:
     inside = np.stack([knots[:-1], knots[1:] - JUST_INSIDE * durations])
     ends = np.stack([trajectory.evaluate(inside, k) for k in range(GIVEN)], axis=2)
     ends *= (durations[:, None] ** np.arange(GIVEN))[..., None]
-    return Trajectory(durations, polynomial.hermite(ends[0], ends[1]))
+    return Trajectory(durations, polynomial.hermite(ends[0], ends[1]), trajectory.heading)
 
 
-def _rotors(trajectory: Trajectory, vehicle: Vehicle, yaw: float, s: Array) -> Array:
+def _rotors(trajectory: Trajectory, vehicle: Vehicle, environment: Environment, s: Array) -> Array:
     """The excess of the worst rotor's thrust at normalised times s (n,) of every segment, (S, n)."""
     inside = np.clip(s, JUST_INSIDE, 1.0 - JUST_INSIDE)
     times = trajectory.knots[:-1, None] + trajectory.durations[:, None] * inside
-    thrusts = reference(trajectory, vehicle, times.ravel(), yaw=yaw).rotor_thrusts
+    thrusts = reference(trajectory, vehicle, times.ravel(), environment=environment).rotor_thrusts
     low, high = vehicle.min_thrusts, vehicle.max_thrusts
     over = np.maximum(low - thrusts, thrusts - high) / (high - low)
     return np.asarray(over.max(axis=1).reshape(times.shape))

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from aerobat.arrays import Array
-from aerobat.flatness import lateral_drag
+from aerobat.flatness import end_thrust
 from aerobat.optimization.nonlinear import symbolics
 from aerobat.planning.warm_start import Guess
 from aerobat.problem.problem import EndState, Problem
@@ -35,10 +35,10 @@ class Frame:
     axes: Array  # orthonormal columns, (3, d); in a plane the second is up
 
     @classmethod
-    def around(cls, guess: Guess) -> Frame:
-        """The vertical plane that a guess stays in, where it stays in one; else all of space."""
+    def around(cls, guess: Guess, wind: Array) -> Frame:
+        """The vertical plane that guess and wind [m/s] stay in, where they stay in one; else all of space."""
         normal = guess.plane()
-        if normal is None:
+        if normal is None or normal @ wind != 0.0:
             return cls(np.zeros(3), np.eye(3))
         start = guess.trajectory.coefficients[0, 0]
         return cls(normal * (normal @ start), np.stack([np.cross(normal, UP), UP], axis=1))
@@ -129,7 +129,7 @@ class KnotVariables:
         values = self._base.ravel() + self._effect @ offsets
         powers = np.tile(durations[:, None] ** np.arange(GIVEN), 2)[..., None]
         coefficients = TO_COEFFICIENTS @ (powers * values.reshape(len(parts), 2 * GIVEN, -1))
-        trajectory = Trajectory(durations, self.frame.outside(coefficients))
+        trajectory = Trajectory(durations, self.frame.outside(coefficients), self.problem.heading)
         segments = list(self.segments)
         times = trajectory.knots[segments] + durations[segments] * places
         return Guess(trajectory, self.guess.stages, tuple(times.tolist()))
@@ -193,5 +193,5 @@ class KnotVariables:
 
     def _thrust_direction(self, state: EndState) -> Array:
         """Where the thrust points at an end, (3,)."""
-        thrust = state.acceleration + self.vehicle.gravity * UP + lateral_drag(self.vehicle) * state.velocity
+        thrust = end_thrust(state.velocity, state.acceleration, self.vehicle, self.problem.environment)
         return np.asarray(thrust / np.linalg.norm(thrust))

@@ -10,7 +10,7 @@ import numpy as np
 
 from aerobat.arrays import Array
 from aerobat.problem.problem import Problem
-from aerobat.problem.stage import Course, Stage
+from aerobat.problem.stage import Stage, StageSequence
 from aerobat.problem.waypoints import Waypoints
 from aerobat.trajectory import Trajectory
 
@@ -19,16 +19,16 @@ SHORTEST = 0.2  # [s] that a leg is given at first
 MISSED = 1e-6  # in SI units: by how much a condition may be missed through rounding
 
 
-def given_at_knots(problem: Problem, course: Course, order: int, gravity: float) -> Array:
+def given_at_knots(problem: Problem, sequence: StageSequence, order: int, gravity: float) -> Array:
     """Position and its derivatives below `order` at start, stages and goal, (K, order, 3); NaN: free.
 
     The closed form takes each axis alone and equalities only. So conditions in oblique directions fix, by
     least norm, every component that they touch; a lower bound on thrust fixes the thrust to it, or to the
     hover's if that is more; other inequalities are left free, to be checked afterwards.
     """
-    given = np.full((len(course.stages) + 2, order, 3), np.nan)
+    given = np.full((len(sequence.stages) + 2, order, 3), np.nan)
     given[0], given[-1] = problem.start.derivatives(order), problem.goal.derivatives(order)
-    for knot, stage in enumerate(course.stages, 1):
+    for knot, stage in enumerate(sequence.stages, 1):
         for derivative in range(3):
             given[knot, derivative] = _fixed(stage, derivative, gravity)
     return given
@@ -47,10 +47,10 @@ def first_times(problem: Problem, given: Array, max_specific_thrust: float) -> A
     return durations
 
 
-def unmet(course: Course, trajectory: Trajectory, gravity: float) -> str | None:
+def unmet(sequence: StageSequence, trajectory: Trajectory, gravity: float) -> str | None:
     """The first stage that a trajectory with a knot a stage misses, in a sentence; or None."""
     values = [trajectory.evaluate(trajectory.knots[1:-1], k) for k in range(3)]
-    for stage, flat in zip(course.stages, np.stack(values, axis=1), strict=True):
+    for stage, flat in zip(sequence.stages, np.stack(values, axis=1), strict=True):
         for condition in stage.conditions:
             derivative = flat[condition.quantity.derivative]
             value = float(condition.direction @ derivative) + condition.weight(gravity)
@@ -78,7 +78,7 @@ def _equalities(stage: Stage, derivative: int, gravity: float) -> Iterator[tuple
         if condition.quantity.derivative != derivative:
             continue
         value = condition.lower
-        if condition.least_thrust > 0.0 and condition.lower < condition.upper:
+        if condition.min_thrust > 0.0 and condition.lower < condition.upper:
             hover = gravity * float(np.linalg.norm(condition.direction))
             value = float(np.clip(hover, condition.lower, condition.upper))
         elif condition.lower < condition.upper:

@@ -18,9 +18,8 @@ from aerobat.planning.proof import certificate_for
 from aerobat.planning.result import Attempt, PlacedStage, Plan
 from aerobat.planning.search import Bisection, Grid, Search
 from aerobat.problem.problem import Problem
-from aerobat.problem.stage import Course
+from aerobat.problem.stage import StageSequence
 from aerobat.problem.waypoints import Waypoints
-from aerobat.states import GRAVITY
 from aerobat.trajectory import Trajectory
 from aerobat.trajectory.minimum_effort import Rule, minimum_effort
 from aerobat.vehicle import Vehicle
@@ -106,7 +105,7 @@ class _Planning:
 
     config: MinSnap
     problem: Problem
-    course: Course
+    sequence: StageSequence
     vehicle: Vehicle | None
     gravity: float  # [m/s²]
     given: Array  # (K, s, 3)
@@ -123,19 +122,21 @@ class _Planning:
         vehicle: Vehicle | None,
         progress: Callable[[Attempt], None] | None,
     ) -> _Planning:
-        gravity = problem.gravity or (GRAVITY if vehicle is None else vehicle.gravity)
+        gravity = problem.environment.gravity
         thrust = ASSUMED_THRUST_TO_WEIGHT * gravity if vehicle is None else vehicle.max_specific_thrust
-        course = problem.maneuver.course(problem.gate, thrust)
-        given = given_at_knots(problem, course, config.order, gravity)
+        sequence = problem.stages(thrust)
+        given = given_at_knots(problem, sequence, config.order, gravity)
         timed = isinstance(problem.maneuver, Waypoints) and problem.maneuver.times is not None
         stretch = config.stretch or (Stretch.FIRST if timed else Stretch.ALL)
         durations = first_times(problem, given, thrust)
-        return cls(config, problem, course, vehicle, gravity, given, durations, stretch, progress)
+        return cls(config, problem, sequence, vehicle, gravity, given, durations, stretch, progress)
 
     def attempt(self, duration: float) -> _Found | None:
         """The path at one duration; None unless it meets its stages and the vehicle can fly it."""
         started = perf_counter()
-        trajectory = minimum_effort(self.given, self._stretched(duration), self.config.rule)
+        trajectory = minimum_effort(
+            self.given, self._stretched(duration), self.config.rule, self.problem.heading
+        )
         found, outcome = self._judged(trajectory)
         spent = perf_counter() - started
         attempt = Attempt(duration, found.feasible, "optimal", outcome, found.cost, 1, spent)
@@ -159,10 +160,10 @@ class _Planning:
     def _judged(self, trajectory: Trajectory) -> tuple[_Found, str]:
         """Whether a path will do, and why, in a sentence."""
         cost = trajectory.effort(self.config.order)
-        missed = unmet(self.course, trajectory, self.gravity)
+        missed = unmet(self.sequence, trajectory, self.gravity)
         if self.vehicle is None:
             return _Found(trajectory, cost, missed is None, None, None), missed or "feasible"
-        margin = rotor_margin(trajectory, self.vehicle, self.problem.yaw)
+        margin = rotor_margin(trajectory, self.vehicle, self.problem.environment)
         if missed is not None or not margin.feasible:
             return _Found(trajectory, cost, False, margin, None), missed or str(margin)
         certificate = certificate_for(trajectory, self.problem, self.vehicle)
@@ -196,10 +197,10 @@ class _Planning:
             backend="closed form",
             stages=tuple(
                 PlacedStage(stage.name, i, time, stage.gate)
-                for i, (stage, time) in enumerate(zip(self.course.stages, times, strict=True))
+                for i, (stage, time) in enumerate(zip(self.sequence.stages, times, strict=True))
             ),
             attempts=tuple(self.attempts),
-            vehicle=None if self.vehicle is None else self.vehicle.name,
+            vehicle=self.vehicle,
             margin=found.margin,
             certificate=found.certificate,
         )

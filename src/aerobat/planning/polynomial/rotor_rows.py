@@ -18,7 +18,8 @@ import numpy as np
 
 from aerobat import so3
 from aerobat.arrays import Array
-from aerobat.flatness import lateral_drag, reference
+from aerobat.environment import Environment
+from aerobat.flatness import axial_drag, lateral_drag, reference
 from aerobat.optimization.nonlinear import symbolics
 from aerobat.trajectory import Trajectory
 from aerobat.vehicle import Vehicle
@@ -34,7 +35,8 @@ class RotorRows:
 
     vehicle: Vehicle
     axes: Array  # of motion, orthonormal columns, (3, d); d = 2: in a vertical plane, the second up
-    yaw: float  # [rad]
+    environment: Environment
+    heading: float  # [rad]
 
     @property
     def size(self) -> int:
@@ -45,7 +47,7 @@ class RotorRows:
         """Body axes in the world along a trajectory, (9, n): x, y and z; or the axis of turning, (3, n)."""
         if self._planar:
             return np.repeat(self._turning_axis[:, None], len(times), axis=1)
-        q = reference(trajectory, self.vehicle, times, yaw=self.yaw).setpoint.q_world_body
+        q = reference(trajectory, self.vehicle, times, environment=self.environment).setpoint.q_world_body
         return np.swapaxes(so3.axes(q), -1, -2).reshape(len(times), 9).T
 
     @cached_property
@@ -56,16 +58,18 @@ class RotorRows:
         frame = ca.SX.sym("frame", 3 if self._planar else 9)
         v, a, j, s = (moving[k * d : (k + 1) * d] / duration ** (k + 1) for k in range(4))
         drag = lateral_drag(self.vehicle)
-        f, df, ddf = a + ca.DM(self.vehicle.gravity * UP @ self.axes) + drag * v, j + drag * a, s + drag * j
+        airspeed = v - ca.DM(self.environment.wind @ self.axes)
+        f = a + ca.DM(self.environment.weight @ self.axes) + drag * airspeed
+        df, ddf = j + drag * a, s + drag * j
         squared = ca.dot(f, f)
         turn = self._turn_in_plane if self._planar else self._turn_in_space
-        axial = float(self.vehicle.drag_body[2]) - self.vehicle.mass * drag
-        thrust = self.vehicle.mass * ca.sqrt(squared) + axial * ca.dot(f, v) / ca.sqrt(squared)
+        along = ca.dot(f, airspeed) / ca.sqrt(squared)
+        thrust = self.vehicle.mass * (ca.sqrt(squared) + axial_drag(self.vehicle) * along)
         thrusts = ca.DM(self._thrusts_from[:, :-2]) @ ca.vertcat(thrust, turn(ca, f, df, ddf, frame))
         low, high = self._thrusts_from[:, -2:].T
         shares = (thrusts - low) / (high - low)
         return ca.Function(
-            "rotors", [moving, duration, frame], [ca.vertcat(shares, squared / self.vehicle.gravity**2)]
+            "rotors", [moving, duration, frame], [ca.vertcat(shares, squared / self.environment.gravity**2)]
         )
 
     @property
@@ -75,7 +79,9 @@ class RotorRows:
     @cached_property
     def _turning_axis(self) -> Array:
         """In a plane, the axis of turning from its first axis to its second, body axes, (3,)."""
-        return so3.rotate(so3.about_axis(UP, np.array(-self.yaw)), np.cross(self.axes[:, 0], self.axes[:, 1]))
+        return so3.rotate(
+            so3.about_axis(UP, np.array(-self.heading)), np.cross(self.axes[:, 0], self.axes[:, 1])
+        )
 
     @cached_property
     def _thrusts_from(self) -> Array:

@@ -161,7 +161,7 @@ class Collocation:
         for powers in np.vander(BETWEEN, len(basis), increasing=True):
             yield _combined(powers @ basis, ends) / scale
 
-    def trajectory(self) -> Trajectory:
+    def trajectory(self, heading: float) -> Trajectory:
         """The trajectory of a motion in numbers, from its start on, continuous to the last digit."""
         ends = [symbolics().DM(rate).full()[VELOCITY] for rate in self.rates.normalised(self.durations)]
         durations = symbolics().DM(self.durations).full()[0]
@@ -172,7 +172,7 @@ class Collocation:
         for piece, h in zip(coefficients, durations.tolist(), strict=True):
             piece[:2] = position, h * velocity
             position, velocity = piece.sum(axis=0), np.arange(8) @ piece / h
-        return Trajectory(durations, coefficients)
+        return Trajectory(durations, coefficients, heading)
 
     def _on_both_sides(self, function: Any) -> tuple[tuple[Any, ...], tuple[Any, ...]]:
         motion, columns = self.motion, function.map(self.mesh.total)

@@ -4,17 +4,18 @@ from __future__ import annotations
 
 import numpy as np
 
+from aerobat.environment import Environment
 from aerobat.flatness import reference
 from aerobat.planning.time_optimal.collocation import Mesh, Motion
 from aerobat.planning.warm_start import Guess
 from aerobat.vehicle import Vehicle
 
 
-def first_motion(guess: Guess, mesh: Mesh, vehicle: Vehicle, yaw: float) -> Motion:
+def first_motion(guess: Guess, mesh: Mesh, vehicle: Vehicle, environment: Environment) -> Motion:
     """What the vehicle does along a guess at the mesh's nodes, by flatness; inputs within their scale."""
     knots = np.concatenate([[0.0], np.cumsum(guess.phases @ mesh.shares)])
     times = np.minimum(knots, guess.trajectory.duration)
-    asked = reference(guess.trajectory, vehicle, times, yaw=yaw).setpoint
+    asked = reference(guess.trajectory, vehicle, times, environment=environment).setpoint
     flat, rates = asked.flat, asked.omega_body[:, :2]
     states = np.concatenate([flat.position, flat.velocity, asked.q_world_body, rates], axis=1).T
     inputs = np.concatenate([asked.wrench.thrust[:, None], asked.omega_dot_body[:, :2]], axis=1).T

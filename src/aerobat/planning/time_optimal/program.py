@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from aerobat.arrays import Array
+from aerobat.environment import Environment
 from aerobat.optimization.nonlinear import NonlinearProgram, symbolics
 from aerobat.planning.time_optimal.collocation import Collocation, Mesh, Motion
 from aerobat.planning.time_optimal.spinless_body import (
@@ -65,7 +66,7 @@ class OptimalControl:
     """
 
     vehicle: Vehicle
-    gravity: float  # [m/s²] of conditions on the specific thrust
+    environment: Environment
     intervals: tuple[int, ...]  # of each phase, (P,)
     start: End
     q_start: Array  # (4,)
@@ -76,7 +77,7 @@ class OptimalControl:
     @cached_property
     def body(self) -> SpinlessBody:
         """The equations of motion."""
-        return SpinlessBody(self.vehicle)
+        return SpinlessBody(self.vehicle, self.environment)
 
     @cached_property
     def mesh(self) -> Mesh:
@@ -127,7 +128,7 @@ class OptimalControl:
     def _hold(self, rows: _Rows, condition: Condition, values: Any) -> None:
         """A condition on values (3, m) of its derivative."""
         along = symbolics().DM(condition.direction).T @ values
-        rows.hold(along, *condition.kinematic_bounds(self.gravity))
+        rows.hold(along, *condition.kinematic_bounds(self.environment.gravity))
 
     def _around(self, collocation: Collocation, derivative: int, node: int) -> Iterator[Any]:
         """A derivative up to acceleration at an inner node, (3, 1); on both sides where it may jump."""

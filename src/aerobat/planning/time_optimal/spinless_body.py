@@ -15,6 +15,7 @@ import numpy as np
 
 from aerobat.engines.packing import models
 from aerobat.engines.trees import rows
+from aerobat.environment import Environment
 from aerobat.flatness import lateral_drag
 from aerobat.kernels import rigid_body
 from aerobat.kernels.allocation import demand
@@ -38,6 +39,7 @@ class SpinlessBody:
     """
 
     vehicle: Vehicle
+    environment: Environment
 
     @cached_property
     def derivatives(self) -> Any:
@@ -75,7 +77,9 @@ class SpinlessBody:
         """What the kernels know of the vehicle, in plain floats."""
         drag = lateral_drag(self.vehicle) * self.vehicle.mass
         flat = replace(self.vehicle, drag_body=np.array([drag, drag, self.vehicle.drag_body[2]]))
-        model: Model = next(iter(rows(models(Controller(), [flat]), lambda leaf: iter(leaf.tolist()))))
+        model: Model = next(
+            iter(rows(models(Controller(), [flat], self.environment), lambda leaf: iter(leaf.tolist())))
+        )
         return model
 
     def _body(self) -> Body:

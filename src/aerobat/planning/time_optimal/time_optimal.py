@@ -15,8 +15,9 @@ import numpy as np
 from aerobat import so3
 from aerobat.arrays import Array
 from aerobat.certification import Certificate, Side
+from aerobat.environment import Environment
 from aerobat.errors import Infeasible, SpecError
-from aerobat.flatness import lateral_drag
+from aerobat.flatness import axial_drag, end_thrust
 from aerobat.optimization.nonlinear import NonlinearResult, solve, symbolics
 from aerobat.planning.feasibility import RotorMargin, rotor_margin
 from aerobat.planning.miqp import Miqp
@@ -100,13 +101,13 @@ class TimeOptimal:
 
     def _guesses(self, problem: Problem, vehicle: Vehicle) -> Iterator[Guess]:
         """The plan that the rotors can do; then one that knows of none, slowed down."""
-        course = problem.maneuver.course(problem.gate, vehicle.max_specific_thrust)
+        sequence = problem.stages(vehicle.max_specific_thrust)
         try:
-            yield Guess.of(self.guess.plan(problem, vehicle), course)
+            yield Guess.of(self.guess.plan(problem, vehicle), sequence)
         except Infeasible as infeasible:
             if not infeasible.attempts:  # a stage asks more thrust than there is
                 raise
-        yield Guess.of(self.guess.plan(problem), course).slowed(SLOWED)
+        yield Guess.of(self.guess.plan(problem), sequence).slowed(SLOWED)
 
 
 @dataclass(frozen=True, eq=False)
@@ -162,15 +163,15 @@ class _Run:
 
     def certified(self) -> _Found | None:
         """Solve, and draw bounds at nodes in by what is exceeded between nodes, until nothing is."""
-        mesh, inside, barrier = self._control.mesh, _Inside(self._problem.limits), None
+        mesh, inside, barrier = self._control.mesh, _Inside(self._problem.path_limits), None
         spare = SPARE * float(np.max(self._vehicle.max_thrusts - self._vehicle.min_thrusts))
-        x = mesh.pack(first_motion(self._guess, mesh, self._vehicle, self._problem.yaw))
+        x = mesh.pack(first_motion(self._guess, mesh, self._vehicle, self._problem.environment))
         for _ in range(ROUNDS):
             found = self._solved(x, inside, barrier)
             if found is None or found.certificate.certified:
                 return found
             try:
-                inside = inside.drawn_in(found, self._problem.limits, spare)
+                inside = inside.drawn_in(found, self._problem.path_limits, spare)
             except SpecError:  # nothing is left between limits
                 return None
             x, barrier = found.x, WARM
@@ -193,7 +194,7 @@ class _Run:
             backend="ipopt",
             stages=stages,
             attempts=tuple(self._attempts),
-            vehicle=self._vehicle.name,
+            vehicle=self._vehicle,
             margin=found.margin,
             certificate=found.certificate,
         )
@@ -205,8 +206,8 @@ class _Run:
         motion = self._control.mesh.read(answer.x)
         if not answer.converged:
             return self._record(answer, motion.phases, None, f"the solver {answer.status}")
-        trajectory = self._control.of(motion).trajectory()
-        margin = rotor_margin(trajectory, self._vehicle, self._problem.yaw)
+        trajectory = self._control.of(motion).trajectory(self._problem.heading)
+        margin = rotor_margin(trajectory, self._vehicle, self._problem.environment)
         certificate = certificate_for(trajectory, self._problem, self._vehicle)
         found = _Found(answer.x, motion.phases, trajectory, margin, certificate)
         outcome = "feasible" if certificate.certified else certificate.why
@@ -233,18 +234,18 @@ def _smoother(vehicle: Vehicle) -> tuple[Vehicle, ...]:
 
 def _control(config: TimeOptimal, problem: Problem, vehicle: Vehicle, guess: Guess) -> OptimalControl:
     """The optimal control through the stages in the guess's order."""
-    course = problem.maneuver.course(problem.gate, vehicle.max_specific_thrust)
-    start = _end(problem.start, vehicle)
+    sequence = problem.stages(vehicle.max_specific_thrust)
+    start = _end(problem.start, vehicle, problem.environment)
     upright = so3.smallest_rotation(UP, start.thrust / np.linalg.norm(start.thrust))
     return OptimalControl(
         vehicle=vehicle,
-        gravity=problem.gravity or vehicle.gravity,
+        environment=problem.environment,
         intervals=guess.shared(config.intervals, LEAST_INTERVALS),
         start=start,
-        q_start=so3.multiply(upright, so3.about_axis(UP, np.array(problem.yaw))),
-        goal=_end(problem.goal, vehicle),
+        q_start=so3.multiply(upright, so3.about_axis(UP, np.array(problem.heading))),
+        goal=_end(problem.goal, vehicle, problem.environment),
         stages=tuple(stage.conditions for stage in guess.stages),
-        always=(*course.always, *(_within_plane(problem, guess) if config.planar else ())),
+        always=(*sequence.path_constraints, *(_within_plane(problem, guess) if config.planar else ())),
     )
 
 
@@ -256,14 +257,12 @@ def _within_plane(problem: Problem, guess: Guess) -> tuple[Condition, ...]:
     return (Condition(Quantity.POSITION, normal, place - THIN, place + THIN),)
 
 
-def _end(state: EndState, vehicle: Vehicle) -> End:
+def _end(state: EndState, vehicle: Vehicle, environment: Environment) -> End:
     """What an end state asks of the thrust."""
-    drag = lateral_drag(vehicle)
-    thrust = state.acceleration + vehicle.gravity * UP + drag * state.velocity
+    thrust = end_thrust(state.velocity, state.acceleration, vehicle, environment)
     size = float(np.linalg.norm(thrust))
-    along = float(thrust @ state.velocity) / max(size, FREE_FALL)
-    axial = float(vehicle.drag_body[2]) - vehicle.mass * drag
-    return End(state.position, state.velocity, thrust, vehicle.mass * size + axial * along)
+    along = float(thrust @ (state.velocity - environment.wind)) / max(size, FREE_FALL)
+    return End(state.position, state.velocity, thrust, vehicle.mass * (size + axial_drag(vehicle) * along))
 
 
 def _bounds(vehicle: Vehicle, reserve: float, inside: _Inside) -> Bounds:
@@ -278,12 +277,14 @@ def _bounds(vehicle: Vehicle, reserve: float, inside: _Inside) -> Bounds:
 
 def _check(problem: Problem, vehicle: Vehicle) -> None:
     """Refuse what cannot be asked of this planner."""
-    if np.isfinite(problem.limits.of(DERIVATIVES)[1]).any():
+    if np.isfinite(problem.path_limits.of(DERIVATIVES)[1]).any():
         raise SpecError(
             "limits.crackle cannot be held by the time-optimal planner, whose moments jump; drop it"
         )
     for name, state in (("start", problem.start), ("goal", problem.goal)):
-        if np.linalg.norm(_end(state, vehicle).thrust) < FREE_FALL * vehicle.gravity:
+        if np.linalg.norm(_end(state, vehicle, problem.environment).thrust) < (
+            FREE_FALL * problem.environment.gravity
+        ):
             raise SpecError(
                 f"{name}.acceleration asks no thrust, which leaves the attitude there open; change it"
             )
