@@ -12,7 +12,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from aerobat.optimization import AssignmentProgram, AssignmentResult, SlottedStage, solver, stage_search, tree
+from aerobat.optimization import AssignmentProgram, AssignmentResult, SlottedStage, solver
+from aerobat.optimization.branch_and_bound import stage_search, tree
 from aerobat.optimization.branch_and_bound.candidates import Placements
 from aerobat.optimization.branch_and_bound.least_distance import LeastDistance, NotConverged, Point
 from aerobat.optimization.branch_and_bound.null_space import Reduction, parts

@@ -1,12 +1,14 @@
-"""Files that are whole or absent: written under a temporary name, then renamed; arrays read back."""
+"""Files and folders that are whole or absent: made under a temporary name, then renamed; arrays read back."""
 
 from __future__ import annotations
 
+import ctypes
 import os
+import shutil
 import tempfile
 import zipfile
-from collections.abc import Iterator
-from contextlib import contextmanager
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
@@ -40,6 +42,42 @@ def whole_file(path: str | os.PathLike[str]) -> Iterator[Path]:
         temporary.unlink(missing_ok=True)
 
 
+@contextmanager
+def whole_folder(path: str | os.PathLike[str], is_ours: Callable[[str], bool]) -> Iterator[Path]:
+    """Yield an empty folder that takes the place of `path`, as one, when the block ends well.
+
+    Whatever ends it, at `path` is either what was there before or all of the new, never a mixture. What
+    killed processes have left beside it is removed. Raises SpecError when the place cannot be written, and
+    for a folder that holds anything whose name is not ours: that is somebody's work.
+
+    Args:
+        path: The folder to make or to replace; missing parents are made.
+        is_ours: Whether a file of this name may be replaced.
+    """
+    target = Path(os.path.abspath(path))
+    try:
+        foreign = sorted(name for name in _entries(target) if not is_ours(name))
+        if foreign:
+            raise SpecError(f"{path}/ holds {foreign[0]}, which no run wrote; give a folder of its own")
+        target.parent.mkdir(parents=True, exist_ok=True)
+        _remove_abandoned(target)
+        staging = target.parent / f".{target.name}.{os.getpid()}{_STAGING}"
+        shutil.rmtree(staging, ignore_errors=True)
+        staging.mkdir()
+    except OSError as error:
+        raise SpecError(f"cannot write {path}: {error.strerror or error}") from None
+    try:
+        yield staging
+        if target.exists():
+            _exchange(staging, target)
+        else:
+            staging.rename(target)
+    except OSError as error:
+        raise SpecError(f"cannot write {path}: {error.strerror or error}") from None
+    finally:
+        shutil.rmtree(staging, ignore_errors=True)
+
+
 def write_whole(path: str | os.PathLike[str], content: str | bytes) -> None:
     """Write a file's whole content, or nothing. Raises SpecError when the place cannot be written."""
     with whole_file(path) as temporary:
@@ -59,6 +97,46 @@ def read_arrays(path: str | os.PathLike[str], what: str) -> dict[str, NDArray[An
         raise SpecError(
             f"{what} file {path}: it is not a whole .npz file of a {what}; save it again"
         ) from None
+
+
+_STAGING = ".aerobat-part"
+_AT_FDCWD, _RENAME_SWAP = -100, 2  # of renameat2(2) and renamex_np(2)
+
+
+def _entries(folder: Path) -> list[str]:
+    try:
+        return os.listdir(folder)
+    except FileNotFoundError:
+        return []
+
+
+def _exchange(a: Path, b: Path) -> None:
+    """Let two folders change places: at once where the system can, else in two steps."""
+    names = os.fsencode(a), os.fsencode(b)
+    libc: Any = ctypes.CDLL(None) if os.name == "posix" else None
+    if hasattr(libc, "renameat2"):  # Linux
+        swapped = libc.renameat2(_AT_FDCWD, names[0], _AT_FDCWD, names[1], _RENAME_SWAP) == 0
+    else:
+        swapped = hasattr(libc, "renamex_np") and libc.renamex_np(*names, _RENAME_SWAP) == 0  # macOS
+    if swapped:
+        return
+    aside = a.with_name(a.name + "-old")
+    b.rename(aside)
+    a.rename(b)
+    aside.rename(a)
+
+
+def _remove_abandoned(target: Path) -> None:
+    """Remove what processes that no longer run have left beside a folder."""
+    if os.name != "posix":  # elsewhere asking for a process may end it
+        return
+    for left in target.parent.glob(f".{target.name}.*{_STAGING}*"):
+        with suppress(ValueError, PermissionError):
+            process = int(left.name.removeprefix(f".{target.name}.").split(".")[0])
+            try:
+                os.kill(process, 0)
+            except ProcessLookupError:
+                shutil.rmtree(left, ignore_errors=True)
 
 
 def _umask() -> int:

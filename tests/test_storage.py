@@ -1,0 +1,100 @@
+"""A run's folder is one result: the old one or the new one, whatever happens in between."""
+
+from __future__ import annotations
+
+import os
+import random
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from aerobat.errors import SpecError
+from aerobat.storage import whole_folder
+
+NAMES = [f"part-{i}" for i in range(6)]
+WRITER = """
+import sys
+from aerobat.storage import whole_folder
+for mark in range(1_000_000):
+    with whole_folder(sys.argv[1], lambda name: name.startswith("part-")) as folder:
+        for i in range(6):
+            (folder / f"part-{i}").write_text(str(mark))
+    print(mark, flush=True)
+"""
+
+
+def ours(name: str) -> bool:
+    return name in NAMES
+
+
+def contents(folder: Path) -> set[tuple[str, str]]:
+    return {(path.name, path.read_text()) for path in folder.iterdir()}
+
+
+def written(folder: Path, mark: str) -> None:
+    with whole_folder(folder, ours) as staging:
+        for name in NAMES:
+            (staging / name).write_text(mark)
+
+
+def test_a_folder_is_replaced_as_one(tmp_path: Path) -> None:
+    target = tmp_path / "new" / "run"
+    with whole_folder(target, ours) as staging:
+        (staging / "part-0").write_text("old")
+        (staging / "part-5").write_text("old")
+    written(target, "new")
+    assert contents(target) == {(name, "new") for name in NAMES}
+    assert [path.name for path in target.parent.iterdir()] == ["run"]
+
+
+def test_a_block_that_fails_leaves_the_old_folder_and_nothing_else(tmp_path: Path) -> None:
+    target = tmp_path / "run"
+    written(target, "old")
+
+    def fail() -> None:
+        with whole_folder(target, ours) as staging:
+            (staging / "part-0").write_text("new")
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        fail()
+    assert contents(target) == {(name, "old") for name in NAMES}
+    assert os.listdir(tmp_path) == ["run"]
+
+
+def test_somebody_elses_files_are_not_replaced(tmp_path: Path) -> None:
+    target = tmp_path / "run"
+    target.mkdir()
+    (target / "thesis.tex").write_text("years of work")
+    with pytest.raises(SpecError, match=r"holds thesis\.tex, which no run wrote"):
+        written(target, "new")
+    assert os.listdir(target) == ["thesis.tex"]
+    assert os.listdir(tmp_path) == ["run"]
+
+
+def test_a_place_that_is_no_folder_is_refused_in_one_sentence(tmp_path: Path) -> None:
+    (tmp_path / "run").write_text("a file")
+    with pytest.raises(SpecError, match="cannot write"):
+        written(tmp_path / "run", "new")
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="two folders change places at once on Linux")
+def test_killed_at_any_instant_it_is_the_old_run_or_the_new_one_and_the_next_run_clears_up(
+    tmp_path: Path,
+) -> None:
+    target, rng = tmp_path / "run", random.Random(0)
+    for _ in range(12):
+        with subprocess.Popen([sys.executable, "-c", WRITER, str(target)], stdout=subprocess.PIPE) as process:
+            assert process.stdout is not None
+            process.stdout.readline()
+            time.sleep(rng.uniform(0.0, 0.02))
+            process.send_signal(signal.SIGKILL)
+        marks = {text for _, text in contents(target)}
+        assert len(marks) == 1
+        assert len(os.listdir(target)) == 6
+    written(target, "end")
+    assert os.listdir(tmp_path) == ["run"]
