@@ -1,6 +1,6 @@
 """How the built-in search grows with stages and gates: flips through gates in a row, crossing times free.
 
-    uv run python benchmarks/growth_with_stages.py [--runs N] [--most GATES] [--others SECONDS]
+    uv run python benchmarks/growth_with_stages.py [--runs N] [--max-gates N] [--others SECONDS]
 
 `examples/two-flips.toml`, four ordered stages a gate, and the same with one gate and with more, each gate
 adding 20 intervals of 0.1 s, order 3; beside it the paper's flip in roll, N = 20, its gate at a fixed time.
@@ -34,11 +34,11 @@ PER_GATE = 4  # stages
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("--runs", type=int, default=5, help="runs of each, in turn (5)")
-    parser.add_argument("--most", type=int, default=3, metavar="GATES", help="gates in a row, at most (3)")
+    parser.add_argument("--max-gates", type=int, default=3, metavar="N", help="gates in a row, at most (3)")
     parser.add_argument("--others", type=float, metavar="SECONDS", help="time limit for Gurobi and SCIP")
     options = parser.parse_args()
     programs = {"paper's flip": paper_program("flip-roll")}
-    programs |= {f"{n} free": flips(n, 20 * n, 2.0 * n) for n in range(1, options.most + 1)}
+    programs |= {f"{n} free": flips(n, 20 * n, 2.0 * n) for n in range(1, options.max_gates + 1)}
     seconds: dict[str, list[float]] = {name: [] for name in programs}
     nodes: dict[str, int] = {}
     for _ in range(options.runs + 1):
@@ -50,7 +50,7 @@ def main() -> None:
     one = medians["paper's flip"]
     print(f"{'gates':14}{'N':>5}{'stages':>8}{'QPs':>7}{'time':>12}{'ratio':>8}")
     for name, program in programs.items():
-        n, stages = program.variables // 3, len(program.stages)
+        n, stages = program.num_variables // 3, len(program.stages)
         took = medians[name]
         print(f"{name:14}{n:5}{stages:8}{nodes[name]:7}{1e3 * took:9.1f} ms{took / one:8.0f}")
     for intervals in (20, 40, 80):

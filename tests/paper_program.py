@@ -89,22 +89,22 @@ def half_flip(maneuver: Maneuver, intervals: int = 20, dt: float = 0.1) -> Assig
     """Section II-D at 90°: every stage is fixed."""
     rows = _Rows(intervals, dt)
     m, gate = maneuver, intervals // 2
-    lateral, vertical = _limits(rows, m, m.lateral, least_vertical=-GRAVITY)
+    lateral, vertical = _limits(rows, m, m.lateral, min_vertical=-GRAVITY)
     ranges = [vertical[gate], lateral[gate]]
     stage = _gate(rows, m, gate, ranges, [-GRAVITY, -inf], [-GRAVITY, -m.lateral_thrust])
     return _program(rows, m, (stage,), ())
 
 
 def _limits(
-    rows: _Rows, m: Maneuver, lateral: int, least_vertical: float = -inf
+    rows: _Rows, m: Maneuver, lateral: int, min_vertical: float = -inf
 ) -> tuple[list[int], list[int]]:
     """Bounds on every axis; the rows of the lateral and of the vertical acceleration at each node."""
     found: dict[int, list[int]] = {}
     for axis in (X, Y, Z):
-        least = max(-m.max_acceleration, least_vertical if axis == Z else -inf)
+        low = max(-m.max_acceleration, min_vertical if axis == Z else -inf)
         for n in range(rows.intervals - 1):
             rows.add(rows.state(axis, VELOCITY, n), -m.max_velocity, m.max_velocity)
-            row = rows.add(rows.state(axis, ACCELERATION, n), least, m.max_acceleration)
+            row = rows.add(rows.state(axis, ACCELERATION, n), low, m.max_acceleration)
             found.setdefault(axis, []).append(row)
         for n in range(rows.intervals):
             rows.add(np.eye(3 * rows.intervals)[axis * rows.intervals + n], -m.max_jerk, m.max_jerk)

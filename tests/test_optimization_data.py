@@ -10,8 +10,15 @@ import numpy as np
 import pytest
 
 from aerobat.errors import AerobatError, BackendMissing, SpecError
-from aerobat.optimization import AssignmentProgram, SlottedStage, available, backends, solver
-from aerobat.optimization.assignment import certified
+from aerobat.optimization import (
+    BACKENDS,
+    AssignmentProgram,
+    SlottedStage,
+    available_backends,
+    backends,
+    solver,
+)
+from aerobat.optimization.result import verified
 from paper_program import FLIP_ROLL, flip
 
 GOOD: dict[str, Any] = {
@@ -75,7 +82,8 @@ def test_what_a_program_holds_cannot_be_changed() -> None:
     program = AssignmentProgram(**GOOD | {"rows": rows})
     rows[0, 0] = 7.0
     assert program.rows[0, 0] == 1.0
-    for array in (program.rows, program.lower, program.stages[0].rows, program.stages[0].upper):
+    stage = program.stages[0]
+    for array in (program.rows, program.lower, program.precedes, stage.rows, stage.upper):
         assert not array.flags.writeable
 
 
@@ -98,9 +106,9 @@ def test_a_claim_is_checked_against_the_program() -> None:
         replace(good, x=np.array([1.2, -0.2])),  # off the range
     ]
     for claim in false:
-        result = certified(program, claim)
+        result = verified(program, claim)
         assert (result.status, result.x, result.cost, result.gap) == ("unknown", None, inf, inf)
-    assert certified(program, replace(good, cost=0.0)).cost == good.cost
+    assert verified(program, replace(good, cost=0.0)).cost == good.cost
 
 
 def test_stages_that_cannot_share_slots_or_be_ordered_are_infeasible() -> None:
@@ -112,10 +120,14 @@ def test_stages_that_cannot_share_slots_or_be_ordered_are_infeasible() -> None:
         assert solver(backend).solve(circle).status == "infeasible"
 
 
-@pytest.mark.parametrize("backend", ["builtin", "gurobi"])
+@pytest.mark.parametrize("backend", BACKENDS)
 def test_a_start_without_a_slot_for_each_stage_is_refused(backend: str) -> None:
     with pytest.raises(SpecError, match="start must have one slot for each of the 1 stages"):
         solver(backend).solve(AssignmentProgram(**GOOD), start=())
+
+
+def test_back_ends_declare_the_names_that_they_are_found_by() -> None:
+    assert available_backends() == tuple(BACKENDS) == tuple(solver(name).name for name in BACKENDS)
 
 
 def test_an_unknown_backend_is_answered_with_a_suggestion() -> None:
@@ -129,7 +141,7 @@ def test_a_missing_backend_is_answered_with_the_command_that_installs_it(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr(backends, "find_spec", lambda name: None if name == "pyscipopt" else object())
-    assert available() == ("builtin", "gurobi")
+    assert available_backends() == ("builtin", "gurobi")
     with pytest.raises(BackendMissing, match=r"pip install 'aerobat\[scip\]'"):
         solver("scip")
 

@@ -26,11 +26,13 @@ def test_flips_have_the_known_optimum(maneuver: Maneuver, cost: float, backend: 
 
 
 @pytest.mark.parametrize("maneuver", [FLIP_ROLL, FLIP_PITCH, FLIP_TRANSLATION])
-@pytest.mark.parametrize(("intervals", "most"), [(20, 8), (40, 8), (80, 30), (160, 60)])
-def test_a_flip_is_proven_optimal_with_few_relaxations(maneuver: Maneuver, intervals: int, most: int) -> None:
+@pytest.mark.parametrize(("intervals", "max_nodes"), [(20, 8), (40, 8), (80, 30), (160, 60)])
+def test_a_flip_is_proven_optimal_with_few_relaxations(
+    maneuver: Maneuver, intervals: int, max_nodes: int
+) -> None:
     result = solver().solve(flip(maneuver, intervals, dt=2.0 / intervals))
     assert result.status == "optimal"
-    assert result.nodes <= most
+    assert result.nodes <= max_nodes
 
 
 @pytest.mark.parametrize("backend", ["builtin", "gurobi", "scip"])

@@ -1,4 +1,4 @@
-"""The built-in search on small programs of every kind: exact, ordered, bounded, the same when asked again."""
+"""The built-in search on small programs of every kind: exact, ordered, bounded, the same every time."""
 
 from __future__ import annotations
 
@@ -13,10 +13,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from aerobat.optimization import AssignmentProgram, AssignmentResult, SlottedStage, solver
-from aerobat.optimization.branch_and_bound import stage_search, tree
-from aerobat.optimization.branch_and_bound.candidates import Placements
-from aerobat.optimization.branch_and_bound.least_distance import LeastDistance, NotConverged, Point
-from aerobat.optimization.branch_and_bound.null_space import Reduction, parts
+from aerobat.optimization.branch_and_bound import search
+from aerobat.optimization.branch_and_bound import solver as branch_and_bound
+from aerobat.optimization.branch_and_bound.candidates import Candidates
+from aerobat.optimization.branch_and_bound.least_distance import LeastDistanceQP, NotConverged, QPSolution
+from aerobat.optimization.branch_and_bound.lower_bounds import DualBounds
+from aerobat.optimization.branch_and_bound.null_space import NullSpace, split_coupled
 from paper_program import FLIP_ROLL, flip
 
 numbers = st.integers(-3, 3).map(float)
@@ -77,7 +79,7 @@ def fixed(program: AssignmentProgram, slots: tuple[int, ...]) -> AssignmentProgr
 
 def enumerated(program: AssignmentProgram) -> float:
     every = product(*(stage.slots for stage in program.stages))
-    costs = [solver().solve(fixed(program, slots)).cost for slots in every if program.admits(slots)]
+    costs = [solver().solve(fixed(program, slots)).cost for slots in every if program.is_assignment(slots)]
     return min(costs, default=inf)
 
 
@@ -98,11 +100,11 @@ def deep_program(seed: int, kinds: int = 3) -> AssignmentProgram:
     placed = []
     for kind in range(kinds):
         own = n + slots * kind + np.arange(slots)
-        asked = rng.uniform(0.5, 4.0, slots)
+        desired = rng.uniform(0.5, 4.0, slots)
         used = np.stack([own, rng.permutation(own)], axis=1)
-        least = np.stack([asked, np.full(slots, -6.0)], axis=1)
-        most = np.stack([np.where(rng.random(slots) < 0.5, asked, inf), np.full(slots, 1.0)], axis=1)
-        placed.append(SlottedStage(str(kind), tuple(range(slots)), used, least, most))
+        lower = np.stack([desired, np.full(slots, -6.0)], axis=1)
+        upper = np.stack([np.where(rng.random(slots) < 0.5, desired, inf), np.full(slots, 1.0)], axis=1)
+        placed.append(SlottedStage(str(kind), tuple(range(slots)), used, lower, upper))
     order = ((0, 1),) if rng.random() < 0.5 else ()
     equality, target = rng.normal(size=(1, n)), rng.normal(size=1)
     return AssignmentProgram(equality, target, rows, low, high, tuple(placed), order)
@@ -184,35 +186,36 @@ def test_the_units_of_a_flip_do_not_matter(backend: str, factor: float) -> None:
 
 
 @pytest.mark.parametrize("seed", range(20))
-def test_no_completion_costs_less_than_the_prospects_of_its_placements(seed: int) -> None:
+def test_no_completion_costs_less_than_the_lower_bounds_of_its_candidates(seed: int) -> None:
     """Where the search does not look there is nothing to find."""
     program = deep_program(seed)
-    part, _ = parts(program, np.concatenate([stage.rows.ravel() for stage in program.stages]))
-    reduction = Reduction(program, part, np.zeros(len(program.rows), dtype=bool))
-    standing = reduction.bounds(program, program.lower, program.upper).over(1.0)
-    placements, nearest = Placements(program, reduction), LeastDistance(reduction.rows)
-    placed = placements.bounds(program, reduction, standing).over(1.0)
-    rng, lower, upper = np.random.default_rng(seed), standing.lower, standing.upper
+    block, _ = split_coupled(program, np.concatenate([stage.rows.ravel() for stage in program.stages]))
+    null_space = NullSpace(program, block, np.zeros(len(program.rows), dtype=bool))
+    root = null_space.bounds(program, program.lower, program.upper).in_units(1.0)
+    candidates, qp = Candidates(program, null_space), LeastDistanceQP(null_space.rows)
+    dual_bounds = DualBounds(candidates, null_space.rows)
+    bounds = candidates.bounds(program, null_space, root).in_units(1.0)
+    rng, lower, upper = np.random.default_rng(seed), root.lower, root.upper
     for p in rng.permutation(15)[:3]:
-        point = nearest.solve(lower, upper)
-        if point is None:
+        solution = qp.solve(lower, upper)
+        if solution is None:
             return
-        prospects = placements.prospects(point, placed, placements.all(placed))
-        assert prospects.moves is not None
-        together = placements.together(point, prospects, prospects.moves, np.arange(15))
-        assert (prospects.least >= point.value).all()
+        single = dual_bounds.single_bounds(solution, bounds, dual_bounds.root_bounds(bounds))
+        assert single.steps is not None
+        pairs = dual_bounds.pairwise_bounds(solution, single, single.steps, np.arange(15))
+        assert (single.value >= solution.value).all()
         for q in range(15):
-            own = tightened(lower, upper, placements.rows[:, q], placed.lower[:, q], placed.upper[:, q])
-            exact = nearest.solve(*own)
-            assert exact is None or prospects.least[q] <= exact.value * (1 + 1e-9)
-            satisfied = exact is not None and exact.value <= point.value * (1 + 1e-9)
-            assert satisfied or not prospects.moves.none[q]
-            for other in np.flatnonzero(placements.compatible[q]):
-                rows, low, high = (of[:, other] for of in (placements.rows, placed.lower, placed.upper))
-                both = nearest.solve(*tightened(*own, rows, low, high))
-                assert both is None or together[q, other] <= both.value * (1 + 1e-9)
-        assert np.isinf(together[~placements.compatible]).all()
-        lower, upper = tightened(lower, upper, placements.rows[:, p], placed.lower[:, p], placed.upper[:, p])
+            own = tightened(lower, upper, candidates.rows[:, q], bounds.lower[:, q], bounds.upper[:, q])
+            exact = qp.solve(*own)
+            assert exact is None or single.value[q] <= exact.value * (1 + 1e-9)
+            satisfied = exact is not None and exact.value <= solution.value * (1 + 1e-9)
+            assert satisfied or not single.steps.satisfied[q]
+            for other in np.flatnonzero(candidates.compatible[q]):
+                rows, low, high = (of[:, other] for of in (candidates.rows, bounds.lower, bounds.upper))
+                both = qp.solve(*tightened(*own, rows, low, high))
+                assert both is None or pairs[q, other] <= both.value * (1 + 1e-9)
+        assert np.isinf(pairs[~candidates.compatible]).all()
+        lower, upper = tightened(lower, upper, candidates.rows[:, p], bounds.lower[:, p], bounds.upper[:, p])
 
 
 def tightened(
@@ -266,7 +269,7 @@ def test_when_time_runs_out_the_optimum_is_between_bound_and_cost(
     ticks: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     clock = count()
-    for module in (stage_search, tree):
+    for module in (branch_and_bound, search):
         monkeypatch.setattr(module, "perf_counter", lambda: float(next(clock)))
     result = solver().solve(flip(FLIP_ROLL), time_limit=ticks)
     assert result.bound * (1 - 1e-9) <= 273196.1243 <= result.cost * (1 + 1e-9)
@@ -287,15 +290,15 @@ def test_a_start_good_or_bad_does_not_change_the_answer(start: tuple[int, ...]) 
 def test_a_relaxation_that_cannot_be_solved_leaves_a_gap_and_no_false_claim(
     failing: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    calls, solve, program = count(), LeastDistance.solve, deep_program(8)
+    calls, solve, program = count(), LeastDistanceQP.solve, deep_program(8)
     cost = solver().solve(program).cost
 
-    def faulty(*arguments: Any, **options: Any) -> Point | None:
+    def faulty(*arguments: Any, **options: Any) -> QPSolution | None:
         if next(calls) == failing:
             raise NotConverged
         return solve(*arguments, **options)
 
-    monkeypatch.setattr(LeastDistance, "solve", faulty)
+    monkeypatch.setattr(LeastDistanceQP, "solve", faulty)
     result = solver().solve(program)
     assert result.bound <= cost * (1 + 1e-9)
     assert result.cost >= cost * (1 - 1e-9)

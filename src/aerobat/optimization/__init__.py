@@ -1,7 +1,8 @@
 """Numerical optimization that knows no robots: convex QPs with stages, each assigned to one slot."""
 
-from aerobat.optimization.assignment import AssignmentProgram, AssignmentResult, SlottedStage
-from aerobat.optimization.backends import BACKENDS, Solver, available, solver
+from aerobat.optimization.assignment import AssignmentProgram, SlottedStage
+from aerobat.optimization.backends import BACKENDS, Solver, available_backends, solver
+from aerobat.optimization.result import AssignmentResult
 
 __all__ = [
     "BACKENDS",
@@ -9,6 +10,6 @@ __all__ = [
     "AssignmentResult",
     "SlottedStage",
     "Solver",
-    "available",
+    "available_backends",
     "solver",
 ]

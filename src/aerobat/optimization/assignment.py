@@ -1,4 +1,4 @@
-"""A convex QP plus stages, each assigned to one slot: the problem as data, and the answer checked against it.
+"""A convex QP plus stages, each assigned to one slot: the problem as data.
 
     minimize    ½ xᵀ H x + fᵀ x + c
     subject to  E x = target                   (equality rows)
@@ -14,7 +14,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from math import inf
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -24,14 +24,11 @@ from aerobat.errors import SpecError
 
 Indices = NDArray[np.intp]
 Mask = NDArray[np.bool_]
-Status = Literal["optimal", "time_limit", "infeasible", "unknown"]
-
-TOLERANCE = 1e-6  # the violation of a row a x <= b, relative to |a| |x| + |b|, that a solution may have
 
 
 @dataclass(frozen=True, eq=False)
 class SlottedStage:
-    """What must hold at exactly one slot: in slots[i] it tightens range rows rows[i] to [lower[i], upper[i]].
+    """Bounds that hold at exactly one slot: slots[i] tightens range rows rows[i] to [lower[i], upper[i]].
 
     A stage with one slot is fixed. `lower` and `upper` may be anything that broadcasts to the shape of
     `rows`. Raises SpecError for what does not fit together.
@@ -45,7 +42,8 @@ class SlottedStage:
 
     def __post_init__(self) -> None:
         """Copy, write-protect and check."""
-        slots, rows = tuple(map(int, self.slots)), _indices(self.rows, f"stage '{self.name}': rows")
+        slots = tuple(map(int, self.slots))
+        rows = _indices(self.rows, f"stage '{self.name}': rows")
         if not slots or len(set(slots)) != len(slots):
             raise SpecError(f"stage '{self.name}': slots must be distinct, at least one, got {slots}")
         if rows.ndim != 2 or len(rows) != len(slots):
@@ -58,7 +56,7 @@ class SlottedStage:
             _set(self, **{side: _broadcast(_bounds(getattr(self, side), name, side), rows.shape, name)})
 
     def index(self, slot: int) -> int:
-        """The place of `slot` among `slots`; raises SpecError where the stage cannot sit there."""
+        """Return the place of `slot` among `slots`; raises SpecError where the stage cannot sit there."""
         if slot not in self.slots:
             raise SpecError(f"stage '{self.name}' cannot sit in slot {slot}; its slots are {self.slots}")
         return self.slots.index(slot)
@@ -69,7 +67,7 @@ class AssignmentProgram:
     """The whole problem.
 
     Programs that share their matrices (made by `with_bounds`, or from the same write-protected arrays) share
-    a solver's factorisations too. Raises SpecError for what does not fit together.
+    a solver's factorizations too. Raises SpecError for what does not fit together.
     """
 
     equality: Array  # E (p, n)
@@ -79,9 +77,7 @@ class AssignmentProgram:
     upper: Array  # (m,)
     stages: tuple[SlottedStage, ...] = ()
     precedence: tuple[tuple[int, int], ...] = ()  # (i, j): the slot of stage i is below that of stage j
-    hessian: Array | None = (
-        None  # H (n, n) symmetric positive definite; None is 2 I, so that xᵀx is minimised
-    )
+    hessian: Array | None = None  # H (n, n) symmetric positive definite; None is 2 I: xᵀx is minimized
     gradient: Array | None = None  # f (n,); None is 0
     constant: float = 0.0  # c
 
@@ -94,36 +90,38 @@ class AssignmentProgram:
         _set(self, lower=_bounds(self.lower, "lower", "lower", (len(rows),)))
         _set(self, upper=_bounds(self.upper, "upper", "upper", (len(rows),)))
         if self.hessian is not None:
-            _set(self, hessian=_positive_definite(_matrix(self.hessian, "hessian", self.variables)))
+            _set(self, hessian=_positive_definite(_matrix(self.hessian, "hessian", self.num_variables)))
         if self.gradient is not None:
-            _set(self, gradient=frozen(self.gradient, "gradient", (self.variables,)))
+            _set(self, gradient=frozen(self.gradient, "gradient", (self.num_variables,)))
         _set(self, stages=tuple(self.stages), precedence=tuple((int(i), int(j)) for i, j in self.precedence))
         self._check_stages()
 
     def _check_stages(self) -> None:
-        m, stages = len(self.rows), len(self.stages)
+        m = len(self.rows)
         for stage in self.stages:
             if stage.rows.size and not 0 <= stage.rows.min() <= stage.rows.max() < m:
                 raise SpecError(
                     f"stage '{stage.name}': rows must lie in 0..{m - 1}, the program's range rows"
                 )
+        stages = len(self.stages)
         if any(not 0 <= k < stages for pair in self.precedence for k in pair):
             raise SpecError(f"precedence must name stages 0..{stages - 1}, got {self.precedence}")
 
     @property
-    def variables(self) -> int:
+    def num_variables(self) -> int:
         """The number of variables n."""
         return int(self.rows.shape[1])
 
     @cached_property
-    def before(self) -> Mask:
+    def precedes(self) -> Mask:
         """The transitive closure of `precedence`, (S, S): [i, j] says that stage i comes before stage j."""
-        before = np.zeros((len(self.stages),) * 2, dtype=bool)
+        precedes = np.zeros((len(self.stages),) * 2, dtype=bool)
         for i, j in self.precedence:
-            before[i, j] = True
-        for k in range(len(before)):
-            before |= np.outer(before[:, k], before[k])
-        return before
+            precedes[i, j] = True
+        for k in range(len(precedes)):
+            precedes |= np.outer(precedes[:, k], precedes[k])
+        precedes.flags.writeable = False
+        return precedes
 
     def with_bounds(
         self,
@@ -133,27 +131,34 @@ class AssignmentProgram:
         upper: ArrayLike | None = None,
         stages: Sequence[SlottedStage] | None = None,
     ) -> AssignmentProgram:
-        """The same matrices with other right-hand sides; what is left out stays."""
-        given = {"target": target, "lower": lower, "upper": upper, "stages": stages}
-        changes: dict[str, Any] = {name: value for name, value in given.items() if value is not None}
+        """Return the program with the same matrices and other right-hand sides.
+
+        Args:
+            target: right-hand side of the equality rows, (p,); None keeps the program's, as below.
+            lower: lower bounds of the range rows, (m,).
+            upper: upper bounds of the range rows, (m,).
+            stages: other stages.
+        """
+        sides = {"target": target, "lower": lower, "upper": upper, "stages": stages}
+        changes: dict[str, Any] = {name: value for name, value in sides.items() if value is not None}
         return replace(self, **changes)
 
     def cost(self, x: Array) -> float:
-        """½ xᵀ H x + fᵀ x + c."""
+        """Return ½ xᵀ H x + fᵀ x + c."""
         quadratic = x @ x if self.hessian is None else 0.5 * (x @ self.hessian @ x)
         linear = 0.0 if self.gradient is None else self.gradient @ x
         return float(quadratic + linear + self.constant)
 
     @cached_property
-    def _unconstrained(self) -> float:
-        """|x| at the least cost of all."""
+    def _unconstrained_norm(self) -> float:
+        """|x| at the minimum of the cost without any constraint."""
         if self.gradient is None:
             return 0.0
-        least = self.gradient / 2.0 if self.hessian is None else np.linalg.solve(self.hessian, self.gradient)
-        return float(np.linalg.norm(least))
+        step = self.gradient / 2.0 if self.hessian is None else np.linalg.solve(self.hessian, self.gradient)
+        return float(np.linalg.norm(step))
 
-    def admits(self, slots: Sequence[int]) -> bool:
-        """Whether `slots`, one a stage, are the stages' own, distinct and in order."""
+    def is_assignment(self, slots: Sequence[int]) -> bool:
+        """Tell if `slots`, one a stage, are the stages' own, distinct and in order."""
         own = all(slot in stage.slots for stage, slot in zip(self.stages, slots, strict=True))
         return own and len(set(slots)) == len(slots) and all(slots[i] < slots[j] for i, j in self.precedence)
 
@@ -164,9 +169,10 @@ class AssignmentProgram:
                 f"start must have one slot for each of the {len(self.stages)} stages, got {start}"
             )
 
-    def tightened(self, slots: Sequence[int | None]) -> tuple[Array, Array]:
-        """The range rows' bounds (lower, upper) with stage i in slots[i]; None leaves that stage out."""
-        lower, upper = self.lower.copy(), self.upper.copy()
+    def bounds_for(self, slots: Sequence[int | None]) -> tuple[Array, Array]:
+        """Return the range rows' bounds (lower, upper) with stage i in slots[i]; None leaves a stage out."""
+        lower = self.lower.copy()
+        upper = self.upper.copy()
         for stage, slot in zip(self.stages, slots, strict=True):
             if slot is not None:
                 i = stage.index(slot)
@@ -174,74 +180,40 @@ class AssignmentProgram:
                 np.minimum.at(upper, stage.rows[i], stage.upper[i])
         return lower, upper
 
-    def violation(self, x: Array, slots: Sequence[int]) -> float:
-        """The largest residual of any row a x <= b, relative to |a| |x| + |b|, the stages sitting in `slots`.
+    @property
+    def root_bounds(self) -> tuple[Array, Array]:
+        """The range rows' bounds (lower, upper) with the stages of a single slot in place."""
+        return self.bounds_for([stage.slots[0] if len(stage.slots) == 1 else None for stage in self.stages])
 
-        |x| is taken no smaller than where the cost alone would lead. Infinite when `slots` are not admitted.
+    def violation(self, x: Array, slots: Sequence[int]) -> float:
+        """Return the largest residual of any row a x <= b, relative to |a| |x| + |b|, for stages in `slots`.
+
+        |x| is taken no smaller than where the cost alone would lead. Infinite when `slots` are no assignment.
         """
-        if not self.admits(slots):
+        if not self.is_assignment(slots):
             return inf
-        lower, upper = self.tightened(slots)
-        reached, missed = self.rows @ x, np.abs(self.equality @ x - self.target)
-        below, above = lower - reached, reached - upper
-        size = max(float(np.linalg.norm(x)), self._unconstrained)
+        lower, upper = self.bounds_for(slots)
+        values = self.rows @ x
+        below = lower - values
+        above = values - upper
+        norm = max(float(np.linalg.norm(x)), self._unconstrained_norm)
         return max(
-            _relative(np.maximum(below, above), self.rows, size, np.where(below > above, lower, upper)),
-            _relative(missed, self.equality, size, self.target),
+            _relative(np.maximum(below, above), self.rows, norm, np.where(below > above, lower, upper)),
+            _relative(np.abs(self.equality @ x - self.target), self.equality, norm, self.target),
         )
 
 
-@dataclass(frozen=True, eq=False)
-class AssignmentResult:
-    """What a solver found. Cost and violation are recomputed from the program, never taken from the solver.
-
-    "optimal": x is feasible and no other costs less. "time_limit": the search ended early, x is the best
-    found and within `gap` of the bound. "infeasible": there is no x. "unknown": none was found, which proves
-    nothing.
-    """
-
-    status: Status
-    x: Array | None  # (n,)
-    slots: tuple[int, ...] | None  # one a stage
-    cost: float  # infinite without x
-    bound: float  # no solution costs less
-    nodes: int  # relaxations solved
-    time: float  # [s], as the solver itself reports it
-    backend: str
-    max_violation: float = 0.0  # of any row a x <= b, relative to |a| |x| + |b|
-
-    @property
-    def gap(self) -> float:
-        """How much of the cost may still be saved: (cost − bound) / |cost|; infinite without x."""
-        return inf if self.x is None else max(0.0, self.cost - self.bound) / max(abs(self.cost), 1e-12)
-
-
-def certified(program: AssignmentProgram, claim: AssignmentResult) -> AssignmentResult:
-    """A solver's claim with cost and violation recomputed from the program.
-
-    An x that violates a row by more than TOLERANCE is dropped, and "optimal" with it.
-    """
-    if claim.x is None or claim.slots is None:
-        return replace(claim, x=None, slots=None, cost=inf)
-    violation = program.violation(claim.x, claim.slots)
-    if not violation <= TOLERANCE:
-        return replace(claim, status="unknown", x=None, slots=None, cost=inf, max_violation=violation)
-    cost = program.cost(claim.x)
-    x = frozen(claim.x, "x")
-    return replace(claim, x=x, cost=cost, bound=min(claim.bound, cost), max_violation=violation)
-
-
-def _relative(residual: Array, rows: Array, size: float, bound: Array) -> float:
-    """The largest residual above zero, each relative to its row, its bound and the size of the variables."""
-    over = np.flatnonzero(residual > 0.0)
-    scale = lengths(rows[over]) * size + np.abs(bound[over])
-    return float((residual[over] / scale).max(initial=0.0))
-
-
-def lengths(rows: Array) -> Array:
-    """The Euclidean length of each row."""
+def row_norms(rows: Array) -> Array:
+    """Return the Euclidean norm of each row."""
     squares: Array = np.einsum("ij,ij->i", rows, rows)
     return np.sqrt(squares)
+
+
+def _relative(residual: Array, rows: Array, x_norm: float, bound: Array) -> float:
+    """Return the largest positive residual relative to |row| |x| + |bound|."""
+    positive = np.flatnonzero(residual > 0.0)
+    scale = row_norms(rows[positive]) * x_norm + np.abs(bound[positive])
+    return float((residual[positive] / scale).max(initial=0.0))
 
 
 def _set(value: object, **fields: object) -> None:
@@ -259,7 +231,8 @@ def _matrix(value: ArrayLike, name: str, columns: int | None) -> Array:
 
 
 def _bounds(value: ArrayLike, name: str, side: str, shape: tuple[int] | None = None) -> Array:
-    bounds, never = frozen_bounds(value, name, shape), inf if side == "lower" else -inf
+    bounds = frozen_bounds(value, name, shape)
+    never = inf if side == "lower" else -inf
     if (bounds == never).any():
         raise SpecError(f"{name} must not be {never}, which nothing satisfies")
     return bounds

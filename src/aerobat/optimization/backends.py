@@ -1,20 +1,29 @@
-"""The solvers by name, each imported when it is asked for."""
+"""The solvers by name, each loaded when it is first needed."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from difflib import get_close_matches
 from importlib import import_module
 from importlib.util import find_spec
-from typing import Protocol, cast
+from typing import ClassVar, Protocol, cast
 
 from aerobat.errors import BackendMissing, SpecError
-from aerobat.optimization.assignment import AssignmentProgram, AssignmentResult
+from aerobat.optimization.assignment import AssignmentProgram
+from aerobat.optimization.result import AssignmentResult
 
 
 class Solver(Protocol):
-    """Solves assignment programs; not for several threads at once."""
+    """Solves assignment programs; not for several threads at once.
+
+    A back-end is one file with one such class, which declares what it needs and what it makes use of, and
+    one line in BACKENDS. Its package is imported when it solves, not before.
+    """
+
+    name: ClassVar[str]
+    package: ClassVar[str]  # that it imports
+    extra: ClassVar[str | None]  # of aerobat, which installs the package; None where aerobat itself does
+    uses_start: ClassVar[bool]  # a start is tried first, not only checked
 
     def solve(
         self,
@@ -23,50 +32,51 @@ class Solver(Protocol):
         time_limit: float | None = None,
         start: Sequence[int] | None = None,
     ) -> AssignmentResult:
-        """The cheapest assignment, or the best one found within `time_limit` [s].
+        """Return the assignment of minimum cost, or the best one found within `time_limit`.
 
-        `start`, one slot a stage, is an assignment that may be good; a solver may try it first.
+        Args:
+            program: what to solve.
+            time_limit: [s]; None sets no limit.
+            start: one slot a stage, an assignment that may be good.
+
+        Raises:
+            SpecError: `start` has not one slot a stage.
         """
         ...
 
 
-@dataclass(frozen=True)
-class Backend:
-    """Where a solver is, and what it needs."""
-
-    module: str
-    solver: str  # its class there
-    package: str  # what it imports
-    extra: str | None = None  # of aerobat, which installs the package
-
-
-BACKENDS = {
-    "builtin": Backend("aerobat.optimization.branch_and_bound.stage_search", "StageSearch", "daqp"),
-    "gurobi": Backend("aerobat.optimization.gurobi", "Gurobi", "gurobipy", "gurobi"),
-    "scip": Backend("aerobat.optimization.scip", "Scip", "pyscipopt", "scip"),
+BACKENDS = {  # module:class
+    "builtin": "aerobat.optimization.branch_and_bound:BranchAndBound",
+    "gurobi": "aerobat.optimization.gurobi:Gurobi",
+    "scip": "aerobat.optimization.scip:Scip",
 }
 
 
-def available() -> tuple[str, ...]:
-    """The names of the backends whose packages are installed."""
-    return tuple(name for name, backend in BACKENDS.items() if find_spec(backend.package) is not None)
+def available_backends() -> tuple[str, ...]:
+    """Return the names of the back-ends whose packages are installed."""
+    return tuple(name for name in BACKENDS if find_spec(_adapter(name).package) is not None)
 
 
 def solver(name: str = "builtin") -> Solver:
-    """A solver; keep it for a series of programs with the same matrices, the built-in one is then faster.
+    """Return a solver; keep it for programs with the same matrices, the built-in one is then faster.
 
     Raises SpecError for a name that is not in BACKENDS and BackendMissing, with the command that installs it,
     for one whose package is not there.
     """
-    backend = BACKENDS.get(name)
-    if backend is None:
+    if name not in BACKENDS:
         near = get_close_matches(name, BACKENDS, n=1)
         hint = f"did you mean '{near[0]}'?" if near else f"choose from {', '.join(BACKENDS)}"
         raise SpecError(f"backend '{name}' is unknown; {hint}")
-    if find_spec(backend.package) is None:
-        wanted = "aerobat" if backend.extra is None else f"aerobat[{backend.extra}]"
+    adapter = _adapter(name)
+    if find_spec(adapter.package) is None:
+        requirement = "aerobat" if adapter.extra is None else f"aerobat[{adapter.extra}]"
         raise BackendMissing(
-            f"backend '{name}' needs the package {backend.package}; install it with "
-            f"pip install '{wanted}' (or uv pip install '{wanted}'), or use --backend builtin"
+            f"backend '{name}' needs the package {adapter.package}; install it with "
+            f"pip install '{requirement}' (or uv pip install '{requirement}'), or use --backend builtin"
         )
-    return cast(Solver, getattr(import_module(backend.module), backend.solver)())
+    return adapter()
+
+
+def _adapter(name: str) -> type[Solver]:
+    module, _, adapter = BACKENDS[name].partition(":")
+    return cast(type[Solver], getattr(import_module(module), adapter))

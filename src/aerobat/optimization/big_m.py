@@ -8,98 +8,119 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from aerobat.arrays import Array
-from aerobat.optimization.assignment import AssignmentProgram, AssignmentResult
+from aerobat.optimization.assignment import AssignmentProgram
+from aerobat.optimization.result import AssignmentResult
 
-StageSlot = tuple[int, int]
+StageSlot = tuple[int, int]  # (stage, slot), the key of a binary
 
 
 @dataclass(frozen=True)
-class Switch:
-    """A bound that holds while a stage sits in a slot: sign · (A x)[row] <= sign · bound."""
+class BinaryConstraint:
+    """The sum of coefficient · binary is `bound`, or at most that."""
 
-    stage: int
-    slot: int
+    terms: tuple[tuple[int, StageSlot], ...]  # (coefficient, binary)
+    bound: int
+    is_equality: bool = False
+
+
+@dataclass(frozen=True)
+class IndicatorConstraint:
+    """A bound that a binary switches on: sign · (A x)[row] <= bound while it is 1, root_bound while it is 0.
+
+    Where the root bound is finite, that is row <= root_bound + (bound − root_bound) · binary, the smallest
+    big-M there is without further knowledge; where it is infinite, the solver's own indicator constraint.
+    """
+
+    binary: StageSlot
     row: int
     sign: int  # 1: an upper bound, -1: a lower bound
     bound: float
+    root_bound: float
 
 
 @dataclass(frozen=True, eq=False)
-class Conditioned:
+class ScaledProgram:
     """A program with unit rows and variables of order one, since general solvers' tolerances are absolute."""
 
     program: AssignmentProgram
     unit: float  # of the variables
 
-    def restored(self, claim: AssignmentResult) -> AssignmentResult:
-        """What a claim says of the program that was conditioned."""
+    def unscaled(self, claim: AssignmentResult) -> AssignmentResult:
+        """Return a claim on the scaled program as one on the program itself."""
         x = None if claim.x is None else self.unit * claim.x
         return replace(claim, x=x, bound=self.unit**2 * claim.bound)
 
 
-def conditioned(program: AssignmentProgram) -> Conditioned:
-    """The program for solvers whose tolerances are absolute."""
-    lengths, rows = _unit_rows(program.rows)
-    equality_lengths, equality = _unit_rows(program.equality)
-    target = program.target / equality_lengths
-    lower, upper = (bound / lengths for bound in standing_bounds(program))
-    pinned = lower == upper
-    known = np.concatenate([target, lower[pinned]])
-    least = np.linalg.lstsq(np.concatenate([equality, rows[pinned]]), known)[0]
-    unit = np.abs(least).max(initial=0.0) or np.maximum(lower, -upper).max(initial=0.0) or 1.0
+def scaled(program: AssignmentProgram) -> ScaledProgram:
+    """Return the program for solvers whose tolerances are absolute."""
+    norms, rows = _unit_rows(program.rows)
+    equality_norms, equality = _unit_rows(program.equality)
+    target = program.target / equality_norms
+    lower, upper = (bound / norms for bound in program.root_bounds)
+    fixed = lower == upper
+    known = np.concatenate([target, lower[fixed]])
+    shortest = np.linalg.lstsq(np.concatenate([equality, rows[fixed]]), known)[0]
+    unit = np.abs(shortest).max(initial=0.0) or np.maximum(lower, -upper).max(initial=0.0) or 1.0
     stages = (
-        replace(s, lower=s.lower / (unit * lengths[s.rows]), upper=s.upper / (unit * lengths[s.rows]))
+        replace(s, lower=s.lower / (unit * norms[s.rows]), upper=s.upper / (unit * norms[s.rows]))
         for s in program.stages
     )
-    scaled = replace(
+    scaled_program = replace(
         program,
         rows=rows,
-        lower=program.lower / (unit * lengths),
-        upper=program.upper / (unit * lengths),
+        lower=program.lower / (unit * norms),
+        upper=program.upper / (unit * norms),
         equality=equality,
         target=target / unit,
         stages=tuple(stages),
         gradient=None if program.gradient is None else program.gradient / unit,
         constant=program.constant / unit**2,
     )
-    return Conditioned(scaled, float(unit))
+    return ScaledProgram(scaled_program, float(unit))
 
 
 def _unit_rows(matrix: Array) -> tuple[Array, Array]:
-    """The length of each row, 1 for those that are zero, and the rows divided by it."""
-    lengths = np.linalg.norm(matrix, axis=1)
-    lengths = np.where(lengths > 0.0, lengths, 1.0)
-    return lengths, matrix / lengths[:, None]
+    """Return the norm of each row, 1 for those that are zero, and the rows divided by it."""
+    norms = np.linalg.norm(matrix, axis=1)
+    norms = np.where(norms > 0.0, norms, 1.0)
+    return norms, matrix / norms[:, None]
 
 
-def standing_bounds(program: AssignmentProgram) -> tuple[Array, Array]:
-    """The range rows' bounds (lower, upper) with the stages of a single slot in place."""
-    return program.tightened([stage.slots[0] if len(stage.slots) == 1 else None for stage in program.stages])
+def binaries(program: AssignmentProgram) -> list[StageSlot]:
+    """Return the keys of all binaries."""
+    return [(i, slot) for i, stage in enumerate(program.stages) for slot in stage.slots]
 
 
-def switches(program: AssignmentProgram) -> Iterator[Switch]:
-    """All that placements tighten beyond the standing bounds."""
-    lower, upper = standing_bounds(program)
+def binary_constraints(program: AssignmentProgram) -> Iterator[BinaryConstraint]:
+    """Yield what makes binaries an assignment: one slot a stage, one stage a slot, stages in order."""
+    users: dict[int, list[StageSlot]] = {}
+    for i, stage in enumerate(program.stages):
+        yield BinaryConstraint(tuple((1, (i, slot)) for slot in stage.slots), 1, is_equality=True)
+        for slot in stage.slots:
+            users.setdefault(slot, []).append((i, slot))
+    for sharing in users.values():
+        if len(sharing) > 1:
+            yield BinaryConstraint(tuple((1, key) for key in sharing), 1)
+    for i, j in program.precedence:
+        first = tuple((slot, (i, slot)) for slot in program.stages[i].slots)
+        second = tuple((-slot, (j, slot)) for slot in program.stages[j].slots)
+        yield BinaryConstraint(first + second, -1)
+
+
+def indicator_constraints(program: AssignmentProgram) -> Iterator[IndicatorConstraint]:
+    """Yield all bounds of stages that are tighter than the root's."""
+    lower, upper = (bound.tolist() for bound in program.root_bounds)
     for i, stage in enumerate(program.stages):
         for slot, rows, lows, highs in zip(stage.slots, stage.rows, stage.lower, stage.upper, strict=True):
             for row, low, high in zip(rows.tolist(), lows.tolist(), highs.tolist(), strict=True):
                 if high < upper[row]:
-                    yield Switch(i, slot, row, 1, high)
+                    yield IndicatorConstraint((i, slot), row, 1, high, upper[row])
                 if low > lower[row]:
-                    yield Switch(i, slot, row, -1, low)
-
-
-def slots_taken(program: AssignmentProgram) -> list[list[StageSlot]]:
-    """For each slot that several stages may take, who they are."""
-    users: dict[int, list[StageSlot]] = {}
-    for i, stage in enumerate(program.stages):
-        for slot in stage.slots:
-            users.setdefault(slot, []).append((i, slot))
-    return [sharing for sharing in users.values() if len(sharing) > 1]
+                    yield IndicatorConstraint((i, slot), row, -1, -low, -lower[row])
 
 
 def chosen_slots(program: AssignmentProgram, values: Mapping[StageSlot, float]) -> tuple[int, ...]:
-    """The slot of each stage, from the values of the binaries."""
+    """Return the slot of each stage, from the values of the binaries."""
     return tuple(
         max((values[i, slot], slot) for slot in stage.slots)[1] for i, stage in enumerate(program.stages)
     )

@@ -10,30 +10,34 @@ from typing import Any, ClassVar
 import numpy as np
 
 from aerobat.errors import AerobatError
-from aerobat.optimization.assignment import AssignmentProgram, AssignmentResult, Status, certified
+from aerobat.optimization.assignment import AssignmentProgram
 from aerobat.optimization.big_m import (
-    Switch,
+    IndicatorConstraint,
+    StageSlot,
+    binaries,
+    binary_constraints,
     chosen_slots,
-    conditioned,
-    slots_taken,
-    standing_bounds,
-    switches,
+    indicator_constraints,
+    scaled,
 )
+from aerobat.optimization.result import AssignmentResult, Status, verified
 
 _TOO_LARGE = 10010  # Gurobi's error number for a model beyond the size of the licence
-_STRICT = {"FeasibilityTol": 1e-9, "IntFeasTol": 1e-9, "MIPGap": 1e-9}
+_PARAMETERS = {"FeasibilityTol": 1e-9, "IntFeasTol": 1e-9, "MIPGap": 1e-9}
 
 
 @dataclass(frozen=True)
 class Gurobi:
-    """One binary for each stage and slot.
+    """One binary for each stage and slot, its bounds switched on by big-M or by indicator constraints.
 
-    The bounds of a placement are switched on by big-M where there are standing bounds, which takes less time
-    than indicator constraints, and by those where there are none. The licence that comes with the package
-    takes `free_variables` variables, a full one any number.
+    Big-M takes less time than indicator constraints. The licence that comes with the package takes
+    `free_variables` variables, a full one any number.
     """
 
     name: ClassVar[str] = "gurobi"
+    package: ClassVar[str] = "gurobipy"
+    extra: ClassVar[str | None] = "gurobi"
+    uses_start: ClassVar[bool] = True
     free_variables: ClassVar[int] = 200  # with a quadratic objective
 
     threads: int = 1
@@ -45,15 +49,21 @@ class Gurobi:
         time_limit: float | None = None,
         start: Sequence[int] | None = None,
     ) -> AssignmentResult:
-        """The cheapest assignment, or the best one found within `time_limit` [s].
+        """Return the assignment of minimum cost, or the best one found within `time_limit`.
 
-        `start` are slots that may be good. The result's time is Gurobi's own Runtime. Raises
-        AerobatError where the licence is missing or too small for the program.
+        Args:
+            program: what to solve.
+            time_limit: [s]; None sets no limit. The result's time is Gurobi's own Runtime.
+            start: one slot a stage, tried first.
+
+        Raises:
+            AerobatError: the licence is missing or too small for the program.
+            SpecError: `start` has not one slot a stage.
         """
         import gurobipy
 
         program.check_start(start)
-        scaled = conditioned(program)
+        scaling = scaled(program)
         try:
             with gurobipy.Env(empty=True) as env:
                 env.setParam("OutputFlag", 0)  # before it starts, or it prints the licence's banner
@@ -61,48 +71,54 @@ class Gurobi:
                 env.start()
                 with gurobipy.Model(env=env) as model:
                     model.Params.TimeLimit = inf if time_limit is None else time_limit
-                    claim = _Run(gurobipy, model, scaled.program).claim(start)
+                    claim = _GurobiModel(gurobipy, model, scaling.program).claim(start)
         except gurobipy.GurobiError as error:
-            raise AerobatError(_explained(error, program)) from None
-        return certified(program, scaled.restored(claim))
+            raise AerobatError(_message(error, program)) from None
+        return verified(program, scaling.unscaled(claim))
 
 
-class _Run:
+class _GurobiModel:
     """One program in one Gurobi model."""
 
     def __init__(self, gurobipy: Any, model: Any, program: AssignmentProgram) -> None:
-        self._gurobipy, self._grb, self._model, self._program = gurobipy, gurobipy.GRB, model, program
-        for name, value in _STRICT.items():
+        self._sum = gurobipy.quicksum
+        self._grb = gurobipy.GRB
+        self._model = model
+        self._program = program
+        for name, value in _PARAMETERS.items():
             model.setParam(name, value)
-        self._x = model.addMVar(program.variables, lb=-inf)
-        self._bounds = dict(zip((-1, 1), standing_bounds(program), strict=True))
+        self._x = model.addMVar(program.num_variables, lb=-inf)
         model.addConstr(program.equality @ self._x == program.target)
-        for sign, bounds in self._bounds.items():
-            given = np.isfinite(bounds)
-            model.addConstr((sign * program.rows[given]) @ self._x <= sign * bounds[given])
+        for sign, bounds in zip((-1, 1), program.root_bounds, strict=True):
+            finite = np.isfinite(bounds)
+            model.addConstr((sign * program.rows[finite]) @ self._x <= sign * bounds[finite])
 
     def claim(self, start: Sequence[int] | None) -> AssignmentResult:
         """Build, solve, read."""
-        program, model = self._program, self._model
-        binaries = self._add_binaries(start)
-        for switch in switches(program):
-            self._add_switch(switch, binaries[switch.stage, switch.slot])
+        variables = self._add_binaries(start)
+        for indicator in indicator_constraints(self._program):
+            self._add_indicator(indicator, variables[indicator.binary])
         self._set_cost()
+        model = self._model
         model.optimize()
-        status = self._status()
-        if not model.SolCount:
-            proven = status == "infeasible"
-            return self._result("infeasible" if proven else "unknown", None, None, inf if proven else -inf)
-        slots = chosen_slots(program, {key: binary.X for key, binary in binaries.items()})
-        return self._result(status, self._x.X, slots, model.ObjBound)
-
-    def _status(self) -> Status:
         meaning: dict[int, Status] = {
             self._grb.OPTIMAL: "optimal",
             self._grb.INFEASIBLE: "infeasible",
             self._grb.INF_OR_UNBD: "infeasible",  # the cost has a minimum
         }
-        return meaning.get(self._model.Status, "time_limit")
+        slots = x = None
+        if model.SolCount:
+            slots = chosen_slots(self._program, {key: binary.X for key, binary in variables.items()})
+            x = self._x.X
+        return AssignmentResult(
+            status=meaning.get(model.Status, "time_limit"),
+            backend=Gurobi.name,
+            bound=-inf if x is None else model.ObjBound,
+            x=x,
+            slots=slots,
+            nodes=int(model.NodeCount) if model.IsMIP else 0,
+            time=model.Runtime,
+        )
 
     def _set_cost(self) -> None:
         program, x = self._program, self._x
@@ -111,41 +127,32 @@ class _Run:
             cost = cost + program.gradient @ x
         self._model.setObjective(cost + program.constant, self._grb.MINIMIZE)
 
-    def _add_binaries(self, start: Sequence[int] | None) -> dict[tuple[int, int], Any]:
-        model, total, program = self._model, self._gurobipy.quicksum, self._program
-        keys = [(i, slot) for i, stage in enumerate(program.stages) for slot in stage.slots]
-        binaries = {key: model.addVar(vtype=self._grb.BINARY) for key in keys}
-        for i, stage in enumerate(program.stages):
-            model.addConstr(total(binaries[i, slot] for slot in stage.slots) == 1)
-            if start is not None:
-                for slot in stage.slots:
-                    binaries[i, slot].Start = float(slot == start[i])
-        for users in slots_taken(program):
-            model.addConstr(total(binaries[user] for user in users) <= 1)
-        for i, j in program.precedence:
-            first, second = (total(s * binaries[k, s] for s in program.stages[k].slots) for k in (i, j))
-            model.addConstr(first + 1 <= second)
-        return binaries
+    def _add_binaries(self, start: Sequence[int] | None) -> dict[StageSlot, Any]:
+        model = self._model
+        variables = {key: model.addVar(vtype=self._grb.BINARY) for key in binaries(self._program)}
+        if start is not None:
+            for (stage, slot), variable in variables.items():
+                variable.Start = float(slot == start[stage])
+        for constraint in binary_constraints(self._program):
+            total = self._sum(coefficient * variables[key] for coefficient, key in constraint.terms)
+            model.addConstr(
+                total == constraint.bound if constraint.is_equality else total <= constraint.bound
+            )
+        return variables
 
-    def _add_switch(self, switch: Switch, binary: Any) -> None:
-        sign, bound = switch.sign, switch.sign * switch.bound
-        row, most = (sign * self._program.rows[switch.row]) @ self._x, sign * self._bounds[sign][switch.row]
-        if most < inf:
-            self._model.addConstr(row <= most + (bound - most) * binary)
+    def _add_indicator(self, indicator: IndicatorConstraint, binary: Any) -> None:
+        row = (indicator.sign * self._program.rows[indicator.row]) @ self._x
+        bound, root_bound = indicator.bound, indicator.root_bound
+        if root_bound < inf:
+            self._model.addConstr(row <= root_bound + (bound - root_bound) * binary)
         else:
             self._model.addGenConstrIndicator(binary, True, row.item() <= bound)
 
-    def _result(
-        self, status: Status, x: Any, slots: tuple[int, ...] | None, bound: float
-    ) -> AssignmentResult:
-        nodes = int(self._model.NodeCount) if self._model.IsMIP else 0
-        return AssignmentResult(status, x, slots, inf, bound, nodes, self._model.Runtime, Gurobi.name)
 
-
-def _explained(error: Any, program: AssignmentProgram) -> str:
+def _message(error: Any, program: AssignmentProgram) -> str:
     if error.errno != _TOO_LARGE:
         return f"Gurobi failed: {error}"
-    size = program.variables + sum(len(stage.slots) for stage in program.stages)
+    size = program.num_variables + len(binaries(program))
     return (
         f"Gurobi's free licence takes {Gurobi.free_variables} variables with a quadratic objective and this "
         f"program has {size}; use fewer intervals, a full licence, or the 'builtin' backend"

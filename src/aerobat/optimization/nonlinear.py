@@ -1,6 +1,6 @@
 """Smooth nonlinear programs, stated in CasADi's symbols and solved by IPOPT's interior-point method.
 
-CasADi is optional: whatever needs it asks `symbolics()`, which says how to install it where it is missing.
+CasADi is optional: whatever needs it calls `import_casadi()`, which says how to install it.
 """
 
 from __future__ import annotations
@@ -19,11 +19,12 @@ from numpy.typing import ArrayLike
 from aerobat.arrays import Array, frozen, frozen_bounds
 from aerobat.errors import BackendMissing, SpecError
 
-_SILENT = {"print_time": False, "show_eval_warnings": False, "ipopt.print_level": 0, "ipopt.sb": "yes"}
-_FOUND = ("Solve_Succeeded", "Solved_To_Acceptable_Level")
-_SENTENCES = {
+_OPTIONS = {"print_time": False, "show_eval_warnings": False, "ipopt.print_level": 0, "ipopt.sb": "yes"}
+_MAX_VIOLATION = 1e-6  # that a result may have and be called converged
+_CONVERGED = ("Solve_Succeeded", "Solved_To_Acceptable_Level")
+_MEANING = {
     "Solve_Succeeded": "solved to the tolerance",
-    "Solved_To_Acceptable_Level": "solved to a looser tolerance, short of the one asked",
+    "Solved_To_Acceptable_Level": "solved to a looser tolerance, short of the desired one",
     "Infeasible_Problem_Detected": "converged to a point where no small change lessens the violation",
     "Maximum_Iterations_Exceeded": "stopped at the limit of iterations",
     "Maximum_CpuTime_Exceeded": "stopped at the limit of time",
@@ -35,7 +36,7 @@ _SENTENCES = {
 }
 
 
-def symbolics() -> Any:
+def import_casadi() -> Any:
     """The casadi module. Raises BackendMissing, with the command that installs it, where it is not there."""
     if find_spec("casadi") is None:
         raise BackendMissing('nonlinear programs need CasADi; install it with pip install "aerobat[casadi]"')
@@ -44,7 +45,7 @@ def symbolics() -> Any:
 
 @dataclass(frozen=True, eq=False)
 class NonlinearProgram:
-    """Minimize f(x) subject to lower ≤ g(x) ≤ upper and least ≤ x ≤ most.
+    """Minimize f(x) subject to lower ≤ g(x) ≤ upper and x_min ≤ x ≤ x_max.
 
     Raises SpecError when bounds cross or do not fit the symbols; infinite bounds do not bind.
     """
@@ -54,12 +55,12 @@ class NonlinearProgram:
     constraints: Any  # g, a column of m expressions
     lower: Array  # (m,), or one number for all
     upper: Array
-    least: Array = field(default_factory=lambda: np.array(-inf))  # (n,), or one number for all
-    most: Array = field(default_factory=lambda: np.array(inf))
+    x_min: Array = field(default_factory=lambda: np.array(-inf))  # (n,), or one number for all
+    x_max: Array = field(default_factory=lambda: np.array(inf))
 
     def __post_init__(self) -> None:
         """Check and broadcast."""
-        for names, symbols in ((("lower", "upper"), self.constraints), (("least", "most"), self.variables)):
+        for names, symbols in ((("lower", "upper"), self.constraints), (("x_min", "x_max"), self.variables)):
             size = int(symbols.numel())
             for name in names:
                 object.__setattr__(self, name, _bound(getattr(self, name), name, size))
@@ -70,18 +71,18 @@ class NonlinearProgram:
     @cached_property
     def values(self) -> Any:
         """The CasADi function x -> (f, g)."""
-        return symbolics().Function("values", [self.variables], [self.objective, self.constraints])
+        return import_casadi().Function("values", [self.variables], [self.objective, self.constraints])
 
     def cost(self, x: Array) -> float:
-        """f(x)."""
+        """Return f(x)."""
         return float(self.values(x)[0])
 
     def violation(self, x: Array) -> float:
-        """By how much the worst constraint or bound is violated at x; infinite where x or g is not finite."""
+        """Return the largest violation of a constraint or bound at x, infinite where x or g is not finite."""
         g = np.asarray(self.values(x)[1], dtype=float).reshape(-1)
         if not (np.isfinite(x).all() and np.isfinite(g).all()):
             return inf
-        parts = (self.lower - g, g - self.upper, self.least - x, x - self.most)
+        parts = (self.lower - g, g - self.upper, self.x_min - x, x - self.x_max)
         return max(float(np.max(part, initial=0.0)) for part in parts)
 
 
@@ -92,51 +93,62 @@ class NonlinearResult:
     x: Array  # (n,)
     cost: float
     violation: float  # of the worst constraint or bound, in its own unit
-    converged: bool  # IPOPT found an optimum, and the violation is within what was allowed
+    converged: bool  # IPOPT found an optimum, and the violation is within 1e-6
     status: str  # a sentence
     iterations: int
     time: float  # [s], derivatives included
 
 
-def solve(
+def solve_nonlinear(
     program: NonlinearProgram,
     start: ArrayLike,
     *,
-    iterations: int = 500,
+    max_iterations: int = 500,
     tolerance: float = 1e-8,
-    allowed_violation: float = 1e-6,
-    barrier: float | None = None,
+    initial_barrier: float | None = None,
     time_limit: float | None = None,
     exact_hessian: bool = True,
 ) -> NonlinearResult:
-    """A local minimum near `start` (n,), by IPOPT with CasADi's exact derivatives.
+    """Return a local minimum near `start`, by IPOPT with CasADi's exact derivatives.
 
-    `tolerance` is IPOPT's, on the scaled optimality conditions. `barrier` is the first barrier parameter (0.1
-    by default): 1e-4 or less keeps a start that is nearly optimal. Without the `exact_hessian` it is built up
-    by BFGS updates. Raises SpecError for a start of the wrong size, BackendMissing without CasADi.
+    Args:
+        program: what to solve.
+        start: the first iterate, (n,).
+        max_iterations: of IPOPT.
+        tolerance: of IPOPT, on the scaled optimality conditions.
+        initial_barrier: the first barrier parameter; None is IPOPT's 0.1, and 1e-4 or less keeps a start that
+            is nearly optimal.
+        time_limit: [s]; None sets no limit.
+        exact_hessian: False has the Hessian built up by BFGS updates.
+
+    Raises:
+        SpecError: `start` has the wrong size.
+        BackendMissing: CasADi is not installed.
     """
     began = perf_counter()
-    first = frozen(start, "start", (int(program.variables.numel()),))
-    options: dict[str, Any] = {**_SILENT, "ipopt.max_iter": iterations, "ipopt.tol": tolerance}
-    options |= {} if time_limit is None else {"ipopt.max_wall_time": time_limit}
-    options |= {} if exact_hessian else {"ipopt.hessian_approximation": "limited-memory"}
-    if barrier is not None:
-        options |= {"ipopt.mu_init": barrier, "ipopt.bound_push": 1e-6, "ipopt.bound_frac": 1e-6}
+    x0 = frozen(start, "start", (int(program.variables.numel()),))
+    options: dict[str, Any] = {**_OPTIONS, "ipopt.max_iter": max_iterations, "ipopt.tol": tolerance}
+    if time_limit is not None:
+        options["ipopt.max_wall_time"] = time_limit
+    if not exact_hessian:
+        options["ipopt.hessian_approximation"] = "limited-memory"
+    if initial_barrier is not None:
+        options |= {"ipopt.mu_init": initial_barrier, "ipopt.bound_push": 1e-6, "ipopt.bound_frac": 1e-6}
     symbols = {"x": program.variables, "f": program.objective, "g": program.constraints}
-    solver = symbolics().nlpsol("program", "ipopt", symbols, options)
-    bounds = {"lbg": program.lower, "ubg": program.upper, "lbx": program.least, "ubx": program.most}
-    x = np.asarray(solver(x0=first, **bounds)["x"], dtype=float).reshape(-1)
+    solver = import_casadi().nlpsol("program", "ipopt", symbols, options)
+    bounds = {"lbg": program.lower, "ubg": program.upper, "lbx": program.x_min, "ubx": program.x_max}
+    x = np.asarray(solver(x0=x0, **bounds)["x"], dtype=float).reshape(-1)
     x.flags.writeable = False
-    reported = str(solver.stats()["return_status"])
+    status = str(solver.stats()["return_status"])
     violation = program.violation(x)
     return NonlinearResult(
-        x,
-        program.cost(x),
-        violation,
-        reported in _FOUND and violation <= allowed_violation,
-        _SENTENCES.get(reported, f"stopped: {reported.replace('_', ' ').lower()}"),
-        int(solver.stats()["iter_count"]),
-        perf_counter() - began,
+        x=x,
+        cost=program.cost(x),
+        violation=violation,
+        converged=status in _CONVERGED and violation <= _MAX_VIOLATION,
+        status=_MEANING.get(status, f"stopped: {status.replace('_', ' ').lower()}"),
+        iterations=int(solver.stats()["iter_count"]),
+        time=perf_counter() - began,
     )
 
 

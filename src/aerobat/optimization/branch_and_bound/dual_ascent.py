@@ -1,4 +1,4 @@
-"""A few steps of the dual active-set method, for many additions to one solved problem at once."""
+"""A few steps of the dual active-set method, for many candidates beside one solved QP at once."""
 
 from __future__ import annotations
 
@@ -10,80 +10,89 @@ import numpy as np
 from aerobat.arrays import Array
 from aerobat.optimization.assignment import Indices, Mask
 
-_STEPS = 3  # more hardly raise the bounds
-_TINY = 1e-300
+MIN_DIVISOR = 1e-300  # in place of a divisor that may be zero where the dividend is then zero too
+_MAX_STEPS = 3  # more hardly raise the bounds
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class Ascent:
-    """Additions on their way up: pushed by t, one raises the dual objective by slope · t − ½ curvature · t².
+class DualDirections:
+    """Search directions in the space of the multipliers, one for each of q candidates.
 
-    Meanwhile the multipliers of the w active rows fall by give · t.
+    By a step t along it the dual objective rises by slope · t − ½ curvature · t², while the multipliers of
+    the w active rows change by −multiplier_rate · t.
     """
 
-    give: Array  # (w, q)
+    multiplier_rate: Array  # (w, q)
     slope: Array  # (q,)
     curvature: Array  # (q,) positive
 
 
-def dual_steps(
-    inverse: Array, multipliers: Array, equal: Mask, ascent: Ascent
+def dual_ascent(
+    inverse_gram: Array, multipliers: Array, is_equality: Mask, directions: DualDirections
 ) -> tuple[Array, Array, Indices]:
-    """Multipliers of the active rows for each addition, (w, q), how far it is pushed, (q,), which fall short.
+    """Return the multipliers (w, q), the summed steps (q,) and which candidates are blocked, after ascent.
 
-    A step ends at the top, or where a multiplier is zero; its row is then dropped and the next step goes on
-    without it (Goldfarb and Idnani 1983). `inverse` (w, w) is that of the active rows' Gram matrix; rows that
-    are `equal`ities have multipliers of either sign and never drop.
+    A step ends at the maximum, or where a multiplier is zero; its row is then dropped and the next step goes
+    on without it (Goldfarb and Idnani 1983). Blocked are those that another step might raise further.
+
+    Args:
+        inverse_gram: the inverse of the active rows' Gram matrix, (w, w).
+        multipliers: of the active rows at the start, (w,).
+        is_equality: which of the rows have multipliers of either sign and never drop, (w,).
+        directions: of the candidates.
     """
-    left = np.where(equal, inf, multipliers)[:, None]  # to fall, until the row drops
-    pushed, stopped = _step(left, ascent)
-    held = multipliers[:, None] - pushed * ascent.give
-    if not stopped.size:
-        return held, pushed, stopped
-    moving, step, dropped = np.arange(len(pushed)), pushed, list[tuple[Array, Indices]]()
-    for _ in range(_STEPS - 1):
-        rate = (ascent.give / left)[:, stopped]
-        left = (left - step * ascent.give)[:, stopped]
-        moving, row, each = moving[stopped], rate.argmax(axis=0), np.arange(len(stopped))
-        left[row, each] = inf
-        left[left == 0.0] = inf  # a tie: the sign is mended below
-        dropped = [(column[:, stopped], earlier[stopped]) for column, earlier in dropped]
-        ascent = _without(inverse, row, dropped, _further(ascent, stopped, step))
-        step, stopped = _step(left, ascent)
-        held[:, moving] -= step * ascent.give
-        pushed[moving] += step
-        if not stopped.size:
+    remaining = np.where(is_equality, inf, multipliers)[:, None]  # multipliers, until the row drops
+    steps, blocked = _step(remaining, directions)
+    result = multipliers[:, None] - steps * directions.multiplier_rate
+    if not blocked.size:
+        return result, steps, blocked
+    moving = np.arange(len(steps))
+    step = steps
+    dropped = list[tuple[Array, Indices]]()
+    for _ in range(_MAX_STEPS - 1):
+        rate = (directions.multiplier_rate / remaining)[:, blocked]
+        remaining = (remaining - step * directions.multiplier_rate)[:, blocked]
+        row = rate.argmax(axis=0)
+        remaining[row, np.arange(len(blocked))] = inf
+        remaining[remaining == 0.0] = inf  # a tie: the sign is mended below
+        moving = moving[blocked]
+        dropped = [(column[:, blocked], earlier[blocked]) for column, earlier in dropped]
+        slope = (directions.slope - step * directions.curvature)[blocked]
+        directions = DualDirections(
+            directions.multiplier_rate[:, blocked], slope, directions.curvature[blocked]
+        )
+        directions = _without(inverse_gram, row, dropped, directions)
+        step, blocked = _step(remaining, directions)
+        result[:, moving] -= step * directions.multiplier_rate
+        steps[moving] += step
+        if not blocked.size:
             break
-    still = moving[stopped]
-    sign = np.where(equal, 0.0, np.sign(multipliers))[:, None]
-    return np.where(held * sign < 0.0, 0.0, held), pushed, still
+    sign = np.where(is_equality, 0.0, np.sign(multipliers))[:, None]
+    return np.where(result * sign < 0.0, 0.0, result), steps, moving[blocked]
 
 
-def _step(left: Array, ascent: Ascent) -> tuple[Array, Indices]:
-    """How far each addition goes, and which of them a multiplier stops."""
-    top = ascent.slope / ascent.curvature
-    soonest = (ascent.give / left).max(axis=0, initial=_TINY)
-    step = np.minimum(top, 1.0 / soonest)
-    return step, (step < top).nonzero()[0]
+def _step(remaining: Array, directions: DualDirections) -> tuple[Array, Indices]:
+    """Return the steps, and which of them end at a multiplier that is zero."""
+    to_maximum = directions.slope / directions.curvature
+    fastest = (directions.multiplier_rate / remaining).max(axis=0, initial=MIN_DIVISOR)
+    step = np.minimum(to_maximum, 1.0 / fastest)
+    return step, (step < to_maximum).nonzero()[0]
 
 
-def _further(ascent: Ascent, some: Indices, step: Array) -> Ascent:
-    """Some of the additions after a step."""
-    slope = (ascent.slope - step * ascent.curvature)[some]
-    return Ascent(ascent.give[:, some], slope, ascent.curvature[some])
-
-
-def _without(inverse: Array, row: Indices, dropped: list[tuple[Array, Indices]], ascent: Ascent) -> Ascent:
-    """The ascent once `row` is dropped, beside those `dropped` before, to which it is added.
+def _without(
+    inverse_gram: Array, row: Indices, dropped: list[tuple[Array, Indices]], directions: DualDirections
+) -> DualDirections:
+    """Return the directions once `row` is dropped, beside those `dropped` before, to which it is added.
 
     Each dropped row goes with its column of the inverse, less what the earlier ones took of it.
     """
     each = np.arange(len(row))
-    column = inverse[:, row]
-    for taken, earlier in dropped:
-        column = column - taken * (taken[row, each] / taken[earlier, each])
+    column = inverse_gram[:, row]
+    for earlier_column, earlier_row in dropped:
+        column = column - earlier_column * (earlier_column[row, each] / earlier_column[earlier_row, each])
     dropped.append((column, row))
-    pivot, given = np.maximum(column[row, each], _TINY), ascent.give[row, each]
-    give = ascent.give - column * (given / pivot)
-    give[row, each] = 0.0
-    return Ascent(give, ascent.slope, ascent.curvature + given**2 / pivot)
+    pivot = np.maximum(column[row, each], MIN_DIVISOR)
+    pivot_rate = directions.multiplier_rate[row, each]
+    multiplier_rate = directions.multiplier_rate - column * (pivot_rate / pivot)
+    multiplier_rate[row, each] = 0.0
+    return DualDirections(multiplier_rate, directions.slope, directions.curvature + pivot_rate**2 / pivot)

@@ -1,4 +1,4 @@
-"""The children of one relaxation, made as they are asked for, the cheapest first."""
+"""The children of one node, made as they are needed, those of the smallest lower bound first."""
 
 from __future__ import annotations
 
@@ -11,103 +11,114 @@ import numpy as np
 
 from aerobat.arrays import Array
 from aerobat.optimization.assignment import Indices
-from aerobat.optimization.branch_and_bound.candidates import Placements, Prospects
-from aerobat.optimization.branch_and_bound.least_distance import Point
+from aerobat.optimization.branch_and_bound.least_distance import QPSolution
+from aerobat.optimization.branch_and_bound.lower_bounds import DualBounds, LowerBounds
 
-_NOBODY = np.zeros(0, dtype=np.intp)
-_AT_FIRST = 4  # placements are looked at together; twice as many the next time
-_FEW = 2  # pairs of one placement that become branches of their own; of more, the placement alone is one
+_NONE = np.zeros(0, dtype=np.intp)
+_FIRST_BATCH = 4  # candidates that are paired at once; twice as many the next time
+_MAX_PAIR_BRANCHES = 2  # of one candidate; with more pairs below the cutoff, the candidate alone is a branch
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Branch:
-    """All ways to complete a node with the placements `placed` and without those `spared`."""
+    """All ways to complete a node with the candidates `chosen` and without those `excluded`."""
 
     bound: float
-    placed: tuple[int, ...]
-    spared: tuple[int, ...] = ()
+    chosen: tuple[int, ...]
+    excluded: tuple[int, ...] = ()
 
 
 @dataclass(eq=False, slots=True)
-class _Choice:
-    """A placement with any one of its partner stage's, the cheapest first; alone where it has no partner."""
+class _Pairing:
+    """A candidate with any one of its partner group's; alone where it has no partner."""
 
-    placement: int
+    candidate: int
     partners: Indices
     bounds: Array  # of the pairs
-    paired: int = 0  # the first ones are dealt with
-    sorted: bool = False
+    num_branched: int = 0  # of the partners in order of their bounds
+    is_sorted: bool = False
 
     def sort(self) -> None:
-        if not self.sorted:
+        """Put partners in the order of their bounds."""
+        if not self.is_sorted:
             order = self.bounds.argsort()
-            self.partners, self.bounds, self.sorted = self.partners[order], self.bounds[order], True
+            self.partners = self.partners[order]
+            self.bounds = self.bounds[order]
+            self.is_sorted = True
 
 
-class Fan:
+class LazyChildren:
     """Branches that cover all ways to complete a node.
 
-    They place the stage whose cheapest placement costs most and, where that leaves few choices, with it the
-    stage that would cost most then: one point bounds what two placements cost together, so that most of the
-    relaxations in between need not be solved. Placements are looked at when their turn comes.
+    They choose for the group whose smallest lower bound is the largest and, where that leaves few choices,
+    also for the group that would have the largest then: pairwise bounds come from the node's own solution, so
+    that most QPs in between need not be solved. Candidates are paired when their turn comes.
     """
 
-    def __init__(self, placements: Placements, point: Point, prospects: Prospects) -> None:
-        """`point` is the node's; `prospects` have placements of every stage that is left."""
-        self.prospects = prospects
-        self._of, self._point = placements, point
-        stage, least = prospects.stage, prospects.least
-        self._starts = np.concatenate([[0], (stage[1:] != stage[:-1]).nonzero()[0] + 1])
-        self._spans = [slice(a, b) for a, b in pairwise((*self._starts.tolist(), len(stage)))]
-        self._dearest = int(np.minimum.reduceat(least, self._starts).argmax())
-        span = self._spans[self._dearest]
-        self._waiting = (span.start + least[span].argsort(kind="stable")).tolist()
-        self._at_once = _AT_FIRST
-        self._ready: list[tuple[float, int, _Choice]] = []
+    def __init__(self, dual_bounds: DualBounds, solution: QPSolution, lower_bounds: LowerBounds) -> None:
+        """`solution` is the node's; `lower_bounds` have candidates of every group that is left."""
+        self.lower_bounds = lower_bounds
+        self._dual_bounds = dual_bounds
+        self._solution = solution
+        group, value = lower_bounds.group, lower_bounds.value
+        self._starts = np.concatenate([[0], (group[1:] != group[:-1]).nonzero()[0] + 1])
+        self._spans = [slice(a, b) for a, b in pairwise((*self._starts.tolist(), len(group)))]
+        self._branching_group = int(np.minimum.reduceat(value, self._starts).argmax())
+        span = self._spans[self._branching_group]
+        self._waiting = (span.start + value[span].argsort(kind="stable")).tolist()
+        self._batch = _FIRST_BATCH
+        self._evaluated: list[tuple[float, int, _Pairing]] = []
         self._ticket = count()
 
     @property
     def bound(self) -> float:
-        """No branch that is left costs less."""
-        ready = self._ready[0][0] if self._ready else inf
-        return min(ready, float(self.prospects.least[self._waiting[0]])) if self._waiting else ready
+        """The lower bound of all branches that are left."""
+        evaluated = self._evaluated[0][0] if self._evaluated else inf
+        if not self._waiting:
+            return evaluated
+        return min(evaluated, float(self.lower_bounds.value[self._waiting[0]]))
 
-    def settle(self) -> float:
-        """Look at placements until the cheapest is known; the bound then."""
-        while self._waiting and (not self._ready or self.bound < self._ready[0][0]):
-            some, self._waiting = self._waiting[: self._at_once], self._waiting[self._at_once :]
-            self._look_at(some)
-            self._at_once *= 2
+    def evaluate_best(self) -> float:
+        """Pair candidates until the best branch is known; return its bound."""
+        while self._waiting and (not self._evaluated or self.bound < self._evaluated[0][0]):
+            batch = self._waiting[: self._batch]
+            self._waiting = self._waiting[self._batch :]
+            self._evaluate(batch)
+            self._batch *= 2
         return self.bound
 
-    def pop(self, limit: float, in_pairs: bool) -> Branch:
-        """The cheapest branch, once settled: a pair, if wanted or where few pairs cost less than `limit`."""
-        bound, _, choice = heappop(self._ready)
-        if not choice.partners.size:
-            return Branch(bound, (choice.placement,))
-        choice.sort()
-        paired, partners = choice.paired, choice.partners.tolist()
-        if not in_pairs and choice.bounds.searchsorted(limit) > paired + _FEW:
-            return Branch(bound, (choice.placement,), tuple(partners[:paired]))
-        choice.paired += 1
-        if choice.paired < len(partners):
-            self._push(float(choice.bounds[choice.paired]), choice)
-        return Branch(bound, (choice.placement, partners[paired]))
+    def pop(self, cutoff: float, in_pairs: bool) -> Branch:
+        """Return the best branch, once evaluated: a pair, if wanted or where few pairs are below `cutoff`."""
+        bound, _, pairing = heappop(self._evaluated)
+        if not pairing.partners.size:
+            return Branch(bound, (pairing.candidate,))
+        pairing.sort()
+        done = pairing.num_branched
+        partners = pairing.partners.tolist()
+        if not in_pairs and pairing.bounds.searchsorted(cutoff) > done + _MAX_PAIR_BRANCHES:
+            return Branch(bound, (pairing.candidate,), tuple(partners[:done]))
+        pairing.num_branched += 1
+        if pairing.num_branched < len(partners):
+            self._push(float(pairing.bounds[pairing.num_branched]), pairing)
+        return Branch(bound, (pairing.candidate, partners[done]))
 
-    def _push(self, bound: float, choice: _Choice) -> None:
+    def _push(self, bound: float, pairing: _Pairing) -> None:
         if bound < inf:
-            heappush(self._ready, (bound, next(self._ticket), choice))
+            heappush(self._evaluated, (bound, next(self._ticket), pairing))
 
-    def _look_at(self, some: list[int]) -> None:
-        among, least, moves = self.prospects.among, self.prospects.least, self.prospects.moves
-        if moves is None or len(self._spans) == 1:
-            for i in some:
-                self._push(float(least[i]), _Choice(int(among[i]), _NOBODY, least[:0]))
+    def _evaluate(self, batch: list[int]) -> None:
+        candidates = self.lower_bounds.candidates
+        value = self.lower_bounds.value
+        steps = self.lower_bounds.steps
+        if steps is None or len(self._spans) == 1:
+            for i in batch:
+                self._push(float(value[i]), _Pairing(int(candidates[i]), _NONE, value[:0]))
             return
-        joint = self._of.together(self._point, self.prospects, moves, np.array(some))
-        each = np.minimum.reduceat(joint, self._starts, axis=1)
-        each[:, self._dearest] = -inf
-        partners, bounds = each.argmax(axis=1).tolist(), each.max(axis=1).tolist()
-        for i, row, bound, partner in zip(some, joint, bounds, partners, strict=True):
-            span = slice(0, 0) if i in moves.stopped else self._spans[partner]
-            self._push(bound, _Choice(int(among[i]), among[span], row[span]))
+        pairs = self._dual_bounds.pairwise_bounds(self._solution, self.lower_bounds, steps, np.array(batch))
+        by_group = np.minimum.reduceat(pairs, self._starts, axis=1)
+        by_group[:, self._branching_group] = -inf
+        partner_groups = by_group.argmax(axis=1).tolist()
+        bounds = by_group.max(axis=1).tolist()
+        for i, row, bound, partner in zip(batch, pairs, bounds, partner_groups, strict=True):
+            span = slice(0, 0) if i in steps.blocked else self._spans[partner]
+            self._push(bound, _Pairing(int(candidates[i]), candidates[span], row[span]))

@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
-import daqp
 import numpy as np
 from numpy.typing import NDArray
 
@@ -14,11 +13,11 @@ from aerobat.arrays import Array
 from aerobat.optimization.assignment import Indices
 from aerobat.optimization.branch_and_bound.null_space import UNBOUNDED
 
-# DAQP's marks on a row
+# DAQP's marks on a row, and its exit flags
 _AT_UPPER, _AT_LOWER, _IGNORED = 1, 3, 4
-_SOLVED, _EXCLUDED = 1, -1
-_PRIMAL_TOLERANCE = 1e-9  # on rows of unit length
-_CAREFUL = {"pivot_tol": 1e-4, "sing_tol": 1e-13, "dual_tol": 1e-10}  # tried when the ordinary settings fail
+_SOLVED, _INFEASIBLE = 1, -1
+_SETTINGS = {"primal_tol": 1e-9}  # on rows of unit norm
+_CAREFUL_SETTINGS = {"pivot_tol": 1e-4, "sing_tol": 1e-13, "dual_tol": 1e-10}  # where the usual ones fail
 
 
 class NotConverged(Exception):
@@ -26,8 +25,8 @@ class NotConverged(Exception):
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class Point:
-    """The minimiser of ½|y|² within bounds, and what holds it there."""
+class QPSolution:
+    """The minimizer of ½|y|² within bounds, and its active set."""
 
     y: Array
     value: float  # ½|y|²
@@ -37,8 +36,8 @@ class Point:
     multipliers: Array  # of the active rows: positive at an upper bound, negative at a lower
 
 
-class LeastDistance:
-    """minimise ½|y|² subject to lower <= M y <= upper, for rows M of unit length or zero, many times over."""
+class LeastDistanceQP:
+    """Minimize ½|y|² subject to lower <= M y <= upper, for rows M of unit norm or zero, many times over."""
 
     def __init__(self, rows: Array) -> None:
         """Keep the rows."""
@@ -46,57 +45,59 @@ class LeastDistance:
 
     @cached_property
     def _model(self) -> Any:
+        import daqp
+
         model = daqp.Model()
         unbounded = np.full(len(self._rows), UNBOUNDED)
         # no linear term, not a zero one: DAQP would multiply it by all rows at every change of bounds
         model.setup(np.eye(self._rows.shape[1]), None, self._rows, unbounded, -unbounded)
-        model.settings = {"primal_tol": _PRIMAL_TOLERANCE}
+        model.settings = _SETTINGS
         return model
 
     def solve(
-        self, lower: Array, upper: Array, guess: Point | None = None, limit: float = UNBOUNDED
-    ) -> Point | None:
-        """The minimiser, or None where there is none with ½|y|² <= limit.
+        self, lower: Array, upper: Array, warm_start: QPSolution | None = None, cutoff: float = UNBOUNDED
+    ) -> QPSolution | None:
+        """Return the minimizer, or None where there is none with ½|y|² <= cutoff.
 
-        Infinite bounds are ±UNBOUNDED. `guess` is a point of similar bounds, whose active rows are tried
-        first. Raises NotConverged.
+        Args:
+            lower: bounds of M y, (m,), −UNBOUNDED where there is none.
+            upper: likewise, UNBOUNDED where there is none.
+            warm_start: the solution for similar bounds, whose active rows are tried first.
+            cutoff: of ½|y|².
+
+        Raises:
+            NotConverged: DAQP fails with its careful settings too.
         """
         if lower.max(initial=0.0) <= 0.0 <= upper.min(initial=0.0):
-            nothing = np.zeros(0)
-            return Point(
-                np.zeros(self._rows.shape[1]), 0.0, lower, upper, np.zeros(0, dtype=np.intp), nothing
-            )
+            y = np.zeros(self._rows.shape[1])
+            return QPSolution(y, 0.0, lower, upper, np.zeros(0, dtype=np.intp), np.zeros(0))
         unbounded = upper - lower >= 2.0 * UNBOUNDED
         cold = np.multiply(unbounded, _IGNORED, dtype=np.intc)
-        y, flag, multipliers = self._run(lower, upper, _warmed(cold, guess), limit)
-        if flag not in (_SOLVED, _EXCLUDED):
-            y, flag, multipliers = self._run(lower, upper, cold, limit)
-        if flag not in (_SOLVED, _EXCLUDED):
-            ordinary = self._model.settings
-            self._model.settings = _CAREFUL
-            y, flag, multipliers = self._run(lower, upper, cold, limit)
-            self._model.settings = ordinary
-        if flag not in (_SOLVED, _EXCLUDED):
+        warm = cold
+        if warm_start is not None:
+            warm = cold.copy()
+            warm[warm_start.active] = np.where(warm_start.multipliers > 0.0, _AT_UPPER, _AT_LOWER)
+        y, flag, multipliers = self._run(lower, upper, warm, cutoff)
+        if flag not in (_SOLVED, _INFEASIBLE):
+            y, flag, multipliers = self._run(lower, upper, cold, cutoff)
+        if flag not in (_SOLVED, _INFEASIBLE):
+            usual_settings = self._model.settings
+            self._model.settings = _CAREFUL_SETTINGS
+            y, flag, multipliers = self._run(lower, upper, cold, cutoff)
+            self._model.settings = usual_settings
+        if flag not in (_SOLVED, _INFEASIBLE):
             raise NotConverged
-        if flag == _EXCLUDED:
+        if flag == _INFEASIBLE:
             return None
         active = multipliers.nonzero()[0]
-        return Point(y, 0.5 * float(y @ y), lower, upper, active, multipliers[active])
+        return QPSolution(y, 0.5 * float(y @ y), lower, upper, active, multipliers[active])
 
     def _run(
-        self, lower: Array, upper: Array, sense: NDArray[np.intc], limit: float
+        self, lower: Array, upper: Array, sense: NDArray[np.intc], cutoff: float
     ) -> tuple[Array, int, Array]:
-        self._model.settings = {"fval_bound": limit}
+        self._model.settings = {"fval_bound": cutoff}
         flag = self._model.update(bupper=upper, blower=lower, sense=sense)
-        if flag < 0:  # excluded at once: a lower bound is above its upper bound
+        if flag < 0:  # infeasible at once: a lower bound is above its upper bound
             return lower, flag, lower
         y, _, flag, details = self._model.solve()
         return y, flag, details["lam"]
-
-
-def _warmed(cold: NDArray[np.intc], guess: Point | None) -> NDArray[np.intc]:
-    if guess is None:
-        return cold
-    sense = cold.copy()
-    sense[guess.active] = np.where(guess.multipliers > 0.0, _AT_UPPER, _AT_LOWER)
-    return sense

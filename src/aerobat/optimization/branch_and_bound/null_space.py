@@ -1,4 +1,4 @@
-"""The equalities eliminated: what is left is the shortest vector that satisfies the range rows.
+"""Equalities eliminated: what is left is the shortest vector that satisfies the range rows.
 
 With H = L Lᵀ and w = Lᵀ x + L⁻¹ f the cost is ½|w|² plus a constant. The equalities G w = d leave
 w = G⁺ d + Z y, Z an orthonormal basis of the null space of G, so that
@@ -14,174 +14,176 @@ from math import inf, sqrt
 import numpy as np
 
 from aerobat.arrays import Array
-from aerobat.optimization.assignment import AssignmentProgram, Indices, Mask, lengths
+from aerobat.optimization.assignment import AssignmentProgram, Indices, Mask, row_norms
 
 UNBOUNDED = 1e30  # an infinite bound, as DAQP writes it
-_VANISHED = 1e-9  # a row shorter than this share of its length has no free direction left
-_ROOT = sqrt(2.0)
-_RANK = 1e-11  # singular values below this share of the largest are zero
-_CONSISTENT = (
-    1e-7  # residual of redundant equalities and of rows without freedom, relative to max(1, |bound|)
-)
+_RANK_TOLERANCE = 1e-11  # singular values below this fraction of the largest are zero
+_CONSTANT_ROW_TOLERANCE = 1e-9  # a row whose projection is below this fraction of its norm cannot change
+_CONSISTENCY_TOLERANCE = 1e-7  # residual of redundant equalities and of constant rows, relative to scale
 
 
 @dataclass(frozen=True, eq=False)
-class Bounds:
+class ReducedBounds:
     """lower <= M y <= upper, y in units of `unit`: what a program's right-hand sides become."""
 
     lower: Array  # (m + 1,)
     upper: Array  # (m + 1,)
-    base: float  # the cost at y = 0, in units of unit²
-    shift: Array  # (m + 1,) the program's rows at y = 0
-    slack: Array  # (m + 1,) how far rows without freedom may miss their bounds
-    origin: Array  # (n,) x at y = 0
-    size: float  # no solution has a shorter w
-    consistent: bool  # False where equalities, or rows without freedom, contradict each other
+    base_cost: float  # the cost at y = 0, in units of unit²
+    row_offset: Array  # (m + 1,) the program's rows at y = 0
+    slack: Array  # (m + 1,) how far constant rows may miss their bounds
+    x_offset: Array  # (n,) x at y = 0
+    min_norm: float  # no solution has a shorter w
+    consistent: bool  # False where equalities, or constant rows, contradict each other
     unit: float = 1.0
 
-    def over(self, unit: float) -> Bounds:
-        """The same in units of `unit`, infinities as DAQP writes them: its tolerances are absolute."""
-        lower, upper = in_units(self.lower, unit), in_units(self.upper, unit)
-        return replace(self, lower=lower, upper=upper, base=self.base / unit**2, unit=unit)
+    def in_units(self, unit: float) -> ReducedBounds:
+        """Return the same in units of `unit`, infinities as DAQP writes them: its tolerances are absolute."""
+        lower = in_units(self.lower, unit)
+        upper = in_units(self.upper, unit)
+        return replace(self, lower=lower, upper=upper, base_cost=self.base_cost / unit**2, unit=unit)
 
     def cost(self, value: float) -> float:
-        """The cost where ½|y|² is `value`."""
-        return self.unit**2 * (self.base + value)
+        """Return the cost where ½|y|² is `value`."""
+        return self.unit**2 * (self.base_cost + value)
 
 
 @dataclass(frozen=True, eq=False)
-class Part:
-    """Some variables, and the rows that speak of them and of no others."""
+class Block:
+    """Some variables, and the rows that involve them and no others."""
 
     columns: Mask  # (n,)
     equalities: Mask  # (p,)
     rows: Mask  # (m,)
 
 
-class Reduction:
-    """Some variables of a program that no row links to the others, in the null space of their equalities.
+class NullSpace:
+    """One block of a program in the null space of its equalities.
 
-    Depends on the program's matrices alone; `bounds` brings the bounds in. One all-zero row, `zero`, is
-    appended to the range rows: whatever has fewer rows than its fellows points there.
+    Depends on the program's matrices alone; `bounds` brings the right-hand sides in. One all-zero row,
+    `zero_row`, is appended to the range rows: stages with fewer rows than others are padded with it.
     """
 
-    def __init__(self, program: AssignmentProgram, part: Part, pinned: Mask) -> None:
-        """`pinned` (m,) marks the range rows that are equalities, whatever dt."""
-        self.columns, self.ranges = np.flatnonzero(part.columns), np.flatnonzero(part.rows)
-        self.equalities = np.flatnonzero(part.equalities)
-        self.pinned = np.flatnonzero(part.rows & pinned)
-        whitening = _Whitening(program, self.columns)
-        self._eliminate(program, whitening)
-        self._project(program, whitening, pinned[self.ranges])
+    def __init__(self, program: AssignmentProgram, block: Block, implicit_equalities: Mask) -> None:
+        """`implicit_equalities` (m,) marks the range rows whose two bounds are equal."""
+        self.columns = np.flatnonzero(block.columns)
+        self.ranges = np.flatnonzero(block.rows)
+        self._equalities = np.flatnonzero(block.equalities)
+        self._implicit_equalities = np.flatnonzero(block.rows & implicit_equalities)
+        scaling = _CholeskyScaling(program, self.columns)
+        self._eliminate(program, scaling)
+        self._project(program, scaling, implicit_equalities[self.ranges])
 
-    def _eliminate(self, program: AssignmentProgram, whitening: _Whitening) -> None:
-        stacked = np.concatenate([program.equality[self.equalities], program.rows[self.pinned]])
-        stacked = stacked[:, self.columns]
-        equality = whitening.rows(stacked)
-        length = lengths(equality)
-        self._unit = 1.0 / np.where(length > 0.0, length, 1.0)
-        equality = equality * self._unit[:, None]
+    def _eliminate(self, program: AssignmentProgram, scaling: _CholeskyScaling) -> None:
+        rows = np.concatenate([program.equality[self._equalities], program.rows[self._implicit_equalities]])
+        rows = rows[:, self.columns]
+        equality = scaling.scale_rows(rows)
+        norms = row_norms(equality)
+        self._equality_scale = 1.0 / np.where(norms > 0.0, norms, 1.0)
+        equality = equality * self._equality_scale[:, None]
         left, singular, right = np.linalg.svd(equality, full_matrices=True)
-        rank = int((singular > _RANK * singular.max(initial=0.0)).sum())
-        pseudo_inverse = right[:rank].T @ (left[:, :rank] / singular[:rank]).T
-        self._least = pseudo_inverse
-        self._inconsistency = np.eye(len(equality)) - equality @ pseudo_inverse
-        self._offset = float(np.linalg.norm(whitening.offset))
-        self._centre = -whitening.lifted(whitening.offset)
-        self._centre_equality = stacked @ self._centre
-        self._from_target = whitening.lifted(pseudo_inverse)
-        self.from_free = whitening.lifted(right[rank:].T)
+        rank = int((singular > _RANK_TOLERANCE * singular.max(initial=0.0)).sum())
+        self._pseudo_inverse = right[:rank].T @ (left[:, :rank] / singular[:rank]).T
+        self._residual_projector = np.eye(len(equality)) - equality @ self._pseudo_inverse
+        self._w_offset_norm = float(np.linalg.norm(scaling.offset))
+        self._unconstrained_x = -scaling.unscale(scaling.offset)
+        self._unconstrained_equality = rows @ self._unconstrained_x
+        self._x_from_target = scaling.unscale(self._pseudo_inverse)
+        self._x_from_y = scaling.unscale(right[rank:].T)
 
-    def _project(self, program: AssignmentProgram, whitening: _Whitening, pinned: Mask) -> None:
+    def _project(self, program: AssignmentProgram, scaling: _CholeskyScaling, fixed: Mask) -> None:
         rows = program.rows[self.ranges][:, self.columns]
-        projected, self._length = rows @ self.from_free, lengths(whitening.rows(rows))
-        norm = lengths(projected)
-        constant = (norm <= _VANISHED * self._length) | pinned
+        projected = rows @ self._x_from_y
+        norm = row_norms(projected)
+        self._row_norms = row_norms(scaling.scale_rows(rows))
+        constant = (norm <= _CONSTANT_ROW_TOLERANCE * self._row_norms) | fixed
         norm[constant] = 1.0
         projected[constant] = 0.0
-        self.constant, self.norm = np.append(constant, True), np.append(norm, 1.0)
-        self.zero = len(rows)  # the appended row
+        self.constant = np.append(constant, True)
+        self._projected_norms = np.append(norm, 1.0)
+        self.zero_row = len(rows)
         self.rows = np.zeros((len(rows) + 1, projected.shape[1]))
         np.divide(projected, norm[:, None], out=self.rows[:-1])
-        self._rows_from_target = rows @ self._from_target
-        self._rows_centre = rows @ self._centre
+        self._rows_from_target = rows @ self._x_from_target
+        self._unconstrained_rows = rows @ self._unconstrained_x
 
-    def bounds(self, program: AssignmentProgram, lower: Array, upper: Array) -> Bounds:
-        """What is left of the program's targets and of the given bounds (m,) of its range rows."""
-        target = np.concatenate([program.target[self.equalities], lower[self.pinned]])
-        target = (target - self._centre_equality) * self._unit
-        least, missed = self._least @ target, np.abs(self._inconsistency @ target)
-        size = float(np.linalg.norm(least))
-        shift = np.append(self._rows_centre + self._rows_from_target @ target, 0.0)
-        slack = np.append(_CONSISTENT * self._length * np.hypot(size, self._offset), 0.0)
-        low = self.scaled(np.append(lower[self.ranges], -inf), shift)
-        high = self.scaled(np.append(upper[self.ranges], inf), shift)
+    def bounds(self, program: AssignmentProgram, lower: Array, upper: Array) -> ReducedBounds:
+        """Return what is left of the program's targets and of bounds (m,) of its range rows."""
+        target = np.concatenate([program.target[self._equalities], lower[self._implicit_equalities]])
+        target = (target - self._unconstrained_equality) * self._equality_scale
+        missed = np.abs(self._residual_projector @ target)
+        norm = float(np.linalg.norm(self._pseudo_inverse @ target))
+        offset = np.append(self._unconstrained_rows + self._rows_from_target @ target, 0.0)
+        scale = self._row_norms * np.hypot(norm, self._w_offset_norm)
+        slack = np.append(_CONSISTENCY_TOLERANCE * scale, 0.0)
+        low = self.normalized(np.append(lower[self.ranges], -inf), offset)
+        high = self.normalized(np.append(upper[self.ranges], inf), offset)
         fits = (low <= slack) & (high >= -slack) | ~self.constant
-        low, high = np.where(self.constant, -inf, low), np.where(self.constant, inf, high)
-        return Bounds(
+        low = np.where(self.constant, -inf, low)
+        high = np.where(self.constant, inf, high)
+        max_missed = _CONSISTENCY_TOLERANCE * np.abs(target).max(initial=0.0)
+        return ReducedBounds(
             lower=low,
             upper=high,
-            base=0.5 * (size**2 - self._offset**2),
-            shift=shift,
+            base_cost=0.5 * (norm**2 - self._w_offset_norm**2),
+            row_offset=offset,
             slack=slack,
-            origin=self._centre + self._from_target @ target,
-            size=max(size, low.max(initial=0.0), -high.min(initial=0.0)),
-            consistent=bool(fits.all() and (missed <= _CONSISTENT * np.abs(target).max(initial=0.0)).all()),
+            x_offset=self._unconstrained_x + self._x_from_target @ target,
+            min_norm=max(norm, low.max(initial=0.0), -high.min(initial=0.0)),
+            consistent=bool(fits.all() and (missed <= max_missed).all()),
         )
 
-    def scaled(self, bound: Array, shift: Array, rows: Indices | slice = slice(None)) -> Array:
-        """`bound`, of the program's rows, which are `shift` at y = 0, as a bound of M y."""
-        scaled: Array = (bound - shift[rows]) / self.norm[rows]
-        return scaled
+    def normalized(self, bound: Array, row_offset: Array, rows: Indices | slice = slice(None)) -> Array:
+        """Return `bound`, of the program's rows, which are `row_offset` at y = 0, as a bound of M y."""
+        normalized: Array = (bound - row_offset[rows]) / self._projected_norms[rows]
+        return normalized
 
-    def lifted(self, at: Bounds, y: Array) -> Array:
-        """The variables x of this part at y."""
-        x: Array = at.origin + self.from_free @ (at.unit * y)
+    def expand(self, bounds: ReducedBounds, y: Array) -> Array:
+        """Return the variables x of this block at y."""
+        x: Array = bounds.x_offset + self._x_from_y @ (bounds.unit * y)
         return x
 
 
 def in_units(bound: Array, unit: float) -> Array:
-    """`bound` / `unit`, infinities as DAQP writes them."""
+    """Return `bound` / `unit`, infinities as DAQP writes them."""
     scaled: Array = np.clip(bound / unit, -UNBOUNDED, UNBOUNDED)
     return scaled
 
 
-def parts(program: AssignmentProgram, rows: Indices) -> tuple[Part, Part]:
-    """The program split in two that share nothing: all that range rows `rows` are linked to, and the rest."""
-    links = [np.abs(program.equality), np.abs(program.rows)]
+def split_coupled(program: AssignmentProgram, rows: Indices) -> tuple[Block, Block]:
+    """Split a program in two blocks that share nothing: all that range rows `rows` couple, and the rest."""
+    couplings = [np.abs(program.equality), np.abs(program.rows)]
     if program.hessian is not None:
-        links.append(np.abs(program.hessian))
-    incidence = np.concatenate(links)
-    columns: Mask = np.any(incidence[len(program.equality) + rows], axis=0)
+        couplings.append(np.abs(program.hessian))
+    incidence = np.concatenate(couplings)
+    p = len(program.equality)
+    columns: Mask = np.any(incidence[p + rows], axis=0)
     while True:
         touched = incidence @ columns > 0.0
-        linked = columns | (touched @ incidence > 0.0)
-        if (linked == columns).all():
+        coupled = columns | (touched @ incidence > 0.0)
+        if (coupled == columns).all():
             break
-        columns = linked
-    equalities, ranges = (
-        touched[: len(program.equality)],
-        touched[len(program.equality) :][: len(program.rows)],
-    )
+        columns = coupled
+    equalities = touched[:p]
+    ranges = touched[p : p + len(program.rows)]
     ranges[rows] = True
-    return Part(columns, equalities, ranges), Part(~columns, ~equalities, ~ranges)
+    return Block(columns, equalities, ranges), Block(~columns, ~equalities, ~ranges)
 
 
-class _Whitening:
+class _CholeskyScaling:
     """x = L⁻ᵀ (w − offset), with L = √2 where the program has no hessian."""
 
     def __init__(self, program: AssignmentProgram, columns: Indices) -> None:
         gradient = np.zeros(len(columns)) if program.gradient is None else program.gradient[columns]
         self._inverse: Array | None = None
-        self.offset = gradient / _ROOT  # L⁻¹ f
+        self.offset = gradient / sqrt(2.0)  # L⁻¹ f
         if program.hessian is not None:
             self._inverse = np.linalg.inv(np.linalg.cholesky(program.hessian[np.ix_(columns, columns)]))
             self.offset = self._inverse @ gradient
 
-    def rows(self, matrix: Array) -> Array:
-        """Rows over x as rows over w."""
-        return matrix / _ROOT if self._inverse is None else matrix @ self._inverse.T
+    def scale_rows(self, matrix: Array) -> Array:
+        """Return rows over x as rows over w."""
+        return matrix / sqrt(2.0) if self._inverse is None else matrix @ self._inverse.T
 
-    def lifted(self, vectors: Array) -> Array:
-        """L⁻ᵀ times vectors w, its columns."""
-        return vectors / _ROOT if self._inverse is None else self._inverse.T @ vectors
+    def unscale(self, vectors: Array) -> Array:
+        """Return L⁻ᵀ times vectors w, its columns."""
+        return vectors / sqrt(2.0) if self._inverse is None else self._inverse.T @ vectors

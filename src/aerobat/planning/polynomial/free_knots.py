@@ -14,7 +14,7 @@ import numpy as np
 from aerobat.certification import Certificate, Verdict
 from aerobat.errors import Infeasible, SpecError
 from aerobat.flatness import end_thrust
-from aerobat.optimization.nonlinear import NonlinearResult, symbolics
+from aerobat.optimization.nonlinear import NonlinearResult, import_casadi
 from aerobat.planning.miqp import Miqp
 from aerobat.planning.polynomial.knot_bounds import Bound, path_bounds
 from aerobat.planning.polynomial.knot_program import KnotProgram
@@ -78,7 +78,7 @@ class FreeKnots:
                 "the free-knots planner needs a vehicle: no limits, no least time; give --vehicle"
             )
         _check(problem, vehicle)
-        symbolics()
+        import_casadi()
         run = _Run.of(self, problem, vehicle, progress)
         for start in run.starts():
             run.descend(start)

@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 
 from aerobat.arrays import Array
-from aerobat.optimization.nonlinear import NonlinearProgram, NonlinearResult, solve, symbolics
+from aerobat.optimization.nonlinear import NonlinearProgram, NonlinearResult, import_casadi, solve_nonlinear
 from aerobat.planning.polynomial.knot_bounds import Bound
 from aerobat.planning.polynomial.knot_variables import DEGREE, GIVEN, Frame, KnotVariables
 from aerobat.planning.polynomial.rotor_rows import RotorRows
@@ -58,7 +58,9 @@ class KnotProgram:
     def solve(self, iterations: int) -> tuple[Guess, NonlinearResult]:
         """The solution near the guess, as the next guess. Raises BackendMissing without CasADi."""
         start = self._variables.start
-        answer = solve(self._program, start, iterations=iterations, tolerance=TOLERANCE, barrier=WARM)
+        answer = solve_nonlinear(
+            self._program, start, max_iterations=iterations, tolerance=TOLERANCE, initial_barrier=WARM
+        )
         return self._variables.read(answer.x), answer
 
     @cached_property
@@ -77,7 +79,7 @@ class KnotProgram:
 
     @cached_property
     def _program(self) -> NonlinearProgram:
-        ca, variables = symbolics(), self._variables
+        ca, variables = import_casadi(), self._variables
         rows = [self._rotors(), *self._path(), *self._stages(), *self._order()]
         durations = [variables.duration(i) for i in range(len(self.samples))]
         return NonlinearProgram(
@@ -91,7 +93,7 @@ class KnotProgram:
 
     def _rotors(self) -> _Rows:
         """Limits of rotors and the floor of thrust at all samples."""
-        ca, trajectory, variables = symbolics(), self.guess.trajectory, self._variables
+        ca, trajectory, variables = import_casadi(), self.guess.trajectory, self._variables
         rotors = RotorRows(self.vehicle, variables.frame.axes, self.problem.environment, self.problem.heading)
         moving = [
             ca.vertcat(*((ca.DM(_powers(s, k)) @ variables.coefficients[i]).T for k in range(1, GIVEN)))
@@ -116,7 +118,7 @@ class KnotProgram:
 
     def _stages(self) -> Iterator[_Rows]:
         """What the stages ask, each at its place."""
-        ca, variables = symbolics(), self._variables
+        ca, variables = import_casadi(), self._variables
         for j, stage in enumerate(self.guess.stages):
             s = variables.place(j)
             for bound in (Bound.of(condition, self.gravity) for condition in stage.conditions):
@@ -126,7 +128,7 @@ class KnotProgram:
 
     def _within(self, bound: Bound, segment: int, at: Any, reserve: float) -> Iterator[_Rows]:
         """Rows that keep a bound with a reserve at powers `at` (n, 10); none where no variable matters."""
-        ca, variables = symbolics(), self._variables
+        ca, variables = import_casadi(), self._variables
         along = bound.direction @ variables.frame.axes
         if np.abs(along).max() < NORMAL:
             return

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from aerobat.arrays import Array
 from aerobat.flatness import end_thrust
-from aerobat.optimization.nonlinear import symbolics
+from aerobat.optimization.nonlinear import import_casadi
 from aerobat.planning.warm_start import Guess
 from aerobat.problem.problem import EndState, Problem
 from aerobat.trajectory import Trajectory, polynomial
@@ -81,7 +81,7 @@ class KnotVariables:
     @cached_property
     def x(self) -> Any:
         """The symbols, a column."""
-        return symbolics().MX.sym("x", len(self.start))
+        return import_casadi().MX.sym("x", len(self.start))
 
     @cached_property
     def start(self) -> Array:
@@ -110,7 +110,7 @@ class KnotVariables:
     @cached_property
     def coefficients(self) -> list[Any]:
         """Of every segment, in the frame, (10, d) each."""
-        ca, d = symbolics(), self.frame.dimensions
+        ca, d = import_casadi(), self.frame.dimensions
         offsets = self.x[len(self._parts) + len(self._places) :]
         values = ca.DM(self._base.ravel()) + ca.sparsify(ca.DM(self._effect)) @ offsets
         ends = ca.vertsplit(ca.reshape(values, d, len(self._base)).T, 2 * GIVEN)

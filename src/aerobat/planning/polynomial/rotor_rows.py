@@ -20,7 +20,7 @@ from aerobat import so3
 from aerobat.arrays import Array
 from aerobat.environment import Environment
 from aerobat.flatness import axial_drag, lateral_drag, reference
-from aerobat.optimization.nonlinear import symbolics
+from aerobat.optimization.nonlinear import import_casadi
 from aerobat.trajectory import Trajectory
 from aerobat.vehicle import Vehicle
 from aerobat.vehicle.allocation import mixer
@@ -53,7 +53,7 @@ class RotorRows:
     @cached_property
     def function(self) -> Any:
         """(derivatives 1 to 4 by normalised time (4 d,), duration, frame) -> values (size,)."""
-        ca, d = symbolics(), self.axes.shape[1]
+        ca, d = import_casadi(), self.axes.shape[1]
         moving, duration = ca.SX.sym("moving", 4 * d), ca.SX.sym("T")
         frame = ca.SX.sym("frame", 3 if self._planar else 9)
         v, a, j, s = (moving[k * d : (k + 1) * d] / duration ** (k + 1) for k in range(4))

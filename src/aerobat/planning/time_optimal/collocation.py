@@ -21,7 +21,7 @@ from typing import Any
 import numpy as np
 
 from aerobat.arrays import Array
-from aerobat.optimization.nonlinear import symbolics
+from aerobat.optimization.nonlinear import import_casadi
 from aerobat.planning.time_optimal.spinless_body import INPUTS, POSITION, STATES, VELOCITY, SpinlessBody
 from aerobat.trajectory import Trajectory, polynomial
 
@@ -51,7 +51,7 @@ class Rates:
 
     def normalised(self, durations: Any) -> list[Any]:
         """The six of them with respect to normalised time, where x' has the unit of x per second."""
-        rows = symbolics().repmat(durations, STATES, 1)
+        rows = import_casadi().repmat(durations, STATES, 1)
         return [rate * rows**k for side in (self.starts, self.ends) for k, rate in enumerate(side)]
 
 
@@ -99,7 +99,7 @@ class Mesh:
 
     def unpack(self, column: Any) -> Motion:
         """The motion of a column of unknowns, in symbols."""
-        ca, K = symbolics(), self.total
+        ca, K = import_casadi(), self.total
         cuts = np.cumsum([0, *self._sizes]).tolist()
         phases, states, inputs = ca.vertsplit(column * self.scale, cuts)
         inputs = ca.reshape(inputs, INPUTS, -1)
@@ -109,7 +109,7 @@ class Mesh:
 
     def read(self, column: Array) -> Motion:
         """The motion of a column of unknowns, in numbers."""
-        motion = self.unpack(symbolics().DM(column))
+        motion = self.unpack(import_casadi().DM(column))
         states, starts, ends = (part.full() for part in (motion.states, motion.starts, motion.ends))
         return Motion(motion.phases.full()[:, 0], states, starts, ends)
 
@@ -130,7 +130,7 @@ class Collocation:
     @cached_property
     def durations(self) -> Any:
         """Of the intervals [s], (1, K)."""
-        return symbolics().reshape(self.motion.phases, 1, -1) @ symbolics().DM(self.mesh.shares)
+        return import_casadi().reshape(self.motion.phases, 1, -1) @ import_casadi().DM(self.mesh.shares)
 
     @cached_property
     def rates(self) -> Rates:
@@ -145,7 +145,7 @@ class Collocation:
 
     def defects(self) -> Any:
         """By how much the quintics miss the next states, (12, K)."""
-        ca, x0, x1 = symbolics(), self.motion.states[:, :-1], self.motion.states[:, 1:]
+        ca, x0, x1 = import_casadi(), self.motion.states[:, :-1], self.motion.states[:, 1:]
         h = ca.repmat(self.durations, 3, 1)
         ends = self.rates.normalised(self.durations)
         missed = x1 - x0 - _combined(INTEGRAL @ QUINTIC, ends) * ca.repmat(self.durations, STATES, 1)
@@ -157,14 +157,14 @@ class Collocation:
         """Acceleration, jerk or snap of the trajectory within all intervals, (3, K) at each place."""
         ends = [rate[VELOCITY, :] for rate in self.rates.normalised(self.durations)]
         basis = polynomial.differentiate(QUINTIC[None], derivative - 2)[0]
-        scale = symbolics().repmat(self.durations, 3, 1) ** (derivative - 2)
+        scale = import_casadi().repmat(self.durations, 3, 1) ** (derivative - 2)
         for powers in np.vander(BETWEEN, len(basis), increasing=True):
             yield _combined(powers @ basis, ends) / scale
 
     def trajectory(self, heading: float) -> Trajectory:
         """The trajectory of a motion in numbers, from its start on, continuous to the last digit."""
-        ends = [symbolics().DM(rate).full()[VELOCITY] for rate in self.rates.normalised(self.durations)]
-        durations = symbolics().DM(self.durations).full()[0]
+        ends = [import_casadi().DM(rate).full()[VELOCITY] for rate in self.rates.normalised(self.durations)]
+        durations = import_casadi().DM(self.durations).full()[0]
         quintics = np.einsum("ij,jdk->kid", QUINTIC, ends) * durations[:, None, None] ** 2
         twice = (np.arange(1, 7) * np.arange(2, 8))[:, None]
         coefficients = np.concatenate([np.zeros((self.mesh.total, 2, 3)), quintics / twice], axis=1)
@@ -176,7 +176,7 @@ class Collocation:
 
     def _on_both_sides(self, function: Any) -> tuple[tuple[Any, ...], tuple[Any, ...]]:
         motion, columns = self.motion, function.map(self.mesh.total)
-        slope = (motion.ends - motion.starts) / symbolics().repmat(self.durations, INPUTS, 1)
+        slope = (motion.ends - motion.starts) / import_casadi().repmat(self.durations, INPUTS, 1)
         return (
             columns(motion.states[:, :-1], motion.starts, slope),
             columns(motion.states[:, 1:], motion.ends, slope),

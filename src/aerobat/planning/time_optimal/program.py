@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 
 from aerobat.arrays import Array
 from aerobat.environment import Environment
-from aerobat.optimization.nonlinear import NonlinearProgram, symbolics
+from aerobat.optimization.nonlinear import NonlinearProgram, import_casadi
 from aerobat.planning.time_optimal.collocation import Collocation, Mesh, Motion
 from aerobat.planning.time_optimal.spinless_body import (
     ATTITUDE,
@@ -93,7 +93,7 @@ class OptimalControl:
 
     def program(self, bounds: Bounds) -> NonlinearProgram:
         """The program of the mesh's unknowns."""
-        column = symbolics().MX.sym("motion", self.mesh.size)
+        column = import_casadi().MX.sym("motion", self.mesh.size)
         collocation = self.of(self.mesh.unpack(column))
         rows = _Rows()
         rows.hold(collocation.defects(), 0.0, 0.0)
@@ -127,7 +127,7 @@ class OptimalControl:
 
     def _hold(self, rows: _Rows, condition: Condition, values: Any) -> None:
         """A condition on values (3, m) of its derivative."""
-        along = symbolics().DM(condition.direction).T @ values
+        along = import_casadi().DM(condition.direction).T @ values
         rows.hold(along, *condition.kinematic_bounds(self.environment.gravity))
 
     def _around(self, collocation: Collocation, derivative: int, node: int) -> Iterator[Any]:
@@ -180,7 +180,7 @@ class OptimalControl:
 
     def _cost(self, motion: Motion) -> Any:
         """The duration, and a little for changing the input."""
-        ca, scale = symbolics(), symbolics().DM(1.0 / self.mesh.input_scale)
+        ca, scale = import_casadi(), import_casadi().DM(1.0 / self.mesh.input_scale)
         changes = (motion.ends - motion.starts, motion.starts[:, 1:] - motion.ends[:, :-1])
         spread = sum(ca.sumsqr(ca.diag(scale) @ change) for change in changes)
         return ca.sum1(motion.phases) + CHANGE_COST / self.mesh.total * spread
@@ -197,10 +197,14 @@ class _Rows:
     def hold(self, values: Any, lower: ArrayLike, upper: ArrayLike) -> None:
         """lower ≤ values ≤ upper, every column alike."""
         rows, columns = values.shape
-        self.expressions.append(symbolics().vec(values))
+        self.expressions.append(import_casadi().vec(values))
         self.lower.append(np.tile(np.broadcast_to(lower, rows), columns))
         self.upper.append(np.tile(np.broadcast_to(upper, rows), columns))
 
     def stacked(self) -> tuple[Any, Array, Array]:
         """All of them in one column."""
-        return symbolics().vertcat(*self.expressions), np.concatenate(self.lower), np.concatenate(self.upper)
+        return (
+            import_casadi().vertcat(*self.expressions),
+            np.concatenate(self.lower),
+            np.concatenate(self.upper),
+        )

@@ -23,7 +23,7 @@ from aerobat.kernels.control import Model
 from aerobat.kernels.controller import Controller
 from aerobat.kernels.rigid_body import Body, Load
 from aerobat.kernels.vectors import add, axes, cross, transform
-from aerobat.optimization.nonlinear import symbolics
+from aerobat.optimization.nonlinear import import_casadi
 from aerobat.vehicle import Vehicle
 
 STATES = 12
@@ -51,7 +51,7 @@ class SpinlessBody:
     @cached_property
     def rotors(self) -> Any:
         """(x, u, u') -> the rotors' least-norm thrusts [N], and their commands f + τ f' [N], each (n,)."""
-        ca = symbolics()
+        ca = import_casadi()
         thrusts = ca.vertcat(*demand(self._model.mixer, self._load()))
         commands = thrusts + ca.DM(self.vehicle.lags) * self._along(thrusts)
         return self._function("rotors", [thrusts, commands])
@@ -59,13 +59,13 @@ class SpinlessBody:
     @cached_property
     def thrust_axes(self) -> Any:
         """x -> the body axes in the world as columns, (3, 3)."""
-        ca = symbolics()
+        ca = import_casadi()
         columns = [ca.vertcat(*axis) for axis in axes(_scalars(self._x[ATTITUDE]))]
         return ca.Function("thrust_axes", [self._x], [ca.horzcat(*columns)])
 
     @cached_property
     def _symbols(self) -> tuple[Any, Any, Any]:
-        sx = symbolics().SX
+        sx = import_casadi().SX
         return sx.sym("x", STATES), sx.sym("u", INPUTS), sx.sym("slope", INPUTS)
 
     @property
@@ -95,16 +95,16 @@ class SpinlessBody:
         """x' by the kernel that the simulation runs (paper, eqs. (3) and (4))."""
         rate = rigid_body.derivative(self._model.airframe.inertial, self._body(), self._load())
         wx, wy, _ = rate.omega_body
-        return symbolics().vertcat(*rate.position, *rate.velocity, *rate.q_world_body, wx, wy)
+        return import_casadi().vertcat(*rate.position, *rate.velocity, *rate.q_world_body, wx, wy)
 
     def _along(self, expression: Any) -> Any:
         """The time derivative of an expression in x and u."""
         x, u, slope = self._symbols
-        jtimes = symbolics().jtimes
+        jtimes = import_casadi().jtimes
         return jtimes(expression, x, self._rate()) + jtimes(expression, u, slope)
 
     def _function(self, name: str, outputs: list[Any]) -> Any:
-        return symbolics().Function(name, list(self._symbols), outputs)
+        return import_casadi().Function(name, list(self._symbols), outputs)
 
 
 def _scalars(column: Any) -> tuple[Any, ...]:

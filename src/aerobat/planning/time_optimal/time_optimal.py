@@ -18,7 +18,7 @@ from aerobat.certification import Certificate, Side
 from aerobat.environment import Environment
 from aerobat.errors import Infeasible, SpecError
 from aerobat.flatness import axial_drag, end_thrust
-from aerobat.optimization.nonlinear import NonlinearResult, solve, symbolics
+from aerobat.optimization.nonlinear import NonlinearResult, import_casadi, solve_nonlinear
 from aerobat.planning.feasibility import RotorMargin, rotor_margin
 from aerobat.planning.miqp import Miqp
 from aerobat.planning.proof import certificate_for
@@ -83,7 +83,7 @@ class TimeOptimal:
                 "the time-optimal planner needs a vehicle: no limits, no least time; give --vehicle"
             )
         _check(problem, vehicle)
-        symbolics()
+        import_casadi()
         attempts: list[Attempt] = []
         runs = (
             _Run(self, problem, flown, guess, attempts, progress)
@@ -202,7 +202,7 @@ class _Run:
     def _solved(self, x: Array, inside: _Inside, barrier: float | None) -> _Found | None:
         """The solution near x; None where there is none."""
         program = self._control.program(_bounds(self._vehicle, self._config.reserve, inside))
-        answer = solve(program, x, iterations=self._config.iterations, barrier=barrier)
+        answer = solve_nonlinear(program, x, max_iterations=self._config.iterations, initial_barrier=barrier)
         motion = self._control.mesh.read(answer.x)
         if not answer.converged:
             return self._record(answer, motion.phases, None, f"the solver {answer.status}")

@@ -1,0 +1,217 @@
+"""Lower bounds on the cost of a node with one more candidate, or two, from the node's own multipliers."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from aerobat.arrays import Array
+from aerobat.optimization.assignment import Indices, Mask
+from aerobat.optimization.branch_and_bound.candidates import (
+    FEASIBILITY_TOLERANCE,
+    CandidateBounds,
+    Candidates,
+)
+from aerobat.optimization.branch_and_bound.dual_ascent import MIN_DIVISOR, DualDirections, dual_ascent
+from aerobat.optimization.branch_and_bound.least_distance import QPSolution
+
+_CANCELLATION = 1e-13  # of the largest term of a dual objective, by which its terms may cancel wrongly
+_MIN_SQUARE = 1e-9  # a unit row's square off the active rows is taken no smaller
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class DualSteps:
+    """By how much dual ascent moved the multipliers: the w active ones, and those of q candidates' k rows.
+
+    By a fraction θ of its step the dual objective rises by slope · θ − ½ curvature · θ².
+    """
+
+    active_rows: Array  # (w, n)
+    multiplier_change: Array  # (w, q) of the active rows
+    fraction_lost: Array  # (w, q) of the active multipliers, zero for equalities
+    row_index: Indices  # (k, q) the candidates' rows, among those that candidates have
+    own_multipliers: Array  # (k, q) of these rows
+    slope: Array  # (q,)
+    curvature: Array  # (q,)
+    blocked: frozenset[int]  # of the q, which further steps might raise
+    satisfied: Mask  # (q,) the node's solution satisfies the candidate as it is
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class LowerBounds:
+    """Lower bounds on the cost of a node with one more candidate, for q of them, sorted by group."""
+
+    candidates: Indices  # (q,)
+    group: Indices  # (q,)
+    value: Array  # (q,) no y of the node that satisfies the candidate too has a smaller ½|y|²
+    steps: DualSteps | None = None  # that prove them; None where they are inherited from another node
+
+    def restricted(self, allowed: Mask, cutoff: float) -> LowerBounds:
+        """Return those of candidates `allowed` (P,) that may be below `cutoff`, for nodes further down."""
+        keep = allowed[self.candidates] & (self.value < cutoff)
+        return LowerBounds(self.candidates[keep], self.group[keep], self.value[keep])
+
+    def covers_all_stages(self, groups: Sequence[int]) -> bool:
+        """Tell if each of `groups`, which are all that occur, has a candidate."""
+        return len(set(self.group.tolist())) == len(groups)
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class _ActiveSet:
+    """The w active rows of a solution, and their products with the u rows that candidates have."""
+
+    rows: Array  # (w, n)
+    gram: Array  # (w, w)
+    inverse_gram: Array  # (w, w)
+    cross_gram: Array  # (w, u)
+    squares: Array  # (u,) of the candidates' rows, projected off the active rows
+    bound: Array  # (w, 1) that is active
+    is_equality: Mask  # (w,)
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class _Violations:
+    """By how much a solution violates q candidates of k rows, and the dual directions that follow."""
+
+    row_index: Indices  # (k, q)
+    nearest: Array  # (k, q) to the solution's row values, within the bounds
+    violation: Array  # (k, q) of them, positive above the upper bound
+    direction: Array  # (k, q) of the rows' multipliers
+    coupling: Array  # (w, q) products of that direction with the active rows
+    square: Array  # (q,) of that direction
+
+
+class DualBounds:
+    """Lower bounds by dual ascent. Depends on the matrices and on the stages' rows alone."""
+
+    def __init__(self, candidates: Candidates, rows: Array) -> None:
+        """`rows` are M, those of the null space."""
+        self._candidates = candidates
+        self._rows = rows
+        is_used = np.zeros(len(rows), dtype=bool)
+        is_used[candidates.rows] = True
+        self._row_index = (is_used.cumsum() - 1)[candidates.rows]  # (k, P)
+        self._used_rows = rows[is_used]  # (u, n)
+        self._cross_gram = rows @ self._used_rows.T  # (m + 1, u)
+        gram = self._cross_gram[is_used]
+        self._squares = gram.diagonal()
+        self._candidate_grams = gram[self._row_index[:, None], self._row_index]  # (k, k, P)
+
+    def root_bounds(self, bounds: CandidateBounds) -> LowerBounds:
+        """Return zero for all possible candidates."""
+        possible = np.flatnonzero(bounds.possible)
+        return LowerBounds(possible, self._candidates.group[possible], np.zeros(len(possible)))
+
+    def single_bounds(
+        self, solution: QPSolution, bounds: CandidateBounds, inherited: LowerBounds
+    ) -> LowerBounds:
+        """Return the lower bounds for the node of `solution` with any one of the candidates inherited.
+
+        The multipliers of a candidate's violated rows rise, each by its violation over its square off the
+        active rows, and those of the active rows follow. The bound is the dual objective −½|Mᵀλ|² − λᵀb at
+        the multipliers so reached: they are dual feasible, hence it is a bound whatever the steps were.
+        """
+        active = self._active_set(solution)
+        violations = self._violations(solution, bounds, inherited, active)
+        rate = active.inverse_gram @ violations.coupling
+        slope = np.einsum("kq,kq->q", violations.violation, violations.direction)
+        curvature = violations.square - np.einsum("wq,wq->q", violations.coupling, rate)
+        curvature = np.maximum(curvature, _MIN_SQUARE * slope + MIN_DIVISOR)
+        directions = DualDirections(rate, slope, curvature)
+        multipliers, step, blocked = dual_ascent(
+            active.inverse_gram, solution.multipliers, active.is_equality, directions
+        )
+        linear = step * violations.coupling + active.bound
+        dual = -np.einsum("wq,wq->q", multipliers, 0.5 * (active.gram @ multipliers) + linear)
+        own_linear = np.einsum("kq,kq->q", violations.direction, violations.nearest)
+        dual -= step * (own_linear + (0.5 + _CANCELLATION) * step * violations.square)
+        value = np.maximum(np.maximum(dual, inherited.value), solution.value)
+        change = multipliers - solution.multipliers[:, None]
+        rise = step * slope
+        steps = DualSteps(
+            active_rows=active.rows,
+            multiplier_change=change,
+            fraction_lost=change / np.where(active.is_equality, -np.inf, -solution.multipliers)[:, None],
+            row_index=violations.row_index,
+            own_multipliers=step * violations.direction,
+            slope=rise,
+            curvature=2.0 * np.maximum(rise - (dual - solution.value), 0.0),
+            blocked=frozenset(blocked.tolist()),
+            satisfied=np.all(np.abs(violations.violation) <= FEASIBILITY_TOLERANCE, axis=0),
+        )
+        return LowerBounds(inherited.candidates, inherited.group, value, steps)
+
+    def pairwise_bounds(
+        self, solution: QPSolution, lower_bounds: LowerBounds, steps: DualSteps, some: Indices
+    ) -> Array:
+        """Return the lower bounds for one of `some` and another of the q candidates together, (c, q).
+
+        Both candidates' steps are taken by the same fraction θ: the best that keeps the signs of the active
+        multipliers. Infinite where the two are not compatible.
+
+        Args:
+            solution: of the node.
+            lower_bounds: of the node, for q candidates.
+            steps: that prove those.
+            some: c of the q candidates, (c,).
+        """
+        moved = steps.multiplier_change[:, some].T @ steps.active_rows
+        moved += np.einsum(
+            "kc,kcn->cn", steps.own_multipliers[:, some], self._used_rows[steps.row_index[:, some]]
+        )
+        products = (moved @ self._used_rows.T).take(steps.row_index, axis=1)
+        cross = np.einsum("ckq,kq->cq", products, steps.own_multipliers)
+        cross += (moved @ steps.active_rows.T) @ steps.multiplier_change
+        slope = steps.slope[some, None] + steps.slope
+        separate = steps.curvature[some, None] + steps.curvature
+        curvature = separate + 2.0 * cross
+        lost = (steps.fraction_lost[:, some, None] + steps.fraction_lost[:, None]).max(axis=0, initial=1.0)
+        fraction = np.minimum(slope / np.maximum(curvature, slope + MIN_DIVISOR), 1.0 / lost)  # at most 1
+        rise = fraction * (slope - fraction * (0.5 * curvature + _CANCELLATION * separate))
+        alone = np.maximum(lower_bounds.value[some, None], lower_bounds.value)
+        bounds: Array = np.maximum(solution.value + rise, alone)
+        candidates = lower_bounds.candidates
+        bounds[~self._candidates.compatible[candidates[some, None], candidates]] = np.inf
+        return bounds
+
+    def _active_set(self, solution: QPSolution) -> _ActiveSet:
+        lower = solution.lower[solution.active]
+        upper = solution.upper[solution.active]
+        rows = self._rows[solution.active]
+        gram = rows @ rows.T
+        inverse_gram = np.asarray(np.linalg.inv(gram), dtype=np.float64)
+        cross_gram = self._cross_gram[solution.active]
+        squares = self._squares - np.einsum("wu,wu->u", cross_gram, inverse_gram @ cross_gram)
+        return _ActiveSet(
+            rows=rows,
+            gram=gram,
+            inverse_gram=inverse_gram,
+            cross_gram=cross_gram,
+            squares=np.maximum(squares, _MIN_SQUARE),
+            bound=np.where(solution.multipliers > 0.0, upper, lower)[:, None],
+            is_equality=lower == upper,
+        )
+
+    def _violations(
+        self, solution: QPSolution, bounds: CandidateBounds, inherited: LowerBounds, active: _ActiveSet
+    ) -> _Violations:
+        candidates = inherited.candidates
+        width = self._candidates.widths[inherited.group].max(initial=0)
+        row_index = self._row_index[:width].take(candidates, axis=1)
+        lower = bounds.lower[:width].take(candidates, axis=1)
+        upper = bounds.upper[:width].take(candidates, axis=1)
+        values = (self._used_rows @ solution.y).take(row_index)
+        nearest = np.minimum(np.maximum(values, lower), upper)
+        violation = values - nearest
+        direction = violation / active.squares.take(row_index)
+        grams = self._candidate_grams[:width, :width].take(candidates, axis=2)
+        return _Violations(
+            row_index=row_index,
+            nearest=nearest,
+            violation=violation,
+            direction=direction,
+            coupling=np.einsum("wkq,kq->wq", active.cross_gram.take(row_index, axis=1), direction),
+            square=np.einsum("abq,aq,bq->q", grams, direction, direction),
+        )

@@ -1,0 +1,236 @@
+"""Best-first branch and bound over the candidates of stages.
+
+A node chooses candidates for some stages and drops the others, which can only lower the cost; its relaxation
+is a convex QP. Few children reach the QP solver: lower bounds for all of them at once, and for pairs, show
+that most cost too much, and each waits in line behind cheaper siblings.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from heapq import heappop, heappush
+from itertools import count
+from math import inf
+from time import perf_counter
+
+import numpy as np
+
+from aerobat.arrays import Array
+from aerobat.optimization.assignment import Indices
+from aerobat.optimization.branch_and_bound.candidates import CandidateBounds, Candidates
+from aerobat.optimization.branch_and_bound.lazy_children import Branch, LazyChildren
+from aerobat.optimization.branch_and_bound.least_distance import LeastDistanceQP, NotConverged, QPSolution
+from aerobat.optimization.branch_and_bound.lower_bounds import DualBounds, LowerBounds
+from aerobat.optimization.branch_and_bound.null_space import UNBOUNDED, ReducedBounds
+from aerobat.optimization.result import Status
+
+_OPTIMALITY_GAP = 1e-10  # relative, at which the search ends
+_MAX_INHERITED = 4  # candidates of the last stage, whose bounds are not computed anew
+_DIVE_GROWTH = 2  # a dive whenever the number of QPs has grown by this factor
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class _Node:
+    """A relaxation that is solved."""
+
+    solution: QPSolution
+    chosen: tuple[int, ...]  # candidates
+    pending: tuple[int, ...]  # groups without a chosen candidate
+    inherited: LowerBounds  # of its parent, for the candidates that may join those chosen
+
+
+class BestFirstSearch:
+    """One search: `best` is the cheapest solution found, with its candidates, and `bound` bounds all."""
+
+    def __init__(
+        self,
+        candidates: Candidates,
+        dual_bounds: DualBounds,
+        qp: LeastDistanceQP,
+        bounds: CandidateBounds,
+        root: ReducedBounds,
+    ) -> None:
+        """Prepare a search.
+
+        Args:
+            candidates: what there is to choose from.
+            dual_bounds: lower bounds for them.
+            qp: the solver of relaxations.
+            bounds: of the candidates.
+            root: the bounds of the rows, with no stage assigned.
+        """
+        self._candidates = candidates
+        self._dual_bounds = dual_bounds
+        self._qp = qp
+        self._bounds = bounds
+        self._root = root
+        self._heap: list[tuple[float, int, _Node, LazyChildren | None]] = []
+        self._ticket = count()
+        self._unresolved = inf  # the smallest bound of a relaxation that the QP solver could not solve
+        self.best: tuple[QPSolution, tuple[int, ...]] | None = None
+        self.nodes = 0  # QPs solved
+
+    @property
+    def bound(self) -> float:
+        """The lower bound of ½|y|²; infinite when there is no solution."""
+        waiting = self._heap[0][0] if self._heap else inf
+        return min(waiting, self._unresolved, self._cutoff if self.best else inf)
+
+    @property
+    def status(self) -> Status:
+        """What is proven so far."""
+        if self.best is not None:
+            return "time_limit" if self._improves(self.bound) else "optimal"
+        return "infeasible" if self.bound == inf else "unknown"
+
+    def try_start(self, slots: Mapping[int, int]) -> None:
+        """Take an assignment (stage: slot) for the best so far, where it is feasible."""
+        chosen: list[int] = []
+        possible = self._bounds.possible
+        for stage, slot in slots.items():
+            is_meant = (self._candidates.stage == stage) & (self._candidates.slot == slot)
+            fitting = np.flatnonzero(possible & is_meant)
+            if not fitting.size:
+                return
+            chosen.append(int(fitting[0]))
+            possible = possible & self._candidates.compatible_with(chosen[-1:])
+        lower, upper = self._tightened(self._root.lower, self._root.upper, chosen)
+        solution = self._solve(lower, upper, None, inf)
+        if solution is not None:
+            self.best = (solution, tuple(chosen))
+
+    def run(self, deadline: float = inf) -> None:
+        """Search until the best is proven optimal, or nothing is left, or the deadline has passed."""
+        if perf_counter() >= deadline:
+            self._unresolved = 0.0
+            return
+        solution = self._solve(self._root.lower, self._root.upper, None, 0.0)
+        pending = tuple(range(len(self._candidates.free_stages)))
+        inherited = self._dual_bounds.root_bounds(self._bounds)
+        if solution is not None and inherited.covers_all_stages(pending):
+            self._dive(_Node(solution, (), pending, inherited), deadline)
+        next_dive = _DIVE_GROWTH * self.nodes
+        while self._heap and self._improves(self._heap[0][0]) and perf_counter() < deadline:
+            node = self._next()
+            if node is None:
+                continue
+            if self.nodes >= next_dive:
+                self._dive(node, deadline)
+                next_dive = _DIVE_GROWTH * self.nodes
+            elif self._heap and node.solution.value > self._heap[0][0]:
+                self._push(node.solution.value, node)  # others may cost less
+            else:
+                children = self._children(node)
+                if children is not None:
+                    self._push(children.bound, node, children)
+
+    def _next(self) -> _Node | None:
+        """Return the best node; None where the best branch has no solution, or costs more than the next."""
+        _, _, node, children = heappop(self._heap)
+        if children is None:
+            return node
+        bound = children.evaluate_best()
+        if self._improves(bound) and not (self._heap and bound > self._heap[0][0]):
+            branch = children.pop(self._cutoff, in_pairs=False)
+            self._push(children.bound, node, children)
+            return self._child(node, children.lower_bounds, branch)
+        self._push(bound, node, children)
+        return None
+
+    def _dive(self, node: _Node | None, deadline: float) -> None:
+        """Go down to some assignment, by the best child at every turn; all others are left in the heap.
+
+        What costs more is not searched any more, and should time run out there is something to show.
+        """
+        while node is not None and perf_counter() < deadline:
+            children = self._children(node)
+            if children is None:
+                return
+            child = None
+            while child is None and self._improves(children.evaluate_best()) and perf_counter() < deadline:
+                branch = children.pop(self._cutoff, in_pairs=True)
+                child = self._child(node, children.lower_bounds, branch)
+            self._push(children.bound, node, children)
+            node = child
+        if node is not None:
+            self._push(node.solution.value, node)
+
+    def _children(self, node: _Node) -> LazyChildren | None:
+        """Return the node's children; None where its solution is an assignment's, the best so far."""
+        if not node.pending:
+            self.best = (node.solution, node.chosen)
+            return None
+        lower_bounds = node.inherited
+        # else a few QPs cost less than their bounds
+        if not node.chosen or len(node.pending) > 1 or len(lower_bounds.candidates) > _MAX_INHERITED:
+            lower_bounds = self._dual_bounds.single_bounds(node.solution, self._bounds, node.inherited)
+        complete = self._completed(node, lower_bounds)
+        if complete is not None:
+            self.best = (node.solution, complete)
+            return None
+        return LazyChildren(self._dual_bounds, node.solution, lower_bounds)
+
+    def _child(self, node: _Node, lower_bounds: LowerBounds, branch: Branch) -> _Node | None:
+        """Return one child of a node; None where it cannot beat the best."""
+        groups = self._candidates.group[list(branch.chosen)].tolist()
+        pending = tuple(group for group in node.pending if group not in groups)
+        allowed = self._candidates.compatible_with(branch.chosen, branch.excluded)
+        inherited = lower_bounds.restricted(allowed, self._cutoff)
+        if not inherited.covers_all_stages(pending):
+            return None
+        lower, upper = self._tightened(node.solution.lower, node.solution.upper, branch.chosen)
+        solution = self._solve(lower, upper, node.solution, branch.bound)
+        return None if solution is None else _Node(solution, node.chosen + branch.chosen, pending, inherited)
+
+    def _completed(self, node: _Node, lower_bounds: LowerBounds) -> tuple[int, ...] | None:
+        """Return candidates, one a group, that the node's solution satisfies as it is; None without."""
+        if lower_bounds.steps is None:
+            return None
+        satisfied = lower_bounds.candidates[lower_bounds.steps.satisfied]
+        if len(satisfied) < len(node.pending):
+            return None
+        return self._matched(node.chosen, node.pending, satisfied)
+
+    def _matched(
+        self, chosen: tuple[int, ...], pending: tuple[int, ...], satisfied: Indices
+    ) -> tuple[int, ...] | None:
+        """Return `chosen` with one compatible candidate of `satisfied` for each group; None without."""
+        if not pending:
+            return chosen
+        for candidate in satisfied[self._candidates.group[satisfied] == pending[0]]:
+            compatible = satisfied[self._candidates.compatible[candidate][satisfied]]
+            complete = self._matched((*chosen, int(candidate)), pending[1:], compatible)
+            if complete is not None:
+                return complete
+        return None
+
+    def _tightened(self, lower: Array, upper: Array, chosen: Sequence[int]) -> tuple[Array, Array]:
+        lower = lower.copy()
+        upper = upper.copy()
+        for candidate in chosen:
+            rows = self._candidates.rows[:, candidate]
+            np.maximum.at(lower, rows, self._bounds.lower[:, candidate])  # a row may be there twice
+            np.minimum.at(upper, rows, self._bounds.upper[:, candidate])
+        return lower, upper
+
+    def _solve(
+        self, lower: Array, upper: Array, warm_start: QPSolution | None, bound: float
+    ) -> QPSolution | None:
+        self.nodes += 1
+        try:
+            return self._qp.solve(lower, upper, warm_start, self._cutoff)
+        except NotConverged:
+            self._unresolved = min(self._unresolved, bound)
+            return None
+
+    @property
+    def _cutoff(self) -> float:
+        return UNBOUNDED if self.best is None else self.best[0].value
+
+    def _improves(self, bound: float) -> bool:
+        return bound < self._cutoff - _OPTIMALITY_GAP * (self._cutoff + abs(self._root.base_cost))
+
+    def _push(self, bound: float, node: _Node, children: LazyChildren | None = None) -> None:
+        if self._improves(bound):
+            heappush(self._heap, (bound, next(self._ticket), node, children))
