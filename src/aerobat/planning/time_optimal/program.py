@@ -101,8 +101,8 @@ class OptimalControl:
         rows.hold(self.body.thrust_axes(collocation.motion.states[:, -1]).T @ self.goal.thrust, *ALONG_Z)
         self._hold_stages(rows, collocation)
         self._hold_limits(rows, collocation, bounds.limits)
-        least, most = (self.mesh.pack(motion) for motion in self._box(bounds.least_collective))
-        return NonlinearProgram(column, self._cost(collocation.motion), *rows.stacked(), least, most)
+        x_min, x_max = (self.mesh.pack(motion) for motion in self._box(bounds.least_collective))
+        return NonlinearProgram(column, self._cost(collocation.motion), *rows.stacked(), x_min, x_max)
 
     def _hold_rotors(self, rows: _Rows, collocation: Collocation, bounds: Bounds) -> None:
         """A rotor that lags stays within its limits if its commands do."""
