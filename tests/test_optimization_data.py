@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from math import inf
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -46,6 +47,7 @@ def test_a_stage_takes_the_cheaper_slot() -> None:
         ({"equality": np.ones((1, 3))}, "equality"),
         ({"target": np.ones(2)}, "target"),
         ({"lower": [0.0, np.nan]}, "lower"),
+        ({"lower": [0.0, inf]}, "lower must not be inf"),
         ({"upper": [1.0]}, "upper"),
         ({"hessian": -np.eye(2)}, "hessian"),
         ({"hessian": [[1.0, 0.5], [0.0, 1.0]]}, "hessian"),
@@ -85,6 +87,11 @@ def test_what_a_program_holds_cannot_be_changed() -> None:
     stage = program.stages[0]
     for array in (program.rows, program.lower, program.precedes, stage.rows, stage.upper):
         assert not array.flags.writeable
+
+
+def test_a_stage_is_not_put_where_it_has_no_slot() -> None:
+    with pytest.raises(SpecError, match=r"stage 'up' cannot sit in slot 5; its slots are \(0, 1\)"):
+        AssignmentProgram(**GOOD).bounds_for((5,))
 
 
 def test_programs_with_other_bounds_share_their_matrices() -> None:
@@ -151,6 +158,14 @@ def test_a_program_beyond_gurobis_free_licence_is_answered_in_a_sentence() -> No
         AerobatError, match="200 variables with a quadratic objective and this program has 277"
     ):
         solver("gurobi").solve(flip(FLIP_ROLL, intervals=40, dt=0.05))
+
+
+def test_a_missing_licence_of_gurobi_is_answered_in_its_own_words(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.setenv("GRB_LICENSE_FILE", str(tmp_path / "none.lic"))
+    with pytest.raises(AerobatError, match="Gurobi failed: .*none.lic"):
+        solver("gurobi").solve(AssignmentProgram(**GOOD))
 
 
 @pytest.mark.parametrize("backend", ["builtin", "gurobi", "scip"])

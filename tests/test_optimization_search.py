@@ -243,13 +243,22 @@ def test_a_series_of_programs_with_the_same_matrices_is_solved_as_if_each_were_a
         assert together.cost == alone.cost
 
 
+def test_a_kept_solver_notices_another_order_of_the_same_stages() -> None:
+    program, kept = flip(FLIP_ROLL), solver()
+    ordered = replace(program, precedence=tuple((i, i + 1) for i in range(4)))
+    assert ordered.rows is program.rows
+    kept.solve(program)
+    result, alone = kept.solve(ordered), solver().solve(ordered)
+    assert (result.slots, result.cost) == (alone.slots, alone.cost)
+
+
 def test_the_same_program_has_the_same_answer_twice() -> None:
     first, second = (solver().solve(flip(FLIP_ROLL)) for _ in range(2))
     assert np.array_equal(first.x, second.x)
     assert first.nodes == second.nodes
 
 
-@pytest.mark.parametrize("backend", ["builtin", "gurobi"])
+@pytest.mark.parametrize("backend", ["builtin", "gurobi", "scip"])
 def test_without_any_time_nothing_is_claimed(backend: str) -> None:
     result = solver(backend).solve(flip(FLIP_ROLL), time_limit=0.0)
     assert (result.status, result.x, result.gap) == ("unknown", None, inf)
@@ -277,16 +286,17 @@ def test_when_time_runs_out_the_optimum_is_between_bound_and_cost(
     assert (result.x is not None) == (ticks > 6)  # one dive down four stages
 
 
+@pytest.mark.parametrize("backend", ["builtin", "gurobi"])
 @pytest.mark.parametrize(
     "start", [(5, 6, 10, 13, 7), (1, 2, 10, 3, 4), (5, 5, 10, 5, 5), (99, 99, 99, 99, 99)]
 )
-def test_a_start_good_or_bad_does_not_change_the_answer(start: tuple[int, ...]) -> None:
-    result = solver().solve(flip(FLIP_ROLL), start=start)
+def test_a_start_good_or_bad_does_not_change_the_answer(start: tuple[int, ...], backend: str) -> None:
+    result = solver(backend).solve(flip(FLIP_ROLL), start=start)
     assert result.status == "optimal"
     assert result.cost == pytest.approx(273196.1243, rel=1e-9)
 
 
-@pytest.mark.parametrize("failing", range(1, 12))
+@pytest.mark.parametrize("failing", range(12))
 def test_a_relaxation_that_cannot_be_solved_leaves_a_gap_and_no_false_claim(
     failing: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -306,3 +316,27 @@ def test_a_relaxation_that_cannot_be_solved_leaves_a_gap_and_no_false_claim(
         assert result.cost == pytest.approx(cost)
     else:
         assert result.status in ("time_limit", "unknown")
+
+
+@pytest.mark.parametrize("failures", [1, 2, 3])
+def test_a_relaxation_that_fails_is_tried_cold_and_then_with_care(
+    failures: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    rows = np.array([[1.0, 0.0], [0.6, 0.8]])
+    lower, upper = np.array([1.0, -5.0]), np.array([2.0, -0.5])
+    exact = LeastDistanceQP(rows).solve(lower, upper)
+    assert exact is not None
+    calls, run = count(), LeastDistanceQP._run
+
+    def faulty(*arguments: Any) -> tuple[np.ndarray, int, np.ndarray]:
+        y, flag, multipliers = run(*arguments)
+        return y, -2 if next(calls) < failures else flag, multipliers
+
+    monkeypatch.setattr(LeastDistanceQP, "_run", faulty)
+    if failures == 3:
+        with pytest.raises(NotConverged):
+            LeastDistanceQP(rows).solve(lower, upper, warm_start=exact)
+    else:
+        again = LeastDistanceQP(rows).solve(lower, upper, warm_start=exact)
+        assert again is not None
+        np.testing.assert_allclose(again.y, exact.y, atol=1e-12)
