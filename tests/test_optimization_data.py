@@ -164,7 +164,7 @@ def test_a_missing_licence_of_gurobi_is_answered_in_its_own_words(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     monkeypatch.setenv("GRB_LICENSE_FILE", str(tmp_path / "none.lic"))
-    with pytest.raises(AerobatError, match="Gurobi failed: .*none.lic"):
+    with pytest.raises(AerobatError, match=r"Gurobi failed: .*none\.lic"):
         solver("gurobi").solve(AssignmentProgram(**GOOD))
 
 

@@ -10,16 +10,8 @@ from typing import Any, ClassVar
 import numpy as np
 
 from aerobat.errors import AerobatError
+from aerobat.optimization import big_m
 from aerobat.optimization.assignment import AssignmentProgram
-from aerobat.optimization.big_m import (
-    IndicatorConstraint,
-    StageSlot,
-    binaries,
-    binary_constraints,
-    chosen_slots,
-    indicator_constraints,
-    scaled,
-)
 from aerobat.optimization.result import AssignmentResult, Status, verified
 
 _TOO_LARGE = 10010  # Gurobi's error number for a model beyond the size of the licence
@@ -49,21 +41,14 @@ class Gurobi:
         time_limit: float | None = None,
         start: Sequence[int] | None = None,
     ) -> AssignmentResult:
-        """Return the assignment of minimum cost, or the best one found within `time_limit`.
+        """As `Solver.solve`; the result's time is Gurobi's own Runtime.
 
-        Args:
-            program: what to solve.
-            time_limit: [s]; None sets no limit. The result's time is Gurobi's own Runtime.
-            start: one slot a stage, tried first.
-
-        Raises:
-            AerobatError: the licence is missing or too small for the program.
-            SpecError: `start` has not one slot a stage.
+        Raises AerobatError where the licence is missing or too small for the program.
         """
         import gurobipy
 
         program.check_start(start)
-        scaling = scaled(program)
+        scaling = big_m.scaled(program)
         try:
             with gurobipy.Env(empty=True) as env:
                 env.setParam("OutputFlag", 0)  # before it starts, or it prints the licence's banner
@@ -96,7 +81,7 @@ class _GurobiModel:
     def claim(self, start: Sequence[int] | None) -> AssignmentResult:
         """Build, solve, read."""
         variables = self._add_binaries(start)
-        for indicator in indicator_constraints(self._program):
+        for indicator in big_m.indicator_constraints(self._program):
             self._add_indicator(indicator, variables[indicator.binary])
         self._set_cost()
         model = self._model
@@ -108,7 +93,7 @@ class _GurobiModel:
         }
         slots = x = None
         if model.SolCount:
-            slots = chosen_slots(self._program, {key: binary.X for key, binary in variables.items()})
+            slots = big_m.chosen_slots(self._program, {key: binary.X for key, binary in variables.items()})
             x = self._x.X
         return AssignmentResult(
             status=meaning.get(model.Status, "time_limit"),
@@ -127,20 +112,20 @@ class _GurobiModel:
             cost = cost + program.gradient @ x
         self._model.setObjective(cost + program.constant, self._grb.MINIMIZE)
 
-    def _add_binaries(self, start: Sequence[int] | None) -> dict[StageSlot, Any]:
+    def _add_binaries(self, start: Sequence[int] | None) -> dict[big_m.StageSlot, Any]:
         model = self._model
-        variables = {key: model.addVar(vtype=self._grb.BINARY) for key in binaries(self._program)}
+        variables = {key: model.addVar(vtype=self._grb.BINARY) for key in big_m.binaries(self._program)}
         if start is not None:
             for (stage, slot), variable in variables.items():
                 variable.Start = float(slot == start[stage])
-        for constraint in binary_constraints(self._program):
+        for constraint in big_m.binary_constraints(self._program):
             total = self._sum(coefficient * variables[key] for coefficient, key in constraint.terms)
             model.addConstr(
                 total == constraint.bound if constraint.is_equality else total <= constraint.bound
             )
         return variables
 
-    def _add_indicator(self, indicator: IndicatorConstraint, binary: Any) -> None:
+    def _add_indicator(self, indicator: big_m.IndicatorConstraint, binary: Any) -> None:
         row = (indicator.sign * self._program.rows[indicator.row]) @ self._x
         bound, root_bound = indicator.bound, indicator.root_bound
         if root_bound < inf:
@@ -152,7 +137,7 @@ class _GurobiModel:
 def _message(error: Any, program: AssignmentProgram) -> str:
     if error.errno != _TOO_LARGE:
         return f"Gurobi failed: {error}"
-    size = program.num_variables + len(binaries(program))
+    size = program.num_variables + len(big_m.binaries(program))
     return (
         f"Gurobi's free licence takes {Gurobi.free_variables} variables with a quadratic objective and this "
         f"program has {size}; use fewer intervals, a full licence, or the 'builtin' backend"

@@ -9,16 +9,8 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from aerobat.optimization import big_m
 from aerobat.optimization.assignment import AssignmentProgram
-from aerobat.optimization.big_m import (
-    IndicatorConstraint,
-    StageSlot,
-    binaries,
-    binary_constraints,
-    chosen_slots,
-    indicator_constraints,
-    scaled,
-)
 from aerobat.optimization.result import AssignmentResult, Status, verified
 
 _MEANING: dict[str, Status] = {"optimal": "optimal", "infeasible": "infeasible"}
@@ -40,16 +32,7 @@ class Scip:
         time_limit: float | None = None,
         start: Sequence[int] | None = None,
     ) -> AssignmentResult:
-        """Return the assignment of minimum cost, or the best one found within `time_limit`.
-
-        Args:
-            program: what to solve.
-            time_limit: [s]; None sets no limit.
-            start: one slot a stage; not used.
-
-        Raises:
-            SpecError: `start` has not one slot a stage.
-        """
+        """As `Solver.solve`; the result's time is SCIP's own."""
         import pyscipopt
 
         program.check_start(start)
@@ -57,7 +40,7 @@ class Scip:
         model.hideOutput()
         if time_limit is not None:
             model.setParam("limits/time", time_limit)
-        scaling = scaled(program)
+        scaling = big_m.scaled(program)
         return verified(program, scaling.unscaled(_ScipModel(pyscipopt, model, scaling.program).claim()))
 
 
@@ -81,7 +64,7 @@ class _ScipModel:
     def claim(self) -> AssignmentResult:
         """Build, solve, read."""
         variables = self._add_binaries()
-        for indicator in indicator_constraints(self._program):
+        for indicator in big_m.indicator_constraints(self._program):
             self._add_indicator(indicator, variables[indicator.binary])
         self._set_cost()
         model = self._model
@@ -89,7 +72,7 @@ class _ScipModel:
         slots = x = None
         if model.getNSols():
             values = {key: model.getVal(binary) for key, binary in variables.items()}
-            slots = chosen_slots(self._program, values)
+            slots = big_m.chosen_slots(self._program, values)
             x = np.array([model.getVal(variable) for variable in self._x])
         return AssignmentResult(
             status=_MEANING.get(model.getStatus(), "time_limit"),
@@ -109,15 +92,15 @@ class _ScipModel:
         ]
         return self._sum(terms) if terms else 0.0 * self._x[0]
 
-    def _add_binaries(self) -> dict[StageSlot, Any]:
+    def _add_binaries(self) -> dict[big_m.StageSlot, Any]:
         model = self._model
-        variables = {key: model.addVar(vtype="B") for key in binaries(self._program)}
-        for constraint in binary_constraints(self._program):
+        variables = {key: model.addVar(vtype="B") for key in big_m.binaries(self._program)}
+        for constraint in big_m.binary_constraints(self._program):
             total = self._sum(coefficient * variables[key] for coefficient, key in constraint.terms)
             model.addCons(total == constraint.bound if constraint.is_equality else total <= constraint.bound)
         return variables
 
-    def _add_indicator(self, indicator: IndicatorConstraint, binary: Any) -> None:
+    def _add_indicator(self, indicator: big_m.IndicatorConstraint, binary: Any) -> None:
         row = self._product(indicator.sign * self._program.rows[indicator.row])
         bound, root_bound = indicator.bound, indicator.root_bound
         if root_bound < inf:

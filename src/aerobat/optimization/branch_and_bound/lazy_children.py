@@ -35,16 +35,7 @@ class _Pairing:
     candidate: int
     partners: Indices
     bounds: Array  # of the pairs
-    num_branched: int = 0  # of the partners in order of their bounds
-    is_sorted: bool = False
-
-    def sort(self) -> None:
-        """Put partners in the order of their bounds."""
-        if not self.is_sorted:
-            order = self.bounds.argsort()
-            self.partners = self.partners[order]
-            self.bounds = self.bounds[order]
-            self.is_sorted = True
+    num_branched: int = 0  # of the partners, which are in the order of their bounds from the first on
 
 
 class LazyChildren:
@@ -92,8 +83,11 @@ class LazyChildren:
         bound, _, pairing = heappop(self._evaluated)
         if not pairing.partners.size:
             return Branch(bound, (pairing.candidate,))
-        pairing.sort()
         done = pairing.num_branched
+        if done == 0:
+            order = pairing.bounds.argsort()
+            pairing.partners = pairing.partners[order]
+            pairing.bounds = pairing.bounds[order]
         partners = pairing.partners.tolist()
         if not in_pairs and pairing.bounds.searchsorted(cutoff) > done + _MAX_PAIR_BRANCHES:
             return Branch(bound, (pairing.candidate,), tuple(partners[:done]))

@@ -51,15 +51,7 @@ class BestFirstSearch:
         bounds: CandidateBounds,
         root: ReducedBounds,
     ) -> None:
-        """Prepare a search.
-
-        Args:
-            candidates: what there is to choose from.
-            dual_bounds: lower bounds for them.
-            qp: the solver of relaxations.
-            bounds: of the candidates.
-            root: the bounds of the rows, with no stage assigned.
-        """
+        """`bounds` are those of the candidates, `root` those of the rows with no stage assigned."""
         self._candidates = candidates
         self._dual_bounds = dual_bounds
         self._qp = qp

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from math import inf
 from time import perf_counter
 from typing import ClassVar
@@ -12,7 +12,7 @@ import numpy as np
 
 from aerobat.optimization.assignment import AssignmentProgram, Mask
 from aerobat.optimization.branch_and_bound.candidates import Candidates
-from aerobat.optimization.branch_and_bound.least_distance import LeastDistanceQP, NotConverged, QPSolution
+from aerobat.optimization.branch_and_bound.least_distance import LeastDistanceQP, NotConverged
 from aerobat.optimization.branch_and_bound.lower_bounds import DualBounds
 from aerobat.optimization.branch_and_bound.null_space import NullSpace, ReducedBounds, split_coupled
 from aerobat.optimization.branch_and_bound.search import BestFirstSearch
@@ -44,16 +44,7 @@ class BranchAndBound:
         time_limit: float | None = None,
         start: Sequence[int] | None = None,
     ) -> AssignmentResult:
-        """Return the assignment of minimum cost, or the best one found within `time_limit`.
-
-        Args:
-            program: what to solve.
-            time_limit: [s]; None sets no limit.
-            start: one slot a stage, tried first: what costs more is then not searched.
-
-        Raises:
-            SpecError: `start` has not one slot a stage.
-        """
+        """As `Solver.solve`; the result's time is that of the whole call."""
         program.check_start(start)
         began = perf_counter()
         deadline = inf if time_limit is None else began + time_limit
@@ -84,7 +75,13 @@ class BranchAndBound:
             return _without_solution("unknown", -inf)
         if solution is None:
             return _without_solution("infeasible", inf)
-        return _Prepared(program, kept, root, independent, solution).search(deadline, start)
+        claim = kept.search(program, root, deadline, start)
+        claim = replace(claim, bound=claim.bound + independent.cost(solution.value))
+        if claim.x is None:
+            return claim
+        x = claim.x.copy()
+        x[kept.independent.columns] = kept.independent.expand(independent, solution.y)
+        return replace(claim, x=x)
 
 
 class _Factorization:
@@ -116,49 +113,32 @@ class _Factorization:
             and all(a.slots == b.slots and np.array_equal(a.rows, b.rows) for a, b in stages)
         )
 
-
-@dataclass(frozen=True, eq=False)
-class _Prepared:
-    """A program ready to be searched."""
-
-    program: AssignmentProgram
-    kept: _Factorization
-    root: ReducedBounds  # of the block that stages with several slots couple
-    independent: ReducedBounds  # of the other block,
-    independent_solution: QPSolution  # which is solved
-
-    def search(self, deadline: float, start: Sequence[int] | None) -> AssignmentResult:
-        """Search until the deadline."""
-        kept = self.kept
-        program = self.program
-        bounds = kept.candidates.bounds(program, kept.coupled, self.root)
-        unit = max(self.root.min_norm, kept.candidates.min_norm(bounds)) or 1.0
-        root = self.root.in_units(unit)
-        search = BestFirstSearch(
-            kept.candidates, kept.dual_bounds, kept.coupled_qp, bounds.in_units(unit), root
-        )
+    def search(
+        self, program: AssignmentProgram, root: ReducedBounds, deadline: float, start: Sequence[int] | None
+    ) -> AssignmentResult:
+        """Return what a search of the coupled block finds by the deadline, the other variables zero."""
+        bounds = self.candidates.bounds(program, self.coupled, root)
+        root = root.in_units(max(root.min_norm, self.candidates.min_norm(bounds)) or 1.0)
+        bounds = bounds.in_units(root.unit)
+        search = BestFirstSearch(self.candidates, self.dual_bounds, self.coupled_qp, bounds, root)
         if start is not None:
-            search.try_start({stage: start[stage] for stage in kept.candidates.free_stages})
+            search.try_start({stage: start[stage] for stage in self.candidates.free_stages})
         search.run(deadline)
-        base_cost = program.constant + self.independent.cost(self.independent_solution.value)
-        bound = base_cost + root.cost(search.bound)
-        if search.best is None:
-            return replace(_without_solution(search.status, bound), nodes=search.nodes)
-        solution, chosen = search.best
-        x = np.zeros(program.num_variables)
-        x[kept.coupled.columns] = kept.coupled.expand(root, solution.y)
-        x[kept.independent.columns] = kept.independent.expand(self.independent, self.independent_solution.y)
-        slots = [stage.slots[0] for stage in program.stages]
-        for candidate in chosen:
-            slots[kept.candidates.stage[candidate]] = int(kept.candidates.slot[candidate])
-        return AssignmentResult(
+        claim = AssignmentResult(
             status=search.status,
             backend=BranchAndBound.name,
-            bound=bound,
-            x=x,
-            slots=tuple(slots),
+            bound=program.constant + root.cost(search.bound),
             nodes=search.nodes,
         )
+        if search.best is None:
+            return claim
+        solution, chosen = search.best
+        x = np.zeros(program.num_variables)
+        x[self.coupled.columns] = self.coupled.expand(root, solution.y)
+        slots = [stage.slots[0] for stage in program.stages]
+        for candidate in chosen:
+            slots[self.candidates.stage[candidate]] = int(self.candidates.slot[candidate])
+        return replace(claim, x=x, slots=tuple(slots))
 
 
 def _without_solution(status: Status, bound: float) -> AssignmentResult:
