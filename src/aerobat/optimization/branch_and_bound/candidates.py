@@ -90,6 +90,13 @@ class Candidates:
         ]
         return max((float(norm) for norm in norms if norm < inf), default=0.0)
 
+    def slots_with(self, program: AssignmentProgram, chosen: Sequence[int]) -> tuple[int, ...]:
+        """Return the slot of each stage of the program, with one candidate of each group `chosen`."""
+        slots = [stage.slots[0] for stage in program.stages]
+        for candidate in chosen:
+            slots[self.stage[candidate]] = int(self.slot[candidate])
+        return tuple(slots)
+
     def compatible_with(self, chosen: Sequence[int], excluded: Sequence[int] = ()) -> Mask:
         """Return the candidates that may join those `chosen`, without those `excluded`, (P,)."""
         joining: Mask = self.compatible[chosen[0]]

@@ -10,11 +10,12 @@ from typing import ClassVar
 
 import numpy as np
 
+from aerobat.arrays import Array
 from aerobat.optimization.assignment import AssignmentProgram, Mask
 from aerobat.optimization.branch_and_bound.candidates import Candidates
 from aerobat.optimization.branch_and_bound.least_distance import LeastDistanceQP, NotConverged
 from aerobat.optimization.branch_and_bound.lower_bounds import DualBounds
-from aerobat.optimization.branch_and_bound.null_space import NullSpace, ReducedBounds, split_coupled
+from aerobat.optimization.branch_and_bound.null_space import NullSpace, split_coupled
 from aerobat.optimization.branch_and_bound.search import BestFirstSearch
 from aerobat.optimization.result import AssignmentResult, Status, verified
 
@@ -64,24 +65,10 @@ class BranchAndBound:
         if kept is None or not kept.fits(program, implicit_equalities):
             kept = _Factorization(program, implicit_equalities)
             self._factorization = kept
-        root = kept.coupled.bounds(program, lower, upper)
-        independent = kept.independent.bounds(program, lower, upper)
-        if not (root.consistent and independent.consistent):
-            return _without_solution("infeasible", inf)
-        independent = independent.in_units(independent.min_norm or 1.0)
         try:
-            solution = kept.independent_qp.solve(independent.lower, independent.upper)
-        except NotConverged:
+            return kept.claim(program, lower, upper, deadline, start)
+        except NotConverged:  # of the independent block: the search deals with its own
             return _without_solution("unknown", -inf)
-        if solution is None:
-            return _without_solution("infeasible", inf)
-        claim = kept.search(program, root, deadline, start)
-        claim = replace(claim, bound=claim.bound + independent.cost(solution.value))
-        if claim.x is None:
-            return claim
-        x = claim.x.copy()
-        x[kept.independent.columns] = kept.independent.expand(independent, solution.y)
-        return replace(claim, x=x)
 
 
 class _Factorization:
@@ -113,10 +100,26 @@ class _Factorization:
             and all(a.slots == b.slots and np.array_equal(a.rows, b.rows) for a, b in stages)
         )
 
-    def search(
-        self, program: AssignmentProgram, root: ReducedBounds, deadline: float, start: Sequence[int] | None
+    def claim(
+        self,
+        program: AssignmentProgram,
+        lower: Array,
+        upper: Array,
+        deadline: float,
+        start: Sequence[int] | None,
     ) -> AssignmentResult:
-        """Return what a search of the coupled block finds by the deadline, the other variables zero."""
+        """Solve the independent block, search the coupled one, and put them together.
+
+        `lower` and `upper` (m,) are the root's bounds. Raises NotConverged for the independent block's QP.
+        """
+        root = self.coupled.bounds(program, lower, upper)
+        independent = self.independent.bounds(program, lower, upper)
+        if not (root.consistent and independent.consistent):
+            return _without_solution("infeasible", inf)
+        independent = independent.in_units(independent.min_norm or 1.0)
+        independent_solution = self.independent_qp.solve(independent.lower, independent.upper)
+        if independent_solution is None:
+            return _without_solution("infeasible", inf)
         bounds = self.candidates.bounds(program, self.coupled, root)
         root = root.in_units(max(root.min_norm, self.candidates.min_norm(bounds)) or 1.0)
         bounds = bounds.in_units(root.unit)
@@ -124,21 +127,21 @@ class _Factorization:
         if start is not None:
             search.try_start({stage: start[stage] for stage in self.candidates.free_stages})
         search.run(deadline)
-        claim = AssignmentResult(
+        x = slots = None
+        if search.best is not None:
+            solution, chosen = search.best
+            x = np.zeros(program.num_variables)
+            x[self.coupled.columns] = self.coupled.expand(root, solution.y)
+            x[self.independent.columns] = self.independent.expand(independent, independent_solution.y)
+            slots = self.candidates.slots_with(program, chosen)
+        return AssignmentResult(
             status=search.status,
             backend=BranchAndBound.name,
-            bound=program.constant + root.cost(search.bound),
+            bound=program.constant + independent.cost(independent_solution.value) + root.cost(search.bound),
+            x=x,
+            slots=slots,
             nodes=search.nodes,
         )
-        if search.best is None:
-            return claim
-        solution, chosen = search.best
-        x = np.zeros(program.num_variables)
-        x[self.coupled.columns] = self.coupled.expand(root, solution.y)
-        slots = [stage.slots[0] for stage in program.stages]
-        for candidate in chosen:
-            slots[self.candidates.stage[candidate]] = int(self.candidates.slot[candidate])
-        return replace(claim, x=x, slots=tuple(slots))
 
 
 def _without_solution(status: Status, bound: float) -> AssignmentResult:
