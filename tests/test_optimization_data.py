@@ -45,7 +45,10 @@ def test_a_stage_takes_the_cheaper_slot() -> None:
         ({"rows": np.ones(2)}, "rows"),
         ({"rows": [[np.nan, 1.0]]}, "rows"),
         ({"equality": np.ones((1, 3))}, "equality"),
+        ({"rows": np.ones((2, 2, 2))}, "rows must have no more axes than 2"),
         ({"target": np.ones(2)}, "target"),
+        ({"target": np.ones((3, 1))}, "target must have no more axes than 1"),
+        ({"lower": np.zeros((3, 2))}, "lower must have no more axes than 1"),
         ({"lower": [0.0, np.nan]}, "lower"),
         ({"lower": [0.0, inf]}, "lower must not be inf"),
         ({"upper": [1.0]}, "upper"),
@@ -95,10 +98,10 @@ def test_a_stage_is_not_put_where_it_has_no_slot() -> None:
 
 
 def test_programs_with_other_bounds_share_their_matrices() -> None:
-    program = AssignmentProgram(**GOOD)
+    program = AssignmentProgram(**GOOD, hessian=np.eye(2), gradient=np.ones(2))
     other = program.with_bounds(upper=[1.0, 1.0])
-    assert other.rows is program.rows
-    assert other.equality is program.equality
+    for name in ("rows", "equality", "hessian", "gradient"):
+        assert getattr(other, name) is getattr(program, name)
     assert other.upper.tolist() == [1.0, 1.0]
 
 

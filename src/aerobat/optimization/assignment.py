@@ -83,16 +83,17 @@ class AssignmentProgram:
 
     def __post_init__(self) -> None:
         """Copy, write-protect and check."""
-        rows = _matrix(self.rows, "rows", None)
-        equality = _matrix(self.equality, "equality", rows.shape[1])
+        rows = _shared(self.rows, "rows", (None, None))
+        equality = _shared(self.equality, "equality", (None, rows.shape[1]))
         _set(self, rows=rows, equality=equality)
-        _set(self, target=frozen(self.target, "target", (len(equality),)))
+        _set(self, target=_shared(self.target, "target", (len(equality),)))
         _set(self, lower=_bounds(self.lower, "lower", "lower", (len(rows),)))
         _set(self, upper=_bounds(self.upper, "upper", "upper", (len(rows),)))
         if self.hessian is not None:
-            _set(self, hessian=_positive_definite(_matrix(self.hessian, "hessian", self.num_variables)))
+            shape = (self.num_variables, self.num_variables)
+            _set(self, hessian=_positive_definite(_shared(self.hessian, "hessian", shape)))
         if self.gradient is not None:
-            _set(self, gradient=frozen(self.gradient, "gradient", (self.num_variables,)))
+            _set(self, gradient=_shared(self.gradient, "gradient", (self.num_variables,)))
         _set(self, stages=tuple(self.stages), precedence=tuple((int(i), int(j)) for i, j in self.precedence))
         self._check_stages()
 
@@ -221,17 +222,27 @@ def _set(value: object, **fields: object) -> None:
         object.__setattr__(value, name, field)
 
 
-def _matrix(value: ArrayLike, name: str, columns: int | None) -> Array:
-    """As `frozen`, but a matrix that is already write-protected is shared: solvers cache by its identity."""
+def _shared(value: ArrayLike, name: str, shape: Sequence[int | None]) -> Array:
+    """As `frozen`, but an array that is already write-protected is shared: solvers cache by its identity."""
     if isinstance(value, np.ndarray) and value.dtype == np.float64 and value.base is None:
-        fits = value.ndim == 2 and columns in (None, value.shape[1])
+        fits = value.ndim == len(shape) and all(
+            n in (None, m) for n, m in zip(shape, value.shape, strict=True)
+        )
         if fits and not value.flags.writeable and np.isfinite(value).all():
             return value
-    return frozen(value, name, (None, columns))
+    return _without_leading_axes(frozen(value, name, shape), name, shape)
+
+
+def _without_leading_axes(array: Array, name: str, shape: Sequence[int | None]) -> Array:
+    if array.ndim != len(shape):
+        raise SpecError(f"{name} must have no more axes than {len(shape)}, got the shape {array.shape}")
+    return array
 
 
 def _bounds(value: ArrayLike, name: str, side: str, shape: tuple[int] | None = None) -> Array:
     bounds = frozen_bounds(value, name, shape)
+    if shape is not None:
+        _without_leading_axes(bounds, name, shape)
     never = inf if side == "lower" else -inf
     if (bounds == never).any():
         raise SpecError(f"{name} must not be {never}, which nothing satisfies")
