@@ -33,7 +33,7 @@ def dual_ascent(
     """Return the multipliers (w, q), the summed steps (q,) and which candidates are blocked, after ascent.
 
     A step ends at the maximum, or where a multiplier is zero; its row is then dropped and the next step goes
-    on without it (Goldfarb and Idnani 1983). Blocked are those that another step might raise further.
+    on without it [GI]. Blocked are those that another step might raise further.
 
     Args:
         inverse_gram: the inverse of the active rows' Gram matrix, (w, w).
