@@ -14,10 +14,10 @@ from matplotlib.quiver import Quiver, QuiverKey
 
 import aerobat as ab
 from aerobat import so3
-from aerobat.reporting import path_panel
 from aerobat.reporting.figures import draw, report_figure, save_figure
+from aerobat.reporting.panels import path as path_panel
+from aerobat.reporting.panels.keyframes import keyframes, maneuver_plane
 from aerobat.reporting.style import BLUE, RED
-from aerobat.reporting.turn import snapshots, turn_plane
 from aerobat.states import BodyState
 from reporting_cases import PROBLEMS, flown, planned, require_legible
 
@@ -115,8 +115,8 @@ def test_arrows_are_the_specific_thrust_at_the_scale_of_their_keys(problem):
     axes = stages_panel(page(problem))
     quivers = {q.get_facecolor()[0].tobytes(): q for q in axes.collections if isinstance(q, Quiver)}
     keys = {key.Q: key for key in axes.get_children() if isinstance(key, QuiverKey)}
-    asked = snapshots(plan, vehicle)
-    plane = turn_plane(plan, asked.thrust)
+    asked = keyframes(plan, vehicle)
+    plane = maneuver_plane(plan, asked.thrust)
     for colour, column in ((BLUE, 0), (RED, 1)):
         quiver = quivers[np.array(to_rgba(colour)).tobytes()]
         value = float(keys[quiver].label.split()[-2])
@@ -161,7 +161,7 @@ def test_all_stages_are_drawn_where_they_are_planned():
 def test_the_plane_of_a_flip_is_square_to_its_axis(axis_deg):
     plan = planned("flip-roll")
     plan = replace(plan, problem=replace(plan.problem, maneuver=ab.Flip(axis_deg=axis_deg)))
-    plane = turn_plane(plan, np.zeros((3, 3)))
+    plane = maneuver_plane(plan, np.zeros((3, 3)))
     axis = np.array([np.cos(np.deg2rad(axis_deg)), np.sin(np.deg2rad(axis_deg)), 0.0])
     lateral, up = plane.camera.screen
     np.testing.assert_allclose([lateral @ axis, up[2]], [0.0, 1.0], atol=1e-9)
@@ -172,13 +172,13 @@ def test_any_other_plane_is_where_the_thrust_moves_most(heading_deg, seed):
     rng = np.random.default_rng(seed)
     along = np.array([np.cos(np.deg2rad(heading_deg)), np.sin(np.deg2rad(heading_deg)), 0.0])
     thrust = np.outer(rng.uniform(-20, 20, 6), along) + rng.uniform(-0.1, 0.1, (6, 3))
-    plane = turn_plane(planned("line"), thrust)
+    plane = maneuver_plane(planned("line"), thrust)
     assert abs(plane.camera.screen[0] @ along) > np.cos(np.deg2rad(9.0))
 
 
 def test_vehicles_along_the_path_stand_as_the_flight_stood(monkeypatch):
     painted = []
-    monkeypatch.setattr(path_panel, "paint", lambda axes, shapes, camera: painted.extend(shapes))
+    monkeypatch.setattr(path_panel, "draw_depth_sorted", lambda axes, shapes, camera: painted.extend(shapes))
     flight, gate = flown("flip-roll"), planned("flip-roll").problem.gates[0]
     page("flip-roll")
     axes = [shape.points for shape in painted if len(shape.points) == 2 and shape.width == 0.9]

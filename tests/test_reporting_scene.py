@@ -9,9 +9,10 @@ from matplotlib.figure import Figure
 
 from aerobat import so3
 from aerobat.problem import tilted_gate
-from aerobat.reporting.box import draw_room, room_around
-from aerobat.reporting.camera import Camera, best_view
-from aerobat.reporting.glyphs import (
+from aerobat.reporting.panels.labels import spread_out
+from aerobat.reporting.scene.axes_box import box_around, draw_axes_box
+from aerobat.reporting.scene.camera import Camera, best_view
+from aerobat.reporting.scene.glyphs import (
     enlargement,
     gate_bars,
     side_tint,
@@ -19,8 +20,7 @@ from aerobat.reporting.glyphs import (
     thrust_axis_shape,
     vehicle_shapes,
 )
-from aerobat.reporting.scene import Shape, paint
-from aerobat.reporting.spreading import spread_out
+from aerobat.reporting.scene.shapes import Shape, draw_depth_sorted
 from aerobat.vehicle import load_vehicle, vehicle_names
 
 angles = st.floats(-np.pi, np.pi)
@@ -66,7 +66,7 @@ def test_far_shapes_are_painted_first(camera, centres):
     assume(np.all((apart == 0.0) | (apart > 1e-9)))  # else rounding decides
     offsets = np.array([[0.1, 0.0, 0.0], [0.0, 0.1, 0.0], [-0.1, -0.1, 0.0]])
     shapes = [Shape(centre + offsets, face="#000000") for centre in centres]
-    collection = paint(blank_axes(), shapes, camera)
+    collection = draw_depth_sorted(blank_axes(), shapes, camera)
     order = np.argsort([camera.nearness(centre) for centre in centres], kind="stable")
     painted = [path.vertices[:3] for path in collection.get_paths()]
     np.testing.assert_allclose(painted, [camera.project(shapes[k].points) for k in order], atol=1e-12)
@@ -135,7 +135,7 @@ def test_the_chosen_view_shows_the_gate_open_and_the_path_spread(gate, heading, 
     up = np.array([0.0, 0.0, 1.0])
     path = gate.position + 2 * np.outer(np.sin(turn), across) + 4 * np.outer(np.cos(turn) - 1, up)
     path += flatness * np.outer(np.sin(turn / 2), np.cross(up, across))
-    room = room_around(path, 0.3)
+    room = box_around(path, 0.3)
     camera = best_view(path, gate, room.corners, np.array([6.0, 6.0]))
     assert abs(camera.toward @ gate.normal) > 0.3
     picture = camera.project(path)
@@ -146,11 +146,11 @@ def test_the_chosen_view_shows_the_gate_open_and_the_path_spread(gate, heading, 
 @given(st.lists(points, min_size=2, max_size=20).map(np.array), cameras, st.floats(2, 8), st.floats(2, 8))
 def test_a_room_holds_everything_and_fits_its_axes_at_equal_scales(inside, camera, width, height):
     assume(np.ptp(inside, axis=0).max() > 0.1)
-    room = room_around(inside, 0.2)
+    room = box_around(inside, 0.2)
     assert (inside >= room.lower).all()
     assert (inside <= room.upper).all()
     axes = blank_axes(width, height)
-    draw_room(axes, room, camera)
+    draw_axes_box(axes, room, camera)
     low, high = np.array([axes.get_xlim(), axes.get_ylim()]).T
     picture = camera.project(room.corners)
     assert (picture > low).all()

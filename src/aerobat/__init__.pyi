@@ -44,7 +44,7 @@ from .problem import (
 )
 from .reporting.comparison import comparison_figure
 from .reporting.figures import draw
-from .reporting.tracking_page import tracking_figure
+from .reporting.tracking import tracking_figure
 from .sensitivity import Gradient, Sensitivity, gradient
 from .simulation import StateNoise
 from .states import BodyState, FlatState, Setpoint, Wrench

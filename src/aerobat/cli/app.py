@@ -101,7 +101,7 @@ def check(plan: Path, options: Checked = CheckOptions()) -> None:
     """
     from aerobat.certification import Envelope, certify
     from aerobat.interchange import read_trajectory
-    from aerobat.reporting.report import to_json
+    from aerobat.reporting.report_json import to_json
     from aerobat.reporting.tables import certificate_table, show
     from aerobat.vehicle import load_vehicle
 
@@ -138,7 +138,7 @@ def compare(problem: str, options: Tasked = TaskOptions()) -> None:
     """
     from aerobat.reporting.comparison import comparison_figure, comparison_rows, comparison_table
     from aerobat.reporting.figures import png
-    from aerobat.reporting.report import to_json
+    from aerobat.reporting.report_json import to_json
     from aerobat.reporting.tables import show
     from aerobat.storage import write_whole
     from aerobat.studies.compare import compare as compare_planners
@@ -211,7 +211,7 @@ def _finish(
     """Write what was made, then say what it is."""
     from aerobat.interchange.csv import write_csv
     from aerobat.reporting.figures import png, report_figure
-    from aerobat.reporting.report import report, to_json
+    from aerobat.reporting.report_json import report, to_json
     from aerobat.storage import write_whole
     from aerobat.trajectory import save_trajectory
 

@@ -13,10 +13,11 @@ from rich.text import Text
 
 from aerobat.flight import COMPLETE
 from aerobat.planning import Plan
-from aerobat.reporting.canvas import MARGIN, blank_page, heading, headline, house_style, panel
 from aerobat.reporting.figures import AXIS, COLUMNS, FACT, HEAD, TITLES, is_flat, length
-from aerobat.reporting.motion import plan_reference
-from aerobat.reporting.overlay import NamedPath, draw_overlay
+from aerobat.reporting.page import MARGIN, blank_page, heading, headline, house_style, panel
+from aerobat.reporting.panels.overlay import NamedPath, draw_overlay
+from aerobat.reporting.panels.poses import plan_reference
+from aerobat.reporting.panels.signals import draw_limits, fit_to_limits
 from aerobat.reporting.style import (
     BLUE,
     INK,
@@ -29,7 +30,6 @@ from aerobat.reporting.style import (
     TITLE,
     YELLOW,
 )
-from aerobat.reporting.tracks import draw_limits, fit_to_limits
 from aerobat.studies.compare import Comparison, Entry
 from aerobat.vehicle import Vehicle
 

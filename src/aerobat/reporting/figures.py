@@ -12,8 +12,7 @@ from aerobat.arrays import Array
 from aerobat.flight import Flight
 from aerobat.metrics import Score, attitude_error, position_error
 from aerobat.planning import Plan
-from aerobat.reporting import timelines
-from aerobat.reporting.canvas import (
+from aerobat.reporting.page import (
     blank_page,
     heading,
     headline,
@@ -22,9 +21,10 @@ from aerobat.reporting.canvas import (
     png,
     save_figure,
 )
-from aerobat.reporting.motion import Motion, asked_motion, flown_motions, plan_reference
-from aerobat.reporting.path_panel import draw_path
-from aerobat.reporting.stages_panel import draw_stages
+from aerobat.reporting.panels import timelines
+from aerobat.reporting.panels.path import draw_path
+from aerobat.reporting.panels.poses import PoseHistory, actual_poses, plan_reference, reference_poses
+from aerobat.reporting.panels.stages import draw_stages
 from aerobat.reporting.style import PAGE_WIDTH
 from aerobat.vehicle import Vehicle, load_vehicle
 
@@ -70,14 +70,14 @@ class FlightPage:
     height: float  # [in] without the head
 
 
-BESIDE = FlightPage(
+TIMELINES_BESIDE = FlightPage(
     path=(0.3, 0.2, 6.1, 6.0),
     position=(7.1, AXIS + 4.0, 4.2, 1.75),
     attitude=(7.1, AXIS + 2.0, 4.2, 1.75),
     rotors=(7.1, AXIS, 4.2, 1.75),
     height=6.85,
 )
-BENEATH = FlightPage(
+TIMELINES_BELOW = FlightPage(
     path=(0.3, 2.7, 11.0, 3.1),
     position=(0.68, AXIS, 3.05, 1.6),
     attitude=(4.5, AXIS, 3.05, 1.6),
@@ -93,9 +93,9 @@ def draw(flight: Flight, plan: Plan | None = None, vehicle: Vehicle | None = Non
     SpecError where it is not.
     """
     vehicle = load_vehicle(flight.vehicles[0]) if vehicle is None else vehicle
-    flown = flown_motions(flight)
-    planned = asked_motion(flight if plan is None else plan_reference(plan, vehicle))
-    page = BENEATH if is_flat(planned.position) else BESIDE
+    flown = actual_poses(flight)
+    planned = reference_poses(flight if plan is None else plan_reference(plan, vehicle))
+    page = TIMELINES_BELOW if is_flat(planned.position) else TIMELINES_BESIDE
     of = f"{'flight' if len(flown) == 1 else f'{len(flown)} flights'} of {vehicle.name}"
     with house_style():
         figure = blank_page(PAGE_WIDTH, page.height + HEAD + FACT)
@@ -107,7 +107,7 @@ def draw(flight: Flight, plan: Plan | None = None, vehicle: Vehicle | None = Non
         timelines.draw_position_error(lines[0], flight)
         timelines.draw_attitude_error(lines[1], flight)
         timelines.draw_rotor_thrusts(lines[2], flight.times, flight.thrusts, vehicle)
-        for column in [lines] if page is BESIDE else [[axes] for axes in lines]:
+        for column in [lines] if page is TIMELINES_BESIDE else [[axes] for axes in lines]:
             timelines.finish_column(column, "", stages, float(planned.times[-1]))
     return figure
 
@@ -126,7 +126,7 @@ def report_figure(
 def _report_page(plan: Plan, vehicle: Vehicle, flight: Flight, score: Score | None) -> Figure:
     facts = [plan_facts(plan), _error_facts(flight) if score is None else flight_facts(score)]
     figure, rows = _page(
-        plan, vehicle, asked_motion(plan_reference(plan, vehicle)), flown_motions(flight), 2, facts
+        plan, vehicle, reference_poses(plan_reference(plan, vehicle)), actual_poses(flight), 2, facts
     )
     errors, thrusts = ([panel(figure, x, y, WIDTH, ROW) for y in rows] for x in COLUMNS)
     timelines.draw_position_error(errors[0], flight)
@@ -141,7 +141,7 @@ def _report_page(plan: Plan, vehicle: Vehicle, flight: Flight, score: Score | No
 def _plan_page(plan: Plan, vehicle: Vehicle) -> Figure:
     asked = plan_reference(plan, vehicle)
     facts = [plan_facts(plan), *([] if plan.margin is None else [f"rotors {plan.margin}"])]
-    figure, rows = _page(plan, vehicle, asked_motion(asked), [], 1, facts)
+    figure, rows = _page(plan, vehicle, reference_poses(asked), [], 1, facts)
     specific, rotors = (panel(figure, x, rows[0], WIDTH, ROW) for x in COLUMNS)
     timelines.draw_specific_thrust(specific, plan, vehicle)
     timelines.draw_rotor_thrusts(rotors, asked.times, asked.rotor_thrusts, vehicle)
@@ -151,7 +151,12 @@ def _plan_page(plan: Plan, vehicle: Vehicle) -> Figure:
 
 
 def _page(
-    plan: Plan, vehicle: Vehicle, planned: Motion, flown: Sequence[Motion], rows: int, facts: Sequence[str]
+    plan: Plan,
+    vehicle: Vehicle,
+    planned: PoseHistory,
+    flown: Sequence[PoseHistory],
+    rows: int,
+    facts: Sequence[str],
 ) -> tuple[Figure, list[float]]:
     """A page with headline and pictures, and the bottoms [in] of its rows of timelines, top row first."""
     pictures = STACKED if is_flat(planned.position) else SIDE_BY_SIDE

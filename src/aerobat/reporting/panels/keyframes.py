@@ -10,7 +10,7 @@ from aerobat.arrays import Array
 from aerobat.flatness import reference
 from aerobat.planning import Plan
 from aerobat.problem import Flip
-from aerobat.reporting.camera import Camera
+from aerobat.reporting.scene.camera import Camera
 from aerobat.vehicle import Vehicle
 
 FEWEST = 5  # moments shown; where a maneuver has fewer stages, equal steps of time join them
@@ -20,7 +20,7 @@ THIN = 0.02  # of a path's extent: what spreads less to its sides lies in a plan
 
 
 @dataclass(frozen=True)
-class TurnPlane:
+class ManeuverPlane:
     """The vertical plane in which the specific thrust turns, at a heading [deg] of its horizontal axis."""
 
     heading_deg: float
@@ -42,7 +42,7 @@ class TurnPlane:
 
 
 @dataclass(frozen=True)
-class Moment:
+class Keyframe:
     """One instant of a maneuver: a stage, or a step of time between stages (no interval)."""
 
     name: str
@@ -51,51 +51,51 @@ class Moment:
 
 
 @dataclass(frozen=True, eq=False)
-class Snapshots:
-    """Moments of a plan with what the vehicle is asked there."""
+class Keyframes:
+    """Keyframe of a plan with what the vehicle is asked there."""
 
-    moments: tuple[Moment, ...]
+    moments: tuple[Keyframe, ...]
     position: Array  # [m], (k, 3)
     q_world_body: Array  # (k, 4)
     thrust: Array  # [m/s²] specific thrust a + g e3, (k, 3)
 
-    def only(self, kept: list[int]) -> Snapshots:
+    def only(self, kept: list[int]) -> Keyframes:
         """Some of the moments."""
         moments = tuple(self.moments[k] for k in kept)
-        return Snapshots(moments, self.position[kept], self.q_world_body[kept], self.thrust[kept])
+        return Keyframes(moments, self.position[kept], self.q_world_body[kept], self.thrust[kept])
 
 
-def snapshots(plan: Plan, vehicle: Vehicle) -> Snapshots:
+def keyframes(plan: Plan, vehicle: Vehicle) -> Keyframes:
     """What `plan` asks of `vehicle` at its stages, and where those are few, at equal steps of time."""
-    shown = [Moment(stage.name, stage.time, stage.interval) for stage in plan.stages]
+    shown = [Keyframe(stage.name, stage.time, stage.interval) for stage in plan.stages]
     if len(shown) < FEWEST:
         steps = np.linspace(0.0, plan.duration, STEPS + 1).tolist()
-        shown += [Moment("", t) for t in steps if all(abs(t - m.time) > 0.5 * steps[1] for m in shown)]
+        shown += [Keyframe("", t) for t in steps if all(abs(t - m.time) > 0.5 * steps[1] for m in shown)]
     shown.sort(key=lambda moment: moment.time)  # stages may come in any order
     times = [moment.time for moment in shown]
     setpoint = reference(plan.trajectory, vehicle, times=times, environment=plan.problem.environment).setpoint
     thrust = setpoint.flat.acceleration + plan.problem.environment.weight
-    return Snapshots(tuple(shown), setpoint.flat.position, setpoint.q_world_body, thrust)
+    return Keyframes(tuple(shown), setpoint.flat.position, setpoint.q_world_body, thrust)
 
 
-def turn_plane(plan: Plan, thrust: Array) -> TurnPlane:
+def maneuver_plane(plan: Plan, thrust: Array) -> ManeuverPlane:
     """The plane square to a flip's axis; else that in which the specific thrust (k, 3) varies most."""
     if isinstance(plan.problem.maneuver, Flip):
-        return TurnPlane(_as_line(plan.problem.maneuver.axis_deg - 90.0))
+        return ManeuverPlane(_as_line(plan.problem.maneuver.axis_deg - 90.0))
     level = thrust[:, :2] - thrust[:, :2].mean(axis=0)
     _, _, directions = np.linalg.svd(level)
     heading = np.rad2deg(np.arctan2(directions[0, 1], directions[0, 0]))
-    return TurnPlane(_as_line(ROUND_HEADING * round(heading / ROUND_HEADING)))
+    return ManeuverPlane(_as_line(ROUND_HEADING * round(heading / ROUND_HEADING)))
 
 
-def plane_of(points: Array) -> TurnPlane | None:
+def plane_of(points: Array) -> ManeuverPlane | None:
     """The vertical plane in which points (n, 3) lie; None where they spread to its sides."""
     level = points[:, :2] - points[:, :2].mean(axis=0)
     _, _, directions = np.linalg.svd(level, full_matrices=False)
     if np.ptp(level @ directions[1]) > THIN * np.ptp(points, axis=0).max():
         return None
     along = directions[0] if np.ptp(level) > 0.0 else np.array([1.0, 0.0])
-    return TurnPlane(_as_line(round(float(np.rad2deg(np.arctan2(along[1], along[0]))), 1)))
+    return ManeuverPlane(_as_line(round(float(np.rad2deg(np.arctan2(along[1], along[0]))), 1)))
 
 
 def _as_line(heading_deg: float) -> float:

@@ -8,24 +8,24 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from aerobat.arrays import Array
-from aerobat.reporting.camera import Camera
-from aerobat.reporting.canvas import size_of
-from aerobat.reporting.scene import Shape, paint
+from aerobat.reporting.page import size_of
+from aerobat.reporting.scene.camera import Camera
+from aerobat.reporting.scene.shapes import Shape, draw_depth_sorted
 from aerobat.reporting.style import HAIR, NORMAL, PAPER, SMALL
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-LEAST_SIDE = np.array([0.35, 0.35, 0.12])  # of a room, relative to its longest
+MIN_SIDE = np.array([0.35, 0.35, 0.12])  # of a room, relative to its longest
 ROUND = np.array([1.0, 2.0, 5.0])
 MARGIN = 0.5  # [in] for the scales around a room
 NUMBERS = 0.15  # [in] from an edge to the numbers along it
 NAMES = np.array([0.3, 0.2])  # [in] from the numbers to the axis' name, to the side and up or down
-LEAST_PITCH = 0.26  # [in] between the numbers of a scale
+MIN_PITCH = 0.26  # [in] between the numbers of a scale
 
 
 @dataclass(frozen=True, eq=False)
-class Room:
+class AxesBox:
     """An upright box around everything in a scene."""
 
     lower: Array  # [m], (3,)
@@ -54,12 +54,12 @@ class Room:
         return np.where(camera.toward > 0, self.lower, self.upper)
 
 
-def room_around(points: Array, pad: float) -> Room:
+def box_around(points: Array, pad: float) -> AxesBox:
     """The room around points (n, 3), `pad` [m] wider, and no side much shorter than the longest."""
     lower, upper = points.min(axis=0) - pad, points.max(axis=0) + pad
-    short = np.maximum(LEAST_SIDE * (upper - lower).max() - (upper - lower), 0.0)
+    short = np.maximum(MIN_SIDE * (upper - lower).max() - (upper - lower), 0.0)
     share = np.array([0.5, 0.5, 0.0])  # the floor stays right below
-    return Room(lower - share * short, upper + (1.0 - share) * short)
+    return AxesBox(lower - share * short, upper + (1.0 - share) * short)
 
 
 def round_step(length: float) -> float:
@@ -68,15 +68,15 @@ def round_step(length: float) -> float:
     return float(decade * ROUND[ROUND * decade <= length * (1 + 1e-9)].max())
 
 
-def draw_room(axes: Axes, room: Room, camera: Camera) -> None:
+def draw_axes_box(axes: Axes, room: AxesBox, camera: Camera) -> None:
     """Draw floor, walls and scales, and fit the axes to them with their aspect kept."""
     per_metre = _fit(axes, room, camera)
-    paint(axes, _walls(room, camera), camera, zorder=1.0)
+    draw_depth_sorted(axes, _walls(room, camera), camera, zorder=1.0)
     for axis in range(3):
         _scale(axes, room, camera, axis, per_metre)
 
 
-def _fit(axes: Axes, room: Room, camera: Camera) -> float:
+def _fit(axes: Axes, room: AxesBox, camera: Camera) -> float:
     """Centre the room in the axes and return the scale [in/m]."""
     picture = camera.project(room.corners)
     low, high = picture.min(axis=0), picture.max(axis=0)
@@ -88,7 +88,7 @@ def _fit(axes: Axes, room: Room, camera: Camera) -> float:
     return per_metre
 
 
-def _walls(room: Room, camera: Camera) -> list[Shape]:
+def _walls(room: AxesBox, camera: Camera) -> list[Shape]:
     """Floor and back walls with the lines of their grids."""
     back = room.back(camera)
     back[2] = room.lower[2]
@@ -101,11 +101,11 @@ def _walls(room: Room, camera: Camera) -> list[Shape]:
                 ends = np.tile(back, (2, 1))
                 ends[:, along] = room.lower[along], room.upper[along]
                 ends[:, across] = tick
-                lines.append(Shape(ends, edge=HAIR, width=0.7, raised=1e3))
+                lines.append(Shape(ends, edge=HAIR, width=0.7, depth_bias=1e3))
     return shapes + lines
 
 
-def _rectangle(room: Room, normal: int, level: float) -> Array:
+def _rectangle(room: AxesBox, normal: int, level: float) -> Array:
     first, second = (axis for axis in range(3) if axis != normal)
     points = np.full((4, 3), level)
     points[:, first] = np.array([room.lower, room.upper, room.upper, room.lower])[:, first]
@@ -113,7 +113,7 @@ def _rectangle(room: Room, normal: int, level: float) -> Array:
     return points
 
 
-def _scale(axes: Axes, room: Room, camera: Camera, axis: int, per_metre: float) -> None:
+def _scale(axes: Axes, room: AxesBox, camera: Camera, axis: int, per_metre: float) -> None:
     """Numbers and the axis' name along one edge of the room."""
     edge, outward = _edge(room, camera, axis)
     ticks = room.ticks(axis)
@@ -122,7 +122,7 @@ def _scale(axes: Axes, room: Room, camera: Camera, axis: int, per_metre: float) 
     places = camera.project(points)
     if len(ticks) > 1:
         pitch = max(float(np.linalg.norm(places[1] - places[0])) * per_metre, 1e-6)  # an axis seen end-on
-        keep = slice(None, None, max(1, int(np.ceil(LEAST_PITCH / pitch))))
+        keep = slice(None, None, max(1, int(np.ceil(MIN_PITCH / pitch))))
         places, ticks = places[keep], ticks[keep]
     for place, tick in zip(places + NUMBERS * outward / per_metre, ticks, strict=True):
         axes.text(place[0], place[1], f"{tick:g}".replace("-", "−"), size=SMALL, ha="center", va="center")
@@ -134,14 +134,14 @@ def _scale(axes: Axes, room: Room, camera: Camera, axis: int, per_metre: float) 
     axes.text(place[0], place[1], f"{'xyz'[axis]} [m]", size=NORMAL, ha="center", va="center")
 
 
-def _name_point(room: Room, edge: Array, axis: int) -> Array:
+def _name_point(room: AxesBox, edge: Array, axis: int) -> Array:
     """Where on an edge the axis' name stands: at the top of the upright one, half-way along the others."""
     point = edge.copy()
     point[axis] = room.upper[axis] if axis == 2 else (room.lower[axis] + room.upper[axis]) / 2
     return point
 
 
-def _edge(room: Room, camera: Camera, axis: int) -> tuple[Array, Array]:
+def _edge(room: AxesBox, camera: Camera, axis: int) -> tuple[Array, Array]:
     """A point of the edge that carries an axis' scale (3,), and the way out of the picture there (2,)."""
     edge = room.front(camera)
     edge[2] = room.lower[2]
@@ -155,5 +155,5 @@ def _edge(room: Room, camera: Camera, axis: int) -> tuple[Array, Array]:
     return edge, outward / max(float(np.linalg.norm(outward)), 1e-9)
 
 
-def _ends(room: Room, axis: int) -> tuple[float, float]:
+def _ends(room: AxesBox, axis: int) -> tuple[float, float]:
     return float(room.lower[axis]), float(room.upper[axis])

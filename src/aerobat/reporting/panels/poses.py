@@ -19,7 +19,7 @@ FAR = 0.5  # of the planned path's extent: where a flight strays further, it is 
 
 
 @dataclass(frozen=True, eq=False)
-class Motion:
+class PoseHistory:
     """Where a vehicle is, or shall be, over time."""
 
     times: Array  # [s], (T,)
@@ -43,12 +43,12 @@ class Motion:
             return float(self.times[0])
         return float(self.times[np.linalg.norm(self.position - gate.position, axis=-1).argmin()])
 
-    def near(self, planned: Motion) -> Motion:
+    def near(self, planned: PoseHistory) -> PoseHistory:
         """The motion up to where it strays far from the planned one, taken at the same times."""
         error = np.linalg.norm(self.position - planned.position, axis=-1)
         stray = np.flatnonzero(error > FAR * max(planned.extent, 1.0))
         end = max(int(stray[0]), 2) if len(stray) else len(self.times)
-        return Motion(self.times[:end], self.position[:end], self.q_world_body[:end])
+        return PoseHistory(self.times[:end], self.position[:end], self.q_world_body[:end])
 
 
 def plan_reference(plan: Plan, vehicle: Vehicle) -> Reference:
@@ -56,14 +56,14 @@ def plan_reference(plan: Plan, vehicle: Vehicle) -> Reference:
     return reference(plan.trajectory, vehicle, rate=RATE, environment=plan.problem.environment)
 
 
-def asked_motion(asked: Reference | Flight) -> Motion:
+def reference_poses(asked: Reference | Flight) -> PoseHistory:
     """The motion that a reference asks, or that was asked of a flight for as long as it lasted."""
-    return Motion(asked.times, asked.setpoint.flat.position, asked.setpoint.q_world_body)
+    return PoseHistory(asked.times, asked.setpoint.flat.position, asked.setpoint.q_world_body)
 
 
-def flown_motions(flight: Flight) -> list[Motion]:
+def actual_poses(flight: Flight) -> list[PoseHistory]:
     """What each vehicle of a flight, or of a batch, did before it went astray."""
-    asked = asked_motion(flight)
+    asked = reference_poses(flight)
     positions = flight.states.position.reshape(-1, *asked.position.shape)
     attitudes = flight.states.q_world_body.reshape(-1, *asked.q_world_body.shape)
-    return [Motion(flight.times, p, q).near(asked) for p, q in zip(positions, attitudes, strict=True)]
+    return [PoseHistory(flight.times, p, q).near(asked) for p, q in zip(positions, attitudes, strict=True)]

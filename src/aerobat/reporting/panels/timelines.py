@@ -11,10 +11,10 @@ from aerobat.arrays import Array
 from aerobat.flight import Flight
 from aerobat.metrics import attitude_error, position_error
 from aerobat.planning import PlacedStage, Plan
-from aerobat.reporting.canvas import HEADING, heading, legend, size_of
-from aerobat.reporting.spreading import spread_out
+from aerobat.reporting.page import HEADING, heading, legend, size_of
+from aerobat.reporting.panels.keyframes import keyframes, maneuver_plane
+from aerobat.reporting.panels.labels import spread_out
 from aerobat.reporting.style import BLUE, FAINT, INK, MUTED, RED, SMALL, YELLOW
-from aerobat.reporting.turn import snapshots, turn_plane
 from aerobat.vehicle import Vehicle
 
 if TYPE_CHECKING:
@@ -68,7 +68,7 @@ def rotor_colours(vehicle: Vehicle) -> list[str]:
 
 def draw_specific_thrust(axes: Axes, plan: Plan, vehicle: Vehicle) -> None:
     """a_z + g and the lateral acceleration in the plane of the turn, with dots at the stages."""
-    plane = turn_plane(plan, snapshots(plan, vehicle).thrust)
+    plane = maneuver_plane(plan, keyframes(plan, vehicle).thrust)
     times = plan.trajectory.sample(200.0)
     stages = np.array([stage.time for stage in plan.stages])
     for at, style in ((times, "-"), (stages, "o")):

@@ -10,13 +10,13 @@ import numpy as np
 
 from aerobat.arrays import Array
 from aerobat.problem.gate import Gate
-from aerobat.reporting.box import draw_room, room_around
-from aerobat.reporting.camera import Camera, best_view
-from aerobat.reporting.canvas import size_of
-from aerobat.reporting.glyphs import gate_bars, gate_shapes
-from aerobat.reporting.path_panel import mark_ends
-from aerobat.reporting.scene import paint
-from aerobat.reporting.turn import TurnPlane, plane_of
+from aerobat.reporting.page import size_of
+from aerobat.reporting.panels.keyframes import ManeuverPlane, plane_of
+from aerobat.reporting.panels.path import mark_ends
+from aerobat.reporting.scene.axes_box import box_around, draw_axes_box
+from aerobat.reporting.scene.camera import Camera, best_view
+from aerobat.reporting.scene.glyphs import gate_bars, gate_shapes
+from aerobat.reporting.scene.shapes import draw_depth_sorted
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -41,7 +41,7 @@ def draw_overlay(axes: Axes, paths: Sequence[NamedPath], gate: Gate | None) -> N
     plane = plane_of(points)
     camera = _room(axes, points, gate) if plane is None else _sheet(axes, points, plane)
     if gate is not None:
-        paint(axes, gate_shapes(gate), camera, zorder=1.5)
+        draw_depth_sorted(axes, gate_shapes(gate), camera, zorder=1.5)
     pictures = [camera.project(path.position) for path in paths]
     for path, picture in zip(paths, pictures, strict=True):
         axes.plot(*picture.T, color=path.colour, linewidth=1.7, label=path.name)
@@ -49,13 +49,13 @@ def draw_overlay(axes: Axes, paths: Sequence[NamedPath], gate: Gate | None) -> N
 
 
 def _room(axes: Axes, points: Array, gate: Gate | None) -> Camera:
-    room = room_around(points, 0.02 * float(np.ptp(points, axis=0).max()))
+    room = box_around(points, 0.02 * float(np.ptp(points, axis=0).max()))
     camera = best_view(points, gate, room.corners, size_of(axes))
-    draw_room(axes, room, camera)
+    draw_axes_box(axes, room, camera)
     return camera
 
 
-def _sheet(axes: Axes, points: Array, plane: TurnPlane) -> Camera:
+def _sheet(axes: Axes, points: Array, plane: ManeuverPlane) -> Camera:
     """Fit the plane into the axes, the same scale along both."""
     picture = plane.camera.project(points)
     low, high = picture.min(axis=0), picture.max(axis=0)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import aerobat as ab
-from aerobat.reporting.tracks import at_limit, fit_to_limits, wrench_limits
+from aerobat.reporting.panels.signals import at_limit, fit_to_limits, wrench_limits
 from aerobat.vehicle import wrench
 from reporting_cases import flown, planned, require_legible
 from test_reporting_figures import batch_of

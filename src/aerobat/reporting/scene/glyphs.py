@@ -7,8 +7,8 @@ import numpy as np
 from aerobat import so3
 from aerobat.arrays import Array
 from aerobat.problem.gate import Gate
-from aerobat.reporting.camera import Camera
-from aerobat.reporting.scene import Colour, Shape
+from aerobat.reporting.scene.camera import Camera
+from aerobat.reporting.scene.shapes import Colour, Shape
 from aerobat.reporting.style import BLUE, FAINT, INK, RED, YELLOW
 from aerobat.vehicle import Vehicle
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from aerobat.arrays import Array
-from aerobat.reporting.camera import Camera
+from aerobat.reporting.scene.camera import Camera
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -27,16 +27,20 @@ class Shape:
     face: Colour = NOTHING
     edge: Colour = NOTHING
     width: float = 0.0  # [pt] of the edge
-    raised: float = 0.0  # [m] toward the viewer, for the order of painting only
+    depth_bias: float = 0.0  # [m] toward the viewer, for the order of painting only
 
 
-def polyline(points: Array, edge: Colour, width: float, raised: float = 0.0, piece: int = 4) -> list[Shape]:
+def polyline(
+    points: Array, edge: Colour, width: float, depth_bias: float = 0.0, piece: int = 4
+) -> list[Shape]:
     """A line (T, 3) in short pieces, so that it can pass behind one thing and before another."""
     starts = range(0, len(points) - 1, piece)
-    return [Shape(points[k : k + piece + 1], edge=edge, width=width, raised=raised) for k in starts]
+    return [Shape(points[k : k + piece + 1], edge=edge, width=width, depth_bias=depth_bias) for k in starts]
 
 
-def paint(axes: Axes, shapes: Sequence[Shape], camera: Camera, zorder: float = 2.0) -> PolyCollection:
+def draw_depth_sorted(
+    axes: Axes, shapes: Sequence[Shape], camera: Camera, zorder: float = 2.0
+) -> PolyCollection:
     """Add shapes to axes whose data coordinates are the camera's picture [m]."""
     from matplotlib.collections import PolyCollection
 
@@ -44,7 +48,7 @@ def paint(axes: Axes, shapes: Sequence[Shape], camera: Camera, zorder: float = 2
     points = np.concatenate([shape.points for shape in shapes])
     starts = np.concatenate([[0], np.cumsum(counts)[:-1]])
     nearness = np.add.reduceat(camera.nearness(points), starts) / counts
-    order = np.argsort(nearness + [shape.raised for shape in shapes], kind="stable")
+    order = np.argsort(nearness + [shape.depth_bias for shape in shapes], kind="stable")
     outlines = np.split(camera.project(points), starts[1:])
     collection = PolyCollection(
         [outlines[k] for k in order],

@@ -11,8 +11,6 @@ from aerobat.flatness import Reference, reference
 from aerobat.flight import Flight
 from aerobat.metrics import score
 from aerobat.planning import Plan
-from aerobat.reporting import timelines
-from aerobat.reporting.canvas import blank_page, heading, headline, house_style, panel
 from aerobat.reporting.figures import (
     AXIS,
     FACT,
@@ -22,10 +20,19 @@ from aerobat.reporting.figures import (
     flight_facts,
     plan_facts,
 )
-from aerobat.reporting.motion import asked_motion, flown_motions
-from aerobat.reporting.path_panel import draw_path
+from aerobat.reporting.page import blank_page, heading, headline, house_style, panel
+from aerobat.reporting.panels import timelines
+from aerobat.reporting.panels.path import draw_path
+from aerobat.reporting.panels.poses import actual_poses, reference_poses
+from aerobat.reporting.panels.signals import (
+    Signal,
+    draw_signal,
+    effort_signals,
+    motion_signals,
+    rotor_signals,
+    shade,
+)
 from aerobat.reporting.style import PAGE_WIDTH
-from aerobat.reporting.tracks import Track, draw_track, effort_tracks, motion_tracks, rotor_tracks, shade
 from aerobat.vehicle import Vehicle
 
 if TYPE_CHECKING:
@@ -60,16 +67,16 @@ class Columns:
         """Complete a column with title, stages and time axis."""
         timelines.finish_column(column, title, self.plan.stages, self.plan.duration)
 
-    def draw_tracks(self, place: Place, tracks: Sequence[Track], title: str, named: bool = False) -> None:
+    def draw_signals(self, place: Place, signals: Sequence[Signal], title: str, named: bool = False) -> None:
         """Tracks one above the other, with names for a legend if asked."""
-        column = stacked(self.figure, place, len(tracks))
-        for axes, track in zip(column, tracks, strict=True):
-            self.draw_track(axes, track, named and axes is column[0])
+        column = stacked(self.figure, place, len(signals))
+        for axes, signal in zip(column, signals, strict=True):
+            self.draw_signal(axes, signal, named and axes is column[0])
         self.finished(column, title)
 
-    def draw_track(self, axes: Axes, track: Track, named: bool = False) -> None:
+    def draw_signal(self, axes: Axes, signal: Signal, named: bool = False) -> None:
         """One of them."""
-        draw_track(axes, track, self.asked.times, self.flight.times, named)
+        draw_signal(axes, signal, self.asked.times, self.flight.times, named)
 
     def draw_errors(self, place: Place) -> None:
         """Errors of position and attitude."""
@@ -98,19 +105,19 @@ def tracking_figure(plan: Plan, vehicle: Vehicle, flight: Flight) -> Figure:
         figure = blank_page(PAGE_WIDTH, HEIGHT + HEAD + FACT * len(facts))
         headline(figure, f"{plan.problem.name} · tracking by {vehicle.name}", facts)
         path = panel(figure, *PATH)
-        motions = asked_motion(asked), flown_motions(flight)
+        motions = reference_poses(asked), actual_poses(flight)
         note = draw_path(path, *motions, vehicle, next(iter(plan.problem.gates), None), plan.stages)
         heading(path, "Path and attitude", note)
         columns = Columns(figure, plan, asked, flight)
-        positions, velocities = motion_tracks(asked, flight)
-        thrust, *moments = effort_tracks(asked, flight, vehicle)
+        positions, velocities = motion_signals(asked, flight)
+        thrust, *moments = effort_signals(asked, flight, vehicle)
         errors, middle, right = ((x, AXIS + ROTORS + NEXT, THIRD, EFFORTS) for x in THIRDS)
-        columns.draw_tracks(POSITIONS, positions, "Position", named=True)
-        columns.draw_tracks(VELOCITIES, velocities, "Velocity")
+        columns.draw_signals(POSITIONS, positions, "Position", named=True)
+        columns.draw_signals(VELOCITIES, velocities, "Velocity")
         columns.draw_errors(errors)
-        columns.draw_tracks(middle, [thrust], "Collective thrust")
-        columns.draw_tracks(right, moments, "Moments about the body's axes")
-        _draw_rotors(columns, rotor_tracks(asked, flight, vehicle))
+        columns.draw_signals(middle, [thrust], "Collective thrust")
+        columns.draw_signals(right, moments, "Keyframe about the body's axes")
+        _draw_rotors(columns, rotor_signals(asked, flight, vehicle))
     return figure
 
 
@@ -128,11 +135,11 @@ def _facts(plan: Plan, vehicle: Vehicle, flight: Flight) -> list[str]:
     return [plan_facts(plan), *([] if proof is None else [proof]), flown]
 
 
-def _draw_rotors(columns: Columns, tracks: Sequence[Track]) -> None:
+def _draw_rotors(columns: Columns, signals: Sequence[Signal]) -> None:
     """All rotors side by side on one scale."""
-    row = _side_by_side(columns.figure, len(tracks))
-    for i, (axes, track) in enumerate(zip(row, tracks, strict=True)):
-        columns.draw_track(axes, track)
+    row = _side_by_side(columns.figure, len(signals))
+    for i, (axes, signal) in enumerate(zip(row, signals, strict=True)):
+        columns.draw_signal(axes, signal)
         timelines.mark_stages(axes, columns.plan.stages, columns.plan.duration, named=False)
         axes.set_xlabel("time [s]")
         heading(axes, "" if i else "Thrust of each rotor", f"rotor {i}")

@@ -10,10 +10,11 @@ import numpy as np
 from aerobat.arrays import Array
 from aerobat.planning import PlacedStage
 from aerobat.problem.gate import Gate
-from aerobat.reporting.box import draw_room, room_around
-from aerobat.reporting.camera import Camera, best_view
-from aerobat.reporting.canvas import HEADING, legend, size_of
-from aerobat.reporting.glyphs import (
+from aerobat.reporting.page import HEADING, legend, size_of
+from aerobat.reporting.panels.poses import PoseHistory
+from aerobat.reporting.scene.axes_box import box_around, draw_axes_box
+from aerobat.reporting.scene.camera import Camera, best_view
+from aerobat.reporting.scene.glyphs import (
     drop_line,
     enlargement,
     gate_bars,
@@ -24,8 +25,7 @@ from aerobat.reporting.glyphs import (
     thrust_axis_shape,
     vehicle_shapes,
 )
-from aerobat.reporting.motion import Motion
-from aerobat.reporting.scene import Shape, paint, polyline
+from aerobat.reporting.scene.shapes import Shape, draw_depth_sorted, polyline
 from aerobat.reporting.style import BAND, BLUE, HAIR, INK, RED
 from aerobat.vehicle import Vehicle
 
@@ -41,8 +41,8 @@ ALONE_WIDTH = 1.6  # [pt] of a planned path that nobody flew
 
 def draw_path(
     axes: Axes,
-    planned: Motion,
-    flown: Sequence[Motion],
+    planned: PoseHistory,
+    flown: Sequence[PoseHistory],
     vehicle: Vehicle,
     gate: Gate | None,
     stages: Sequence[PlacedStage] = (),
@@ -53,9 +53,9 @@ def draw_path(
     """
     scale = enlargement(vehicle, SIZE * planned.extent)
     reach = scale * span(vehicle)
-    room = room_around(_everything(planned, flown, gate), 0.6 * reach)
+    room = box_around(_everything(planned, flown, gate), 0.6 * reach)
     camera = best_view(planned.path, gate, room.corners, size_of(axes))
-    draw_room(axes, room, camera)
+    draw_axes_box(axes, room, camera)
     poses = flown[0] if flown else planned
     samples, step = pose_samples(poses, reach, gate)
     shapes = [
@@ -63,7 +63,7 @@ def draw_path(
         *_gate(gate, float(room.lower[2])),
         *(shape for k in samples for shape in _pose(vehicle, poses, k, camera, scale)),
     ]
-    paint(axes, shapes, camera)
+    draw_depth_sorted(axes, shapes, camera)
     _name_paths(axes, bool(flown))
     _mark_stages(axes, camera, planned, [stage for stage in stages if stage.gate is None])
     mark_ends(axes, camera.project(planned.position[[0, -1]]))
@@ -71,7 +71,7 @@ def draw_path(
     return f"vehicle every {step:.2f} s{size}; blue seen from above, red from below"
 
 
-def pose_samples(motion: Motion, size: float, gate: Gate | None) -> tuple[list[int], float]:
+def pose_samples(motion: PoseHistory, size: float, gate: Gate | None) -> tuple[list[int], float]:
     """At which samples to draw the vehicle: equal steps of time [s], one of them in the gate.
 
     Those at which it would cover one already drawn are left out.
@@ -86,19 +86,19 @@ def pose_samples(motion: Motion, size: float, gate: Gate | None) -> tuple[list[i
     return sorted(kept), step
 
 
-def _pose(vehicle: Vehicle, motion: Motion, k: int, camera: Camera, scale: float) -> list[Shape]:
+def _pose(vehicle: Vehicle, motion: PoseHistory, k: int, camera: Camera, scale: float) -> list[Shape]:
     q = motion.q_world_body[k]
     position, tint = motion.position[k], side_tint(q, camera)
     axis = thrust_axis_shape(vehicle, position, q, scale)
     return [axis, *vehicle_shapes(vehicle, position, q, scale, tint)]
 
 
-def _paths(planned: Motion, flown: Sequence[Motion], floor: float) -> list[Shape]:
+def _paths(planned: PoseHistory, flown: Sequence[PoseHistory], floor: float) -> list[Shape]:
     """The planned path as a band with its shadow, the flown one as a line on it, many as thin lines."""
     course = planned.path
-    shapes = [Shape(shadow(course, floor), edge=HAIR, width=3.0, raised=-1e3)]
+    shapes = [Shape(shadow(course, floor), edge=HAIR, width=3.0, depth_bias=-1e3)]
     width = PLANNED_WIDTH if flown else ALONE_WIDTH
-    shapes += polyline(course, BAND, width, raised=-BELOW * planned.extent)
+    shapes += polyline(course, BAND, width, depth_bias=-BELOW * planned.extent)
     if len(flown) == 1:
         return shapes + polyline(flown[0].path, INK, FLOWN_WIDTH)
     opacity = max(0.08, len(flown) ** -0.5) if flown else 1.0
@@ -114,7 +114,7 @@ def _gate(gate: Gate | None, floor: float) -> list[Shape]:
     return [*gate_shapes(gate), drop_line(foot, floor)]
 
 
-def _everything(planned: Motion, flown: Sequence[Motion], gate: Gate | None) -> Array:
+def _everything(planned: PoseHistory, flown: Sequence[PoseHistory], gate: Gate | None) -> Array:
     """All that the room has to hold, (n, 3)."""
     points = [planned.path, *(motion.path for motion in flown)]
     if gate is not None:
@@ -129,7 +129,7 @@ def _name_paths(axes: Axes, flown: bool) -> None:
         axes.plot([], [], color=INK, linewidth=FLOWN_WIDTH, label="flown")
 
 
-def _mark_stages(axes: Axes, camera: Camera, planned: Motion, stages: Sequence[PlacedStage]) -> None:
+def _mark_stages(axes: Axes, camera: Camera, planned: PoseHistory, stages: Sequence[PlacedStage]) -> None:
     """A diamond on the planned path at each stage; in the legend its name, or what many are."""
     if stages:
         rows = np.searchsorted(planned.times, [stage.time for stage in stages]).clip(

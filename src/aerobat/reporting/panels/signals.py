@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from aerobat.arrays import Array
 from aerobat.flatness import Reference
 from aerobat.flight import Flight
-from aerobat.reporting.canvas import size_of
+from aerobat.reporting.page import size_of
 from aerobat.reporting.style import BAND, INK, MUTED, RED, SMALL
 from aerobat.vehicle import Vehicle, wrench
 
@@ -31,7 +31,7 @@ NEAR = 0.01  # of a rotor's range: a saturated command this near to a limit is a
 
 
 @dataclass(frozen=True, eq=False)
-class Track:
+class Signal:
     """What was asked of one quantity (T,), and what a flight gave (T',) for as long as it lasted."""
 
     label: str  # quantity and unit
@@ -47,7 +47,7 @@ class Track:
         return bool(max(np.ptp(self.asked), np.ptp(self.flown)) > STILL * (high - low))
 
 
-def motion_tracks(asked: Reference, flight: Flight) -> tuple[list[Track], list[Track]]:
+def motion_signals(asked: Reference, flight: Flight) -> tuple[list[Signal], list[Signal]]:
     """Positions and velocities along those of the world's axes on which anything moves; all at a hover."""
     wanted, flown = asked.setpoint.flat, flight.states
     extents = np.ptp(wanted.position, axis=0)
@@ -60,31 +60,31 @@ def motion_tracks(asked: Reference, flight: Flight) -> tuple[list[Track], list[T
 
 def _along(
     axes: Sequence[int], names: Sequence[str], asked: Array, flown: Array, flight: Flight
-) -> list[Track]:
-    return [Track(names[i], asked[:, i], flown[:, i], saturated=flight.saturated) for i in axes]
+) -> list[Signal]:
+    return [Signal(names[i], asked[:, i], flown[:, i], saturated=flight.saturated) for i in axes]
 
 
-def effort_tracks(asked: Reference, flight: Flight, vehicle: Vehicle) -> list[Track]:
+def effort_signals(asked: Reference, flight: Flight, vehicle: Vehicle) -> list[Signal]:
     """Collective thrust, and the moments about the body's axes that are used; all of them where none is."""
     flown, (low, high) = wrench(vehicle, flight.thrusts), wrench_limits(vehicle)
     wanted, saturated = asked.setpoint.wrench, flight.saturated
-    thrust = Track("thrust [N]", wanted.thrust, flown.thrust, (low[0], high[0]), saturated)
+    thrust = Signal("thrust [N]", wanted.thrust, flown.thrust, (low[0], high[0]), saturated)
     moments = [
-        Track(
+        Signal(
             f"{name} [N·m]", wanted.moment_body[:, i], flown.moment_body[:, i], (low[i + 1], high[i + 1]),
             saturated,
         )
         for i, name in enumerate(("$M_x$", "$M_y$", "$M_z$"))
     ]  # fmt: skip
-    return [thrust, *([track for track in moments if track.moves] or moments)]
+    return [thrust, *([signal for signal in moments if signal.moves] or moments)]
 
 
-def rotor_tracks(asked: Reference, flight: Flight, vehicle: Vehicle) -> list[Track]:
+def rotor_signals(asked: Reference, flight: Flight, vehicle: Vehicle) -> list[Signal]:
     """The thrust of every rotor."""
     saturated = at_limit(flight)
     limits = zip(vehicle.min_thrusts.tolist(), vehicle.max_thrusts.tolist(), strict=True)
     return [
-        Track("thrust [N]", asked.rotor_thrusts[:, i], flight.thrusts[:, i], limit, saturated[:, i])
+        Signal("thrust [N]", asked.rotor_thrusts[:, i], flight.thrusts[:, i], limit, saturated[:, i])
         for i, limit in enumerate(limits)
     ]
 
@@ -106,23 +106,23 @@ def at_limit(flight: Flight) -> Mask:
     return np.asarray(beyond & flight.saturated[..., None])
 
 
-def draw_track(axes: Axes, track: Track, asked_at: Array, flown_at: Array, named: bool) -> None:
+def draw_signal(axes: Axes, signal: Signal, asked_at: Array, flown_at: Array, named: bool) -> None:
     """Asked as a band, flown as a line, limits dashed and saturation shaded; with names for a legend.
 
-    The names are those of all that a page of tracks shows.
+    The names are those of all that a page of signals shows.
     """
-    axes.plot(asked_at, track.asked, color=BAND, linewidth=ASKED_WIDTH, label="asked" if named else "")
-    axes.plot(flown_at, track.flown, color=INK, linewidth=FLOWN_WIDTH, label="flown" if named else "")
-    axes.set_ylabel(track.label)
+    axes.plot(asked_at, signal.asked, color=BAND, linewidth=ASKED_WIDTH, label="asked" if named else "")
+    axes.plot(flown_at, signal.flown, color=INK, linewidth=FLOWN_WIDTH, label="flown" if named else "")
+    axes.set_ylabel(signal.label)
     if flown_at[-1] < asked_at[-1]:  # the flight went astray
-        axes.plot(flown_at[-1:], track.flown[-1:], "x", color=INK, markersize=5.0, mew=1.4)
-    if track.limits is not None:
-        draw_limits(axes, track.limits)
-        fit_to_limits(axes, track.limits, np.concatenate([track.asked, track.flown]))
+        axes.plot(flown_at[-1:], signal.flown[-1:], "x", color=INK, markersize=5.0, mew=1.4)
+    if signal.limits is not None:
+        draw_limits(axes, signal.limits)
+        fit_to_limits(axes, signal.limits, np.concatenate([signal.asked, signal.flown]))
     if named:
         axes.plot([], [], label="limits", **LIMIT)
-    if track.saturated is not None:
-        shade(axes, flown_at, track.saturated, "saturated" if named else "")
+    if signal.saturated is not None:
+        shade(axes, flown_at, signal.saturated, "saturated" if named else "")
 
 
 def draw_limits(axes: Axes, limits: Sequence[float]) -> None:

@@ -8,13 +8,13 @@ import numpy as np
 
 from aerobat.arrays import Array
 from aerobat.planning import Plan
-from aerobat.reporting.camera import Camera
-from aerobat.reporting.canvas import size_of
-from aerobat.reporting.glyphs import enlargement, gate_section, span, vehicle_shapes
-from aerobat.reporting.scene import Shape, paint
-from aerobat.reporting.spreading import spread_out
+from aerobat.reporting.page import size_of
+from aerobat.reporting.panels.keyframes import Keyframe, Keyframes, ManeuverPlane, keyframes, maneuver_plane
+from aerobat.reporting.panels.labels import spread_out
+from aerobat.reporting.scene.camera import Camera
+from aerobat.reporting.scene.glyphs import enlargement, gate_section, span, vehicle_shapes
+from aerobat.reporting.scene.shapes import Shape, draw_depth_sorted
 from aerobat.reporting.style import BAND, BLUE, FAINT, INK, MUTED, NORMAL, RED, SMALL
-from aerobat.reporting.turn import Moment, Snapshots, TurnPlane, snapshots, turn_plane
 from aerobat.vehicle import Vehicle
 
 if TYPE_CHECKING:
@@ -36,8 +36,8 @@ KEYS = np.array([0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0])  # [m/s
 
 def draw_stages(axes: Axes, plan: Plan, vehicle: Vehicle) -> str:
     """Draw the stages in the plane of the turn; return a note on what is shown."""
-    shots = snapshots(plan, vehicle)
-    plane, gate = turn_plane(plan, shots.thrust), next(iter(plan.problem.gates), None)
+    shots = keyframes(plan, vehicle)
+    plane, gate = maneuver_plane(plan, shots.thrust), next(iter(plan.problem.gates), None)
     camera = plane.camera
     frame = camera.project(np.concatenate([shots.position, *([] if gate is None else [gate.corners])]))
     column = _column(shots.moments)
@@ -53,8 +53,8 @@ def draw_stages(axes: Axes, plan: Plan, vehicle: Vehicle) -> str:
     path = plan.trajectory.evaluate(np.linspace(0.0, plan.duration, 241))
     axes.plot(*camera.project(path).T, color=BAND, linewidth=1.6)
     if gate is not None:
-        paint(axes, gate_section(gate, camera), camera, zorder=1.5)
-    paint(axes, _vehicles(vehicle, shots, scale), camera, zorder=2.2)
+        draw_depth_sorted(axes, gate_section(gate, camera), camera, zorder=1.5)
+    draw_depth_sorted(axes, _vehicles(vehicle, shots, scale), camera, zorder=2.2)
     _draw_sums(axes, places, thrust * arrow / inches)
     _draw_components(axes, places, thrust * arrow, arrow, plane)
     _draw_names(axes, shots.moments, places, thrust, 0.55 * scale * span(vehicle))
@@ -62,7 +62,7 @@ def draw_stages(axes: Axes, plan: Plan, vehicle: Vehicle) -> str:
     return ("a stage holds at the end of interval n" if plan.stages else "equal steps of time") + size
 
 
-def _apart(shots: Snapshots, camera: Camera, distance: float) -> list[int]:
+def _apart(shots: Keyframes, camera: Camera, distance: float) -> list[int]:
     """The stages, and of the steps of time between them those that are drawn clear of all others."""
     places = camera.project(shots.position)
     kept = [k for k, moment in enumerate(shots.moments) if moment.interval is not None]
@@ -72,7 +72,7 @@ def _apart(shots: Snapshots, camera: Camera, distance: float) -> list[int]:
     return sorted(kept)
 
 
-def _column(moments: tuple[Moment, ...]) -> float:
+def _column(moments: tuple[Keyframe, ...]) -> float:
     """The room [in] that the longest name takes."""
     return max(COLUMN, LETTER * max(len(moment.name) for moment in moments))
 
@@ -93,7 +93,7 @@ def _fit(axes: Axes, points: Array, pad: float, least: float, column: float) -> 
     return inches
 
 
-def _vehicles(vehicle: Vehicle, shots: Snapshots, scale: float) -> list[Shape]:
+def _vehicles(vehicle: Vehicle, shots: Keyframes, scale: float) -> list[Shape]:
     poses = zip(shots.position, shots.q_world_body, strict=True)
     return [shape for p, q in poses for shape in vehicle_shapes(vehicle, p, q, scale, weight=1.5)]
 
@@ -111,7 +111,7 @@ def _draw_sums(axes: Axes, places: Array, sums: Array) -> None:
         axes.add_collection(LineCollection(list(lines), zorder=2.1, **style), autolim=False)
 
 
-def _draw_components(axes: Axes, places: Array, arrows: Array, unit: float, plane: TurnPlane) -> None:
+def _draw_components(axes: Axes, places: Array, arrows: Array, unit: float, plane: ManeuverPlane) -> None:
     """The thrust's components (k, 2) [in] as arrows from the vehicles, with keys; 1 m/s² is `unit` long."""
     size = size_of(axes)
     key = max(KEYS[KEYS * unit <= KEY], default=KEYS[0])
@@ -127,7 +127,9 @@ def _draw_components(axes: Axes, places: Array, arrows: Array, unit: float, plan
         )  # fmt: skip
 
 
-def _draw_names(axes: Axes, moments: tuple[Moment, ...], places: Array, thrust: Array, clear: float) -> None:
+def _draw_names(
+    axes: Axes, moments: tuple[Keyframe, ...], places: Array, thrust: Array, clear: float
+) -> None:
     """Names, times and intervals beside the vehicles or below them, with a hair line to each."""
     from matplotlib.collections import LineCollection
 
@@ -147,7 +149,7 @@ def _draw_names(axes: Axes, moments: tuple[Moment, ...], places: Array, thrust: 
         _write_name(axes, moment, anchor, side)
 
 
-def _write_name(axes: Axes, moment: Moment, anchor: Array, side: str) -> None:
+def _write_name(axes: Axes, moment: Keyframe, anchor: Array, side: str) -> None:
     """A stage's name in bold over its time and interval; a step of time has its time only."""
     x, y = anchor + GAPS[side] / size_of(axes) * [np.ptp(axes.get_xlim()), np.ptp(axes.get_ylim())]
     below = side == "center"
