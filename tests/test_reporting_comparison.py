@@ -102,8 +102,14 @@ def test_every_plan_has_its_path_and_its_thrusts_between_the_limits_on_one_time_
         np.testing.assert_allclose(drawn, plan.trajectory.evaluate(times)[:, [0, 2]], atol=1e-9)
         rotors = axes.get_lines()[:4]
         assert {rotor.get_color() for rotor in rotors} == {line.get_color()}
-        asked = ab.reference(plan.trajectory, comparison.vehicle, times=rotors[0].get_xdata()).rotor_thrusts
-        np.testing.assert_allclose(np.column_stack([rotor.get_ydata() for rotor in rotors]), asked, atol=1e-9)
+        reference = ab.reference(
+            plan.trajectory,
+            comparison.vehicle,
+            times=rotors[0].get_xdata(),
+            environment=plan.problem.environment,
+        )
+        drawn = np.column_stack([rotor.get_ydata() for rotor in rotors])
+        np.testing.assert_allclose(drawn, reference.rotor_thrusts, atol=1e-9)
         dashed = [one.get_ydata()[0] for one in axes.get_lines() if one.get_linestyle() == "--"]
         assert dashed == [-0.2, 18.0]
     assert len({line.get_color() for line in paths.get_lines()[: len(plans)]}) == len(plans)

@@ -135,8 +135,8 @@ def test_the_chosen_view_shows_the_gate_open_and_the_path_spread(gate, heading, 
     up = np.array([0.0, 0.0, 1.0])
     path = gate.position + 2 * np.outer(np.sin(turn), across) + 4 * np.outer(np.cos(turn) - 1, up)
     path += flatness * np.outer(np.sin(turn / 2), np.cross(up, across))
-    room = box_around(path, 0.3)
-    camera = best_view(path, gate, room.corners, np.array([6.0, 6.0]))
+    box = box_around(path, 0.3)
+    camera = best_view(path, [gate], box.corners, np.array([6.0, 6.0]))
     assert abs(camera.toward @ gate.normal) > 0.3
     picture = camera.project(path)
     assert np.ptp(picture, axis=0).min() > 0.3 * min(4.0, np.ptp(path[:, 2]))
@@ -144,15 +144,15 @@ def test_the_chosen_view_shows_the_gate_open_and_the_path_spread(gate, heading, 
 
 @settings(max_examples=25)
 @given(st.lists(points, min_size=2, max_size=20).map(np.array), cameras, st.floats(2, 8), st.floats(2, 8))
-def test_a_room_holds_everything_and_fits_its_axes_at_equal_scales(inside, camera, width, height):
+def test_an_axes_box_holds_everything_and_fits_its_axes_at_equal_scales(inside, camera, width, height):
     assume(np.ptp(inside, axis=0).max() > 0.1)
-    room = box_around(inside, 0.2)
-    assert (inside >= room.lower).all()
-    assert (inside <= room.upper).all()
+    box = box_around(inside, 0.2)
+    assert (inside >= box.lower).all()
+    assert (inside <= box.upper).all()
     axes = blank_axes(width, height)
-    draw_axes_box(axes, room, camera)
+    draw_axes_box(axes, box, camera)
     low, high = np.array([axes.get_xlim(), axes.get_ylim()]).T
-    picture = camera.project(room.corners)
+    picture = camera.project(box.corners)
     assert (picture > low).all()
     assert (picture < high).all()
     np.testing.assert_allclose((high - low)[0] / width, (high - low)[1] / height)

@@ -1,4 +1,4 @@
-"""The tracking page shows what was asked, what was flown, the vehicle's limits, and saturation as it was."""
+"""The tracking page shows reference, actual, the vehicle's limits, and saturation as it was."""
 
 from functools import lru_cache
 
@@ -120,7 +120,10 @@ def test_every_rotor_is_drawn_with_its_limits(stop_after):
     figure, plan, flight = page_of(stop_after)
     for i, axes in enumerate(rotor_panels(figure, 4)):
         (asked_at, asked), (_, given), limits = lines(axes, 2)
-        expected = ab.reference(plan.trajectory, VEHICLE, times=asked_at).rotor_thrusts
+        environment = PROBLEM.environment
+        expected = ab.reference(
+            plan.trajectory, VEHICLE, times=asked_at, environment=environment
+        ).rotor_thrusts
         np.testing.assert_allclose(asked, expected[:, i], atol=1e-9)
         np.testing.assert_array_equal(given, flight.thrusts[:, i])
         np.testing.assert_allclose(limits, [-0.2, 18.0])
@@ -147,7 +150,7 @@ def test_nothing_is_shaded_in_a_flight_without_saturation():
     assert not flight.saturated.any()
     assert not any(len(shaded(axes)) for axes in figure.axes)
     names = {text.get_text() for text in panels(figure, "x [m]")[0].get_legend().get_texts()}
-    assert names == {"asked", "flown", "limits"}
+    assert names == {"reference", "actual", "limits"}
 
 
 def test_a_flight_that_ends_early_is_marked_where_it_ended():

@@ -137,7 +137,7 @@ def compare(problem: str, options: Tasked = TaskOptions()) -> None:
         A name that `aerobat problems` lists, or a problem's TOML file.
     """
     from aerobat.reporting.comparison import comparison_figure, comparison_rows, comparison_table
-    from aerobat.reporting.figures import png
+    from aerobat.reporting.page import png
     from aerobat.reporting.report_json import to_json
     from aerobat.reporting.tables import show
     from aerobat.storage import write_whole
@@ -210,7 +210,8 @@ def _finish(
 ) -> None:
     """Write what was made, then say what it is."""
     from aerobat.interchange.csv import write_csv
-    from aerobat.reporting.figures import png, report_figure
+    from aerobat.reporting.figures import report_figure
+    from aerobat.reporting.page import png
     from aerobat.reporting.report_json import report, to_json
     from aerobat.storage import write_whole
     from aerobat.trajectory import save_trajectory

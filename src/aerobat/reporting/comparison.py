@@ -13,23 +13,23 @@ from rich.text import Text
 
 from aerobat.flight import COMPLETE
 from aerobat.planning import Plan
-from aerobat.reporting.figures import AXIS, COLUMNS, FACT, HEAD, TITLES, is_flat, length
-from aerobat.reporting.page import MARGIN, blank_page, heading, headline, house_style, panel
-from aerobat.reporting.panels.overlay import NamedPath, draw_overlay
-from aerobat.reporting.panels.poses import plan_reference
-from aerobat.reporting.panels.signals import draw_limits, fit_to_limits
-from aerobat.reporting.style import (
-    BLUE,
-    INK,
-    MUTED,
-    NORMAL,
+from aerobat.reporting.captions import length
+from aerobat.reporting.page import (
+    AXIS,
+    COLUMNS,
+    MARGIN,
     PAGE_WIDTH,
-    RED,
-    SKY,
-    SMALL,
-    TITLE,
-    YELLOW,
+    TITLES,
+    blank_page,
+    heading,
+    house_style,
+    panel,
+    write,
 )
+from aerobat.reporting.panels.overlay import NamedPath, draw_overlay
+from aerobat.reporting.panels.poses import is_flat, plan_reference
+from aerobat.reporting.panels.signals import draw_limits, fit_to_limits
+from aerobat.reporting.style import BLUE, INK, MUTED, NORMAL, RED, SKY, SMALL, TITLE, YELLOW
 from aerobat.studies.compare import Comparison, Entry
 from aerobat.vehicle import Vehicle
 
@@ -80,8 +80,8 @@ def comparison_table(comparison: Comparison) -> Table:
         segments = NONE if entry.plan is None else str(entry.plan.intervals)
         spent = f"{entry.planning_time:.2f} s"
         table.add_row(entry.planner, segments, *_facts(comparison, entry).values(), spent)
-    told = [f"{_name(entry)}: {entry.outcome}" for entry in comparison.entries if entry.outcome != COMPLETE]
-    table.caption = Text("\n".join(told)) if told else None  # as it stands: brackets are no markup
+    notes = [f"{_name(entry)}: {entry.outcome}" for entry in comparison.entries if entry.outcome != COMPLETE]
+    table.caption = Text("\n".join(notes)) if notes else None  # as it stands: brackets are no markup
     return table
 
 
@@ -96,11 +96,11 @@ def comparison_figure(comparison: Comparison) -> Figure:
     rows = AXIS + sum(map(_pitch, entries))
     height = PATHS[is_flat(np.concatenate([path.position for path in paths]))]
     with house_style():
-        figure = blank_page(PAGE_WIDTH, rows + AXIS + MARGIN + height + TITLES + HEAD + FACT)
+        title = f"{comparison.problem.name} · planners for {comparison.vehicle.name}"
         fact = f"{len(paths)} of {len(entries)} planners found a plan"
-        headline(figure, f"{comparison.problem.name} · planners for {comparison.vehicle.name}", [fact])
+        figure = blank_page(rows + AXIS + MARGIN + height + TITLES, title, [fact])
         axes = panel(figure, COLUMNS[0], rows + AXIS + MARGIN, PAGE_WIDTH - COLUMNS[0] - MARGIN, height)
-        draw_overlay(axes, paths, next(iter(comparison.problem.gates), None))
+        draw_overlay(axes, paths, comparison.problem.gates)
         heading(axes, "Paths")
         _draw_rows(figure, comparison, colours, rows)
     return figure
@@ -148,7 +148,7 @@ def _draw_rows(figure: Figure, comparison: Comparison, colours: Sequence[str], t
     """A row a planner from `top` [in] downward: its timeline and facts, or why it has no plan."""
     timelines: list[Axes] = []
     for x, name in zip(PLACES, _facts(comparison, comparison.entries[0]), strict=True):
-        _write(figure, x, top, name, size=SMALL, color=MUTED)
+        write(figure, x, top, name, size=SMALL, color=MUTED)
     for entry, colour in zip(comparison.entries, colours, strict=True):
         top -= _pitch(entry)
         if entry.plan is None:
@@ -164,12 +164,12 @@ def _draw_rows(figure: Figure, comparison: Comparison, colours: Sequence[str], t
 
 def _draw_thrusts(axes: Axes, plan: Plan, vehicle: Vehicle, colour: str) -> None:
     """What flatness asks of all rotors, up to the plan's end."""
-    asked = plan_reference(plan, vehicle)
-    axes.plot(asked.times, asked.rotor_thrusts, color=colour, linewidth=1.1)
+    reference = plan_reference(plan, vehicle)
+    axes.plot(reference.times, reference.rotor_thrusts, color=colour, linewidth=1.1)
     axes.axvline(plan.duration, color=colour, linewidth=2.4)
     limits = sorted({*vehicle.min_thrusts.tolist(), *vehicle.max_thrusts.tolist()})
     draw_limits(axes, limits)
-    fit_to_limits(axes, limits, asked.rotor_thrusts)
+    fit_to_limits(axes, limits, reference.rotor_thrusts)
     axes.set(ylabel="thrust [N]", xlim=(0.0, TAIL * plan.duration))
 
 
@@ -186,17 +186,11 @@ def _write_facts(figure: Figure, comparison: Comparison, entry: Entry, bottom: f
     """Numbers beside a timeline, and what became of the flight below them."""
     for x, (name, fact) in zip(PLACES, _facts(comparison, entry).items(), strict=True):
         wrong = name == "certified" and not entry.certified
-        _write(figure, x, bottom + 0.6, fact, size=TITLE, color=RED if wrong else INK)
-    told = fill(f"planned in {entry.planning_time:.2f} s; {entry.outcome}", SENTENCE)
-    _write(figure, PLACES[0], bottom + 0.42, told, size=SMALL, color=MUTED, va="top")
+        write(figure, x, bottom + 0.6, fact, size=TITLE, color=RED if wrong else INK)
+    note = fill(f"planned in {entry.planning_time:.2f} s; {entry.outcome}", SENTENCE)
+    write(figure, PLACES[0], bottom + 0.42, note, size=SMALL, color=MUTED, va="top")
 
 
 def _write_reason(figure: Figure, entry: Entry, bottom: float) -> None:
-    _write(figure, COLUMNS[0], bottom + 0.4, _name(entry), size=SMALL, color=MUTED)
-    _write(figure, COLUMNS[0], bottom + 0.3, fill(entry.outcome, PARAGRAPH), size=NORMAL, va="top")
-
-
-def _write(figure: Figure, x: float, y: float, text: str, **options: Any) -> None:
-    """Text at a place on the page [in]."""
-    across, up = figure.get_size_inches()
-    figure.text(x / across, y / up, text, **options)
+    write(figure, COLUMNS[0], bottom + 0.4, _name(entry), size=SMALL, color=MUTED)
+    write(figure, COLUMNS[0], bottom + 0.3, fill(entry.outcome, PARAGRAPH), size=NORMAL, va="top")

@@ -1,34 +1,32 @@
-"""Blank pages and saved pages; matplotlib's drawing library without pyplot, its window manager."""
+"""Pages and what stands where on them; matplotlib's drawing library without pyplot, its window manager."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from io import BytesIO
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
 from aerobat.arrays import Array
-from aerobat.errors import SpecError
-from aerobat.reporting.style import DPI, HEADLINE, MUTED, NORMAL, RC, SMALL, TITLE
-from aerobat.storage import whole_file
+from aerobat.reporting.style import HEADLINE, MUTED, NORMAL, RC, SMALL, TITLE
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-# What each format is told: no dates, so that the same data give the same file, and for PNG a fast deflate.
-_OPTIONS: dict[str, dict[str, Any]] = {
-    ".png": {"pil_kwargs": {"compress_level": 1}},
-    ".pdf": {"metadata": {"CreationDate": None}},
-    ".svg": {"metadata": {"Date": None}},
-}
+Place = tuple[float, float, float, float]  # [in] left, bottom, width, height
 
-
+PAGE_WIDTH = 11.5  # [in]
 MARGIN = 0.3  # [in] at the left of a page
+HEAD = 0.57  # [in] the page's title
+FACT = 0.19  # [in] each line of facts under it
 HEADING = 0.3  # [in] from axes to the title above them
+TITLES = 0.62  # [in] above timelines, for their title and the stages' names
+AXIS = 0.5  # [in] below timelines, for the time axis
+COLUMNS = (0.74, 6.52)  # [in] where timelines begin from the left, in two columns
+DPI = 140  # 1610 pixels across a page
 
 
 @contextmanager
@@ -40,34 +38,35 @@ def house_style() -> Iterator[None]:
         yield
 
 
-def blank_page(width: float, height: float) -> Figure:
-    """An empty figure, sizes in inches."""
+def blank_page(height: float, title: str, facts: Sequence[str]) -> Figure:
+    """A page with its title and lines of facts under it; `height` [in] is what remains below them."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
-    figure = Figure(figsize=(width, height), dpi=DPI)
+    figure = Figure(figsize=(PAGE_WIDTH, height + HEAD + FACT * len(facts)), dpi=DPI)
     FigureCanvasAgg(figure)
+    top = figure.get_size_inches()[1]
+    write(figure, MARGIN, top - 0.34, title, size=HEADLINE, weight="bold", va="center")
+    for k, fact in enumerate(facts):
+        write(figure, MARGIN, top - 0.62 - FACT * k, fact, size=NORMAL, color=MUTED, va="center")
     return figure
 
 
-def panel(figure: Figure, left: float, bottom: float, width: float, height: float, **options: Any) -> Axes:
+def write(figure: Figure, x: float, y: float, text: str, **options: Any) -> None:
+    """Write text at a place on the page [in]."""
+    across, up = figure.get_size_inches()
+    figure.text(x / across, y / up, text, **options)
+
+
+def panel(figure: Figure, left: float, bottom: float, width: float, height: float) -> Axes:
     """Axes at a place given in inches from the page's lower left corner."""
     across, up = figure.get_size_inches()
-    return figure.add_axes((left / across, bottom / up, width / across, height / up), **options)
+    return figure.add_axes((left / across, bottom / up, width / across, height / up))
 
 
 def size_of(axes: Axes) -> Array:
     """Width and height of axes [in], (2,)."""
     return np.asarray(cast("Figure", axes.figure).get_size_inches() * axes.get_position().size)
-
-
-def headline(figure: Figure, title: str, facts: Sequence[str]) -> None:
-    """The page's title, and lines of facts under it."""
-    width, height = figure.get_size_inches()
-    figure.text(MARGIN / width, 1.0 - 0.34 / height, title, size=HEADLINE, weight="bold", va="center")
-    for k, fact in enumerate(facts):
-        place = MARGIN / width, 1.0 - (0.62 + 0.19 * k) / height
-        figure.text(*place, fact, size=NORMAL, color=MUTED, va="center")
 
 
 def heading(axes: Axes, title: str, note: str = "") -> None:
@@ -89,27 +88,9 @@ def legend(axes: Axes, above: float) -> None:
         )  # fmt: skip
 
 
-def save_figure(figure: Figure, path: str | Path) -> None:
-    """Write a figure as PNG, PDF or SVG, whole or not at all.
-
-    Raises SpecError for a name with another ending, or a place that cannot be written.
-    """
-    ending = Path(path).suffix.lower()
-    if ending not in _OPTIONS:
-        raise SpecError(
-            f"cannot save a figure as '{path}'; give it a name that ends in {', '.join(_OPTIONS)}"
-        )
-    with whole_file(path) as temporary:
-        _write(figure, temporary, ending)
-
-
 def png(figure: Figure) -> bytes:
-    """A figure as the bytes of a PNG file."""
+    """The bytes of a figure's PNG file: the same for the same data, deflated fast."""
     file = BytesIO()
-    _write(figure, file, ".png")
-    return file.getvalue()
-
-
-def _write(figure: Figure, file: Path | BytesIO, ending: str) -> None:
     with house_style():
-        figure.savefig(file, format=ending[1:], dpi=figure.dpi, **_OPTIONS[ending])
+        figure.savefig(file, format="png", dpi=figure.dpi, pil_kwargs={"compress_level": 1})
+    return file.getvalue()

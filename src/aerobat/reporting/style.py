@@ -1,4 +1,4 @@
-"""How figures look: one family of colours, one set of sizes, for screen and paper alike."""
+"""The look of figures: one family of colours, one set of sizes, for screen and paper alike."""
 
 from __future__ import annotations
 
@@ -15,10 +15,7 @@ MUTED = "#66788a"
 FAINT = "#a9b6c2"
 HAIR = "#dfe6ec"
 PAPER = "#f5f7f9"
-BAND = "#b4c8dd"  # a planned path, wide enough to show on both sides of the flown one
-
-DPI = 140  # 1610 pixels across a page of 11.5 inches
-PAGE_WIDTH = 11.5  # [in]
+BAND = "#b4c8dd"  # a reference path, wide enough to show on both sides of the actual one
 
 SMALL = 7.5  # [pt]
 NORMAL = 8.5

@@ -11,16 +11,8 @@ from aerobat.flatness import Reference, reference
 from aerobat.flight import Flight
 from aerobat.metrics import score
 from aerobat.planning import Plan
-from aerobat.reporting.figures import (
-    AXIS,
-    FACT,
-    HEAD,
-    TITLES,
-    Place,
-    flight_facts,
-    plan_facts,
-)
-from aerobat.reporting.page import blank_page, heading, headline, house_style, panel
+from aerobat.reporting.captions import plan_caption, score_caption
+from aerobat.reporting.page import AXIS, TITLES, Place, blank_page, heading, house_style, panel
 from aerobat.reporting.panels import timelines
 from aerobat.reporting.panels.path import draw_path
 from aerobat.reporting.panels.poses import actual_poses, reference_poses
@@ -32,7 +24,6 @@ from aerobat.reporting.panels.signals import (
     rotor_signals,
     shade,
 )
-from aerobat.reporting.style import PAGE_WIDTH
 from aerobat.vehicle import Vehicle
 
 if TYPE_CHECKING:
@@ -51,107 +42,92 @@ PATH: Place = (0.3, FOOT - 0.15, 6.1, 6.25)
 POSITIONS: Place = (7.1, FOOT + 3.6, 4.17, 2.5)
 VELOCITIES: Place = (7.1, FOOT, 4.17, 2.5)
 HEIGHT = FOOT + 6.75  # [in] of the page below its headline
-RATE = 1000.0  # [1/s] at which asked values are taken: they may peak sharply
+RATE = 1000.0  # [1/s] at which reference values are taken: they may peak sharply
 
 
 @dataclass(frozen=True)
-class Columns:
-    """What timelines of a page share."""
+class TrackingPage:
+    """A page of timelines, and what they share."""
 
     figure: Figure
     plan: Plan
-    asked: Reference
+    reference: Reference
     flight: Flight
 
-    def finished(self, column: Sequence[Axes], title: str) -> None:
-        """Complete a column with title, stages and time axis."""
+    def draw_signals(self, place: Place, signals: Sequence[Signal], title: str, named: bool = False) -> None:
+        """Draw signals one above the other, with names for a legend if asked."""
+        column = self._stacked(place, len(signals))
+        for axes, signal in zip(column, signals, strict=True):
+            self._draw_signal(axes, signal, named and axes is column[0])
         timelines.finish_column(column, title, self.plan.stages, self.plan.duration)
 
-    def draw_signals(self, place: Place, signals: Sequence[Signal], title: str, named: bool = False) -> None:
-        """Tracks one above the other, with names for a legend if asked."""
-        column = stacked(self.figure, place, len(signals))
-        for axes, signal in zip(column, signals, strict=True):
-            self.draw_signal(axes, signal, named and axes is column[0])
-        self.finished(column, title)
-
-    def draw_signal(self, axes: Axes, signal: Signal, named: bool = False) -> None:
-        """One of them."""
-        draw_signal(axes, signal, self.asked.times, self.flight.times, named)
-
     def draw_errors(self, place: Place) -> None:
-        """Errors of position and attitude."""
-        column = stacked(self.figure, place, 2)
+        """Draw errors of position and attitude."""
+        column = self._stacked(place, 2)
         timelines.draw_position_error(column[0], self.flight)
         timelines.draw_attitude_error(column[1], self.flight)
         for axes in column:
             shade(axes, self.flight.times, self.flight.saturated)
-        self.finished(column, "Tracking error")
+        timelines.finish_column(column, "Tracking error", self.plan.stages, self.plan.duration)
+
+    def draw_rotors(self, signals: Sequence[Signal]) -> None:
+        """Draw all rotors side by side across the foot of the page, on one scale."""
+        pitch = (THIRDS[-1] + THIRD - THIRDS[0] + ROTOR_GAP) / len(signals)
+        row = []
+        for i, signal in enumerate(signals):
+            axes = panel(self.figure, THIRDS[0] + i * pitch, AXIS, pitch - ROTOR_GAP, ROTORS)
+            self._draw_signal(axes, signal)
+            timelines.mark_stages(axes, self.plan.stages, self.plan.duration, named=False)
+            axes.set_xlabel("time [s]")
+            heading(axes, "" if i else "Thrust of each rotor", f"rotor {i}")
+            row.append(axes)
+        ends = [axes.get_ylim() for axes in row]
+        for axes in row:
+            axes.set_ylim(min(low for low, _ in ends), max(high for _, high in ends))
+        for axes in row[1:]:
+            axes.set_ylabel("")
+            axes.tick_params(labelleft=False)
+
+    def _draw_signal(self, axes: Axes, signal: Signal, named: bool = False) -> None:
+        draw_signal(axes, signal, self.reference.times, self.flight.times, named)
+
+    def _stacked(self, place: Place, count: int) -> list[Axes]:
+        """So many timelines in one place, the top one first."""
+        left, bottom, width, height = place
+        pitch = (height + GAP) / count
+        bottoms = [bottom + k * pitch for k in reversed(range(count))]
+        return [panel(self.figure, left, y, width, pitch - GAP) for y in bottoms]
 
 
 def tracking_figure(plan: Plan, vehicle: Vehicle, flight: Flight) -> Figure:
-    """One page on what a plan asks and what its flight gave (paper, Figs. 8, 9 and 10).
+    """Draw a page on what a plan asks and what its flight gave (paper, Figs. 8, 9 and 10).
 
     The path with the vehicle's attitude; positions and velocities; tracking errors; collective thrust,
-    moments about the body's axes and every rotor's thrust. Asked (by flatness) is a band, flown is a line;
-    limits are dashed, those of thrust and moments being what rotors within theirs give of each by itself; a
-    shade shows where rotors are saturated. What does not move is left out. An axis that values would stretch
-    far beyond its limits is cut off and says so. Raises SpecError for a batch of flights.
+    moments about the body's axes and every rotor's thrust. The reference (by flatness) is a band, the actual
+    is a line; limits are dashed, those of thrust and moments being what rotors within theirs give of each by
+    itself; a shade shows where rotors are saturated. What does not move is left out. An axis that values
+    would stretch far beyond its limits is cut off and says so. Raises SpecError for a batch of flights.
     """
     if flight.ends.ndim:
         raise SpecError("tracking_figure draws one flight; of a batch, give flight[k]")
     asked = reference(plan.trajectory, vehicle, rate=RATE, environment=plan.problem.environment)
-    facts = _facts(plan, vehicle, flight)
+    rotors = None if plan.margin is None else f"rotors asked for {plan.margin}"
+    proof = rotors if plan.certificate is None else plan.certificate.why
+    result = score_caption(score(flight, plan.problem, vehicle))
+    facts = [plan_caption(plan), *([] if proof is None else [proof]), result]
     with house_style():
-        figure = blank_page(PAGE_WIDTH, HEIGHT + HEAD + FACT * len(facts))
-        headline(figure, f"{plan.problem.name} · tracking by {vehicle.name}", facts)
+        figure = blank_page(HEIGHT, f"{plan.problem.name} · tracking by {vehicle.name}", facts)
         path = panel(figure, *PATH)
-        motions = reference_poses(asked), actual_poses(flight)
-        note = draw_path(path, *motions, vehicle, next(iter(plan.problem.gates), None), plan.stages)
-        heading(path, "Path and attitude", note)
-        columns = Columns(figure, plan, asked, flight)
+        poses = reference_poses(asked), actual_poses(flight)
+        heading(path, "Path and attitude", draw_path(path, *poses, vehicle, plan.problem.gates, plan.stages))
+        page = TrackingPage(figure, plan, asked, flight)
         positions, velocities = motion_signals(asked, flight)
         thrust, *moments = effort_signals(asked, flight, vehicle)
         errors, middle, right = ((x, AXIS + ROTORS + NEXT, THIRD, EFFORTS) for x in THIRDS)
-        columns.draw_signals(POSITIONS, positions, "Position", named=True)
-        columns.draw_signals(VELOCITIES, velocities, "Velocity")
-        columns.draw_errors(errors)
-        columns.draw_signals(middle, [thrust], "Collective thrust")
-        columns.draw_signals(right, moments, "Keyframe about the body's axes")
-        _draw_rotors(columns, rotor_signals(asked, flight, vehicle))
+        page.draw_signals(POSITIONS, positions, "Position", named=True)
+        page.draw_signals(VELOCITIES, velocities, "Velocity")
+        page.draw_errors(errors)
+        page.draw_signals(middle, [thrust], "Collective thrust")
+        page.draw_signals(right, moments, "Moments about the body's axes")
+        page.draw_rotors(rotor_signals(asked, flight, vehicle))
     return figure
-
-
-def stacked(figure: Figure, place: Place, count: int) -> list[Axes]:
-    """So many timelines in one place, the top one first."""
-    left, bottom, width, height = place
-    pitch = (height + GAP) / count
-    return [panel(figure, left, bottom + k * pitch, width, pitch - GAP) for k in reversed(range(count))]
-
-
-def _facts(plan: Plan, vehicle: Vehicle, flight: Flight) -> list[str]:
-    rotors = None if plan.margin is None else f"rotors asked for {plan.margin}"
-    proof = rotors if plan.certificate is None else plan.certificate.why
-    flown = flight_facts(score(flight, plan.problem, vehicle))
-    return [plan_facts(plan), *([] if proof is None else [proof]), flown]
-
-
-def _draw_rotors(columns: Columns, signals: Sequence[Signal]) -> None:
-    """All rotors side by side on one scale."""
-    row = _side_by_side(columns.figure, len(signals))
-    for i, (axes, signal) in enumerate(zip(row, signals, strict=True)):
-        columns.draw_signal(axes, signal)
-        timelines.mark_stages(axes, columns.plan.stages, columns.plan.duration, named=False)
-        axes.set_xlabel("time [s]")
-        heading(axes, "" if i else "Thrust of each rotor", f"rotor {i}")
-    ends = [axes.get_ylim() for axes in row]
-    for axes in row:
-        axes.set_ylim(min(low for low, _ in ends), max(high for _, high in ends))
-    for axes in row[1:]:
-        axes.set_ylabel("")
-        axes.tick_params(labelleft=False)
-
-
-def _side_by_side(figure: Figure, count: int) -> list[Axes]:
-    """So many timelines across the foot of the page, the left one first."""
-    pitch = (THIRDS[-1] + THIRD - THIRDS[0] + ROTOR_GAP) / count
-    return [panel(figure, THIRDS[0] + k * pitch, AXIS, pitch - ROTOR_GAP, ROTORS) for k in range(count)]

@@ -11,11 +11,11 @@ import numpy as np
 from aerobat.arrays import Array
 from aerobat.problem.gate import Gate
 from aerobat.reporting.page import size_of
-from aerobat.reporting.panels.keyframes import ManeuverPlane, plane_of
+from aerobat.reporting.panels.keyframes import plane_of
 from aerobat.reporting.panels.path import mark_ends
 from aerobat.reporting.scene.axes_box import box_around, draw_axes_box
-from aerobat.reporting.scene.camera import Camera, best_view
-from aerobat.reporting.scene.glyphs import gate_bars, gate_shapes
+from aerobat.reporting.scene.camera import best_view
+from aerobat.reporting.scene.glyphs import gate_corners, gate_shapes
 from aerobat.reporting.scene.shapes import draw_depth_sorted
 
 if TYPE_CHECKING:
@@ -33,34 +33,31 @@ class NamedPath:
     position: Array  # [m], (T, 3), as many as of the others
 
 
-def draw_overlay(axes: Axes, paths: Sequence[NamedPath], gate: Gate | None) -> None:
+def draw_overlay(axes: Axes, paths: Sequence[NamedPath], gates: Sequence[Gate]) -> None:
     """Draw paths from one start to one goal: in the vertical plane that holds them, or in space."""
-    points = np.concatenate([path.position for path in paths])
-    if gate is not None:
-        points = np.concatenate([points, np.concatenate(gate_bars(gate)).reshape(-1, 3)])
+    points = np.concatenate([*(path.position for path in paths), gate_corners(gates)])
     plane = plane_of(points)
-    camera = _room(axes, points, gate) if plane is None else _sheet(axes, points, plane)
-    if gate is not None:
-        draw_depth_sorted(axes, gate_shapes(gate), camera, zorder=1.5)
+    if plane is None:
+        box = box_around(points, 0.02 * float(np.ptp(points, axis=0).max()))
+        camera = best_view(points, gates, box.corners, size_of(axes))
+        draw_axes_box(axes, box, camera)
+    else:
+        camera = plane.camera
+        _fit_plane(axes, camera.project(points))
+        axes.set(xlabel=plane.label, ylabel="z [m]")
+    if gates:
+        shapes = [shape for gate in gates for shape in gate_shapes(gate)]
+        draw_depth_sorted(axes, shapes, camera, zorder=1.5)
     pictures = [camera.project(path.position) for path in paths]
     for path, picture in zip(paths, pictures, strict=True):
         axes.plot(*picture.T, color=path.colour, linewidth=1.7, label=path.name)
     mark_ends(axes, pictures[0][[0, -1]])
 
 
-def _room(axes: Axes, points: Array, gate: Gate | None) -> Camera:
-    room = box_around(points, 0.02 * float(np.ptp(points, axis=0).max()))
-    camera = best_view(points, gate, room.corners, size_of(axes))
-    draw_axes_box(axes, room, camera)
-    return camera
-
-
-def _sheet(axes: Axes, points: Array, plane: ManeuverPlane) -> Camera:
-    """Fit the plane into the axes, the same scale along both."""
-    picture = plane.camera.project(points)
+def _fit_plane(axes: Axes, picture: Array) -> None:
+    """Fit points (n, 2) [m] into the axes, the same scale along both."""
     low, high = picture.min(axis=0), picture.max(axis=0)
     size = size_of(axes)
     per_inch = max(float(((high - low) / (size - 2 * AROUND)).max()), 1e-3)
     (left, bottom), (right, top) = ((low + high + sign * size * per_inch) / 2 for sign in (-1.0, 1.0))
-    axes.set(xlim=(left, right), ylim=(bottom, top), xlabel=plane.label, ylabel="z [m]")
-    return plane.camera
+    axes.set(xlim=(left, right), ylim=(bottom, top))

@@ -17,7 +17,7 @@ from aerobat.reporting.scene.camera import Camera, best_view
 from aerobat.reporting.scene.glyphs import (
     drop_line,
     enlargement,
-    gate_bars,
+    gate_corners,
     gate_shapes,
     shadow,
     side_tint,
@@ -34,115 +34,98 @@ if TYPE_CHECKING:
 
 POSES = 20  # time steps at which the vehicle is drawn, fewer where it would cover itself
 SIZE = 0.085  # of the vehicle as drawn, relative to the path's extent
-BELOW = 0.06  # by which a planned path is painted under a flown one, likewise
-FLOWN_WIDTH, PLANNED_WIDTH = 1.3, 4.0  # [pt]
-ALONE_WIDTH = 1.6  # [pt] of a planned path that nobody flew
+BELOW = 0.06  # by which a reference path is drawn under an actual one, likewise
+ACTUAL_WIDTH, REFERENCE_WIDTH = 1.3, 4.0  # [pt]
+ALONE_WIDTH = 1.6  # [pt] of a reference path that nobody flew
 
 
 def draw_path(
     axes: Axes,
-    planned: PoseHistory,
-    flown: Sequence[PoseHistory],
+    reference: PoseHistory,
+    actual: Sequence[PoseHistory],
     vehicle: Vehicle,
-    gate: Gate | None,
+    gates: Sequence[Gate],
     stages: Sequence[PlacedStage] = (),
 ) -> str:
-    """Draw planned and flown paths, the first vehicle along its path, the gate, other stages, start and end.
+    """Draw paths, the first vehicle along its path, the gates, other stages, start and end.
 
-    Returns a note on how the vehicle is drawn.
+    Args:
+        axes: Where to draw.
+        reference: The poses that were planned.
+        actual: Those of each flight; empty where nothing was flown.
+        vehicle: Whose glyph is drawn.
+        gates: All gates of the problem; the picture holds each of them.
+        stages: Of which those without a gate are marked by diamonds.
+
+    Returns:
+        A note on how the vehicle is drawn.
     """
-    scale = enlargement(vehicle, SIZE * planned.extent)
+    scale = enlargement(vehicle, SIZE * reference.extent)
     reach = scale * span(vehicle)
-    room = box_around(_everything(planned, flown, gate), 0.6 * reach)
-    camera = best_view(planned.path, gate, room.corners, size_of(axes))
-    draw_axes_box(axes, room, camera)
-    poses = flown[0] if flown else planned
-    samples, step = pose_samples(poses, reach, gate)
-    shapes = [
-        *_paths(planned, flown, float(room.lower[2])),
-        *_gate(gate, float(room.lower[2])),
-        *(shape for k in samples for shape in _pose(vehicle, poses, k, camera, scale)),
-    ]
+    paths = [poses.path for poses in (reference, *actual)]
+    box = box_around(np.concatenate([*paths, gate_corners(gates)]), 0.6 * reach)
+    camera = best_view(reference.path, gates, box.corners, size_of(axes))
+    draw_axes_box(axes, box, camera)
+    floor = float(box.lower[2])
+    poses = actual[0] if actual else reference
+    rows, step = pose_samples(poses, reach, gates)
+    shapes = _path_shapes(reference, actual, floor)
+    for gate in gates:
+        lowest = np.sort(gate.corners[:, 2])[:2].mean()  # the middle of the lower edge
+        foot = gate.position + np.array([0.0, 0.0, lowest - gate.position[2]])
+        shapes += [*gate_shapes(gate), drop_line(foot, floor)]
+    for k in rows:
+        position, q = poses.position[k], poses.q_world_body[k]
+        shapes.append(thrust_axis_shape(vehicle, position, q, scale))
+        shapes += vehicle_shapes(vehicle, position, q, scale, side_tint(q, camera))
     draw_depth_sorted(axes, shapes, camera)
-    _name_paths(axes, bool(flown))
-    _mark_stages(axes, camera, planned, [stage for stage in stages if stage.gate is None])
-    mark_ends(axes, camera.project(planned.position[[0, -1]]))
+    axes.plot([], [], color=BAND, linewidth=REFERENCE_WIDTH if actual else ALONE_WIDTH, label="reference")
+    if actual:
+        axes.plot([], [], color=INK, linewidth=ACTUAL_WIDTH, label="actual")
+    _mark_stages(axes, camera, reference, [stage for stage in stages if stage.gate is None])
+    mark_ends(axes, camera.project(reference.position[[0, -1]]))
     size = "" if scale == 1.0 else f", {scale:g} times its size"
     return f"vehicle every {step:.2f} s{size}; blue seen from above, red from below"
 
 
-def pose_samples(motion: PoseHistory, size: float, gate: Gate | None) -> tuple[list[int], float]:
-    """At which samples to draw the vehicle: equal steps of time [s], one of them in the gate.
+def pose_samples(poses: PoseHistory, size: float, gates: Sequence[Gate]) -> tuple[list[int], float]:
+    """At which rows to draw the vehicle: one in each gate, and equal steps of time [s] from the first.
 
     Those at which it would cover one already drawn are left out.
     """
-    step = float(np.ptp(motion.times)) / POSES
-    passage = motion.passage(gate)
-    asked = np.arange(passage % step, motion.times[-1] + 1e-9, step)
-    kept = [int(np.abs(motion.times - passage).argmin())]
-    for k in np.searchsorted(motion.times, asked - 1e-9).clip(0, len(motion.times) - 1).tolist():
-        if np.linalg.norm(motion.position[kept] - motion.position[k], axis=-1).min() > 0.5 * size:
+    step = float(np.ptp(poses.times)) / POSES
+    kept = poses.rows_at_gates(gates) or [0]
+    for k in poses.rows(np.arange(poses.times[kept[0]] % step, poses.times[-1] + 1e-9, step)):
+        if np.linalg.norm(poses.position[kept] - poses.position[k], axis=-1).min() > 0.5 * size:
             kept.append(k)
     return sorted(kept), step
 
 
-def _pose(vehicle: Vehicle, motion: PoseHistory, k: int, camera: Camera, scale: float) -> list[Shape]:
-    q = motion.q_world_body[k]
-    position, tint = motion.position[k], side_tint(q, camera)
-    axis = thrust_axis_shape(vehicle, position, q, scale)
-    return [axis, *vehicle_shapes(vehicle, position, q, scale, tint)]
+def _path_shapes(reference: PoseHistory, actual: Sequence[PoseHistory], floor: float) -> list[Shape]:
+    """The reference path as a band with its shadow, the actual one as a line on it, many as thin lines."""
+    shapes = [Shape(shadow(reference.path, floor), edge=HAIR, width=3.0, depth_bias=-1e3)]
+    width = REFERENCE_WIDTH if actual else ALONE_WIDTH
+    shapes += polyline(reference.path, BAND, width, depth_bias=-BELOW * reference.extent)
+    if len(actual) == 1:
+        return shapes + polyline(actual[0].path, INK, ACTUAL_WIDTH)
+    opacity = max(0.08, len(actual) ** -0.5) if actual else 1.0
+    for poses in actual:
+        shapes += polyline(poses.path, (INK, opacity), 0.6, piece=16)
+    return shapes
 
 
-def _paths(planned: PoseHistory, flown: Sequence[PoseHistory], floor: float) -> list[Shape]:
-    """The planned path as a band with its shadow, the flown one as a line on it, many as thin lines."""
-    course = planned.path
-    shapes = [Shape(shadow(course, floor), edge=HAIR, width=3.0, depth_bias=-1e3)]
-    width = PLANNED_WIDTH if flown else ALONE_WIDTH
-    shapes += polyline(course, BAND, width, depth_bias=-BELOW * planned.extent)
-    if len(flown) == 1:
-        return shapes + polyline(flown[0].path, INK, FLOWN_WIDTH)
-    opacity = max(0.08, len(flown) ** -0.5) if flown else 1.0
-    return shapes + [s for motion in flown for s in polyline(motion.path, (INK, opacity), 0.6, piece=16)]
-
-
-def _gate(gate: Gate | None, floor: float) -> list[Shape]:
-    """The gate, with a line down to the floor from the middle of its lower edge."""
-    if gate is None:
-        return []
-    lowest = np.sort(gate.corners[:, 2])[:2].mean()
-    foot = gate.position + np.array([0.0, 0.0, lowest - gate.position[2]])
-    return [*gate_shapes(gate), drop_line(foot, floor)]
-
-
-def _everything(planned: PoseHistory, flown: Sequence[PoseHistory], gate: Gate | None) -> Array:
-    """All that the room has to hold, (n, 3)."""
-    points = [planned.path, *(motion.path for motion in flown)]
-    if gate is not None:
-        points.append(np.concatenate(gate_bars(gate)).reshape(-1, 3))
-    return np.concatenate(points)
-
-
-def _name_paths(axes: Axes, flown: bool) -> None:
-    """What the band and the line are, for the legend."""
-    axes.plot([], [], color=BAND, linewidth=PLANNED_WIDTH if flown else ALONE_WIDTH, label="planned")
-    if flown:
-        axes.plot([], [], color=INK, linewidth=FLOWN_WIDTH, label="flown")
-
-
-def _mark_stages(axes: Axes, camera: Camera, planned: PoseHistory, stages: Sequence[PlacedStage]) -> None:
-    """A diamond on the planned path at each stage; in the legend its name, or what many are."""
+def _mark_stages(axes: Axes, camera: Camera, reference: PoseHistory, stages: Sequence[PlacedStage]) -> None:
+    """A diamond on the reference path at each stage; in the legend its name, or what many are."""
     if stages:
-        rows = np.searchsorted(planned.times, [stage.time for stage in stages]).clip(
-            0, len(planned.times) - 1
-        )
+        rows = reference.rows([stage.time for stage in stages])
         axes.plot(
-            *camera.project(planned.position[rows]).T, "D", color="white", mec=INK, mew=1.1, markersize=5.5,
+            *camera.project(reference.position[rows]).T, "D", color="white", mec=INK, mew=1.1, markersize=5.5,
             label=stages[0].name if len(stages) == 1 else "stages", zorder=5.0,
         )  # fmt: skip
 
 
 def mark_ends(axes: Axes, places: Array) -> None:
-    """The end as a red disc, the start as a smaller blue one: both show where they coincide; and a legend."""
+    """Mark the end by a red disc and the start by a smaller blue one, which shows on it; add a legend."""
     for place, colour, size, name in ((places[0], BLUE, 5.5, "start"), (places[1], RED, 10.0, "end")):
         axes.plot(
             *place[:, None], "o", color=colour, mec="white", mew=0.8, markersize=size, label=name,

@@ -1,7 +1,8 @@
-"""One vehicle's motion as figures draw it."""
+"""Poses over time, as figures draw them."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,7 +16,8 @@ from aerobat.vehicle import Vehicle
 
 RATE = 250.0  # [1/s] at which a plan is shown
 VERTICES = 240  # of a drawn path
-FAR = 0.5  # of the planned path's extent: where a flight strays further, it is drawn no more
+FAR = 0.5  # of the reference path's extent: where a flight strays further, it is drawn no more
+FLAT = 0.3  # a path whose height is less than this fraction of its length is drawn across the whole page
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,18 +39,32 @@ class PoseHistory:
         """The longest side of the box around the path [m]."""
         return float(np.ptp(self.position, axis=0).max())
 
-    def passage(self, gate: Gate | None) -> float:
-        """The time [s] at which the vehicle is nearest to a gate; the start without one."""
-        if gate is None:
-            return float(self.times[0])
-        return float(self.times[np.linalg.norm(self.position - gate.position, axis=-1).argmin()])
+    @property
+    def is_flat(self) -> bool:
+        """Whether the path is much longer than high."""
+        return is_flat(self.position)
 
-    def near(self, planned: PoseHistory) -> PoseHistory:
-        """The motion up to where it strays far from the planned one, taken at the same times."""
-        error = np.linalg.norm(self.position - planned.position, axis=-1)
-        stray = np.flatnonzero(error > FAR * max(planned.extent, 1.0))
+    def rows(self, times: Sequence[float] | Array) -> list[int]:
+        """The first rows at or after `times` [s]."""
+        rows = np.searchsorted(self.times, np.asarray(times, dtype=float) - 1e-9)
+        return [int(k) for k in rows.clip(0, len(self.times) - 1)]
+
+    def rows_at_gates(self, gates: Sequence[Gate]) -> list[int]:
+        """The row at which the vehicle is nearest to each gate's centre."""
+        return [int(np.linalg.norm(self.position - gate.position, axis=-1).argmin()) for gate in gates]
+
+    def until_astray(self, reference: PoseHistory) -> PoseHistory:
+        """The poses up to where they stray far from the reference's, taken at the same times."""
+        error = np.linalg.norm(self.position - reference.position, axis=-1)
+        stray = np.flatnonzero(error > FAR * max(reference.extent, 1.0))
         end = max(int(stray[0]), 2) if len(stray) else len(self.times)
         return PoseHistory(self.times[:end], self.position[:end], self.q_world_body[:end])
+
+
+def is_flat(positions: Array) -> bool:
+    """Whether a path (T, 3) is much longer than high."""
+    extents = np.ptp(positions, axis=0)
+    return bool(extents[2] < FLAT * extents.max())
 
 
 def plan_reference(plan: Plan, vehicle: Vehicle) -> Reference:
@@ -56,14 +72,16 @@ def plan_reference(plan: Plan, vehicle: Vehicle) -> Reference:
     return reference(plan.trajectory, vehicle, rate=RATE, environment=plan.problem.environment)
 
 
-def reference_poses(asked: Reference | Flight) -> PoseHistory:
-    """The motion that a reference asks, or that was asked of a flight for as long as it lasted."""
-    return PoseHistory(asked.times, asked.setpoint.flat.position, asked.setpoint.q_world_body)
+def reference_poses(reference: Reference | Flight) -> PoseHistory:
+    """The poses of a reference, or of a flight's for as long as it lasted."""
+    setpoint = reference.setpoint
+    return PoseHistory(reference.times, setpoint.flat.position, setpoint.q_world_body)
 
 
 def actual_poses(flight: Flight) -> list[PoseHistory]:
-    """What each vehicle of a flight, or of a batch, did before it went astray."""
-    asked = reference_poses(flight)
-    positions = flight.states.position.reshape(-1, *asked.position.shape)
-    attitudes = flight.states.q_world_body.reshape(-1, *asked.q_world_body.shape)
-    return [PoseHistory(flight.times, p, q).near(asked) for p, q in zip(positions, attitudes, strict=True)]
+    """The poses of each vehicle of a flight, or of a batch, before it went astray."""
+    planned = reference_poses(flight)
+    positions = flight.states.position.reshape(-1, *planned.position.shape)
+    attitudes = flight.states.q_world_body.reshape(-1, *planned.q_world_body.shape)
+    poses = zip(positions, attitudes, strict=True)
+    return [PoseHistory(flight.times, p, q).until_astray(planned) for p, q in poses]

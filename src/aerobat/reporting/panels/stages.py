@@ -1,4 +1,4 @@
-"""The attitudes of a maneuver's stages, in the plane of the turn (paper, Fig. 3)."""
+"""The attitudes of a maneuver's stages, in the maneuver's plane (paper, Fig. 3)."""
 
 from __future__ import annotations
 
@@ -9,11 +9,17 @@ import numpy as np
 from aerobat.arrays import Array
 from aerobat.planning import Plan
 from aerobat.reporting.page import size_of
-from aerobat.reporting.panels.keyframes import Keyframe, Keyframes, ManeuverPlane, keyframes, maneuver_plane
+from aerobat.reporting.panels.keyframes import (
+    Keyframe,
+    Keyframes,
+    ManeuverPlane,
+    maneuver_plane,
+    plan_keyframes,
+)
 from aerobat.reporting.panels.labels import spread_out
 from aerobat.reporting.scene.camera import Camera
 from aerobat.reporting.scene.glyphs import enlargement, gate_section, span, vehicle_shapes
-from aerobat.reporting.scene.shapes import Shape, draw_depth_sorted
+from aerobat.reporting.scene.shapes import draw_depth_sorted
 from aerobat.reporting.style import BAND, BLUE, FAINT, INK, MUTED, NORMAL, RED, SMALL
 from aerobat.vehicle import Vehicle
 
@@ -35,12 +41,13 @@ KEYS = np.array([0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0])  # [m/s
 
 
 def draw_stages(axes: Axes, plan: Plan, vehicle: Vehicle) -> str:
-    """Draw the stages in the plane of the turn; return a note on what is shown."""
-    shots = keyframes(plan, vehicle)
-    plane, gate = maneuver_plane(plan, shots.thrust), next(iter(plan.problem.gates), None)
+    """Draw the stages in the maneuver's plane; return a note on what is shown."""
+    shots = plan_keyframes(plan, vehicle)
+    plane = maneuver_plane(plan, shots.thrust)
     camera = plane.camera
-    frame = camera.project(np.concatenate([shots.position, *([] if gate is None else [gate.corners])]))
-    column = _column(shots.moments)
+    gates = plan.problem.gates
+    frame = camera.project(np.concatenate([shots.position, *(gate.corners for gate in gates)]))
+    column = max(COLUMN, LETTER * max(len(keyframe.name) for keyframe in shots.instants))
     inches = _fit(axes, frame, VEHICLE, span(vehicle), column)  # per metre
     scale = enlargement(vehicle, VEHICLE / inches)
     shots = shots.only(_apart(shots, camera, 0.85 * scale * span(vehicle)))
@@ -52,12 +59,15 @@ def draw_stages(axes: Axes, plan: Plan, vehicle: Vehicle) -> str:
     axes.set(xlabel=plane.label, ylabel="z [m]")
     path = plan.trajectory.evaluate(np.linspace(0.0, plan.duration, 241))
     axes.plot(*camera.project(path).T, color=BAND, linewidth=1.6)
-    if gate is not None:
+    for gate in gates:
         draw_depth_sorted(axes, gate_section(gate, camera), camera, zorder=1.5)
-    draw_depth_sorted(axes, _vehicles(vehicle, shots, scale), camera, zorder=2.2)
+    vehicles = []
+    for position, q in zip(shots.position, shots.q_world_body, strict=True):
+        vehicles += vehicle_shapes(vehicle, position, q, scale, weight=1.5)
+    draw_depth_sorted(axes, vehicles, camera, zorder=2.2)
     _draw_sums(axes, places, thrust * arrow / inches)
     _draw_components(axes, places, thrust * arrow, arrow, plane)
-    _draw_names(axes, shots.moments, places, thrust, 0.55 * scale * span(vehicle))
+    _draw_names(axes, shots.instants, places, thrust, 0.55 * scale * span(vehicle), column)
     size = "" if scale == 1.0 else f"; vehicle {scale:g} times its size"
     return ("a stage holds at the end of interval n" if plan.stages else "equal steps of time") + size
 
@@ -65,37 +75,27 @@ def draw_stages(axes: Axes, plan: Plan, vehicle: Vehicle) -> str:
 def _apart(shots: Keyframes, camera: Camera, distance: float) -> list[int]:
     """The stages, and of the steps of time between them those that are drawn clear of all others."""
     places = camera.project(shots.position)
-    kept = [k for k, moment in enumerate(shots.moments) if moment.interval is not None]
+    kept = [k for k, keyframe in enumerate(shots.instants) if keyframe.interval is not None]
     for k in range(len(places)):
         if k not in kept and all(np.linalg.norm(places[i] - places[k]) > distance for i in kept):
             kept.append(k)
     return sorted(kept)
 
 
-def _column(moments: tuple[Keyframe, ...]) -> float:
-    """The room [in] that the longest name takes."""
-    return max(COLUMN, LETTER * max(len(moment.name) for moment in moments))
-
-
-def _fit(axes: Axes, points: Array, pad: float, least: float, column: float) -> float:
+def _fit(axes: Axes, points: Array, pad: float, min_side: float, column: float) -> float:
     """Fit points (n, 2) [m], `pad` [in] around, and names beside them; return both axes' scale [in/m].
 
-    Names take `column` [in] on either side of a tall panel. What is shorter than `least` [m] is shown that
-    long.
+    Names take `column` [in] on either side of a tall panel. What is shorter than `min_side` [m] is
+    shown that long.
     """
     size = size_of(axes)
     left, foot = (column, 0.0) if size[1] >= size[0] else (0.0, ROW)
     free = size - (2 * left, foot)
     low, high = points.min(axis=0), points.max(axis=0)
-    inches = float(((free - np.minimum(2 * pad, 0.5 * free)) / np.maximum(high - low, least)).min())
+    inches = float(((free - np.minimum(2 * pad, 0.5 * free)) / np.maximum(high - low, min_side)).min())
     centre, half = (low + high) / 2 - np.array([0.0, foot / 2]) / inches, size / 2 / inches
     axes.set(xlim=(centre[0] - half[0], centre[0] + half[0]), ylim=(centre[1] - half[1], centre[1] + half[1]))
     return inches
-
-
-def _vehicles(vehicle: Vehicle, shots: Keyframes, scale: float) -> list[Shape]:
-    poses = zip(shots.position, shots.q_world_body, strict=True)
-    return [shape for p, q in poses for shape in vehicle_shapes(vehicle, p, q, scale, weight=1.5)]
 
 
 def _draw_sums(axes: Axes, places: Array, sums: Array) -> None:
@@ -128,7 +128,7 @@ def _draw_components(axes: Axes, places: Array, arrows: Array, unit: float, plan
 
 
 def _draw_names(
-    axes: Axes, moments: tuple[Keyframe, ...], places: Array, thrust: Array, clear: float
+    axes: Axes, instants: tuple[Keyframe, ...], places: Array, thrust: Array, clear: float, column: float
 ) -> None:
     """Names, times and intervals beside the vehicles or below them, with a hair line to each."""
     from matplotlib.collections import LineCollection
@@ -138,27 +138,27 @@ def _draw_names(
     corner = np.array([axes.get_xlim()[0], axes.get_ylim()[0]])
     beside = size[1] >= size[0]
     layout = names_beside if beside else names_below
-    anchors = layout((places - corner) * inches, thrust, size, _column(moments)) / inches + corner
+    anchors = layout((places - corner) * inches, thrust, size, column) / inches + corner
     away = anchors - places
     reach = np.linalg.norm(away, axis=1, keepdims=True)
     starts = places + away * np.minimum(clear / np.maximum(reach, 1e-9), 1.0)
     lines = np.stack([starts, anchors], axis=1)[reach[:, 0] > clear + 0.12 / inches]
     axes.add_collection(LineCollection(list(lines), colors=FAINT, linewidths=0.7, zorder=2.0), autolim=False)
-    for moment, anchor, direction in zip(moments, anchors, away, strict=True):
+    for keyframe, anchor, direction in zip(instants, anchors, away, strict=True):
         side = "center" if not beside else "right" if direction[0] < 0 else "left"
-        _write_name(axes, moment, anchor, side)
+        _write_name(axes, keyframe, anchor, side)
 
 
-def _write_name(axes: Axes, moment: Keyframe, anchor: Array, side: str) -> None:
+def _write_name(axes: Axes, keyframe: Keyframe, anchor: Array, side: str) -> None:
     """A stage's name in bold over its time and interval; a step of time has its time only."""
     x, y = anchor + GAPS[side] / size_of(axes) * [np.ptp(axes.get_xlim()), np.ptp(axes.get_ylim())]
     below = side == "center"
-    if moment.interval is None:
+    if keyframe.interval is None:
         up = "top" if below else "center"
-        axes.text(x, y, f"{moment.time:.2f} s", size=SMALL, color=MUTED, ha=side, va=up)
+        axes.text(x, y, f"{keyframe.time:.2f} s", size=SMALL, color=MUTED, ha=side, va=up)
         return
-    axes.text(x, y, moment.name, size=NORMAL, weight="bold", ha=side, va="top" if below else "bottom")
-    facts = f"{moment.time:.2f} s\nn = {moment.interval}"
+    axes.text(x, y, keyframe.name, size=NORMAL, weight="bold", ha=side, va="top" if below else "bottom")
+    facts = f"{keyframe.time:.2f} s\nn = {keyframe.interval}"
     axes.text(x, y, "\n" * below + facts, size=SMALL, color=MUTED, linespacing=1.15, ha=side, va="top")
 
 

@@ -1,9 +1,9 @@
-"""What happens over time: tracking errors, rotor thrusts and limits, specific thrust (paper, Fig. 5)."""
+"""Quantities over time: tracking errors, rotor thrusts and limits, specific thrust (paper, Fig. 5)."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -12,7 +12,7 @@ from aerobat.flight import Flight
 from aerobat.metrics import attitude_error, position_error
 from aerobat.planning import PlacedStage, Plan
 from aerobat.reporting.page import HEADING, heading, legend, size_of
-from aerobat.reporting.panels.keyframes import keyframes, maneuver_plane
+from aerobat.reporting.panels.keyframes import maneuver_plane, plan_keyframes
 from aerobat.reporting.panels.labels import spread_out
 from aerobat.reporting.style import BLUE, FAINT, INK, MUTED, RED, SMALL, YELLOW
 from aerobat.vehicle import Vehicle
@@ -26,22 +26,22 @@ NAME_WIDTH, LETTER = 0.36, 0.065  # [in] that a stage's name takes at least, and
 
 
 def draw_position_error(axes: Axes, flight: Flight) -> None:
-    """The distance between flown and planned position, in the unit that suits its largest value."""
+    """Draw the distance between actual and reference position, in the unit that suits its largest value."""
     error = position_error(flight)
-    unit, least = next((u for u in LENGTHS if error.max() >= u[1]), LENGTHS[-1])
-    draw_series(axes, flight.times, error / least, INK)
-    axes.set(ylabel=f"position error [{unit}]", ylim=(0.0, _top(error / least, 0.01)))
+    unit, size = next((u for u in LENGTHS if error.max() >= u[1]), LENGTHS[-1])
+    draw_series(axes, flight.times, error / size, INK)
+    axes.set(ylabel=f"position error [{unit}]", ylim=(0.0, _top(error / size, 0.01)))
 
 
 def draw_attitude_error(axes: Axes, flight: Flight) -> None:
-    """The angle between flown and planned attitude."""
+    """Draw the angle between actual and reference attitude."""
     error = np.rad2deg(attitude_error(flight))
     draw_series(axes, flight.times, error, INK)
     axes.set(ylabel="attitude error [°]", ylim=(0.0, _top(error, 0.01)))
 
 
 def draw_rotor_thrusts(axes: Axes, times: Array, thrusts: Array, vehicle: Vehicle) -> None:
-    """Every rotor's thrust (..., T, n) [N], blue or red by its sense of turning, with the limits dashed."""
+    """Draw every rotor's thrust (..., T, n) [N], blue or red by its sense of turning, and dashed limits."""
     colours = rotor_colours(vehicle)
     for i, colour in enumerate(colours):
         draw_series(axes, times, thrusts[..., i], colour, width=1.0, label=f"{i}" if i else "rotor 0")
@@ -61,14 +61,14 @@ def rotor_colours(vehicle: Vehicle) -> list[str]:
     colours = [""] * len(vehicle.rotors)
     for spin, (dark, light) in SPIN_RAMPS.items():
         same = [i for i, rotor in enumerate(vehicle.rotors) if rotor.spin == spin]
-        for share, i in zip(np.linspace(0.0, 1.0, max(len(same), 2)), same, strict=False):
-            colours[i] = to_hex((1 - share) * np.array(to_rgb(dark)) + share * np.array(to_rgb(light)))
+        for fraction, i in zip(np.linspace(0.0, 1.0, max(len(same), 2)), same, strict=False):
+            colours[i] = to_hex((1 - fraction) * np.array(to_rgb(dark)) + fraction * np.array(to_rgb(light)))
     return colours
 
 
 def draw_specific_thrust(axes: Axes, plan: Plan, vehicle: Vehicle) -> None:
-    """a_z + g and the lateral acceleration in the plane of the turn, with dots at the stages."""
-    plane = maneuver_plane(plan, keyframes(plan, vehicle).thrust)
+    """Draw a_z + g and the lateral acceleration in the plane of the turn, with dots at the stages."""
+    plane = maneuver_plane(plan, plan_keyframes(plan, vehicle).thrust)
     times = plan.trajectory.sample(200.0)
     stages = np.array([stage.time for stage in plan.stages])
     for at, style in ((times, "-"), (stages, "o")):
@@ -84,7 +84,7 @@ def draw_specific_thrust(axes: Axes, plan: Plan, vehicle: Vehicle) -> None:
 def draw_series(
     axes: Axes, times: Array, values: Array, colour: str, width: float = 1.3, label: str = ""
 ) -> None:
-    """One line (T,), or a bundle of thin ones (..., T)."""
+    """Draw one line (T,), or a bundle of thin ones (..., T)."""
     lines = values.reshape(-1, values.shape[-1])
     if len(lines) == 1:
         axes.plot(times, lines[0], color=colour, linewidth=width, label=label)
@@ -100,46 +100,46 @@ def draw_series(
 
 
 def mark_stages(axes: Axes, stages: Sequence[PlacedStage], duration: float, named: bool) -> None:
-    """Upright lines at the stages' times, the gate's in its colour, with names above the axes if asked.
+    """Draw upright lines at the stages' times, passages of gates in their colour, with names above if asked.
 
     Where there is no room for all names, stages are numbered in their order.
     """
-    from matplotlib.collections import LineCollection
-
     axes.set_xlim(0.0, duration)
-    if not stages:
-        return
     times = np.array([stage.time for stage in stages])
     gates = [stage.gate is not None for stage in stages]
-    axes.add_collection(
-        LineCollection(
-            [[(t, 0.0), (t, 1.0)] for t in times],
-            colors=[YELLOW if gate else FAINT for gate in gates],
-            linewidths=[1.8 if gate else 0.8 for gate in gates],
-            transform=axes.get_xaxis_transform(),
-            zorder=1.5,
-        ),
-        autolim=False,
-    )
-    if not named:
+    lines = [[(t, 0.0), (t, 1.0)] for t in times]
+    colours = [YELLOW if gate else FAINT for gate in gates]
+    widths = [1.8 if gate else 0.8 for gate in gates]
+    _draw_lines(axes, lines, colors=colours, linewidths=widths, zorder=1.5)
+    if not (named and stages):
         return
-    width = size_of(axes)[0]
+    width, height = size_of(axes)
     names = [stage.name for stage in stages]
     pitch = max(NAME_WIDTH, LETTER * max(map(len, names)))
     if pitch * (len(names) - 1) > width:
-        names, pitch = [str(k) for k in range(1, len(names) + 1)], NAME_WIDTH
+        names = [str(k) for k in range(1, len(names) + 1)]
+        pitch = NAME_WIDTH
     places = spread_out(times / duration * width, pitch, 0.0, width) / width * duration
-    for stage, name, place in zip(stages, names, places, strict=True):
-        axes.annotate(
-            name, (stage.time, 1.0), (place, 1.0 + 0.1 / size_of(axes)[1]), size=SMALL, ha="center",
-            color=INK if stage.gate is not None else MUTED, xycoords=axes.get_xaxis_transform(),
-            textcoords=axes.get_xaxis_transform(), va="bottom",
-            arrowprops={"arrowstyle": "-", "color": FAINT, "linewidth": 0.7, "shrinkA": 0.0, "shrinkB": 0.0},
+    top = 1.0 + 0.1 / height
+    for gate, name, place in zip(gates, names, places, strict=True):
+        axes.text(
+            place, top, name, size=SMALL, ha="center", va="bottom", color=INK if gate else MUTED,
+            transform=axes.get_xaxis_transform(),
         )  # fmt: skip
+    ties = [[(t, 1.0), (place, top)] for t, place in zip(times, places, strict=True)]
+    _draw_lines(axes, ties, colors=FAINT, linewidths=0.7, clip_on=False)
+
+
+def _draw_lines(axes: Axes, lines: list[list[tuple[float, float]]], **style: Any) -> None:
+    """Lines between times [s] and heights as fractions of the axes'."""
+    from matplotlib.collections import LineCollection
+
+    collection = LineCollection(lines, transform=axes.get_xaxis_transform(), **style)
+    axes.add_collection(collection, autolim=False)
 
 
 def finish_column(column: Sequence[Axes], title: str, stages: Sequence[PlacedStage], duration: float) -> None:
-    """The title of a column of timelines, their stages, legends and common time axis."""
+    """Add the title of a column of timelines, their stages, legends and common time axis."""
     for axes in column:
         mark_stages(axes, stages, duration, named=axes is column[0])
         legend(axes, above=HEADING if axes is column[0] else 0.06)
@@ -150,6 +150,6 @@ def finish_column(column: Sequence[Axes], title: str, stages: Sequence[PlacedSta
     heading(column[0], title)
 
 
-def _top(values: Array, least: float) -> float:
-    """The upper end of an axis that starts at zero; what is smaller than `least` is noise."""
-    return max(1.12 * float(values.max()), least)
+def _top(values: Array, floor: float) -> float:
+    """The upper end of an axis that starts at zero; what is smaller than `floor` is noise."""
+    return max(1.12 * float(values.max()), floor)

@@ -1,4 +1,4 @@
-"""The room around a scene: floor, two back walls, and scales along its edges."""
+"""The axes box around a scene: floor, two back walls, and scales along its edges."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ from aerobat.reporting.style import HAIR, NORMAL, PAPER, SMALL
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-MIN_SIDE = np.array([0.35, 0.35, 0.12])  # of a room, relative to its longest
+MIN_SIDE = np.array([0.35, 0.35, 0.12])  # of a box, relative to its longest
 ROUND = np.array([1.0, 2.0, 5.0])
-MARGIN = 0.5  # [in] for the scales around a room
+MARGIN = 0.5  # [in] for the scales around a box
 NUMBERS = 0.15  # [in] from an edge to the numbers along it
 NAMES = np.array([0.3, 0.2])  # [in] from the numbers to the axis' name, to the side and up or down
 MIN_PITCH = 0.26  # [in] between the numbers of a scale
@@ -55,11 +55,11 @@ class AxesBox:
 
 
 def box_around(points: Array, pad: float) -> AxesBox:
-    """The room around points (n, 3), `pad` [m] wider, and no side much shorter than the longest."""
+    """The box around points (n, 3), `pad` [m] wider, and no side much shorter than the longest."""
     lower, upper = points.min(axis=0) - pad, points.max(axis=0) + pad
     short = np.maximum(MIN_SIDE * (upper - lower).max() - (upper - lower), 0.0)
-    share = np.array([0.5, 0.5, 0.0])  # the floor stays right below
-    return AxesBox(lower - share * short, upper + (1.0 - share) * short)
+    fraction = np.array([0.5, 0.5, 0.0])  # the floor stays right below
+    return AxesBox(lower - fraction * short, upper + (1.0 - fraction) * short)
 
 
 def round_step(length: float) -> float:
@@ -68,17 +68,17 @@ def round_step(length: float) -> float:
     return float(decade * ROUND[ROUND * decade <= length * (1 + 1e-9)].max())
 
 
-def draw_axes_box(axes: Axes, room: AxesBox, camera: Camera) -> None:
+def draw_axes_box(axes: Axes, box: AxesBox, camera: Camera) -> None:
     """Draw floor, walls and scales, and fit the axes to them with their aspect kept."""
-    per_metre = _fit(axes, room, camera)
-    draw_depth_sorted(axes, _walls(room, camera), camera, zorder=1.0)
+    per_metre = _fit(axes, box, camera)
+    draw_depth_sorted(axes, _walls(box, camera), camera, zorder=1.0)
     for axis in range(3):
-        _scale(axes, room, camera, axis, per_metre)
+        _scale(axes, box, camera, axis, per_metre)
 
 
-def _fit(axes: Axes, room: AxesBox, camera: Camera) -> float:
-    """Centre the room in the axes and return the scale [in/m]."""
-    picture = camera.project(room.corners)
+def _fit(axes: Axes, box: AxesBox, camera: Camera) -> float:
+    """Centre the box in the axes and return the scale [in/m]."""
+    picture = camera.project(box.corners)
     low, high = picture.min(axis=0), picture.max(axis=0)
     size = size_of(axes)
     per_metre = float(((size - 2 * MARGIN) / (high - low)).min())
@@ -88,35 +88,35 @@ def _fit(axes: Axes, room: AxesBox, camera: Camera) -> float:
     return per_metre
 
 
-def _walls(room: AxesBox, camera: Camera) -> list[Shape]:
+def _walls(box: AxesBox, camera: Camera) -> list[Shape]:
     """Floor and back walls with the lines of their grids."""
-    back = room.back(camera)
-    back[2] = room.lower[2]
+    back = box.back(camera)
+    back[2] = box.lower[2]
     shapes, lines = [], []
     for normal in range(3):
         first, second = (axis for axis in range(3) if axis != normal)
-        shapes.append(Shape(_rectangle(room, normal, back[normal]), face=PAPER if normal == 2 else "#fbfcfd"))
+        shapes.append(Shape(_rectangle(box, normal, back[normal]), face=PAPER if normal == 2 else "#fbfcfd"))
         for along, across in ((first, second), (second, first)):
-            for tick in room.ticks(across):
+            for tick in box.ticks(across):
                 ends = np.tile(back, (2, 1))
-                ends[:, along] = room.lower[along], room.upper[along]
+                ends[:, along] = box.lower[along], box.upper[along]
                 ends[:, across] = tick
                 lines.append(Shape(ends, edge=HAIR, width=0.7, depth_bias=1e3))
     return shapes + lines
 
 
-def _rectangle(room: AxesBox, normal: int, level: float) -> Array:
+def _rectangle(box: AxesBox, normal: int, level: float) -> Array:
     first, second = (axis for axis in range(3) if axis != normal)
     points = np.full((4, 3), level)
-    points[:, first] = np.array([room.lower, room.upper, room.upper, room.lower])[:, first]
-    points[:, second] = np.array([room.lower, room.lower, room.upper, room.upper])[:, second]
+    points[:, first] = np.array([box.lower, box.upper, box.upper, box.lower])[:, first]
+    points[:, second] = np.array([box.lower, box.lower, box.upper, box.upper])[:, second]
     return points
 
 
-def _scale(axes: Axes, room: AxesBox, camera: Camera, axis: int, per_metre: float) -> None:
-    """Numbers and the axis' name along one edge of the room."""
-    edge, outward = _edge(room, camera, axis)
-    ticks = room.ticks(axis)
+def _scale(axes: Axes, box: AxesBox, camera: Camera, axis: int, per_metre: float) -> None:
+    """Numbers and the axis' name along one edge of the box."""
+    edge, outward = _edge(box, camera, axis)
+    ticks = box.ticks(axis)
     points = np.tile(edge, (len(ticks), 1))
     points[:, axis] = ticks
     places = camera.project(points)
@@ -126,34 +126,24 @@ def _scale(axes: Axes, room: AxesBox, camera: Camera, axis: int, per_metre: floa
         places, ticks = places[keep], ticks[keep]
     for place, tick in zip(places + NUMBERS * outward / per_metre, ticks, strict=True):
         axes.text(place[0], place[1], f"{tick:g}".replace("-", "−"), size=SMALL, ha="center", va="center")
-    place = camera.project(_name_point(room, edge, axis))
     if axis == 2:
-        place = place + np.array([-NUMBERS, NUMBERS]) / per_metre
+        edge[axis] = box.upper[axis]
+        place = camera.project(edge) + np.array([-NUMBERS, NUMBERS]) / per_metre
     else:
-        place = place + (NUMBERS + NAMES) * outward / per_metre
+        edge[axis] = (box.lower[axis] + box.upper[axis]) / 2
+        place = camera.project(edge) + (NUMBERS + NAMES) * outward / per_metre
     axes.text(place[0], place[1], f"{'xyz'[axis]} [m]", size=NORMAL, ha="center", va="center")
 
 
-def _name_point(room: AxesBox, edge: Array, axis: int) -> Array:
-    """Where on an edge the axis' name stands: at the top of the upright one, half-way along the others."""
-    point = edge.copy()
-    point[axis] = room.upper[axis] if axis == 2 else (room.lower[axis] + room.upper[axis]) / 2
-    return point
-
-
-def _edge(room: AxesBox, camera: Camera, axis: int) -> tuple[Array, Array]:
+def _edge(box: AxesBox, camera: Camera, axis: int) -> tuple[Array, Array]:
     """A point of the edge that carries an axis' scale (3,), and the way out of the picture there (2,)."""
-    edge = room.front(camera)
-    edge[2] = room.lower[2]
+    edge = box.front(camera)
+    edge[2] = box.lower[2]
     if axis == 2:  # the leftmost of the upright edges
-        sides = [np.array([a, b, 0.0]) for a in _ends(room, 0) for b in _ends(room, 1)]
-        return min(sides, key=lambda side: float(camera.project(side)[0])), np.array([-1.0, 0.0])
+        leftmost = min(box.corners, key=lambda corner: float(camera.project(corner)[0]))
+        return leftmost.copy(), np.array([-1.0, 0.0])
     other = 1 - axis
     inward = np.zeros(3)
     inward[other] = np.sign(camera.toward[other])
     outward = camera.project(inward)
     return edge, outward / max(float(np.linalg.norm(outward)), 1e-9)
-
-
-def _ends(room: AxesBox, axis: int) -> tuple[float, float]:
-    return float(room.lower[axis]), float(room.upper[axis])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,7 +12,7 @@ from aerobat.problem.gate import Gate
 
 AZIMUTHS = np.deg2rad(np.arange(-180.0, 180.0, 5.0))
 ELEVATIONS = np.deg2rad([20.0, 27.0])
-OBLIQUE = 0.3  # the least horizontal component of a view that looks deep
+OBLIQUE = 0.3  # the smallest horizontal component of a view that looks deep
 CUSTOMARY = np.deg2rad(-60.0)  # where a viewer stands when nothing speaks for another place: x to the right
 
 
@@ -43,33 +44,38 @@ class Camera:
         return np.asarray(points @ self.toward)
 
 
-def best_view(path: Array, gate: Gate | None, room: Array, size: Array) -> Camera:
-    """The view in which a path (T, 3) spreads widest and the gate's opening is seen, not its edge.
+def best_view(path: Array, gates: Sequence[Gate], corners: Array, size: Array) -> Camera:
+    """Return the view in which a path spreads widest and openings of gates are seen, not their edges.
 
-    It fits the corners of a room (8, 3) into a picture of `size` (2,). Of views that show both as well, the
-    one in which the path leads to the right, then the customary one.
+    Of views that show both as well, the one in which the path leads to the right, then the customary one.
+
+    Args:
+        path: Positions [m], (T, 3).
+        gates: All of which are to be seen open.
+        corners: Of the box that is fitted into the picture [m], (8, 3).
+        size: The picture's width and height, (2,).
     """
     cameras = [Camera(float(a), float(e)) for a in AZIMUTHS for e in ELEVATIONS]
-    scores = _spread(path, room, size, cameras)
-    scores *= _openness(gate, cameras) * _depth(cameras) * _custom(path, cameras)
+    scores = _spread(path, corners, size, cameras)
+    scores *= _openness(gates, cameras) * _depth(cameras) * _custom(path, cameras)
     return cameras[int(np.argmax(scores))]
 
 
-def _spread(path: Array, room: Array, size: Array, cameras: list[Camera]) -> Array:
+def _spread(path: Array, corners: Array, size: Array, cameras: list[Camera]) -> Array:
     """The area over which the path spreads in each picture, (cameras,)."""
     covariance = np.cov(path.T)
     covariance = covariance + 1e-3 * (np.trace(covariance) + 1e-9) * np.eye(3)  # a straight path spreads too
     screens = np.array([camera.screen for camera in cameras])
     areas = np.sqrt(np.linalg.det(screens @ covariance @ np.swapaxes(screens, -1, -2)))
-    scales = (size / np.ptp(room @ np.swapaxes(screens, -1, -2), axis=1)).min(axis=1)
+    scales = (size / np.ptp(corners @ np.swapaxes(screens, -1, -2), axis=1)).min(axis=1)
     return np.asarray(areas * scales**2)
 
 
-def _openness(gate: Gate | None, cameras: list[Camera]) -> Array:
-    """How open the gate looks, (cameras,); the root lets the path weigh more than the gate."""
-    if gate is None:
-        return np.ones(len(cameras))
-    return np.sqrt(np.abs([camera.toward @ gate.normal for camera in cameras]))
+def _openness(gates: Sequence[Gate], cameras: list[Camera]) -> Array:
+    """How open the least open gate looks, (cameras,); the root lets the path weigh more than the gates."""
+    normals = np.array([gate.normal for gate in gates]).reshape(-1, 3)
+    openness = np.abs(np.array([camera.toward for camera in cameras]) @ normals.T)
+    return np.asarray(np.sqrt(openness.min(axis=1, initial=1.0)))
 
 
 def _depth(cameras: list[Camera]) -> Array:

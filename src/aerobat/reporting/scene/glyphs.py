@@ -1,6 +1,8 @@
-"""What scenes are made of: vehicles in their attitudes, gates as frames around their openings."""
+"""Glyphs of vehicles in their attitudes, and of gates as frames around their openings."""
 
 from __future__ import annotations
+
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -14,10 +16,10 @@ from aerobat.vehicle import Vehicle
 
 TURN = np.linspace(0.0, 2.0 * np.pi, 19)
 CIRCLE = np.stack([np.cos(TURN), np.sin(TURN), np.zeros_like(TURN)], axis=-1)
-AXIS = 0.45  # the length of a drawn thrust axis, as a share of the vehicle's span
-FRAME = 0.12  # the thickness of a gate's bars, as a share of the opening's shorter side
+AXIS = 0.45  # the length of a drawn thrust axis, as a fraction of the vehicle's span
+FRAME = 0.12  # the thickness of a gate's bars, as a fraction of the opening's shorter side
 EDGE_ON = 0.2  # a gate whose normal is this square to the view is seen edge-on
-MAST = 0.35  # the height of a rotor above its arm, as a share of the rotor's radius
+MAST = 0.35  # the height of a rotor above its arm, as a fraction of the rotor's radius
 LIGHT = np.array([0.3, -0.5, 0.81])  # where light comes from in shaded pictures
 SHADES = {YELLOW: ("#8f6a12", "#f0c964")}  # darkest and lightest side of a bar
 STEPS = (1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0, 15.0, 20.0, 30.0, 50.0, 100.0)
@@ -77,6 +79,11 @@ def gate_bars(gate: Gate) -> list[Array]:
         faces = zip(rims, [*rims[1:], rims[0]], strict=True)
         bars.append(np.array([[*first, *second[::-1]] for first, second in faces]))
     return bars
+
+
+def gate_corners(gates: Sequence[Gate]) -> Array:
+    """All corners of all bars of gates [m], (n, 3), for a picture that must hold them."""
+    return np.array([bar for gate in gates for bar in gate_bars(gate)]).reshape(-1, 3)
 
 
 def gate_shapes(gate: Gate) -> list[Shape]:

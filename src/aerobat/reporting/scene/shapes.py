@@ -1,4 +1,4 @@
-"""A small 3D painter: flat shapes in the world, drawn far ones first, as one matplotlib collection."""
+"""Flat shapes in the world, drawn far ones first (painter's algorithm) as one matplotlib collection."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ class Shape:
     face: Colour = NOTHING
     edge: Colour = NOTHING
     width: float = 0.0  # [pt] of the edge
-    depth_bias: float = 0.0  # [m] toward the viewer, for the order of painting only
+    depth_bias: float = 0.0  # [m] toward the viewer, for the order of drawing only
 
 
 def polyline(
@@ -41,7 +41,7 @@ def polyline(
 def draw_depth_sorted(
     axes: Axes, shapes: Sequence[Shape], camera: Camera, zorder: float = 2.0
 ) -> PolyCollection:
-    """Add shapes to axes whose data coordinates are the camera's picture [m]."""
+    """Draw shapes into axes whose data coordinates are the camera's picture [m]."""
     from matplotlib.collections import PolyCollection
 
     counts = np.array([len(shape.points) for shape in shapes])

@@ -1,0 +1,41 @@
+"""Plans and flights in a line each, as they stand under a page's title."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from aerobat.flight import Flight
+from aerobat.metrics import Score, attitude_error, position_error
+from aerobat.planning import Plan
+
+
+def plan_caption(plan: Plan) -> str:
+    """How a plan came about."""
+    dt = "" if plan.dt is None else f" of {plan.dt:.4f} s"
+    return (
+        f"{plan.planner}: {plan.duration:.3f} s in {plan.intervals} intervals{dt}, order {plan.order}, "
+        f"cost {plan.cost:.6g} ({plan.backend}, {plan.nodes} nodes, {1000 * plan.solve_time:.0f} ms)"
+    )
+
+
+def score_caption(score: Score) -> str:
+    """How a flight went."""
+    return (
+        f"{score.outcome}; position error at most {length(score.max_position_error_m)}, "
+        f"attitude error at most {score.max_attitude_error_deg:.2f}°, "
+        f"{score.rms_attitude_error_deg:.2f}° RMS, "
+        f"saturated {100 * score.saturated_fraction:.1f} % of the time"
+    )
+
+
+def error_caption(flight: Flight) -> str:
+    """The largest errors of a flight, or of a batch."""
+    return (
+        f"position error at most {length(float(position_error(flight).max()))}, "
+        f"attitude error at most {np.rad2deg(attitude_error(flight).max()):.2f}°"
+    )
+
+
+def length(metres: float) -> str:
+    """A length with the unit that suits it."""
+    return f"{metres:.2f} m" if metres >= 1.0 else f"{100 * metres:.2f} cm"
