@@ -28,6 +28,15 @@ def flown(problem: str, vehicle: str = "agile-quad") -> ab.Flight:
     return ab.fly(planned(problem, vehicle).trajectory, ab.load_vehicle(vehicle), rate=200.0)
 
 
+@lru_cache
+def two_flips() -> tuple[ab.Plan, ab.Flight]:
+    """A plan through two gates, and its flight."""
+    plan = ab.plan(
+        ab.load_problem("examples/two-flips.toml"), ab.Miqp(order=4), ab.load_vehicle("agile-quad")
+    )
+    return plan, ab.fly(plan.trajectory, ab.load_vehicle("agile-quad"), rate=200.0)
+
+
 def require_legible(figure: Figure, monkeypatch: pytest.MonkeyPatch) -> None:
     """No text of a page lies over another one or beyond the page."""
     texts = texts_of(figure, monkeypatch)

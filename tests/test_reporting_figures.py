@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from matplotlib.collections import PolyCollection
 from matplotlib.colors import to_rgba
 from matplotlib.quiver import Quiver, QuiverKey
 
@@ -18,11 +19,13 @@ from aerobat.reporting.figures import draw, report_figure
 from aerobat.reporting.page import png
 from aerobat.reporting.panels import path as path_panel
 from aerobat.reporting.panels.keyframes import maneuver_plane, plan_keyframes
-from aerobat.reporting.style import BLUE, RED
+from aerobat.reporting.scene.glyphs import gate_bars
+from aerobat.reporting.style import BLUE, RED, YELLOW
 from aerobat.states import BodyState
-from reporting_cases import PROBLEMS, flown, planned, require_legible
+from reporting_cases import PROBLEMS, flown, planned, require_legible, two_flips
 
 pytestmark = pytest.mark.filterwarnings("error")  # drawing warns of nothing
+YELLOW_RGBA = to_rgba(YELLOW)
 CASES = [(problem, "agile-quad") for problem in PROBLEMS] + [
     ("flip-roll", "hexarotor"),
     ("half-flip", "crazyflie"),
@@ -269,11 +272,59 @@ def test_drawing_never_imports_pyplot(tmp_path):
     subprocess.run([sys.executable, "-c", code], check=True, cwd=tmp_path)
 
 
+def two_flips_page():
+    plan, flight = two_flips()
+    return report_figure(plan, ab.load_vehicle("agile-quad"), flight)
+
+
 def test_stages_are_numbered_where_their_names_have_no_room(monkeypatch):
-    quad = ab.load_vehicle("agile-quad")
-    found = ab.plan(ab.load_problem("examples/two-flips.toml"), ab.Miqp(order=4), quad)
-    figure = report_figure(found, quad, ab.fly(found.trajectory, quad))
+    plan, _ = two_flips()
+    figure = two_flips_page()
     shown = {text.get_text() for text in panel_of(figure, "position error").texts}
     assert {str(k) for k in range(1, 9)} <= shown
-    assert not {stage.name for stage in found.stages} & shown
+    assert not {stage.name for stage in plan.stages} & shown
     require_legible(figure, monkeypatch)
+
+
+def test_every_gate_is_drawn_inside_the_picture_with_a_vehicle_in_it(monkeypatch):
+    calls = []
+    monkeypatch.setattr(path_panel, "draw_depth_sorted", lambda *call: calls.append(call))
+    plan, flight = two_flips()
+    draw(flight, plan)
+    [(axes, shapes, camera)] = calls
+    assert len(plan.problem.gates) == 2
+    drawn = np.concatenate([shape.points for shape in shapes])
+    low, high = np.array([axes.get_xlim(), axes.get_ylim()]).T
+    for gate in plan.problem.gates:
+        for corner in np.concatenate(gate_bars(gate)).reshape(-1, 3):
+            assert np.linalg.norm(drawn - corner, axis=1).min() < 1e-9
+            assert (camera.project(corner) > low).all()
+            assert (camera.project(corner) < high).all()
+        assert np.linalg.norm(drawn - gate.position, axis=1).min() < 0.05  # the foot of a thrust axis
+
+
+def test_every_passage_of_a_gate_is_marked_in_every_timeline():
+    plan, _ = two_flips()
+    passages = [stage.time for stage in plan.stages if stage.gate is not None]
+    assert len(passages) == 2
+    figure = two_flips_page()
+    for quantity in ("position error", "attitude error", "specific thrust", "rotor thrust"):
+        marks = panel_of(figure, quantity).collections[0]
+        colours = marks.get_colors()
+        times = [
+            s[0][0] for s, c in zip(marks.get_segments(), colours, strict=True) if (c == YELLOW_RGBA).all()
+        ]
+        np.testing.assert_allclose(times, passages)
+
+
+def test_stages_that_would_cover_each_other_follow_one_another():
+    plan, _ = two_flips()
+    axes = next(a for a in two_flips_page().axes if a.get_ylabel().startswith("stages in order"))
+    quiver = next(q for q in axes.collections if isinstance(q, Quiver))
+    per_metre = axes.figure.get_size_inches()[1] * axes.get_position().height / np.ptp(axes.get_ylim())
+    assert len(quiver.get_offsets()) == len(plan.stages)
+    assert (-np.diff(quiver.get_offsets()[:, 1]) * per_metre > 0.5).all()  # [in] downward in their order
+    gates = [c for c in axes.collections if isinstance(c, PolyCollection) and c.get_zorder() == 1.5]
+    centres = [np.mean([p.vertices.mean(axis=0) for p in gate.get_paths()], axis=0) for gate in gates]
+    passed = [place for place, s in zip(quiver.get_offsets(), plan.stages, strict=True) if s.gate is not None]
+    np.testing.assert_allclose(centres, passed, atol=0.05)

@@ -218,9 +218,8 @@ def _finish(
 
     folder = options.out or Path("out") / plan.problem.name
     facts = report(plan, score, vehicle.name)
-    picture = png(
-        report_figure(plan, vehicle, flight, score)
-    )  # before anything is written: all files or none
+    figure = report_figure(plan, vehicle, flight, score)
+    picture = png(figure)  # before anything is written: all files or none
     save_trajectory(plan.trajectory, folder / "plan.npz")
     write_csv(plan.trajectory, folder / "plan.csv")
     if flight is not None:

@@ -1,1 +1,1 @@
-"""What people and machines get to see: figures, tables, reports."""
+"""Figures, tables and reports, for people and machines."""

@@ -11,7 +11,7 @@ from aerobat.planning import Plan
 
 
 def report(plan: Plan, score: Score | None = None, vehicle: str | None = None) -> dict[str, Any]:
-    """What report.json holds; units are in the keys. `flight` is missing when nothing was flown."""
+    """The content of report.json; units are in the keys. `flight` is missing when nothing was flown."""
     facts: dict[str, Any] = {
         "problem": plan.problem.name,
         "vehicle": vehicle or (None if plan.vehicle is None else plan.vehicle.name),

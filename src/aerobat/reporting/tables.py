@@ -27,7 +27,7 @@ def summary_table(plan: Plan, score: Score | None, vehicle: str) -> Table:
 
 
 def vehicles_table(vehicles: Iterable[Vehicle]) -> Table:
-    """What can fly."""
+    """Vehicles, one a row."""
     table = Table("vehicle", "mass", "rotors", "thrust/weight", "what it is", box=None, pad_edge=False)
     for v in vehicles:
         mass = f"{v.mass:.3g} kg"
@@ -36,7 +36,7 @@ def vehicles_table(vehicles: Iterable[Vehicle]) -> Table:
 
 
 def problems_table(problems: Iterable[Problem]) -> Table:
-    """What can be flown."""
+    """Problems, one a row."""
     table = Table("problem", "what it is", box=None, pad_edge=False)
     for problem in problems:
         table.add_row(problem.name, problem.description)
@@ -50,7 +50,7 @@ def show(table: Table) -> None:
 
 
 def certificate_table(certificate: Certificate, title: str) -> Table:
-    """What is proven, a limit a row, and what quantities without a limit reach at most."""
+    """Proven limits, one a row, and the largest values of quantities without a limit."""
     headings = ("quantity", "reaches", "at", "limit", "margin", "verdict")
     table = Table(*headings, title=title, title_justify="left", box=None, pad_edge=False)
     for finding in certificate.findings:
@@ -94,16 +94,20 @@ def _flight_facts(score: Score | None) -> Iterable[tuple[str, str]]:
     yield "outcome", score.outcome
     yield "position error", _pair(100 * score.max_position_error_m, 100 * score.rms_position_error_m, "cm")
     yield "attitude error", _pair(score.max_attitude_error_deg, score.rms_attitude_error_deg, "°")
-    if score.gate_miss_m is not None:
-        clearance = "" if score.gate_clearance_m is None else f", {100 * score.gate_clearance_m:.0f} cm clear"
-        yield (
-            "gate",
-            (
-                f"{1000 * score.gate_miss_m:.1f} mm off, {score.gate_attitude_error_deg:.2f}° off, "
-                f"at {score.gate_speed_m_s:.2f} m/s{clearance}"
-            ),
-        )
+    passages = _passages(score)
+    for i, (miss, attitude_error_deg, speed, clearance) in enumerate(passages, start=1):
+        clear = "" if clearance is None else f", {100 * clearance:.0f} cm clear"
+        fact = f"{1000 * miss:.1f} mm off, {attitude_error_deg:.2f}° off, at {speed:.2f} m/s{clear}"
+        yield "gate" if len(passages) == 1 else f"gate {i}", fact
     yield "saturated", f"{100 * score.saturated_fraction:.1f} % of the time"
+
+
+def _passages(score: Score) -> list[tuple[float, float, float, float | None]]:
+    """Of each gate: distance from its centre [m], attitude error [deg], speed [m/s], clearance [m]."""
+    miss, angle, speed = score.gate_miss_m, score.gate_attitude_error_deg, score.gate_speed_m_s
+    if miss is None or angle is None or speed is None:
+        return []
+    return [(miss, angle, speed, score.gate_clearance_m)]
 
 
 def _pair(largest: float, rms: float, unit: str) -> str:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -51,6 +51,7 @@ class Keyframe:
     name: str
     time: float  # [s]
     interval: int | None = None
+    gate: str | None = None  # the name of the gate that is passed then
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,10 +68,19 @@ class Keyframes:
         instants = tuple(self.instants[k] for k in kept)
         return Keyframes(instants, self.position[kept], self.q_world_body[kept], self.thrust[kept])
 
+    def unfolded(self, camera: Camera, downward: bool, pitch: float) -> Keyframes:
+        """The same, shifted on the camera's picture to follow one another in steps of `pitch` [m].
+
+        They go downward, or to the right; across that direction each stays where it is.
+        """
+        direction = -camera.screen[1] if downward else camera.screen[0]
+        shifts = pitch * np.arange(len(self.instants)) - self.position @ direction
+        return replace(self, position=self.position + shifts[:, None] * direction)
+
 
 def plan_keyframes(plan: Plan, vehicle: Vehicle) -> Keyframes:
     """What `plan` asks of `vehicle` at its stages, and where those are few, at equal steps of time."""
-    shown = [Keyframe(stage.name, stage.time, stage.interval) for stage in plan.stages]
+    shown = [Keyframe(stage.name, stage.time, stage.interval, stage.gate) for stage in plan.stages]
     if len(shown) < FEWEST:
         steps = np.linspace(0.0, plan.duration, STEPS + 1).tolist()
         shown += [Keyframe("", t) for t in steps if all(abs(t - k.time) > 0.5 * steps[1] for k in shown)]

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from aerobat.arrays import Array
 from aerobat.planning import Plan
+from aerobat.problem.gate import Gate
 from aerobat.reporting.page import size_of
 from aerobat.reporting.panels.keyframes import (
     Keyframe,
@@ -27,6 +30,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 ARROW = 1.0  # [in] the longest arrow
+UNFOLDED = 0.5  # of the usual size of arrows and vehicles, where stages follow one another
 KEY = 0.4  # [in] the longest key arrow
 KEY_HEIGHT = 0.38  # [in] of the keys above the axes
 VEHICLE = 0.6  # [in] a vehicle, about
@@ -41,35 +45,39 @@ KEYS = np.array([0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0])  # [m/s
 
 
 def draw_stages(axes: Axes, plan: Plan, vehicle: Vehicle) -> str:
-    """Draw the stages in the maneuver's plane; return a note on what is shown."""
+    """Draw the stages in the maneuver's plane; return a note on what is shown.
+
+    Where they would cover each other in that plane, they follow one another along the panel's longer side.
+    """
     shots = plan_keyframes(plan, vehicle)
     plane = maneuver_plane(plan, shots.thrust)
     camera = plane.camera
     gates = plan.problem.gates
-    frame = camera.project(np.concatenate([shots.position, *(gate.corners for gate in gates)]))
     column = max(COLUMN, LETTER * max(len(keyframe.name) for keyframe in shots.instants))
+    frame = camera.project(np.concatenate([shots.position, *(gate.corners for gate in gates)]))
     inches = _fit(axes, frame, VEHICLE, span(vehicle), column)  # per metre
-    scale = enlargement(vehicle, VEHICLE / inches)
-    shots = shots.only(_apart(shots, camera, 0.85 * scale * span(vehicle)))
-    places, thrust = camera.project(shots.position), camera.project(shots.thrust)
-    arrow = ARROW / max(float(np.abs(thrust).max()), 1e-9)  # [in] per m/s²
-    tips = places + thrust * arrow / inches
-    pad = 0.6 * inches * scale * span(vehicle)
-    inches = _fit(axes, np.concatenate([frame, tips]), pad, span(vehicle), column)
+    reach = enlargement(vehicle, VEHICLE / inches) * span(vehicle)  # [m]
     axes.set(xlabel=plane.label, ylabel="z [m]")
-    path = plan.trajectory.evaluate(np.linspace(0.0, plan.duration, 241))
-    axes.plot(*camera.project(path).T, color=BAND, linewidth=1.6)
-    for gate in gates:
-        draw_depth_sorted(axes, gate_section(gate, camera), camera, zorder=1.5)
-    vehicles = []
-    for position, q in zip(shots.position, shots.q_world_body, strict=True):
-        vehicles += vehicle_shapes(vehicle, position, q, scale, weight=1.5)
-    draw_depth_sorted(axes, vehicles, camera, zorder=2.2)
-    _draw_sums(axes, places, thrust * arrow / inches)
-    _draw_components(axes, places, thrust * arrow, arrow, plane)
-    _draw_names(axes, shots.instants, places, thrust, 0.55 * scale * span(vehicle), column)
-    size = "" if scale == 1.0 else f"; vehicle {scale:g} times its size"
-    return ("a stage holds at the end of interval n" if plan.stages else "equal steps of time") + size
+    if not _is_crowded(shots, camera, 0.5 * reach):
+        shots = shots.only(_apart(shots, camera, 0.85 * reach))
+        path = plan.trajectory.evaluate(np.linspace(0.0, plan.duration, 241))
+        axes.plot(*camera.project(path).T, color=BAND, linewidth=1.6)
+        scale = _draw(axes, shots, gates, plane, vehicle, column)
+        note = "a stage holds at the end of interval n" if plan.stages else "equal steps of time"
+    else:
+        shots = shots.only([k for k, keyframe in enumerate(shots.instants) if keyframe.interval is not None])
+        shots, gates = _unfold(axes, shots, gates, camera, reach, column)
+        scale = _draw(axes, shots, gates, plane, vehicle, column, UNFOLDED)
+        note = "in order, each held at the end of interval n"
+    return note if scale == 1.0 else f"{note}; vehicle {scale:g} times its size"
+
+
+def _is_crowded(shots: Keyframes, camera: Camera, distance: float) -> bool:
+    """True where two stages come to lie nearer to each other than `distance` [m] on the picture."""
+    stages = [k for k, keyframe in enumerate(shots.instants) if keyframe.interval is not None]
+    places = camera.project(shots.position[stages])
+    apart = np.linalg.norm(places[:, None] - places, axis=-1)
+    return bool((apart[np.triu_indices(len(stages), 1)] < distance).any())
 
 
 def _apart(shots: Keyframes, camera: Camera, distance: float) -> list[int]:
@@ -80,6 +88,61 @@ def _apart(shots: Keyframes, camera: Camera, distance: float) -> list[int]:
         if k not in kept and all(np.linalg.norm(places[i] - places[k]) > distance for i in kept):
             kept.append(k)
     return sorted(kept)
+
+
+def _unfold(
+    axes: Axes, shots: Keyframes, gates: Sequence[Gate], camera: Camera, reach: float, column: float
+) -> tuple[Keyframes, tuple[Gate, ...]]:
+    """Stages that follow one another along the panel's longer side, each with the gate that it passes."""
+    width, height = size_of(axes)
+    downward = height >= width
+    across = float(np.ptp(camera.project(shots.position)[:, 0 if downward else 1])) + reach
+    aspect = height / (width - 2 * column) if downward else width / (height - ROW)
+    pitch = across * aspect / (len(shots.instants) + 1)
+    unfolded = shots.unfolded(camera, downward, pitch)
+    moved = []
+    for k, keyframe in enumerate(shots.instants):
+        shift = unfolded.position[k] - shots.position[k]
+        moved += [replace(g, position=g.position + shift) for g in gates if g.name == keyframe.gate]
+    if downward:
+        axes.set(yticks=[], ylabel="stages in order, downward")
+    else:
+        axes.set(xticks=[], xlabel="stages in order")
+    return unfolded, tuple(moved)
+
+
+def _draw(
+    axes: Axes,
+    shots: Keyframes,
+    gates: Sequence[Gate],
+    plane: ManeuverPlane,
+    vehicle: Vehicle,
+    column: float,
+    shrink: float = 1.0,
+) -> float:
+    """Draw vehicles, gates, arrows of thrust and names; return by how much vehicles are enlarged.
+
+    Names take `column` [in]; vehicles and arrows are `shrink` times as large as usual.
+    """
+    camera = plane.camera
+    frame = camera.project(np.concatenate([shots.position, *(gate.corners for gate in gates)]))
+    inches = _fit(axes, frame, shrink * VEHICLE, span(vehicle), column)  # per metre
+    scale = enlargement(vehicle, shrink * VEHICLE / inches)
+    places, thrust = camera.project(shots.position), camera.project(shots.thrust)
+    arrow = shrink * ARROW / max(float(np.abs(thrust).max()), 1e-9)  # [in] per m/s²
+    tips = places + thrust * arrow / inches
+    pad = 0.6 * inches * scale * span(vehicle)
+    inches = _fit(axes, np.concatenate([frame, tips]), pad, span(vehicle), column)
+    for gate in gates:
+        draw_depth_sorted(axes, gate_section(gate, camera), camera, zorder=1.5)
+    vehicles = []
+    for position, q in zip(shots.position, shots.q_world_body, strict=True):
+        vehicles += vehicle_shapes(vehicle, position, q, scale, weight=1.5)
+    draw_depth_sorted(axes, vehicles, camera, zorder=2.2)
+    _draw_sums(axes, places, thrust * arrow / inches)
+    _draw_components(axes, places, thrust * arrow, arrow, plane)
+    _draw_names(axes, shots.instants, places, thrust, 0.55 * scale * span(vehicle), column)
+    return scale
 
 
 def _fit(axes: Axes, points: Array, pad: float, min_side: float, column: float) -> float:
