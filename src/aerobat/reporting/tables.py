@@ -94,20 +94,16 @@ def _flight_facts(score: Score | None) -> Iterable[tuple[str, str]]:
     yield "outcome", score.outcome
     yield "position error", _pair(100 * score.max_position_error_m, 100 * score.rms_position_error_m, "cm")
     yield "attitude error", _pair(score.max_attitude_error_deg, score.rms_attitude_error_deg, "°")
-    passages = _passages(score)
-    for i, (miss, attitude_error_deg, speed, clearance) in enumerate(passages, start=1):
-        clear = "" if clearance is None else f", {100 * clearance:.0f} cm clear"
-        fact = f"{1000 * miss:.1f} mm off, {attitude_error_deg:.2f}° off, at {speed:.2f} m/s{clear}"
-        yield "gate" if len(passages) == 1 else f"gate {i}", fact
+    if score.gate_miss_m is not None:
+        clearance = "" if score.gate_clearance_m is None else f", {100 * score.gate_clearance_m:.0f} cm clear"
+        yield (
+            "gate",
+            (
+                f"{1000 * score.gate_miss_m:.1f} mm off, {score.gate_attitude_error_deg:.2f}° off, "
+                f"at {score.gate_speed_m_s:.2f} m/s{clearance}"
+            ),
+        )
     yield "saturated", f"{100 * score.saturated_fraction:.1f} % of the time"
-
-
-def _passages(score: Score) -> list[tuple[float, float, float, float | None]]:
-    """Of each gate: distance from its centre [m], attitude error [deg], speed [m/s], clearance [m]."""
-    miss, angle, speed = score.gate_miss_m, score.gate_attitude_error_deg, score.gate_speed_m_s
-    if miss is None or angle is None or speed is None:
-        return []
-    return [(miss, angle, speed, score.gate_clearance_m)]
 
 
 def _pair(largest: float, rms: float, unit: str) -> str:
