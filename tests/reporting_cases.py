@@ -23,7 +23,7 @@ def planned(problem: str, vehicle: str = "agile-quad") -> ab.Plan:
 
 
 @lru_cache
-def flown(problem: str, vehicle: str = "agile-quad") -> ab.Flight:
+def simulated(problem: str, vehicle: str = "agile-quad") -> ab.Flight:
     """A flight of that plan, at a rate that keeps tests short."""
     return ab.fly(planned(problem, vehicle).trajectory, ab.load_vehicle(vehicle), rate=200.0)
 

@@ -11,7 +11,7 @@ from rich.console import Console
 import aerobat as ab
 from aerobat.reporting.comparison import comparison_rows, comparison_table
 from aerobat.studies.compare import Comparison, Entry
-from reporting_cases import flown, planned, require_legible
+from reporting_cases import planned, require_legible, simulated
 
 pytestmark = pytest.mark.filterwarnings("error")  # drawing warns of nothing
 KEYS = [
@@ -32,12 +32,12 @@ def section_v():
 
 
 def flip():
-    plan, flight, vehicle = planned("flip-roll"), flown("flip-roll"), ab.load_vehicle("agile-quad")
+    plan, flight, vehicle = planned("flip-roll"), simulated("flip-roll"), ab.load_vehicle("agile-quad")
     entry = Entry("miqp", plan, flight, ab.score(flight, plan.problem, vehicle), 0.1, "through the gate")
     return Comparison(plan.problem, vehicle, (entry, NONE))
 
 
-def told(comparison):
+def printed(comparison):
     console = Console(width=80)
     with console.capture() as capture:
         console.print(comparison_table(comparison))
@@ -58,7 +58,7 @@ def test_rows_hold_what_the_plans_and_flights_are():
         error = entry.flight.states.position - entry.flight.setpoint.flat.position
         assert row["max_position_error_m"] == pytest.approx(np.linalg.norm(error, axis=1).max())
     assert [row["certified"] for row in rows] == [True, False, None, True]
-    assert rows[1]["min_margin_n"] == pytest.approx(-11.54, abs=0.01)  # rotor 1 is asked for -11.74 N
+    assert rows[1]["min_margin_n"] == pytest.approx(-11.54, abs=0.01)  # rotor 1 is reference for -11.74 N
     assert rows[3]["min_margin_n"] == pytest.approx(0.063, abs=0.001)
 
 
@@ -72,7 +72,7 @@ def test_there_is_no_ratio_without_a_time_optimal_plan():
 
 
 def test_the_table_fits_a_terminal_and_tells_why_there_is_no_plan():
-    text = told(section_v())
+    text = printed(section_v())
     assert max(map(len, text.splitlines())) <= 80
     assert "3.100 s" in text
     assert " ".join(REASON.split()) in " ".join(text.split())  # its brackets are no markup

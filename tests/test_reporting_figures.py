@@ -1,4 +1,4 @@
-"""Whole pages: they show what was planned and flown, labelled, without one text over another."""
+"""Whole pages: they show plan and flight, labelled, without one text over another."""
 
 import subprocess
 import sys
@@ -22,7 +22,7 @@ from aerobat.reporting.panels.keyframes import maneuver_plane, plan_keyframes
 from aerobat.reporting.scene.glyphs import gate_bars
 from aerobat.reporting.style import BLUE, RED, YELLOW
 from aerobat.states import BodyState
-from reporting_cases import PROBLEMS, flown, planned, require_legible, two_flips
+from reporting_cases import PROBLEMS, planned, require_legible, simulated, two_flips
 
 pytestmark = pytest.mark.filterwarnings("error")  # drawing warns of nothing
 YELLOW_RGBA = to_rgba(YELLOW)
@@ -34,11 +34,11 @@ CASES = [(problem, "agile-quad") for problem in PROBLEMS] + [
 
 
 def page(problem, vehicle="agile-quad"):
-    return report_figure(planned(problem, vehicle), ab.load_vehicle(vehicle), flown(problem, vehicle))
+    return report_figure(planned(problem, vehicle), ab.load_vehicle(vehicle), simulated(problem, vehicle))
 
 
 def pages(problem, vehicle):
-    plan, body, flight = planned(problem, vehicle), ab.load_vehicle(vehicle), flown(problem, vehicle)
+    plan, body, flight = planned(problem, vehicle), ab.load_vehicle(vehicle), simulated(problem, vehicle)
     return [report_figure(plan, body, flight), report_figure(plan, body), draw(flight, plan), draw(flight)]
 
 
@@ -76,7 +76,7 @@ def test_a_page_is_a_picture_1600_pixels_wide():
 
 
 def test_drawn_errors_are_those_of_the_flight():
-    flight = flown("half-flip")
+    flight = simulated("half-flip")
     figure = page("half-flip")
     distance = np.linalg.norm(flight.states.position - flight.setpoint.flat.position, axis=1)
     position = panel_of(figure, "position error")
@@ -92,7 +92,7 @@ def test_drawn_errors_are_those_of_the_flight():
 
 @pytest.mark.parametrize("vehicle", ["agile-quad", "hexarotor"])
 def test_rotor_thrusts_are_drawn_with_the_vehicle_s_limits(vehicle):
-    flight, body = flown("flip-roll", vehicle), ab.load_vehicle(vehicle)
+    flight, body = simulated("flip-roll", vehicle), ab.load_vehicle(vehicle)
     lines = panel_of(page("flip-roll", vehicle), "rotor thrust").get_lines()
     rotors, limits = lines[: len(body.rotors)], lines[len(body.rotors) :]
     for i, line in enumerate(rotors):
@@ -118,15 +118,15 @@ def test_arrows_are_the_specific_thrust_at_the_scale_of_their_keys(problem):
     axes = stages_panel(page(problem))
     quivers = {q.get_facecolor()[0].tobytes(): q for q in axes.collections if isinstance(q, Quiver)}
     keys = {key.Q: key for key in axes.get_children() if isinstance(key, QuiverKey)}
-    asked = plan_keyframes(plan, vehicle)
-    plane = maneuver_plane(plan, asked.thrust)
+    reference = plan_keyframes(plan, vehicle)
+    plane = maneuver_plane(plan, reference.thrust)
     for colour, column in ((BLUE, 0), (RED, 1)):
         quiver = quivers[np.array(to_rgba(colour)).tobytes()]
         value = float(keys[quiver].label.split()[-2])
         drawn = (quiver.U, quiver.V)[column] * value / keys[quiver].U
-        expected = plane.camera.project(asked.thrust)[:, column]
+        expected = plane.camera.project(reference.thrust)[:, column]
         for place, thrust in zip(quiver.get_offsets(), drawn, strict=True):
-            k = np.linalg.norm(plane.camera.project(asked.position) - place, axis=1).argmin()
+            k = np.linalg.norm(plane.camera.project(reference.position) - place, axis=1).argmin()
             assert thrust == pytest.approx(expected[k], abs=1e-6)
 
 
@@ -182,7 +182,7 @@ def test_any_other_plane_is_where_the_thrust_moves_most(heading_deg, seed):
 def test_vehicles_along_the_path_stand_as_the_flight_stood(monkeypatch):
     painted = []
     monkeypatch.setattr(path_panel, "draw_depth_sorted", lambda axes, shapes, camera: painted.extend(shapes))
-    flight, gate = flown("flip-roll"), planned("flip-roll").problem.gates[0]
+    flight, gate = simulated("flip-roll"), planned("flip-roll").problem.gates[0]
     page("flip-roll")
     axes = [shape.points for shape in painted if len(shape.points) == 2 and shape.width == 0.9]
     assert len(axes) >= 10
@@ -221,7 +221,7 @@ def batch_of(flight, count):
 
 
 def test_a_batch_of_flights_is_drawn_whole():
-    batch = batch_of(flown("flip-roll"), 7)
+    batch = batch_of(simulated("flip-roll"), 7)
     figure = draw(batch, planned("flip-roll"))
     assert any("7 flights" in text.get_text() for text in figure.texts)
     bundle = next(c for c in panel_of(figure, "position error").collections if len(c.get_segments()) == 7)
@@ -230,7 +230,7 @@ def test_a_batch_of_flights_is_drawn_whole():
 
 
 def test_a_flight_that_went_astray_does_not_shrink_the_picture():
-    flight = flown("flip-roll")
+    flight = simulated("flip-roll")
     position = flight.states.position.copy()
     position[len(position) // 2 :] += 1000.0
     stray = replace(flight, states=replace(flight.states, position=position))
@@ -239,8 +239,8 @@ def test_a_flight_that_went_astray_does_not_shrink_the_picture():
 
 
 def test_a_flight_can_be_drawn_alone_when_its_vehicle_is_a_preset():
-    assert draw(flown("line")).texts[0].get_text() == "flight of agile-quad"
-    stranger = replace(flown("line"), vehicles=("my-own",))
+    assert draw(simulated("line")).texts[0].get_text() == "flight of agile-quad"
+    stranger = replace(simulated("line"), vehicles=("my-own",))
     with pytest.raises(ab.SpecError, match="my-own"):
         draw(stranger)
     assert draw(stranger, vehicle=ab.load_vehicle("agile-quad")).axes
@@ -258,11 +258,11 @@ def test_the_reader_s_own_matplotlib_settings_change_nothing():
 
 
 def test_the_same_data_give_the_same_picture():
-    assert png(draw(flown("line"))) == png(draw(flown("line")))
+    assert png(draw(simulated("line"))) == png(draw(simulated("line")))
 
 
 def test_drawing_never_imports_pyplot(tmp_path):
-    flown("line").save(tmp_path / "flight.npz")
+    simulated("line").save(tmp_path / "flight.npz")
     code = (
         "import sys, aerobat as ab, aerobat.reporting.figures\n"
         "assert 'matplotlib' not in sys.modules\n"

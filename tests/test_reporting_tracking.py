@@ -8,7 +8,7 @@ import pytest
 import aerobat as ab
 from aerobat.reporting.panels.signals import at_limit, fit_to_limits, wrench_limits
 from aerobat.vehicle import wrench
-from reporting_cases import flown, planned, require_legible
+from reporting_cases import planned, require_legible, simulated
 from test_reporting_figures import batch_of
 
 pytestmark = pytest.mark.filterwarnings("error")  # drawing warns of nothing
@@ -34,12 +34,12 @@ def panels(figure, label):
 
 
 def lines(axes, count):
-    """The asked series, the flown one, and the levels of the limits, all dashed."""
-    asked, flight, *others = axes.get_lines()
+    """The reference series, the actual one, and the levels of the limits, all dashed."""
+    reference, flight, *others = axes.get_lines()
     limits = [line for line in others if len(line.get_ydata()) == 2]
     assert all(line.get_linestyle() == "--" for line in limits)
     assert len(limits) == count
-    return asked.get_data(), flight.get_data(), sorted(line.get_ydata()[0] for line in limits)
+    return reference.get_data(), flight.get_data(), sorted(line.get_ydata()[0] for line in limits)
 
 
 def rotor_panels(figure, count):
@@ -67,7 +67,7 @@ def test_no_text_of_section_v_lies_over_another_or_beyond_the_page(stop_after, m
     ],
 )
 def test_no_text_lies_over_another_or_beyond_the_page(problem, vehicle, monkeypatch):
-    plan, flight = planned(problem, vehicle), flown(problem, vehicle)
+    plan, flight = planned(problem, vehicle), simulated(problem, vehicle)
     require_legible(ab.tracking_figure(plan, ab.load_vehicle(vehicle), flight), monkeypatch)
 
 
@@ -79,11 +79,11 @@ def test_motion_is_the_flight_s_beside_the_plan_s(stop_after):
         (VELOCITIES, 1, flight.states.velocity),
     ):
         for label, axis in zip(labels, (0, 2), strict=True):
-            (asked_at, asked), (flown_at, given), _ = lines(panels(figure, label)[0], 0)
+            (reference_times, reference), (actual_times, given), _ = lines(panels(figure, label)[0], 0)
             np.testing.assert_allclose(
-                asked, plan.trajectory.evaluate(asked_at, derivative)[:, axis], atol=1e-9
+                reference, plan.trajectory.evaluate(reference_times, derivative)[:, axis], atol=1e-9
             )
-            np.testing.assert_array_equal(flown_at, flight.times)
+            np.testing.assert_array_equal(actual_times, flight.times)
             np.testing.assert_array_equal(given, truth[:, axis])
 
 
@@ -119,12 +119,12 @@ def test_no_thrusts_within_the_limits_give_more_than_the_drawn_wrench_limits(veh
 def test_every_rotor_is_drawn_with_its_limits(stop_after):
     figure, plan, flight = page_of(stop_after)
     for i, axes in enumerate(rotor_panels(figure, 4)):
-        (asked_at, asked), (_, given), limits = lines(axes, 2)
+        (reference_times, reference), (_, given), limits = lines(axes, 2)
         environment = PROBLEM.environment
         expected = ab.reference(
-            plan.trajectory, VEHICLE, times=asked_at, environment=environment
+            plan.trajectory, VEHICLE, times=reference_times, environment=environment
         ).rotor_thrusts
-        np.testing.assert_allclose(asked, expected[:, i], atol=1e-9)
+        np.testing.assert_allclose(reference, expected[:, i], atol=1e-9)
         np.testing.assert_array_equal(given, flight.thrusts[:, i])
         np.testing.assert_allclose(limits, [-0.2, 18.0])
 
@@ -180,4 +180,4 @@ def test_an_axis_stretched_far_beyond_its_limits_is_cut_off_and_says_so():
 
 def test_a_batch_is_refused_in_a_sentence():
     with pytest.raises(ab.SpecError, match=r"flight\[k\]"):
-        ab.tracking_figure(planned("line"), ab.load_vehicle("agile-quad"), batch_of(flown("line"), 2))
+        ab.tracking_figure(planned("line"), ab.load_vehicle("agile-quad"), batch_of(simulated("line"), 2))
