@@ -19,7 +19,7 @@ IMPORTS = [sys.executable, "-c", "import numpy, matplotlib.pyplot"]
 def main() -> None:
     runs = int(sys.argv[1]) if len(sys.argv) > 1 else 7
     with tempfile.TemporaryDirectory() as folder:
-        job = [sys.executable, "-m", "aerobat.cli", "fly", "flip-roll", "--out", str(Path(folder) / "out")]
+        job = [sys.executable, "-m", "aerobat", "fly", "flip-roll", "--out", str(Path(folder) / "out")]
         bytecode = {"PYTHONPYCACHEPREFIX": str(Path(folder) / "bytecode")}
         report("compiled bytecode", job, runs, {**bytecode, "PYTHONDONTWRITEBYTECODE": ""})
         report("no bytecode", job, runs, {"PYTHONPYCACHEPREFIX": folder, "PYTHONDONTWRITEBYTECODE": "1"})

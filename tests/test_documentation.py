@@ -81,7 +81,7 @@ def test_the_first_command_prints_what_the_readme_shows(tmp_path: Path) -> None:
     words = command.split()
     assert words[:3] == ["uv", "run", "aerobat"]
     shown = without_numbers(printed)
-    assert without_numbers(run(["-m", "aerobat.cli", *words[3:]], tmp_path))[: len(shown)] == shown
+    assert without_numbers(run(["-m", "aerobat", *words[3:]], tmp_path))[: len(shown)] == shown
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)

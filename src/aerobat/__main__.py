@@ -1,0 +1,5 @@
+"""`python -m aerobat` is `aerobat`."""
+
+from aerobat.cli import main
+
+main()

@@ -1,5 +1,0 @@
-"""`python -m aerobat.cli` is `aerobat`."""
-
-from aerobat.cli import main
-
-main()

@@ -1,0 +1,11 @@
+"""`aerobat problems`: what there is to plan."""
+
+from __future__ import annotations
+
+
+def problems() -> None:
+    """List the built-in problems."""
+    from aerobat.problem import load_problem, problem_names
+    from aerobat.reporting.tables import problems_table, show
+
+    show(problems_table(load_problem(name) for name in problem_names()))
