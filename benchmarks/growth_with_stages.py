@@ -23,7 +23,6 @@ from aerobat.errors import AerobatError
 from aerobat.optimization import AssignmentProgram, solver
 from aerobat.planning.miqp import formulate
 from aerobat.problem import CustomManeuver, load_problem
-from aerobat.problem.stage import Quantity, Stage
 from paper_programs import paper_program
 
 EXAMPLE = Path(__file__).parents[1] / "examples" / "two-flips.toml"
@@ -78,24 +77,17 @@ def flips(gates: int, intervals: int, duration: float) -> AssignmentProgram:
     example = load_problem(EXAMPLE)
     if not isinstance(example.maneuver, CustomManeuver):
         raise SystemExit(f"{EXAMPLE.name} is not a list of stages")
-    one = example.maneuver.stages[:PER_GATE]
-    stages = tuple(moved(stage, i * APART) for i in range(gates) for stage in one)
-    shift = np.array([(gates - 2) * APART, 0.0, 0.0])
+    apart = np.array([APART, 0.0, 0.0])
+    first = example.gates[0]
+    passed = [replace(first, name=f"gate {i}", position=first.position + i * apart) for i in range(gates)]
+    one = example.maneuver.sequence[:PER_GATE]
+    stages = (replace(stage, gate=stage.gate and gate.name) for gate in passed for stage in one)
+    shift = (gates - 2) * apart
     goal = replace(example.goal, position=example.goal.position + shift)
     limits = replace(example.limits, upper=example.limits.upper + np.maximum(shift, 0.0))
-    maneuver = replace(example.maneuver, stages=stages)
-    problem = replace(example, goal=goal, limits=limits, maneuver=maneuver)
+    maneuver = replace(example.maneuver, sequence=tuple(stages))
+    problem = replace(example, goal=goal, gates=tuple(passed), limits=limits, maneuver=maneuver)
     return formulate(problem, 3, intervals).program(duration / intervals)
-
-
-def moved(stage: Stage, x: float) -> Stage:
-    conditions = (
-        replace(c, lower=c.lower + x * c.direction[0], upper=c.upper + x * c.direction[0])
-        if c.quantity is Quantity.POSITION
-        else c
-        for c in stage.conditions
-    )
-    return replace(stage, conditions=tuple(conditions))
 
 
 def solved(program: AssignmentProgram) -> int:
