@@ -3,6 +3,7 @@
 import subprocess
 import sys
 from dataclasses import replace
+from types import SimpleNamespace
 
 import matplotlib
 import numpy as np
@@ -21,7 +22,6 @@ from aerobat.reporting.panels import path as path_panel
 from aerobat.reporting.panels.keyframes import maneuver_plane, plan_keyframes
 from aerobat.reporting.scene.glyphs import gate_bars
 from aerobat.reporting.style import BLUE, RED, YELLOW
-from aerobat.states import BodyState
 from reporting_cases import PROBLEMS, planned, require_legible, simulated, two_flips
 
 pytestmark = pytest.mark.filterwarnings("error")  # drawing warns of nothing
@@ -198,42 +198,36 @@ def test_vehicles_along_the_path_stand_as_the_flight_stood(monkeypatch):
     assert min(np.linalg.norm(foot - gate.position) for foot, _ in axes) < 0.05  # one of them in the gate
 
 
-def batch_of(flight, count):
-    """As many flights as `count`, each a little beside the other."""
-    shifts = 0.01 * np.arange(count)[:, None, None]
-    states = {k: np.broadcast_to(v, (count, *v.shape)) for k, v in vars(flight.states).items()}
-    states["position"] = states["position"] + shifts
-
-    def many(array):
-        return np.broadcast_to(array, (count, *np.shape(array)))
-
-    return replace(
-        flight,
-        states=BodyState(**states),
-        **{
-            k: many(getattr(flight, k))
-            for k in ("commands", "thrusts", "saturated", "min_thrusts", "max_thrusts")
-        },
-        ends=many(flight.ends),
-        outcomes=flight.outcomes * count,
-        vehicles=flight.vehicles * count,
-    )
+def batch_of(problem, count):
+    """As many flights as `count`, each of a vehicle a little heavier than the one before."""
+    quad = ab.load_vehicle("agile-quad")
+    heavier = [replace(quad, mass=(1.0 + 0.01 * k) * quad.mass) for k in range(count)]
+    return ab.fly(planned(problem).trajectory, heavier, rate=200.0)
 
 
 def test_a_batch_of_flights_is_drawn_whole():
-    batch = batch_of(simulated("flip-roll"), 7)
+    batch = batch_of("flip-roll", 7)
     figure = draw(batch, planned("flip-roll"))
     assert any("7 flights" in text.get_text() for text in figure.texts)
-    bundle = next(c for c in panel_of(figure, "position error").collections if len(c.get_segments()) == 7)
-    tops = [segment[:, 1].max() for segment in bundle.get_segments()]
-    np.testing.assert_allclose(np.diff(tops), 0.01 * np.sqrt(3) / 0.01, rtol=0.05)  # [cm]
+    axes = panel_of(figure, "position error")
+    bundle = next(c for c in axes.collections if len(c.get_segments()) == 7)
+    unit = {"[m]": 1.0, "[cm]": 1e-2, "[mm]": 1e-3}[axes.get_ylabel().split()[-1]]
+    distances = np.linalg.norm(batch.states.position - batch.setpoint.flat.position, axis=-1)
+    for segment, distance in zip(bundle.get_segments(), distances, strict=True):
+        np.testing.assert_allclose(unit * segment[:, 1], distance, rtol=1e-12)
 
 
 def test_a_flight_that_went_astray_does_not_shrink_the_picture():
     flight = simulated("flip-roll")
     position = flight.states.position.copy()
     position[len(position) // 2 :] += 1000.0
-    stray = replace(flight, states=replace(flight.states, position=position))
+    stray = SimpleNamespace(
+        times=flight.times,
+        setpoint=flight.setpoint,
+        states=replace(flight.states, position=position),
+        thrusts=flight.thrusts,
+        vehicles=flight.vehicles,
+    )
     ordinary, lost = (draw(f, planned("flip-roll")).axes[0].get_ylim() for f in (flight, stray))
     assert np.ptp(lost) < 2.0 * np.ptp(ordinary)
 

@@ -180,4 +180,4 @@ def test_an_axis_stretched_far_beyond_its_limits_is_cut_off_and_says_so():
 
 def test_a_batch_is_refused_in_a_sentence():
     with pytest.raises(ab.SpecError, match=r"flight\[k\]"):
-        ab.tracking_figure(planned("line"), ab.load_vehicle("agile-quad"), batch_of(simulated("line"), 2))
+        ab.tracking_figure(planned("line"), ab.load_vehicle("agile-quad"), batch_of("line", 2))
