@@ -165,13 +165,13 @@ MALFORMED: dict[str, tuple[Callable[[], Any], str]] = {
     "mass true": (put("mass", value=True), "mass must be a number, got True"),
     "mass nan": (put("mass", value=float("nan")), "mass must be a finite number, got nan"),
     "mass infinite": (put("mass", value=float("inf")), "mass must be a finite number, got inf"),
-    "mass negative": (put("mass", value=-1.0), "mass must be positive, got -1 kg"),
+    "mass negative": (put("mass", value=-1.0), "mass must be positive, got -1.0"),
     "mass a table": (put("mass", value={"kg": 0.85}), "mass must be a number, got a table"),
-    "inertia short": (put("inertia", value=[1e-3, 1e-3]), "inertia must have at least 3 entries, got 2"),
-    "inertia a number": (put("inertia", value=1e-3), "inertia must be a list, got 0.001"),
+    "inertia short": (put("inertia", value=[1e-3, 1e-3]), "inertia must be 3 numbers, got a list of 2"),
+    "inertia a number": (put("inertia", value=1e-3), "inertia must be 3 numbers, got 0.001"),
     "inertia ragged": (
         put("inertia", value=[[1], [1], [1]]),
-        "inertia[0] must have at least 3 entries, got 1",
+        "inertia must be 3 x 3 numbers, got a list of 3",
     ),
     "inertia of text": (put("inertia", value=[1e-3, "x", 1e-3]), "inertia[1] must be a number, got 'x'"),
     "inertia no body's": (put("inertia", value=[1e-3, 1e-3, 3e-3]), "inertia belongs to no rigid body"),
@@ -180,14 +180,14 @@ MALFORMED: dict[str, tuple[Callable[[], Any], str]] = {
         put("inertia", value=[[1, 0.2, 0], [0, 1, 0], [0, 0, 1]]),
         "inertia must be symmetric",
     ),
-    "drag long": (put("drag_body", value=[0.1] * 4), "drag_body must have at most 3 entries, got 4"),
+    "drag long": (put("drag_body", value=[0.1] * 4), "drag_body must be 3 numbers, got a list of 4"),
     "drag negative": (put("drag_body", value=[0.0, -0.1, 0.0]), "drag_body must not be negative"),
     "gravity": (put("gravity", value=9.81), "gravity is not a known key"),
     "name a number": (put("name", value=7), "name must be text, got 7"),
     "name of two lines": (put("name", value="a\nb"), "name must be one line of text"),
     "no rotors": (without("rotors"), "rotors is missing; add it"),
     "rotors a table": (put("rotors", value={"front": 1}), "rotors must be a list, got a table"),
-    "a rotor a number": (put("rotors", 1, value=3), "rotors[1] must be a table, got 3"),
+    "a rotor a number": (put("rotors", 1, value=3), "rotors[1] must be a Rotor, in a file a table, got 3"),
     "three rotors": (without("rotors", 3), "rotors must be 4 or more, got 3"),
     "spin of three": (put("rotors", 2, "spin", value=3), "rotors[2].spin must be 1 "),
     "spin a fraction": (
@@ -198,7 +198,7 @@ MALFORMED: dict[str, tuple[Callable[[], Any], str]] = {
     "spins alike": (put("rotors", 1, "spin", value=-1), "rotors cannot hold a level hover"),
     "position flat": (
         put("rotors", 0, "position_body", value=[0.1, 0.1]),
-        "rotors[0].position_body must have at least 3 entries",
+        "rotors[0].position_body must be 3 numbers, got a list of 2",
     ),
     "position unknown": (
         put("rotors", 3, "position", value=[0.1, 0.1, 0.0]),
@@ -212,7 +212,7 @@ MALFORMED: dict[str, tuple[Callable[[], Any], str]] = {
         put("rotors", 1, "min_thrust", value=9.0),
         "rotors[1].min_thrust must be below max_thrust, got 9 N and 6.87926 N",
     ),
-    "lag negative": (put("rotor_defaults", "lag", value=-0.02), "rotors[0].lag must not be negative"),
+    "lag negative": (put("rotor_defaults", "lag", value=-0.02), "rotor_defaults.lag must be 0 or more"),
     "lag of time": (
         lambda: AGILE_QUAD.replace("lag = 0.02", "lag = 00:00:02"),
         "rotor_defaults.lag must be a number, got datetime.time(0, 0, 2)",
@@ -223,7 +223,7 @@ MALFORMED: dict[str, tuple[Callable[[], Any], str]] = {
     ),
     "table unknown": (
         put("engine", value={"cylinders": 4}),
-        "engine is not a known key; known keys are name, description, mass, inertia, drag_body",
+        "engine is not a known key; known keys are name, mass, inertia, rotors, drag_body",
     ),
     "key of two lines": (put("a\nb", value=1), r"'a\nb' is not a known key"),
 }
