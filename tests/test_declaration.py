@@ -1,6 +1,7 @@
 """Declared values of any kind: how what does not fit reads, and tables of them, from files and back."""
 
 import pickle
+import runpy
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal
 
@@ -24,6 +25,8 @@ from aerobat.declaration import (
 )
 from aerobat.documents import read_document, within, write_document
 from aerobat.errors import SpecError
+
+ROOT = Path(__file__).parent.parent
 
 
 @declared
@@ -204,3 +207,11 @@ def test_prefixes_nest() -> None:
 def test_an_unknown_name_is_met_with_all_known_ones_even_of_an_iterator() -> None:
     error = unknown_name("solver", "gurobo", iter(["scip", "gurobi"]))
     assert str(error) == "no solver named 'gurobo'; did you mean 'gurobi'? Known: scip, gurobi"
+
+
+def test_the_page_on_files_says_what_the_declarations_say() -> None:
+    """After a change of them: uv run python docs/make_files_page.py."""
+    maker = runpy.run_path(str(ROOT / "docs" / "make_files_page.py"))
+    assert maker["page"]() == (ROOT / "docs" / "files.md").read_text(encoding="utf-8")
+    declared_part = maker["page"]().partition(maker["WRITTEN"])[0]
+    assert {row.count("|") for row in declared_part.splitlines() if row.startswith("|")} == {6}

@@ -189,10 +189,10 @@ MALFORMED: dict[str, tuple[Callable[[], Any], str]] = {
     "rotors a table": (put("rotors", value={"front": 1}), "rotors must be a list, got a table"),
     "a rotor a number": (put("rotors", 1, value=3), "rotors[1] must be a Rotor, in a file a table, got 3"),
     "three rotors": (without("rotors", 3), "rotors must be 4 or more, got 3"),
-    "spin of three": (put("rotors", 2, "spin", value=3), "rotors[2].spin must be 1 "),
+    "spin of three": (put("rotors", 2, "spin", value=3), "rotors[2].spin must be 1 or -1, got 3"),
     "spin a fraction": (
         put("rotors", 2, "spin", value=0.5),
-        "rotors[2].spin must be a whole number, got 0.5",
+        "rotors[2].spin must be 1 or -1, got 0.5",
     ),
     "no spin": (without("rotors", 2, "spin"), "rotors[2].spin is missing; add it"),
     "spins alike": (put("rotors", 1, "spin", value=-1), "rotors cannot hold a level hover"),

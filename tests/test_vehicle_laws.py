@@ -75,8 +75,8 @@ def test_what_cannot_be_a_vehicle_is_refused_by_the_field(changes: dict, message
     [
         ({"position_body": [0.1, 0.1]}, "position_body must be 3 numbers"),
         ({"position_body": [0.1, 0.1, np.inf]}, "position_body must be finite"),
-        ({"spin": 0}, "spin must be 1 "),
-        ({"spin": "left"}, "spin must be a whole number"),
+        ({"spin": 0}, "spin must be 1 or -1, got "),
+        ({"spin": "left"}, "spin must be 1 or -1, got "),
         ({"min_thrust": 6.8792625}, "min_thrust must be below max_thrust"),
         ({"min_thrust": -2, "max_thrust": -1}, "max_thrust must be positive"),
         ({"max_thrust": np.inf}, "max_thrust must be a finite number"),

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import hashlib
-import importlib.util
+import os
 import sys
 from collections.abc import Iterator, Mapping
-from importlib.metadata import entry_points
 from pathlib import Path
 from typing import Any, Generic, TypeVar
 
@@ -83,6 +81,8 @@ class Registry(Generic[T]):
         if self._searched:
             return
         self._searched = True
+        from importlib.metadata import entry_points
+
         for entry in entry_points(group=self._group):
             _import(entry.load, f"{self._group} of the installed package {entry.value}")
 
@@ -92,8 +92,11 @@ def import_plugin(path: str | Path) -> None:
 
     Raises SpecError when there is no such file or it fails.
     """
+    import hashlib
+    import importlib.util
+
     file = Path(path).resolve()
-    name = f"aerobat_plugin_{file.stem}_{hashlib.sha256(str(file).encode()).hexdigest()[:8]}"
+    name = "aerobat_plugin_" + hashlib.sha256(os.fsencode(file)).hexdigest()[:16]
     if name in sys.modules:
         return
     spec = importlib.util.spec_from_file_location(name, file) if file.suffix == ".py" else None

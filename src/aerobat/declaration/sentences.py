@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import reprlib
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
@@ -58,6 +57,8 @@ def unknown_name(kind: str, name: str, known: Iterable[str]) -> SpecError:
 
 def closest(name: str, known: Iterable[str]) -> str | None:
     """The known name that is most like `name`, if any is like it."""
+    import difflib  # only once something is wrong
+
     return next(iter(difflib.get_close_matches(name.lower(), known, n=1)), None)
 
 

@@ -40,9 +40,9 @@ ZERO = (0.0, 0.0, 0.0)
 class EndState:
     """Where a trajectory begins or ends; derivatives above acceleration are zero there. World frame."""
 
-    position: Vector3  # [m]
-    velocity: Vector3 = field(default_factory=lambda: np.zeros(3))  # [m/s]
-    acceleration: Vector3 = field(default_factory=lambda: np.zeros(3))  # [m/s²]
+    position: Vector3  # [m] world
+    velocity: Vector3 = field(default_factory=lambda: np.zeros(3))  # [m/s] world
+    acceleration: Vector3 = field(default_factory=lambda: np.zeros(3))  # [m/s²] world
 
     def derivatives(self, order: int) -> Array:
         """Position and its derivatives below `order`, (order, 3)."""
@@ -63,11 +63,11 @@ class Limits:
 
     lower: Corner = field(default_factory=lambda: -_unbounded())  # [m] corner of the volume allowed
     upper: Corner = field(default_factory=_unbounded)  # [m] opposite corner
-    velocity: PerAxis = field(default_factory=_unbounded)  # [m/s]
-    acceleration: PerAxis = field(default_factory=_unbounded)  # [m/s²]
-    jerk: PerAxis = field(default_factory=_unbounded)  # [m/s³]
-    snap: PerAxis = field(default_factory=_unbounded)  # [m/s⁴]
-    crackle: PerAxis = field(default_factory=_unbounded)  # [m/s⁵]
+    velocity: PerAxis = field(default_factory=_unbounded)  # [m/s] largest magnitude
+    acceleration: PerAxis = field(default_factory=_unbounded)  # [m/s²] largest magnitude
+    jerk: PerAxis = field(default_factory=_unbounded)  # [m/s³] largest magnitude
+    snap: PerAxis = field(default_factory=_unbounded)  # [m/s⁴] largest magnitude
+    crackle: PerAxis = field(default_factory=_unbounded)  # [m/s⁵] largest magnitude
 
     def __post_init__(self) -> None:
         """Check."""

@@ -8,7 +8,7 @@ from math import inf
 from typing import Annotated, Any, ClassVar
 
 import numpy as np
-from pydantic import Strict
+from pydantic import Field, Strict
 
 from aerobat.arrays import Array
 from aerobat.declaration import (
@@ -102,7 +102,7 @@ class Stage:
     name: Label  # shown in reports and pictures
     conditions: tuple[Condition, ...] = ()  # what holds together
     at: Fraction | None = None  # [-] fraction of the duration at which it is; left out, the search chooses
-    interval_offset: int = 0  # intervals after that
+    interval_offset: Annotated[int, Field(ge=0, le=10_000)] = 0  # intervals after that
     gate: str | None = None  # name of the gate whose centre is passed
 
     def fixed_interval(self, intervals: int) -> int | None:

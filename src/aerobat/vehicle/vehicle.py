@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import field, fields
 from functools import cached_property
-from typing import Annotated, Any, ClassVar
+from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
 from pydantic import Field, PlainValidator
@@ -43,18 +43,16 @@ class Rotor:
     """
 
     position_body: Vector3  # [m] from the centre of mass
-    spin: int  # 1 counter-clockwise seen from above, -1 clockwise; the body feels -spin·c·f about +z
+    spin: Literal[
+        1, -1
+    ]  # 1 counter-clockwise seen from above, -1 clockwise; the body feels -spin·c·f about +z
     min_thrust: float  # [N] negative for a variable pitch
-    max_thrust: Positive  # [N]
+    max_thrust: Positive  # [N] at full throttle
     torque_coefficient: NonNegative  # [m] c: N·m of drag torque per N of thrust
     lag: NonNegative  # [s] time constant; zero for a thrust that follows its command at once
     radius: Positive  # [m] of the propeller
 
     def __post_init__(self) -> None:
-        if self.spin not in (1, -1):
-            raise FieldError(
-                "spin", f"must be 1 (counter-clockwise seen from above) or -1 (clockwise), got {self.spin}"
-            )
         if not self.min_thrust < self.max_thrust:
             raise FieldError(
                 "min_thrust",
@@ -70,8 +68,8 @@ class Vehicle:
     see `require_hover`.
     """
 
-    name: Label  # of the vehicle; left out in a file, the file's
-    mass: Positive  # [kg]
+    name: Label  # left out in a file, the file's
+    mass: Positive  # [kg] of all
     inertia: Annotated[
         Array, PlainValidator(_inertia), Field(description="three principal moments, or a 3 x 3 matrix")
     ]  # [kg·m²] about the centre of mass, body axes

@@ -34,11 +34,11 @@ class Waypoint:
     both are.
     """
 
-    position: PartialVector = field(default_factory=_free)  # [m]
-    velocity: PartialVector = field(default_factory=_free)  # [m/s]
-    acceleration: PartialVector = field(default_factory=_free)  # [m/s²]
+    position: PartialVector = field(default_factory=_free)  # [m] world
+    velocity: PartialVector = field(default_factory=_free)  # [m/s] world
+    acceleration: PartialVector = field(default_factory=_free)  # [m/s²] world
     up: UnitVector | None = None  # direction of the thrust
-    # specific thrust along `up`, |a + g e₃|; left out, 20 % or more of what the vehicle has
+    # specific thrust along `up`, the norm of a + g e₃; left out, 20 % or more of what the vehicle has
     thrust: Positive | None = None  # [m/s²]
     time: Positive | None = None  # [s] when to pass by, where a search on times begins
     gate: str | None = None  # name of the gate whose centre is passed
