@@ -57,7 +57,7 @@ def test_waypoints_are_passed_in_order_and_the_gate_at_its_centre() -> None:
     ("wrong", "sentence"),
     [
         (lambda: Waypoint(position=(0, 0)), "position must be three numbers"),
-        (lambda: Waypoint(position=(0, 0, np.inf)), "position must be finite"),
+        (lambda: Waypoint(position=(0, 0, np.inf)), r"position\[2\] must be a finite number"),
         (lambda: Waypoint(thrust=5.0), "thrust needs up"),
         (lambda: Waypoint(up=(0, 0, 1), thrust=-5.0), "thrust must be positive"),
         (lambda: Waypoint(up=(0, 0, 0)), "up must be a direction"),

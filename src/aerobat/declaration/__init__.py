@@ -17,13 +17,13 @@ from aerobat.declaration.field_types import (
     Positive,
     UnitVector,
     Vector3,
-    deg2rad,
     finite,
+    number,
     unit,
 )
 from aerobat.declaration.registry import Registry, import_plugin
 from aerobat.declaration.sentences import FieldError, unknown_key, unknown_name, within_field
-from aerobat.declaration.tables import check_field, from_table, to_table
+from aerobat.declaration.tables import from_table, to_table
 
 __all__ = [
     "Corner",
@@ -39,12 +39,11 @@ __all__ = [
     "Registry",
     "UnitVector",
     "Vector3",
-    "check_field",
     "declared",
-    "deg2rad",
     "finite",
     "from_table",
     "import_plugin",
+    "number",
     "to_table",
     "unit",
     "unknown_key",

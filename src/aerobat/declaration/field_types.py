@@ -2,19 +2,21 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Mapping
-from math import isinf, nan, radians
+from math import hypot, isfinite, nan
 from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 from pydantic import AfterValidator, Field, PlainValidator
 
-from aerobat.arrays import Array, frozen
+from aerobat.arrays import Array
 from aerobat.declaration.sentences import FieldError, shown, unknown_key, within_field
 
 AXES = ("x", "y", "z")
 _ROUND_OFF = 1e-12  # [-] components of a unit vector that are zero but for it
+_UNIT = 1e-15  # [-] how far from one a norm may be by round-off
 
 
 def unit(direction: ArrayLike) -> Array:
@@ -24,18 +26,26 @@ def unit(direction: ArrayLike) -> Array:
     zero, since they would couple axes that have nothing to do with each other.
     """
     vector = _direction(direction)
-    length = float(np.linalg.norm(vector))
-    if abs(length - 1.0) <= 4.0 * np.finfo(float).eps and (np.abs(vector[vector != 0.0]) >= _ROUND_OFF).all():
+    components = vector.tolist()
+    norm = hypot(*components)
+    if abs(norm - 1.0) <= _UNIT and not any(0.0 < abs(x) < _ROUND_OFF for x in components):
         return vector
-    scaled = vector / length
-    return frozen(np.where(np.abs(scaled) < _ROUND_OFF, 0.0, scaled), "unit vector")
+    return finite([x / norm if abs(x / norm) >= _ROUND_OFF else 0.0 for x in components], 3)
 
 
 def array(value: Any, *shape: int) -> Array:
     """A read-only array of exactly this shape, of numbers that may be infinite. Raises FieldError."""
-    numbers = _numbers(value, "")
+    return _shaped(_numbers(value, "", infinite=True), value, shape)
+
+
+def finite(value: Any, *shape: int) -> Array:
+    """A read-only array of exactly this shape, of finite numbers. Raises FieldError."""
+    return _shaped(_numbers(value, "", infinite=False), value, shape)
+
+
+def _shaped(numbers: Any, value: Any, shape: tuple[int, ...]) -> Array:
     try:
-        made = np.array(numbers, dtype=np.float64) + 0.0  # no negative zeros: equal values have equal bytes
+        made = np.array(numbers, dtype=np.float64)
     except ValueError:  # ragged
         made = np.empty(0)
     if made.shape != shape:
@@ -45,42 +55,33 @@ def array(value: Any, *shape: int) -> Array:
     return made
 
 
-def deg2rad(degrees: Any, name: str) -> float:
-    """An angle [rad] that a file gives in degrees under `name`. Raises FieldError unless it is finite."""
+def number(value: Any, name: str) -> float:
+    """A finite number that a file gives under `name`. Raises FieldError for anything else."""
     with within_field(name):
-        angle = _numbers(degrees, "")
-        if not isinstance(angle, float) or isinf(angle):
-            raise FieldError("", f"must be a finite number, got {shown(degrees)}")
-    return radians(angle)
+        made = _numbers(value, "", infinite=False)
+        if not isinstance(made, float):
+            raise FieldError("", f"must be a number, got {shown(value)}")
+    return made
 
 
-def _numbers(value: Any, place: str) -> Any:
+def _numbers(value: Any, place: str, infinite: bool) -> Any:
     """Nested lists of floats from lists or arrays. Raises FieldError for the first entry that is none."""
+    if isinstance(value, float) and (isfinite(value) or (infinite and value == value)):
+        return float(value) + 0.0  # no negative zeros: equal values have equal bytes
     if hasattr(value, "__array__"):
-        value = np.asarray(value).tolist()
+        return _numbers(np.asarray(value).tolist(), place, infinite)
     if isinstance(value, list | tuple):
-        return [_numbers(each, f"{place}[{i}]") for i, each in enumerate(value)]
+        return [_numbers(each, f"{place}[{i}]", infinite) for i, each in enumerate(value)]
     if isinstance(value, bool) or not isinstance(value, int | float):
         raise FieldError(place, f"must be a number, got {shown(value)}")
-    if value != value:
-        raise FieldError(place, "must be a finite number, got nan")
-    try:
-        return float(value)
-    except OverflowError:
-        raise FieldError(place, "must be a finite number, got a huge one") from None
+    if isinstance(value, float) or abs(value) > sys.float_info.max:
+        raise FieldError(place, f"must be a finite number, got {shown(value)}")
+    return float(value)
 
 
 def _extent(value: Any) -> str:
     size = np.shape(value) if hasattr(value, "__array__") else None
     return f"an array of the shape {size}" if size else shown(value)
-
-
-def finite(value: Any, *shape: int) -> Array:
-    """A read-only array of exactly this shape, of finite numbers. Raises FieldError."""
-    made = array(value, *shape)
-    if not np.isfinite(made).all():
-        raise FieldError("", "must be finite numbers; it contains an infinity")
-    return made
 
 
 def _vector(value: Any) -> Array:
@@ -89,7 +90,7 @@ def _vector(value: Any) -> Array:
 
 def _direction(value: Any) -> Array:
     vector = _vector(value)
-    if np.linalg.norm(vector) < 1e-9:
+    if hypot(*vector.tolist()) < 1e-9:
         raise FieldError("", "must be a direction, not the zero vector")
     return vector
 
@@ -106,10 +107,11 @@ def _partial(value: Any) -> Array:
         given = np.asarray(value).tolist()
     if not isinstance(given, list | tuple) or len(given) != 3:
         raise FieldError("", f"must be three numbers or a table of some of x, y, z, got {shown(value)}")
-    places = [f".{axis}" if isinstance(value, Mapping) else f"[{i}]" for i, axis in enumerate(AXES)]
+    places = AXES if isinstance(value, Mapping) else ("[0]", "[1]", "[2]")
     free = [isinstance(x, float) and x != x for x in given]
     numbers = [
-        0.0 if f else _numbers(x, p.removeprefix(".")) for x, f, p in zip(given, free, places, strict=True)
+        0.0 if left_free else _numbers(x, place, infinite=False)
+        for x, place, left_free in zip(given, places, free, strict=True)
     ]
     vector = np.where(free, nan, finite(numbers, 3))
     vector.flags.writeable = False

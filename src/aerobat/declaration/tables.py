@@ -5,13 +5,12 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Mapping
 from enum import Enum
-from typing import Any, TypeVar, get_type_hints
+from typing import Any, TypeVar
 
 import numpy as np
-from pydantic import ConfigDict, TypeAdapter, ValidationError
 
 from aerobat.arrays import Array
-from aerobat.declaration.sentences import first_complaint, unknown_key
+from aerobat.declaration.sentences import unknown_key
 from aerobat.errors import SpecError
 
 T = TypeVar("T")
@@ -49,25 +48,6 @@ def to_table(value: Any) -> dict[str, Any]:
     if kind and "kind" not in vars(type(value)):
         raise SpecError(f"{type(value).__name__} has no place in a file: it is not registered")
     return kind | (value.abbreviate(table) if hasattr(value, "abbreviate") else table)
-
-
-def check_field(cls: type, name: str, value: Any, key: str) -> None:
-    """Check a value that stands for a field under another key.
-
-    Args:
-        cls: the declared class.
-        name: its field whose declaration the value must fit.
-        value: the value.
-        key: what errors call it.
-
-    Raises:
-        FieldError: `value` may not stand in that field.
-    """
-    hint = get_type_hints(cls, include_extras=True)[name]
-    try:
-        TypeAdapter(hint, config=ConfigDict(strict=True, allow_inf_nan=False)).validate_python(value)
-    except ValidationError as error:
-        raise first_complaint(error).inside(key) from None
 
 
 def _is_default(value: Any, field: dataclasses.Field[Any]) -> bool:

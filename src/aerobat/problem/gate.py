@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from functools import cached_property
-from math import degrees
+from math import degrees, radians
 from typing import Any, ClassVar
 
 import numpy as np
@@ -18,8 +18,8 @@ from aerobat.declaration import (
     UnitVector,
     Vector3,
     declared,
-    deg2rad,
     from_table,
+    number,
     unit,
     unknown_name,
 )
@@ -60,8 +60,8 @@ class Gate:
         """Replace the angles by `normal` and `up`, which are given instead of them or not at all."""
         angles = {key: table.pop(key) for key in cls.SHORTHANDS if key in table}
         if "normal" not in table and "up" not in table:
-            radians = [deg2rad(angles.get(key, 0.0), key) for key in cls.SHORTHANDS]
-            table["normal"], table["up"] = _directions(*radians)
+            attitude = [radians(number(angles.get(key, 0.0), key)) for key in cls.SHORTHANDS]
+            table["normal"], table["up"] = _directions(*attitude)
         elif angles:
             raise FieldError(next(iter(angles)), "stands beside normal and up; give one or the other")
         return table

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 from dataclasses import field, replace
-from math import degrees
+from math import degrees, radians
 from typing import Annotated, Any, ClassVar
 
 import numpy as np
@@ -20,8 +20,8 @@ from aerobat.declaration import (
     PerAxis,
     Vector3,
     declared,
-    deg2rad,
     from_table,
+    number,
     to_table,
     within_field,
 )
@@ -153,7 +153,7 @@ class Problem:
         if "heading_deg" in table:
             if "heading" in table:
                 raise SpecError("heading and heading_deg are both given; give one of them")
-            table["heading"] = deg2rad(table.pop("heading_deg"), "heading_deg")
+            table["heading"] = radians(number(table.pop("heading_deg"), "heading_deg"))
         return table
 
     def abbreviate(self, table: dict[str, Any]) -> dict[str, Any]:
@@ -161,7 +161,7 @@ class Problem:
         table.setdefault("maneuver", to_table(self.maneuver))
         heading = table.pop("heading", 0.0)
         for heading_deg in (round(degrees(heading), 9), degrees(heading)):
-            if heading and deg2rad(heading_deg, "heading_deg") == heading:
+            if heading and radians(heading_deg) == heading:
                 return {"heading_deg": heading_deg} | table
         return table | ({"heading": heading} if heading else {})
 

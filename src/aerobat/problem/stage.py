@@ -17,8 +17,8 @@ from aerobat.declaration import (
     Fraction,
     Label,
     Number,
-    check_field,
     declared,
+    number,
     unit,
 )
 from aerobat.errors import SpecError
@@ -63,8 +63,9 @@ class Condition:
     def expand(cls, table: dict[str, Any]) -> dict[str, Any]:
         """Replace `equals` by both bounds."""
         if "equals" in table:
-            check_field(cls, "lower", table["equals"], "equals")
-            table["lower"] = table["upper"] = table.pop("equals")
+            if "lower" in table or "upper" in table:
+                raise FieldError("equals", "stands beside lower or upper; give one or the other")
+            table["lower"] = table["upper"] = number(table.pop("equals"), "equals")
         return table
 
     def abbreviate(self, table: dict[str, Any]) -> dict[str, Any]:

@@ -17,11 +17,10 @@ from aerobat.declaration import (
     NonNegative,
     Positive,
     Vector3,
-    check_field,
     declared,
     finite,
+    from_table,
     unknown_key,
-    within_field,
 )
 from aerobat.errors import SpecError
 from aerobat.states import STANDARD_GRAVITY
@@ -90,20 +89,16 @@ class Vehicle:
 
     @classmethod
     def expand(cls, table: dict[str, Any]) -> dict[str, Any]:
-        """Give every rotor the keys of `rotor_defaults` that it lacks."""
+        """Make every rotor, with the keys of `rotor_defaults` that it lacks."""
         defaults = table.pop("rotor_defaults", {})
         if not isinstance(defaults, Mapping):
             raise FieldError("rotor_defaults", "must be a table; begin it with [rotor_defaults]")
         keys = [each.name for each in fields(Rotor)]
-        for key, value in defaults.items():
-            with within_field("rotor_defaults"):
-                if key not in keys:
-                    raise unknown_key(key, keys)
-                check_field(Rotor, key, value, key)
+        for key in defaults:
+            if key not in keys:
+                raise unknown_key(key, keys).inside("rotor_defaults")
         if isinstance(rotors := table.get("rotors"), list | tuple):
-            table["rotors"] = tuple(
-                _with_defaults(rotor, defaults, f"rotors[{i}]") for i, rotor in enumerate(rotors)
-            )
+            table["rotors"] = tuple(_rotor(rotor, defaults, f"rotors[{i}]") for i, rotor in enumerate(rotors))
         return table
 
     def abbreviate(self, table: dict[str, Any]) -> dict[str, Any]:
@@ -199,17 +194,19 @@ def _is_matrix(value: Any) -> bool:
     return isinstance(value, list | tuple) and len(value) > 0 and isinstance(value[0], list | tuple)
 
 
-def _with_defaults(rotor: Any, defaults: Mapping[str, Any], place: str) -> Any:
-    """A rotor's table with the keys that it lacks. Raises FieldError for one that the defaults lack too."""
-    if not isinstance(rotor, Mapping):
-        return rotor
-    whole = {**defaults, **rotor}
+def _rotor(table: Any, defaults: Mapping[str, Any], place: str) -> Any:
+    """The rotor of a table and what it lacks. Raises FieldError, naming where the value at fault stands."""
+    if not isinstance(table, Mapping):
+        return table
     for each in fields(Rotor):
-        if each.name not in whole:
-            raise FieldError(
-                f"{place}.{each.name}", "is missing; add it there or, for all rotors, in [rotor_defaults]"
-            )
-    return whole
+        if each.name not in table and each.name not in defaults:
+            complaint = "is missing; add it there or, for all rotors, in [rotor_defaults]"
+            raise FieldError(f"{place}.{each.name}", complaint)
+    try:
+        return from_table(Rotor, {**defaults, **table})
+    except FieldError as error:
+        key = error.field.partition("[")[0]
+        raise error.inside("rotor_defaults" if key in defaults and key not in table else place) from None
 
 
 def _check_inertia(inertia: Array) -> None:
