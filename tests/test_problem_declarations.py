@@ -98,6 +98,15 @@ def test_a_wrong_component_of_a_vector_is_named(cls: type, field: str) -> None:
         assert said.startswith(f"{cls.__name__}.{field}[1] must be a ")
 
 
+@pytest.mark.parametrize("wrong", NO_NUMBERS, ids=lambda wrong: type(wrong).__name__)
+def test_short_ways_to_make_values_refuse_what_the_values_refuse(wrong: Any) -> None:
+    assert complaint(lambda: ab.at_rest((0.0, wrong, 0.0))).startswith("EndState.position[1] must be a ")
+    for angle in ("heading", "elevation", "tilt"):
+        said = complaint(lambda: ab.tilted_gate((0.0, 0.0, 0.0), **{angle: wrong}))  # noqa: B023
+        assert said.startswith(f"{angle} must be a ")
+    assert complaint(lambda: ab.at_rest(wrong)).startswith("EndState.position must be ")
+
+
 JUNK = st.one_of(
     st.none(),
     st.booleans(),

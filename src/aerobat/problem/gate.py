@@ -118,13 +118,23 @@ def tilted_gate(
     height: float = 0.6,
     name: str = "gate",
 ) -> Gate:
-    """The gate at `position` [m] that is passed toward `heading`, climbing at `elevation`, rolled by `tilt`.
+    """Return the gate whose attitude is given by angles.
 
-    All angles in rad. The tilt is a roll about the direction of passage, right-handed: 0 upright,
-    π/2 with its upright to the right of who passes, π upside down. The paper's angle α (Section II-D) is
-    measured toward +y when passing toward +x, so its α is our −tilt.
+    Args:
+        position: centre of the opening [m], world, (3,).
+        heading: of the direction of passage [rad], from x toward y.
+        elevation: climb of the direction of passage [rad].
+        tilt: roll about the direction of passage [rad], right-handed: 0 upright, π/2 with its upright to the
+            right of who passes, π upside down. The paper's α (Section II-D) is measured toward +y when
+            passing toward +x: α = −tilt.
+        width: of the opening [m].
+        height: of the opening [m].
+        name: by which stages refer to it.
+
+    Raises:
+        SpecError: a number is not finite, or a side not positive.
     """
-    normal, up = _directions(heading, elevation, tilt)
+    normal, up = _directions(number(heading, "heading"), number(elevation, "elevation"), number(tilt, "tilt"))
     return Gate(position, normal, up, width, height, name)
 
 

@@ -6,7 +6,7 @@ import re
 from collections.abc import Mapping
 from dataclasses import field, replace
 from math import degrees, radians
-from typing import Annotated, Any, ClassVar
+from typing import Annotated, Any, ClassVar, cast
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -209,4 +209,4 @@ class Problem:
 
 def at_rest(position: ArrayLike) -> EndState:
     """At rest at `position` [m], (3,)."""
-    return EndState(np.asarray(position, dtype=float))
+    return EndState(cast(Array, position))
