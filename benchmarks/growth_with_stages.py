@@ -80,12 +80,12 @@ def flips(gates: int, intervals: int, duration: float) -> AssignmentProgram:
     apart = np.array([APART, 0.0, 0.0])
     first = example.gates[0]
     passed = [replace(first, name=f"gate {i}", position=first.position + i * apart) for i in range(gates)]
-    one = example.maneuver.sequence[:PER_GATE]
+    one = example.maneuver.stages[:PER_GATE]
     stages = (replace(stage, gate=stage.gate and gate.name) for gate in passed for stage in one)
     shift = (gates - 2) * apart
     goal = replace(example.goal, position=example.goal.position + shift)
     limits = replace(example.limits, upper=example.limits.upper + np.maximum(shift, 0.0))
-    maneuver = replace(example.maneuver, sequence=tuple(stages))
+    maneuver = replace(example.maneuver, stages=tuple(stages))
     problem = replace(example, goal=goal, gates=tuple(passed), limits=limits, maneuver=maneuver)
     return formulate(problem, 3, intervals).program(duration / intervals)
 

@@ -107,7 +107,7 @@ PROBLEM_FAULTS = {
         "maneuver.waypoints[0].position",
     ),
     "a thrust without attitude": (
-        setting("maneuver", {"kind": "waypoints", "waypoints": [{"gate": True, "thrust": 9.0}]}),
+        setting("maneuver", {"kind": "waypoints", "waypoints": [{"gate": "gate", "thrust": 9.0}]}),
         "thrust",
     ),
     "waypoints back in time": (

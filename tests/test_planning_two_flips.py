@@ -64,10 +64,10 @@ def varied(seed: int) -> AssignmentProgram:
     assert isinstance(example.maneuver, CustomManeuver)
     stages = tuple(
         replace(stage, conditions=tuple(stronger(c, factor) for c in stage.conditions))
-        for stage, factor in zip(example.maneuver.sequence, rng.uniform(0.5, 2.5, 8), strict=True)
+        for stage, factor in zip(example.maneuver.stages, rng.uniform(0.5, 2.5, 8), strict=True)
     )
     limits = replace(example.limits, acceleration=rng.uniform(25, 60), velocity=rng.uniform(5, 12))
-    problem = replace(example, maneuver=replace(example.maneuver, sequence=stages), limits=limits)
+    problem = replace(example, maneuver=replace(example.maneuver, stages=stages), limits=limits)
     return formulate(problem, int(rng.integers(3, 5)), 12).program(rng.uniform(0.2, 0.4))
 
 

@@ -40,12 +40,12 @@ def test_the_papers_gate_at_90_degrees_asks_thrust_sideways() -> None:
 @pytest.mark.parametrize(
     ("changes", "field"),
     [
-        ({"normal": (0, 0, 0)}, "gate.normal"),
-        ({"up": (1, 0, 0)}, "gate.up"),
-        ({"width": 0.0}, "gate.width"),
-        ({"height": np.nan}, "gate.height"),
-        ({"position": (0, np.nan, 0)}, "gate.position"),
-        ({"position": (0, 0)}, "gate.position"),
+        ({"normal": (0, 0, 0)}, "Gate.normal"),
+        ({"up": (1, 0, 0)}, "Gate.up"),
+        ({"width": 0.0}, "Gate.width"),
+        ({"height": np.nan}, "Gate.height"),
+        ({"position": (0, np.nan, 0)}, "Gate.position"),
+        ({"position": (0, 0)}, "Gate.position"),
     ],
 )
 def test_a_gate_that_cannot_be_is_refused_by_the_field_at_fault(changes: dict, field: str) -> None:

@@ -15,11 +15,11 @@ from aerobat.problem import (
     HalfFlip,
     Line,
     Quantity,
+    Stage,
     StageSequence,
     load_problem,
     tilted_gate,
 )
-from aerobat.problem.stage import Stage
 
 G = 9.81
 
@@ -72,8 +72,8 @@ def test_a_flip_asks_the_same_turn_about_any_horizontal_axis(axis_deg: float, th
     gate = tilted_gate(np.zeros(3), tilt=np.pi)
     axis = np.deg2rad(axis_deg)
     spun = so3.about_axis(np.array([0, 0, 1.0]), axis)
-    reference = Flip(0.0).stages([gate], thrust)
-    turned = Flip(axis_deg).stages([gate], thrust)
+    reference = Flip(0.0).stage_sequence([gate], thrust)
+    turned = Flip(axis_deg).stage_sequence([gate], thrust)
     for a, b in zip(reference.stages, turned.stages, strict=True):
         for ca, cb in zip(a.conditions, b.conditions, strict=True):
             if ca.quantity is Quantity.SPECIFIC_THRUST:
@@ -97,7 +97,7 @@ def test_the_half_flip_ties_lateral_to_vertical_thrust_by_the_tangent_of_the_til
     """(a_z + g) tan α = a_y, a_y ≥ ε_y; our tilt is to the right, the paper's α to the left."""
     tilt = np.deg2rad(tilt_deg)
     gate = tilted_gate(np.zeros(3), tilt=tilt)
-    (stage,) = HalfFlip(min_lateral_thrust=18.0).stages([gate], 50.0).stages
+    (stage,) = HalfFlip(min_lateral_thrust=18.0).stage_sequence([gate], 50.0).stages
     fitting = np.array([along, -lateral, lateral / np.tan(tilt) - G])
     assert holds(stage, fitting)
     assert not holds(stage, np.add(fitting, [0, 0, 1.0]))
@@ -112,15 +112,15 @@ def test_the_half_flip_never_turns_over() -> None:
 
 
 def test_a_line_asks_nothing_but_the_gate_it_may_have() -> None:
-    assert Line().stages([], 50.0).stages == ()
-    (stage,) = Line().stages([tilted_gate(np.ones(3))], 50.0).stages
+    assert Line().stage_sequence([], 50.0).stages == ()
+    (stage,) = Line().stage_sequence([tilted_gate(np.ones(3))], 50.0).stages
     assert {c.quantity for c in stage.conditions} == {Quantity.POSITION, Quantity.VELOCITY}
 
 
 def test_a_spelled_out_maneuver_may_pass_the_problems_gate() -> None:
     gate = tilted_gate(np.ones(3))
     kick = Stage("kick", (Condition("specific_thrust", (1.0, 0.0, 0.0), lower=5.0),))
-    course = CustomManeuver((kick, Stage("gate", (), 0.4, gate="gate"))).stages([gate], 50.0)
+    course = CustomManeuver((kick, Stage("gate", (), 0.4, gate="gate"))).stage_sequence([gate], 50.0)
     assert course.stages[0] is kick
     assert (course.stages[1].gate, course.stages[1].at) == (gate.name, 0.4)
 
@@ -132,9 +132,9 @@ def test_a_spelled_out_maneuver_may_pass_the_problems_gate() -> None:
         lambda: Flip(min_lateral_thrust=-1.0),
         lambda: Flip(min_inverted_thrust=0.0),
         lambda: HalfFlip(min_lateral_thrust=np.nan),
-        lambda: HalfFlip(18.0).stages([tilted_gate(np.zeros(3))], 50.0),
-        lambda: HalfFlip().stages([tilted_gate(np.zeros(3), tilt=np.pi)], 50.0),
-        lambda: Flip().stages([], 50.0),
+        lambda: HalfFlip(18.0).stage_sequence([tilted_gate(np.zeros(3))], 50.0),
+        lambda: HalfFlip().stage_sequence([tilted_gate(np.zeros(3), tilt=np.pi)], 50.0),
+        lambda: Flip().stage_sequence([], 50.0),
         lambda: Condition("position", (0.0, 0.0, 0.0), 0.0),
         lambda: Condition("velocity", (1.0, 0.0, 0.0), 2.0, 1.0),
         lambda: Stage("late", (), at=1.0),

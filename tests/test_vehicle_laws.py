@@ -38,7 +38,7 @@ def test_the_triangle_inequality_is_checked_in_any_axes(seed: int) -> None:
     flat = axes @ np.diag([1e-3, 2e-3, 3e-3]) @ axes.T  # a plate: the bound itself
     dataclasses.replace(QUAD, inertia=(flat + flat.T) / 2)
     beyond = flat + 2e-6 * np.outer(axes[:, 2], axes[:, 2])
-    with pytest.raises(SpecError, match=r"^inertia .* exceeds the sum of the others"):
+    with pytest.raises(SpecError, match=r"^Vehicle\.inertia .* exceeds the sum of the others"):
         dataclasses.replace(QUAD, inertia=(beyond + beyond.T) / 2)
 
 
@@ -46,17 +46,17 @@ def test_the_triangle_inequality_is_checked_in_any_axes(seed: int) -> None:
     ("changes", "message"),
     [
         ({"mass": 0}, "mass must be positive"),
-        ({"mass": float("nan")}, "mass must be numbers; it contains a NaN"),
-        ({"mass": "heavy"}, "mass must be numbers"),
-        ({"mass": [1.0, 2.0]}, "mass must be one number"),
+        ({"mass": float("nan")}, "mass must be a finite number, got nan"),
+        ({"mass": "heavy"}, "mass must be a number, got 'heavy'"),
+        ({"mass": [1.0, 2.0]}, "mass must be a number, got a list of 2"),
         ({"name": ""}, "name must be one line"),
         ({"name": "two\nlines"}, "name must be one line"),
-        ({"inertia": [1e-3, 1e-3, 1e-3]}, "inertia must be 3 x 3"),
+        ({"inertia": [1e-3, 1e-3]}, "inertia must be 3 numbers"),
         ({"inertia": np.ones((2, 3, 3))}, "inertia must be 3 x 3"),
         ({"inertia": [[1, 0.1, 0], [0, 1, 0], [0, 0, 1]]}, "inertia must be symmetric"),
         ({"inertia": np.diag([1, 1, -1])}, "inertia must be positive definite"),
         ({"inertia": np.zeros((3, 3))}, "inertia must be positive definite"),
-        ({"inertia": np.diag([1, 1, np.inf])}, "inertia must be finite"),
+        ({"inertia": np.diag([1, 1, np.inf])}, r"inertia\[2\]\[2\] must be a finite number"),
         ({"drag_body": [0.1, -0.1, 0.1]}, "drag_body must not be negative"),
         ({"rotors": QUAD.rotors[:3]}, "rotors must be 4 or more, got 3"),
         ({"rotors": (*QUAD.rotors[:3], "rotor")}, r"rotors\[3\] must be a Rotor"),
@@ -66,7 +66,7 @@ def test_the_triangle_inequality_is_checked_in_any_axes(seed: int) -> None:
     ],
 )
 def test_what_cannot_be_a_vehicle_is_refused_by_the_field(changes: dict, message: str) -> None:
-    with pytest.raises(SpecError, match=f"^{message}"):
+    with pytest.raises(SpecError, match=rf"^Vehicle\.{message}"):
         dataclasses.replace(QUAD, **changes)
 
 
@@ -74,19 +74,19 @@ def test_what_cannot_be_a_vehicle_is_refused_by_the_field(changes: dict, message
     ("changes", "message"),
     [
         ({"position_body": [0.1, 0.1]}, "position_body must be 3 numbers"),
-        ({"position_body": [0.1, 0.1, np.inf]}, "position_body must be finite"),
-        ({"spin": 0}, "spin must be 1 "),
-        ({"spin": "left"}, "spin must be 1 "),
+        ({"position_body": [0.1, 0.1, np.inf]}, r"position_body\[2\] must be a finite number"),
+        ({"spin": 0}, "spin must be 1 or -1, got "),
+        ({"spin": "left"}, "spin must be 1 or -1, got "),
         ({"min_thrust": 6.8792625}, "min_thrust must be below max_thrust"),
         ({"min_thrust": -2, "max_thrust": -1}, "max_thrust must be positive"),
-        ({"max_thrust": np.inf}, "max_thrust must be finite"),
-        ({"torque_coefficient": -0.05}, "torque_coefficient must not be negative"),
-        ({"lag": -0.02}, "lag must not be negative"),
+        ({"max_thrust": np.inf}, "max_thrust must be a finite number"),
+        ({"torque_coefficient": -0.05}, "torque_coefficient must be 0 or more"),
+        ({"lag": -0.02}, "lag must be 0 or more"),
         ({"radius": 0}, "radius must be positive"),
     ],
 )
 def test_what_cannot_be_a_rotor_is_refused_by_the_field(changes: dict, message: str) -> None:
-    with pytest.raises(SpecError, match=f"^{message}"):
+    with pytest.raises(SpecError, match=rf"^Rotor\.{message}"):
         changed_rotor(**changes)
 
 

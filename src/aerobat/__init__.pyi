@@ -1,4 +1,5 @@
 from .certification import Certificate, Envelope, certify
+from .declaration import import_plugin
 from .environment import Environment
 from .errors import AerobatError, BackendMissing, Infeasible, SpecError
 from .flatness import Reference, reference
@@ -31,6 +32,7 @@ from .problem import (
     HalfFlip,
     Limits,
     Line,
+    Maneuver,
     Problem,
     Quantity,
     Stage,
@@ -38,7 +40,9 @@ from .problem import (
     Waypoints,
     at_rest,
     load_problem,
+    maneuver,
     problem_names,
+    registered_maneuvers,
     tilted_gate,
     write_problem,
 )
@@ -50,7 +54,7 @@ from .simulation import StateNoise
 from .states import BodyState, FlatState, Setpoint, Wrench
 from .studies.compare import Comparison, compare
 from .trajectory import Rule, Trajectory, load_trajectory, minimum_effort, save_trajectory
-from .vehicle import Rotor, Vehicle, load_vehicle, vehicle_names
+from .vehicle import Rotor, Vehicle, load_vehicle, vehicle_names, write_vehicle
 
 __all__ = [
     "AerobatError",
@@ -77,6 +81,7 @@ __all__ = [
     "Infeasible",
     "Limits",
     "Line",
+    "Maneuver",
     "MinSnap",
     "Miqp",
     "Plan",
@@ -106,16 +111,19 @@ __all__ = [
     "draw",
     "fly",
     "gradient",
+    "import_plugin",
     "load_flight",
     "load_problem",
     "load_trajectory",
     "load_vehicle",
+    "maneuver",
     "minimum_effort",
     "plan",
     "problem_names",
     "read_csv",
     "read_trajectory",
     "reference",
+    "registered_maneuvers",
     "rotor_margin",
     "save_trajectory",
     "score",
@@ -124,4 +132,5 @@ __all__ = [
     "vehicle_names",
     "write_csv",
     "write_problem",
+    "write_vehicle",
 ]

@@ -27,9 +27,12 @@ def frozen(value: ArrayLike, name: str, shape: Sequence[int | None] | None = Non
 def frozen_bounds(value: ArrayLike, name: str, shape: Sequence[int | None] | None = None) -> Array:
     """As `frozen`, but infinities may stand for bounds that do not bind. Raises SpecError."""
     try:
-        array = np.array(value, dtype=np.float64)
-    except (TypeError, ValueError):
+        array = np.array(value)
+    except ValueError:  # ragged
         raise SpecError(f"{name} must be numbers, got {value!r}") from None
+    if array.dtype.kind not in "fiu":  # text and truth are no numbers
+        raise SpecError(f"{name} must be numbers, got {value!r}")
+    array = array.astype(np.float64, copy=False)
     if shape is not None and not _fits(array.shape, shape):
         wanted = ", ".join("n" if size is None else str(size) for size in shape)
         raise SpecError(f"{name} must have the shape ({wanted}), got {array.shape}")

@@ -14,7 +14,7 @@ import numpy as np
 from aerobat import engines, so3
 from aerobat.arrays import Array
 from aerobat.closed_loop import Given, Judged, Prepared, added_up, prepare
-from aerobat.documents import unknown_name
+from aerobat.declaration import unknown_name
 from aerobat.engines.batch import ArrayOps
 from aerobat.engines.duals import Dual, DualOps, differentiated, dual
 from aerobat.engines.engine import Init, Step

@@ -41,17 +41,18 @@ FLOWN_RESERVE = 0.03  # of each rotor's range, where a time-optimal plan is to b
 
 def read_task(name: str, options: TaskOptions, paper: bool = False) -> tuple[Problem, Vehicle]:
     """The problem and the vehicle that a command names."""
-    from aerobat.problem import HalfFlip, load_problem
+    from aerobat.documents import within
+    from aerobat.problem import load_problem
     from aerobat.vehicle import load_vehicle
 
     problem = load_problem(name)
     vehicle = load_vehicle(options.vehicle or ("hexarotor" if paper else "agile-quad"))
     if options.angle is not None:
-        if not isinstance(problem.maneuver, HalfFlip):
-            raise SpecError(f"--angle tilts the gate of a half-flip; '{problem.name}' is none, leave it out")
         if not (isfinite(options.angle) and abs(options.angle) <= 90.0):
             raise SpecError(f"--angle must be from -90 to 90 degrees, got {options.angle}")
-        problem = replace(problem, gates=tuple(gate.tilted(radians(options.angle)) for gate in problem.gates))
+        with within("--angle: "):
+            gates = problem.maneuver.with_gate_tilt(problem.gates, radians(options.angle))
+        problem = replace(problem, gates=gates)
     if paper:
         problem = problem.as_in_paper()
     return problem, vehicle

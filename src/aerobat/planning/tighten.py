@@ -21,7 +21,7 @@ def drawn_in(bounds: Limits, asked: Limits, trajectory: Trajectory, derivatives:
         (lower, upper), (least, most) = asked.of(derivative), trajectory.component_range(derivative)
         below, above = _more(lower - least, lower), _more(most - upper, upper)
         if below.any() or above.any():
-            bounds = bounds.drawn_in(derivative, below, above)
+            bounds = bounds.tightened(derivative, below, above)
     return bounds
 
 

@@ -2,10 +2,20 @@
 
 from aerobat.problem.files import load_problem, problem_names, write_problem
 from aerobat.problem.gate import Gate, tilted_gate
-from aerobat.problem.maneuver import CustomManeuver, Flip, GatePassage, HalfFlip, Line, Maneuver
+from aerobat.problem.maneuvers import (
+    CustomManeuver,
+    Flip,
+    GatePassage,
+    HalfFlip,
+    Line,
+    Maneuver,
+    Waypoint,
+    Waypoints,
+    maneuver,
+    registered_maneuvers,
+)
 from aerobat.problem.problem import PAPER_LIMITS, EndState, Limits, Problem, at_rest
 from aerobat.problem.stage import Condition, Quantity, Stage, StageSequence
-from aerobat.problem.waypoints import Waypoint, Waypoints
 
 __all__ = [
     "PAPER_LIMITS",
@@ -27,7 +37,9 @@ __all__ = [
     "Waypoints",
     "at_rest",
     "load_problem",
+    "maneuver",
     "problem_names",
+    "registered_maneuvers",
     "tilted_gate",
     "write_problem",
 ]

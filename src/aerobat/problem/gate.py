@@ -2,50 +2,87 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
 from functools import cached_property
+from math import degrees, radians
+from typing import Any, ClassVar
 
 import numpy as np
 
 from aerobat import so3
-from aerobat.arrays import Array, frozen
+from aerobat.arrays import Array
+from aerobat.declaration import (
+    FieldError,
+    Label,
+    Positive,
+    UnitVector,
+    Vector3,
+    declared,
+    from_table,
+    number,
+    unit,
+    unknown_name,
+)
 from aerobat.errors import SpecError
+from aerobat.problem.stage import Condition, Quantity
 
 
-@dataclass(frozen=True)
+@declared
 class Gate:
     """A rectangular opening that a vehicle passes with its thrust axis along `up`.
 
     An upright gate has up = +z; one that is passed upside down has up = −z; the paper's half-flip
-    gate, tilted by 90°, has up in the horizontal plane (Section II-D).
+    gate, tilted by 90°, has up in the horizontal plane (Section II-D). Files give its attitude by angles.
 
-    Raises SpecError when a direction is zero, `up` is not normal to `normal`, or a side is not positive.
+    Raises SpecError when `up` is not normal to `normal`.
     """
 
-    position: Array  # [m] world, the centre of the opening
-    normal: Array  # unit, world: the direction of passage
-    up: Array  # unit, world, normal to `normal`
-    width: float = 1.0  # [m] along `lateral`
-    height: float = 0.6  # [m] along `up`
-    name: str = "gate"
+    position: Vector3  # [m] centre of the opening
+    normal: UnitVector  # direction of passage; instead of angles
+    up: UnitVector  # upright of the opening, normal to `normal`; instead of angles
+    width: Positive = 1.0  # [m] of the opening
+    height: Positive = 0.6  # [m] of the opening
+    name: Label = "gate"  # by which stages and waypoints refer to it
+
+    SHORTHANDS: ClassVar[Mapping[str, str]] = {
+        "heading_deg": "[deg] direction of passage, from x toward y (0)",
+        "elevation_deg": "[deg] climb of the direction of passage (0)",
+        "tilt_deg": "[deg] roll about the passage, to the right: 90 sideways, 180 upside down (0)",
+    }
 
     def __post_init__(self) -> None:
-        """Check and normalise."""
-        if not self.name.strip() or not self.name.isprintable():
-            raise SpecError(f"gate.name must be one line of text, got {self.name!r}")
-        object.__setattr__(self, "position", frozen(self.position, "gate.position", (3,)))
-        object.__setattr__(self, "normal", unit(self.normal, "gate.normal"))
-        object.__setattr__(self, "up", unit(self.up, "gate.up"))
+        """Check."""
         if abs(self.normal @ self.up) > 1e-6:
-            raise SpecError("gate.up must be normal to gate.normal, the direction of passage")
-        for name in ("width", "height"):
-            if not 0.0 < getattr(self, name) < np.inf:
-                raise SpecError(f"gate.{name} must be a positive length in metres, got {getattr(self, name)}")
+            raise FieldError("up", "must be normal to normal, the direction of passage")
+
+    @classmethod
+    def expand(cls, table: dict[str, Any]) -> dict[str, Any]:
+        """Replace the angles by `normal` and `up`, which are given instead of them or not at all."""
+        angles = {key: table.pop(key) for key in cls.SHORTHANDS if key in table}
+        if "normal" not in table and "up" not in table:
+            attitude = [radians(number(angles.get(key, 0.0), key)) for key in cls.SHORTHANDS]
+            table["normal"], table["up"] = _directions(*attitude)
+        elif angles:
+            raise FieldError(next(iter(angles)), "stands beside normal and up; give one or the other")
+        return table
+
+    def abbreviate(self, table: dict[str, Any]) -> dict[str, Any]:
+        """Write `normal` and `up` as angles where those say exactly the same."""
+        for digits in (9, 17):
+            angles = {
+                key: round(degrees(angle), digits)
+                for key, angle in zip(self.SHORTHANDS, self.angles, strict=True)
+            }
+            again = from_table(Gate, {"position": self.position, **angles})
+            if (again.normal == self.normal).all() and (again.up == self.up).all():
+                del table["normal"], table["up"]
+                return table | {key: angle for key, angle in angles.items() if angle != 0.0}
+        return table
 
     @cached_property
     def lateral(self) -> Array:
         """The unit vector across the opening, to the left of who passes upright, (3,)."""
-        return unit(np.cross(self.up, self.normal), "gate.lateral")
+        return unit(np.cross(self.up, self.normal))
 
     @property
     def corners(self) -> Array:
@@ -81,12 +118,53 @@ def tilted_gate(
     height: float = 0.6,
     name: str = "gate",
 ) -> Gate:
-    """The gate at `position` [m] that is passed toward `heading`, climbing at `elevation`, rolled by `tilt`.
+    """Return the gate whose attitude is given by angles.
 
-    All angles in rad. The tilt is a roll about the direction of passage, right-handed: 0 upright,
-    π/2 with its upright to the right of who passes, π upside down. The paper's angle α (Section II-D) is
-    measured toward +y when passing toward +x, so its α is our −tilt.
+    Args:
+        position: centre of the opening [m], world, (3,).
+        heading: of the direction of passage [rad], from x toward y.
+        elevation: climb of the direction of passage [rad].
+        tilt: roll about the direction of passage [rad], right-handed: 0 upright, π/2 with its upright to the
+            right of who passes, π upside down. The paper's α (Section II-D) is measured toward +y when
+            passing toward +x: α = −tilt.
+        width: of the opening [m].
+        height: of the opening [m].
+        name: by which stages refer to it.
+
+    Raises:
+        SpecError: a number is not finite, or a side not positive.
     """
+    normal, up = _directions(number(heading, "heading"), number(elevation, "elevation"), number(tilt, "tilt"))
+    return Gate(position, normal, up, width, height, name)
+
+
+def at_centre(gate: Gate) -> tuple[Condition, ...]:
+    """Meeting the centre of a gate's opening."""
+    return tuple(
+        Condition(Quantity.POSITION, e, x, x) for e, x in zip(np.eye(3), gate.position.tolist(), strict=True)
+    )
+
+
+def only_gate(gates: Sequence[Gate], maneuver: str) -> Gate:
+    """The one gate of a maneuver that passes one. Raises SpecError when there are none or several."""
+    if len(gates) != 1:
+        has = "none" if not gates else str(len(gates))
+        raise SpecError(
+            f"a {maneuver} passes one gate, there is {has}; give one table [[gates]] with a position"
+        )
+    return gates[0]
+
+
+def named_gate(gates: Sequence[Gate], name: str) -> Gate:
+    """The gate of that name. Raises SpecError when there is none."""
+    for gate in gates:
+        if gate.name == name:
+            return gate
+    raise unknown_name("gate", name, [gate.name for gate in gates])
+
+
+def _directions(heading: float, elevation: float, tilt: float) -> tuple[Array, Array]:
+    """The direction of passage and the upright, unit vectors, (3,) each, for angles [rad]."""
     turn = so3.multiply(
         so3.about_axis(np.array([0.0, 0.0, 1.0]), np.asarray(heading)),
         so3.multiply(
@@ -95,15 +173,4 @@ def tilted_gate(
         ),
     )
     frame = so3.axes(turn)
-    return Gate(position, frame[:, 0], frame[:, 2], width, height, name)
-
-
-def unit(direction: Array, name: str) -> Array:
-    """`direction` scaled to length one, write-protected. Raises SpecError, naming `name`, when it is zero."""
-    vector = frozen(direction, name, (3,))
-    length = float(np.linalg.norm(vector))
-    if length < 1e-9:
-        raise SpecError(f"{name} must be a direction, not the zero vector")
-    vector = vector / length
-    # what is only round-off would couple axes that have nothing to do with each other
-    return frozen(np.where(np.abs(vector) < 1e-12, 0.0, vector), name)
+    return frame[:, 0], frame[:, 2]

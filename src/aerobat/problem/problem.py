@@ -2,18 +2,33 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, fields, replace
-from typing import Any
+import re
+from collections.abc import Mapping
+from dataclasses import field, replace
+from math import degrees, radians
+from typing import Annotated, Any, ClassVar, cast
 
 import numpy as np
 from numpy.typing import ArrayLike
+from pydantic import AfterValidator, PlainValidator
 
-from aerobat.arrays import Array, frozen, frozen_bounds
-from aerobat.documents import within
+from aerobat.arrays import Array
+from aerobat.declaration import (
+    Corner,
+    FieldError,
+    Label,
+    PerAxis,
+    Vector3,
+    declared,
+    from_table,
+    number,
+    to_table,
+    within_field,
+)
 from aerobat.environment import Environment
 from aerobat.errors import SpecError
-from aerobat.problem.gate import Gate
-from aerobat.problem.maneuver import Line, Maneuver, named_gate
+from aerobat.problem.gate import Gate, named_gate
+from aerobat.problem.maneuvers import MANEUVERS, Line, Maneuver
 from aerobat.problem.stage import StageSequence
 
 DERIVATIVES = ("position", "velocity", "acceleration", "jerk", "snap", "crackle")
@@ -21,18 +36,13 @@ UNITS = ("m", "m/s", "m/s²", "m/s³", "m/s⁴", "m/s⁵")
 ZERO = (0.0, 0.0, 0.0)
 
 
-@dataclass(frozen=True)
+@declared
 class EndState:
     """Where a trajectory begins or ends; derivatives above acceleration are zero there. World frame."""
 
-    position: Array  # [m], (3,)
-    velocity: Array = field(default_factory=lambda: np.zeros(3))  # [m/s]
-    acceleration: Array = field(default_factory=lambda: np.zeros(3))  # [m/s²]
-
-    def __post_init__(self) -> None:
-        """Check."""
-        for f in fields(self):
-            object.__setattr__(self, f.name, frozen(getattr(self, f.name), f.name, (3,)))
+    position: Vector3  # [m] world
+    velocity: Vector3 = field(default_factory=lambda: np.zeros(3))  # [m/s] world
+    acceleration: Vector3 = field(default_factory=lambda: np.zeros(3))  # [m/s²] world
 
     def derivatives(self, order: int) -> Array:
         """Position and its derivatives below `order`, (order, 3)."""
@@ -40,33 +50,29 @@ class EndState:
         return np.array([known[k] if k < len(known) else np.zeros(3) for k in range(order)])
 
 
-@dataclass(frozen=True)
+def _unbounded() -> Array:
+    return np.full(3, np.inf)
+
+
+@declared
 class Limits:
     """Bounds per axis, at the interval ends as in the paper's (1); infinite where nothing is asked.
 
-    `lower` and `upper` bound the position [m]; the others bound the magnitude of each component of a
-    derivative, a number for all axes or one per axis.
+    `lower` and `upper` bound the position; the others bound the magnitude of each component of a derivative.
     """
 
-    lower: Array = field(default_factory=lambda: np.full(3, -np.inf))  # [m]
-    upper: Array = field(default_factory=lambda: np.full(3, np.inf))  # [m]
-    velocity: Array | float = np.inf  # [m/s]
-    acceleration: Array | float = np.inf  # [m/s²]
-    jerk: Array | float = np.inf  # [m/s³]
-    snap: Array | float = np.inf  # [m/s⁴]
-    crackle: Array | float = np.inf  # [m/s⁵]
+    lower: Corner = field(default_factory=lambda: -_unbounded())  # [m] corner of the volume allowed
+    upper: Corner = field(default_factory=_unbounded)  # [m] opposite corner
+    velocity: PerAxis = field(default_factory=_unbounded)  # [m/s] largest magnitude
+    acceleration: PerAxis = field(default_factory=_unbounded)  # [m/s²] largest magnitude
+    jerk: PerAxis = field(default_factory=_unbounded)  # [m/s³] largest magnitude
+    snap: PerAxis = field(default_factory=_unbounded)  # [m/s⁴] largest magnitude
+    crackle: PerAxis = field(default_factory=_unbounded)  # [m/s⁵] largest magnitude
 
     def __post_init__(self) -> None:
         """Check."""
-        for name in ("lower", "upper"):
-            object.__setattr__(self, name, frozen_bounds(getattr(self, name), f"limits.{name}", (3,)))
         if not (self.lower < self.upper).all():
-            raise SpecError("limits.lower must be below limits.upper on every axis")
-        for name in DERIVATIVES[1:]:
-            bound = frozen_bounds(getattr(self, name), f"limits.{name}")
-            if bound.shape not in ((), (3,)) or not (bound > 0).all():
-                raise SpecError(f"limits.{name} must be positive, one number or one per axis")
-            object.__setattr__(self, name, frozen_bounds(np.broadcast_to(bound, 3), f"limits.{name}"))
+            raise FieldError("lower", "must be below upper on every axis")
 
     def of(self, derivative: int) -> tuple[Array, Array]:
         """The lower and upper bounds of a derivative of position, each (3,)."""
@@ -82,7 +88,7 @@ class Limits:
         bounds: dict[str, Any] = {DERIVATIVES[derivative]: np.inf}
         return replace(self, **bounds)
 
-    def drawn_in(self, derivative: int, below: Array, above: Array) -> Limits:
+    def tightened(self, derivative: int, below: Array, above: Array) -> Limits:
         """The same limits, one derivative's tighter: by `below` at its lower ends, `above` at its upper ones.
 
         Raises SpecError when nothing is left between them.
@@ -97,51 +103,84 @@ class Limits:
 PAPER_LIMITS = Limits(velocity=10.0, acceleration=90.0, jerk=200.0)  # the authors' reference code
 
 
-@dataclass(frozen=True)
+def _file_name(name: str) -> str:
+    if not re.fullmatch(r"\w[\w .-]*", name):
+        raise FieldError("", f"must be letters, digits, spaces, points and dashes, got {name!r}")
+    return name
+
+
+@declared
 class Problem:
     """A maneuver between two states, free of any vehicle.
 
     Raises SpecError when an end lies outside the limits, or the maneuver lacks its gate.
     """
 
-    name: str
-    start: EndState
-    goal: EndState
-    maneuver: Maneuver = field(default_factory=Line)
-    gates: tuple[Gate, ...] = ()
-    limits: Limits = field(default_factory=Limits)
+    name: Annotated[Label, AfterValidator(_file_name)]  # also names the output folder
+    start: EndState  # where and how fast it begins
+    goal: EndState  # where and how fast it ends
+    maneuver: Annotated[Maneuver, PlainValidator(MANEUVERS.read)] = Line()  # what happens on the way
+    gates: tuple[Gate, ...] = ()  # openings to pass
+    limits: Limits = field(default_factory=Limits)  # bounds on the path
     heading: float = 0.0  # [rad] about the thrust axis at the start, carried along without spin
-    environment: Environment = field(default_factory=Environment)
-    description: str = ""
+    environment: Environment = field(default_factory=Environment)  # where it is flown
+    description: str = ""  # what it is, for people
+
+    SHORTHANDS: ClassVar[Mapping[str, str]] = {
+        "heading_deg": "[deg] `heading` in degrees",
+        "gate": "the only one of `gates`",
+    }
 
     def __post_init__(self) -> None:
         """Check."""
-        if not np.isfinite(self.heading):
-            raise SpecError("heading_deg must be a finite angle in degrees")
-        object.__setattr__(self, "gates", tuple(self.gates))
         names = [gate.name for gate in self.gates]
         for i, name in enumerate(names):
             if name in names[:i]:
-                raise SpecError(f"gates[{i}].name: there are two gates named '{name}'; rename one")
-        with within(f"problem '{self.name}': "):
-            self.stages(1.0)
+                raise FieldError(f"gates[{i}].name", f": there are two gates named '{name}'; rename one")
+        self.stages(1.0)
         self._check_within_limits()
+
+    @classmethod
+    def expand(cls, table: dict[str, Any]) -> dict[str, Any]:
+        """Replace the shorthands. Raises FieldError for a file that ends before its maneuver."""
+        if "maneuver" not in table:
+            raise FieldError("maneuver", "is missing; add it")
+        if "gate" in table:
+            if "gates" in table:
+                raise SpecError("gate and gates are both given; give all gates as tables [[gates]]")
+            with within_field("gate"):
+                table["gates"] = (from_table(Gate, table.pop("gate")),)
+        if "heading_deg" in table:
+            if "heading" in table:
+                raise SpecError("heading and heading_deg are both given; give one of them")
+            table["heading"] = radians(number(table.pop("heading_deg"), "heading_deg"))
+        return table
+
+    def abbreviate(self, table: dict[str, Any]) -> dict[str, Any]:
+        """Write the heading in degrees where those say exactly the same; what is short comes first."""
+        table.setdefault("maneuver", to_table(self.maneuver))
+        heading = table.pop("heading", 0.0)
+        for heading_deg in (round(degrees(heading), 9), degrees(heading)):
+            if heading and radians(heading_deg) == heading:
+                return {"heading_deg": heading_deg} | table
+        return table | ({"heading": heading} if heading else {})
 
     def _check_within_limits(self) -> None:
         for derivative, quantity in enumerate(DERIVATIVES[:3]):
             for end, state in (("start", self.start), ("goal", self.goal)):
                 self._check_point(f"{end}.{quantity}", state.derivatives(3)[derivative], derivative)
-        for gate in self.gates:
-            self._check_point(f"{gate.name}.position", gate.position, 0)
+        for i, gate in enumerate(self.gates):
+            self._check_point(f"gates[{i}].position", gate.position, 0)
 
     def _check_point(self, name: str, value: Array, derivative: int) -> None:
         lower, upper = self.path_limits.of(derivative)
         for axis, x, low, high in zip("xyz", value, lower, upper, strict=True):
             if not low <= x <= high:
                 limit = "lower and limits.upper" if derivative == 0 else DERIVATIVES[derivative]
-                raise SpecError(
-                    f"{name}: its {axis} component, {x:g} {UNITS[derivative]}, lies outside the limits "
-                    f"[{low:g}, {high:g}]; move it or widen limits.{limit}"
+                raise FieldError(
+                    name,
+                    f": its {axis} component, {x:g} {UNITS[derivative]}, lies outside the limits "
+                    f"[{low:g}, {high:g}]; move it or widen limits.{limit}",
                 )
 
     @property
@@ -157,7 +196,7 @@ class Problem:
 
         Raises SpecError for gates that do not suit the maneuver.
         """
-        return self.maneuver.stages(self.gates, max_specific_thrust)
+        return self.maneuver.stage_sequence(self.gates, max_specific_thrust)
 
     def gate(self, name: str) -> Gate:
         """The gate of that name. Raises SpecError when there is none."""
@@ -170,4 +209,4 @@ class Problem:
 
 def at_rest(position: ArrayLike) -> EndState:
     """At rest at `position` [m], (3,)."""
-    return EndState(np.asarray(position, dtype=float))
+    return EndState(cast(Array, position))

@@ -6,7 +6,7 @@ from aerobat.vehicle.allocation import (
     rotor_thrusts,
     wrench,
 )
-from aerobat.vehicle.files import load_vehicle, vehicle_names
+from aerobat.vehicle.files import load_vehicle, vehicle_names, write_vehicle
 from aerobat.vehicle.vehicle import Rotor, Vehicle
 
 __all__ = [
@@ -18,4 +18,5 @@ __all__ = [
     "rotor_thrusts",
     "vehicle_names",
     "wrench",
+    "write_vehicle",
 ]

@@ -2,88 +2,113 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, field
+from collections.abc import Mapping
+from dataclasses import field, fields
 from functools import cached_property
+from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
-from numpy.typing import ArrayLike
+from pydantic import Field, PlainValidator
 
 from aerobat.arrays import Array, frozen
+from aerobat.declaration import (
+    FieldError,
+    Label,
+    NonNegative,
+    Positive,
+    Vector3,
+    declared,
+    finite,
+    from_table,
+    unknown_key,
+)
 from aerobat.errors import SpecError
 from aerobat.states import STANDARD_GRAVITY
 
 _ROUNDING = 1e-9  # [-] relative: inertias are written with a few digits
 
 
-@dataclass(frozen=True, eq=False)
+def _inertia(value: Any) -> Array:
+    """The matrix, of itself or of three principal moments."""
+    vector = np.ndim(value) == 1 if hasattr(value, "__array__") else not _is_matrix(value)
+    return finite(np.diag(finite(value, 3)) if vector else value, 3, 3)
+
+
+@declared
 class Rotor:
     """A motor with its propeller, thrust along the body's +z, first-order in its command.
 
-    Raises SpecError, beginning with the field's name, for values that no rotor has.
+    Raises SpecError, naming the field, for values that no rotor has.
     """
 
-    position_body: Array  # [m] from the centre of mass, (3,)
-    spin: int  # +1 counter-clockwise seen from above, -1 clockwise; the body feels -spin·c·f about +z
-    min_thrust: float  # [N]; negative for a variable pitch
-    max_thrust: float  # [N]
-    torque_coefficient: float  # [m] c: N·m of drag torque per N of thrust
-    lag: float  # [s] time constant; zero for a thrust that follows its command at once
-    radius: float  # [m] of the propeller
+    position_body: Vector3  # [m] from the centre of mass
+    spin: Literal[
+        1, -1
+    ]  # 1 counter-clockwise seen from above, -1 clockwise; the body feels -spin·c·f about +z
+    min_thrust: float  # [N] negative for a variable pitch
+    max_thrust: Positive  # [N] at full throttle
+    torque_coefficient: NonNegative  # [m] c: N·m of drag torque per N of thrust
+    lag: NonNegative  # [s] time constant; zero for a thrust that follows its command at once
+    radius: Positive  # [m] of the propeller
 
     def __post_init__(self) -> None:
-        _set(self, "position_body", _array(self.position_body, "position_body", (3,)))
-        for name in ("min_thrust", "max_thrust", "torque_coefficient", "lag", "radius"):
-            _set(self, name, _number(getattr(self, name), name))
-        if self.spin not in (1, -1):
-            raise SpecError(
-                f"spin must be 1 (counter-clockwise seen from above) or -1 (clockwise), got {self.spin!r}"
-            )
-        _set(self, "spin", int(self.spin))
         if not self.min_thrust < self.max_thrust:
-            raise SpecError(
-                f"min_thrust must be below max_thrust, got {self.min_thrust:g} N and {self.max_thrust:g} N"
+            raise FieldError(
+                "min_thrust",
+                f"must be below max_thrust, got {self.min_thrust:g} N and {self.max_thrust:g} N",
             )
-        if self.max_thrust <= 0:
-            raise SpecError(f"max_thrust must be positive, got {self.max_thrust:g} N")
-        if self.torque_coefficient < 0:
-            raise SpecError(
-                "torque_coefficient must not be negative (spin carries the sign), "
-                f"got {self.torque_coefficient:g} m"
-            )
-        if self.lag < 0:
-            raise SpecError(f"lag must not be negative, got {self.lag:g} s")
-        _check_positive(self.radius, "radius", "m")
 
 
-@dataclass(frozen=True, eq=False)
+@declared
 class Vehicle:
     """A multirotor: one rigid body, n >= 4 rotors, linear drag.
 
-    Compared and hashed by identity. Raises SpecError, beginning with the field's name, for what cannot be a
-    vehicle; whether it can hover depends on where, see `require_hover`.
+    Raises SpecError, naming the field, for what cannot be a vehicle; whether it can hover depends on where,
+    see `require_hover`.
     """
 
-    name: str
-    mass: float  # [kg]
-    inertia: Array  # [kg·m²] about the centre of mass in body axes, (3, 3)
-    rotors: tuple[Rotor, ...]
-    drag_body: Array = field(default_factory=lambda: np.zeros(3))  # [kg/s] force_body = -drag_body·v_body
+    name: Label  # left out in a file, the file's
+    mass: Positive  # [kg] of all
+    inertia: Annotated[
+        Array, PlainValidator(_inertia), Field(description="three principal moments, or a 3 x 3 matrix")
+    ]  # [kg·m²] about the centre of mass, body axes
+    rotors: tuple[Rotor, ...]  # four or more
+    drag_body: Vector3 = field(default_factory=lambda: np.zeros(3))  # [kg/s] force_body = -drag_body·v_body
     description: str = ""  # where its numbers come from
 
+    SHORTHANDS: ClassVar[Mapping[str, str]] = {"rotor_defaults": "any keys of rotors, for all of them"}
+
     def __post_init__(self) -> None:
-        _set(self, "mass", _number(self.mass, "mass"))
-        _check_positive(self.mass, "mass", "kg")
-        _set(self, "inertia", _array(self.inertia, "inertia", (3, 3)))
-        _set(self, "drag_body", _array(self.drag_body, "drag_body", (3,)))
-        _set(self, "rotors", tuple(self.rotors))
-        _check_name(self.name)
         _check_inertia(self.inertia)
         if (self.drag_body < 0).any():
-            raise SpecError(f"drag_body must not be negative, got {self.drag_body.tolist()} kg/s")
-        _check_rotors(self.rotors)
+            raise FieldError("drag_body", f"must not be negative, got {self.drag_body.tolist()} kg/s")
+        if len(self.rotors) < 4:
+            raise FieldError("rotors", f"must be 4 or more, got {len(self.rotors)}")
         _check_rank(self.allocation)
         self._check_balance()
+
+    @classmethod
+    def expand(cls, table: dict[str, Any]) -> dict[str, Any]:
+        """Make every rotor, with the keys of `rotor_defaults` that it lacks."""
+        defaults = table.pop("rotor_defaults", {})
+        if not isinstance(defaults, Mapping):
+            raise FieldError("rotor_defaults", "must be a table; begin it with [rotor_defaults]")
+        keys = [each.name for each in fields(Rotor)]
+        for key in defaults:
+            if key not in keys:
+                raise unknown_key(key, keys).inside("rotor_defaults")
+        if isinstance(rotors := table.get("rotors"), list | tuple):
+            table["rotors"] = tuple(_rotor(rotor, defaults, f"rotors[{i}]") for i, rotor in enumerate(rotors))
+        return table
+
+    def abbreviate(self, table: dict[str, Any]) -> dict[str, Any]:
+        """Write a diagonal inertia as its moments, and once what all rotors share."""
+        if not (self.inertia - np.diag(np.diag(self.inertia))).any():
+            table["inertia"] = np.diag(self.inertia).tolist()
+        rotors = table.pop("rotors")
+        shared = {key: value for key, value in rotors[0].items() if all(r[key] == value for r in rotors)}
+        own = [{key: value for key, value in rotor.items() if key not in shared} for rotor in rotors]
+        return table | {"rotor_defaults": shared, "rotors": own}
 
     @cached_property
     def min_thrusts(self) -> Array:
@@ -158,38 +183,46 @@ class Vehicle:
         wrong = (fractions <= _ROUNDING) & (self.min_thrusts >= 0.0)
         if wrong.any():
             i = int(np.argmax(wrong))
-            raise SpecError(
-                f"rotors cannot hold a level hover: rotors[{i}] would bear {fractions[i]:.2g} of the weight, "
-                f"but gives {self.min_thrusts[i]:.4g} N or more; check position_body, spin, limits"
+            raise FieldError(
+                "rotors",
+                f"cannot hold a level hover: rotors[{i}] would bear {fractions[i]:.2g} of the weight, "
+                f"but gives {self.min_thrusts[i]:.4g} N or more; check position_body, spin, limits",
             )
 
 
-def _check_name(name: str) -> None:
-    if not isinstance(name, str) or not name.strip() or not name.isprintable():
-        raise SpecError(f"name must be one line of text, got {name!r}")
+def _is_matrix(value: Any) -> bool:
+    return isinstance(value, list | tuple) and len(value) > 0 and isinstance(value[0], list | tuple)
+
+
+def _rotor(table: Any, defaults: Mapping[str, Any], place: str) -> Any:
+    """The rotor of a table and what it lacks. Raises FieldError, naming where the value at fault stands."""
+    if not isinstance(table, Mapping):
+        return table
+    for each in fields(Rotor):
+        if each.name not in table and each.name not in defaults:
+            complaint = "is missing; add it there or, for all rotors, in [rotor_defaults]"
+            raise FieldError(f"{place}.{each.name}", complaint)
+    try:
+        return from_table(Rotor, {**defaults, **table})
+    except FieldError as error:
+        key = error.field.partition("[")[0]
+        raise error.inside("rotor_defaults" if key in defaults and key not in table else place) from None
 
 
 def _check_inertia(inertia: Array) -> None:
     if not np.allclose(inertia, inertia.T, rtol=0, atol=_ROUNDING * np.abs(inertia).max()):
-        raise SpecError("inertia must be symmetric; give its products of inertia twice, mirrored")
+        raise FieldError("inertia", "must be symmetric; give its products of inertia twice, mirrored")
     smallest, middle, largest = np.linalg.eigvalsh(inertia)
     if smallest <= 0:
-        raise SpecError(
-            f"inertia must be positive definite; its smallest principal moment is {smallest:.4g} kg·m²"
+        raise FieldError(
+            "inertia", f"must be positive definite; its smallest principal moment is {smallest:.4g} kg·m²"
         )
     if largest > (smallest + middle) * (1 + _ROUNDING):
-        raise SpecError(
-            "inertia belongs to no rigid body: its largest principal moment exceeds the sum of the others, "
-            f"{largest:.4g} > {smallest:.4g} + {middle:.4g} kg·m²; check the values"
+        raise FieldError(
+            "inertia",
+            "belongs to no rigid body: its largest principal moment exceeds the sum of the others, "
+            f"{largest:.4g} > {smallest:.4g} + {middle:.4g} kg·m²; check the values",
         )
-
-
-def _check_rotors(rotors: Sequence[Rotor]) -> None:
-    if len(rotors) < 4:
-        raise SpecError(f"rotors must be 4 or more, got {len(rotors)}")
-    for i, rotor in enumerate(rotors):
-        if not isinstance(rotor, Rotor):
-            raise SpecError(f"rotors[{i}] must be a Rotor, got {rotor!r}")
 
 
 def _check_rank(allocation: Array) -> None:
@@ -197,29 +230,8 @@ def _check_rank(allocation: Array) -> None:
     sizes = np.linalg.norm(allocation, axis=1, keepdims=True)
     rank = np.linalg.matrix_rank(allocation / np.where(sizes > 0, sizes, 1.0))
     if rank < 4:
-        raise SpecError(
-            "rotors must give thrust, roll, pitch and yaw independently, but their allocation has rank "
-            f"{rank} instead of 4; vary position_body, spin or torque_coefficient"
+        raise FieldError(
+            "rotors",
+            "must give thrust, roll, pitch and yaw independently, but their allocation has rank "
+            f"{rank} instead of 4; vary position_body, spin or torque_coefficient",
         )
-
-
-def _number(value: float, name: str) -> float:
-    return float(_array(value, name, ()))
-
-
-def _array(value: ArrayLike, name: str, shape: tuple[int, ...]) -> Array:
-    """A frozen array of exactly this shape; a value has no leading axes."""
-    array = frozen(value, name)
-    if array.shape != shape:
-        wanted = " x ".join(map(str, shape)) + " numbers" if shape else "one number"
-        raise SpecError(f"{name} must be {wanted}, got an array of the shape {array.shape}")
-    return array
-
-
-def _check_positive(value: float, name: str, unit: str) -> None:
-    if value <= 0:
-        raise SpecError(f"{name} must be positive, got {value:g} {unit}")
-
-
-def _set(instance: object, name: str, value: object) -> None:
-    object.__setattr__(instance, name, value)  # frozen dataclasses normalise their fields this way

@@ -26,7 +26,6 @@ from aerobat.planning.result import Attempt, PlacedStage, Plan
 from aerobat.planning.warm_start import Guess
 from aerobat.problem.problem import Problem
 from aerobat.problem.stage import StageSequence
-from aerobat.problem.waypoints import Waypoints
 from aerobat.vehicle import Vehicle
 
 ROUNDS = 36  # of solving, at most, for one number of segments
@@ -135,7 +134,7 @@ class _Run:
         """Plans to begin from, the best first; the last knows no rotors."""
         if self.config.start is not None:
             yield self.config.start
-        if isinstance(self.problem.maneuver, Waypoints):
+        if self.problem.maneuver.through_points:
             yield from self._planned(MinSnap(), self.vehicle)
         yield from self._planned(Miqp(), self.vehicle)
         yield Miqp().plan(self.problem)

@@ -11,7 +11,6 @@ import numpy as np
 from aerobat.arrays import Array
 from aerobat.problem.problem import Problem
 from aerobat.problem.stage import Stage, StageSequence
-from aerobat.problem.waypoints import Waypoints
 from aerobat.trajectory import Trajectory
 
 SHARE = 0.3  # of the specific thrust, that accelerates along a leg when times are guessed
@@ -36,8 +35,8 @@ def given_at_knots(problem: Problem, sequence: StageSequence, order: int, gravit
 
 def first_times(problem: Problem, given: Array, max_specific_thrust: float) -> Array:
     """Durations between knots to begin with [s], (K - 1,): the problem's own, or a guess from distances."""
-    if isinstance(problem.maneuver, Waypoints) and problem.maneuver.times is not None:
-        return np.diff([0.0, *problem.maneuver.times])
+    if problem.maneuver.first_times is not None:
+        return np.diff([0.0, *problem.maneuver.first_times])
     placed = np.flatnonzero(~np.isnan(given[:, 0]).any(axis=1))
     durations = np.empty(len(given) - 1)
     for a, b in pairwise(placed.tolist()):

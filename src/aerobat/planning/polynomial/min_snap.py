@@ -19,7 +19,6 @@ from aerobat.planning.result import Attempt, PlacedStage, Plan
 from aerobat.planning.search import Bisection, Grid, Search
 from aerobat.problem.problem import Problem
 from aerobat.problem.stage import StageSequence
-from aerobat.problem.waypoints import Waypoints
 from aerobat.trajectory import Trajectory
 from aerobat.trajectory.minimum_effort import Rule, minimum_effort
 from aerobat.vehicle import Vehicle
@@ -126,7 +125,7 @@ class _Planning:
         thrust = ASSUMED_THRUST_TO_WEIGHT * gravity if vehicle is None else vehicle.max_specific_thrust
         sequence = problem.stages(thrust)
         given = given_at_knots(problem, sequence, config.order, gravity)
-        timed = isinstance(problem.maneuver, Waypoints) and problem.maneuver.times is not None
+        timed = problem.maneuver.first_times is not None
         stretch = config.stretch or (Stretch.FIRST if timed else Stretch.ALL)
         durations = first_times(problem, given, thrust)
         return cls(config, problem, sequence, vehicle, gravity, given, durations, stretch, progress)

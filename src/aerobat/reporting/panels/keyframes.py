@@ -94,8 +94,9 @@ def plan_keyframes(plan: Plan, vehicle: Vehicle) -> Keyframes:
 
 def maneuver_plane(plan: Plan, thrust: Array) -> ManeuverPlane:
     """The plane normal to the maneuver's axis; else that in which the specific thrust (k, 3) varies most."""
-    axis_deg: float | None = getattr(plan.problem.maneuver, "axis_deg", None)
-    if axis_deg is not None:
+    axis = plan.problem.maneuver.turn_axis
+    if axis is not None:
+        axis_deg = round(float(np.rad2deg(np.arctan2(axis[1], axis[0]))), 9)
         return ManeuverPlane(axis_deg - 90.0)
     heading_deg, _ = _main_direction(thrust)
     return ManeuverPlane(ROUND_HEADING * round(heading_deg / ROUND_HEADING))

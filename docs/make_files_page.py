@@ -1,0 +1,207 @@
+"""Write docs/files.md from the declarations: `uv run python docs/make_files_page.py`.
+
+A field's type and default come from its declaration, unit and meaning from the comment beside it.
+"""
+
+from __future__ import annotations
+
+import ast
+import dataclasses
+import inspect
+import re
+import types
+from enum import Enum
+from importlib.resources import files
+from pathlib import Path
+from typing import Any, Literal, get_args, get_origin, get_type_hints
+
+import numpy as np
+
+from aerobat.environment import Environment
+from aerobat.problem import (
+    Condition,
+    EndState,
+    Gate,
+    GatePassage,
+    Limits,
+    Maneuver,
+    Problem,
+    Stage,
+    Waypoint,
+    registered_maneuvers,
+)
+from aerobat.vehicle import Rotor, Vehicle
+
+PAGE = Path(__file__).parent / "files.md"
+WRITTEN = "## What a run writes"  # from here on the page is written by hand
+
+PLACES = {  # where each class stands in a file
+    EndState: "`[start]` and `[goal]`",
+    Gate: "`[[gates]]`, or `[gate]` for a single one",
+    Limits: "`[limits]`, at the ends of intervals and, planned with a vehicle, between them",
+    Environment: "`[environment]`",
+    GatePassage: "`[maneuver.passage]`",
+    Stage: "`[[maneuver.stages]]`",
+    Condition: "`conditions` and `path_constraints`: lower ≤ direction · quantity ≤ upper",
+    Waypoint: "`[[maneuver.waypoints]]`",
+    Rotor: "`[[rotors]]`",
+}
+INTRODUCTION = """# Files
+
+SI units; the world is ENU (x east, y north, z up), the body FLU (x forward, y left, z up, thrust along +z).
+Keys without a default must be given, themselves or by a shorthand. An unknown key is an error that names it.
+`aerobat.load_problem` and `load_vehicle` read these files, `write_problem` and `write_vehicle` write them,
+exactly. From Python, the classes below take the same fields, without the shorthands.
+
+This page is written by `docs/make_files_page.py` from the declarations in the code.
+"""
+STAGES = """
+```toml
+[maneuver]
+kind = "stages"
+
+[[maneuver.stages]]
+name = "knife edge"
+conditions = [
+    { quantity = "specific_thrust", direction = [0.0, 0.0, 1.0], equals = 0.0 },
+    { quantity = "specific_thrust", direction = [1.0, 0.0, 0.0], lower = 10.0 },
+]
+```
+"""
+WAYPOINTS = """
+With the times of all waypoints and `duration`, `--planner min-snap` searches as in the paper's Section V-D,
+by 0.1 s at the first waypoint.
+
+```toml
+[maneuver]
+kind = "waypoints"
+waypoints = [
+    { position = [2.0, 0.0, 1.0] },
+    { position = { x = 4.0, z = 2.0 }, up = [0.0, 0.0, -1.0], thrust = 12.0 },
+]
+```
+"""
+
+
+def page() -> str:
+    """The whole page; its part about what a run writes is kept as it stands."""
+    by_hand = PAGE.read_text(encoding="utf-8").partition(WRITTEN)[2]
+    parts = [INTRODUCTION, "## Problem (`aerobat fly problem.toml`)\n", preset("problem", "flip-roll")]
+    parts += [table(Problem)]
+    parts += [section(cls) for cls in (EndState, Gate, Limits, Environment)]
+    parts += ["### Maneuvers\n", "`[maneuver]` has a `kind`, and what that kind takes:\n"]
+    parts += [kind(name, cls) for name, cls in registered_maneuvers().items() if of_package(cls)]
+    parts += [section(GatePassage), section(Stage), section(Condition), STAGES, section(Waypoint), WAYPOINTS]
+    parts += ["## Vehicle (`--vehicle vehicle.toml`)\n", preset("vehicle", "agile-quad"), table(Vehicle)]
+    parts += [section(Rotor)]
+    return "\n".join(part.strip("\n") + "\n" for part in parts) + "\n" + WRITTEN + by_hand
+
+
+def of_package(cls: type) -> bool:
+    """True for maneuvers that come with Aerobat."""
+    return cls.__module__.startswith("aerobat.")
+
+
+def preset(room: str, name: str) -> str:
+    """A built-in file, as an example."""
+    text = (files(f"aerobat.{room}") / "presets" / f"{name}.toml").read_text(encoding="utf-8")
+    return f"```toml\n{text.strip()}\n```\n"
+
+
+def section(cls: type) -> str:
+    """A class that stands in a table of its own."""
+    return f"### {cls.__name__}\n\n{PLACES[cls]}\n\n{table(cls)}"
+
+
+def kind(name: str, cls: type) -> str:
+    """A kind of maneuver."""
+    first = (cls.__doc__ or "").strip().partition("\n")[0]
+    return f'**`kind = "{name}"`** {first}\n\n{table(cls)}'
+
+
+def table(cls: Any) -> str:
+    """The fields and shorthands of a declared class, a row each."""
+    meanings = comments(cls)
+    hints = get_type_hints(cls, include_extras=True)
+    rows = [
+        (f"`{field.name}`", type_of(hints[field.name]), default_of(field), *meanings[field.name])
+        for field in dataclasses.fields(cls)
+    ]
+    for key, meaning in getattr(cls, "SHORTHANDS", {}).items():
+        unit, text = split_unit(meaning)
+        rows.append((f"`{key}`", "shorthand", "", unit, text))
+    lines = ["| key | type | default | unit | meaning |", "| --- | --- | --- | --- | --- |"]
+    return "\n".join(lines + ["| " + " | ".join(row) + " |" for row in rows]) + "\n"
+
+
+def comments(cls: type) -> dict[str, tuple[str, str]]:
+    """Unit and meaning of each field, from the comments beside it and right above it."""
+    source = inspect.getsource(cls)
+    lines = source.splitlines()
+    (definition,) = ast.parse(source).body
+    assert isinstance(definition, ast.ClassDef)
+    found = {}
+    for node in definition.body:
+        if not (isinstance(node, ast.AnnAssign) and isinstance(node.target, ast.Name)):
+            continue
+        above: list[str] = []
+        for line in reversed(lines[: node.lineno - 1]):
+            if not line.strip().startswith("#"):
+                break
+            above.insert(0, line.strip(" #"))
+        beside = lines[(node.end_lineno or node.lineno) - 1].rpartition("  # ")
+        unit, meaning = split_unit(beside[2] if beside[1] else "")
+        found[node.target.id] = (unit, " ".join([*above, meaning]).strip())
+    return found
+
+
+def split_unit(text: str) -> tuple[str, str]:
+    """The unit in brackets that a comment begins with, and the rest."""
+    unit = re.match(r"\[([^\]]+)\]\s*", text)
+    return (unit[1], text[unit.end() :]) if unit else ("", text)
+
+
+def type_of(hint: Any) -> str:
+    """A type as people say it."""
+    descriptions = [getattr(each, "description", None) for each in getattr(hint, "__metadata__", ())]
+    if any(descriptions):
+        return next(each for each in descriptions if each)
+    if hasattr(hint, "__metadata__"):
+        return type_of(get_args(hint)[0])
+    arguments = [argument for argument in get_args(hint) if argument not in (types.NoneType, ...)]
+    if get_origin(hint) is tuple:
+        return f"list of tables, {type_of(arguments[0])}"
+    if get_origin(hint) is Literal:
+        return ", ".join(f"`{choice!r}`" for choice in arguments)
+    if arguments:
+        return type_of(arguments[0])
+    if issubclass(hint, Maneuver):
+        return "[maneuver](#maneuvers)"
+    if issubclass(hint, Enum):
+        return ", ".join(f'`"{member.value}"`' for member in hint)
+    plain = {float: "number", int: "whole number", bool: "`true`, `false`", str: "text"}
+    return plain.get(hint) or f"[{hint.__name__}](#{hint.__name__.lower()})"
+
+
+def default_of(field: dataclasses.Field[Any]) -> str:
+    """A field's default as a file would give it; empty where it must be given."""
+    if field.default_factory is not dataclasses.MISSING:
+        value = field.default_factory()
+        return (
+            "none" if dataclasses.is_dataclass(value) or not np.isfinite(value).any() else f"{value.tolist()}"
+        )
+    if field.default is dataclasses.MISSING or isinstance(
+        field.default, Maneuver
+    ):  # files say what they want
+        return ""
+    if field.default in (None, "", ()):
+        return "none"
+    if isinstance(field.default, bool):
+        return f"`{str(field.default).lower()}`"
+    if dataclasses.is_dataclass(field.default):
+        return "its defaults"
+    return str(field.default)
+
+
+if __name__ == "__main__":
+    PAGE.write_text(page(), encoding="utf-8")

@@ -1,0 +1,166 @@
+"""The types of fields, declared once: what each takes, and what stands in the value afterwards."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Mapping
+from math import hypot, isfinite, nan
+from typing import Annotated, Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+from pydantic import AfterValidator, Field, PlainValidator
+
+from aerobat.arrays import Array
+from aerobat.declaration.sentences import FieldError, shown, unknown_key, within_field
+
+AXES = ("x", "y", "z")
+_ROUND_OFF = 1e-12  # [-] components of a unit vector that are zero but for it
+_UNIT = 1e-15  # [-] how far from one a norm may be by round-off
+
+
+def unit(direction: ArrayLike) -> Array:
+    """`direction` (3,) scaled to length one, read-only. Raises FieldError when it is zero.
+
+    A unit vector comes back as it is, bit by bit; of any other, components that are only round-off become
+    zero, since they would couple axes that have nothing to do with each other.
+    """
+    vector = _direction(direction)
+    components = vector.tolist()
+    norm = hypot(*components)
+    if abs(norm - 1.0) <= _UNIT and not any(0.0 < abs(x) < _ROUND_OFF for x in components):
+        return vector
+    return finite([x / norm if abs(x / norm) >= _ROUND_OFF else 0.0 for x in components], 3)
+
+
+def array(value: Any, *shape: int) -> Array:
+    """A read-only array of exactly this shape, of numbers that may be infinite. Raises FieldError."""
+    return _shaped(_numbers(value, "", infinite=True), value, shape)
+
+
+def finite(value: Any, *shape: int) -> Array:
+    """A read-only array of exactly this shape, of finite numbers. Raises FieldError."""
+    return _shaped(_numbers(value, "", infinite=False), value, shape)
+
+
+def _shaped(numbers: Any, value: Any, shape: tuple[int, ...]) -> Array:
+    try:
+        made = np.array(numbers, dtype=np.float64)
+    except ValueError:  # ragged
+        made = np.empty(0)
+    if made.shape != shape:
+        wanted = " x ".join(map(str, shape)) + " numbers"
+        raise FieldError("", f"must be {wanted}, got {_extent(value)}")
+    made.flags.writeable = False
+    return made
+
+
+def number(value: Any, name: str) -> float:
+    """A finite number that a file gives under `name`. Raises FieldError for anything else."""
+    with within_field(name):
+        made = _numbers(value, "", infinite=False)
+        if not isinstance(made, float):
+            raise FieldError("", f"must be a number, got {shown(value)}")
+    return made
+
+
+def _numbers(value: Any, place: str, infinite: bool) -> Any:
+    """Nested lists of floats from lists or arrays. Raises FieldError for the first entry that is none."""
+    if isinstance(value, float) and (isfinite(value) or (infinite and value == value)):
+        return float(value) + 0.0  # no negative zeros: equal values have equal bytes
+    if hasattr(value, "__array__"):
+        return _numbers(np.asarray(value).tolist(), place, infinite)
+    if isinstance(value, list | tuple):
+        return [_numbers(each, f"{place}[{i}]", infinite) for i, each in enumerate(value)]
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        raise FieldError(place, f"must be a number, got {shown(value)}")
+    if isinstance(value, float) or abs(value) > sys.float_info.max:
+        raise FieldError(place, f"must be a finite number, got {shown(value)}")
+    return float(value)
+
+
+def _extent(value: Any) -> str:
+    size = np.shape(value) if hasattr(value, "__array__") else None
+    return f"an array of the shape {size}" if size else shown(value)
+
+
+def _vector(value: Any) -> Array:
+    return finite(value, 3)
+
+
+def _direction(value: Any) -> Array:
+    vector = _vector(value)
+    if hypot(*vector.tolist()) < 1e-9:
+        raise FieldError("", "must be a direction, not the zero vector")
+    return vector
+
+
+def _partial(value: Any) -> Array:
+    """Three numbers, or a table of those that are given; NaN stands for a free one."""
+    given = value
+    if isinstance(value, Mapping):
+        for key in value:
+            if key not in AXES:
+                raise unknown_key(str(key), AXES)
+        given = [value.get(axis, nan) for axis in AXES]
+    elif hasattr(value, "__array__"):
+        given = np.asarray(value).tolist()
+    if not isinstance(given, list | tuple) or len(given) != 3:
+        raise FieldError("", f"must be three numbers or a table of some of x, y, z, got {shown(value)}")
+    places = AXES if isinstance(value, Mapping) else ("[0]", "[1]", "[2]")
+    free = [isinstance(x, float) and x != x for x in given]
+    numbers = [
+        0.0 if left_free else _numbers(x, place, infinite=False)
+        for x, place, left_free in zip(given, places, free, strict=True)
+    ]
+    vector = np.where(free, nan, finite(numbers, 3))
+    vector.flags.writeable = False
+    return vector
+
+
+def _corner(value: Any) -> Array:
+    return array(value, 3)
+
+
+def _per_axis(value: Any) -> Array:
+    one = isinstance(value, int | float) or (hasattr(value, "__array__") and np.ndim(value) == 0)
+    bounds = array([value] * 3 if one else value, 3)
+    if not (bounds > 0.0).all():
+        raise FieldError("", f"must be positive, one number or one per axis, got {shown(value)}")
+    return bounds
+
+
+def _not_nan(value: float) -> float:
+    if value != value:
+        raise FieldError("", "must be a number, got nan")
+    return value
+
+
+def _one_line(text: str) -> str:
+    if not text.strip() or not text.isprintable():
+        raise FieldError("", f"must be one line of text, got {shown(text)}")
+    return text
+
+
+Positive = Annotated[float, Field(gt=0, description="positive number")]
+NonNegative = Annotated[float, Field(ge=0, description="number ≥ 0")]
+Fraction = Annotated[float, Field(gt=0, lt=1, description="number between 0 and 1")]
+Number = Annotated[
+    float,
+    Field(allow_inf_nan=True),
+    AfterValidator(_not_nan),
+    Field(description="number, `inf` and `-inf` too"),
+]
+Label = Annotated[str, AfterValidator(_one_line), Field(description="one line of text")]
+Vector3 = Annotated[Array, PlainValidator(_vector), Field(description="three numbers")]
+Direction = Annotated[Array, PlainValidator(_direction), Field(description="three numbers, not all zero")]
+UnitVector = Annotated[Array, PlainValidator(unit), Field(description="three numbers, scaled to length one")]
+PartialVector = Annotated[
+    Array, PlainValidator(_partial), Field(description="three numbers, or a table of some of `x`, `y`, `z`")
+]
+Corner = Annotated[Array, PlainValidator(_corner), Field(description="three numbers, `inf` and `-inf` too")]
+PerAxis = Annotated[
+    Array | float,
+    PlainValidator(_per_axis),
+    Field(description="positive number, or three of them, one per axis"),
+]

@@ -1,0 +1,122 @@
+"""Classes that files and commands call by name: of this package, of a user's file, of installed packages."""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any, Generic, TypeVar
+
+from aerobat.declaration.declared import declared
+from aerobat.declaration.sentences import FieldError, shown, unknown_name
+from aerobat.declaration.tables import from_table
+from aerobat.errors import SpecError
+
+T = TypeVar("T")
+
+
+class Registry(Generic[T]):
+    """The declared classes of one base, each by its name.
+
+    Installed packages add theirs through the entry points of `group`, which are imported when a name is
+    asked for that nobody has registered yet, or all names are.
+
+    Args:
+        base: what all classes inherit from.
+        noun: what one of them is called in sentences.
+        group: the group of entry points, such as "aerobat.maneuvers".
+    """
+
+    def __init__(self, base: type[T], noun: str, group: str) -> None:
+        self._base = base
+        self._noun = noun
+        self._group = group
+        self._classes: dict[str, type[T]] = {}
+        self._searched = False
+
+    def add(self, name: str, cls: type[T]) -> type[T]:
+        """Declare `cls` and register it as `name`. Raises SpecError for what does not fit or is taken."""
+        if not issubclass(cls, self._base):
+            raise SpecError(f"{cls.__name__} must inherit from {self._base.__name__} to be a {self._noun}")
+        other = self._classes.get(name)
+        if other and (other.__module__, other.__qualname__) != (cls.__module__, cls.__qualname__):
+            raise SpecError(f"there are two {self._noun}s named {name!r}, {other!r} and {cls!r}; rename one")
+        made: Any = declared(cls)
+        made.kind = name
+        self._classes[name] = made
+        return self._classes[name]
+
+    def __getitem__(self, name: str) -> type[T]:
+        """The class of that name. Raises SpecError, with the closest name, when there is none."""
+        if name not in self._classes:
+            self._import_installed()
+        if name not in self._classes:
+            raise unknown_name(self._noun, name, self._classes)
+        return self._classes[name]
+
+    def __iter__(self) -> Iterator[str]:
+        self._import_installed()
+        return iter(sorted(self._classes))
+
+    def read(self, value: Any) -> T:
+        """The value that a field takes: one of the base class, or a table whose `kind` names its class.
+
+        Raises FieldError for anything else.
+        """
+        if isinstance(value, self._base):
+            return value
+        if not isinstance(value, Mapping):
+            complaint = f"must be a {self._base.__name__}, in a file a table, got {shown(value)}"
+            raise FieldError("", complaint)
+        if "kind" not in value:
+            raise FieldError("kind", "is missing; add it")
+        kind = value["kind"]
+        if not isinstance(kind, str) or (kind not in self._classes and kind not in tuple(self)):
+            known = ", ".join(map(repr, self))
+            raise FieldError("kind", f"must be one of {known}, got {shown(kind)}")
+        return from_table(self[kind], {key: each for key, each in value.items() if key != "kind"})
+
+    def _import_installed(self) -> None:
+        if self._searched:
+            return
+        self._searched = True
+        from importlib.metadata import entry_points
+
+        for entry in entry_points(group=self._group):
+            _import(entry.load, f"{self._group} of the installed package {entry.value}")
+
+
+def import_plugin(path: str | Path) -> None:
+    """Run a user's Python file, which registers maneuvers and planners of its own, once.
+
+    Raises SpecError when there is no such file or it fails.
+    """
+    import hashlib
+    import importlib.util
+
+    file = Path(path).resolve()
+    name = "aerobat_plugin_" + hashlib.sha256(os.fsencode(file)).hexdigest()[:16]
+    if name in sys.modules:
+        return
+    spec = importlib.util.spec_from_file_location(name, file) if file.suffix == ".py" else None
+    if spec is None or spec.loader is None or not file.is_file():
+        raise SpecError(f"plugin {path}: there is no such Python file; give the path of a .py file")
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[name] = module  # before it runs: annotations are looked up there
+    loader = spec.loader
+    try:
+        _import(lambda: loader.exec_module(module), f"plugin {path}")
+    except SpecError:
+        del sys.modules[name]
+        raise
+
+
+def _import(load: Any, what: str) -> None:
+    try:
+        load()
+    except SpecError as error:
+        raise SpecError(f"{what}: {error}") from None
+    except Exception as error:
+        reason = " ".join(str(error).split())
+        raise SpecError(f"{what} cannot be imported: {type(error).__name__}: {reason}") from error

@@ -1,0 +1,77 @@
+"""Declared values as tables of plain numbers, text and lists, as TOML and JSON hold them, and back."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping
+from enum import Enum
+from typing import Any, TypeVar
+
+import numpy as np
+
+from aerobat.arrays import Array
+from aerobat.declaration.sentences import unknown_key
+from aerobat.errors import SpecError
+
+T = TypeVar("T")
+
+
+def from_table(cls: type[T], table: Mapping[str, Any]) -> T:
+    """The value of the declared class `cls` that a table describes, whose keys are its fields and shorthands.
+
+    Raises FieldError, one sentence that names the field from here on, when the table does not fit.
+    """
+    declaration: Any = cls
+    known = [*(field.name for field in dataclasses.fields(declaration)), *getattr(cls, "SHORTHANDS", ())]
+    for key in table:
+        if key not in known:
+            raise unknown_key(str(key), known)
+    values = dict(table)
+    value = cls.__new__(cls)
+    declaration.__checked_init__(value, declaration.expand(values) if hasattr(cls, "expand") else values)
+    return value
+
+
+def to_table(value: Any) -> dict[str, Any]:
+    """The table from which `from_table` makes exactly this value; fields at their defaults are left out.
+
+    Raises SpecError for a value that no file can hold.
+    """
+    if not hasattr(value, "__checked_init__"):
+        raise SpecError(f"{type(value).__name__} has no place in a file: it is not declared")
+    table = {
+        field.name: _plain(getattr(value, field.name))
+        for field in dataclasses.fields(value)
+        if not _is_default(value, field)
+    }
+    kind = {"kind": value.kind} if hasattr(value, "kind") else {}
+    if kind and "kind" not in vars(type(value)):
+        raise SpecError(f"{type(value).__name__} has no place in a file: it is not registered")
+    return kind | (value.abbreviate(table) if hasattr(value, "abbreviate") else table)
+
+
+def _is_default(value: Any, field: dataclasses.Field[Any]) -> bool:
+    if field.default is dataclasses.MISSING and field.default_factory is dataclasses.MISSING:
+        return False
+    default = field.default if field.default_factory is dataclasses.MISSING else field.default_factory()
+    current = getattr(value, field.name)
+    if isinstance(current, np.ndarray) and default is not None:
+        return np.array_equal(current, np.broadcast_to(np.asarray(default), current.shape), equal_nan=True)
+    return bool(current is default if default is None else current == default)
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, np.ndarray):
+        return _components(value)
+    if isinstance(value, tuple):
+        return [_plain(each) for each in value]
+    if isinstance(value, Enum):
+        return value.value
+    return to_table(value) if dataclasses.is_dataclass(value) else value
+
+
+def _components(array: Array) -> Any:
+    """Lists of numbers; a table of the components that are given where some are left free."""
+    if not np.isnan(array).any():
+        return array.tolist()
+    return {axis: x for axis, x in zip("xyz", array.tolist(), strict=True) if not np.isnan(x)}

@@ -1,0 +1,23 @@
+"""Maneuvers, one file each; a new one is a file and a line here."""
+
+from aerobat.problem.maneuvers.custom import CustomManeuver
+from aerobat.problem.maneuvers.flip import Flip
+from aerobat.problem.maneuvers.gate_passage import GatePassage
+from aerobat.problem.maneuvers.half_flip import HalfFlip
+from aerobat.problem.maneuvers.line import Line
+from aerobat.problem.maneuvers.maneuver import MANEUVERS, Maneuver, maneuver, registered_maneuvers
+from aerobat.problem.maneuvers.waypoints import Waypoint, Waypoints
+
+__all__ = [
+    "MANEUVERS",
+    "CustomManeuver",
+    "Flip",
+    "GatePassage",
+    "HalfFlip",
+    "Line",
+    "Maneuver",
+    "Waypoint",
+    "Waypoints",
+    "maneuver",
+    "registered_maneuvers",
+]

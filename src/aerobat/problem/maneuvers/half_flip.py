@@ -1,0 +1,58 @@
+"""A passage through a tilted gate with the thrust along its upright (paper, Section II-D)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import ClassVar
+
+import numpy as np
+
+from aerobat.declaration import Positive
+from aerobat.errors import SpecError
+from aerobat.problem.gate import Gate, only_gate
+from aerobat.problem.maneuvers.gate_passage import PAPER_LATERAL, PAPER_PASSAGE, GatePassage
+from aerobat.problem.maneuvers.maneuver import Maneuver, maneuver
+from aerobat.problem.stage import Condition, Quantity, StageSequence, thrust_along
+
+
+@maneuver("half-flip")
+class HalfFlip(Maneuver):
+    """Thrust along the tilted gate's upright while passing it, never upside down (paper, Section II-D)."""
+
+    # ε_y, least horizontal thrust across the passage; left out, the thrust along the gate's upright is at
+    # least 20 % of what the vehicle has
+    min_lateral_thrust: Positive | None = None  # [m/s²]
+    passage: GatePassage = GatePassage()  # how the gate is passed
+
+    THRUST_FRACTION: ClassVar[float] = 0.2  # of the greatest specific thrust
+
+    def stage_sequence(self, gates: Sequence[Gate], max_specific_thrust: float) -> StageSequence:
+        """Return one stage, the gate, and upright thrust at all times: (a_z + g) tan α = a_y, α ≤ 90°.
+
+        Raises SpecError unless there is one gate, its upright not below the horizontal.
+        """
+        gate = only_gate(gates, self.kind)
+        conditions = thrust_along(gate.up, gate.normal, self._min_thrust(gate, max_specific_thrust))
+        upright = Condition(Quantity.SPECIFIC_THRUST, np.array([0.0, 0.0, 1.0]), lower=0.0)
+        return StageSequence((self.passage.stage(gate, conditions),), (upright,))
+
+    def as_in_paper(self) -> HalfFlip:
+        """Return it with ε_y = 18 m/s²."""
+        return HalfFlip(PAPER_LATERAL, PAPER_PASSAGE)
+
+    def with_gate_tilt(self, gates: Sequence[Gate], tilt: float) -> tuple[Gate, ...]:
+        """Return the gates at another tilt [rad]."""
+        return tuple(gate.tilted(tilt) for gate in gates)
+
+    def _min_thrust(self, gate: Gate, max_specific_thrust: float) -> float:
+        """The least thrust along the gate's upright [m/s²]."""
+        if gate.up[2] < -1e-9:
+            raise SpecError("gate.tilt_deg must be from -90 to 90 for a half-flip; past that it is a flip")
+        if self.min_lateral_thrust is None:
+            return self.THRUST_FRACTION * max_specific_thrust
+        across = float(np.hypot(gate.up[0], gate.up[1]))
+        if across < 1e-9:
+            raise SpecError(
+                "maneuver.min_lateral_thrust asks for thrust sideways, which an upright gate has not; tilt it"
+            )
+        return self.min_lateral_thrust / across

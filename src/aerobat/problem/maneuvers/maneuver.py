@@ -1,0 +1,77 @@
+"""What every maneuver answers, and the register of them by name."""
+
+from __future__ import annotations
+
+import dataclasses
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Mapping, Sequence
+from types import MappingProxyType
+from typing import ClassVar, TypeVar, cast, dataclass_transform
+
+from pydantic import Field
+
+from aerobat.arrays import Array
+from aerobat.declaration import Registry
+from aerobat.errors import SpecError
+from aerobat.problem.gate import Gate
+from aerobat.problem.stage import StageSequence
+
+
+class Maneuver(ABC):
+    """What happens on the way: a sequence of stages, given gates and the thrust to be had.
+
+    A maneuver of one's own inherits from this class, is registered by `@maneuver("its-name")`, and says its
+    stages; the other questions have answers that suit a maneuver of no special kind.
+    """
+
+    kind: ClassVar[str] = ""  # its name in files, set when it is registered
+
+    @abstractmethod
+    def stage_sequence(self, gates: Sequence[Gate], max_specific_thrust: float) -> StageSequence:
+        """Return the stages through `gates` for a vehicle with so much specific thrust [m/s²].
+
+        Raises SpecError for gates that do not suit the maneuver.
+        """
+
+    def as_in_paper(self) -> Maneuver:
+        """Return the maneuver exactly as the paper prints it; itself when the paper has no such maneuver."""
+        return self
+
+    def with_gate_tilt(self, gates: Sequence[Gate], tilt: float) -> tuple[Gate, ...]:
+        """Return the gates at another tilt [rad]. Raises SpecError unless a half-flip passes them."""
+        raise SpecError(f"only the gate of a half-flip can be tilted, this maneuver is a {self.kind}")
+
+    @property
+    def turn_axis(self) -> Array | None:
+        """The unit vector about which the vehicle turns, right-handed, (3,); None where there is no such."""
+        return None
+
+    @property
+    def through_points(self) -> bool:
+        """True where every stage is a point to pass, for which closed-form polynomials are a good start."""
+        return False
+
+    @property
+    def first_times(self) -> tuple[float, ...] | None:
+        """The times [s] of all stages and of the end where a search begins; None: the planner's choice."""
+        return None
+
+
+M = TypeVar("M", bound=Maneuver)
+
+MANEUVERS: Registry[Maneuver] = Registry(Maneuver, "maneuver", "aerobat.maneuvers")  # type: ignore[type-abstract]
+
+
+@dataclass_transform(frozen_default=True, field_specifiers=(dataclasses.field, Field))
+def maneuver(kind: str) -> Callable[[type[M]], type[M]]:
+    """Declare the class that follows and register it: `kind` is its name in problem files."""
+
+    def register(cls: type[M]) -> type[M]:
+        return cast(type[M], MANEUVERS.add(kind, cls))
+
+    return register
+
+
+def registered_maneuvers() -> Mapping[str, type[Maneuver]]:
+    """The maneuvers by their names: those of this package, of plugins, of installed packages."""
+    return MappingProxyType({kind: MANEUVERS[kind] for kind in MANEUVERS})

@@ -1,0 +1,119 @@
+"""A path through waypoints, each with as many components given as one likes (paper, Section V-B)."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import field
+from itertools import pairwise
+from typing import Annotated
+
+import numpy as np
+from pydantic import Field
+
+from aerobat.arrays import Array
+from aerobat.declaration import FieldError, PartialVector, Positive, UnitVector, declared, unit
+from aerobat.errors import SpecError
+from aerobat.problem.gate import Gate, at_centre, named_gate
+from aerobat.problem.maneuvers.maneuver import Maneuver, maneuver
+from aerobat.problem.stage import Condition, Quantity, Stage, StageSequence
+
+THRUST_FRACTION = 0.2  # of the greatest specific thrust: the least along an attitude that names no thrust
+GIVEN = (Quantity.POSITION, Quantity.VELOCITY, Quantity.ACCELERATION)
+
+
+def _free() -> Array:
+    return np.full(3, np.nan)
+
+
+@declared
+class Waypoint:
+    """What is given where one passes by, world frame; components that are NaN are free.
+
+    `up` asks that the thrust points there, with exactly `thrust` per mass, or, without it, with at least a
+    fraction of what the vehicle has. Raises SpecError when nothing is given, or acceleration and attitude
+    both are.
+    """
+
+    position: PartialVector = field(default_factory=_free)  # [m] world
+    velocity: PartialVector = field(default_factory=_free)  # [m/s] world
+    acceleration: PartialVector = field(default_factory=_free)  # [m/s²] world
+    up: UnitVector | None = None  # direction of the thrust
+    # specific thrust along `up`, the norm of a + g e₃; left out, 20 % or more of what the vehicle has
+    thrust: Positive | None = None  # [m/s²]
+    time: Positive | None = None  # [s] when to pass by, where a search on times begins
+    gate: str | None = None  # name of the gate whose centre is passed
+
+    def __post_init__(self) -> None:
+        """Check."""
+        if self.thrust is not None and self.up is None:
+            raise FieldError("thrust", "needs up, its direction; add it")
+        if self.up is not None and not np.isnan(self.acceleration).all():
+            raise SpecError("acceleration and up both fix the attitude; give one of them")
+        free = all(np.isnan(getattr(self, q.value)).all() for q in GIVEN)
+        if free and self.up is None and self.gate is None:
+            raise SpecError("nothing is given; give at least one component of the position")
+
+    def conditions(self, max_specific_thrust: float) -> Iterable[Condition]:
+        """What is given, as conditions of a stage."""
+        for quantity in GIVEN:
+            for direction, value in zip(np.eye(3), getattr(self, quantity.value).tolist(), strict=True):
+                if not np.isnan(value):
+                    yield Condition(quantity, direction, value, value)
+        if self.up is None:
+            return
+        if self.thrust is None:
+            for axis in _across(self.up):
+                yield Condition(Quantity.SPECIFIC_THRUST, axis, 0.0, 0.0)
+            yield Condition(Quantity.SPECIFIC_THRUST, self.up, lower=THRUST_FRACTION * max_specific_thrust)
+            return
+        for direction, value in zip(np.eye(3), (self.thrust * self.up).tolist(), strict=True):
+            yield Condition(Quantity.SPECIFIC_THRUST, direction, value, value)
+
+
+@maneuver("waypoints")
+class Waypoints(Maneuver):
+    """From start to goal through waypoints in their order.
+
+    `duration` is that of the whole path at first, for planners that begin from times (paper, Section V-D:
+    its waypoint at 0.5 s, its end at 2 s). Raises SpecError for times that do not rise.
+    """
+
+    waypoints: Annotated[tuple[Waypoint, ...], Field(min_length=1)]  # in order
+    duration: Positive | None = None  # [s] of the whole path, where a search on times begins
+
+    def __post_init__(self) -> None:
+        """Check."""
+        times = [t for t in (0.0, *(w.time for w in self.waypoints), self.duration) if t is not None]
+        if any(later <= earlier for earlier, later in pairwise(times)):
+            raise FieldError("waypoints", ": their times must rise, and duration must come last")
+
+    def stage_sequence(self, gates: Sequence[Gate], max_specific_thrust: float) -> StageSequence:
+        """Return a stage a waypoint, in order, each at a time that the planner chooses."""
+        return StageSequence(
+            tuple(self._stage(i, gates, max_specific_thrust) for i in range(len(self.waypoints)))
+        )
+
+    @property
+    def through_points(self) -> bool:
+        """True: every stage is a waypoint."""
+        return True
+
+    @property
+    def first_times(self) -> tuple[float, ...] | None:
+        """The times of all waypoints and of the end [s], if every one is given."""
+        times = [*(w.time for w in self.waypoints), self.duration]
+        return None if None in times else tuple(t for t in times if t is not None)
+
+    def _stage(self, i: int, gates: Sequence[Gate], max_specific_thrust: float) -> Stage:
+        waypoint = self.waypoints[i]
+        conditions = tuple(waypoint.conditions(max_specific_thrust))
+        if waypoint.gate is None:
+            return Stage(f"waypoint {i + 1}", conditions)
+        gate = named_gate(gates, waypoint.gate)
+        return Stage(gate.name, (*at_centre(gate), *conditions), gate=gate.name)
+
+
+def _across(direction: Array) -> tuple[Array, Array]:
+    """Two unit vectors normal to a unit vector and to each other."""
+    first = unit(np.cross(direction, np.eye(3)[int(np.argmin(np.abs(direction)))]))
+    return first, unit(np.cross(direction, first))
