@@ -97,7 +97,7 @@ def test_a_wrong_mass_leaves_no_lasting_error(name: str) -> None:
     assert error(flight)[-1] < 0.05 * error(flight).max()
 
 
-@pytest.mark.parametrize("switch", ["moment_feedforward", "motor_lag_lead"])
+@pytest.mark.parametrize("switch", ["moment_feedforward", "motor_lag_compensation"])
 def test_each_feed_forward_brings_the_vehicle_nearer_to_its_path(switch: str) -> None:
     vehicle = load_vehicle("agile-quad")
     off = fly(swerve(), vehicle, controller=Controller(**{switch: False}))
@@ -136,12 +136,12 @@ def test_a_gain_that_is_no_gain_is_refused_by_name(field: str, value: object) ->
 
 
 def test_a_switch_is_on_or_off() -> None:
-    with pytest.raises(SpecError, match=r"^controller\.yaw_shed_first must be True or False, got 1"):
-        Controller(yaw_shed_first=1)
+    with pytest.raises(SpecError, match=r"^controller\.prioritize_tilt must be True or False, got 1"):
+        Controller(prioritize_tilt=1)
 
 
 def test_filters_of_no_length_are_no_filters() -> None:
-    sharp = Controller(lead_filter=0.0, jerk_filter=0.0, max_integral=0.0)
+    sharp = Controller(lead_time_constant=0.0, jerk_filter=0.0, max_integral=0.0)
     assert error(fly(swerve(), load_vehicle("agile-quad"), controller=sharp)).max() < 1e-3
 
 

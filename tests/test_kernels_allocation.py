@@ -6,13 +6,13 @@ from hypothesis import strategies as st
 
 from aerobat.engines.batch import ArrayOps
 from aerobat.engines.floats import FloatOps
-from aerobat.engines.packing import airframes, components, joined, models
+from aerobat.engines.packing import airframes, components, joined, controller_models
 from aerobat.engines.trees import rows
 from aerobat.kernels.allocation import demand, fits, nearest
 from aerobat.kernels.controller import Controller
 from aerobat.kernels.motors import clamp
-from aerobat.kernels.rigid_body import Load
-from aerobat.states import STANDARD_GRAVITY, Wrench
+from aerobat.kernels.rigid_body import Wrench
+from aerobat.states import Wrench
 from aerobat.vehicle import Vehicle, collective_range, load_vehicle, rotor_thrusts, wrench
 from random_vehicles import (
     SAMPLES,
@@ -29,7 +29,7 @@ from random_vehicles import (
 def allocate(vehicle: Vehicle, load: Wrench) -> np.ndarray:
     """Thrusts for a batch of loads (k,): exact where they fit, the kernel's `nearest` elsewhere."""
     count = len(load.thrust)
-    airframe, mixer = airframes([vehicle] * count), models(Controller(), [vehicle] * count).mixer
+    airframe, mixer = airframes([vehicle] * count), controller_models(Controller(), [vehicle] * count).mixer
     asked = Load(load.thrust, components(load.moment_body))
     exact = demand(mixer, asked)
     limited, whole = nearest(ArrayOps, airframe.rotors, mixer, asked), fits(airframe.rotors, exact)
@@ -106,7 +106,7 @@ def test_floats_allocate_as_arrays_do(rotors: int, seed: int) -> None:
     vehicle, rng = load_vehicle({4: "agile-quad", 6: "hexarotor"}[rotors]), np.random.default_rng(seed)
     load = demands(vehicle, rng)
     together = allocate(vehicle, load)
-    airframe, mixer = airframes([vehicle]), models(Controller(), [vehicle]).mixer
+    airframe, mixer = airframes([vehicle]), controller_models(Controller(), [vehicle]).mixer
     one_airframe, one_mixer = next(rows((airframe.rotors, mixer), iter))
     for k in range(5):
         asked = next(rows(Load(load.thrust[k : k + 1], components(load.moment_body[k : k + 1])), iter))
@@ -125,4 +125,4 @@ def test_a_collective_out_of_reach_is_brought_to_the_nearest_that_can_be_held(ma
     load = wrench(vehicle, thrusts)
     np.testing.assert_allclose(load.thrust, [low, low, high, high], rtol=0, atol=1e-9 * span(vehicle))
     np.testing.assert_allclose(load.moment_body, 0, rtol=0, atol=1e-9 * span(vehicle))
-    assert low <= vehicle.mass * STANDARD_GRAVITY <= high
+    assert low <= vehicle.mass * vehicle.gravity <= high

@@ -30,7 +30,7 @@ QUAD = replace(
     inertia=AGILE.inertia * 1.04 + 1e-4 * np.ones((3, 3)) * np.trace(AGILE.inertia),
 )  # not quite what its controller believes
 PATH, RATE = loops(6.0), 500.0
-GAINS = tuple(f.name for f in fields(Controller) if f.type == "float" and f.name != "lead_filter")
+GAINS = tuple(f.name for f in fields(Controller) if f.type == "float" and f.name != "lead_time_constant")
 FIVE = ("position_gain", "velocity_gain", "integral_gain", "attitude_frequency", "attitude_damping")
 ROTORS = ("lag", "torque_coefficient", "min_thrust", "max_thrust", "position_body")
 START = BodyState(
@@ -89,16 +89,16 @@ def test_slopes_in_gains(name: str, everything: Sensitivity) -> None:
     assert_slopes(value * listed(everything, name), flights, 2e-5)
 
 
-@pytest.mark.parametrize("agility", [15.0, 100.0])
+@pytest.mark.parametrize("max_bandwidth", [15.0, 100.0])
 @pytest.mark.parametrize("name", GAINS)
-def test_gains_have_slopes_on_weak_rotors_too(name: str, agility: float) -> None:
+def test_gains_have_slopes_on_weak_rotors_too(name: str, max_bandwidth: float) -> None:
     """Where the vehicle, not the controller, sets how fast the loops are."""
     value = getattr(TIGHT, name)
-    gains = replace(TIGHT, **{name: Dual(value, value)}).gains(agility, DualOps(FloatOps))
+    gains = replace(TIGHT, **{name: Dual(value, value)}).gains(max_bandwidth, DualOps(FloatOps))
     got = [dual(gain).slope or 0.0 for gain in gains]
 
     def changed(moves: Array) -> Array:
-        return np.array([replace(TIGHT, **{name: value * (1.0 + h)}).gains(agility) for h in moves])
+        return np.array([replace(TIGHT, **{name: value * (1.0 + h)}).gains(max_bandwidth) for h in moves])
 
     assert_slopes(np.array(got), changed, 1e-3, rtol=1e-9)
 
@@ -225,8 +225,8 @@ def test_answers_cannot_be_written_to() -> None:
         ((), "of must name at least one quantity, such as 'position_gain' or 'mass'"),
         ("positon_gain", "no differentiable quantity named 'positon_gain'; did you mean 'position_gain'?"),
         (("mass", 3), "no differentiable quantity named '3'; known: position_gain"),
-        ("lead_filter", "lead_filter has no slope"),
-        ("yaw_shed_first", "no differentiable quantity named 'yaw_shed_first'"),
+        ("lead_time_constant", "lead_time_constant has no slope"),
+        ("prioritize_tilt", "no differentiable quantity named 'prioritize_tilt'"),
     ],
 )
 def test_what_has_no_slope_is_refused(of: object, message: str) -> None:

@@ -14,7 +14,7 @@ from aerobat.engines.packing import airframes, bodies, body_states
 from aerobat.engines.trees import rows
 from aerobat.kernels import motors, rigid_body
 from aerobat.kernels.integrator import Airframe, Motion, advance
-from aerobat.kernels.rigid_body import Body, Inertial, Load
+from aerobat.kernels.rigid_body import Body, MassProperties, Wrench
 from aerobat.simulation import plant
 from aerobat.states import BodyState
 from aerobat.vehicle import Vehicle, load_vehicle
@@ -32,15 +32,15 @@ def airframe_of(vehicle: Vehicle) -> Airframe:
     return next(rows(airframes([vehicle]), iter))
 
 
-def inertial_of(**changes) -> Inertial:
-    return airframe_of(replace(load_vehicle("hexarotor"), inertia=FULL_INERTIA, **changes)).inertial
+def inertial_of(**changes) -> MassProperties:
+    return airframe_of(replace(load_vehicle("hexarotor"), inertia=FULL_INERTIA, **changes)).mass_properties
 
 
 def body_of(state: BodyState) -> Body:
     return next(rows(bodies(BodyState(**{k: v[None] for k, v in vars(state).items()})), iter))
 
 
-def flown(inertial: Inertial, body: Body, load: Callable[[float], Load], end: float, steps: int) -> Body:
+def flown(inertial: MassProperties, body: Body, load: Callable[[float], Load], end: float, steps: int) -> Body:
     dt = end / steps
     for k in range(steps):
         loads = tuple(load((k + part) * dt) for part in (0.0, 0.5, 1.0))

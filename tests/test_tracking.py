@@ -72,7 +72,7 @@ def test_the_half_flip_passes_a_gate_at_90_degrees_at_twice_the_speed_of_the_pap
     assert result.gate_attitude_error_deg < 1.0
 
 
-@pytest.mark.parametrize("switch", ["moment_feedforward", "motor_lag_lead"])
+@pytest.mark.parametrize("switch", ["moment_feedforward", "motor_lag_compensation"])
 def test_each_feed_forward_pays_at_least_tenfold(switch: str) -> None:
     vehicle, problem = load_vehicle("agile-quad"), load_problem("flip-roll-translation")
     trajectory = planned(problem, vehicle).trajectory

@@ -12,17 +12,16 @@ import numpy as np
 from aerobat import so3
 from aerobat.arrays import Array, frozen
 from aerobat.engines.engine import Init, Step
-from aerobat.engines.packing import airframes, bodies, components, models
-from aerobat.environment import Environment
+from aerobat.engines.packing import airframes, bodies, components, controller_models
 from aerobat.errors import SpecError
 from aerobat.flatness import lateral_drag, reference
 from aerobat.flight import DIVERGED
 from aerobat.kernels import control, tally
-from aerobat.kernels.control import Commands, Memory, Model
+from aerobat.kernels.control import Commands, ControllerState, ControllerModel
 from aerobat.kernels.controller import Controller
 from aerobat.kernels.integrator import Airframe, Motion
 from aerobat.kernels.ops import Ops, Scalar
-from aerobat.kernels.position_loop import Ahead, Target
+from aerobat.kernels.position_loop import Lookahead, ReferencePoint
 from aerobat.kernels.rigid_body import Body
 from aerobat.kernels.tally import Asked, Bounds, Tally
 from aerobat.metrics import passage_window
@@ -38,14 +37,14 @@ class Given(NamedTuple):
     """What does not change along a flight."""
 
     airframe: Airframe  # what flies
-    model: Model  # what the controller believes flies
+    model: ControllerModel  # what the controller believes flies
     start: Body
 
 
 class Tick(NamedTuple):
     """What the loop is told at each tick."""
 
-    target: Target
+    target: ReferencePoint
     elapsed: Scalar  # [s] since the tick before
     period: Scalar  # [s] until the next
     error: Body | tuple[()]  # of what the controller sees
@@ -73,7 +72,6 @@ class Prepared:
     ticks: Tick
     times: Array  # [s]
     setpoint: Setpoint
-    environment: Environment
     vehicles: tuple[Vehicle, ...]  # that fly
     believed: tuple[Vehicle, ...]  # that their controllers believe in
     batch: bool  # whether one was asked for
@@ -95,7 +93,7 @@ def prepare(
     trajectory: Trajectory,
     vehicle: Vehicle | Sequence[Vehicle],
     *,
-    environment: Environment,
+    yaw: float,
     controller: Controller,
     rate: float,
     start: BodyState | None,
@@ -105,28 +103,23 @@ def prepare(
 ) -> Prepared:
     """All that a flight takes; see `flying.fly`. Raises SpecError for arguments that do not fit together."""
     flown, believed, batch = _crew(vehicle, model, start)
-    asked = reference(trajectory, believed[0], rate=rate, environment=environment)
+    asked = reference(trajectory, believed[0], rate=rate, yaw=yaw)
     setpoint, times = asked.setpoint, asked.times
-    later = np.minimum(times + controller.effect_delay(1.0 / rate), times[-1])
-    ahead = reference(trajectory, believed[0], times=later, environment=environment).setpoint
+    later = np.minimum(times + controller.actuation_delay(1.0 / rate), times[-1])
+    ahead = reference(trajectory, believed[0], times=later, yaw=yaw).setpoint
     # all but the last period alike to the last bit, so that an engine may see that they are
     periods = np.append(np.full(len(times) - 2, 1.0 / rate), [times[-1] - times[-2], 0.0])
     ticks = Tick(
-        _target(setpoint, ahead, environment.gravity),
+        _target(setpoint, ahead, believed[0].gravity),
         np.append(periods[0], periods[:-1]),
         periods,
         () if noise is None else bodies(noise.drawn(_generators(seed, len(flown), batch), len(times))),
     )
     return Prepared(
-        given=Given(
-            airframes(flown, environment),
-            models(controller, believed, environment),
-            _started(start, setpoint, len(flown)),
-        ),
+        given=Given(airframes(flown), controller_models(controller, believed), _started(start, setpoint, len(flown))),
         ticks=ticks,
         times=times,
         setpoint=setpoint,
-        environment=environment,
         vehicles=tuple(flown),
         believed=tuple(believed),
         batch=batch,
@@ -162,13 +155,13 @@ def _closed_loop(switches: Controller, steps: int) -> tuple[Init, Step]:
     def seen(body: Body, tick: Tick) -> Body:
         return observed(body, tick.error) if tick.error else body
 
-    def init(ops: Ops, given: Given, tick: Tick) -> tuple[Motion, Memory]:
+    def init(ops: Ops, given: Given, tick: Tick) -> tuple[Motion, ControllerState]:
         memory = control.init(ops, given.model, seen(given.start, tick), tick.target)
         return Motion(given.start, memory.thrusts), memory
 
     def step(
-        ops: Ops, given: Given, carry: tuple[Motion, Memory], tick: Tick
-    ) -> tuple[tuple[Motion, Memory], Row]:
+        ops: Ops, given: Given, carry: tuple[Motion, ControllerState], tick: Tick
+    ) -> tuple[tuple[Motion, ControllerState], Row]:
         motion, memory = carry
         body = seen(motion.body, tick)
         memory = control.step(ops, switches, given.model, memory, body, tick.target, tick.elapsed)
@@ -183,8 +176,8 @@ def _switches(controller: Controller) -> Controller:
     """Only what makes the loop another one; its gains are the model's."""
     return Controller(
         moment_feedforward=controller.moment_feedforward,
-        motor_lag_lead=controller.motor_lag_lead,
-        yaw_shed_first=controller.yaw_shed_first,
+        motor_lag_compensation=controller.motor_lag_compensation,
+        prioritize_tilt=controller.prioritize_tilt,
     )
 
 
@@ -212,6 +205,8 @@ def _crew(
         raise SpecError(
             "vehicle: all vehicles of one flight, and their model, need as many rotors; fly others apart"
         )
+    if len({each.gravity for each in believed}) > 1:
+        raise SpecError("vehicle: all vehicles of one flight need the same gravity; fly others apart")
     if len({lateral_drag(each) for each in believed}) > 1:
         raise SpecError(
             "vehicle: vehicles that differ in drag per mass need different attitudes; fly them apart, "
@@ -244,17 +239,17 @@ def _started(start: BodyState | None, setpoint: Setpoint, vehicles: int) -> Body
         raise SpecError(f"start must carry the same leading axis of {vehicles} in all its fields") from None
 
 
-def _target(setpoint: Setpoint, ahead: Setpoint, gravity: float) -> Target:
+def _target(setpoint: Setpoint, ahead: Setpoint, gravity: float) -> ReferencePoint:
     now, then = _specific_thrust(setpoint, gravity), _specific_thrust(ahead, gravity)
     change = np.linalg.norm(then, axis=-1) - np.linalg.norm(now, axis=-1)
-    return Target(
+    return ReferencePoint(
         components(setpoint.flat.position),
         components(setpoint.flat.velocity),
         components(now),
         components(setpoint.flat.jerk),
         components(setpoint.q_world_body),
         components(so3.rotate(setpoint.q_world_body, setpoint.omega_body)),
-        Ahead(
+        Lookahead(
             change,
             components(so3.rotate(ahead.q_world_body, ahead.omega_body)),
             components(so3.rotate(ahead.q_world_body, ahead.omega_dot_body)),

@@ -18,9 +18,8 @@ from aerobat.documents import unknown_name
 from aerobat.engines.batch import ArrayOps
 from aerobat.engines.duals import Dual, DualOps, differentiated, dual
 from aerobat.engines.engine import Init, Step
-from aerobat.engines.packing import body_states, components, models
+from aerobat.engines.packing import body_states, components, controller_models
 from aerobat.engines.trees import Tree, leaves, refilled
-from aerobat.environment import Environment
 from aerobat.errors import SpecError
 from aerobat.kernels.controller import Controller, Gains
 from aerobat.kernels.integrator import Airframe
@@ -33,7 +32,7 @@ from aerobat.trajectory import Trajectory
 from aerobat.vehicle import Vehicle
 
 # the lead's filter also sets how far ahead set-points are read, which may jump from piece to piece
-_GAINS = tuple(f.name for f in fields(Controller) if f.type == "float" and f.name != "lead_filter")
+_GAINS = tuple(f.name for f in fields(Controller) if f.type == "float" and f.name != "lead_time_constant")
 _EACH_ROTOR = 0
 _SHAPES: Mapping[str, tuple[int, ...]] = {
     **dict.fromkeys(_GAINS, ()),
@@ -87,7 +86,7 @@ def gradient(
     vehicle: Vehicle | Sequence[Vehicle],
     of: str | Sequence[str],
     *,
-    environment: Environment | None = None,
+    yaw: float = 0.0,
     controller: Controller = Controller(),  # noqa: B008 - frozen
     rate: float = 500.0,
     start: BodyState | None = None,
@@ -98,7 +97,7 @@ def gradient(
 ) -> Sensitivity:
     """Fly as `fly` does with the same arguments, and differentiate the flight's errors.
 
-    `of` names quantities: a gain of Controller (all but lead_filter); of the vehicle that flies "mass",
+    `of` names quantities: a gain of Controller (all but lead_time_constant); of the vehicle that flies "mass",
     "inertia", "drag_body"; of each of its rotors "rotors.position_body", "rotors.min_thrust",
     "rotors.max_thrust", "rotors.torque_coefficient", "rotors.lag"; "start.position", "start.velocity",
     "start.attitude" (a rotation [rad] about body axes), "start.omega_body". Slopes in the inertia are for
@@ -116,7 +115,7 @@ def gradient(
     flight = prepare(
         trajectory,
         vehicle,
-        environment=environment or Environment(),
+        yaw=yaw,
         controller=controller,
         rate=rate,
         start=start,
@@ -138,9 +137,9 @@ def _known(names: tuple[str, ...]) -> tuple[str, ...]:
     if not names:
         raise SpecError("of must name at least one quantity, such as 'position_gain' or 'mass'")
     for name in names:
-        if name == "lead_filter":
+        if name == "lead_time_constant":
             raise SpecError(
-                "lead_filter has no slope: it also moves where set-points are read, and they jump"
+                "lead_time_constant has no slope: it also moves where set-points are read, and they jump"
             )
         if name not in _SHAPES:
             raise unknown_name("differentiable quantity", str(name), _SHAPES)
@@ -224,7 +223,7 @@ def _moved(flight: Prepared, controller: Controller, name: str, unit: Array) -> 
     vehicles = len(flight.vehicles)
     still: Given = refilled(flight.given, map(np.zeros, repeat(vehicles)))
     if name in _GAINS:
-        gains = _gains(controller, flight, name)
+        gains = _gains(controller, flight.believed, name)
         return still._replace(model=still.model._replace(gains=gains))
     if name.startswith("start."):
         return still._replace(start=_start(still.start, flight.given.start, name, unit))
@@ -233,11 +232,9 @@ def _moved(flight: Prepared, controller: Controller, name: str, unit: Array) -> 
     return still._replace(airframe=_inertial(still.airframe, flight.vehicles, name, unit))
 
 
-def _gains(controller: Controller, flight: Prepared, name: str) -> Gains:
-    believed = flight.believed
+def _gains(controller: Controller, believed: Sequence[Vehicle], name: str) -> Gains:
     number: Any = Dual(getattr(controller, name), 1.0)
-    dual_controller = replace(controller, **{name: number})
-    gains = models(dual_controller, believed, flight.environment, DualOps(ArrayOps)).gains
+    gains = controller_models(replace(controller, **{name: number}), believed, DualOps(ArrayOps)).gains
     slopes = (dual(gain).slope for gain in gains)
     return Gains(*(np.zeros(len(believed)) if x is None else x + np.zeros(len(believed)) for x in slopes))
 
@@ -251,7 +248,7 @@ def _start(still: Body, start: Body, name: str, unit: Array) -> Body:
 
 
 def _inertial(still: Airframe, vehicles: Sequence[Vehicle], name: str, unit: Array) -> Airframe:
-    inertial = still.inertial
+    inertial = still.mass_properties
     if name == "inertia":  # d(J⁻¹) = −J⁻¹ dJ J⁻¹
         change = 0.5 * (unit + unit.T)
         inverse = np.linalg.inv([vehicle.inertia for vehicle in vehicles])
@@ -263,7 +260,7 @@ def _inertial(still: Airframe, vehicles: Sequence[Vehicle], name: str, unit: Arr
         moved = inertial._replace(mass=np.ones(len(vehicles)))
     else:
         moved = inertial._replace(drag_body=_alike(unit, len(vehicles)))
-    return still._replace(inertial=moved)
+    return still._replace(mass_properties=moved)
 
 
 def _rotors(still: Airframe, vehicles: Sequence[Vehicle], name: str, unit: Array) -> Airframe:
@@ -272,7 +269,7 @@ def _rotors(still: Airframe, vehicles: Sequence[Vehicle], name: str, unit: Array
         case "rotors.lag":
             lags = np.array([vehicle.lags for vehicle in vehicles])
             rates = np.divide(-unit, lags**2, out=np.zeros_like(lags), where=lags > 0.0)
-            moved = rotors._replace(lag_rate=components(rates))
+            moved = rotors._replace(inverse_time_constant=components(rates))
         case "rotors.position_body":
             total, _, _, yaw = rotors.allocation
             x, y, _ = unit.T
