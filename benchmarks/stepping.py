@@ -29,7 +29,6 @@ import numpy as np
 
 import aerobat as ab
 from aerobat.engines import compiled
-from aerobat.engines.loops import Loop, traced
 from stepping_peers import PEERS, VEHICLES, Peer
 
 ENGINES = ("numpy", "jax", "jax-float32", "compiled")

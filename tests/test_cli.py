@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 
 from aerobat import cli
-from aerobat.flight import load_flight
 from aerobat.interchange.csv import read_csv
 from aerobat.problem import problem_names
+from aerobat.simulation import load_flight
 from aerobat.vehicle import vehicle_names
 
 PLAN_KEYS = {

@@ -8,10 +8,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from aerobat import so3
+from aerobat.control import Controller
 from aerobat.errors import SpecError
-from aerobat.flight import Flight
-from aerobat.flying import fly
-from aerobat.kernels.controller import Controller
+from aerobat.simulation import Flight, fly
 from aerobat.states import STANDARD_GRAVITY, BodyState
 from aerobat.trajectory import Trajectory
 from aerobat.vehicle import load_vehicle, vehicle_names
@@ -92,7 +91,7 @@ def test_thrown_into_the_air_in_any_attitude_it_comes_back(name: str, tilt_deg: 
 def test_a_wrong_mass_leaves_no_lasting_error(name: str) -> None:
     vehicle = load_vehicle(name)
     heavy = replace(vehicle, mass=1.05 * vehicle.mass)
-    flight = fly(hover(12.0), heavy, model=vehicle)
+    flight = fly(hover(12.0), heavy, nominal=vehicle)
     assert error(flight).max() > 1e-3
     assert error(flight)[-1] < 0.05 * error(flight).max()
 
@@ -107,7 +106,7 @@ def test_each_feed_forward_brings_the_vehicle_nearer_to_its_path(switch: str) ->
 def test_drag_that_the_controller_knows_of_is_made_up_for() -> None:
     vehicle = load_vehicle("agile-quad")
     dragged = replace(vehicle, drag_body=np.array([0.3, 0.3, 0.3]))
-    unknown = error(fly(swerve(), dragged, model=vehicle)).max()
+    unknown = error(fly(swerve(), dragged, nominal=vehicle)).max()
     assert unknown > 0.01
     assert error(fly(swerve(), dragged)).max() < 0.1 * unknown
 

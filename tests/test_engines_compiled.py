@@ -7,13 +7,11 @@ from typing import Any
 import llvmlite.binding as llvm
 import numpy as np
 import pytest
+from aerobat.engines.emitting import Layout, module
 
 from aerobat.engines import compiled
-from aerobat.engines.emitting import Layout, module
 from aerobat.engines.floats import scan as float_scan
-from aerobat.engines.loops import traced
-from aerobat.flying import fly
-from aerobat.simulation import StateNoise
+from aerobat.simulation import StateNoise, fly
 from aerobat.trajectory import Trajectory
 from aerobat.vehicle import load_vehicle
 from test_flying_batches import loops, near

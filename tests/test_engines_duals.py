@@ -10,9 +10,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from aerobat.engines import NUMPY, choose
-from aerobat.engines.batch import ArrayOps
 from aerobat.engines.duals import Dual, DualOps, differentiated, dual
 from aerobat.engines.floats import FloatOps
+from aerobat.engines.numpy import ArrayOps
 
 jax = pytest.importorskip("jax")
 import jax.numpy as jnp  # noqa: E402 - after what it needs

@@ -7,9 +7,9 @@ import pytest
 
 from aerobat.engines import FLOATS
 from aerobat.engines.engine import Engine, told
-from aerobat.flying import fly
 from aerobat.planning import Miqp, plan
 from aerobat.problem import load_problem
+from aerobat.simulation import fly
 from aerobat.vehicle import load_vehicle
 
 jax = pytest.importorskip("jax")

@@ -21,7 +21,9 @@ class Clock(NamedTuple):
 
     elapsed: Any
 
-    piecewise_constant = True
+    @property
+    def piecewise_constant(self) -> bool:
+        return True
 
 
 class Inputs(NamedTuple):
@@ -99,9 +101,7 @@ def test_one_scan_chunks_of_any_size_and_single_steps_give_the_same_bits(engine:
 def test_any_cuts_give_the_same_bits(cuts: list[int], engine: str) -> None:
     inputs = drawn(200, 5)
     loop = loop_of(engine, inputs)
-    assert_same(
-        in_chunks(loop, inputs, [0, *sorted(set(cuts)), 200]), in_chunks(loop, inputs, [0, 200])
-    )
+    assert_same(in_chunks(loop, inputs, [0, *sorted(set(cuts)), 200]), in_chunks(loop, inputs, [0, 200]))
 
 
 @pytest.mark.parametrize("engine", NAMES)
@@ -138,9 +138,7 @@ def test_inputs_that_are_overwritten_after_a_scan_leave_its_carry_alone(engine: 
         return inputs.own, carry
 
     inputs = drawn(10)
-    loop = choose(engine, VEHICLES, 10).compile(
-        remembering, shift, np.ones(VEHICLES), first_row(inputs)
-    )
+    loop = choose(engine, VEHICLES, 10).compile(remembering, shift, np.ones(VEHICLES), first_row(inputs))
     carry, _ = loop.scan(loop.init(first_row(inputs)), inputs)
     last = inputs.own[-1].copy()
     inputs.own[...] = 0.0

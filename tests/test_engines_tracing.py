@@ -9,7 +9,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from aerobat.engines.floats import FloatOps
-from aerobat.engines.loops import traced
 from aerobat.engines.tracing import FUNCTIONS, BranchError, Symbol, Trace, TraceOps
 
 NUMBERS = st.floats(-5.0, 5.0)

@@ -6,12 +6,10 @@ import numpy as np
 import pytest
 
 from aerobat import so3
+from aerobat.control import Controller
 from aerobat.engines import FLOATS, NUMPY, choose
 from aerobat.errors import BackendMissing, SpecError
-from aerobat.flight import COMPLETE, Flight
-from aerobat.flying import fly
-from aerobat.kernels.controller import Controller
-from aerobat.simulation import StateNoise
+from aerobat.simulation import Flight, StateNoise, fly
 from aerobat.states import BodyState
 from aerobat.trajectory import Trajectory
 from aerobat.vehicle import load_vehicle

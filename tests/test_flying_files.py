@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 
 from aerobat.errors import SpecError
-from aerobat.flight import Flight, load_flight
-from aerobat.flying import fly
+from aerobat.simulation import Flight, fly, load_flight
 from aerobat.states import BodyState
 from aerobat.trajectory import Trajectory
 from aerobat.vehicle import load_vehicle

@@ -10,11 +10,10 @@ import pytest
 
 from aerobat import so3
 from aerobat.errors import SpecError
-from aerobat.flying import fly
-from aerobat.metrics import Score, score
+from aerobat.evaluation.score import Score, score
 from aerobat.planning import Plan, plan
 from aerobat.problem import load_problem
-from aerobat.simulation import StateNoise
+from aerobat.simulation import StateNoise, fly
 from aerobat.states import BodyState
 from aerobat.vehicle import Vehicle, load_vehicle
 
@@ -54,8 +53,8 @@ def assert_same(a: Score, b: Score, tolerance: float) -> None:
 @pytest.mark.parametrize("engine", EXACT)
 def test_scores_are_those_of_the_logged_flights(engine: str, flip: Plan) -> None:
     vehicles, noise = dispersed(6), StateNoise.fused()
-    logged = fly(flip.trajectory, vehicles, model=QUAD, noise=noise, engine="floats")
-    scores = fly(flip.trajectory, vehicles, model=QUAD, noise=noise, engine=engine, scored=flip.problem)
+    logged = fly(flip.trajectory, vehicles, nominal=QUAD, noise=noise, engine="floats")
+    scores = fly(flip.trajectory, vehicles, nominal=QUAD, noise=noise, engine=engine, scored=flip.problem)
     for k, vehicle in enumerate(vehicles):
         assert_same(scores[k], score(logged[k], flip.problem, vehicle), 1e-9)
 
@@ -86,10 +85,10 @@ from test_flying_scores import QUAD, assert_same, dispersed, fly, load_problem, 
 
 problem = load_problem("flip-roll")
 trajectory, fleet, starts = plan(problem, vehicle=QUAD).trajectory, dispersed(10_000), near(10_000, 0.1)
-scores = fly(trajectory, fleet, start=starts, model=QUAD, scored=problem)
+scores = fly(trajectory, fleet, start=starts, nominal=QUAD, scored=problem)
 assert len(scores) == 10_000
 for k in range(0, 10_000, 500):
-    alone = fly(trajectory, fleet[k], start=started(starts, k), model=QUAD, scored=problem, engine="floats")
+    alone = fly(trajectory, fleet[k], start=started(starts, k), nominal=QUAD, scored=problem, engine="floats")
     assert_same(scores[k], alone[0], 1e-9)
 print(next(line.split()[1] for line in open("/proc/self/status") if line.startswith("VmHWM")))
 """
@@ -117,10 +116,10 @@ def test_ten_thousand_flights_take_little_memory_and_are_those_of_floats() -> No
 def test_scores_do_not_depend_on_what_flies_beside(flip: Plan) -> None:
     """To the last bit, whatever the size of the batch."""
     vehicles = dispersed(21)
-    scores = fly(flip.trajectory, vehicles, model=QUAD, scored=flip.problem, engine="compiled")
+    scores = fly(flip.trajectory, vehicles, nominal=QUAD, scored=flip.problem, engine="compiled")
     for count in (1, 3, 16, 20):
         assert (
-            fly(flip.trajectory, vehicles[:count], model=QUAD, scored=flip.problem, engine="compiled")
+            fly(flip.trajectory, vehicles[:count], nominal=QUAD, scored=flip.problem, engine="compiled")
             == (scores[:count])
         )
 

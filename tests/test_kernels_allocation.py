@@ -1,15 +1,15 @@
 """Rotor thrusts within limits: what is made of a load, and what is given up of one that does not fit."""
 
 import numpy as np
+from aerobat.engines.packing import airframes, components, controller_models, joined
+from aerobat.engines.trees import rows
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from aerobat.engines.batch import ArrayOps
+from aerobat.control import Controller
 from aerobat.engines.floats import FloatOps
-from aerobat.engines.packing import airframes, components, joined, controller_models
-from aerobat.engines.trees import rows
+from aerobat.engines.numpy import ArrayOps
 from aerobat.kernels.allocation import demand, fits, nearest
-from aerobat.kernels.controller import Controller
 from aerobat.kernels.motors import clamp
 from aerobat.kernels.rigid_body import Wrench
 from aerobat.states import Wrench

@@ -2,13 +2,13 @@
 
 import numpy as np
 import pytest
+from aerobat.engines.packing import components, joined
 from hypothesis import given
 from hypothesis import strategies as st
 
 from aerobat import so3
-from aerobat.engines.batch import ArrayOps
 from aerobat.engines.floats import FloatOps
-from aerobat.engines.packing import components, joined
+from aerobat.engines.numpy import ArrayOps
 from aerobat.kernels import vectors
 
 SEEDS = st.integers(0, 2**32 - 1)

@@ -7,10 +7,9 @@ import pytest
 
 from aerobat import so3
 from aerobat.errors import SpecError
-from aerobat.flight import Flight
-from aerobat.flying import fly
-from aerobat.metrics import gate_passage, score
+from aerobat.evaluation.score import gate_passage, score
 from aerobat.problem import Problem, at_rest, tilted_gate
+from aerobat.simulation import Flight, fly
 from aerobat.states import BodyState
 from aerobat.trajectory import Trajectory
 from aerobat.vehicle import Vehicle, load_vehicle

@@ -9,15 +9,14 @@ import pytest
 
 from aerobat import so3
 from aerobat.arrays import Array
+from aerobat.control import Controller
 from aerobat.engines.duals import Dual, DualOps, dual
 from aerobat.engines.floats import FloatOps
 from aerobat.errors import SpecError
-from aerobat.flying import fly
-from aerobat.kernels.controller import Controller
-from aerobat.metrics import attitude_error, position_error
+from aerobat.evaluation import Sensitivity
+from aerobat.evaluation.score import attitude_error, position_error
 from aerobat.problem import load_problem
-from aerobat.sensitivity import Sensitivity, gradient
-from aerobat.simulation import StateNoise
+from aerobat.simulation import StateNoise, fly
 from aerobat.states import BodyState
 from aerobat.vehicle import Vehicle, load_vehicle
 from test_flying_batches import loops, near, one

@@ -6,15 +6,15 @@ from dataclasses import replace
 import mujoco
 import numpy as np
 import pytest
+from aerobat.engines.packing import airframes, bodies, body_states
+from aerobat.engines.trees import rows
 from scipy.integrate import solve_ivp
 
 from aerobat import so3
 from aerobat.engines.floats import FloatOps
-from aerobat.engines.packing import airframes, bodies, body_states
-from aerobat.engines.trees import rows
 from aerobat.kernels import motors, rigid_body
-from aerobat.kernels.integrator import Airframe, Motion, advance
-from aerobat.kernels.rigid_body import Body, MassProperties, Wrench
+from aerobat.kernels.motors import Airframe, Motion, advance
+from aerobat.kernels.rigid_body import Body, MassProperties
 from aerobat.simulation import plant
 from aerobat.states import BodyState
 from aerobat.vehicle import Vehicle, load_vehicle
@@ -40,7 +40,9 @@ def body_of(state: BodyState) -> Body:
     return next(rows(bodies(BodyState(**{k: v[None] for k, v in vars(state).items()})), iter))
 
 
-def flown(inertial: MassProperties, body: Body, load: Callable[[float], Load], end: float, steps: int) -> Body:
+def flown(
+    inertial: MassProperties, body: Body, load: Callable[[float], Load], end: float, steps: int
+) -> Body:
     dt = end / steps
     for k in range(steps):
         loads = tuple(load((k + part) * dt) for part in (0.0, 0.5, 1.0))

@@ -5,13 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from aerobat.flight import Flight
-from aerobat.flying import fly
-from aerobat.kernels.controller import Controller
-from aerobat.metrics import score
+from aerobat.control import Controller
+from aerobat.evaluation.score import score
 from aerobat.planning import Miqp, Plan, plan
 from aerobat.problem import Problem, load_problem
-from aerobat.simulation import StateNoise
+from aerobat.simulation import Flight, StateNoise, fly
 from aerobat.vehicle import Vehicle, load_vehicle
 
 MANEUVERS = ["flip-roll", "flip-roll-translation", "flip-pitch", "half-flip", "line"]
@@ -99,7 +97,7 @@ def test_dispersed_vehicles_stay_within_a_hand_of_the_path() -> None:
     rng = np.random.default_rng(7)
     others = [dispersed(vehicle, rng) for _ in range(40)]
     trajectory = planned(problem, vehicle).trajectory
-    flights = fly(trajectory, others, model=vehicle)
+    flights = fly(trajectory, others, nominal=vehicle)
     worst = [score(flights[k], problem).max_position_error_m for k in range(len(others))]
     assert np.median(worst) < 0.05
     assert np.quantile(worst, 0.95) < 0.12

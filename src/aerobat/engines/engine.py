@@ -57,8 +57,8 @@ class Compile(Protocol):
             step: makes the next carry and the row of one tick; both are written in `ops`.
             parameters: leaves (vehicles,).
             inputs: of one tick; leaves are numbers where all vehicles have the same, else (vehicles,). Those
-                below a tuple whose type declares `piecewise_constant = True` change at few ticks: a hint to
-                the compiler, which changes no result.
+                below a tuple with a true attribute `piecewise_constant` change at few ticks: a hint to the
+                compiler, which changes no result.
         """
 
 

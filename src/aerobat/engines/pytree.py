@@ -53,14 +53,14 @@ def tree_rows(tree: Tree, iterate: Callable[[Any], Iterator[Any]]) -> Iterator[T
 
 
 def piecewise_constant_leaves(tree: Tree) -> list[bool]:
-    """For each leaf, true below a tuple whose type declares `piecewise_constant = True`."""
+    """For each leaf, true below a tuple that is `piecewise_constant`."""
     return tree_leaves(_marked(tree, False))
 
 
 def _marked(tree: Tree, mark: bool) -> Tree:
     if not isinstance(tree, tuple):
         return mark
-    mark = mark or getattr(type(tree), "piecewise_constant", False)
+    mark = mark or getattr(tree, "piecewise_constant", False)
     return tuple(_marked(child, mark) for child in tree)
 
 

@@ -47,7 +47,9 @@ def desaturate(ops: Ops, rotors: Rotors, mixer: Mixer, load: Wrench) -> PerRotor
     """
     mx, my, mz = load.moment_body
     tilting = tuple(a * mx + b * my for a, b in zip(mixer.roll, mixer.pitch, strict=True))
-    thrust = clip(ops, _lowered(ops, rotors, mixer, load.thrust, tilting), mixer.min_collective, mixer.max_collective)
+    thrust = clip(
+        ops, _lowered(ops, rotors, mixer, load.thrust, tilting), mixer.min_collective, mixer.max_collective
+    )
     level = tuple(c * thrust for c in mixer.collective)
     tilted = _as_far_as_fits(ops, rotors, level, tilting)
     return clamp(ops, rotors, _as_far_as_fits(ops, rotors, tilted, tuple(d * mz for d in mixer.yaw)))

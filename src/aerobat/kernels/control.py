@@ -101,7 +101,9 @@ def step(
     return ControllerState(outer, integral, thrusts, commands)
 
 
-def _collective(ops: Ops, mass: Scalar, b3: Vector, attitude: AttitudeCommand, reference: ReferencePoint) -> Scalar:
+def _collective(
+    ops: Ops, mass: Scalar, b3: Vector, attitude: AttitudeCommand, reference: ReferencePoint
+) -> Scalar:
     """The collective thrust [N]: the commanded specific thrust along b3, whichever way the vehicle points.
 
     Pointing away it would vanish, and with it the means to turn back: a part of |f| is kept.
@@ -145,5 +147,6 @@ def _leading(thrusts: PerRotor, desired: PerRotor, decay_factors: PerRotor, frac
     where the rotors are believed to be, it goes on pushing after a saturation until they have got there.
     """
     return tuple(
-        f + (w - f) * fraction / (1.0 - left) for f, w, left in zip(thrusts, desired, decay_factors, strict=True)
+        f + (w - f) * fraction / (1.0 - left)
+        for f, w, left in zip(thrusts, desired, decay_factors, strict=True)
     )

@@ -7,7 +7,18 @@ from typing import NamedTuple
 from aerobat.kernels.ops import Axes, Matrix, Ops, Quaternion, Scalar, Vector
 from aerobat.kernels.quaternions import axes, conjugate, multiply, smallest_rotation, to_body, to_world
 from aerobat.kernels.rigid_body import Body, EnvironmentParameters, MassProperties
-from aerobat.kernels.vectors import ZERO, add, add_scaled, clamp_norm, cross, dot, norm, scale, subtract, transform
+from aerobat.kernels.vectors import (
+    ZERO,
+    add,
+    add_scaled,
+    clamp_norm,
+    cross,
+    dot,
+    norm,
+    scale,
+    subtract,
+    transform,
+)
 
 _MIN_THRUST = 1e-3  # [m/s²] a specific thrust below it has no direction to follow
 
@@ -65,7 +76,9 @@ def init_position_loop(
     reference: ReferencePoint,
 ) -> PositionLoopState:
     """The state before the first tick: no integral, and an answer that has stood for long."""
-    return PositionLoopState(ZERO, _feedback_acceleration(ops, gains, mass_properties, environment, ZERO, body, reference), ZERO)
+    return PositionLoopState(
+        ZERO, _feedback_acceleration(ops, gains, mass_properties, environment, ZERO, body, reference), ZERO
+    )
 
 
 def step_position_loop(
@@ -100,7 +113,9 @@ def _feedback_acceleration(
     proportional = scale(gains.position, subtract(reference.position, body.position))
     damping = scale(gains.velocity, subtract(reference.velocity, body.velocity))
     feedback = add_scaled(add(proportional, damping), gains.integral, integral)
-    return subtract(clamp_norm(ops, feedback, gains.max_feedback), _drag(mass_properties, environment, reference))
+    return subtract(
+        clamp_norm(ops, feedback, gains.max_feedback), _drag(mass_properties, environment, reference)
+    )
 
 
 def _drag(
@@ -158,7 +173,9 @@ def attitude_error(ops: Ops, body: Body, body_axes: Axes, attitude: AttitudeComm
     return AttitudeError(scale(sign, (x, y, z)), subtract(omega, body.omega_body))
 
 
-def integrate_attitude_error(ops: Ops, gains: Gains, integral: Vector, error: AttitudeError, elapsed: Scalar) -> Vector:
+def integrate_attitude_error(
+    ops: Ops, gains: Gains, integral: Vector, error: AttitudeError, elapsed: Scalar
+) -> Vector:
     """The integral of the attitude error [rad·s], `elapsed` [s] later."""
     longer = add_scaled(integral, 2.0 * elapsed, error.rotation)
     return clamp_norm(ops, longer, gains.max_attitude_integral)

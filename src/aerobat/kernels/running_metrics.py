@@ -52,7 +52,7 @@ class RunningMetrics(NamedTuple):
 
     flying: Scalar  # 1 until the vehicle has diverged, then 0
     is_finite: Scalar  # 0 once something was not a number
-    stop: Scalar  # [s] when it diverged
+    stop: Scalar  # [s] the last tick that counts, once it has diverged
     ground_time: Scalar  # [s] when it was below ground first, infinite if never
     ticks: Scalar  # that count
     max_square: Scalar  # [m²] of the position error
@@ -68,9 +68,7 @@ def init(gates: int) -> RunningMetrics:
     """Metrics before the first tick of a flight through so many gates."""
     nowhere = Snapshot(0.0, ZERO, ZERO, (1.0, 0.0, 0.0, 0.0))
     approach = GateApproach(0.0, nowhere, inf)
-    return RunningMetrics(
-        1.0, 1.0, 0.0, inf, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, nowhere, gates * (approach,)
-    )
+    return RunningMetrics(1.0, 1.0, 0.0, inf, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, nowhere, gates * (approach,))
 
 
 def step(
@@ -107,7 +105,7 @@ def step(
     return RunningMetrics(
         flying=going,
         is_finite=ops.select(ended & (counts < 0.5), 0.0, metrics.is_finite),
-        stop=ops.select(ended, inputs.time, metrics.stop),
+        stop=ops.select(ended, ops.select(counted, inputs.time, metrics.last.time), metrics.stop),
         ground_time=ops.minimum(metrics.ground_time, ops.select(below, inputs.time, inf)),
         ticks=metrics.ticks + counts,
         max_square=ops.select(counted, ops.maximum(metrics.max_square, square), metrics.max_square),

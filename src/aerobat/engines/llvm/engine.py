@@ -86,7 +86,9 @@ class MachineLoop(CompiledLoop):
     def _unpacked(self, carry: Array) -> Tree:
         """(c, lanes) -> a tree of read-only leaves (vehicles,)."""
         rows = read_only(carry)[:, : self._vehicles]
-        leaves = (read_only(x != 0.0) if logical else x for x, logical in zip(rows, self._logical, strict=True))
+        leaves = (
+            read_only(x != 0.0) if logical else x for x, logical in zip(rows, self._logical, strict=True)
+        )
         return tree_unflatten(self._loop.carry_tree, leaves)
 
     def _run(self, function: Function, arrays: Sequence[Array], ticks: int, log_stride: int) -> None:
