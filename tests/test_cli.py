@@ -22,7 +22,7 @@ PLAN_KEYS = {
 }  # fmt: skip
 FLIGHT_KEYS = {
     "max_position_error_m", "rms_position_error_m", "max_attitude_error_deg", "rms_attitude_error_deg",
-    "gate_miss_m", "gate_speed_m_s", "gate_attitude_error_deg", "saturated_fraction", "outcome",
+    "passages", "saturated_fraction", "outcome", "sentence",
 }  # fmt: skip
 
 

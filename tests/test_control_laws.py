@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from aerobat import so3
 from aerobat.control import Controller
 from aerobat.errors import SpecError
-from aerobat.simulation import Flight, fly
+from aerobat.simulation import Flight, Outcome, fly
 from aerobat.states import STANDARD_GRAVITY, BodyState
 from aerobat.trajectory import Trajectory
 from aerobat.vehicle import load_vehicle, vehicle_names
@@ -83,7 +83,7 @@ def test_turned_about_the_vertical_everything_turns(angle: float) -> None:
 def test_thrown_into_the_air_in_any_attitude_it_comes_back(name: str, tilt_deg: int) -> None:
     q = so3.about_axis([0.8, 0.6, 0.0], np.deg2rad(tilt_deg))
     flight = fly(hover(6.0), load_vehicle(name), start=start_at(q=q))
-    assert flight.diverged is None
+    assert flight.outcome is Outcome.COMPLETE
     assert error(flight)[-1] < 0.15
 
 

@@ -68,10 +68,12 @@ def controller_parameters(
 def max_bandwidth(fleet: Fleet, environment: Environment) -> Array:
     """The highest frequencies [rad/s] of attitude loops that vehicles have the rotors for, (vehicles,).
 
-    Hovering, they then meet their limits only at larger errors of roll or pitch than the free one.
+    Hovering, they then meet their limits only at larger errors of roll or pitch than the free one. NaN for a
+    vehicle that cannot hover.
     """
     hover = (fleet.mass * environment.gravity)[:, None] * fleet.mixer[..., 0]
     room = np.minimum(hover - fleet.min_thrusts, fleet.max_thrusts - hover)
     torque = (np.abs(fleet.allocation[:, 1:3]) @ room[..., None])[..., 0]
     acceleration = torque / np.diagonal(fleet.inertia, axis1=1, axis2=2)[:, :2]
-    return np.asarray(np.sqrt(acceleration.min(axis=-1) / _FREE_ERROR))
+    with np.errstate(invalid="ignore"):
+        return np.asarray(np.sqrt(acceleration.min(axis=-1) / _FREE_ERROR))

@@ -129,8 +129,8 @@ class DualOps:
 def differentiated(init: Init, step: Step) -> tuple[Init, Step]:
     """The loop whose rows are pairs: those of the given one, and their tangents along one direction.
 
-    Its parameters are pairs too, (values, tangents), and so are its inputs. Tangents are a tuple with an entry
-    for each leaf of the values, from left to right; of parameters and inputs it may be `()`, for none.
+    Its parameters are pairs too, (values, tangents), and so are its inputs. Tangents are a tuple with an
+    entry for each leaf of the values, from left to right; of parameters and inputs it may be `()`, for none.
     """
 
     def begin(ops: Ops, parameters: Tree, row: Tree) -> Tree:

@@ -1,4 +1,4 @@
-"""An engine: arithmetic, and loops over time that it compiles once, to be stepped, cut and resumed at will."""
+"""Engines: arithmetic, and loops over time that are compiled once, then stepped, cut and resumed at will."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A loop as operations: what parameters alone decide (the prologue), and what every tick computes (the body)."""
+"""A loop as operations: the prologue, which parameters alone decide, and the body, computed at every tick."""
 
 from __future__ import annotations
 

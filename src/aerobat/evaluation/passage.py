@@ -41,11 +41,10 @@ def gates_of(problem: Problem) -> tuple[Gate, ...]:
     return tuple(map(problem.gate, passed)) or problem.gates
 
 
-def passage_windows(goal: Problem | Plan, times: Array, position: Array) -> tuple[NDArray[np.bool_], ...]:
-    """For each gate, the times at which a flight is looked at for its passage.
+def planned_passages(goal: Problem | Plan, times: Array, position: Array) -> tuple[float, ...]:
+    """The planned instant [s] of each gate's passage.
 
-    Planned is the instant of a plan's stage, or that of the set-points' nearest approach, after the gate
-    before where it is the same gate again.
+    That of a plan's stage, or of the set-points' nearest approach, after the last one of the same gate.
 
     Args:
         goal: the problem, or a plan for it.
@@ -53,19 +52,21 @@ def passage_windows(goal: Problem | Plan, times: Array, position: Array) -> tupl
         position: of the set-points [m], (T, 3).
     """
     if isinstance(goal, Plan):
-        planned = [stage.time for stage in goal.stages if stage.gate is not None]
-        if planned:
-            return tuple(np.abs(times - time) <= PASSAGE_WINDOW for time in planned)
-        goal = goal.problem
-    windows: list[NDArray[np.bool_]] = []
+        planned = tuple(stage.time for stage in goal.stages if stage.gate is not None)
+        return planned or planned_passages(goal.problem, times, position)
     latest: dict[str, float] = {}
+    found = []
     for gate in gates_of(goal):
         distance = np.linalg.norm(position - gate.position, axis=-1)
         after = latest.get(gate.name, -np.inf) + PASSAGE_WINDOW
-        distance = np.where(times > after, distance, np.inf)
-        latest[gate.name] = float(times[int(np.argmin(distance))])
-        windows.append(np.abs(times - latest[gate.name]) <= PASSAGE_WINDOW)
-    return tuple(windows)
+        latest[gate.name] = float(times[int(np.argmin(np.where(times > after, distance, np.inf)))])
+        found.append(latest[gate.name])
+    return tuple(found)
+
+
+def passage_window(times: Array, planned: float) -> NDArray[np.bool_]:
+    """The times (T,) [s] at which a flight is looked at for a passage planned at an instant [s]."""
+    return np.asarray(np.abs(times - planned) <= PASSAGE_WINDOW)
 
 
 def passages(gate: Gate, nearest: Snapshot, distance_sq: Array, fleet: Fleet | None) -> Passage:

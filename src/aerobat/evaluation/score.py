@@ -10,7 +10,14 @@ import numpy as np
 from aerobat import so3
 from aerobat.arrays import Array
 from aerobat.errors import SpecError
-from aerobat.evaluation.passage import Passage, gates_of, nearest_approach, passage_windows, passages
+from aerobat.evaluation.passage import (
+    Passage,
+    gates_of,
+    nearest_approach,
+    passage_window,
+    passages,
+    planned_passages,
+)
 from aerobat.kernels.running_metrics import RunningMetrics
 from aerobat.planning import Plan
 from aerobat.problem.problem import Problem
@@ -118,15 +125,17 @@ def score(flight: Flight, goal: Problem | Plan, vehicle: Vehicle | None = None) 
     problem = goal.problem if isinstance(goal, Plan) else goal
     states, setpoints = flight.states, flight.setpoint.flat.position
     square, angle = position_error(flight) ** 2, attitude_error(flight)
-    windows = passage_windows(goal, flight.times, setpoints)
+    diverged = flight.outcome is not Outcome.COMPLETE
     found = []
-    for gate, window in zip(gates_of(problem), windows, strict=True):
+    for gate, planned in zip(gates_of(problem), planned_passages(goal, flight.times, setpoints), strict=True):
+        window = passage_window(flight.times, planned)
+        if diverged and planned >= flight.times[-1]:  # still under way to it
+            window[:] = False
         parts = (states.position, states.velocity, states.q_world_body)
         nearest, distance_sq = nearest_approach(window, gate, flight.times, parts)
         found.append(passages(gate, nearest, distance_sq, None if vehicle is None else Fleet.of([vehicle])))
     ground = flight.environment.ground
     below = np.zeros(1, bool) if ground is None else states.position[:, 2] < ground
-    diverged = flight.outcome is not Outcome.COMPLETE
     return Scores(
         max_position_error_m=np.sqrt([square.max()]),
         rms_position_error_m=np.sqrt([square.mean()]),

@@ -13,7 +13,7 @@ from aerobat.engines.components import components
 from aerobat.engines.pytree import tree_map
 from aerobat.environment import Environment
 from aerobat.errors import SpecError
-from aerobat.evaluation.passage import gates_of, passage_windows
+from aerobat.evaluation.passage import gates_of, passage_window, planned_passages
 from aerobat.evaluation.score import Scores, scores_of
 from aerobat.kernels import running_metrics
 from aerobat.kernels.ops import Ops
@@ -123,8 +123,8 @@ def with_metrics(setup: FlightSetup, goal: Problem | Plan | None) -> FlightSetup
         problem = goal.problem if isinstance(goal, Plan) else goal
         blocks = range(0, len(times), BLOCK)
         parts = [setup.reference.setpoint(k, min(k + BLOCK, len(times))).flat.position for k in blocks]
-        found = passage_windows(goal, times, np.concatenate(parts))
-        windows = tuple(window.astype(float) for window in found)
+        planned = planned_passages(goal, times, np.concatenate(parts))
+        windows = tuple(passage_window(times, instant).astype(float) for instant in planned)
         centres = tuple(
             components(np.broadcast_to(gate.position, (vehicles, 3))) for gate in gates_of(problem)
         )
@@ -132,10 +132,9 @@ def with_metrics(setup: FlightSetup, goal: Problem | Plan | None) -> FlightSetup
     parameters = MetricsParameters(
         np.full(vehicles, DIVERGENCE_RADIUS**2), np.full(vehicles, ground), centres
     )
-    start, own = setup.parameters
     return replace(
         setup,
         components=(*setup.components, MetricsMonitor(len(windows))),
-        parameters=setup.parameters._replace(own=(*own, parameters)),
+        parameters=setup.parameters._replace(own=(*setup.parameters.own, parameters)),
         sources=(*setup.sources, MetricsSource(times, windows)),
     )

@@ -141,7 +141,7 @@ def _commands(
 
 
 def _leading(thrusts: PerRotor, desired: PerRotor, decay_factors: PerRotor, fraction: Scalar) -> PerRotor:
-    """Commands [N] that bring the rotors, in one period, by `fraction` of the way from `thrusts` to `desired`.
+    """Commands [N] that bring the rotors, in one period, a `fraction` of the way from `thrusts` to `desired`.
 
     With fraction = 1 − e^(−period/T) it is u = f + τ f' behind a low-pass of time constant T. Written about
     where the rotors are believed to be, it goes on pushing after a saturation until they have got there.

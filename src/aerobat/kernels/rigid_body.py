@@ -46,7 +46,8 @@ def derivative(
 ) -> Body:
     """The time derivative of a body's state.
 
-    Eq. (3) in the Hamilton convention, body to world: v' = q ⊗ F ⊗ q* / m − g·e3, with the body's drag in the wind in F.
+    Eq. (3) in the Hamilton convention, body to world: v' = q ⊗ F ⊗ q* / m − g·e3, with the drag in F, by the
+    velocity relative to the wind.
     Eq. (4): ω' = J⁻¹ (M − ω × Jω). Attitude: q' = ½ q ⊗ (0, ω).
     """
     body_axes = axes(body.q_world_body)

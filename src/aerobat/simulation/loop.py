@@ -1,4 +1,4 @@
-"""The loop over time as a tuple of components, each with its own period: plant, sensors, controller, monitors.
+"""The loop over time, a tuple of components, each with its own period: sensors, controller, plant, monitors.
 
 At each tick the components step in order. One with direct feedthrough (a sensor, a controller) is seen in its
 new state by those after it and by the log; one without (the plant) leads to the next tick, and is seen as it

@@ -47,7 +47,7 @@ class StateNoise:
 
     @classmethod
     def fused(cls) -> StateNoise:
-        """Errors that an error-state filter leaves of motion capture (1 mm, 100 Hz) and a gyro (1e-3 rad/s/√Hz)."""
+        """Errors that a filter leaves of motion capture (1 mm, 100 Hz) and a gyro (1e-3 rad/s/√Hz)."""
         return cls(position=0.001, velocity=0.011, attitude=0.002, omega=0.016)
 
     def scaled(self, factor: float) -> StateNoise:

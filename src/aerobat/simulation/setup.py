@@ -130,7 +130,7 @@ class FlightSetup:
         return inputs
 
     def inputs(self, begin: int, end: int) -> LoopInput:
-        """The inputs of the ticks from `begin` to before `end`, for `scan`; all of one block of the reference's."""
+        """The inputs of the ticks from `begin` to before `end`, all of one block, for `scan`."""
         own = tuple(() if source is None else source.chunk(begin, end) for source in self.sources)
         return LoopInput(self.reference.clock(begin, end), self.reference.chunk(begin, end), own)
 
@@ -170,6 +170,8 @@ def prepare(
     fleet = Fleet.of(flying)
     nominal_fleet = fleet if nominal is flying else Fleet.of(nominal)
     model = controller_parameters(config.controller, nominal_fleet, environment)
+    for grounded in np.flatnonzero(~np.isfinite(model.gains.stiffness)):
+        nominal[grounded].require_hover(environment.gravity)
     if nominal_fleet is not fleet:  # one for all
         model = tree_map(lambda leaf: np.broadcast_to(leaf, len(fleet)), model)
     plant = PlantParameters(airframe_parameters(fleet), environment_parameters(environment, len(fleet)))
