@@ -11,27 +11,19 @@ Tree: TypeAlias = Any
 
 def tree_leaves(tree: Tree) -> list[Any]:
     """The leaves of a tree, from left to right."""
-    if not isinstance(tree, tuple):
-        return [tree]
     leaves: list[Any] = []
-    for child in tree:
-        if isinstance(child, tuple):
-            leaves.extend(tree_leaves(child))
-        else:
-            leaves.append(child)
+    _collect((tree,), leaves)
     return leaves
 
 
 def tree_unflatten(tree: Tree, leaves: Iterable[Any]) -> Tree:
     """The tree with other leaves, from left to right."""
-    return _unflatten(tree, iter(leaves))
+    return _unflatten((tree,), iter(leaves))[0]
 
 
 def tree_map(function: Callable[[Any], Any], tree: Tree) -> Tree:
     """The tree with `function` applied to each leaf."""
-    if isinstance(tree, tuple):
-        return _like(tree, [tree_map(function, child) for child in tree])
-    return function(tree)
+    return tree_unflatten(tree, map(function, tree_leaves(tree)))
 
 
 def tree_stack(trees: Sequence[Tree], join: Callable[[Sequence[Any]], Any]) -> Tree:
@@ -64,11 +56,18 @@ def _marked(tree: Tree, mark: bool) -> Tree:
     return tuple(_marked(child, mark) for child in tree)
 
 
-def _unflatten(tree: Tree, leaves: Iterator[Any]) -> Tree:
-    if isinstance(tree, tuple):
-        return _like(tree, [_unflatten(child, leaves) for child in tree])
-    return next(leaves)
+def _collect(tree: tuple[Any, ...], leaves: list[Any]) -> None:
+    for child in tree:
+        if isinstance(child, tuple):
+            _collect(child, leaves)
+        else:
+            leaves.append(child)
+
+
+def _unflatten(tree: tuple[Any, ...], leaves: Iterator[Any]) -> Tree:
+    children = [_unflatten(child, leaves) if isinstance(child, tuple) else next(leaves) for child in tree]
+    return _like(tree, children)
 
 
 def _like(tree: tuple[Any, ...], children: list[Any]) -> Tree:
-    return type(tree)(*children) if hasattr(tree, "_fields") else tuple(children)
+    return tuple.__new__(type(tree), children)  # named tuples too, without their constructors' detour

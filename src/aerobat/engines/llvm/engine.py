@@ -38,6 +38,7 @@ class MachineLoop(CompiledLoop):
         self._lanes = -(-self._vehicles // width) * width
         equal = [bool((leaf == leaf[0]).all()) for leaf in leaves]
         self._shared = [np.ndim(leaf) == 0 for leaf in tree_leaves(inputs)]
+        self._own = [not shared for shared in self._shared]
         constant = zip(piecewise_constant_leaves(inputs), self._shared, strict=True)
         layout = Layout(width, tuple(equal), tuple(self._shared), tuple(a and b for a, b in constant))
         self._loop, self._init, self._scan = _program(init, step, _bare(parameters), _bare(inputs), layout)
@@ -45,34 +46,54 @@ class MachineLoop(CompiledLoop):
             np.array([leaf[0] for leaf in compress(leaves, equal)]),
             self._pad_lanes([leaf for leaf, one in zip(leaves, equal, strict=True) if not one], ()),
         )
+        self._latest: tuple[Tree, Array] = (None, _UNUSED)
+        self._addresses = [array.ctypes.data for array in self._parameters]
         self._cuts = _thread_cuts(self._lanes // width, threads or available_cores(), width)
-        self._logical = tuple(map(self._loop.is_logical, self._loop.carry))
-        self._logical_outputs = tuple(map(self._loop.is_logical, self._loop.outputs))
+        self._logical = [i for i, n in enumerate(self._loop.carry) if self._loop.is_logical(n)]
+        self._logical_outputs = [i for i, n in enumerate(self._loop.outputs) if self._loop.is_logical(n)]
 
     def init(self, inputs: Tree) -> Tree:
         """See `CompiledLoop.init`."""
-        carry = np.empty((len(self._loop.carry), self._lanes))
-        chunk = tree_map(lambda leaf: np.asarray(leaf)[None], inputs)
-        self._run(self._init, (*self._packed(chunk), _UNUSED, carry, _UNUSED), 1, 1)
-        return self._unpacked(carry)
+        after = np.empty((len(self._loop.carry), self._lanes))
+        self._run(self._init, (*self._packed(inputs, ()), _UNUSED, after, _UNUSED), 1, 1)
+        return self._unpacked(after)
 
     def scan(self, carry: Tree, inputs: Tree, log_stride: int = 1) -> tuple[Tree, Tree]:
         """See `CompiledLoop.scan`."""
-        ticks, loop = tick_count(inputs), self._loop
-        before = self._pad_lanes(tree_leaves(carry), ())
-        after = np.empty((len(loop.carry), self._lanes))
-        outputs = np.empty((len(logged_ticks(ticks, log_stride)), len(loop.outputs), self._lanes))
-        self._run(self._scan, (*self._packed(inputs), before, after, outputs), ticks, log_stride)
-        series = outputs[..., : self._vehicles].transpose(1, 2, 0)
-        rows = (x != 0.0 if logical else x for x, logical in zip(series, self._logical_outputs, strict=True))
-        return self._unpacked(after), tree_unflatten(loop.row, rows)
+        ticks = tick_count(inputs)
+        rows = len(logged_ticks(ticks, log_stride))
+        after, outputs = self._advanced(carry, self._packed(inputs, (ticks,)), rows, ticks, log_stride)
+        return after, self._row(outputs.transpose(1, 2, 0))
 
-    def _packed(self, inputs: Tree) -> tuple[Array, Array]:
-        """Shared inputs (ticks, r) and inputs (ticks, i, lanes)."""
+    def step(self, carry: Tree, inputs: Tree) -> tuple[Tree, Tree]:
+        """See `CompiledLoop.step`."""
+        after, outputs = self._advanced(carry, self._packed(inputs, ()), 1, 1, 1)
+        return after, self._row(outputs[0])
+
+    def _advanced(
+        self, carry: Tree, inputs: tuple[Array, Array], rows: int, ticks: int, log_stride: int
+    ) -> tuple[Tree, Array]:
+        """The next carry, and the outputs (rows, o, vehicles)."""
+        latest, packed = self._latest  # most scans go on from where the last one ended
+        before = packed if carry is latest else self._pad_lanes(tree_leaves(carry), ())
+        after = np.empty((len(self._loop.carry), self._lanes))
+        outputs = np.empty((rows, len(self._loop.outputs), self._lanes))
+        self._run(self._scan, (*inputs, before, after, outputs), ticks, log_stride)
+        return self._unpacked(after), outputs[..., : self._vehicles]
+
+    def _row(self, series: Array) -> Tree:
+        """Outputs (o, vehicles, ...) as a row's tree."""
+        leaves = list(series)
+        for index in self._logical_outputs:
+            leaves[index] = leaves[index] != 0.0
+        return tree_unflatten(self._loop.row, leaves)
+
+    def _packed(self, inputs: Tree, ticks: tuple[int, ...]) -> tuple[Array, Array]:
+        """Shared inputs (*ticks, r) and inputs (*ticks, i, lanes)."""
         leaves = tree_leaves(inputs)
         shared = np.array(list(compress(leaves, self._shared)), dtype=np.float64).T
-        own = [leaf for leaf, one in zip(leaves, self._shared, strict=True) if not one]
-        return np.ascontiguousarray(shared), self._pad_lanes(own, leaves[0].shape[:1])
+        own = list(compress(leaves, self._own))
+        return np.ascontiguousarray(shared), self._pad_lanes(own, ticks)
 
     def _pad_lanes(self, leaves: Sequence[Array], ticks: tuple[int, ...]) -> Array:
         """Leaves (*ticks, vehicles) as (*ticks, leaf, lanes); lanes too many repeat the last vehicle."""
@@ -85,21 +106,23 @@ class MachineLoop(CompiledLoop):
 
     def _unpacked(self, carry: Array) -> Tree:
         """(c, lanes) -> a tree of read-only leaves (vehicles,)."""
-        rows = read_only(carry)[:, : self._vehicles]
-        leaves = (
-            read_only(x != 0.0) if logical else x for x, logical in zip(rows, self._logical, strict=True)
-        )
-        return tree_unflatten(self._loop.carry_tree, leaves)
+        carry.flags.writeable = False
+        leaves = list(carry[:, : self._vehicles])
+        for index in self._logical:
+            leaves[index] = read_only(leaves[index] != 0.0)
+        tree = tree_unflatten(self._loop.carry_tree, leaves)
+        self._latest = (tree, carry)
+        return tree
 
     def _run(self, function: Function, arrays: Sequence[Array], ticks: int, log_stride: int) -> None:
         """All lanes, divided among threads in whole blocks; a thread holds no lock of Python's meanwhile."""
-        arguments = [array.ctypes.data for array in (*self._parameters, *arrays)]
+        arguments = [*self._addresses, *(array.ctypes.data for array in arrays)]
         arguments += [self._lanes, ticks, log_stride]
         if len(self._cuts) == 2:
             function(*arguments, *self._cuts)
             return
-        with ThreadPoolExecutor(len(self._cuts) - 1) as pool:
-            list(pool.map(lambda begin, end: function(*arguments, begin, end), self._cuts, self._cuts[1:]))
+        pool = _pool(len(self._cuts) - 1)
+        list(pool.map(lambda begin, end: function(*arguments, begin, end), self._cuts, self._cuts[1:]))
 
 
 @lru_cache(maxsize=32)
@@ -126,6 +149,15 @@ def machine_code(loop: TracedLoop, layout: Layout) -> tuple[Function, Function]:
     for function in functions:
         function.code = code  # lives as long as what calls it
     return functions[0], functions[1]
+
+
+@lru_cache(maxsize=4)
+def _pool(threads: int) -> ThreadPoolExecutor:
+    return ThreadPoolExecutor(threads)
+
+
+if hasattr(os, "register_at_fork"):
+    os.register_at_fork(after_in_child=_pool.cache_clear)  # threads do not survive a fork
 
 
 def target_machine() -> llvm.TargetMachine:
