@@ -135,15 +135,21 @@ class FlightSetup:
         return LoopInput(self.reference.clock(begin, end), self.reference.chunk(begin, end), own)
 
     def chunks(self, log_stride: int = 1, copies: int = 1) -> Iterator[tuple[int, int]]:
-        """The flight cut into pieces whose inputs fit into little memory, none across a row of the log."""
+        """The flight cut into pieces whose inputs fit into little memory, each of one block.
+
+        A piece that holds rows of the log begins with one. Each of `copies` of a vehicle has its own inputs.
+        """
         ticks, size = len(self.times), BLOCK
         if any(source is not None and source.per_vehicle for source in self.sources):
             size = min(max(_VEHICLE_TICKS // (copies * len(self.fleet)), _MIN_CHUNK), BLOCK)
-        if log_stride <= size:
-            size -= size % log_stride
-        cuts = {ticks, *range(0, ticks, BLOCK), *range(0, ticks, size)}
+        cuts = {ticks, *range(0, ticks, BLOCK)}
         if log_stride > size:
-            cuts.update(range(0, ticks, log_stride))
+            cuts.update(range(0, ticks, size), range(0, ticks, log_stride))
+        else:
+            size -= size % log_stride
+            for first in range(0, ticks, BLOCK):
+                aligned = -(-first // log_stride) * log_stride
+                cuts.update(range(aligned, min(first + BLOCK, ticks), size))
         return pairwise(sorted(cuts))
 
 
