@@ -22,7 +22,7 @@ FLIGHT = """
 import aerobat as ab
 vehicle = ab.load_vehicle({vehicle!r})
 flight = ab.fly(ab.load_trajectory({path!r}), vehicle, rate={rate!r}, engine="compiled")
-assert len(flight.times) > {rows} and flight.diverged is None
+assert len(flight.times) > {rows} and flight.outcome.name == "COMPLETE"
 """
 FLOOR = (2.0, 0.4)  # times the imports, and seconds more
 

@@ -4,7 +4,7 @@
 
 The flip "flip-roll" of agile-quad at 500 Hz; medians of RUNS (9) whole calls after a first one that
 compiles, from arguments to answer: set-points, packing, simulation. Differences are central ones of
-`fly(..., scored=...)` with the same engine, ten flights. JAX runs the same dual numbers by its own compiler.
+`score_flights` with the same engine, ten flights. JAX runs the same dual numbers by its own compiler.
 """
 
 import statistics
@@ -26,7 +26,7 @@ def main() -> None:
     flip = ab.plan(problem, ab.Miqp(order=4), vehicle).trajectory
 
     def exact(engine: str) -> list[float]:
-        answer = ab.gradient(flip, vehicle, FIVE, engine=engine).mean_square_position_error
+        answer = ab.sensitivity(flip, FIVE, vehicle, engine=engine).mean_square_position_error
         return [float(answer.slopes[name]) for name in FIVE]
 
     def differences() -> list[float]:
@@ -55,8 +55,8 @@ def timed(way: Callable[[], list[float]]) -> tuple[float, list[float]]:
 
 
 def square(path: ab.Trajectory, vehicle: ab.Vehicle, problem: ab.Problem, controller: ab.Controller) -> float:
-    (score,) = ab.fly(path, vehicle, controller=controller, scored=problem, engine="compiled")
-    return score.rms_position_error_m**2
+    scores = ab.score_flights(path, vehicle, problem=problem, controller=controller, engine="compiled")
+    return float(scores.rms_position_error_m[0]) ** 2
 
 
 def difference(error: Callable[[ab.Controller], float], name: str) -> float:

@@ -28,8 +28,8 @@ import llvmlite.binding as llvm
 import numpy as np
 
 import aerobat as ab
-from aerobat.engines import compiled
-from aerobat.engines.loops import Loop, traced
+from aerobat.engines.llvm import engine as llvm_engine
+from aerobat.engines.traced_loop import TracedLoop, trace_loop
 from stepping_peers import PEERS, VEHICLES, Peer
 
 ENGINES = ("numpy", "jax", "jax-float32", "compiled")
@@ -134,9 +134,9 @@ def against(speed: float, peers: dict[Peer, float]) -> None:
         print(f"| {peer.name} | {theirs / 1e6:.3f} | {speed / theirs:.1f} × | {floor} | {peer.includes} |")
 
 
-def bound(speed: float, loop: Loop) -> None:
+def bound(speed: float, loop: TracedLoop) -> None:
     """How far from a core that does nothing but add and multiply, and always all it can."""
-    names = Counter(loop.trace.operations[number].name for number in loop.during)
+    names = Counter(loop.trace.operations[number].name for number in loop.body)
     count = sum(number for name, number in names.items() if name not in FREE)
     lanes = next((width for flag, width in LANES.items() if flag in cpu_flags()), 2)
     cycles = clock()
@@ -151,15 +151,15 @@ def bound(speed: float, loop: Loop) -> None:
     )
 
 
-def operations(path: ab.Trajectory, quad: ab.Vehicle) -> Loop:
+def operations(path: ab.Trajectory, quad: ab.Vehicle) -> TracedLoop:
     """What is compiled for a flight."""
     loops = []
 
-    def kept(*given: Any) -> Loop:
-        loops.append(traced(*given))
+    def kept(*given: Any) -> TracedLoop:
+        loops.append(trace_loop(*given))
         return loops[-1]
 
-    with mock.patch.object(compiled, "traced", kept):
+    with mock.patch.object(llvm_engine, "trace_loop", kept):
         ab.fly(path, quad, rate=1000.0, engine="compiled")
     return loops[0]
 
@@ -170,7 +170,7 @@ def cpu_flags() -> str:
 
 def clock() -> float:
     """Cycles per second, from a chain of products that each wait for the one before."""
-    code = llvm.create_mcjit_compiler(llvm.parse_assembly(CHAIN), compiled.machine())
+    code = llvm.create_mcjit_compiler(llvm.parse_assembly(CHAIN), llvm_engine.target_machine())
     code.finalize_object()
     chain = ctypes.CFUNCTYPE(ctypes.c_int64, ctypes.c_int64, ctypes.c_int64)(
         code.get_function_address("chain")

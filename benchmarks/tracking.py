@@ -23,10 +23,10 @@ def main() -> None:
     print(f"| {' | '.join(COLUMNS)} |")
     print("|" + " --- |" * len(COLUMNS))
     for vehicle, problem, plan, kind in plans():
-        result = ab.score(ab.fly(plan.trajectory, vehicle), problem, vehicle)
+        result = ab.score(ab.fly(plan, vehicle), problem, vehicle)
         gate = "– | –"
-        if result.gate_miss_m is not None:
-            gate = f"{1000 * result.gate_miss_m:.1f} | {result.gate_speed_m_s:.1f}"
+        if result.passages:
+            gate = f"{1000 * result.passages[0].miss:.1f} | {result.passages[0].speed:.1f}"
         print(
             f"| {vehicle.name} | {problem.name} | {kind} | {plan.duration:.2f} "
             f"| {100 * result.max_position_error_m:.2f} | {result.rms_attitude_error_deg:.2f} | {gate} |"

@@ -8,11 +8,11 @@ from scipy.optimize import minimize
 import aerobat as ab
 
 GAINS = ("position_gain", "velocity_gain", "attitude_frequency", "attitude_damping")
-model = ab.load_vehicle("agile-quad")
-flown = replace(model, mass=1.03 * model.mass)  # heavier than its controller believes
+nominal = ab.load_vehicle("agile-quad")
+actual = replace(nominal, mass=1.03 * nominal.mass)  # heavier than its controller takes it to be
 usual = ab.Controller()
 first = np.array([getattr(usual, name) for name in GAINS])
-flip = ab.plan(ab.load_problem("flip-roll"), ab.Miqp(order=4), vehicle=model).trajectory
+plan = ab.plan(ab.load_problem("flip-roll"), ab.Miqp(order=4), vehicle=nominal)
 
 
 def tuned(factors: np.ndarray) -> ab.Controller:
@@ -21,7 +21,8 @@ def tuned(factors: np.ndarray) -> ab.Controller:
 
 def error(factors: np.ndarray) -> tuple[float, np.ndarray]:
     """The mean squared position error [mm²] and its slopes."""
-    mean = ab.gradient(flip, flown, GAINS, controller=tuned(factors), model=model).mean_square_position_error
+    found = ab.sensitivity(plan, GAINS, actual, controller=tuned(factors), nominal=nominal)
+    mean = found.mean_square_position_error
     return 1e6 * float(mean.value), 1e6 * first * np.array([mean.slopes[name] for name in GAINS])
 
 

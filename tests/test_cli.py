@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 
 from aerobat import cli
-from aerobat.flight import load_flight
 from aerobat.interchange.csv import read_csv
 from aerobat.problem import problem_names
+from aerobat.simulation import load_flight
 from aerobat.vehicle import vehicle_names
 
 PLAN_KEYS = {
@@ -22,7 +22,7 @@ PLAN_KEYS = {
 }  # fmt: skip
 FLIGHT_KEYS = {
     "max_position_error_m", "rms_position_error_m", "max_attitude_error_deg", "rms_attitude_error_deg",
-    "gate_miss_m", "gate_speed_m_s", "gate_attitude_error_deg", "saturated_fraction", "outcome",
+    "passages", "saturated_fraction", "outcome", "sentence",
 }  # fmt: skip
 
 

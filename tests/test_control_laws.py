@@ -8,10 +8,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from aerobat import so3
+from aerobat.control import Controller
 from aerobat.errors import SpecError
-from aerobat.flight import Flight
-from aerobat.flying import fly
-from aerobat.kernels.controller import Controller
+from aerobat.simulation import Flight, Outcome, fly
 from aerobat.states import STANDARD_GRAVITY, BodyState
 from aerobat.trajectory import Trajectory
 from aerobat.vehicle import load_vehicle, vehicle_names
@@ -84,7 +83,7 @@ def test_turned_about_the_vertical_everything_turns(angle: float) -> None:
 def test_thrown_into_the_air_in_any_attitude_it_comes_back(name: str, tilt_deg: int) -> None:
     q = so3.about_axis([0.8, 0.6, 0.0], np.deg2rad(tilt_deg))
     flight = fly(hover(6.0), load_vehicle(name), start=start_at(q=q))
-    assert flight.diverged is None
+    assert flight.outcome is Outcome.COMPLETE
     assert error(flight)[-1] < 0.15
 
 
@@ -92,12 +91,12 @@ def test_thrown_into_the_air_in_any_attitude_it_comes_back(name: str, tilt_deg: 
 def test_a_wrong_mass_leaves_no_lasting_error(name: str) -> None:
     vehicle = load_vehicle(name)
     heavy = replace(vehicle, mass=1.05 * vehicle.mass)
-    flight = fly(hover(12.0), heavy, model=vehicle)
+    flight = fly(hover(12.0), heavy, nominal=vehicle)
     assert error(flight).max() > 1e-3
     assert error(flight)[-1] < 0.05 * error(flight).max()
 
 
-@pytest.mark.parametrize("switch", ["moment_feedforward", "motor_lag_lead"])
+@pytest.mark.parametrize("switch", ["moment_feedforward", "motor_lag_compensation"])
 def test_each_feed_forward_brings_the_vehicle_nearer_to_its_path(switch: str) -> None:
     vehicle = load_vehicle("agile-quad")
     off = fly(swerve(), vehicle, controller=Controller(**{switch: False}))
@@ -107,7 +106,7 @@ def test_each_feed_forward_brings_the_vehicle_nearer_to_its_path(switch: str) ->
 def test_drag_that_the_controller_knows_of_is_made_up_for() -> None:
     vehicle = load_vehicle("agile-quad")
     dragged = replace(vehicle, drag_body=np.array([0.3, 0.3, 0.3]))
-    unknown = error(fly(swerve(), dragged, model=vehicle)).max()
+    unknown = error(fly(swerve(), dragged, nominal=vehicle)).max()
     assert unknown > 0.01
     assert error(fly(swerve(), dragged)).max() < 0.1 * unknown
 
@@ -136,12 +135,12 @@ def test_a_gain_that_is_no_gain_is_refused_by_name(field: str, value: object) ->
 
 
 def test_a_switch_is_on_or_off() -> None:
-    with pytest.raises(SpecError, match=r"^controller\.yaw_shed_first must be True or False, got 1"):
-        Controller(yaw_shed_first=1)
+    with pytest.raises(SpecError, match=r"^controller\.prioritize_tilt must be True or False, got 1"):
+        Controller(prioritize_tilt=1)
 
 
 def test_filters_of_no_length_are_no_filters() -> None:
-    sharp = Controller(lead_filter=0.0, jerk_filter=0.0, max_integral=0.0)
+    sharp = Controller(lead_time_constant=0.0, jerk_filter=0.0, max_integral=0.0)
     assert error(fly(swerve(), load_vehicle("agile-quad"), controller=sharp)).max() < 1e-3
 
 

@@ -9,10 +9,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from aerobat.engines import NUMPY, choose
-from aerobat.engines.batch import ArrayOps
+from aerobat.engines import NUMPY, choose, run_whole
 from aerobat.engines.duals import Dual, DualOps, differentiated, dual
 from aerobat.engines.floats import FloatOps
+from aerobat.engines.numpy import ArrayOps
 
 jax = pytest.importorskip("jax")
 import jax.numpy as jnp  # noqa: E402 - after what it needs
@@ -65,7 +65,7 @@ def drawn(seed: int) -> tuple[np.ndarray, np.ndarray]:
 @given(program=programs(SMOOTH), seed=st.integers(0, 1000))
 def test_slopes_are_limits_of_differences(program: Any, seed: int) -> None:
     at, along = drawn(seed)
-    slope = dual(run(program, DualOps(FloatOps), map(Dual, at, along))).slope
+    slope = dual(run(program, DualOps(FloatOps), map(Dual, at, along))).tangent
     assert slope is not None
     wanted = richardson(lambda h: run(program, FloatOps, at + h * along), 1e-3)
     assert slope == pytest.approx(wanted, rel=1e-7, abs=1e-7)
@@ -84,7 +84,7 @@ def test_slopes_are_those_of_jax(program: Any, seed: int) -> None:
         value, wanted = jax.jvp(lambda *x: run(program, JaxOps, x), tuple(at), tuple(along))
     got = dual(run(program, DualOps(FloatOps), map(Dual, at, along)))
     assert got.value == pytest.approx(float(value), rel=1e-13, abs=1e-13)
-    assert (got.slope or 0.0) == pytest.approx(float(wanted), rel=1e-12, abs=1e-12)
+    assert (got.tangent or 0.0) == pytest.approx(float(wanted), rel=1e-12, abs=1e-12)
 
 
 @given(program=programs(SMOOTH + KINKED), seed=st.integers(0, 1000))
@@ -97,19 +97,19 @@ def test_values_are_those_of_the_plain_kernel_to_the_last_bit(program: Any, seed
 def test_no_slope_comes_of_none() -> None:
     ops, x, y = DualOps(FloatOps), Dual(2.0), Dual(3.0)
     results = (x + y, x - 1.0, 1.0 - x, x * y, x / y, -x, x**3, ops.sqrt(x), ops.exp(x), ops.minimum(x, y))
-    assert all(result.slope is None for result in results)
+    assert all(result.tangent is None for result in results)
 
 
 def test_at_a_kink_the_slope_is_that_of_the_second_and_the_root_of_zero_has_none() -> None:
     ops, x, y = DualOps(FloatOps), Dual(1.0, 2.0), Dual(1.0, 3.0)
-    assert ops.minimum(x, y).slope == ops.maximum(x, y).slope == 3.0
+    assert ops.minimum(x, y).tangent == ops.maximum(x, y).tangent == 3.0
     root = DualOps(ArrayOps).sqrt(Dual(np.array([0.0, 4.0]), np.array([1.0, 1.0])))
-    np.testing.assert_array_equal(root.slope, [0.0, 0.25])
+    np.testing.assert_array_equal(root.tangent, [0.0, 0.25])
 
 
 def test_powers_and_comparisons_are_those_of_values() -> None:
     x = Dual(2.0, 5.0)
-    assert ((x**3).value, (x**3).slope) == (8.0, 60.0)
+    assert ((x**3).value, (x**3).tangent) == (8.0, 60.0)
     compared = (operator.lt, operator.le, operator.gt, operator.ge)
     assert [f(x, 2.0) for f in compared] == [False, True, False, True]
     assert [f(1.0, x) for f in compared] == [True, True, False, False]
@@ -129,9 +129,10 @@ def grow(ops: Any, rate: Any, carry: Any, push: Any) -> Any:
 def test_a_loop_carries_slopes_along(engine: str) -> None:
     """x_n = a^n has the slope n a^(n-1), whatever runs the loop."""
     rate, ticks = np.array([0.9, 1.0, 1.01, 1.02, 1.1]), 50
-    scan = choose(engine, len(rate), ticks).scan
     parameters, inputs = (rate, (np.ones_like(rate),)), (np.zeros(ticks), ((),))
-    values, slopes = scan(*differentiated(begin, grow), parameters, inputs)
+    values, slopes = run_whole(
+        choose(engine, len(rate), ticks), *differentiated(begin, grow), parameters, inputs
+    )
     n = np.arange(1, ticks + 1)
     np.testing.assert_allclose(values[0], rate[:, None] ** n, rtol=1e-13)
     np.testing.assert_allclose(slopes[0], n * rate[:, None] ** (n - 1), rtol=1e-13)
@@ -141,5 +142,5 @@ def test_a_loop_carries_slopes_along(engine: str) -> None:
 def test_inputs_have_slopes_too() -> None:
     """Of a push at every tick, Σ a^k."""
     inputs = (np.zeros(5), (np.ones(5),))
-    _, slopes = NUMPY.scan(*differentiated(begin, grow), (np.array([0.5]), ((),)), inputs)
+    _, slopes = run_whole(NUMPY, *differentiated(begin, grow), (np.array([0.5]), ((),)), inputs)
     np.testing.assert_allclose(slopes[0][0], np.cumsum(0.5 ** np.arange(5)))

@@ -5,11 +5,10 @@ from typing import Any, NamedTuple
 import numpy as np
 import pytest
 
-from aerobat.engines import FLOATS
-from aerobat.engines.engine import Engine, told
-from aerobat.flying import fly
+from aerobat.engines import FLOATS, Engine, run_whole
 from aerobat.planning import Miqp, plan
 from aerobat.problem import load_problem
+from aerobat.simulation import fly
 from aerobat.vehicle import load_vehicle
 
 jax = pytest.importorskip("jax")
@@ -41,10 +40,10 @@ def step(ops: Any, stiffness: Any, carry: Any, push: Any) -> Any:
     return ((angle, speed), beyond), Swing(angle, speed, ops.select(angle > 1.5, True, beyond), 1.0)
 
 
-def swung(engine: Engine, every: int = 1, ticks: int = TICKS, seed: int = 0) -> Swing:
+def swung(engine: Engine, ticks: int = TICKS, seed: int = 0) -> Swing:
     rng = np.random.default_rng(seed)
     pushes = 9.0 * rng.normal(size=ticks), 9.0 * rng.normal(size=(ticks, VEHICLES))
-    answer: Swing = engine.scan(init, step, rng.uniform(0.5, 2.0, VEHICLES), pushes, every)
+    answer: Swing = run_whole(engine, init, step, rng.uniform(0.5, 2.0, VEHICLES), pushes)
     return answer
 
 
@@ -59,13 +58,6 @@ def test_all_arithmetic_agrees_with_floats_in_either_precision(engine: Engine, a
         np.testing.assert_allclose(value, getattr(expected, name), rtol=0, atol=atol)
     np.testing.assert_array_equal(found.beyond, expected.beyond)
     assert 0 < found.beyond.sum() < found.beyond.size
-
-
-@pytest.mark.parametrize("every", [1, 2, 7, 2999, 3000, 10**9])
-def test_it_tells_the_first_tick_each_that_is_due_and_the_last(every: int) -> None:
-    whole, told_ = swung(ENGINE), swung(ENGINE, every)
-    for all_, some in zip(whole, told_, strict=True):
-        np.testing.assert_array_equal(some, all_[:, told(TICKS, every)])
 
 
 def test_a_flip_with_a_thousand_steps_a_second_agrees_with_floats() -> None:
@@ -88,18 +80,20 @@ def test_the_precision_that_jax_is_set_to_is_neither_used_nor_changed(set_to: bo
 
 
 def test_loops_of_the_same_operations_are_compiled_once(caplog) -> None:
-    """Other numbers, closures and intervals of telling change nothing; another operation does."""
+    """Other numbers, closures and a few ticks more change nothing; another operation does."""
 
     def steeper(ops: Any, stiffness: Any, carry: Any, push: Any) -> Any:
         return step(ops, stiffness * stiffness, carry, push)
 
-    def compiled(step_: Any, seed: int, every: int) -> int:
+    def compiled(step_: Any, seed: int, ticks: int) -> int:
         rng = np.random.default_rng(seed)
-        pushes = rng.normal(size=40), rng.normal(size=(40, 3))
+        pushes = rng.normal(size=ticks), rng.normal(size=(ticks, 3))
         caplog.clear()
         with jax.log_compiles():
-            ENGINE.scan(init, lambda *given: step_(*given), rng.uniform(0.5, 2.0, 3), pushes, every)
-        return sum("_flown" in record.message and "Compiling" in record.message for record in caplog.records)
+            run_whole(ENGINE, init, lambda *given: step_(*given), rng.uniform(0.5, 2.0, 3), pushes)
+        return sum(
+            "_scanned" in record.message and "Compiling" in record.message for record in caplog.records
+        )
 
-    assert [compiled(step, *given) for given in ((0, 13), (1, 13), (2, 14))] == [1, 0, 0]
-    assert [compiled(steeper, seed, 13) for seed in (0, 1)] == [1, 0]
+    assert [compiled(step, *given) for given in ((0, 40), (1, 40), (2, 53))] == [1, 0, 0]
+    assert [compiled(steeper, seed, 40) for seed in (0, 1)] == [1, 0]

@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from aerobat.engines.floats import FloatOps
-from aerobat.engines.loops import traced
+from aerobat.engines.traced_loop import trace_loop
 from aerobat.engines.tracing import FUNCTIONS, BranchError, Symbol, Trace, TraceOps
 
 NUMBERS = st.floats(-5.0, 5.0)
@@ -98,12 +98,12 @@ def step(ops: Any, rate: Any, carry: Carry, row: Any) -> tuple[Carry, Any]:
     return carry, (carry.total, carry.total > 1.0)
 
 
-def test_a_loop_knows_what_it_computes_once_and_carries_only_what_is_told() -> None:
-    loop = traced(init, step, np.ones(3), np.ones(5))
-    assert len(loop.carry) == 1  # neither the count nor what is idle is told
-    names = [[loop.trace.operations[i].name for i in part] for part in (loop.before, loop.during)]
+def test_a_loop_knows_what_it_computes_once_and_carries_only_what_rows_need() -> None:
+    loop = trace_loop(init, step, np.ones(3), np.ones(5))
+    assert len(loop.carry) == 1  # neither the count nor what is idle is in a row
+    names = [[loop.trace.operations[i].name for i in part] for part in (loop.prologue, loop.body)]
     assert "exp" in names[0]
     assert "exp" not in names[1]
-    assert str(loop).splitlines()[-1].startswith("told: %")
+    assert str(loop).splitlines()[-1].startswith("output: %")
     assert "exp %" in str(loop)
-    assert isinstance(loop.told[0], Symbol)
+    assert isinstance(loop.row[0], Symbol)

@@ -8,10 +8,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from aerobat.environment import Environment
 from aerobat.errors import SpecError
-from aerobat.flight import Flight, load_flight
-from aerobat.flying import fly
-from aerobat.states import BodyState
+from aerobat.simulation import Flight, fly, load_flight
+from aerobat.simulation.flight import SERIES
 from aerobat.trajectory import Trajectory
 from aerobat.vehicle import load_vehicle
 
@@ -19,19 +19,16 @@ QUAD = load_vehicle("agile-quad")
 RISE = Trajectory(np.array([0.1]), np.array([[[0, 0, 0], [0.1, 0, 0], [0, 0, 0.05]]], dtype=float))
 
 
-def leaves(value: object) -> dict[str, object]:
-    """Every array and word of a flight by its path."""
-    found = {}
-    for field in fields(value):
-        part = getattr(value, field.name)
-        nested = leaves(part) if hasattr(part, "__dataclass_fields__") else {"": part}
-        found |= {f"{field.name}.{name}": leaf for name, leaf in nested.items()}
-    return found
+def leaves(flight: Flight) -> dict[str, object]:
+    """Every array and word of a flight by its name."""
+    rest = {field.name: getattr(flight, field.name) for field in fields(flight) if field.name != "series"}
+    air = rest.pop("environment")
+    return rest | dict(flight.series) | {"gravity": air.gravity, "wind": air.wind, "ground": air.ground}
 
 
 @pytest.mark.parametrize("vehicles", [QUAD, [QUAD], [QUAD] * 3], ids=["one", "batch of one", "batch"])
 def test_a_flight_survives_saving_and_loading_bit_for_bit(vehicles, tmp_path: Path) -> None:
-    flight = fly(RISE, vehicles)
+    flight = fly(RISE, vehicles, environment=Environment(wind=[0.5, 0.0, 0.0], ground=-1.0))
     flight.save(tmp_path / "flight.npz")
     again = load_flight(tmp_path / "flight.npz")
     assert leaves(again).keys() == leaves(flight).keys()
@@ -75,7 +72,11 @@ def changed(**arrays: object) -> Callable[[Path], None]:
         (lambda path: np.save(path.open("wb"), np.zeros(3)), "not a whole .npz"),
         (lambda path: np.savez(path, a=np.zeros(3)), "no array 'format'"),
         (lambda path: np.savez(path, format=np.array([{}], dtype=object)), "not a whole .npz"),
-        (changed(format="aerobat-flight-9"), "format is aerobat-flight-9"),
+        (
+            changed(format="aerobat-flight-1"),
+            "format is aerobat-flight-1, not aerobat-flight-2; fly it again",
+        ),
+        (changed(outcomes=["LANDED"]), "no array 'LANDED'"),
         (changed(thrusts=None), "no array 'thrusts'"),
         (changed(setpoint_jerk=None), "no array 'setpoint_jerk'"),
         (changed(position=np.zeros((3, 3))), "position must have the shape"),
@@ -84,7 +85,7 @@ def changed(**arrays: object) -> Callable[[Path], None]:
         (changed(times=np.zeros(51)), "times must be one list of rising"),
         (changed(saturated=np.zeros(3)), "saturated must have the shape"),
         (changed(saturated="never"), "saturated must have the shape"),
-        (changed(outcomes=["one", "two"]), "one end, name and outcome"),
+        (changed(outcomes=["COMPLETE"] * 2), "one end, name and outcome"),
         (changed(setpoint_thrust=np.zeros(7)), "setpoint_thrust must have the shape"),
         (changed(max_thrusts=6.0), "a flight needs rotors"),
     ],
@@ -103,14 +104,24 @@ def test_a_broken_file_is_refused_in_one_sentence(
 def test_a_flight_of_mismatched_arrays_cannot_be_made() -> None:
     flight = fly(RISE, QUAD)
     with pytest.raises(SpecError, match="position must have the shape"):
-        replace(flight, states=BodyState(np.zeros((2, 3)), *list(vars(flight.states).values())[1:]))
+        replace(flight, series={**flight.series, "position": np.zeros((2, 3))})
 
 
 def test_one_flight_is_no_batch_and_a_batch_no_flight() -> None:
     flight, batch = fly(RISE, QUAD), fly(RISE, [QUAD, QUAD])
     with pytest.raises(SpecError, match="one flight, not a batch"):
         flight[0]
-    with pytest.raises(SpecError, match=r"flight\[k\]\.diverged"):
-        batch.diverged  # noqa: B018
+    with pytest.raises(SpecError, match=r"flight\[k\]\.outcome"):
+        batch.outcome  # noqa: B018
     assert isinstance(batch[1], Flight)
     assert len(list(batch)) == 2
+
+
+def test_each_series_of_the_table_is_an_attribute_and_nothing_else_is() -> None:
+    flight = fly(RISE, QUAD)
+    for series in SERIES:
+        assert getattr(flight, series.name) is flight.series[series.name]
+    np.testing.assert_array_equal(flight.states.velocity, flight.velocity)
+    np.testing.assert_array_equal(flight.setpoint.wrench.thrust, flight.setpoint_thrust)
+    with pytest.raises(AttributeError, match="a flight has no 'thrust'; its series are position"):
+        flight.thrust  # noqa: B018

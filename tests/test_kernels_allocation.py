@@ -4,16 +4,19 @@ import numpy as np
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from aerobat.engines.batch import ArrayOps
+from aerobat.control import Controller
+from aerobat.control.parameters import controller_parameters
+from aerobat.engines.components import components, from_components
 from aerobat.engines.floats import FloatOps
-from aerobat.engines.packing import airframes, components, joined, models
-from aerobat.engines.trees import rows
-from aerobat.kernels.allocation import demand, fits, nearest
-from aerobat.kernels.controller import Controller
-from aerobat.kernels.motors import clamp
-from aerobat.kernels.rigid_body import Load
-from aerobat.states import STANDARD_GRAVITY, Wrench
+from aerobat.engines.numpy import ArrayOps
+from aerobat.engines.pytree import tree_map
+from aerobat.environment import Environment
+from aerobat.kernels import rigid_body
+from aerobat.kernels.allocation import Mixer, desaturate, mix, within_limits
+from aerobat.kernels.motors import Rotors, clamp
+from aerobat.states import Wrench
 from aerobat.vehicle import Vehicle, collective_range, load_vehicle, rotor_thrusts, wrench
+from aerobat.vehicle.fleet import Fleet
 from random_vehicles import (
     SAMPLES,
     demands,
@@ -26,15 +29,20 @@ from random_vehicles import (
 )
 
 
+def parameters(vehicle: Vehicle, count: int) -> tuple[Rotors, Mixer]:
+    """Rotors and mixer of so many of a vehicle."""
+    model = controller_parameters(Controller(), Fleet.of([vehicle] * count), Environment())
+    return model.airframe.rotors, model.mixer
+
+
 def allocate(vehicle: Vehicle, load: Wrench) -> np.ndarray:
-    """Thrusts for a batch of loads (k,): exact where they fit, the kernel's `nearest` elsewhere."""
-    count = len(load.thrust)
-    airframe, mixer = airframes([vehicle] * count), models(Controller(), [vehicle] * count).mixer
-    asked = Load(load.thrust, components(load.moment_body))
-    exact = demand(mixer, asked)
-    limited, whole = nearest(ArrayOps, airframe.rotors, mixer, asked), fits(airframe.rotors, exact)
-    chosen = tuple(np.where(whole, f, g) for f, g in zip(exact, limited, strict=True))
-    return joined(clamp(ArrayOps, airframe.rotors, chosen))
+    """Thrusts for a batch of loads (k,): exact where they fit, the kernel's `desaturate` elsewhere."""
+    rotors, mixer = parameters(vehicle, len(load.thrust))
+    desired = rigid_body.Wrench(load.thrust, components(load.moment_body))
+    exact = mix(mixer, desired)
+    limited, feasible = desaturate(ArrayOps, rotors, mixer, desired), within_limits(rotors, exact)
+    chosen = tuple(np.where(feasible, f, g) for f, g in zip(exact, limited, strict=True))
+    return from_components(clamp(ArrayOps, rotors, chosen))
 
 
 @given(vehicles())
@@ -106,12 +114,11 @@ def test_floats_allocate_as_arrays_do(rotors: int, seed: int) -> None:
     vehicle, rng = load_vehicle({4: "agile-quad", 6: "hexarotor"}[rotors]), np.random.default_rng(seed)
     load = demands(vehicle, rng)
     together = allocate(vehicle, load)
-    airframe, mixer = airframes([vehicle]), models(Controller(), [vehicle]).mixer
-    one_airframe, one_mixer = next(rows((airframe.rotors, mixer), iter))
+    rotors, mixer = tree_map(lambda leaf: leaf[0], parameters(vehicle, 1))
     for k in range(5):
-        asked = next(rows(Load(load.thrust[k : k + 1], components(load.moment_body[k : k + 1])), iter))
-        exact = demand(one_mixer, asked)
-        alone = exact if fits(one_airframe, exact) else nearest(FloatOps, one_airframe, one_mixer, asked)
+        desired = rigid_body.Wrench(load.thrust[k], tuple(load.moment_body[k]))
+        exact = mix(mixer, desired)
+        alone = exact if within_limits(rotors, exact) else desaturate(FloatOps, rotors, mixer, desired)
         np.testing.assert_allclose(alone, together[k], rtol=0, atol=1e-12 * span(vehicle))
 
 
@@ -125,4 +132,3 @@ def test_a_collective_out_of_reach_is_brought_to_the_nearest_that_can_be_held(ma
     load = wrench(vehicle, thrusts)
     np.testing.assert_allclose(load.thrust, [low, low, high, high], rtol=0, atol=1e-9 * span(vehicle))
     np.testing.assert_allclose(load.moment_body, 0, rtol=0, atol=1e-9 * span(vehicle))
-    assert low <= vehicle.mass * STANDARD_GRAVITY <= high

@@ -6,12 +6,11 @@ import numpy as np
 import pytest
 
 from aerobat import so3
+from aerobat.environment import Environment
 from aerobat.errors import SpecError
-from aerobat.flight import Flight
-from aerobat.flying import fly
-from aerobat.metrics import gate_passage, score
-from aerobat.problem import Problem, at_rest, tilted_gate
-from aerobat.states import BodyState
+from aerobat.evaluation import Passage, score
+from aerobat.problem import Gate, Problem, at_rest, tilted_gate
+from aerobat.simulation import Flight, Outcome, fly
 from aerobat.trajectory import Trajectory
 from aerobat.vehicle import Vehicle, load_vehicle
 
@@ -34,20 +33,25 @@ def moved(flight: Flight, offset: tuple[float, float, float], turn: tuple[float,
     """The same flight with every state off by `offset` [m] and turned by `turn` [rad, body axes]."""
     s = flight.states
     q = so3.multiply(s.q_world_body, so3.exp(np.array(turn)))
-    return replace(flight, states=BodyState(s.position + offset, s.velocity, q, s.omega_body))
+    return replace(flight, series={**flight.series, "position": s.position + offset, "q_world_body": q})
 
 
-def problem(gate) -> Problem:
-    return Problem("cruise", at_rest((0, 0, 1)), at_rest((8, 0, 1)), gates=() if gate is None else (gate,))
+def problem(*gates: Gate) -> Problem:
+    return Problem("cruise", at_rest((0, 0, 1)), at_rest((8, 0, 1)), gates=gates)
+
+
+def passage(flight: Flight, gate: Gate, vehicle: Vehicle | None = None) -> Passage:
+    (passed,) = score(flight, problem(gate), vehicle).passages
+    return passed
 
 
 def test_errors_are_the_distances_and_angles_by_which_a_flight_is_off(cruise: Flight) -> None:
-    result = score(moved(cruise, (0.03, 0.0, 0.04), (0.0, 0.02, 0.0)), problem(None))
+    result = score(moved(cruise, (0.03, 0.0, 0.04), (0.0, 0.02, 0.0)), problem())
     assert result.max_position_error_m == pytest.approx(0.05, abs=1e-4)
     assert result.rms_position_error_m == pytest.approx(0.05, abs=1e-4)
     assert result.max_attitude_error_deg == pytest.approx(np.rad2deg(0.02), abs=1e-3)
     assert result.rms_attitude_error_deg == pytest.approx(np.rad2deg(0.02), abs=1e-3)
-    assert result.gate_miss_m is None
+    assert result.passages == ()
     assert result.saturated_fraction == 0.0
 
 
@@ -56,44 +60,86 @@ def test_the_gate_is_missed_by_the_distance_between_path_and_centre_wherever_sam
 ) -> None:
     for x in (3.0, 3.001, 3.0037):
         gate = tilted_gate(np.array([x, 0.0, 1.0]))
-        passage = gate_passage(moved(cruise, (0.0, -0.06, 0.08), (0.1, 0.0, 0.0)), gate)
-        assert passage.miss == pytest.approx(0.1, abs=1e-4)
-        assert passage.time == pytest.approx(x / SPEED, abs=1e-4)
-        assert passage.speed == pytest.approx(SPEED, abs=1e-3)
-        assert passage.attitude_error_deg == pytest.approx(np.rad2deg(0.1), abs=0.01)
+        passed = passage(moved(cruise, (0.0, -0.06, 0.08), (0.1, 0.0, 0.0)), gate)
+        assert passed.miss == pytest.approx(0.1, abs=1e-4)
+        assert passed.time == pytest.approx(x / SPEED, abs=1e-4)
+        assert passed.speed == pytest.approx(SPEED, abs=1e-3)
+        assert passed.attitude_error_deg == pytest.approx(np.rad2deg(0.1), abs=0.01)
 
 
 def test_clearance_is_what_the_rotors_leave_of_the_opening(cruise: Flight, quad: Vehicle) -> None:
     """Level flight: half the width less the outermost hub and its propeller."""
     reach = max(abs(r.position_body[1]) + r.radius for r in quad.rotors)
     gate = tilted_gate(np.array([4.0, 0.0, 1.0]), width=1.0, height=1.0)
-    assert gate_passage(cruise, gate, quad).clearance == pytest.approx(0.5 - reach, abs=1e-3)
+    assert passage(cruise, gate, quad).clearance == pytest.approx(0.5 - reach, abs=1e-3)
     off = moved(cruise, (0.0, 0.1, 0.0), (0.0, 0.0, 0.0))
-    assert gate_passage(off, gate, quad).clearance == pytest.approx(0.4 - reach, abs=1e-3)
+    assert passage(off, gate, quad).clearance == pytest.approx(0.4 - reach, abs=1e-3)
 
 
 def test_a_vehicle_wider_than_the_opening_hits_the_frame(cruise: Flight, quad: Vehicle) -> None:
     gate = tilted_gate(np.array([4.0, 0.0, 1.0]), width=0.2, height=1.0)
     result = score(cruise, problem(gate), quad)
-    assert result.gate_clearance_m < 0.0
-    assert "hit the gate's frame" in result.outcome
+    assert result.passages[0].clearance < 0.0
+    assert result.outcome is Outcome.HIT_FRAME
+    assert result.sentence.startswith("hit the frame of the gate")
 
 
 def test_a_flight_beside_the_opening_misses_the_gate(cruise: Flight, quad: Vehicle) -> None:
     gate = tilted_gate(np.array([4.0, 0.7, 1.0]), width=1.0, height=1.0)
-    assert score(cruise, problem(gate), quad).outcome.startswith("missed the gate, 0.70 m off")
+    result = score(cruise, problem(gate), quad)
+    assert result.outcome is Outcome.MISSED_GATE
+    assert result.sentence.startswith("missed the gate, 0.70 m off")
 
 
 def test_a_flight_that_diverges_says_when_and_why(quad: Vehicle) -> None:
     runaway = Trajectory(np.array([2.0]), np.array([[[0.0, 0, 1], [0, 0, 0], [200.0, 0, 0]]]))
     flight = fly(runaway, quad)
-    assert score(flight, problem(None)).outcome == flight.diverged
-    assert "diverged at" in flight.diverged
+    result = score(flight, problem())
+    assert result.outcome is flight.outcome is Outcome.DIVERGED
+    assert result.sentence == flight.sentences[0]
+    assert "diverged at" in result.sentence
 
 
 def test_a_batch_is_scored_flight_by_flight(quad: Vehicle) -> None:
     straight = Trajectory(np.array([1.0]), np.array([[[0.0, 0, 1], [SPEED, 0, 0]]]))
     flights = fly(straight, [quad, quad])
     with pytest.raises(SpecError, match=r"flight\[k\]"):
-        score(flights, problem(None))
-    assert score(flights[1], problem(None)).max_position_error_m < 0.01
+        score(flights, problem())
+    assert score(flights[1], problem()).max_position_error_m < 0.01
+
+
+def test_every_gate_is_judged_and_the_first_thing_that_went_wrong_is_the_outcome(
+    cruise: Flight, quad: Vehicle
+) -> None:
+    """Three gates, the first passed, the second missed, the third too narrow."""
+    gates = (
+        tilted_gate(np.array([2.0, 0.0, 1.0]), height=1.0, name="open"),
+        tilted_gate(np.array([4.0, 0.7, 1.0]), height=1.0, name="aside"),
+        tilted_gate(np.array([6.0, 0.0, 1.0]), width=0.2, height=1.0, name="narrow"),
+    )
+    result = score(cruise, problem(*gates), quad)
+    assert [passed.gate for passed in result.passages] == ["open", "aside", "narrow"]
+    assert [passed.inside for passed in result.passages] == [True, False, True]
+    assert [passed.time for passed in result.passages] == pytest.approx([0.5, 1.0, 1.5], abs=1e-3)
+    assert result.outcome is Outcome.MISSED_GATE
+    assert result.sentence.startswith("missed gate 'aside', 0.70 m off its centre at 1.00 s")
+    assert score(cruise, problem(gates[0], gates[2]), quad).outcome is Outcome.HIT_FRAME
+    assert score(cruise, problem(gates[0]), quad).outcome is Outcome.THROUGH_GATES
+
+
+def test_a_gate_that_a_flight_ends_before_was_not_reached(quad: Vehicle) -> None:
+    runaway = Trajectory(np.array([2.0]), np.array([[[0.0, 0, 1], [0, 0, 0], [200.0, 0, 0]]]))
+    flight = fly(runaway, quad)
+    far = Problem("far", at_rest((0, 0, 1)), at_rest((800, 0, 1)), gates=(tilted_gate([700.0, 0.0, 1.0]),))
+    result = score(flight, far, quad)
+    assert np.isnan(result.passages[0].time)
+    assert not result.passages[0].inside
+    assert result.outcome is Outcome.DIVERGED
+
+
+def test_a_flight_below_the_ground_has_hit_it(quad: Vehicle) -> None:
+    dive = Trajectory(np.array([1.0]), np.array([[[0.0, 0, 1], [0, 0, -2]]]))
+    flight = fly(dive, quad, environment=Environment(ground=0.0))
+    result = score(flight, problem())
+    assert result.outcome is Outcome.HIT_GROUND
+    assert result.sentence == "hit the ground at 0.50 s"

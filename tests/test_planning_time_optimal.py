@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 
 from aerobat.errors import BackendMissing, Infeasible, SpecError
-from aerobat.flying import fly
 from aerobat.planning import Plan
 from aerobat.planning.time_optimal.time_optimal import TimeOptimal
 from aerobat.problem import (
@@ -21,6 +20,7 @@ from aerobat.problem import (
     at_rest,
     load_problem,
 )
+from aerobat.simulation import fly
 from aerobat.states import STANDARD_GRAVITY
 from aerobat.vehicle import Vehicle, load_vehicle
 from rigid_body_replay import replayed

@@ -9,28 +9,27 @@ import pytest
 
 from aerobat import so3
 from aerobat.arrays import Array
+from aerobat.control import Controller
 from aerobat.engines.duals import Dual, DualOps, dual
 from aerobat.engines.floats import FloatOps
 from aerobat.errors import SpecError
-from aerobat.flying import fly
-from aerobat.kernels.controller import Controller
-from aerobat.metrics import attitude_error, position_error
+from aerobat.evaluation import Sensitivity, score_flights, sensitivity
+from aerobat.evaluation.score import attitude_error, position_error
 from aerobat.problem import load_problem
-from aerobat.sensitivity import Sensitivity, gradient
-from aerobat.simulation import StateNoise
+from aerobat.simulation import StateNoise, fly
 from aerobat.states import BodyState
 from aerobat.vehicle import Vehicle, load_vehicle
 from test_flying_batches import loops, near, one
 
 AGILE = load_vehicle("agile-quad")
-BELIEVED = replace(AGILE, drag_body=[0.1, 0.12, 0.2])
+NOMINAL = replace(AGILE, drag_body=[0.1, 0.12, 0.2])
 QUAD = replace(
-    BELIEVED,
+    NOMINAL,
     mass=1.02 * AGILE.mass,
     inertia=AGILE.inertia * 1.04 + 1e-4 * np.ones((3, 3)) * np.trace(AGILE.inertia),
-)  # not quite what its controller believes
+)  # not quite the nominal one
 PATH, RATE = loops(6.0), 500.0
-GAINS = tuple(f.name for f in fields(Controller) if f.type == "float" and f.name != "lead_filter")
+GAINS = tuple(f.name for f in fields(Controller) if f.type == "float" and f.name != "lead_time_constant")
 FIVE = ("position_gain", "velocity_gain", "integral_gain", "attitude_frequency", "attitude_damping")
 ROTORS = ("lag", "torque_coefficient", "min_thrust", "max_thrust", "position_body")
 START = BodyState(
@@ -42,7 +41,7 @@ PARTS = ("mean_square_position_error", "mean_square_attitude_error", "final_squa
 
 def flown(vehicle: Vehicle | list[Vehicle] = QUAD, **options: Any) -> Array:
     """The three errors of a flight or of each of a batch, from its log, (..., 3)."""
-    given = {"controller": TIGHT, "start": START, "model": BELIEVED, "rate": RATE, "engine": "compiled"}
+    given = {"controller": TIGHT, "start": START, "nominal": NOMINAL, "rate": RATE, "engine": "compiled"}
     flight = fly(PATH, vehicle, **(given | options))
     square = position_error(flight) ** 2
     angle = attitude_error(flight) ** 2
@@ -54,12 +53,12 @@ def everything() -> Sensitivity:
     """In all there is, in one call."""
     names = [*GAINS, "mass", "drag_body", "inertia", *(f"rotors.{name}" for name in ROTORS)]
     names += [f"start.{name}" for name in ("position", "velocity", "attitude", "omega_body")]
-    return gradient(PATH, QUAD, names, controller=TIGHT, start=START, model=BELIEVED, rate=RATE)
+    return sensitivity(PATH, names, QUAD, controller=TIGHT, start=START, nominal=NOMINAL, rate=RATE)
 
 
-def listed(sensitivity: Sensitivity, name: str) -> Array:
+def listed(answer: Sensitivity, name: str) -> Array:
     """Slopes of the three errors, (3, ...)."""
-    return np.array([getattr(sensitivity, part).slopes[name] for part in PARTS])
+    return np.array([getattr(answer, part).slopes[name] for part in PARTS])
 
 
 def differences(flights: Callable[[Array], Array], step: float) -> Array:
@@ -74,7 +73,7 @@ def assert_slopes(got: Array, flights: Callable[[Array], Array], step: float, rt
 
 
 def test_values_are_those_of_the_flight(everything: Sensitivity) -> None:
-    assert not fly(PATH, QUAD, controller=TIGHT, start=START, model=BELIEVED, rate=RATE).saturated.any()
+    assert not fly(PATH, QUAD, controller=TIGHT, start=START, nominal=NOMINAL, rate=RATE).saturated.any()
     values = [getattr(everything, part).value for part in PARTS]
     np.testing.assert_allclose(values, flown(), rtol=1e-12)
 
@@ -89,16 +88,16 @@ def test_slopes_in_gains(name: str, everything: Sensitivity) -> None:
     assert_slopes(value * listed(everything, name), flights, 2e-5)
 
 
-@pytest.mark.parametrize("agility", [15.0, 100.0])
+@pytest.mark.parametrize("max_bandwidth", [15.0, 100.0])
 @pytest.mark.parametrize("name", GAINS)
-def test_gains_have_slopes_on_weak_rotors_too(name: str, agility: float) -> None:
+def test_gains_have_slopes_on_weak_rotors_too(name: str, max_bandwidth: float) -> None:
     """Where the vehicle, not the controller, sets how fast the loops are."""
     value = getattr(TIGHT, name)
-    gains = replace(TIGHT, **{name: Dual(value, value)}).gains(agility, DualOps(FloatOps))
-    got = [dual(gain).slope or 0.0 for gain in gains]
+    gains = replace(TIGHT, **{name: Dual(value, value)}).gains(max_bandwidth, DualOps(FloatOps))
+    got = [dual(gain).tangent or 0.0 for gain in gains]
 
     def changed(moves: Array) -> Array:
-        return np.array([replace(TIGHT, **{name: value * (1.0 + h)}).gains(agility) for h in moves])
+        return np.array([replace(TIGHT, **{name: value * (1.0 + h)}).gains(max_bandwidth) for h in moves])
 
     assert_slopes(np.array(got), changed, 1e-3, rtol=1e-9)
 
@@ -149,14 +148,14 @@ def test_slopes_in_the_start(name: str, everything: Sensitivity) -> None:
 
 
 def test_slopes_of_a_scored_flight_in_five_gains() -> None:
-    """As a user would check: the mean squared error of fly(scored=...), one gain after another."""
+    """As a user would check: the mean squared error of score_flights(), one gain after another."""
     line, controller = load_problem("line"), Controller()
-    got = gradient(PATH, QUAD, FIVE, start=START).mean_square_position_error
+    got = sensitivity(PATH, FIVE, QUAD, start=START).mean_square_position_error
 
     def scored(name: str, factor: float) -> float:
         changed = replace(controller, **{name: factor * getattr(controller, name)})
-        (score,) = fly(PATH, QUAD, start=START, controller=changed, scored=line, engine="compiled")
-        return score.rms_position_error_m**2
+        scores = score_flights(PATH, QUAD, problem=line, start=START, controller=changed, engine="compiled")
+        return float(scores.rms_position_error_m[0]) ** 2
 
     for name in FIVE:
         wanted = differences(lambda moves, name=name: np.array([scored(name, 1 + h) for h in moves]), 1e-4)
@@ -167,9 +166,9 @@ def test_slopes_of_a_scored_flight_in_five_gains() -> None:
 @pytest.mark.parametrize("engine", ["numpy", "compiled"])
 def test_engines_agree(engine: str) -> None:
     names = ("position_gain", "mass", "start.attitude")
-    options = {"model": BELIEVED, "start": START, "rate": 200.0, "noise": StateNoise.fused(), "seed": 5}
-    wanted = gradient(loops(1.0), QUAD, names, engine="floats", **options)
-    got = gradient(loops(1.0), QUAD, names, engine=engine, **options)
+    options = {"nominal": NOMINAL, "start": START, "rate": 200.0, "noise": StateNoise.fused(), "seed": 5}
+    wanted = sensitivity(loops(1.0), names, QUAD, engine="floats", **options)
+    got = sensitivity(loops(1.0), names, QUAD, engine=engine, **options)
     for name in names:
         np.testing.assert_allclose(listed(got, name), listed(wanted, name), rtol=1e-9, atol=1e-13)
 
@@ -177,24 +176,24 @@ def test_engines_agree(engine: str) -> None:
 def test_each_of_a_batch_has_the_slopes_that_it_has_alone() -> None:
     names, starts = ("velocity_gain", "inertia", "rotors.lag"), near(3)
     vehicles = [replace(QUAD, mass=QUAD.mass * (1.0 + 0.02 * k)) for k in range(3)]
-    options = {"model": BELIEVED, "rate": RATE, "noise": StateNoise.fused(), "engine": "compiled"}
-    together = gradient(PATH, vehicles, names, start=starts, seed=9, **options)
+    options = {"nominal": NOMINAL, "rate": RATE, "noise": StateNoise.fused(), "engine": "compiled"}
+    together = sensitivity(PATH, names, vehicles, start=starts, seed=9, **options)
     assert together.mean_square_position_error.slopes["inertia"].shape == (3, 3, 3)
     for k in range(3):
         seed = np.random.SeedSequence(9, spawn_key=(k,))
-        alone = gradient(PATH, vehicles[k], names, start=one(starts, k), seed=seed, **options)
+        alone = sensitivity(PATH, names, vehicles[k], start=one(starts, k), seed=seed, **options)
         for name in names:
             np.testing.assert_array_equal(listed(together, name)[:, k], listed(alone, name))
 
 
 def test_a_flight_at_its_rotors_limits_has_slopes_too() -> None:
-    """Rotors are weaker than their controller believes."""
+    """Rotors are weaker than those of the nominal vehicle."""
     limit = 0.5 * QUAD.rotors[0].max_thrust
     weak = retrofitted(QUAD, "max_thrust", np.full(4, -limit))
-    commands = fly(PATH, weak, controller=TIGHT, start=START, model=BELIEVED, rate=RATE).commands
+    commands = fly(PATH, weak, controller=TIGHT, start=START, nominal=NOMINAL, rate=RATE).commands
     assert 0.01 < (commands > limit).any(axis=-1).mean() < 0.5
     names = ("mass", "rotors.max_thrust")
-    got = gradient(PATH, weak, names, controller=TIGHT, start=START, model=BELIEVED, rate=RATE)
+    got = sensitivity(PATH, names, weak, controller=TIGHT, start=START, nominal=NOMINAL, rate=RATE)
 
     def heavier(moves: Array) -> Array:
         return flown([replace(weak, mass=weak.mass + h) for h in moves])
@@ -208,13 +207,13 @@ def test_a_flight_at_its_rotors_limits_has_slopes_too() -> None:
 
 def test_a_vehicle_that_diverges_has_no_final_error() -> None:
     falling = replace(START, velocity=np.array([0.0, 0.0, -60.0]))
-    lost = gradient(PATH, QUAD, "mass", start=falling)
+    lost = sensitivity(PATH, "mass", QUAD, start=falling)
     assert np.isfinite(lost.mean_square_position_error.slopes["mass"])
     assert np.isnan(lost.final_square_position_error.value)
 
 
 def test_answers_cannot_be_written_to() -> None:
-    answer = gradient(loops(0.5), QUAD, "inertia").mean_square_position_error
+    answer = sensitivity(loops(0.5), "inertia", QUAD).mean_square_position_error
     with pytest.raises(ValueError, match="read-only"):
         answer.slopes["inertia"][0, 0] = 1.0
 
@@ -225,11 +224,11 @@ def test_answers_cannot_be_written_to() -> None:
         ((), "of must name at least one quantity, such as 'position_gain' or 'mass'"),
         ("positon_gain", "no differentiable quantity named 'positon_gain'; did you mean 'position_gain'?"),
         (("mass", 3), "no differentiable quantity named '3'; known: position_gain"),
-        ("lead_filter", "lead_filter has no slope"),
-        ("yaw_shed_first", "no differentiable quantity named 'yaw_shed_first'"),
+        ("lead_time_constant", "lead_time_constant has no slope"),
+        ("prioritize_tilt", "no differentiable quantity named 'prioritize_tilt'"),
     ],
 )
 def test_what_has_no_slope_is_refused(of: object, message: str) -> None:
     with pytest.raises(SpecError) as caught:
-        gradient(PATH, QUAD, of)
+        sensitivity(PATH, of, QUAD)
     assert str(caught.value).startswith(message)

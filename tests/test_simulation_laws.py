@@ -9,16 +9,19 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from aerobat import so3
+from aerobat.control.parameters import airframe_parameters
 from aerobat.engines.floats import FloatOps
-from aerobat.engines.packing import airframes, bodies, body_states
-from aerobat.engines.trees import rows
+from aerobat.engines.pytree import tree_map
 from aerobat.kernels import motors, rigid_body
-from aerobat.kernels.integrator import Airframe, Motion, advance
-from aerobat.kernels.rigid_body import Body, Inertial, Load
-from aerobat.simulation import plant
+from aerobat.kernels.motors import Airframe, Motion, advance
+from aerobat.kernels.rigid_body import Body, EnvironmentParameters, MassProperties, Wrench
+from aerobat.simulation.components import RigidBodyPlant
+from aerobat.simulation.noise import bodies, body_states
 from aerobat.states import BodyState
 from aerobat.vehicle import Vehicle, load_vehicle
+from aerobat.vehicle.fleet import Fleet
 
+CALM = EnvironmentParameters(9.81, (0.0, 0.0, 0.0))
 FULL_INERTIA = np.array([[0.012, 0.002, -0.001], [0.002, 0.009, 0.0015], [-0.001, 0.0015, 0.016]])
 TUMBLING = BodyState(
     position=np.array([0.3, -0.2, 1.0]),
@@ -29,27 +32,29 @@ TUMBLING = BodyState(
 
 
 def airframe_of(vehicle: Vehicle) -> Airframe:
-    return next(rows(airframes([vehicle]), iter))
+    return tree_map(lambda leaf: leaf[0], airframe_parameters(Fleet.of([vehicle])))
 
 
-def inertial_of(**changes) -> Inertial:
-    return airframe_of(replace(load_vehicle("hexarotor"), inertia=FULL_INERTIA, **changes)).inertial
+def inertial_of(**changes) -> MassProperties:
+    return airframe_of(replace(load_vehicle("hexarotor"), inertia=FULL_INERTIA, **changes)).mass_properties
 
 
 def body_of(state: BodyState) -> Body:
-    return next(rows(bodies(BodyState(**{k: v[None] for k, v in vars(state).items()})), iter))
+    return tree_map(float, bodies(state))
 
 
-def flown(inertial: Inertial, body: Body, load: Callable[[float], Load], end: float, steps: int) -> Body:
+def flown(
+    inertial: MassProperties, body: Body, load: Callable[[float], Wrench], end: float, steps: int
+) -> Body:
     dt = end / steps
     for k in range(steps):
         loads = tuple(load((k + part) * dt) for part in (0.0, 0.5, 1.0))
-        body = rigid_body.step(FloatOps, inertial, body, loads, dt)
+        body = rigid_body.step(FloatOps, inertial, CALM, body, loads, dt)
     return body
 
 
-def no_load(t: float) -> Load:
-    return Load(0.0, (0.0, 0.0, 0.0))
+def no_load(t: float) -> Wrench:
+    return Wrench(0.0, (0.0, 0.0, 0.0))
 
 
 def test_torque_free_tumbling_keeps_energy_and_angular_momentum() -> None:
@@ -86,14 +91,27 @@ def test_against_drag_a_fall_ends_at_the_speed_at_which_drag_carries_the_weight(
 
 def test_drag_opposes_motion_along_each_body_axis_by_its_own_coefficient() -> None:
     inertial = inertial_of(drag_body=np.array([0.1, 0.2, 0.4]))
-    rate = rigid_body.derivative(inertial, body_of(TUMBLING), no_load(0.0))
+    rate = rigid_body.derivative(inertial, CALM, body_of(TUMBLING), no_load(0.0))
     velocity_body = so3.unrotate(TUMBLING.q_world_body, TUMBLING.velocity)
     force = so3.rotate(TUMBLING.q_world_body, -np.array([0.1, 0.2, 0.4]) * velocity_body)
     np.testing.assert_allclose(rate.velocity, force / 1.0 + [0.0, 0.0, -9.81], rtol=1e-13)
 
 
-def wavy_load(t: float) -> Load:
-    return Load(
+def test_a_body_that_drifts_with_the_wind_feels_no_drag() -> None:
+    """Wind is another frame of reference: the same motion, seen from one that moves along."""
+    inertial, wind = inertial_of(drag_body=np.array([0.1, 0.2, 0.4])), (3.0, -1.0, 0.5)
+    windy = CALM._replace(wind=wind)
+    body = body_of(TUMBLING)
+    calm = rigid_body.derivative(inertial, CALM, body, no_load(0.0))
+    blown = body._replace(velocity=tuple(v + w for v, w in zip(body.velocity, wind, strict=True)))
+    moved = rigid_body.derivative(inertial, windy, blown, no_load(0.0))
+    np.testing.assert_allclose(moved.velocity, calm.velocity, rtol=1e-13)
+    drifting = rigid_body.derivative(inertial, windy, body._replace(velocity=wind), no_load(0.0))
+    np.testing.assert_allclose(drifting.velocity, [0.0, 0.0, -9.81], rtol=1e-13)
+
+
+def wavy_load(t: float) -> Wrench:
+    return Wrench(
         9.0 + 4.0 * np.sin(5 * t), (0.05 * np.cos(7 * t), -0.04 * np.sin(4 * t), 0.03 * np.cos(3 * t))
     )
 
@@ -131,7 +149,7 @@ def test_body_and_rotors_together_are_of_order_four() -> None:
     def after(steps: int) -> np.ndarray:
         motion = Motion(body_of(TUMBLING), (1.0, 2.0, 3.0, 1.0, 2.0, 3.0))
         for _ in range(steps):
-            motion = advance(FloatOps, airframe, motion, commands, 0.2 / steps)
+            motion = advance(FloatOps, airframe, CALM, motion, commands, 0.2 / steps)
         return np.concatenate(motion.body)
 
     reference = after(1600)
@@ -143,7 +161,8 @@ def test_body_and_rotors_together_are_of_order_four() -> None:
 def test_a_period_of_two_milliseconds_is_integrated_to_micrometres() -> None:
     airframe = airframe_of(load_vehicle("agile-quad"))
     finest, usual = (
-        after_commands(airframe, plant.substeps(0.002) * refinement, periods=1000) for refinement in (8, 1)
+        after_commands(airframe, RigidBodyPlant.for_rate(500.0).substeps * refinement, periods=1000)
+        for refinement in (8, 1)
     )
     np.testing.assert_allclose(usual.position, finest.position, rtol=0, atol=1e-6)
     np.testing.assert_allclose(usual.q_world_body, finest.q_world_body, rtol=0, atol=1e-6)
@@ -154,7 +173,8 @@ def after_commands(airframe: Airframe, steps: int, periods: int) -> Body:
     motion = Motion(body_of(TUMBLING), (2.0,) * 4)
     for k in range(periods):
         wave = [2.0 + 0.5 * np.sin(0.02 * k + phase) for phase in (0.0, 0.2, 0.1, 0.3)]
-        motion = plant.step(FloatOps, airframe, motion, tuple(wave), 0.002, steps)
+        for _ in range(steps):
+            motion = advance(FloatOps, airframe, CALM, motion, tuple(wave), 0.002 / steps)
     return motion.body
 
 
@@ -165,14 +185,14 @@ def test_rotors_answer_a_step_with_the_analytic_exponential_and_stop_at_their_li
     assert wanted == (0.1, 0.05, vehicle.max_thrusts[2], 0.0)
     thrusts = start = (0.02, 0.09, 0.03, 0.04)
     for _ in range(50):
-        thrusts = motors.follow(thrusts, wanted, motors.decays(FloatOps, rotors, 0.002))
+        thrusts = motors.first_order_response(thrusts, wanted, motors.decay_factors(FloatOps, rotors, 0.002))
     expected = wanted + (np.array(start) - wanted) * np.exp(-0.1 / vehicle.lags)
     np.testing.assert_allclose(thrusts, expected, rtol=1e-13)
 
 
 def test_a_rotor_without_lag_follows_at_once() -> None:
     rotors = airframe_of(load_vehicle("section-v")).rotors
-    after = motors.follow((1.0,) * 4, (2.0,) * 4, motors.decays(FloatOps, rotors, 1e-4))
+    after = motors.first_order_response((1.0,) * 4, (2.0,) * 4, motors.decay_factors(FloatOps, rotors, 1e-4))
     assert after == (2.0,) * 4
 
 
@@ -207,7 +227,7 @@ def test_mujocos_free_body_agrees_to_a_nanometre() -> None:
         load = wavy_load(0.001 * k)
         data.ctrl[:] = [load.thrust, *load.moment_body]
         mujoco.mj_step(model, data)
-        body = rigid_body.step(FloatOps, inertial, body, (load, load, load), 0.001)
+        body = rigid_body.step(FloatOps, inertial, CALM, body, (load, load, load), 0.001)
     np.testing.assert_allclose(body.position, data.qpos[:3], rtol=0, atol=1e-9)
     np.testing.assert_allclose(body.omega_body, data.qvel[3:], rtol=0, atol=1e-9)
     assert so3.angle_between(body.q_world_body, data.qpos[3:]) < 1e-9

@@ -1,14 +1,12 @@
 from .certification import Certificate, Envelope, certify
+from .control import Controller
 from .declaration import import_plugin
 from .environment import Environment
 from .errors import AerobatError, BackendMissing, Infeasible, SpecError
+from .evaluation import Gradient, Passage, Score, Scores, Sensitivity, score, score_flights, sensitivity
 from .flatness import Reference, reference
-from .flight import Flight, load_flight
-from .flying import fly
 from .interchange.csv import read_csv, write_csv
 from .interchange.read import read_trajectory
-from .kernels.controller import Controller
-from .metrics import Score, score
 from .planning import (
     Bisection,
     FreeKnots,
@@ -49,8 +47,7 @@ from .problem import (
 from .reporting.comparison import comparison_figure
 from .reporting.figures import draw
 from .reporting.tracking import tracking_figure
-from .sensitivity import Gradient, Sensitivity, gradient
-from .simulation import StateNoise
+from .simulation import Flight, FlightConfig, Outcome, StateNoise, fly, load_flight
 from .states import BodyState, FlatState, Setpoint, Wrench
 from .studies.compare import Comparison, compare
 from .trajectory import Rule, Trajectory, load_trajectory, minimum_effort, save_trajectory
@@ -71,6 +68,7 @@ __all__ = [
     "Environment",
     "FlatState",
     "Flight",
+    "FlightConfig",
     "Flip",
     "FreeKnots",
     "Gate",
@@ -84,6 +82,8 @@ __all__ = [
     "Maneuver",
     "MinSnap",
     "Miqp",
+    "Outcome",
+    "Passage",
     "Plan",
     "Problem",
     "Quantity",
@@ -92,6 +92,7 @@ __all__ = [
     "RotorMargin",
     "Rule",
     "Score",
+    "Scores",
     "Sensitivity",
     "Setpoint",
     "SpecError",
@@ -110,7 +111,6 @@ __all__ = [
     "comparison_figure",
     "draw",
     "fly",
-    "gradient",
     "import_plugin",
     "load_flight",
     "load_problem",
@@ -127,6 +127,8 @@ __all__ = [
     "rotor_margin",
     "save_trajectory",
     "score",
+    "score_flights",
+    "sensitivity",
     "tilted_gate",
     "tracking_figure",
     "vehicle_names",

@@ -27,12 +27,12 @@ def fly(
     problem
         A name that `aerobat problems` lists, or a problem's TOML file.
     """
-    from aerobat.flying import fly as simulate
-    from aerobat.metrics import score
+    from aerobat.evaluation.score import score
     from aerobat.simulation import StateNoise
+    from aerobat.simulation import fly as simulate
 
     noise = StateNoise.fused().scaled(flying.noise) if flying.noise else None
     task, vehicle = read_task(problem, options, options.paper)
     plan = make_plan(task, vehicle, options)
-    flight = simulate(plan.trajectory, vehicle, environment=task.environment, noise=noise, seed=flying.seed)
-    finish(plan, vehicle, options, flight, score(flight, task, vehicle))
+    flight = simulate(plan, vehicle, noise=noise, seed=flying.seed)
+    finish(plan, vehicle, options, flight, score(flight, plan, vehicle))

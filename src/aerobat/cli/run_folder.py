@@ -10,9 +10,9 @@ from aerobat.cli.options import PlanningOptions
 from aerobat.storage import whole_folder
 
 if TYPE_CHECKING:
-    from aerobat.flight import Flight
-    from aerobat.metrics import Score
+    from aerobat.evaluation.score import Score
     from aerobat.planning import Plan
+    from aerobat.simulation import Flight
     from aerobat.vehicle import Vehicle
 
 FILES = ("plan.npz", "plan.csv", "flight.npz", "report.json", "report.png", "compare.json", "compare.png")

@@ -1,10 +1,10 @@
 """Exact derivatives: kernels run on dual numbers, whatever those are made of.
 
-A dual number is a value and its slope along one direction. Kernels never ask what their numbers are, so an
+A dual number is a value and its tangent along one direction. Kernels never ask what their numbers are, so an
 engine that runs a kernel runs its derivative too: the loop over time is wrapped, not the engine. Several
 directions are several vehicles, side by side.
 
-Where a function has a kink, a slope is that of one side; at zero the square root's is taken to be zero.
+Where a function has a kink, a tangent is that of one side; at zero the square root's is taken to be zero.
 """
 
 from __future__ import annotations
@@ -14,54 +14,54 @@ from functools import lru_cache
 from typing import Any
 
 from aerobat.engines.engine import Init, Step
-from aerobat.engines.trees import Tree, leaves, refilled
+from aerobat.engines.pytree import Tree, tree_leaves, tree_unflatten
 from aerobat.kernels.ops import Ops, Scalar
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Dual:
-    """A value and its slope, None where it has none whatever the values are."""
+    """A value and its tangent, None where it has none whatever the values are."""
 
     value: Scalar
-    slope: Scalar | None = None
+    tangent: Scalar | None = None
 
     __array_ufunc__ = None  # NumPy leaves arithmetic with it to it
 
     def __neg__(self) -> Dual:
-        return Dual(-self.value, None if self.slope is None else -self.slope)
+        return Dual(-self.value, None if self.tangent is None else -self.tangent)
 
     def __add__(self, other: Any) -> Dual:
-        x, slope = _parts(other)
-        return Dual(self.value + x, _sum(self.slope, slope))
+        x, tangent = _parts(other)
+        return Dual(self.value + x, _sum(self.tangent, tangent))
 
     def __radd__(self, other: Any) -> Dual:
         return dual(other) + self
 
     def __sub__(self, other: Any) -> Dual:
-        x, slope = _parts(other)
-        return Dual(self.value - x, _difference(self.slope, slope))
+        x, tangent = _parts(other)
+        return Dual(self.value - x, _difference(self.tangent, tangent))
 
     def __rsub__(self, other: Any) -> Dual:
         return dual(other) - self
 
     def __mul__(self, other: Any) -> Dual:
-        x, slope = _parts(other)
-        return Dual(self.value * x, _sum(_product(self.slope, x), _product(slope, self.value)))
+        x, tangent = _parts(other)
+        return Dual(self.value * x, _sum(_product(self.tangent, x), _product(tangent, self.value)))
 
     def __rmul__(self, other: Any) -> Dual:
         return dual(other) * self
 
     def __truediv__(self, other: Any) -> Dual:
-        x, slope = _parts(other)
+        x, tangent = _parts(other)
         quotient = self.value / x
-        change = _difference(self.slope, _product(slope, quotient))
+        change = _difference(self.tangent, _product(tangent, quotient))
         return Dual(quotient, None if change is None else change / x)
 
     def __rtruediv__(self, other: Any) -> Dual:
         return dual(other) / self
 
     def __pow__(self, exponent: int) -> Dual:
-        return Dual(self.value**exponent, _product(self.slope, exponent * self.value ** (exponent - 1)))
+        return Dual(self.value**exponent, _product(self.tangent, exponent * self.value ** (exponent - 1)))
 
     def __lt__(self, other: Any) -> Any:
         return self.value < _parts(other)[0]
@@ -77,7 +77,7 @@ class Dual:
 
 
 def dual(x: Any) -> Dual:
-    """A dual number as it is; any other without a slope."""
+    """A dual number as it is; any other without a tangent."""
     return x if isinstance(x, Dual) else Dual(x)
 
 
@@ -89,27 +89,27 @@ class DualOps:
 
     def sqrt(self, x: Any) -> Dual:
         """The square root."""
-        value, slope = _parts(x)
+        value, tangent = _parts(x)
         root = self.ops.sqrt(value)
-        if slope is None:
+        if tangent is None:
             return Dual(root)
         positive = root > 0.0
         rate = 0.5 / self.ops.select(positive, root, 1.0)
-        return Dual(root, self.ops.select(positive, rate * slope, 0.0))
+        return Dual(root, self.ops.select(positive, rate * tangent, 0.0))
 
     def exp(self, x: Any) -> Dual:
         """The exponential."""
-        value, slope = _parts(x)
+        value, tangent = _parts(x)
         power = self.ops.exp(value)
-        return Dual(power, _product(slope, power))
+        return Dual(power, _product(tangent, power))
 
     def minimum(self, x: Any, y: Any) -> Dual:
-        """The smaller of two; the slope is the second's where they are equal."""
+        """The smaller of two; the tangent is the second's where they are equal."""
         x, y = dual(x), dual(y)
         return Dual(self.ops.minimum(x.value, y.value), self._either(x < y, x, y))
 
     def maximum(self, x: Any, y: Any) -> Dual:
-        """The larger of two; the slope is the second's where they are equal."""
+        """The larger of two; the tangent is the second's where they are equal."""
         x, y = dual(x), dual(y)
         return Dual(self.ops.maximum(x.value, y.value), self._either(x > y, x, y))
 
@@ -119,50 +119,50 @@ class DualOps:
         return Dual(self.ops.select(condition, x.value, y.value), self._either(condition, x, y))
 
     def _either(self, condition: Any, x: Dual, y: Dual) -> Scalar | None:
-        """The slope of `x` if the condition holds, else that of `y`."""
-        if x.slope is None and y.slope is None:
+        """Tangent of `x` if the condition holds, else that of `y`."""
+        if x.tangent is None and y.tangent is None:
             return None
-        return self.ops.select(condition, _number(x.slope), _number(y.slope))
+        return self.ops.select(condition, _number(x.tangent), _number(y.tangent))
 
 
 @lru_cache(maxsize=32)
 def differentiated(init: Init, step: Step) -> tuple[Init, Step]:
-    """The loop that tells pairs: what the given one tells, and its slopes along one direction.
+    """The loop whose rows are pairs: those of the given one, and their tangents along one direction.
 
-    Its parameters are pairs too, (values, slopes), and so are its inputs. Slopes are a tuple with an entry
-    for each leaf of the values, from left to right; of parameters and inputs it may be `()`, for none.
+    Its parameters are pairs too, (values, tangents), and so are its inputs. Tangents are a tuple with an
+    entry for each leaf of the values, from left to right; of parameters and inputs it may be `()`, for none.
     """
 
     def begin(ops: Ops, parameters: Tree, row: Tree) -> Tree:
         return _apart(init(DualOps(ops), _together(parameters), _together(row)))
 
     def advance(ops: Ops, parameters: Tree, carry: Tree, row: Tree) -> tuple[Tree, Tree]:
-        carry, told = step(DualOps(ops), _together(parameters), _together(carry), _together(row))
-        return _apart(carry), _apart(told)
+        carry, output = step(DualOps(ops), _together(parameters), _together(carry), _together(row))
+        return _apart(carry), _apart(output)
 
     return begin, advance
 
 
 def _together(pair: Tree) -> Tree:
-    """Values and slopes as dual numbers."""
-    values, slopes = pair
-    given = (None if isinstance(slope, tuple) else slope for slope in slopes)
-    return refilled(values, map(Dual, leaves(values), given))
+    """Values and tangents as dual numbers."""
+    values, tangents = pair
+    given = (None if isinstance(tangent, tuple) else tangent for tangent in tangents)
+    return tree_unflatten(values, map(Dual, tree_leaves(values), given))
 
 
 def _apart(tree: Tree) -> Tree:
-    """Dual numbers as values and slopes."""
-    numbers = [dual(leaf) for leaf in leaves(tree)]
-    values = refilled(tree, (number.value for number in numbers))
-    return values, tuple(_number(number.slope) for number in numbers)
+    """Dual numbers as values and tangents."""
+    numbers = [dual(leaf) for leaf in tree_leaves(tree)]
+    values = tree_unflatten(tree, (number.value for number in numbers))
+    return values, tuple(_number(number.tangent) for number in numbers)
 
 
 def _parts(x: Any) -> tuple[Scalar, Scalar | None]:
-    return (x.value, x.slope) if isinstance(x, Dual) else (x, None)
+    return (x.value, x.tangent) if isinstance(x, Dual) else (x, None)
 
 
-def _number(slope: Scalar | None) -> Scalar:
-    return 0.0 if slope is None else slope
+def _number(tangent: Scalar | None) -> Scalar:
+    return 0.0 if tangent is None else tangent
 
 
 def _sum(a: Scalar | None, b: Scalar | None) -> Scalar | None:
@@ -177,5 +177,5 @@ def _difference(a: Scalar | None, b: Scalar | None) -> Scalar | None:
     return a - b
 
 
-def _product(slope: Scalar | None, factor: Scalar) -> Scalar | None:
-    return None if slope is None else slope * factor
+def _product(tangent: Scalar | None, factor: Scalar) -> Scalar | None:
+    return None if tangent is None else tangent * factor

@@ -1,36 +1,65 @@
-"""What an engine is: arithmetic, and a loop over time written in it."""
+"""Engines: arithmetic, and loops over time that are compiled once, then stepped, cut and resumed at will."""
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Protocol, TypeAlias
+from typing import Any, Protocol, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
-from aerobat.engines.trees import Tree
+from aerobat.engines.pytree import Tree, tree_leaves, tree_map
 from aerobat.kernels.ops import Ops
 
 Init: TypeAlias = Callable[[Ops, Tree, Tree], Tree]
 Step: TypeAlias = Callable[[Ops, Tree, Tree, Tree], tuple[Tree, Tree]]
 
 
-class Scan(Protocol):
-    """The loop over time."""
+class CompiledLoop(ABC):
+    """A loop over time, `carry, row = step(ops, parameters, carry, inputs)`, for parameters once given.
 
-    def __call__(self, init: Init, step: Step, parameters: Tree, inputs: Tree, every: int = 1) -> Tree:
-        """The outputs of `carry, output = step(ops, parameters, carry, input)`, a step for each input row.
+    A carry is a plain tree of read-only arrays (vehicles,): it can be kept, pickled, and gone on from as
+    often as one likes. However the ticks are cut into scans and steps, the bits are the same.
+    """
 
-        The loop starts with carry = init(ops, parameters, first input row). Leaves of `parameters` are arrays
-        (vehicles,); of `inputs` (ticks,), the same for all vehicles, or (ticks, vehicles); of the answer
-        (vehicles, rows told): those of the first tick, of each `every` ticks after it, and of the last.
+    @abstractmethod
+    def init(self, inputs: Tree) -> Tree:
+        """The carry before the first tick; leaves of its `inputs` are numbers or arrays (vehicles,)."""
+
+    @abstractmethod
+    def scan(self, carry: Tree, inputs: Tree, log_stride: int = 1) -> tuple[Tree, Tree]:
+        """The carry after some ticks, and the rows of those that are logged (see `logged_ticks`).
+
+        Args:
+            carry: from `init`, or from an earlier scan or step; stays as it is.
+            inputs: leaves (ticks,), the same for all vehicles, or (ticks, vehicles), as at compilation.
+            log_stride: ticks from one logged row to the next.
+
+        The rows' leaves are (vehicles, logged ticks).
         """
 
+    def step(self, carry: Tree, inputs: Tree) -> tuple[Tree, Tree]:
+        """The carry after one tick, and its row with leaves (vehicles,); inputs as for `init`."""
+        carry, rows = self.scan(carry, tree_map(lambda leaf: np.asarray(leaf)[None], inputs))
+        return carry, tree_map(lambda leaf: leaf[..., 0], rows)
 
-def told(ticks: int, every: int) -> NDArray[np.intp]:
-    """The ticks whose outputs a scan tells."""
-    return np.unique(np.append(np.arange(0, ticks, every), ticks - 1))
+
+class Compile(Protocol):
+    """The way from functions to a loop."""
+
+    def __call__(self, init: Init, step: Step, parameters: Tree, inputs: Tree) -> CompiledLoop:
+        """The loop that starts with `init(ops, parameters, inputs)` and goes on with `step`.
+
+        Args:
+            init: makes the carry before the first tick.
+            step: makes the next carry and the row of one tick; both are written in `ops`.
+            parameters: leaves (vehicles,).
+            inputs: of one tick; leaves are numbers where all vehicles have the same, else (vehicles,). Those
+                below a tuple with a true attribute `piecewise_constant` change at few ticks: a hint to the
+                compiler, which changes no result.
+        """
 
 
 @dataclass(frozen=True)
@@ -38,4 +67,31 @@ class Engine:
     """One way to run kernels. All give the same numbers to rounding."""
 
     name: str
-    scan: Scan
+    compile: Compile
+
+
+def logged_ticks(ticks: int, log_stride: int) -> NDArray[np.intp]:
+    """Ticks whose rows a scan returns: the first, each `log_stride` ticks after it, and the last."""
+    return np.unique(np.append(np.arange(0, ticks, log_stride), ticks - 1))
+
+
+def run_whole(engine: Engine, init: Init, step: Step, parameters: Tree, inputs: Tree) -> Tree:
+    """The rows of all ticks of a loop that is run once, from its start to its end."""
+    loop = engine.compile(init, step, parameters, first_row(inputs))
+    return loop.scan(loop.init(first_row(inputs)), inputs)[1]
+
+
+def first_row(inputs: Tree) -> Tree:
+    """Inputs of the first tick."""
+    return tree_map(lambda leaf: np.asarray(leaf)[0], inputs)
+
+
+def tick_count(inputs: Tree) -> int:
+    """Ticks of a scan's inputs."""
+    return len(tree_leaves(inputs)[0])
+
+
+def read_only(array: Any) -> Any:
+    """The same array, write-protected."""
+    array.flags.writeable = False
+    return array

@@ -3,13 +3,21 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Container
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
 
-from aerobat.engines.engine import Engine, Init, Step, told
-from aerobat.engines.trees import Tree, leaves, rows, stacked
+from aerobat.engines.engine import (
+    CompiledLoop,
+    Engine,
+    Init,
+    Step,
+    logged_ticks,
+    read_only,
+    tick_count,
+)
+from aerobat.engines.pytree import Tree, tree_map, tree_rows, tree_stack
 
 
 class FloatOps:
@@ -34,23 +42,49 @@ class FloatOps:
         return x if condition else y
 
 
-def scan(init: Init, step: Step, parameters: Tree, inputs: Tree, every: int = 1) -> Tree:
-    """The loop over time of each vehicle, one after another; see `engine.Scan`."""
-    due = set(told(len(leaves(inputs)[0]), every).tolist())
-    vehicles = enumerate(rows(parameters, lambda leaf: iter(leaf.tolist())))
-    return stacked([_flown(init, step, parameter, inputs, k, due) for k, parameter in vehicles], np.stack)
+class FloatLoop(CompiledLoop):
+    """A loop run as it is written."""
+
+    def __init__(self, init: Init, step: Step, parameters: Tree, inputs: Tree) -> None:
+        del inputs  # nothing is compiled for them
+        self._init = init
+        self._step = step
+        self._parameters = list(tree_rows(parameters, _floats))
+
+    def init(self, inputs: Tree) -> Tree:
+        """See `CompiledLoop.init`."""
+        chunk = tree_map(lambda leaf: np.asarray(leaf)[None], inputs)
+        carries = [
+            self._init(FloatOps, parameters, next(_ticks(chunk, vehicle)))
+            for vehicle, parameters in enumerate(self._parameters)
+        ]
+        return _stacked(carries)
+
+    def scan(self, carry: Tree, inputs: Tree, log_stride: int = 1) -> tuple[Tree, Tree]:
+        """See `CompiledLoop.scan`."""
+        logged = set(logged_ticks(tick_count(inputs), log_stride).tolist())
+        carries, series = [], []
+        for vehicle, state in enumerate(tree_rows(carry, _floats)):
+            parameters, rows = self._parameters[vehicle], []
+            for tick, row in enumerate(_ticks(inputs, vehicle)):
+                state, output = self._step(FloatOps, parameters, state, row)
+                if tick in logged:
+                    rows.append(output)
+            carries.append(state)
+            series.append(tree_stack(rows, np.array))
+        return _stacked(carries), tree_stack(series, np.stack)
 
 
-def _flown(init: Init, step: Step, parameter: Tree, inputs: Tree, vehicle: int, due: Container[int]) -> Tree:
-    carry, outputs = None, []
-    ticks = rows(inputs, lambda leaf: iter((leaf if leaf.ndim == 1 else leaf[:, vehicle]).tolist()))
-    for tick, row in enumerate(ticks):
-        if carry is None:
-            carry = init(FloatOps, parameter, row)
-        carry, output = step(FloatOps, parameter, carry, row)
-        if tick in due:
-            outputs.append(output)
-    return stacked(outputs, np.array)
+def _floats(leaf: Any) -> Iterator[Any]:
+    return iter(leaf.tolist())
 
 
-FLOATS = Engine("floats", scan)
+def _ticks(inputs: Tree, vehicle: int) -> Iterator[Tree]:
+    return tree_rows(inputs, lambda leaf: _floats(leaf if leaf.ndim == 1 else leaf[:, vehicle]))
+
+
+def _stacked(carries: list[Tree]) -> Tree:
+    return tree_stack(carries, lambda values: read_only(np.array(values)))
+
+
+FLOATS = Engine("floats", FloatLoop)

@@ -12,14 +12,15 @@ import jax.numpy as jnp
 import numpy as np
 
 from aerobat.arrays import Array
-from aerobat.engines.engine import Engine, Init, Step, told
-from aerobat.engines.loops import Loop, traced
+from aerobat.engines.engine import CompiledLoop, Engine, Init, Step, logged_ticks, read_only, tick_count
+from aerobat.engines.pytree import Tree, tree_leaves, tree_unflatten
+from aerobat.engines.traced_loop import TracedLoop, trace_loop
 from aerobat.engines.tracing import FUNCTIONS
-from aerobat.engines.trees import Tree, leaves, refilled
 
 Values = tuple[Any, ...]  # arrays of JAX, each (vehicles,)
-State = tuple[Values, Values]  # the carry, and what the last tick told
+State = tuple[Values, Values]  # the carry, and the outputs of the last tick
 
+MIN_TICKS = 8  # a scan's ticks and rows are padded to this times a power of two, lest each length be compiled
 _FUNCTIONS: dict[str, Callable[..., Any]] = {
     **FUNCTIONS,
     "sqrt": jnp.sqrt,
@@ -30,26 +31,41 @@ _FUNCTIONS: dict[str, Callable[..., Any]] = {
 }
 
 
-def scan(
-    init: Init,
-    step: Step,
-    parameters: Tree,
-    inputs: Tree,
-    every: int = 1,
-    precision: Literal["float64", "float32"] = "float64",
-) -> Tree:
-    """The loop over time, all vehicles at each tick; see `engine.Scan`.
+class JaxLoop(CompiledLoop):
+    """A loop compiled by XLA. The precision holds in here, whatever JAX is set to; rows are of float64."""
 
-    The precision holds in here, whatever JAX is set to elsewhere; the answer is of float64 in either.
-    """
-    loop = traced(init, step, parameters, inputs)
-    with jax.enable_x64(precision == "float64"):
-        given, rows = (
-            tuple(jnp.asarray(leaf, precision) for leaf in leaves(tree)) for tree in (parameters, inputs)
-        )
-        due = jnp.asarray(told(len(rows[0]), every))
-        outputs = [_answer(output) for output in _flown(_Program(str(loop), loop), given, rows, due)]
-    return refilled(loop.told, iter(outputs))
+    def __init__(
+        self,
+        init: Init,
+        step: Step,
+        parameters: Tree,
+        inputs: Tree,
+        precision: Literal["float64", "float32"] = "float64",
+    ) -> None:
+        self._loop = trace_loop(init, step, parameters, inputs)
+        self._program = _Program(str(self._loop), self._loop)
+        self._precision = precision
+        with jax.enable_x64(precision == "float64"):
+            self._parameters = tuple(jnp.asarray(leaf, precision) for leaf in tree_leaves(parameters))
+
+    def init(self, inputs: Tree) -> Tree:
+        """See `CompiledLoop.init`."""
+        with jax.enable_x64(self._precision == "float64"):
+            row = tuple(jnp.asarray(leaf, self._precision) for leaf in tree_leaves(inputs))
+            return self._carry(_initialized(self._program, self._parameters, row))
+
+    def scan(self, carry: Tree, inputs: Tree, log_stride: int = 1) -> tuple[Tree, Tree]:
+        """See `CompiledLoop.scan`."""
+        logged = logged_ticks(tick_count(inputs), log_stride)
+        with jax.enable_x64(self._precision == "float64"):
+            state = tuple(map(jnp.asarray, tree_leaves(carry)))
+            series = tuple(jnp.asarray(_padded(x), self._precision) for x in tree_leaves(inputs))
+            state, outputs = _scanned(self._program, self._parameters, state, series, _padded(logged))
+            rows = [_row(output, len(logged)) for output in outputs]
+            return self._carry(state), tree_unflatten(self._loop.row, rows)
+
+    def _carry(self, values: Values) -> Tree:
+        return tree_unflatten(self._loop.carry_tree, (read_only(np.array(value)) for value in values))
 
 
 @dataclass(frozen=True)
@@ -57,27 +73,11 @@ class _Program:
     """A loop that equals all loops with the same listing, so that JAX compiles it only once."""
 
     listing: str
-    loop: Loop = field(compare=False)
+    loop: TracedLoop = field(compare=False)
 
-    def begun(self, parameters: Values, row: Values) -> dict[int, Any]:
-        """The values before the first tick, by their numbers."""
-        loop = self.loop
-        given = dict(zip((*loop.parameters, *loop.inputs), (*parameters, *row), strict=True))
-        return self._computed(loop.before, given)
-
-    def ticked(self, begun: dict[int, Any], carry: Values, row: Values) -> dict[int, Any]:
-        """The values at a tick, by their numbers."""
-        loop = self.loop
-        found = dict(zip((*loop.carry, *loop.inputs), (*carry, *row), strict=True))
-        return self._computed(loop.during, begun | found)
-
-    def filled(self, numbers: Iterable[int], values: dict[int, Any], like: Any) -> Values:
-        """Some of the values, each an array with an entry for every vehicle, as `like` is."""
-        operations = self.loop.trace.operations
-        kinds = {number: bool if operations[number].logical else like.dtype for number in numbers}
-        return tuple(jnp.broadcast_to(jnp.asarray(values[n], kinds[n]), like.shape) for n in numbers)
-
-    def _computed(self, numbers: Iterable[int], values: dict[int, Any]) -> dict[int, Any]:
+    def computed(self, numbers: Iterable[int], known: dict[int, Any]) -> dict[int, Any]:
+        """Values, by their numbers, and those known before."""
+        values = dict(known)
         for number in numbers:
             operation = self.loop.trace.operations[number]
             if operation.name == "constant":
@@ -87,35 +87,61 @@ class _Program:
                 values[number] = _FUNCTIONS[operation.name](*arguments)
         return values
 
+    def filled(self, numbers: Iterable[int], values: dict[int, Any], like: Any) -> Values:
+        """Some of the values, each an array with an entry for every vehicle, as `like` is."""
+        kinds = {number: bool if self.loop.is_logical(number) else like.dtype for number in numbers}
+        return tuple(jnp.broadcast_to(jnp.asarray(values[n], kinds[n]), like.shape) for n in numbers)
+
 
 @partial(jax.jit, static_argnums=0)
-def _flown(program: _Program, parameters: Values, inputs: Values, due: Any) -> Values:
-    """The outputs (rows, vehicles) of the ticks that are due, the first and the last among them."""
+def _initialized(program: _Program, parameters: Values, row: Values) -> Values:
+    """The first carry."""
+    loop = program.loop
+    known = dict(zip((*loop.parameters, *loop.inputs), (*parameters, *row), strict=True))
+    return program.filled(loop.first_carry, program.computed(loop.initialization, known), parameters[0])
+
+
+@partial(jax.jit, static_argnums=0)
+def _scanned(
+    program: _Program, parameters: Values, carry: Values, inputs: Values, logged: Any
+) -> tuple[Values, Values]:
+    """The next carry, and the outputs (rows, vehicles) of the ticks logged, the last among them."""
     loop, like = program.loop, parameters[0]
-    begun = program.begun(parameters, tuple(leaf[0] for leaf in inputs))
+    prologue = program.computed(loop.prologue, dict(zip(loop.parameters, parameters, strict=True)))
 
     def tick(index: Any, state: State) -> State:
-        values = program.ticked(begun, state[0], tuple(leaf[index] for leaf in inputs))
-        return program.filled(loop.following, values, like), program.filled(loop.outputs, values, like)
+        row = tuple(leaf[index] for leaf in inputs)
+        known = dict(zip((*loop.carry, *loop.inputs), (*state[0], *row), strict=True))
+        values = program.computed(loop.body, prologue | known)
+        return program.filled(loop.next_carry, values, like), program.filled(loop.outputs, values, like)
 
     def stretch(state: State, ends: tuple[Any, Any]) -> tuple[State, Values]:
-        """From after a tick that is due through the next one."""
+        """From after a tick that is logged through the next one."""
         state = jax.lax.fori_loop(*ends, tick, state)
         return state, state[1]
 
     nothing = dict.fromkeys(loop.outputs, 0)
-    start = program.filled(loop.first, begun, like), program.filled(loop.outputs, nothing, like)
-    ends = due + 1
+    start = carry, program.filled(loop.outputs, nothing, like)
+    ends = logged + 1
     begins = jnp.concatenate([jnp.zeros_like(ends[:1]), ends[:-1]])
-    outputs: Values = jax.lax.scan(stretch, start, (begins, ends))[1]
-    return outputs
+    (after, _), outputs = jax.lax.scan(stretch, start, (begins, ends))
+    return after, outputs
 
 
-def _answer(output: Any) -> Array:
+def _padded(series: Any) -> Array:
+    """A series that repeats its last entry, as long as the next of a few lengths."""
+    series = np.asarray(series)
+    length = MIN_TICKS
+    while length < len(series):
+        length *= 2
+    return np.concatenate([series, np.repeat(series[-1:], length - len(series), axis=0)])
+
+
+def _row(output: Any, rows: int) -> Array:
     """(rows, vehicles) on a device -> (vehicles, rows), logical or of float64."""
-    rows = np.asarray(output).T
-    return rows if rows.dtype == bool else rows.astype(np.float64)
+    series = np.asarray(output)[:rows].T
+    return series if series.dtype == bool else series.astype(np.float64)
 
 
-ENGINE = Engine("jax", scan)
-SINGLE = Engine("jax-float32", partial(scan, precision="float32"))
+ENGINE = Engine("jax", JaxLoop)
+SINGLE = Engine("jax-float32", partial(JaxLoop, precision="float32"))

@@ -7,9 +7,9 @@ from typing import NamedTuple
 
 from aerobat.kernels.motors import Rotors, clamp
 from aerobat.kernels.ops import Ops, PerRotor, Scalar, clip
-from aerobat.kernels.rigid_body import Load
+from aerobat.kernels.rigid_body import Wrench
 
-_BEARING = 1e-9  # [-] a rotor with a smaller share of the collective thrust bears nothing
+_BEARING = 1e-9  # [-] a rotor with a smaller fraction of the collective thrust bears nothing
 
 
 class Mixer(NamedTuple):
@@ -19,18 +19,18 @@ class Mixer(NamedTuple):
     roll: PerRotor  # [1/m]
     pitch: PerRotor  # [1/m]
     yaw: PerRotor  # [1/m]
-    least: Scalar  # [N] of collective thrust that the rotors can hold without any moment
-    most: Scalar  # [N]
+    min_collective: Scalar  # [N] of collective thrust that the rotors can hold without any moment
+    max_collective: Scalar  # [N]
 
 
-def demand(mixer: Mixer, load: Load) -> PerRotor:
+def mix(mixer: Mixer, load: Wrench) -> PerRotor:
     """The least-norm rotor thrusts [N] that make a load, limits ignored."""
     mx, my, mz = load.moment_body
     columns = zip(mixer.collective, mixer.roll, mixer.pitch, mixer.yaw, strict=True)
     return tuple(c * load.thrust + a * mx + b * my + d * mz for c, a, b, d in columns)
 
 
-def fits(rotors: Rotors, thrusts: PerRotor) -> Scalar:
+def within_limits(rotors: Rotors, thrusts: PerRotor) -> Scalar:
     """Whether thrusts [N] are within all limits."""
     inside: Scalar = True
     for f, low, high, slack in zip(thrusts, rotors.min_thrust, rotors.max_thrust, rotors.slack, strict=True):
@@ -38,7 +38,7 @@ def fits(rotors: Rotors, thrusts: PerRotor) -> Scalar:
     return inside
 
 
-def nearest(ops: Ops, rotors: Rotors, mixer: Mixer, load: Load) -> PerRotor:
+def desaturate(ops: Ops, rotors: Rotors, mixer: Mixer, load: Wrench) -> PerRotor:
     """Thrusts within limits [N] that make, of a load that does not fit, what can be had; yaw is shed first.
 
     Next, collective thrust is lowered until roll and pitch fit: a vehicle that cannot tilt is lost, one that
@@ -47,7 +47,9 @@ def nearest(ops: Ops, rotors: Rotors, mixer: Mixer, load: Load) -> PerRotor:
     """
     mx, my, mz = load.moment_body
     tilting = tuple(a * mx + b * my for a, b in zip(mixer.roll, mixer.pitch, strict=True))
-    thrust = clip(ops, _lowered(ops, rotors, mixer, load.thrust, tilting), mixer.least, mixer.most)
+    thrust = clip(
+        ops, _lowered(ops, rotors, mixer, load.thrust, tilting), mixer.min_collective, mixer.max_collective
+    )
     level = tuple(c * thrust for c in mixer.collective)
     tilted = _as_far_as_fits(ops, rotors, level, tilting)
     return clamp(ops, rotors, _as_far_as_fits(ops, rotors, tilted, tuple(d * mz for d in mixer.yaw)))
@@ -60,11 +62,11 @@ def _lowered(ops: Ops, rotors: Rotors, mixer: Mixer, thrust: Scalar, tilting: Pe
     """
     slopes, ceilings = [], []
     for c, df, high in zip(mixer.collective, tilting, rotors.max_thrust, strict=True):
-        bears, share = c > _BEARING, ops.maximum(c, _BEARING)
-        slopes.append(ops.select(bears, df / share, 0.0))
-        ceilings.append(ops.select(bears, high / share, mixer.most))
+        bears, fraction = c > _BEARING, ops.maximum(c, _BEARING)
+        slopes.append(ops.select(bears, df / fraction, 0.0))
+        ceilings.append(ops.select(bears, high / fraction, mixer.max_collective))
     spread = reduce(ops.maximum, slopes) - reduce(ops.minimum, slopes)
-    room = mixer.most - mixer.least
+    room = mixer.max_collective - mixer.min_collective
     part = room / ops.maximum(ops.maximum(spread, room), _BEARING)
     bounds = (ceiling - part * slope for ceiling, slope in zip(ceilings, slopes, strict=True))
     return reduce(ops.minimum, bounds, thrust)
@@ -73,9 +75,9 @@ def _lowered(ops: Ops, rotors: Rotors, mixer: Mixer, thrust: Scalar, tilting: Pe
 def _as_far_as_fits(ops: Ops, rotors: Rotors, base: PerRotor, change: PerRotor) -> PerRotor:
     """base + s·change with the largest s in [0, 1] within limits, for a base within them."""
     limits = zip(rotors.min_thrust, rotors.max_thrust, rotors.slack, strict=True)
-    share: Scalar = 1.0
+    fraction: Scalar = 1.0
     for f, df, (low, high, slack) in zip(base, change, limits, strict=True):
         room = ops.maximum(ops.select(df > 0.0, high - f, f - low), 0.0)
         size = ops.maximum(df, -df)
-        share = ops.minimum(share, ops.select(size > slack, room / ops.maximum(size, slack), 1.0))
-    return tuple(f + share * df for f, df in zip(base, change, strict=True))
+        fraction = ops.minimum(fraction, ops.select(size > slack, room / ops.maximum(size, slack), 1.0))
+    return tuple(f + fraction * df for f, df in zip(base, change, strict=True))

@@ -4,101 +4,122 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from aerobat.kernels import attitude_loop, motors, position_loop
-from aerobat.kernels.allocation import Mixer, demand, fits, nearest
-from aerobat.kernels.attitude_loop import Attitude, reference_moment
-from aerobat.kernels.controller import Controller, Gains
-from aerobat.kernels.integrator import Airframe
+from aerobat.kernels import motors
+from aerobat.kernels.allocation import Mixer, desaturate, mix, within_limits
+from aerobat.kernels.control_loops import (
+    AttitudeCommand,
+    Gains,
+    PositionLoopState,
+    ReferencePoint,
+    attitude_command,
+    attitude_error,
+    feedback_moment,
+    init_position_loop,
+    integrate_attitude_error,
+    reference_moment,
+    step_position_loop,
+)
+from aerobat.kernels.motors import Airframe
 from aerobat.kernels.ops import Ops, PerRotor, Scalar, Vector
-from aerobat.kernels.position_loop import Outer, Target
-from aerobat.kernels.rigid_body import Body, Load
-from aerobat.kernels.vectors import ZERO, add, axes, dot, length
+from aerobat.kernels.quaternions import axes
+from aerobat.kernels.rigid_body import Body, EnvironmentParameters, Wrench
+from aerobat.kernels.vectors import ZERO, add, dot, norm
 
-_LEAST_PART = 0.3  # [-] of the commanded specific thrust, kept where the vehicle points away from it
+_MIN_PART = 0.3  # [-] of the commanded specific thrust, kept where the vehicle points away from it
 
 
-class Model(NamedTuple):
-    """The vehicle as the controller believes it to be."""
+class FeatureFlags(NamedTuple):
+    """What the controller adds to the paper's law; see `aerobat.control.Controller`."""
+
+    moment_feedforward: bool
+    motor_lag_compensation: bool
+    prioritize_tilt: bool
+
+
+class ControllerModel(NamedTuple):
+    """The nominal vehicle, which the controller takes to be flying, and the gains for it."""
 
     airframe: Airframe
+    environment: EnvironmentParameters
     mixer: Mixer
     gains: Gains
 
 
 class Commands(NamedTuple):
-    """The answer of one tick."""
+    """Commands of one tick."""
 
     thrusts: PerRotor  # [N] within limits
-    saturated: Scalar  # whether the limits changed them
+    saturated: Scalar  # true where the limits changed them
 
 
-class Memory(NamedTuple):
-    """What the controller remembers from tick to tick."""
+class ControllerState(NamedTuple):
+    """What evolves in the controller from tick to tick, its commands among it."""
 
-    outer: Outer
+    outer: PositionLoopState
     attitude_integral: Vector  # [rad·s]
-    thrusts: PerRotor  # [N] where the rotors are believed to be
+    thrusts: PerRotor  # [N] that the rotors give, by the nominal model
     commands: Commands  # the last ones
 
 
-def init(ops: Ops, model: Model, body: Body, target: Target) -> Memory:
-    """The memory before the first tick, with the rotors at what the trajectory asks there."""
-    inertial, rotors = model.airframe
-    moment = reference_moment(inertial.inertia, axes(body.q_world_body), target.ahead)
-    asked = Load(inertial.mass * length(ops, target.specific_thrust), moment)
-    thrusts = motors.clamp(ops, rotors, demand(model.mixer, asked))
-    outer = position_loop.init(ops, model.gains, inertial, body, target)
-    return Memory(outer, ZERO, thrusts, Commands(thrusts, False))
+def init(ops: Ops, model: ControllerModel, body: Body, reference: ReferencePoint) -> ControllerState:
+    """The state before the first tick, with the rotors at what the trajectory asks there."""
+    mass_properties, rotors = model.airframe
+    moment = reference_moment(mass_properties.inertia, axes(body.q_world_body), reference.ahead)
+    feedforward = Wrench(mass_properties.mass * norm(ops, reference.specific_thrust), moment)
+    thrusts = motors.clamp(ops, rotors, mix(model.mixer, feedforward))
+    outer = init_position_loop(ops, model.gains, mass_properties, model.environment, body, reference)
+    return ControllerState(outer, ZERO, thrusts, Commands(thrusts, False))
 
 
 def step(
     ops: Ops,
-    controller: Controller,
-    model: Model,
-    memory: Memory,
+    flags: FeatureFlags,
+    model: ControllerModel,
+    state: ControllerState,
     body: Body,
-    target: Target,
+    reference: ReferencePoint,
     elapsed: Scalar,
-) -> Memory:
-    """The memory, new commands included, `elapsed` [s] after the last tick.
-
-    Of `controller` only the switches count; the gains are the model's.
-    """
-    inertial, rotors = model.airframe
-    outer = position_loop.step(ops, model.gains, inertial, memory.outer, body, target, elapsed)
-    attitude = attitude_loop.desired(ops, outer, target)
+) -> ControllerState:
+    """The state, new commands included, `elapsed` [s] after the last tick."""
+    mass_properties, rotors = model.airframe
+    outer = step_position_loop(
+        ops, model.gains, mass_properties, model.environment, state.outer, body, reference, elapsed
+    )
+    attitude = attitude_command(ops, outer, reference)
     body_axes = axes(body.q_world_body)
-    error = attitude_loop.error(ops, body, body_axes, attitude)
+    error = attitude_error(ops, body, body_axes, attitude)
     # while rotors saturate, the attitude error says nothing about a lasting moment
-    counted = ops.select(memory.commands.saturated, 0.0, elapsed)
-    integral = attitude_loop.accumulate(ops, model.gains, memory.attitude_integral, error, counted)
-    moment = attitude_loop.moment(model.gains, inertial.inertia, error, integral)
-    if controller.moment_feedforward:
-        moment = add(moment, reference_moment(inertial.inertia, body_axes, target.ahead))
-    load = Load(_collective(ops, inertial.mass, body_axes[2], attitude, target), moment)
-    decays = motors.decays(ops, rotors, elapsed)
-    thrusts = motors.follow(memory.thrusts, memory.commands.thrusts, decays)
-    commands = _commands(ops, controller, model, load, thrusts, decays, elapsed)
-    return Memory(outer, integral, thrusts, commands)
+    counted = ops.select(state.commands.saturated, 0.0, elapsed)
+    integral = integrate_attitude_error(ops, model.gains, state.attitude_integral, error, counted)
+    moment = feedback_moment(model.gains, mass_properties.inertia, error, integral)
+    if flags.moment_feedforward:
+        moment = add(moment, reference_moment(mass_properties.inertia, body_axes, reference.ahead))
+    load = Wrench(_collective(ops, mass_properties.mass, body_axes[2], attitude, reference), moment)
+    decay_factors = motors.decay_factors(ops, rotors, elapsed)
+    thrusts = motors.first_order_response(state.thrusts, state.commands.thrusts, decay_factors)
+    commands = _commands(ops, flags, model, load, thrusts, decay_factors, elapsed)
+    return ControllerState(outer, integral, thrusts, commands)
 
 
-def _collective(ops: Ops, mass: Scalar, b3: Vector, attitude: Attitude, target: Target) -> Scalar:
+def _collective(
+    ops: Ops, mass: Scalar, b3: Vector, attitude: AttitudeCommand, reference: ReferencePoint
+) -> Scalar:
     """The collective thrust [N]: the commanded specific thrust along b3, whichever way the vehicle points.
 
     Pointing away it would vanish, and with it the means to turn back: a part of |f| is kept.
     """
     f = attitude.specific_thrust
-    along = ops.maximum(dot(f, b3), _LEAST_PART * length(ops, f))
-    return mass * (along + target.ahead.thrust_change)
+    along = ops.maximum(dot(f, b3), _MIN_PART * norm(ops, f))
+    return mass * (along + reference.ahead.thrust_change)
 
 
 def _commands(
     ops: Ops,
-    controller: Controller,
-    model: Model,
-    load: Load,
+    flags: FeatureFlags,
+    model: ControllerModel,
+    load: Wrench,
     thrusts: PerRotor,
-    decays: PerRotor,
+    decay_factors: PerRotor,
     period: Scalar,
 ) -> Commands:
     """Commands for a load, with the rotors now at `thrusts` [N].
@@ -107,24 +128,25 @@ def _commands(
     moments only, in which each rotor does best to hurry.
     """
     rotors = model.airframe.rotors
-    wished = demand(model.mixer, load)
-    whole = fits(rotors, wished)
-    if controller.yaw_shed_first:
-        shed = nearest(ops, rotors, model.mixer, load)
-        wished = tuple(ops.select(whole, f, g) for f, g in zip(wished, shed, strict=True))
-    if controller.motor_lag_lead:
-        share = 1.0 - ops.exp(-period / model.gains.lead_filter)
-        wished = _leading(thrusts, wished, decays, share)
-    changed = ops.select(whole & fits(rotors, wished), False, True)
-    return Commands(motors.clamp(ops, rotors, wished), changed)
+    desired = mix(model.mixer, load)
+    feasible = within_limits(rotors, desired)
+    if flags.prioritize_tilt:
+        desaturated = desaturate(ops, rotors, model.mixer, load)
+        desired = tuple(ops.select(feasible, f, g) for f, g in zip(desired, desaturated, strict=True))
+    if flags.motor_lag_compensation:
+        fraction = 1.0 - ops.exp(-period / model.gains.lead_time_constant)
+        desired = _leading(thrusts, desired, decay_factors, fraction)
+    changed = ops.select(feasible & within_limits(rotors, desired), False, True)
+    return Commands(motors.clamp(ops, rotors, desired), changed)
 
 
-def _leading(thrusts: PerRotor, wished: PerRotor, decays: PerRotor, share: Scalar) -> PerRotor:
-    """Commands [N] that bring the rotors, in one period, by `share` of the way from `thrusts` to `wished`.
+def _leading(thrusts: PerRotor, desired: PerRotor, decay_factors: PerRotor, fraction: Scalar) -> PerRotor:
+    """Commands [N] that bring the rotors, in one period, a `fraction` of the way from `thrusts` to `desired`.
 
-    With share = 1 − e^(−period/T) it is u = f + τ f' behind a low-pass of time constant T. Written about
+    With fraction = 1 − e^(−period/T) it is u = f + τ f' behind a low-pass of time constant T. Written about
     where the rotors are believed to be, it goes on pushing after a saturation until they have got there.
     """
     return tuple(
-        f + (w - f) * share / (1.0 - left) for f, w, left in zip(thrusts, wished, decays, strict=True)
+        f + (w - f) * fraction / (1.0 - left)
+        for f, w, left in zip(thrusts, desired, decay_factors, strict=True)
     )

@@ -1,20 +1,24 @@
-"""Rotors: thrusts that follow clamped commands with a first-order lag, and the load they make together."""
+"""Rotors that follow clamped commands with a first-order lag, and the body that they move.
+
+Body and rotors are advanced together: apart from each other, RK4 would be of first order.
+"""
 
 from __future__ import annotations
 
 from typing import NamedTuple
 
+from aerobat.kernels import rigid_body
 from aerobat.kernels.ops import Ops, PerRotor, Scalar, clip
-from aerobat.kernels.rigid_body import Load
+from aerobat.kernels.rigid_body import Body, EnvironmentParameters, MassProperties, Wrench
 
 
 class Rotors(NamedTuple):
-    """What the rotors of one vehicle are, one entry a rotor."""
+    """The rotors of one vehicle, one entry a rotor."""
 
     min_thrust: PerRotor  # [N]
     max_thrust: PerRotor  # [N]
     slack: PerRotor  # [N] by which rounding may push a thrust past a limit
-    lag_rate: PerRotor  # [1/s], 1/τ
+    inverse_time_constant: PerRotor  # [1/s], 1/τ
     allocation: tuple[PerRotor, PerRotor, PerRotor, PerRotor]  # collective, Mx, My, Mz a newton of thrust
 
 
@@ -26,28 +30,66 @@ def clamp(ops: Ops, rotors: Rotors, thrusts: PerRotor) -> PerRotor:
     )
 
 
-def decays(ops: Ops, rotors: Rotors, dt: Scalar) -> PerRotor:
-    """What is left of each rotor's distance from a held command after `dt` [s], e^(−dt/τ)."""
-    return tuple(ops.exp(-dt * rate) for rate in rotors.lag_rate)
+def decay_factors(ops: Ops, rotors: Rotors, dt: Scalar) -> PerRotor:
+    """Fraction that is left of each rotor's distance from a held command after `dt` [s], e^(−dt/τ)."""
+    return tuple(ops.exp(-dt * rate) for rate in rotors.inverse_time_constant)
 
 
-def follow(thrusts: PerRotor, commands: PerRotor, decays: PerRotor) -> PerRotor:
+def first_order_response(thrusts: PerRotor, commands: PerRotor, decay_factors: PerRotor) -> PerRotor:
     """Thrusts [N] a while later, by f' = (u − f)/τ under held commands u [N].
 
     The exact solution, stable for any lag, however short.
     """
-    return tuple(u + (f - u) * left for f, u, left in zip(thrusts, commands, decays, strict=True))
+    return tuple(u + (f - u) * left for f, u, left in zip(thrusts, commands, decay_factors, strict=True))
 
 
-def load(rotors: Rotors, thrusts: PerRotor) -> Load:
+def wrench(rotors: Rotors, thrusts: PerRotor) -> Wrench:
     """The collective thrust and the moments that rotor thrusts [N] make."""
-    collective, mx, my, mz = (weigh(row, thrusts) for row in rotors.allocation)
-    return Load(collective, (mx, my, mz))
+    collective, mx, my, mz = (_weighted_sum(row, thrusts) for row in rotors.allocation)
+    return Wrench(collective, (mx, my, mz))
 
 
-def weigh(weights: PerRotor, values: PerRotor) -> Scalar:
-    """Σ weights·values."""
+def _weighted_sum(weights: PerRotor, values: PerRotor) -> Scalar:
     total = weights[0] * values[0]
     for weight, value in zip(weights[1:], values[1:], strict=True):
         total = total + weight * value
     return total
+
+
+class Airframe(NamedTuple):
+    """A vehicle as the kernels see it."""
+
+    mass_properties: MassProperties
+    rotors: Rotors
+
+
+class Motion(NamedTuple):
+    """All that evolves in a flying vehicle."""
+
+    body: Body
+    thrusts: PerRotor  # [N]
+
+
+def advance(
+    ops: Ops,
+    airframe: Airframe,
+    environment: EnvironmentParameters,
+    motion: Motion,
+    commands: PerRotor,
+    dt: Scalar,
+) -> Motion:
+    """The motion after `dt` [s] under held rotor commands [N].
+
+    The rotors are solved exactly, so RK4 sees their true load at each of its stages: order four jointly.
+    """
+    wanted = clamp(ops, airframe.rotors, commands)
+    halfway = decay_factors(ops, airframe.rotors, 0.5 * dt)
+    middle = first_order_response(motion.thrusts, wanted, halfway)
+    end = first_order_response(middle, wanted, halfway)
+    at_start, at_middle, at_end = (
+        wrench(airframe.rotors, thrusts) for thrusts in (motion.thrusts, middle, end)
+    )
+    body = rigid_body.step(
+        ops, airframe.mass_properties, environment, motion.body, (at_start, at_middle, at_end), dt
+    )
+    return Motion(body, end)

@@ -5,17 +5,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from aerobat.kernels.ops import Matrix, Ops, Quaternion, Scalar, Vector
-from aerobat.kernels.vectors import (
-    add_scaled,
-    axes,
-    cross,
-    normalize,
-    spinning,
-    subtract,
-    to_body,
-    to_world,
-    transform,
-)
+from aerobat.kernels.quaternions import axes, normalize, quaternion_rate, to_body, to_world
+from aerobat.kernels.vectors import add_scaled, cross, subtract, transform
 
 
 class Body(NamedTuple):
@@ -27,54 +18,69 @@ class Body(NamedTuple):
     omega_body: Vector  # [rad/s] body
 
 
-class Inertial(NamedTuple):
-    """What a rigid body is."""
+class MassProperties(NamedTuple):
+    """Mass, inertia and drag of a rigid body."""
 
     mass: Scalar  # [kg]
     inertia: Matrix  # [kg·m²] body
     inverse_inertia: Matrix
     drag_body: Vector  # [kg/s]: force_body = −drag_body ∘ airspeed_body
-    gravity: Scalar  # [m/s²]
+
+
+class EnvironmentParameters(NamedTuple):
+    """What acts on every body; see `aerobat.environment.Environment`."""
+
+    gravity: Scalar  # [m/s²] along −z
     wind: Vector  # [m/s] velocity of the air, world
 
 
-class Load(NamedTuple):
-    """What the rotors do to the body."""
+class Wrench(NamedTuple):
+    """Force and moment of the rotors on the body."""
 
     thrust: Scalar  # [N] along b3
     moment_body: Vector  # [N·m]
 
 
-def derivative(inertial: Inertial, body: Body, load: Load) -> Body:
+def derivative(
+    mass_properties: MassProperties, environment: EnvironmentParameters, body: Body, load: Wrench
+) -> Body:
     """The time derivative of a body's state.
 
-    Eq. (3) in the Hamilton convention, body to world: v' = q ⊗ F ⊗ q* / m − g·e3, with the body drag in F.
+    Eq. (3) in the Hamilton convention, body to world: v' = q ⊗ F ⊗ q* / m − g·e3, with the drag in F, by the
+    velocity relative to the wind.
     Eq. (4): ω' = J⁻¹ (M − ω × Jω). Attitude: q' = ½ q ⊗ (0, ω).
     """
     body_axes = axes(body.q_world_body)
-    u, v, w = to_body(body_axes, subtract(body.velocity, inertial.wind))
-    dx, dy, dz = inertial.drag_body
+    u, v, w = to_body(body_axes, subtract(body.velocity, environment.wind))
+    dx, dy, dz = mass_properties.drag_body
     ax, ay, az = to_world(body_axes, (-dx * u, -dy * v, load.thrust - dz * w))
-    lightness = 1.0 / inertial.mass
-    gyroscopic = cross(body.omega_body, transform(inertial.inertia, body.omega_body))
+    lightness = 1.0 / mass_properties.mass
+    gyroscopic = cross(body.omega_body, transform(mass_properties.inertia, body.omega_body))
     return Body(
         body.velocity,
-        (ax * lightness, ay * lightness, az * lightness - inertial.gravity),
-        spinning(body.q_world_body, body.omega_body),
-        transform(inertial.inverse_inertia, subtract(load.moment_body, gyroscopic)),
+        (ax * lightness, ay * lightness, az * lightness - environment.gravity),
+        quaternion_rate(body.q_world_body, body.omega_body),
+        transform(mass_properties.inverse_inertia, subtract(load.moment_body, gyroscopic)),
     )
 
 
-def step(ops: Ops, inertial: Inertial, body: Body, loads: tuple[Load, Load, Load], dt: Scalar) -> Body:
+def step(
+    ops: Ops,
+    mass_properties: MassProperties,
+    environment: EnvironmentParameters,
+    body: Body,
+    loads: tuple[Wrench, Wrench, Wrench],
+    dt: Scalar,
+) -> Body:
     """The state after `dt` [s] of classical RK4, under the loads at its start, middle and end.
 
     Of order four if the loads are exact there; the quaternion is normalised once, at the end.
     """
     start, middle, end = loads
-    k1 = derivative(inertial, body, start)
-    k2 = derivative(inertial, _along(body, 0.5 * dt, k1), middle)
-    k3 = derivative(inertial, _along(body, 0.5 * dt, k2), middle)
-    k4 = derivative(inertial, _along(body, dt, k3), end)
+    k1 = derivative(mass_properties, environment, body, start)
+    k2 = derivative(mass_properties, environment, _along(body, 0.5 * dt, k1), middle)
+    k3 = derivative(mass_properties, environment, _along(body, 0.5 * dt, k2), middle)
+    k4 = derivative(mass_properties, environment, _along(body, dt, k3), end)
     sixth = dt / 6.0
     new = Body(
         *(

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from aerobat.flight import Flight
-from aerobat.metrics import Score, attitude_error, position_error
+from aerobat.evaluation.score import Score, attitude_error, position_error
 from aerobat.planning import Plan
+from aerobat.simulation import Flight
 
 
 def plan_caption(plan: Plan) -> str:
@@ -21,7 +21,7 @@ def plan_caption(plan: Plan) -> str:
 def score_caption(score: Score) -> str:
     """How a flight went."""
     return (
-        f"{score.outcome}; position error at most {length(score.max_position_error_m)}, "
+        f"{score.sentence}; position error at most {length(score.max_position_error_m)}, "
         f"attitude error at most {score.max_attitude_error_deg:.2f}°, "
         f"{score.rms_attitude_error_deg:.2f}° RMS, "
         f"saturated {100 * score.saturated_fraction:.1f} % of the time"

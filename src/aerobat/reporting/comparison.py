@@ -11,7 +11,6 @@ import numpy as np
 from rich.table import Table
 from rich.text import Text
 
-from aerobat.flight import COMPLETE
 from aerobat.planning import Plan
 from aerobat.reporting.captions import length
 from aerobat.reporting.page import (
@@ -30,6 +29,7 @@ from aerobat.reporting.panels.overlay import NamedPath, draw_overlay
 from aerobat.reporting.panels.poses import is_flat, plan_reference
 from aerobat.reporting.panels.signals import draw_limits, fit_to_limits
 from aerobat.reporting.style import BLUE, INK, MUTED, NORMAL, RED, SKY, SMALL, TITLE, YELLOW
+from aerobat.simulation import Outcome
 from aerobat.studies.compare import Comparison, Entry
 from aerobat.vehicle import Vehicle
 
@@ -80,7 +80,11 @@ def comparison_table(comparison: Comparison) -> Table:
         segments = NONE if entry.plan is None else str(entry.plan.intervals)
         spent = f"{entry.planning_time:.2f} s"
         table.add_row(entry.planner, segments, *_facts(comparison, entry).values(), spent)
-    notes = [f"{_name(entry)}: {entry.outcome}" for entry in comparison.entries if entry.outcome != COMPLETE]
+    notes = [
+        f"{_name(entry)}: {entry.outcome}"
+        for entry in comparison.entries
+        if entry.outcome != Outcome.COMPLETE.value
+    ]
     table.caption = Text("\n".join(notes)) if notes else None  # as it stands: brackets are no markup
     return table
 

@@ -6,8 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from aerobat.flight import Flight
-from aerobat.metrics import Score
+from aerobat.evaluation.score import Score
 from aerobat.planning import Plan
 from aerobat.reporting.captions import error_caption, plan_caption, score_caption
 from aerobat.reporting.page import AXIS, COLUMNS, TITLES, Place, blank_page, heading, house_style, panel
@@ -15,6 +14,7 @@ from aerobat.reporting.panels import timelines
 from aerobat.reporting.panels.path import draw_path
 from aerobat.reporting.panels.poses import PoseHistory, actual_poses, plan_reference, reference_poses
 from aerobat.reporting.panels.stages import draw_stages
+from aerobat.simulation import Flight
 from aerobat.vehicle import Vehicle, load_vehicle
 
 if TYPE_CHECKING:

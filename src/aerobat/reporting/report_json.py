@@ -6,7 +6,7 @@ import json
 from dataclasses import asdict
 from typing import Any
 
-from aerobat.metrics import Score
+from aerobat.evaluation.score import Score
 from aerobat.planning import Plan
 
 
@@ -18,13 +18,23 @@ def report(plan: Plan, score: Score | None = None, vehicle: str | None = None) -
         "plan": _plan(plan),
     }
     if score is not None:
-        facts["flight"] = asdict(score)
+        facts["flight"] = _flight(score)
     return facts
 
 
 def to_json(facts: dict[str, Any] | list[dict[str, Any]]) -> str:
     """A report, or a list of rows, as JSON text."""
     return json.dumps(facts, indent=2, ensure_ascii=False, allow_nan=False)
+
+
+def _flight(score: Score) -> dict[str, Any]:
+    """A score; what is not known is None, as JSON has no NaN."""
+    facts = asdict(score) | {"outcome": score.outcome.name.lower()}
+    facts["passages"] = [
+        {name: None if value != value else value for name, value in passage.items()}
+        for passage in facts["passages"]
+    ]
+    return facts
 
 
 def _plan(plan: Plan) -> dict[str, Any]:

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from math import isnan
 
 from rich.console import Console
 from rich.table import Table
 
 from aerobat.certification import Certificate, Side
-from aerobat.metrics import Score
+from aerobat.evaluation.score import Score
 from aerobat.planning import Plan
 from aerobat.problem import Problem
 from aerobat.vehicle import Vehicle
@@ -91,18 +92,16 @@ def _optimality(plan: Plan) -> str:
 def _flight_facts(score: Score | None) -> Iterable[tuple[str, str]]:
     if score is None:
         return
-    yield "outcome", score.outcome
+    yield "outcome", score.sentence
     yield "position error", _pair(100 * score.max_position_error_m, 100 * score.rms_position_error_m, "cm")
     yield "attitude error", _pair(score.max_attitude_error_deg, score.rms_attitude_error_deg, "°")
-    if score.gate_miss_m is not None:
-        clearance = "" if score.gate_clearance_m is None else f", {100 * score.gate_clearance_m:.0f} cm clear"
-        yield (
-            "gate",
-            (
-                f"{1000 * score.gate_miss_m:.1f} mm off, {score.gate_attitude_error_deg:.2f}° off, "
-                f"at {score.gate_speed_m_s:.2f} m/s{clearance}"
-            ),
+    for passage in score.passages:
+        clearance = "" if isnan(passage.clearance) else f", {100 * passage.clearance:.0f} cm clear"
+        passed = (
+            f"{1000 * passage.miss:.1f} mm off, {passage.attitude_error_deg:.2f}° off, "
+            f"at {passage.speed:.2f} m/s{clearance}"
         )
+        yield passage.gate, "not reached" if isnan(passage.time) else passed
     yield "saturated", f"{100 * score.saturated_fraction:.1f} % of the time"
 
 

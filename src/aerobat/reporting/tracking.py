@@ -7,9 +7,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from aerobat.errors import SpecError
+from aerobat.evaluation.score import score
 from aerobat.flatness import Reference, reference
-from aerobat.flight import Flight
-from aerobat.metrics import score
 from aerobat.planning import Plan
 from aerobat.reporting.captions import plan_caption, score_caption
 from aerobat.reporting.page import AXIS, TITLES, Place, blank_page, heading, house_style, panel
@@ -24,6 +23,7 @@ from aerobat.reporting.panels.signals import (
     rotor_signals,
     shade,
 )
+from aerobat.simulation import Flight
 from aerobat.vehicle import Vehicle
 
 if TYPE_CHECKING:
@@ -108,7 +108,7 @@ def tracking_figure(plan: Plan, vehicle: Vehicle, flight: Flight) -> Figure:
     itself; a shade shows where rotors are saturated. What does not move is left out. An axis that values
     would stretch far beyond its limits is cut off and says so. Raises SpecError for a batch of flights.
     """
-    if flight.ends.ndim:
+    if flight.is_batch:
         raise SpecError("tracking_figure draws one flight; of a batch, give flight[k]")
     asked = reference(plan.trajectory, vehicle, rate=RATE, environment=plan.problem.environment)
     rotors = None if plan.margin is None else f"rotors asked for {plan.margin}"

@@ -1,5 +1,9 @@
-"""What the controller flies: the plant, and the errors of what it sees."""
+"""Simulation: the loop of plant, sensors and controller, and the flights that come of it."""
 
+from aerobat.simulation.flight import Flight, load_flight
+from aerobat.simulation.fly import fly
 from aerobat.simulation.noise import StateNoise
+from aerobat.simulation.outcome import Outcome
+from aerobat.simulation.setup import FlightConfig, prepare
 
-__all__ = ["StateNoise"]
+__all__ = ["Flight", "FlightConfig", "Outcome", "StateNoise", "fly", "load_flight", "prepare"]

@@ -7,11 +7,10 @@ from dataclasses import dataclass
 from time import perf_counter
 
 from aerobat.errors import BackendMissing, Infeasible
-from aerobat.flight import Flight
-from aerobat.flying import fly
-from aerobat.metrics import Score, score
+from aerobat.evaluation.score import Score, score
 from aerobat.planning import Attempt, FreeKnots, MinSnap, Miqp, Plan, Planner, TimeOptimal, plan
 from aerobat.problem.problem import Problem
+from aerobat.simulation import Flight, fly
 from aerobat.vehicle import Vehicle
 
 PLANNERS: tuple[tuple[str, Planner], ...] = (
@@ -87,6 +86,6 @@ def _entry(
     except (Infeasible, BackendMissing) as error:
         return Entry(name, None, None, None, perf_counter() - started, str(error))
     spent = perf_counter() - started
-    flight = fly(found.trajectory, vehicle, environment=problem.environment)
-    flown = score(flight, problem, vehicle)
-    return Entry(name, found, flight, flown, spent, flown.outcome)
+    flight = fly(found, vehicle)
+    flown = score(flight, found, vehicle)
+    return Entry(name, found, flight, flown, spent, flown.sentence)

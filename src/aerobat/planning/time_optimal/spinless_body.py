@@ -13,18 +13,20 @@ from typing import Any
 
 import numpy as np
 
-from aerobat.engines.packing import models
-from aerobat.engines.trees import rows
+from aerobat.control import Controller
+from aerobat.control.parameters import controller_parameters
+from aerobat.engines.pytree import tree_map
 from aerobat.environment import Environment
 from aerobat.flatness import lateral_drag
 from aerobat.kernels import rigid_body
-from aerobat.kernels.allocation import demand
-from aerobat.kernels.control import Model
-from aerobat.kernels.controller import Controller
-from aerobat.kernels.rigid_body import Body, Load
-from aerobat.kernels.vectors import add, axes, cross, transform
+from aerobat.kernels.allocation import mix
+from aerobat.kernels.control import ControllerModel
+from aerobat.kernels.quaternions import axes
+from aerobat.kernels.rigid_body import Body, Wrench
+from aerobat.kernels.vectors import add, cross, transform
 from aerobat.optimization.nonlinear import import_casadi
 from aerobat.vehicle import Vehicle
+from aerobat.vehicle.fleet import Fleet
 
 STATES = 12
 INPUTS = 3
@@ -52,7 +54,7 @@ class SpinlessBody:
     def rotors(self) -> Any:
         """(x, u, u') -> the rotors' least-norm thrusts [N], and their commands f + τ f' [N], each (n,)."""
         ca = import_casadi()
-        thrusts = ca.vertcat(*demand(self._model.mixer, self._load()))
+        thrusts = ca.vertcat(*mix(self._model.mixer, self._load()))
         commands = thrusts + ca.DM(self.vehicle.lags) * self._along(thrusts)
         return self._function("rotors", [thrusts, commands])
 
@@ -73,27 +75,28 @@ class SpinlessBody:
         return self._symbols[0]
 
     @cached_property
-    def _model(self) -> Model:
+    def _model(self) -> ControllerModel:
         """What the kernels know of the vehicle, in plain floats."""
         drag = lateral_drag(self.vehicle) * self.vehicle.mass
         flat = replace(self.vehicle, drag_body=np.array([drag, drag, self.vehicle.drag_body[2]]))
-        model: Model = next(
-            iter(rows(models(Controller(), [flat], self.environment), lambda leaf: iter(leaf.tolist())))
-        )
+        parameters = controller_parameters(Controller(), Fleet.of([flat]), self.environment)
+        model: ControllerModel = tree_map(lambda leaf: leaf[0].item(), parameters)
         return model
 
     def _body(self) -> Body:
         p, v, q, (wx, wy) = (_scalars(self._x[part]) for part in (POSITION, VELOCITY, ATTITUDE, RATES))
         return Body(p, v, q, (wx, wy, 0.0))
 
-    def _load(self) -> Load:
-        inertia, omega = self._model.airframe.inertial.inertia, self._body().omega_body
+    def _load(self) -> Wrench:
+        inertia, omega = self._model.airframe.mass_properties.inertia, self._body().omega_body
         thrust, ax, ay = _scalars(self._symbols[1])
-        return Load(thrust, add(transform(inertia, (ax, ay, 0.0)), cross(omega, transform(inertia, omega))))
+        return Wrench(thrust, add(transform(inertia, (ax, ay, 0.0)), cross(omega, transform(inertia, omega))))
 
     def _rate(self) -> Any:
         """x' by the kernel that the simulation runs (paper, eqs. (3) and (4))."""
-        rate = rigid_body.derivative(self._model.airframe.inertial, self._body(), self._load())
+        rate = rigid_body.derivative(
+            self._model.airframe.mass_properties, self._model.environment, self._body(), self._load()
+        )
         wx, wy, _ = rate.omega_body
         return import_casadi().vertcat(*rate.position, *rate.velocity, *rate.q_world_body, wx, wy)
 

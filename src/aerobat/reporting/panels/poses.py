@@ -9,9 +9,9 @@ import numpy as np
 
 from aerobat.arrays import Array
 from aerobat.flatness import Reference, reference
-from aerobat.flight import Flight
 from aerobat.planning import Plan
 from aerobat.problem.gate import Gate
+from aerobat.simulation import Flight
 from aerobat.vehicle import Vehicle
 
 RATE = 250.0  # [1/s] at which a plan is shown

@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 
 from aerobat.arrays import Array
 from aerobat.flatness import Reference
-from aerobat.flight import Flight
 from aerobat.reporting.page import size_of
 from aerobat.reporting.style import BAND, INK, MUTED, RED, SMALL
+from aerobat.simulation import Flight
 from aerobat.vehicle import Vehicle, wrench
 
 if TYPE_CHECKING:

@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from aerobat.arrays import Array
-from aerobat.flight import Flight
-from aerobat.metrics import attitude_error, position_error
+from aerobat.evaluation.score import attitude_error, position_error
 from aerobat.planning import PlacedStage, Plan
 from aerobat.reporting.page import HEADING, heading, legend, size_of
 from aerobat.reporting.panels.keyframes import maneuver_plane, plan_keyframes
 from aerobat.reporting.panels.labels import spread_out
 from aerobat.reporting.style import BLUE, FAINT, INK, MUTED, RED, SMALL, YELLOW
+from aerobat.simulation import Flight
 from aerobat.vehicle import Vehicle
 
 if TYPE_CHECKING:

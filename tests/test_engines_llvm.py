@@ -2,18 +2,19 @@
 
 import math
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import llvmlite.binding as llvm
 import numpy as np
 import pytest
 
-from aerobat.engines import compiled
-from aerobat.engines.emitting import Layout, module
-from aerobat.engines.floats import scan as float_scan
-from aerobat.engines.loops import traced
-from aerobat.flying import fly
-from aerobat.simulation import StateNoise
+from aerobat.engines import FLOATS, Engine, run_whole
+from aerobat.engines.llvm import ENGINE
+from aerobat.engines.llvm.codegen import Layout, module
+from aerobat.engines.llvm.engine import MachineLoop, machine_code, target_machine
+from aerobat.engines.traced_loop import trace_loop
+from aerobat.simulation import StateNoise, fly
 from aerobat.trajectory import Trajectory
 from aerobat.vehicle import load_vehicle
 from test_flying_batches import loops, near
@@ -32,14 +33,14 @@ def nothing(ops: Any, parameters: Any, row: Any) -> tuple[()]:
 @pytest.mark.parametrize("vehicles", [1, 9])
 def test_the_exponential_is_right_to_the_last_digits_over_all_its_range(vehicles: int) -> None:
     x = np.concatenate([np.linspace(-707, 708, 20_001), np.linspace(-2, 2, 20_001), [0.0, -1e-300]])
-    answer = compiled.scan(nothing, exponential, np.linspace(0.5, 1.0, vehicles), x)
+    answer = run_whole(ENGINE, nothing, exponential, np.linspace(0.5, 1.0, vehicles), x)
     wanted = np.exp(np.linspace(0.5, 1.0, vehicles)[:, None] * x)
     np.testing.assert_allclose(answer, wanted, rtol=5e-16)
     edges = np.array([-np.inf, -1e9, -709.0, 710.0, np.inf])
-    assert compiled.scan(nothing, exponential, np.ones(vehicles), edges)[0].tolist() == [
+    assert run_whole(ENGINE, nothing, exponential, np.ones(vehicles), edges)[0].tolist() == [
         0.0, 0.0, 0.0, math.inf, math.inf
     ]  # fmt: skip
-    assert np.isnan(compiled.scan(nothing, exponential, np.ones(vehicles), np.array([np.nan]))).all()
+    assert np.isnan(run_whole(ENGINE, nothing, exponential, np.ones(vehicles), np.array([np.nan]))).all()
 
 
 @pytest.fixture(scope="module")
@@ -80,40 +81,33 @@ def begin(ops: Any, pull: Any, row: Any) -> Any:
 def test_threads_change_nothing(threads: int) -> None:
     rng = np.random.default_rng(0)
     pull, push = rng.uniform(0.1, 0.5, 100), rng.normal(size=(300, 100))
-    one = compiled.scan(begin, random_walk, pull, push, threads=1)
-    many = compiled.scan(begin, random_walk, pull, push, threads=threads)
+    one, many = (
+        run_whole(Engine("", partial(MachineLoop, threads=count)), begin, random_walk, pull, push)
+        for count in (1, threads)
+    )
     np.testing.assert_array_equal(one[0], many[0])
     np.testing.assert_array_equal(one[1], many[1])
     assert one[1].dtype == bool
-    oracle = float_scan(begin, random_walk, pull, push)
+    oracle = run_whole(FLOATS, begin, random_walk, pull, push)
     np.testing.assert_allclose(one[0], oracle[0], rtol=0, atol=1e-12)
-
-
-@pytest.mark.parametrize("every", [1, 2, 7, 299, 300, 1000])
-def test_the_ticks_told_are_the_first_each_so_many_after_it_and_the_last(every: int) -> None:
-    rng = np.random.default_rng(0)
-    pull, push = rng.uniform(0.1, 0.5, 3), rng.normal(size=300)
-    for scan in (compiled.scan, float_scan):
-        all_of_them, _ = scan(begin, random_walk, pull, push)
-        some, _ = scan(begin, random_walk, pull, push, every)
-        ticks = sorted({*range(0, 300, every), 299})
-        np.testing.assert_array_equal(some, all_of_them[:, ticks])
 
 
 def test_a_second_flight_of_the_same_kind_is_not_compiled_again() -> None:
     still = Trajectory(np.array([1.0]), np.zeros((1, 1, 3)))
     fly(still, QUAD, engine="compiled")
-    before = compiled.compiled.cache_info().misses
+    before = machine_code.cache_info().misses
     fly(still, replace(QUAD, mass=0.9 * QUAD.mass), engine="compiled")
-    assert compiled.compiled.cache_info().misses == before
+    assert machine_code.cache_info().misses == before
 
 
 @pytest.mark.parametrize("width", [1, 8])
 def test_no_multiplication_is_fused_with_an_addition(width: int) -> None:
     """Fusing rounds once where the kernel rounds twice, and not on all machines."""
-    loop = traced(begin, random_walk, np.ones(3), np.ones((4, 3)))
-    text = module(loop, Layout(width, shared_parameters=(False,), shared_inputs=(False,)))
-    assembly = compiled.machine().emit_assembly(llvm.parse_assembly(text))
+    loop = trace_loop(begin, random_walk, np.ones(3), np.ones(3))
+    text = module(
+        loop, Layout(width, shared_parameters=(False,), shared_inputs=(False,), piecewise_constant=(False,))
+    )
+    assembly = target_machine().emit_assembly(llvm.parse_assembly(text))
     assert "mul" in assembly
     assert "fmadd" not in assembly
     assert "fma" not in assembly

@@ -1,5 +1,7 @@
 """A loop in LLVM's intermediate language: all ticks of all vehicles, a few of them side by side.
 
+DERIVATION.md, beside this file, says what is computed where and why the bits are always the same.
+
 A value is one number for all vehicles or, where they differ, a vector with a lane for each of `width`
 vehicles. No operation is fused with another or reordered, and the exponential is spelt out, so that neither
 the machine, nor the width, nor the size of a batch changes a bit of what comes out.
@@ -8,7 +10,7 @@ the machine, nor the width, nor the size of a batch changes a bit of what comes 
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
 from itertools import compress
 from math import factorial, inf
@@ -16,12 +18,20 @@ from typing import Any
 
 from llvmlite import ir
 
-from aerobat.engines.loops import Loop
+from aerobat.engines.traced_loop import TracedLoop
 from aerobat.engines.tracing import Operation
 
 NUMBER, LOGICAL, INTEGER = ir.DoubleType(), ir.IntType(1), ir.IntType(64)
-ARRAYS = ("shared parameters", "parameters", "shared inputs", "inputs", "outputs")
-COUNTS = ("lanes", "ticks", "every", "begin", "end")
+ARRAYS = (
+    "shared parameters",
+    "parameters",
+    "shared inputs",
+    "inputs",
+    "carry",
+    "next carry",
+    "outputs",
+)
+COUNTS = ("lanes", "ticks", "log_stride", "begin", "end")
 
 LOG2_E = 1.4426950408889634
 LN2 = (6.93147180369123816490e-01, 1.90821492927058770002e-10)  # the first ends in zeros: k · LN2[0] is exact
@@ -33,95 +43,122 @@ BIAS, MANTISSA = 1023, 52  # of a float64's exponent; its bits below that
 
 @dataclass(frozen=True)
 class Layout:
-    """How many vehicles fly side by side, and which parameters and inputs are one number for all.
+    """Vehicles side by side, and which parameters and inputs are one number for all.
 
-    The function's arrays, all of float64: shared parameters (s,), parameters (p, lanes), shared inputs
-    (ticks, r), inputs (ticks, i, lanes), outputs (ticks told, o, lanes). Told are the first tick, each
-    `every` ticks after it, and the last. Its lanes `begin` to `end` fly, multiples of the width.
+    Both functions take arrays of float64: shared parameters (s,), parameters (p, lanes), shared inputs
+    (ticks, r), inputs (ticks, i, lanes), carry and next carry (c, lanes), outputs (logged ticks, o, lanes).
+    `scan` logs the first tick, each `log_stride` ticks after it, and the last; `init` reads the inputs of one
+    tick and writes the next carry. The lanes `begin` to `end` are run, multiples of the width.
     """
 
     width: int
     shared_parameters: tuple[bool, ...]
     shared_inputs: tuple[bool, ...]
-    steady_inputs: tuple[bool, ...] = ()  # shared, and at most ticks the same as before
+    piecewise_constant: tuple[bool, ...]  # inputs that are shared, and at most ticks the same as before
 
 
-def module(loop: Loop, layout: Layout) -> str:
-    """The text of a module whose function `loop` takes the addresses of ARRAYS, and COUNTS."""
+def module(loop: TracedLoop, layout: Layout) -> str:
+    """The text of a module whose functions `init` and `scan` take the addresses of ARRAYS, and COUNTS."""
     whole = ir.Module("aerobat")
     arguments = [ir.PointerType()] * len(ARRAYS) + [INTEGER] * len(COUNTS)
-    function = ir.Function(whole, ir.FunctionType(ir.VoidType(), arguments), "loop")
-    _Emitter(loop, layout, function).emit()
+    signature = ir.FunctionType(ir.VoidType(), arguments)
+    _Codegen(loop, layout, ir.Function(whole, signature, "init")).emit_init()
+    _Codegen(loop, layout, ir.Function(whole, signature, "scan")).emit_scan()
     return str(whole)
 
 
-class _Emitter:
+class _Codegen:
     """Writes one function."""
 
-    def __init__(self, loop: Loop, layout: Layout, function: ir.Function) -> None:
-        self._loop, self._layout = loop, layout
-        self._given = dict(zip((*ARRAYS, *COUNTS), function.args, strict=True))
+    def __init__(self, loop: TracedLoop, layout: Layout, function: ir.Function) -> None:
+        self._loop = loop
+        self._layout = layout
+        self._arguments = dict(zip((*ARRAYS, *COUNTS), function.args, strict=True))
         self._builder = ir.IRBuilder(function.append_basic_block())
         self._values: dict[int, Any] = {}  # by their numbers in the trace
         self._widened: dict[Any, Any] = {}
 
-    def emit(self) -> None:
-        """Blocks of lanes, one after another, each through all ticks."""
-        given, loop, layout = self._given, self._loop, self._layout
-        with self._counting(given["begin"], given["end"], layout.width) as lane:
+    def emit_init(self) -> None:
+        """The first carry of each block of lanes, one after another."""
+        loop, layout = self._loop, self._layout
+        with self._blocks() as lane:
             self._load("parameters", loop.parameters, layout.shared_parameters, INTEGER(0), lane)
             self._load("inputs", loop.inputs, layout.shared_inputs, INTEGER(0), lane)
-            self._compute(loop.before)
-            carry = [self._slot(value) for value in self._wide(loop.first)]
-            with self._counting(INTEGER(0), given["ticks"], 1) as tick:
-                self._tick(carry, tick, lane)
+            self._compute(loop.initialization)
+            self._store("next carry", INTEGER(0), self._wide(loop.first_carry), lane)
         self._builder.ret_void()
+
+    def emit_scan(self) -> None:
+        """Blocks of lanes, one after another, each through all ticks."""
+        b, loop, layout = self._builder, self._loop, self._layout
+        with self._blocks() as lane:
+            self._load("parameters", loop.parameters, layout.shared_parameters, INTEGER(0), lane)
+            self._compute(loop.prologue)
+            carry = []
+            for index, number in enumerate(loop.carry):
+                address = self._address("carry", INTEGER(0), len(loop.carry), index, lane)
+                value = b.load(address, typ=self._wide_type(NUMBER), align=8)
+                carry.append(self._slot(self._as_logical(value) if loop.is_logical(number) else value))
+            with self._counting(INTEGER(0), self._arguments["ticks"], 1) as tick:
+                self._tick(carry, tick, lane)
+            after = [b.load(slot, typ=slot.allocated_type) for slot in carry]
+            self._store("next carry", INTEGER(0), after, lane)
+        b.ret_void()
+
+    def _blocks(self) -> AbstractContextManager[Any]:
+        return self._counting(self._arguments["begin"], self._arguments["end"], self._layout.width)
 
     def _tick(self, carry: Sequence[Any], tick: Any, lane: Any) -> None:
         b, loop = self._builder, self._loop
         for number, slot in zip(loop.carry, carry, strict=True):
             self._values[number] = b.load(slot, typ=slot.allocated_type)
         self._load("inputs", loop.inputs, self._layout.shared_inputs, tick, lane)
-        steady = list(compress(loop.inputs, self._layout.steady_inputs))
-        lasting = loop.lasting(steady)
-        self._refresh(steady, lasting, tick)
-        self._compute(number for number in loop.during if number not in lasting)
-        self._tell(tick, lane)
-        for value, slot in zip(self._wide(loop.following), carry, strict=True):
+        piecewise_constant = list(compress(loop.inputs, self._layout.piecewise_constant))
+        invariant = loop.loop_invariant(piecewise_constant)
+        self._refresh(piecewise_constant, invariant, tick)
+        held = set(invariant)
+        self._compute(number for number in loop.body if number not in held)
+        self._log(tick, lane)
+        for value, slot in zip(self._wide(loop.next_carry), carry, strict=True):
             b.store(value, slot)
 
-    def _refresh(self, steady: Sequence[int], lasting: Sequence[int], tick: Any) -> None:
-        """The values that last from tick to tick, computed anew when a steady input changes."""
+    def _refresh(self, piecewise_constant: Sequence[int], invariant: Sequence[int], tick: Any) -> None:
+        """The loop-invariant values, computed anew at the first tick and when a constant input changes."""
         b, values = self._builder, self._values
         columns = sum(self._layout.shared_inputs)
-        places = dict(
-            zip(compress(self._loop.inputs, self._layout.shared_inputs), range(columns), strict=True)
-        )
-        begins = changed = b.icmp_signed("==", tick, INTEGER(0))
+        shared = compress(self._loop.inputs, self._layout.shared_inputs)
+        column = {number: index for index, number in enumerate(shared)}
+        begins = b.icmp_signed("==", tick, INTEGER(0))
+        changed = begins
         before = b.select(begins, tick, b.sub(tick, INTEGER(1)))
-        for number in steady:
-            address = self._address("shared inputs", before, columns, places[number], None)
+        for number in piecewise_constant:
+            address = self._address("shared inputs", before, columns, column[number], None)
             was = b.load(address, typ=INTEGER, align=8)  # bits: 0.0 and -0.0 are equal
             changed = b.or_(changed, b.icmp_signed("!=", b.bitcast(values[number], INTEGER), was))
         widened, slots = dict(self._widened), {}
         with b.if_then(changed):
-            self._compute(lasting)
-            for number in lasting:
+            self._compute(invariant)
+            for number in invariant:
                 slots[number] = self._slot(values[number])
         self._widened = widened  # what was widened in there is not known out here
         for number, slot in slots.items():
             values[number] = b.load(slot, typ=slot.allocated_type)
 
-    def _tell(self, tick: Any, lane: Any) -> None:
+    def _log(self, tick: Any, lane: Any) -> None:
         """Store the outputs, if it is time to."""
-        b, every = self._builder, self._given["every"]
-        outputs = [self._as_number(value) for value in self._wide(self._loop.outputs)]
-        last = b.icmp_signed("==", b.add(tick, INTEGER(1)), self._given["ticks"])
-        due = b.icmp_signed("==", b.srem(tick, every), INTEGER(0))
+        b, stride = self._builder, self._arguments["log_stride"]
+        outputs = self._wide(self._loop.outputs)
+        last = b.icmp_signed("==", b.add(tick, INTEGER(1)), self._arguments["ticks"])
+        due = b.icmp_signed("==", b.srem(tick, stride), INTEGER(0))
         with b.if_then(b.or_(due, last)):
-            row = b.sdiv(b.add(tick, b.sub(every, INTEGER(1))), every)
-            for index, value in enumerate(outputs):
-                b.store(value, self._address("outputs", row, len(outputs), index, lane), align=8)
+            row = b.sdiv(b.add(tick, b.sub(stride, INTEGER(1))), stride)
+            self._store("outputs", row, outputs, lane)
+
+    def _store(self, array: str, row: Any, values: Sequence[Any], lane: Any) -> None:
+        """Wide values into a row of an array, true and false as 1 and 0."""
+        for column, value in enumerate(values):
+            address = self._address(array, row, len(values), column, lane)
+            self._builder.store(self._as_number(value), address, align=8)
 
     def _compute(self, numbers: Iterable[int]) -> None:
         operations = self._loop.trace.operations
@@ -136,7 +173,7 @@ class _Emitter:
                 self._values[number] = self._apply(operation, arguments)
 
     def _apply(self, operation: Operation, arguments: Sequence[Any]) -> Any:
-        """What an operation makes of arguments that are all wide, or none."""
+        """The result of an operation on arguments that are all wide, or none."""
         b = self._builder
         match operation.name, arguments:
             case "add", (x, y):
@@ -207,8 +244,8 @@ class _Emitter:
         b = self._builder
         place = b.add(b.mul(row, INTEGER(columns)), INTEGER(column))
         if lane is not None:
-            place = b.add(b.mul(place, self._given["lanes"]), lane)
-        return b.gep(self._given[array], [place], source_etype=NUMBER)
+            place = b.add(b.mul(place, self._arguments["lanes"]), lane)
+        return b.gep(self._arguments[array], [place], source_etype=NUMBER)
 
     @contextmanager
     def _counting(self, begin: Any, end: Any, step: int) -> Iterator[Any]:
@@ -258,6 +295,10 @@ class _Emitter:
         if _shaped(value.type, LOGICAL) != value.type:
             return value
         return self._builder.uitofp(value, _shaped(value.type, NUMBER))
+
+    def _as_logical(self, value: Any) -> Any:
+        """1 and 0 as true and false."""
+        return self._builder.fcmp_ordered("!=", value, _filled(value.type, NUMBER(0.0)))
 
 
 def _constant(content: Any) -> Any:

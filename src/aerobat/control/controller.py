@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, fields
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
 from aerobat.errors import SpecError
+from aerobat.kernels.control import FeatureFlags
+from aerobat.kernels.control_loops import Gains
 from aerobat.kernels.ops import Scalar
 
 _SMALLEST = 1e-9  # [s], [rad/s]: stands for zero where one divides
@@ -34,10 +36,10 @@ class Controller:
     attitude_damping: float = 0.85  # [-] ζ of the attitude loop
     attitude_integral_gain: float = 1000.0  # [1/s³]
     max_attitude_integral: float = 0.05  # [rad·s]
-    lead_filter: float = 0.01  # [s] time constant that the lead leaves in place of the rotors' lag
+    lead_time_constant: float = 0.01  # [s] time constant that the lead leaves in place of the rotors' lag
     moment_feedforward: bool = True  # the moment that the reference asks, J ω' + ω × Jω
-    motor_lag_lead: bool = True  # commands that lead the rotors' lag
-    yaw_shed_first: bool = True  # on saturation, give up the yaw moment before roll and pitch
+    motor_lag_compensation: bool = True  # commands that lead the rotors' lag
+    prioritize_tilt: bool = True  # on saturation, give up the yaw moment before roll and pitch
 
     def __post_init__(self) -> None:
         for field in fields(self):
@@ -47,23 +49,28 @@ class Controller:
             else:
                 _require_gain(field.name, value)
 
-    def effect_delay(self, period: float) -> float:
-        """How long commands given every `period` [s] take, on the average, to become thrust [s].
+    @property
+    def feature_flags(self) -> FeatureFlags:
+        """The switches: all that makes the control law another one, its gains being numbers."""
+        return FeatureFlags(self.moment_feedforward, self.motor_lag_compensation, self.prioritize_tilt)
+
+    def actuation_delay(self, period: float) -> float:
+        """Time [s] that commands given every `period` [s] take, on the average, to become thrust.
 
         The lead leaves a first-order filter in place of the rotors' lag; sampled, it delays a ramp so long.
         """
-        if not self.motor_lag_lead:
+        if not self.motor_lag_compensation:
             return 0.0
-        return period / -math.expm1(-period / max(self.lead_filter, _SMALLEST))
+        return period / -math.expm1(-period / max(self.lead_time_constant, _SMALLEST))
 
-    def gains(self, agility: Scalar, ops: Any = np) -> Gains:
-        """The gains for a vehicle that the attitude loop's frequency must not exceed `agility` [rad/s].
+    def gains(self, max_bandwidth: Scalar, ops: Any = np) -> Gains:
+        """The gains for a vehicle whose attitude loop must not be faster than `max_bandwidth` [rad/s].
 
         `ops` are of the arithmetic of the controller's own numbers: dual ones have dual gains.
         """
-        frequency = ops.minimum(self.attitude_frequency, agility)
+        frequency = ops.minimum(self.attitude_frequency, max_bandwidth)
         slower = frequency / max(self.attitude_frequency, _SMALLEST)
-        like = np.ones_like(agility)
+        like = np.ones_like(max_bandwidth)
         return Gains(
             position=self.position_gain * slower**2,
             velocity=self.velocity_gain * slower,
@@ -75,24 +82,8 @@ class Controller:
             damping=2.0 * self.attitude_damping * frequency,
             attitude_integral=self.attitude_integral_gain * slower**3,
             max_attitude_integral=self.max_attitude_integral * like,
-            lead_filter=max(self.lead_filter, _SMALLEST) * like,
+            lead_time_constant=max(self.lead_time_constant, _SMALLEST) * like,
         )
-
-
-class Gains(NamedTuple):
-    """The numbers that the loops read, scalars or one for each vehicle; see `Controller`."""
-
-    position: Scalar
-    velocity: Scalar
-    integral: Scalar
-    max_integral: Scalar
-    max_feedback: Scalar
-    jerk_filter: Scalar
-    stiffness: Scalar  # [1/s²] of the attitude loop, on the vector part of a quaternion: 2 ω_n²
-    damping: Scalar  # [1/s] of the attitude loop, 2 ζ ω_n
-    attitude_integral: Scalar
-    max_attitude_integral: Scalar
-    lead_filter: Scalar
 
 
 def _require_switch(name: str, value: Any) -> None:

@@ -1,0 +1,79 @@
+"""Vehicles, settings and environment as the numbers that kernels read, for many vehicles at once."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from aerobat.arrays import Array
+from aerobat.control.controller import Controller
+from aerobat.engines.components import components, matrix_components
+from aerobat.environment import Environment
+from aerobat.kernels.allocation import Mixer
+from aerobat.kernels.control import ControllerModel
+from aerobat.kernels.motors import Airframe, Rotors
+from aerobat.kernels.rigid_body import EnvironmentParameters, MassProperties
+from aerobat.vehicle.fleet import Fleet
+
+_FREE_ERROR = 0.06  # [rad] of attitude that must not saturate a hovering vehicle's rotors
+_SLACK = 1e-12  # [-] of a rotor's range, for rounding
+_MIN_TIME_CONSTANT = 1e-9  # [s] a rotor without lag follows within it
+
+
+def airframe_parameters(fleet: Fleet) -> Airframe:
+    """Airframes with leaves (vehicles,)."""
+    mass_properties = MassProperties(
+        fleet.mass,
+        matrix_components(fleet.inertia),
+        matrix_components(np.asarray(np.linalg.inv(fleet.inertia))),
+        components(fleet.drag_body),
+    )
+    rotors = Rotors(
+        components(fleet.min_thrusts),
+        components(fleet.max_thrusts),
+        components(_SLACK * (fleet.max_thrusts - fleet.min_thrusts)),
+        components(1.0 / np.maximum(fleet.lags, _MIN_TIME_CONSTANT)),
+        matrix_components(fleet.allocation),
+    )
+    return Airframe(mass_properties, rotors)
+
+
+def environment_parameters(environment: Environment, vehicles: int) -> EnvironmentParameters:
+    """One environment for so many vehicles, leaves (vehicles,)."""
+    wind = np.broadcast_to(environment.wind, (vehicles, 3))
+    return EnvironmentParameters(np.full(vehicles, environment.gravity), components(wind))
+
+
+def controller_parameters(
+    controller: Controller, fleet: Fleet, environment: Environment, ops: Any = np
+) -> ControllerModel:
+    """Nominal models with leaves (vehicles,).
+
+    Args:
+        controller: the settings.
+        fleet: the nominal vehicles.
+        environment: what they are taken to fly in.
+        ops: of the arithmetic of the settings' numbers; see `Controller.gains`.
+    """
+    rows = matrix_components(np.swapaxes(fleet.mixer, 1, 2))
+    return ControllerModel(
+        airframe_parameters(fleet),
+        environment_parameters(environment, len(fleet)),
+        Mixer(*rows, *components(fleet.collective_range)),
+        controller.gains(max_bandwidth(fleet, environment), ops),
+    )
+
+
+def max_bandwidth(fleet: Fleet, environment: Environment) -> Array:
+    """The highest frequencies [rad/s] of attitude loops that vehicles have the rotors for, (vehicles,).
+
+    Hovering, they then meet their limits only at larger errors of roll or pitch than the free one. NaN for a
+    vehicle that cannot hover.
+    """
+    hover = (fleet.mass * environment.gravity)[:, None] * fleet.mixer[..., 0]
+    room = np.minimum(hover - fleet.min_thrusts, fleet.max_thrusts - hover)
+    torque = (np.abs(fleet.allocation[:, 1:3]) @ room[..., None])[..., 0]
+    acceleration = torque / np.diagonal(fleet.inertia, axis1=1, axis2=2)[:, :2]
+    with np.errstate(invalid="ignore"):
+        return np.asarray(np.sqrt(acceleration.min(axis=-1) / _FREE_ERROR))

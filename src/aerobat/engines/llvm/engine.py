@@ -1,0 +1,190 @@
+"""Kernels as machine code: traced once, compiled by LLVM in a moment, vehicles side by side on all cores."""
+
+from __future__ import annotations
+
+import ctypes
+import os
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from functools import lru_cache
+from itertools import compress
+from typing import Any
+
+import llvmlite.binding as llvm
+import numpy as np
+
+from aerobat.arrays import Array
+from aerobat.engines.engine import CompiledLoop, Engine, Init, Step, logged_ticks, read_only, tick_count
+from aerobat.engines.llvm.codegen import ARRAYS, COUNTS, Layout, module
+from aerobat.engines.pytree import Tree, piecewise_constant_leaves, tree_leaves, tree_map, tree_unflatten
+from aerobat.engines.traced_loop import TracedLoop, trace_loop
+
+REGISTERS = 2  # of vehicles side by side, so that one need not wait for another's result
+MAX_SCALAR_VEHICLES = 4  # up to which they fly one by one
+
+Function = Callable[..., None]
+_UNUSED = np.zeros(0)
+
+
+class MachineLoop(CompiledLoop):
+    """A loop as machine code, for its vehicles' parameters; by default run on all cores."""
+
+    def __init__(
+        self, init: Init, step: Step, parameters: Tree, inputs: Tree, threads: int | None = None
+    ) -> None:
+        leaves = [np.asarray(leaf, dtype=np.float64) for leaf in tree_leaves(parameters)]
+        self._vehicles = len(leaves[0])
+        width = 1 if self._vehicles <= MAX_SCALAR_VEHICLES else REGISTERS * _lanes()
+        self._lanes = -(-self._vehicles // width) * width
+        equal = [bool((leaf == leaf[0]).all()) for leaf in leaves]
+        self._shared = [np.ndim(leaf) == 0 for leaf in tree_leaves(inputs)]
+        self._own = [not shared for shared in self._shared]
+        constant = zip(piecewise_constant_leaves(inputs), self._shared, strict=True)
+        layout = Layout(width, tuple(equal), tuple(self._shared), tuple(a and b for a, b in constant))
+        self._loop, self._init, self._scan = _program(init, step, _bare(parameters), _bare(inputs), layout)
+        self._parameters = (
+            np.array([leaf[0] for leaf in compress(leaves, equal)]),
+            self._pad_lanes([leaf for leaf, one in zip(leaves, equal, strict=True) if not one], ()),
+        )
+        self._latest: tuple[Tree, Array] = (None, _UNUSED)
+        self._addresses = [array.ctypes.data for array in self._parameters]
+        self._cuts = _thread_cuts(self._lanes // width, threads or available_cores(), width)
+        self._logical = [i for i, n in enumerate(self._loop.carry) if self._loop.is_logical(n)]
+        self._logical_outputs = [i for i, n in enumerate(self._loop.outputs) if self._loop.is_logical(n)]
+
+    def init(self, inputs: Tree) -> Tree:
+        """See `CompiledLoop.init`."""
+        after = np.empty((len(self._loop.carry), self._lanes))
+        self._run(self._init, (*self._packed(inputs, ()), _UNUSED, after, _UNUSED), 1, 1)
+        return self._unpacked(after)
+
+    def scan(self, carry: Tree, inputs: Tree, log_stride: int = 1) -> tuple[Tree, Tree]:
+        """See `CompiledLoop.scan`."""
+        ticks = tick_count(inputs)
+        rows = len(logged_ticks(ticks, log_stride))
+        after, outputs = self._advanced(carry, self._packed(inputs, (ticks,)), rows, ticks, log_stride)
+        return after, self._row(outputs.transpose(1, 2, 0))
+
+    def step(self, carry: Tree, inputs: Tree) -> tuple[Tree, Tree]:
+        """See `CompiledLoop.step`."""
+        after, outputs = self._advanced(carry, self._packed(inputs, ()), 1, 1, 1)
+        return after, self._row(outputs[0])
+
+    def _advanced(
+        self, carry: Tree, inputs: tuple[Array, Array], rows: int, ticks: int, log_stride: int
+    ) -> tuple[Tree, Array]:
+        """The next carry, and the outputs (rows, o, vehicles)."""
+        latest, packed = self._latest  # most scans go on from where the last one ended
+        before = packed if carry is latest else self._pad_lanes(tree_leaves(carry), ())
+        after = np.empty((len(self._loop.carry), self._lanes))
+        outputs = np.empty((rows, len(self._loop.outputs), self._lanes))
+        self._run(self._scan, (*inputs, before, after, outputs), ticks, log_stride)
+        return self._unpacked(after), outputs[..., : self._vehicles]
+
+    def _row(self, series: Array) -> Tree:
+        """Outputs (o, vehicles, ...) as a row's tree."""
+        leaves = list(series)
+        for index in self._logical_outputs:
+            leaves[index] = leaves[index] != 0.0
+        return tree_unflatten(self._loop.row, leaves)
+
+    def _packed(self, inputs: Tree, ticks: tuple[int, ...]) -> tuple[Array, Array]:
+        """Shared inputs (*ticks, r) and inputs (*ticks, i, lanes)."""
+        leaves = tree_leaves(inputs)
+        shared = np.array(list(compress(leaves, self._shared)), dtype=np.float64).T
+        own = list(compress(leaves, self._own))
+        return np.ascontiguousarray(shared), self._pad_lanes(own, ticks)
+
+    def _pad_lanes(self, leaves: Sequence[Array], ticks: tuple[int, ...]) -> Array:
+        """Leaves (*ticks, vehicles) as (*ticks, leaf, lanes); lanes too many repeat the last vehicle."""
+        if not leaves:
+            return _UNUSED
+        packed = np.empty((*ticks, len(leaves), self._lanes))
+        np.stack(leaves, axis=-2, out=packed[..., : self._vehicles], casting="unsafe")
+        packed[..., self._vehicles :] = packed[..., self._vehicles - 1, None]
+        return packed
+
+    def _unpacked(self, carry: Array) -> Tree:
+        """(c, lanes) -> a tree of read-only leaves (vehicles,)."""
+        carry.flags.writeable = False
+        leaves = list(carry[:, : self._vehicles])
+        for index in self._logical:
+            leaves[index] = read_only(leaves[index] != 0.0)
+        tree = tree_unflatten(self._loop.carry_tree, leaves)
+        self._latest = (tree, carry)
+        return tree
+
+    def _run(self, function: Function, arrays: Sequence[Array], ticks: int, log_stride: int) -> None:
+        """All lanes, divided among threads in whole blocks; a thread holds no lock of Python's meanwhile."""
+        arguments = [*self._addresses, *(array.ctypes.data for array in arrays)]
+        arguments += [self._lanes, ticks, log_stride]
+        if len(self._cuts) == 2:
+            function(*arguments, *self._cuts)
+            return
+        pool = _pool(len(self._cuts) - 1)
+        list(pool.map(lambda begin, end: function(*arguments, begin, end), self._cuts, self._cuts[1:]))
+
+
+@lru_cache(maxsize=32)
+def _program(
+    init: Init, step: Step, parameters: Tree, inputs: Tree, layout: Layout
+) -> tuple[TracedLoop, Function, Function]:
+    """A loop and its machine code, for bare trees; once for functions that are the same."""
+    loop = trace_loop(init, step, parameters, inputs)
+    return loop, *machine_code(loop, layout)
+
+
+def _bare(tree: Tree) -> Tree:
+    """The tree without its numbers."""
+    return tree_map(lambda leaf: 0, tree)
+
+
+@lru_cache(maxsize=32)
+def machine_code(loop: TracedLoop, layout: Layout) -> tuple[Function, Function]:
+    """`init` and `scan` of a loop as functions of the addresses of ARRAYS, and COUNTS."""
+    code = llvm.create_mcjit_compiler(llvm.parse_assembly(module(loop, layout)), target_machine())
+    code.finalize_object()
+    signature = ctypes.CFUNCTYPE(None, *[ctypes.c_void_p] * len(ARRAYS), *[ctypes.c_int64] * len(COUNTS))
+    functions: list[Any] = [signature(code.get_function_address(name)) for name in ("init", "scan")]
+    for function in functions:
+        function.code = code  # lives as long as what calls it
+    return functions[0], functions[1]
+
+
+@lru_cache(maxsize=4)
+def _pool(threads: int) -> ThreadPoolExecutor:
+    return ThreadPoolExecutor(threads)
+
+
+if hasattr(os, "register_at_fork"):
+    os.register_at_fork(after_in_child=_pool.cache_clear)  # threads do not survive a fork
+
+
+def target_machine() -> llvm.TargetMachine:
+    """The machine that this runs on, with all that its processor can do."""
+    llvm.initialize_native_target()
+    llvm.initialize_native_asmprinter()
+    return llvm.Target.from_default_triple().create_target_machine(
+        cpu=llvm.get_host_cpu_name(), features=llvm.get_host_cpu_features().flatten(), opt=2, jit=True
+    )
+
+
+def available_cores() -> int:
+    """The processors that this process may use; where the system does not say, all there are."""
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
+
+
+def _lanes() -> int:
+    """The numbers of float64 that a register of this processor holds."""
+    return 8 if llvm.get_host_cpu_features().get("avx512f") else 4
+
+
+def _thread_cuts(blocks: int, threads: int, width: int) -> list[int]:
+    """The lanes at which one thread's part ends and the next one's begins."""
+    parts = min(threads, blocks)
+    return [width * (blocks * k // parts) for k in range(parts + 1)]
+
+
+ENGINE = Engine("compiled", MachineLoop)

@@ -1,0 +1,73 @@
+"""Pytrees: (named) tuples of (named) tuples whose leaves are arrays or numbers."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from itertools import repeat
+from typing import Any, TypeAlias
+
+Tree: TypeAlias = Any
+
+
+def tree_leaves(tree: Tree) -> list[Any]:
+    """The leaves of a tree, from left to right."""
+    leaves: list[Any] = []
+    _collect((tree,), leaves)
+    return leaves
+
+
+def tree_unflatten(tree: Tree, leaves: Iterable[Any]) -> Tree:
+    """The tree with other leaves, from left to right."""
+    return _unflatten((tree,), iter(leaves))[0]
+
+
+def tree_map(function: Callable[[Any], Any], tree: Tree) -> Tree:
+    """The tree with `function` applied to each leaf."""
+    return tree_unflatten(tree, map(function, tree_leaves(tree)))
+
+
+def tree_stack(trees: Sequence[Tree], join: Callable[[Sequence[Any]], Any]) -> Tree:
+    """The tree whose leaves are `join` of the leaves of alike trees."""
+    first = trees[0]
+    if isinstance(first, tuple):
+        return _like(first, [tree_stack(children, join) for children in zip(*trees, strict=True)])
+    return join(trees)
+
+
+def tree_rows(tree: Tree, iterate: Callable[[Any], Iterator[Any]]) -> Iterator[Tree]:
+    """One tree for each row: `iterate` iterates over the leading axis of a leaf."""
+    if not isinstance(tree, tuple):
+        return iterate(tree)
+    if not tree:
+        return repeat(tree)
+    children = [tree_rows(child, iterate) for child in tree]
+    return map(type(tree), *children) if hasattr(tree, "_fields") else zip(*children)  # noqa: B905
+
+
+def piecewise_constant_leaves(tree: Tree) -> list[bool]:
+    """For each leaf, true below a tuple that is `piecewise_constant`."""
+    return tree_leaves(_marked(tree, False))
+
+
+def _marked(tree: Tree, mark: bool) -> Tree:
+    if not isinstance(tree, tuple):
+        return mark
+    mark = mark or getattr(tree, "piecewise_constant", False)
+    return tuple(_marked(child, mark) for child in tree)
+
+
+def _collect(tree: tuple[Any, ...], leaves: list[Any]) -> None:
+    for child in tree:
+        if isinstance(child, tuple):
+            _collect(child, leaves)
+        else:
+            leaves.append(child)
+
+
+def _unflatten(tree: tuple[Any, ...], leaves: Iterator[Any]) -> Tree:
+    children = [_unflatten(child, leaves) if isinstance(child, tuple) else next(leaves) for child in tree]
+    return _like(tree, children)
+
+
+def _like(tree: tuple[Any, ...], children: list[Any]) -> Tree:
+    return tuple.__new__(type(tree), children)  # named tuples too, without their constructors' detour

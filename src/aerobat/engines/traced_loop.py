@@ -1,0 +1,134 @@
+"""A loop as operations: the prologue, which parameters alone decide, and the body, computed at every tick."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+from aerobat.engines.engine import Init, Step
+from aerobat.engines.pytree import Tree, tree_leaves, tree_unflatten
+from aerobat.engines.tracing import Symbol, Trace, TraceOps
+
+
+@dataclass(frozen=True, eq=False)
+class TracedLoop:
+    """Values of a trace, by their numbers: the carry is `first_carry`, and after each tick `next_carry`.
+
+    Parts of the carry on which no output depends are left out. Loops with the same listing are equal, so
+    that an engine compiles them once.
+    """
+
+    trace: Trace
+    parameters: tuple[int, ...]
+    inputs: tuple[int, ...]
+    carry: tuple[int, ...]  # as a tick finds it
+    first_carry: tuple[int, ...]  # from parameters and the first tick's inputs
+    next_carry: tuple[int, ...]
+    outputs: tuple[int, ...]
+    carry_tree: Tree  # a leaf for each part of the carry, () where one is left out
+    row: Tree  # of a tick, its leaves the outputs' symbols
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, TracedLoop) and self._listing == other._listing
+
+    def __hash__(self) -> int:
+        return hash(self._listing)
+
+    def __str__(self) -> str:
+        """A listing: every value, what the carry becomes, what is output."""
+        return self._listing
+
+    @cached_property
+    def _listing(self) -> str:
+        carried = zip(self.carry, self.first_carry, self.next_carry, strict=True)
+        lines = [f"%{now} is first %{first}, then %{then}" for now, first, then in carried]
+        return "\n".join([str(self.trace), *lines, "output: " + " ".join(f"%{i}" for i in self.outputs)])
+
+    @cached_property
+    def initialization(self) -> list[int]:
+        """The values to compute for the first carry, in order."""
+        return sorted(self.trace.needed(self.first_carry))
+
+    @cached_property
+    def prologue(self) -> list[int]:
+        """The values that ticks use and no tick changes, in order."""
+        return sorted(self._each_tick - self._changing)
+
+    @cached_property
+    def body(self) -> list[int]:
+        """The values to compute at every tick, in order."""
+        return sorted(self._each_tick & self._changing)
+
+    def loop_invariant(self, piecewise_constant: Iterable[int]) -> list[int]:
+        """The values of `body` that change only when these inputs do, in order."""
+        known = {*piecewise_constant, *self.prologue}
+        found = []
+        for number in self.body:
+            arguments = self.trace.operations[number].arguments
+            if arguments and known.issuperset(arguments):
+                known.add(number)
+                found.append(number)
+        return found
+
+    def is_logical(self, number: int) -> bool:
+        """True for a value that is true or false, not a number."""
+        return self.trace.operations[number].logical
+
+    @cached_property
+    def _each_tick(self) -> set[int]:
+        return self.trace.needed((*self.next_carry, *self.outputs))
+
+    @cached_property
+    def _changing(self) -> set[int]:
+        """What inputs and carry change."""
+        changing = {*self.inputs, *self.carry}
+        for number, operation in enumerate(self.trace.operations):
+            if not changing.isdisjoint(operation.arguments):
+                changing.add(number)
+        return changing
+
+
+def trace_loop(init: Init, step: Step, parameters: Tree, inputs: Tree) -> TracedLoop:
+    """The loop that `init` and `step` make for trees of such a structure; see `engine.Compile`."""
+    trace = Trace()
+    ops = TraceOps(trace)
+    parameters, inputs = _symbols(trace, parameters, "parameter"), _symbols(trace, inputs, "input")
+    first_tree = init(ops, parameters, inputs)
+    first = [trace.symbol(leaf) for leaf in tree_leaves(first_tree)]
+    kinds = [trace.operations[symbol.number].logical for symbol in first]
+    carry = [trace.input(f"carry {i}", logical) for i, logical in enumerate(kinds)]
+    next_tree, row = step(ops, parameters, tree_unflatten(first_tree, carry), inputs)
+    following = [trace.symbol(leaf) for leaf in tree_leaves(next_tree)]
+    row = tree_unflatten(row, [trace.symbol(leaf) for leaf in tree_leaves(row)])
+    kept = _kept(trace, _numbers(carry), _numbers(following), _numbers(tree_leaves(row)))
+    return TracedLoop(
+        trace=trace,
+        parameters=_numbers(tree_leaves(parameters)),
+        inputs=_numbers(tree_leaves(inputs)),
+        carry=_numbers(carry[i] for i in kept),
+        first_carry=_numbers(first[i] for i in kept),
+        next_carry=_numbers(following[i] for i in kept),
+        outputs=_numbers(tree_leaves(row)),
+        carry_tree=tree_unflatten(first_tree, (i if i in kept else () for i in range(len(carry)))),
+        row=row,
+    )
+
+
+def _symbols(trace: Trace, tree: Tree, name: str) -> Tree:
+    return tree_unflatten(tree, (trace.input(f"{name} {i}") for i, _ in enumerate(tree_leaves(tree))))
+
+
+def _numbers(symbols: Iterable[Symbol]) -> tuple[int, ...]:
+    return tuple(symbol.number for symbol in symbols)
+
+
+def _kept(trace: Trace, carry: Sequence[int], following: Sequence[int], outputs: Sequence[int]) -> list[int]:
+    """The parts of the carry on which the outputs depend, sooner or later."""
+    kept: set[int] = set()
+    while True:
+        needed = trace.needed((*outputs, *(following[i] for i in kept)))
+        more = {i for i, number in enumerate(carry) if number in needed}
+        if more == kept:
+            return sorted(kept)
+        kept = more

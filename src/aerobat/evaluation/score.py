@@ -1,0 +1,188 @@
+"""Scores: tracking errors, the passage of each gate, saturation, and what a flight came to."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, fields, replace
+
+import numpy as np
+
+from aerobat import so3
+from aerobat.arrays import Array
+from aerobat.errors import SpecError
+from aerobat.evaluation.passage import (
+    Passage,
+    gates_of,
+    nearest_approach,
+    passage_window,
+    passages,
+    planned_passages,
+)
+from aerobat.kernels.running_metrics import RunningMetrics
+from aerobat.planning import Plan
+from aerobat.problem.problem import Problem
+from aerobat.simulation.flight import Flight
+from aerobat.simulation.outcome import Outcome
+from aerobat.vehicle import Vehicle
+from aerobat.vehicle.fleet import Fleet
+
+
+@dataclass(frozen=True)
+class Score:
+    """A flight in numbers."""
+
+    max_position_error_m: float
+    rms_position_error_m: float
+    max_attitude_error_deg: float
+    rms_attitude_error_deg: float
+    saturated_fraction: float  # of the control periods, any rotor's command clipped
+    passages: tuple[Passage, ...]  # one for each gate, in the order of the stages
+    outcome: Outcome  # the first thing that went wrong, if anything did
+    sentence: str  # the outcome with its numbers
+
+    def __str__(self) -> str:
+        """One line for people."""
+        return (
+            f"{self.sentence}; position error {100 * self.max_position_error_m:.2f} cm at most, "
+            f"attitude error {self.rms_attitude_error_deg:.2f}° RMS, "
+            f"saturated {100 * self.saturated_fraction:.1f} % of the time"
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class Scores:
+    """The scores of many flights: arrays with one entry a flight; `scores[k]` is one flight's Score."""
+
+    max_position_error_m: Array
+    rms_position_error_m: Array
+    max_attitude_error_deg: Array
+    rms_attitude_error_deg: Array
+    saturated_fraction: Array
+    passages: tuple[Passage, ...]  # one for each gate, its fields arrays
+    stop: Array  # [s] when a flight diverged, NaN if it did not
+    is_finite: Array  # false where a flight diverged by what is not a number
+    ground_time: Array  # [s] when a vehicle was below ground first, NaN if never
+
+    def __len__(self) -> int:
+        return len(self.stop)
+
+    def __getitem__(self, k: int) -> Score:
+        """The score of one flight."""
+        if not -len(self) <= k < len(self):
+            raise IndexError(f"there are {len(self)} flights, no flight {k}")
+        passed = tuple(_passage_of(passage, k) for passage in self.passages)
+        outcome, sentence = self._outcome(k, passed)
+        return Score(
+            **{field.name: float(getattr(self, field.name)[k]) for field in fields(self)[:5]},
+            passages=passed,
+            outcome=outcome,
+            sentence=sentence,
+        )
+
+    def __iter__(self) -> Iterator[Score]:
+        return (self[k] for k in range(len(self)))
+
+    @property
+    def outcomes(self) -> tuple[Outcome, ...]:
+        """What each flight came to."""
+        return tuple(score.outcome for score in self)
+
+    def _outcome(self, k: int, passed: tuple[Passage, ...]) -> tuple[Outcome, str]:
+        """The first thing that went wrong, else through all gates, else flown to the end."""
+        found: list[tuple[float, Outcome, dict[str, object]]] = []
+        if np.isfinite(self.stop[k]):
+            outcome = Outcome.DIVERGED if self.is_finite[k] else Outcome.STATE_NOT_FINITE
+            found.append((float(self.stop[k]), outcome, {}))
+        if np.isfinite(self.ground_time[k]):
+            found.append((float(self.ground_time[k]), Outcome.HIT_GROUND, {}))
+        for passage in passed:
+            label = "the gate" if len(passed) == 1 else f"gate '{passage.gate}'"
+            numbers = {"gate": label, "miss": passage.miss, "excess_cm": -100 * passage.clearance}
+            if np.isfinite(passage.time) and not passage.inside:
+                found.append((passage.time, Outcome.MISSED_GATE, numbers))
+            elif passage.clearance < 0.0:
+                found.append((passage.time, Outcome.HIT_FRAME, numbers))
+        if found:
+            time, outcome, numbers = min(found, key=lambda event: event[0])
+            return outcome, outcome.sentence(time=time, **numbers)
+        if not passed:
+            return Outcome.COMPLETE, Outcome.COMPLETE.sentence()
+        worst = max(passed, key=lambda passage: passage.miss)
+        gates = "the gate" if len(passed) == 1 else f"all {len(passed)} gates, the worst"
+        numbers = {"gate": gates, "speed": worst.speed, "miss_mm": 1000 * worst.miss}
+        return Outcome.THROUGH_GATES, Outcome.THROUGH_GATES.sentence(**numbers)
+
+
+def score(flight: Flight, goal: Problem | Plan, vehicle: Vehicle | None = None) -> Score:
+    """Score one flight; with the vehicle, its clearance in the gates too.
+
+    Errors are against the set-points in the flight: position as a distance [m], attitude as the angle of
+    the relative rotation [deg]. With a plan, gates are looked for around its stages' instants; with the
+    problem alone, around the set-points' nearest approaches. Raises SpecError for a batch of flights.
+    """
+    if flight.is_batch:
+        raise SpecError("score takes one flight at a time; of a batch, score flight[k]")
+    problem = goal.problem if isinstance(goal, Plan) else goal
+    states, setpoints = flight.states, flight.setpoint.flat.position
+    square, angle = position_error(flight) ** 2, attitude_error(flight)
+    diverged = flight.outcome is not Outcome.COMPLETE
+    found = []
+    for gate, planned in zip(gates_of(problem), planned_passages(goal, flight.times, setpoints), strict=True):
+        window = passage_window(flight.times, planned)
+        if diverged and planned >= flight.times[-1]:  # still under way to it
+            window[:] = False
+        parts = (states.position, states.velocity, states.q_world_body)
+        nearest, distance_sq = nearest_approach(window, gate, flight.times, parts)
+        found.append(passages(gate, nearest, distance_sq, None if vehicle is None else Fleet.of([vehicle])))
+    ground = flight.environment.ground
+    below = np.zeros(1, bool) if ground is None else states.position[:, 2] < ground
+    return Scores(
+        max_position_error_m=np.sqrt([square.max()]),
+        rms_position_error_m=np.sqrt([square.mean()]),
+        max_attitude_error_deg=np.rad2deg([angle.max()]),
+        rms_attitude_error_deg=np.rad2deg(np.sqrt([np.mean(angle**2)])),
+        saturated_fraction=np.array([flight.saturated.mean()]),
+        passages=tuple(found),
+        stop=np.array([flight.ends if diverged else np.nan]),
+        is_finite=np.array([flight.outcome is not Outcome.STATE_NOT_FINITE]),
+        ground_time=np.array([flight.times[int(np.argmax(below))] if below.any() else np.nan]),
+    )[0]
+
+
+def scores_of(metrics: RunningMetrics, problem: Problem, fleet: Fleet) -> Scores:
+    """Scores of flights that were added up as they were flown, from their last metrics, leaves (flights,)."""
+    ticks = np.maximum(metrics.ticks, 1.0)
+    diverged = metrics.flying < 0.5
+    never = np.isinf(metrics.ground_time)
+    return Scores(
+        max_position_error_m=np.sqrt(metrics.max_square),
+        rms_position_error_m=np.sqrt(metrics.sum_square / ticks),
+        max_attitude_error_deg=np.rad2deg(metrics.max_angle),
+        rms_attitude_error_deg=np.rad2deg(np.sqrt(metrics.sum_square_angle / ticks)),
+        saturated_fraction=metrics.saturated / ticks,
+        passages=tuple(
+            passages(gate, approach.nearest, approach.distance_sq, fleet)
+            for gate, approach in zip(gates_of(problem), metrics.gates, strict=True)
+        ),
+        stop=np.where(diverged, metrics.stop, np.nan),
+        is_finite=metrics.is_finite > 0.5,
+        ground_time=np.where(never, np.nan, metrics.ground_time),
+    )
+
+
+def position_error(flight: Flight) -> Array:
+    """|p − p_ref| [m], (..., T)."""
+    return np.asarray(np.linalg.norm(flight.states.position - flight.setpoint.flat.position, axis=-1))
+
+
+def attitude_error(flight: Flight) -> Array:
+    """The angle between actual and reference attitude [rad], (..., T)."""
+    return so3.angle_between(flight.states.q_world_body, flight.setpoint.q_world_body)
+
+
+def _passage_of(passage: Passage, k: int) -> Passage:
+    """One flight's passage, in plain numbers."""
+    return replace(
+        passage,
+        **{field.name: getattr(passage, field.name)[k].item() for field in fields(passage)[1:]},
+    )

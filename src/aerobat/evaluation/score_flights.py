@@ -1,0 +1,140 @@
+"""score_flights(): many flights scored as they are flown, none of them kept."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from aerobat.arrays import Array
+from aerobat.engines.components import components
+from aerobat.engines.pytree import tree_map
+from aerobat.environment import Environment
+from aerobat.errors import SpecError
+from aerobat.evaluation.passage import gates_of, passage_window, planned_passages
+from aerobat.evaluation.score import Scores, scores_of
+from aerobat.kernels import running_metrics
+from aerobat.kernels.ops import Ops
+from aerobat.kernels.running_metrics import MetricsInput, MetricsParameters, RunningMetrics
+from aerobat.planning import Plan
+from aerobat.problem.problem import Problem
+from aerobat.simulation.loop import Signals
+from aerobat.simulation.outcome import DIVERGENCE_RADIUS
+from aerobat.simulation.reference_source import BLOCK
+from aerobat.simulation.setup import FlightConfig, FlightSetup, prepare
+from aerobat.trajectory import Trajectory
+from aerobat.vehicle import Vehicle
+
+
+@dataclass(frozen=True)
+class MetricsMonitor:
+    """The loop's component that adds up a flight's metrics."""
+
+    gates: int
+    period: int = 1
+    name: str = "metrics"
+    feedthrough: bool = True
+
+    def init(
+        self, ops: Ops, parameters: MetricsParameters, inputs: MetricsInput, signals: Signals
+    ) -> RunningMetrics:
+        """See `Component.init`."""
+        return running_metrics.init(self.gates)
+
+    def step(
+        self,
+        ops: Ops,
+        parameters: MetricsParameters,
+        metrics: RunningMetrics,
+        inputs: MetricsInput,
+        signals: Signals,
+    ) -> RunningMetrics:
+        """See `Component.step`."""
+        motion, commands = signals["plant"], signals["controller"].commands
+        reference = (signals["reference"].position, signals["reference"].q_world_body)
+        actuation = (motion.thrusts, commands.thrusts, commands.saturated)
+        return running_metrics.step(ops, parameters, metrics, motion.body, reference, actuation, inputs)
+
+
+@dataclass(frozen=True, eq=False)
+class MetricsSource:
+    """The instants of ticks, and which of them are about a gate's planned passage."""
+
+    times: Array
+    windows: tuple[Array, ...]
+    per_vehicle: bool = False
+
+    def chunk(self, begin: int, end: int) -> MetricsInput:
+        """See `Source.chunk`."""
+        return MetricsInput(self.times[begin:end], tuple(window[begin:end] for window in self.windows))
+
+
+def score_flights(
+    plan: Plan | Trajectory,
+    vehicles: Vehicle | Sequence[Vehicle] | None = None,
+    *,
+    problem: Problem | None = None,
+    environment: Environment | None = None,
+    config: FlightConfig = FlightConfig(),  # noqa: B008 - frozen
+    **changes: Any,
+) -> Scores:
+    """Fly as `fly` does with the same arguments, and score each flight as it is flown; nothing is logged.
+
+    Args:
+        plan: what is flown; a bare trajectory needs vehicles and a problem.
+        vehicles: what flies it, by default the plan's.
+        problem: what is judged by, by default the plan's.
+        environment: where, by default the problem's.
+        config: how.
+        changes: fields of FlightConfig that replace those of `config`, as `seed=3`.
+
+    Raises SpecError for arguments that do not fit together, BackendMissing for an engine that is not
+    installed.
+    """
+    goal = problem if problem is not None else plan
+    if isinstance(goal, Trajectory):
+        raise SpecError("problem is missing: a trajectory says not what it is judged by")
+    settings = replace(config, **changes)
+    if settings.log_rate is not None:
+        raise SpecError("log_rate: a scored flight keeps no rows; leave it out")
+    judged_by = goal.problem if isinstance(goal, Plan) else goal
+    setup = with_metrics(prepare(plan, vehicles, environment or judged_by.environment, settings), goal)
+    loop = setup.compile(log=metrics_row)
+    carry = loop.init(setup.first_tick)
+    for begin, end in setup.chunks():
+        carry, rows = loop.scan(carry, setup.inputs(begin, end), end)
+    return scores_of(tree_map(lambda leaf: leaf[:, -1], rows), judged_by, setup.fleet)
+
+
+def metrics_row(signals: Signals) -> RunningMetrics:
+    """The metrics so far."""
+    metrics: RunningMetrics = signals["metrics"]
+    return metrics
+
+
+def with_metrics(setup: FlightSetup, goal: Problem | Plan | None) -> FlightSetup:
+    """The same flight with its metrics added up, by gates and ground if there is a goal."""
+    vehicles, times = len(setup.fleet), setup.times
+    windows: tuple[Array, ...] = ()
+    centres: tuple[Any, ...] = ()
+    if goal is not None:
+        problem = goal.problem if isinstance(goal, Plan) else goal
+        blocks = range(0, len(times), BLOCK)
+        parts = [setup.reference.setpoint(k, min(k + BLOCK, len(times))).flat.position for k in blocks]
+        planned = planned_passages(goal, times, np.concatenate(parts))
+        windows = tuple(passage_window(times, instant).astype(float) for instant in planned)
+        centres = tuple(
+            components(np.broadcast_to(gate.position, (vehicles, 3))) for gate in gates_of(problem)
+        )
+    ground = -np.inf if setup.environment.ground is None else setup.environment.ground
+    parameters = MetricsParameters(
+        np.full(vehicles, DIVERGENCE_RADIUS**2), np.full(vehicles, ground), centres
+    )
+    return replace(
+        setup,
+        components=(*setup.components, MetricsMonitor(len(windows))),
+        parameters=setup.parameters._replace(own=(*setup.parameters.own, parameters)),
+        sources=(*setup.sources, MetricsSource(times, windows)),
+    )

@@ -1,0 +1,278 @@
+"""sensitivity(): how the errors of a flight change with gains, vehicle and start, exact to rounding."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, fields, replace
+from functools import lru_cache
+from types import MappingProxyType
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from aerobat import so3
+from aerobat.arrays import Array
+from aerobat.control import Controller
+from aerobat.control.parameters import max_bandwidth
+from aerobat.declaration import unknown_name
+from aerobat.engines.components import components, matrix_components
+from aerobat.engines.duals import Dual, DualOps, differentiated, dual
+from aerobat.engines.engine import Init, Step, first_row
+from aerobat.engines.numpy import ArrayOps
+from aerobat.engines.pytree import Tree, tree_leaves, tree_map
+from aerobat.environment import Environment
+from aerobat.errors import SpecError
+from aerobat.evaluation.score_flights import metrics_row, with_metrics
+from aerobat.kernels.control_loops import Gains
+from aerobat.kernels.motors import Airframe
+from aerobat.kernels.ops import Ops, Scalar
+from aerobat.kernels.rigid_body import Body
+from aerobat.kernels.vectors import dot, subtract
+from aerobat.simulation.loop import LoopInput, LoopParameters, compose
+from aerobat.simulation.noise import body_states
+from aerobat.simulation.setup import FlightConfig, FlightSetup, Flyable, prepare
+from aerobat.trajectory import Trajectory
+from aerobat.vehicle import Vehicle
+
+# the lead's filter also sets how far ahead set-points are read, which may jump from piece to piece
+_GAINS = tuple(f.name for f in fields(Controller) if f.type == "float" and f.name != "lead_time_constant")
+_EACH_ROTOR = 0
+_SHAPES: Mapping[str, tuple[int, ...]] = {
+    **dict.fromkeys(_GAINS, ()),
+    "mass": (),
+    "inertia": (3, 3),
+    "drag_body": (3,),
+    "rotors.position_body": (_EACH_ROTOR, 3),
+    "rotors.min_thrust": (_EACH_ROTOR,),
+    "rotors.max_thrust": (_EACH_ROTOR,),
+    "rotors.torque_coefficient": (_EACH_ROTOR,),
+    "rotors.lag": (_EACH_ROTOR,),
+    "start.position": (3,),
+    "start.velocity": (3,),
+    "start.attitude": (3,),
+    "start.omega_body": (3,),
+}
+
+
+@dataclass(frozen=True, eq=False)
+class Gradient:
+    """A number that a flight comes to, and its slopes in named quantities.
+
+    Of a batch, all arrays have a leading axis of vehicles.
+    """
+
+    value: Array  # (...)
+    slopes: Mapping[str, Array]  # by the quantity's name, (..., *its shape), in its unit
+
+
+@dataclass(frozen=True, eq=False)
+class Sensitivity:
+    """The errors of a flight against its set-points, and how they change."""
+
+    mean_square_position_error: Gradient  # [m²] over the ticks up to the end or divergence, as in a score
+    mean_square_attitude_error: Gradient  # [rad²] likewise
+    final_square_position_error: Gradient  # [m²] at the last tick; NaN for a vehicle that has diverged
+
+
+class _Sums(NamedTuple):
+    """The loop's row."""
+
+    square: Scalar  # [m²]
+    square_angle: Scalar  # [rad²]
+    final_square: Scalar  # [m²]
+    ticks: Scalar
+    flying: Scalar
+
+
+def sensitivity(
+    plan: Flyable | Trajectory,
+    of: str | Sequence[str],
+    vehicle: Vehicle | Sequence[Vehicle] | None = None,
+    *,
+    environment: Environment | None = None,
+    config: FlightConfig = FlightConfig(),  # noqa: B008 - frozen
+    **changes: Any,
+) -> Sensitivity:
+    """Fly as `fly` does with the same arguments, and differentiate the flight's errors.
+
+    Args:
+        plan: what is flown; a bare trajectory needs a vehicle.
+        of: names of quantities: a gain of Controller (all but lead_time_constant); of the vehicle that flies
+            "mass", "inertia", "drag_body"; of each of its rotors "rotors.position_body", "rotors.min_thrust",
+            "rotors.max_thrust", "rotors.torque_coefficient", "rotors.lag"; "start.position",
+            "start.velocity", "start.attitude" (a rotation [rad] about body axes), "start.omega_body".
+        vehicle: what flies it, by default the plan's.
+        environment: where, by default the problem's.
+        config: how.
+        changes: fields of FlightConfig that replace those of `config`.
+
+    Slopes in the inertia are for its entries one by one, half for each of a mirrored pair: an error changes
+    by Σ slope_ij dJ_ij. The controller's nominal vehicle and the set-points are held: the slope in the mass
+    is what a mass does that the controller does not know of, as in `fly(..., vehicle, nominal=...)` with
+    `vehicle` alone changed.
+
+    Slopes are those of the simulation as it is computed, by dual numbers, not differences of two flights.
+    Where it has a kink, as where a rotor's command just meets its limit, they are those of one side. They say
+    nothing of jumps, as of the tick at which a vehicle diverges. Raises SpecError for an unknown quantity
+    and for arguments that do not fit together, BackendMissing for an engine that is not installed.
+    """
+    names = _known((of,) if isinstance(of, str) else tuple(of))
+    setup = with_metrics(prepare(plan, vehicle, environment, replace(config, **changes)), None)
+    rotors = setup.fleet.lags.shape[1]
+    shapes = {name: tuple(n or rotors for n in _SHAPES[name]) for name in names}
+    directions = [
+        tree_leaves(_tangent(setup, name, unit))
+        for name, shape in shapes.items()
+        for unit in np.eye(int(np.prod(shape))).reshape(-1, *shape)
+    ]
+    values, slopes = _flown(setup, directions)
+    return _sensitivity(values, slopes, shapes, setup.is_batch)
+
+
+def _known(names: tuple[str, ...]) -> tuple[str, ...]:
+    if not names:
+        raise SpecError("of must name at least one quantity, such as 'position_gain' or 'mass'")
+    for name in names:
+        if name == "lead_time_constant":
+            raise SpecError(
+                "lead_time_constant has no slope: it also moves where set-points are read, and they jump"
+            )
+        if name not in _SHAPES:
+            raise unknown_name("differentiable quantity", str(name), _SHAPES)
+    return tuple(dict.fromkeys(names))
+
+
+def _flown(setup: FlightSetup, directions: Sequence[list[Array]]) -> tuple[_Sums, _Sums]:
+    """The last row of the loop, and its slopes; leaves (vehicles, directions).
+
+    Each vehicle flies once for each direction, side by side.
+    """
+    count, vehicles = len(directions), len(setup.fleet)
+    along = (np.stack(each, axis=-1).ravel() for each in zip(*directions, strict=True))
+    tangents = tuple(tangent if tangent.any() else () for tangent in along)
+    parameters = (tree_map(lambda leaf: np.repeat(leaf, count), setup.parameters), tangents)
+
+    def paired(inputs: LoopInput) -> Tree:
+        """Inputs that have no slopes, each vehicle's as often as there are directions."""
+        repeated = tree_map(lambda leaf: leaf if leaf.ndim == 1 else np.repeat(leaf, count, axis=-1), inputs)
+        return repeated, tuple(() for _ in tree_leaves(inputs))
+
+    loop = None
+    for begin, end in setup.chunks(copies=count):
+        inputs = paired(setup.inputs(begin, end))
+        if loop is None:
+            functions = differentiated(*_summed(*compose(setup.components, metrics_row)))
+            loop = setup.engine(count).compile(*functions, parameters, first_row(inputs))
+            carry = loop.init(first_row(inputs))
+        carry, rows = loop.scan(carry, inputs, end)
+    values, slopes = (_Sums(*(x[:, -1].reshape(vehicles, count) for x in half)) for half in rows)
+    return values, slopes
+
+
+@lru_cache(maxsize=32)
+def _summed(init: Init, step: Step) -> tuple[Init, Step]:
+    """The loop whose rows are sums, of one whose rows are metrics."""
+
+    def advance(ops: Ops, parameters: Tree, carry: Tree, inputs: LoopInput) -> tuple[Tree, _Sums]:
+        carry, metrics = step(ops, parameters, carry, inputs)
+        error = subtract(metrics.last.position, inputs.reference.position)
+        sums = (metrics.sum_square, metrics.sum_square_angle, dot(error, error))
+        return carry, _Sums(*sums, metrics.ticks, metrics.flying)
+
+    return init, advance
+
+
+def _sensitivity(
+    values: _Sums, slopes: _Sums, shapes: Mapping[str, tuple[int, ...]], batch: bool
+) -> Sensitivity:
+    ticks = np.maximum(values.ticks, 1.0)
+    ended = np.where(values.flying > 0.5, 1.0, np.nan)
+    cuts = np.cumsum([int(np.prod(shape)) for shape in shapes.values()])[:-1]
+
+    def part(value: Array, slope: Array) -> Gradient:
+        named = zip(shapes.items(), np.split(slope, cuts, axis=1), strict=True)
+        by_name = {name: each(x.reshape(-1, *shape)) for (name, shape), x in named}
+        return Gradient(each(value[:, 0]), MappingProxyType(by_name))
+
+    def each(array: Array) -> Array:
+        own = np.array(array if batch else array[0])
+        own.flags.writeable = False  # a diverged vehicle's may be no numbers
+        return own
+
+    return Sensitivity(
+        part(values.square / ticks, slopes.square / ticks),
+        part(values.square_angle / ticks, slopes.square_angle / ticks),
+        part(values.final_square * ended, slopes.final_square * ended),
+    )
+
+
+def _tangent(setup: FlightSetup, name: str, unit: Array) -> LoopParameters:
+    """How the loop's parameters change with a quantity, along `unit`; leaves (vehicles,)."""
+    still: LoopParameters = tree_map(np.zeros_like, setup.parameters)
+    observer, model, plant, metrics = still.own
+    if name in _GAINS:
+        model = model._replace(gains=_gains(setup, name))
+    elif name.startswith("start."):
+        return still._replace(start=_start(still.start, setup.parameters.start, name, unit))
+    elif name.startswith("rotors."):
+        plant = plant._replace(airframe=_rotors(plant.airframe, setup, name, unit))
+    else:
+        plant = plant._replace(airframe=_mass_properties(plant.airframe, setup, name, unit))
+    return still._replace(own=(observer, model, plant, metrics))
+
+
+def _gains(setup: FlightSetup, name: str) -> Gains:
+    controller = setup.config.controller
+    number: Any = Dual(getattr(controller, name), 1.0)
+    gains = replace(controller, **{name: number}).gains(
+        max_bandwidth(setup.nominal, setup.environment), DualOps(ArrayOps)
+    )
+    none = np.zeros(len(setup.fleet))
+    slopes = (dual(gain).tangent for gain in gains)
+    return Gains(*(none if slope is None else slope + none for slope in slopes))
+
+
+def _start(still: Body, start: Body, name: str, unit: Array) -> Body:
+    if name == "start.attitude":  # q ⊗ exp(φ) ≈ q + ½ q ⊗ (0, φ)
+        q = body_states(start).q_world_body
+        change = 0.5 * so3.multiply(q, np.append(0.0, unit))
+        return still._replace(q_world_body=components(change))
+    return still._replace(**{name.removeprefix("start."): _alike(unit, len(start.position[0]))})
+
+
+def _mass_properties(still: Airframe, setup: FlightSetup, name: str, unit: Array) -> Airframe:
+    count = len(setup.fleet)
+    if name == "inertia":  # d(J⁻¹) = −J⁻¹ dJ J⁻¹
+        change = 0.5 * (unit + unit.T)
+        inverse = np.linalg.inv(setup.fleet.inertia)
+        moved = still.mass_properties._replace(
+            inertia=tuple(_alike(row, count) for row in change),
+            inverse_inertia=matrix_components(-inverse @ change @ inverse),
+        )
+    elif name == "mass":
+        moved = still.mass_properties._replace(mass=np.ones(count))
+    else:
+        moved = still.mass_properties._replace(drag_body=_alike(unit, count))
+    return still._replace(mass_properties=moved)
+
+
+def _rotors(still: Airframe, setup: FlightSetup, name: str, unit: Array) -> Airframe:
+    rotors, fleet, count = still.rotors, setup.fleet, len(setup.fleet)
+    match name:
+        case "rotors.lag":
+            rates = np.divide(-unit, fleet.lags**2, out=np.zeros_like(fleet.lags), where=fleet.lags > 0.0)
+            moved = rotors._replace(inverse_time_constant=components(rates))
+        case "rotors.position_body":
+            total, _, _, yaw = rotors.allocation
+            x, y, _ = unit.T
+            moved = rotors._replace(allocation=(total, _alike(y, count), _alike(-x, count), yaw))
+        case "rotors.torque_coefficient":
+            moved = rotors._replace(allocation=(*rotors.allocation[:3], components(-fleet.spins * unit)))
+        case _:
+            moved = rotors._replace(**{name.removeprefix("rotors."): _alike(unit, count)})
+    return still._replace(rotors=moved)
+
+
+def _alike(vector: Array, vehicles: int) -> Tree:
+    """Components (vehicles,) of a vector that is the same for all."""
+    return components(np.broadcast_to(vector, (vehicles, len(vector))))

@@ -1,0 +1,196 @@
+"""The two loops of the tracking controller (paper, Section III): position and attitude errors to a wrench."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from aerobat.kernels.ops import Axes, Matrix, Ops, Quaternion, Scalar, Vector
+from aerobat.kernels.quaternions import axes, conjugate, multiply, smallest_rotation, to_body, to_world
+from aerobat.kernels.rigid_body import Body, EnvironmentParameters, MassProperties
+from aerobat.kernels.vectors import (
+    ZERO,
+    add,
+    add_scaled,
+    clamp_norm,
+    cross,
+    dot,
+    norm,
+    scale,
+    subtract,
+    transform,
+)
+
+_MIN_THRUST = 1e-3  # [m/s²] a specific thrust below it has no direction to follow
+
+
+class Gains(NamedTuple):
+    """Gains of both loops, per unit of mass and inertia; see `aerobat.control.Controller`."""
+
+    position: Scalar  # [1/s²]
+    velocity: Scalar  # [1/s]
+    integral: Scalar  # [1/s³]
+    max_integral: Scalar  # [m·s]
+    max_feedback: Scalar  # [m/s²]
+    jerk_filter: Scalar  # [s]
+    stiffness: Scalar  # [1/s²] of the attitude loop, on the vector part of a quaternion: 2 ω_n²
+    damping: Scalar  # [1/s] of the attitude loop, 2 ζ ω_n
+    attitude_integral: Scalar  # [1/s³]
+    max_attitude_integral: Scalar  # [rad·s]
+    lead_time_constant: Scalar  # [s]
+
+
+class Lookahead(NamedTuple):
+    """Reference for the rotors at the time when this tick's commands will have taken effect."""
+
+    thrust_change: Scalar  # [m/s²] |f| then, less |f| now
+    omega: Vector  # [rad/s] world
+    omega_dot: Vector  # [rad/s²] world
+
+
+class ReferencePoint(NamedTuple):
+    """What the controller tracks at one tick; world frame."""
+
+    position: Vector  # [m]
+    velocity: Vector  # [m/s]
+    specific_thrust: Vector  # [m/s²] f = a + g·e3
+    jerk: Vector  # [m/s³]
+    q_world_body: Quaternion  # transported along the trajectory without spin, then yawed
+    omega: Vector  # [rad/s]
+    ahead: Lookahead
+
+
+class PositionLoopState(NamedTuple):
+    """State and output of the outer loop."""
+
+    integral: Vector  # [m·s] of the position error
+    acceleration: Vector  # [m/s²] feedback, and what makes up for the drag
+    jerk: Vector  # [m/s³] its filtered derivative
+
+
+def init_position_loop(
+    ops: Ops,
+    gains: Gains,
+    mass_properties: MassProperties,
+    environment: EnvironmentParameters,
+    body: Body,
+    reference: ReferencePoint,
+) -> PositionLoopState:
+    """The state before the first tick: no integral, and an answer that has stood for long."""
+    return PositionLoopState(
+        ZERO, _feedback_acceleration(ops, gains, mass_properties, environment, ZERO, body, reference), ZERO
+    )
+
+
+def step_position_loop(
+    ops: Ops,
+    gains: Gains,
+    mass_properties: MassProperties,
+    environment: EnvironmentParameters,
+    state: PositionLoopState,
+    body: Body,
+    reference: ReferencePoint,
+    elapsed: Scalar,
+) -> PositionLoopState:
+    """The answer `elapsed` [s] after the last one."""
+    error = subtract(reference.position, body.position)
+    integral = clamp_norm(ops, add_scaled(state.integral, elapsed, error), gains.max_integral)
+    acceleration = _feedback_acceleration(ops, gains, mass_properties, environment, integral, body, reference)
+    difference = scale(1.0 / elapsed, subtract(acceleration, state.acceleration))
+    fraction = elapsed / (gains.jerk_filter + elapsed)
+    jerk = add_scaled(state.jerk, fraction, subtract(difference, state.jerk))
+    return PositionLoopState(integral, acceleration, jerk)
+
+
+def _feedback_acceleration(
+    ops: Ops,
+    gains: Gains,
+    mass_properties: MassProperties,
+    environment: EnvironmentParameters,
+    integral: Vector,
+    body: Body,
+    reference: ReferencePoint,
+) -> Vector:
+    proportional = scale(gains.position, subtract(reference.position, body.position))
+    damping = scale(gains.velocity, subtract(reference.velocity, body.velocity))
+    feedback = add_scaled(add(proportional, damping), gains.integral, integral)
+    return subtract(
+        clamp_norm(ops, feedback, gains.max_feedback), _drag(mass_properties, environment, reference)
+    )
+
+
+def _drag(
+    mass_properties: MassProperties, environment: EnvironmentParameters, reference: ReferencePoint
+) -> Vector:
+    """The acceleration by drag that is expected along the trajectory [m/s²], world."""
+    body_axes = axes(reference.q_world_body)
+    u, v, w = to_body(body_axes, subtract(reference.velocity, environment.wind))
+    dx, dy, dz = mass_properties.drag_body
+    return scale(-1.0 / mass_properties.mass, to_world(body_axes, (dx * u, dy * v, dz * w)))
+
+
+class AttitudeCommand(NamedTuple):
+    """What the inner loop tracks."""
+
+    specific_thrust: Vector  # [m/s²] world, along the desired b3
+    q_world_body: Quaternion
+    omega: Vector  # [rad/s] world
+
+
+class AttitudeError(NamedTuple):
+    """Distance of the body from its desired attitude; body axes."""
+
+    rotation: Vector  # sign(q_w)·q_vec of q* ⊗ q_des, half the angle where it is small
+    omega: Vector  # [rad/s]
+
+
+def attitude_command(ops: Ops, outer: PositionLoopState, reference: ReferencePoint) -> AttitudeCommand:
+    """The reference attitude, turned by the smallest rotation from its thrust axis to the commanded one.
+
+    Rates: ω = b3 × f'/|f| with the jerk of reference and feedback in f', and the reference's spin about b3.
+    Where the commanded specific thrust vanishes the reference attitude is kept.
+    """
+    f = add(reference.specific_thrust, outer.acceleration)
+    size = norm(ops, f)
+    determined = size > _MIN_THRUST
+    shrink = 1.0 / ops.maximum(size, _MIN_THRUST)
+    b1, _, nominal = axes(reference.q_world_body)
+    x, y, z = nominal
+    b3 = (
+        ops.select(determined, f[0] * shrink, x),
+        ops.select(determined, f[1] * shrink, y),
+        ops.select(determined, f[2] * shrink, z),
+    )
+    q = multiply(smallest_rotation(ops, nominal, b3, b1), reference.q_world_body)
+    swing = cross(b3, scale(shrink, add(reference.jerk, outer.jerk)))
+    return AttitudeCommand(f, q, add_scaled(swing, dot(nominal, reference.omega), b3))
+
+
+def attitude_error(ops: Ops, body: Body, body_axes: Axes, attitude: AttitudeCommand) -> AttitudeError:
+    """Distance of the body from its desired attitude and rates; the same for q and −q."""
+    w, x, y, z = multiply(conjugate(body.q_world_body), attitude.q_world_body)
+    omega = to_body(body_axes, attitude.omega)
+    sign = ops.select(w < 0.0, -1.0, 1.0)
+    return AttitudeError(scale(sign, (x, y, z)), subtract(omega, body.omega_body))
+
+
+def integrate_attitude_error(
+    ops: Ops, gains: Gains, integral: Vector, error: AttitudeError, elapsed: Scalar
+) -> Vector:
+    """The integral of the attitude error [rad·s], `elapsed` [s] later."""
+    longer = add_scaled(integral, 2.0 * elapsed, error.rotation)
+    return clamp_norm(ops, longer, gains.max_attitude_integral)
+
+
+def feedback_moment(gains: Gains, inertia: Matrix, error: AttitudeError, integral: Vector) -> Vector:
+    """The feedback moment [N·m], body axes: eq. (2) as a PID, with gains per unit of inertia.
+
+    M = J (2 ω_n² sign(q_w) q_vec + 2 ζ ω_n (ω_des − ω) + K_i ∫).
+    """
+    acceleration = add_scaled(scale(gains.stiffness, error.rotation), gains.damping, error.omega)
+    return transform(inertia, add_scaled(acceleration, gains.attitude_integral, integral))
+
+
+def reference_moment(inertia: Matrix, body_axes: Axes, ahead: Lookahead) -> Vector:
+    """The moment that the reference asks [N·m], J ω' + ω × Jω, with its rates in the body's own axes."""
+    omega, omega_dot = to_body(body_axes, ahead.omega), to_body(body_axes, ahead.omega_dot)
+    return add(transform(inertia, omega_dot), cross(omega, transform(inertia, omega)))

@@ -1,0 +1,124 @@
+"""Unit quaternions in components: rotations of any arithmetic; `aerobat.so3` is their face for arrays.
+
+Hamilton's convention, (w, x, y, z), body to world: Solà, arXiv:1711.02508.
+"""
+
+from __future__ import annotations
+
+import math
+from functools import reduce
+
+from aerobat.kernels.ops import Axes, Ops, Quaternion, Scalar, Vector
+from aerobat.kernels.vectors import add, add_scaled, cross, dot, norm, scale
+
+# the arc tangent is x + x³ P(x²)/Q(x²) for |x| ≤ tan(π/8), highest power first (Cephes library, S. Moshier)
+_ARC_P = (
+    -0.8750608600031904,
+    -16.157537187333652,
+    -75.00855792314705,
+    -122.88666844901361,
+    -64.85021904942025,
+)
+_ARC_Q = (
+    1.0,
+    24.858464901423062,
+    165.02700983169885,
+    432.88106049129027,
+    485.3903996359137,
+    194.5506571482614,
+)
+_EIGHTH = 0.4142135623730951  # tan(π/8)
+
+
+def multiply(p: Quaternion, q: Quaternion) -> Quaternion:
+    """The Hamilton product p ⊗ q."""
+    pw, px, py, pz = p
+    qw, qx, qy, qz = q
+    return (
+        pw * qw - px * qx - py * qy - pz * qz,
+        pw * qx + px * qw + py * qz - pz * qy,
+        pw * qy - px * qz + py * qw + pz * qx,
+        pw * qz + px * qy - py * qx + pz * qw,
+    )
+
+
+def quaternion_rate(q: Quaternion, omega_body: Vector) -> Quaternion:
+    """The rate of change of an attitude, q' = ½ q ⊗ (0, ω)."""
+    w, x, y, z = q
+    a, b, c = scale(0.5, omega_body)
+    return -x * a - y * b - z * c, w * a + y * c - z * b, w * b + z * a - x * c, w * c + x * b - y * a
+
+
+def conjugate(q: Quaternion) -> Quaternion:
+    """The inverse rotation q*."""
+    return q[0], -q[1], -q[2], -q[3]
+
+
+def normalize(ops: Ops, q: Quaternion) -> Quaternion:
+    """q / |q|."""
+    w, x, y, z = q
+    inverse = 1.0 / ops.sqrt(w * w + x * x + y * y + z * z)
+    return w * inverse, x * inverse, y * inverse, z * inverse
+
+
+def axes(q: Quaternion) -> Axes:
+    """The body axes b1, b2, b3 in the world, for q = q_world_body: columns of the rotation matrix."""
+    w, x, y, z = q
+    x2, y2, z2 = 2.0 * x, 2.0 * y, 2.0 * z
+    xx, yy, zz = x * x2, y * y2, z * z2
+    xy, xz, yz = x * y2, x * z2, y * z2
+    wx, wy, wz = w * x2, w * y2, w * z2
+    return (
+        (1.0 - yy - zz, xy + wz, xz - wy),
+        (xy - wz, 1.0 - xx - zz, yz + wx),
+        (xz + wy, yz - wx, 1.0 - xx - yy),
+    )
+
+
+def to_body(body_axes: Axes, a: Vector) -> Vector:
+    """A world vector in body axes, Rᵀ·a."""
+    b1, b2, b3 = body_axes
+    return dot(b1, a), dot(b2, a), dot(b3, a)
+
+
+def to_world(body_axes: Axes, a: Vector) -> Vector:
+    """A body vector in world axes, R·a."""
+    b1, b2, b3 = body_axes
+    return add_scaled(add_scaled(scale(a[0], b1), a[1], b2), a[2], b3)
+
+
+def angle_between(ops: Ops, p: Quaternion, q: Quaternion) -> Scalar:
+    """The angle of the rotation from attitude p to attitude q [rad], in [0, π]."""
+    w, *vector = multiply(conjugate(p), q)
+    return 2.0 * atan2(ops, norm(ops, tuple(vector)), ops.maximum(w, -w))
+
+
+def atan2(ops: Ops, y: Scalar, x: Scalar) -> Scalar:
+    """The angle [rad] in [0, π/2] whose tangent is y/x, for y and x of zero or more, not both zero."""
+    ratio = ops.minimum(x, y) / ops.maximum(x, y)
+    large = ratio > _EIGHTH
+    t = ops.select(large, (ratio - 1.0) / (ratio + 1.0), ratio)
+    square = t * t
+    p, q = reduce(lambda v, c: v * square + c, _ARC_P), reduce(lambda v, c: v * square + c, _ARC_Q)
+    angle = ops.select(large, 0.25 * math.pi, 0.0) + (t + t * square * p / q)
+    return ops.select(y > x, 0.5 * math.pi - angle, angle)
+
+
+def smallest_rotation(ops: Ops, a: Vector, b: Vector, normal: Vector) -> Quaternion:
+    """The smallest rotation that takes unit vector a to unit vector b.
+
+    Opposite vectors leave its axis open: the half turn about `normal`, a unit vector normal to a, is taken.
+    """
+    # half-way vector h = (a + b)/|a + b|: q = (a·h, a × h) with a·h = |a + b|/2, which stays accurate where
+    # a + b is hardly more than rounding
+    h = add(a, b)
+    square = dot(h, h)
+    opposite = square < 1e-24
+    shrink = 1.0 / ops.sqrt(ops.select(opposite, 1.0, square))
+    x, y, z = cross(a, h)
+    return (
+        ops.select(opposite, 0.0, 0.5 * square * shrink),
+        ops.select(opposite, normal[0], x * shrink),
+        ops.select(opposite, normal[1], y * shrink),
+        ops.select(opposite, normal[2], z * shrink),
+    )

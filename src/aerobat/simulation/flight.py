@@ -1,0 +1,213 @@
+"""Flights: what vehicles did over time, as values that can be saved, replayed and scored."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from aerobat.arrays import Array, frozen
+from aerobat.environment import Environment
+from aerobat.errors import SpecError
+from aerobat.simulation.outcome import Outcome
+from aerobat.states import BodyState, FlatState, Setpoint, Wrench
+from aerobat.storage import read_arrays, whole_file
+
+_FORMAT = "aerobat-flight-2"
+_ROTORS = -1  # in a shape: as many as the vehicles have
+
+
+@dataclass(frozen=True)
+class Series:
+    """One quantity of a flight; its array is ([vehicles,] [times,] *shape)."""
+
+    name: str
+    unit: str
+    shape: tuple[int, ...] = ()
+    per_vehicle: bool = True
+    over_time: bool = True
+    logical: bool = False
+
+
+SERIES = (
+    Series("position", "m", (3,)),
+    Series("velocity", "m/s", (3,)),
+    Series("q_world_body", "", (4,)),
+    Series("omega_body", "rad/s", (3,)),
+    Series("commands", "N", (_ROTORS,)),
+    Series("thrusts", "N", (_ROTORS,)),
+    Series("saturated", "", logical=True),
+    Series("setpoint_position", "m", (3,), per_vehicle=False),
+    Series("setpoint_velocity", "m/s", (3,), per_vehicle=False),
+    Series("setpoint_acceleration", "m/s²", (3,), per_vehicle=False),
+    Series("setpoint_jerk", "m/s³", (3,), per_vehicle=False),
+    Series("setpoint_snap", "m/s⁴", (3,), per_vehicle=False),
+    Series("setpoint_q_world_body", "", (4,), per_vehicle=False),
+    Series("setpoint_omega_body", "rad/s", (3,), per_vehicle=False),
+    Series("setpoint_omega_dot_body", "rad/s²", (3,), per_vehicle=False),
+    Series("setpoint_thrust", "N", per_vehicle=False),
+    Series("setpoint_moment_body", "N·m", (3,), per_vehicle=False),
+    Series("min_thrusts", "N", (_ROTORS,), over_time=False),
+    Series("max_thrusts", "N", (_ROTORS,), over_time=False),
+    Series("ends", "s", over_time=False),  # the last row of each vehicle
+)
+
+
+@dataclass(frozen=True, eq=False)
+class Flight:
+    """One flight, or a batch of them: then the vehicles' series carry a leading axis of vehicles.
+
+    Row k of every series is the situation at `times[k]`: the true state, the thrusts that the rotors give,
+    and the commands that the controller sends then and holds until the next row. Each series of SERIES is an
+    attribute too, as `flight.thrusts`. A vehicle that diverges ends at its `ends`; in a batch its later rows
+    repeat that one. Raises SpecError for shapes that do not match and numbers that are not finite.
+    """
+
+    times: Array  # [s], (T,), rising
+    series: Mapping[str, Array]  # by the names of SERIES
+    vehicles: tuple[str, ...]  # their names
+    outcomes: tuple[Outcome, ...]  # of each vehicle
+    sentences: tuple[str, ...]  # the outcomes with their numbers
+    engine: str  # which engine flew them
+    environment: Environment
+
+    def __post_init__(self) -> None:
+        """Copy, check and write-protect."""
+        times = frozen(self.times, "times", (None,))
+        if times.ndim != 1 or (np.diff(times) <= 0).any():
+            raise SpecError("times must be one list of rising numbers of seconds")
+        many, rotors = np.shape(self.series["ends"]), np.shape(self.series["max_thrusts"])[-1:]
+        alike = len(self.vehicles) == len(self.outcomes) == len(self.sentences)
+        if not rotors or not alike or many not in ((), (len(self.vehicles),)):
+            raise SpecError("a flight needs rotors, and one end, name and outcome for each vehicle")
+        checked = {}
+        for one in SERIES:
+            shape = tuple(rotors[0] if size == _ROTORS else size for size in one.shape)
+            leading = (many if one.per_vehicle else ()) + (times.shape if one.over_time else ())
+            checked[one.name] = _checked(one, self.series[one.name], leading + shape)
+        object.__setattr__(self, "times", times)
+        object.__setattr__(self, "series", MappingProxyType(checked))
+
+    def __getattr__(self, name: str) -> NDArray[Any]:
+        if not name.startswith("_") and name in self.__dict__.get("series", ()):
+            return self.series[name]
+        raise AttributeError(f"a flight has no {name!r}; its series are {', '.join(s.name for s in SERIES)}")
+
+    @cached_property
+    def states(self) -> BodyState:
+        """True states, (..., T, ·)."""
+        return BodyState(**{name: self.series[name] for name in BodyState.__dataclass_fields__})
+
+    @cached_property
+    def setpoint(self) -> Setpoint:
+        """What the trajectory asked (of the first vehicle, where vehicles differ), (T, ·)."""
+        return _setpoint(self.series)
+
+    @property
+    def is_batch(self) -> bool:
+        """True for a batch, false for one flight."""
+        return bool(self.series["ends"].ndim)
+
+    @property
+    def outcome(self) -> Outcome:
+        """What one flight came to. Raises SpecError for a batch."""
+        if self.is_batch:
+            raise SpecError("outcome is asked of one flight; of a batch, ask flight[k].outcome or outcomes")
+        return self.outcomes[0]
+
+    def __getitem__(self, vehicle: int) -> Flight:
+        """The flight of one vehicle of a batch, as if it had flown alone. Raises SpecError for one flight."""
+        if not self.is_batch:
+            raise SpecError("this is one flight, not a batch: use it without an index")
+        rows = slice(0, int(np.searchsorted(self.times, self.series["ends"][vehicle], side="right")))
+        picked = {}
+        for one in SERIES:
+            values = self.series[one.name][vehicle] if one.per_vehicle else self.series[one.name]
+            picked[one.name] = values[rows] if one.over_time else values
+        return Flight(
+            times=self.times[rows],
+            series=picked,
+            vehicles=(self.vehicles[vehicle],),
+            outcomes=(self.outcomes[vehicle],),
+            sentences=(self.sentences[vehicle],),
+            engine=self.engine,
+            environment=self.environment,
+        )
+
+    def save(self, path: str | Path) -> None:
+        """Write the flight as a NumPy .npz file, whole or not at all.
+
+        Its arrays: times; each of SERIES; the text vehicles, outcomes, sentences, engine; gravity, wind and
+        ground (NaN where there is none) of the environment; and format, "aerobat-flight-2". No pickles.
+        Raises SpecError when the file cannot be written.
+        """
+        text = {"vehicles": self.vehicles, "sentences": self.sentences, "engine": self.engine}
+        outcomes = [outcome.name for outcome in self.outcomes]
+        ground = np.nan if self.environment.ground is None else self.environment.ground
+        air = {"gravity": self.environment.gravity, "wind": self.environment.wind, "ground": ground}
+        arrays: dict[str, Any] = {**self.series, **text, **air, "times": self.times, "outcomes": outcomes}
+        with whole_file(path) as temporary, temporary.open("wb") as file:
+            np.savez(file, format=_FORMAT, **arrays)
+
+
+def load_flight(path: str | Path) -> Flight:
+    """Read a flight that `Flight.save` wrote. Raises SpecError, one sentence, for any other file."""
+    content = read_arrays(path, "flight")
+    try:
+        if str(content["format"]) != _FORMAT:
+            raise SpecError(f"its format is {content['format']}, not {_FORMAT}; fly it again")
+        ground = float(content["ground"])
+        return Flight(
+            times=content["times"],
+            series={one.name: content[one.name] for one in SERIES},
+            vehicles=_texts(content["vehicles"]),
+            outcomes=tuple(Outcome[name] for name in _texts(content["outcomes"])),
+            sentences=_texts(content["sentences"]),
+            engine=str(content["engine"]),
+            environment=Environment(
+                float(content["gravity"]), content["wind"], None if np.isnan(ground) else ground
+            ),
+        )
+    except KeyError as error:
+        raise SpecError(f"flight file {path}: it has no array {error.args[0]!r}; save it again") from None
+    except SpecError as error:
+        raise SpecError(f"flight file {path}: {error}") from None
+
+
+def setpoint_series(setpoint: Setpoint) -> dict[str, Array]:
+    """Set-points as arrays by the names of SERIES."""
+    parts = vars(setpoint) | vars(setpoint.flat) | vars(setpoint.wrench)
+    return {f"setpoint_{name}": part for name, part in parts.items() if isinstance(part, np.ndarray)}
+
+
+def setpoint_rows(setpoint: Setpoint, rows: slice | NDArray[np.intp]) -> Setpoint:
+    """Some rows of set-points."""
+    return _setpoint({name: values[rows] for name, values in setpoint_series(setpoint).items()})
+
+
+def _setpoint(series: Mapping[str, Array]) -> Setpoint:
+    flat = FlatState(**{name: series[f"setpoint_{name}"] for name in FlatState.__dataclass_fields__})
+    wrench = Wrench(series["setpoint_thrust"], series["setpoint_moment_body"])
+    own = ("q_world_body", "omega_body", "omega_dot_body")
+    return Setpoint(flat=flat, wrench=wrench, **{name: series[f"setpoint_{name}"] for name in own})
+
+
+def _checked(series: Series, values: Array, shape: tuple[int, ...]) -> Array:
+    if series.logical:
+        array: Any = np.array(values, dtype=bool)
+        array.flags.writeable = False
+    else:
+        array = frozen(values, series.name)
+    if array.shape != shape:
+        raise SpecError(f"{series.name} must have the shape {shape}, got {array.shape}")
+    return np.asarray(array)
+
+
+def _texts(array: NDArray[Any]) -> tuple[str, ...]:
+    return tuple(str(text) for text in np.atleast_1d(array).tolist())

@@ -1,0 +1,136 @@
+"""fly(): one or many vehicles along a plan's trajectory, in simulation; reference → control → plant."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from functools import partial
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from aerobat.arrays import Array
+from aerobat.engines import logged_ticks
+from aerobat.engines.components import from_components
+from aerobat.engines.pytree import tree_map, tree_stack
+from aerobat.environment import Environment
+from aerobat.simulation.components import LogRow
+from aerobat.simulation.flight import SERIES, Flight, setpoint_rows, setpoint_series
+from aerobat.simulation.noise import body_states
+from aerobat.simulation.outcome import DIVERGENCE_RADIUS, Outcome
+from aerobat.simulation.setup import FlightConfig, FlightSetup, Flyable, prepare
+from aerobat.states import Setpoint
+from aerobat.trajectory import Trajectory
+from aerobat.vehicle import Vehicle
+
+
+def fly(
+    plan: Flyable | Trajectory,
+    vehicle: Vehicle | Sequence[Vehicle] | None = None,
+    *,
+    environment: Environment | None = None,
+    config: FlightConfig = FlightConfig(),  # noqa: B008 - frozen
+    **changes: Any,
+) -> Flight:
+    """Fly a plan in the nonlinear simulation (paper, Sections III and IV-A).
+
+    One vehicle, or a batch: a sequence of vehicles with as many rotors each, or a `start` with a leading
+    axis. Vehicle k of a batch flies as it would alone with the seed `SeedSequence(seed, spawn_key=(k,))`.
+    Divergence (5 m off, or no longer a number) ends a flight and is its outcome, not an error.
+
+    Args:
+        plan: what is flown; a bare trajectory needs a vehicle.
+        vehicle: what flies it, by default the plan's.
+        environment: where, by default the problem's; for a bare trajectory a calm day on Earth.
+        config: how.
+        changes: fields of FlightConfig that replace those of `config`, as `seed=3`.
+
+    Raises SpecError for arguments that do not fit together, BackendMissing for an engine that is not
+    installed.
+    """
+    setup = prepare(plan, vehicle, environment, replace(config, **changes))
+    stride = setup.config.log_stride
+    engine = setup.engine()
+    loop = setup.compile(engine)
+    logged = logged_ticks(len(setup.times), stride)
+    carry = loop.init(setup.first_tick)
+    rows, setpoints = [], []
+    for begin, end in setup.chunks(stride):
+        chunk_stride = end if begin % stride else stride
+        carry, chunk = loop.scan(carry, setup.inputs(begin, end), chunk_stride)
+        ticks = begin + logged_ticks(end - begin, chunk_stride)
+        kept = np.isin(ticks, logged)
+        rows.append(chunk if kept.all() else tree_map(partial(np.compress, kept, axis=1), chunk))
+        setpoints.append(setpoint_rows(setup.reference.setpoint(begin, end), ticks[kept] - begin))
+    log = rows[0] if len(rows) == 1 else tree_stack(rows, lambda parts: np.concatenate(parts, axis=-1))
+    return _flight(setup, log, setup.times[logged], setpoints, engine.name)
+
+
+def _flight(
+    setup: FlightSetup, log: LogRow, times: Array, setpoints: Sequence[Setpoint], engine: str
+) -> Flight:
+    series: dict[str, Any] = {
+        **vars(body_states(log.motion.body)),
+        "thrusts": from_components(log.motion.thrusts),
+        "commands": from_components(log.commands.thrusts),
+        "saturated": log.commands.saturated,
+    }
+    for name in setpoint_series(setpoints[0]):
+        series[name] = np.concatenate([setpoint_series(part)[name] for part in setpoints])
+    ends, outcomes, sentences = _endings(series, times)
+    length = ends.max() + 1
+    # a diverged vehicle repeats its last row for as long as another one flies
+    shown = np.minimum(np.arange(length), ends[:, None])
+    series |= {
+        "min_thrusts": setup.fleet.min_thrusts,
+        "max_thrusts": setup.fleet.max_thrusts,
+        "ends": times[ends],
+    }
+    for one in SERIES:
+        values = series[one.name]
+        if one.per_vehicle and one.over_time:
+            values = values[:, :length] if (ends == ends.max()).all() else _taken(values, shown)
+        elif one.over_time:
+            values = values[:length]
+        series[one.name] = values[0] if one.per_vehicle and not setup.is_batch else values
+    return Flight(
+        times=times[:length],
+        series=series,
+        vehicles=setup.fleet.names,
+        outcomes=outcomes,
+        sentences=sentences,
+        engine=engine,
+        environment=setup.environment,
+    )
+
+
+def _taken(values: Array, shown: NDArray[np.intp]) -> Array:
+    index = shown.reshape(*shown.shape, *(1,) * (values.ndim - 2))
+    return np.take_along_axis(values, index, axis=1)
+
+
+def _endings(
+    series: dict[str, Array], times: Array
+) -> tuple[NDArray[np.intp], tuple[Outcome, ...], tuple[str, ...]]:
+    """The last row of each vehicle, its outcome, and that in a sentence."""
+    finite: Any = np.logical_and.reduce(
+        [
+            np.isfinite(series[name]).all(axis=-1)
+            for name in ("position", "velocity", "q_world_body", "omega_body", "thrusts", "commands")
+        ]
+    )
+    with np.errstate(over="ignore", invalid="ignore"):
+        distance = np.linalg.norm(series["position"] - series["setpoint_position"], axis=-1)
+    fine = finite & (distance <= DIVERGENCE_RADIUS)
+    ends, outcomes, sentences = [], [], []
+    for vehicle in range(len(fine)):
+        k = int(np.argmin(fine[vehicle]))  # the first row that is not, if there is one
+        outcome = Outcome.COMPLETE
+        if not fine[vehicle, k]:
+            outcome = Outcome.DIVERGED if finite[vehicle, k] else Outcome.STATE_NOT_FINITE
+        last = {Outcome.COMPLETE: len(times) - 1, Outcome.DIVERGED: k, Outcome.STATE_NOT_FINITE: k - 1}
+        ends.append(max(last[outcome], 0))
+        outcomes.append(outcome)
+        sentences.append(outcome.sentence(time=float(times[ends[-1]])))
+    return np.array(ends), tuple(outcomes), tuple(sentences)

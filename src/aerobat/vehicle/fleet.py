@@ -1,0 +1,85 @@
+"""Many vehicles as arrays: each field with a leading axis of vehicles."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from aerobat.arrays import Array
+from aerobat.vehicle.vehicle import Vehicle
+
+_SLACK = 1e-12  # a rotor with a smaller fraction of the collective thrust bears none of it
+
+
+@dataclass(frozen=True, eq=False)
+class Fleet:
+    """Vehicles with n rotors each; the fields are those of Vehicle and Rotor, stacked."""
+
+    names: tuple[str, ...]
+    mass: Array  # [kg], (vehicles,)
+    inertia: Array  # [kg·m²], (vehicles, 3, 3)
+    drag_body: Array  # [kg/s], (vehicles, 3)
+    rotor_positions: Array  # [m], (vehicles, n, 3)
+    spins: Array  # (vehicles, n)
+    min_thrusts: Array  # [N], (vehicles, n)
+    max_thrusts: Array  # [N], (vehicles, n)
+    torque_coefficients: Array  # [m], (vehicles, n)
+    lags: Array  # [s], (vehicles, n)
+    radii: Array  # [m], (vehicles, n)
+
+    @classmethod
+    def of(cls, vehicles: Sequence[Vehicle]) -> Fleet:
+        """The fleet of some vehicles with as many rotors each."""
+        rotors = [rotor for vehicle in vehicles for rotor in vehicle.rotors]
+        shape = (len(vehicles), -1)
+        numbers = np.array(
+            [(r.spin, r.min_thrust, r.max_thrust, r.torque_coefficient, r.lag, r.radius) for r in rotors]
+        )
+        spin, low, high, torque, lag, radius = numbers.T.copy()
+        return cls(
+            names=tuple(vehicle.name for vehicle in vehicles),
+            mass=np.array([vehicle.mass for vehicle in vehicles]),
+            inertia=np.concatenate([vehicle.inertia for vehicle in vehicles]).reshape(-1, 3, 3),
+            drag_body=np.concatenate([vehicle.drag_body for vehicle in vehicles]).reshape(-1, 3),
+            rotor_positions=np.concatenate([r.position_body for r in rotors]).reshape(*shape, 3),
+            spins=spin.reshape(shape),
+            min_thrusts=low.reshape(shape),
+            max_thrusts=high.reshape(shape),
+            torque_coefficients=torque.reshape(shape),
+            lags=lag.reshape(shape),
+            radii=radius.reshape(shape),
+        )
+
+    def __len__(self) -> int:
+        return len(self.mass)
+
+    @cached_property
+    def allocation(self) -> Array:
+        """The maps from rotor thrusts to thrust and moments, as `Vehicle.allocation`, (vehicles, 4, n)."""
+        x, y, _ = np.moveaxis(self.rotor_positions, -1, 0)
+        return np.stack([np.ones_like(x), y, -x, -self.spins * self.torque_coefficients], axis=1)
+
+    @cached_property
+    def mixer(self) -> Array:
+        """The least-norm inverses of the allocations, (vehicles, n, 4)."""
+        flat = self.allocation.reshape(len(self), -1)
+        same = (flat == flat[0]).all()  # the inverse is dear, and most fleets differ in other things
+        distinct, place = (
+            (flat[:1], np.zeros(len(self), int)) if same else np.unique(flat, axis=0, return_inverse=True)
+        )
+        inverses = np.linalg.pinv(distinct.reshape(-1, *self.allocation.shape[1:]))
+        return np.asarray(inverses[place.reshape(-1)])
+
+    @cached_property
+    def collective_range(self) -> Array:
+        """Least and most collective thrust [N] that can be held without any moment, (vehicles, 2)."""
+        direction = self.mixer[..., 0]
+        moving = np.abs(direction) > _SLACK
+        divisor = np.where(moving, direction, 1.0)
+        ends = np.sort([self.min_thrusts / divisor, self.max_thrusts / divisor], axis=0)
+        low = np.where(moving, ends[0], -np.inf).max(axis=-1)
+        high = np.where(moving, ends[1], np.inf).min(axis=-1)
+        return np.stack([low, high], axis=-1)
