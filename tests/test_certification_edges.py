@@ -121,7 +121,8 @@ def test_wildly_unequal_durations_change_no_extreme():
     cuts = np.array([0.0, 1e-5, 0.3, 0.3 + 1e-4, 0.9, 1.0])
     parts = [cut_out(flight.trajectory, a, b) for a, b in pairwise(cuts)]
     durations = np.outer(flight.trajectory.durations, np.diff(cuts)).ravel()
-    pieces = Trajectory(durations, np.stack(parts, axis=1).reshape(len(durations), -1, 3))
+    coefficients = np.stack(parts, axis=1).reshape(len(durations), -1, 3)
+    pieces = Trajectory(durations, coefficients, flight.trajectory.heading)
     again = certify(pieces, flight.vehicle)
     assert again.certified == whole.certified
     assert certified_margin(flight, again) == pytest.approx(certified_margin(flight, whole), abs=1e-6)

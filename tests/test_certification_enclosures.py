@@ -10,6 +10,7 @@ from aerobat.certification import chebyshev, ellipses, quantities
 from aerobat.certification.attitude import Turning
 from aerobat.certification.extremes import Family, greatest
 from aerobat.certification.motion import Motion, Pieces
+from aerobat.environment import Environment
 from random_flights import random_flight
 
 seeds = st.integers(0, 2**32 - 1)
@@ -77,7 +78,7 @@ def test_interpolation_is_as_near_as_its_bound_says_on_coarse_pieces_too(seed, d
     # the same pieces with a far higher degree stand for the truth
     flight = random_flight(seed)
     segments = flight.trajectory.segments
-    coarse, truth = (Motion.of(flight.trajectory, flight.vehicle, k) for k in (degree, 60))
+    coarse, truth = (Motion.of(flight.trajectory, flight.vehicle, Environment(), k) for k in (degree, 60))
     for parts in (4, 16, 64):
         start = np.tile(np.arange(parts) / parts, segments)
         pieces = Pieces(np.repeat(np.arange(segments), parts), start, np.full(len(start), 1 / parts))
