@@ -24,7 +24,7 @@ WEIGHT = VEHICLE.mass * STANDARD_GRAVITY
 REST = [[0.0, 0.0, 0.0]] * 4
 
 
-def finding_of(certificate: Certificate, quantity: str, side: Side = Side.MOST) -> Finding:
+def finding_of(certificate: Certificate, quantity: str, side: Side = Side.MAX) -> Finding:
     return next(f for f in certificate.findings if (f.quantity, f.side) == (quantity, side))
 
 
@@ -49,7 +49,7 @@ def test_a_limit_met_exactly_holds_and_one_a_millionth_tighter_does_not(size, se
         tighter = factor * max(abs(least), abs(most))
         bound = max(-least, most) - tighter
         box = Limits(upper=[most - tighter, 1, 1]) if derivative == 0 else Limits(**{name: bound})
-        side = Side.MOST if derivative == 0 or most >= -least else Side.LEAST
+        side = Side.MAX if derivative == 0 or most >= -least else Side.MIN
         found = finding_of(certify(trajectory, VEHICLE, envelope=Envelope(limits=box)), f"{name} x", side)
         assert found.verdict is verdict
         assert found.margin == pytest.approx(-tighter, abs=2e-9 * max(abs(least), abs(most)))
@@ -60,13 +60,13 @@ def test_a_floor_on_which_the_flight_starts_holds():
     upwards = Trajectory([2.0], hop(1.0, 2.0).coefficients[..., [1, 2, 0]])
     certificate = certify(upwards, VEHICLE, envelope=Envelope(limits=Limits(lower=[-1, -1, 0])))
     assert certificate.certified, certificate.why
-    assert finding_of(certificate, "position z", Side.LEAST).margin == 0.0
+    assert finding_of(certificate, "position z", Side.MIN).margin == 0.0
 
 
 def test_a_ceiling_far_above_does_not_soften_the_floor():
     dipping = Trajectory([2.0], hop(-1e-4, 2.0).coefficients[..., [1, 2, 0]])
     box = Limits(lower=[-1, -1, 0], upper=[1, 1, 1e6])
-    finding = finding_of(certify(dipping, VEHICLE, envelope=Envelope(limits=box)), "position z", Side.LEAST)
+    finding = finding_of(certify(dipping, VEHICLE, envelope=Envelope(limits=box)), "position z", Side.MIN)
     assert finding.verdict is Verdict.VIOLATED
     assert finding.margin == pytest.approx(-1e-4)
 

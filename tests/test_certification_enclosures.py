@@ -6,10 +6,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.polynomial import chebyshev as npcheb
 
-from aerobat.certification import chebyshev, ellipses, quantities
-from aerobat.certification.attitude import Turning
-from aerobat.certification.extremes import Family, greatest
-from aerobat.certification.motion import Motion, Pieces
+from aerobat.certification import quantities
+from aerobat.certification.attitude import ThrustDirectionRates
+from aerobat.certification.enclosure import chebyshev, interpolation_error
+from aerobat.certification.enclosure.extrema import SeriesBatch, enclose_maximum
+from aerobat.certification.thrust_curve import Pieces, ThrustCurve
 from aerobat.environment import Environment
 from random_flights import random_flight
 
@@ -26,7 +27,7 @@ def test_the_greatest_value_of_series_is_enclosed_tightly_and_found(seed, degree
     coefficients = rng.normal(size=(members, degree + 1)) * np.exp(-decay * np.arange(degree + 1))
     error, group = 1e-3 * rng.uniform(size=members), rng.integers(0, groups, members)
     group[:groups] = np.arange(groups)
-    found = greatest(Family(coefficients, error, group, np.ones(groups), TIGHTNESS))
+    found = enclose_maximum(SeriesBatch(coefficients, error, group, np.ones(groups), TIGHTNESS))
     sampled = npcheb.chebval(FINE, coefficients.T)
     for g in range(groups):
         own = group == g
@@ -44,7 +45,9 @@ def test_the_greatest_value_of_series_is_enclosed_tightly_and_found(seed, degree
 def test_of_equal_greatest_values_the_earliest_is_told(value, count):
     flat = np.zeros((count, 5))
     flat[:, 0] = value
-    found = greatest(Family(flat, np.zeros(count), np.zeros(count, dtype=int), np.ones(1), TIGHTNESS))
+    found = enclose_maximum(
+        SeriesBatch(flat, np.zeros(count), np.zeros(count, dtype=int), np.ones(1), TIGHTNESS)
+    )
     assert (found.member[0], found.position[0]) == (0, -1.0)
     assert found.least[0] == found.most[0] == pytest.approx(value)
 
@@ -78,20 +81,22 @@ def test_interpolation_is_as_near_as_its_bound_says_on_coarse_pieces_too(seed, d
     # the same pieces with a far higher degree stand for the truth
     flight = random_flight(seed)
     segments = flight.trajectory.segments
-    coarse, truth = (Motion.of(flight.trajectory, flight.vehicle, Environment(), k) for k in (degree, 60))
+    coarse, truth = (
+        ThrustCurve.of(flight.trajectory, flight.vehicle, Environment(), k) for k in (degree, 60)
+    )
     for parts in (4, 16, 64):
         start = np.tile(np.arange(parts) / parts, segments)
         pieces = Pieces(np.repeat(np.arange(segments), parts), start, np.full(len(start), 1 / parts))
         norms = coarse.norms(coarse.series(coarse.on(pieces)), pieces)
-        usable = ellipses.regular(norms)
+        usable = interpolation_error.regular(norms)
         pieces, norms = pieces[usable], norms[usable]
         if not len(pieces.segment):
             continue
-        found = ellipses.accuracy(
+        found = interpolation_error.accuracy(
             norms, pieces.seconds(flight.trajectory), coarse.sums[pieces.segment], flight.vehicle
         )
         middle = truth.at(pieces.segment, (pieces.start + pieces.length / 2)[:, None])[:, 0, 1]
-        interpolants, exact = (piecewise(motion, pieces, middle) for motion in (coarse, truth))
+        interpolants, exact = (piecewise(curve, pieces, middle) for curve in (coarse, truth))
         nodes = npcheb.chebvander(truth.basis.nodes, coarse.basis.degree)
         off = np.abs(nodes @ coarse.basis.analysis @ interpolants - exact).max(axis=1)
         twist = found.twist_remainder + coarse.basis.lebesgue * found.twist_rounding
@@ -100,8 +105,10 @@ def test_interpolation_is_as_near_as_its_bound_says_on_coarse_pieces_too(seed, d
         assert (np.abs(exact).max(axis=1) <= found.size * (1 + 1e-9)).all()
 
 
-def piecewise(motion: Motion, pieces: Pieces, near: np.ndarray) -> np.ndarray:
+def piecewise(curve: ThrustCurve, pieces: Pieces, near: np.ndarray) -> np.ndarray:
     """The quantities at the basis's nodes, every piece in a frame of its own, about the thrust `near` it."""
-    values = motion.on(pieces)
-    turning = Turning.along(values[..., 1:, :], near, pieces.seconds(motion.trajectory), motion.basis)
-    return quantities.values(motion.vehicle, values, *turning.body(turning.twist))
+    values = curve.on(pieces)
+    turning = ThrustDirectionRates.along(
+        values[..., 1:, :], near, pieces.seconds(curve.trajectory), curve.basis
+    )
+    return quantities.values(curve.vehicle, values, *turning.body(turning.twist))

@@ -40,7 +40,7 @@ def reversed_in_time(trajectory: Trajectory) -> Trajectory:
 def extremes_of(flight: Flight, times: np.ndarray) -> dict[tuple[str, Side], np.ndarray]:
     """Every quantity at some times, by flatness."""
     found = reference(flight.trajectory, flight.vehicle, times=times)
-    setpoint, most = found.setpoint, Side.MOST
+    setpoint, most = found.setpoint, Side.MAX
     series = {
         ("speed", most): np.linalg.norm(setpoint.flat.velocity, axis=1),
         ("tilt", most): np.arccos(np.clip(so3.thrust_axis(setpoint.q_world_body)[:, 2], -1, 1)),
@@ -79,7 +79,7 @@ def test_each_extreme_is_taken_where_it_is_said_to_be_and_never_passed(seed):
     named = {(finding.quantity, finding.side): finding for finding in certificate.findings}
     assert named.keys() == samples.keys()
     for key, finding in named.items():
-        outwards = 1 if finding.side is Side.MOST else -1
+        outwards = 1 if finding.side is Side.MAX else -1
         size = np.abs(samples[key]).max() + 1e-3
         assert (outwards * (finding.bound - samples[key]) >= -1e-9 * size).all(), key
         assert 0 <= outwards * (finding.bound - finding.value) <= 1e-4 * size, key
@@ -137,7 +137,7 @@ def test_a_hover_has_exactly_its_margin(heading):
     hover = certify(Trajectory([1.0], np.zeros((1, 1, 3)), heading), VEHICLE)
     assert hover.certified
     assert hover.margin == pytest.approx(VEHICLE.mass * STANDARD_GRAVITY / 4, abs=1e-9)
-    most = {finding.quantity: finding.bound for finding in hover.findings if finding.side is Side.MOST}
+    most = {finding.quantity: finding.bound for finding in hover.findings if finding.side is Side.MAX}
     assert most["speed"] == most["body rate"] == most["moment"] == 0.0
     assert most["tilt"] < 1e-6
     assert hover.why.startswith("certified: rotor ")
@@ -252,10 +252,10 @@ def test_the_example_of_section_v_has_the_published_extremes(iteration, thrust, 
         minimum_effort(given, [0.5 + shift, 1.5]), load_vehicle("section-v"), Environment(gravity=9.80665)
     )
     values = {(finding.quantity, finding.side): finding.value for finding in certificate.findings}
-    found = [values["thrust", Side.LEAST], values["thrust", Side.MOST]]
-    found += [values["moment", Side.MOST], values["body rate", Side.MOST]]
-    found += [min(values[f"rotor {i}", Side.LEAST] for i in range(4))]
-    found += [max(values[f"rotor {i}", Side.MOST] for i in range(4))]
+    found = [values["thrust", Side.MIN], values["thrust", Side.MAX]]
+    found += [values["moment", Side.MAX], values["body rate", Side.MAX]]
+    found += [min(values[f"rotor {i}", Side.MIN] for i in range(4))]
+    found += [max(values[f"rotor {i}", Side.MAX] for i in range(4))]
     printed = np.array([*thrust, moment, rate, *rotors])
     half_digits = np.array([0.06, 0.06, 0.006, 0.06, 0.006, 0.006])
     assert (np.abs(found - printed) <= np.maximum(half_digits, 6e-3 * np.abs(printed))).all()

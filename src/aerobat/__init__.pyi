@@ -53,7 +53,7 @@ from .sensitivity import Gradient, Sensitivity, gradient
 from .simulation import StateNoise
 from .states import BodyState, FlatState, Setpoint, Wrench
 from .studies.compare import Comparison, compare
-from .trajectory import Rule, Trajectory, load_trajectory, minimum_effort, save_trajectory
+from .trajectory import ContinuityRule, Trajectory, load_trajectory, minimum_effort, save_trajectory
 from .vehicle import Rotor, Vehicle, load_vehicle, vehicle_names, write_vehicle
 
 __all__ = [
@@ -64,6 +64,7 @@ __all__ = [
     "Certificate",
     "Comparison",
     "Condition",
+    "ContinuityRule",
     "Controller",
     "CustomManeuver",
     "EndState",
@@ -90,7 +91,6 @@ __all__ = [
     "Reference",
     "Rotor",
     "RotorMargin",
-    "Rule",
     "Score",
     "Sensitivity",
     "Setpoint",

@@ -23,14 +23,14 @@ from numpy.typing import NDArray
 
 from aerobat import so3
 from aerobat.arrays import Array
-from aerobat.certification import chebyshev
+from aerobat.certification.enclosure import chebyshev
 
 UP = np.array([0.0, 0.0, 1.0])
 ComplexArray = NDArray[np.complex128]
 
 
 @dataclass(frozen=True)
-class Turning:
+class ThrustDirectionRates:
     """How the thrust direction turns along P pieces, at N nodes each, in a frame of its own on each piece."""
 
     axes: Array  # e1, e2, e3 as columns, (P, 3, 3)
@@ -40,7 +40,9 @@ class Turning:
     twist: Array  # φ since the piece's start [rad], (P, N)
 
     @classmethod
-    def along(cls, values: Array, mean: Array, seconds: Array, basis: chebyshev.Basis) -> Turning:
+    def along(
+        cls, values: Array, mean: Array, seconds: Array, basis: chebyshev.Basis
+    ) -> ThrustDirectionRates:
         """The turning of f, f', f'' (P, N, 3, 3) at the basis's nodes; e3 along the `mean` of f (P, 3)."""
         axes = _axes_about(mean)
         local = values @ axes[:, None]

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import asdict, dataclass
 from enum import StrEnum
 
-from aerobat.flatness import Span
+from aerobat.flatness import TimeInterval
 
 
 class Verdict(StrEnum):
@@ -19,8 +19,8 @@ class Verdict(StrEnum):
 class Side(StrEnum):
     """Which extreme of a quantity is meant."""
 
-    LEAST = "least"
-    MOST = "most"
+    MIN = "min"
+    MAX = "max"
 
 
 @dataclass(frozen=True)
@@ -42,19 +42,19 @@ class Finding:
         if self.limit is None:
             return None
         extreme = self.value if self.verdict is Verdict.VIOLATED else self.bound
-        margin = self.limit - extreme if self.side is Side.MOST else extreme - self.limit
+        margin = self.limit - extreme if self.side is Side.MAX else extreme - self.limit
         return max(margin, 0.0) if self.verdict is Verdict.HOLDS else margin
 
     def __str__(self) -> str:
         """One sentence without its full stop."""
-        change = "rises" if self.side is Side.MOST else "falls"
+        change = "rises" if self.side is Side.MAX else "falls"
         value = round(self.value, 9) + 0.0  # what is zero but for rounding reads as zero
         reached = f"{self.quantity} {change} to {value:.4g} {self.unit} at {self.time:.3f} s"
         margin = self.margin
         if self.limit is None or margin is None:
             return reached
         if self.verdict is Verdict.VIOLATED:
-            where = "above" if self.side is Side.MOST else "below"
+            where = "above" if self.side is Side.MAX else "below"
             return f"{reached}, {-margin:.2g} {self.unit} {where} its limit"
         if self.verdict is Verdict.UNDECIDED and margin < 0:
             return f"{reached}, nearer to its limit than can be told"
@@ -82,7 +82,7 @@ class Certificate:
     """What holds along the whole of a trajectory, between samples and knots too, and what does not."""
 
     findings: tuple[Finding, ...]
-    undetermined: tuple[Span, ...]  # where thrust vanishes, and with it the attitude
+    undetermined: tuple[TimeInterval, ...]  # where thrust vanishes, and with it the attitude
     discontinuities: tuple[Discontinuity, ...]
 
     @property

@@ -8,20 +8,20 @@ import numpy as np
 
 from aerobat.arrays import Array
 from aerobat.certification.certificate import Discontinuity
-from aerobat.certification.motion import Motion
+from aerobat.certification.thrust_curve import ThrustCurve
 from aerobat.trajectory import Trajectory
 
 NEGLIGIBLE = 1e-6  # of the largest value at knots: less than any controller or solver can tell
 CANCELLATION = 1e3  # units in the last place of the largest coefficient that fitting a segment may cost
 
 
-def discontinuities(motion: Motion, floor: float) -> tuple[Discontinuity, ...]:
+def discontinuities(curve: ThrustCurve, floor: float) -> tuple[Discontinuity, ...]:
     """The jump of lowest order at every inner knot where one cannot be flown; directions above the floor.
 
     Rates are compared as b3' in the world: with b3 the same on both sides that is the body rates' jump.
     """
-    trajectory = motion.trajectory
-    ends = motion.at(np.arange(trajectory.segments), np.tile([0.0, 1.0], (trajectory.segments, 1)))
+    trajectory = curve.trajectory
+    ends = curve.at(np.arange(trajectory.segments), np.tile([0.0, 1.0], (trajectory.segments, 1)))
     position = trajectory.on_segments([0.0, 1.0]) - trajectory.coefficients[0, 0]
     velocity, f, df = np.moveaxis(ends[:, :, :3], 2, 0)
     n = np.linalg.norm(f, axis=-1, keepdims=True)

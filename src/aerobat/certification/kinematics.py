@@ -1,6 +1,6 @@
 """Speed and derivatives per axis: polynomials, so that interpolation is exact but for rounding.
 
-A plan may run along such a limit or end on it, so one that is met exactly holds: MET says what "exactly"
+A plan may run along such a limit or end on it, so one that is met exactly holds: LIMIT_TOLERANCE says what "exactly"
 leaves to rounding.
 """
 
@@ -11,17 +11,19 @@ from dataclasses import replace
 import numpy as np
 
 from aerobat.arrays import Array
-from aerobat.certification import chebyshev
 from aerobat.certification.certificate import Finding, Side
+from aerobat.certification.enclosure import chebyshev
+from aerobat.certification.enclosure.queries import ChebyshevSeries, ExtremumQuery, both_sides, root
 from aerobat.certification.envelope import Envelope
-from aerobat.certification.motion import Pieces
-from aerobat.certification.questions import Interpolated, Question, both_sides, root
+from aerobat.certification.thrust_curve import Pieces
 from aerobat.problem.problem import DERIVATIVES, UNITS, Limits
 from aerobat.trajectory import Trajectory, polynomial
 
 AXES = "xyz"
-MET = 1e-9  # of the limit or of the derivative's largest component, the larger: beyond by so much is met
-TIGHTNESS = MET / 10  # of enclosures
+LIMIT_TOLERANCE = (
+    1e-9  # of the limit or of the derivative's largest component, the larger: beyond by so much is met
+)
+TIGHTNESS = LIMIT_TOLERANCE / 10  # of enclosures
 
 
 def kinematic_findings(trajectory: Trajectory, envelope: Envelope) -> list[Finding]:
@@ -38,7 +40,7 @@ def kinematic_findings(trajectory: Trajectory, envelope: Envelope) -> list[Findi
     errors = [(2 * np.sqrt(most[:, 0]) + off_speed) * off_speed, *off]
     whole = Pieces(np.arange(count), np.zeros(count), np.ones(count))
     error = basis.lebesgue * np.stack(errors, axis=-1)
-    found = Interpolated(trajectory, whole, series, error, most.max(axis=0), TIGHTNESS, everywhere=True)
+    found = ChebyshevSeries(trajectory, whole, series, error, most.max(axis=0), TIGHTNESS, everywhere=True)
     return found.answers(_questions(envelope, components, [float(np.abs(rate).max()) for rate in rates]))
 
 
@@ -48,9 +50,11 @@ def _limited(limits: Limits) -> list[tuple[int, int]]:
     return [(int(k), int(axis)) for k, axis in np.argwhere(bounds)]
 
 
-def _questions(envelope: Envelope, components: list[tuple[int, int]], largest: list[float]) -> list[Question]:
+def _questions(
+    envelope: Envelope, components: list[tuple[int, int]], largest: list[float]
+) -> list[ExtremumQuery]:
     """What is asked of speed and of the components, given the `largest` component of each derivative."""
-    asked = [_lenient(Question("speed", "m/s", Side.MOST, envelope.speed, 0, 1, root), largest[1])]
+    asked = [_lenient(ExtremumQuery("speed", "m/s", Side.MAX, envelope.speed, 0, 1, root), largest[1])]
     for column, (k, axis) in enumerate(components, 1):
         title, (lower, upper) = f"{DERIVATIVES[k]} {AXES[axis]}", envelope.limits.of(k)
         sides = both_sides(title, UNITS[k], column, lower[axis], upper[axis])
@@ -58,8 +62,8 @@ def _questions(envelope: Envelope, components: list[tuple[int, int]], largest: l
     return asked
 
 
-def _lenient(question: Question, largest: float) -> Question:
-    return replace(question, slack=MET * max(largest, abs(question.limit)))
+def _lenient(question: ExtremumQuery, largest: float) -> ExtremumQuery:
+    return replace(question, slack=LIMIT_TOLERANCE * max(largest, abs(question.limit)))
 
 
 def _sums(trajectory: Trajectory, derivative: int) -> Array:

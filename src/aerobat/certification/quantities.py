@@ -1,7 +1,7 @@
 """What is certified: rotor thrusts, collective thrust, tilt, body rate and moment, as analytic functions.
 
 Magnitudes are squared and the tilt is taken by its cosine, so that no kink spoils interpolation; the
-`Question` turns them into what people read.
+`ExtremumQuery` turns them into what people read.
 """
 
 from __future__ import annotations
@@ -12,14 +12,14 @@ import numpy as np
 
 from aerobat.arrays import Array
 from aerobat.certification.certificate import Side
+from aerobat.certification.enclosure.queries import ExtremumQuery, angle, both_sides, root
 from aerobat.certification.envelope import Envelope
-from aerobat.certification.questions import Question, angle, both_sides, root
-from aerobat.flatness.setpoints import wrench_for
+from aerobat.flatness.reference import wrench_for
 from aerobat.vehicle import Vehicle, mixer, rotor_thrusts
 
 
 @dataclass(frozen=True)
-class Sizes:
+class MagnitudeBounds:
     """Bounds of, or errors in, what the quantities are made of; all (...)."""
 
     thrust: Array  # [N]
@@ -28,25 +28,25 @@ class Sizes:
     omega_dot: Array  # [rad/s²]
 
 
-def values(vehicle: Vehicle, motion: Array, omega: Array, omega_dot: Array) -> Array:
+def values(vehicle: Vehicle, curve: Array, omega: Array, omega_dot: Array) -> Array:
     """Rotor thrusts, collective thrust, cos tilt, |ω|², |M|², (..., n + 4).
 
-    `motion` holds v, f, f', f'' (..., 4, 3), world; ω and ω' (..., 3) are in body axes.
+    `curve` holds v, f, f', f'' (..., 4, 3), world; ω and ω' (..., 3) are in body axes.
     """
-    airspeed, thrust = motion[..., 0, :], motion[..., 1:, :]
+    airspeed, thrust = curve[..., 0, :], curve[..., 1:, :]
     wrench = wrench_for(thrust, airspeed, omega, omega_dot, vehicle)
     upright = thrust[..., 0, 2] / np.linalg.norm(thrust[..., 0, :], axis=-1)
     others = [wrench.thrust, upright, _square(omega), _square(wrench.moment_body)]
     return np.concatenate([rotor_thrusts(vehicle, wrench), np.stack(others, axis=-1)], axis=-1)
 
 
-def bounds(vehicle: Vehicle, sizes: Sizes) -> Array:
+def bounds(vehicle: Vehicle, sizes: MagnitudeBounds) -> Array:
     """The largest absolute values that `values` can have for arguments of these sizes, (..., n + 4)."""
     moment = _inertia(vehicle) * (sizes.omega_dot + sizes.omega**2)
     return _stacked(vehicle, sizes.thrust, moment, sizes.upright, sizes.omega**2, moment**2)
 
 
-def errors(vehicle: Vehicle, sizes: Sizes, of: Sizes) -> Array:
+def errors(vehicle: Vehicle, sizes: MagnitudeBounds, of: MagnitudeBounds) -> Array:
     """What small errors `of` the arguments do to `values`, (..., n + 4)."""
     size = _inertia(vehicle) * (sizes.omega_dot + sizes.omega**2)
     moment = _inertia(vehicle) * (of.omega_dot + 2 * sizes.omega * of.omega)
@@ -61,16 +61,16 @@ def scales(vehicle: Vehicle) -> Array:
     return np.concatenate([ranges, [ranges.sum(), 0.01, 1.0, moment**2]])
 
 
-def questions(vehicle: Vehicle, envelope: Envelope) -> list[Question]:
+def questions(vehicle: Vehicle, envelope: Envelope) -> list[ExtremumQuery]:
     """What a certificate asks of the columns of `values`."""
     count, low, high = len(vehicle.rotors), vehicle.min_thrusts, vehicle.max_thrusts
     asked = [q for i in range(count) for q in both_sides(f"rotor {i}", "N", i, low[i], high[i])]
     return [
         *asked,
         *both_sides("thrust", "N", count, low.sum(), high.sum()),
-        Question("tilt", "rad", Side.MOST, envelope.tilt, count + 1, -1, angle),
-        Question("body rate", "rad/s", Side.MOST, envelope.body_rate, count + 2, 1, root),
-        Question("moment", "N·m", Side.MOST, envelope.moment, count + 3, 1, root),
+        ExtremumQuery("tilt", "rad", Side.MAX, envelope.tilt, count + 1, -1, angle),
+        ExtremumQuery("body rate", "rad/s", Side.MAX, envelope.body_rate, count + 2, 1, root),
+        ExtremumQuery("moment", "N·m", Side.MAX, envelope.moment, count + 3, 1, root),
     ]
 
 

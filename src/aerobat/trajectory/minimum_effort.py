@@ -22,7 +22,7 @@ ORDERS = {3: "jerk", 4: "snap", 5: "crackle"}
 AXES = "xyz"
 
 
-class Rule(StrEnum):
+class ContinuityRule(StrEnum):
     """Which continuity gives way at an inner knot for a derivative that is given there."""
 
     VARIATIONAL = "variational"  # derivative 2s - 1 - d for a given derivative d: least effort
@@ -32,7 +32,10 @@ class Rule(StrEnum):
 
 
 def minimum_effort(
-    given: ArrayLike, durations: ArrayLike, rule: Rule = Rule.VARIATIONAL, heading: float = 0.0
+    given: ArrayLike,
+    durations: ArrayLike,
+    rule: ContinuityRule = ContinuityRule.VARIATIONAL,
+    heading: float = 0.0,
 ) -> Trajectory:
     """Polynomials of degree 2s - 1 on n segments, through what is given at their n + 1 knots.
 
@@ -55,12 +58,12 @@ def minimum_effort(
     return Trajectory(lengths, coefficients, heading)
 
 
-def _conditions(known: Mask, durations: Array, rule: Rule) -> KnotConditions:
+def _conditions(known: Mask, durations: Array, rule: ContinuityRule) -> KnotConditions:
     """The conditions at all knots for components of which `known` (n + 1, s) is given."""
     order = known.shape[1]
     given = np.concatenate([known, np.zeros_like(known)], axis=1)
     variational = ~given & ~given[:, ::-1]
-    continuous = variational.copy() if rule is Rule.VARIATIONAL else _without_highest(given)
+    continuous = variational.copy() if rule is ContinuityRule.VARIATIONAL else _without_highest(given)
     # beyond an end of the course lies nothing to join: free derivatives make others vanish
     ends = [0, -1]
     continuous[ends] = variational[ends] & (np.arange(2 * order) >= order)
@@ -128,8 +131,8 @@ def _split(given: ArrayLike, segments: int) -> tuple[Array, Mask]:
     return frozen(np.where(known, array, 0.0), "given"), known
 
 
-def _checked(rule: Rule) -> Rule:
+def _checked(rule: ContinuityRule) -> ContinuityRule:
     try:
-        return Rule(rule)
+        return ContinuityRule(rule)
     except ValueError:
-        raise SpecError(f"rule must be one of {', '.join(Rule)}, got {rule!r}") from None
+        raise SpecError(f"rule must be one of {', '.join(ContinuityRule)}, got {rule!r}") from None

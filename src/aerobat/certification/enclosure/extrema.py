@@ -13,14 +13,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from aerobat.arrays import Array
-from aerobat.certification import chebyshev
+from aerobat.certification.enclosure import chebyshev
 
 MAX_HALVINGS = 50
 Indices = NDArray[np.intp]
 
 
 @dataclass(frozen=True)
-class Family:
+class SeriesBatch:
     """Series that approximate functions, each of one of G groups whose greatest value is wanted.
 
     The ends of an enclosure come as near to one another as `tightness` says: of the group's scale or of its
@@ -68,7 +68,7 @@ class _Parts:
         )
 
 
-def greatest(family: Family) -> Enclosure:
+def enclose_maximum(family: SeriesBatch) -> Enclosure:
     """Enclose the greatest value of each group, all groups at once."""
     count, groups = len(family.group), len(family.scale)
     parts = _Parts(family.coefficients, np.arange(count), np.zeros(count), np.ones(count))

@@ -8,9 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from aerobat.arrays import Array
-from aerobat.certification import ellipses, quantities
-from aerobat.certification.motion import Motion, Pieces, joined
-from aerobat.flatness import Span
+from aerobat.certification import quantities
+from aerobat.certification.enclosure import interpolation_error
+from aerobat.certification.thrust_curve import Pieces, ThrustCurve, joined
+from aerobat.flatness import TimeInterval
 
 REMAINDER = 1e-8  # of its scale: what interpolation may leave open of a quantity
 TWIST = 1e-9  # [rad] and of the frame's angle on one piece
@@ -20,37 +21,37 @@ MANY = 20_000  # pieces at a time, beside the segments; no flight needs so many
 
 @dataclass(frozen=True)
 class Resolution:
-    """The pieces of a motion in their order, and what is left of it."""
+    """The pieces of a curve in their order, and what is left of it."""
 
     pieces: Pieces
-    vanishing: tuple[Span, ...]  # where |f| is below the floor
+    vanishing: tuple[TimeInterval, ...]  # where |f| is below the floor
 
 
-def resolve(motion: Motion, floor: float) -> Resolution:
+def resolve(curve: ThrustCurve, floor: float) -> Resolution:
     """Halve segments until |f| >= floor [m/s²] and interpolation is accurate on each piece.
 
     What stays below the floor, or cannot be told from it, is left out.
     """
-    count = motion.trajectory.segments
+    count = curve.trajectory.segments
     pending = Pieces(np.arange(count), np.zeros(count), np.ones(count))
     done, left = [pending[:0]], [pending[:0]]
     while len(pending.segment):
-        norms = motion.norms(motion.series(motion.on(pending)), pending)
+        norms = curve.norms(curve.series(curve.on(pending)), pending)
         mean, spread = norms[:, 0, 1], norms[:, 1:, 1].sum(axis=1)
-        good = (mean - spread >= floor) & ellipses.regular(norms)
-        good[good] = _accurate(motion, pending[good], norms[good])
-        hopeless = (mean + spread < floor) | (pending.seconds(motion.trajectory) < SHORTEST)
+        good = (mean - spread >= floor) & interpolation_error.regular(norms)
+        good[good] = _accurate(curve, pending[good], norms[good])
+        hopeless = (mean + spread < floor) | (pending.seconds(curve.trajectory) < SHORTEST)
         hopeless |= len(good) > MANY + 4 * count
         done.append(pending[good])
         left.append(pending[hopeless & ~good])
         pending = pending[~(good | hopeless)].halves()
-    return Resolution(_sorted(joined(done)), _spans(motion, _sorted(joined(left))))
+    return Resolution(_sorted(joined(done)), _spans(curve, _sorted(joined(left))))
 
 
-def _accurate(motion: Motion, pieces: Pieces, norms: Array) -> NDArray[np.bool_]:
-    seconds = pieces.seconds(motion.trajectory)
-    found = ellipses.accuracy(norms, seconds, motion.sums[pieces.segment], motion.vehicle)
-    wanted = REMAINDER * np.maximum(quantities.scales(motion.vehicle), found.size)
+def _accurate(curve: ThrustCurve, pieces: Pieces, norms: Array) -> NDArray[np.bool_]:
+    seconds = pieces.seconds(curve.trajectory)
+    found = interpolation_error.accuracy(norms, seconds, curve.sums[pieces.segment], curve.vehicle)
+    wanted = REMAINDER * np.maximum(quantities.scales(curve.vehicle), found.size)
     small = (found.remainder <= wanted).all(axis=1) & (found.twist_remainder <= TWIST)
     return np.asarray(small & np.isfinite(found.size).all(axis=1))
 
@@ -59,11 +60,11 @@ def _sorted(pieces: Pieces) -> Pieces:
     return pieces[np.lexsort((pieces.start, pieces.segment))]
 
 
-def _spans(motion: Motion, pieces: Pieces) -> tuple[Span, ...]:
+def _spans(curve: ThrustCurve, pieces: Pieces) -> tuple[TimeInterval, ...]:
     """The stretches that pieces in order make up together."""
     if not len(pieces.segment):
         return ()
-    start, end = (pieces.times(motion.trajectory, np.full(len(pieces.segment), side)) for side in (-1.0, 1.0))
+    start, end = (pieces.times(curve.trajectory, np.full(len(pieces.segment), side)) for side in (-1.0, 1.0))
     apart = start[1:] - end[:-1] > SHORTEST
     firsts, lasts = start[np.append(True, apart)], end[np.append(apart, True)]
-    return tuple(Span(float(first), float(last)) for first, last in zip(firsts, lasts, strict=True))
+    return tuple(TimeInterval(float(first), float(last)) for first, last in zip(firsts, lasts, strict=True))

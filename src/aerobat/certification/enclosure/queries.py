@@ -10,15 +10,15 @@ import numpy as np
 
 from aerobat.arrays import Array
 from aerobat.certification.certificate import Finding, Side, Verdict
-from aerobat.certification.extremes import Family, greatest
-from aerobat.certification.motion import Pieces
+from aerobat.certification.enclosure.extrema import SeriesBatch, enclose_maximum
+from aerobat.certification.thrust_curve import Pieces
 from aerobat.trajectory import Trajectory
 
 ROUNDING = 1e-13  # of the sizes of a series' terms: halving it some ten times and summing it
 
 
 @dataclass(frozen=True)
-class Question:
+class ExtremumQuery:
     """How large (or, with the sign -1, how small) a function gets that is given by series on pieces."""
 
     quantity: str
@@ -34,7 +34,7 @@ class Question:
         """The finding, if the greatest value is in [least, most]; `everywhere`: no time was left out."""
         value, bound = self.read(least), self.read(most)
         limit = None if math.isinf(self.limit) else self.limit
-        inwards = 1 if self.side is Side.MOST else -1
+        inwards = 1 if self.side is Side.MAX else -1
         verdict = Verdict.UNDECIDED
         if limit is None or (everywhere and inwards * (limit - bound) >= -self.slack):
             verdict = Verdict.HOLDS
@@ -44,7 +44,7 @@ class Question:
 
 
 @dataclass(frozen=True)
-class Interpolated:
+class ChebyshevSeries:
     """Functions as Chebyshev series on pieces of a trajectory."""
 
     trajectory: Trajectory
@@ -52,34 +52,34 @@ class Interpolated:
     series: Array  # (P, K + 1, Q)
     error: Array  # at most, (P, Q)
     scale: Array  # what is large, (Q,)
-    tightness: float  # of enclosures, as `extremes.Family` has it
+    tightness: float  # of enclosures, as `extremes.SeriesBatch` has it
     everywhere: bool  # whether the pieces make up the whole trajectory
 
-    def answers(self, questions: Sequence[Question]) -> list[Finding]:
+    def answers(self, questions: Sequence[ExtremumQuery]) -> list[Finding]:
         """A finding for each question; none at all if there are no pieces."""
         count = len(self.pieces.segment)
         if not (count and questions):
             return []
         columns = np.array([question.column for question in questions])
         signed = self.series[..., columns] * np.array([question.sign for question in questions])
-        family = Family(
+        family = SeriesBatch(
             signed.swapaxes(1, 2).reshape(-1, signed.shape[1]),
             (self.error[:, columns] + ROUNDING * np.abs(signed).sum(axis=1)).ravel(),
             np.tile(np.arange(len(questions)), count),
             self.scale[columns],
             self.tightness,
         )
-        found = greatest(family)
+        found = enclose_maximum(family)
         times = self.pieces[found.member // len(questions)].times(self.trajectory, found.position)
         ranges = zip(questions, found.least.tolist(), found.most.tolist(), times.tolist(), strict=True)
         return [question.answer(least, most, time, self.everywhere) for question, least, most, time in ranges]
 
 
-def both_sides(quantity: str, unit: str, column: int, lower: float, upper: float) -> list[Question]:
+def both_sides(quantity: str, unit: str, column: int, lower: float, upper: float) -> list[ExtremumQuery]:
     """How small and how large a function gets."""
     return [
-        Question(quantity, unit, Side.LEAST, float(lower), column, -1, _negated),
-        Question(quantity, unit, Side.MOST, float(upper), column, 1, _plain),
+        ExtremumQuery(quantity, unit, Side.MIN, float(lower), column, -1, _negated),
+        ExtremumQuery(quantity, unit, Side.MAX, float(upper), column, 1, _plain),
     ]
 
 

@@ -25,7 +25,7 @@ UP = np.array([0.0, 0.0, 1.0])
 
 
 @dataclass(frozen=True)
-class Span:
+class TimeInterval:
     """A stretch of time [s]."""
 
     start: float
@@ -41,7 +41,7 @@ class Frames:
     q_world_body: Array  # (M, 4), sign continuous
     determined: NDArray[np.bool_]  # |f| reaches the floor, so that there is a thrust direction, (M,)
     samples: NDArray[np.intp]  # where among the nodes the samples are, (T,)
-    undetermined: tuple[Span, ...]
+    undetermined: tuple[TimeInterval, ...]
 
 
 @dataclass(frozen=True)
@@ -98,7 +98,7 @@ def _carry(directions: Array, control: Array, heading: float) -> Array:
     return np.asarray(q * np.cumprod(np.where(turned, -1.0, 1.0))[:, None])
 
 
-def onward(q_world_body: Array, thrust: Array, ahead: Array, step: Array) -> Array:
+def advance(q_world_body: Array, thrust: Array, ahead: Array, step: Array) -> Array:
     """Carry attitudes (n, 4) over one `step` (n,) [s] each, from f, f', f'' (n, 3, 3) to those ahead.
 
     For steps inside the cone that `frames` keeps between its nodes, at determined thrust.
@@ -187,7 +187,9 @@ def _held_directions(f: Array, magnitude: Array, determined: NDArray[np.bool_]) 
     return np.where(last[:, None] >= 0, directions[last], UP)
 
 
-def _spans(times: Array, pieces: _Pieces, determined: NDArray[np.bool_], floor: float) -> tuple[Span, ...]:
+def _spans(
+    times: Array, pieces: _Pieces, determined: NDArray[np.bool_], floor: float
+) -> tuple[TimeInterval, ...]:
     """The stretches whose nodes are below the floor, to where the curve crosses it."""
     edges = np.diff(np.concatenate([[0], ~determined, [0]]).astype(int))
     crossings = [
@@ -197,7 +199,7 @@ def _spans(times: Array, pieces: _Pieces, determined: NDArray[np.bool_], floor: 
     start = [] if determined[0] else [float(times[0])]
     end = [] if determined[-1] else [float(times[-1])]
     bounds = iter([*start, *crossings, *end])
-    return tuple(Span(first, last) for first, last in zip(bounds, bounds, strict=True))
+    return tuple(TimeInterval(first, last) for first, last in zip(bounds, bounds, strict=True))
 
 
 def _crossing(control: Array, floor: float) -> float:

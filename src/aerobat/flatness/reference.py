@@ -24,7 +24,7 @@ from aerobat import so3
 from aerobat.arrays import Array, frozen
 from aerobat.environment import Environment
 from aerobat.errors import SpecError
-from aerobat.flatness.transport import Frames, Span, frames
+from aerobat.flatness.parallel_transport import Frames, TimeInterval, frames
 from aerobat.states import FlatState, Setpoint, Wrench
 from aerobat.trajectory import Trajectory
 from aerobat.vehicle import Vehicle
@@ -41,7 +41,7 @@ class Reference:
     times: Array  # [s], (T,)
     setpoint: Setpoint  # leading axis T; where the attitude is undetermined it is held and its rates are zero
     rotor_thrusts: Array  # [N], as flatness asks, limits or not, (T, n)
-    undetermined: tuple[Span, ...]  # where |f| is next to nothing, between samples too
+    undetermined: tuple[TimeInterval, ...]  # where |f| is next to nothing, between samples too
 
 
 def reference(

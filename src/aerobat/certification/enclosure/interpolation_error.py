@@ -21,13 +21,13 @@ from numpy.typing import NDArray
 
 from aerobat.arrays import Array
 from aerobat.certification import quantities
-from aerobat.certification.chebyshev import ROUNDING, growth
-from aerobat.certification.quantities import Sizes
-from aerobat.flatness.setpoints import axial_drag
+from aerobat.certification.enclosure.chebyshev import ROUNDING, growth
+from aerobat.certification.quantities import MagnitudeBounds
+from aerobat.flatness.reference import axial_drag
 from aerobat.vehicle import Vehicle
 
 RHO = np.array([1.0, 1.6, 2.0, 2.5, 3.2, 4.0, 5.5, 8.0, 14.0, 30.0, 80.0])
-CURLED = 30.0  # a frame's imaginary angle beyond which an ellipse is of no use
+MAX_FRAME_ANGLE = 30.0  # a frame's imaginary angle beyond which an ellipse is of no use
 
 
 @dataclass(frozen=True)
@@ -47,12 +47,12 @@ class _Bounds:
     """Bounds on R ellipses about P pieces, all (P, R)."""
 
     regular: NDArray[np.bool_]  # where not, the others mean nothing
-    sizes: Sizes
+    sizes: MagnitudeBounds
     twist: Array  # of the angle by which the frame turns about b3 per half length [rad]
 
 
 def regular(norms: Array) -> NDArray[np.bool_]:
-    """Whether the smallest ellipse is off the zeros of f·f; `norms` (P, K + 1, 4) as from `Motion.norms`."""
+    """Whether the smallest ellipse is off the zeros of f·f; `norms` (P, K + 1, 4) as from `ThrustCurve.norms`."""
     thrust = norms[..., 1]
     return _off_zero(thrust[:, 0], thrust[:, 1:] @ growth(thrust.shape[1] - 1, RHO[1:2])[1:, 0])
 
@@ -63,7 +63,7 @@ def accuracy(norms: Array, seconds: Array, sums: Array, vehicle: Vehicle) -> Acc
     `sums` (P, 4): the sums of absolute values that v, f, f', f'' are evaluated from.
     """
     around = _bounds(norms, seconds / 2, vehicle)
-    sizes = Sizes(*(bound[:, 0] for bound in vars(around.sizes).values()))
+    sizes = MagnitudeBounds(*(bound[:, 0] for bound in vars(around.sizes).values()))
     least = norms[:, 0, 1] - norms[:, 1:, 1].sum(axis=1)
     rounded = _rounded(sizes, least, norms, ROUNDING * sums, vehicle)
     none = np.zeros_like(least)
@@ -76,7 +76,7 @@ def accuracy(norms: Array, seconds: Array, sums: Array, vehicle: Vehicle) -> Acc
         rounding=quantities.errors(vehicle, sizes, rounded),
         twist_remainder=2 * (twist[:, 1:] * decay).min(axis=1),
         twist_rounding=seconds * rounded.omega + ROUNDING,
-        turning=quantities.errors(vehicle, sizes, Sizes(none, none, sizes.omega, sizes.omega_dot)),
+        turning=quantities.errors(vehicle, sizes, MagnitudeBounds(none, none, sizes.omega, sizes.omega_dot)),
     )
 
 
@@ -94,25 +94,27 @@ def _bounds(norms: Array, half: Array, vehicle: Vehicle) -> _Bounds:
     beside = mean * (root + 1 - delta)  # |n + w|, at least
     twist = half[:, None] * away * jerk * inverse / beside
     curl = twist * (RHO + 1 / RHO) / 2  # the angle's imaginary part, gathered from the real line on
-    usable &= curl < CURLED
+    usable &= curl < MAX_FRAME_ANGLE
     frame = (1 + away * (1 + ratio) / beside) * np.exp(np.where(usable, curl, 0.0))  # |x, y|
     omega = frame * jerk * inverse
     omega_dot = frame * inverse * (snap + 2 * ratio * jerk**2 * inverse)
     axial = abs(axial_drag(vehicle))
     thrust = vehicle.mass * (mean * np.where(RHO > 1, 1 - root, 1 + delta) + axial * ratio * speed)
-    return _Bounds(usable, Sizes(thrust, ratio, omega, omega_dot), twist)
+    return _Bounds(usable, MagnitudeBounds(thrust, ratio, omega, omega_dot), twist)
 
 
 def _off_zero(mean: Array, away: Array) -> NDArray[np.bool_]:
     return np.asarray(2 * away * mean + away**2 < 0.999 * mean**2)
 
 
-def _rounded(sizes: Sizes, least: Array, norms: Array, off: Array, vehicle: Vehicle) -> Sizes:
+def _rounded(
+    sizes: MagnitudeBounds, least: Array, norms: Array, off: Array, vehicle: Vehicle
+) -> MagnitudeBounds:
     """First-order errors of what flatness gives if v, f, f', f'' are `off` by so much, (P, 4)."""
     f, df, ddf = (off[:, 1:] / least[:, None]).T
     omega, omega_dot = sizes.omega, sizes.omega_dot
     speed = norms[..., 0].sum(axis=1)
-    return Sizes(
+    return MagnitudeBounds(
         thrust=vehicle.mass * (off[:, 1] + abs(axial_drag(vehicle)) * (off[:, 0] + 2 * f * speed)),
         upright=2 * f,
         omega=df + 2 * f * omega,

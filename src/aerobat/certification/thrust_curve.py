@@ -8,14 +8,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from aerobat.arrays import Array
-from aerobat.certification import chebyshev
+from aerobat.certification.enclosure import chebyshev
 from aerobat.environment import Environment
 from aerobat.errors import SpecError
-from aerobat.flatness.setpoints import lateral_drag, specific_thrust
+from aerobat.flatness.reference import lateral_drag, specific_thrust
 from aerobat.trajectory import Trajectory, polynomial
 from aerobat.vehicle import Vehicle
 
-VIOLENT = 1e30  # [m/s^k] a derivative, up to crackle, that cannot be meant and whose powers might overflow
+MAX_DERIVATIVE = (
+    1e30  # [m/s^k] a derivative, up to crackle, that cannot be meant and whose powers might overflow
+)
 Rows = NDArray[np.bool_] | NDArray[np.intp] | slice
 
 
@@ -52,7 +54,7 @@ def joined(parts: list[Pieces]) -> Pieces:
 
 
 @dataclass(frozen=True)
-class Motion:
+class ThrustCurve:
     """Airspeed v and specific thrust f, f', f'' of a vehicle on a trajectory: four vector polynomials."""
 
     trajectory: Trajectory
@@ -63,7 +65,9 @@ class Motion:
     basis: chebyshev.Basis
 
     @classmethod
-    def of(cls, trajectory: Trajectory, vehicle: Vehicle, environment: Environment, degree: int) -> Motion:
+    def of(
+        cls, trajectory: Trajectory, vehicle: Vehicle, environment: Environment, degree: int
+    ) -> ThrustCurve:
         """The motion, to be interpolated with a degree of at least `degree`. Raises SpecError if violent."""
         _check(trajectory)
         size = max(trajectory.degree, 1)
@@ -115,7 +119,7 @@ def _check(trajectory: Trajectory) -> None:
     with np.errstate(all="ignore"):
         for k in range(6):
             rates = polynomial.differentiate(trajectory.coefficients, k)
-            if not (np.abs(rates / trajectory.durations[:, None, None] ** k) < VIOLENT).all():
+            if not (np.abs(rates / trajectory.durations[:, None, None] ** k) < MAX_DERIVATIVE).all():
                 raise SpecError(
-                    f"the trajectory's derivatives exceed {VIOLENT:g} m/s^k; check the unit of its durations"
+                    f"the trajectory's derivatives exceed {MAX_DERIVATIVE:g} m/s^k; check the unit of its durations"
                 )
