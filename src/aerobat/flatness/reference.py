@@ -1,16 +1,8 @@
 """From a trajectory to everything a vehicle must do to fly it: attitude, rates, moments, rotor thrusts.
 
-With the velocity v in the air, relative to the wind, the specific thrust f = a + g e3 + (d/m) v, drag made
-up for, and its direction b3 = f/|f|,
-
-    b3'  = (f' − b3 n') / n                  n = |f|,  n' = b3·f'
-    b3'' = (f'' − 2 n' b3' − n'' b3) / n     n'' = b3·f'' + b3'·f'
-    ω = b3 × b3',   ω' = b3 × b3''           world axes, no spin about b3
-    M = J ω' + ω × J ω                       body axes, ω_body = Rᵀ ω, ω'_body = Rᵀ ω'
-
-No step divides by 1 + b3_z: upside down is as good as any other attitude. Linear drag with coefficients
-d across and d_z along the body's z keeps the vehicle flat (Faessler, Franchi, Scaramuzza, RA-L 2018; of
-unequal ones across the mean is taken): the thrust is T = m|f| + (d_z − d) b3·v.
+The equations are those of `kernels.flatness`, the attitude is carried by `parallel_transport`. Linear drag with
+coefficients d across and d_z along the body's z keeps the vehicle flat (Faessler, Franchi, Scaramuzza,
+RA-L 2018); of unequal ones across the mean is taken.
 """
 
 from __future__ import annotations
@@ -25,22 +17,22 @@ from aerobat.arrays import Array, frozen
 from aerobat.environment import Environment
 from aerobat.errors import SpecError
 from aerobat.flatness.parallel_transport import Frames, TimeInterval, frames
+from aerobat.kernels import flatness as kernel
 from aerobat.states import FlatState, Setpoint, Wrench
 from aerobat.trajectory import Trajectory
 from aerobat.vehicle import Vehicle
 from aerobat.vehicle.allocation import rotor_thrusts
 
 UNDETERMINED = 1e-3  # the attitude is undetermined where |f| is below this fraction of gravity
-TURN = np.array([-1.0, 1.0, 0.0])
 
 
 @dataclass(frozen=True, eq=False)
 class Reference:
-    """What a trajectory asks of a vehicle, at every time of a series."""
+    """All that a vehicle must do to follow a trajectory, at every time of a series."""
 
     times: Array  # [s], (T,)
     setpoint: Setpoint  # leading axis T; where the attitude is undetermined it is held and its rates are zero
-    rotor_thrusts: Array  # [N], as flatness asks, limits or not, (T, n)
+    rotor_thrusts: Array  # [N], as flatness has them, limits or not, (T, n)
     undetermined: tuple[TimeInterval, ...]  # where |f| is next to nothing, between samples too
 
 
@@ -51,28 +43,34 @@ def reference(
     rate: float | None = None,
     environment: Environment | None = None,
 ) -> Reference:
-    """What `trajectory` asks of `vehicle` at the times given [s], or at `rate` [1/s] and the very end.
+    """Derive from `trajectory` what `vehicle` must do, at `times`, or at `rate` and the very end.
 
     The attitude starts, at the trajectory's start, as the smallest rotation from upright to the thrust,
     turned about it by the trajectory's heading, and is carried along without spin, so that it does not depend
-    on the times asked for. The environment is by default one without wind. Raises SpecError unless one of
-    times and rate is given, rising and in the trajectory.
+    on the times. Raises SpecError unless one of times and rate is given, rising and in the trajectory.
+
+    Args:
+        trajectory: The path and its heading.
+        vehicle: What flies it; its limits do not matter here.
+        times: When [s], (T,), none before the last.
+        rate: Samples a second [1/s], instead of times.
+        environment: Gravity and wind, by default those of a calm day on Earth.
     """
     if (times is None) == (rate is None):
         raise SpecError("reference needs either times or a rate, not both")
     environment = environment or Environment()
-    asked = _rising(trajectory.sample(rate) if rate is not None else times)
-    flat = trajectory.flat(asked)
-    # both sides of every knot join the times asked for, which show the later side
-    seams = np.concatenate([trajectory.knots[1:], trajectory.knots[:-1]])
-    thrust = np.concatenate(
-        [_thrust_at_seams(trajectory, vehicle, environment), _thrust(flat, vehicle, environment)]
-    )
-    side = np.repeat([0, 1, 2], [trajectory.segments, trajectory.segments, len(asked)])
-    order = np.lexsort((side, np.concatenate([seams, asked])))
-    path = _frames(np.concatenate([seams, asked])[order], thrust[order], environment, trajectory.heading)
-    nodes = path.samples[np.argsort(order)[len(seams) :]]
-    return _assembled(asked, flat, path, nodes, vehicle, environment)
+    times = _rising(trajectory.sample(rate) if rate is not None else times)
+    flat = trajectory.flat(times)
+    # both sides of every knot join the times, which show the later side
+    sides = (_thrust_on_segments(trajectory, vehicle, environment, s) for s in (1.0, 0.0))
+    thrust = np.concatenate([*sides, _thrust(flat, vehicle, environment)])
+    segment_boundaries = np.concatenate([trajectory.knots[1:], trajectory.knots[:-1]])
+    nodes = np.concatenate([segment_boundaries, times])
+    side = np.repeat([0, 1, 2], [trajectory.segments, trajectory.segments, len(times)])
+    order = np.lexsort((side, nodes))
+    path = _frames(nodes[order], thrust[order], environment, trajectory.heading)
+    at = path.samples[np.argsort(order)[len(segment_boundaries) :]]
+    return _assembled(times, flat, path, at, vehicle, environment)
 
 
 def reference_of(
@@ -82,19 +80,25 @@ def reference_of(
     environment: Environment | None = None,
     heading: float = 0.0,
 ) -> Reference:
-    """What a series of flat states (T, 3) at `times` (T,) [s] asks of `vehicle`; as `reference` otherwise.
+    """Derive from a series of flat states what `vehicle` must do; as `reference` otherwise.
 
     Between samples the thrust is taken as the quintic that fits both; where a derivative jumps, give the
     time twice, with the states of both sides. Raises SpecError for falling times and shapes that differ.
+
+    Args:
+        times: When [s], (T,).
+        flat: Position to snap at these times, (T, 3) each.
+        vehicle: What flies them; its limits do not matter here.
+        environment: Gravity and wind, by default those of a calm day on Earth.
+        heading: Of the start [rad], about the thrust axis.
     """
     environment = environment or Environment()
-    asked = _rising(times)
-    names = ("position", "velocity", "acceleration", "jerk", "snap")
-    flat = FlatState(*(frozen(getattr(flat, name), name, (len(asked), 3)) for name in names))
+    times = _rising(times)
+    flat = FlatState(**{name: frozen(x, name, (len(times), 3)) for name, x in vars(flat).items()})
     if any(series.ndim != 2 for series in vars(flat).values()):
         raise SpecError("the flat states must be one series, with a row for each time and no further axes")
-    path = _frames(asked, _thrust(flat, vehicle, environment), environment, heading)
-    return _assembled(asked, flat, path, path.samples, vehicle, environment)
+    path = _frames(times, _thrust(flat, vehicle, environment), environment, heading)
+    return _assembled(times, flat, path, path.samples, vehicle, environment)
 
 
 def body_rates(thrust: Array, q_world_body: Array, determined: NDArray[np.bool_]) -> tuple[Array, Array]:
@@ -102,28 +106,29 @@ def body_rates(thrust: Array, q_world_body: Array, determined: NDArray[np.bool_]
 
     `thrust` holds f, f', f'' (..., 3, 3); where the attitude is not `determined` (...), both are zero.
     """
-    f, df, ddf = (thrust[..., k, :] for k in range(3))
-    n = np.where(determined, np.linalg.norm(f, axis=-1), np.inf)[..., None]
-    b3 = f / n
-    dn = _dot(b3, df)
-    db3 = (df - b3 * dn) / n
-    ddn = _dot(b3, ddf) + _dot(db3, df)
-    ddb3 = (ddf - 2 * dn * db3 - ddn * b3) / n
-    # b3 is e3 in the body: the cross product with it turns x, y into -y, x
-    turned = so3.unrotate(q_world_body[..., None, :], np.stack([db3, ddb3], axis=-2))[..., [1, 0, 2]] * TURN
-    return turned[..., 0, :], turned[..., 1, :]
+    n = np.where(determined, np.linalg.norm(thrust[..., 0, :], axis=-1), np.inf)
+    turning = so3.unrotate(q_world_body[..., None, :], thrust[..., 1:, :]) / n[..., None, None]
+    jerk, snap = (_components(turning[..., k, :]) for k in (0, 1))
+    omega, omega_dot = kernel.body_rates((0.0, 0.0, 1.0), jerk, snap)
+    return np.stack(omega, axis=-1), np.stack(omega_dot, axis=-1)
 
 
 def wrench_for(thrust: Array, airspeed: Array, omega: Array, omega_dot: Array, vehicle: Vehicle) -> Wrench:
-    """Collective thrust m|f| + (d_z − d) b3·v and moment J ω' + ω × J ω; ω, ω' (..., 3) in body axes.
+    """Collective thrust and moment along a path.
 
-    `airspeed` is the velocity v relative to the wind, world.
+    Args:
+        thrust: f, f', f'' [m/s²] and so on, world, (..., 3, 3).
+        airspeed: Velocity relative to the wind [m/s], world, (..., 3).
+        omega: ω [rad/s], body axes, (..., 3).
+        omega_dot: ω' [rad/s²], body axes, (..., 3).
+        vehicle: What flies it.
     """
-    moment = omega_dot @ vehicle.inertia.T + so3.cross(omega, omega @ vehicle.inertia.T)
     f = thrust[..., 0, :]
-    size = np.linalg.norm(f, axis=-1)
-    along = np.sum(f * airspeed, axis=-1) / np.where(size > 0.0, size, 1.0)
-    return Wrench(vehicle.mass * (size + axial_drag(vehicle) * along), moment)
+    n = np.linalg.norm(f, axis=-1)
+    b3 = _components(f / np.where(n > 0.0, n, 1.0)[..., None])
+    moment = kernel.moment(vehicle.inertia.tolist(), _components(omega), _components(omega_dot))
+    collective = kernel.collective(vehicle.mass, axial_drag(vehicle), n, b3, _components(airspeed))
+    return Wrench(collective, np.stack(moment, axis=-1))
 
 
 def specific_thrust(
@@ -134,16 +139,20 @@ def specific_thrust(
     jerk: Array,
     snap: Array,
 ) -> Array:
-    """f = a + g e3 + (d/m) v and its two derivatives, (..., 3, 3), of the flat outputs' (..., 3).
+    """Specific thrust f and its derivatives f', f'' [m/s²] and so on, world, (..., 3, 3).
 
-    `airspeed` is the velocity v relative to the wind, world.
+    Args:
+        vehicle: Its drag counts.
+        environment: Its gravity counts; the wind is in the airspeed.
+        airspeed: Velocity relative to the wind [m/s], world, (..., 3).
+        acceleration: [m/s²] world, (..., 3).
+        jerk: [m/s³] world, (..., 3).
+        snap: [m/s⁴] world, (..., 3).
     """
     drag = lateral_drag(vehicle)
-    thrust = np.stack([acceleration, jerk, snap], axis=-2)
-    if drag:
-        thrust += drag * np.stack([airspeed, acceleration, jerk], axis=-2)
-    thrust[..., 0, 2] += environment.gravity
-    return thrust
+    return np.stack(
+        kernel.specific_thrust(environment.weight, drag, airspeed, acceleration, jerk, snap), axis=-2
+    )
 
 
 def lateral_drag(vehicle: Vehicle) -> float:
@@ -152,14 +161,22 @@ def lateral_drag(vehicle: Vehicle) -> float:
 
 
 def axial_drag(vehicle: Vehicle) -> float:
-    """By how much the drag coefficient along the thrust exceeds that across it, per mass [1/s]."""
+    """The drag coefficient along the thrust less that across it, per mass, (d_z − d)/m [1/s]."""
     return float(vehicle.drag_body[2]) / vehicle.mass - lateral_drag(vehicle)
 
 
 def end_thrust(velocity: Array, acceleration: Array, vehicle: Vehicle, environment: Environment) -> Array:
-    """Specific thrust f [m/s²] (..., 3) at a velocity and an acceleration of a path, world."""
+    """Specific thrust f [m/s²] (..., 3) at a velocity and an acceleration of a path, world.
+
+    Args:
+        velocity: Relative to the ground [m/s], world, (..., 3).
+        acceleration: [m/s²] world, (..., 3).
+        vehicle: Its drag counts.
+        environment: Its gravity and wind count.
+    """
+    none = np.zeros(3)
     airspeed = velocity - environment.wind
-    return np.asarray(acceleration + environment.weight + lateral_drag(vehicle) * airspeed)
+    return specific_thrust(vehicle, environment, airspeed, acceleration, none, none)[..., 0, :]
 
 
 def _thrust(flat: FlatState, vehicle: Vehicle, environment: Environment) -> Array:
@@ -167,10 +184,12 @@ def _thrust(flat: FlatState, vehicle: Vehicle, environment: Environment) -> Arra
     return specific_thrust(vehicle, environment, airspeed, flat.acceleration, flat.jerk, flat.snap)
 
 
-def _thrust_at_seams(trajectory: Trajectory, vehicle: Vehicle, environment: Environment) -> Array:
-    """f, f', f'' at the ends of all segments, then at their starts, (2S, 3, 3)."""
-    v, a, j, s = (trajectory.on_segments([1.0, 0.0], k).swapaxes(0, 1).reshape(-1, 3) for k in (1, 2, 3, 4))
-    return specific_thrust(vehicle, environment, v - environment.wind, a, j, s)
+def _thrust_on_segments(
+    trajectory: Trajectory, vehicle: Vehicle, environment: Environment, s: float
+) -> Array:
+    """f, f', f'' at one normalised time on each segment, (S, 3, 3)."""
+    v, a, j, snap = (trajectory.on_segments([s], k)[:, 0] for k in (1, 2, 3, 4))
+    return specific_thrust(vehicle, environment, v - environment.wind, a, j, snap)
 
 
 def _frames(times: Array, thrust: Array, environment: Environment, heading: float) -> Frames:
@@ -196,11 +215,12 @@ def _assembled(
 
 
 def _rising(times: ArrayLike | None) -> Array:
-    asked = frozen(times, "times", (None,)) if times is not None else np.empty(0)
-    if asked.ndim != 1 or asked.size == 0 or (np.diff(asked) < 0).any():
+    series = frozen(times, "times", (None,)) if times is not None else np.empty(0)
+    if series.ndim != 1 or series.size == 0 or (np.diff(series) < 0).any():
         raise SpecError("times must be a list of at least one number of seconds, none before the last")
-    return asked
+    return series
 
 
-def _dot(a: Array, b: Array) -> Array:
-    return np.asarray(np.sum(a * b, axis=-1, keepdims=True))
+def _components(vectors: Array) -> tuple[Array, Array, Array]:
+    x, y, z = np.moveaxis(vectors, -1, 0)
+    return x, y, z

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+from aerobat.kernels import flatness
 from aerobat.kernels.controller import Gains
 from aerobat.kernels.ops import Axes, Matrix, Ops, Quaternion, Scalar, Vector
 from aerobat.kernels.position_loop import Ahead, Outer, Target
@@ -91,4 +92,4 @@ def moment(gains: Gains, inertia: Matrix, error: Error, integral: Vector) -> Vec
 def reference_moment(inertia: Matrix, body_axes: Axes, ahead: Ahead) -> Vector:
     """The moment that the reference asks [N·m], J ω' + ω × Jω, with its rates in the body's own axes."""
     omega, omega_dot = to_body(body_axes, ahead.omega), to_body(body_axes, ahead.omega_dot)
-    return add(transform(inertia, omega_dot), cross(omega, transform(inertia, omega)))
+    return flatness.moment(inertia, omega, omega_dot)
