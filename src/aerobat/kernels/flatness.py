@@ -24,7 +24,10 @@ def specific_thrust(
 
 
 def body_rates(b3: Vector, jerk: Vector, snap: Vector) -> tuple[Vector, Vector]:
-    """Return ω [rad/s] and ω' [rad/s²] of a body that keeps b3 along f; `jerk` and `snap` are f'/n, f''/n."""
+    """Return ω [rad/s] and ω' [rad/s²] of a body that keeps b3 along f; `jerk` and `snap` are f'/n, f''/n.
+
+    f itself with f'/n² and f''/n² gives the same.
+    """
     omega = cross(b3, jerk)
     return omega, add_scaled(cross(b3, snap), -2.0 * dot(b3, jerk), omega)
 
