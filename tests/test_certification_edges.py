@@ -164,7 +164,7 @@ def test_where_and_how_large_a_flight_is_changes_no_tolerance_for_jumps(scale):
         slow = Trajectory([3.0 * max(scale, 1.0)] * 2, flown)
         (jump,) = certify(slow, VEHICLE).discontinuities
         assert (jump.quantity, jump.time) == ("position", slow.knots[1])
-        assert jump.size == pytest.approx(size, rel=1e-6)
+        assert jump.norm == pytest.approx(size, rel=1e-6)
 
 
 def test_six_unlike_rotors_skew_inertia_and_drag_are_judged_as_sampling_judges_them():

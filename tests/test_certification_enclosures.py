@@ -10,8 +10,9 @@ from aerobat.certification import quantities
 from aerobat.certification.attitude import ThrustDirectionRates
 from aerobat.certification.enclosure import chebyshev, interpolation_error
 from aerobat.certification.enclosure.extrema import SeriesBatch, enclose_maximum
-from aerobat.certification.thrust_curve import Pieces, ThrustCurve
+from aerobat.certification.thrust_curve import ThrustCurve
 from aerobat.environment import Environment
+from aerobat.trajectory.subintervals import Subintervals
 from random_flights import random_flight
 
 seeds = st.integers(0, 2**32 - 1)
@@ -31,14 +32,14 @@ def test_the_greatest_value_of_series_is_enclosed_tightly_and_found(seed, degree
     sampled = npcheb.chebval(FINE, coefficients.T)
     for g in range(groups):
         own = group == g
-        tolerance = TIGHTNESS * max(1, abs(found.most[g]))
-        assert found.most[g] >= (sampled.max(axis=1) + error)[own].max() - 1e-12
-        assert found.least[g] >= (sampled.max(axis=1) - error)[own].max() - tolerance
-        assert found.most[g] - found.least[g] <= 2 * error[own].max() + 1.1 * tolerance
+        tolerance = TIGHTNESS * max(1, abs(found.max[g]))
+        assert found.max[g] >= (sampled.max(axis=1) + error)[own].max() - 1e-12
+        assert found.min[g] >= (sampled.max(axis=1) - error)[own].max() - tolerance
+        assert found.max[g] - found.min[g] <= 2 * error[own].max() + 1.1 * tolerance
         member = found.member[g]
         assert own[member]
         taken = npcheb.chebval(found.position[g], coefficients[member]) - error[member]
-        assert taken == pytest.approx(found.least[g], abs=1e-12)
+        assert taken == pytest.approx(found.min[g], abs=1e-12)
 
 
 @given(value=st.floats(-5, 5), count=st.integers(1, 9))
@@ -49,7 +50,7 @@ def test_of_equal_greatest_values_the_earliest_is_told(value, count):
         SeriesBatch(flat, np.zeros(count), np.zeros(count, dtype=int), np.ones(1), TIGHTNESS)
     )
     assert (found.member[0], found.position[0]) == (0, -1.0)
-    assert found.least[0] == found.most[0] == pytest.approx(value)
+    assert found.min[0] == found.max[0] == pytest.approx(value)
 
 
 @settings(max_examples=25)
@@ -86,26 +87,26 @@ def test_interpolation_is_as_near_as_its_bound_says_on_coarse_pieces_too(seed, d
     )
     for parts in (4, 16, 64):
         start = np.tile(np.arange(parts) / parts, segments)
-        pieces = Pieces(np.repeat(np.arange(segments), parts), start, np.full(len(start), 1 / parts))
+        pieces = Subintervals(np.repeat(np.arange(segments), parts), start, np.full(len(start), 1 / parts))
         norms = coarse.norms(coarse.series(coarse.on(pieces)), pieces)
         usable = interpolation_error.regular(norms)
         pieces, norms = pieces[usable], norms[usable]
-        if not len(pieces.segment):
+        if not len(pieces):
             continue
         found = interpolation_error.accuracy(
-            norms, pieces.seconds(flight.trajectory), coarse.sums[pieces.segment], flight.vehicle
+            norms, pieces.seconds(flight.trajectory), coarse.sums[pieces.interval], flight.vehicle
         )
-        middle = truth.at(pieces.segment, (pieces.start + pieces.length / 2)[:, None])[:, 0, 1]
+        middle = truth.at(pieces.interval, (pieces.start + pieces.length / 2)[:, None])[:, 0, 1]
         interpolants, exact = (piecewise(curve, pieces, middle) for curve in (coarse, truth))
         nodes = npcheb.chebvander(truth.basis.nodes, coarse.basis.degree)
         off = np.abs(nodes @ coarse.basis.analysis @ interpolants - exact).max(axis=1)
         twist = found.twist_remainder + coarse.basis.lebesgue * found.twist_rounding
-        allowed = found.remainder + 4 * (found.rounding + twist[:, None] * found.turning)
+        allowed = found.remainder + 4 * (found.rounding + twist[:, None] * found.per_radian)
         assert (off <= allowed).all()
-        assert (np.abs(exact).max(axis=1) <= found.size * (1 + 1e-9)).all()
+        assert (np.abs(exact).max(axis=1) <= found.magnitude * (1 + 1e-9)).all()
 
 
-def piecewise(curve: ThrustCurve, pieces: Pieces, near: np.ndarray) -> np.ndarray:
+def piecewise(curve: ThrustCurve, pieces: Subintervals, near: np.ndarray) -> np.ndarray:
     """The quantities at the basis's nodes, every piece in a frame of its own, about the thrust `near` it."""
     values = curve.on(pieces)
     turning = ThrustDirectionRates.along(

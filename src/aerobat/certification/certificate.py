@@ -1,4 +1,4 @@
-"""Certificate: what has been proven about a trajectory, and what refutes it."""
+"""Certificate: what is proven about a trajectory, and what refutes it."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from aerobat.flatness import TimeInterval
 
 
 class Verdict(StrEnum):
-    """What is known about a limit over continuous time."""
+    """Knowledge about a limit over continuous time."""
 
     HOLDS = "holds"  # proven, or there is no limit
     VIOLATED = "violated"  # at the time given
@@ -17,7 +17,7 @@ class Verdict(StrEnum):
 
 
 class Side(StrEnum):
-    """Which extreme of a quantity is meant."""
+    """Minimum or maximum of a quantity."""
 
     MIN = "min"
     MAX = "max"
@@ -25,7 +25,7 @@ class Side(StrEnum):
 
 @dataclass(frozen=True)
 class Finding:
-    """The least or the most of one quantity, enclosed between `value` and `bound`."""
+    """The minimum or the maximum of one quantity, enclosed between `value` and `bound`."""
 
     quantity: str  # "speed", "tilt", "thrust", "body rate", "moment", "rotor 0", "velocity x", ...
     unit: str
@@ -67,19 +67,19 @@ class Discontinuity:
 
     quantity: str  # "position", "velocity", "thrust direction" or "body rate"
     unit: str
-    size: float
+    norm: float
     time: float  # [s]
 
     def __str__(self) -> str:
         """One sentence without its full stop."""
         means = "force" if self.quantity in ("position", "velocity") else "moment"
-        size = f"{self.size:.2g} {self.unit}"
-        return f"{self.quantity} jumps by {size} at {self.time:.3f} s, which no {means} can do"
+        jump = f"{self.norm:.2g} {self.unit}"
+        return f"{self.quantity} jumps by {jump} at {self.time:.3f} s, which no {means} can do"
 
 
 @dataclass(frozen=True)
 class Certificate:
-    """What holds along the whole of a trajectory, between samples and knots too, and what does not."""
+    """Findings along the whole of a trajectory, between samples and knots too."""
 
     findings: tuple[Finding, ...]
     undetermined: tuple[TimeInterval, ...]  # where thrust vanishes, and with it the attitude
@@ -87,7 +87,7 @@ class Certificate:
 
     @property
     def certified(self) -> bool:
-        """Whether all limits are proven to hold, attitude determined throughout and moments finite."""
+        """True if all limits are proven to hold, attitude determined throughout and moments finite."""
         holds = all(finding.verdict is Verdict.HOLDS for finding in self.findings)
         return holds and not self.undetermined and not self.discontinuities
 
@@ -107,7 +107,7 @@ class Certificate:
 
     @property
     def why(self) -> str:
-        """What decides, in one sentence without its full stop."""
+        """The deciding finding, in one sentence without its full stop."""
         violated = [f for f in self.findings if f.verdict is Verdict.VIOLATED]
         if self.discontinuities:
             return str(self.discontinuities[0])

@@ -1,7 +1,7 @@
 """From a trajectory to everything a vehicle must do to fly it: attitude, rates, moments, rotor thrusts.
 
-The equations are those of `kernels.flatness`, the attitude is carried by `parallel_transport`. Linear drag with
-coefficients d across and d_z along the body's z keeps the vehicle flat (Faessler, Franchi, Scaramuzza,
+The equations are those of `kernels.flatness`; `parallel_transport` carries the attitude along. Linear drag
+with coefficients d across and d_z along the body's z keeps the vehicle flat (Faessler, Franchi, Scaramuzza,
 RA-L 2018); of unequal ones across the mean is taken.
 """
 

@@ -10,7 +10,8 @@ from numpy.polynomial import chebyshev
 
 from aerobat.arrays import Array
 
-ROUNDING = 1e-14  # of the sum of absolute values behind a polynomial's value: Horner's rule and its argument
+# of the sum of absolute values behind a polynomial's value: Horner's rule and its argument
+EVALUATION_ROUNDING = 1e-14
 
 
 @dataclass(frozen=True)

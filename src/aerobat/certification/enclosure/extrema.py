@@ -1,8 +1,8 @@
-"""The greatest values of Chebyshev series, enclosed: branch and bound by halving intervals.
+"""Maxima of Chebyshev series, enclosed: branch and bound by halving intervals.
 
-On an interval a series is at most the maximum of its first three terms, a parabola, plus the sizes of all
-others. Halving shrinks these by eight, and wherever the bound stays below a value known, nothing remains
-to be looked for.
+On an interval a series is at most the maximum of its first three terms, a parabola, plus the magnitudes
+of all others. Halving shrinks these by eight, and wherever the bound stays below a value known, nothing
+remains to be looked for.
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from aerobat.arrays import Array
 from aerobat.certification.enclosure import chebyshev
+from aerobat.trajectory.subintervals import Subintervals
 
 MAX_HALVINGS = 50
 Indices = NDArray[np.intp]
@@ -36,65 +37,43 @@ class SeriesBatch:
 
 @dataclass(frozen=True)
 class Enclosure:
-    """For each group: least <= sup <= most, and where at least `least` is taken. All (G,)."""
+    """For each group: min <= sup <= max, and where at least `min` is taken. All (G,)."""
 
-    least: Array
-    most: Array
+    min: Array
+    max: Array
     member: Indices
     position: Array  # in [-1, 1], on that member's interval
 
 
-@dataclass(frozen=True)
-class _Parts:
-    """Parts of members' intervals: the series there, stretched to [-1, 1]."""
-
-    coefficients: Array  # (n, K + 1)
-    member: Indices  # (n,)
-    middle: Array  # (n,)
-    half: Array  # (n,)
-
-    def __getitem__(self, rows: Indices) -> _Parts:
-        return _Parts(self.coefficients[rows], self.member[rows], self.middle[rows], self.half[rows])
-
-    def halves(self) -> _Parts:
-        """Both halves of every part."""
-        lower, upper = chebyshev.basis(self.coefficients.shape[1] - 1).halves
-        half = self.half / 2
-        return _Parts(
-            np.concatenate([self.coefficients @ lower.T, self.coefficients @ upper.T]),
-            np.concatenate([self.member, self.member]),
-            np.concatenate([self.middle - half, self.middle + half]),
-            np.concatenate([half, half]),
-        )
-
-
-def enclose_maximum(family: SeriesBatch) -> Enclosure:
+def enclose_maximum(batch: SeriesBatch) -> Enclosure:
     """Enclose the greatest value of each group, all groups at once."""
-    count, groups = len(family.group), len(family.scale)
-    parts = _Parts(family.coefficients, np.arange(count), np.zeros(count), np.ones(count))
+    groups = len(batch.scale)
     found = Enclosure(
         np.full(groups, -np.inf), np.full(groups, -np.inf), np.zeros(groups, dtype=np.intp), np.zeros(groups)
     )
+    halves = chebyshev.basis(batch.coefficients.shape[1] - 1).halves
+    slack = batch.tightness / 10 * batch.scale
+    pending, coefficients = Subintervals.whole(len(batch.group)), batch.coefficients
     for halving in range(MAX_HALVINGS):
-        group, error = family.group[parts.member], family.error[parts.member]
-        slack = family.tightness / 10 * family.scale
-        peak, tail, vertex = _parabola(parts.coefficients, slack[group])
+        group, error = batch.group[pending.interval], batch.error[pending.interval]
+        peak, tail, vertex = _parabola(coefficients, slack[group])
         upper = peak + tail + error
-        value = chebyshev.evaluate(parts.coefficients, vertex) - error
-        _improve(found, parts, group, vertex, value, slack)
-        tolerance = family.tightness * np.maximum(family.scale, np.abs(found.least))[group]
-        open_ = (upper > found.least[group] + tolerance) & (tail > tolerance / 4)
+        value = chebyshev.evaluate(coefficients, vertex) - error
+        _improve(found, pending, group, vertex, value, slack)
+        tolerance = batch.tightness * np.maximum(batch.scale, np.abs(found.min))[group]
+        open_ = (upper > found.min[group] + tolerance) & (tail > tolerance / 4)
         if halving == MAX_HALVINGS - 1:
             open_[:] = False
-        np.maximum.at(found.most, group[~open_], upper[~open_])
+        np.maximum.at(found.max, group[~open_], upper[~open_])
         if not open_.any():
             break
-        parts = parts[np.flatnonzero(open_)].halves()
+        pending = pending[open_].halves()
+        coefficients = np.concatenate([coefficients[open_] @ half.T for half in halves])
     return found
 
 
 def _parabola(coefficients: Array, flat: Array) -> tuple[Array, Array, Array]:
-    """The maximum of c0 T0 + c1 T1 + c2 T2 on [-1, 1], the sizes of all other terms, and where it is.
+    """The maximum of c0 T0 + c1 T1 + c2 T2 on [-1, 1], the magnitudes of all other terms, and where it is.
 
     That is said to be at -1 where these terms change by less than `flat` (n,).
     """
@@ -109,14 +88,14 @@ def _parabola(coefficients: Array, flat: Array) -> tuple[Array, Array, Array]:
 
 
 def _improve(
-    found: Enclosure, parts: _Parts, group: Indices, vertex: Array, value: Array, slack: Array
+    found: Enclosure, parts: Subintervals, group: Indices, vertex: Array, value: Array, slack: Array
 ) -> None:
     """Enter values that exceed those known by more than a `slack` (G,); of equal ones the earliest."""
-    greatest = found.least.copy()
-    np.maximum.at(greatest, group, value)
-    position = parts.middle + parts.half * vertex
-    better = (greatest > found.least + slack)[group] & (value >= greatest[group] - slack[group])
-    order = np.lexsort((-position, -parts.member))  # of several of one group the last assigned stays
+    maximum = found.min.copy()
+    np.maximum.at(maximum, group, value)
+    position = 2 * parts.start + parts.length * (1 + vertex) - 1
+    better = (maximum > found.min + slack)[group] & (value >= maximum[group] - slack[group])
+    order = np.lexsort((-position, -parts.interval))  # of several of one group the last assigned stays
     order = order[better[order]]
     at = group[order]
-    found.least[at], found.member[at], found.position[at] = value[order], parts.member[order], position[order]
+    found.min[at], found.member[at], found.position[at] = value[order], parts.interval[order], position[order]

@@ -1,4 +1,4 @@
-"""Extremes that are asked for, and their answers: findings."""
+"""Extrema of Chebyshev series on pieces of a trajectory, and what they say of limits: findings."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ import numpy as np
 from aerobat.arrays import Array
 from aerobat.certification.certificate import Finding, Side, Verdict
 from aerobat.certification.enclosure.extrema import SeriesBatch, enclose_maximum
-from aerobat.certification.thrust_curve import Pieces
 from aerobat.trajectory import Trajectory
+from aerobat.trajectory.subintervals import Subintervals
 
-ROUNDING = 1e-13  # of the sizes of a series' terms: halving it some ten times and summing it
+SUMMATION_ROUNDING = 1e-13  # of the magnitudes of a series' terms: halving it some ten times, and summing
 
 
 @dataclass(frozen=True)
@@ -30,9 +30,16 @@ class ExtremumQuery:
     read: Callable[[float], float]  # from the greatest value of sign times function to what people read
     slack: float = 0.0  # beyond the limit by so much it counts as met
 
-    def answer(self, least: float, most: float, time: float, everywhere: bool) -> Finding:
-        """The finding, if the greatest value is in [least, most]; `everywhere`: no time was left out."""
-        value, bound = self.read(least), self.read(most)
+    def answer(self, reached: float, bound: float, time: float, everywhere: bool) -> Finding:
+        """The finding for a proven enclosure of the greatest value.
+
+        Args:
+            reached: The function is at least so large at `time`.
+            bound: The function is nowhere larger.
+            time: [s].
+            everywhere: No time was left out.
+        """
+        value, bound = self.read(reached), self.read(bound)
         limit = None if math.isinf(self.limit) else self.limit
         inwards = 1 if self.side is Side.MAX else -1
         verdict = Verdict.UNDECIDED
@@ -48,31 +55,31 @@ class ChebyshevSeries:
     """Functions as Chebyshev series on pieces of a trajectory."""
 
     trajectory: Trajectory
-    pieces: Pieces
+    pieces: Subintervals
     series: Array  # (P, K + 1, Q)
     error: Array  # at most, (P, Q)
     scale: Array  # what is large, (Q,)
-    tightness: float  # of enclosures, as `extremes.SeriesBatch` has it
+    tightness: float  # of enclosures, as `SeriesBatch` has it
     everywhere: bool  # whether the pieces make up the whole trajectory
 
-    def answers(self, questions: Sequence[ExtremumQuery]) -> list[Finding]:
-        """A finding for each question; none at all if there are no pieces."""
-        count = len(self.pieces.segment)
-        if not (count and questions):
+    def answers(self, queries: Sequence[ExtremumQuery]) -> list[Finding]:
+        """A finding for each query; none at all if there are no pieces."""
+        count = len(self.pieces)
+        if not (count and queries):
             return []
-        columns = np.array([question.column for question in questions])
-        signed = self.series[..., columns] * np.array([question.sign for question in questions])
-        family = SeriesBatch(
+        columns = np.array([query.column for query in queries])
+        signed = self.series[..., columns] * np.array([query.sign for query in queries])
+        batch = SeriesBatch(
             signed.swapaxes(1, 2).reshape(-1, signed.shape[1]),
-            (self.error[:, columns] + ROUNDING * np.abs(signed).sum(axis=1)).ravel(),
-            np.tile(np.arange(len(questions)), count),
+            (self.error[:, columns] + SUMMATION_ROUNDING * np.abs(signed).sum(axis=1)).ravel(),
+            np.tile(np.arange(len(queries)), count),
             self.scale[columns],
             self.tightness,
         )
-        found = enclose_maximum(family)
-        times = self.pieces[found.member // len(questions)].times(self.trajectory, found.position)
-        ranges = zip(questions, found.least.tolist(), found.most.tolist(), times.tolist(), strict=True)
-        return [question.answer(least, most, time, self.everywhere) for question, least, most, time in ranges]
+        found = enclose_maximum(batch)
+        times = self.pieces[found.member // len(queries)].times(self.trajectory, found.position)
+        ranges = zip(queries, found.min.tolist(), found.max.tolist(), times.tolist(), strict=True)
+        return [query.answer(reached, bound, time, self.everywhere) for query, reached, bound, time in ranges]
 
 
 def both_sides(quantity: str, unit: str, column: int, lower: float, upper: float) -> list[ExtremumQuery]:
