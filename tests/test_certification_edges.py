@@ -117,13 +117,13 @@ def test_a_hover_of_many_unequal_durations_is_certified(vehicle, place):
 
 def test_wildly_unequal_durations_change_no_extreme():
     flight = random_flight(3)
-    whole = certify(flight.trajectory, flight.vehicle)
+    whole = certify(flight.trajectory, flight.vehicle, flight.environment)
     cuts = np.array([0.0, 1e-5, 0.3, 0.3 + 1e-4, 0.9, 1.0])
     parts = [cut_out(flight.trajectory, a, b) for a, b in pairwise(cuts)]
     durations = np.outer(flight.trajectory.durations, np.diff(cuts)).ravel()
     coefficients = np.stack(parts, axis=1).reshape(len(durations), -1, 3)
     pieces = Trajectory(durations, coefficients, flight.trajectory.heading)
-    again = certify(pieces, flight.vehicle)
+    again = certify(pieces, flight.vehicle, flight.environment)
     assert again.certified == whole.certified
     assert certified_margin(flight, again) == pytest.approx(certified_margin(flight, whole), abs=1e-6)
 
@@ -174,7 +174,8 @@ def test_six_unlike_rotors_skew_inertia_and_drag_are_judged_as_sampling_judges_t
     flight, verdicts = replace(random_flight(11), vehicle=vehicle), set()
     for factor in np.geomspace(0.2, 20.0, 15):
         at_pace = replace(flight, trajectory=stretched(flight.trajectory, factor))
-        certificate, samples = certify(at_pace.trajectory, vehicle), sampled(at_pace, 5000)
+        certificate = certify(at_pace.trajectory, vehicle, at_pace.environment)
+        samples = sampled(at_pace, 5000)
         assert certificate.certified == (samples.margin >= 0 and samples.determined)
         verdicts.add(certificate.certified)
     assert verdicts == {False, True}

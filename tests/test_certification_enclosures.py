@@ -11,7 +11,6 @@ from aerobat.certification.attitude import ThrustDirectionRates
 from aerobat.certification.enclosure import chebyshev, interpolation_error
 from aerobat.certification.enclosure.extrema import SeriesBatch, enclose_maximum
 from aerobat.certification.thrust_curve import ThrustCurve
-from aerobat.environment import Environment
 from aerobat.trajectory.subintervals import Subintervals
 from random_flights import random_flight
 
@@ -83,7 +82,7 @@ def test_interpolation_is_as_near_as_its_bound_says_on_coarse_pieces_too(seed, d
     flight = random_flight(seed)
     segments = flight.trajectory.segments
     coarse, truth = (
-        ThrustCurve.of(flight.trajectory, flight.vehicle, Environment(), k) for k in (degree, 60)
+        ThrustCurve.of(flight.trajectory, flight.vehicle, flight.environment, k) for k in (degree, 60)
     )
     for parts in (4, 16, 64):
         start = np.tile(np.arange(parts) / parts, segments)
