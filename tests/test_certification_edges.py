@@ -167,6 +167,15 @@ def test_where_and_how_large_a_flight_is_changes_no_tolerance_for_jumps(scale):
         assert jump.norm == pytest.approx(size, rel=1e-6)
 
 
+def test_a_small_jump_of_the_body_rate_far_from_the_origin_is_found():
+    flown = np.zeros((2, 10, 3))
+    flown[:, 0, 2] = 1000.0
+    flown[1, 3, 1] = 3e-5 / 6  # [m/s³] the jerk's jump over 3!
+    (jump,) = certify(Trajectory([1.0, 1.0], flown), VEHICLE).discontinuities
+    assert jump.quantity == "body rate"
+    assert jump.norm == pytest.approx(3e-5 / STANDARD_GRAVITY, rel=1e-2)
+
+
 def test_six_unlike_rotors_skew_inertia_and_drag_are_judged_as_sampling_judges_them():
     rng = np.random.default_rng(5)
     vehicle = next(v for v in (irregular(rng) for _ in range(99)) if len(v.rotors) == 6 and v.drag_body.any())

@@ -8,6 +8,7 @@ from numpy.polynomial import chebyshev as npcheb
 
 from aerobat.certification import quantities
 from aerobat.certification.attitude import ThrustDirectionRates
+from aerobat.certification.certify import interpolated
 from aerobat.certification.enclosure import chebyshev, interpolation_error
 from aerobat.certification.enclosure.extrema import SeriesBatch, enclose_maximum
 from aerobat.certification.thrust_curve import ThrustCurve
@@ -103,6 +104,27 @@ def test_interpolation_is_as_near_as_its_bound_says_on_coarse_pieces_too(seed, d
         allowed = found.remainder + 4 * (found.rounding + twist[:, None] * found.per_radian)
         assert (off <= allowed).all()
         assert (np.abs(exact).max(axis=1) <= found.magnitude * (1 + 1e-9)).all()
+
+
+@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("degree", [9, 14])
+def test_series_in_the_carried_frame_are_as_near_as_they_say(seed, degree):
+    flight = random_flight(seed)
+    coarse, truth = (
+        ThrustCurve.of(flight.trajectory, flight.vehicle, flight.environment, k) for k in (degree, 60)
+    )
+    pieces = Subintervals.whole(flight.trajectory.segments)
+    for _ in range(12):
+        pieces = pieces.halves()
+        pieces = pieces[pieces.order()]
+        if interpolation_error.regular(coarse.norms(coarse.series(coarse.on(pieces)), pieces)).all():
+            break
+    near, exact = (interpolated(curve, pieces, everywhere=True) for curve in (coarse, truth))
+    values = [
+        np.einsum("tk,pkq->ptq", npcheb.chebvander(FINE[::50], found.series.shape[1] - 1), found.series)
+        for found in (near, exact)
+    ]
+    assert (np.abs(values[0] - values[1]).max(axis=1) <= near.error + exact.error).all()
 
 
 def piecewise(curve: ThrustCurve, pieces: Subintervals, near: np.ndarray) -> np.ndarray:

@@ -58,7 +58,7 @@ def certify(
     found = subdivide(curve, floor)
     findings: list[Finding] = []
     if len(found.pieces):
-        series = _interpolated(curve, found.pieces, everywhere=not found.vanishing)
+        series = interpolated(curve, found.pieces, everywhere=not found.vanishing)
         findings += series.answers(_queries(vehicle, envelope))
     findings += kinematic_findings(trajectory, envelope)
     return Certificate(tuple(findings), found.vanishing, discontinuities(curve, floor))
@@ -78,7 +78,7 @@ def _queries(vehicle: Vehicle, envelope: Envelope) -> list[ExtremumQuery]:
     ]
 
 
-def _interpolated(curve: ThrustCurve, pieces: Subintervals, everywhere: bool) -> ChebyshevSeries:
+def interpolated(curve: ThrustCurve, pieces: Subintervals, everywhere: bool) -> ChebyshevSeries:
     """All quantities along pieces that follow each other, in the frame that is carried along them."""
     vehicle, basis = curve.vehicle, curve.basis
     values = curve.on(pieces)
