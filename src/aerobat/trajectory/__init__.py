@@ -1,4 +1,4 @@
-"""How position varies over time: piecewise polynomials, their extremes, and those of minimum effort."""
+"""Position over time: piecewise polynomials, their extrema, and those of minimum effort."""
 
 from aerobat.trajectory.files import load_trajectory, save_trajectory
 from aerobat.trajectory.minimum_effort import ContinuityRule, minimum_effort
