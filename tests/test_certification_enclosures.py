@@ -1,5 +1,7 @@
 """The bounds behind a certificate contain what they bound."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -12,6 +14,8 @@ from aerobat.certification.certify import interpolated
 from aerobat.certification.enclosure import chebyshev, interpolation_error
 from aerobat.certification.enclosure.extrema import SeriesBatch, enclose_maximum
 from aerobat.certification.thrust_curve import ThrustCurve
+from aerobat.environment import Environment
+from aerobat.kernels import flatness
 from aerobat.trajectory.subintervals import Subintervals
 from random_flights import random_flight
 
@@ -125,6 +129,54 @@ def test_series_in_the_carried_frame_are_as_near_as_they_say(seed, degree):
         for found in (near, exact)
     ]
     assert (np.abs(values[0] - values[1]).max(axis=1) <= near.error + exact.error).all()
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_magnitudes_in_complex_time_stay_within_their_bounds(seed):
+    """On Bernstein ellipses, with the equations of flatness in complex numbers."""
+    flight = random_flight(seed)
+    vehicle = replace(flight.vehicle, drag_body=np.zeros(3))
+    curve = ThrustCurve.of(flight.trajectory, vehicle, Environment(), 20)
+    pieces = Subintervals.whole(flight.trajectory.segments)
+    for _ in range(4):
+        pieces = pieces.halves()
+    series = curve.series(curve.on(pieces))
+    seconds = pieces.seconds(flight.trajectory)
+    bounds = interpolation_error.on_ellipses(curve.norms(series, pieces), seconds / 2, vehicle)
+    reached = []
+    for ellipse, rho in enumerate(interpolation_error.RHO[1:5], 1):
+        circle = rho * np.exp(1j * np.linspace(0, 2 * np.pi, 64))
+        z = (circle + 1 / circle) / 2
+        for piece in np.flatnonzero(bounds.regular[:, ellipse]):
+            n, omega, twist = complex_rates(series[piece, :, 1:], z, seconds[piece] / 2)
+            found = [np.abs(n - np.linalg.norm(series[piece, 0, 1])).max() * vehicle.mass, omega, twist]
+            allowed = (bounds.magnitudes.thrust, bounds.magnitudes.omega, bounds.twist)
+            reached.append([each / bound[piece, ellipse] for each, bound in zip(found, allowed, strict=True)])
+    assert len(reached) > 20
+    assert np.max(reached) <= 1 + 1e-6
+    assert (np.max(reached, axis=0)[:2] > 0.5).all()  # which are hardly larger than need be
+
+
+def complex_rates(series: np.ndarray, z: np.ndarray, half: float) -> tuple[np.ndarray, float, float]:
+    """n, the largest norm of ω in the body and the largest rate of its frame, at complex times z."""
+    e3 = series[0, 0] / np.linalg.norm(series[0, 0])
+    e1 = np.cross(e3, np.eye(3)[np.abs(e3).argmin()])
+    e1 /= np.linalg.norm(e1)
+    local = series @ np.stack([e1, np.cross(e3, e1), e3], axis=-1)
+
+    def at(times: np.ndarray) -> tuple[np.ndarray, tuple[np.ndarray, np.ndarray], np.ndarray]:
+        f, df, ddf = (npcheb.chebval(times, local[:, k]) for k in range(3))
+        n = np.sqrt(np.sum(f * f, axis=0))
+        omega, _ = flatness.body_rates(f / n, df / n, ddf / n)
+        return n, flatness.tilted(f / n, omega), half * omega[2] / (1 + f[2] / n)
+
+    n, (x, y), rate = at(z)
+    # the frame's angle at z, integrated along the way from the real line's middle
+    nodes, weights = np.polynomial.legendre.leggauss(24)
+    angle = z / 2 * sum(w * at((1 + s) / 2 * z)[2] for s, w in zip(nodes, weights, strict=True))
+    turned = x * np.cos(angle) + y * np.sin(angle), y * np.cos(angle) - x * np.sin(angle)
+    norm = np.sqrt(np.abs(turned[0]) ** 2 + np.abs(turned[1]) ** 2)
+    return n, float(norm.max()), float(np.abs(rate).max())
 
 
 def piecewise(curve: ThrustCurve, pieces: Subintervals, near: np.ndarray) -> np.ndarray:

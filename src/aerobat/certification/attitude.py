@@ -28,7 +28,7 @@ ComplexArray = NDArray[np.complex128]
 
 @dataclass(frozen=True)
 class ThrustDirectionRates:
-    """How the thrust direction turns along P pieces, at N nodes each, in a frame of its own on each piece."""
+    """Body rates along P pieces, at N nodes each, in a frame of its own on each piece."""
 
     axes: Array  # e1, e2, e3 as columns, (P, 3, 3)
     direction: Array  # b3, world, (P, N, 3)

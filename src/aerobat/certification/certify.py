@@ -39,9 +39,10 @@ def certify(
 
     Quantities are those of `flatness.reference`: the thrust of every rotor and their
     sum, tilt, body rate, moment and speed, and per axis what `envelope.limits` bounds. Bounds are proven
-    over continuous time, rounding included. A limit nearer than about 1e-7 of a rotor's range stays
-    undecided, as does all that needs an attitude where thrust, and with it the attitude, is undetermined;
-    speed and what `envelope.limits` bounds may meet their limits exactly (`kinematics.LIMIT_TOLERANCE`).
+    over continuous time, rounding included. A limit nearer than about 1e-7 of a rotor's range (1e-5 after
+    tens of seconds) stays undecided, as does all that needs an attitude where thrust, and with it the
+    attitude, is undetermined; speed and what `envelope.limits` bounds may meet their limits exactly
+    (`kinematics.LIMIT_TOLERANCE`).
     Raises SpecError for derivatives beyond all reason.
 
     Args:

@@ -16,7 +16,7 @@ EVALUATION_ROUNDING = 1e-14
 
 @dataclass(frozen=True)
 class Basis:
-    """What interpolation of one degree K needs; series are rows of K + 1 coefficients c of Σ c_k T_k."""
+    """Nodes and matrices of interpolation of one degree K; series are rows of coefficients of Σ c_k T_k."""
 
     nodes: Array  # Chebyshev points, both ends among them, (K + 1,)
     analysis: Array  # values at the nodes -> coefficients, (K + 1, K + 1)

@@ -1,4 +1,4 @@
-"""How far flatness, interpolated at Chebyshev points, can be from the truth: proven, by complex analysis.
+"""Error of flatness interpolated at Chebyshev points, proven by complex analysis.
 
 Velocity and specific thrust f are polynomials on a piece of a segment, so all that flatness makes of them
 is analytic in complex time wherever f·f keeps off zero. If q is analytic inside the Bernstein ellipse E_ρ
@@ -43,7 +43,7 @@ class InterpolationError:
 
 
 @dataclass(frozen=True)
-class _EllipseBounds:
+class EllipseBounds:
     """Bounds on R ellipses about P pieces, all (P, R)."""
 
     regular: NDArray[np.bool_]  # where not, the others mean nothing
@@ -66,7 +66,7 @@ def accuracy(norms: Array, seconds: Array, sums: Array, vehicle: Vehicle) -> Int
         sums: Of the absolute values that v, f, f', f'' are evaluated from, (P, 4).
         vehicle: What flies.
     """
-    around = _on_ellipses(norms, seconds / 2, vehicle)
+    around = on_ellipses(norms, seconds / 2, vehicle)
     real = MagnitudeBounds(*(bound[:, 0] for bound in vars(around.magnitudes).values()))
     min_thrust = norms[:, 0, 1] - norms[:, 1:, 1].sum(axis=1)
     rounded = _rounded(real, min_thrust, norms, EVALUATION_ROUNDING * sums, vehicle)
@@ -85,7 +85,7 @@ def accuracy(norms: Array, seconds: Array, sums: Array, vehicle: Vehicle) -> Int
     )
 
 
-def _on_ellipses(norms: Array, half: Array, vehicle: Vehicle) -> _EllipseBounds:
+def on_ellipses(norms: Array, half: Array, vehicle: Vehicle) -> EllipseBounds:
     """Bounds from the norms (P, K + 1, 4) of the terms of v, f, f', f'' on pieces `half` (P,) [s] a side."""
     larger = growth(norms.shape[1] - 1, RHO)
     speed, _, jerk, snap = (norms[..., k] @ larger for k in range(4))
@@ -106,7 +106,7 @@ def _on_ellipses(norms: Array, half: Array, vehicle: Vehicle) -> _EllipseBounds:
     omega_dot = frame * inverse * (snap + 2 * ratio * jerk**2 * inverse)
     axial = abs(axial_drag(vehicle))
     thrust = vehicle.mass * (mean * np.where(RHO > 1, 1 - root, 1 + delta) + axial * ratio * speed)
-    return _EllipseBounds(usable, MagnitudeBounds(thrust, ratio, omega, omega_dot), twist)
+    return EllipseBounds(usable, MagnitudeBounds(thrust, ratio, omega, omega_dot), twist)
 
 
 def _off_zero(mean: Array, away: Array) -> NDArray[np.bool_]:

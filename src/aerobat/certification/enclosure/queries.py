@@ -19,7 +19,7 @@ SUMMATION_ROUNDING = 1e-13  # of the magnitudes of a series' terms: halving it s
 
 @dataclass(frozen=True)
 class ExtremumQuery:
-    """How large (or, with the sign -1, how small) a function gets that is given by series on pieces."""
+    """A question for the maximum (with the sign -1, the minimum) of a function given by series on pieces."""
 
     quantity: str
     unit: str
@@ -83,7 +83,7 @@ class ChebyshevSeries:
 
 
 def both_sides(quantity: str, unit: str, column: int, lower: float, upper: float) -> list[ExtremumQuery]:
-    """How small and how large a function gets."""
+    """Queries for the minimum and the maximum of a function."""
     return [
         ExtremumQuery(quantity, unit, Side.MIN, float(lower), column, -1, _negated),
         ExtremumQuery(quantity, unit, Side.MAX, float(upper), column, 1, _plain),
