@@ -84,7 +84,7 @@ def report(name: str, rows: list[Row]) -> None:
 def judge(seed: int, points: int) -> Row:
     flight = random_flight(seed)
     began = time.perf_counter()
-    certificate = certify(flight.trajectory, flight.vehicle)
+    certificate = certify(flight.trajectory, flight.vehicle, flight.environment)
     seconds = time.perf_counter() - began
     found = sampled(flight, points)
     margin = certified_margin(flight, certificate)

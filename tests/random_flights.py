@@ -1,11 +1,12 @@
 """Random vehicles on random trajectories in 3D, their rotors near the limits, to judge certificates."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from aerobat import so3
 from aerobat.certification import Certificate
+from aerobat.environment import Environment
 from aerobat.errors import SpecError
 from aerobat.flatness import reference
 from aerobat.trajectory import Trajectory
@@ -18,10 +19,11 @@ HALVINGS = 14
 
 @dataclass(frozen=True)
 class Flight:
-    """A vehicle and a trajectory."""
+    """A vehicle and a trajectory, on every second seed in a wind."""
 
     vehicle: Vehicle
     trajectory: Trajectory
+    environment: Environment = field(default_factory=Environment)
 
 
 @dataclass(frozen=True)
@@ -38,12 +40,13 @@ def random_flight(seed: int) -> Flight:
     vehicle = irregular(rng)
     trajectory = tour(rng)
     trajectory = replace(trajectory, heading=rng.uniform(-3, 3))
-    wanted = rng.uniform(*MARGINS)
+    margin = rng.uniform(*MARGINS)
+    environment = Environment(wind=seed % 2 * 5 * rng.normal(size=3))
     low, high = np.log([0.02, 50.0])
     for _ in range(HALVINGS):
         middle = (low + high) / 2
-        near = Flight(vehicle, stretched(trajectory, np.exp(middle)))
-        low, high = (middle, high) if sampled(near, 300).margin < wanted else (low, middle)
+        near = Flight(vehicle, stretched(trajectory, np.exp(middle)), environment)
+        low, high = (middle, high) if sampled(near, 300).margin < margin else (low, middle)
     return replace(near, trajectory=stretched(trajectory, np.exp(high)))
 
 
@@ -101,7 +104,8 @@ def moved(flight: Flight, heading: float, shift: np.ndarray) -> Flight:
     coefficients = so3.rotate(turn, flight.trajectory.coefficients)
     coefficients[:, 0] += shift
     turned = Trajectory(flight.trajectory.durations, coefficients, flight.trajectory.heading + heading)
-    return replace(flight, trajectory=turned)
+    environment = replace(flight.environment, wind=so3.rotate(turn, flight.environment.wind))
+    return Flight(flight.vehicle, turned, environment)
 
 
 def sampled(flight: Flight, points: int) -> Sampled:
@@ -113,8 +117,8 @@ def sampled(flight: Flight, points: int) -> Sampled:
 
 def at(flight: Flight, times: np.ndarray, before: np.ndarray) -> Sampled:
     """The margin at some times; those of `before` that precede them help to carry the attitude there."""
-    asked = np.concatenate([before[before < times[0]], times])
-    found = reference(flight.trajectory, flight.vehicle, times=asked)
+    times = np.concatenate([before[before < times[0]], times])
+    found = reference(flight.trajectory, flight.vehicle, times, environment=flight.environment)
     low, high = flight.vehicle.min_thrusts, flight.vehicle.max_thrusts
     gaps = np.minimum(found.rotor_thrusts - low, high - found.rotor_thrusts) / (high - low)
     return Sampled(float(gaps.min()), not found.undetermined)

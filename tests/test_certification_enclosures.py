@@ -1,15 +1,22 @@
 """The bounds behind a certificate contain what they bound."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.polynomial import chebyshev as npcheb
 
-from aerobat.certification import chebyshev, ellipses, quantities
-from aerobat.certification.attitude import Turning
-from aerobat.certification.extremes import Family, greatest
-from aerobat.certification.motion import Motion, Pieces
+from aerobat.certification import quantities
+from aerobat.certification.attitude import ThrustDirectionRates
+from aerobat.certification.certify import interpolated
+from aerobat.certification.enclosure import chebyshev, interpolation_error
+from aerobat.certification.enclosure.extrema import SeriesBatch, enclose_maximum
+from aerobat.certification.thrust_curve import ThrustCurve
+from aerobat.environment import Environment
+from aerobat.kernels import flatness
+from aerobat.trajectory.subintervals import Subintervals
 from random_flights import random_flight
 
 seeds = st.integers(0, 2**32 - 1)
@@ -25,27 +32,29 @@ def test_the_greatest_value_of_series_is_enclosed_tightly_and_found(seed, degree
     coefficients = rng.normal(size=(members, degree + 1)) * np.exp(-decay * np.arange(degree + 1))
     error, group = 1e-3 * rng.uniform(size=members), rng.integers(0, groups, members)
     group[:groups] = np.arange(groups)
-    found = greatest(Family(coefficients, error, group, np.ones(groups), TIGHTNESS))
+    found = enclose_maximum(SeriesBatch(coefficients, error, group, np.ones(groups), TIGHTNESS))
     sampled = npcheb.chebval(FINE, coefficients.T)
     for g in range(groups):
         own = group == g
-        tolerance = TIGHTNESS * max(1, abs(found.most[g]))
-        assert found.most[g] >= (sampled.max(axis=1) + error)[own].max() - 1e-12
-        assert found.least[g] >= (sampled.max(axis=1) - error)[own].max() - tolerance
-        assert found.most[g] - found.least[g] <= 2 * error[own].max() + 1.1 * tolerance
+        tolerance = TIGHTNESS * max(1, abs(found.max[g]))
+        assert found.max[g] >= (sampled.max(axis=1) + error)[own].max() - 1e-12
+        assert found.min[g] >= (sampled.max(axis=1) - error)[own].max() - tolerance
+        assert found.max[g] - found.min[g] <= 2 * error[own].max() + 1.1 * tolerance
         member = found.member[g]
         assert own[member]
         taken = npcheb.chebval(found.position[g], coefficients[member]) - error[member]
-        assert taken == pytest.approx(found.least[g], abs=1e-12)
+        assert taken == pytest.approx(found.min[g], abs=1e-12)
 
 
 @given(value=st.floats(-5, 5), count=st.integers(1, 9))
 def test_of_equal_greatest_values_the_earliest_is_told(value, count):
     flat = np.zeros((count, 5))
     flat[:, 0] = value
-    found = greatest(Family(flat, np.zeros(count), np.zeros(count, dtype=int), np.ones(1), TIGHTNESS))
+    found = enclose_maximum(
+        SeriesBatch(flat, np.zeros(count), np.zeros(count, dtype=int), np.ones(1), TIGHTNESS)
+    )
     assert (found.member[0], found.position[0]) == (0, -1.0)
-    assert found.least[0] == found.most[0] == pytest.approx(value)
+    assert found.min[0] == found.max[0] == pytest.approx(value)
 
 
 @settings(max_examples=25)
@@ -77,30 +86,103 @@ def test_interpolation_is_as_near_as_its_bound_says_on_coarse_pieces_too(seed, d
     # the same pieces with a far higher degree stand for the truth
     flight = random_flight(seed)
     segments = flight.trajectory.segments
-    coarse, truth = (Motion.of(flight.trajectory, flight.vehicle, k) for k in (degree, 60))
+    coarse, truth = (
+        ThrustCurve.of(flight.trajectory, flight.vehicle, flight.environment, k) for k in (degree, 60)
+    )
     for parts in (4, 16, 64):
         start = np.tile(np.arange(parts) / parts, segments)
-        pieces = Pieces(np.repeat(np.arange(segments), parts), start, np.full(len(start), 1 / parts))
+        pieces = Subintervals(np.repeat(np.arange(segments), parts), start, np.full(len(start), 1 / parts))
         norms = coarse.norms(coarse.series(coarse.on(pieces)), pieces)
-        usable = ellipses.regular(norms)
+        usable = interpolation_error.regular(norms)
         pieces, norms = pieces[usable], norms[usable]
-        if not len(pieces.segment):
+        if not len(pieces):
             continue
-        found = ellipses.accuracy(
-            norms, pieces.seconds(flight.trajectory), coarse.sums[pieces.segment], flight.vehicle
+        found = interpolation_error.accuracy(
+            norms, pieces.seconds(flight.trajectory), coarse.sums[pieces.interval], flight.vehicle
         )
-        middle = truth.at(pieces.segment, (pieces.start + pieces.length / 2)[:, None])[:, 0, 1]
-        interpolants, exact = (piecewise(motion, pieces, middle) for motion in (coarse, truth))
+        middle = truth.at(pieces.interval, (pieces.start + pieces.length / 2)[:, None])[:, 0, 1]
+        interpolants, exact = (piecewise(curve, pieces, middle) for curve in (coarse, truth))
         nodes = npcheb.chebvander(truth.basis.nodes, coarse.basis.degree)
         off = np.abs(nodes @ coarse.basis.analysis @ interpolants - exact).max(axis=1)
         twist = found.twist_remainder + coarse.basis.lebesgue * found.twist_rounding
-        allowed = found.remainder + 4 * (found.rounding + twist[:, None] * found.turning)
+        allowed = found.remainder + 4 * (found.rounding + twist[:, None] * found.per_radian)
         assert (off <= allowed).all()
-        assert (np.abs(exact).max(axis=1) <= found.size * (1 + 1e-9)).all()
+        assert (np.abs(exact).max(axis=1) <= found.magnitude * (1 + 1e-9)).all()
 
 
-def piecewise(motion: Motion, pieces: Pieces, near: np.ndarray) -> np.ndarray:
+@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("degree", [9, 14])
+def test_series_in_the_carried_frame_are_as_near_as_they_say(seed, degree):
+    flight = random_flight(seed)
+    coarse, truth = (
+        ThrustCurve.of(flight.trajectory, flight.vehicle, flight.environment, k) for k in (degree, 60)
+    )
+    pieces = Subintervals.whole(flight.trajectory.segments)
+    for _ in range(12):
+        pieces = pieces.halves()
+        pieces = pieces[pieces.order()]
+        if interpolation_error.regular(coarse.norms(coarse.series(coarse.on(pieces)), pieces)).all():
+            break
+    near, exact = (interpolated(curve, pieces, everywhere=True) for curve in (coarse, truth))
+    values = [
+        np.einsum("tk,pkq->ptq", npcheb.chebvander(FINE[::50], found.series.shape[1] - 1), found.series)
+        for found in (near, exact)
+    ]
+    assert (np.abs(values[0] - values[1]).max(axis=1) <= near.error + exact.error).all()
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_magnitudes_in_complex_time_stay_within_their_bounds(seed):
+    """On Bernstein ellipses, with the equations of flatness in complex numbers."""
+    flight = random_flight(seed)
+    vehicle = replace(flight.vehicle, drag_body=np.zeros(3))
+    curve = ThrustCurve.of(flight.trajectory, vehicle, Environment(), 20)
+    pieces = Subintervals.whole(flight.trajectory.segments)
+    for _ in range(4):
+        pieces = pieces.halves()
+    series = curve.series(curve.on(pieces))
+    seconds = pieces.seconds(flight.trajectory)
+    bounds = interpolation_error.on_ellipses(curve.norms(series, pieces), seconds / 2, vehicle)
+    reached = []
+    for ellipse, rho in enumerate(interpolation_error.RHO[1:5], 1):
+        circle = rho * np.exp(1j * np.linspace(0, 2 * np.pi, 64))
+        z = (circle + 1 / circle) / 2
+        for piece in np.flatnonzero(bounds.regular[:, ellipse]):
+            n, omega, twist = complex_rates(series[piece, :, 1:], z, seconds[piece] / 2)
+            found = [np.abs(n - np.linalg.norm(series[piece, 0, 1])).max() * vehicle.mass, omega, twist]
+            allowed = (bounds.magnitudes.thrust, bounds.magnitudes.omega, bounds.twist)
+            reached.append([each / bound[piece, ellipse] for each, bound in zip(found, allowed, strict=True)])
+    assert len(reached) > 20
+    assert np.max(reached) <= 1 + 1e-6
+    assert (np.max(reached, axis=0)[:2] > 0.5).all()  # which are hardly larger than need be
+
+
+def complex_rates(series: np.ndarray, z: np.ndarray, half: float) -> tuple[np.ndarray, float, float]:
+    """n, the largest norm of ω in the body and the largest rate of its frame, at complex times z."""
+    e3 = series[0, 0] / np.linalg.norm(series[0, 0])
+    e1 = np.cross(e3, np.eye(3)[np.abs(e3).argmin()])
+    e1 /= np.linalg.norm(e1)
+    local = series @ np.stack([e1, np.cross(e3, e1), e3], axis=-1)
+
+    def at(times: np.ndarray) -> tuple[np.ndarray, tuple[np.ndarray, np.ndarray], np.ndarray]:
+        f, df, ddf = (npcheb.chebval(times, local[:, k]) for k in range(3))
+        n = np.sqrt(np.sum(f * f, axis=0))
+        omega, _ = flatness.body_rates(f / n, df / n, ddf / n)
+        return n, flatness.tilted(f / n, omega), half * omega[2] / (1 + f[2] / n)
+
+    n, (x, y), rate = at(z)
+    # the frame's angle at z, integrated along the way from the real line's middle
+    nodes, weights = np.polynomial.legendre.leggauss(24)
+    angle = z / 2 * sum(w * at((1 + s) / 2 * z)[2] for s, w in zip(nodes, weights, strict=True))
+    turned = x * np.cos(angle) + y * np.sin(angle), y * np.cos(angle) - x * np.sin(angle)
+    norm = np.sqrt(np.abs(turned[0]) ** 2 + np.abs(turned[1]) ** 2)
+    return n, float(norm.max()), float(np.abs(rate).max())
+
+
+def piecewise(curve: ThrustCurve, pieces: Subintervals, near: np.ndarray) -> np.ndarray:
     """The quantities at the basis's nodes, every piece in a frame of its own, about the thrust `near` it."""
-    values = motion.on(pieces)
-    turning = Turning.along(values[..., 1:, :], near, pieces.seconds(motion.trajectory), motion.basis)
-    return quantities.values(motion.vehicle, values, *turning.body(turning.twist))
+    values = curve.on(pieces)
+    turning = ThrustDirectionRates.along(
+        values[..., 1:, :], near, pieces.seconds(curve.trajectory), curve.basis
+    )
+    return quantities.values(curve.vehicle, values, *turning.body(turning.twist))

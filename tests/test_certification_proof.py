@@ -27,7 +27,7 @@ TIGHT = 1e-6  # of a rotor's range
 
 
 def certificate_of(flight: Flight, envelope: Envelope | None = None) -> Certificate:
-    return certify(flight.trajectory, flight.vehicle, envelope=envelope)
+    return certify(flight.trajectory, flight.vehicle, flight.environment, envelope)
 
 
 def reversed_in_time(trajectory: Trajectory) -> Trajectory:
@@ -39,8 +39,8 @@ def reversed_in_time(trajectory: Trajectory) -> Trajectory:
 
 def extremes_of(flight: Flight, times: np.ndarray) -> dict[tuple[str, Side], np.ndarray]:
     """Every quantity at some times, by flatness."""
-    found = reference(flight.trajectory, flight.vehicle, times=times)
-    setpoint, most = found.setpoint, Side.MOST
+    found = reference(flight.trajectory, flight.vehicle, times, environment=flight.environment)
+    setpoint, most = found.setpoint, Side.MAX
     series = {
         ("speed", most): np.linalg.norm(setpoint.flat.velocity, axis=1),
         ("tilt", most): np.arccos(np.clip(so3.thrust_axis(setpoint.q_world_body)[:, 2], -1, 1)),
@@ -79,7 +79,7 @@ def test_each_extreme_is_taken_where_it_is_said_to_be_and_never_passed(seed):
     named = {(finding.quantity, finding.side): finding for finding in certificate.findings}
     assert named.keys() == samples.keys()
     for key, finding in named.items():
-        outwards = 1 if finding.side is Side.MOST else -1
+        outwards = 1 if finding.side is Side.MAX else -1
         size = np.abs(samples[key]).max() + 1e-3
         assert (outwards * (finding.bound - samples[key]) >= -1e-9 * size).all(), key
         assert 0 <= outwards * (finding.bound - finding.value) <= 1e-4 * size, key
@@ -99,10 +99,50 @@ def test_neither_place_nor_heading_changes_the_margin(seed):
     assert certified_margin(elsewhere, after) == pytest.approx(certified_margin(flight, before), abs=TIGHT)
 
 
+def drifting(trajectory: Trajectory, wind: np.ndarray) -> Trajectory:
+    """The trajectory as the air sees it that moves with the wind: p(t) - w t."""
+    coefficients = trajectory.coefficients.copy()
+    coefficients[:, 0] -= trajectory.knots[:-1, None] * wind
+    coefficients[:, 1] -= trajectory.durations[:, None] * wind
+    return replace(trajectory, coefficients=coefficients)
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_flying_in_a_wind_is_flying_in_the_air_that_moves_with_it(seed):
+    flight, wind = random_flight(seed), np.array([4.0, -7.0, 1.5])
+    windy = replace(flight, environment=Environment(wind=wind))
+    calm = Flight(flight.vehicle, drifting(flight.trajectory, wind))
+    before, after = certificate_of(windy), certificate_of(calm)
+    assert before.certified == after.certified
+    assert certified_margin(calm, after) == pytest.approx(certified_margin(windy, before), abs=1e-9)
+    for one, other in zip(before.findings, after.findings, strict=True):
+        assert one.quantity == "speed" or one.value == pytest.approx(other.value, rel=1e-9, abs=1e-9)
+    if flight.vehicle.drag_body.any():
+        assert certificate_of(replace(flight, environment=Environment())).margin != before.margin
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_references_in_a_wind_are_those_in_the_air_that_moves_with_it(seed):
+    flight, wind = random_flight(seed), np.array([4.0, -7.0, 1.5])
+    windy = reference(flight.trajectory, flight.vehicle, rate=100.0, environment=Environment(wind=wind))
+    calm = reference(drifting(flight.trajectory, wind), flight.vehicle, rate=100.0)
+    assert so3.angle_between(windy.setpoint.q_world_body, calm.setpoint.q_world_body).max() < 1e-9
+    scale = np.abs(calm.rotor_thrusts).max()
+    np.testing.assert_allclose(windy.rotor_thrusts, calm.rotor_thrusts, atol=1e-9 * scale)
+
+
+@pytest.mark.parametrize("gravity", [1.62, 3.71, 9.81])
+def test_a_hover_in_any_gravity_has_its_weights_margin(gravity):
+    hover = certify(Trajectory([1.0], np.zeros((1, 1, 3))), VEHICLE, Environment(gravity))
+    assert hover.certified
+    assert hover.margin == pytest.approx(VEHICLE.mass * gravity / 4, abs=1e-9)
+
+
 @pytest.mark.parametrize("seed", range(8))
 def test_without_drag_the_way_back_in_time_asks_the_same_of_the_rotors(seed):
     flight = random_flight(seed)
-    flight = replace(flight, vehicle=replace(flight.vehicle, drag_body=np.zeros(3)))
+    calm = replace(flight.vehicle, drag_body=np.zeros(3))
+    flight = Flight(calm, flight.trajectory)
     end = reference(flight.trajectory, flight.vehicle, rate=500.0).setpoint.q_world_body[-1]
     upright = so3.smallest_rotation(UP, so3.thrust_axis(end))
     heading = so3.log(so3.multiply(so3.conjugate(upright), end))[2]
@@ -137,7 +177,7 @@ def test_a_hover_has_exactly_its_margin(heading):
     hover = certify(Trajectory([1.0], np.zeros((1, 1, 3)), heading), VEHICLE)
     assert hover.certified
     assert hover.margin == pytest.approx(VEHICLE.mass * STANDARD_GRAVITY / 4, abs=1e-9)
-    most = {finding.quantity: finding.bound for finding in hover.findings if finding.side is Side.MOST}
+    most = {finding.quantity: finding.bound for finding in hover.findings if finding.side is Side.MAX}
     assert most["speed"] == most["body rate"] == most["moment"] == 0.0
     assert most["tilt"] < 1e-6
     assert hover.why.startswith("certified: rotor ")
@@ -252,10 +292,10 @@ def test_the_example_of_section_v_has_the_published_extremes(iteration, thrust, 
         minimum_effort(given, [0.5 + shift, 1.5]), load_vehicle("section-v"), Environment(gravity=9.80665)
     )
     values = {(finding.quantity, finding.side): finding.value for finding in certificate.findings}
-    found = [values["thrust", Side.LEAST], values["thrust", Side.MOST]]
-    found += [values["moment", Side.MOST], values["body rate", Side.MOST]]
-    found += [min(values[f"rotor {i}", Side.LEAST] for i in range(4))]
-    found += [max(values[f"rotor {i}", Side.MOST] for i in range(4))]
+    found = [values["thrust", Side.MIN], values["thrust", Side.MAX]]
+    found += [values["moment", Side.MAX], values["body rate", Side.MAX]]
+    found += [min(values[f"rotor {i}", Side.MIN] for i in range(4))]
+    found += [max(values[f"rotor {i}", Side.MAX] for i in range(4))]
     printed = np.array([*thrust, moment, rate, *rotors])
     half_digits = np.array([0.06, 0.06, 0.006, 0.06, 0.006, 0.006])
     assert (np.abs(found - printed) <= np.maximum(half_digits, 6e-3 * np.abs(printed))).all()

@@ -11,7 +11,7 @@ from scipy.interpolate import CubicSpline
 from aerobat import so3
 from aerobat.environment import Environment
 from aerobat.flatness import reference_of
-from aerobat.flatness.setpoints import specific_thrust
+from aerobat.flatness.references import specific_thrust
 from aerobat.planning.feasibility import rotor_margin
 from aerobat.states import STANDARD_GRAVITY, FlatState
 from aerobat.trajectory import Trajectory

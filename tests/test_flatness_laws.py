@@ -128,7 +128,10 @@ def test_flying_the_moments_open_loop_follows_the_trajectory(drag):
     sizes = np.array([2, 2, 6, 8, 8, 6, 4, 2, 1, 1])[:, None]
     trajectory = Trajectory([1.2], rng.normal(size=(1, 10, 3)) * sizes)
     times = np.linspace(0.0, 1.2, 4001)
-    vehicle = replace(VEHICLE, drag_body=np.array(drag))
+    # three unlike moments of inertia about axes of their own: gyroscopic moments count
+    own = so3.axes(so3.exp([0.3, -0.5, 0.4]))
+    inertia = own @ np.diag(np.linalg.eigvalsh(VEHICLE.inertia) * [0.8, 1.3, 1.1]) @ own.T
+    vehicle = replace(VEHICLE, drag_body=np.array(drag), inertia=(inertia + inertia.T) / 2)
     flown = reference(replace(trajectory, heading=0.4), vehicle, times=times)
     assert so3.thrust_axis(flown.setpoint.q_world_body)[:, 2].min() < 0.3
     thrusts = CubicSpline(times, flown.rotor_thrusts)

@@ -12,7 +12,7 @@ from aerobat.environment import Environment
 from aerobat.errors import SpecError
 from aerobat.flatness import reference
 from aerobat.planning import rotor_margin
-from aerobat.trajectory import Rule, Trajectory, minimum_effort, polynomial
+from aerobat.trajectory import ContinuityRule, Trajectory, minimum_effort, polynomial
 from aerobat.vehicle import load_vehicle
 from minimum_effort_reference import exact_coefficients
 
@@ -66,12 +66,12 @@ def assert_jump_free(trajectory, knot, derivative, axis):
 def continuous_derivatives(fixed, order, rule):
     """By the rule's words: the derivatives that stay continuous at an inner knot where `fixed` are given."""
     free = [d for d in range(2 * order) if d not in fixed]
-    if rule is Rule.HIGHEST:
+    if rule is ContinuityRule.HIGHEST:
         return free[: len(free) - len(fixed)]
     return [d for d in free if 2 * order - 1 - d not in fixed]
 
 
-@drawn(seed=seeds, order=orders, rule=st.sampled_from(Rule), segments=st.integers(1, 6))
+@drawn(seed=seeds, order=orders, rule=st.sampled_from(ContinuityRule), segments=st.integers(1, 6))
 def test_what_is_given_is_met_and_what_the_rule_promises_is_continuous(seed, order, rule, segments):
     given, durations = random_course(seed, order, segments)
     trajectory = minimum_effort(given, durations, rule)
@@ -162,7 +162,7 @@ def dense_minimum(given, durations, order):
 def test_the_highest_rule_never_costs_less(seed, order):
     given, durations = random_course(seed, order)
     best = minimum_effort(given, durations).effort(order)
-    assert best <= minimum_effort(given, durations, Rule.HIGHEST).effort(order) * (1 + 1e-9)
+    assert best <= minimum_effort(given, durations, ContinuityRule.HIGHEST).effort(order) * (1 + 1e-9)
 
 
 @drawn(seed=seeds, order=orders, fixed=st.integers(1, 3))
@@ -171,15 +171,15 @@ def test_the_rules_agree_where_the_lowest_derivatives_are_given_and_differ_elsew
     given = course(rng.normal(size=(5, 3)), order)
     given[1:-1, :fixed] = rng.normal(size=(3, fixed, 3))
     durations = rng.uniform(0.5, 2.0, 4)
-    highest, variational = (minimum_effort(given, durations, rule) for rule in Rule)
+    highest, variational = (minimum_effort(given, durations, rule) for rule in ContinuityRule)
     np.testing.assert_array_equal(highest.coefficients, variational.coefficients)
     given[1:-1, 1] = np.nan
     given[1:-1, 2] = rng.normal(size=(3, 3))  # a thrust direction at the waypoints, as in a flip
-    variational, highest = (minimum_effort(given, durations, rule).effort(order) for rule in Rule)
+    variational, highest = (minimum_effort(given, durations, rule).effort(order) for rule in ContinuityRule)
     assert highest > 1.01 * variational
 
 
-@drawn(seed=seeds, order=orders, rule=st.sampled_from(Rule), part=st.floats(0.1, 0.9))
+@drawn(seed=seeds, order=orders, rule=st.sampled_from(ContinuityRule), part=st.floats(0.1, 0.9))
 def test_a_knot_where_nothing_is_given_changes_nothing(seed, order, rule, part):
     given, durations = random_course(seed, order, 3)
     whole = minimum_effort(given, durations, rule)
@@ -204,7 +204,7 @@ def test_giving_what_the_optimum_has_changes_nothing(seed, order, knot, derivati
     assert difference <= 1e-10 * np.abs(best.coefficients).max()
 
 
-@drawn(seed=seeds, order=orders, rule=st.sampled_from(Rule), slower=st.floats(1e-3, 1e3))
+@drawn(seed=seeds, order=orders, rule=st.sampled_from(ContinuityRule), slower=st.floats(1e-3, 1e3))
 def test_slower_time_keeps_the_path(seed, order, rule, slower):
     given, durations = random_course(seed, order)
     trajectory = minimum_effort(given, durations, rule)
@@ -216,7 +216,7 @@ def test_slower_time_keeps_the_path(seed, order, rule, slower):
     assert slowed.effort(order) == pytest.approx(expected, rel=1e-8)
 
 
-@drawn(seed=seeds, order=orders, rule=st.sampled_from(Rule))
+@drawn(seed=seeds, order=orders, rule=st.sampled_from(ContinuityRule))
 def test_backwards_the_path_is_the_same(seed, order, rule):
     given, durations = random_course(seed, order)
     trajectory = minimum_effort(given, durations, rule)
@@ -228,7 +228,7 @@ def test_backwards_the_path_is_the_same(seed, order, rule):
     np.testing.assert_allclose(back, there, atol=1e-11 * scale)
 
 
-@drawn(seed=seeds, order=orders, rule=st.sampled_from(Rule))
+@drawn(seed=seeds, order=orders, rule=st.sampled_from(ContinuityRule))
 def test_the_curve_is_linear_in_what_is_given_and_axes_stand_alone(seed, order, rule):
     given, durations = random_course(seed, order)
     rng = np.random.default_rng(seed + 1)
@@ -378,23 +378,23 @@ GOOD = course([[0, 0, 0], [1, 1, 1], [2, 2, 2]], 4)
 @pytest.mark.parametrize(
     ("given", "durations", "rule", "named"),
     [
-        (GOOD, [1.0, 0.0], Rule.VARIATIONAL, "durations"),
-        (GOOD, [1.0, -1.0], Rule.VARIATIONAL, "durations"),
-        (GOOD, [1.0, np.nan], Rule.VARIATIONAL, "durations"),
-        (GOOD, [1.0, np.inf], Rule.VARIATIONAL, "durations"),
-        (GOOD, [[1.0, 1.0]], Rule.VARIATIONAL, "durations"),
-        (GOOD, [], Rule.VARIATIONAL, "durations"),
-        (GOOD, [1.0], Rule.VARIATIONAL, "2 knots"),
-        (GOOD[:, :2], [1.0, 1.0], Rule.VARIATIONAL, "3, 4 or 5 derivatives"),
-        (GOOD[..., 0], [1.0, 1.0], Rule.VARIATIONAL, "shape"),
-        (1.0, [1.0], Rule.VARIATIONAL, "shape"),
-        ("fast", [1.0], Rule.VARIATIONAL, "array of numbers"),
-        (with_entry((1, 0, 2), np.inf), [1.0, 1.0], Rule.VARIATIONAL, "given must be finite"),
-        (with_entry((0, 0, 2), np.nan), [1.0, 1.0], Rule.VARIATIONAL, "position at both ends"),
-        (with_entry((2, 0, 0), np.nan), [1.0, 1.0], Rule.VARIATIONAL, "position at both ends"),
+        (GOOD, [1.0, 0.0], ContinuityRule.VARIATIONAL, "durations"),
+        (GOOD, [1.0, -1.0], ContinuityRule.VARIATIONAL, "durations"),
+        (GOOD, [1.0, np.nan], ContinuityRule.VARIATIONAL, "durations"),
+        (GOOD, [1.0, np.inf], ContinuityRule.VARIATIONAL, "durations"),
+        (GOOD, [[1.0, 1.0]], ContinuityRule.VARIATIONAL, "durations"),
+        (GOOD, [], ContinuityRule.VARIATIONAL, "durations"),
+        (GOOD, [1.0], ContinuityRule.VARIATIONAL, "2 knots"),
+        (GOOD[:, :2], [1.0, 1.0], ContinuityRule.VARIATIONAL, "3, 4 or 5 derivatives"),
+        (GOOD[..., 0], [1.0, 1.0], ContinuityRule.VARIATIONAL, "shape"),
+        (1.0, [1.0], ContinuityRule.VARIATIONAL, "shape"),
+        ("fast", [1.0], ContinuityRule.VARIATIONAL, "array of numbers"),
+        (with_entry((1, 0, 2), np.inf), [1.0, 1.0], ContinuityRule.VARIATIONAL, "fixed must be finite"),
+        (with_entry((0, 0, 2), np.nan), [1.0, 1.0], ContinuityRule.VARIATIONAL, "position at both ends"),
+        (with_entry((2, 0, 0), np.nan), [1.0, 1.0], ContinuityRule.VARIATIONAL, "position at both ends"),
         (GOOD, [1.0, 1.0], "lowest", "variational, highest"),
-        (GOOD, [1e-200, 1e200], Rule.VARIATIONAL, "more alike"),
-        (course(np.arange(9.0).reshape(3, 3), 5), [1e-300, 1.0], Rule.HIGHEST, "more alike"),
+        (GOOD, [1e-200, 1e200], ContinuityRule.VARIATIONAL, "more alike"),
+        (course(np.arange(9.0).reshape(3, 3), 5), [1e-300, 1.0], ContinuityRule.HIGHEST, "more alike"),
     ],
 )
 def test_what_cannot_be_solved_is_refused_by_name(given, durations, rule, named):

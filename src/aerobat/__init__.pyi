@@ -50,7 +50,7 @@ from .reporting.tracking import tracking_figure
 from .simulation import Flight, FlightConfig, Outcome, StateNoise, fly, load_flight
 from .states import BodyState, FlatState, Setpoint, Wrench
 from .studies.compare import Comparison, compare
-from .trajectory import Rule, Trajectory, load_trajectory, minimum_effort, save_trajectory
+from .trajectory import ContinuityRule, Trajectory, load_trajectory, minimum_effort, save_trajectory
 from .vehicle import Rotor, Vehicle, load_vehicle, vehicle_names, write_vehicle
 
 __all__ = [
@@ -61,6 +61,7 @@ __all__ = [
     "Certificate",
     "Comparison",
     "Condition",
+    "ContinuityRule",
     "Controller",
     "CustomManeuver",
     "EndState",
@@ -90,7 +91,6 @@ __all__ = [
     "Reference",
     "Rotor",
     "RotorMargin",
-    "Rule",
     "Score",
     "Scores",
     "Sensitivity",

@@ -1,7 +1,7 @@
 """Proof, over continuous time, that a vehicle flies a trajectory within its limits; knows no planner."""
 
 from aerobat.certification.certificate import Certificate, Discontinuity, Finding, Side, Verdict
-from aerobat.certification.certifying import certify
+from aerobat.certification.certify import certify
 from aerobat.certification.envelope import Envelope
 
 __all__ = ["Certificate", "Discontinuity", "Envelope", "Finding", "Side", "Verdict", "certify"]

@@ -3,15 +3,11 @@
 On a piece take any fixed axes e1, e2, e3 with e3 near the thrust, and let f = (u, v, w) in them, n = |f|,
 b3 = f/n. The smallest rotation from e3 to b3 makes of e1, e2
 
-    x~ = e1 − u g,   y~ = e2 − v g,   g = (e3 + b3)/(n + w)
+    x~ = e1 − b3_x g,   y~ = e2 − b3_y g,   g = (e3 + b3)/(1 + b3_z)
 
-and the frame without spin lies at an angle φ from them about b3, with φ' = (u v' − v u') / (n (n + w))
-(Hanson and Ma, 1995). Rates, as complex numbers x + i y in the plane across b3, are then
-
-    b3'  = (f'  − (u + i v) g·f') / n
-    b3'' = (f'' − (u + i v) g·f'' − 2 n' b3') / n
-
-times exp(−i φ), and ω = i b3', ω' = i b3''. Nothing here divides by 1 + b3_z.
+and the frame without spin lies at an angle φ from them about b3, with φ' = ω_z / (1 + b3_z) for the rates of
+`kernels.flatness` in these axes (Hanson and Ma, 1995). Across b3, where they lie, rates are complex numbers
+x + i y in x~, y~, times exp(−i φ). e3 is near b3: nothing here comes near 1 + b3_z = 0.
 """
 
 from __future__ import annotations
@@ -23,38 +19,44 @@ from numpy.typing import NDArray
 
 from aerobat import so3
 from aerobat.arrays import Array
-from aerobat.certification import chebyshev
+from aerobat.certification.enclosure import chebyshev
+from aerobat.kernels import flatness
 
 UP = np.array([0.0, 0.0, 1.0])
 ComplexArray = NDArray[np.complex128]
 
 
 @dataclass(frozen=True)
-class Turning:
-    """How the thrust direction turns along P pieces, at N nodes each, in a frame of its own on each piece."""
+class ThrustDirectionRates:
+    """Body rates along P pieces, at N nodes each, in a frame of its own on each piece."""
 
     axes: Array  # e1, e2, e3 as columns, (P, 3, 3)
     direction: Array  # b3, world, (P, N, 3)
-    rate: ComplexArray  # b3' across b3 [rad/s], (P, N)
-    acceleration: ComplexArray  # b3'' across b3 [rad/s²], (P, N)
+    omega: ComplexArray  # ω across b3 [rad/s], (P, N)
+    omega_dot: ComplexArray  # ω' across b3 [rad/s²], (P, N)
     twist: Array  # φ since the piece's start [rad], (P, N)
 
     @classmethod
-    def along(cls, values: Array, mean: Array, seconds: Array, basis: chebyshev.Basis) -> Turning:
-        """The turning of f, f', f'' (P, N, 3, 3) at the basis's nodes; e3 along the `mean` of f (P, 3)."""
+    def along(
+        cls, thrust: Array, mean: Array, seconds: Array, basis: chebyshev.Basis
+    ) -> ThrustDirectionRates:
+        """Turn f, f', f'' (P, N, 3, 3) at the basis's nodes into rates.
+
+        Args:
+            thrust: f, f', f'', world.
+            mean: What e3 shall be along on each piece, world, (P, 3).
+            seconds: How long the pieces are [s], (P,).
+            basis: Of interpolation.
+        """
         axes = _axes_about(mean)
-        local = values @ axes[:, None]
-        u, v, w = np.moveaxis(local[..., 0, :], -1, 0)
-        n = np.sqrt(u * u + v * v + w * w)
-        stretch = np.sum(local * local[..., :1, :], axis=-1) / n[..., None]  # b3·f, b3·f', b3·f''
-        along = (local[..., 2] + stretch) / (n + w)[..., None]  # g·f, g·f', g·f''
-        across = local[..., 0] + 1j * local[..., 1]
-        carried = across - across[..., :1] * along
-        rate = carried[..., 1] / n
-        acceleration = (carried[..., 2] - 2 * stretch[..., 1] * rate) / n
-        spin = np.imag(np.conj(across[..., 0]) * across[..., 1]) / (n * (n + w))
+        n = np.linalg.norm(thrust[..., 0, :], axis=-1)
+        local = np.moveaxis(thrust @ axes[:, None], (-2, -1), (0, 1)) / n
+        b3, jerk, snap = (tuple(vector) for vector in local)
+        rates = flatness.body_rates(b3, jerk, snap)
+        omega, omega_dot = (x + 1j * y for x, y in (flatness.tilted(b3, rate) for rate in rates))
+        spin = rates[0][2] / (1 + b3[2])
         twist = seconds[:, None] / 2 * chebyshev.integral(spin, basis)
-        return cls(axes, values[..., 0, :] / n[..., None], rate, acceleration, twist)
+        return cls(axes, thrust[..., 0, :] / n[..., None], omega, omega_dot, twist)
 
     def carried(self, heading: float) -> Array:
         """φ at all nodes (P, N) of a frame that each piece takes over from the one before it.
@@ -74,9 +76,8 @@ class Turning:
 
     def body(self, angle: Array) -> tuple[Array, Array]:
         """ω and ω' in the axes of a body whose frame is at these angles φ (P, N), each (P, N, 3)."""
-        back = 1j * np.exp(-1j * angle)
-        omega, omega_dot = (_flat(back * rate) for rate in (self.rate, self.acceleration))
-        return omega, omega_dot
+        back = np.exp(-1j * angle)
+        return _flat(back * self.omega), _flat(back * self.omega_dot)
 
 
 def _axes_about(direction: Array) -> Array:

@@ -1,15 +1,15 @@
-"""Certificate: what has been proven about a trajectory, and what refutes it."""
+"""Certificate: what is proven about a trajectory, and what refutes it."""
 
 from __future__ import annotations
 
 from dataclasses import asdict, dataclass
 from enum import StrEnum
 
-from aerobat.flatness import Span
+from aerobat.flatness import TimeInterval
 
 
 class Verdict(StrEnum):
-    """What is known about a limit over continuous time."""
+    """Knowledge about a limit over continuous time."""
 
     HOLDS = "holds"  # proven, or there is no limit
     VIOLATED = "violated"  # at the time given
@@ -17,15 +17,15 @@ class Verdict(StrEnum):
 
 
 class Side(StrEnum):
-    """Which extreme of a quantity is meant."""
+    """Minimum or maximum of a quantity."""
 
-    LEAST = "least"
-    MOST = "most"
+    MIN = "min"
+    MAX = "max"
 
 
 @dataclass(frozen=True)
 class Finding:
-    """The least or the most of one quantity, enclosed between `value` and `bound`."""
+    """The minimum or the maximum of one quantity, enclosed between `value` and `bound`."""
 
     quantity: str  # "speed", "tilt", "thrust", "body rate", "moment", "rotor 0", "velocity x", ...
     unit: str
@@ -42,19 +42,19 @@ class Finding:
         if self.limit is None:
             return None
         extreme = self.value if self.verdict is Verdict.VIOLATED else self.bound
-        margin = self.limit - extreme if self.side is Side.MOST else extreme - self.limit
+        margin = self.limit - extreme if self.side is Side.MAX else extreme - self.limit
         return max(margin, 0.0) if self.verdict is Verdict.HOLDS else margin
 
     def __str__(self) -> str:
         """One sentence without its full stop."""
-        change = "rises" if self.side is Side.MOST else "falls"
+        change = "rises" if self.side is Side.MAX else "falls"
         value = round(self.value, 9) + 0.0  # what is zero but for rounding reads as zero
         reached = f"{self.quantity} {change} to {value:.4g} {self.unit} at {self.time:.3f} s"
         margin = self.margin
         if self.limit is None or margin is None:
             return reached
         if self.verdict is Verdict.VIOLATED:
-            where = "above" if self.side is Side.MOST else "below"
+            where = "above" if self.side is Side.MAX else "below"
             return f"{reached}, {-margin:.2g} {self.unit} {where} its limit"
         if self.verdict is Verdict.UNDECIDED and margin < 0:
             return f"{reached}, nearer to its limit than can be told"
@@ -67,27 +67,27 @@ class Discontinuity:
 
     quantity: str  # "position", "velocity", "thrust direction" or "body rate"
     unit: str
-    size: float
+    norm: float
     time: float  # [s]
 
     def __str__(self) -> str:
         """One sentence without its full stop."""
         means = "force" if self.quantity in ("position", "velocity") else "moment"
-        size = f"{self.size:.2g} {self.unit}"
-        return f"{self.quantity} jumps by {size} at {self.time:.3f} s, which no {means} can do"
+        jump = f"{self.norm:.2g} {self.unit}"
+        return f"{self.quantity} jumps by {jump} at {self.time:.3f} s, which no {means} can do"
 
 
 @dataclass(frozen=True)
 class Certificate:
-    """What holds along the whole of a trajectory, between samples and knots too, and what does not."""
+    """Findings along the whole of a trajectory, between samples and knots too."""
 
     findings: tuple[Finding, ...]
-    undetermined: tuple[Span, ...]  # where thrust vanishes, and with it the attitude
+    undetermined: tuple[TimeInterval, ...]  # where thrust vanishes, and with it the attitude
     discontinuities: tuple[Discontinuity, ...]
 
     @property
     def certified(self) -> bool:
-        """Whether all limits are proven to hold, attitude determined throughout and moments finite."""
+        """True if all limits are proven to hold, attitude determined throughout and moments finite."""
         holds = all(finding.verdict is Verdict.HOLDS for finding in self.findings)
         return holds and not self.undetermined and not self.discontinuities
 
@@ -107,7 +107,7 @@ class Certificate:
 
     @property
     def why(self) -> str:
-        """What decides, in one sentence without its full stop."""
+        """The deciding finding, in one sentence without its full stop."""
         violated = [f for f in self.findings if f.verdict is Verdict.VIOLATED]
         if self.discontinuities:
             return str(self.discontinuities[0])

@@ -1,4 +1,4 @@
-"""What jumps between segments: only thrust's size and the moments may."""
+"""Jumps between segments: of what forces and moments make, only thrust's norm and the moments may."""
 
 from __future__ import annotations
 
@@ -8,20 +8,20 @@ import numpy as np
 
 from aerobat.arrays import Array
 from aerobat.certification.certificate import Discontinuity
-from aerobat.certification.motion import Motion
+from aerobat.certification.thrust_curve import ThrustCurve
 from aerobat.trajectory import Trajectory
 
-NEGLIGIBLE = 1e-6  # of the largest value at knots: less than any controller or solver can tell
+NEGLIGIBLE_JUMP = 1e-6  # of the largest value at knots: less than any controller or solver can tell
 CANCELLATION = 1e3  # units in the last place of the largest coefficient that fitting a segment may cost
 
 
-def discontinuities(motion: Motion, floor: float) -> tuple[Discontinuity, ...]:
+def discontinuities(curve: ThrustCurve, floor: float) -> tuple[Discontinuity, ...]:
     """The jump of lowest order at every inner knot where one cannot be flown; directions above the floor.
 
     Rates are compared as b3' in the world: with b3 the same on both sides that is the body rates' jump.
     """
-    trajectory = motion.trajectory
-    ends = motion.at(np.arange(trajectory.segments), np.tile([0.0, 1.0], (trajectory.segments, 1)))
+    trajectory = curve.trajectory
+    ends = curve.at(np.arange(trajectory.segments), np.tile([0.0, 1.0], (trajectory.segments, 1)))
     position = trajectory.on_segments([0.0, 1.0]) - trajectory.coefficients[0, 0]
     velocity, f, df = np.moveaxis(ends[:, :, :3], 2, 0)
     n = np.linalg.norm(f, axis=-1, keepdims=True)
@@ -29,10 +29,10 @@ def discontinuities(motion: Motion, floor: float) -> tuple[Discontinuity, ...]:
     inverse = 1 / np.maximum(n, floor)
     b3 = f * inverse
     db3 = (df - b3 * np.sum(b3 * df, axis=-1, keepdims=True)) * inverse
-    least = np.maximum(np.minimum(n[1:, 0, 0], n[:-1, 1, 0]), floor)
-    turn = _tolerance(trajectory, f, 2) / least
+    min_thrust = np.maximum(np.minimum(n[1:, 0, 0], n[:-1, 1, 0]), floor)
+    turn = _tolerance(trajectory, f, 2) / min_thrust
     speeds = np.linalg.norm(db3, axis=-1)
-    spin = _tolerance(trajectory, df, 3) / least + 2 * turn * np.maximum(speeds[1:, 0], speeds[:-1, 1])
+    spin = _tolerance(trajectory, df, 3) / min_thrust + 2 * turn * np.maximum(speeds[1:, 0], speeds[:-1, 1])
     everywhere = np.full(len(determined), True)
     checks = (
         ("position", "m", _jump(position), _tolerance(trajectory, position, 0), everywhere),
@@ -41,22 +41,22 @@ def discontinuities(motion: Motion, floor: float) -> tuple[Discontinuity, ...]:
         ("body rate", "rad/s", _jump(db3), spin, determined),
     )
     found: dict[int, Discontinuity] = {}
-    for name, unit, size, tolerance, counts in checks:
-        for knot in np.flatnonzero(counts & (size > tolerance)):
+    for name, unit, norm, tolerance, counts in checks:
+        for knot in np.flatnonzero(counts & (norm > tolerance)):
             time = float(trajectory.knots[knot + 1])
-            found.setdefault(int(knot), Discontinuity(name, unit, float(size[knot]), time))
+            found.setdefault(int(knot), Discontinuity(name, unit, float(norm[knot]), time))
     return tuple(found[knot] for knot in sorted(found))
 
 
 def _jump(ends: Array) -> Array:
-    """The size of the jump at each inner knot of values at both ends of segments, (S, 2, 3) -> (S - 1,)."""
+    """Norm of the jump at each inner knot of values at both ends of segments, (S, 2, 3) -> (S - 1,)."""
     return np.asarray(np.linalg.norm(ends[1:, 0] - ends[:-1, 1], axis=-1))
 
 
 def _tolerance(trajectory: Trajectory, ends: Array, derivative: int) -> Array:
-    """What a jump of `ends` (S, 2, 3) may be by rounding, at each inner knot, (S - 1,)."""
+    """Largest jump of `ends` (S, 2, 3) that rounding may make, at each inner knot, (S - 1,)."""
     largest = np.abs(trajectory.coefficients).max(axis=(1, 2))
     steepness = math.perm(trajectory.degree, derivative) / trajectory.durations**derivative
     rounding = CANCELLATION * np.finfo(float).eps * largest * steepness
-    relative = NEGLIGIBLE * float(np.linalg.norm(ends, axis=-1).max())
+    relative = NEGLIGIBLE_JUMP * float(np.linalg.norm(ends, axis=-1).max())
     return np.asarray(np.maximum(rounding[1:], rounding[:-1]) + relative)

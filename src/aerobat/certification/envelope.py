@@ -1,4 +1,4 @@
-"""What a flight shall stay within, beside the limits of the rotors."""
+"""Limits that a flight shall stay within, beside those of the rotors."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from aerobat.problem import Limits
 
 @dataclass(frozen=True)
 class Envelope:
-    """Limits over continuous time; infinite where nothing is asked.
+    """Limits over continuous time; infinite where there is none.
 
     `limits` bounds position and its derivatives per axis, as a problem does. Raises SpecError for limits
     that are not positive numbers.

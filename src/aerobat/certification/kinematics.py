@@ -1,8 +1,4 @@
-"""Speed and derivatives per axis: polynomials, so that interpolation is exact but for rounding.
-
-A plan may run along such a limit or end on it, so one that is met exactly holds: MET says what "exactly"
-leaves to rounding.
-"""
+"""Speed and derivatives per axis: polynomials, so that interpolation is exact but for rounding."""
 
 from __future__ import annotations
 
@@ -11,35 +7,40 @@ from dataclasses import replace
 import numpy as np
 
 from aerobat.arrays import Array
-from aerobat.certification import chebyshev
 from aerobat.certification.certificate import Finding, Side
+from aerobat.certification.enclosure import chebyshev
+from aerobat.certification.enclosure.queries import ChebyshevSeries, ExtremumQuery, both_sides, root
 from aerobat.certification.envelope import Envelope
-from aerobat.certification.motion import Pieces
-from aerobat.certification.questions import Interpolated, Question, both_sides, root
 from aerobat.problem.problem import DERIVATIVES, UNITS, Limits
 from aerobat.trajectory import Trajectory, polynomial
+from aerobat.trajectory.subintervals import Subintervals
 
 AXES = "xyz"
-MET = 1e-9  # of the limit or of the derivative's largest component, the larger: beyond by so much is met
-TIGHTNESS = MET / 10  # of enclosures
+# of the limit or of the derivative's largest component, the larger: a plan may run along such a limit or end
+# on it, so beyond by so much counts as met
+LIMIT_TOLERANCE = 1e-9
+TIGHTNESS = LIMIT_TOLERANCE / 10  # of enclosures
 
 
 def kinematic_findings(trajectory: Trajectory, envelope: Envelope) -> list[Finding]:
-    """The largest speed, and the extremes of every component that `envelope.limits` bounds."""
-    count, components = trajectory.segments, _limited(envelope.limits)
+    """The largest speed, and the extrema of every component that `envelope.limits` bounds."""
+    components = _limited(envelope.limits)
     basis = chebyshev.basis(max(2 * (trajectory.degree - 1), trajectory.degree, 1))
     s = (1 + basis.nodes) / 2
-    rates = [trajectory.on_segments(s, k) for k in range(len(DERIVATIVES))]
-    columns = [np.sum(rates[1] ** 2, axis=-1), *(rates[k][..., axis] for k, axis in components)]
+    derivatives = [trajectory.on_segments(s, k) for k in range(len(DERIVATIVES))]
+    columns = [np.sum(derivatives[1] ** 2, axis=-1), *(derivatives[k][..., axis] for k, axis in components)]
     series = basis.analysis @ np.stack(columns, axis=-1)
-    most = np.abs(series).sum(axis=1)
-    off = [chebyshev.ROUNDING * _sums(trajectory, k)[:, axis] for k, axis in components]
-    off_speed = chebyshev.ROUNDING * np.linalg.norm(_sums(trajectory, 1), axis=1)
-    errors = [(2 * np.sqrt(most[:, 0]) + off_speed) * off_speed, *off]
-    whole = Pieces(np.arange(count), np.zeros(count), np.ones(count))
+    magnitude = np.abs(series).sum(axis=1)
+    off = [chebyshev.EVALUATION_ROUNDING * _sums(trajectory, k)[:, axis] for k, axis in components]
+    off_speed = chebyshev.EVALUATION_ROUNDING * np.linalg.norm(_sums(trajectory, 1), axis=1)
+    errors = [(2 * np.sqrt(magnitude[:, 0]) + off_speed) * off_speed, *off]
     error = basis.lebesgue * np.stack(errors, axis=-1)
-    found = Interpolated(trajectory, whole, series, error, most.max(axis=0), TIGHTNESS, everywhere=True)
-    return found.answers(_questions(envelope, components, [float(np.abs(rate).max()) for rate in rates]))
+    whole = Subintervals.whole(trajectory.segments)
+    found = ChebyshevSeries(
+        trajectory, whole, series, error, magnitude.max(axis=0), TIGHTNESS, everywhere=True
+    )
+    largest = [float(np.abs(values).max()) for values in derivatives]
+    return found.answers(_queries(envelope, components, largest))
 
 
 def _limited(limits: Limits) -> list[tuple[int, int]]:
@@ -48,21 +49,23 @@ def _limited(limits: Limits) -> list[tuple[int, int]]:
     return [(int(k), int(axis)) for k, axis in np.argwhere(bounds)]
 
 
-def _questions(envelope: Envelope, components: list[tuple[int, int]], largest: list[float]) -> list[Question]:
-    """What is asked of speed and of the components, given the `largest` component of each derivative."""
-    asked = [_lenient(Question("speed", "m/s", Side.MOST, envelope.speed, 0, 1, root), largest[1])]
+def _queries(
+    envelope: Envelope, components: list[tuple[int, int]], largest: list[float]
+) -> list[ExtremumQuery]:
+    """Queries of speed and of the components, given the `largest` component of each derivative."""
+    queries = [_lenient(ExtremumQuery("speed", "m/s", Side.MAX, envelope.speed, 0, 1, root), largest[1])]
     for column, (k, axis) in enumerate(components, 1):
-        title, (lower, upper) = f"{DERIVATIVES[k]} {AXES[axis]}", envelope.limits.of(k)
-        sides = both_sides(title, UNITS[k], column, lower[axis], upper[axis])
-        asked += [_lenient(side, largest[k]) for side in sides]
-    return asked
+        lower, upper = envelope.limits.of(k)
+        sides = both_sides(f"{DERIVATIVES[k]} {AXES[axis]}", UNITS[k], column, lower[axis], upper[axis])
+        queries += [_lenient(side, largest[k]) for side in sides]
+    return queries
 
 
-def _lenient(question: Question, largest: float) -> Question:
-    return replace(question, slack=MET * max(largest, abs(question.limit)))
+def _lenient(query: ExtremumQuery, largest: float) -> ExtremumQuery:
+    return replace(query, slack=LIMIT_TOLERANCE * max(largest, abs(query.limit)))
 
 
 def _sums(trajectory: Trajectory, derivative: int) -> Array:
     """The sums of absolute values that each component is evaluated from, (S, 3)."""
-    rates = polynomial.differentiate(trajectory.coefficients, derivative)
-    return np.asarray(np.abs(rates).sum(axis=1) / trajectory.durations[:, None] ** derivative)
+    coefficients = polynomial.differentiate(trajectory.coefficients, derivative)
+    return np.asarray(np.abs(coefficients).sum(axis=1) / trajectory.durations[:, None] ** derivative)

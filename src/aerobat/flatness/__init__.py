@@ -1,6 +1,7 @@
 """Differential flatness: what a vehicle must do to fly a trajectory, inverted or not."""
 
-from aerobat.flatness.setpoints import (
+from aerobat.flatness.parallel_transport import TimeInterval
+from aerobat.flatness.references import (
     Reference,
     axial_drag,
     end_thrust,
@@ -8,6 +9,13 @@ from aerobat.flatness.setpoints import (
     reference,
     reference_of,
 )
-from aerobat.flatness.transport import Span
 
-__all__ = ["Reference", "Span", "axial_drag", "end_thrust", "lateral_drag", "reference", "reference_of"]
+__all__ = [
+    "Reference",
+    "TimeInterval",
+    "axial_drag",
+    "end_thrust",
+    "lateral_drag",
+    "reference",
+    "reference_of",
+]

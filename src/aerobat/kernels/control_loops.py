@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+from aerobat.kernels import flatness
 from aerobat.kernels.ops import Axes, Matrix, Ops, Quaternion, Scalar, Vector
 from aerobat.kernels.quaternions import axes, conjugate, multiply, smallest_rotation, to_body, to_world
 from aerobat.kernels.rigid_body import Body, EnvironmentParameters, MassProperties
@@ -193,4 +194,4 @@ def feedback_moment(gains: Gains, inertia: Matrix, error: AttitudeError, integra
 def reference_moment(inertia: Matrix, body_axes: Axes, ahead: Lookahead) -> Vector:
     """The moment that the reference asks [N·m], J ω' + ω × Jω, with its rates in the body's own axes."""
     omega, omega_dot = to_body(body_axes, ahead.omega), to_body(body_axes, ahead.omega_dot)
-    return add(transform(inertia, omega_dot), cross(omega, transform(inertia, omega)))
+    return flatness.moment(inertia, omega, omega_dot)

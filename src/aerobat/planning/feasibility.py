@@ -14,10 +14,10 @@ from numpy.typing import NDArray
 
 from aerobat.arrays import Array
 from aerobat.certification.continuity import discontinuities
-from aerobat.certification.motion import Motion
+from aerobat.certification.thrust_curve import ThrustCurve
 from aerobat.environment import Environment
-from aerobat.flatness.setpoints import UNDETERMINED, body_rates, specific_thrust, wrench_for
-from aerobat.flatness.transport import Frames, Span, frames, onward
+from aerobat.flatness.parallel_transport import Frames, TimeInterval, advance, frames
+from aerobat.flatness.references import UNDETERMINED, body_rates, specific_thrust, wrench_for
 from aerobat.trajectory import Trajectory
 from aerobat.vehicle import Vehicle, rotor_thrusts
 
@@ -42,7 +42,7 @@ class RotorMargin:
     max_rotor: int
     low_margin: float  # [N] from the lower limit, negative: below it
     high_margin: float  # [N] from the upper limit, negative: above it
-    undetermined: tuple[Span, ...]  # where thrust vanishes, and with it the attitude
+    undetermined: tuple[TimeInterval, ...]  # where thrust vanishes, and with it the attitude
     bounded_moments: bool  # False if attitude or body rates jump, which no moment can do
 
     @property
@@ -199,7 +199,7 @@ class _Path:
         airspeed = v - self.environment.wind
         thrust = specific_thrust(self.vehicle, self.environment, airspeed, a, j, s)
         step = at - self.frames.times[base]
-        q = onward(self.frames.q_world_body[base], self.frames.thrust[base], thrust, step)
+        q = advance(self.frames.q_world_body[base], self.frames.thrust[base], thrust, step)
         gaps = self._gaps(thrust, airspeed, q, np.ones(len(at), dtype=bool))
         gaps = gaps.reshape(*times.shape, 2 * len(self.vehicle.rotors))
         return np.take_along_axis(gaps, found.columns[:, None, None], axis=-1)[..., 0]
@@ -225,8 +225,8 @@ def _bounded_moments(trajectory: Trajectory, vehicle: Vehicle, environment: Envi
 
     Jerk may jump along the thrust axis: that is a kink in the thrust's size.
     """
-    motion = Motion.of(trajectory, vehicle, environment, trajectory.degree)
-    return not discontinuities(motion, UNDETERMINED * environment.gravity)
+    curve = ThrustCurve.of(trajectory, vehicle, environment, trajectory.degree)
+    return not discontinuities(curve, UNDETERMINED * environment.gravity)
 
 
 CHEBYSHEV = np.polynomial.chebyshev.chebpts1(9)

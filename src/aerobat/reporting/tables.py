@@ -55,7 +55,7 @@ def certificate_table(certificate: Certificate, title: str) -> Table:
     headings = ("quantity", "reaches", "at", "limit", "margin", "verdict")
     table = Table(*headings, title=title, title_justify="left", box=None, pad_edge=False)
     for finding in certificate.findings:
-        if finding.limit is None and finding.side is Side.LEAST:
+        if finding.limit is None and finding.side is Side.MIN:
             continue
         limit = "–" if finding.limit is None else f"{finding.limit:.4g} {finding.unit}"
         margin = "" if finding.margin is None else f"{finding.margin:.3g} {finding.unit}"

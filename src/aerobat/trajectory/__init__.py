@@ -1,7 +1,7 @@
-"""How position varies over time: piecewise polynomials, their extremes, and those of minimum effort."""
+"""Position over time: piecewise polynomials, their extrema, and those of minimum effort."""
 
 from aerobat.trajectory.files import load_trajectory, save_trajectory
-from aerobat.trajectory.minimum_effort import Rule, minimum_effort
+from aerobat.trajectory.minimum_effort import ContinuityRule, minimum_effort
 from aerobat.trajectory.piecewise import Extremum, Trajectory
 
-__all__ = ["Extremum", "Rule", "Trajectory", "load_trajectory", "minimum_effort", "save_trajectory"]
+__all__ = ["ContinuityRule", "Extremum", "Trajectory", "load_trajectory", "minimum_effort", "save_trajectory"]

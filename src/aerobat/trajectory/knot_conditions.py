@@ -1,4 +1,4 @@
-"""What polynomial segments must meet at their knots, as one banded linear system: linear in the segments.
+"""Conditions on polynomial segments at their knots, as one banded linear system: linear in the segments.
 
 A component of n segments of degree 2s - 1 has 2s·n coefficients, of the powers of normalised segment time,
 and as many conditions: s at each end of the course, 2s at each inner knot. The condition on derivative d
@@ -29,24 +29,26 @@ Extended = NDArray[np.longdouble]  # 80 bits where the machine has them, else fl
 Mask = NDArray[np.bool_]
 
 MAX_PASSES = 12  # each wins back digits; beyond, the system is as good as singular
-ROUNDING = 2.0**-54  # a correction this small, relative to its segment, is lost in float64
-TRUSTED = 1e-6  # the last correction, relative to its segment: after a larger one it did not converge
+NEGLIGIBLE_CORRECTION = 2.0**-54  # a correction this small, relative to its segment, is lost in float64
+MAX_LAST_CORRECTION = (
+    1e-6  # the last correction, relative to its segment: after a larger one it did not converge
+)
 
 
 @dataclass(frozen=True, eq=False)
 class KnotConditions:
-    """The conditions on derivatives 0..2s-1 at every knot, for components of which the same is given.
+    """The conditions on derivatives 0..2s-1 at every knot, for components of which the same is fixed.
 
-    Masks (n + 1, 2s). A given derivative takes its value on each side of the knot that there is. A
+    Masks (n + 1, 2s). A fixed derivative takes its value on each side of the knot that there is. A
     continuous one is the same on both sides; at an end of the course the far side is zero.
     """
 
     durations: Array  # [s], (n,)
-    given: Mask
+    fixed: Mask
     continuous: Mask
 
     def solve(self, values: Array) -> Array:
-        """Coefficients (n, 2s, m) of m components; `values` (n + 1, s, m) are zero where none is given.
+        """Coefficients (n, 2s, m) of m components; `values` (n + 1, s, m) are zero where none is fixed.
 
         Raises SpecError when float64 can't tell the system from a singular one.
         """
@@ -59,9 +61,9 @@ class KnotConditions:
                 coefficients += step
                 before, error = error, _relative_size(step, coefficients.astype(float))
                 # errors shrink by a constant ratio: what is left is known without another pass
-                if error * (error / before) <= ROUNDING or not error <= before / 2:
+                if error * (error / before) <= NEGLIGIBLE_CORRECTION or not error <= before / 2:
                     break
-        if not error <= TRUSTED:
+        if not error <= MAX_LAST_CORRECTION:
             raise SpecError(self._too_hard())
         return np.asarray(coefficients, dtype=float)
 
@@ -73,17 +75,17 @@ class KnotConditions:
     @cached_property
     def _rates(self) -> Extended:
         """(u/T)^d of every segment, (n, 2s)."""
-        return np.vander(self._unit / self.durations, self.given.shape[1], increasing=True)
+        return np.vander(self._unit / self.durations, self.fixed.shape[1], increasing=True)
 
     @cached_property
     def _rows(self) -> Mask:
-        """Which conditions there are: (n + 1, 2s, 2), on a segment's end, then on a segment's beginning.
+        """Masks of the conditions: (n + 1, 2s, 2), on a segment's end, then on a segment's beginning.
 
         Continuity counts as one on the end. In this order rows stay within s places above the diagonal
         and 2s - 1 below.
         """
-        ends = self.given | self.continuous
-        begins = self.given.copy()
+        ends = self.fixed | self.continuous
+        begins = self.fixed.copy()
         begins[0] = ends[0]
         begins[-1] = ends[0] = False
         return np.stack([ends, begins], axis=-1)
@@ -144,7 +146,7 @@ class KnotConditions:
     def _too_hard(self) -> str:
         shortest, longest = self.durations.min(), self.durations.max()
         return (
-            "given and durations make conditions that float64 cannot tell apart; make the durations, "
+            "fixed and durations make conditions that float64 cannot tell apart; make the durations, "
             f"{shortest:.3g} to {longest:.3g} s, more alike, or give other derivatives"
         )
 

@@ -1,6 +1,6 @@
 """Closed-form minimum-effort polynomials through waypoints (paper, Section V-B; Cutler and How, 2012).
 
-Of all curves that take the given derivatives at the knots, the one with the least ∫ |d^s p/dt^s|² dt: jerk
+Of all curves that take the fixed derivatives at the knots, the one with the smallest ∫ |d^s p/dt^s|² dt: jerk
 for s = 3, snap for 4, crackle for 5. It consists of polynomials of degree 2s - 1, and where derivative
 d < s is free at a knot its derivative 2s - 1 - d is continuous there (at an end of the course: zero).
 """
@@ -22,31 +22,37 @@ ORDERS = {3: "jerk", 4: "snap", 5: "crackle"}
 AXES = "xyz"
 
 
-class Rule(StrEnum):
-    """Which continuity gives way at an inner knot for a derivative that is given there."""
+class ContinuityRule(StrEnum):
+    """Continuity that gives way at an inner knot for a derivative that is fixed there."""
 
-    VARIATIONAL = "variational"  # derivative 2s - 1 - d for a given derivative d: least effort
+    VARIATIONAL = "variational"  # derivative 2s - 1 - d for a fixed derivative d: minimum effort
     HIGHEST = (
         "highest"  # the highest that remains, as in Cutler and How: more effort, low ones stay continuous
     )
 
 
 def minimum_effort(
-    given: ArrayLike, durations: ArrayLike, rule: Rule = Rule.VARIATIONAL, heading: float = 0.0
+    fixed: ArrayLike,
+    durations: ArrayLike,
+    rule: ContinuityRule = ContinuityRule.VARIATIONAL,
+    heading: float = 0.0,
 ) -> Trajectory:
-    """Polynomials of degree 2s - 1 on n segments, through what is given at their n + 1 knots.
+    """Polynomials of degree 2s - 1 on n segments, through what is fixed at their n + 1 knots.
 
-    `given` (n + 1, s, 3) holds derivatives 0 to s - 1 of position [m/s^d], world frame, NaN where one is
-    free; `durations` (n,) are in seconds. By the variational rule the result is the minimizer of
-    ∫ |d^s p/dt^s|² dt, `Trajectory.effort(s)`; the axes do not know each other. Time and memory grow
-    linearly with n. The paper's curves, of degree 9, have s = 5. The `heading` [rad] is the trajectory's.
+    By the variational rule the result is the minimizer of ∫ |d^s p/dt^s|² dt, `Trajectory.effort(s)`; the
+    axes do not know each other. Time and memory grow linearly with n. The paper's curves, of degree 9, have
+    s = 5. Raises SpecError for other shapes, durations that are not positive, infinities, an end without a
+    position, too little fixed to determine the curve, and durations that differ by more orders of magnitude
+    than float64 can resolve.
 
-    Raises SpecError for shapes other than these, durations that are not positive, infinities, an end
-    without a position, too little given to determine the curve, and durations that differ by more orders
-    of magnitude than float64 can resolve.
+    Args:
+        fixed: Derivatives 0 to s - 1 of position [m/s^d], world, (n + 1, s, 3), NaN where one is free.
+        durations: Of the segments [s], (n,).
+        rule: Continuity that gives way where a derivative is fixed.
+        heading: The trajectory's [rad].
     """
     lengths = _positive(durations)
-    values, known = _split(given, len(lengths))
+    values, known = _split(fixed, len(lengths))
     coefficients = np.empty((len(lengths), 2 * known.shape[1], 3))
     for axes in _alike(known):
         pattern = known[..., axes[0]]
@@ -55,28 +61,28 @@ def minimum_effort(
     return Trajectory(lengths, coefficients, heading)
 
 
-def _conditions(known: Mask, durations: Array, rule: Rule) -> KnotConditions:
-    """The conditions at all knots for components of which `known` (n + 1, s) is given."""
+def _conditions(known: Mask, durations: Array, rule: ContinuityRule) -> KnotConditions:
+    """The conditions at all knots for components of which `known` (n + 1, s) is fixed."""
     order = known.shape[1]
-    given = np.concatenate([known, np.zeros_like(known)], axis=1)
-    variational = ~given & ~given[:, ::-1]
-    continuous = variational.copy() if rule is Rule.VARIATIONAL else _without_highest(given)
+    fixed = np.concatenate([known, np.zeros_like(known)], axis=1)
+    variational = ~fixed & ~fixed[:, ::-1]
+    continuous = variational.copy() if rule is ContinuityRule.VARIATIONAL else _without_highest(fixed)
     # beyond an end of the course lies nothing to join: free derivatives make others vanish
     ends = [0, -1]
     continuous[ends] = variational[ends] & (np.arange(2 * order) >= order)
-    return KnotConditions(durations, given, continuous)
+    return KnotConditions(durations, fixed, continuous)
 
 
-def _without_highest(given: Mask) -> Mask:
-    """At each knot, the derivatives not given but for as many of the highest as there are given."""
-    from_top = np.cumsum(~given[:, ::-1], axis=1)[:, ::-1]
-    return np.asarray(~given & (from_top > given.sum(axis=1, keepdims=True)))
+def _without_highest(fixed: Mask) -> Mask:
+    """At each knot, the derivatives not fixed but for as many of the highest as there are fixed."""
+    from_top = np.cumsum(~fixed[:, ::-1], axis=1)[:, ::-1]
+    return np.asarray(~fixed & (from_top > fixed.sum(axis=1, keepdims=True)))
 
 
 def _check_determined(known: Mask, durations: Array, axis: str) -> None:
-    """Refuse (n + 1, s) givens on all of which some polynomial of degree below s vanishes: it costs nothing.
+    """Refuse (n + 1, s) conditions on all of which some polynomial of degree below s vanishes.
 
-    Values with all derivatives below those given at the same knot (Hermite's) determine such a polynomial
+    Values with all derivatives below those fixed at the same knot (Hermite's) determine such a polynomial
     by their number; others (Birkhoff's) by the rank of their matrix.
     """
     order = known.shape[1]
@@ -90,13 +96,13 @@ def _check_determined(known: Mask, durations: Array, axis: str) -> None:
     missing = order - int(np.linalg.matrix_rank(np.array(rows)))
     if missing:
         raise SpecError(
-            f"given leaves the curve along {axis} undetermined; give {missing} more of its derivatives "
+            f"fixed leaves the curve along {axis} undetermined; give {missing} more of its derivatives "
             f"for minimum {ORDERS[order]}, at the ends for instance"
         )
 
 
 def _alike(known: Mask) -> list[list[int]]:
-    """The axes in groups of which the same is given."""
+    """The axes in groups of which the same is fixed."""
     groups: dict[bytes, list[int]] = {}
     for axis in range(3):
         groups.setdefault(known[..., axis].tobytes(), []).append(axis)
@@ -110,26 +116,26 @@ def _positive(durations: ArrayLike) -> Array:
     return lengths
 
 
-def _split(given: ArrayLike, segments: int) -> tuple[Array, Mask]:
-    """What is given, zero where free, and where it is, both (n + 1, s, 3)."""
+def _split(fixed: ArrayLike, segments: int) -> tuple[Array, Mask]:
+    """Fixed values, zero where free, and where they are, both (n + 1, s, 3)."""
     try:
-        array = np.array(given, dtype=np.float64)
+        array = np.array(fixed, dtype=np.float64)
     except (TypeError, ValueError):
-        raise SpecError("given must be an array of numbers, NaN where a derivative is free") from None
+        raise SpecError("fixed must be an array of numbers, NaN where a derivative is free") from None
     shape = array.shape
     if shape[:1] + shape[2:] != (segments + 1, 3) or shape[1] not in ORDERS:
         raise SpecError(
-            "given must have the shape (knots, derivatives, 3) with 3, 4 or 5 derivatives and "
+            "fixed must have the shape (knots, derivatives, 3) with 3, 4 or 5 derivatives and "
             f"{segments + 1} knots, one more than durations, got {shape}"
         )
     known = ~np.isnan(array)
     if not known[[0, -1], 0].all():
-        raise SpecError("given must hold the position at both ends, in all three components")
-    return frozen(np.where(known, array, 0.0), "given"), known
+        raise SpecError("fixed must hold the position at both ends, in all three components")
+    return frozen(np.where(known, array, 0.0), "fixed"), known
 
 
-def _checked(rule: Rule) -> Rule:
+def _checked(rule: ContinuityRule) -> ContinuityRule:
     try:
-        return Rule(rule)
+        return ContinuityRule(rule)
     except ValueError:
-        raise SpecError(f"rule must be one of {', '.join(Rule)}, got {rule!r}") from None
+        raise SpecError(f"rule must be one of {', '.join(ContinuityRule)}, got {rule!r}") from None

@@ -1,4 +1,4 @@
-"""Trajectory: a piecewise polynomial position with its heading, all derivatives and their exact extremes."""
+"""Trajectory: a piecewise polynomial position with its heading, all derivatives and their exact extrema."""
 
 from __future__ import annotations
 
@@ -66,8 +66,13 @@ class Trajectory:
     ) -> Trajectory:
         """Integrate exactly a chain of r integrators whose input is constant on each interval.
 
-        `initial` (r, 3) holds position, velocity, ... at t = 0, `inputs` (N, 3) the r-th derivative of
-        position on each interval of `dt` seconds (paper, Section II: r = 3, jerk). Raises SpecError.
+        That is the paper's Section II for r = 3, jerk. Raises SpecError for other shapes.
+
+        Args:
+            initial: Position, velocity, ... at t = 0 [m/s^k], world, (r, 3).
+            inputs: The r-th derivative of position on each interval [m/s^r], world, (N, 3).
+            dt: How long an interval is [s].
+            heading: The trajectory's [rad].
         """
         state = frozen(initial, "initial", (None, 3))
         inputs = frozen(inputs, "inputs", (None, 3))
@@ -155,7 +160,7 @@ class Trajectory:
         return self._extrema(self._rates(derivative))[1]
 
     def component_range(self, derivative: int) -> tuple[Array, Array]:
-        """The least and the largest of each component of d^k p/dt^k over continuous time, each (3,)."""
+        """The smallest and the largest of each component of d^k p/dt^k over continuous time, each (3,)."""
         values = []
         for axis in range(3):
             component = self._rates(derivative)[..., axis : axis + 1]
@@ -164,7 +169,7 @@ class Trajectory:
         return np.min(values, axis=1), np.max(values, axis=1)
 
     def specific_thrust_range(self, gravity: float) -> tuple[Extremum, Extremum]:
-        """The least and the largest |a + g e3| [m/s²] over continuous time, exactly."""
+        """The smallest and the largest |a + g e3| [m/s²] over continuous time, exactly."""
         thrust = self._rates(2).copy()
         thrust[:, 0, 2] += gravity
         return self._extrema(thrust)
@@ -184,12 +189,12 @@ class Trajectory:
         return segment, (times - self.knots[segment]) / self.durations[segment]
 
     def _extrema(self, coefficients: Array) -> tuple[Extremum, Extremum]:
-        """The least and the largest norm of segment polynomials (S, K, 3), with their times."""
+        """The smallest and the largest norm of segment polynomials (S, K, 3), with their times."""
         s = polynomial.stationary_points(coefficients)
         norms = np.linalg.norm(polynomial.evaluate(coefficients[:, None], s), axis=-1)
         times = self.knots[:-1, None] + s * self.durations[:, None]
-        least, largest = norms.argmin(), norms.argmax()
+        smallest, largest = norms.argmin(), norms.argmax()
         return (
-            Extremum(float(norms.flat[least]), float(times.flat[least])),
+            Extremum(float(norms.flat[smallest]), float(times.flat[smallest])),
             Extremum(float(norms.flat[largest]), float(times.flat[largest])),
         )

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from aerobat.arrays import Array
 
-NEGLIGIBLE = 1e-11  # a leading coefficient this small beside the largest spoils a companion matrix
+NEGLIGIBLE_LEADING = 1e-11  # a leading coefficient this small beside the largest spoils a companion matrix
 
 
 def differentiate(coefficients: Array, order: int = 1) -> Array:
@@ -112,4 +112,4 @@ def _true_degrees(coefficients: Array) -> NDArray[np.intp]:
     magnitudes = np.abs(coefficients)
     largest = magnitudes.max(axis=1, keepdims=True, initial=0.0)
     powers = np.arange(coefficients.shape[1])
-    return np.asarray(np.where(magnitudes > NEGLIGIBLE * largest, powers, 0).max(axis=1, initial=0))
+    return np.asarray(np.where(magnitudes > NEGLIGIBLE_LEADING * largest, powers, 0).max(axis=1, initial=0))

@@ -20,7 +20,7 @@ from aerobat.planning.search import Bisection, Grid, Search
 from aerobat.problem.problem import Problem
 from aerobat.problem.stage import StageSequence
 from aerobat.trajectory import Trajectory
-from aerobat.trajectory.minimum_effort import Rule, minimum_effort
+from aerobat.trajectory.minimum_effort import ContinuityRule, minimum_effort
 from aerobat.vehicle import Vehicle
 
 ASSUMED_THRUST_TO_WEIGHT = 2.0  # for first times without a vehicle
@@ -48,7 +48,7 @@ class MinSnap:
     """
 
     order: int = 5  # s
-    rule: Rule = Rule.VARIATIONAL
+    rule: ContinuityRule = ContinuityRule.VARIATIONAL
     stretch: Stretch | None = None
     search: Search | None = None
     stop_after: int | None = None

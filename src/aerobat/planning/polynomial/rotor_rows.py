@@ -1,8 +1,4 @@
-"""Rotor thrusts along a polynomial path, in CasADi's symbols.
-
-By flatness, without the terms of b3 × b3' and b3 × b3'' that cancel,
-
-    ω = f × f' / n²,   ω' = f × f'' / n² − 2 (f·f' / n²) ω,   n = |f|,   f = a + g e3 + (d/m) v.
+"""Rotor thrusts along a polynomial path, in CasADi's symbols, by the equations of `kernels.flatness`.
 
 In a vertical plane the body turns about one axis of its own. In space its axes are those of a guess, carried
 from the guess's thrust direction to the new one by the smallest rotation: exact where the guess is met.
@@ -20,6 +16,10 @@ from aerobat import so3
 from aerobat.arrays import Array
 from aerobat.environment import Environment
 from aerobat.flatness import axial_drag, lateral_drag, reference
+from aerobat.kernels import flatness as kernel
+from aerobat.kernels.ops import Vector
+from aerobat.kernels.quaternions import to_body
+from aerobat.kernels.vectors import dot, scale
 from aerobat.optimization.nonlinear import import_casadi
 from aerobat.trajectory import Trajectory
 from aerobat.vehicle import Vehicle
@@ -57,20 +57,24 @@ class RotorRows:
         moving, duration = ca.SX.sym("moving", 4 * d), ca.SX.sym("T")
         frame = ca.SX.sym("frame", 3 if self._planar else 9)
         v, a, j, s = (moving[k * d : (k + 1) * d] / duration ** (k + 1) for k in range(4))
-        drag = lateral_drag(self.vehicle)
         airspeed = v - ca.DM(self.environment.wind @ self.axes)
-        f = a + ca.DM(self.environment.weight @ self.axes) + drag * airspeed
-        df, ddf = j + drag * a, s + drag * j
-        squared = ca.dot(f, f)
-        turn = self._turn_in_plane if self._planar else self._turn_in_space
-        along = ca.dot(f, airspeed) / ca.sqrt(squared)
-        thrust = self.vehicle.mass * (ca.sqrt(squared) + axial_drag(self.vehicle) * along)
-        thrusts = ca.DM(self._thrusts_from[:, :-2]) @ ca.vertcat(thrust, turn(ca, f, df, ddf, frame))
+        weight = ca.DM(self.environment.weight @ self.axes)
+        thrusts = kernel.specific_thrust(weight, lateral_drag(self.vehicle), airspeed, a, j, s)
+        f, jerk, snap, airspeed = (self._local(vector, frame) for vector in (*thrusts, airspeed))
+        squared = dot(f, f)
+        n = ca.sqrt(squared)
+        b3 = scale(1 / n, f)
+        omega, omega_dot = kernel.body_rates(f, scale(1 / squared, jerk), scale(1 / squared, snap))
+        collective = kernel.collective(self.vehicle.mass, axial_drag(self.vehicle), n, b3, airspeed)
+        if self._planar:
+            turning = ca.vertcat(omega_dot[2], omega[2] ** 2)
+        else:
+            body = ((*kernel.tilted(b3, rate), 0.0) for rate in (omega, omega_dot))
+            turning = ca.vertcat(*kernel.moment(self.vehicle.inertia.tolist(), *body))
+        rotors = ca.DM(self._thrusts_from[:, :-2]) @ ca.vertcat(collective, turning)
         low, high = self._thrusts_from[:, -2:].T
-        shares = (thrusts - low) / (high - low)
-        return ca.Function(
-            "rotors", [moving, duration, frame], [ca.vertcat(shares, squared / self.environment.gravity**2)]
-        )
+        values = ca.vertcat((rotors - low) / (high - low), squared / self.environment.gravity**2)
+        return ca.Function("rotors", [moving, duration, frame], [values])
 
     @property
     def _planar(self) -> bool:
@@ -99,28 +103,9 @@ class RotorRows:
         scaled = np.round(rows / np.maximum(np.abs(rows).max(axis=0), ROUNDING) / ROUNDING)
         return np.asarray(rows[np.sort(np.unique(scaled, axis=0, return_index=True)[1])])
 
-    def _turn_in_plane(self, ca: Any, f: Any, df: Any, ddf: Any, frame: Any) -> Any:
-        """Angular acceleration and squared rate about the axis of turning."""
-        squared = ca.dot(f, f)
-        rate = _cross(f, df) / squared
-        return ca.vertcat(_cross(f, ddf) / squared - 2.0 * ca.dot(f, df) / squared * rate, rate**2)
-
-    def _turn_in_space(self, ca: Any, f: Any, df: Any, ddf: Any, frame: Any) -> Any:
-        """The moment J ω' + ω × J ω, body axes."""
-        squared = ca.dot(f, f)
-        rate = ca.cross(f, df) / squared
-        change = ca.cross(f, ddf) / squared - 2.0 * ca.dot(f, df) / squared * rate
-        x, y, z = frame[:3], frame[3:6], frame[6:]
-        b3 = f / ca.sqrt(squared)
-
-        def in_body(across: Any) -> Any:
-            """Components of a vector normal to b3 along x and y, turned as z turns to b3."""
-            tipped = ca.dot(z, across) / (1.0 + ca.dot(z, b3))
-            return ca.vertcat(*(ca.dot(e, across) - ca.dot(e, b3) * tipped for e in (x, y)), 0.0)
-
-        inertia, omega = ca.DM(self.vehicle.inertia), in_body(rate)
-        return inertia @ in_body(change) + ca.cross(omega, inertia @ omega)
-
-
-def _cross(a: Any, b: Any) -> Any:
-    return a[0] * b[1] - a[1] * b[0]
+    def _local(self, vector: Any, frame: Any) -> Vector:
+        """Components of a vector in the guess's body axes; in a plane in its own, the third across it."""
+        if self._planar:
+            return vector[0], vector[1], 0.0
+        x, y, z = ((frame[k], frame[k + 1], frame[k + 2]) for k in (0, 3, 6))
+        return to_body((x, y, z), (vector[0], vector[1], vector[2]))

@@ -131,7 +131,7 @@ class _Inside:
 
     def drawn_in(self, found: _Found, asked: Limits, spare: float) -> _Inside:
         """Further within by what a solution exceeds, the rotors' thrusts by a `spare` [N] more."""
-        low, high = (_unproven(found.certificate, side) for side in (Side.LEAST, Side.MOST))
+        low, high = (_unproven(found.certificate, side) for side in (Side.MIN, Side.MAX))
         return _Inside(
             drawn_in(self.limits, asked, found.trajectory, DERIVATIVES),
             self.below + (spare + low if low > 0.0 else 0.0),

@@ -10,12 +10,13 @@ from numpy.polynomial import chebyshev
 
 from aerobat.arrays import Array
 
-ROUNDING = 1e-14  # of the sum of absolute values behind a polynomial's value: Horner's rule and its argument
+# of the sum of absolute values behind a polynomial's value: Horner's rule and its argument
+EVALUATION_ROUNDING = 1e-14
 
 
 @dataclass(frozen=True)
 class Basis:
-    """What interpolation of one degree K needs; series are rows of K + 1 coefficients c of Σ c_k T_k."""
+    """Nodes and matrices of interpolation of one degree K; series are rows of coefficients of Σ c_k T_k."""
 
     nodes: Array  # Chebyshev points, both ends among them, (K + 1,)
     analysis: Array  # values at the nodes -> coefficients, (K + 1, K + 1)

@@ -1,4 +1,4 @@
-"""How far flatness, interpolated at Chebyshev points, can be from the truth: proven, by complex analysis.
+"""Error of flatness interpolated at Chebyshev points, proven by complex analysis.
 
 Velocity and specific thrust f are polynomials on a piece of a segment, so all that flatness makes of them
 is analytic in complex time wherever f·f keeps off zero. If q is analytic inside the Bernstein ellipse E_ρ
@@ -8,8 +8,8 @@ norms of the terms of v, f, f', f'' alone: with c = |c_0| of f, |f − c_0| <= �
 
     |n² − c²| <= κ c²,  κ = 2δ + δ² < 1   =>   Re n >= c √(1 − κ)
 
-whence the rest, as `attitude` states its equations; complex vectors have their Hermitian norms. On the
-piece itself, ρ = 1, the same bounds say how large things are there, and what rounding does to them.
+whence the rest, as DERIVATION.md has it; complex vectors have their Hermitian norms. On the piece itself,
+ρ = 1, the same bounds say how large things are there, and what rounding does to them.
 """
 
 from __future__ import annotations
@@ -21,70 +21,76 @@ from numpy.typing import NDArray
 
 from aerobat.arrays import Array
 from aerobat.certification import quantities
-from aerobat.certification.chebyshev import ROUNDING, growth
-from aerobat.certification.quantities import Sizes
-from aerobat.flatness.setpoints import axial_drag
+from aerobat.certification.enclosure.chebyshev import EVALUATION_ROUNDING, growth
+from aerobat.certification.quantities import MagnitudeBounds
+from aerobat.flatness.references import axial_drag
 from aerobat.vehicle import Vehicle
 
 RHO = np.array([1.0, 1.6, 2.0, 2.5, 3.2, 4.0, 5.5, 8.0, 14.0, 30.0, 80.0])
-CURLED = 30.0  # a frame's imaginary angle beyond which an ellipse is of no use
+MAX_FRAME_ANGLE = 30.0  # an imaginary angle of the frame beyond which an ellipse is of no use
 
 
 @dataclass(frozen=True)
-class Accuracy:
-    """What holds on each of P pieces, for each of Q quantities."""
+class InterpolationError:
+    """Bounds on each of P pieces, for each of Q quantities."""
 
-    size: Array  # of the quantities, at most, (P, Q)
+    magnitude: Array  # of the quantities, at most, (P, Q)
     remainder: Array  # between a quantity and its interpolant, at most, rounding aside, (P, Q)
     rounding: Array  # of a quantity's values, at most, (P, Q)
     twist_remainder: Array  # [rad] of the angle by which the frame turns along the piece, (P,)
     twist_rounding: Array  # [rad], and of the frame's hand-over from piece to piece, (P,)
-    turning: Array  # what an error of one radian in the frame's angle does to a quantity, (P, Q)
+    per_radian: Array  # what an error in the frame's angle does to a quantity [1/rad], (P, Q)
 
 
 @dataclass(frozen=True)
-class _Bounds:
+class EllipseBounds:
     """Bounds on R ellipses about P pieces, all (P, R)."""
 
     regular: NDArray[np.bool_]  # where not, the others mean nothing
-    sizes: Sizes
+    magnitudes: MagnitudeBounds
     twist: Array  # of the angle by which the frame turns about b3 per half length [rad]
 
 
 def regular(norms: Array) -> NDArray[np.bool_]:
-    """Whether the smallest ellipse is off the zeros of f·f; `norms` (P, K + 1, 4) as from `Motion.norms`."""
+    """Tell on which pieces the smallest ellipse is off the zeros of f·f; norms as from `ThrustCurve`."""
     thrust = norms[..., 1]
     return _off_zero(thrust[:, 0], thrust[:, 1:] @ growth(thrust.shape[1] - 1, RHO[1:2])[1:, 0])
 
 
-def accuracy(norms: Array, seconds: Array, sums: Array, vehicle: Vehicle) -> Accuracy:
-    """Judge interpolation on regular pieces that take `seconds` (P,); `norms` as in `regular`.
+def accuracy(norms: Array, seconds: Array, sums: Array, vehicle: Vehicle) -> InterpolationError:
+    """Bound the error of interpolation on regular pieces.
 
-    `sums` (P, 4): the sums of absolute values that v, f, f', f'' are evaluated from.
+    Args:
+        norms: Of the terms of v, f, f', f'' as Chebyshev series, (P, K + 1, 4).
+        seconds: How long the pieces are [s], (P,).
+        sums: Of the absolute values that v, f, f', f'' are evaluated from, (P, 4).
+        vehicle: What flies.
     """
-    around = _bounds(norms, seconds / 2, vehicle)
-    sizes = Sizes(*(bound[:, 0] for bound in vars(around.sizes).values()))
-    least = norms[:, 0, 1] - norms[:, 1:, 1].sum(axis=1)
-    rounded = _rounded(sizes, least, norms, ROUNDING * sums, vehicle)
-    none = np.zeros_like(least)
+    around = on_ellipses(norms, seconds / 2, vehicle)
+    real = MagnitudeBounds(*(bound[:, 0] for bound in vars(around.magnitudes).values()))
+    min_thrust = norms[:, 0, 1] - norms[:, 1:, 1].sum(axis=1)
+    rounded = _rounded(real, min_thrust, norms, EVALUATION_ROUNDING * sums, vehicle)
     decay = 4 / (RHO[1:] ** (norms.shape[1] - 1) * (RHO[1:] - 1))
-    bounds = np.where(around.regular[..., None], quantities.bounds(vehicle, around.sizes), np.inf)
+    bounds = np.where(around.regular[..., None], quantities.bounds(vehicle, around.magnitudes), np.inf)
     twist = np.where(around.regular, around.twist, np.inf)
-    return Accuracy(
-        size=bounds[:, 0],
+    none = np.zeros_like(min_thrust)
+    turned = MagnitudeBounds(none, none, real.omega, real.omega_dot)
+    return InterpolationError(
+        magnitude=bounds[:, 0],
         remainder=(bounds[:, 1:] * decay[:, None]).min(axis=1),
-        rounding=quantities.errors(vehicle, sizes, rounded),
+        rounding=quantities.errors(vehicle, real, rounded),
         twist_remainder=2 * (twist[:, 1:] * decay).min(axis=1),
-        twist_rounding=seconds * rounded.omega + ROUNDING,
-        turning=quantities.errors(vehicle, sizes, Sizes(none, none, sizes.omega, sizes.omega_dot)),
+        twist_rounding=seconds * rounded.omega + EVALUATION_ROUNDING,
+        per_radian=quantities.errors(vehicle, real, turned),
     )
 
 
-def _bounds(norms: Array, half: Array, vehicle: Vehicle) -> _Bounds:
+def on_ellipses(norms: Array, half: Array, vehicle: Vehicle) -> EllipseBounds:
     """Bounds from the norms (P, K + 1, 4) of the terms of v, f, f', f'' on pieces `half` (P,) [s] a side."""
     larger = growth(norms.shape[1] - 1, RHO)
     speed, _, jerk, snap = (norms[..., k] @ larger for k in range(4))
-    mean, away = norms[:, :1, 1], norms[:, 1:, 1] @ larger[1:]
+    mean = norms[:, :1, 1]
+    away = norms[:, 1:, 1] @ larger[1:]
     usable = _off_zero(mean, away)
     away, speed, jerk, snap = (np.where(usable, bound, 0.0) for bound in (away, speed, jerk, snap))
     delta = away / mean
@@ -94,27 +100,29 @@ def _bounds(norms: Array, half: Array, vehicle: Vehicle) -> _Bounds:
     beside = mean * (root + 1 - delta)  # |n + w|, at least
     twist = half[:, None] * away * jerk * inverse / beside
     curl = twist * (RHO + 1 / RHO) / 2  # the angle's imaginary part, gathered from the real line on
-    usable &= curl < CURLED
-    frame = (1 + away * (1 + ratio) / beside) * np.exp(np.where(usable, curl, 0.0))  # |x, y|
+    usable &= curl < MAX_FRAME_ANGLE
+    frame = (1 + away * (1 + ratio) / beside) * np.exp(np.where(usable, curl, 0.0))  # |x|, |y|, at most
     omega = frame * jerk * inverse
     omega_dot = frame * inverse * (snap + 2 * ratio * jerk**2 * inverse)
     axial = abs(axial_drag(vehicle))
     thrust = vehicle.mass * (mean * np.where(RHO > 1, 1 - root, 1 + delta) + axial * ratio * speed)
-    return _Bounds(usable, Sizes(thrust, ratio, omega, omega_dot), twist)
+    return EllipseBounds(usable, MagnitudeBounds(thrust, ratio, omega, omega_dot), twist)
 
 
 def _off_zero(mean: Array, away: Array) -> NDArray[np.bool_]:
+    """Tell where κ < 1, with a thousandth to spare."""
     return np.asarray(2 * away * mean + away**2 < 0.999 * mean**2)
 
 
-def _rounded(sizes: Sizes, least: Array, norms: Array, off: Array, vehicle: Vehicle) -> Sizes:
+def _rounded(
+    real: MagnitudeBounds, min_thrust: Array, norms: Array, off: Array, vehicle: Vehicle
+) -> MagnitudeBounds:
     """First-order errors of what flatness gives if v, f, f', f'' are `off` by so much, (P, 4)."""
-    f, df, ddf = (off[:, 1:] / least[:, None]).T
-    omega, omega_dot = sizes.omega, sizes.omega_dot
+    f, df, ddf = (off[:, 1:] / min_thrust[:, None]).T
     speed = norms[..., 0].sum(axis=1)
-    return Sizes(
+    return MagnitudeBounds(
         thrust=vehicle.mass * (off[:, 1] + abs(axial_drag(vehicle)) * (off[:, 0] + 2 * f * speed)),
-        upright=2 * f,
-        omega=df + 2 * f * omega,
-        omega_dot=ddf + 4 * df * omega + 2 * f * (omega_dot + 4 * omega**2),
+        cos_tilt=2 * f,
+        omega=df + 2 * f * real.omega,
+        omega_dot=ddf + 4 * df * real.omega + 2 * f * (real.omega_dot + 4 * real.omega**2),
     )

@@ -17,15 +17,16 @@ from numpy.typing import NDArray
 
 from aerobat import so3
 from aerobat.arrays import Array
+from aerobat.trajectory.subintervals import Subintervals
 
-CONE = 0.5  # a piece stays within this fraction of |f| of its start: 30 degrees
+MAX_TURN = 0.5  # a piece stays within this fraction of |f| of its start: 30 degrees
 MAX_HALVINGS = 60  # far more than the cone asks of any sane curve
 CROSSING_ROUNDS = 10  # each divides by 16: to the last digit
 UP = np.array([0.0, 0.0, 1.0])
 
 
 @dataclass(frozen=True)
-class Span:
+class TimeInterval:
     """A stretch of time [s]."""
 
     start: float
@@ -41,30 +42,7 @@ class Frames:
     q_world_body: Array  # (M, 4), sign continuous
     determined: NDArray[np.bool_]  # |f| reaches the floor, so that there is a thrust direction, (M,)
     samples: NDArray[np.intp]  # where among the nodes the samples are, (T,)
-    undetermined: tuple[Span, ...]
-
-
-@dataclass(frozen=True)
-class _Pieces:
-    """Quintic pieces of a curve in their order: (n, 6, 3) control points on parts of sample intervals."""
-
-    interval: NDArray[np.intp]  # (n,)
-    offset: Array  # where in its interval a piece starts, in [0, 1), (n,)
-    length: Array  # its part of the interval, (n,)
-    control: Array  # (n, 6, 3)
-
-    def __getitem__(self, rows: NDArray[np.bool_] | NDArray[np.intp]) -> _Pieces:
-        return _Pieces(self.interval[rows], self.offset[rows], self.length[rows], self.control[rows])
-
-    def halves(self) -> _Pieces:
-        """Both halves of every piece."""
-        half = self.length / 2
-        return _joined(
-            [
-                _Pieces(self.interval, self.offset, half, LOWER_HALF @ self.control),
-                _Pieces(self.interval, self.offset + half, half, UPPER_HALF @ self.control),
-            ]
-        )
+    undetermined: tuple[TimeInterval, ...]
 
 
 def frames(times: Array, thrust: Array, floor: float, heading: float) -> Frames:
@@ -73,15 +51,17 @@ def frames(times: Array, thrust: Array, floor: float, heading: float) -> Frames:
     It starts as the smallest rotation from the vertical to f, turned about f by `heading`. Where |f| is below
     the floor it stays as it was; beyond, the smallest rotation takes it on. Repeated times are allowed.
     """
-    pieces = _subdivided(times, thrust, floor)
-    samples = np.append(np.flatnonzero(pieces.offset == 0.0), len(pieces.offset))
-    nodes, node_thrust = _nodes(times, thrust, pieces, samples)
+    pieces, control = _subdivided(times, thrust, floor)
+    samples = np.append(np.flatnonzero(pieces.start == 0.0), len(pieces))
+    nodes, node_thrust = _nodes(times, thrust, pieces, control, samples)
     magnitude = _norm(node_thrust[:, 0])
     determined = magnitude >= floor
     directions = _held_directions(node_thrust[:, 0], magnitude, determined)
     smooth = determined[1:] & determined[:-1]
-    q = _carry(directions, np.where(smooth[:, None, None], pieces.control, directions[:-1, None]), heading)
-    return Frames(nodes, node_thrust, q, determined, samples, _spans(nodes, pieces, determined, floor))
+    q = _carry(directions, np.where(smooth[:, None, None], control, directions[:-1, None]), heading)
+    return Frames(
+        nodes, node_thrust, q, determined, samples, _undetermined(nodes, control, determined, floor)
+    )
 
 
 def _carry(directions: Array, control: Array, heading: float) -> Array:
@@ -98,7 +78,7 @@ def _carry(directions: Array, control: Array, heading: float) -> Array:
     return np.asarray(q * np.cumprod(np.where(turned, -1.0, 1.0))[:, None])
 
 
-def onward(q_world_body: Array, thrust: Array, ahead: Array, step: Array) -> Array:
+def advance(q_world_body: Array, thrust: Array, ahead: Array, step: Array) -> Array:
     """Carry attitudes (n, 4) over one `step` (n,) [s] each, from f, f', f'' (n, 3, 3) to those ahead.
 
     For steps inside the cone that `frames` keeps between its nodes, at determined thrust.
@@ -136,27 +116,31 @@ def _angle_about_up(q: Array) -> Array:
     return np.asarray(2 * np.arctan2(q[..., 3], q[..., 0]))
 
 
-def _subdivided(times: Array, thrust: Array, floor: float) -> _Pieces:
-    """The curve's pieces, halved until each stays in a cone about its start or below the floor."""
-    count = len(times) - 1
-    control = _hermite(thrust[:-1], thrust[1:], np.diff(times))
-    pending = _Pieces(np.arange(count), np.zeros(count), np.ones(count), control)
+def _subdivided(times: Array, thrust: Array, floor: float) -> tuple[Subintervals, Array]:
+    """Parts of sample intervals in their order, and control points (n, 6, 3) there.
+
+    They are halved until each stays in a cone about its start or below the floor.
+    """
+    pending, control = Subintervals.whole(len(times) - 1), _hermite(thrust[:-1], thrust[1:], np.diff(times))
     done = []
     for _ in range(MAX_HALVINGS):
-        rough = _rough(pending.control, floor)
-        done.append(pending[~rough])
-        pending = pending[rough].halves()
-        if not rough.any():
+        wide = _leaves_cone(control, floor)
+        done.append((pending[~wide], control[~wide]))
+        pending = pending[wide].halves()
+        control = np.concatenate([LOWER_HALF @ control[wide], UPPER_HALF @ control[wide]])
+        if not wide.any():
             break
-    pieces = _joined([*done, pending])
-    return pieces[np.lexsort((pieces.offset, pieces.interval))]
+    parts, controls = zip(*done, (pending, control), strict=True)
+    pieces = Subintervals.joined(parts)
+    order = pieces.order()
+    return pieces[order], np.concatenate(controls)[order]
 
 
-def _rough(control: Array, floor: float) -> NDArray[np.bool_]:
-    """Whether a piece may leave the cone about its start, and rises above the floor."""
+def _leaves_cone(control: Array, floor: float) -> NDArray[np.bool_]:
+    """Tell which pieces may leave the cone about their start, and rise above the floor."""
     spread = _norm(control - control[:, :1]).max(axis=1)
-    sizes = _norm(control)
-    return np.asarray((spread > CONE * sizes[:, 0]) & (sizes.max(axis=1) > floor))
+    norms = _norm(control)
+    return np.asarray((spread > MAX_TURN * norms[:, 0]) & (norms.max(axis=1) > floor))
 
 
 def _hermite(thrust: Array, ahead: Array, step: Array) -> Array:
@@ -168,12 +152,14 @@ def _hermite(thrust: Array, ahead: Array, step: Array) -> Array:
     return np.stack([f0, left, *inner, right, f1], axis=1)
 
 
-def _nodes(times: Array, thrust: Array, pieces: _Pieces, samples: NDArray[np.intp]) -> tuple[Array, Array]:
+def _nodes(
+    times: Array, thrust: Array, pieces: Subintervals, control: Array, samples: NDArray[np.intp]
+) -> tuple[Array, Array]:
     """Times (M,) and thrust (M, 3, 3) at the starts of all pieces and at the end; exact at the samples."""
     steps = np.diff(times)[pieces.interval]
-    nodes = np.append(times[pieces.interval] + pieces.offset * steps, times[-1])
+    nodes = np.append(times[pieces.interval] + pieces.start * steps, times[-1])
     length = np.where(steps > 0, pieces.length * steps, np.inf)[:, None]
-    b0, b1, b2 = pieces.control[:, :3].swapaxes(0, 1)
+    b0, b1, b2 = control[:, :3].swapaxes(0, 1)
     started = np.stack([b0, 5 * (b1 - b0) / length, 20 * (b2 - 2 * b1 + b0) / length**2], axis=1)
     node_thrust = np.concatenate([started, thrust[-1:]])
     node_thrust[samples] = thrust
@@ -187,17 +173,19 @@ def _held_directions(f: Array, magnitude: Array, determined: NDArray[np.bool_]) 
     return np.where(last[:, None] >= 0, directions[last], UP)
 
 
-def _spans(times: Array, pieces: _Pieces, determined: NDArray[np.bool_], floor: float) -> tuple[Span, ...]:
-    """The stretches whose nodes are below the floor, to where the curve crosses it."""
+def _undetermined(
+    times: Array, control: Array, determined: NDArray[np.bool_], floor: float
+) -> tuple[TimeInterval, ...]:
+    """The intervals whose nodes are below the floor, to where the curve crosses it."""
     edges = np.diff(np.concatenate([[0], ~determined, [0]]).astype(int))
     crossings = [
-        float(times[i] + _crossing(pieces.control[i], floor) * (times[i + 1] - times[i]))
+        float(times[i] + _crossing(control[i], floor) * (times[i + 1] - times[i]))
         for i in np.flatnonzero(edges[1:-1])
     ]
     start = [] if determined[0] else [float(times[0])]
     end = [] if determined[-1] else [float(times[-1])]
     bounds = iter([*start, *crossings, *end])
-    return tuple(Span(first, last) for first, last in zip(bounds, bounds, strict=True))
+    return tuple(TimeInterval(first, last) for first, last in zip(bounds, bounds, strict=True))
 
 
 def _crossing(control: Array, floor: float) -> float:
@@ -209,11 +197,6 @@ def _crossing(control: Array, floor: float) -> float:
         past = max(int(np.argmax(above != above[0])), 1)
         low, high = float(s[past - 1]), float(s[past])
     return (low + high) / 2
-
-
-def _joined(parts: list[_Pieces]) -> _Pieces:
-    names = ("interval", "offset", "length", "control")
-    return _Pieces(*(np.concatenate([getattr(part, name) for part in parts]) for name in names))
 
 
 def _norm(vectors: Array) -> Array:

@@ -1,0 +1,101 @@
+"""Maxima of Chebyshev series, enclosed: branch and bound by halving intervals.
+
+On an interval a series is at most the maximum of its first three terms, a parabola, plus the magnitudes
+of all others. Halving shrinks these by eight, and wherever the bound stays below a value known, nothing
+remains to be looked for.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from aerobat.arrays import Array
+from aerobat.certification.enclosure import chebyshev
+from aerobat.trajectory.subintervals import Subintervals
+
+MAX_HALVINGS = 50
+Indices = NDArray[np.intp]
+
+
+@dataclass(frozen=True)
+class SeriesBatch:
+    """Series that approximate functions, each of one of G groups whose greatest value is wanted.
+
+    The ends of an enclosure come as near to one another as `tightness` says: of the group's scale or of its
+    greatest value, whichever is larger, errors aside.
+    """
+
+    coefficients: Array  # (N, K + 1)
+    error: Array  # between function and series, at most, (N,)
+    group: Indices  # (N,)
+    scale: Array  # what is large for a group, (G,)
+    tightness: float
+
+
+@dataclass(frozen=True)
+class Enclosure:
+    """For each group: min <= sup <= max, and where at least `min` is taken. All (G,)."""
+
+    min: Array
+    max: Array
+    member: Indices
+    position: Array  # in [-1, 1], on that member's interval
+
+
+def enclose_maximum(batch: SeriesBatch) -> Enclosure:
+    """Enclose the greatest value of each group, all groups at once."""
+    groups = len(batch.scale)
+    found = Enclosure(
+        np.full(groups, -np.inf), np.full(groups, -np.inf), np.zeros(groups, dtype=np.intp), np.zeros(groups)
+    )
+    halves = chebyshev.basis(batch.coefficients.shape[1] - 1).halves
+    slack = batch.tightness / 10 * batch.scale
+    pending, coefficients = Subintervals.whole(len(batch.group)), batch.coefficients
+    for halving in range(MAX_HALVINGS):
+        group, error = batch.group[pending.interval], batch.error[pending.interval]
+        peak, tail, vertex = _parabola(coefficients, slack[group])
+        upper = peak + tail + error
+        value = chebyshev.evaluate(coefficients, vertex) - error
+        _improve(found, pending, group, vertex, value, slack)
+        tolerance = batch.tightness * np.maximum(batch.scale, np.abs(found.min))[group]
+        open_ = (upper > found.min[group] + tolerance) & (tail > tolerance / 4)
+        if halving == MAX_HALVINGS - 1:
+            open_[:] = False
+        np.maximum.at(found.max, group[~open_], upper[~open_])
+        if not open_.any():
+            break
+        pending = pending[open_].halves()
+        coefficients = np.concatenate([coefficients[open_] @ half.T for half in halves])
+    return found
+
+
+def _parabola(coefficients: Array, flat: Array) -> tuple[Array, Array, Array]:
+    """The maximum of c0 T0 + c1 T1 + c2 T2 on [-1, 1], the magnitudes of all other terms, and where it is.
+
+    That is said to be at -1 where these terms change by less than `flat` (n,).
+    """
+    padded = coefficients if coefficients.shape[1] > 2 else np.pad(coefficients, ((0, 0), (0, 2)))
+    c0, c1, c2 = padded[:, :3].T
+    inside = (c2 < 0) & (np.abs(c1) < -4 * c2)
+    steep = np.where(inside, c2, -1.0)
+    vertex = np.where(inside, -c1 / (4 * steep), np.where(c1 < 0, -1.0, 1.0))
+    peak = np.where(inside, c0 - steep - c1**2 / (8 * steep), c0 + c2 + np.abs(c1))
+    vertex = np.where(np.abs(c1) + np.abs(c2) < flat / 2, -1.0, vertex)
+    return peak, np.abs(padded[:, 3:]).sum(axis=1), vertex
+
+
+def _improve(
+    found: Enclosure, parts: Subintervals, group: Indices, vertex: Array, value: Array, slack: Array
+) -> None:
+    """Enter values that exceed those known by more than a `slack` (G,); of equal ones the earliest."""
+    maximum = found.min.copy()
+    np.maximum.at(maximum, group, value)
+    position = 2 * parts.start + parts.length * (1 + vertex) - 1
+    better = (maximum > found.min + slack)[group] & (value >= maximum[group] - slack[group])
+    order = np.lexsort((-position, -parts.interval))  # of several of one group the last assigned stays
+    order = order[better[order]]
+    at = group[order]
+    found.min[at], found.member[at], found.position[at] = value[order], parts.interval[order], position[order]

@@ -1,0 +1,70 @@
+"""Cutting a trajectory into pieces on which interpolation is provably as good as exact."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from aerobat.arrays import Array
+from aerobat.certification import quantities
+from aerobat.certification.enclosure import interpolation_error
+from aerobat.certification.thrust_curve import ThrustCurve
+from aerobat.flatness import TimeInterval
+from aerobat.trajectory.subintervals import Subintervals
+
+MAX_REMAINDER = 1e-8  # of its scale: what interpolation may leave open of a quantity
+MAX_TWIST_REMAINDER = 1e-9  # [rad] and of the frame's angle on one piece
+MIN_DURATION = 1e-8  # [s], a piece that is not cut further
+MAX_PIECES = 20_000  # at a time, beside four a segment; no flight needs so many
+
+
+@dataclass(frozen=True)
+class Subdivision:
+    """The pieces of a curve in their order, and what is left of it."""
+
+    pieces: Subintervals
+    vanishing: tuple[TimeInterval, ...]  # where |f| is below the floor
+
+
+def subdivide(curve: ThrustCurve, floor: float) -> Subdivision:
+    """Halve segments until |f| >= floor [m/s²] and interpolation is accurate on each piece.
+
+    What stays below the floor, or cannot be told from it, is left out.
+    """
+    count = curve.trajectory.segments
+    pending = Subintervals.whole(count)
+    done, left = [pending[:0]], [pending[:0]]
+    while len(pending):
+        norms = curve.norms(curve.series(curve.on(pending)), pending)
+        mean = norms[:, 0, 1]
+        spread = norms[:, 1:, 1].sum(axis=1)
+        good = (mean - spread >= floor) & interpolation_error.regular(norms)
+        good[good] = _accurate(curve, pending[good], norms[good])
+        hopeless = (mean + spread < floor) | (pending.seconds(curve.trajectory) < MIN_DURATION)
+        hopeless |= len(good) > MAX_PIECES + 4 * count
+        done.append(pending[good])
+        left.append(pending[hopeless & ~good])
+        pending = pending[~(good | hopeless)].halves()
+    pieces, rest = Subintervals.joined(done), Subintervals.joined(left)
+    return Subdivision(pieces[pieces.order()], _time_intervals(curve, rest[rest.order()]))
+
+
+def _accurate(curve: ThrustCurve, pieces: Subintervals, norms: Array) -> NDArray[np.bool_]:
+    seconds = pieces.seconds(curve.trajectory)
+    found = interpolation_error.accuracy(norms, seconds, curve.sums[pieces.interval], curve.vehicle)
+    allowed = MAX_REMAINDER * np.maximum(quantities.scales(curve.vehicle), found.magnitude)
+    small = (found.remainder <= allowed).all(axis=1) & (found.twist_remainder <= MAX_TWIST_REMAINDER)
+    return np.asarray(small & np.isfinite(found.magnitude).all(axis=1))
+
+
+def _time_intervals(curve: ThrustCurve, pieces: Subintervals) -> tuple[TimeInterval, ...]:
+    """The intervals that pieces in order make up together."""
+    if not len(pieces):
+        return ()
+    start, end = (pieces.times(curve.trajectory, np.full(len(pieces), side)) for side in (-1.0, 1.0))
+    apart = start[1:] - end[:-1] > MIN_DURATION
+    firsts = start[np.append(True, apart)]
+    lasts = end[np.append(apart, True)]
+    return tuple(TimeInterval(float(a), float(b)) for a, b in zip(firsts, lasts, strict=True))

@@ -1,0 +1,95 @@
+"""Airspeed and specific thrust along a trajectory: what all certified quantities are made of."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from aerobat.arrays import Array
+from aerobat.certification.enclosure import chebyshev
+from aerobat.environment import Environment
+from aerobat.errors import SpecError
+from aerobat.flatness.references import lateral_drag, specific_thrust
+from aerobat.kernels import flatness
+from aerobat.trajectory import Trajectory, polynomial
+from aerobat.trajectory.subintervals import Subintervals
+from aerobat.vehicle import Vehicle
+
+MAX_DERIVATIVE = 1e30  # [m/s^k] up to crackle; a larger one cannot be meant, and powers of it might overflow
+
+
+@dataclass(frozen=True)
+class ThrustCurve:
+    """Airspeed v and specific thrust f, f', f'' of a vehicle on a trajectory: four vector polynomials."""
+
+    trajectory: Trajectory
+    vehicle: Vehicle
+    environment: Environment
+    rates: Array  # velocity to snap in powers of normalised time, (S, K, 12)
+    sums: Array  # sums of the absolute values of what v, f, f', f'' are summed from, (S, 4)
+    basis: chebyshev.Basis
+
+    @classmethod
+    def of(
+        cls, trajectory: Trajectory, vehicle: Vehicle, environment: Environment, degree: int
+    ) -> ThrustCurve:
+        """The curve of a vehicle on a trajectory. Raises SpecError for derivatives beyond all reason.
+
+        Args:
+            trajectory: The path; its heading does not matter here.
+            vehicle: Its drag counts.
+            environment: Its gravity and wind count.
+            degree: Of interpolation, at least; the polynomials' own if that is higher.
+        """
+        _check(trajectory)
+        size = max(trajectory.degree, 1)
+        rates = np.zeros((trajectory.segments, size, 4, 3))
+        for k in range(4):
+            rate = polynomial.differentiate(trajectory.coefficients, k + 1)
+            rates[:, : rate.shape[1], k] = rate / trajectory.durations[:, None, None] ** (k + 1)
+        velocity, acceleration, jerk, snap = np.linalg.norm(rates, axis=-1).sum(axis=1).T
+        airspeed = velocity + np.linalg.norm(environment.wind)
+        drag = lateral_drag(vehicle)
+        thrust = flatness.specific_thrust(environment.gravity, drag, airspeed, acceleration, jerk, snap)
+        sums = np.stack([airspeed, *thrust], axis=1)
+        basis = chebyshev.basis(max(degree, size))
+        return cls(trajectory, vehicle, environment, rates.reshape(*rates.shape[:2], 12), sums, basis)
+
+    def at(self, segment: NDArray[np.intp], s: Array) -> Array:
+        """v, f, f', f'' at normalised times s (..., k) of segments (...), (..., k, 4, 3)."""
+        rates = polynomial.evaluate(self.rates[segment][..., None, :, :], s)
+        v, a, j, snap = np.moveaxis(rates.reshape(*s.shape, 4, 3), -2, 0)
+        airspeed = v - self.environment.wind
+        thrust = specific_thrust(self.vehicle, self.environment, airspeed, a, j, snap)
+        return np.concatenate([airspeed[..., None, :], thrust], axis=-2)
+
+    def on(self, pieces: Subintervals) -> Array:
+        """v, f, f', f'' at the basis's nodes on pieces of segments, (P, K + 1, 4, 3)."""
+        s = pieces.start[:, None] + pieces.length[:, None] * (1 + self.basis.nodes) / 2
+        return self.at(pieces.interval, s)
+
+    def series(self, values: Array) -> Array:
+        """Chebyshev series of v, f, f', f'' from `on`, in the order of their terms, (P, K + 1, 4, 3)."""
+        flat = self.basis.analysis @ values.reshape(*values.shape[:2], 12)
+        flat[:, self.rates.shape[1] :] = 0.0  # polynomials of this degree have no further terms
+        return np.asarray(flat.reshape(values.shape))
+
+    def norms(self, series: Array, pieces: Subintervals) -> Array:
+        """Norms of the terms of `series`, all but the first padded outward by rounding, (P, K + 1, 4)."""
+        norms = np.linalg.norm(series, axis=-1)
+        padding = self.basis.lebesgue * chebyshev.EVALUATION_ROUNDING * self.sums[pieces.interval]
+        norms[:, 1 : self.rates.shape[1]] += padding[:, None]
+        return np.asarray(norms)
+
+
+def _check(trajectory: Trajectory) -> None:
+    with np.errstate(all="ignore"):
+        for k in range(6):
+            rates = polynomial.differentiate(trajectory.coefficients, k)
+            if not (np.abs(rates / trajectory.durations[:, None, None] ** k) < MAX_DERIVATIVE).all():
+                raise SpecError(
+                    f"the trajectory's derivatives exceed {MAX_DERIVATIVE:g} m/s^k; "
+                    "check the unit of its durations"
+                )

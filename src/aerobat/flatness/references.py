@@ -1,0 +1,226 @@
+"""From a trajectory to everything a vehicle must do to fly it: attitude, rates, moments, rotor thrusts.
+
+The equations are those of `kernels.flatness`; `parallel_transport` carries the attitude along. Linear drag
+with coefficients d across and d_z along the body's z keeps the vehicle flat (Faessler, Franchi, Scaramuzza,
+RA-L 2018); of unequal ones across the mean is taken.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from aerobat import so3
+from aerobat.arrays import Array, frozen
+from aerobat.environment import Environment
+from aerobat.errors import SpecError
+from aerobat.flatness.parallel_transport import Frames, TimeInterval, frames
+from aerobat.kernels import flatness as kernel
+from aerobat.states import FlatState, Setpoint, Wrench
+from aerobat.trajectory import Trajectory
+from aerobat.vehicle import Vehicle
+from aerobat.vehicle.allocation import rotor_thrusts
+
+UNDETERMINED = 1e-3  # the attitude is undetermined where |f| is below this fraction of gravity
+
+
+@dataclass(frozen=True, eq=False)
+class Reference:
+    """All that a vehicle must do to follow a trajectory, at every time of a series."""
+
+    times: Array  # [s], (T,)
+    setpoint: Setpoint  # leading axis T; where the attitude is undetermined it is held and its rates are zero
+    rotor_thrusts: Array  # [N], as flatness has them, limits or not, (T, n)
+    undetermined: tuple[TimeInterval, ...]  # where |f| is next to nothing, between samples too
+
+
+def reference(
+    trajectory: Trajectory,
+    vehicle: Vehicle,
+    times: ArrayLike | None = None,
+    rate: float | None = None,
+    environment: Environment | None = None,
+) -> Reference:
+    """Derive from `trajectory` what `vehicle` must do, at `times`, or at `rate` and the very end.
+
+    The attitude starts, at the trajectory's start, as the smallest rotation from upright to the thrust,
+    turned about it by the trajectory's heading, and is carried along without spin, so that it does not depend
+    on the times. Raises SpecError unless one of times and rate is given, rising and in the trajectory.
+
+    Args:
+        trajectory: The path and its heading.
+        vehicle: What flies it; its limits do not matter here.
+        times: When [s], (T,), none before the last.
+        rate: Samples a second [1/s], instead of times.
+        environment: Gravity and wind, by default those of a calm day on Earth.
+    """
+    if (times is None) == (rate is None):
+        raise SpecError("reference needs either times or a rate, not both")
+    environment = environment or Environment()
+    times = _rising(trajectory.sample(rate) if rate is not None else times)
+    flat = trajectory.flat(times)
+    # both sides of every knot join the times, which show the later side
+    sides = (_thrust_on_segments(trajectory, vehicle, environment, s) for s in (1.0, 0.0))
+    thrust = np.concatenate([*sides, _thrust(flat, vehicle, environment)])
+    segment_boundaries = np.concatenate([trajectory.knots[1:], trajectory.knots[:-1]])
+    nodes = np.concatenate([segment_boundaries, times])
+    side = np.repeat([0, 1, 2], [trajectory.segments, trajectory.segments, len(times)])
+    order = np.lexsort((side, nodes))
+    path = _frames(nodes[order], thrust[order], environment, trajectory.heading)
+    at = path.samples[np.argsort(order)[len(segment_boundaries) :]]
+    return _assembled(times, flat, path, at, vehicle, environment)
+
+
+def reference_of(
+    times: ArrayLike,
+    flat: FlatState,
+    vehicle: Vehicle,
+    environment: Environment | None = None,
+    heading: float = 0.0,
+) -> Reference:
+    """Derive from a series of flat states what `vehicle` must do; as `reference` otherwise.
+
+    Between samples the thrust is taken as the quintic that fits both; where a derivative jumps, give the
+    time twice, with the states of both sides. Raises SpecError for falling times and shapes that differ.
+
+    Args:
+        times: When [s], (T,).
+        flat: Position to snap at these times, (T, 3) each.
+        vehicle: What flies them; its limits do not matter here.
+        environment: Gravity and wind, by default those of a calm day on Earth.
+        heading: Of the start [rad], about the thrust axis.
+    """
+    environment = environment or Environment()
+    times = _rising(times)
+    flat = FlatState(**{name: frozen(x, name, (len(times), 3)) for name, x in vars(flat).items()})
+    if any(series.ndim != 2 for series in vars(flat).values()):
+        raise SpecError("the flat states must be one series, with a row for each time and no further axes")
+    path = _frames(times, _thrust(flat, vehicle, environment), environment, heading)
+    return _assembled(times, flat, path, path.samples, vehicle, environment)
+
+
+def body_rates(thrust: Array, q_world_body: Array, determined: NDArray[np.bool_]) -> tuple[Array, Array]:
+    """Body rates [rad/s] and accelerations [rad/s²] that keep b3 along f, body axes, both (..., 3).
+
+    `thrust` holds f, f', f'' (..., 3, 3); where the attitude is not `determined` (...), both are zero.
+    """
+    n = np.where(determined, np.linalg.norm(thrust[..., 0, :], axis=-1), np.inf)
+    turning = so3.unrotate(q_world_body[..., None, :], thrust[..., 1:, :]) / n[..., None, None]
+    jerk, snap = (_components(turning[..., k, :]) for k in (0, 1))
+    omega, omega_dot = kernel.body_rates((0.0, 0.0, 1.0), jerk, snap)
+    return np.stack(omega, axis=-1), np.stack(omega_dot, axis=-1)
+
+
+def wrench_for(thrust: Array, airspeed: Array, omega: Array, omega_dot: Array, vehicle: Vehicle) -> Wrench:
+    """Collective thrust and moment along a path.
+
+    Args:
+        thrust: f, f', f'' [m/s²] and so on, world, (..., 3, 3).
+        airspeed: Velocity relative to the wind [m/s], world, (..., 3).
+        omega: ω [rad/s], body axes, (..., 3).
+        omega_dot: ω' [rad/s²], body axes, (..., 3).
+        vehicle: What flies it.
+    """
+    f = thrust[..., 0, :]
+    n = np.linalg.norm(f, axis=-1)
+    b3 = _components(f / np.where(n > 0.0, n, 1.0)[..., None])
+    moment = kernel.moment(vehicle.inertia.tolist(), _components(omega), _components(omega_dot))
+    collective = kernel.collective(vehicle.mass, axial_drag(vehicle), n, b3, _components(airspeed))
+    return Wrench(collective, np.stack(moment, axis=-1))
+
+
+def specific_thrust(
+    vehicle: Vehicle,
+    environment: Environment,
+    airspeed: Array,
+    acceleration: Array,
+    jerk: Array,
+    snap: Array,
+) -> Array:
+    """Specific thrust f and its derivatives f', f'' [m/s²] and so on, world, (..., 3, 3).
+
+    Args:
+        vehicle: Its drag counts.
+        environment: Its gravity counts; the wind is in the airspeed.
+        airspeed: Velocity relative to the wind [m/s], world, (..., 3).
+        acceleration: [m/s²] world, (..., 3).
+        jerk: [m/s³] world, (..., 3).
+        snap: [m/s⁴] world, (..., 3).
+    """
+    drag = lateral_drag(vehicle)
+    return np.stack(
+        kernel.specific_thrust(environment.weight, drag, airspeed, acceleration, jerk, snap), axis=-2
+    )
+
+
+def lateral_drag(vehicle: Vehicle) -> float:
+    """The drag coefficient across the thrust axis per mass, d/m [1/s]."""
+    return float(vehicle.drag_body[:2].mean()) / vehicle.mass
+
+
+def axial_drag(vehicle: Vehicle) -> float:
+    """The drag coefficient along the thrust less that across it, per mass, (d_z − d)/m [1/s]."""
+    return float(vehicle.drag_body[2]) / vehicle.mass - lateral_drag(vehicle)
+
+
+def end_thrust(velocity: Array, acceleration: Array, vehicle: Vehicle, environment: Environment) -> Array:
+    """Specific thrust f [m/s²] (..., 3) at a velocity and an acceleration of a path, world.
+
+    Args:
+        velocity: Relative to the ground [m/s], world, (..., 3).
+        acceleration: [m/s²] world, (..., 3).
+        vehicle: Its drag counts.
+        environment: Its gravity and wind count.
+    """
+    none = np.zeros(3)
+    airspeed = velocity - environment.wind
+    return specific_thrust(vehicle, environment, airspeed, acceleration, none, none)[..., 0, :]
+
+
+def _thrust(flat: FlatState, vehicle: Vehicle, environment: Environment) -> Array:
+    airspeed = flat.velocity - environment.wind
+    return specific_thrust(vehicle, environment, airspeed, flat.acceleration, flat.jerk, flat.snap)
+
+
+def _thrust_on_segments(
+    trajectory: Trajectory, vehicle: Vehicle, environment: Environment, s: float
+) -> Array:
+    """f, f', f'' at one normalised time on each segment, (S, 3, 3)."""
+    v, a, j, snap = (trajectory.on_segments([s], k)[:, 0] for k in (1, 2, 3, 4))
+    return specific_thrust(vehicle, environment, v - environment.wind, a, j, snap)
+
+
+def _frames(times: Array, thrust: Array, environment: Environment, heading: float) -> Frames:
+    return frames(times, thrust, UNDETERMINED * environment.gravity, float(frozen(heading, "heading", ())))
+
+
+def _assembled(
+    times: Array,
+    flat: FlatState,
+    path: Frames,
+    nodes: NDArray[np.intp],
+    vehicle: Vehicle,
+    environment: Environment,
+) -> Reference:
+    thrust, q = path.thrust[nodes], path.q_world_body[nodes]
+    omega, omega_dot = body_rates(thrust, q, path.determined[nodes])
+    wrench = wrench_for(thrust, flat.velocity - environment.wind, omega, omega_dot, vehicle)
+    setpoint = Setpoint(flat, q, omega, omega_dot, wrench)
+    rotors = rotor_thrusts(vehicle, wrench)
+    for array in (*vars(flat).values(), q, omega, omega_dot, wrench.thrust, wrench.moment_body, rotors):
+        array.flags.writeable = False
+    return Reference(times, setpoint, rotors, path.undetermined)
+
+
+def _rising(times: ArrayLike | None) -> Array:
+    series = frozen(times, "times", (None,)) if times is not None else np.empty(0)
+    if series.ndim != 1 or series.size == 0 or (np.diff(series) < 0).any():
+        raise SpecError("times must be a list of at least one number of seconds, none before the last")
+    return series
+
+
+def _components(vectors: Array) -> tuple[Array, Array, Array]:
+    x, y, z = np.moveaxis(vectors, -1, 0)
+    return x, y, z

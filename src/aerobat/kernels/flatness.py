@@ -1,0 +1,48 @@
+"""Differential flatness in scalar components: from a specific thrust to body rates, moment and thrust.
+
+With the velocity v relative to the air, f = a + g e3 + (d/m) v and its derivatives, n = |f| and b3 = f/n,
+
+    ω = b3 × f'/n,   ω' = b3 × f''/n − 2 (b3·f'/n) ω     no spin about b3, in whichever axes f is
+    M = J ω' + ω × J ω                                   body axes
+    T = m (n + (d_z − d)/m b3·v)
+
+ω' is b3 × b3'': what b3'' has along b3 drops out, and n'' with it. No step divides by 1 + b3_z, save the way
+into axes that are given relative to the upright ones.
+"""
+
+from __future__ import annotations
+
+from aerobat.kernels.ops import Matrix, Scalar, Vector
+from aerobat.kernels.vectors import add, add_scaled, cross, dot, transform
+
+
+def specific_thrust(
+    weight: Scalar, drag: Scalar, airspeed: Scalar, acceleration: Scalar, jerk: Scalar, snap: Scalar
+) -> tuple[Scalar, Scalar, Scalar]:
+    """Return f, f' and f'' of components, or of whole vectors of an engine that adds and scales them."""
+    return acceleration + drag * airspeed + weight, jerk + drag * acceleration, snap + drag * jerk
+
+
+def body_rates(b3: Vector, jerk: Vector, snap: Vector) -> tuple[Vector, Vector]:
+    """Return ω [rad/s] and ω' [rad/s²] of a body that keeps b3 along f; `jerk` and `snap` are f'/n, f''/n.
+
+    f itself with f'/n² and f''/n² gives the same.
+    """
+    omega = cross(b3, jerk)
+    return omega, add_scaled(cross(b3, snap), -2.0 * dot(b3, jerk), omega)
+
+
+def tilted(b3: Vector, across: Vector) -> tuple[Scalar, Scalar]:
+    """Components x, y of a vector `across` b3, in axes tilted with e3 by the smallest rotation to b3."""
+    share = across[2] / (1.0 + b3[2])
+    return across[0] - b3[0] * share, across[1] - b3[1] * share
+
+
+def moment(inertia: Matrix, omega: Vector, omega_dot: Vector) -> Vector:
+    """The moment J ω' + ω × Jω [N·m] that makes a body turn so; body axes."""
+    return add(transform(inertia, omega_dot), cross(omega, transform(inertia, omega)))
+
+
+def collective(mass: Scalar, axial_drag: Scalar, norm: Scalar, b3: Vector, airspeed: Vector) -> Scalar:
+    """The collective thrust [N] behind a specific thrust of this norm, drag along b3 made up for."""
+    return mass * (norm + axial_drag * dot(b3, airspeed))

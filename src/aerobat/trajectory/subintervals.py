@@ -1,0 +1,59 @@
+"""Intervals cut into halves: parts of segments or of sample intervals, until a proof goes through."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from aerobat.arrays import Array
+from aerobat.trajectory.piecewise import Trajectory
+
+Rows = NDArray[np.bool_] | NDArray[np.intp] | slice
+
+
+@dataclass(frozen=True)
+class Subintervals:
+    """Parts of numbered intervals, in any order, each interval's own time running from 0 to 1."""
+
+    interval: NDArray[np.intp]  # (n,)
+    start: Array  # in [0, 1), (n,)
+    length: Array  # (n,)
+
+    @classmethod
+    def whole(cls, count: int) -> Subintervals:
+        """All of `count` intervals."""
+        return cls(np.arange(count), np.zeros(count), np.ones(count))
+
+    @classmethod
+    def joined(cls, collections: Sequence[Subintervals]) -> Subintervals:
+        """All parts of several collections."""
+        names = ("interval", "start", "length")
+        return cls(*(np.concatenate([getattr(parts, name) for parts in collections]) for name in names))
+
+    def __len__(self) -> int:
+        return len(self.interval)
+
+    def __getitem__(self, rows: Rows) -> Subintervals:
+        return Subintervals(self.interval[rows], self.start[rows], self.length[rows])
+
+    def halves(self) -> Subintervals:
+        """Both halves of every part: all first ones, then all second ones."""
+        half = self.length / 2
+        starts = (self.start, self.start + half)
+        return Subintervals.joined([Subintervals(self.interval, start, half) for start in starts])
+
+    def order(self) -> NDArray[np.intp]:
+        """The rows in the order of intervals and starts, (n,)."""
+        return np.lexsort((self.start, self.interval))
+
+    def seconds(self, trajectory: Trajectory) -> Array:
+        """Durations [s] of parts of a trajectory's segments, (n,)."""
+        return np.asarray(self.length * trajectory.durations[self.interval])
+
+    def times(self, trajectory: Trajectory, position: Array) -> Array:
+        """Times [s] of positions in [-1, 1] on each part of a trajectory's segments, (n,) -> (n,)."""
+        s = self.start + self.length * (1 + position) / 2
+        return np.asarray(trajectory.knots[self.interval] + s * trajectory.durations[self.interval])
