@@ -59,8 +59,8 @@ def test_the_half_flip_passes_a_gate_at_any_tilt_with_its_thrust_along_the_uprig
     gate = problem.gates[0].tilted(np.deg2rad(tilt_deg))
     problem = replace(problem, gates=(gate,))
     found = plan(problem, vehicle=quad)
-    (gate,) = found.stages
-    thrust = found.trajectory.evaluate(gate.time, 2) + [0.0, 0.0, STANDARD_GRAVITY]  # noqa: RUF005
+    (passage,) = found.stages
+    thrust = found.trajectory.evaluate(passage.time, 2) + [0.0, 0.0, STANDARD_GRAVITY]  # noqa: RUF005
     sideways = thrust - (thrust @ gate.normal) * gate.normal
     np.testing.assert_allclose(sideways / np.linalg.norm(sideways), gate.up, atol=1e-5)
 
