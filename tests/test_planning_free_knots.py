@@ -8,8 +8,8 @@ import pytest
 from aerobat.errors import SpecError
 from aerobat.planning import MinSnap, Plan
 from aerobat.planning.polynomial.free_knots import FreeKnots
-from aerobat.planning.polynomial.knot_samples import cut
-from aerobat.planning.polynomial.min_snap import Stretch
+from aerobat.planning.polynomial.knot_samples import refit
+from aerobat.planning.polynomial.min_snap import TimeScaling
 from aerobat.planning.proof import certificate_for
 from aerobat.problem import EndState, Limits, Problem, Waypoint, Waypoints, load_problem
 from aerobat.states import STANDARD_GRAVITY
@@ -109,7 +109,7 @@ def test_random_starts_end_certified(seed: int, plans: dict[str, Plan]) -> None:
     rng = np.random.default_rng(seed)
     first, second = rng.uniform(0.2, 3.0, 2).tolist()
     waypoints = Waypoints((Waypoint(position=np.array([np.nan, np.nan, -2.0]), time=first),), first + second)
-    start = MinSnap(stretch=Stretch.ALL, stop_after=1).plan(
+    start = MinSnap(time_scaling=TimeScaling.ALL, stop_after=1).plan(
         replace(SECTION_V, maneuver=waypoints), vehicle("B")
     )
     plan = FreeKnots(start=start).plan(SECTION_V, vehicle("B"))
@@ -146,7 +146,7 @@ def test_cutting_keeps_a_path_of_degree_nine(plans: dict[str, Plan]) -> None:
     times = np.linspace(0.0, whole.duration, 101)
     for k in range(4):
         np.testing.assert_allclose(
-            cut(whole, 7).evaluate(times, k), whole.evaluate(times, k), atol=1e-6 * 10.0**k
+            refit(whole, 7).evaluate(times, k), whole.evaluate(times, k), atol=1e-6 * 10.0**k
         )
 
 

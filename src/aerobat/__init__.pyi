@@ -8,15 +8,15 @@ from .flatness import Reference, reference
 from .interchange.csv import read_csv, write_csv
 from .interchange.read import read_trajectory
 from .planning import (
-    Bisection,
+    BisectionSearch,
     FreeKnots,
-    Grid,
+    GridSearch,
     MinSnap,
     Miqp,
     Plan,
     RotorMargin,
-    Stretch,
     TimeOptimal,
+    TimeScaling,
     plan,
     rotor_margin,
 )
@@ -56,7 +56,7 @@ from .vehicle import Rotor, Vehicle, load_vehicle, vehicle_names, write_vehicle
 __all__ = [
     "AerobatError",
     "BackendMissing",
-    "Bisection",
+    "BisectionSearch",
     "BodyState",
     "Certificate",
     "Comparison",
@@ -74,7 +74,7 @@ __all__ = [
     "Gate",
     "GatePassage",
     "Gradient",
-    "Grid",
+    "GridSearch",
     "HalfFlip",
     "Infeasible",
     "Limits",
@@ -98,8 +98,8 @@ __all__ = [
     "SpecError",
     "Stage",
     "StateNoise",
-    "Stretch",
     "TimeOptimal",
+    "TimeScaling",
     "Trajectory",
     "Vehicle",
     "Waypoint",

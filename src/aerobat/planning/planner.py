@@ -6,7 +6,7 @@ from collections.abc import Callable
 from typing import Protocol
 
 from aerobat.planning.miqp import Miqp
-from aerobat.planning.proof import proven
+from aerobat.planning.proof import with_certificate
 from aerobat.planning.result import Attempt, Plan
 from aerobat.problem.problem import Problem
 from aerobat.vehicle import Vehicle
@@ -39,4 +39,4 @@ def plan(
     if vehicle is not None:
         vehicle.require_hover(problem.environment.gravity)
     found = (planner or Miqp()).plan(problem, vehicle, progress)
-    return found if vehicle is None or found.certificate is not None else proven(found, vehicle)
+    return found if vehicle is None or found.certificate is not None else with_certificate(found, vehicle)

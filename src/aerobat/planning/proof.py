@@ -17,7 +17,7 @@ def certificate_for(trajectory: Trajectory, problem: Problem, vehicle: Vehicle) 
     return certify(trajectory, vehicle, problem.environment, Envelope(limits=problem.path_limits))
 
 
-def proven(plan: Plan, vehicle: Vehicle) -> Plan:
+def with_certificate(plan: Plan, vehicle: Vehicle) -> Plan:
     """The plan with the margin and the certificate of a vehicle, whichever it was made for."""
     return replace(
         plan,

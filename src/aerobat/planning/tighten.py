@@ -12,7 +12,7 @@ SPARE = 1e-4  # of a bound, by which it is drawn in beyond what was exceeded
 ROUNDING = 1e-9  # in SI units: an excess that means nothing
 
 
-def drawn_in(bounds: Limits, asked: Limits, trajectory: Trajectory, derivatives: int) -> Limits:
+def tightened(bounds: Limits, asked: Limits, trajectory: Trajectory, derivatives: int) -> Limits:
     """Bounds tighter by as much as the first derivatives of a trajectory exceed what is asked; or unchanged.
 
     Raises SpecError when nothing is left between them.

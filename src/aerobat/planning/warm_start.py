@@ -15,7 +15,7 @@ FLAT = 1e-6  # of its extent: how far a path may leave a plane and still be in i
 
 
 @dataclass(frozen=True, eq=False)
-class Guess:
+class WarmStart:
     """A trajectory, and when it passes a sequence's stages."""
 
     trajectory: Trajectory
@@ -23,7 +23,7 @@ class Guess:
     times: tuple[float, ...]  # [s] of the stages, rising
 
     @classmethod
-    def of(cls, plan: Plan, sequence: StageSequence) -> Guess:
+    def of(cls, plan: Plan, sequence: StageSequence) -> WarmStart:
         """A plan's trajectory, and the order of the sequence's stages in it if it leaves that open."""
         times = [placed.time for placed in plan.stages]
         order = sorted(range(len(times)), key=times.__getitem__)
@@ -34,12 +34,12 @@ class Guess:
         """From the start to the first stage, ..., from the last to the end [s], (P,)."""
         return np.diff([0.0, *self.times, self.trajectory.duration])
 
-    def slowed(self, factor: float) -> Guess:
+    def time_scaled(self, factor: float) -> WarmStart:
         """The same path, flown longer by a factor."""
         trajectory = replace(self.trajectory, durations=factor * self.trajectory.durations)
         return replace(self, trajectory=trajectory, times=tuple(factor * t for t in self.times))
 
-    def shared(self, intervals: int, least: int) -> tuple[int, ...]:
+    def allocate_intervals(self, intervals: int, least: int) -> tuple[int, ...]:
         """About so many intervals, shared among phases by their durations, each given the least or more."""
         share = np.rint(intervals * self.phases / self.trajectory.duration).astype(int)
         return tuple(np.maximum(share, least).tolist())

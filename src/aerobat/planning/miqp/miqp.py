@@ -17,8 +17,8 @@ from aerobat.planning.miqp.formulation import Formulation
 from aerobat.planning.miqp.integrator import IntegratorChain
 from aerobat.planning.proof import certificate_for
 from aerobat.planning.result import Attempt, PlacedStage, Plan
-from aerobat.planning.search import Bisection, Grid, Search
-from aerobat.planning.tighten import drawn_in
+from aerobat.planning.search import BisectionSearch, GridSearch, Search
+from aerobat.planning.tighten import tightened
 from aerobat.problem.problem import Problem
 from aerobat.problem.stage import StageSequence
 from aerobat.trajectory import Trajectory
@@ -89,9 +89,9 @@ class Miqp:
         if self.search is not None:
             return self.search
         if vehicle is None:
-            return Grid()
-        first = _fastest_conceivable(formulation.problem, vehicle) / self.intervals
-        return Bisection(first, last=max(4.0, 2.0 * first))
+            return GridSearch()
+        first = duration_lower_bound(formulation.problem, vehicle) / self.intervals
+        return BisectionSearch(first, last=max(4.0, 2.0 * first))
 
 
 def formulate(problem: Problem, order: int, intervals: int, vehicle: Vehicle | None = None) -> Formulation:
@@ -134,7 +134,7 @@ class _Planning:
         """Draw bounds in by what a trajectory exceeds, or is not proven to hold; whether there was any."""
         bounds, limits = self.formulation.bounds, self.formulation.problem.path_limits
         # the input itself is constant on each interval and exceeds nothing
-        inside = drawn_in(bounds, limits, trajectory, self.formulation.chain.order)
+        inside = tightened(bounds, limits, trajectory, self.formulation.chain.order)
         self.formulation = replace(self.formulation, limits=inside)
         worst = certificate.worst
         if worst is None or worst.verdict is Verdict.HOLDS:
@@ -218,7 +218,7 @@ def _check_thrust(sequence: StageSequence, vehicle: Vehicle) -> None:
                 )
 
 
-def _fastest_conceivable(problem: Problem, vehicle: Vehicle) -> float:
+def duration_lower_bound(problem: Problem, vehicle: Vehicle) -> float:
     """Half the time that full thrust would take straight through the gates [s]: where the search starts."""
     gates = [gate.position for gate in problem.gates]
     points = [problem.start.position, *gates, problem.goal.position]

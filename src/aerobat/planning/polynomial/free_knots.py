@@ -19,11 +19,11 @@ from aerobat.planning.miqp import Miqp
 from aerobat.planning.polynomial.knot_bounds import Bound, path_bounds
 from aerobat.planning.polynomial.knot_program import KnotProgram
 from aerobat.planning.polynomial.knot_rounds import COARSE, RESERVE, Round
-from aerobat.planning.polynomial.knot_samples import Excess, cut
+from aerobat.planning.polynomial.knot_samples import ConstraintViolation, refit
 from aerobat.planning.polynomial.min_snap import MinSnap
 from aerobat.planning.proof import certificate_for
 from aerobat.planning.result import Attempt, PlacedStage, Plan
-from aerobat.planning.warm_start import Guess
+from aerobat.planning.warm_start import WarmStart
 from aerobat.problem.problem import Problem
 from aerobat.problem.stage import StageSequence
 from aerobat.vehicle import Vehicle
@@ -94,8 +94,8 @@ class FreeKnots:
 class _Found:
     """A guess that is certified."""
 
-    guess: Guess
-    excess: Excess
+    guess: WarmStart
+    excess: ConstraintViolation
     certificate: Certificate
     start: Plan | None  # whose path it is, slowed down or not, if it is another planner's
 
@@ -104,7 +104,7 @@ class _Found:
 class _Judged:
     """What a guess comes to."""
 
-    excess: Excess
+    excess: ConstraintViolation
     certified: bool
     outcome: str  # a sentence
 
@@ -141,11 +141,11 @@ class _Run:
 
     def descend(self, start: Plan) -> None:
         """Free the knots of a plan: first of few segments, then of as many as are wanted."""
-        guess = Guess.of(start, self.sequence)
+        guess = WarmStart.of(start, self.sequence)
         if not self._judged(guess, start).certified:
             guess = self._slowed(guess, start)
         for segments in sorted({COARSE, self.config.segments}):
-            shaped = replace(guess, trajectory=cut(guess.trajectory, segments))
+            shaped = replace(guess, trajectory=refit(guess.trajectory, segments))
             last = self._rounds(Round.first(shaped, self._excess(shaped), self.config.reserve))
             if last.usable:
                 guess = last.guess
@@ -198,10 +198,10 @@ class _Run:
             still_ends=self.config.still_ends,
         )
 
-    def _excess(self, guess: Guess) -> Excess:
-        return Excess.of(guess.trajectory, self.vehicle, self.problem.environment, self.bounds)
+    def _excess(self, guess: WarmStart) -> ConstraintViolation:
+        return ConstraintViolation.of(guess.trajectory, self.vehicle, self.problem.environment, self.bounds)
 
-    def _judged(self, guess: Guess, start: Plan | None = None) -> _Judged:
+    def _judged(self, guess: WarmStart, start: Plan | None = None) -> _Judged:
         """What a guess comes to; the best that is certified is kept."""
         excess, missed = self._excess(guess), self._missed(guess)
         if missed is not None or not excess.margin.feasible:
@@ -213,7 +213,9 @@ class _Run:
             self.best = _Found(guess, excess, certificate, start)
         return _Judged(excess, True, certificate.why)
 
-    def _refuted(self, guess: Guess, excess: Excess, certificate: Certificate) -> Excess:
+    def _refuted(
+        self, guess: WarmStart, excess: ConstraintViolation, certificate: Certificate
+    ) -> ConstraintViolation:
         """The excess, with what samples have overlooked and the certificate has not."""
         span = float((self.vehicle.max_thrusts - self.vehicle.min_thrusts).min())
         for finding in certificate.findings:
@@ -223,7 +225,7 @@ class _Run:
                 excess = excess.beside(guess.trajectory, finding.time, max(part, RESERVE))
         return excess
 
-    def _missed(self, guess: Guess) -> str | None:
+    def _missed(self, guess: WarmStart) -> str | None:
         """The first stage that a guess misses, in a sentence; or None."""
         for stage, time in zip(guess.stages, guess.times, strict=True):
             for bound in (Bound.of(condition, self.gravity) for condition in stage.conditions):
@@ -232,15 +234,15 @@ class _Run:
                     return f"the stage '{stage.name}' is missed by {excess:.2g} in SI units"
         return None
 
-    def _slowed(self, guess: Guess, start: Plan) -> Guess:
+    def _slowed(self, guess: WarmStart, start: Plan) -> WarmStart:
         """A guess at the first slower pace that is certified; as it is, where none is."""
         for times in range(1, SLOWED + 1):
-            slower = guess.slowed(SLOWER**times)
+            slower = guess.time_scaled(SLOWER**times)
             if self._judged(slower, start).certified:
                 return slower
         return guess
 
-    def _record(self, guess: Guess, answer: NonlinearResult, judged: _Judged) -> None:
+    def _record(self, guess: WarmStart, answer: NonlinearResult, judged: _Judged) -> None:
         duration, status = guess.trajectory.duration, "locally optimal" if answer.converged else "unknown"
         attempt = Attempt(
             duration, judged.certified, status, judged.outcome, duration, answer.iterations, answer.time

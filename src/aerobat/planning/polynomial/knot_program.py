@@ -21,8 +21,8 @@ from aerobat.arrays import Array
 from aerobat.optimization.nonlinear import NonlinearProgram, NonlinearResult, import_casadi, solve_nonlinear
 from aerobat.planning.polynomial.knot_bounds import Bound
 from aerobat.planning.polynomial.knot_variables import DEGREE, GIVEN, Frame, KnotVariables
-from aerobat.planning.polynomial.rotor_rows import RotorRows
-from aerobat.planning.warm_start import Guess
+from aerobat.planning.polynomial.rotor_constraints import RotorConstraints
+from aerobat.planning.warm_start import WarmStart
 from aerobat.problem.problem import Problem
 from aerobat.vehicle import Vehicle
 
@@ -47,7 +47,7 @@ class KnotProgram:
 
     problem: Problem
     vehicle: Vehicle
-    guess: Guess
+    guess: WarmStart
     samples: tuple[Array, ...]  # normalised times in each segment at which limits hold
     bounds: tuple[Bound, ...]  # that hold along the whole path
     gravity: float  # [m/s²] as the stages mean it
@@ -55,7 +55,7 @@ class KnotProgram:
     reserve: float  # of every limit's range, kept at samples
     still_ends: bool = False  # see KnotVariables
 
-    def solve(self, iterations: int) -> tuple[Guess, NonlinearResult]:
+    def solve(self, iterations: int) -> tuple[WarmStart, NonlinearResult]:
         """The solution near the guess, as the next guess. Raises BackendMissing without CasADi."""
         start = self._variables.start
         answer = solve_nonlinear(
@@ -94,7 +94,9 @@ class KnotProgram:
     def _rotors(self) -> _Rows:
         """Limits of rotors and the floor of thrust at all samples."""
         ca, trajectory, variables = import_casadi(), self.guess.trajectory, self._variables
-        rotors = RotorRows(self.vehicle, variables.frame.axes, self.problem.environment, self.problem.heading)
+        rotors = RotorConstraints(
+            self.vehicle, variables.frame.axes, self.problem.environment, self.problem.heading
+        )
         moving = [
             ca.vertcat(*((ca.DM(_powers(s, k)) @ variables.coefficients[i]).T for k in range(1, GIVEN)))
             for i, s in enumerate(self.samples)

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from aerobat.planning.polynomial.knot_samples import Excess, Samples
-from aerobat.planning.warm_start import Guess
+from aerobat.planning.polynomial.knot_samples import ConstraintViolation, Samples
+from aerobat.planning.warm_start import WarmStart
 
 COARSE = 2  # segments to begin with
 SAMPLES = 25  # of each of them at first
@@ -30,8 +30,8 @@ LOSS = 0.01  # of the duration: more than mending costs
 class Round:
     """What one solve begins from."""
 
-    guess: Guess
-    excess: Excess
+    guess: WarmStart
+    excess: ConstraintViolation
     samples: Samples
     box: float
     largest_box: float
@@ -39,7 +39,7 @@ class Round:
     repairing: bool = False  # little is left to gain: what is exceeded is mended, nearby
 
     @classmethod
-    def first(cls, guess: Guess, excess: Excess, reserve: float) -> Round:
+    def first(cls, guess: WarmStart, excess: ConstraintViolation, reserve: float) -> Round:
         """To begin with: few samples and a large box; more of them, and a smaller one, of many segments."""
         segments = guess.trajectory.segments
         count, box = (SAMPLES, BOX) if segments <= COARSE else (FINE_SAMPLES, FINE_BOX)
@@ -55,7 +55,7 @@ class Round:
         """Whether no box is left in which an answer would do."""
         return self.box < LEAST_BOX
 
-    def takes(self, guess: Guess, excess: Excess, violation: float) -> bool:
+    def takes(self, guess: WarmStart, excess: ConstraintViolation, violation: float) -> bool:
         """Go on from an answer if it will do, else in a smaller box; either way with more samples."""
         self.samples = excess.joined(self.samples)
         before, gain = self.excess.worst, 1.0 - guess.trajectory.duration / self.guess.trajectory.duration

@@ -23,7 +23,7 @@ Samples = tuple[Array, ...]  # normalised times in each segment, rising
 
 
 @dataclass(frozen=True, eq=False)
-class Excess:
+class ConstraintViolation:
     """By how much a trajectory exceeds limits, and where."""
 
     worst: float  # as a part of the limit's range; negative: all hold
@@ -33,7 +33,7 @@ class Excess:
     @classmethod
     def of(
         cls, trajectory: Trajectory, vehicle: Vehicle, environment: Environment, bounds: tuple[Bound, ...]
-    ) -> Excess:
+    ) -> ConstraintViolation:
         """Of rotor thrusts and of bounds along a trajectory."""
         s, margin = np.linspace(0.0, 1.0, DENSE), rotor_margin(trajectory, vehicle, environment)
         over = [_rotors(trajectory, vehicle, environment, s)]
@@ -51,7 +51,7 @@ class Excess:
             worst = max(worst, -gap / float(vehicle.max_thrusts[rotor] - vehicle.min_thrusts[rotor]))
         return cls(worst, tuple(peaks), margin)
 
-    def beside(self, trajectory: Trajectory, time: float, part: float) -> Excess:
+    def beside(self, trajectory: Trajectory, time: float, part: float) -> ConstraintViolation:
         """The same, and an excess by a part of its limit's range at a time [s], where all seemed well."""
         peaks = list(self.peaks)
         i, place = _place(trajectory, time)
@@ -63,7 +63,7 @@ class Excess:
         return tuple(_with(old, new) for old, new in zip(samples, self.peaks, strict=True))
 
 
-def cut(trajectory: Trajectory, segments: int) -> Trajectory:
+def refit(trajectory: Trajectory, segments: int) -> Trajectory:
     """So many polynomials of degree 9, which meet a trajectory at their knots up to snap.
 
     Its own knots are kept, and its longest segments cut; if it has more segments than that, all are equal.

@@ -46,7 +46,7 @@ def first_times(problem: Problem, given: Array, max_specific_thrust: float) -> A
     return durations
 
 
-def unmet(sequence: StageSequence, trajectory: Trajectory, gravity: float) -> str | None:
+def violated_stage(sequence: StageSequence, trajectory: Trajectory, gravity: float) -> str | None:
     """The first stage that a trajectory with a knot a stage misses, in a sentence; or None."""
     values = [trajectory.evaluate(trajectory.knots[1:-1], k) for k in range(3)]
     for stage, flat in zip(sequence.stages, np.stack(values, axis=1), strict=True):

@@ -13,12 +13,13 @@ from aerobat.arrays import Array
 from aerobat.certification import Certificate
 from aerobat.errors import Infeasible, SpecError
 from aerobat.planning.feasibility import RotorMargin, rotor_margin
-from aerobat.planning.polynomial.knots import first_times, given_at_knots, unmet
+from aerobat.planning.polynomial.knots import first_times, given_at_knots, violated_stage
 from aerobat.planning.proof import certificate_for
 from aerobat.planning.result import Attempt, PlacedStage, Plan
-from aerobat.planning.search import Bisection, Grid, Search
+from aerobat.planning.search import BisectionSearch, GridSearch, Search
 from aerobat.problem.problem import Problem
 from aerobat.problem.stage import StageSequence
+from aerobat.problem.waypoints import Waypoints
 from aerobat.trajectory import Trajectory
 from aerobat.trajectory.minimum_effort import Rule, minimum_effort
 from aerobat.vehicle import Vehicle
@@ -30,7 +31,7 @@ SLOWER = 30.0  # times the first duration, where stretching all segments gives u
 FASTER = 0.3  # times the first duration, where it begins
 
 
-class Stretch(StrEnum):
+class TimeScaling(StrEnum):
     """Which segments a longer duration lengthens."""
 
     FIRST = "first"  # all knots shift by as much, as in the paper: the first segment alone lengthens
@@ -42,14 +43,14 @@ class MinSnap:
     """Closed-form polynomials of degree 2s − 1 through waypoints, at the smallest duration searched.
 
     With s = 5, the paper's degree 9, the cost is the integral of crackle squared: "minimum snap" in name
-    only; s = 4 is minimum snap, s = 3 minimum jerk. Without a `stretch`, waypoints that come with their
+    only; s = 4 is minimum snap, s = 3 minimum jerk. Without a `time_scaling`, waypoints that come with their
     times are shifted as in the paper, by 0.1 s at a time; other paths are stretched as a whole. With
     `stop_after` the search ends at that attempt, whether the vehicle can fly it or not (paper, Fig. 10).
     """
 
     order: int = 5  # s
     rule: Rule = Rule.VARIATIONAL
-    stretch: Stretch | None = None
+    time_scaling: TimeScaling | None = None
     search: Search | None = None
     stop_after: int | None = None
 
@@ -76,17 +77,17 @@ class MinSnap:
         if vehicle is None:
             found = planning.attempt(first)
         else:
-            found = self._search(planning.stretch, first).smallest(planning.attempt)
+            found = self._search(planning.time_scaling, first).smallest(planning.attempt)
         if found is None:
             raise Infeasible(planning.why_infeasible(), planning.attempts)
         return planning.result(found)
 
-    def _search(self, stretch: Stretch, first: float) -> Search:
+    def _search(self, stretch: TimeScaling, first: float) -> Search:
         if self.search is not None:
             return self.search
-        if stretch is Stretch.FIRST or self.stop_after is not None:
-            return Grid(first, first + STEP * (STEPS - 1), STEPS)
-        return Bisection(FASTER * first, SLOWER * first)
+        if stretch is TimeScaling.FIRST or self.stop_after is not None:
+            return GridSearch(first, first + STEP * (STEPS - 1), STEPS)
+        return BisectionSearch(FASTER * first, SLOWER * first)
 
 
 @dataclass(frozen=True)
@@ -109,7 +110,7 @@ class _Planning:
     gravity: float  # [m/s²]
     given: Array  # (K, s, 3)
     durations: Array  # [s] to begin with, (K - 1,)
-    stretch: Stretch
+    time_scaling: TimeScaling
     progress: Callable[[Attempt], None] | None
     attempts: list[Attempt] = field(default_factory=list)
 
@@ -125,8 +126,8 @@ class _Planning:
         thrust = ASSUMED_THRUST_TO_WEIGHT * gravity if vehicle is None else vehicle.max_specific_thrust
         sequence = problem.stages(thrust)
         given = given_at_knots(problem, sequence, config.order, gravity)
-        timed = problem.maneuver.first_times is not None
-        stretch = config.stretch or (Stretch.FIRST if timed else Stretch.ALL)
+        timed = isinstance(problem.maneuver, Waypoints) and problem.maneuver.times is not None
+        stretch = config.time_scaling or (TimeScaling.FIRST if timed else TimeScaling.ALL)
         durations = first_times(problem, given, thrust)
         return cls(config, problem, sequence, vehicle, gravity, given, durations, stretch, progress)
 
@@ -147,7 +148,7 @@ class _Planning:
 
     def _stretched(self, duration: float) -> Array:
         durations = self.durations.copy()
-        if self.stretch is Stretch.ALL:
+        if self.time_scaling is TimeScaling.ALL:
             return np.asarray(durations * (duration / durations.sum()))
         durations[0] += duration - durations.sum()
         if durations[0] <= 0.0:
@@ -159,7 +160,7 @@ class _Planning:
     def _judged(self, trajectory: Trajectory) -> tuple[_Found, str]:
         """Whether a path will do, and why, in a sentence."""
         cost = trajectory.effort(self.config.order)
-        missed = unmet(self.sequence, trajectory, self.gravity)
+        missed = violated_stage(self.sequence, trajectory, self.gravity)
         if self.vehicle is None:
             return _Found(trajectory, cost, missed is None, None, None), missed or "feasible"
         margin = rotor_margin(trajectory, self.vehicle, self.problem.environment)
@@ -175,7 +176,7 @@ class _Planning:
         shortest = min(attempt.duration for attempt in self.attempts)
         remedy = (
             "stretch all segments, or give other times"
-            if self.stretch is Stretch.FIRST
+            if self.time_scaling is TimeScaling.FIRST
             else "give the waypoints other times or fewer givens, or take the planner free-knots"
         )
         return (

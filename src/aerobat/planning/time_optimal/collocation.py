@@ -22,7 +22,13 @@ import numpy as np
 
 from aerobat.arrays import Array
 from aerobat.optimization.nonlinear import import_casadi
-from aerobat.planning.time_optimal.spinless_body import INPUTS, POSITION, STATES, VELOCITY, SpinlessBody
+from aerobat.planning.time_optimal.zero_yaw_rate_body import (
+    INPUTS,
+    POSITION,
+    STATES,
+    VELOCITY,
+    ZeroYawRateBody,
+)
 from aerobat.trajectory import Trajectory, polynomial
 
 STATE_SCALE = np.repeat([1.0, 5.0, 1.0, 5.0], [3, 3, 4, 2])  # what is large in SI units
@@ -123,7 +129,7 @@ class Mesh:
 class Collocation:
     """A motion on a mesh with what the equations of motion make of it, in numbers or symbols."""
 
-    body: SpinlessBody
+    body: ZeroYawRateBody
     mesh: Mesh
     motion: Motion
 

@@ -15,14 +15,14 @@ from aerobat.arrays import Array
 from aerobat.environment import Environment
 from aerobat.optimization.nonlinear import NonlinearProgram, import_casadi
 from aerobat.planning.time_optimal.collocation import Collocation, Mesh, Motion
-from aerobat.planning.time_optimal.spinless_body import (
+from aerobat.planning.time_optimal.zero_yaw_rate_body import (
     ATTITUDE,
     INPUTS,
     POSITION,
     RATES,
     STATES,
     VELOCITY,
-    SpinlessBody,
+    ZeroYawRateBody,
 )
 from aerobat.problem.problem import Limits
 from aerobat.problem.stage import Condition
@@ -75,9 +75,9 @@ class OptimalControl:
     always: tuple[Condition, ...]
 
     @cached_property
-    def body(self) -> SpinlessBody:
+    def body(self) -> ZeroYawRateBody:
         """The equations of motion."""
-        return SpinlessBody(self.vehicle, self.environment)
+        return ZeroYawRateBody(self.vehicle, self.environment)
 
     @cached_property
     def mesh(self) -> Mesh:

@@ -23,10 +23,10 @@ from aerobat.planning.feasibility import RotorMargin, rotor_margin
 from aerobat.planning.miqp import Miqp
 from aerobat.planning.proof import certificate_for
 from aerobat.planning.result import Attempt, PlacedStage, Plan
-from aerobat.planning.tighten import SPARE, drawn_in
-from aerobat.planning.time_optimal.first_motion import first_motion
+from aerobat.planning.tighten import SPARE, tightened
+from aerobat.planning.time_optimal.initial_guess import initial_guess
 from aerobat.planning.time_optimal.program import DERIVATIVES, Bounds, End, OptimalControl
-from aerobat.planning.warm_start import Guess
+from aerobat.planning.warm_start import WarmStart
 from aerobat.problem.problem import EndState, Limits, Problem
 from aerobat.problem.stage import Condition, Quantity
 from aerobat.trajectory import Trajectory
@@ -99,15 +99,15 @@ class TimeOptimal:
             attempts,
         )
 
-    def _guesses(self, problem: Problem, vehicle: Vehicle) -> Iterator[Guess]:
+    def _guesses(self, problem: Problem, vehicle: Vehicle) -> Iterator[WarmStart]:
         """The plan that the rotors can do; then one that knows of none, slowed down."""
         sequence = problem.stages(vehicle.max_specific_thrust)
         try:
-            yield Guess.of(self.guess.plan(problem, vehicle), sequence)
+            yield WarmStart.of(self.guess.plan(problem, vehicle), sequence)
         except Infeasible as infeasible:
             if not infeasible.attempts:  # a stage asks more thrust than there is
                 raise
-        yield Guess.of(self.guess.plan(problem), sequence).slowed(SLOWED)
+        yield WarmStart.of(self.guess.plan(problem), sequence).time_scaled(SLOWED)
 
 
 @dataclass(frozen=True, eq=False)
@@ -129,11 +129,11 @@ class _Inside:
     below: float = 0.0  # [N] above the rotors' least thrusts
     above: float = 0.0  # [N] below their largest
 
-    def drawn_in(self, found: _Found, asked: Limits, spare: float) -> _Inside:
+    def tightened(self, found: _Found, asked: Limits, spare: float) -> _Inside:
         """Further within by what a solution exceeds, the rotors' thrusts by a `spare` [N] more."""
         low, high = (_unproven(found.certificate, side) for side in (Side.LEAST, Side.MOST))
         return _Inside(
-            drawn_in(self.limits, asked, found.trajectory, DERIVATIVES),
+            tightened(self.limits, asked, found.trajectory, DERIVATIVES),
             self.below + (spare + low if low > 0.0 else 0.0),
             self.above + (spare + high if high > 0.0 else 0.0),
         )
@@ -153,7 +153,7 @@ class _Run:
         config: TimeOptimal,
         problem: Problem,
         vehicle: Vehicle,
-        guess: Guess,
+        guess: WarmStart,
         attempts: list[Attempt],
         progress: Progress | None,
     ) -> None:
@@ -165,13 +165,13 @@ class _Run:
         """Solve, and draw bounds at nodes in by what is exceeded between nodes, until nothing is."""
         mesh, inside, barrier = self._control.mesh, _Inside(self._problem.path_limits), None
         spare = SPARE * float(np.max(self._vehicle.max_thrusts - self._vehicle.min_thrusts))
-        x = mesh.pack(first_motion(self._guess, mesh, self._vehicle, self._problem.environment))
+        x = mesh.pack(initial_guess(self._guess, mesh, self._vehicle, self._problem.environment))
         for _ in range(ROUNDS):
             found = self._solved(x, inside, barrier)
             if found is None or found.certificate.certified:
                 return found
             try:
-                inside = inside.drawn_in(found, self._problem.path_limits, spare)
+                inside = inside.tightened(found, self._problem.path_limits, spare)
             except SpecError:  # nothing is left between limits
                 return None
             x, barrier = found.x, WARM
@@ -232,7 +232,7 @@ def _smoother(vehicle: Vehicle) -> tuple[Vehicle, ...]:
     return vehicle, replace(vehicle, rotors=tuple(replace(rotor, lag=LITTLE) for rotor in vehicle.rotors))
 
 
-def _control(config: TimeOptimal, problem: Problem, vehicle: Vehicle, guess: Guess) -> OptimalControl:
+def _control(config: TimeOptimal, problem: Problem, vehicle: Vehicle, guess: WarmStart) -> OptimalControl:
     """The optimal control through the stages in the guess's order."""
     sequence = problem.stages(vehicle.max_specific_thrust)
     start = _end(problem.start, vehicle, problem.environment)
@@ -240,7 +240,7 @@ def _control(config: TimeOptimal, problem: Problem, vehicle: Vehicle, guess: Gue
     return OptimalControl(
         vehicle=vehicle,
         environment=problem.environment,
-        intervals=guess.shared(config.intervals, LEAST_INTERVALS),
+        intervals=guess.allocate_intervals(config.intervals, LEAST_INTERVALS),
         start=start,
         q_start=so3.multiply(upright, so3.about_axis(UP, np.array(problem.heading))),
         goal=_end(problem.goal, vehicle, problem.environment),
@@ -249,7 +249,7 @@ def _control(config: TimeOptimal, problem: Problem, vehicle: Vehicle, guess: Gue
     )
 
 
-def _within_plane(problem: Problem, guess: Guess) -> tuple[Condition, ...]:
+def _within_plane(problem: Problem, guess: WarmStart) -> tuple[Condition, ...]:
     normal = guess.plane()
     if normal is None:
         return ()

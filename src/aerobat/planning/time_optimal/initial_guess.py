@@ -7,11 +7,11 @@ import numpy as np
 from aerobat.environment import Environment
 from aerobat.flatness import reference
 from aerobat.planning.time_optimal.collocation import Mesh, Motion
-from aerobat.planning.warm_start import Guess
+from aerobat.planning.warm_start import WarmStart
 from aerobat.vehicle import Vehicle
 
 
-def first_motion(guess: Guess, mesh: Mesh, vehicle: Vehicle, environment: Environment) -> Motion:
+def initial_guess(guess: WarmStart, mesh: Mesh, vehicle: Vehicle, environment: Environment) -> Motion:
     """What the vehicle does along a guess at the mesh's nodes, by flatness; inputs within their scale."""
     knots = np.concatenate([[0.0], np.cumsum(guess.phases @ mesh.shares)])
     times = np.minimum(knots, guess.trajectory.duration)

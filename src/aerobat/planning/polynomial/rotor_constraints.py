@@ -30,7 +30,7 @@ UP = np.array([0.0, 0.0, 1.0])
 
 
 @dataclass(frozen=True, eq=False)
-class RotorRows:
+class RotorConstraints:
     """Thrusts of a vehicle's rotors, each as a part of its range, 0 to 1, then |f|² over gravity's."""
 
     vehicle: Vehicle
