@@ -1,10 +1,11 @@
-from .feasibility import RotorMargin, rotor_margin
+from .certified_solve import Judged, Solution, certified_solve, with_certificate
 from .miqp import Miqp
-from .planner import Planner, plan
+from .planners import Planner, PlannerOption, option, plan, planner, planner_options, registered_planners
 from .polynomial.free_knots import FreeKnots
 from .polynomial.min_snap import MinSnap, TimeScaling
-from .proof import with_certificate
-from .result import Attempt, PlacedStage, Plan
+from .recorder import Attempt, Recorder
+from .result import PlacedStage, Plan
+from .rotor_margin import RotorMargin
 from .search import BisectionSearch, GridSearch
 from .time_optimal.time_optimal import TimeOptimal
 
@@ -13,15 +14,23 @@ __all__ = [
     "BisectionSearch",
     "FreeKnots",
     "GridSearch",
+    "Judged",
     "MinSnap",
     "Miqp",
     "PlacedStage",
     "Plan",
     "Planner",
+    "PlannerOption",
+    "Recorder",
     "RotorMargin",
+    "Solution",
     "TimeOptimal",
     "TimeScaling",
+    "certified_solve",
+    "option",
     "plan",
-    "rotor_margin",
+    "planner",
+    "planner_options",
+    "registered_planners",
     "with_certificate",
 ]

@@ -50,8 +50,7 @@ class KnotProgram:
     guess: WarmStart
     samples: tuple[Array, ...]  # normalised times in each segment at which limits hold
     bounds: tuple[Bound, ...]  # that hold along the whole path
-    gravity: float  # [m/s²] as the stages mean it
-    radius: float  # of the box, in scaled variables
+    radius: float  # of the trust region, a box in scaled variables
     reserve: float  # of every limit's range, kept at samples
     still_ends: bool = False  # see KnotVariables
 
@@ -123,7 +122,9 @@ class KnotProgram:
         ca, variables = import_casadi(), self._variables
         for j, stage in enumerate(self.guess.stages):
             s = variables.place(j)
-            for bound in (Bound.of(condition, self.gravity) for condition in stage.conditions):
+            for bound in (
+                Bound.of(condition, self.problem.environment.gravity) for condition in stage.conditions
+            ):
                 k = bound.derivative
                 at = ca.horzcat(*(perm(p, k) * s ** max(p - k, 0) for p in range(DEGREE + 1)))
                 yield from self._within(bound, variables.segments[j], at, 0.0)

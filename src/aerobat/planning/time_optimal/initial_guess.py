@@ -6,12 +6,14 @@ import numpy as np
 
 from aerobat.environment import Environment
 from aerobat.flatness import reference
-from aerobat.planning.time_optimal.collocation import Mesh, Motion
+from aerobat.planning.time_optimal.collocation import CollocatedMotion, Mesh
 from aerobat.planning.warm_start import WarmStart
 from aerobat.vehicle import Vehicle
 
 
-def initial_guess(guess: WarmStart, mesh: Mesh, vehicle: Vehicle, environment: Environment) -> Motion:
+def initial_guess(
+    guess: WarmStart, mesh: Mesh, vehicle: Vehicle, environment: Environment
+) -> CollocatedMotion:
     """What the vehicle does along a guess at the mesh's nodes, by flatness; inputs within their scale."""
     knots = np.concatenate([[0.0], np.cumsum(guess.phases @ mesh.shares)])
     times = np.minimum(knots, guess.trajectory.duration)
@@ -21,4 +23,4 @@ def initial_guess(guess: WarmStart, mesh: Mesh, vehicle: Vehicle, environment: E
     inputs = np.concatenate([asked.wrench.thrust[:, None], asked.omega_dot_body[:, :2]], axis=1).T
     most = 2.0 * mesh.input_scale[:, None]
     inputs = np.clip(inputs, -most, most)
-    return Motion(guess.phases, states, inputs[:, :-1], inputs[:, 1:])
+    return CollocatedMotion(guess.phases, states, inputs[:, :-1], inputs[:, 1:])
