@@ -1,6 +1,15 @@
 from .certified_solve import Judged, Solution, certified_solve, with_certificate
 from .miqp import Miqp
-from .planners import Planner, PlannerOption, option, plan, planner, planner_options, registered_planners
+from .planners import (
+    Planner,
+    PlannerOption,
+    option,
+    plan,
+    planner,
+    planner_class,
+    planner_options,
+    registered_planners,
+)
 from .polynomial.free_knots import FreeKnots
 from .polynomial.min_snap import MinSnap, TimeScaling
 from .recorder import Attempt, Recorder
@@ -30,6 +39,7 @@ __all__ = [
     "option",
     "plan",
     "planner",
+    "planner_class",
     "planner_options",
     "registered_planners",
     "with_certificate",

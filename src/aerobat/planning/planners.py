@@ -52,7 +52,7 @@ def plan(
     SpecError for input that makes no sense.
 
     Args:
-        problem: What is asked.
+        problem: What is planned.
         planner: How to plan, say `Miqp(order=5)`, or a registered name, whose defaults are taken.
         vehicle: What shall fly it, within its rotors' limits; without one the plan knows no limits but the
             problem's.

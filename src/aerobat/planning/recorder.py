@@ -1,4 +1,4 @@
-"""The record of planning: every attempt, kept in order and told to whoever listens."""
+"""The record of planning: every attempt, kept in order and passed on as it ends."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ class Recorder:
     attempts: list[Attempt] = field(default_factory=list)
 
     def record(self, attempt: Attempt) -> None:
-        """Keep an attempt and tell of it."""
+        """Keep an attempt and pass it on."""
         self.attempts.append(attempt)
         if self.progress is not None:
             self.progress(attempt)

@@ -47,10 +47,10 @@ class WarmStart:
         trajectory = replace(self.trajectory, durations=factor * self.trajectory.durations)
         return replace(self, trajectory=trajectory, times=tuple(factor * t for t in self.times))
 
-    def allocate_intervals(self, intervals: int, least: int) -> tuple[int, ...]:
-        """About so many intervals, shared among phases by their durations, each given the least or more."""
-        share = np.rint(intervals * self.phases / self.trajectory.duration).astype(int)
-        return tuple(np.maximum(share, least).tolist())
+    def allocate_intervals(self, intervals: int, minimum: int) -> tuple[int, ...]:
+        """About so many intervals, allocated to phases by their durations, to each at least the minimum."""
+        counts = np.rint(intervals * self.phases / self.trajectory.duration).astype(int)
+        return tuple(np.maximum(counts, minimum).tolist())
 
     def plane(self) -> Array | None:
         """The normal of the vertical plane that it stays in, (3,); None when it stays in none."""

@@ -37,7 +37,7 @@ class Miqp:
     Without a `search`, dt is the first feasible of the paper's grid when there is no vehicle, and otherwise
     the smallest, to half a percent, at which a plan is certified. With a vehicle the problem's limits hold
     between interval ends too: where a solution exceeds any, its bounds are tightened by as much, and it is
-    solved again. Only with jerk as input, order 3, body rates jump, which its certificate then tells.
+    solved again. Only with jerk as input, order 3, body rates jump, which its certificate then says.
     """
 
     order: int = option(

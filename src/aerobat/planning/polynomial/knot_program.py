@@ -110,7 +110,7 @@ class KnotProgram:
         return _Rows(ca.vec(values), np.tile(lower, len(times)), np.tile(upper, len(times)))
 
     def _path(self) -> Iterator[_Rows]:
-        """What holds along the whole path, at all samples but the very ends, which are given."""
+        """What holds along the whole path, at all samples but the very ends, which are fixed."""
         last = len(self.samples) - 1
         for bound in self.bounds:
             for i, s in enumerate(self.samples):

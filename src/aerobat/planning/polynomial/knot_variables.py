@@ -183,7 +183,7 @@ class KnotVariables:
         return np.hstack([effect, jerks.reshape(len(effect), 2)])
 
     def _rows(self) -> NDArray[np.intp]:
-        """The number of the offset of each derivative at each end of each segment; -1: given, (S, 2, 5)."""
+        """The number of the offset of each derivative at each end of each segment; -1: fixed, (S, 2, 5)."""
         count = self.guess.trajectory.segments
         rows = np.full((count, 2, GIVEN), -1)
         knots = np.arange(SNAP * (count - 1)).reshape(count - 1, SNAP)

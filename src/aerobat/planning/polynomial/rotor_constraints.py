@@ -67,9 +67,11 @@ class RotorConstraints:
         thrust = self.vehicle.mass * (ca.sqrt(squared) + axial_drag(self.vehicle) * along)
         thrusts = ca.DM(self._thrusts_from[:, :-2]) @ ca.vertcat(thrust, turn(ca, f, df, ddf, frame))
         low, high = self._thrusts_from[:, -2:].T
-        shares = (thrusts - low) / (high - low)
+        fractions = (thrusts - low) / (high - low)
         return ca.Function(
-            "rotors", [moving, duration, frame], [ca.vertcat(shares, squared / self.environment.gravity**2)]
+            "rotors",
+            [moving, duration, frame],
+            [ca.vertcat(fractions, squared / self.environment.gravity**2)],
         )
 
     @property

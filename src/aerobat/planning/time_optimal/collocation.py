@@ -83,7 +83,7 @@ class Mesh:
         return len(self.scale)
 
     @cached_property
-    def shares(self) -> Array:
+    def fractions(self) -> Array:
         """What part of each phase each interval takes, (P, K)."""
         counts = np.array(self.intervals)
         return np.repeat(np.diag(1.0 / counts), counts, axis=1)
@@ -136,7 +136,7 @@ class Collocation:
     @cached_property
     def durations(self) -> Any:
         """Of the intervals [s], (1, K)."""
-        return import_casadi().reshape(self.motion.phases, 1, -1) @ import_casadi().DM(self.mesh.shares)
+        return import_casadi().reshape(self.motion.phases, 1, -1) @ import_casadi().DM(self.mesh.fractions)
 
     @cached_property
     def rates(self) -> Rates:

@@ -39,7 +39,7 @@ ALONG_Z = np.zeros(3), np.array([0.0, 0.0, inf])  # bounds on a thrust direction
 
 @dataclass(frozen=True, eq=False)
 class End:
-    """What is given at one end of the motion; body rates are zero there."""
+    """What is fixed at one end of the motion; body rates are zero there."""
 
     position: Array  # [m], (3,)
     velocity: Array  # [m/s], (3,)
@@ -140,7 +140,7 @@ class OptimalControl:
             yield collocation.rates.ends[0][VELOCITY, node - 1]
 
     def _everywhere(self, collocation: Collocation, derivative: int) -> Iterator[Any]:
-        """A derivative up to snap wherever it is not given, (3, m) each; on both sides where it may jump."""
+        """A derivative up to snap wherever it is not fixed, (3, m) each; on both sides where it may jump."""
         rates = collocation.rates
         if derivative < 2:
             yield collocation.motion.states[KINEMATIC[derivative], 1:-1]
@@ -153,7 +153,7 @@ class OptimalControl:
             yield from collocation.between(derivative)
 
     def _box(self, min_collective: float) -> tuple[CollocatedMotion, CollocatedMotion]:
-        """The least and the most that every unknown may be: what is given, and little else."""
+        """The least and the most that every unknown may be: what is fixed, and little else."""
         lower, upper = self._all(-inf), self._all(inf)
         lower.phases[:] = SHORTEST_PHASE
         lower.starts[0] = lower.ends[0] = min_collective
@@ -168,7 +168,7 @@ class OptimalControl:
         return CollocatedMotion(*(np.full(shape, value) for shape in shapes))
 
     def _fix_ends(self, motion: CollocatedMotion) -> None:
-        """Put what is given at the ends into a motion."""
+        """Fix a motion's ends."""
         for node, end in ((0, self.start), (-1, self.goal)):
             motion.states[POSITION, node] = end.position
             motion.states[VELOCITY, node] = end.velocity

@@ -17,7 +17,7 @@ from aerobat.arrays import Array
 from aerobat.certification import Certificate, Side
 from aerobat.environment import Environment
 from aerobat.errors import Infeasible, SpecError
-from aerobat.flatness import axial_drag, end_thrust
+from aerobat.flatness import axial_drag, end_thrust, reference
 from aerobat.optimization.nonlinear import import_casadi, solve_nonlinear
 from aerobat.planning.certified_solve import Judged, Solution, certified_solve, tightened
 from aerobat.planning.miqp import Miqp
@@ -25,14 +25,16 @@ from aerobat.planning.planners import option, planner
 from aerobat.planning.recorder import Progress, Recorder
 from aerobat.planning.result import PlacedStage, Plan
 from aerobat.planning.rotor_margin import rotor_findings
-from aerobat.planning.time_optimal.initial_guess import initial_guess
+from aerobat.planning.time_optimal.collocation import CollocatedMotion, Mesh
 from aerobat.planning.time_optimal.program import DERIVATIVES, End, NodeBounds, OptimalControl
 from aerobat.planning.warm_start import WarmStart, plans_to_begin_from, require_attitudes
 from aerobat.problem.problem import EndState, Limits, Problem
 from aerobat.problem.stage import Condition, Quantity
 from aerobat.vehicle import Vehicle
 
-THRUST_FLOOR = 0.02  # of the most collective thrust: less is not asked, and the attitude stays determined
+THRUST_FLOOR = (
+    0.02  # of the largest collective thrust: less is never planned, so that the attitude stays determined
+)
 MIN_INTERVALS = 4  # of a phase
 ROUNDS = 6  # of solving, at most
 ROTOR_BACKOFF = 1e-4  # of the largest range of thrust: how much more than was exceeded rotors keep at nodes
@@ -198,6 +200,21 @@ class _CollocatedProgram:
             float(max(low.sum(), THRUST_FLOOR * high.sum())),
             self._bounds.limits,
         )
+
+
+def initial_guess(
+    guess: WarmStart, mesh: Mesh, vehicle: Vehicle, environment: Environment
+) -> CollocatedMotion:
+    """States and inputs of the vehicle along a guess at the mesh's nodes, inputs within twice their scale."""
+    knots = np.concatenate([[0.0], np.cumsum(guess.phases @ mesh.fractions)])
+    times = np.minimum(knots, guess.trajectory.duration)
+    setpoint = reference(guess.trajectory, vehicle, times, environment=environment).setpoint
+    flat, rates = setpoint.flat, setpoint.omega_body[:, :2]
+    states = np.concatenate([flat.position, flat.velocity, setpoint.q_world_body, rates], axis=1).T
+    inputs = np.concatenate([setpoint.wrench.thrust[:, None], setpoint.omega_dot_body[:, :2]], axis=1).T
+    bound = 2.0 * mesh.input_scale[:, None]
+    inputs = np.clip(inputs, -bound, bound)
+    return CollocatedMotion(guess.phases, states, inputs[:, :-1], inputs[:, 1:])
 
 
 def _excess(certificate: Certificate, side: Side) -> float:
