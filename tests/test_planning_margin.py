@@ -69,8 +69,8 @@ def test_margin_is_that_of_dense_sampling(order, vehicle):
         assert found.max_thrust == pytest.approx(largest(thrusts), abs=1e-6 * scale)
         assert found.min_thrust == pytest.approx(-largest(-thrusts), abs=1e-6 * scale)
         assert found.margin == min(found.low_margin, found.high_margin)
-        assert found.low_margin == pytest.approx(found.min_thrust - vehicle.min_thrusts[0])
-        assert found.high_margin == pytest.approx(vehicle.max_thrusts[0] - found.max_thrust)
+        assert found.low_margin == pytest.approx(found.min_thrust - vehicle.min_thrusts[0], abs=1e-6 * scale)
+        assert found.high_margin == pytest.approx(vehicle.max_thrusts[0] - found.max_thrust, abs=1e-6 * scale)
 
 
 @settings(max_examples=25)

@@ -103,7 +103,7 @@ def certified_solve(
         vehicle: What shall fly it; without one every solution will do.
         recorder: Keeps an attempt a solve.
         rounds: Solves, at most.
-        jumps: Whether body rates may jump between segments, which no moment can do; the certificate says so all the same.
+        jumps: Whether body rates may jump between segments, which no moment can do, as the certificate says.
     """
     for left in reversed(range(rounds)):
         judged = _judged(program.solve(), problem, vehicle, recorder, jumps)

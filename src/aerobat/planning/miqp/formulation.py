@@ -183,12 +183,18 @@ class Formulation:
         )
         return tuple(np.array(table, dtype=np.intp) for table in tables)
 
+    @cached_property
+    def _stage_bounds(self) -> tuple[Array, ...]:
+        """For each stage the bounds of its conditions in SI units, (conditions, 2)."""
+        gravity = self.problem.environment.gravity
+        return tuple(
+            np.array([c.kinematic_bounds(gravity) for c in stage.conditions]).reshape(-1, 2)
+            for stage in self.sequence.stages
+        )
+
     def _assigned(self, i: int, scale: Array, free: Array) -> SlottedStage:
-        stage, rows = self.sequence.stages[i], self._stage_rows[i]
-        si = np.array(
-            [c.kinematic_bounds(self.problem.environment.gravity) for c in stage.conditions]
-        ).reshape(-1, 2)
-        lower, upper = (si[:, side] * scale[rows] - free[rows] for side in (0, 1))
+        stage, rows, bounds = self.sequence.stages[i], self._stage_rows[i], self._stage_bounds[i]
+        lower, upper = (bounds[:, side] * scale[rows] - free[rows] for side in (0, 1))
         return SlottedStage(stage.name, tuple(self._slots(stage)), rows, lower, upper)
 
 

@@ -116,7 +116,7 @@ class _Planning:
 
     def attempt(self, dt: float) -> Judged[AssignmentResult] | None:
         """What one dt comes to; None where nothing is found that the rotors can follow within all limits."""
-        program = _ProgramAtDt(self, dt, self.formulation.problem.path_limits)
+        program = _ProgramAtDt(self, dt)
         jumps = self.config.order == JERK
         judged = certified_solve(
             program, self.formulation.problem, self.vehicle, self.recorder, ROUNDS, jumps
@@ -145,7 +145,7 @@ class _ProgramAtDt:
 
     planning: _Planning
     dt: float
-    bounds: Limits
+    bounds: Limits | None = None  # tighter than the problem's limits
 
     def solve(self) -> Solution[AssignmentResult]:
         """Its solution; a failure where it has none, or where samples show that the rotors cannot follow."""
@@ -171,8 +171,9 @@ class _ProgramAtDt:
         if solution.trajectory is None or certificate is None or (certificate.margin or 0.0) < 0.0:
             return False  # rotors are helped by a longer dt only
         chain, limits = self.planning.formulation.chain, self.planning.formulation.problem.path_limits
-        bounds = tightened(self.bounds, limits, solution.trajectory, chain.order)
-        if bounds is None or bounds is self.bounds:
+        imposed = limits if self.bounds is None else self.bounds
+        bounds = tightened(imposed, limits, solution.trajectory, chain.order)
+        if bounds is None or bounds is imposed:
             return False
         self.bounds = bounds
         return True

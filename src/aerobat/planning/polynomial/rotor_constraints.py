@@ -68,11 +68,8 @@ class RotorConstraints:
         thrusts = ca.DM(self._thrusts_from[:, :-2]) @ ca.vertcat(thrust, turn(ca, f, df, ddf, frame))
         low, high = self._thrusts_from[:, -2:].T
         fractions = (thrusts - low) / (high - low)
-        return ca.Function(
-            "rotors",
-            [moving, duration, frame],
-            [ca.vertcat(fractions, squared / self.environment.gravity**2)],
-        )
+        values = ca.vertcat(fractions, squared / self.environment.gravity**2)
+        return ca.Function("rotors", [moving, duration, frame], [values])
 
     @property
     def _planar(self) -> bool:

@@ -32,9 +32,7 @@ from aerobat.problem.problem import EndState, Limits, Problem
 from aerobat.problem.stage import Condition, Quantity
 from aerobat.vehicle import Vehicle
 
-THRUST_FLOOR = (
-    0.02  # of the largest collective thrust: less is never planned, so that the attitude stays determined
-)
+THRUST_FLOOR = 0.02  # of the largest collective thrust: more, and the attitude stays determined
 MIN_INTERVALS = 4  # of a phase
 ROUNDS = 6  # of solving, at most
 ROTOR_BACKOFF = 1e-4  # of the largest range of thrust: how much more than was exceeded rotors keep at nodes
