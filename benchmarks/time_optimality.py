@@ -17,7 +17,7 @@ os.environ["OPENBLAS_NUM_THREADS"] = "1"  # one thread for everyone, before NumP
 import numpy as np
 
 from aerobat.errors import Infeasible
-from aerobat.planning import MinSnap, Miqp, Plan, Planner, Stretch, plan
+from aerobat.planning import MinSnap, Miqp, Plan, Planner, TimeScaling, plan
 from aerobat.planning.polynomial.free_knots import FreeKnots
 from aerobat.planning.time_optimal.time_optimal import TimeOptimal
 from aerobat.problem import Waypoint, Waypoints, load_problem
@@ -95,7 +95,7 @@ def random_start(vehicle: Vehicle, legs: np.ndarray) -> Plan:
     at, end = np.cumsum(legs).tolist()
     waypoint = Waypoint(position=np.array([np.nan, np.nan, -2.0]), time=at)
     problem = replace(SECTION_V, maneuver=Waypoints((waypoint,), duration=end))
-    return MinSnap(stretch=Stretch.ALL, stop_after=1).plan(problem, vehicle)
+    return MinSnap(time_scaling=TimeScaling.ALL, stop_after=1).plan(problem, vehicle)
 
 
 def compare_flip(name: str) -> None:

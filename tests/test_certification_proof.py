@@ -13,7 +13,7 @@ from aerobat.environment import Environment
 from aerobat.errors import SpecError
 from aerobat.flatness import reference
 from aerobat.interchange import read_csv, write_csv
-from aerobat.planning import Miqp, plan, rotor_margin
+from aerobat.planning import Miqp, plan
 from aerobat.problem import Limits, load_problem
 from aerobat.states import STANDARD_GRAVITY
 from aerobat.trajectory import Trajectory
@@ -152,11 +152,10 @@ def test_without_drag_the_way_back_in_time_asks_the_same_of_the_rotors(seed):
 
 
 @pytest.mark.parametrize("name", ["flip-roll", "half-flip"])
-def test_it_agrees_with_the_planners_rotor_margin_and_accepts_the_plan_read_back_from_csv(name, tmp_path):
+def test_it_accepts_the_plan_read_back_from_csv(name, tmp_path):
     made = plan(load_problem(name), Miqp(order=4), vehicle=VEHICLE).trajectory
     certificate = certify(made, VEHICLE)
     assert certificate.certified, certificate.why
-    assert certificate.margin == pytest.approx(rotor_margin(made, VEHICLE).margin, abs=1e-5)
     write_csv(made, tmp_path / "plan.csv")
     again = certify(read_csv(tmp_path / "plan.csv"), VEHICLE)
     assert again.certified, again.why

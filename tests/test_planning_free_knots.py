@@ -7,10 +7,10 @@ import pytest
 
 from aerobat.errors import SpecError
 from aerobat.planning import MinSnap, Plan
+from aerobat.planning.certified_solve import certificate_for
 from aerobat.planning.polynomial.free_knots import FreeKnots
-from aerobat.planning.polynomial.knot_samples import cut
-from aerobat.planning.polynomial.min_snap import Stretch
-from aerobat.planning.proof import certificate_for
+from aerobat.planning.polynomial.knot_samples import refit
+from aerobat.planning.polynomial.min_snap import TimeScaling
 from aerobat.problem import EndState, Limits, Problem, Waypoint, Waypoints, load_problem
 from aerobat.states import STANDARD_GRAVITY
 from aerobat.vehicle import Vehicle, load_vehicle
@@ -109,7 +109,7 @@ def test_random_starts_end_certified(seed: int, plans: dict[str, Plan]) -> None:
     rng = np.random.default_rng(seed)
     first, second = rng.uniform(0.2, 3.0, 2).tolist()
     waypoints = Waypoints((Waypoint(position=np.array([np.nan, np.nan, -2.0]), time=first),), first + second)
-    start = MinSnap(stretch=Stretch.ALL, stop_after=1).plan(
+    start = MinSnap(time_scaling=TimeScaling.ALL, stop_after=1).plan(
         replace(SECTION_V, maneuver=waypoints), vehicle("B")
     )
     plan = FreeKnots(start=start).plan(SECTION_V, vehicle("B"))
@@ -136,7 +136,7 @@ def test_stages_of_a_flip_hold() -> None:
         for condition in stage.conditions:
             value = plan.trajectory.evaluate(placed.time, condition.quantity.derivative)
             if condition.quantity.value == "specific_thrust":
-                value = value + np.array([0.0, 0.0, problem.gravity or STANDARD_GRAVITY])
+                value = value + problem.environment.weight
             along = float(condition.direction @ value)
             assert condition.lower - 1e-3 <= along <= condition.upper + 1e-3
 
@@ -146,7 +146,7 @@ def test_cutting_keeps_a_path_of_degree_nine(plans: dict[str, Plan]) -> None:
     times = np.linspace(0.0, whole.duration, 101)
     for k in range(4):
         np.testing.assert_allclose(
-            cut(whole, 7).evaluate(times, k), whole.evaluate(times, k), atol=1e-6 * 10.0**k
+            refit(whole, 7).evaluate(times, k), whole.evaluate(times, k), atol=1e-6 * 10.0**k
         )
 
 
@@ -165,6 +165,6 @@ def test_bad_input_gets_a_sentence() -> None:
         FreeKnots(reserve=0.5)
     with pytest.raises(SpecError, match="needs a vehicle"):
         FreeKnots().plan(SECTION_V)
-    falling = EndState(np.zeros(3), acceleration=np.array([0.0, 0.0, -vehicle("A").gravity]))
+    falling = EndState(np.zeros(3), acceleration=np.array([0.0, 0.0, -STANDARD_GRAVITY]))
     with pytest.raises(SpecError, match=r"start\.acceleration asks no thrust"):
         FreeKnots().plan(Problem("falling", falling, SECTION_V.goal), vehicle("A"))

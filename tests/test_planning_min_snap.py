@@ -7,7 +7,7 @@ import pytest
 
 from aerobat.errors import Infeasible, SpecError
 from aerobat.flatness import reference
-from aerobat.planning import MinSnap, Plan, Stretch, plan
+from aerobat.planning import MinSnap, Plan, TimeScaling, plan
 from aerobat.problem import GatePassage, HalfFlip, Problem, Waypoint, Waypoints, at_rest, load_problem
 from aerobat.states import STANDARD_GRAVITY
 from aerobat.vehicle import load_vehicle
@@ -46,8 +46,8 @@ def test_without_a_vehicle_the_waypoints_own_times_are_taken() -> None:
 
 def test_a_longer_search_of_the_papers_kind_lengthens_the_first_segment_only(paper: Plan) -> None:
     vehicle = load_vehicle("section-v")
-    first = plan(load_problem("section-v"), MinSnap(stretch=Stretch.FIRST, stop_after=3), vehicle)
-    every = plan(load_problem("section-v"), MinSnap(stretch=Stretch.ALL, stop_after=3), vehicle)
+    first = plan(load_problem("section-v"), MinSnap(time_scaling=TimeScaling.FIRST, stop_after=3), vehicle)
+    every = plan(load_problem("section-v"), MinSnap(time_scaling=TimeScaling.ALL, stop_after=3), vehicle)
     assert first.trajectory.durations == pytest.approx([0.7, 1.5])
     assert every.trajectory.durations == pytest.approx([0.55, 1.65])
 

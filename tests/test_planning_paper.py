@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from aerobat.planning import Grid, Miqp, Plan, plan
+from aerobat.planning import GridSearch, Miqp, Plan, plan
 from aerobat.problem import Limits, load_problem
 
 AT_100_MS = {"flip-roll": 273196.1243, "flip-pitch": 273196.1243, "flip-roll-translation": 280399.0114}
@@ -70,7 +70,7 @@ def test_every_stage_holds_where_the_plan_says(name: str) -> None:
 
 def test_the_first_feasible_of_another_grid_is_taken() -> None:
     problem = load_problem("flip-roll").as_in_paper()
-    found = plan(problem, Miqp(order=3, search=Grid(0.05, 0.2, 16)))
+    found = plan(problem, Miqp(order=3, search=GridSearch(0.05, 0.2, 16)))
     assert [a.feasible for a in found.attempts][:-1] == [False] * (len(found.attempts) - 1)
     assert found.attempts[-1].feasible
 

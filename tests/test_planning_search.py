@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from aerobat.errors import SpecError
-from aerobat.planning import Bisection, Grid
+from aerobat.planning import BisectionSearch, GridSearch
 
 
 def above(threshold: float, tried: list[float]):
@@ -23,7 +23,7 @@ def above(threshold: float, tried: list[float]):
 def test_bisection_ends_within_its_tolerance_above_the_threshold(
     threshold: float, growth: float, tolerance: float
 ) -> None:
-    found = Bisection(0.02, 1.0, growth, tolerance).smallest(above(threshold, []))
+    found = BisectionSearch(0.02, 1.0, growth, tolerance).smallest(above(threshold, []))
     assert found is not None
     assert threshold <= found <= threshold * (1 + tolerance) * (1 + 1e-9)
 
@@ -31,7 +31,7 @@ def test_bisection_ends_within_its_tolerance_above_the_threshold(
 @given(st.floats(0.0, 4.5))
 def test_the_papers_grid_takes_the_first_feasible_of_its_50_steps(threshold: float) -> None:
     tried: list[float] = []
-    found = Grid().smallest(above(threshold, tried))
+    found = GridSearch().smallest(above(threshold, tried))
     steps = np.linspace(0.1, 4.0, 50)
     feasible = steps[steps >= threshold]
     assert found == (feasible[0] if len(feasible) else None)
@@ -40,26 +40,26 @@ def test_the_papers_grid_takes_the_first_feasible_of_its_50_steps(threshold: flo
 
 def test_a_search_that_finds_nothing_has_tried_up_to_its_end() -> None:
     tried: list[float] = []
-    assert Bisection(0.1, 0.5).smallest(above(9.0, tried)) is None
+    assert BisectionSearch(0.1, 0.5).smallest(above(9.0, tried)) is None
     assert tried[-1] == 0.5
 
 
 def test_climbing_finds_the_fast_island_when_slow_is_infeasible_again() -> None:
-    found = Bisection(0.02, 2.0, tolerance=0.001).smallest(lambda s: s if 0.1 <= s <= 0.15 else None)
+    found = BisectionSearch(0.02, 2.0, tolerance=0.001).smallest(lambda s: s if 0.1 <= s <= 0.15 else None)
     assert found == pytest.approx(0.1, rel=0.001)
 
 
 @pytest.mark.parametrize(
     "wrong",
     [
-        lambda: Grid(0.0),
-        lambda: Grid(2.0, 1.0),
-        lambda: Grid(count=0),
-        lambda: Grid(np.nan),
-        lambda: Bisection(-1.0),
-        lambda: Bisection(growth=1.0),
-        lambda: Bisection(tolerance=0.0),
-        lambda: Bisection(last=np.inf),
+        lambda: GridSearch(0.0),
+        lambda: GridSearch(2.0, 1.0),
+        lambda: GridSearch(count=0),
+        lambda: GridSearch(np.nan),
+        lambda: BisectionSearch(-1.0),
+        lambda: BisectionSearch(growth=1.0),
+        lambda: BisectionSearch(tolerance=0.0),
+        lambda: BisectionSearch(last=np.inf),
     ],
 )
 def test_a_search_that_cannot_be_is_refused(wrong) -> None:

@@ -8,10 +8,11 @@ from hypothesis import given as drawn
 from hypothesis import settings
 from hypothesis import strategies as st
 
+from aerobat.certification import certify
 from aerobat.environment import Environment
 from aerobat.errors import SpecError
 from aerobat.flatness import reference
-from aerobat.planning import rotor_margin
+from aerobat.planning import RotorMargin
 from aerobat.trajectory import ContinuityRule, Trajectory, minimum_effort, polynomial
 from aerobat.vehicle import load_vehicle
 from minimum_effort_reference import exact_coefficients
@@ -279,7 +280,7 @@ def test_the_papers_iterations_ask_of_the_vehicle_what_is_known(k, thrust, momen
     vehicle, trajectory = load_vehicle("section-v"), section_v(k)
     times = np.linspace(0.0, trajectory.duration, 40_001)
     asked = reference(trajectory, vehicle, times=times, environment=CODE).setpoint
-    margin = rotor_margin(trajectory, vehicle, CODE)
+    margin = RotorMargin.of(certify(trajectory, vehicle, CODE))
     least, largest = trajectory.specific_thrust_range(CODE.gravity)
     found = (vehicle.mass * least.value, vehicle.mass * largest.value)
     assert found == pytest.approx(thrust, abs=0.006)

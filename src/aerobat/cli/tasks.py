@@ -60,14 +60,14 @@ def read_task(name: str, options: TaskOptions, paper: bool = False) -> tuple[Pro
 
 def make_plan(problem: Problem, vehicle: Vehicle, options: PlanningOptions) -> Plan:
     """The plan that the options ask for, with the vehicle's certificate."""
-    from aerobat.planning import plan, proven
+    from aerobat.planning import plan, with_certificate
 
     planner = make_planner(options)
     with planning_progress() as progress:
         if (
             options.paper
         ):  # the paper plans without a vehicle; whether this one can fly it is told all the same
-            return proven(plan(problem, planner, progress=progress), vehicle)
+            return with_certificate(plan(problem, planner, progress=progress), vehicle)
         return plan(problem, planner, vehicle, progress)
 
 

@@ -1,27 +1,46 @@
-from .feasibility import RotorMargin, rotor_margin
+from .certified_solve import Judged, Solution, certified_solve, with_certificate
 from .miqp import Miqp
-from .planner import Planner, plan
+from .planners import (
+    Planner,
+    PlannerOption,
+    option,
+    plan,
+    planner,
+    planner_class,
+    planner_options,
+    registered_planners,
+)
 from .polynomial.free_knots import FreeKnots
-from .polynomial.min_snap import MinSnap, Stretch
-from .proof import proven
-from .result import Attempt, PlacedStage, Plan
-from .search import Bisection, Grid
+from .polynomial.min_snap import MinSnap, TimeScaling
+from .recorder import Attempt, Recorder
+from .result import PlacedStage, Plan
+from .rotor_margin import RotorMargin
+from .search import BisectionSearch, GridSearch
 from .time_optimal.time_optimal import TimeOptimal
 
 __all__ = [
     "Attempt",
-    "Bisection",
+    "BisectionSearch",
     "FreeKnots",
-    "Grid",
+    "GridSearch",
+    "Judged",
     "MinSnap",
     "Miqp",
     "PlacedStage",
     "Plan",
     "Planner",
+    "PlannerOption",
+    "Recorder",
     "RotorMargin",
-    "Stretch",
+    "Solution",
     "TimeOptimal",
+    "TimeScaling",
+    "certified_solve",
+    "option",
     "plan",
-    "proven",
-    "rotor_margin",
+    "planner",
+    "planner_class",
+    "planner_options",
+    "registered_planners",
+    "with_certificate",
 ]

@@ -1,31 +1,15 @@
-"""What planning returns: the plan, and every attempt on the way to it."""
+"""What planning returns: a trajectory that solves a problem, and the evidence for it."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
-from aerobat.planning.feasibility import RotorMargin
+from aerobat.certification import Certificate
+from aerobat.planning.recorder import Attempt
+from aerobat.planning.rotor_margin import RotorMargin
 from aerobat.problem.problem import Problem
 from aerobat.trajectory import Trajectory
 from aerobat.vehicle import Vehicle
-
-if TYPE_CHECKING:
-    from aerobat.certification import Certificate
-
-
-@dataclass(frozen=True)
-class Attempt:
-    """One program that was solved on the way: one duration that was tried, or one round of refinement."""
-
-    duration: float  # [s]
-    feasible: bool
-    status: str  # of the program: optimal, time_limit (the best found by then), infeasible, unknown
-    outcome: str  # a sentence
-    cost: float | None  # what the planner minimizes, as in Plan
-    nodes: int  # QPs solved, or iterations
-    solve_time: float  # [s]
-    dt: float | None = None  # [s] of the intervals, where they are equal
 
 
 @dataclass(frozen=True)
@@ -44,24 +28,33 @@ class Plan:
 
     problem: Problem
     trajectory: Trajectory
-    planner: str  # miqp, min-snap, free-knots or time-optimal
-    order: int  # of the derivative of position that is the input, or the closed form's cost
-    cost: float  # what the planner minimizes: Σ|u|², ∫|p⁽ˢ⁾|² dt, or the duration [s]
-    status: str  # optimal, time_limit (the best found by then), locally optimal, feasible, stopped
-    backend: str
-    stages: tuple[PlacedStage, ...]
-    attempts: tuple[Attempt, ...]
+    planner: str  # its registered name
+    order: int | None = None  # of the derivative of position that is the input, or the closed form's cost
+    cost: float | None = None  # what the planner minimizes: Σ|u|², ∫|p⁽ˢ⁾|² dt, or the duration [s]
+    status: str = "feasible"  # or optimal, time_limit (the best found by then), locally optimal, stopped
+    backend: str = ""  # what solved it
+    stages: tuple[PlacedStage, ...] = ()
+    attempts: tuple[Attempt, ...] = ()
     dt: float | None = None  # [s] of the intervals, where they are equal
     bound: float | None = None  # the cost of any solution at this dt is at least this, proven
     gap: float | None = None  # (cost − bound) / cost
     vehicle: Vehicle | None = None  # what it was planned or certified for
-    margin: RotorMargin | None = None
     certificate: Certificate | None = None  # for the vehicle, over continuous time
 
     @property
     def duration(self) -> float:
         """The trajectory's duration [s]."""
         return self.trajectory.duration
+
+    @property
+    def certified(self) -> bool:
+        """Whether it is proven that its vehicle can fly it within all limits."""
+        return self.certificate is not None and self.certificate.certified
+
+    @property
+    def margin(self) -> RotorMargin | None:
+        """The certificate's findings about rotors, in short; None without a vehicle."""
+        return None if self.certificate is None else RotorMargin.of(self.certificate)
 
     @property
     def intervals(self) -> int:
@@ -84,7 +77,8 @@ class Plan:
         margin = "" if self.margin is None else f"; rotors {self.margin}"
         proof = "" if self.certificate is None else f"; {self.certificate}"
         dt = "" if self.dt is None else f" of {self.dt:.4f} s"
+        backend = f" ({self.backend})" if self.backend else ""
         return (
             f"{self.problem.name}: {self.duration:.3f} s in {self.intervals} intervals{dt}, {self.status} by "
-            f"{self.planner} ({self.backend}); {stages}{margin}{proof}"
+            f"{self.planner}{backend}; {stages}{margin}{proof}"
         )

@@ -27,7 +27,7 @@ class Search(Protocol):
 
 
 @dataclass(frozen=True)
-class Grid:
+class GridSearch:
     """The first feasible of `count` equal steps from `first` to `last` [s] (paper, Section II)."""
 
     first: float = 0.1
@@ -51,7 +51,7 @@ class Grid:
 
 
 @dataclass(frozen=True)
-class Bisection:
+class BisectionSearch:
     """Climb from `first` by `growth` until feasible, then halve the last step down to `tolerance`.
 
     Feasibility need not be monotone; the result is feasible, and the scale below it by the tolerance is

@@ -1,21 +1,28 @@
-"""A plan of another planner as the first guess of an optimal control: its phases, its motion, its plane."""
+"""Where nonlinear programs begin: at a plan of another planner, with its phases, its path and its plane."""
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from aerobat.arrays import Array
+from aerobat.errors import Infeasible, SpecError
+from aerobat.flatness import end_thrust
+from aerobat.flatness.references import UNDETERMINED
+from aerobat.planning.planners import Planner
 from aerobat.planning.result import Plan
+from aerobat.problem.problem import Problem
 from aerobat.problem.stage import Stage, StageSequence
 from aerobat.trajectory import Trajectory
+from aerobat.vehicle import Vehicle
 
 FLAT = 1e-6  # of its extent: how far a path may leave a plane and still be in it
 
 
 @dataclass(frozen=True, eq=False)
-class Guess:
+class WarmStart:
     """A trajectory, and when it passes a sequence's stages."""
 
     trajectory: Trajectory
@@ -23,26 +30,27 @@ class Guess:
     times: tuple[float, ...]  # [s] of the stages, rising
 
     @classmethod
-    def of(cls, plan: Plan, sequence: StageSequence) -> Guess:
+    def of(cls, plan: Plan, sequence: StageSequence) -> WarmStart:
         """A plan's trajectory, and the order of the sequence's stages in it if it leaves that open."""
         times = [placed.time for placed in plan.stages]
         order = sorted(range(len(times)), key=times.__getitem__)
-        return cls(plan.trajectory, tuple(sequence.stages[i] for i in order), tuple(times[i] for i in order))
+        stages = tuple(sequence.stages[i] for i in order)
+        return cls(plan.trajectory, stages, tuple(times[i] for i in order))
 
     @property
     def phases(self) -> Array:
         """From the start to the first stage, ..., from the last to the end [s], (P,)."""
         return np.diff([0.0, *self.times, self.trajectory.duration])
 
-    def slowed(self, factor: float) -> Guess:
+    def time_scaled(self, factor: float) -> WarmStart:
         """The same path, flown longer by a factor."""
         trajectory = replace(self.trajectory, durations=factor * self.trajectory.durations)
         return replace(self, trajectory=trajectory, times=tuple(factor * t for t in self.times))
 
-    def shared(self, intervals: int, least: int) -> tuple[int, ...]:
-        """About so many intervals, shared among phases by their durations, each given the least or more."""
-        share = np.rint(intervals * self.phases / self.trajectory.duration).astype(int)
-        return tuple(np.maximum(share, least).tolist())
+    def allocate_intervals(self, intervals: int, minimum: int) -> tuple[int, ...]:
+        """About so many intervals, allocated to phases by their durations, to each at least the minimum."""
+        counts = np.rint(intervals * self.phases / self.trajectory.duration).astype(int)
+        return tuple(np.maximum(counts, minimum).tolist())
 
     def plane(self) -> Array | None:
         """The normal of the vertical plane that it stays in, (3,); None when it stays in none."""
@@ -51,3 +59,32 @@ class Guess:
         if extents[1] > FLAT * max(extents[0], FLAT):
             return None
         return np.array([*directions[1], 0.0])
+
+
+def require_attitudes(planner: str, problem: Problem, vehicle: Vehicle | None) -> Vehicle:
+    """The vehicle, whose attitude is determined at both ends.
+
+    Raises SpecError where there is none, and for ends in free fall, whose attitude is open.
+    """
+    if vehicle is None:
+        raise SpecError(f"the {planner} planner needs a vehicle: no limits, no least time; give --vehicle")
+    for name, state in (("start", problem.start), ("goal", problem.goal)):
+        thrust = end_thrust(state.velocity, state.acceleration, vehicle, problem.environment)
+        if np.linalg.norm(thrust) < UNDETERMINED * problem.environment.gravity:
+            raise SpecError(
+                f"{name}.acceleration asks no thrust, which leaves the attitude there open; change it"
+            )
+    return vehicle
+
+
+def plans_to_begin_from(planners: Iterable[Planner], problem: Problem, vehicle: Vehicle) -> Iterator[Plan]:
+    """The plans of other planners that find one.
+
+    Raises Infeasible where a stage asks more thrust than the vehicle has.
+    """
+    for planner in planners:
+        try:
+            yield planner.plan(problem, vehicle)
+        except Infeasible as infeasible:
+            if not infeasible.attempts:  # no attempt: refused at once, and whatever the planner
+                raise

@@ -12,10 +12,10 @@ from aerobat.simulation import Flight
 def plan_caption(plan: Plan) -> str:
     """How a plan came about."""
     dt = "" if plan.dt is None else f" of {plan.dt:.4f} s"
-    return (
-        f"{plan.planner}: {plan.duration:.3f} s in {plan.intervals} intervals{dt}, order {plan.order}, "
-        f"cost {plan.cost:.6g} ({plan.backend}, {plan.nodes} nodes, {1000 * plan.solve_time:.0f} ms)"
-    )
+    order = "" if plan.order is None else f", order {plan.order}"
+    cost = "" if plan.cost is None else f", cost {plan.cost:.6g}"
+    solver = f"{plan.backend}, {plan.nodes} nodes, {1000 * plan.solve_time:.0f} ms".removeprefix(", ")
+    return f"{plan.planner}: {plan.duration:.3f} s in {plan.intervals} intervals{dt}{order}{cost} ({solver})"
 
 
 def score_caption(score: Score) -> str:

@@ -69,7 +69,7 @@ def _plan(plan: Plan) -> dict[str, Any]:
         "min_rotor_thrust_n": margin and margin.min_thrust,
         "max_rotor_thrust_n": margin and margin.max_thrust,
         "rotor_margin_n": margin and margin.margin,
-        "bounded_moments": None if margin is None else margin.bounded_moments,
-        "rotor_feasible": None if margin is None else margin.feasible and margin.bounded_moments,
+        "bounded_moments": plan.certificate and not plan.certificate.discontinuities,
+        "rotor_feasible": plan.certificate and plan.certificate.certified,
         "certificate": plan.certificate and plan.certificate.record(),
     }

@@ -68,10 +68,13 @@ def certificate_table(certificate: Certificate, title: str) -> Table:
 
 
 def _plan_facts(plan: Plan) -> Iterable[tuple[str, str]]:
-    yield "planner", f"{plan.planner}, order {plan.order}, {plan.intervals} intervals, {plan.backend}"
+    order = "" if plan.order is None else f", order {plan.order}"
+    backend = f", {plan.backend}" if plan.backend else ""
+    yield "planner", f"{plan.planner}{order}, {plan.intervals} intervals{backend}"
     dt = "" if plan.dt is None else f"dt {plan.dt:.4f} s "
     yield "duration", f"{plan.duration:.3f} s, {dt}after {len(plan.attempts)} attempts"
-    yield "cost", f"{plan.cost:.7g}, {_optimality(plan)}"
+    if plan.cost is not None:
+        yield "cost", f"{plan.cost:.7g}, {_optimality(plan)}"
     yield "nodes", f"{plan.nodes}, solved in {1000 * plan.solve_time:.0f} ms"
     if plan.stages and plan.dt is not None:
         yield "stage intervals", ", ".join(f"{s.name} {s.interval}" for s in plan.stages)

@@ -5,21 +5,14 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from time import perf_counter
+from typing import Any
 
 from aerobat.errors import BackendMissing, Infeasible
 from aerobat.evaluation.score import Score, score
-from aerobat.planning import Attempt, FreeKnots, MinSnap, Miqp, Plan, Planner, TimeOptimal, plan
+from aerobat.planning import Attempt, Plan, Planner, plan, registered_planners
 from aerobat.problem.problem import Problem
 from aerobat.simulation import Flight, fly
 from aerobat.vehicle import Vehicle
-
-PLANNERS: tuple[tuple[str, Planner], ...] = (
-    ("miqp", Miqp()),
-    ("min-snap", MinSnap()),
-    ("free-knots", FreeKnots(segments=2)),
-    ("free-knots", FreeKnots(segments=8)),
-    ("time-optimal", TimeOptimal()),
-)
 
 
 @dataclass(frozen=True)
@@ -57,20 +50,36 @@ class Comparison:
 def compare(
     problem: Problem,
     vehicle: Vehicle,
-    planners: Sequence[tuple[str, Planner]] = PLANNERS,
+    planners: Sequence[tuple[str, Planner]] | None = None,
     progress: Callable[[Attempt], None] | None = None,
 ) -> Comparison:
-    """Plan a problem with each planner, named, and fly each plan.
+    """Plan a problem with each planner and fly each plan.
 
     A planner that finds none, or whose solver is not installed, has an entry that says so. Raises Infeasible
     when no planner finds any, SpecError for input that makes no sense.
+
+    Args:
+        problem: What is planned.
+        vehicle: What flies it.
+        planners: Each with a name; by default all that are registered.
+        progress: Called with every attempt as it ends.
     """
-    entries = tuple(_entry(name, planner, problem, vehicle, progress) for name, planner in planners)
+    compared = all_planners() if planners is None else planners
+    entries = tuple(_entry(name, planner, problem, vehicle, progress) for name, planner in compared)
     if all(entry.plan is None for entry in entries):
         raise Infeasible(
             f"no planner finds a plan for '{problem.name}' on {vehicle.name}: {entries[0].outcome}"
         )
     return Comparison(problem, vehicle, entries)
+
+
+def all_planners() -> tuple[tuple[str, Planner], ...]:
+    """Every registered planner with its defaults, or with each of the settings in its `COMPARED`."""
+    planners: list[tuple[str, Planner]] = []
+    for name, cls in registered_planners().items():
+        compared: Sequence[dict[str, Any]] = getattr(cls, "COMPARED", ({},))
+        planners += [(name, cls(**settings)) for settings in compared]
+    return tuple(planners)
 
 
 def _entry(

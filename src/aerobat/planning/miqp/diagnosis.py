@@ -4,30 +4,26 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from math import inf
 
 import numpy as np
 
 from aerobat.optimization import solver
-from aerobat.planning.feasibility import RotorMargin
 from aerobat.planning.miqp.formulation import Formulation
-from aerobat.planning.result import Attempt
+from aerobat.planning.recorder import Attempt
 from aerobat.problem.problem import DERIVATIVES, UNITS
 from aerobat.vehicle import Vehicle
 
 PROBES = 4  # durations at which a relaxed problem is tried
 
 
-def why_infeasible(
-    formulation: Formulation,
-    attempts: Sequence[Attempt],
-    margins: Sequence[RotorMargin],
-    vehicle: Vehicle | None,
-) -> str:
-    """One sentence: the rotors, when some program had a solution, otherwise the bounds that exclude all."""
+def why_infeasible(formulation: Formulation, attempts: Sequence[Attempt], vehicle: Vehicle | None) -> str:
+    """One sentence: the vehicle, when some program had a solution, otherwise the bounds that exclude all."""
     tried = [a.duration / formulation.chain.intervals for a in attempts]
     said = f"'{formulation.problem.name}' has no plan at any dt from {min(tried):.3g} to {max(tried):.3g} s"
-    if margins and vehicle is not None:
-        best = max(margins, key=lambda m: m.margin)
+    solved = [a for a in attempts if a.cost is not None]
+    if solved and vehicle is not None:
+        best = max(solved, key=lambda a: -inf if a.margin is None else a.margin).outcome
         return (
             f"{said} that {vehicle.name} can fly: at best, {best}; lower the maneuver's thrusts, "
             "move the gate nearer, or take a stronger vehicle"

@@ -48,7 +48,6 @@ class Formulation:
     problem: Problem
     sequence: StageSequence
     chain: IntegratorChain
-    limits: Limits | None = None  # tighter than the problem's, whose they are by default
 
     def __post_init__(self) -> None:
         """Check."""
@@ -59,16 +58,19 @@ class Formulation:
                 f"the {stages} stages of '{self.problem.name}'; use at least {max(2 * stages, 3)}"
             )
         for derivative in range(self.chain.order + 1, len(DERIVATIVES)):
-            if np.isfinite(self.bounds.of(derivative)[1]).any():
+            if np.isfinite(self.problem.path_limits.of(derivative)[1]).any():
                 raise SpecError(
                     f"limits.{DERIVATIVES[derivative]} cannot be held when the input is "
                     f"{INPUTS[self.chain.order]}; plan with --order {derivative} or drop it"
                 )
 
-    def program(self, dt: float) -> AssignmentProgram:
-        """The program at one dt [s]; its matrices are the same arrays for all dt."""
+    def program(self, dt: float, bounds: Limits | None = None) -> AssignmentProgram:
+        """The program at one dt [s]; its matrices are the same arrays for all dt.
+
+        `bounds` are imposed in place of the problem's limits, at most tighter.
+        """
         scale, free = dt**self._derivatives, self._free(dt)
-        lower, upper = self._bounds
+        lower, upper = self._limits if bounds is None else _columns(self._bounded_rows(bounds))
         goal = self.problem.goal.derivatives(self.chain.order) * self.chain.scales(dt)[:, None]
         reached = self.chain.free(self.initial, dt)[-1]
         return AssignmentProgram(
@@ -89,11 +91,6 @@ class Formulation:
         """The paper's Σ|u|² in SI units of a program's cost."""
         return program_cost / dt ** (2 * self.chain.order)
 
-    @property
-    def bounds(self) -> Limits:
-        """What is imposed at the interval ends."""
-        return self.problem.path_limits if self.limits is None else self.limits
-
     @cached_property
     def initial(self) -> Array:
         """The start's derivatives below the order in SI units, (r, 3)."""
@@ -111,9 +108,13 @@ class Formulation:
 
     @cached_property
     def _rows(self) -> dict[Row, tuple[float, float]]:
-        """Every row that bounds or stages speak of, with its standing bounds in SI units."""
+        """Every row that limits or stages speak of, with the problem's limits in SI units."""
+        return self._bounded_rows(self.problem.path_limits)
+
+    def _bounded_rows(self, bounds: Limits) -> dict[Row, tuple[float, float]]:
+        """The rows with bounds on the state and the input: the same rows, whatever is bounded how tightly."""
         rows: dict[Row, tuple[float, float]] = {}
-        for row, lower, upper in (*self._limit_rows(), *self._path_rows()):
+        for row, lower, upper in (*self._limit_rows(bounds), *self._path_rows()):
             low, high = rows.get(row, (-inf, inf))
             rows[row] = (max(low, lower), min(high, upper))
         for stage in self.sequence.stages:
@@ -122,10 +123,10 @@ class Formulation:
                     rows.setdefault(_row(condition, interval), (-inf, inf))
         return rows
 
-    def _limit_rows(self) -> Iterable[tuple[Row, float, float]]:
+    def _limit_rows(self, bounds: Limits) -> Iterable[tuple[Row, float, float]]:
         for derivative in range(self.chain.order + 1):
             intervals = self.chain.intervals if derivative == self.chain.order else self.chain.intervals - 1
-            for axis, low, high in zip(AXES, *self.bounds.of(derivative), strict=True):
+            for axis, low, high in zip(AXES, *bounds.of(derivative), strict=True):
                 if low > -inf or high < inf:
                     for interval in range(intervals):
                         yield Row(interval, derivative, axis), float(low), float(high)
@@ -144,9 +145,8 @@ class Formulation:
         return np.array([row.direction for row in self._rows]).reshape(-1, 3)
 
     @cached_property
-    def _bounds(self) -> tuple[Array, Array]:
-        bounds = np.array(list(self._rows.values())).reshape(-1, 2)
-        return bounds[:, 0], bounds[:, 1]
+    def _limits(self) -> tuple[Array, Array]:
+        return _columns(self._rows)
 
     @cached_property
     def _matrix(self) -> Array:
@@ -183,13 +183,25 @@ class Formulation:
         )
         return tuple(np.array(table, dtype=np.intp) for table in tables)
 
+    @cached_property
+    def _stage_bounds(self) -> tuple[Array, ...]:
+        """For each stage the bounds of its conditions in SI units, (conditions, 2)."""
+        gravity = self.problem.environment.gravity
+        return tuple(
+            np.array([c.kinematic_bounds(gravity) for c in stage.conditions]).reshape(-1, 2)
+            for stage in self.sequence.stages
+        )
+
     def _assigned(self, i: int, scale: Array, free: Array) -> SlottedStage:
-        stage, rows = self.sequence.stages[i], self._stage_rows[i]
-        si = np.array(
-            [c.kinematic_bounds(self.problem.environment.gravity) for c in stage.conditions]
-        ).reshape(-1, 2)
-        lower, upper = (si[:, side] * scale[rows] - free[rows] for side in (0, 1))
+        stage, rows, bounds = self.sequence.stages[i], self._stage_rows[i], self._stage_bounds[i]
+        lower, upper = (bounds[:, side] * scale[rows] - free[rows] for side in (0, 1))
         return SlottedStage(stage.name, tuple(self._slots(stage)), rows, lower, upper)
+
+
+def _columns(rows: dict[Row, tuple[float, float]]) -> tuple[Array, Array]:
+    """The lower and the upper bounds of rows, (m,) each."""
+    bounds = np.array(list(rows.values())).reshape(-1, 2)
+    return bounds[:, 0], bounds[:, 1]
 
 
 def _row(condition: Condition, interval: int) -> Row:

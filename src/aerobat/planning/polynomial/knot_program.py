@@ -21,8 +21,8 @@ from aerobat.arrays import Array
 from aerobat.optimization.nonlinear import NonlinearProgram, NonlinearResult, import_casadi, solve_nonlinear
 from aerobat.planning.polynomial.knot_bounds import Bound
 from aerobat.planning.polynomial.knot_variables import DEGREE, GIVEN, Frame, KnotVariables
-from aerobat.planning.polynomial.rotor_rows import RotorRows
-from aerobat.planning.warm_start import Guess
+from aerobat.planning.polynomial.rotor_constraints import RotorConstraints
+from aerobat.planning.warm_start import WarmStart
 from aerobat.problem.problem import Problem
 from aerobat.vehicle import Vehicle
 
@@ -47,15 +47,14 @@ class KnotProgram:
 
     problem: Problem
     vehicle: Vehicle
-    guess: Guess
+    guess: WarmStart
     samples: tuple[Array, ...]  # normalised times in each segment at which limits hold
     bounds: tuple[Bound, ...]  # that hold along the whole path
-    gravity: float  # [m/s²] as the stages mean it
-    radius: float  # of the box, in scaled variables
+    radius: float  # of the trust region, a box in scaled variables
     reserve: float  # of every limit's range, kept at samples
     still_ends: bool = False  # see KnotVariables
 
-    def solve(self, iterations: int) -> tuple[Guess, NonlinearResult]:
+    def solve(self, iterations: int) -> tuple[WarmStart, NonlinearResult]:
         """The solution near the guess, as the next guess. Raises BackendMissing without CasADi."""
         start = self._variables.start
         answer = solve_nonlinear(
@@ -94,7 +93,9 @@ class KnotProgram:
     def _rotors(self) -> _Rows:
         """Limits of rotors and the floor of thrust at all samples."""
         ca, trajectory, variables = import_casadi(), self.guess.trajectory, self._variables
-        rotors = RotorRows(self.vehicle, variables.frame.axes, self.problem.environment, self.problem.heading)
+        rotors = RotorConstraints(
+            self.vehicle, variables.frame.axes, self.problem.environment, self.problem.heading
+        )
         moving = [
             ca.vertcat(*((ca.DM(_powers(s, k)) @ variables.coefficients[i]).T for k in range(1, GIVEN)))
             for i, s in enumerate(self.samples)
@@ -109,7 +110,7 @@ class KnotProgram:
         return _Rows(ca.vec(values), np.tile(lower, len(times)), np.tile(upper, len(times)))
 
     def _path(self) -> Iterator[_Rows]:
-        """What holds along the whole path, at all samples but the very ends, which are given."""
+        """What holds along the whole path, at all samples but the very ends, which are fixed."""
         last = len(self.samples) - 1
         for bound in self.bounds:
             for i, s in enumerate(self.samples):
@@ -121,7 +122,9 @@ class KnotProgram:
         ca, variables = import_casadi(), self._variables
         for j, stage in enumerate(self.guess.stages):
             s = variables.place(j)
-            for bound in (Bound.of(condition, self.gravity) for condition in stage.conditions):
+            for bound in (
+                Bound.of(condition, self.problem.environment.gravity) for condition in stage.conditions
+            ):
                 k = bound.derivative
                 at = ca.horzcat(*(perm(p, k) * s ** max(p - k, 0) for p in range(DEGREE + 1)))
                 yield from self._within(bound, variables.segments[j], at, 0.0)

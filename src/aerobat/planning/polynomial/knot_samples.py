@@ -1,4 +1,4 @@
-"""Where polynomials exceed limits between samples, and the polynomials that a plan is cut into at first."""
+"""Where polynomials exceed limits between samples, and the polynomials that a plan is refitted by."""
 
 from __future__ import annotations
 
@@ -9,7 +9,6 @@ import numpy as np
 from aerobat.arrays import Array
 from aerobat.environment import Environment
 from aerobat.flatness import reference
-from aerobat.planning.feasibility import RotorMargin, rotor_margin
 from aerobat.planning.polynomial.knot_bounds import Bound
 from aerobat.planning.polynomial.knot_variables import GIVEN
 from aerobat.trajectory import Trajectory, polynomial
@@ -23,47 +22,39 @@ Samples = tuple[Array, ...]  # normalised times in each segment, rising
 
 
 @dataclass(frozen=True, eq=False)
-class Excess:
+class ConstraintViolation:
     """By how much a trajectory exceeds limits, and where."""
 
-    worst: float  # as a part of the limit's range; negative: all hold
+    worst: float  # as a fraction of the limit's range; negative: all hold
     peaks: Samples  # where more is exceeded than beside it
-    margin: RotorMargin
 
     @classmethod
     def of(
         cls, trajectory: Trajectory, vehicle: Vehicle, environment: Environment, bounds: tuple[Bound, ...]
-    ) -> Excess:
+    ) -> ConstraintViolation:
         """Of rotor thrusts and of bounds along a trajectory."""
-        s, margin = np.linspace(0.0, 1.0, DENSE), rotor_margin(trajectory, vehicle, environment)
+        s = np.linspace(0.0, 1.0, DENSE)
         over = [_rotors(trajectory, vehicle, environment, s)]
         over += [bound.excess(trajectory.on_segments(s, bound.derivative)) / bound.scale for bound in bounds]
         values = np.max(over, axis=0)
-        beside = np.pad(values, ((0, 0), (1, 1)), constant_values=-np.inf)
-        peaks = [s[p] for p in (values > 0.0) & (values >= beside[:, :-2]) & (values >= beside[:, 2:])]
-        worst = float(values.max())
-        for time, gap, rotor in (
-            (margin.min_time, margin.low_margin, margin.min_rotor),
-            (margin.max_time, margin.high_margin, margin.max_rotor),
-        ):
-            i, place = _place(trajectory, time)
-            peaks[i] = np.append(peaks[i], [place] if gap < 0.0 else [])
-            worst = max(worst, -gap / float(vehicle.max_thrusts[rotor] - vehicle.min_thrusts[rotor]))
-        return cls(worst, tuple(peaks), margin)
+        neighbours = np.pad(values, ((0, 0), (1, 1)), constant_values=-np.inf)
+        peaks = (values > 0.0) & (values >= neighbours[:, :-2]) & (values >= neighbours[:, 2:])
+        return cls(float(values.max()), tuple(s[p] for p in peaks))
 
-    def beside(self, trajectory: Trajectory, time: float, part: float) -> Excess:
-        """The same, and an excess by a part of its limit's range at a time [s], where all seemed well."""
+    def add_counterexample(self, trajectory: Trajectory, time: float, excess: float) -> ConstraintViolation:
+        """The same, and an excess, a fraction of its limit's range, at a time [s] where all seemed well."""
         peaks = list(self.peaks)
-        i, place = _place(trajectory, time)
+        i = int(np.searchsorted(trajectory.knots[1:-1], time, side="right"))
+        place = np.clip((time - trajectory.knots[i]) / trajectory.durations[i], 0.0, 1.0)
         peaks[i] = np.append(peaks[i], place)
-        return replace(self, worst=max(self.worst, part), peaks=tuple(peaks))
+        return replace(self, worst=max(self.worst, excess), peaks=tuple(peaks))
 
     def joined(self, samples: Samples) -> Samples:
         """Samples, and the peaks that are not among them."""
         return tuple(_with(old, new) for old, new in zip(samples, self.peaks, strict=True))
 
 
-def cut(trajectory: Trajectory, segments: int) -> Trajectory:
+def refit(trajectory: Trajectory, segments: int) -> Trajectory:
     """So many polynomials of degree 9, which meet a trajectory at their knots up to snap.
 
     Its own knots are kept, and its longest segments cut; if it has more segments than that, all are equal.
@@ -91,12 +82,6 @@ def _rotors(trajectory: Trajectory, vehicle: Vehicle, environment: Environment, 
     low, high = vehicle.min_thrusts, vehicle.max_thrusts
     over = np.maximum(low - thrusts, thrusts - high) / (high - low)
     return np.asarray(over.max(axis=1).reshape(times.shape))
-
-
-def _place(trajectory: Trajectory, time: float) -> tuple[int, float]:
-    """The segment at a time [s], and the normalised time in it."""
-    i = int(np.searchsorted(trajectory.knots[1:-1], time, side="right"))
-    return i, float(np.clip((time - trajectory.knots[i]) / trajectory.durations[i], 0.0, 1.0))
 
 
 def _with(old: Array, new: Array) -> Array:

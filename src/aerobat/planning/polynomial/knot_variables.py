@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from aerobat.arrays import Array
 from aerobat.flatness import end_thrust
 from aerobat.optimization.nonlinear import import_casadi
-from aerobat.planning.warm_start import Guess
+from aerobat.planning.warm_start import WarmStart
 from aerobat.problem.problem import EndState, Problem
 from aerobat.trajectory import Trajectory, polynomial
 from aerobat.vehicle import Vehicle
@@ -35,7 +35,7 @@ class Frame:
     axes: Array  # orthonormal columns, (3, d); in a plane the second is up
 
     @classmethod
-    def around(cls, guess: Guess, wind: Array) -> Frame:
+    def around(cls, guess: WarmStart, wind: Array) -> Frame:
         """The vertical plane that guess and wind [m/s] stay in, where they stay in one; else all of space."""
         normal = guess.plane()
         if normal is None or normal @ wind != 0.0:
@@ -72,7 +72,7 @@ class KnotVariables:
 
     problem: Problem
     vehicle: Vehicle
-    guess: Guess
+    guess: WarmStart
     segments: tuple[int, ...]  # of the stages
     frame: Frame
     radius: float  # of the box
@@ -122,7 +122,7 @@ class KnotVariables:
             for power, end in zip(powers, ends, strict=True)
         ]
 
-    def read(self, x: Array) -> Guess:
+    def read(self, x: Array) -> WarmStart:
         """The trajectory and the stages' times that values of x (n,) stand for."""
         parts, places, offsets = self._split(x)
         durations = self._mean * parts
@@ -132,7 +132,7 @@ class KnotVariables:
         trajectory = Trajectory(durations, self.frame.outside(coefficients), self.problem.heading)
         segments = list(self.segments)
         times = trajectory.knots[segments] + durations[segments] * places
-        return Guess(trajectory, self.guess.stages, tuple(times.tolist()))
+        return WarmStart(trajectory, self.guess.stages, tuple(times.tolist()))
 
     def _split(self, x: Array) -> list[Array]:
         """Durations, places and offsets among values of x."""
@@ -183,7 +183,7 @@ class KnotVariables:
         return np.hstack([effect, jerks.reshape(len(effect), 2)])
 
     def _rows(self) -> NDArray[np.intp]:
-        """The number of the offset of each derivative at each end of each segment; -1: given, (S, 2, 5)."""
+        """The number of the offset of each derivative at each end of each segment; -1: fixed, (S, 2, 5)."""
         count = self.guess.trajectory.segments
         rows = np.full((count, 2, GIVEN), -1)
         knots = np.arange(SNAP * (count - 1)).reshape(count - 1, SNAP)

@@ -1,4 +1,4 @@
-"""What a problem gives at the knots of a polynomial path, and when to pass them at first."""
+"""What a problem fixes at the knots of a polynomial path, and when to pass them at first."""
 
 from __future__ import annotations
 
@@ -13,47 +13,47 @@ from aerobat.problem.problem import Problem
 from aerobat.problem.stage import Stage, StageSequence
 from aerobat.trajectory import Trajectory
 
-SHARE = 0.3  # of the specific thrust, that accelerates along a leg when times are guessed
-SHORTEST = 0.2  # [s] that a leg is given at first
-MISSED = 1e-6  # in SI units: by how much a condition may be missed through rounding
+THRUST_FRACTION = 0.3  # of the specific thrust, that accelerates along a leg when times are guessed
+SHORTEST_LEG = 0.2  # [s] that a leg is given at first
+STAGE_TOLERANCE = 1e-6  # in SI units: by how much a condition may be missed through rounding
 
 
-def given_at_knots(problem: Problem, sequence: StageSequence, order: int, gravity: float) -> Array:
+def fixed_at_knots(problem: Problem, sequence: StageSequence, order: int, gravity: float) -> Array:
     """Position and its derivatives below `order` at start, stages and goal, (K, order, 3); NaN: free.
 
     The closed form takes each axis alone and equalities only. So conditions in oblique directions fix, by
     least norm, every component that they touch; a lower bound on thrust fixes the thrust to it, or to the
     hover's if that is more; other inequalities are left free, to be checked afterwards.
     """
-    given = np.full((len(sequence.stages) + 2, order, 3), np.nan)
-    given[0], given[-1] = problem.start.derivatives(order), problem.goal.derivatives(order)
+    fixed = np.full((len(sequence.stages) + 2, order, 3), np.nan)
+    fixed[0], fixed[-1] = problem.start.derivatives(order), problem.goal.derivatives(order)
     for knot, stage in enumerate(sequence.stages, 1):
         for derivative in range(3):
-            given[knot, derivative] = _fixed(stage, derivative, gravity)
-    return given
+            fixed[knot, derivative] = _fixed(stage, derivative, gravity)
+    return fixed
 
 
-def first_times(problem: Problem, given: Array, max_specific_thrust: float) -> Array:
+def first_times(problem: Problem, fixed: Array, max_specific_thrust: float) -> Array:
     """Durations between knots to begin with [s], (K - 1,): the problem's own, or a guess from distances."""
     if problem.maneuver.first_times is not None:
         return np.diff([0.0, *problem.maneuver.first_times])
-    placed = np.flatnonzero(~np.isnan(given[:, 0]).any(axis=1))
-    durations = np.empty(len(given) - 1)
+    placed = np.flatnonzero(~np.isnan(fixed[:, 0]).any(axis=1))
+    durations = np.empty(len(fixed) - 1)
     for a, b in pairwise(placed.tolist()):
-        length = float(np.linalg.norm(given[b, 0] - given[a, 0]))
-        leg = max(2.0 * sqrt(length / (SHARE * max_specific_thrust)), SHORTEST)
+        length = float(np.linalg.norm(fixed[b, 0] - fixed[a, 0]))
+        leg = max(2.0 * sqrt(length / (THRUST_FRACTION * max_specific_thrust)), SHORTEST_LEG)
         durations[a:b] = leg / (b - a)
     return durations
 
 
-def unmet(sequence: StageSequence, trajectory: Trajectory, gravity: float) -> str | None:
+def violated_stage(sequence: StageSequence, trajectory: Trajectory, gravity: float) -> str | None:
     """The first stage that a trajectory with a knot a stage misses, in a sentence; or None."""
     values = [trajectory.evaluate(trajectory.knots[1:-1], k) for k in range(3)]
     for stage, flat in zip(sequence.stages, np.stack(values, axis=1), strict=True):
         for condition in stage.conditions:
             derivative = flat[condition.quantity.derivative]
             value = float(condition.direction @ derivative) + condition.weight(gravity)
-            if not condition.lower - MISSED <= value <= condition.upper + MISSED:
+            if not condition.lower - STAGE_TOLERANCE <= value <= condition.upper + STAGE_TOLERANCE:
                 return (
                     f"the stage '{stage.name}' asks {condition.quantity.value} between {condition.lower:.4g} "
                     f"and {condition.upper:.4g}, the closed form gives {value:.4g}"

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from enum import StrEnum
 from time import perf_counter
 
@@ -12,46 +11,50 @@ import numpy as np
 from aerobat.arrays import Array
 from aerobat.certification import Certificate
 from aerobat.errors import Infeasible, SpecError
-from aerobat.planning.feasibility import RotorMargin, rotor_margin
-from aerobat.planning.polynomial.knots import first_times, given_at_knots, unmet
-from aerobat.planning.proof import certificate_for
-from aerobat.planning.result import Attempt, PlacedStage, Plan
-from aerobat.planning.search import Bisection, Grid, Search
+from aerobat.planning.certified_solve import Judged, Solution, certified_solve, refuted_by_samples
+from aerobat.planning.planners import option, planner
+from aerobat.planning.polynomial.knots import first_times, fixed_at_knots, violated_stage
+from aerobat.planning.recorder import Progress, Recorder
+from aerobat.planning.result import PlacedStage, Plan
+from aerobat.planning.search import BisectionSearch, GridSearch, Search
 from aerobat.problem.problem import Problem
 from aerobat.problem.stage import StageSequence
-from aerobat.trajectory import Trajectory
 from aerobat.trajectory.minimum_effort import ContinuityRule, minimum_effort
 from aerobat.vehicle import Vehicle
 
 ASSUMED_THRUST_TO_WEIGHT = 2.0  # for first times without a vehicle
 STEP = 0.1  # [s] of the paper's line search (Section V-D: 12 iterations from 0.5 and 2.0 to 1.6 and 3.1 s)
 STEPS = 100
-SLOWER = 30.0  # times the first duration, where stretching all segments gives up
-FASTER = 0.3  # times the first duration, where it begins
+SLOWEST = 30.0  # times the first duration, where scaling all segments gives up
+FASTEST = 0.3  # times the first duration, where it begins
 
 
-class Stretch(StrEnum):
+class TimeScaling(StrEnum):
     """Which segments a longer duration lengthens."""
 
     FIRST = "first"  # all knots shift by as much, as in the paper: the first segment alone lengthens
     ALL = "all"  # every segment by the same factor
 
 
+@planner("min-snap")
 @dataclass(frozen=True)
 class MinSnap:
-    """Closed-form polynomials of degree 2s − 1 through waypoints, at the smallest duration searched.
+    """Closed-form polynomials through waypoints with a line search on their times (Section V).
 
-    With s = 5, the paper's degree 9, the cost is the integral of crackle squared: "minimum snap" in name
-    only; s = 4 is minimum snap, s = 3 minimum jerk. Without a `stretch`, waypoints that come with their
-    times are shifted as in the paper, by 0.1 s at a time; other paths are stretched as a whole. With
-    `stop_after` the search ends at that attempt, whether the vehicle can fly it or not (paper, Fig. 10).
+    Degree 2s − 1 at the smallest duration searched. With s = 5, the paper's degree 9, the cost is the
+    integral of crackle squared: "minimum snap" in name only; s = 4 is minimum snap, s = 3 minimum jerk.
+    Without a `time_scaling`, waypoints that come with their times are shifted as in the paper, by 0.1 s at a
+    time; other paths are scaled as a whole. With `stop_after` the search ends at that attempt, whether the
+    vehicle can fly it or not (paper, Fig. 10).
     """
 
-    order: int = 5  # s
+    order: int = option(5, "The derivative whose square is minimized, 3 to 5; 5 gives degree 9.")  # s
     rule: ContinuityRule = ContinuityRule.VARIATIONAL
-    stretch: Stretch | None = None
+    time_scaling: TimeScaling | None = None
     search: Search | None = None
-    stop_after: int | None = None
+    stop_after: int | None = option(
+        None, "Stop the search at this attempt, whether the vehicle can fly it or not (paper, Fig. 10)."
+    )
 
     def __post_init__(self) -> None:
         """Check."""
@@ -61,93 +64,57 @@ class MinSnap:
             raise SpecError(f"stop_after must be a number of attempts, 1 or more, got {self.stop_after}")
 
     def plan(
-        self,
-        problem: Problem,
-        vehicle: Vehicle | None = None,
-        progress: Callable[[Attempt], None] | None = None,
+        self, problem: Problem, vehicle: Vehicle | None = None, progress: Progress | None = None
     ) -> Plan:
         """The path at the first duration of the search that the vehicle can fly, certified.
 
         Without a vehicle, the path at its first times. Raises Infeasible when no duration will do, and
         SpecError for input that makes no sense.
         """
-        planning = _Planning.of(self, problem, vehicle, progress)
+        planning = _Planning(self, problem, vehicle, Recorder(progress))
         first = float(planning.durations.sum())
         if vehicle is None:
             found = planning.attempt(first)
         else:
-            found = self._search(planning.stretch, first).smallest(planning.attempt)
+            found = self._search(planning.scaling, first).smallest(planning.attempt)
         if found is None:
-            raise Infeasible(planning.why_infeasible(), planning.attempts)
+            raise Infeasible(planning.why_infeasible(), planning.recorder.attempts)
         return planning.result(found)
 
-    def _search(self, stretch: Stretch, first: float) -> Search:
+    def _search(self, scaling: TimeScaling, first: float) -> Search:
         if self.search is not None:
             return self.search
-        if stretch is Stretch.FIRST or self.stop_after is not None:
-            return Grid(first, first + STEP * (STEPS - 1), STEPS)
-        return Bisection(FASTER * first, SLOWER * first)
+        if scaling is TimeScaling.FIRST or self.stop_after is not None:
+            return GridSearch(first, first + STEP * (STEPS - 1), STEPS)
+        return BisectionSearch(FASTEST * first, SLOWEST * first)
 
 
-@dataclass(frozen=True)
-class _Found:
-    trajectory: Trajectory
-    cost: float
-    feasible: bool
-    margin: RotorMargin | None
-    certificate: Certificate | None
-
-
-@dataclass
 class _Planning:
-    """One run of the search: tries durations and keeps the record."""
+    """One run of the search: what all attempts share."""
 
-    config: MinSnap
-    problem: Problem
-    sequence: StageSequence
-    vehicle: Vehicle | None
-    gravity: float  # [m/s²]
-    given: Array  # (K, s, 3)
-    durations: Array  # [s] to begin with, (K - 1,)
-    stretch: Stretch
-    progress: Callable[[Attempt], None] | None
-    attempts: list[Attempt] = field(default_factory=list)
-
-    @classmethod
-    def of(
-        cls,
-        config: MinSnap,
-        problem: Problem,
-        vehicle: Vehicle | None,
-        progress: Callable[[Attempt], None] | None,
-    ) -> _Planning:
+    def __init__(
+        self, config: MinSnap, problem: Problem, vehicle: Vehicle | None, recorder: Recorder
+    ) -> None:
         gravity = problem.environment.gravity
         thrust = ASSUMED_THRUST_TO_WEIGHT * gravity if vehicle is None else vehicle.max_specific_thrust
-        sequence = problem.stages(thrust)
-        given = given_at_knots(problem, sequence, config.order, gravity)
-        timed = problem.maneuver.first_times is not None
-        stretch = config.stretch or (Stretch.FIRST if timed else Stretch.ALL)
-        durations = first_times(problem, given, thrust)
-        return cls(config, problem, sequence, vehicle, gravity, given, durations, stretch, progress)
+        self.config, self.problem, self.vehicle, self.recorder = config, problem, vehicle, recorder
+        self.sequence: StageSequence = problem.stages(thrust)
+        self.fixed = fixed_at_knots(problem, self.sequence, config.order, gravity)
+        self.durations = first_times(problem, self.fixed, thrust)
+        timed = TimeScaling.ALL if problem.maneuver.first_times is None else TimeScaling.FIRST
+        self.scaling = config.time_scaling or timed
 
-    def attempt(self, duration: float) -> _Found | None:
-        """The path at one duration; None unless it meets its stages and the vehicle can fly it."""
-        started = perf_counter()
-        trajectory = minimum_effort(
-            self.given, self._stretched(duration), self.config.rule, self.problem.heading
-        )
-        found, outcome = self._judged(trajectory)
-        spent = perf_counter() - started
-        attempt = Attempt(duration, found.feasible, "optimal", outcome, found.cost, 1, spent)
-        self.attempts.append(attempt)
-        if self.progress is not None:
-            self.progress(attempt)
-        stopped = len(self.attempts) == self.config.stop_after
-        return found if found.feasible or stopped else None
+    def attempt(self, duration: float) -> Judged[None] | None:
+        """What one duration comes to; None unless it meets its stages and the vehicle can fly it."""
+        program = _ClosedForm(self, duration)
+        judged = certified_solve(program, self.problem, self.vehicle, self.recorder)
+        stopped = len(self.recorder.attempts) == self.config.stop_after
+        return judged if judged.feasible or stopped else None
 
-    def _stretched(self, duration: float) -> Array:
+    def scaled(self, duration: float) -> Array:
+        """Durations of the segments [s] that make up one duration [s]."""
         durations = self.durations.copy()
-        if self.stretch is Stretch.ALL:
+        if self.scaling is TimeScaling.ALL:
             return np.asarray(durations * (duration / durations.sum()))
         durations[0] += duration - durations.sum()
         if durations[0] <= 0.0:
@@ -156,50 +123,61 @@ class _Planning:
             )
         return durations
 
-    def _judged(self, trajectory: Trajectory) -> tuple[_Found, str]:
-        """Whether a path will do, and why, in a sentence."""
-        cost = trajectory.effort(self.config.order)
-        missed = unmet(self.sequence, trajectory, self.gravity)
-        if self.vehicle is None:
-            return _Found(trajectory, cost, missed is None, None, None), missed or "feasible"
-        margin = rotor_margin(trajectory, self.vehicle, self.problem.environment)
-        if missed is not None or not margin.feasible:
-            return _Found(trajectory, cost, False, margin, None), missed or str(margin)
-        certificate = certificate_for(trajectory, self.problem, self.vehicle)
-        outcome = "feasible" if certificate.certified else certificate.why
-        return _Found(trajectory, cost, certificate.certified, margin, certificate), outcome
-
     def why_infeasible(self) -> str:
         """One sentence, from the last attempt, the slowest."""
-        longest = max(self.attempts, key=lambda attempt: attempt.duration)
-        shortest = min(attempt.duration for attempt in self.attempts)
+        attempts = self.recorder.attempts
+        longest = max(attempts, key=lambda attempt: attempt.duration)
+        shortest = min(attempt.duration for attempt in attempts)
         remedy = (
-            "stretch all segments, or give other times"
-            if self.stretch is Stretch.FIRST
-            else "give the waypoints other times or fewer givens, or take the planner free-knots"
+            "scale the times of all segments, or give others"
+            if self.scaling is TimeScaling.FIRST
+            else "give the waypoints other times or fix fewer components, or take the planner free-knots"
         )
         return (
             f"'{self.problem.name}' has no closed-form path that flies at any duration from {shortest:.3g} "
             f"to {longest.duration:.3g} s: at the last, {longest.outcome}; {remedy}"
         )
 
-    def result(self, found: _Found) -> Plan:
+    def result(self, found: Judged[None]) -> Plan:
         """The plan of what the search settled on."""
-        times = found.trajectory.knots[1:-1].tolist()
-        return Plan(
-            problem=self.problem,
-            trajectory=found.trajectory,
+        times = np.cumsum(self.scaled(found.solution.duration))[:-1].tolist()
+        stages = enumerate(zip(self.sequence.stages, times, strict=True))
+        return found.plan(
+            self.recorder,
             planner="min-snap",
             order=self.config.order,
-            cost=found.cost,
             status="feasible" if found.feasible else "stopped",
             backend="closed form",
-            stages=tuple(
-                PlacedStage(stage.name, i, time, stage.gate)
-                for i, (stage, time) in enumerate(zip(self.sequence.stages, times, strict=True))
-            ),
-            attempts=tuple(self.attempts),
-            vehicle=self.vehicle,
-            margin=found.margin,
-            certificate=found.certificate,
+            stages=tuple(PlacedStage(stage.name, i, time, stage.gate) for i, (stage, time) in stages),
         )
+
+
+@dataclass
+class _ClosedForm:
+    """The path at one duration; nothing is imposed that could be tightened."""
+
+    planning: _Planning
+    duration: float
+
+    def solve(self) -> Solution[None]:
+        """The path; a failure where it misses a stage or samples refute it."""
+        started = perf_counter()
+        planning, problem, order = self.planning, self.planning.problem, self.planning.config.order
+        durations = planning.scaled(self.duration)
+        trajectory = minimum_effort(planning.fixed, durations, planning.config.rule, problem.heading)
+        failure = violated_stage(planning.sequence, trajectory, problem.environment.gravity)
+        solution = Solution(
+            source=None,
+            duration=self.duration,
+            trajectory=trajectory,
+            status="optimal",
+            nodes=1,
+            solve_time=perf_counter() - started,
+            cost=trajectory.effort(order),
+            failure=failure,
+        )
+        return refuted_by_samples(solution, problem, planning.vehicle)
+
+    def tighten(self, solution: Solution[None], certificate: Certificate | None) -> bool:
+        """A longer duration is all that helps."""
+        return False

@@ -22,7 +22,13 @@ import numpy as np
 
 from aerobat.arrays import Array
 from aerobat.optimization.nonlinear import import_casadi
-from aerobat.planning.time_optimal.spinless_body import INPUTS, POSITION, STATES, VELOCITY, SpinlessBody
+from aerobat.planning.time_optimal.zero_yaw_rate_body import (
+    INPUTS,
+    POSITION,
+    STATES,
+    VELOCITY,
+    ZeroYawRateBody,
+)
 from aerobat.trajectory import Trajectory, polynomial
 
 STATE_SCALE = np.repeat([1.0, 5.0, 1.0, 5.0], [3, 3, 4, 2])  # what is large in SI units
@@ -33,7 +39,7 @@ DOUBLE_INTEGRAL = INTEGRAL / np.arange(2, 8)
 
 
 @dataclass(frozen=True, eq=False)
-class Motion:
+class CollocatedMotion:
     """States and inputs over all phases in SI units: arrays, or symbols of the same shapes."""
 
     phases: Any  # durations [s], (P,)
@@ -77,7 +83,7 @@ class Mesh:
         return len(self.scale)
 
     @cached_property
-    def shares(self) -> Array:
+    def fractions(self) -> Array:
         """What part of each phase each interval takes, (P, K)."""
         counts = np.array(self.intervals)
         return np.repeat(np.diag(1.0 / counts), counts, axis=1)
@@ -91,13 +97,13 @@ class Mesh:
             [np.ones(phases), np.tile(STATE_SCALE, states), np.tile(self.input_scale, inputs)]
         )
 
-    def pack(self, motion: Motion) -> Array:
+    def pack(self, motion: CollocatedMotion) -> Array:
         """The column of unknowns of a motion in numbers, (size,)."""
         first = motion.starts[:, :1] if self.continuous else motion.starts
         columns = (motion.states, first, motion.ends)
         return np.concatenate([motion.phases, *(column.T.ravel() for column in columns)]) / self.scale
 
-    def unpack(self, column: Any) -> Motion:
+    def unpack(self, column: Any) -> CollocatedMotion:
         """The motion of a column of unknowns, in symbols."""
         ca, K = import_casadi(), self.total
         cuts = np.cumsum([0, *self._sizes]).tolist()
@@ -105,13 +111,13 @@ class Mesh:
         inputs = ca.reshape(inputs, INPUTS, -1)
         starts = inputs[:, :K]
         ends = inputs[:, 1:] if self.continuous else inputs[:, K:]
-        return Motion(phases, ca.reshape(states, STATES, K + 1), starts, ends)
+        return CollocatedMotion(phases, ca.reshape(states, STATES, K + 1), starts, ends)
 
-    def read(self, column: Array) -> Motion:
+    def read(self, column: Array) -> CollocatedMotion:
         """The motion of a column of unknowns, in numbers."""
         motion = self.unpack(import_casadi().DM(column))
         states, starts, ends = (part.full() for part in (motion.states, motion.starts, motion.ends))
-        return Motion(motion.phases.full()[:, 0], states, starts, ends)
+        return CollocatedMotion(motion.phases.full()[:, 0], states, starts, ends)
 
     @property
     def _sizes(self) -> tuple[int, int, int]:
@@ -123,14 +129,14 @@ class Mesh:
 class Collocation:
     """A motion on a mesh with what the equations of motion make of it, in numbers or symbols."""
 
-    body: SpinlessBody
+    body: ZeroYawRateBody
     mesh: Mesh
-    motion: Motion
+    motion: CollocatedMotion
 
     @cached_property
     def durations(self) -> Any:
         """Of the intervals [s], (1, K)."""
-        return import_casadi().reshape(self.motion.phases, 1, -1) @ import_casadi().DM(self.mesh.shares)
+        return import_casadi().reshape(self.motion.phases, 1, -1) @ import_casadi().DM(self.mesh.fractions)
 
     @cached_property
     def rates(self) -> Rates:

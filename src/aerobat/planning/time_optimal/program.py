@@ -14,15 +14,15 @@ from numpy.typing import ArrayLike
 from aerobat.arrays import Array
 from aerobat.environment import Environment
 from aerobat.optimization.nonlinear import NonlinearProgram, import_casadi
-from aerobat.planning.time_optimal.collocation import Collocation, Mesh, Motion
-from aerobat.planning.time_optimal.spinless_body import (
+from aerobat.planning.time_optimal.collocation import CollocatedMotion, Collocation, Mesh
+from aerobat.planning.time_optimal.zero_yaw_rate_body import (
     ATTITUDE,
     INPUTS,
     POSITION,
     RATES,
     STATES,
     VELOCITY,
-    SpinlessBody,
+    ZeroYawRateBody,
 )
 from aerobat.problem.problem import Limits
 from aerobat.problem.stage import Condition
@@ -39,7 +39,7 @@ ALONG_Z = np.zeros(3), np.array([0.0, 0.0, inf])  # bounds on a thrust direction
 
 @dataclass(frozen=True, eq=False)
 class End:
-    """What is given at one end of the motion; body rates are zero there."""
+    """What is fixed at one end of the motion; body rates are zero there."""
 
     position: Array  # [m], (3,)
     velocity: Array  # [m/s], (3,)
@@ -48,12 +48,12 @@ class End:
 
 
 @dataclass(frozen=True, eq=False)
-class Bounds:
+class NodeBounds:
     """What holds at every node: limits, and the range of the rotors' thrusts or, where they lag, commands."""
 
     lower: Array  # [N], (n,)
     upper: Array  # [N], (n,)
-    least_collective: float  # [N] of all together, which keeps the attitude determined
+    min_collective: float  # [N] of all together, which keeps the attitude determined
     limits: Limits
 
 
@@ -72,12 +72,12 @@ class OptimalControl:
     q_start: Array  # (4,)
     goal: End
     stages: tuple[tuple[Condition, ...], ...]  # (P - 1,)
-    always: tuple[Condition, ...]
+    path_constraints: tuple[Condition, ...]
 
     @cached_property
-    def body(self) -> SpinlessBody:
+    def body(self) -> ZeroYawRateBody:
         """The equations of motion."""
-        return SpinlessBody(self.vehicle, self.environment)
+        return ZeroYawRateBody(self.vehicle, self.environment)
 
     @cached_property
     def mesh(self) -> Mesh:
@@ -87,11 +87,11 @@ class OptimalControl:
         scale = spread / np.array([1.0, vehicle.inertia[0, 0], vehicle.inertia[1, 1]])
         return Mesh(self.intervals, bool(vehicle.lags.any()), scale)
 
-    def of(self, motion: Motion) -> Collocation:
+    def of(self, motion: CollocatedMotion) -> Collocation:
         """A motion with its rates and rotor thrusts."""
         return Collocation(self.body, self.mesh, motion)
 
-    def program(self, bounds: Bounds) -> NonlinearProgram:
+    def program(self, bounds: NodeBounds) -> NonlinearProgram:
         """The program of the mesh's unknowns."""
         column = import_casadi().MX.sym("motion", self.mesh.size)
         collocation = self.of(self.mesh.unpack(column))
@@ -101,10 +101,10 @@ class OptimalControl:
         rows.hold(self.body.thrust_axes(collocation.motion.states[:, -1]).T @ self.goal.thrust, *ALONG_Z)
         self._hold_stages(rows, collocation)
         self._hold_limits(rows, collocation, bounds.limits)
-        x_min, x_max = (self.mesh.pack(motion) for motion in self._box(bounds.least_collective))
-        return NonlinearProgram(column, self._cost(collocation.motion), *rows.stacked(), x_min, x_max)
+        lower, upper = (self.mesh.pack(motion) for motion in self._box(bounds.min_collective))
+        return NonlinearProgram(column, self._cost(collocation.motion), *rows.stacked(), lower, upper)
 
-    def _hold_rotors(self, rows: _Rows, collocation: Collocation, bounds: Bounds) -> None:
+    def _hold_rotors(self, rows: _Rows, collocation: Collocation, bounds: NodeBounds) -> None:
         """A rotor that lags stays within its limits if its commands do."""
         for thrusts, commands in collocation.rotors:
             rows.hold(commands if self.mesh.continuous else thrusts, bounds.lower, bounds.upper)
@@ -121,7 +121,7 @@ class OptimalControl:
             for axis in np.flatnonzero(np.isfinite(lower) | np.isfinite(upper)).tolist():
                 for values in self._everywhere(collocation, derivative):
                     rows.hold(values[axis, :], lower[axis], upper[axis])
-        for condition in self.always:
+        for condition in self.path_constraints:
             for values in self._everywhere(collocation, condition.quantity.derivative):
                 self._hold(rows, condition, values)
 
@@ -140,7 +140,7 @@ class OptimalControl:
             yield collocation.rates.ends[0][VELOCITY, node - 1]
 
     def _everywhere(self, collocation: Collocation, derivative: int) -> Iterator[Any]:
-        """A derivative up to snap wherever it is not given, (3, m) each; on both sides where it may jump."""
+        """A derivative up to snap wherever it is not fixed, (3, m) each; on both sides where it may jump."""
         rates = collocation.rates
         if derivative < 2:
             yield collocation.motion.states[KINEMATIC[derivative], 1:-1]
@@ -152,23 +152,23 @@ class OptimalControl:
         if derivative >= 2:
             yield from collocation.between(derivative)
 
-    def _box(self, least_collective: float) -> tuple[Motion, Motion]:
-        """The least and the most that every unknown may be: what is given, and little else."""
-        least, most = self._all(-inf), self._all(inf)
-        least.phases[:] = SHORTEST_PHASE
-        least.starts[0] = least.ends[0] = least_collective
-        for motion in (least, most):
+    def _box(self, min_collective: float) -> tuple[CollocatedMotion, CollocatedMotion]:
+        """The least and the most that every unknown may be: what is fixed, and little else."""
+        lower, upper = self._all(-inf), self._all(inf)
+        lower.phases[:] = SHORTEST_PHASE
+        lower.starts[0] = lower.ends[0] = min_collective
+        for motion in (lower, upper):
             self._fix_ends(motion)
-        return least, most
+        return lower, upper
 
-    def _all(self, value: float) -> Motion:
+    def _all(self, value: float) -> CollocatedMotion:
         """A motion whose every number is the same."""
         total = self.mesh.total
         shapes = ((len(self.intervals),), (STATES, total + 1), (INPUTS, total), (INPUTS, total))
-        return Motion(*(np.full(shape, value) for shape in shapes))
+        return CollocatedMotion(*(np.full(shape, value) for shape in shapes))
 
-    def _fix_ends(self, motion: Motion) -> None:
-        """Put what is given at the ends into a motion."""
+    def _fix_ends(self, motion: CollocatedMotion) -> None:
+        """Fix a motion's ends."""
         for node, end in ((0, self.start), (-1, self.goal)):
             motion.states[POSITION, node] = end.position
             motion.states[VELOCITY, node] = end.velocity
@@ -178,7 +178,7 @@ class OptimalControl:
             motion.starts[:, 0] = self.start.collective, 0.0, 0.0
             motion.ends[:, -1] = self.goal.collective, 0.0, 0.0
 
-    def _cost(self, motion: Motion) -> Any:
+    def _cost(self, motion: CollocatedMotion) -> Any:
         """The duration, and a little for changing the input."""
         ca, scale = import_casadi(), import_casadi().DM(1.0 / self.mesh.input_scale)
         changes = (motion.ends - motion.starts, motion.starts[:, 1:] - motion.ends[:, :-1])

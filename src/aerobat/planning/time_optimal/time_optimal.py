@@ -7,7 +7,7 @@ the controller have it, so that the trajectory is flown as it was planned.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -17,54 +17,58 @@ from aerobat.arrays import Array
 from aerobat.certification import Certificate, Side
 from aerobat.environment import Environment
 from aerobat.errors import Infeasible, SpecError
-from aerobat.flatness import axial_drag, end_thrust
-from aerobat.optimization.nonlinear import NonlinearResult, import_casadi, solve_nonlinear
-from aerobat.planning.feasibility import RotorMargin, rotor_margin
+from aerobat.flatness import axial_drag, end_thrust, reference
+from aerobat.optimization.nonlinear import import_casadi, solve_nonlinear
+from aerobat.planning.certified_solve import Judged, Solution, certified_solve, tightened
 from aerobat.planning.miqp import Miqp
-from aerobat.planning.proof import certificate_for
-from aerobat.planning.result import Attempt, PlacedStage, Plan
-from aerobat.planning.tighten import SPARE, drawn_in
-from aerobat.planning.time_optimal.first_motion import first_motion
-from aerobat.planning.time_optimal.program import DERIVATIVES, Bounds, End, OptimalControl
-from aerobat.planning.warm_start import Guess
+from aerobat.planning.planners import option, planner
+from aerobat.planning.recorder import Progress, Recorder
+from aerobat.planning.result import PlacedStage, Plan
+from aerobat.planning.rotor_margin import rotor_findings
+from aerobat.planning.time_optimal.collocation import CollocatedMotion, Mesh
+from aerobat.planning.time_optimal.program import DERIVATIVES, End, NodeBounds, OptimalControl
+from aerobat.planning.warm_start import WarmStart, plans_to_begin_from, require_attitudes
 from aerobat.problem.problem import EndState, Limits, Problem
 from aerobat.problem.stage import Condition, Quantity
-from aerobat.trajectory import Trajectory
 from aerobat.vehicle import Vehicle
 
-THRUST_FLOOR = 0.02  # of the most collective thrust: less is not asked, and the attitude stays determined
-FREE_FALL = 1e-3  # of gravity: a specific thrust that gives an end no attitude
-LEAST_INTERVALS = 4  # of a phase
+THRUST_FLOOR = 0.02  # of the largest collective thrust: more, and the attitude stays determined
+MIN_INTERVALS = 4  # of a phase
 ROUNDS = 6  # of solving, at most
-THIN = 1e-6  # [m] to either side of a plane: equalities would repeat those of gates and waypoints in it
-WARM = 1e-6  # the first barrier parameter of a solve that starts from a solution
-LITTLE = 0.005  # [s] of lag, where thrusts that jump lead nowhere
-SLOWED = 1.5  # how much longer a guess that knows no rotors takes
+ROTOR_BACKOFF = 1e-4  # of the largest range of thrust: how much more than was exceeded rotors keep at nodes
+PLANE_TOLERANCE = 1e-6  # [m] to either side of it: equalities would repeat those of gates and waypoints in it
+WARM_BARRIER = 1e-6  # the first barrier parameter of a solve that starts from a solution
+SMOOTHING_LAG = 0.005  # [s] that rotors without lag are given, where thrusts that jump lead nowhere
+GUESS_SCALE = 1.5  # how much longer a guess that knows no rotors takes
 UP = np.array([0.0, 0.0, 1.0])
 
-Progress = Callable[[Attempt], None]
 
-
+@planner("time-optimal")
 @dataclass(frozen=True)
 class TimeOptimal:
-    """How to plan: so many `intervals` in all, shared among the phases, from the plan of `guess`.
+    """The full nonlinear dynamics at the rotors' limits; needs the extra casadi.
 
-    Each limit is used in full, which leaves nothing for a controller: `reserve`, a part of each rotor's range
-    of thrust, is kept from either of its ends for it. One percent costs agile-quad's flips half a percent of
+    So many `intervals` in all are allocated to the phases, starting from the plan of `guess`. Each limit is
+    used in full, which leaves nothing for a controller: `reserve`, a fraction of each rotor's range of
+    thrust, is kept from either of its ends for it. One percent costs agile-quad's flips half a percent of
     time, and is what keeps flip-roll-translation within 6 mm of the plan, else 45 mm. A `planar` plan stays
     in the vertical plane of its guess, where that has one; in space there may be a faster one.
     """
 
     intervals: int = 60
-    reserve: float = 0.0
-    planar: bool = True
+    reserve: float = option(
+        0.0,
+        "The fraction of each rotor's range of thrust that is kept from either of its ends for the "
+        "controller; with 0 a time-optimal plan is a yardstick that no controller follows for sure.",
+    )
+    planar: bool = option(True, "Leave the maneuver's vertical plane where that is faster.", off="in_space")
     iterations: int = 500  # at most, each solve
     guess: Miqp = field(default_factory=Miqp)
 
     def __post_init__(self) -> None:
         """Check."""
-        if self.intervals < LEAST_INTERVALS:
-            raise SpecError(f"intervals must be {LEAST_INTERVALS} or more, got {self.intervals}")
+        if self.intervals < MIN_INTERVALS:
+            raise SpecError(f"intervals must be {MIN_INTERVALS} or more, got {self.intervals}")
         if not 0.0 <= self.reserve < 0.5:
             raise SpecError(f"reserve must be a part of the range of thrust, 0 to 0.5, got {self.reserve}")
         if self.iterations < 1:
@@ -78,161 +82,153 @@ class TimeOptimal:
         Raises SpecError without a vehicle and for input that makes no sense, Infeasible when no motion is
         found that can be certified, BackendMissing without CasADi.
         """
-        if vehicle is None:
+        vehicle = require_attitudes("time-optimal", problem, vehicle)
+        if np.isfinite(problem.path_limits.of(DERIVATIVES)[1]).any():
             raise SpecError(
-                "the time-optimal planner needs a vehicle: no limits, no least time; give --vehicle"
+                "limits.crackle cannot be held by the time-optimal planner, whose moments jump; drop it"
             )
-        _check(problem, vehicle)
         import_casadi()
-        attempts: list[Attempt] = []
-        runs = (
-            _Run(self, problem, flown, guess, attempts, progress)
-            for guess in self._guesses(problem, vehicle)
-            for flown in _smoother(vehicle)
-        )
-        for run in runs:
-            if (found := run.certified()) is not None:
-                return run.plan(found)
+        recorder = Recorder(progress)
+        for guess in self._guesses(problem, vehicle):
+            for body in _with_smoother(vehicle):
+                program = _CollocatedProgram(self, problem, body, guess)
+                found = certified_solve(program, problem, vehicle, recorder, ROUNDS)
+                if found.feasible:
+                    return self._result(found, guess, program.control.intervals, recorder)
         raise Infeasible(
             f"no motion of '{problem.name}' was found that {vehicle.name} can do: at the last attempt "
-            f"{attempts[-1].outcome}; ask less of its stages and limits, or give more intervals",
-            attempts,
+            f"{recorder.attempts[-1].outcome}; ask less of its stages and limits, or give more intervals",
+            recorder.attempts,
         )
 
-    def _guesses(self, problem: Problem, vehicle: Vehicle) -> Iterator[Guess]:
-        """The plan that the rotors can do; then one that knows of none, slowed down."""
+    def _guesses(self, problem: Problem, vehicle: Vehicle) -> Iterator[WarmStart]:
+        """The plan that the rotors can do; then one that knows of none, made longer."""
         sequence = problem.stages(vehicle.max_specific_thrust)
-        try:
-            yield Guess.of(self.guess.plan(problem, vehicle), sequence)
-        except Infeasible as infeasible:
-            if not infeasible.attempts:  # a stage asks more thrust than there is
-                raise
-        yield Guess.of(self.guess.plan(problem), sequence).slowed(SLOWED)
+        for plan in plans_to_begin_from([self.guess], problem, vehicle):
+            yield WarmStart.of(plan, sequence)
+        yield WarmStart.of(self.guess.plan(problem), sequence).time_scaled(GUESS_SCALE)
 
-
-@dataclass(frozen=True, eq=False)
-class _Found:
-    """A solution, and what it comes to."""
-
-    x: Array
-    phases: Array  # [s]
-    trajectory: Trajectory
-    margin: RotorMargin
-    certificate: Certificate
-
-
-@dataclass(frozen=True, eq=False)
-class _Inside:
-    """What is held at nodes, a little within what is asked everywhere."""
-
-    limits: Limits
-    below: float = 0.0  # [N] above the rotors' least thrusts
-    above: float = 0.0  # [N] below their largest
-
-    def drawn_in(self, found: _Found, asked: Limits, spare: float) -> _Inside:
-        """Further within by what a solution exceeds, the rotors' thrusts by a `spare` [N] more."""
-        low, high = (_unproven(found.certificate, side) for side in (Side.MIN, Side.MAX))
-        return _Inside(
-            drawn_in(self.limits, asked, found.trajectory, DERIVATIVES),
-            self.below + (spare + low if low > 0.0 else 0.0),
-            self.above + (spare + high if high > 0.0 else 0.0),
-        )
-
-
-def _unproven(certificate: Certificate, side: Side) -> float:
-    """By how much [N] the thrust of some rotor is not proven to stay on the right side of its limit."""
-    rotors = (f for f in certificate.findings if f.quantity.startswith("rotor ") and f.side is side)
-    return -min((f.margin for f in rotors if f.margin is not None), default=0.0)
-
-
-class _Run:
-    """The planner on one guess."""
-
-    def __init__(
-        self,
-        config: TimeOptimal,
-        problem: Problem,
-        vehicle: Vehicle,
-        guess: Guess,
-        attempts: list[Attempt],
-        progress: Progress | None,
-    ) -> None:
-        self._config, self._problem, self._vehicle, self._guess = config, problem, vehicle, guess
-        self._attempts, self._progress = attempts, progress
-        self._control = _control(config, problem, vehicle, guess)
-
-    def certified(self) -> _Found | None:
-        """Solve, and draw bounds at nodes in by what is exceeded between nodes, until nothing is."""
-        mesh, inside, barrier = self._control.mesh, _Inside(self._problem.path_limits), None
-        spare = SPARE * float(np.max(self._vehicle.max_thrusts - self._vehicle.min_thrusts))
-        x = mesh.pack(first_motion(self._guess, mesh, self._vehicle, self._problem.environment))
-        for _ in range(ROUNDS):
-            found = self._solved(x, inside, barrier)
-            if found is None or found.certificate.certified:
-                return found
-            try:
-                inside = inside.drawn_in(found, self._problem.path_limits, spare)
-            except SpecError:  # nothing is left between limits
-                return None
-            x, barrier = found.x, WARM
-        return None
-
-    def plan(self, found: _Found) -> Plan:
-        """The plan of a solution."""
-        ends, times = np.cumsum(self._control.intervals), np.cumsum(found.phases)
-        stages = tuple(
-            PlacedStage(stage.name, end - 1, time, stage.gate)
-            for stage, end, time in zip(self._guess.stages, ends.tolist(), times.tolist(), strict=False)
-        )
-        return Plan(
-            problem=self._problem,
-            trajectory=found.trajectory,
+    def _result(
+        self, found: Judged[_Point], guess: WarmStart, intervals: tuple[int, ...], recorder: Recorder
+    ) -> Plan:
+        ends, times = np.cumsum(intervals).tolist(), np.cumsum(found.solution.source.phases).tolist()
+        stages = zip(guess.stages, ends, times, strict=False)
+        return found.plan(
+            recorder,
             planner="time-optimal",
             order=4,
-            cost=found.trajectory.duration,
             status="locally optimal",
             backend="ipopt",
-            stages=stages,
-            attempts=tuple(self._attempts),
-            vehicle=self._vehicle,
-            margin=found.margin,
-            certificate=found.certificate,
+            stages=tuple(PlacedStage(s.name, end - 1, time, s.gate) for s, end, time in stages),
         )
 
-    def _solved(self, x: Array, inside: _Inside, barrier: float | None) -> _Found | None:
-        """The solution near x; None where there is none."""
-        program = self._control.program(_bounds(self._vehicle, self._config.reserve, inside))
-        answer = solve_nonlinear(program, x, max_iterations=self._config.iterations, initial_barrier=barrier)
-        motion = self._control.mesh.read(answer.x)
-        if not answer.converged:
-            return self._record(answer, motion.phases, None, f"the solver {answer.status}")
-        trajectory = self._control.of(motion).trajectory(self._problem.heading)
-        margin = rotor_margin(trajectory, self._vehicle, self._problem.environment)
-        certificate = certificate_for(trajectory, self._problem, self._vehicle)
-        found = _Found(answer.x, motion.phases, trajectory, margin, certificate)
-        outcome = "feasible" if certificate.certified else certificate.why
-        return self._record(answer, motion.phases, found, outcome)
 
-    def _record(
-        self, answer: NonlinearResult, phases: Array, found: _Found | None, outcome: str
-    ) -> _Found | None:
-        duration, feasible = float(phases.sum()), found is not None and found.certificate.certified
-        status, cost = ("unknown", None) if found is None else ("locally optimal", duration)
-        attempt = Attempt(duration, feasible, status, outcome, cost, answer.iterations, answer.time)
-        self._attempts.append(attempt)
-        if self._progress is not None:
-            self._progress(attempt)
-        return found
+@dataclass(frozen=True, eq=False)
+class _Point:
+    """Where a solve ended."""
+
+    x: Array  # the unknowns
+    phases: Array  # [s]
 
 
-def _smoother(vehicle: Vehicle) -> tuple[Vehicle, ...]:
+@dataclass(frozen=True, eq=False)
+class _TightenedBounds:
+    """What is held at nodes, a little within what shall hold everywhere."""
+
+    limits: Limits
+    low_backoff: float = 0.0  # [N] above the rotors' least thrusts
+    high_backoff: float = 0.0  # [N] below their largest
+
+
+class _CollocatedProgram:
+    """The optimal control near one guess, with bounds at nodes as tight as what lies between needs."""
+
+    def __init__(self, config: TimeOptimal, problem: Problem, vehicle: Vehicle, guess: WarmStart) -> None:
+        self.control = _control(config, problem, vehicle, guess)
+        self._config, self._problem, self._vehicle = config, problem, vehicle
+        self._bounds = _TightenedBounds(problem.path_limits)
+        self._barrier: float | None = None
+        motion = initial_guess(guess, self.control.mesh, vehicle, problem.environment)
+        self._x = self.control.mesh.pack(motion)
+
+    def solve(self) -> Solution[_Point]:
+        """The solution near the last one, or near the guess."""
+        program = self.control.program(self._node_bounds())
+        answer = solve_nonlinear(
+            program, self._x, max_iterations=self._config.iterations, initial_barrier=self._barrier
+        )
+        motion = self.control.mesh.read(answer.x)
+        duration = float(motion.phases.sum())
+        trajectory = self.control.of(motion).trajectory(self._problem.heading) if answer.converged else None
+        return Solution(
+            source=_Point(answer.x, motion.phases),
+            duration=duration,
+            trajectory=trajectory,
+            status="locally optimal" if answer.converged else "unknown",
+            nodes=answer.iterations,
+            solve_time=answer.time,
+            cost=duration if answer.converged else None,
+            failure=None if answer.converged else f"the solver {answer.status}",
+        )
+
+    def tighten(self, solution: Solution[_Point], certificate: Certificate | None) -> bool:
+        """Tighten what is held at nodes by what is exceeded between them, and go on from the solution."""
+        if solution.trajectory is None or certificate is None:
+            return False
+        limits = self._problem.path_limits
+        limits_at_nodes = tightened(self._bounds.limits, limits, solution.trajectory, DERIVATIVES)
+        if limits_at_nodes is None:
+            return False
+        more = ROTOR_BACKOFF * float(np.max(self._vehicle.max_thrusts - self._vehicle.min_thrusts))
+        low, high = (_excess(certificate, side) for side in (Side.MIN, Side.MAX))
+        self._bounds = _TightenedBounds(
+            limits_at_nodes,
+            self._bounds.low_backoff + (more + low if low > 0.0 else 0.0),
+            self._bounds.high_backoff + (more + high if high > 0.0 else 0.0),
+        )
+        self._x, self._barrier = solution.source.x, WARM_BARRIER
+        return True
+
+    def _node_bounds(self) -> NodeBounds:
+        low, high = self._vehicle.min_thrusts, self._vehicle.max_thrusts
+        reserve = self._config.reserve * (high - low)
+        return NodeBounds(
+            low + reserve + self._bounds.low_backoff,
+            high - reserve - self._bounds.high_backoff,
+            float(max(low.sum(), THRUST_FLOOR * high.sum())),
+            self._bounds.limits,
+        )
+
+
+def initial_guess(
+    guess: WarmStart, mesh: Mesh, vehicle: Vehicle, environment: Environment
+) -> CollocatedMotion:
+    """States and inputs of the vehicle along a guess at the mesh's nodes, inputs within twice their scale."""
+    knots = np.concatenate([[0.0], np.cumsum(guess.phases @ mesh.fractions)])
+    times = np.minimum(knots, guess.trajectory.duration)
+    setpoint = reference(guess.trajectory, vehicle, times, environment=environment).setpoint
+    flat, rates = setpoint.flat, setpoint.omega_body[:, :2]
+    states = np.concatenate([flat.position, flat.velocity, setpoint.q_world_body, rates], axis=1).T
+    inputs = np.concatenate([setpoint.wrench.thrust[:, None], setpoint.omega_dot_body[:, :2]], axis=1).T
+    bound = 2.0 * mesh.input_scale[:, None]
+    inputs = np.clip(inputs, -bound, bound)
+    return CollocatedMotion(guess.phases, states, inputs[:, :-1], inputs[:, 1:])
+
+
+def _excess(certificate: Certificate, side: Side) -> float:
+    """By how much [N] the thrust of some rotor is not proven to stay on the right side of its limit."""
+    return -min((f.margin for f in rotor_findings(certificate, side) if f.margin is not None), default=0.0)
+
+
+def _with_smoother(vehicle: Vehicle) -> tuple[Vehicle, ...]:
     """The vehicle; if its rotors have no lag, next one of a little: thrusts that jump are harder to find."""
     if vehicle.lags.any():
         return (vehicle,)
-    return vehicle, replace(vehicle, rotors=tuple(replace(rotor, lag=LITTLE) for rotor in vehicle.rotors))
+    rotors = tuple(replace(rotor, lag=SMOOTHING_LAG) for rotor in vehicle.rotors)
+    return vehicle, replace(vehicle, rotors=rotors)
 
 
-def _control(config: TimeOptimal, problem: Problem, vehicle: Vehicle, guess: Guess) -> OptimalControl:
+def _control(config: TimeOptimal, problem: Problem, vehicle: Vehicle, guess: WarmStart) -> OptimalControl:
     """The optimal control through the stages in the guess's order."""
     sequence = problem.stages(vehicle.max_specific_thrust)
     start = _end(problem.start, vehicle, problem.environment)
@@ -240,51 +236,30 @@ def _control(config: TimeOptimal, problem: Problem, vehicle: Vehicle, guess: Gue
     return OptimalControl(
         vehicle=vehicle,
         environment=problem.environment,
-        intervals=guess.shared(config.intervals, LEAST_INTERVALS),
+        intervals=guess.allocate_intervals(config.intervals, MIN_INTERVALS),
         start=start,
         q_start=so3.multiply(upright, so3.about_axis(UP, np.array(problem.heading))),
         goal=_end(problem.goal, vehicle, problem.environment),
         stages=tuple(stage.conditions for stage in guess.stages),
-        always=(*sequence.path_constraints, *(_within_plane(problem, guess) if config.planar else ())),
+        path_constraints=(
+            *sequence.path_constraints,
+            *(_within_plane(problem, guess) if config.planar else ()),
+        ),
     )
 
 
-def _within_plane(problem: Problem, guess: Guess) -> tuple[Condition, ...]:
+def _within_plane(problem: Problem, guess: WarmStart) -> tuple[Condition, ...]:
     normal = guess.plane()
     if normal is None:
         return ()
     place = float(normal @ problem.start.position)
-    return (Condition(Quantity.POSITION, normal, place - THIN, place + THIN),)
+    lower, upper = place - PLANE_TOLERANCE, place + PLANE_TOLERANCE
+    return (Condition(Quantity.POSITION, normal, lower, upper),)
 
 
 def _end(state: EndState, vehicle: Vehicle, environment: Environment) -> End:
     """What an end state asks of the thrust."""
     thrust = end_thrust(state.velocity, state.acceleration, vehicle, environment)
-    size = float(np.linalg.norm(thrust))
-    along = float(thrust @ (state.velocity - environment.wind)) / max(size, FREE_FALL)
-    return End(state.position, state.velocity, thrust, vehicle.mass * (size + axial_drag(vehicle) * along))
-
-
-def _bounds(vehicle: Vehicle, reserve: float, inside: _Inside) -> Bounds:
-    kept = reserve * (vehicle.max_thrusts - vehicle.min_thrusts)
-    return Bounds(
-        vehicle.min_thrusts + kept + inside.below,
-        vehicle.max_thrusts - kept - inside.above,
-        float(max(vehicle.min_thrusts.sum(), THRUST_FLOOR * vehicle.max_thrusts.sum())),
-        inside.limits,
-    )
-
-
-def _check(problem: Problem, vehicle: Vehicle) -> None:
-    """Refuse what cannot be asked of this planner."""
-    if np.isfinite(problem.path_limits.of(DERIVATIVES)[1]).any():
-        raise SpecError(
-            "limits.crackle cannot be held by the time-optimal planner, whose moments jump; drop it"
-        )
-    for name, state in (("start", problem.start), ("goal", problem.goal)):
-        if np.linalg.norm(_end(state, vehicle, problem.environment).thrust) < (
-            FREE_FALL * problem.environment.gravity
-        ):
-            raise SpecError(
-                f"{name}.acceleration asks no thrust, which leaves the attitude there open; change it"
-            )
+    norm = float(np.linalg.norm(thrust))
+    along = float(thrust @ (state.velocity - environment.wind)) / norm
+    return End(state.position, state.velocity, thrust, vehicle.mass * (norm + axial_drag(vehicle) * along))

@@ -30,7 +30,7 @@ UP = np.array([0.0, 0.0, 1.0])
 
 
 @dataclass(frozen=True, eq=False)
-class RotorRows:
+class RotorConstraints:
     """Thrusts of a vehicle's rotors, each as a part of its range, 0 to 1, then |f|² over gravity's."""
 
     vehicle: Vehicle
@@ -73,7 +73,8 @@ class RotorRows:
             turning = ca.vertcat(*kernel.moment(self.vehicle.inertia.tolist(), *body))
         rotors = ca.DM(self._thrusts_from[:, :-2]) @ ca.vertcat(collective, turning)
         low, high = self._thrusts_from[:, -2:].T
-        values = ca.vertcat((rotors - low) / (high - low), squared / self.environment.gravity**2)
+        fractions = (rotors - low) / (high - low)
+        values = ca.vertcat(fractions, squared / self.environment.gravity**2)
         return ca.Function("rotors", [moving, duration, frame], [values])
 
     @property

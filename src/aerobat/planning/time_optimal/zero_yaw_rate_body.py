@@ -34,7 +34,7 @@ POSITION, VELOCITY, ATTITUDE, RATES = slice(0, 3), slice(3, 6), slice(6, 10), sl
 
 
 @dataclass(frozen=True, eq=False)
-class SpinlessBody:
+class ZeroYawRateBody:
     """A vehicle's equations of motion with ω_z = 0, as CasADi functions of x, u and the input's slope u'.
 
     Drag across the thrust axis is the same in all directions, as flatness has it.

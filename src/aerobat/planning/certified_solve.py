@@ -1,0 +1,193 @@
+"""Solve, certify, tighten by what was exceeded, again: the one way in which planners come to a plan.
+
+A planner states a program and bounds that can be tightened; what makes an answer a plan is decided here, by
+its certificate over continuous time, which therefore is always that of the trajectory it comes with.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any, Generic, Protocol, TypeVar
+
+import numpy as np
+
+from aerobat.arrays import Array
+from aerobat.certification import Certificate, Envelope, certify
+from aerobat.errors import SpecError
+from aerobat.planning.recorder import Attempt, Recorder
+from aerobat.planning.result import Plan
+from aerobat.planning.rotor_margin import sampled_margin
+from aerobat.problem.problem import Limits, Problem
+from aerobat.trajectory import Trajectory
+from aerobat.vehicle import Vehicle
+
+BACKOFF = 1e-4  # of a bound: by how much more than what was exceeded it is tightened
+NEGLIGIBLE = 1e-9  # in SI units: an excess that means nothing
+
+Source = TypeVar("Source")
+
+
+@dataclass(frozen=True, eq=False)
+class Solution(Generic[Source]):
+    """What a planner's program answered: a trajectory, or a sentence about why there is none."""
+
+    source: Source  # whatever the planner tightens by and reads its stages from
+    duration: float  # [s]
+    trajectory: Trajectory | None
+    status: str  # of the program, as in Attempt
+    nodes: int
+    solve_time: float  # [s]
+    cost: float | None = None
+    dt: float | None = None  # [s]
+    failure: str | None = None  # why it cannot be a plan, found without a certificate
+    margin: float | None = None  # [N] of the rotors, where samples have shown it to be negative
+
+
+class Program(Protocol[Source]):
+    """A planner's program with bounds that can be tightened."""
+
+    def solve(self) -> Solution[Source]:
+        """Its solution with the bounds as they are."""
+        ...
+
+    def tighten(self, solution: Solution[Source], certificate: Certificate | None) -> bool:
+        """Tighten by what a solution exceeds; False where that leads nowhere.
+
+        There is no certificate where the solution is a failure.
+        """
+        ...
+
+
+@dataclass(frozen=True, eq=False)
+class Judged(Generic[Source]):
+    """A solution and what decides about it: its own certificate, where there is a vehicle."""
+
+    problem: Problem
+    vehicle: Vehicle | None
+    solution: Solution[Source]
+    certificate: Certificate | None
+    feasible: bool
+
+    def plan(self, recorder: Recorder, **facts: Any) -> Plan:
+        """The plan of it; `facts` are the fields of Plan that the planner alone knows."""
+        trajectory = self.solution.trajectory
+        assert trajectory is not None, "a plan is made of a solution that has a trajectory"
+        plan = Plan(
+            problem=self.problem,
+            trajectory=trajectory,
+            cost=self.solution.cost,
+            dt=self.solution.dt,
+            attempts=tuple(recorder.attempts),
+            vehicle=self.vehicle,
+            certificate=self.certificate,
+            **facts,
+        )
+        if self.vehicle is None or self.certificate is not None:
+            return plan
+        return with_certificate(plan, self.vehicle)
+
+
+def certified_solve(
+    program: Program[Source],
+    problem: Problem,
+    vehicle: Vehicle | None,
+    recorder: Recorder,
+    rounds: int = 1,
+    jumps: bool = False,
+) -> Judged[Source]:
+    """The first solution that is certified, or the last one that was tried.
+
+    Args:
+        program: What is solved and tightened.
+        problem: Its limits and its environment are certified, beside the vehicle's limits.
+        vehicle: What shall fly it; without one every solution will do.
+        recorder: Keeps an attempt a solve.
+        rounds: Solves, at most.
+        jumps: Whether body rates may jump between segments, which no moment can do, as the certificate says.
+    """
+    for left in reversed(range(rounds)):
+        judged = _judged(program.solve(), problem, vehicle, recorder, jumps)
+        if judged.feasible or not left or not program.tighten(judged.solution, judged.certificate):
+            break
+    return judged
+
+
+def refuted_by_samples(
+    solution: Solution[Source], problem: Problem, vehicle: Vehicle | None
+) -> Solution[Source]:
+    """The solution, a failure where samples already show that the vehicle's rotors cannot follow it."""
+    if vehicle is None or solution.trajectory is None or solution.failure is not None:
+        return solution
+    sampled = sampled_margin(solution.trajectory, vehicle, problem.environment)
+    if sampled.margin >= 0.0:
+        return solution
+    return replace(solution, failure=str(sampled), margin=sampled.margin)
+
+
+def certificate_for(trajectory: Trajectory, problem: Problem, vehicle: Vehicle) -> Certificate:
+    """The certificate of a trajectory for the vehicle's limits and the problem's, over continuous time."""
+    return certify(trajectory, vehicle, problem.environment, Envelope(limits=problem.path_limits))
+
+
+def with_certificate(plan: Plan, vehicle: Vehicle) -> Plan:
+    """The plan with the certificate of a vehicle, whichever it was made for."""
+    certificate = certificate_for(plan.trajectory, plan.problem, vehicle)
+    return replace(plan, vehicle=vehicle, certificate=certificate)
+
+
+def tightened(bounds: Limits, limits: Limits, trajectory: Trajectory, derivatives: int) -> Limits | None:
+    """Bounds tighter by as much as a trajectory exceeds the limits; None where that leaves nothing.
+
+    Args:
+        bounds: What was imposed where the program could, say at nodes.
+        limits: What shall hold everywhere.
+        trajectory: The solution with these bounds.
+        derivatives: How many of position's derivatives, itself included, are looked at.
+
+    Where nothing is exceeded, the same object is returned.
+    """
+    for derivative in range(derivatives):
+        (lower, upper), (least, most) = limits.of(derivative), trajectory.component_range(derivative)
+        below, above = _backoff(lower - least, lower), _backoff(most - upper, upper)
+        if below.any() or above.any():
+            try:
+                bounds = bounds.tightened(derivative, below, above)
+            except SpecError:
+                return None
+    return bounds
+
+
+def _backoff(excess: Array, bound: Array) -> Array:
+    """A little more than what is exceeded, and nothing where nothing but rounding is."""
+    backoff = np.zeros_like(excess)
+    exceeded = excess > NEGLIGIBLE
+    backoff[exceeded] = excess[exceeded] + BACKOFF * np.abs(bound[exceeded])
+    return backoff
+
+
+def _judged(
+    solution: Solution[Source], problem: Problem, vehicle: Vehicle | None, recorder: Recorder, jumps: bool
+) -> Judged[Source]:
+    certificate = None
+    if solution.trajectory is not None and solution.failure is None and vehicle is not None:
+        certificate = certificate_for(solution.trajectory, problem, vehicle)
+    outcome = solution.failure
+    if certificate is not None:
+        within = replace(certificate, discontinuities=()) if jumps else certificate
+        outcome = None if within.certified else certificate.why
+    feasible = outcome is None
+    margin = solution.margin if certificate is None else certificate.margin
+    recorder.record(
+        Attempt(
+            duration=solution.duration,
+            feasible=feasible,
+            status=solution.status,
+            outcome=outcome or "feasible",
+            cost=solution.cost,
+            nodes=solution.nodes,
+            solve_time=solution.solve_time,
+            dt=solution.dt,
+            margin=margin,
+        )
+    )
+    return Judged(problem, vehicle, solution, certificate, feasible)

@@ -1,0 +1,107 @@
+"""The rotors' margin, read from a certificate; samples of it, which can refute but not prove."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import inf
+
+import numpy as np
+
+from aerobat.certification import Certificate, Finding, Side
+from aerobat.environment import Environment
+from aerobat.flatness import reference
+from aerobat.trajectory import Trajectory
+from aerobat.vehicle import Vehicle
+
+SAMPLES_PER_DEGREE = 2  # of each segment, per degree of its polynomial: a cubic's extremes stand out
+
+
+@dataclass(frozen=True)
+class RotorMargin:
+    """How far the rotors stay from their limits along a trajectory, by flatness.
+
+    `min_thrust` is the least thrust of the rotor that comes closest to its lower limit, `max_thrust` the
+    largest of the one that comes closest to its upper limit: with equal rotors, of all of them.
+    """
+
+    min_thrust: float  # [N]
+    min_time: float  # [s]
+    min_rotor: int
+    max_thrust: float  # [N]
+    max_time: float  # [s]
+    max_rotor: int
+    low_margin: float  # [N] from the lower limit, negative: below it
+    high_margin: float  # [N] from the upper limit, negative: above it
+
+    @classmethod
+    def of(cls, certificate: Certificate) -> RotorMargin | None:
+        """A certificate's findings about rotors, in short; None if no attitude is ever determined."""
+        if certificate.worst is None:
+            return None
+        low, high = (_closest(certificate, side) for side in (Side.MIN, Side.MAX))
+        return cls(
+            min_thrust=low.value,
+            min_time=low.time,
+            min_rotor=_rotor(low),
+            max_thrust=high.value,
+            max_time=high.time,
+            max_rotor=_rotor(high),
+            low_margin=_margin(low),
+            high_margin=_margin(high),
+        )
+
+    @property
+    def margin(self) -> float:
+        """The distance to the nearest limit [N], negative: beyond it by so much."""
+        return min(self.low_margin, self.high_margin)
+
+    def __str__(self) -> str:
+        """The outcome in a few words."""
+        words = f"{self.min_thrust:.2f} to {self.max_thrust:.2f} N, "
+        if self.margin >= 0:
+            return words + f"within limits by {self.margin:.2f} N"
+        if self.low_margin < self.high_margin:
+            return (
+                words + f"{-self.margin:.2f} N too little for rotor {self.min_rotor} at {self.min_time:.3f} s"
+            )
+        return words + f"{-self.margin:.2f} N too much for rotor {self.max_rotor} at {self.max_time:.3f} s"
+
+
+def sampled_margin(trajectory: Trajectory, vehicle: Vehicle, environment: Environment) -> RotorMargin:
+    """The margin at samples only, never smaller than the true one: where it is negative, no proof is needed.
+
+    Costs a seventh of a certificate, and most attempts of a search on durations are far beyond their limits.
+    """
+    s = np.linspace(0.0, 1.0, SAMPLES_PER_DEGREE * max(trajectory.degree, 1), endpoint=False)
+    times = (trajectory.knots[:-1, None] + s * trajectory.durations[:, None]).ravel()
+    thrusts = reference(trajectory, vehicle, times, environment=environment).rotor_thrusts
+    low, high = thrusts - vehicle.min_thrusts, vehicle.max_thrusts - thrusts
+    at_low, at_high = (np.unravel_index(gap.argmin(), gap.shape) for gap in (low, high))
+    return RotorMargin(
+        min_thrust=float(thrusts[at_low]),
+        min_time=float(times[at_low[0]]),
+        min_rotor=int(at_low[1]),
+        max_thrust=float(thrusts[at_high]),
+        max_time=float(times[at_high[0]]),
+        max_rotor=int(at_high[1]),
+        low_margin=float(low[at_low]),
+        high_margin=float(high[at_high]),
+    )
+
+
+def rotor_findings(certificate: Certificate, side: Side) -> list[Finding]:
+    """What a certificate says of each rotor's thrust on one side."""
+    return [f for f in certificate.findings if f.quantity.startswith("rotor ") and f.side is side]
+
+
+def _closest(certificate: Certificate, side: Side) -> Finding:
+    """The rotor's finding with the smallest margin on one side."""
+    return min(rotor_findings(certificate, side), key=_margin)
+
+
+def _margin(finding: Finding) -> float:
+    return inf if finding.margin is None else finding.margin
+
+
+def _rotor(finding: Finding) -> int:
+    return int(finding.quantity.split()[1])

@@ -1,0 +1,208 @@
+"""Laws of every planner: its certificate is that of what it returns, in the world that it was planned for."""
+
+from dataclasses import dataclass, replace
+from functools import cache
+
+import numpy as np
+import pytest
+
+import aerobat as ab
+from aerobat.certification import Verdict
+from aerobat.environment import Environment
+from aerobat.planning import (
+    FreeKnots,
+    MinSnap,
+    Miqp,
+    Plan,
+    Planner,
+    TimeOptimal,
+    plan,
+    planner,
+    planner_options,
+    registered_planners,
+)
+from aerobat.problem import EndState, Limits, Problem, Waypoint, Waypoints, at_rest, load_problem
+from aerobat.vehicle import load_vehicle
+
+QUAD = load_vehicle("agile-quad")
+PLANNERS: dict[str, Planner] = {
+    "miqp": Miqp(intervals=12),
+    "min-snap": MinSnap(),
+    "free-knots": FreeKnots(),
+    "time-optimal": TimeOptimal(intervals=12),
+}
+STEP = Problem(
+    "step",
+    at_rest((0.0, 0.0, 1.0)),
+    at_rest((3.0, 0.0, 1.5)),
+    Waypoints((Waypoint(position=np.array([1.5, 0.0, 1.0])),)),
+)
+WORLDS = {
+    "calm": STEP,
+    "light": replace(STEP, environment=Environment(gravity=3.7)),
+    "wind": replace(STEP, environment=Environment(wind=(2.0, -1.0, 0.5))),
+    "turned": replace(STEP, heading=np.pi / 2),
+    "ground": replace(STEP, environment=Environment(ground=0.9)),
+    "limits": replace(STEP, limits=Limits(velocity=3.0, acceleration=12.0)),
+}
+
+
+@cache
+def planned(name: str, world: str) -> Plan:
+    if name in ("free-knots", "time-optimal"):
+        pytest.importorskip("casadi")
+    return plan(WORLDS[world], PLANNERS[name], QUAD)
+
+
+def test_every_registered_planner_is_held_to_these_laws() -> None:
+    assert {name: type(p) for name, p in PLANNERS.items()}.items() <= registered_planners().items()
+    assert set(registered_planners()) - set(PLANNERS) <= {"straight"}
+
+
+@pytest.mark.parametrize("world", WORLDS)
+@pytest.mark.parametrize("name", PLANNERS)
+def test_a_plans_certificate_is_its_trajectorys_in_the_problems_environment(name: str, world: str) -> None:
+    found, problem = planned(name, world), WORLDS[world]
+    envelope = ab.Envelope(limits=problem.path_limits)
+    assert found.certificate == ab.certify(found.trajectory, QUAD, problem.environment, envelope)
+    assert found.certified
+    assert found.vehicle == QUAD
+    assert found.planner == name
+    assert found.attempts[-1].margin == pytest.approx(found.certificate.margin) or len(found.attempts) > 1
+
+
+@pytest.mark.parametrize("name", PLANNERS)
+def test_a_plan_for_another_gravity_is_certified_for_that_one_only(name: str) -> None:
+    found = planned(name, "light")
+    elsewhere = ab.certify(found.trajectory, QUAD)
+    assert elsewhere != found.certificate
+    assert elsewhere.margin != pytest.approx(found.certificate.margin, abs=0.1)
+
+
+def test_a_flip_on_mars_is_certified_on_mars() -> None:
+    mars = replace(load_problem("flip-roll"), environment=Environment(gravity=3.7))
+    found = plan(mars, vehicle=QUAD)
+    assert found.certificate == ab.certify(
+        found.trajectory, QUAD, mars.environment, ab.Envelope(limits=mars.path_limits)
+    )
+    assert found.certified
+    on_earth = ab.certify(found.trajectory, QUAD, envelope=ab.Envelope(limits=mars.path_limits))
+    assert on_earth.margin != pytest.approx(found.certificate.margin, abs=0.1)
+
+
+@pytest.mark.parametrize("name", PLANNERS)
+def test_a_trajectory_knows_the_heading_it_was_planned_for(name: str) -> None:
+    found = planned(name, "turned")
+    assert found.trajectory.heading == pytest.approx(np.pi / 2)
+    ahead = ab.reference(found.trajectory, QUAD, times=[0.0]).setpoint.q_world_body[0]
+    np.testing.assert_allclose(ahead, [np.sqrt(0.5), 0.0, 0.0, np.sqrt(0.5)], atol=1e-6)
+
+
+@pytest.mark.parametrize("name", PLANNERS)
+def test_a_plan_in_wind_asks_other_thrusts_than_in_calm_air(name: str) -> None:
+    draggy = replace(QUAD, drag_body=np.array([0.1, 0.1, 0.05]))
+    if name in ("free-knots", "time-optimal"):
+        pytest.importorskip("casadi")
+    found = plan(WORLDS["wind"], PLANNERS[name], draggy)
+    windy = WORLDS["wind"].environment
+    assert found.certified
+    assert found.certificate == ab.certify(
+        found.trajectory, draggy, windy, ab.Envelope(limits=WORLDS["wind"].path_limits)
+    )
+    calm = ab.certify(found.trajectory, draggy)
+    assert calm.margin != pytest.approx(found.certificate.margin, abs=1e-4)
+
+
+@pytest.mark.parametrize("name", PLANNERS)
+def test_no_certified_path_goes_below_the_ground(name: str) -> None:
+    found = planned(name, "ground")
+    least = found.trajectory.component_range(0)[0][2]
+    assert least >= WORLDS["ground"].environment.ground - 1e-9
+    (bound,) = (f for f in found.certificate.findings if f.quantity == "position z" and f.side == "least")
+    assert bound.limit == WORLDS["ground"].environment.ground
+    assert bound.verdict is Verdict.HOLDS
+
+
+def test_the_certificate_returned_is_that_of_the_last_round_of_tightening() -> None:
+    """Both ends run towards the floor: each round of bounds leaves a smaller excess between nodes."""
+    start = EndState((0.0, 0.0, 1.0), (0.0, 0.0, -4.0))
+    goal = EndState((8.0, 0.0, 1.0), (0.0, 0.0, 4.0))
+    middle = ab.Stage("mid", (ab.Condition(ab.Quantity.POSITION, (1.0, 0.0, 0.0), 4.0, 4.0),), at=0.5)
+    limits = Limits(lower=(-20.0, -20.0, 0.0), upper=(20.0, 20.0, 20.0))
+    floor = Problem("floor", start, goal, ab.CustomManeuver((middle,)), limits=limits)
+    found = plan(floor, vehicle=QUAD)
+    assert found.certificate == ab.certify(
+        found.trajectory, QUAD, floor.environment, ab.Envelope(limits=limits)
+    )
+    assert found.certified
+
+
+def test_what_cannot_be_certified_is_no_plan() -> None:
+    """A ground that is left at 4 m/s downwards, one centimetre above it."""
+    falling = EndState((0.0, 0.0, 0.01), (0.0, 0.0, -4.0))
+    problem = Problem("crash", falling, at_rest((3.0, 0.0, 1.0)), environment=Environment(ground=0.0))
+    with pytest.raises(ab.Infeasible) as refused:
+        plan(problem, Miqp(search=ab.BisectionSearch(0.02, 0.3)), QUAD)
+    assert not any(attempt.feasible for attempt in refused.value.attempts)
+
+
+def test_jerk_inputs_keep_the_rotors_limits_and_their_certificate_says_what_jumps() -> None:
+    found = plan(load_problem("flip-roll"), Miqp(order=3), QUAD)
+    assert not found.certified
+    assert found.certificate.margin > 0.0
+    assert "body rate jumps" in str(found)
+
+
+@pytest.mark.parametrize("name", PLANNERS)
+def test_progress_sees_every_attempt_as_it_is_kept(name: str) -> None:
+    if name in ("free-knots", "time-optimal"):
+        pytest.importorskip("casadi")
+    seen: list[object] = []
+    assert plan(STEP, PLANNERS[name], QUAD, seen.append).attempts == tuple(seen)
+
+
+def test_a_planner_is_known_by_its_name() -> None:
+    assert plan(STEP, "min-snap", QUAD).trajectory.durations == pytest.approx(
+        plan(STEP, MinSnap(), QUAD).trajectory.durations
+    )
+    with pytest.raises(ab.SpecError, match=r"no planner named 'min_snap'; did you mean 'min-snap'"):
+        plan(STEP, "min_snap", QUAD)
+
+
+def test_a_users_planner_is_one_registered_class_and_gets_its_certificate() -> None:
+    @planner("straight")
+    @dataclass(frozen=True)
+    class Straight:
+        """A straight line at the closed form's pace."""
+
+        pace: float = ab.option(3.0, "Its duration, s.")
+
+        def plan(self, problem, vehicle=None, progress=None) -> Plan:
+            ends = np.array([problem.start.derivatives(5), problem.goal.derivatives(5)])
+            return Plan(problem, ab.minimum_effort(ends, [self.pace]), "straight")
+
+    assert registered_planners()["straight"] is Straight
+    found = plan(STEP, "straight", QUAD)
+    assert found.certificate == ab.certify(found.trajectory, QUAD, STEP.environment)
+    assert found.certified
+    assert str(found)
+    (pace,) = planner_options(Straight)
+    assert (pace.name, pace.flag, pace.type, pace.default, pace.help) == (
+        "pace", "--pace", float, 3.0, "Its duration, s."
+    )  # fmt: skip
+    with pytest.raises(ab.SpecError, match="a planner named 'miqp' already"):
+        planner("miqp")(Straight)
+
+
+def test_the_command_lines_options_follow_from_the_fields() -> None:
+    flags = {
+        name: [o.flag for o in planner_options(cls)]
+        for name, cls in registered_planners().items()
+        if name != "straight"
+    }
+    assert flags == {
+        "miqp": ["--order", "--intervals", "--backend", "--time-limit"],
+        "min-snap": ["--order", "--stop-after"],
+        "free-knots": ["--segments", "--reserve"],
+        "time-optimal": ["--reserve", "--in-space"],
+    }
