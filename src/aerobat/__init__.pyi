@@ -6,7 +6,7 @@ from .errors import AerobatError, BackendMissing, Infeasible, SpecError
 from .evaluation import Gradient, Passage, Score, Scores, Sensitivity, score, score_flights, sensitivity
 from .flatness import Reference, reference
 from .interchange.csv import read_csv, write_csv
-from .interchange.read import read_trajectory
+from .interchange.read import read_plan, read_trajectory
 from .planning import (
     BisectionSearch,
     FreeKnots,
@@ -16,6 +16,7 @@ from .planning import (
     Plan,
     TimeOptimal,
     TimeScaling,
+    load_plan,
     option,
     plan,
     planner,
@@ -113,6 +114,7 @@ __all__ = [
     "fly",
     "import_plugin",
     "load_flight",
+    "load_plan",
     "load_problem",
     "load_trajectory",
     "load_vehicle",
@@ -123,6 +125,7 @@ __all__ = [
     "planner",
     "problem_names",
     "read_csv",
+    "read_plan",
     "read_trajectory",
     "reference",
     "registered_maneuvers",

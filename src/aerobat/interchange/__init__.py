@@ -1,6 +1,6 @@
-"""Trajectories in other people's formats, and whichever holds one."""
+"""Plans and trajectories in other systems' formats, and whichever file holds one."""
 
 from aerobat.interchange.csv import read_csv, write_csv
-from aerobat.interchange.read import read_trajectory
+from aerobat.interchange.read import read_plan, read_trajectory
 
-__all__ = ["read_csv", "read_trajectory", "write_csv"]
+__all__ = ["read_csv", "read_plan", "read_trajectory", "write_csv"]

@@ -1,4 +1,4 @@
-"""Whatever holds a trajectory: our own file, rows of a CSV, or a folder with either."""
+"""Whatever holds a plan or a bare trajectory: our own files, rows of a CSV, or a folder with one of them."""
 
 from __future__ import annotations
 
@@ -6,20 +6,37 @@ from pathlib import Path
 
 from aerobat.errors import SpecError
 from aerobat.interchange.csv import read_csv
+from aerobat.planning import Plan, load_plan
 from aerobat.trajectory import Trajectory, load_trajectory
 
-PLAN_FILES = ("plan.npz", "plan.csv")
+PATTERNS = ("*.plan", "plan.npz", "plan.csv")  # of what a folder may hold, the first that is there counts
 
 
-def read_trajectory(path: str | Path, rate: float = 100.0) -> Trajectory:
-    """The trajectory in a plan.npz, a CSV file with `rate` [1/s] rows, or a folder that holds one of them.
+def read_plan(path: str | Path, rate: float = 100.0) -> Plan | Trajectory:
+    """Read a .plan file as a plan, or the bare trajectory in an .npz or CSV file with `rate` [1/s] rows.
 
-    Raises SpecError, one sentence, when there is none or the file is malformed.
+    Of a folder, the plan that a run has left there is read. Raises SpecError, one sentence, when there is
+    none, when there are several, or when the file is malformed.
     """
     path = Path(path)
     if path.is_dir():
-        found = next((path / name for name in PLAN_FILES if (path / name).is_file()), None)
-        if found is None:
-            raise SpecError(f"{path}/ holds no plan.npz and no plan.csv; give the file of a trajectory")
-        path = found
+        path = _only_plan(path)
+    if path.suffix == ".plan":
+        return load_plan(path)
     return load_trajectory(path) if path.suffix == ".npz" else read_csv(path, rate)
+
+
+def read_trajectory(path: str | Path, rate: float = 100.0) -> Trajectory:
+    """Read the trajectory alone of whatever `read_plan` reads. Raises SpecError as it does."""
+    found = read_plan(path, rate)
+    return found.trajectory if isinstance(found, Plan) else found
+
+
+def _only_plan(folder: Path) -> Path:
+    for pattern in PATTERNS:
+        found = sorted(folder.glob(pattern))
+        if len(found) > 1:
+            raise SpecError(f"{folder}/ holds {found[0].name} and {found[1].name}; give one of the files")
+        if found:
+            return found[0]
+    raise SpecError(f"{folder}/ holds no .plan file and no plan.csv; give the file of a trajectory")

@@ -1,5 +1,6 @@
 from .certified_solve import Judged, Solution, certified_solve, with_certificate
 from .miqp import Miqp
+from .plan_file import load_plan
 from .planners import (
     Planner,
     PlannerOption,
@@ -36,6 +37,7 @@ __all__ = [
     "TimeOptimal",
     "TimeScaling",
     "certified_solve",
+    "load_plan",
     "option",
     "plan",
     "planner",

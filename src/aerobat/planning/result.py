@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from pathlib import Path
 
 from aerobat.certification import Certificate
 from aerobat.planning.recorder import Attempt
@@ -70,6 +71,15 @@ class Plan:
     def solve_time(self) -> float:
         """Time in the solver over all attempts [s]."""
         return sum(attempt.solve_time for attempt in self.attempts)
+
+    def save(self, path: str | Path) -> None:
+        """Write the whole plan as one file, whole or not at all; `load_plan` reads it back.
+
+        Raises SpecError when the file cannot be written.
+        """
+        from aerobat.planning.plan_file import save_plan
+
+        save_plan(self, path)
 
     def __str__(self) -> str:
         """One line for people."""

@@ -1,0 +1,99 @@
+"""Plans as files: everything that a plan is, in one file that whatever follows can read.
+
+A .plan file is a NumPy .npz archive without pickles. Its arrays `durations` (S,), `coefficients`
+(S, degree + 1, 3) and `heading` are the trajectory's, bit for bit; `document` holds, as UTF-8 JSON, the rest:
+the problem and the vehicle as the tables of their files, how the plan was made, its stages, attempts and
+certificate, and the version of Aerobat that wrote it.
+"""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass, fields
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from aerobat.certification import Certificate
+from aerobat.declaration import from_table, to_table
+from aerobat.errors import SpecError
+from aerobat.planning.recorder import Attempt
+from aerobat.planning.result import PlacedStage, Plan
+from aerobat.problem.problem import Problem
+from aerobat.storage import read_arrays, whole_file
+from aerobat.trajectory import Trajectory
+from aerobat.vehicle import Vehicle
+
+FORMAT = "aerobat-plan-1"
+
+
+@dataclass(frozen=True)
+class _Evidence:
+    """What a document holds beside problem and vehicle: the fields of Plan of those names."""
+
+    planner: str
+    order: int | None
+    cost: float | None
+    status: str
+    backend: str
+    stages: tuple[PlacedStage, ...]
+    attempts: tuple[Attempt, ...]
+    dt: float | None
+    bound: float | None
+    gap: float | None
+    certificate: Certificate | None
+
+
+def save_plan(plan: Plan, path: str | Path) -> None:
+    """Write a plan with its problem, vehicle and certificate, whole or not at all.
+
+    Raises SpecError when the file cannot be written, or for a maneuver that is not registered.
+    """
+    evidence = _Evidence(**{field.name: getattr(plan, field.name) for field in fields(_Evidence)})
+    document = {
+        "aerobat": version("aerobat"),
+        "problem": to_table(plan.problem),
+        "vehicle": None if plan.vehicle is None else to_table(plan.vehicle),
+        "evidence": _adapter().dump_python(evidence, mode="json"),
+    }
+    with whole_file(path) as temporary, temporary.open("wb") as file:
+        np.savez(
+            file,
+            format=FORMAT,
+            durations=plan.trajectory.durations,
+            coefficients=plan.trajectory.coefficients,
+            heading=plan.trajectory.heading,
+            document=np.frombuffer(json.dumps(document).encode(), dtype=np.uint8),
+        )
+
+
+def load_plan(path: str | Path) -> Plan:
+    """Read what `Plan.save` wrote, exactly. Raises SpecError, one sentence, for any other file."""
+    content = read_arrays(path, "plan")
+    found = str(content.get("format", "something else"))
+    if found != FORMAT:
+        raise SpecError(f"plan file {path}: it holds {found}, not {FORMAT}; plan again and save that")
+    try:
+        document = json.loads(content["document"].tobytes())
+        evidence: _Evidence = _adapter().validate_python(document["evidence"])
+        vehicle = document["vehicle"]
+        return Plan(
+            problem=from_table(Problem, document["problem"]),
+            trajectory=Trajectory(content["durations"], content["coefficients"], float(content["heading"])),
+            vehicle=None if vehicle is None else from_table(Vehicle, vehicle),
+            **vars(evidence),
+        )
+    except KeyError as error:
+        raise SpecError(f"plan file {path}: it has no {error.args[0]!r}; save it again") from None
+    except SpecError as error:
+        raise SpecError(f"plan file {path}: {error}") from None
+    except (TypeError, ValueError):  # not JSON, not such a document
+        raise SpecError(f"plan file {path}: it is damaged; save it again") from None
+
+
+def _adapter() -> Any:
+    from pydantic import TypeAdapter
+
+    return TypeAdapter(_Evidence)

@@ -1,0 +1,112 @@
+"""A saved plan is the plan: what is judged, flown and shown from the file is what was planned."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import aerobat as ab
+from aerobat.errors import SpecError
+from aerobat.storage import read_arrays
+
+VEHICLE = ab.load_vehicle("agile-quad")
+WINDY = replace(
+    ab.load_problem("half-flip"),
+    heading=1.2,
+    environment=ab.Environment(gravity=9.7, wind=(1.0, -0.5, 0.2), ground=-3.0),
+)
+
+
+@pytest.fixture(scope="module")
+def plan() -> ab.Plan:
+    return ab.plan(WINDY, vehicle=replace(VEHICLE, drag_body=(0.1, 0.1, 0.05)))
+
+
+def test_a_plan_survives_its_file(plan: ab.Plan, tmp_path: Path) -> None:
+    plan.save(tmp_path / "half.plan")
+    again = ab.load_plan(tmp_path / "half.plan")
+    np.testing.assert_array_equal(again.trajectory.coefficients, plan.trajectory.coefficients)
+    np.testing.assert_array_equal(again.trajectory.durations, plan.trajectory.durations)
+    assert again.trajectory.heading == plan.trajectory.heading == 1.2
+    assert again.problem == plan.problem
+    assert again.vehicle == plan.vehicle
+    assert again.certificate == plan.certificate
+    assert (again.stages, again.attempts, str(again)) == (plan.stages, plan.attempts, str(plan))
+
+
+def test_the_certificate_in_the_file_is_that_of_what_the_file_holds(plan: ab.Plan, tmp_path: Path) -> None:
+    plan.save(tmp_path / "half.plan")
+    again = ab.load_plan(tmp_path / "half.plan")
+    envelope = ab.Envelope(limits=again.problem.path_limits)
+    assert again.vehicle is not None
+    found = ab.certify(again.trajectory, again.vehicle, again.problem.environment, envelope)
+    assert found == again.certificate
+
+
+def test_what_is_flown_from_the_file_is_what_was_planned(plan: ab.Plan, tmp_path: Path) -> None:
+    """Bit for bit: its heading, its vehicle, its wind."""
+    plan.save(tmp_path / "half.plan")
+    before, after = ab.fly(plan, seed=3), ab.fly(ab.load_plan(tmp_path / "half.plan"), seed=3)
+    np.testing.assert_array_equal(before.states.q_world_body, after.states.q_world_body)
+    np.testing.assert_array_equal(before.thrusts, after.thrusts)
+    assert ab.score(before, plan).max_position_error_m < 0.05
+
+
+def test_a_plan_without_a_vehicle_survives_too(tmp_path: Path) -> None:
+    bare = ab.plan(ab.load_problem("line"))
+    bare.save(tmp_path / "line.plan")
+    again = ab.load_plan(tmp_path / "line.plan")
+    assert again.vehicle is None
+    assert again.certificate is None
+    assert str(again) == str(bare)
+
+
+def spoilt(path: Path, **changes: object) -> Path:
+    content = read_arrays(path, "plan")
+    document = json.loads(content["document"].tobytes())
+    for key, value in changes.items():
+        if key in content:
+            content[key] = value
+        elif value is None:
+            del document[key]
+        else:
+            document[key] = value
+    if "document" not in changes:
+        content["document"] = np.frombuffer(json.dumps(document).encode(), dtype=np.uint8)
+    np.savez(path.open("wb"), **content)
+    return path
+
+
+@pytest.mark.parametrize(
+    ("changes", "sentence"),
+    [
+        ({"format": "aerobat-trajectory-1"}, "it holds aerobat-trajectory-1, not aerobat-plan-1"),
+        ({"document": np.frombuffer(b"{", dtype=np.uint8)}, "it is damaged"),
+        ({"document": np.frombuffer(b"[1]", dtype=np.uint8)}, "it is damaged"),
+        ({"problem": None}, "it has no 'problem'"),
+        ({"problem": {"name": "x"}}, "is missing; add it"),
+        ({"evidence": {"planner": 3}}, "it is damaged"),
+        ({"durations": np.array([-1.0])}, "durations must be"),
+        ({"heading": np.array([1.0, 2.0])}, "it is damaged"),
+    ],
+)
+def test_a_file_that_is_no_plan_is_refused_in_one_sentence(
+    plan: ab.Plan, tmp_path: Path, changes: dict, sentence: str
+) -> None:
+    plan.save(tmp_path / "half.plan")
+    with pytest.raises(SpecError, match=sentence) as error:
+        ab.load_plan(spoilt(tmp_path / "half.plan", **changes))
+    assert "\n" not in str(error.value)
+
+
+def test_a_truncated_file_is_refused_in_one_sentence(plan: ab.Plan, tmp_path: Path) -> None:
+    plan.save(tmp_path / "half.plan")
+    whole = (tmp_path / "half.plan").read_bytes()
+    for size in (0, 10, len(whole) // 2, len(whole) - 1):
+        (tmp_path / "half.plan").write_bytes(whole[:size])
+        with pytest.raises(SpecError, match="plan file"):
+            ab.load_plan(tmp_path / "half.plan")
