@@ -67,8 +67,9 @@ def enclose_maximum(batch: SeriesBatch) -> Enclosure:
         np.maximum.at(found.max, group[~open_], upper[~open_])
         if not open_.any():
             break
-        pending = pending[open_].halves()
-        coefficients = np.concatenate([coefficients[open_] @ half.T for half in halves])
+        rows = np.flatnonzero(open_)
+        pending, coefficients = pending[rows].halves(), coefficients[rows]
+        coefficients = np.concatenate([coefficients @ half.T for half in halves])
     return found
 
 
