@@ -1,14 +1,19 @@
 """Rotations as unit Hamilton quaternions (w, x, y, z), body to world; leading axes broadcast.
 
+The face for arrays of `kernels.quaternions`, with what takes more than arithmetic: exponential and logarithm.
 Conventions: Solà, "Quaternion kinematics for the error-state Kalman filter", arXiv:1711.02508.
 """
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import ArrayLike
 
 from aerobat.arrays import Array
+from aerobat.kernels import quaternions, vectors
+from aerobat.kernels.ops import Quaternion, Vector
 
 IDENTITY: Array = np.array([1.0, 0.0, 0.0, 0.0])
 IDENTITY.flags.writeable = False
@@ -16,24 +21,12 @@ IDENTITY.flags.writeable = False
 
 def cross(a: ArrayLike, b: ArrayLike) -> Array:
     """a × b, (..., 3); several times faster than np.cross on few vectors."""
-    ax, ay, az = _components(a)
-    bx, by, bz = _components(b)
-    return np.stack([ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx], axis=-1)
+    return _joined(vectors.cross(_vector(a), _vector(b)))
 
 
 def multiply(p: ArrayLike, q: ArrayLike) -> Array:
     """Hamilton product p ⊗ q, (..., 4)."""
-    pw, px, py, pz = _components(p)
-    qw, qx, qy, qz = _components(q)
-    return np.stack(
-        [
-            pw * qw - px * qx - py * qy - pz * qz,
-            pw * qx + px * qw + py * qz - pz * qy,
-            pw * qy - px * qz + py * qw + pz * qx,
-            pw * qz + px * qy - py * qx + pz * qw,
-        ],
-        axis=-1,
-    )
+    return _joined(quaternions.multiply(_quaternion(p), _quaternion(q)))
 
 
 def conjugate(q: ArrayLike) -> Array:
@@ -49,15 +42,12 @@ def normalize(q: ArrayLike) -> Array:
 
 def rotate(q: ArrayLike, v: ArrayLike) -> Array:
     """q ⊗ v ⊗ q*: body vectors (..., 3) to the world for q = q_world_body."""
-    q, v = np.asarray(q, dtype=float), np.asarray(v, dtype=float)
-    vector = q[..., 1:]
-    t = 2.0 * cross(vector, v)
-    return np.asarray(v + q[..., :1] * t + cross(vector, t))
+    return _joined(quaternions.rotate(_quaternion(q), _vector(v)))
 
 
 def unrotate(q: ArrayLike, v: ArrayLike) -> Array:
     """q* ⊗ v ⊗ q: world vectors (..., 3) to the body for q = q_world_body."""
-    return rotate(conjugate(q), v)
+    return _joined(quaternions.rotate(quaternions.conjugate(_quaternion(q)), _vector(v)))
 
 
 def exp(phi: ArrayLike) -> Array:
@@ -129,6 +119,15 @@ def _any_normal(a: Array) -> Array:
     return np.asarray(normal / np.linalg.norm(normal, axis=-1, keepdims=True))
 
 
-def _components(vectors: ArrayLike) -> tuple[Array, ...]:
-    array = np.asarray(vectors, dtype=float)
-    return tuple(array[..., i] for i in range(array.shape[-1]))
+def _vector(array: ArrayLike) -> Vector:
+    array = np.asarray(array, dtype=float)
+    return array[..., 0], array[..., 1], array[..., 2]
+
+
+def _quaternion(array: ArrayLike) -> Quaternion:
+    array = np.asarray(array, dtype=float)
+    return array[..., 0], array[..., 1], array[..., 2], array[..., 3]
+
+
+def _joined(components: tuple[Any, ...]) -> Array:
+    return np.stack(components, axis=-1)

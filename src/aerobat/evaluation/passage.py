@@ -35,28 +35,33 @@ class Passage:
     clearance: float  # [m] from the outermost rotor tip to the frame; negative: a collision; NaN: unknown
 
 
-def gates_of(problem: Problem) -> tuple[Gate, ...]:
+def gates_of(goal: Problem | Plan) -> tuple[Gate, ...]:
     """The gates in the order in which a problem's stages pass them; all of them where no stage names one."""
+    problem = goal.problem if isinstance(goal, Plan) else goal
     passed = [stage.gate for stage in problem.stages(1.0).stages if stage.gate is not None]
     return tuple(map(problem.gate, passed)) or problem.gates
 
 
-def planned_passages(goal: Problem | Plan, times: Array, position: Array) -> tuple[float, ...]:
+def planned_passages(
+    goal: Problem | Plan, gates: tuple[Gate, ...], times: Array, position: Array
+) -> tuple[float, ...]:
     """The planned instant [s] of each gate's passage.
 
     That of a plan's stage, or of the set-points' nearest approach, after the last one of the same gate.
 
     Args:
         goal: the problem, or a plan for it.
+        gates: of the goal, see `gates_of`.
         times: of the set-points [s], (T,).
         position: of the set-points [m], (T, 3).
     """
     if isinstance(goal, Plan):
         planned = tuple(stage.time for stage in goal.stages if stage.gate is not None)
-        return planned or planned_passages(goal.problem, times, position)
+        if planned:
+            return planned
     latest: dict[str, float] = {}
     found = []
-    for gate in gates_of(goal):
+    for gate in gates:
         distance = np.linalg.norm(position - gate.position, axis=-1)
         after = latest.get(gate.name, -np.inf) + PASSAGE_WINDOW
         latest[gate.name] = float(times[int(np.argmin(np.where(times > after, distance, np.inf)))])

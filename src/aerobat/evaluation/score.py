@@ -20,6 +20,7 @@ from aerobat.evaluation.passage import (
 )
 from aerobat.kernels.running_metrics import RunningMetrics
 from aerobat.planning import Plan
+from aerobat.problem.gate import Gate
 from aerobat.problem.problem import Problem
 from aerobat.simulation.flight import Flight
 from aerobat.simulation.outcome import Outcome
@@ -122,12 +123,13 @@ def score(flight: Flight, goal: Problem | Plan, vehicle: Vehicle | None = None) 
     """
     if flight.is_batch:
         raise SpecError("score takes one flight at a time; of a batch, score flight[k]")
-    problem = goal.problem if isinstance(goal, Plan) else goal
-    states, setpoints = flight.states, flight.setpoint.flat.position
+    gates = gates_of(goal)
+    states = flight.states
     square, angle = position_error(flight) ** 2, attitude_error(flight)
     diverged = flight.outcome is not Outcome.COMPLETE
     found = []
-    for gate, planned in zip(gates_of(problem), planned_passages(goal, flight.times, setpoints), strict=True):
+    instants = planned_passages(goal, gates, flight.times, flight.setpoint.flat.position)
+    for gate, planned in zip(gates, instants, strict=True):
         window = passage_window(flight.times, planned)
         if diverged and planned >= flight.times[-1]:  # still under way to it
             window[:] = False
@@ -149,7 +151,7 @@ def score(flight: Flight, goal: Problem | Plan, vehicle: Vehicle | None = None) 
     )[0]
 
 
-def scores_of(metrics: RunningMetrics, problem: Problem, fleet: Fleet) -> Scores:
+def scores_of(metrics: RunningMetrics, gates: tuple[Gate, ...], fleet: Fleet) -> Scores:
     """Scores of flights that were added up as they were flown, from their last metrics, leaves (flights,)."""
     ticks = np.maximum(metrics.ticks, 1.0)
     diverged = metrics.flying < 0.5
@@ -162,7 +164,7 @@ def scores_of(metrics: RunningMetrics, problem: Problem, fleet: Fleet) -> Scores
         saturated_fraction=metrics.saturated / ticks,
         passages=tuple(
             passages(gate, approach.nearest, approach.distance_sq, fleet)
-            for gate, approach in zip(gates_of(problem), metrics.gates, strict=True)
+            for gate, approach in zip(gates, metrics.gates, strict=True)
         ),
         stop=np.where(diverged, metrics.stop, np.nan),
         is_finite=metrics.is_finite > 0.5,

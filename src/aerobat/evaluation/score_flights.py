@@ -19,6 +19,7 @@ from aerobat.kernels import running_metrics
 from aerobat.kernels.ops import Ops
 from aerobat.kernels.running_metrics import MetricsInput, MetricsParameters, RunningMetrics
 from aerobat.planning import Plan
+from aerobat.problem.gate import Gate
 from aerobat.problem.problem import Problem
 from aerobat.simulation.loop import Signals
 from aerobat.simulation.outcome import DIVERGENCE_RADIUS
@@ -99,13 +100,19 @@ def score_flights(
     settings = replace(config, **changes)
     if settings.log_rate is not None:
         raise SpecError("log_rate: a scored flight keeps no rows; leave it out")
-    judged_by = goal.problem if isinstance(goal, Plan) else goal
-    setup = with_metrics(prepare(plan, vehicles, environment or judged_by.environment, settings), goal)
+    if environment is None:
+        environment = (goal.problem if isinstance(goal, Plan) else goal).environment
+    gates = gates_of(goal)
+    setup = prepare(plan, vehicles, environment, settings)
+    blocks = range(0, len(setup.times), BLOCK)
+    parts = [setup.reference.setpoint(k, min(k + BLOCK, len(setup.times))).flat.position for k in blocks]
+    planned = planned_passages(goal, gates, setup.times, np.concatenate(parts))
+    setup = with_metrics(setup, gates, planned)
     loop = setup.compile(log=metrics_row)
     carry = loop.init(setup.first_tick)
     for begin, end in setup.chunks():
         carry, rows = loop.scan(carry, setup.inputs(begin, end), end)
-    return scores_of(tree_map(lambda leaf: leaf[:, -1], rows), judged_by, setup.fleet)
+    return scores_of(tree_map(lambda leaf: leaf[:, -1], rows), gates, setup.fleet)
 
 
 def metrics_row(signals: Signals) -> RunningMetrics:
@@ -114,20 +121,13 @@ def metrics_row(signals: Signals) -> RunningMetrics:
     return metrics
 
 
-def with_metrics(setup: FlightSetup, goal: Problem | Plan | None) -> FlightSetup:
-    """The same flight with its metrics added up, by gates and ground if there is a goal."""
+def with_metrics(
+    setup: FlightSetup, gates: tuple[Gate, ...] = (), planned: tuple[float, ...] = ()
+) -> FlightSetup:
+    """The same flight with its metrics added up; the gates with the instants [s] of their passages."""
     vehicles, times = len(setup.fleet), setup.times
-    windows: tuple[Array, ...] = ()
-    centres: tuple[Any, ...] = ()
-    if goal is not None:
-        problem = goal.problem if isinstance(goal, Plan) else goal
-        blocks = range(0, len(times), BLOCK)
-        parts = [setup.reference.setpoint(k, min(k + BLOCK, len(times))).flat.position for k in blocks]
-        planned = planned_passages(goal, times, np.concatenate(parts))
-        windows = tuple(passage_window(times, instant).astype(float) for instant in planned)
-        centres = tuple(
-            components(np.broadcast_to(gate.position, (vehicles, 3))) for gate in gates_of(problem)
-        )
+    windows = tuple(passage_window(times, instant).astype(float) for instant in planned)
+    centres = tuple(components(np.broadcast_to(gate.position, (vehicles, 3))) for gate in gates)
     ground = -np.inf if setup.environment.ground is None else setup.environment.ground
     parameters = MetricsParameters(
         np.full(vehicles, DIVERGENCE_RADIUS**2), np.full(vehicles, ground), centres

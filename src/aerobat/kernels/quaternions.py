@@ -61,6 +61,14 @@ def normalize(ops: Ops, q: Quaternion) -> Quaternion:
     return w * inverse, x * inverse, y * inverse, z * inverse
 
 
+def rotate(q: Quaternion, a: Vector) -> Vector:
+    """q ⊗ a ⊗ q*: a body vector in the world for q = q_world_body."""
+    w, x, y, z = q
+    u = (x, y, z)
+    t = scale(2.0, cross(u, a))
+    return add(add_scaled(a, w, t), cross(u, t))
+
+
 def axes(q: Quaternion) -> Axes:
     """The body axes b1, b2, b3 in the world, for q = q_world_body: columns of the rotation matrix."""
     w, x, y, z = q
@@ -89,8 +97,8 @@ def to_world(body_axes: Axes, a: Vector) -> Vector:
 
 def angle_between(ops: Ops, p: Quaternion, q: Quaternion) -> Scalar:
     """The angle of the rotation from attitude p to attitude q [rad], in [0, π]."""
-    w, *vector = multiply(conjugate(p), q)
-    return 2.0 * atan2(ops, norm(ops, tuple(vector)), ops.maximum(w, -w))
+    w, x, y, z = multiply(conjugate(p), q)
+    return 2.0 * atan2(ops, norm(ops, (x, y, z)), ops.maximum(w, -w))
 
 
 def atan2(ops: Ops, y: Scalar, x: Scalar) -> Scalar:
