@@ -11,7 +11,7 @@ from dataclasses import MISSING, Field, dataclass, field, fields
 from importlib import import_module
 from typing import Any, Protocol, TypeVar, get_type_hints
 
-from aerobat.documents import unknown_name
+from aerobat.declaration import unknown_name
 from aerobat.errors import SpecError
 from aerobat.planning.certified_solve import with_certificate
 from aerobat.planning.recorder import Progress
