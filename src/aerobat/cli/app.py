@@ -9,17 +9,22 @@ from collections.abc import Sequence
 
 from cyclopts import App, CycloptsError
 
-from aerobat.cli.check import check
-from aerobat.cli.compare import compare
-from aerobat.cli.fly import fly
-from aerobat.cli.plan import plan
-from aerobat.cli.problems import problems
-from aerobat.cli.vehicles import vehicles
+from aerobat.cli.plugins import import_plugins
 from aerobat.errors import AerobatError, Infeasible
 
 BAD_INPUT = 2
 INFEASIBLE = 3
 INTERRUPTED = 130
+
+# each is one file and one function of this name, imported when it is asked for
+COMMANDS = {
+    "fly": "Plan a maneuver, fly it in simulation, and report.",
+    "plan": "Plan a maneuver and stop there.",
+    "check": "Prove that a vehicle can fly a trajectory, or say when and why it cannot.",
+    "compare": "Plan a maneuver with every planner and put the plans side by side.",
+    "vehicles": "List the built-in vehicles.",
+    "problems": "List the built-in problems.",
+}
 
 app = App(
     name="aerobat",
@@ -32,8 +37,8 @@ app = App(
     sentence says where); 3 no plan exists (one sentence says which bound binds and what would free it).
     """,
 )
-for command in (fly, plan, check, compare, vehicles, problems):
-    app.command(command)
+for name, help in COMMANDS.items():
+    app.command(f"aerobat.cli.{name}:{name}", name=name, help=help)
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
@@ -45,6 +50,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     atexit.register(gc.freeze)  # and least of all when it ends: a tenth of the main job
     tokens = sys.argv[1:] if arguments is None else arguments
     try:
+        import_plugins(tokens)
         app(tokens, exit_on_error=False, print_error=False, result_action="return_value")
     except CycloptsError as error:
         _exit(" ".join(str(error).split()), BAD_INPUT)

@@ -10,43 +10,60 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
+from aerobat.certification import Envelope, certify
 from aerobat.cli.options import CheckOptions
+from aerobat.environment import Environment
+from aerobat.interchange import read_plan
+from aerobat.planning import Plan
+from aerobat.problem import Limits
+from aerobat.reporting.report_json import to_json
+from aerobat.reporting.tables import certificate_table, show
+from aerobat.vehicle import load_vehicle
 
 NOT_CERTIFIED = 1
+ASSUMED_VEHICLE = "agile-quad"
 
 
 def check(plan: Path, options: Annotated[CheckOptions, Parameter(name="*")] = CheckOptions()) -> None:
     """Prove over continuous time that a vehicle can fly a trajectory, or say when and why it cannot.
 
     The proof covers every rotor's thrust and, where limits are given, speed, tilt, body rates and moments. It
-    does not sample: between any two instants it bounds what happens. Exits with 0 only if all is proven.
+    does not sample: between any two instants it bounds what happens. Of a .plan file it judges what was
+    planned: its vehicle, its environment, its heading and its problem's limits; other files hold only the
+    path, and what is assumed is said. Exits with 0 only if all is proven.
 
     Parameters
     ----------
     plan
-        A plan.npz, a CSV file (rows of position, velocity, acceleration, jerk), or a folder that
+        A .plan file, a CSV file (rows of position, velocity, acceleration, jerk), or a folder that
         `aerobat plan` or `aerobat fly` wrote.
     """
-    from aerobat.certification import Envelope, certify
-    from aerobat.interchange import read_trajectory
-    from aerobat.reporting.report_json import to_json
-    from aerobat.reporting.tables import certificate_table, show
-    from aerobat.vehicle import load_vehicle
-
-    vehicle = load_vehicle(options.vehicle)
+    found = read_plan(plan, options.rate)
+    trajectory = found.trajectory if isinstance(found, Plan) else found
+    if options.heading is not None:
+        trajectory = replace(trajectory, heading=radians(options.heading))
+    own_vehicle = found.vehicle if isinstance(found, Plan) else None
+    if options.vehicle is not None or own_vehicle is None:
+        vehicle = load_vehicle(options.vehicle or ASSUMED_VEHICLE)
+    else:
+        vehicle = own_vehicle
+    environment = found.problem.environment if isinstance(found, Plan) else Environment()
     envelope = Envelope(
         speed=options.max_speed or inf,
         tilt=inf if options.max_tilt is None else radians(options.max_tilt),
         body_rate=inf if options.max_rate is None else radians(options.max_rate),
         moment=options.max_moment or inf,
+        limits=found.problem.path_limits if isinstance(found, Plan) else Limits(),
     )
-    trajectory = read_trajectory(plan, options.rate)
-    if options.heading is not None:
-        trajectory = replace(trajectory, heading=radians(options.heading))
-    certificate = certify(trajectory, vehicle, envelope=envelope)
+    certificate = certify(trajectory, vehicle, environment, envelope)
     if options.json:
         print(to_json(certificate.record()))
     else:
         show(certificate_table(certificate, f"{plan} · {vehicle.name}"))
+        if not isinstance(found, Plan):
+            print(
+                f"assumed, as the file holds no more than a path: gravity {environment.gravity:g} m/s², no "
+                "wind, no limits of a problem"
+            )
     if not certificate.certified:
         sys.exit(NOT_CERTIFIED)

@@ -10,6 +10,11 @@ from cyclopts import Parameter
 from aerobat.cli.options import TaskOptions
 from aerobat.cli.run_folder import run_folder
 from aerobat.cli.tasks import planning_progress, read_task
+from aerobat.reporting.comparison import comparison_figure, comparison_rows, comparison_table
+from aerobat.reporting.page import png
+from aerobat.reporting.report_json import to_json
+from aerobat.reporting.tables import show
+from aerobat.studies.compare import compare as compare_planners
 
 
 def compare(problem: str, options: Annotated[TaskOptions, Parameter(name="*")] = TaskOptions()) -> None:
@@ -23,12 +28,6 @@ def compare(problem: str, options: Annotated[TaskOptions, Parameter(name="*")] =
     problem
         A name that `aerobat problems` lists, or a problem's TOML file.
     """
-    from aerobat.reporting.comparison import comparison_figure, comparison_rows, comparison_table
-    from aerobat.reporting.page import png
-    from aerobat.reporting.report_json import to_json
-    from aerobat.reporting.tables import show
-    from aerobat.studies.compare import compare as compare_planners
-
     task, vehicle = read_task(problem, options)
     with planning_progress() as progress:
         comparison = compare_planners(task, vehicle, progress=progress)

@@ -8,7 +8,10 @@ from cyclopts import Parameter
 
 from aerobat.cli.options import FlyingOptions, PlanningOptions
 from aerobat.cli.run_folder import finish
-from aerobat.cli.tasks import make_plan, read_task
+from aerobat.cli.tasks import planned
+from aerobat.evaluation import score
+from aerobat.simulation import StateNoise
+from aerobat.simulation.fly import fly as simulate
 
 
 def fly(
@@ -18,21 +21,16 @@ def fly(
 ) -> None:
     """Plan a maneuver, fly it in simulation, and report.
 
-    Prints a short table and writes to the output folder: plan.npz (the polynomials), plan.csv (position,
-    velocity, acceleration and jerk at 100 Hz), flight.npz (everything that was simulated), report.png and
-    report.json.
+    Prints a short table and writes to the output folder, as one: PROBLEM.plan (the whole plan), plan.csv
+    (position, velocity, acceleration and jerk at 100 Hz), flight.npz (everything that was simulated),
+    report.png and report.json.
 
     Parameters
     ----------
     problem
-        A name that `aerobat problems` lists, or a problem's TOML file.
+        A name that `aerobat problems` lists, a problem's TOML file, or a .plan file, which is flown as it is.
     """
-    from aerobat.evaluation.score import score
-    from aerobat.simulation import StateNoise
-    from aerobat.simulation import fly as simulate
-
     noise = StateNoise.fused().scaled(flying.noise) if flying.noise else None
-    task, vehicle = read_task(problem, options, options.paper)
-    plan = make_plan(task, vehicle, options)
-    flight = simulate(plan, vehicle, noise=noise, seed=flying.seed)
-    finish(plan, vehicle, options, flight, score(flight, plan, vehicle))
+    plan = planned(problem, options)
+    flight = simulate(plan, noise=noise, seed=flying.seed)
+    finish(plan, options, flight, score(flight, plan, plan.vehicle))

@@ -1,12 +1,14 @@
-"""The commands' options, each with what its help says."""
+"""The commands' options, each with its help; those of the planners follow from the registered planners."""
 
-from __future__ import annotations
+# no postponed annotations here: the class of options is made from them, where nobody could look names up
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field, make_dataclass
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Any, TypeVar
 
 from cyclopts import Group, Parameter, validators
+
+from aerobat.planning import PlannerOption, planner_options, registered_planners
 
 planning = Group("Planning", sort_key=1)
 flying = Group("Flying", sort_key=2)
@@ -14,68 +16,86 @@ limiting = Group("Limits", sort_key=2)
 output = Group("Output", sort_key=3)
 
 Positive = validators.Number(gt=0)
-PlannerName = Literal["miqp", "min-snap", "free-knots", "time-optimal"]
+Options = TypeVar("Options", bound=type[Any])
 
 
 @dataclass(frozen=True, kw_only=True)
 class TaskOptions:
-    """What is flown and what flies, and where results go."""
+    """The problem's and the vehicle's options, and where results go."""
 
     vehicle: Annotated[str | None, Parameter(group=planning)] = None
-    """The vehicle: a name that `aerobat vehicles` lists, or a TOML file. Default: agile-quad, or hexarotor
-    with --paper."""
+    """The vehicle: a name that `aerobat vehicles` lists, or a TOML file. Default: that of a .plan file, else
+    agile-quad, or hexarotor with --paper."""
 
     angle: Annotated[float | None, Parameter(group=planning)] = None
     """The tilt of a half-flip's gate in degrees, -90 to 90, to the right when positive."""
 
+    plugins: Annotated[tuple[Path, ...], Parameter(name="--import", group=planning, negative="")] = ()
+    """A Python file that registers maneuvers or planners of your own; may be given several times."""
+
     out: Annotated[Path | None, Parameter(group=output)] = None
-    """The folder to write to. Default: out/PROBLEM."""
+    """The folder to write to, replaced as a whole. Default: out/PROBLEM."""
 
     json: Annotated[bool, Parameter(group=output, negative="", show_default=False)] = False
     """Print the report as JSON on standard output, and nothing else."""
 
 
+def offered_options() -> dict[str, dict[str, PlannerOption]]:
+    """The options of all registered planners: by flag, then by planner."""
+    offered: dict[str, dict[str, PlannerOption]] = {}
+    for name, cls in registered_planners().items():
+        for option in planner_options(cls):
+            offered.setdefault(option.flag, {})[name] = option
+    return offered
+
+
+def option_name(flag: str) -> str:
+    """The field of PlanningOptions behind a flag."""
+    return flag.removeprefix("--").replace("-", "_")
+
+
+def _with_planner_options(cls: Options) -> Options:
+    """The class with a field for each option that some planner offers, None where it was not given."""
+    fields = [_field(flag, offers) for flag, offers in offered_options().items()]
+    made: Any = make_dataclass(cls.__name__, fields, bases=(cls,), frozen=True, kw_only=True)
+    made.__module__ = cls.__module__  # else it seems to be one of Python's own types
+    return made  # type: ignore[no-any-return]
+
+
+def _field(flag: str, offers: dict[str, PlannerOption]) -> tuple[str, Any, Any]:
+    first = next(iter(offers.values()))
+    is_switch = first.type is bool
+    help = " ".join(_help(planner, option) for planner, option in offers.items())
+    parameter = Parameter(name=flag, group=planning, help=help, negative="", show_default=False)
+    kind = bool if is_switch else first.type | None
+    return option_name(flag), Annotated[kind, parameter], field(default=False if is_switch else None)
+
+
+def _help(planner: str, option: PlannerOption) -> str:
+    value = option.default if option.command_default is None else option.command_default
+    default = "" if option.type is bool or value is None else f" Default: {value}."
+    return f"{planner}: {option.help}{default}"
+
+
+def _planners_help() -> str:
+    summaries = ((name, cls.__doc__ or "") for name, cls in registered_planners().items())
+    first = (f"{name}, {doc.strip().splitlines()[0].rstrip('.')}" for name, doc in summaries)
+    return "How to plan: " + "; ".join(first) + ". Default: miqp."
+
+
+@_with_planner_options
 @dataclass(frozen=True, kw_only=True)
 class PlanningOptions(TaskOptions):
     """Options of all commands that plan once."""
 
-    planner: Annotated[PlannerName, Parameter(group=planning)] = "miqp"
-    """How to plan: miqp, the paper's mixed-integer program (Section II); min-snap, its closed-form
-    polynomials with a line search on their times (Section V); free-knots, such polynomials at the rotors'
-    limits; time-optimal, the full nonlinear dynamics at the rotors' limits. The last two need the extra
-    casadi."""
-
-    order: Annotated[int | None, Parameter(group=planning)] = None
-    """miqp: the derivative that is piecewise constant, 3 jerk (the paper's), 4 snap, 5 crackle; default 4, or
-    3 with --paper. min-snap: the derivative whose square is minimized, 3 to 5; default 5, degree 9."""
-
-    intervals: Annotated[int | None, Parameter(group=planning)] = None
-    """miqp: N, the number of intervals. Default: 20."""
-
-    backend: Annotated[str | None, Parameter(group=planning)] = None
-    """miqp: the solver, builtin, gurobi or scip (the last two are optional extras). Default: builtin."""
-
-    time_limit: Annotated[float | None, Parameter(group=planning)] = None
-    """miqp: seconds for each program; the best plan found by then is taken and its gap reported."""
-
-    stop_after: Annotated[int | None, Parameter(group=planning)] = None
-    """min-snap: stop the search at this attempt, whether the vehicle can fly it or not (paper, Fig. 10)."""
-
-    segments: Annotated[int | None, Parameter(group=planning)] = None
-    """free-knots: how many polynomial segments. The default, 2, is quick and leaves something to the
-    controller; 8 come closer to time-optimal."""
-
-    reserve: Annotated[float | None, Parameter(group=planning)] = None
-    """free-knots, time-optimal: the part of each rotor's range of thrust that is kept from either of its ends
-    for the controller. Default: 0, or 0.03 with time-optimal, which with 0 is a yardstick that no controller
-    follows for sure."""
-
-    in_space: Annotated[bool, Parameter(group=planning, negative="", show_default=False)] = False
-    """time-optimal: leave the maneuver's vertical plane where that is faster."""
+    planner: Annotated[str | None, Parameter(group=planning, help=_planners_help(), show_default=False)] = (
+        None
+    )
 
     paper: Annotated[bool, Parameter(group=planning, negative="", show_default=False)] = False
-    """Exactly the paper's formulation with its reference parameters: order 3, bounds per axis, unsigned and
-    unordered stages, dt the first feasible of 50 steps from 0.1 to 4 s, no vehicle in planning."""
+    """Exactly the paper's formulation with its reference parameters: miqp of order 3, bounds per axis,
+    unsigned and unordered stages, dt the first feasible of 50 steps from 0.1 to 4 s; no vehicle in
+    planning."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -91,14 +111,15 @@ class FlyingOptions:
 
 @dataclass(frozen=True, kw_only=True)
 class CheckOptions:
-    """What a trajectory is checked for, beyond its vehicle's rotors."""
+    """What a trajectory is checked for, beyond its vehicle's rotors and the limits of its problem."""
 
-    vehicle: Annotated[str, Parameter(group=limiting)] = "agile-quad"
-    """The vehicle: a name that `aerobat vehicles` lists, or a TOML file."""
+    vehicle: Annotated[str | None, Parameter(group=limiting)] = None
+    """The vehicle: a name that `aerobat vehicles` lists, or a TOML file. Default: the plan's, else
+    agile-quad."""
 
     heading: Annotated[float | None, Parameter(group=limiting)] = None
-    """The heading at the start in degrees, carried along the path without spin. Default: the
-    file's own, 0 of a CSV file."""
+    """The heading at the start in degrees, carried along the path without spin. Default: the file's own, of a
+    CSV file 0."""
 
     rate: Annotated[float, Parameter(group=limiting, validator=Positive)] = 100.0
     """Rows a second of a CSV file without times."""

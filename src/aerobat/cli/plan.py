@@ -8,18 +8,17 @@ from cyclopts import Parameter
 
 from aerobat.cli.options import PlanningOptions
 from aerobat.cli.run_folder import finish
-from aerobat.cli.tasks import make_plan, read_task
+from aerobat.cli.tasks import planned
 
 
 def plan(problem: str, options: Annotated[PlanningOptions, Parameter(name="*")] = PlanningOptions()) -> None:
     """Plan a maneuver and stop there.
 
-    As `aerobat fly`, without the flight: writes plan.npz, plan.csv, report.png and report.json.
+    As `aerobat fly`, without the flight: writes PROBLEM.plan, plan.csv, report.png and report.json.
 
     Parameters
     ----------
     problem
         A name that `aerobat problems` lists, or a problem's TOML file.
     """
-    task, vehicle = read_task(problem, options, options.paper)
-    finish(make_plan(task, vehicle, options), vehicle, options)
+    finish(planned(problem, options), options)

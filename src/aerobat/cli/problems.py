@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
+from aerobat.problem import load_problem, problem_names
+from aerobat.reporting.tables import problems_table, show
+
 
 def problems() -> None:
     """List the built-in problems."""
-    from aerobat.problem import load_problem, problem_names
-    from aerobat.reporting.tables import problems_table, show
-
     show(problems_table(load_problem(name) for name in problem_names()))

@@ -106,17 +106,20 @@ class PlannerOption:
     default: Any
     help: str
     flag: str  # --time-limit; of a field that is true by default what makes it false
+    command_default: Any = None  # the command line's default, where it is another one
 
 
-def option(default: Any, help: str, off: str | None = None) -> Any:
+def option(default: Any, help: str, off: str | None = None, command_default: Any = None) -> Any:
     """A dataclass field with its help, which the command line offers as an option.
 
     Args:
         default: Its value, where nothing else is said.
         help: A sentence, its unit included.
         off: Of a field that is true by default, the name of the flag that makes it false.
+        command_default: Its value on the command line, whose plans are to be flown, where it is another one.
     """
-    return field(default=default, metadata={"help": help, "off": off})
+    metadata = {"help": help, "off": off, "command_default": command_default}
+    return field(default=default, metadata=metadata)
 
 
 def planner_options(cls: type[Any]) -> tuple[PlannerOption, ...]:
@@ -128,4 +131,5 @@ def planner_options(cls: type[Any]) -> tuple[PlannerOption, ...]:
 def _option(f: Field[Any], hint: Any) -> PlannerOption:
     default = f.default if f.default_factory is MISSING else f.default_factory()
     flag = f.metadata.get("off") or f.name
-    return PlannerOption(f.name, hint, default, f.metadata["help"], "--" + flag.replace("_", "-"))
+    flag = "--" + flag.replace("_", "-")
+    return PlannerOption(f.name, hint, default, f.metadata["help"], flag, f.metadata.get("command_default"))

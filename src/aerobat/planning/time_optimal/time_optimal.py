@@ -60,6 +60,7 @@ class TimeOptimal:
         0.0,
         "The fraction of each rotor's range of thrust that is kept from either of its ends for the "
         "controller; with 0 a time-optimal plan is a yardstick that no controller follows for sure.",
+        command_default=0.03,
     )
     planar: bool = option(True, "Leave the maneuver's vertical plane where that is faster.", off="in_space")
     iterations: int = 500  # at most, each solve
