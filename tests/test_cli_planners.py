@@ -96,8 +96,8 @@ def test_compare_puts_all_planners_side_by_side(capsys) -> None:
     rows = json.loads(out)
     assert [r["planner"] for r in rows] == ["miqp", "min-snap", "free-knots", "free-knots", "time-optimal"]
     assert all(row.keys() >= ROW_KEYS for row in rows)
-    assert rows == json.loads(Path("out/section-v/compare.json").read_text())
-    assert Path("out/section-v/compare.png").read_bytes().startswith(b"\x89PNG")
+    assert rows == json.loads(Path("out/section-v-compare/compare.json").read_text())
+    assert Path("out/section-v-compare/compare.png").read_bytes().startswith(b"\x89PNG")
     ratios = np.array([row["ratio"] for row in rows])
     assert ratios[-1] == 1.0
     assert (ratios[:-1] > 1.0).all()

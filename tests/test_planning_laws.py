@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import aerobat as ab
-from aerobat.certification import Verdict
+from aerobat.certification import Side, Verdict
 from aerobat.environment import Environment
 from aerobat.planning import (
     FreeKnots,
@@ -118,7 +118,7 @@ def test_no_certified_path_goes_below_the_ground(name: str) -> None:
     found = planned(name, "ground")
     least = found.trajectory.component_range(0)[0][2]
     assert least >= WORLDS["ground"].environment.ground - 1e-9
-    (bound,) = (f for f in found.certificate.findings if f.quantity == "position z" and f.side == "least")
+    (bound,) = (f for f in found.certificate.findings if f.quantity == "position z" and f.side is Side.MIN)
     assert bound.limit == WORLDS["ground"].environment.ground
     assert bound.verdict is Verdict.HOLDS
 
