@@ -2,6 +2,7 @@
 
 import subprocess
 import sys
+from collections import Counter
 from dataclasses import asdict, replace
 from pathlib import Path
 
@@ -11,7 +12,7 @@ import pytest
 from aerobat import so3
 from aerobat.errors import SpecError
 from aerobat.evaluation import Score, score, score_flights
-from aerobat.planning import Plan, plan
+from aerobat.planning import Miqp, Plan, plan
 from aerobat.problem import load_problem
 from aerobat.simulation import Outcome, StateNoise, fly
 from aerobat.states import BodyState
@@ -149,3 +150,27 @@ def test_a_log_that_does_not_fit_the_rate_is_refused(log_rate: float, flip: Plan
         fly(flip, QUAD, log_rate=log_rate)
     with pytest.raises(SpecError, match="a scored flight keeps no rows"):
         score_flights(flip, QUAD, log_rate=500.0)
+
+
+def test_shares_of_outcomes_are_counted(flip: Plan) -> None:
+    """Ever larger errors of the start: all pass, some miss, some hit the frame, some are lost."""
+    scores = score_flights(flip, [QUAD] * 60, start=near(60, 1.0), engine="compiled")
+    counts = Counter(scores.outcomes)
+    assert sum(counts.values()) == len(scores) == 60
+    assert len(counts) > 1
+    assert counts[Outcome.DIVERGED] == np.isfinite(scores.stop).sum()
+    through = scores.passages[0].inside & ~(scores.passages[0].clearance < 0) & np.isnan(scores.stop)
+    assert counts[Outcome.THROUGH_GATES] == through.sum()
+    with pytest.raises(ValueError, match="read-only"):
+        scores.max_position_error_m[0] = 0.0
+
+
+def test_both_gates_of_two_flips_are_judged() -> None:
+    found = plan(load_problem("examples/two-flips.toml"), Miqp(order=4, intervals=40), QUAD)
+    result = score(fly(found), found, QUAD)
+    assert [passage.gate for passage in result.passages] == ["first", "second"]
+    assert all(passage.inside for passage in result.passages)
+    assert result.outcome is Outcome.THROUGH_GATES
+    assert result.sentence.startswith("through all 2 gates")
+    (scored,) = score_flights(found)
+    assert_same(scored, result, 1e-9)

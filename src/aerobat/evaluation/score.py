@@ -64,6 +64,12 @@ class Scores:
     is_finite: Array  # false where a flight diverged by what is not a number
     ground_time: Array  # [s] when a vehicle was below ground first, NaN if never
 
+    def __post_init__(self) -> None:
+        """Write-protect."""
+        for value in (*vars(self).values(), *(part for one in self.passages for part in vars(one).values())):
+            if isinstance(value, np.ndarray):
+                value.flags.writeable = False
+
     def __len__(self) -> int:
         return len(self.stop)
 

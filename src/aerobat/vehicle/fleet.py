@@ -30,6 +30,12 @@ class Fleet:
     lags: Array  # [s], (vehicles, n)
     radii: Array  # [m], (vehicles, n)
 
+    def __post_init__(self) -> None:
+        """Write-protect."""
+        for value in vars(self).values():
+            if isinstance(value, np.ndarray):
+                value.flags.writeable = False
+
     @classmethod
     def of(cls, vehicles: Sequence[Vehicle]) -> Fleet:
         """The fleet of some vehicles with as many rotors each."""

@@ -13,15 +13,14 @@ from collections.abc import Iterable, Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
 from itertools import compress
-from math import factorial, inf
 from typing import Any
 
 from llvmlite import ir
 
+from aerobat.engines.llvm.arithmetic import INTEGER, LOGICAL, NUMBER, exponential, filled, shaped
 from aerobat.engines.traced_loop import TracedLoop
 from aerobat.engines.tracing import Operation
 
-NUMBER, LOGICAL, INTEGER = ir.DoubleType(), ir.IntType(1), ir.IntType(64)
 ARRAYS = (
     "shared parameters",
     "parameters",
@@ -32,13 +31,6 @@ ARRAYS = (
     "outputs",
 )
 COUNTS = ("lanes", "ticks", "log_stride", "begin", "end")
-
-LOG2_E = 1.4426950408889634
-LN2 = (6.93147180369123816490e-01, 1.90821492927058770002e-10)  # the first ends in zeros: k · LN2[0] is exact
-ROUNDING = 6755399441055744.0  # 1.5 · 2^52 leaves no room for a fraction beside it
-NORMAL = (-708.0, 709.0)  # where the exponential is a normal number
-SERIES = [1.0 / factorial(k) for k in range(14)]  # of the exponential: enough for |x| ≤ ln 2 / 2
-BIAS, MANTISSA = 1023, 52  # of a float64's exponent; its bits below that
 
 
 @dataclass(frozen=True)
@@ -189,7 +181,7 @@ class _Codegen:
             case "sqrt", (x,):
                 return b.call(self._square_root(x.type), [x])
             case "exp", (x,):
-                return self._exponential(x)
+                return exponential(b, x)
             case "minimum", (x, y):
                 return b.select(b.fcmp_ordered("<", x, y), x, y)
             case "maximum", (x, y):
@@ -208,25 +200,6 @@ class _Codegen:
         suffix = f"v{type_.count}f64" if isinstance(type_, ir.VectorType) else "f64"
         signature = ir.FunctionType(type_, [type_])
         return self._builder.module.declare_intrinsic(f"llvm.sqrt.{suffix}", (), signature)
-
-    def _exponential(self, x: Any) -> Any:
-        """e^x = 2^k e^r with k the integer nearest to x / ln 2: a series for e^r, the bits of 2^k."""
-        b, like = self._builder, x.type
-
-        def c(value: float) -> Any:
-            return _filled(like, NUMBER(value))
-
-        low, high = b.fcmp_ordered("<", x, c(NORMAL[0])), b.fcmp_ordered(">", x, c(NORMAL[1]))
-        inside = b.select(low, c(NORMAL[0]), b.select(high, c(NORMAL[1]), x))
-        k = b.fsub(b.fadd(b.fmul(inside, c(LOG2_E)), c(ROUNDING)), c(ROUNDING))
-        r = b.fsub(b.fsub(inside, b.fmul(k, c(LN2[0]))), b.fmul(k, c(LN2[1])))
-        series = c(SERIES[-1])
-        for coefficient in SERIES[-2::-1]:
-            series = b.fadd(b.fmul(series, r), c(coefficient))
-        integers = _shaped(like, INTEGER)
-        biased = b.add(b.fptosi(k, integers), _filled(integers, INTEGER(BIAS)))
-        power = b.bitcast(b.shl(biased, _filled(integers, INTEGER(MANTISSA))), like)
-        return b.select(low, c(0.0), b.select(high, c(inf), b.fmul(series, power)))
 
     def _load(self, name: str, numbers: Sequence[int], shared: Sequence[bool], tick: Any, lane: Any) -> None:
         """The parameters, or one tick's inputs."""
@@ -280,7 +253,7 @@ class _Codegen:
             return value
         wide = self._wide_type(value.type)
         if isinstance(value, ir.Constant):
-            return _filled(wide, value)
+            return filled(wide, value)
         if value not in self._widened:
             lane = b.insert_element(ir.Constant(wide, ir.Undefined), value, INTEGER(0))
             first = ir.Constant(ir.VectorType(ir.IntType(32), width), None)
@@ -292,13 +265,13 @@ class _Codegen:
 
     def _as_number(self, value: Any) -> Any:
         """True and false as 1 and 0."""
-        if _shaped(value.type, LOGICAL) != value.type:
+        if shaped(value.type, LOGICAL) != value.type:
             return value
-        return self._builder.uitofp(value, _shaped(value.type, NUMBER))
+        return self._builder.uitofp(value, shaped(value.type, NUMBER))
 
     def _as_logical(self, value: Any) -> Any:
         """1 and 0 as true and false."""
-        return self._builder.fcmp_ordered("!=", value, _filled(value.type, NUMBER(0.0)))
+        return self._builder.fcmp_ordered("!=", value, filled(value.type, NUMBER(0.0)))
 
 
 def _constant(content: Any) -> Any:
@@ -307,13 +280,3 @@ def _constant(content: Any) -> Any:
 
 def _is_wide(value: Any) -> bool:
     return isinstance(value.type, ir.VectorType)
-
-
-def _shaped(like: Any, type_: Any) -> Any:
-    """A type in as many lanes as another."""
-    return ir.VectorType(type_, like.count) if isinstance(like, ir.VectorType) else type_
-
-
-def _filled(type_: Any, constant: Any) -> Any:
-    """A constant in every lane of a type."""
-    return ir.Constant(type_, [constant] * type_.count) if isinstance(type_, ir.VectorType) else constant
