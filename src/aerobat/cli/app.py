@@ -5,16 +5,16 @@ from __future__ import annotations
 import atexit
 import gc
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 from cyclopts import App, CycloptsError
 
-from aerobat.cli.plugins import import_plugins
 from aerobat.errors import AerobatError, Infeasible
 
 BAD_INPUT = 2
 INFEASIBLE = 3
 INTERRUPTED = 130
+IMPORT_FLAG = "--import"
 
 # each is one file and one function of this name, imported when it is asked for
 COMMANDS = {
@@ -50,7 +50,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     atexit.register(gc.freeze)  # and least of all when it ends: a tenth of the main job
     tokens = sys.argv[1:] if arguments is None else arguments
     try:
-        import_plugins(tokens)
+        _import_plugins(tokens)
         app(tokens, exit_on_error=False, print_error=False, result_action="return_value")
     except CycloptsError as error:
         _exit(" ".join(str(error).split()), BAD_INPUT)
@@ -60,6 +60,25 @@ def main(arguments: Sequence[str] | None = None) -> None:
         _exit(str(error), BAD_INPUT)
     except KeyboardInterrupt:
         _exit("interrupted", INTERRUPTED)
+
+
+def _import_plugins(tokens: Sequence[str]) -> None:
+    """Run the Python files that `--import` names, which register maneuvers and planners.
+
+    Their planners bring options of their own: this comes before the options are read.
+    """
+    for path in _import_paths(tokens):
+        from aerobat.declaration import import_plugin
+
+        import_plugin(path)
+
+
+def _import_paths(tokens: Sequence[str]) -> Iterator[str]:
+    for token, following in zip(tokens, [*tokens[1:], ""], strict=True):
+        if token == IMPORT_FLAG and following:
+            yield following
+        elif token.startswith(f"{IMPORT_FLAG}="):
+            yield token.removeprefix(f"{IMPORT_FLAG}=")
 
 
 def _exit(sentence: str, code: int) -> None:
