@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from aerobat.engines import NAMES, CompiledLoop, choose, logged_ticks
+from aerobat.engines import ENGINE_NAMES, CompiledLoop, choose, logged_ticks
 from aerobat.engines.engine import first_row
 from aerobat.engines.pytree import tree_leaves, tree_map
 
@@ -82,7 +82,7 @@ def assert_same(a: Any, b: Any) -> None:
 
 
 @pytest.mark.parametrize("vehicles", [1, VEHICLES])
-@pytest.mark.parametrize("engine", NAMES)
+@pytest.mark.parametrize("engine", ENGINE_NAMES)
 def test_one_scan_chunks_of_any_size_and_single_steps_give_the_same_bits(engine: str, vehicles: int) -> None:
     inputs = drawn(vehicles=vehicles)
     loop = loop_of(engine, inputs)
@@ -104,7 +104,7 @@ def test_any_cuts_give_the_same_bits(cuts: list[int], engine: str) -> None:
     assert_same(in_chunks(loop, inputs, [0, *sorted(set(cuts)), 200]), in_chunks(loop, inputs, [0, 200]))
 
 
-@pytest.mark.parametrize("engine", NAMES)
+@pytest.mark.parametrize("engine", ENGINE_NAMES)
 def test_a_pickled_carry_goes_on_in_another_loop_as_if_nothing_had_happened(engine: str) -> None:
     inputs = drawn(200)
     end, rows = in_chunks(loop_of(engine, inputs), inputs, [0, 200])
@@ -114,7 +114,7 @@ def test_a_pickled_carry_goes_on_in_another_loop_as_if_nothing_had_happened(engi
     assert_same(rest, tree_map(lambda leaf: leaf[:, 90:], rows))
 
 
-@pytest.mark.parametrize("engine", NAMES)
+@pytest.mark.parametrize("engine", ENGINE_NAMES)
 def test_branches_of_a_carry_do_not_know_of_each_other(engine: str) -> None:
     inputs = drawn(200)
     loop = loop_of(engine, inputs)
@@ -145,7 +145,7 @@ def test_inputs_that_are_overwritten_after_a_scan_leave_its_carry_alone(engine: 
     np.testing.assert_array_equal(carry, last)
 
 
-@pytest.mark.parametrize("engine", NAMES)
+@pytest.mark.parametrize("engine", ENGINE_NAMES)
 @pytest.mark.parametrize("log_stride", [1, 2, 7, 199, 200, 1000])
 def test_logged_are_the_first_tick_each_so_many_after_it_and_the_last(engine: str, log_stride: int) -> None:
     inputs = drawn(200, 3)

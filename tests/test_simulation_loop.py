@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from aerobat.engines import NAMES, choose, run_whole
+from aerobat.engines import ENGINE_NAMES, choose, run_whole
 from aerobat.engines.pytree import tree_leaves, tree_map
 from aerobat.environment import Environment
 from aerobat.errors import SpecError
@@ -35,7 +35,7 @@ def assert_equal(a: Any, b: Any) -> None:
 
 
 @pytest.mark.parametrize("vehicles", [QUAD, [QUAD] * 6], ids=["one", "six"])
-@pytest.mark.parametrize("engine", NAMES)
+@pytest.mark.parametrize("engine", ENGINE_NAMES)
 def test_stepped_cut_and_resumed_a_flight_is_the_same_to_the_last_bit(engine: str, vehicles: Any) -> None:
     setup = flight_of(engine, vehicles)
     loop, ticks = setup.compile(), 40

@@ -10,6 +10,9 @@ from numpy.typing import ArrayLike, NDArray
 from aerobat.errors import SpecError
 
 Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+Indices = NDArray[np.intp]
+AXES = "xyz"  # the names of a vector's components
 
 
 def frozen(value: ArrayLike, name: str, shape: Sequence[int | None] | None = None) -> Array:

@@ -17,6 +17,8 @@ from aerobat.kernels.ops import Quaternion, Vector
 
 IDENTITY: Array = np.array([1.0, 0.0, 0.0, 0.0])
 IDENTITY.flags.writeable = False
+UP: Array = np.array([0.0, 0.0, 1.0])  # e3, the thrust axis in the body and the vertical in the world
+UP.flags.writeable = False
 
 
 def cross(a: ArrayLike, b: ArrayLike) -> Array:

@@ -21,8 +21,8 @@ from aerobat import so3
 from aerobat.arrays import Array
 from aerobat.certification.enclosure import chebyshev
 from aerobat.kernels import flatness
+from aerobat.so3 import UP
 
-UP = np.array([0.0, 0.0, 1.0])
 ComplexArray = NDArray[np.complex128]
 
 

@@ -25,7 +25,7 @@ from aerobat.trajectory import Trajectory
 from aerobat.trajectory.subintervals import Subintervals
 from aerobat.vehicle import Vehicle
 
-DEGREE = 20  # of interpolation
+INTERPOLATION_DEGREE = 20  # of interpolation
 TIGHTNESS = 1e-7  # of a rotor's range: how near the proven bounds are to what is reached
 
 
@@ -54,7 +54,7 @@ def certify(
     """
     envelope = Envelope() if envelope is None else envelope
     environment = Environment() if environment is None else environment
-    curve = ThrustCurve.of(trajectory, vehicle, environment, DEGREE)
+    curve = ThrustCurve.of(trajectory, vehicle, environment, INTERPOLATION_DEGREE)
     floor = UNDETERMINED * environment.gravity
     found = subdivide(curve, floor)
     findings: list[Finding] = []

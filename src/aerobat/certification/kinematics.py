@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from aerobat.arrays import Array
+from aerobat.arrays import AXES, Array
 from aerobat.certification.certificate import Finding, Side
 from aerobat.certification.enclosure import chebyshev
 from aerobat.certification.enclosure.queries import ChebyshevSeries, ExtremumQuery, both_sides, root
@@ -15,11 +15,10 @@ from aerobat.problem.problem import DERIVATIVES, UNITS, Limits
 from aerobat.trajectory import Trajectory, polynomial
 from aerobat.trajectory.subintervals import Subintervals
 
-AXES = "xyz"
 # of the limit or of the derivative's largest component, the larger: a plan may run along such a limit or end
 # on it, so beyond by so much counts as met
 LIMIT_TOLERANCE = 1e-9
-TIGHTNESS = LIMIT_TOLERANCE / 10  # of enclosures
+KINEMATIC_TIGHTNESS = LIMIT_TOLERANCE / 10  # of enclosures
 
 
 def kinematic_findings(trajectory: Trajectory, envelope: Envelope) -> list[Finding]:
@@ -37,7 +36,7 @@ def kinematic_findings(trajectory: Trajectory, envelope: Envelope) -> list[Findi
     error = basis.lebesgue * np.stack(errors, axis=-1)
     whole = Subintervals.whole(trajectory.segments)
     found = ChebyshevSeries(
-        trajectory, whole, series, error, magnitude.max(axis=0), TIGHTNESS, everywhere=True
+        trajectory, whole, series, error, magnitude.max(axis=0), KINEMATIC_TIGHTNESS, everywhere=True
     )
     largest = [float(np.abs(values).max()) for values in derivatives]
     return found.answers(_queries(envelope, components, largest))

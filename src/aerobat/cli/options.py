@@ -15,7 +15,7 @@ flying = Group("Flying", sort_key=2)
 limiting = Group("Limits", sort_key=2)
 output = Group("Output", sort_key=3)
 
-Positive = validators.Number(gt=0)
+POSITIVE = validators.Number(gt=0)
 Options = TypeVar("Options", bound=type[Any])
 
 
@@ -121,19 +121,19 @@ class CheckOptions:
     """The heading at the start in degrees, carried along the path without spin. Default: the file's own, of a
     CSV file 0."""
 
-    rate: Annotated[float, Parameter(group=limiting, validator=Positive)] = 100.0
+    rate: Annotated[float, Parameter(group=limiting, validator=POSITIVE)] = 100.0
     """Rows a second of a CSV file without times."""
 
-    max_speed: Annotated[float | None, Parameter(group=limiting, validator=Positive)] = None
+    max_speed: Annotated[float | None, Parameter(group=limiting, validator=POSITIVE)] = None
     """The greatest speed allowed, m/s."""
 
-    max_tilt: Annotated[float | None, Parameter(group=limiting, validator=Positive)] = None
+    max_tilt: Annotated[float | None, Parameter(group=limiting, validator=POSITIVE)] = None
     """The greatest tilt allowed, degrees from upright."""
 
-    max_rate: Annotated[float | None, Parameter(group=limiting, validator=Positive)] = None
+    max_rate: Annotated[float | None, Parameter(group=limiting, validator=POSITIVE)] = None
     """The greatest body rate allowed, degrees a second."""
 
-    max_moment: Annotated[float | None, Parameter(group=limiting, validator=Positive)] = None
+    max_moment: Annotated[float | None, Parameter(group=limiting, validator=POSITIVE)] = None
     """The greatest moment allowed, N m."""
 
     json: Annotated[bool, Parameter(group=output, negative="", show_default=False)] = False

@@ -11,10 +11,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 from pydantic import AfterValidator, Field, PlainValidator
 
-from aerobat.arrays import Array
+from aerobat.arrays import AXES, Array
 from aerobat.declaration.sentences import FieldError, shown, unknown_key, within_field
 
-AXES = ("x", "y", "z")
 _ROUND_OFF = 1e-12  # [-] components of a unit vector that are zero but for it
 _UNIT = 1e-15  # [-] how far from one a norm may be by round-off
 

@@ -10,7 +10,7 @@ from aerobat.engines.floats import FLOATS
 from aerobat.engines.numpy import NUMPY
 from aerobat.errors import BackendMissing, SpecError
 
-NAMES = ("floats", "numpy", "compiled", "jax", "jax-float32")
+ENGINE_NAMES = ("floats", "numpy", "compiled", "jax", "jax-float32")
 _OPTIONAL = {  # the library that an engine needs, the extra that installs it, and where the engine is
     "compiled": ("llvmlite", "fast", "llvm", "ENGINE"),
     "jax": ("jax", "jax", "jax", "ENGINE"),
@@ -29,8 +29,8 @@ def choose(name: str, vehicles: int, ticks: int) -> Engine:
     """
     if name == "auto":
         name = _fastest(vehicles, ticks)
-    if name not in NAMES:
-        raise SpecError(f"engine must be one of auto, {', '.join(NAMES)}, got {name!r}")
+    if name not in ENGINE_NAMES:
+        raise SpecError(f"engine must be one of auto, {', '.join(ENGINE_NAMES)}, got {name!r}")
     if name not in _OPTIONAL:
         return FLOATS if name == FLOATS.name else NUMPY
     library, extra, module, value = _OPTIONAL[name]

@@ -8,9 +8,8 @@ import numpy as np
 
 from aerobat.arrays import Array
 from aerobat.declaration import Positive, Vector3, declared
+from aerobat.so3 import UP
 from aerobat.states import STANDARD_GRAVITY
-
-UP = np.array([0.0, 0.0, 1.0])
 
 
 @declared

@@ -17,12 +17,12 @@ from numpy.typing import NDArray
 
 from aerobat import so3
 from aerobat.arrays import Array
+from aerobat.so3 import UP
 from aerobat.trajectory.subintervals import Subintervals
 
 MAX_TURN = 0.5  # a piece stays within this fraction of |f| of its start: 30 degrees
 MAX_HALVINGS = 60  # far more than the cone asks of any sane curve
 CROSSING_ROUNDS = 10  # each divides by 16: to the last digit
-UP = np.array([0.0, 0.0, 1.0])
 
 
 @dataclass(frozen=True)

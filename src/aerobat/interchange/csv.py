@@ -21,7 +21,7 @@ from aerobat.storage import write_whole
 from aerobat.trajectory import Trajectory
 from aerobat.trajectory.polynomial import hermite
 
-COLUMNS = 12
+CSV_COLUMNS = 12
 SAME_TIME = 1e-12  # [s], a step this near to a period is one
 
 
@@ -47,13 +47,13 @@ def read_csv(path: str | os.PathLike[str], rate: float = 100.0) -> Trajectory:
     if not (math.isfinite(rate) and rate > 0):
         raise SpecError(f"rate must be a positive number of rows a second, got {rate!r}")
     rows = _parse(Path(path))
-    times = rows[:, COLUMNS] if rows.shape[1] > COLUMNS else np.arange(len(rows)) / rate
+    times = rows[:, CSV_COLUMNS] if rows.shape[1] > CSV_COLUMNS else np.arange(len(rows)) / rate
     steps = np.diff(times)
     if times[0] != 0 or not (steps > 0).all():
         line = 1 if times[0] != 0 else 2 + int(np.argmax(steps <= 0))
         raise SpecError(f"{path}: line {line}: times, the thirteenth numbers, must start at 0 and rise")
     scale = steps[:, None, None] ** np.arange(4)[:, None]
-    derivatives = rows[:, :COLUMNS].reshape(-1, 4, 3)
+    derivatives = rows[:, :CSV_COLUMNS].reshape(-1, 4, 3)
     return Trajectory(steps, hermite(scale * derivatives[:-1], scale * derivatives[1:]))
 
 
@@ -82,7 +82,7 @@ def _parse_row(line: str, where: str) -> list[float]:
         row = [float(word) for word in line.split(",")]
     except ValueError:
         raise SpecError(f"{where} must be numbers with commas between, got {line[:60]!r}") from None
-    if len(row) not in (COLUMNS, COLUMNS + 1):
+    if len(row) not in (CSV_COLUMNS, CSV_COLUMNS + 1):
         raise SpecError(f"{where} must have 12 numbers, or 13 with a time, got {len(row)}")
     if not all(map(math.isfinite, row)):
         raise SpecError(f"{where} must have finite numbers only, got {line[:60]!r}")

@@ -17,13 +17,10 @@ from math import inf
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from aerobat.arrays import Array, frozen, frozen_bounds
+from aerobat.arrays import Array, Indices, Mask, frozen, frozen_bounds
 from aerobat.errors import SpecError
-
-Indices = NDArray[np.intp]
-Mask = NDArray[np.bool_]
 
 
 @dataclass(frozen=True, eq=False)

@@ -24,14 +24,14 @@ from aerobat.vehicle import Vehicle
 BACKOFF = 1e-4  # of a bound: by how much more than what was exceeded it is tightened
 NEGLIGIBLE = 1e-9  # in SI units: an excess that means nothing
 
-Source = TypeVar("Source")
+Detail = TypeVar("Detail")
 
 
 @dataclass(frozen=True, eq=False)
-class Solution(Generic[Source]):
+class Solution(Generic[Detail]):
     """What a planner's program answered: a trajectory, or a sentence about why there is none."""
 
-    source: Source  # whatever the planner tightens by and reads its stages from
+    source: Detail  # whatever the planner tightens by and reads its stages from
     duration: float  # [s]
     trajectory: Trajectory | None
     status: str  # of the program, as in Attempt
@@ -43,14 +43,14 @@ class Solution(Generic[Source]):
     margin: float | None = None  # [N] of the rotors, where samples have shown it to be negative
 
 
-class Program(Protocol[Source]):
+class Program(Protocol[Detail]):
     """A planner's program with bounds that can be tightened."""
 
-    def solve(self) -> Solution[Source]:
+    def solve(self) -> Solution[Detail]:
         """Its solution with the bounds as they are."""
         ...
 
-    def tighten(self, solution: Solution[Source], certificate: Certificate | None) -> bool:
+    def tighten(self, solution: Solution[Detail], certificate: Certificate | None) -> bool:
         """Tighten by what a solution exceeds; False where that leads nowhere.
 
         There is no certificate where the solution is a failure.
@@ -59,12 +59,12 @@ class Program(Protocol[Source]):
 
 
 @dataclass(frozen=True, eq=False)
-class Judged(Generic[Source]):
+class Judged(Generic[Detail]):
     """A solution and what decides about it: its own certificate, where there is a vehicle."""
 
     problem: Problem
     vehicle: Vehicle | None
-    solution: Solution[Source]
+    solution: Solution[Detail]
     certificate: Certificate | None
     feasible: bool
 
@@ -88,13 +88,13 @@ class Judged(Generic[Source]):
 
 
 def certified_solve(
-    program: Program[Source],
+    program: Program[Detail],
     problem: Problem,
     vehicle: Vehicle | None,
     recorder: Recorder,
     rounds: int = 1,
     jumps: bool = False,
-) -> Judged[Source]:
+) -> Judged[Detail]:
     """The first solution that is certified, or the last one that was tried.
 
     Args:
@@ -113,8 +113,8 @@ def certified_solve(
 
 
 def refuted_by_samples(
-    solution: Solution[Source], problem: Problem, vehicle: Vehicle | None
-) -> Solution[Source]:
+    solution: Solution[Detail], problem: Problem, vehicle: Vehicle | None
+) -> Solution[Detail]:
     """The solution, a failure where samples already show that the vehicle's rotors cannot follow it."""
     if vehicle is None or solution.trajectory is None or solution.failure is not None:
         return solution
@@ -166,8 +166,8 @@ def _backoff(excess: Array, bound: Array) -> Array:
 
 
 def _judged(
-    solution: Solution[Source], problem: Problem, vehicle: Vehicle | None, recorder: Recorder, jumps: bool
-) -> Judged[Source]:
+    solution: Solution[Detail], problem: Problem, vehicle: Vehicle | None, recorder: Recorder, jumps: bool
+) -> Judged[Detail]:
     certificate = None
     if solution.trajectory is not None and solution.failure is None and vehicle is not None:
         certificate = certificate_for(solution.trajectory, problem, vehicle)

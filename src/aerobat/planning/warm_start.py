@@ -18,7 +18,7 @@ from aerobat.problem.stage import Stage, StageSequence
 from aerobat.trajectory import Trajectory
 from aerobat.vehicle import Vehicle
 
-FLAT = 1e-6  # of its extent: how far a path may leave a plane and still be in it
+PLANARITY_TOLERANCE = 1e-6  # of its extent: how far a path may leave a plane and still be in it
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,7 +56,7 @@ class WarmStart:
         """The normal of the vertical plane that it stays in, (3,); None when it stays in none."""
         across = self.trajectory.coefficients[..., :2].reshape(-1, 2) - self.trajectory.coefficients[0, 0, :2]
         _, extents, directions = np.linalg.svd(across)
-        if extents[1] > FLAT * max(extents[0], FLAT):
+        if extents[1] > PLANARITY_TOLERANCE * max(extents[0], PLANARITY_TOLERANCE):
             return None
         return np.array([*directions[1], 0.0])
 

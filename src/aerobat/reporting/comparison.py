@@ -39,13 +39,13 @@ if TYPE_CHECKING:
 
 NONE = "–"  # in place of a number that there is not
 COLOURS = (INK, YELLOW, SKY, BLUE, RED)  # of planners, in their order
-VERTICES = 200  # of a drawn path
+PATH_VERTICES = 200  # of a drawn path
 TAIL = 1.02  # where the time axis ends, relative to the longest duration
 
 PATHS = {True: 3.2, False: 4.8}  # [in] the height of the paths' picture, where they are flat or not
 TIMELINE = 5.5  # [in] the width of a timeline
-ROW = 0.85  # [in] its height
-PITCH = 1.3  # [in] of a planner's row, with its name
+COMPARISON_ROW = 0.85  # [in] its height
+COMPARISON_PITCH = 1.3  # [in] of a planner's row, with its name
 REASON_PITCH = 0.75  # [in] of one that has no plan
 PLACES = (6.6, 7.5, 8.25, 9.2, 10.2)  # [in] where a row's facts begin
 SENTENCE = 72  # letters to a line beside a timeline
@@ -140,12 +140,12 @@ def _name(entry: Entry) -> str:
 
 
 def _path(entry: Entry, plan: Plan, colour: str) -> NamedPath:
-    times = np.linspace(0.0, plan.duration, VERTICES)
+    times = np.linspace(0.0, plan.duration, PATH_VERTICES)
     return NamedPath(_name(entry), colour, plan.trajectory.evaluate(times))
 
 
 def _pitch(entry: Entry) -> float:
-    return REASON_PITCH if entry.plan is None else PITCH
+    return REASON_PITCH if entry.plan is None else COMPARISON_PITCH
 
 
 def _draw_rows(figure: Figure, comparison: Comparison, colours: Sequence[str], top: float) -> None:
@@ -158,7 +158,7 @@ def _draw_rows(figure: Figure, comparison: Comparison, colours: Sequence[str], t
         if entry.plan is None:
             _write_reason(figure, entry, top)
             continue
-        axes = panel(figure, COLUMNS[0], top, TIMELINE, ROW)
+        axes = panel(figure, COLUMNS[0], top, TIMELINE, COMPARISON_ROW)
         _draw_thrusts(axes, entry.plan, comparison.vehicle, colour)
         heading(axes, "", _name(entry))
         _write_facts(figure, comparison, entry, top)

@@ -42,7 +42,7 @@ PATH: Place = (0.3, FOOT - 0.15, 6.1, 6.25)
 POSITIONS: Place = (7.1, FOOT + 3.6, 4.17, 2.5)
 VELOCITIES: Place = (7.1, FOOT, 4.17, 2.5)
 HEIGHT = FOOT + 6.75  # [in] of the page below its headline
-RATE = 1000.0  # [1/s] at which reference values are taken: they may peak sharply
+TRACKING_RATE = 1000.0  # [1/s] at which reference values are taken: they may peak sharply
 
 
 @dataclass(frozen=True)
@@ -110,7 +110,7 @@ def tracking_figure(plan: Plan, vehicle: Vehicle, flight: Flight) -> Figure:
     """
     if flight.is_batch:
         raise SpecError("tracking_figure draws one flight; of a batch, give flight[k]")
-    asked = reference(plan.trajectory, vehicle, rate=RATE, environment=plan.problem.environment)
+    asked = reference(plan.trajectory, vehicle, rate=TRACKING_RATE, environment=plan.problem.environment)
     rotors = None if plan.margin is None else f"rotors asked for {plan.margin}"
     proof = rotors if plan.certificate is None else plan.certificate.why
     result = score_caption(score(flight, plan.problem, vehicle))

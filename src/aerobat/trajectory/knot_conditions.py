@@ -22,11 +22,10 @@ from functools import cache, cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from aerobat.arrays import Array, frozen
+from aerobat.arrays import Array, Mask, frozen
 from aerobat.errors import SpecError
 
 Extended = NDArray[np.longdouble]  # 80 bits where the machine has them, else float64
-Mask = NDArray[np.bool_]
 
 MAX_PASSES = 12  # each wins back digits; beyond, the system is as good as singular
 NEGLIGIBLE_CORRECTION = 2.0**-54  # a correction this small, relative to its segment, is lost in float64

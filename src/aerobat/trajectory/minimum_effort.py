@@ -13,13 +13,12 @@ from enum import StrEnum
 import numpy as np
 from numpy.typing import ArrayLike
 
-from aerobat.arrays import Array, frozen
+from aerobat.arrays import AXES, Array, Mask, frozen
 from aerobat.errors import SpecError
-from aerobat.trajectory.knot_conditions import KnotConditions, Mask
+from aerobat.trajectory.knot_conditions import KnotConditions
 from aerobat.trajectory.piecewise import Trajectory
 
 ORDERS = {3: "jerk", 4: "snap", 5: "crackle"}
-AXES = "xyz"
 
 
 class ContinuityRule(StrEnum):

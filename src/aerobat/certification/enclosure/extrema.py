@@ -10,14 +10,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from aerobat.arrays import Array
+from aerobat.arrays import Array, Indices
 from aerobat.certification.enclosure import chebyshev
 from aerobat.trajectory.subintervals import Subintervals
 
 MAX_HALVINGS = 50
-Indices = NDArray[np.intp]
 
 
 @dataclass(frozen=True)

@@ -13,9 +13,9 @@ INTEGER = ir.IntType(64)
 
 LOG2_E = 1.4426950408889634
 LN2 = (6.93147180369123816490e-01, 1.90821492927058770002e-10)  # the first ends in zeros: k · LN2[0] is exact
-ROUNDING = 6755399441055744.0  # 1.5 · 2^52 leaves no room for a fraction beside it
-NORMAL = (-708.0, 709.0)  # where the exponential is a normal number
-SERIES = [1.0 / factorial(k) for k in range(14)]  # of the exponential: enough for |x| ≤ ln 2 / 2
+ROUND_TO_INTEGER = 6755399441055744.0  # 1.5 · 2^52 leaves no room for a fraction beside it
+EXP_RANGE = (-708.0, 709.0)  # where the exponential is a normal number
+EXP_COEFFICIENTS = [1.0 / factorial(k) for k in range(14)]  # of the exponential: enough for |x| ≤ ln 2 / 2
 BIAS, MANTISSA = 1023, 52  # of a float64's exponent; its bits below that
 
 
@@ -26,12 +26,12 @@ def exponential(builder: ir.IRBuilder, x: Any) -> Any:
     def c(value: float) -> Any:
         return filled(like, NUMBER(value))
 
-    low, high = b.fcmp_ordered("<", x, c(NORMAL[0])), b.fcmp_ordered(">", x, c(NORMAL[1]))
-    inside = b.select(low, c(NORMAL[0]), b.select(high, c(NORMAL[1]), x))
-    k = b.fsub(b.fadd(b.fmul(inside, c(LOG2_E)), c(ROUNDING)), c(ROUNDING))
+    low, high = b.fcmp_ordered("<", x, c(EXP_RANGE[0])), b.fcmp_ordered(">", x, c(EXP_RANGE[1]))
+    inside = b.select(low, c(EXP_RANGE[0]), b.select(high, c(EXP_RANGE[1]), x))
+    k = b.fsub(b.fadd(b.fmul(inside, c(LOG2_E)), c(ROUND_TO_INTEGER)), c(ROUND_TO_INTEGER))
     r = b.fsub(b.fsub(inside, b.fmul(k, c(LN2[0]))), b.fmul(k, c(LN2[1])))
-    series = c(SERIES[-1])
-    for coefficient in SERIES[-2::-1]:
+    series = c(EXP_COEFFICIENTS[-1])
+    for coefficient in EXP_COEFFICIENTS[-2::-1]:
         series = b.fadd(b.fmul(series, r), c(coefficient))
     integers = shaped(like, INTEGER)
     biased = b.add(b.fptosi(k, integers), filled(integers, INTEGER(BIAS)))

@@ -9,8 +9,8 @@ from math import inf
 
 import numpy as np
 
-from aerobat.arrays import Array
-from aerobat.optimization.assignment import AssignmentProgram, Indices, Mask
+from aerobat.arrays import Array, Indices, Mask
+from aerobat.optimization.assignment import AssignmentProgram
 from aerobat.optimization.branch_and_bound.null_space import NullSpace, ReducedBounds, in_units
 
 FEASIBILITY_TOLERANCE = 1e-9  # on rows of unit norm, in units of the solution's minimum norm

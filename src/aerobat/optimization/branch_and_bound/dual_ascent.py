@@ -7,8 +7,7 @@ from math import inf
 
 import numpy as np
 
-from aerobat.arrays import Array
-from aerobat.optimization.assignment import Indices, Mask
+from aerobat.arrays import Array, Indices, Mask
 
 MIN_DIVISOR = 1e-300  # in place of a divisor that may be zero where the dividend is then zero too
 _MAX_STEPS = 3  # more hardly raise the bounds

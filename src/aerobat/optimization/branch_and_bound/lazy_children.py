@@ -9,8 +9,7 @@ from math import inf
 
 import numpy as np
 
-from aerobat.arrays import Array
-from aerobat.optimization.assignment import Indices
+from aerobat.arrays import Array, Indices
 from aerobat.optimization.branch_and_bound.least_distance import QPSolution
 from aerobat.optimization.branch_and_bound.lower_bounds import DualBounds, LowerBounds
 

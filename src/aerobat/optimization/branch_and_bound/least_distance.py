@@ -9,8 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from aerobat.arrays import Array
-from aerobat.optimization.assignment import Indices
+from aerobat.arrays import Array, Indices
 from aerobat.optimization.branch_and_bound.null_space import UNBOUNDED
 
 # DAQP's marks on a row, and its exit flags

@@ -7,8 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from aerobat.arrays import Array
-from aerobat.optimization.assignment import Indices, Mask
+from aerobat.arrays import Array, Indices, Mask
 from aerobat.optimization.branch_and_bound.candidates import (
     FEASIBILITY_TOLERANCE,
     CandidateBounds,

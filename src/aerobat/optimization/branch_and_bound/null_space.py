@@ -13,8 +13,8 @@ from math import inf, sqrt
 
 import numpy as np
 
-from aerobat.arrays import Array
-from aerobat.optimization.assignment import AssignmentProgram, Indices, Mask, row_norms
+from aerobat.arrays import Array, Indices, Mask
+from aerobat.optimization.assignment import AssignmentProgram, row_norms
 
 UNBOUNDED = 1e30  # an infinite bound, as DAQP writes it
 _RANK_TOLERANCE = 1e-11  # singular values below this fraction of the largest are zero

@@ -16,8 +16,7 @@ from time import perf_counter
 
 import numpy as np
 
-from aerobat.arrays import Array
-from aerobat.optimization.assignment import Indices
+from aerobat.arrays import Array, Indices
 from aerobat.optimization.branch_and_bound.candidates import CandidateBounds, Candidates
 from aerobat.optimization.branch_and_bound.lazy_children import Branch, LazyChildren
 from aerobat.optimization.branch_and_bound.least_distance import LeastDistanceQP, NotConverged, QPSolution

@@ -10,8 +10,8 @@ from typing import ClassVar
 
 import numpy as np
 
-from aerobat.arrays import Array
-from aerobat.optimization.assignment import AssignmentProgram, Mask
+from aerobat.arrays import Array, Mask
+from aerobat.optimization.assignment import AssignmentProgram
 from aerobat.optimization.branch_and_bound.candidates import Candidates
 from aerobat.optimization.branch_and_bound.least_distance import LeastDistanceQP, NotConverged
 from aerobat.optimization.branch_and_bound.lower_bounds import DualBounds

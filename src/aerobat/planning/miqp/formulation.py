@@ -12,17 +12,15 @@ from functools import cached_property
 from math import inf
 
 import numpy as np
-from numpy.typing import NDArray
 
-from aerobat.arrays import Array, frozen
+from aerobat.arrays import Array, Indices, frozen
 from aerobat.errors import SpecError
 from aerobat.optimization import AssignmentProgram, SlottedStage
-from aerobat.planning.miqp.integrator import INPUTS, IntegratorChain
+from aerobat.planning.miqp.integrator import INPUT_NAMES, IntegratorChain
 from aerobat.problem.problem import DERIVATIVES, Limits, Problem
 from aerobat.problem.stage import Condition, Stage, StageSequence
 
-Indices = NDArray[np.intp]
-AXES = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+UNIT_AXES = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
 
 @dataclass(frozen=True)
@@ -61,7 +59,7 @@ class Formulation:
             if np.isfinite(self.problem.path_limits.of(derivative)[1]).any():
                 raise SpecError(
                     f"limits.{DERIVATIVES[derivative]} cannot be held when the input is "
-                    f"{INPUTS[self.chain.order]}; plan with --order {derivative} or drop it"
+                    f"{INPUT_NAMES[self.chain.order]}; plan with --order {derivative} or drop it"
                 )
 
     def program(self, dt: float, bounds: Limits | None = None) -> AssignmentProgram:
@@ -126,7 +124,7 @@ class Formulation:
     def _limit_rows(self, bounds: Limits) -> Iterable[tuple[Row, float, float]]:
         for derivative in range(self.chain.order + 1):
             intervals = self.chain.intervals if derivative == self.chain.order else self.chain.intervals - 1
-            for axis, low, high in zip(AXES, *bounds.of(derivative), strict=True):
+            for axis, low, high in zip(UNIT_AXES, *bounds.of(derivative), strict=True):
                 if low > -inf or high < inf:
                     for interval in range(intervals):
                         yield Row(interval, derivative, axis), float(low), float(high)

@@ -15,7 +15,7 @@ import numpy as np
 from aerobat.arrays import Array
 from aerobat.errors import SpecError
 
-INPUTS = {3: "jerk", 4: "snap", 5: "crackle"}
+INPUT_NAMES = {3: "jerk", 4: "snap", 5: "crackle"}
 
 
 @dataclass(frozen=True)
@@ -30,7 +30,7 @@ class IntegratorChain:
 
     def __post_init__(self) -> None:
         """Check."""
-        if self.order not in INPUTS:
+        if self.order not in INPUT_NAMES:
             raise SpecError(f"order must be 3 (jerk input), 4 (snap) or 5 (crackle), got {self.order}")
         if not 1 <= self.intervals <= 10_000:
             raise SpecError(f"intervals must be a whole number from 1 to 10000, got {self.intervals}")

@@ -26,7 +26,7 @@ from aerobat.vehicle import Vehicle
 # without a vehicle, stages that ask a fraction of its thrust assume what a hexarotor in the paper's class has
 ASSUMED_THRUST_TO_WEIGHT = 5.0
 ROUNDS = 4  # of solving at one dt, at most, with bounds tightened by what was exceeded between interval ends
-JERK = 3  # the order whose body rates jump between intervals
+JERK_ORDER = 3  # the order whose body rates jump between intervals
 
 
 @planner("miqp")
@@ -117,7 +117,7 @@ class _Planning:
     def attempt(self, dt: float) -> Judged[AssignmentResult] | None:
         """What one dt comes to; None where nothing is found that the rotors can follow within all limits."""
         program = _ProgramAtDt(self, dt)
-        jumps = self.config.order == JERK
+        jumps = self.config.order == JERK_ORDER
         judged = certified_solve(
             program, self.formulation.problem, self.vehicle, self.recorder, ROUNDS, jumps
         )

@@ -46,7 +46,7 @@ SHRINK = 4.0  # by how much the trust region is smaller then (Nocedal and Wright
 MENDABLE = 0.015  # of a limit's range: an excess that half as much backoff mends
 SOLVED = 1e-4  # the same at samples, where little is left to gain: more means that the region is too large
 FIRST_BACKOFF = 1e-4  # of every limit's range, kept at samples
-STAGE_TOLERANCE = 1e-5  # of a condition's size: by how much a stage may be missed through rounding
+RELATIVE_STAGE_TOLERANCE = 1e-5  # of a condition's size: by how much a stage may be missed through rounding
 SLOWER = 1.2  # times the duration, each time that a start is slowed
 SLOWED = 15  # times, at most
 
@@ -207,7 +207,7 @@ class _Descent:
             for condition in stage.conditions:
                 bound = Bound.of(condition, self.problem.environment.gravity)
                 excess = bound.excess_at(guess.trajectory, time)
-                if excess > STAGE_TOLERANCE * bound.scale:
+                if excess > RELATIVE_STAGE_TOLERANCE * bound.scale:
                     return f"the stage '{stage.name}' is missed by {excess:.2g} in SI units"
         return None
 

@@ -20,7 +20,12 @@ import numpy as np
 from aerobat.arrays import Array
 from aerobat.optimization.nonlinear import NonlinearProgram, NonlinearResult, import_casadi, solve_nonlinear
 from aerobat.planning.polynomial.knot_bounds import Bound
-from aerobat.planning.polynomial.knot_variables import DEGREE, GIVEN, Frame, KnotVariables
+from aerobat.planning.polynomial.knot_variables import (
+    END_ORDER,
+    POLYNOMIAL_DEGREE,
+    Frame,
+    KnotVariables,
+)
 from aerobat.planning.polynomial.rotor_constraints import RotorConstraints
 from aerobat.planning.warm_start import WarmStart
 from aerobat.problem.problem import Problem
@@ -97,7 +102,7 @@ class KnotProgram:
             self.vehicle, variables.frame.axes, self.problem.environment, self.problem.heading
         )
         moving = [
-            ca.vertcat(*((ca.DM(_powers(s, k)) @ variables.coefficients[i]).T for k in range(1, GIVEN)))
+            ca.vertcat(*((ca.DM(_powers(s, k)) @ variables.coefficients[i]).T for k in range(1, END_ORDER)))
             for i, s in enumerate(self.samples)
         ]
         durations = [ca.repmat(variables.duration(i), 1, len(s)) for i, s in enumerate(self.samples)]
@@ -126,7 +131,7 @@ class KnotProgram:
                 Bound.of(condition, self.problem.environment.gravity) for condition in stage.conditions
             ):
                 k = bound.derivative
-                at = ca.horzcat(*(perm(p, k) * s ** max(p - k, 0) for p in range(DEGREE + 1)))
+                at = ca.horzcat(*(perm(p, k) * s ** max(p - k, 0) for p in range(POLYNOMIAL_DEGREE + 1)))
                 yield from self._within(bound, variables.segments[j], at, 0.0)
 
     def _within(self, bound: Bound, segment: int, at: Any, reserve: float) -> Iterator[_Rows]:
@@ -152,5 +157,5 @@ class KnotProgram:
 
 def _powers(s: Array, derivative: int) -> Array:
     """The k-th derivatives of 1, s, ..., s⁹ at normalised times s (n,), (n, 10)."""
-    columns = [perm(p, derivative) * s ** max(p - derivative, 0) for p in range(DEGREE + 1)]
+    columns = [perm(p, derivative) * s ** max(p - derivative, 0) for p in range(POLYNOMIAL_DEGREE + 1)]
     return np.stack(columns, axis=-1)

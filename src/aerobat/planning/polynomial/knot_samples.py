@@ -10,7 +10,7 @@ from aerobat.arrays import Array
 from aerobat.environment import Environment
 from aerobat.flatness import reference
 from aerobat.planning.polynomial.knot_bounds import Bound
-from aerobat.planning.polynomial.knot_variables import GIVEN
+from aerobat.planning.polynomial.knot_variables import END_ORDER
 from aerobat.trajectory import Trajectory, polynomial
 from aerobat.vehicle import Vehicle
 
@@ -59,7 +59,7 @@ def refit(trajectory: Trajectory, segments: int) -> Trajectory:
 
     Its own knots are kept, and its longest segments cut; if it has more segments than that, all are equal.
     """
-    if trajectory.segments == segments and trajectory.degree == 2 * GIVEN - 1:
+    if trajectory.segments == segments and trajectory.degree == 2 * END_ORDER - 1:
         return trajectory
     durations = np.full(segments, trajectory.duration / segments)
     if trajectory.segments <= segments:
@@ -69,8 +69,8 @@ def refit(trajectory: Trajectory, segments: int) -> Trajectory:
         durations = np.repeat(trajectory.durations / parts, parts)
     knots = np.concatenate([[0.0], np.cumsum(durations)])
     inside = np.stack([knots[:-1], knots[1:] - JUST_INSIDE * durations])
-    ends = np.stack([trajectory.evaluate(inside, k) for k in range(GIVEN)], axis=2)
-    ends *= (durations[:, None] ** np.arange(GIVEN))[..., None]
+    ends = np.stack([trajectory.evaluate(inside, k) for k in range(END_ORDER)], axis=2)
+    ends *= (durations[:, None] ** np.arange(END_ORDER))[..., None]
     return Trajectory(durations, polynomial.hermite(ends[0], ends[1]), trajectory.heading)
 
 

@@ -15,16 +15,16 @@ from aerobat.flatness import end_thrust
 from aerobat.optimization.nonlinear import import_casadi
 from aerobat.planning.warm_start import WarmStart
 from aerobat.problem.problem import EndState, Problem
+from aerobat.so3 import UP
 from aerobat.trajectory import Trajectory, polynomial
 from aerobat.vehicle import Vehicle
 
-GIVEN = 5  # derivatives at either end of a segment that make its polynomial: position to snap
-SNAP = GIVEN - 1
+END_ORDER = 5  # derivatives at either end of a segment that make its polynomial: position to snap
+SNAP = END_ORDER - 1
 JERK = SNAP - 1  # the highest derivative that both neighbours of a knot share
-DEGREE = 2 * GIVEN - 1
+POLYNOMIAL_DEGREE = 2 * END_ORDER - 1
 SHORTEST = 0.3  # of the mean, the least duration of a segment: shorter ones spoil the numbers
-TO_COEFFICIENTS = polynomial.hermite(np.eye(2 * GIVEN)[:GIVEN], np.eye(2 * GIVEN)[GIVEN:])
-UP = np.array([0.0, 0.0, 1.0])
+TO_COEFFICIENTS = polynomial.hermite(np.eye(2 * END_ORDER)[:END_ORDER], np.eye(2 * END_ORDER)[END_ORDER:])
 
 
 @dataclass(frozen=True, eq=False)
@@ -113,9 +113,10 @@ class KnotVariables:
         ca, d = import_casadi(), self.frame.dimensions
         offsets = self.x[len(self._parts) + len(self._places) :]
         values = ca.DM(self._base.ravel()) + ca.sparsify(ca.DM(self._effect)) @ offsets
-        ends = ca.vertsplit(ca.reshape(values, d, len(self._base)).T, 2 * GIVEN)
+        ends = ca.vertsplit(ca.reshape(values, d, len(self._base)).T, 2 * END_ORDER)
         powers = [
-            ca.vertcat(*2 * [self.duration(i) ** k for k in range(GIVEN)]) for i in range(len(self._parts))
+            ca.vertcat(*2 * [self.duration(i) ** k for k in range(END_ORDER)])
+            for i in range(len(self._parts))
         ]
         return [
             ca.DM(TO_COEFFICIENTS) @ (ca.repmat(power, 1, d) * end)
@@ -127,8 +128,8 @@ class KnotVariables:
         parts, places, offsets = self._split(x)
         durations = self._mean * parts
         values = self._base.ravel() + self._effect @ offsets
-        powers = np.tile(durations[:, None] ** np.arange(GIVEN), 2)[..., None]
-        coefficients = TO_COEFFICIENTS @ (powers * values.reshape(len(parts), 2 * GIVEN, -1))
+        powers = np.tile(durations[:, None] ** np.arange(END_ORDER), 2)[..., None]
+        coefficients = TO_COEFFICIENTS @ (powers * values.reshape(len(parts), 2 * END_ORDER, -1))
         trajectory = Trajectory(durations, self.frame.outside(coefficients), self.problem.heading)
         segments = list(self.segments)
         times = trajectory.knots[segments] + durations[segments] * places
@@ -156,7 +157,7 @@ class KnotVariables:
     def _base(self) -> Array:
         """The guess's derivatives at both ends of all segments, in the frame, (segments · 10, d)."""
         trajectory, problem = self.guess.trajectory, self.problem
-        ends = np.stack([trajectory.on_segments([0.0, 1.0], k) for k in range(GIVEN)], axis=2)
+        ends = np.stack([trajectory.on_segments([0.0, 1.0], k) for k in range(END_ORDER)], axis=2)
         shared = (ends[1:, 0, :SNAP] + ends[:-1, 1, :SNAP]) / 2.0
         ends[1:, 0, :SNAP] = ends[:-1, 1, :SNAP] = shared
         for end, state in ((ends[0, 0], problem.start), (ends[-1, 1], problem.goal)):
@@ -168,8 +169,8 @@ class KnotVariables:
     @cached_property
     def _effect(self) -> Array:
         """What offsets add to those, row after row, (segments · 10 · d, offsets)."""
-        length = self.vehicle.max_specific_thrust * self._mean**2 / perm(DEGREE, 2)
-        sizes = np.array([length * perm(DEGREE, k) / self._mean**k for k in range(GIVEN)])
+        length = self.vehicle.max_specific_thrust * self._mean**2 / perm(POLYNOMIAL_DEGREE, 2)
+        sizes = np.array([length * perm(POLYNOMIAL_DEGREE, k) / self._mean**k for k in range(END_ORDER)])
         rows = self._rows()
         free = np.flatnonzero(rows.ravel() >= 0)
         selection = np.zeros((rows.size, int(rows.max()) + 1))
@@ -178,14 +179,16 @@ class KnotVariables:
         if self.still_ends:
             return effect
         jerks = np.zeros((rows.size, self.frame.dimensions, 2))
-        for column, (row, end) in enumerate(((JERK, self.problem.start), (JERK - GIVEN, self.problem.goal))):
+        for column, (row, end) in enumerate(
+            ((JERK, self.problem.start), (JERK - END_ORDER, self.problem.goal))
+        ):
             jerks[row, :, column] = sizes[JERK] * self._thrust_direction(end) @ self.frame.axes
         return np.hstack([effect, jerks.reshape(len(effect), 2)])
 
     def _rows(self) -> NDArray[np.intp]:
         """The number of the offset of each derivative at each end of each segment; -1: fixed, (S, 2, 5)."""
         count = self.guess.trajectory.segments
-        rows = np.full((count, 2, GIVEN), -1)
+        rows = np.full((count, 2, END_ORDER), -1)
         knots = np.arange(SNAP * (count - 1)).reshape(count - 1, SNAP)
         rows[1:, 0, :SNAP] = rows[:-1, 1, :SNAP] = knots
         rows[:, :, SNAP] = knots.size + np.arange(2 * count).reshape(count, 2)

@@ -13,7 +13,7 @@ from aerobat.problem.problem import Problem
 from aerobat.problem.stage import Stage, StageSequence
 from aerobat.trajectory import Trajectory
 
-THRUST_FRACTION = 0.3  # of the specific thrust, that accelerates along a leg when times are guessed
+LEG_THRUST_FRACTION = 0.3  # of the specific thrust, that accelerates along a leg when times are guessed
 SHORTEST_LEG = 0.2  # [s] that a leg is given at first
 STAGE_TOLERANCE = 1e-6  # in SI units: by how much a condition may be missed through rounding
 
@@ -41,7 +41,7 @@ def first_times(problem: Problem, fixed: Array, max_specific_thrust: float) -> A
     durations = np.empty(len(fixed) - 1)
     for a, b in pairwise(placed.tolist()):
         length = float(np.linalg.norm(fixed[b, 0] - fixed[a, 0]))
-        leg = max(2.0 * sqrt(length / (THRUST_FRACTION * max_specific_thrust)), SHORTEST_LEG)
+        leg = max(2.0 * sqrt(length / (LEG_THRUST_FRACTION * max_specific_thrust)), SHORTEST_LEG)
         durations[a:b] = leg / (b - a)
     return durations
 

@@ -22,9 +22,9 @@ from aerobat.problem.stage import StageSequence
 from aerobat.trajectory.minimum_effort import ContinuityRule, minimum_effort
 from aerobat.vehicle import Vehicle
 
-ASSUMED_THRUST_TO_WEIGHT = 2.0  # for first times without a vehicle
+FIRST_GUESS_THRUST_TO_WEIGHT = 2.0  # for first times without a vehicle
 STEP = 0.1  # [s] of the paper's line search (Section V-D: 12 iterations from 0.5 and 2.0 to 1.6 and 3.1 s)
-STEPS = 100
+SEARCH_STEPS = 100
 SLOWEST = 30.0  # times the first duration, where scaling all segments gives up
 FASTEST = 0.3  # times the first duration, where it begins
 
@@ -85,7 +85,7 @@ class MinSnap:
         if self.search is not None:
             return self.search
         if scaling is TimeScaling.FIRST or self.stop_after is not None:
-            return GridSearch(first, first + STEP * (STEPS - 1), STEPS)
+            return GridSearch(first, first + STEP * (SEARCH_STEPS - 1), SEARCH_STEPS)
         return BisectionSearch(FASTEST * first, SLOWEST * first)
 
 
@@ -96,7 +96,7 @@ class _Planning:
         self, config: MinSnap, problem: Problem, vehicle: Vehicle | None, recorder: Recorder
     ) -> None:
         gravity = problem.environment.gravity
-        thrust = ASSUMED_THRUST_TO_WEIGHT * gravity if vehicle is None else vehicle.max_specific_thrust
+        thrust = FIRST_GUESS_THRUST_TO_WEIGHT * gravity if vehicle is None else vehicle.max_specific_thrust
         self.config, self.problem, self.vehicle, self.recorder = config, problem, vehicle, recorder
         self.sequence: StageSequence = problem.stages(thrust)
         self.fixed = fixed_at_knots(problem, self.sequence, config.order, gravity)

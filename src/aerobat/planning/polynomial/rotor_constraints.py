@@ -21,12 +21,12 @@ from aerobat.kernels.ops import Vector
 from aerobat.kernels.quaternions import to_body
 from aerobat.kernels.vectors import dot, scale
 from aerobat.optimization.nonlinear import import_casadi
+from aerobat.so3 import UP
 from aerobat.trajectory import Trajectory
 from aerobat.vehicle import Vehicle
 from aerobat.vehicle.allocation import mixer
 
-ROUNDING = 1e-9  # relative differences between rotors that mean nothing
-UP = np.array([0.0, 0.0, 1.0])
+ROTOR_DIFFERENCE = 1e-9  # relative differences between rotors that mean nothing
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,7 +101,7 @@ class RotorConstraints:
         axis = self._turning_axis
         moments = np.stack([vehicle.inertia @ axis, np.cross(axis, vehicle.inertia @ axis)], axis=1)
         rows = np.hstack([mix[:, :1], mix[:, 1:] @ moments, *limits])
-        scaled = np.round(rows / np.maximum(np.abs(rows).max(axis=0), ROUNDING) / ROUNDING)
+        scaled = np.round(rows / np.maximum(np.abs(rows).max(axis=0), ROTOR_DIFFERENCE) / ROTOR_DIFFERENCE)
         return np.asarray(rows[np.sort(np.unique(scaled, axis=0, return_index=True)[1])])
 
     def _local(self, vector: Any, frame: Any) -> Vector:

@@ -32,7 +32,7 @@ SHORTEST_PHASE = 1e-3  # [s]
 # [s] for one change of an input by half its range in each interval: far below what is reported, it settles
 # what the duration leaves open
 CHANGE_COST = 1e-4
-DERIVATIVES = 5  # position to snap, that limits can bound
+BOUNDED_DERIVATIVES = 5  # position to snap, that limits can bound
 KINEMATIC = (POSITION, VELOCITY)
 ALONG_Z = np.zeros(3), np.array([0.0, 0.0, inf])  # bounds on a thrust direction in body axes
 
@@ -116,7 +116,7 @@ class OptimalControl:
                     self._hold(rows, condition, values)
 
     def _hold_limits(self, rows: _Rows, collocation: Collocation, limits: Limits) -> None:
-        for derivative in range(DERIVATIVES):
+        for derivative in range(BOUNDED_DERIVATIVES):
             lower, upper = limits.of(derivative)
             for axis in np.flatnonzero(np.isfinite(lower) | np.isfinite(upper)).tolist():
                 for values in self._everywhere(collocation, derivative):

@@ -26,10 +26,11 @@ from aerobat.planning.recorder import Progress, Recorder
 from aerobat.planning.result import PlacedStage, Plan
 from aerobat.planning.rotor_margin import rotor_findings
 from aerobat.planning.time_optimal.collocation import CollocatedMotion, Mesh
-from aerobat.planning.time_optimal.program import DERIVATIVES, End, NodeBounds, OptimalControl
+from aerobat.planning.time_optimal.program import BOUNDED_DERIVATIVES, End, NodeBounds, OptimalControl
 from aerobat.planning.warm_start import WarmStart, plans_to_begin_from, require_attitudes
 from aerobat.problem.problem import EndState, Limits, Problem
 from aerobat.problem.stage import Condition, Quantity
+from aerobat.so3 import UP
 from aerobat.vehicle import Vehicle
 
 THRUST_FLOOR = 0.02  # of the largest collective thrust: more, and the attitude stays determined
@@ -40,7 +41,6 @@ PLANE_TOLERANCE = 1e-6  # [m] to either side of it: equalities would repeat thos
 WARM_BARRIER = 1e-6  # the first barrier parameter of a solve that starts from a solution
 SMOOTHING_LAG = 0.005  # [s] that rotors without lag are given, where thrusts that jump lead nowhere
 GUESS_SCALE = 1.5  # how much longer a guess that knows no rotors takes
-UP = np.array([0.0, 0.0, 1.0])
 
 
 @planner("time-optimal")
@@ -84,7 +84,7 @@ class TimeOptimal:
         found that can be certified, BackendMissing without CasADi.
         """
         vehicle = require_attitudes("time-optimal", problem, vehicle)
-        if np.isfinite(problem.path_limits.of(DERIVATIVES)[1]).any():
+        if np.isfinite(problem.path_limits.of(BOUNDED_DERIVATIVES)[1]).any():
             raise SpecError(
                 "limits.crackle cannot be held by the time-optimal planner, whose moments jump; drop it"
             )
@@ -177,7 +177,7 @@ class _CollocatedProgram:
         if solution.trajectory is None or certificate is None:
             return False
         limits = self._problem.path_limits
-        limits_at_nodes = tightened(self._bounds.limits, limits, solution.trajectory, DERIVATIVES)
+        limits_at_nodes = tightened(self._bounds.limits, limits, solution.trajectory, BOUNDED_DERIVATIVES)
         if limits_at_nodes is None:
             return False
         more = ROTOR_BACKOFF * float(np.max(self._vehicle.max_thrusts - self._vehicle.min_thrusts))

@@ -20,8 +20,7 @@ from aerobat.problem.maneuvers.gate_passage import (
 )
 from aerobat.problem.maneuvers.maneuver import Maneuver, maneuver
 from aerobat.problem.stage import Stage, StageSequence, thrust_along
-
-UP = np.array([0.0, 0.0, 1.0])
+from aerobat.so3 import UP
 
 
 @maneuver("flip")

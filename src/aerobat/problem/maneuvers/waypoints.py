@@ -18,7 +18,7 @@ from aerobat.problem.maneuvers.maneuver import Maneuver, maneuver
 from aerobat.problem.stage import Condition, Quantity, Stage, StageSequence
 
 THRUST_FRACTION = 0.2  # of the greatest specific thrust: the least along an attitude that names no thrust
-GIVEN = (Quantity.POSITION, Quantity.VELOCITY, Quantity.ACCELERATION)
+FIXABLE = (Quantity.POSITION, Quantity.VELOCITY, Quantity.ACCELERATION)
 
 
 def _free() -> Array:
@@ -49,13 +49,13 @@ class Waypoint:
             raise FieldError("thrust", "needs up, its direction; add it")
         if self.up is not None and not np.isnan(self.acceleration).all():
             raise SpecError("acceleration and up both fix the attitude; give one of them")
-        free = all(np.isnan(getattr(self, q.value)).all() for q in GIVEN)
+        free = all(np.isnan(getattr(self, q.value)).all() for q in FIXABLE)
         if free and self.up is None and self.gate is None:
             raise SpecError("nothing is given; give at least one component of the position")
 
     def conditions(self, max_specific_thrust: float) -> Iterable[Condition]:
         """What is given, as conditions of a stage."""
-        for quantity in GIVEN:
+        for quantity in FIXABLE:
             for direction, value in zip(np.eye(3), getattr(self, quantity.value).tolist(), strict=True):
                 if not np.isnan(value):
                     yield Condition(quantity, direction, value, value)

@@ -14,10 +14,10 @@ from aerobat.problem.gate import Gate
 from aerobat.simulation import Flight
 from aerobat.vehicle import Vehicle
 
-RATE = 250.0  # [1/s] at which a plan is shown
+POSE_RATE = 250.0  # [1/s] at which a plan is shown
 VERTICES = 240  # of a drawn path
 FAR = 0.5  # of the reference path's extent: where a flight strays further, it is drawn no more
-FLAT = 0.3  # a path whose height is less than this fraction of its length is drawn across the whole page
+FLATNESS_RATIO = 0.3  # height over length, below which a path is drawn across the page
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,12 +64,12 @@ class PoseHistory:
 def is_flat(positions: Array) -> bool:
     """Whether a path (T, 3) is much longer than high."""
     extents = np.ptp(positions, axis=0)
-    return bool(extents[2] < FLAT * extents.max())
+    return bool(extents[2] < FLATNESS_RATIO * extents.max())
 
 
 def plan_reference(plan: Plan, vehicle: Vehicle) -> Reference:
     """What a plan asks of a vehicle from start to goal, sampled for drawing."""
-    return reference(plan.trajectory, vehicle, rate=RATE, environment=plan.problem.environment)
+    return reference(plan.trajectory, vehicle, rate=POSE_RATE, environment=plan.problem.environment)
 
 
 def reference_poses(reference: Reference | Flight) -> PoseHistory:

@@ -7,9 +7,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from aerobat.arrays import Array
+from aerobat.arrays import Array, Mask
 from aerobat.flatness import Reference
 from aerobat.reporting.page import size_of
 from aerobat.reporting.style import BAND, INK, MUTED, RED, SMALL
@@ -19,13 +18,12 @@ from aerobat.vehicle import Vehicle, wrench
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-Mask = NDArray[np.bool_]
-Limits = tuple[float, float]
+LimitPair = tuple[float, float]
 
 STILL = 0.01  # what changes by less than this fraction of its scale stands still
 REACH = 1.0  # by how many times the limits' distance an axis extends beyond them, at most
 REFERENCE_WIDTH, ACTUAL_WIDTH = 4.0, 1.2  # [pt]
-NAMES = ("reference", "actual", "limits", "saturated")
+LEGEND = ("reference", "actual", "limits", "saturated")
 SATURATED = (RED, 0.13)
 LIMIT: dict[str, Any] = {"color": INK, "linewidth": 0.9, "linestyle": (0, (4, 2))}
 NEAR = 0.01  # of a rotor's range: a saturated command this near to a limit is at it, or soon will be
@@ -38,7 +36,7 @@ class Signal:
     label: str  # quantity and unit
     reference: Array
     actual: Array
-    limits: Limits | None = None
+    limits: LimitPair | None = None
     saturated: Mask | None = None  # where rotors could give no more, (T',)
 
     @property
@@ -115,7 +113,7 @@ def draw_signal(axes: Axes, signal: Signal, reference_times: Array, actual_times
         actual_times: Of the flight's [s], (T',).
         named: Whether to name, for a legend, all that a page of signals shows.
     """
-    reference, actual, limits, saturated = NAMES if named else ("",) * len(NAMES)
+    reference, actual, limits, saturated = LEGEND if named else ("",) * len(LEGEND)
     axes.plot(reference_times, signal.reference, color=BAND, linewidth=REFERENCE_WIDTH, label=reference)
     axes.plot(actual_times, signal.actual, color=INK, linewidth=ACTUAL_WIDTH, label=actual)
     axes.set_ylabel(signal.label)

@@ -36,7 +36,7 @@ KEY_HEIGHT = 0.38  # [in] of the keys above the axes
 VEHICLE = 0.6  # [in] a vehicle, about
 COLUMN = 0.62  # [in] kept free for names on either side of a tall panel, at least
 LETTER = 0.082  # [in] the width of a name's letter
-ROW = 0.5  # [in] kept free for names at the foot of a wide panel
+STAGE_ROW = 0.5  # [in] kept free for names at the foot of a wide panel
 # [in] from a hair line's end to the text, for each alignment of it
 GAPS = {"right": np.array([-0.04, 0.0]), "left": np.array([0.04, 0.0]), "center": np.array([0.0, -0.04])}
 COMPONENTS = np.eye(2)  # lateral, vertical
@@ -97,7 +97,7 @@ def _unfold(
     width, height = size_of(axes)
     downward = height >= width
     across = float(np.ptp(camera.project(shots.position)[:, 0 if downward else 1])) + reach
-    aspect = height / (width - 2 * column) if downward else width / (height - ROW)
+    aspect = height / (width - 2 * column) if downward else width / (height - STAGE_ROW)
     pitch = across * aspect / (len(shots.instants) + 1)
     unfolded = shots.unfolded(camera, downward, pitch)
     moved = []
@@ -152,7 +152,7 @@ def _fit(axes: Axes, points: Array, pad: float, min_side: float, column: float) 
     shown that long.
     """
     size = size_of(axes)
-    left, foot = (column, 0.0) if size[1] >= size[0] else (0.0, ROW)
+    left, foot = (column, 0.0) if size[1] >= size[0] else (0.0, STAGE_ROW)
     free = size - (2 * left, foot)
     low, high = points.min(axis=0), points.max(axis=0)
     inches = float(((free - np.minimum(2 * pad, 0.5 * free)) / np.maximum(high - low, min_side)).min())
@@ -243,4 +243,4 @@ def names_beside(places: Array, thrust: Array, size: Array, column: float) -> Ar
 def names_below(places: Array, thrust: Array, size: Array, column: float) -> Array:
     """Where names go in a row at the foot of a picture, in inches, as in `names_beside`."""
     across = spread_out(places[:, 0], column, 0.3, size[0] - 0.3)
-    return np.stack([across, np.full_like(across, ROW)], axis=1)
+    return np.stack([across, np.full_like(across, STAGE_ROW)], axis=1)

@@ -18,9 +18,9 @@ if TYPE_CHECKING:
 
 MIN_SIDE = np.array([0.35, 0.35, 0.12])  # of a box, relative to its longest
 ROUND = np.array([1.0, 2.0, 5.0])
-MARGIN = 0.5  # [in] for the scales around a box
+BOX_MARGIN = 0.5  # [in] for the scales around a box
 NUMBERS = 0.15  # [in] from an edge to the numbers along it
-NAMES = np.array([0.3, 0.2])  # [in] from the numbers to the axis' name, to the side and up or down
+NAME_OFFSETS = np.array([0.3, 0.2])  # [in] from the numbers to the axis' name, to the side and up or down
 MIN_PITCH = 0.26  # [in] between the numbers of a scale
 
 
@@ -81,7 +81,7 @@ def _fit(axes: Axes, box: AxesBox, camera: Camera) -> float:
     picture = camera.project(box.corners)
     low, high = picture.min(axis=0), picture.max(axis=0)
     size = size_of(axes)
-    per_metre = float(((size - 2 * MARGIN) / (high - low)).min())
+    per_metre = float(((size - 2 * BOX_MARGIN) / (high - low)).min())
     centre, half = (low + high) / 2, size / per_metre / 2
     axes.set(xlim=(centre[0] - half[0], centre[0] + half[0]), ylim=(centre[1] - half[1], centre[1] + half[1]))
     axes.set_axis_off()
@@ -131,7 +131,7 @@ def _scale(axes: Axes, box: AxesBox, camera: Camera, axis: int, per_metre: float
         place = camera.project(edge) + np.array([-NUMBERS, NUMBERS]) / per_metre
     else:
         edge[axis] = (box.lower[axis] + box.upper[axis]) / 2
-        place = camera.project(edge) + (NUMBERS + NAMES) * outward / per_metre
+        place = camera.project(edge) + (NUMBERS + NAME_OFFSETS) * outward / per_metre
     axes.text(place[0], place[1], f"{'xyz'[axis]} [m]", size=NORMAL, ha="center", va="center")
 
 

@@ -16,13 +16,13 @@ from aerobat.vehicle import Vehicle
 
 TURN = np.linspace(0.0, 2.0 * np.pi, 19)
 CIRCLE = np.stack([np.cos(TURN), np.sin(TURN), np.zeros_like(TURN)], axis=-1)
-AXIS = 0.45  # the length of a drawn thrust axis, as a fraction of the vehicle's span
+AXIS_LENGTH = 0.45  # the length of a drawn thrust axis, as a fraction of the vehicle's span
 FRAME = 0.12  # the thickness of a gate's bars, as a fraction of the opening's shorter side
 EDGE_ON = 0.2  # a gate whose normal is this square to the view is seen edge-on
 MAST = 0.35  # the height of a rotor above its arm, as a fraction of the rotor's radius
 LIGHT = np.array([0.3, -0.5, 0.81])  # where light comes from in shaded pictures
 SHADES = {YELLOW: ("#8f6a12", "#f0c964")}  # darkest and lightest side of a bar
-STEPS = (1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0, 15.0, 20.0, 30.0, 50.0, 100.0)
+ENLARGEMENTS = (1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0, 15.0, 20.0, 30.0, 50.0, 100.0)
 
 
 def span(vehicle: Vehicle) -> float:
@@ -32,7 +32,9 @@ def span(vehicle: Vehicle) -> float:
 
 def enlargement(vehicle: Vehicle, size: float) -> float:
     """The round factor by which a vehicle is drawn larger than it is, to span about `size` [m]."""
-    return min((step for step in STEPS if step * span(vehicle) >= 0.85 * size), default=STEPS[-1])
+    return min(
+        (step for step in ENLARGEMENTS if step * span(vehicle) >= 0.85 * size), default=ENLARGEMENTS[-1]
+    )
 
 
 def vehicle_shapes(
@@ -52,7 +54,7 @@ def vehicle_shapes(
 
 def thrust_axis_shape(vehicle: Vehicle, position: Array, q_world_body: Array, scale: float) -> Shape:
     """A line from a vehicle along its thrust axis."""
-    tip = position + AXIS * scale * span(vehicle) * so3.thrust_axis(q_world_body)
+    tip = position + AXIS_LENGTH * scale * span(vehicle) * so3.thrust_axis(q_world_body)
     return Shape(np.array([position, tip]), edge=INK, width=0.9)
 
 
