@@ -45,7 +45,7 @@ def test_fly_writes_the_plan_the_flight_the_picture_and_the_report(capsys) -> No
     code, out, err = run(capsys, "fly", "flip-roll")
     assert (code, err) == (0, "")
     folder = Path("out/flip-roll")
-    written = ["flight.npz", "plan.csv", "plan.npz", "report.json", "report.png"]
+    written = ["flight.npz", "flip-roll.plan", "plan.csv", "report.json", "report.png"]
     assert sorted(p.name for p in folder.iterdir()) == written
     report = json.loads((folder / "report.json").read_text())
     assert report["plan"].keys() >= PLAN_KEYS
@@ -73,7 +73,7 @@ def test_plan_stops_after_planning(capsys) -> None:
     assert code == 0
     assert "flight" not in json.loads(out)
     written = sorted(p.name for p in Path("out/half-flip").iterdir())
-    assert written == ["plan.csv", "plan.npz", "report.json", "report.png"]
+    assert written == ["half-flip.plan", "plan.csv", "report.json", "report.png"]
 
 
 def test_paper_mode_prints_the_known_optimum(capsys) -> None:
@@ -139,3 +139,62 @@ def test_the_main_job_needs_neither_pyplot_nor_scipy() -> None:
     )
     done = subprocess.run([sys.executable, "-c", probe], capture_output=True, text=True, check=True)
     assert done.stderr.strip() == "[]"
+
+
+MARS = """
+name = "mars"
+heading_deg = 90.0
+start = { position = [0.0, 0.0, 0.0] }
+goal = { position = [3.0, 0.0, 0.0] }
+environment = { gravity = 3.7, wind = [0.0, 1.0, 0.0] }
+maneuver = { kind = "line" }
+limits = { velocity = 2.5 }
+"""
+
+
+def test_check_judges_what_was_planned_not_what_it_would_assume(capsys) -> None:
+    """The plan's own vehicle, heading, gravity, wind and limits: the certificate is the plan's."""
+    Path("mars.toml").write_text(MARS)
+    run(capsys, "plan", "mars.toml", "--vehicle", "crazyflie")
+    planned = json.loads(Path("out/mars/report.json").read_text())["plan"]["certificate"]
+    code, out, err = run(capsys, "check", "out/mars", "--json")
+    assert (code, err) == (0, "")
+    assert json.loads(out) == planned
+    code, out, _ = run(capsys, "check", "out/mars/mars.plan", "--vehicle", "hexarotor", "--json")
+    assert json.loads(out) != planned
+
+
+def test_check_says_what_it_assumes_of_a_file_that_holds_no_more_than_a_path(capsys) -> None:
+    Path("mars.toml").write_text(MARS)
+    run(capsys, "plan", "mars.toml")
+    _, out, _ = run(capsys, "check", "out/mars/plan.csv")
+    assert "assumed" in out
+    assert "gravity 9.81 m/s²" in out
+    assert "assumed" not in run(capsys, "check", "out/mars")[1]
+
+
+def test_a_saved_plan_is_flown_as_it_is(capsys) -> None:
+    Path("mars.toml").write_text(MARS)
+    run(capsys, "fly", "mars.toml")
+    code, _, err = run(capsys, "fly", "out/mars/mars.plan", "--out", "again")
+    assert (code, err) == (0, "")
+    first, again = (load_flight(Path(folder) / "flight.npz") for folder in ("out/mars", "again"))
+    np.testing.assert_array_equal(first.states.q_world_body, again.states.q_world_body)
+    code, _, err = run(capsys, "fly", "out/mars/mars.plan", "--order", "5")
+    assert code == 2
+    assert "--order plans anew" in err
+
+
+def test_a_picture_that_cannot_be_drawn_leaves_the_earlier_run_whole(capsys, monkeypatch) -> None:
+    run(capsys, "fly", "line")
+    before = {path.name: path.read_bytes() for path in Path("out/line").iterdir()}
+
+    def fail(*_: object) -> bytes:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr("aerobat.cli.run_folder.png", fail)
+    code, _, err = run(capsys, "fly", "line", "--order", "5")
+    assert code == 2
+    assert err == "aerobat: cannot write out/line: No space left on device\n"
+    assert {path.name: path.read_bytes() for path in Path("out/line").iterdir()} == before
+    assert [path.name for path in Path("out").iterdir()] == ["line"]

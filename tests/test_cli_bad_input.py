@@ -170,7 +170,7 @@ ARGUMENT_FAULTS = {
     ),
     "no plan to check": (["check", "nowhere.npz"], "nowhere.npz"),
     "a file that holds no plan": (["check", "taken"], "taken"),
-    "a folder without a plan": (["check", "folder.toml"], "plan.npz"),
+    "a folder without a plan": (["check", "folder.toml"], ".plan file"),
     "a vehicle to check with that is none": (["check", "taken", "--vehicle", "agile-qad"], "agile-quad"),
     "a limit below zero": (["check", "taken", "--max-speed", "-1"], "max-speed"),
     "rows at no rate": (["check", "taken", "--rate", "0"], "rate"),

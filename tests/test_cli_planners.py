@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from aerobat import cli
+from aerobat.interchange import read_trajectory
 from aerobat.interchange.csv import write_csv
-from aerobat.trajectory import load_trajectory
 
 ROW_KEYS = {
     "planner", "segments", "duration_s", "ratio", "certified", "min_margin_n", "planning_s",
@@ -42,7 +42,9 @@ def test_each_planner_flies_the_papers_second_example(planner: str, capsys) -> N
     assert report["plan"]["planner"] == planner
     assert report["flight"]["max_position_error_m"] < 0.02
     assert report["plan"]["certificate"]["certified"] is True
-    assert load_trajectory("out/section-v/plan.npz").duration == pytest.approx(report["plan"]["duration_s"])
+    assert read_trajectory("out/section-v/section-v.plan").duration == pytest.approx(
+        report["plan"]["duration_s"]
+    )
 
 
 def test_stopped_early_the_rotors_saturate_and_the_report_says_so(capsys) -> None:
@@ -60,11 +62,11 @@ def test_stopped_early_the_rotors_saturate_and_the_report_says_so(capsys) -> Non
 
 def test_check_proves_a_plan_from_its_file_its_folder_and_its_csv(capsys) -> None:
     run(capsys, "plan", "flip-roll", "--json")
-    for plan in ("out/flip-roll", "out/flip-roll/plan.npz"):
+    for plan in ("out/flip-roll", "out/flip-roll/flip-roll.plan"):
         code, out, err = run(capsys, "check", plan, "--json")
         assert (code, err) == (0, "")
         assert json.loads(out)["certified"] is True
-    trajectory = load_trajectory("out/flip-roll/plan.npz")
+    trajectory = read_trajectory("out/flip-roll/flip-roll.plan")
     write_csv(trajectory, "fine.csv", rate=1 / trajectory.durations[0])  # a row a knot: nothing is lost
     code, out, _ = run(capsys, "check", "fine.csv", "--rate", str(1 / trajectory.durations[0]))
     assert code == 0
