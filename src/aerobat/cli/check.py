@@ -38,15 +38,13 @@ def check(plan: Path, options: Annotated[CheckOptions, Parameter(name="*")] = Ch
         A .plan file, a CSV file (rows of position, velocity, acceleration, jerk), or a folder that
         `aerobat plan` or `aerobat fly` wrote.
     """
+    named_vehicle = None if options.vehicle is None else load_vehicle(options.vehicle)
     found = read_plan(plan, options.rate)
     trajectory = found.trajectory if isinstance(found, Plan) else found
     if options.heading is not None:
         trajectory = replace(trajectory, heading=radians(options.heading))
     own_vehicle = found.vehicle if isinstance(found, Plan) else None
-    if options.vehicle is not None or own_vehicle is None:
-        vehicle = load_vehicle(options.vehicle or ASSUMED_VEHICLE)
-    else:
-        vehicle = own_vehicle
+    vehicle = named_vehicle or own_vehicle or load_vehicle(ASSUMED_VEHICLE)
     environment = found.problem.environment if isinstance(found, Plan) else Environment()
     envelope = Envelope(
         speed=options.max_speed or inf,
