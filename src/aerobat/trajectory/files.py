@@ -34,9 +34,7 @@ def load_trajectory(path: str | Path) -> Trajectory:
     content = read_arrays(path, "trajectory")
     found = str(content.get("format", "something else"))
     if found not in (_FORMAT, _WITHOUT_HEADING):
-        raise SpecError(
-            f"trajectory file {path}: it holds {found}, not {_FORMAT}; give a trajectory's .npz, a .plan or a CSV file"
-        )
+        raise SpecError(f"trajectory file {path}: it holds {found}, not {_FORMAT}; give a trajectory's file")
     try:
         heading = float(content["heading"]) if found == _FORMAT else 0.0
         return Trajectory(content["durations"], content["coefficients"], heading)
