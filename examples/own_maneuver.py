@@ -1,9 +1,7 @@
-"""A maneuver of one's own: a list of stages, each a set of linear conditions, some where the solver likes.
+"""A maneuver of one's own as data: a list of stages, some at a given time, some where the solver likes.
 
 A dive: fall with the thrust horizontal somewhere on the way, then pull out through a gate at speed.
 """
-
-import numpy as np
 
 import aerobat as ab
 
@@ -15,16 +13,16 @@ knife_edge = ab.Stage(
         ab.Condition("specific_thrust", (1, 0, 0), lower=0.3 * vehicle.max_specific_thrust),
     ),
 )
-gate = ab.Stage("gate", (ab.Condition("velocity", (1, 0, 0), lower=6.0),), at=0.6)
+pull_out = ab.Stage("pull out", (ab.Condition("velocity", (1, 0, 0), lower=6.0),), at=0.6, gate="exit")
 dive = ab.Problem(
     name="dive",
     start=ab.at_rest((0, 0, 8)),
     goal=ab.at_rest((12, 0, 3)),
-    maneuver=ab.CustomManeuver((knife_edge, gate)),
-    gates=(ab.tilted_gate(np.array([7.0, 0.0, 3.0])),),
+    maneuver=ab.CustomManeuver((knife_edge, pull_out)),
+    gates=(ab.tilted_gate((7.0, 0.0, 3.0), name="exit"),),
     limits=ab.Limits(lower=(-5, -1, 0.5), upper=(20, 1, 10), velocity=12.0),
 )
 
 plan = ab.plan(dive, vehicle=vehicle)
 print(plan)
-print(ab.score(ab.fly(plan.trajectory, vehicle), dive, vehicle))
+print(ab.score(ab.fly(plan), plan, vehicle))

@@ -6,15 +6,16 @@ from pathlib import Path
 import aerobat as ab
 
 out = Path(sys.argv[1] if len(sys.argv) > 1 else "out")
+out.mkdir(parents=True, exist_ok=True)
 
 vehicle = ab.load_vehicle("agile-quad")  # a preset's name, or a TOML file
 problem = ab.load_problem("flip-roll")  # the paper's maneuver, or a TOML file
-plan = ab.plan(problem, ab.Miqp(order=4), vehicle=vehicle)  # rotor-feasible
+plan = ab.plan(problem, ab.Miqp(order=4), vehicle)  # within its rotors' limits, proven
 print(plan)
+plan.save(out / "flip.plan")  # everything; ab.load_plan and `aerobat fly flip.plan` read it back
 
-flight = ab.fly(plan.trajectory, vehicle, seed=0)
-print(ab.score(flight, problem, vehicle))
+flight = ab.fly(plan, seed=0)  # its vehicle, its environment, its heading
+print(ab.score(flight, plan, vehicle))  # with the vehicle, its clearance in the gate too
 
-out.mkdir(parents=True, exist_ok=True)
-ab.draw(flight).savefig(out / "flip.pdf")
+ab.draw(flight, plan).savefig(out / "flip.pdf")
 ab.write_csv(plan.trajectory, out / "flip.csv", rate=100)

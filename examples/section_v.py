@@ -22,8 +22,8 @@ def tracked(planner: ab.MinSnap, picture: str) -> tuple[ab.Plan, ab.Flight]:
     plan = ab.plan(problem, planner, vehicle)
     for k, attempt in enumerate(plan.attempts, start=1):
         print(f"{k:4d}  {attempt.duration:.1f} s  {attempt.outcome}")
-    flight = ab.fly(plan.trajectory, vehicle)
-    print(f"{plan.status}; {ab.score(flight, problem, vehicle)}\n")
+    flight = ab.fly(plan)
+    print(f"{plan.status}; {ab.score(flight, plan, vehicle)}\n")
     ab.tracking_figure(plan, vehicle, flight).savefig(out / picture)
     return plan, flight
 

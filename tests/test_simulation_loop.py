@@ -26,7 +26,7 @@ from test_flying_batches import HEXA, QUAD, assert_same, loops, near
 
 def flight_of(engine: str, vehicles: Any = QUAD, duration: float = 1.0) -> FlightSetup:
     config = FlightConfig(engine=engine, noise=StateNoise.fused(), seed=5)
-    return prepare(loops(duration), vehicles, None, config)
+    return prepare(loops(duration), vehicles, config=config)
 
 
 def assert_equal(a: Any, b: Any) -> None:

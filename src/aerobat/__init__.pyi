@@ -49,7 +49,7 @@ from .problem import (
 from .reporting.comparison import comparison_figure
 from .reporting.figures import draw
 from .reporting.tracking import tracking_figure
-from .simulation import Flight, FlightConfig, Outcome, StateNoise, fly, load_flight
+from .simulation import Flight, FlightConfig, Outcome, StateNoise, fly, load_flight, prepare
 from .states import BodyState, FlatState, Setpoint, Wrench
 from .studies.compare import Comparison, compare
 from .trajectory import ContinuityRule, Trajectory, load_trajectory, minimum_effort, save_trajectory
@@ -123,6 +123,7 @@ __all__ = [
     "option",
     "plan",
     "planner",
+    "prepare",
     "problem_names",
     "read_csv",
     "read_plan",

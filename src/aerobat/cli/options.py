@@ -3,6 +3,7 @@
 # no postponed annotations here: the class of options is made from them, where nobody could look names up
 
 from dataclasses import dataclass, field, make_dataclass
+from functools import partial
 from pathlib import Path
 from typing import Annotated, Any, TypeVar
 
@@ -16,6 +17,12 @@ limiting = Group("Limits", sort_key=2)
 output = Group("Output", sort_key=3)
 
 POSITIVE = validators.Number(gt=0)
+Plugins = partial(
+    Parameter,
+    name="--import",
+    negative="",
+    help="A Python file that registers maneuvers or planners of your own; may be given several times.",
+)
 Options = TypeVar("Options", bound=type[Any])
 
 
@@ -30,8 +37,7 @@ class TaskOptions:
     angle: Annotated[float | None, Parameter(group=planning)] = None
     """The tilt of a half-flip's gate in degrees, -90 to 90, to the right when positive."""
 
-    plugins: Annotated[tuple[Path, ...], Parameter(name="--import", group=planning, negative="")] = ()
-    """A Python file that registers maneuvers or planners of your own; may be given several times."""
+    plugins: Annotated[tuple[Path, ...], Plugins(group=planning)] = ()
 
     out: Annotated[Path | None, Parameter(group=output)] = None
     """The folder to write to, replaced as a whole. Default: out/PROBLEM."""
@@ -132,6 +138,8 @@ class CheckOptions:
 
     max_rate: Annotated[float | None, Parameter(group=limiting, validator=POSITIVE)] = None
     """The greatest body rate allowed, degrees a second."""
+
+    plugins: Annotated[tuple[Path, ...], Plugins(group=limiting)] = ()
 
     max_moment: Annotated[float | None, Parameter(group=limiting, validator=POSITIVE)] = None
     """The greatest moment allowed, N m."""

@@ -103,7 +103,7 @@ def score_flights(
     if environment is None:
         environment = (goal.problem if isinstance(goal, Plan) else goal).environment
     gates = gates_of(goal)
-    setup = prepare(plan, vehicles, environment, settings)
+    setup = prepare(plan, vehicles, environment=environment, config=settings)
     blocks = range(0, len(setup.times), BLOCK)
     parts = [setup.reference.setpoint(k, min(k + BLOCK, len(setup.times))).flat.position for k in blocks]
     planned = planned_passages(goal, gates, setup.times, np.concatenate(parts))

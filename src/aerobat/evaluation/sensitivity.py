@@ -117,7 +117,7 @@ def sensitivity(
     and for arguments that do not fit together, BackendMissing for an engine that is not installed.
     """
     names = _known((of,) if isinstance(of, str) else tuple(of))
-    setup = with_metrics(prepare(plan, vehicle, environment, replace(config, **changes)))
+    setup = with_metrics(prepare(plan, vehicle, environment=environment, config=config, **changes))
     rotors = setup.fleet.lags.shape[1]
     shapes = {name: tuple(n or rotors for n in _SHAPES[name]) for name in names}
     directions = [

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 from functools import partial
 from typing import Any
 
@@ -49,7 +48,7 @@ def fly(
     Raises SpecError for arguments that do not fit together, BackendMissing for an engine that is not
     installed.
     """
-    setup = prepare(plan, vehicle, environment, replace(config, **changes))
+    setup = prepare(plan, vehicle, environment=environment, config=config, **changes)
     stride = setup.config.log_stride
     engine = setup.engine()
     loop = setup.compile(engine)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import pairwise
 from typing import Any, Protocol
@@ -155,11 +155,27 @@ class FlightSetup:
 
 def prepare(
     plan: Flyable | Trajectory,
-    vehicle: Vehicle | Sequence[Vehicle] | None,
-    environment: Environment | None,
-    config: FlightConfig,
+    vehicle: Vehicle | Sequence[Vehicle] | None = None,
+    *,
+    environment: Environment | None = None,
+    config: FlightConfig = FlightConfig(),
+    **changes: Any,
 ) -> FlightSetup:
-    """All that a flight takes; see `fly`. Raises SpecError for arguments that do not fit together."""
+    """All that a flight takes, to be stepped, cut or branched at will: `loop = prepare(plan).compile()`.
+
+    Then `carry = loop.init(setup.first_tick)` and, for each tick k,
+    `carry, row = loop.step(carry, setup.tick(k))`.
+
+    Args:
+        plan: what is flown; a bare trajectory needs a vehicle.
+        vehicle: what flies it, by default the plan's.
+        environment: where, by default the problem's; for a bare trajectory a calm day on Earth.
+        config: how.
+        changes: fields of FlightConfig that replace those of `config`, as `seed=3`.
+
+    Raises SpecError for arguments that do not fit together.
+    """
+    config = replace(config, **changes)
     if isinstance(plan, Trajectory):
         trajectory = plan
     else:
