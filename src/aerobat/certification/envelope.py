@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 
 from aerobat.arrays import frozen_bounds
 from aerobat.errors import SpecError
 from aerobat.problem import Limits
+
+NO_LIMITS = Limits()
 
 
 @dataclass(frozen=True)
@@ -23,7 +25,7 @@ class Envelope:
     tilt: float = np.inf  # [rad] between the thrust axis and the vertical; beyond pi it limits nothing
     body_rate: float = np.inf  # [rad/s] |ω|
     moment: float = np.inf  # [N·m] |M|
-    limits: Limits = field(default_factory=Limits)
+    limits: Limits = NO_LIMITS
 
     def __post_init__(self) -> None:
         """Check."""

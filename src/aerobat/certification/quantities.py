@@ -7,10 +7,11 @@ Magnitudes are squared and the tilt is taken by its cosine, so that no kink spoi
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
-from aerobat.arrays import Array
+from aerobat.arrays import Array, frozen
 from aerobat.flatness.references import wrench_for
 from aerobat.vehicle import Vehicle, mixer, rotor_thrusts
 
@@ -56,11 +57,12 @@ def errors(vehicle: Vehicle, magnitudes: MagnitudeBounds, of: MagnitudeBounds) -
     return _stacked(vehicle, of.thrust, moment, of.cos_tilt, *squares)
 
 
+@lru_cache(maxsize=128)
 def scales(vehicle: Vehicle) -> Array:
     """Magnitudes that count as large, (n + 4,): the rotors' ranges and the moments that use them up."""
     ranges = vehicle.max_thrusts - vehicle.min_thrusts
     moment = float((ranges / np.linalg.norm(mixer(vehicle)[:, 1:], axis=1)).max())
-    return np.concatenate([ranges, [ranges.sum(), 0.01, 1.0, moment**2]])
+    return frozen([*ranges, ranges.sum(), 0.01, 1.0, moment**2], "scales")
 
 
 def _stacked(vehicle: Vehicle, thrust: Array, moment: Array, *others: Array) -> Array:
@@ -75,6 +77,7 @@ def _moment(vehicle: Vehicle, magnitudes: MagnitudeBounds) -> Array:
     return _inertia(vehicle) * (magnitudes.omega_dot + magnitudes.omega**2)
 
 
+@lru_cache(maxsize=128)
 def _inertia(vehicle: Vehicle) -> float:
     """The largest principal moment of inertia."""
     return float(np.linalg.norm(vehicle.inertia, 2))

@@ -5,6 +5,8 @@ Body and rotors are advanced together: apart from each other, RK4 would be of fi
 
 from __future__ import annotations
 
+from functools import reduce
+from operator import add, mul
 from typing import NamedTuple
 
 from aerobat.kernels import rigid_body
@@ -50,10 +52,7 @@ def wrench(rotors: Rotors, thrusts: PerRotor) -> Wrench:
 
 
 def _weighted_sum(weights: PerRotor, values: PerRotor) -> Scalar:
-    total = weights[0] * values[0]
-    for weight, value in zip(weights[1:], values[1:], strict=True):
-        total = total + weight * value
-    return total
+    return reduce(add, map(mul, weights, values))
 
 
 class Airframe(NamedTuple):

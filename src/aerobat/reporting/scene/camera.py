@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from aerobat import so3
 from aerobat.arrays import Array
 from aerobat.problem.gate import Gate
 
@@ -33,7 +34,7 @@ class Camera:
     def screen(self) -> Array:
         """The world directions of right and up on the picture, (2, 3)."""
         right = np.array([-np.sin(self.azimuth), np.cos(self.azimuth), 0.0])
-        return np.array([right, np.cross(self.toward, right)])
+        return np.array([right, so3.cross(self.toward, right)])
 
     def project(self, points: Array) -> Array:
         """Where world points [m] come to lie on the picture [m], (..., 3) -> (..., 2)."""
