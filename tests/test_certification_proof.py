@@ -262,7 +262,7 @@ def test_a_record_is_plain_data():
 
 @pytest.mark.parametrize("limit", [0.0, -1.0, np.nan])
 def test_an_envelope_refuses_limits_that_are_not_positive(limit):
-    with pytest.raises(SpecError, match=r"envelope\.body_rate"):
+    with pytest.raises(SpecError, match=r"^Envelope\.body_rate must be positive, got"):
         Envelope(body_rate=limit)
 
 

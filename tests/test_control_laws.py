@@ -127,15 +127,15 @@ def test_commands_keep_within_limits_and_say_when_limits_changed_them() -> None:
 # ---- settings
 
 
-@pytest.mark.parametrize("field", [f.name for f in fields(Controller) if f.type == "float"])
+@pytest.mark.parametrize("field", [f.name for f in fields(Controller) if not isinstance(f.default, bool)])
 @pytest.mark.parametrize("value", [-1.0, np.nan, np.inf, "fast", None, True])
 def test_a_gain_that_is_no_gain_is_refused_by_name(field: str, value: object) -> None:
-    with pytest.raises(SpecError, match=rf"^controller\.{field} must be a finite number"):
+    with pytest.raises(SpecError, match=rf"^Controller\.{field} must be (a (finite )?number|0 or more), got"):
         Controller(**{field: value})
 
 
 def test_a_switch_is_on_or_off() -> None:
-    with pytest.raises(SpecError, match=r"^controller\.prioritize_tilt must be True or False, got 1"):
+    with pytest.raises(SpecError, match=r"^Controller\.prioritize_tilt must be true or false, got 1"):
         Controller(prioritize_tilt=1)
 
 

@@ -157,11 +157,11 @@ def test_progress_sees_every_attempt() -> None:
 
 
 def test_bad_input_gets_a_sentence() -> None:
-    with pytest.raises(SpecError, match="segments must be 2 or more"):
+    with pytest.raises(SpecError, match=r"^FreeKnots\.segments must be 2 or more"):
         FreeKnots(segments=1)
-    with pytest.raises(SpecError, match="iterations must be 1 or more"):
+    with pytest.raises(SpecError, match=r"^FreeKnots\.iterations must be 1 or more"):
         FreeKnots(iterations=0)
-    with pytest.raises(SpecError, match="reserve must be a part"):
+    with pytest.raises(SpecError, match=r"^FreeKnots\.reserve must be less than 0\.5"):
         FreeKnots(reserve=0.5)
     with pytest.raises(SpecError, match="needs a vehicle"):
         FreeKnots().plan(SECTION_V)

@@ -190,7 +190,7 @@ def test_a_users_planner_is_one_registered_class_and_gets_its_certificate() -> N
     assert (pace.name, pace.flag, pace.type, pace.default, pace.help) == (
         "pace", "--pace", float, 3.0, "Its duration, s."
     )  # fmt: skip
-    with pytest.raises(ab.SpecError, match="a planner named 'miqp' already"):
+    with pytest.raises(ab.SpecError, match="there are two planners named 'miqp'"):
         planner("miqp")(Straight)
 
 

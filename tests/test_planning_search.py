@@ -50,18 +50,19 @@ def test_climbing_finds_the_fast_island_when_slow_is_infeasible_again() -> None:
 
 
 @pytest.mark.parametrize(
-    "wrong",
+    ("wrong", "sentence"),
     [
-        lambda: GridSearch(0.0),
-        lambda: GridSearch(2.0, 1.0),
-        lambda: GridSearch(count=0),
-        lambda: GridSearch(np.nan),
-        lambda: BisectionSearch(-1.0),
-        lambda: BisectionSearch(growth=1.0),
-        lambda: BisectionSearch(tolerance=0.0),
-        lambda: BisectionSearch(last=np.inf),
+        (lambda: GridSearch(0.0), "GridSearch.first must be positive"),
+        (lambda: GridSearch(2.0, 1.0), r"GridSearch.last must be first \(2 s\) or more, got 1"),
+        (lambda: GridSearch(count=0), "GridSearch.count must be 1 or more"),
+        (lambda: GridSearch(np.nan), "GridSearch.first must be a finite number"),
+        (lambda: BisectionSearch(-1.0), "BisectionSearch.first must be positive"),
+        (lambda: BisectionSearch(growth=1.0), "BisectionSearch.growth must be greater than 1"),
+        (lambda: BisectionSearch(tolerance=0.0), "BisectionSearch.tolerance must be positive"),
+        (lambda: BisectionSearch(last=np.inf), "BisectionSearch.last must be a finite number"),
+        (lambda: BisectionSearch(2.0), r"BisectionSearch.last must be first \(2 s\) or more, got 1"),
     ],
 )
-def test_a_search_that_cannot_be_is_refused(wrong) -> None:
-    with pytest.raises(SpecError, match="search"):
+def test_a_search_that_cannot_be_is_refused(wrong, sentence) -> None:
+    with pytest.raises(SpecError, match=f"^{sentence}"):
         wrong()

@@ -4,6 +4,7 @@
 
 from dataclasses import dataclass, field, make_dataclass
 from functools import partial
+from inspect import getdoc
 from pathlib import Path
 from typing import Annotated, Any, TypeVar
 
@@ -84,8 +85,8 @@ def _help(planner: str, option: PlannerOption) -> str:
 
 
 def _planners_help() -> str:
-    summaries = ((name, cls.__doc__ or "") for name, cls in registered_planners().items())
-    first = (f"{name}, {doc.strip().splitlines()[0].rstrip('.')}" for name, doc in summaries)
+    summaries = ((name, getdoc(cls) or cls.__name__) for name, cls in registered_planners().items())
+    first = (f"{name}, {doc.splitlines()[0].rstrip('.')}" for name, doc in summaries)
     return "How to plan: " + "; ".join(first) + ". Default: miqp."
 
 

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, fields
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 
-from aerobat.errors import SpecError
+from aerobat.declaration import NonNegative, declared
 from aerobat.kernels.control import FeatureFlags
 from aerobat.kernels.control_loops import Gains
 from aerobat.kernels.ops import Scalar
@@ -16,38 +16,29 @@ from aerobat.kernels.ops import Scalar
 _SMALLEST = 1e-9  # [s], [rad/s]: stands for zero where one divides
 
 
-@dataclass(frozen=True)
+@declared
 class Controller:
     """Gains, filters and switches of the tracking controller (paper, Section III).
 
     Gains are per unit of mass and of inertia, so that one set suits all vehicles; one whose rotors are too
     weak for the attitude loop gets both loops slowed down alike (`gains`). The three switches add to the
-    paper's law what its tracking error depends on; with all off it is the paper's law. Raises SpecError for a
-    gain that is negative or not finite.
+    paper's law what its tracking error depends on; with all off it is the paper's law.
     """
 
-    position_gain: float = 25.0  # [1/s²]
-    velocity_gain: float = 9.0  # [1/s]
-    integral_gain: float = 10.0  # [1/s³]
-    max_integral: float = 0.5  # [m·s] longest integral of the position error
-    max_feedback: float = 15.0  # [m/s²] largest feedback acceleration
-    jerk_filter: float = 0.1  # [s] time constant of the filter on the feedback acceleration's derivative
-    attitude_frequency: float = 25.0  # [rad/s] ω_n of the attitude loop
-    attitude_damping: float = 0.85  # [-] ζ of the attitude loop
-    attitude_integral_gain: float = 1000.0  # [1/s³]
-    max_attitude_integral: float = 0.05  # [rad·s]
-    lead_time_constant: float = 0.01  # [s] time constant that the lead leaves in place of the rotors' lag
+    position_gain: NonNegative = 25.0  # [1/s²]
+    velocity_gain: NonNegative = 9.0  # [1/s]
+    integral_gain: NonNegative = 10.0  # [1/s³]
+    max_integral: NonNegative = 0.5  # [m·s] longest integral of the position error
+    max_feedback: NonNegative = 15.0  # [m/s²] largest feedback acceleration
+    jerk_filter: NonNegative = 0.1  # [s] time constant of the filter on the feedback's derivative
+    attitude_frequency: NonNegative = 25.0  # [rad/s] ω_n of the attitude loop
+    attitude_damping: NonNegative = 0.85  # [-] ζ of the attitude loop
+    attitude_integral_gain: NonNegative = 1000.0  # [1/s³]
+    max_attitude_integral: NonNegative = 0.05  # [rad·s]
+    lead_time_constant: NonNegative = 0.01  # [s] time constant that the lead leaves of the rotors' lag
     moment_feedforward: bool = True  # the moment that the reference asks, J ω' + ω × Jω
     motor_lag_compensation: bool = True  # commands that lead the rotors' lag
     prioritize_tilt: bool = True  # on saturation, give up the yaw moment before roll and pitch
-
-    def __post_init__(self) -> None:
-        for field in fields(self):
-            value = getattr(self, field.name)
-            if field.type == "bool":
-                _require_switch(field.name, value)
-            else:
-                _require_gain(field.name, value)
 
     @property
     def feature_flags(self) -> FeatureFlags:
@@ -63,38 +54,26 @@ class Controller:
             return 0.0
         return period / -math.expm1(-period / max(self.lead_time_constant, _SMALLEST))
 
-    def gains(self, max_bandwidth: Scalar, ops: Any = np) -> Gains:
+    def gains(self, max_bandwidth: Scalar, ops: Any = np, **instead: Scalar) -> Gains:
         """The gains for a vehicle whose attitude loop must not be faster than `max_bandwidth` [rad/s].
 
-        `ops` are of the arithmetic of the controller's own numbers: dual ones have dual gains.
+        `instead` are numbers of another arithmetic, that of `ops`, in place of settings: dual ones have dual
+        gains.
         """
-        frequency = ops.minimum(self.attitude_frequency, max_bandwidth)
-        slower = frequency / max(self.attitude_frequency, _SMALLEST)
+        setting = SimpleNamespace(**(vars(self) | instead))
+        frequency = ops.minimum(setting.attitude_frequency, max_bandwidth)
+        slower = frequency / max(setting.attitude_frequency, _SMALLEST)
         like = np.ones_like(max_bandwidth)
         return Gains(
-            position=self.position_gain * slower**2,
-            velocity=self.velocity_gain * slower,
-            integral=self.integral_gain * slower**3,
-            max_integral=self.max_integral * like,
-            max_feedback=self.max_feedback * like,
-            jerk_filter=self.jerk_filter * like,
+            position=setting.position_gain * slower**2,
+            velocity=setting.velocity_gain * slower,
+            integral=setting.integral_gain * slower**3,
+            max_integral=setting.max_integral * like,
+            max_feedback=setting.max_feedback * like,
+            jerk_filter=setting.jerk_filter * like,
             stiffness=2.0 * frequency**2,
-            damping=2.0 * self.attitude_damping * frequency,
-            attitude_integral=self.attitude_integral_gain * slower**3,
-            max_attitude_integral=self.max_attitude_integral * like,
-            lead_time_constant=max(self.lead_time_constant, _SMALLEST) * like,
+            damping=2.0 * setting.attitude_damping * frequency,
+            attitude_integral=setting.attitude_integral_gain * slower**3,
+            max_attitude_integral=setting.max_attitude_integral * like,
+            lead_time_constant=max(setting.lead_time_constant, _SMALLEST) * like,
         )
-
-
-def _require_switch(name: str, value: Any) -> None:
-    if not isinstance(value, bool):
-        raise SpecError(f"controller.{name} must be True or False, got {value!r}")
-
-
-def _require_gain(name: str, value: Any) -> None:
-    try:
-        sound = bool(np.all((np.asarray(value) >= 0.0) & (np.asarray(value) < np.inf)))
-    except TypeError:
-        sound = False
-    if not sound or isinstance(value, bool):
-        raise SpecError(f"controller.{name} must be a finite number, zero or more, got {value!r}")

@@ -6,10 +6,13 @@ then run through the same checks, and whatever is wrong becomes one sentence tha
 
 from aerobat.declaration.declared import declared
 from aerobat.declaration.field_types import (
+    AS_IT_IS,
     Corner,
+    Count,
     Direction,
     Fraction,
     Label,
+    Limit,
     NonNegative,
     Number,
     PartialVector,
@@ -22,15 +25,18 @@ from aerobat.declaration.field_types import (
     unit,
 )
 from aerobat.declaration.registry import Registry, import_plugin
-from aerobat.declaration.sentences import FieldError, unknown_key, unknown_name, within_field
+from aerobat.declaration.sentences import FieldError, shown, unknown_key, unknown_name, within_field
 from aerobat.declaration.tables import from_table, to_table
 
 __all__ = [
+    "AS_IT_IS",
     "Corner",
+    "Count",
     "Direction",
     "FieldError",
     "Fraction",
     "Label",
+    "Limit",
     "NonNegative",
     "Number",
     "PartialVector",
@@ -44,6 +50,7 @@ __all__ = [
     "from_table",
     "import_plugin",
     "number",
+    "shown",
     "to_table",
     "unit",
     "unknown_key",

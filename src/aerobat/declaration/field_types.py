@@ -9,7 +9,8 @@ from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
-from pydantic import AfterValidator, Field, PlainValidator
+from pydantic import AfterValidator, Field, GetCoreSchemaHandler, PlainValidator
+from pydantic_core import CoreSchema, core_schema
 
 from aerobat.arrays import AXES, Array
 from aerobat.declaration.sentences import FieldError, shown, unknown_key, within_field
@@ -135,6 +136,13 @@ def _not_nan(value: float) -> float:
     return value
 
 
+class _Instance:
+    """Marks a type whose values are taken as they are, of that class, and whose own fields nobody checks."""
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
+        return core_schema.is_instance_schema(source)
+
+
 def _one_line(text: str) -> str:
     if not text.strip() or not text.isprintable():
         raise FieldError("", f"must be one line of text, got {shown(text)}")
@@ -144,6 +152,9 @@ def _one_line(text: str) -> str:
 Positive = Annotated[float, Field(gt=0, description="positive number")]
 NonNegative = Annotated[float, Field(ge=0, description="number ≥ 0")]
 Fraction = Annotated[float, Field(gt=0, lt=1, description="number between 0 and 1")]
+Limit = Annotated[float, Field(gt=0, allow_inf_nan=True, description="positive number, `inf` for no limit")]
+Count = Annotated[int, Field(ge=1, description="whole number, 1 or more")]
+AS_IT_IS = _Instance()  # Annotated[BodyState, AS_IT_IS]: an instance of a class that is not declared
 Number = Annotated[
     float,
     Field(allow_inf_nan=True),

@@ -5,7 +5,9 @@ from __future__ import annotations
 import os
 import sys
 from collections.abc import Iterator, Mapping
+from importlib import import_module
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any, Generic, TypeVar
 
 from aerobat.declaration.declared import declared
@@ -19,19 +21,24 @@ T = TypeVar("T")
 class Registry(Generic[T]):
     """The declared classes of one base, each by its name.
 
-    Installed packages add theirs through the entry points of `group`, which are imported when a name is
+    The package's own of `modules` come first, in that order; each module is imported when its name is asked
+    for. Installed packages add theirs through the entry points of `group`, which are imported when a name is
     asked for that nobody has registered yet, or all names are.
 
     Args:
-        base: what all classes inherit from.
+        base: what all classes are subclasses of.
         noun: what one of them is called in sentences.
         group: the group of entry points, such as "aerobat.maneuvers".
+        modules: by name, the modules that register it when they are imported.
     """
 
-    def __init__(self, base: type[T], noun: str, group: str) -> None:
+    def __init__(
+        self, base: type[T], noun: str, group: str, modules: Mapping[str, str] = MappingProxyType({})
+    ) -> None:
         self._base = base
         self._noun = noun
         self._group = group
+        self._modules = modules
         self._classes: dict[str, type[T]] = {}
         self._searched = False
 
@@ -39,6 +46,8 @@ class Registry(Generic[T]):
         """Declare `cls` and register it as `name`. Raises SpecError for what does not fit or is taken."""
         if not issubclass(cls, self._base):
             raise SpecError(f"{cls.__name__} must inherit from {self._base.__name__} to be a {self._noun}")
+        if cls.__module__ != self._modules.get(name):
+            self._import_own(name)
         other = self._classes.get(name)
         if other and (other.__module__, other.__qualname__) != (cls.__module__, cls.__qualname__):
             raise SpecError(f"there are two {self._noun}s named {name!r}, {other!r} and {cls!r}; rename one")
@@ -49,15 +58,16 @@ class Registry(Generic[T]):
 
     def __getitem__(self, name: str) -> type[T]:
         """The class of that name. Raises SpecError, with the closest name, when there is none."""
-        if name not in self._classes:
-            self._import_installed()
-        if name not in self._classes:
-            raise unknown_name(self._noun, name, self._classes)
+        self._import_own(name)
+        if name not in self._classes and name not in tuple(self):
+            raise unknown_name(self._noun, name, self)
         return self._classes[name]
 
     def __iter__(self) -> Iterator[str]:
+        for name in self._modules:
+            self._import_own(name)
         self._import_installed()
-        return iter(sorted(self._classes))
+        return iter((*self._modules, *sorted(self._classes.keys() - self._modules)))
 
     def read(self, value: Any) -> T:
         """The value that a field takes: one of the base class, or a table whose `kind` names its class.
@@ -76,6 +86,10 @@ class Registry(Generic[T]):
             known = ", ".join(map(repr, self))
             raise FieldError("kind", f"must be one of {known}, got {shown(kind)}")
         return from_table(self[kind], {key: each for key, each in value.items() if key != "kind"})
+
+    def _import_own(self, name: str) -> None:
+        if name in self._modules:
+            import_module(self._modules[name])
 
     def _import_installed(self) -> None:
         if self._searched:

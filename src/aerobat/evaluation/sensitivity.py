@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass
 from functools import lru_cache
 from types import MappingProxyType
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, get_type_hints
 
 import numpy as np
 
@@ -35,7 +35,8 @@ from aerobat.trajectory import Trajectory
 from aerobat.vehicle import Vehicle
 
 # the lead's filter also sets how far ahead set-points are read, which may jump from piece to piece
-_GAINS = tuple(f.name for f in fields(Controller) if f.type == "float" and f.name != "lead_time_constant")
+_NUMBERS = (name for name, kind in get_type_hints(Controller).items() if kind is float)
+_GAINS = tuple(name for name in _NUMBERS if name != "lead_time_constant")
 _EACH_ROTOR = 0
 _SHAPES: Mapping[str, tuple[int, ...]] = {
     **dict.fromkeys(_GAINS, ()),
@@ -224,9 +225,8 @@ def _tangent(setup: FlightSetup, name: str, unit: Array) -> LoopParameters:
 def _gains(setup: FlightSetup, name: str) -> Gains:
     controller = setup.config.controller
     number: Any = Dual(getattr(controller, name), 1.0)
-    gains = replace(controller, **{name: number}).gains(
-        max_bandwidth(setup.nominal, setup.environment), DualOps(ArrayOps)
-    )
+    bandwidth = max_bandwidth(setup.nominal, setup.environment)
+    gains = controller.gains(bandwidth, DualOps(ArrayOps), **{name: number})
     none = np.zeros(len(setup.fleet))
     slopes = (dual(gain).tangent for gain in gains)
     return Gains(*(none if slope is None else slope + none for slope in slopes))

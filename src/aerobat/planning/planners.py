@@ -1,43 +1,55 @@
 """plan(): a problem in, a plan out, whichever the planner; and the planners by name.
 
-A planner is a frozen dataclass with a method `plan`, registered by one line, the decorator `planner`. Help,
-the command line's choices and its options follow from that.
+A planner is a class with a method `plan`, declared and registered by one line, the decorator `planner`. Help,
+the command line's choices and its options follow from its fields.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import MISSING, Field, dataclass, field, fields
-from importlib import import_module
-from typing import Any, Protocol, TypeVar, get_type_hints
+import dataclasses
+from abc import abstractmethod
+from collections.abc import Callable, Mapping
+from dataclasses import MISSING, dataclass, field, fields
+from types import MappingProxyType
+from typing import Any, Protocol, TypeVar, cast, dataclass_transform, get_type_hints, runtime_checkable
 
-from aerobat.declaration import unknown_name
-from aerobat.errors import SpecError
+from pydantic import Field
+
+from aerobat.declaration import Registry
 from aerobat.planning.certified_solve import with_certificate
 from aerobat.planning.recorder import Progress
 from aerobat.planning.result import Plan
 from aerobat.problem.problem import Problem
 from aerobat.vehicle import Vehicle
 
-# in the order in which they are listed; each registers itself when it is imported
-BUILTIN = {
-    "miqp": "aerobat.planning.miqp.miqp",
-    "min-snap": "aerobat.planning.polynomial.min_snap",
-    "free-knots": "aerobat.planning.polynomial.free_knots",
-    "time-optimal": "aerobat.planning.time_optimal.time_optimal",
-}
-PlannerClass = TypeVar("PlannerClass", bound=type[Any])
-_registered: dict[str, type[Any]] = {}
 
-
+@runtime_checkable
 class Planner(Protocol):
-    """Whatever turns a problem into a plan."""
+    """Whatever turns a problem into a plan.
 
+    A planner of one's own inherits from this class and is registered by `@planner("its-name")`.
+    """
+
+    @abstractmethod
     def plan(
         self, problem: Problem, vehicle: Vehicle | None = None, progress: Progress | None = None
     ) -> Plan:
-        """The plan, or Infeasible."""
-        ...
+        """Plan a problem. Raises Infeasible, with the attempts as evidence."""
+
+
+P = TypeVar("P", bound=Planner)
+
+PLANNERS: Registry[Planner] = Registry(
+    Planner,  # type: ignore[type-abstract]
+    "planner",
+    "aerobat.planners",
+    {
+        "miqp": "aerobat.planning.miqp.miqp",
+        "min-snap": "aerobat.planning.polynomial.min_snap",
+        "free-knots": "aerobat.planning.polynomial.free_knots",
+        "time-optimal": "aerobat.planning.time_optimal.time_optimal",
+    },
+)
 
 
 def plan(
@@ -65,36 +77,37 @@ def plan(
     return found if vehicle is None or found.certificate is not None else with_certificate(found, vehicle)
 
 
-def planner(name: str) -> Callable[[PlannerClass], PlannerClass]:
-    """Register a planner's class under a name, by which `plan` and the command line know it.
+def option(default: Any, help: str, off: str | None = None, command_default: Any = None) -> Any:
+    """A dataclass field with its help, which the command line offers as an option.
 
-    Raises SpecError for a name that another class has.
+    Args:
+        default: Its value, where nothing else is said.
+        help: A sentence, its unit included.
+        off: Of a field that is true by default, the name of the flag that makes it false.
+        command_default: Its value on the command line, whose plans are to be flown, where it is another one.
     """
+    metadata = {"help": help, "off": off, "command_default": command_default}
+    return field(default=default, metadata=metadata)
 
-    def register(cls: PlannerClass) -> PlannerClass:
-        known = _registered.get(name)
-        if known is not None and known.__qualname__ != cls.__qualname__:
-            raise SpecError(f"there is a planner named '{name}' already; register {cls.__name__} by another")
-        _registered[name] = cls
-        return cls
+
+@dataclass_transform(frozen_default=True, field_specifiers=(dataclasses.field, Field))
+def planner(name: str) -> Callable[[type[P]], type[P]]:
+    """Declare the class that follows and register it: by `name`, `plan` and the command line know it."""
+
+    def register(cls: type[P]) -> type[P]:
+        return cast(type[P], PLANNERS.add(name, cls))
 
     return register
 
 
-def registered_planners() -> dict[str, type[Planner]]:
-    """All planners' classes by name, the package's own first."""
-    for module in BUILTIN.values():
-        import_module(module)
-    return {name: _registered[name] for name in (*BUILTIN, *_registered)}
+def registered_planners() -> Mapping[str, type[Planner]]:
+    """The planners by their names: those of this package first, then of plugins and installed packages."""
+    return MappingProxyType({name: PLANNERS[name] for name in PLANNERS})
 
 
 def planner_class(name: str) -> type[Planner]:
     """The planner's class of that name; no other of the package's is imported. Raises SpecError for none."""
-    if name not in _registered and name in BUILTIN:
-        import_module(BUILTIN[name])
-    if name not in _registered:
-        raise unknown_name("planner", name, list(registered_planners()))
-    return _registered[name]
+    return PLANNERS[name]
 
 
 @dataclass(frozen=True)
@@ -109,26 +122,13 @@ class PlannerOption:
     command_default: Any = None  # the command line's default, where it is another one
 
 
-def option(default: Any, help: str, off: str | None = None, command_default: Any = None) -> Any:
-    """A dataclass field with its help, which the command line offers as an option.
-
-    Args:
-        default: Its value, where nothing else is said.
-        help: A sentence, its unit included.
-        off: Of a field that is true by default, the name of the flag that makes it false.
-        command_default: Its value on the command line, whose plans are to be flown, where it is another one.
-    """
-    metadata = {"help": help, "off": off, "command_default": command_default}
-    return field(default=default, metadata=metadata)
-
-
 def planner_options(cls: type[Any]) -> tuple[PlannerOption, ...]:
     """What the command line offers of a planner: its fields that have a help."""
     hints = get_type_hints(cls)
     return tuple(_option(f, hints[f.name]) for f in fields(cls) if "help" in f.metadata)
 
 
-def _option(f: Field[Any], hint: Any) -> PlannerOption:
+def _option(f: dataclasses.Field[Any], hint: Any) -> PlannerOption:
     default = f.default if f.default_factory is MISSING else f.default_factory()
     flag = f.metadata.get("off") or f.name
     flag = "--" + flag.replace("_", "-")

@@ -7,17 +7,18 @@ found there, or None where nothing feasible exists.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
-from typing import Protocol, TypeVar
+from typing import Annotated, Protocol, TypeVar, runtime_checkable
 
 import numpy as np
+from pydantic import Field
 
-from aerobat.errors import SpecError
+from aerobat.declaration import Count, FieldError, Fraction, Positive, declared
 
 Found = TypeVar("Found")
 Attempting = Callable[[float], Found | None]
 
 
+@runtime_checkable
 class Search(Protocol):
     """A way to look for the smallest feasible scale of time."""
 
@@ -26,21 +27,16 @@ class Search(Protocol):
         ...
 
 
-@dataclass(frozen=True)
+@declared
 class GridSearch:
     """The first feasible of `count` equal steps from `first` to `last` [s] (paper, Section II)."""
 
-    first: float = 0.1
-    last: float = 4.0
-    count: int = 50
+    first: Positive = 0.1
+    last: Positive = 4.0
+    count: Count = 50
 
     def __post_init__(self) -> None:
-        """Check."""
-        if not (0.0 < self.first <= self.last < np.inf and self.count >= 1):
-            raise SpecError(
-                "the search's grid needs 0 < first <= last in seconds and at least one step, "
-                f"got first={self.first}, last={self.last}, count={self.count}"
-            )
+        _require_order(self.first, self.last)
 
     def smallest(self, attempt: Attempting[Found]) -> Found | None:
         """Try each in turn and stop at the first that is feasible."""
@@ -50,7 +46,7 @@ class GridSearch:
         return None
 
 
-@dataclass(frozen=True)
+@declared
 class BisectionSearch:
     """Climb from `first` by `growth` until feasible, then halve the last step down to `tolerance`.
 
@@ -58,18 +54,13 @@ class BisectionSearch:
     not (a slow flip is infeasible again, so climbing from below finds the fast one).
     """
 
-    first: float = 0.02  # [s]
-    last: float = 1.0  # [s]
-    growth: float = 1.2
-    tolerance: float = 0.005  # relative
+    first: Positive = 0.02  # [s]
+    last: Positive = 1.0  # [s]
+    growth: Annotated[float, Field(gt=1)] = 1.2
+    tolerance: Fraction = 0.005  # relative
 
     def __post_init__(self) -> None:
-        """Check."""
-        if not (0.0 < self.first <= self.last < np.inf and self.growth > 1.0 and 0.0 < self.tolerance < 1.0):
-            raise SpecError(
-                "the search needs 0 < first <= last in seconds, growth > 1 and 0 < tolerance < 1, got "
-                f"first={self.first}, last={self.last}, growth={self.growth}, tolerance={self.tolerance}"
-            )
+        _require_order(self.first, self.last)
 
     def smallest(self, attempt: Attempting[Found]) -> Found | None:
         """Climb, then bisect between the last infeasible and the first feasible."""
@@ -85,3 +76,8 @@ class BisectionSearch:
             else:
                 found, scale = better, middle
         return found
+
+
+def _require_order(first: float, last: float) -> None:
+    if last < first:
+        raise FieldError("last", f"must be first ({first:g} s) or more, got {last:g}")

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
+from typing import Annotated
 
 import numpy as np
+from pydantic import Field
 
 from aerobat.arrays import Array
 from aerobat.errors import Infeasible, SpecError
@@ -19,6 +21,8 @@ from aerobat.trajectory import Trajectory
 from aerobat.vehicle import Vehicle
 
 PLANARITY_TOLERANCE = 1e-6  # of its extent: how far a path may leave a plane and still be in it
+# of a limit's range, kept from either of its ends for the controller
+Reserve = Annotated[float, Field(ge=0, lt=0.5)]
 
 
 @dataclass(frozen=True, eq=False)

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from dataclasses import fields
 
 import numpy as np
 
 from aerobat import so3
-from aerobat.arrays import frozen
+from aerobat.declaration import NonNegative, declared
 from aerobat.engines.components import components, from_components
-from aerobat.errors import SpecError
 from aerobat.kernels.rigid_body import Body
 from aerobat.states import BodyState
 
@@ -27,23 +26,14 @@ def body_states(body: Body) -> BodyState:
     return BodyState(*(from_components(part) for part in body))
 
 
-@dataclass(frozen=True)
+@declared
 class StateNoise:
-    """Standard deviations of white errors, each axis and each control period anew.
+    """Standard deviations of white errors, each axis and each control period anew."""
 
-    Raises SpecError for a negative one.
-    """
-
-    position: float = 0.0  # [m]
-    velocity: float = 0.0  # [m/s]
-    attitude: float = 0.0  # [rad] about each body axis
-    omega: float = 0.0  # [rad/s]
-
-    def __post_init__(self) -> None:
-        for field in fields(self):
-            value = float(frozen(getattr(self, field.name), f"noise.{field.name}", ()))
-            if value < 0.0:
-                raise SpecError(f"noise.{field.name} must be zero or more, got {value:g}")
+    position: NonNegative = 0.0  # [m]
+    velocity: NonNegative = 0.0  # [m/s]
+    attitude: NonNegative = 0.0  # [rad] about each body axis
+    omega: NonNegative = 0.0  # [rad/s]
 
     @classmethod
     def fused(cls) -> StateNoise:
@@ -78,11 +68,8 @@ class NoiseSource:
     per_vehicle = True
 
     def __init__(self, noise: StateNoise, seed: int | np.random.SeedSequence, vehicles: int | None) -> None:
-        """Seed the generators; `vehicles` is None for one alone. Raises SpecError for what is no seed."""
-        try:
-            root = seed if isinstance(seed, np.random.SeedSequence) else np.random.SeedSequence(seed)
-        except (TypeError, ValueError):
-            raise SpecError(f"seed must be a whole number, zero or more, got {seed!r}") from None
+        """Seed the generators; `vehicles` is None for one alone."""
+        root = seed if isinstance(seed, np.random.SeedSequence) else np.random.SeedSequence(seed)
         self._noise = noise
         self._seeds = [root]
         if vehicles is not None:

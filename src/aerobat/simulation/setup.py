@@ -6,14 +6,16 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import pairwise
-from typing import Any, Protocol
+from typing import Annotated, Any, Protocol
 
 import numpy as np
+from pydantic import PlainValidator
 
 from aerobat import so3
 from aerobat.arrays import Array, frozen
 from aerobat.control import Controller
 from aerobat.control.parameters import airframe_parameters, controller_parameters, environment_parameters
+from aerobat.declaration import AS_IT_IS, FieldError, Positive, declared, shown
 from aerobat.engines import CompiledLoop, Engine, choose
 from aerobat.engines.engine import first_row
 from aerobat.engines.pytree import Tree, tree_map
@@ -40,28 +42,37 @@ _VEHICLE_TICKS = 160_000  # whose own inputs are made at once, so that they take
 _MIN_CHUNK = 16  # ticks
 
 
-@dataclass(frozen=True, eq=False)
+def _seed(value: Any) -> int | np.random.SeedSequence:
+    if isinstance(value, np.random.SeedSequence):
+        return value
+    if not isinstance(value, int) or isinstance(value, bool) or value < 0:
+        raise FieldError("", f"must be a whole number, zero or more, or a SeedSequence, got {shown(value)}")
+    return value
+
+
+@declared
 class FlightConfig:
     """Settings of a flight, whatever plan is flown."""
 
     controller: Controller = field(default_factory=Controller)
-    rate: float = 500.0  # [1/s] of the controller
+    rate: Positive = 500.0  # [1/s] of the controller
     noise: StateNoise | None = None  # errors of the state that the controller sees
-    seed: int | np.random.SeedSequence = 0  # of the noise
-    start: BodyState | None = None  # true state at first, by default the trajectory's; may carry a batch
+    seed: Annotated[int | np.random.SeedSequence, PlainValidator(_seed)] = 0  # of the noise
+    start: Annotated[BodyState, AS_IT_IS] | None = None  # true, by default the trajectory's; or a batch's
     nominal: Vehicle | None = None  # that controller and set-points are made for; by default what flies
     engine: str = "auto"  # floats, numpy, compiled, jax, jax-float32, or the fastest that is installed
-    log_rate: float | None = None  # [1/s] of the flight's rows, rate over a whole number; by default rate
+    log_rate: Positive | None = None  # [1/s] of the flight's rows, rate over a whole number; by default rate
+
+    def __post_init__(self) -> None:
+        stride = self.rate / (self.log_rate or self.rate)
+        if stride < 1.0 or abs(stride - round(stride)) > 1e-6 * stride:
+            complaint = f"must be rate ({self.rate:g}) over a whole number, got {self.log_rate}"
+            raise FieldError("log_rate", complaint)
 
     @property
     def log_stride(self) -> int:
         """The ticks from one row of the log to the next."""
-        if self.log_rate is None:
-            return 1
-        stride = self.rate / self.log_rate if self.log_rate > 0.0 else 0.0
-        if not (stride >= 1.0 and abs(stride - round(stride)) < 1e-6 * stride):
-            raise SpecError(f"log_rate must be rate ({self.rate:g}) over a whole number, got {self.log_rate}")
-        return round(stride)
+        return round(self.rate / (self.log_rate or self.rate))
 
 
 class Source(Protocol):
@@ -187,7 +198,7 @@ def prepare(
     environment = environment or Environment()
     flying, nominal = _broadcast_vehicles(vehicle, config)
     is_batch = not isinstance(vehicle, Vehicle) or _batch_of(config.start) != ()
-    delay = config.controller.actuation_delay(1.0 / config.rate) if config.rate else 0.0
+    delay = config.controller.actuation_delay(1.0 / config.rate)
     reference = ReferenceSource(trajectory, nominal[0], environment, config.rate, delay)
     fleet = Fleet.of(flying)
     nominal_fleet = fleet if nominal is flying else Fleet.of(nominal)

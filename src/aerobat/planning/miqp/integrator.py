@@ -6,34 +6,27 @@ every matrix is free of dt and can be kept along the search on dt.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import cached_property
 from math import factorial
+from typing import Annotated
 
 import numpy as np
+from pydantic import Field
 
 from aerobat.arrays import Array
-from aerobat.errors import SpecError
+from aerobat.declaration import declared
 
 INPUT_NAMES = {3: "jerk", 4: "snap", 5: "crackle"}
+Order = Annotated[int, Field(ge=min(INPUT_NAMES), le=max(INPUT_NAMES))]
+Intervals = Annotated[int, Field(ge=1, le=10_000)]
 
 
-@dataclass(frozen=True)
+@declared
 class IntegratorChain:
-    """`order` integrators in a row, `intervals` intervals long, for one axis.
+    """`order` integrators in a row, `intervals` intervals long, for one axis."""
 
-    Raises SpecError for an order outside 3, 4, 5 or fewer than one interval.
-    """
-
-    order: int
-    intervals: int
-
-    def __post_init__(self) -> None:
-        """Check."""
-        if self.order not in INPUT_NAMES:
-            raise SpecError(f"order must be 3 (jerk input), 4 (snap) or 5 (crackle), got {self.order}")
-        if not 1 <= self.intervals <= 10_000:
-            raise SpecError(f"intervals must be a whole number from 1 to 10000, got {self.intervals}")
+    order: Order
+    intervals: Intervals
 
     @cached_property
     def forced(self) -> Array:

@@ -4,17 +4,19 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from math import sqrt
+from typing import Annotated, Literal
 
 import numpy as np
 
 from aerobat.certification import Certificate
-from aerobat.errors import Infeasible, SpecError
+from aerobat.declaration import AS_IT_IS, NonNegative
+from aerobat.errors import Infeasible
 from aerobat.optimization import AssignmentResult, Solver, solver
 from aerobat.planning.certified_solve import Judged, Solution, certified_solve, refuted_by_samples, tightened
 from aerobat.planning.miqp.diagnosis import why_infeasible
 from aerobat.planning.miqp.formulation import Formulation
-from aerobat.planning.miqp.integrator import IntegratorChain
-from aerobat.planning.planners import option, planner
+from aerobat.planning.miqp.integrator import IntegratorChain, Intervals, Order
+from aerobat.planning.planners import Planner, option, planner
 from aerobat.planning.recorder import Progress, Recorder
 from aerobat.planning.result import PlacedStage, Plan
 from aerobat.planning.search import BisectionSearch, GridSearch, Search
@@ -30,8 +32,7 @@ JERK_ORDER = 3  # the order whose body rates jump between intervals
 
 
 @planner("miqp")
-@dataclass(frozen=True)
-class Miqp:
+class Miqp(Planner):
     """The paper's mixed-integer program (Section II).
 
     Without a `search`, dt is the first feasible of the paper's grid when there is no vehicle, and otherwise
@@ -40,23 +41,17 @@ class Miqp:
     solved again. Only with jerk as input, order 3, body rates jump, which its certificate then says.
     """
 
-    order: int = option(
+    order: Order = option(
         4, "The derivative that is piecewise constant, 3 jerk (the paper's), 4 snap, 5 crackle."
     )
-    intervals: int = option(20, "N, the number of intervals.")
-    search: Search | None = None
-    backend: str = option(
+    intervals: Intervals = option(20, "N, the number of intervals.")
+    search: Annotated[Search, AS_IT_IS] | None = None
+    backend: Literal["builtin", "gurobi", "scip"] = option(
         "builtin", "The solver, builtin, gurobi or scip (the last two are optional extras)."
     )
-    time_limit: float | None = option(  # [s]
+    time_limit: NonNegative | None = option(  # [s]
         None, "Seconds for each program; the best plan found by then is taken and its gap reported."
     )
-
-    def __post_init__(self) -> None:
-        """Check by building what they describe."""
-        IntegratorChain(self.order, self.intervals)
-        if self.time_limit is not None and not self.time_limit >= 0.0:
-            raise SpecError(f"time_limit must be a number of seconds, zero or more, got {self.time_limit}")
 
     def plan(
         self, problem: Problem, vehicle: Vehicle | None = None, progress: Progress | None = None

@@ -13,12 +13,14 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from typing import ClassVar
+from typing import Annotated, ClassVar
 
 import numpy as np
+from pydantic import Field
 
 from aerobat.certification import Certificate, Verdict
-from aerobat.errors import Infeasible, SpecError
+from aerobat.declaration import AS_IT_IS, Count
+from aerobat.errors import Infeasible
 from aerobat.optimization.nonlinear import import_casadi
 from aerobat.planning.certified_solve import Judged, Solution, certified_solve
 from aerobat.planning.miqp import Miqp
@@ -29,7 +31,7 @@ from aerobat.planning.polynomial.knot_samples import ConstraintViolation, refit
 from aerobat.planning.polynomial.min_snap import MinSnap
 from aerobat.planning.recorder import Progress, Recorder
 from aerobat.planning.result import PlacedStage, Plan
-from aerobat.planning.warm_start import WarmStart, plans_to_begin_from, require_attitudes
+from aerobat.planning.warm_start import Reserve, WarmStart, plans_to_begin_from, require_attitudes
 from aerobat.problem.problem import Problem
 from aerobat.vehicle import Vehicle
 
@@ -52,8 +54,7 @@ SLOWED = 15  # times, at most
 
 
 @planner("free-knots")
-@dataclass(frozen=True)
-class FreeKnots:
+class FreeKnots(Planner):
     """Such polynomials at the rotors' limits, derivatives and times at knots free; needs the extra casadi.
 
     It begins from `start`, a plan of the same problem, certified or not; without one from the closed form
@@ -63,27 +64,18 @@ class FreeKnots:
     kept at samples from either end, for the controller: eight segments without one leave it none.
     """
 
-    segments: int = option(
+    segments: Annotated[int, Field(ge=COARSE)] = option(
         COARSE,
         "How many polynomial segments. 2 is quick and leaves something to the controller; 8 come closer to "
         "time-optimal.",
     )
-    start: Plan | None = None
+    start: Annotated[Plan, AS_IT_IS] | None = None
     still_ends: bool = False
-    reserve: float = option(
+    reserve: Reserve = option(
         0.0, "The fraction of every limit's range that is kept from either of its ends for the controller."
     )
-    iterations: int = 50  # at most, each solve
+    iterations: Count = 50  # at most, each solve
     COMPARED: ClassVar[tuple[dict[str, int], ...]] = ({"segments": 2}, {"segments": 8})
-
-    def __post_init__(self) -> None:
-        """Check."""
-        if self.segments < COARSE:
-            raise SpecError(f"segments must be {COARSE} or more, got {self.segments}")
-        if not 0.0 <= self.reserve < 0.5:
-            raise SpecError(f"reserve must be a part of the range of thrust, 0 to 0.5, got {self.reserve}")
-        if self.iterations < 1:
-            raise SpecError(f"iterations must be 1 or more, got {self.iterations}")
 
     def plan(
         self, problem: Problem, vehicle: Vehicle | None = None, progress: Progress | None = None

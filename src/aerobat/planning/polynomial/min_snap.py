@@ -5,14 +5,17 @@ from __future__ import annotations
 from dataclasses import dataclass
 from enum import StrEnum
 from time import perf_counter
+from typing import Annotated
 
 import numpy as np
+from pydantic import Field, Strict
 
 from aerobat.arrays import Array
 from aerobat.certification import Certificate
+from aerobat.declaration import AS_IT_IS, Count
 from aerobat.errors import Infeasible, SpecError
 from aerobat.planning.certified_solve import Judged, Solution, certified_solve, refuted_by_samples
-from aerobat.planning.planners import option, planner
+from aerobat.planning.planners import Planner, option, planner
 from aerobat.planning.polynomial.knots import first_times, fixed_at_knots, violated_stage
 from aerobat.planning.recorder import Progress, Recorder
 from aerobat.planning.result import PlacedStage, Plan
@@ -37,8 +40,7 @@ class TimeScaling(StrEnum):
 
 
 @planner("min-snap")
-@dataclass(frozen=True)
-class MinSnap:
+class MinSnap(Planner):
     """Closed-form polynomials through waypoints with a line search on their times (Section V).
 
     Degree 2s − 1 at the smallest duration searched. With s = 5, the paper's degree 9, the cost is the
@@ -48,20 +50,15 @@ class MinSnap:
     vehicle can fly it or not (paper, Fig. 10).
     """
 
-    order: int = option(5, "The derivative whose square is minimized, 3 to 5; 5 gives degree 9.")  # s
-    rule: ContinuityRule = ContinuityRule.VARIATIONAL
-    time_scaling: TimeScaling | None = None
-    search: Search | None = None
-    stop_after: int | None = option(
+    order: Annotated[int, Field(ge=3, le=5)] = option(  # s
+        5, "The derivative whose square is minimized, 3 to 5; 5 gives degree 9."
+    )
+    rule: Annotated[ContinuityRule, Strict(False)] = ContinuityRule.VARIATIONAL
+    time_scaling: Annotated[TimeScaling, Strict(False)] | None = None
+    search: Annotated[Search, AS_IT_IS] | None = None
+    stop_after: Count | None = option(
         None, "Stop the search at this attempt, whether the vehicle can fly it or not (paper, Fig. 10)."
     )
-
-    def __post_init__(self) -> None:
-        """Check."""
-        if self.order not in (3, 4, 5):
-            raise SpecError(f"order must be 3 (jerk), 4 (snap) or 5 (crackle), got {self.order}")
-        if self.stop_after is not None and self.stop_after < 1:
-            raise SpecError(f"stop_after must be a number of attempts, 1 or more, got {self.stop_after}")
 
     def plan(
         self, problem: Problem, vehicle: Vehicle | None = None, progress: Progress | None = None

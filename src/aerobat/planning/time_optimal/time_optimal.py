@@ -9,25 +9,28 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
+from typing import Annotated
 
 import numpy as np
+from pydantic import Field
 
 from aerobat import so3
 from aerobat.arrays import Array
 from aerobat.certification import Certificate, Side
+from aerobat.declaration import Count
 from aerobat.environment import Environment
 from aerobat.errors import Infeasible, SpecError
 from aerobat.flatness import axial_drag, end_thrust, reference
 from aerobat.optimization.nonlinear import import_casadi, solve_nonlinear
 from aerobat.planning.certified_solve import Judged, Solution, certified_solve, tightened
 from aerobat.planning.miqp import Miqp
-from aerobat.planning.planners import option, planner
+from aerobat.planning.planners import Planner, option, planner
 from aerobat.planning.recorder import Progress, Recorder
 from aerobat.planning.result import PlacedStage, Plan
 from aerobat.planning.rotor_margin import rotor_findings
 from aerobat.planning.time_optimal.collocation import CollocatedMotion, Mesh
 from aerobat.planning.time_optimal.program import BOUNDED_DERIVATIVES, End, NodeBounds, OptimalControl
-from aerobat.planning.warm_start import WarmStart, plans_to_begin_from, require_attitudes
+from aerobat.planning.warm_start import Reserve, WarmStart, plans_to_begin_from, require_attitudes
 from aerobat.problem.problem import EndState, Limits, Problem
 from aerobat.problem.stage import Condition, Quantity
 from aerobat.so3 import UP
@@ -44,8 +47,7 @@ GUESS_SCALE = 1.5  # how much longer a guess that knows no rotors takes
 
 
 @planner("time-optimal")
-@dataclass(frozen=True)
-class TimeOptimal:
+class TimeOptimal(Planner):
     """The full nonlinear dynamics at the rotors' limits; needs the extra casadi.
 
     So many `intervals` in all are allocated to the phases, starting from the plan of `guess`. Each limit is
@@ -55,25 +57,16 @@ class TimeOptimal:
     in the vertical plane of its guess, where that has one; in space there may be a faster one.
     """
 
-    intervals: int = 60
-    reserve: float = option(
+    intervals: Annotated[int, Field(ge=MIN_INTERVALS)] = 60
+    reserve: Reserve = option(
         0.0,
         "The fraction of each rotor's range of thrust that is kept from either of its ends for the "
         "controller; with 0 a time-optimal plan is a yardstick that no controller follows for sure.",
         command_default=0.03,
     )
     planar: bool = option(True, "Leave the maneuver's vertical plane where that is faster.", off="in_space")
-    iterations: int = 500  # at most, each solve
+    iterations: Count = 500  # at most, each solve
     guess: Miqp = field(default_factory=Miqp)
-
-    def __post_init__(self) -> None:
-        """Check."""
-        if self.intervals < MIN_INTERVALS:
-            raise SpecError(f"intervals must be {MIN_INTERVALS} or more, got {self.intervals}")
-        if not 0.0 <= self.reserve < 0.5:
-            raise SpecError(f"reserve must be a part of the range of thrust, 0 to 0.5, got {self.reserve}")
-        if self.iterations < 1:
-            raise SpecError(f"iterations must be 1 or more, got {self.iterations}")
 
     def plan(
         self, problem: Problem, vehicle: Vehicle | None = None, progress: Progress | None = None
