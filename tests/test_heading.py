@@ -29,3 +29,10 @@ def test_a_bare_trajectory_is_flown_at_its_heading_too() -> None:
     trajectory = ab.plan(replace(ab.load_problem("line"), heading=1.0), vehicle=VEHICLE).trajectory
     flight = ab.fly(trajectory, VEHICLE)
     assert so3.angle_between(flight.states.q_world_body[0], so3.about_axis([0, 0, 1.0], 1.0)) < 1e-9
+
+
+def test_a_score_knows_the_vehicle_of_its_plan() -> None:
+    plan = ab.plan(ab.load_problem("half-flip"), vehicle=VEHICLE)
+    flight = ab.fly(plan)
+    assert ab.score(flight, plan) == ab.score(flight, plan, VEHICLE)
+    assert ab.score(flight, plan).passages[0].clearance > 0.0

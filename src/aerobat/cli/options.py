@@ -20,6 +20,7 @@ output = Group("Output", sort_key=3)
 POSITIVE = validators.Number(gt=0)
 Plugins = partial(
     Parameter,
+    show_default=False,
     name="--import",
     negative="",
     help="A Python file that registers maneuvers or planners of your own; may be given several times.",

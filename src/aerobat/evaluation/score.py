@@ -121,7 +121,7 @@ class Scores:
 
 
 def score(flight: Flight, goal: Problem | Plan, vehicle: Vehicle | None = None) -> Score:
-    """Score one flight; with the vehicle, its clearance in the gates too.
+    """Score one flight; with the vehicle, by default the plan's, its clearance in the gates too.
 
     Errors are against the set-points in the flight: position as a distance [m], attitude as the angle of
     the relative rotation [deg]. With a plan, gates are looked for around its stages' instants; with the
@@ -129,6 +129,8 @@ def score(flight: Flight, goal: Problem | Plan, vehicle: Vehicle | None = None) 
     """
     if flight.is_batch:
         raise SpecError("score takes one flight at a time; of a batch, score flight[k]")
+    if vehicle is None and isinstance(goal, Plan):
+        vehicle = goal.vehicle
     gates = gates_of(goal)
     states = flight.states
     square, angle = position_error(flight) ** 2, attitude_error(flight)

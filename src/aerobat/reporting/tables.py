@@ -70,7 +70,8 @@ def certificate_table(certificate: Certificate, title: str) -> Table:
 def _plan_facts(plan: Plan) -> Iterable[tuple[str, str]]:
     order = "" if plan.order is None else f", order {plan.order}"
     backend = f", {plan.backend}" if plan.backend else ""
-    yield "planner", f"{plan.planner}{order}, {plan.intervals} intervals{backend}"
+    pieces = "1 interval" if plan.intervals == 1 else f"{plan.intervals} intervals"
+    yield "planner", f"{plan.planner}{order}, {pieces}{backend}"
     dt = "" if plan.dt is None else f"dt {plan.dt:.4f} s "
     yield "duration", f"{plan.duration:.3f} s, {dt}after {len(plan.attempts)} attempts"
     if plan.cost is not None:

@@ -169,7 +169,7 @@ def prepare(
     vehicle: Vehicle | Sequence[Vehicle] | None = None,
     *,
     environment: Environment | None = None,
-    config: FlightConfig = FlightConfig(),
+    config: FlightConfig = FlightConfig(),  # noqa: B008 - frozen
     **changes: Any,
 ) -> FlightSetup:
     """All that a flight takes, to be stepped, cut or branched at will: `loop = prepare(plan).compile()`.
