@@ -35,7 +35,7 @@ class FlatState:
 
 @dataclass(frozen=True)
 class Wrench:
-    """What the rotors do to the body: collective thrust along +z and moments, body frame."""
+    """The rotors' effect on the body: collective thrust along +z and moments, body frame."""
 
     thrust: Array  # [N], (...)
     moment_body: Array  # [N·m], (..., 3)
@@ -43,7 +43,7 @@ class Wrench:
 
 @dataclass(frozen=True)
 class Setpoint:
-    """What a trajectory asks of a vehicle: the flat state and all that flatness derives from it."""
+    """A trajectory's demand on a vehicle: the flat state and all that flatness derives from it."""
 
     flat: FlatState
     q_world_body: Array  # (..., 4), sign continuous along time

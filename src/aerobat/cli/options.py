@@ -119,7 +119,7 @@ class FlyingOptions:
 
 @dataclass(frozen=True, kw_only=True)
 class CheckOptions:
-    """What a trajectory is checked for, beyond its vehicle's rotors and the limits of its problem."""
+    """Limits that a trajectory is checked for, beyond those of its vehicle's rotors and its problem."""
 
     vehicle: Annotated[str | None, Parameter(group=limiting)] = None
     """The vehicle: a name that `aerobat vehicles` lists, or a TOML file. Default: the plan's, else

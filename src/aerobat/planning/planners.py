@@ -123,7 +123,7 @@ class PlannerOption:
 
 
 def planner_options(cls: type[Any]) -> tuple[PlannerOption, ...]:
-    """What the command line offers of a planner: its fields that have a help."""
+    """The options that the command line offers of a planner: its fields that have a help."""
     hints = get_type_hints(cls)
     return tuple(_option(f, hints[f.name]) for f in fields(cls) if "help" in f.metadata)
 

@@ -49,7 +49,7 @@ class Plan:
 
     @property
     def certified(self) -> bool:
-        """Whether it is proven that its vehicle can fly it within all limits."""
+        """True if it is proven that its vehicle can fly it within all limits."""
         return self.certificate is not None and self.certificate.certified
 
     @property

@@ -18,7 +18,7 @@ SAMPLES_PER_DEGREE = 2  # of each segment, per degree of its polynomial: a cubic
 
 @dataclass(frozen=True)
 class RotorMargin:
-    """How far the rotors stay from their limits along a trajectory, by flatness.
+    """The distance of the rotors from their limits along a trajectory, by flatness.
 
     `min_thrust` is the least thrust of the rotor that comes closest to its lower limit, `max_thrust` the
     largest of the one that comes closest to its upper limit: with equal rotors, of all of them.

@@ -23,7 +23,7 @@ class Search(Protocol):
     """A way to look for the smallest feasible scale of time."""
 
     def smallest(self, attempt: Attempting[Found]) -> Found | None:
-        """What the attempt found at the smallest scale that the search reaches, or None."""
+        """The find of the attempt at the smallest scale that the search reaches, or None."""
         ...
 
 

@@ -25,7 +25,7 @@ from aerobat.errors import SpecError
 
 
 class Quantity(StrEnum):
-    """What a condition is about, all in the world frame."""
+    """The quantity that a condition is about, all in the world frame."""
 
     POSITION = "position"  # [m]
     VELOCITY = "velocity"  # [m/s]

@@ -116,7 +116,7 @@ class Flight:
 
     @property
     def outcome(self) -> Outcome:
-        """What one flight came to. Raises SpecError for a batch."""
+        """The one flight's end. Raises SpecError for a batch."""
         if self.is_batch:
             raise SpecError("outcome is asked of one flight; of a batch, ask flight[k].outcome or outcomes")
         return self.outcomes[0]

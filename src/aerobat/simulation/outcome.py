@@ -8,7 +8,7 @@ DIVERGENCE_RADIUS = 5.0  # [m] of position error: no controller is expected back
 
 
 class Outcome(Enum):
-    """What a flight came to; the value is a sentence to be filled with its numbers."""
+    """The end of a flight; the value is a sentence to be filled with its numbers."""
 
     COMPLETE = "flown to the end"
     THROUGH_GATES = "through {gate} at {speed:.1f} m/s, {miss_mm:.1f} mm off its centre"

@@ -17,7 +17,7 @@ from aerobat.vehicle import Vehicle
 
 @dataclass(frozen=True)
 class Entry:
-    """What one planner made of the problem: a plan and its flight, or the reason why there is none."""
+    """The result of one planner: a plan and its flight, or the reason why there is none."""
 
     planner: str
     plan: Plan | None
@@ -28,7 +28,7 @@ class Entry:
 
     @property
     def certified(self) -> bool:
-        """Whether there is a plan, proven to stay within the vehicle's limits."""
+        """True if there is a plan, proven to stay within the vehicle's limits."""
         certificate = None if self.plan is None else self.plan.certificate
         return certificate is not None and certificate.certified
 

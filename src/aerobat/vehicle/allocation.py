@@ -20,7 +20,7 @@ def mixer(vehicle: Vehicle) -> Array:
 
 
 def wrench(vehicle: Vehicle, thrusts: Array) -> Wrench:
-    """What rotor thrusts [N], (..., n), do to the body."""
+    """The wrench on the body of rotor thrusts [N], (..., n)."""
     effect = np.asarray(thrusts, dtype=float) @ vehicle.allocation.T
     return Wrench(thrust=effect[..., 0], moment_body=effect[..., 1:])
 

@@ -11,7 +11,7 @@ from aerobat.problem.stage import Condition, Quantity, Stage
 
 @declared
 class GatePassage:
-    """How a gate is passed, beyond meeting its centre.
+    """The manner in which a gate is passed, beyond meeting its centre.
 
     A `perpendicular` passage moves along the gate's direction of passage, at `speed` or faster, and not
     across it, so that a vehicle of some size fits through. The gate is met at half the duration when

@@ -18,7 +18,7 @@ from aerobat.problem.stage import StageSequence
 
 
 class Maneuver(ABC):
-    """What happens on the way: a sequence of stages, given gates and the thrust to be had.
+    """The course of the motion: a sequence of stages, given gates and the thrust to be had.
 
     A maneuver of one's own inherits from this class, is registered by `@maneuver("its-name")`, and says its
     stages; the other questions have answers that suit a maneuver of no special kind.

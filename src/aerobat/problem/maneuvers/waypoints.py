@@ -54,7 +54,7 @@ class Waypoint:
             raise SpecError("nothing is given; give at least one component of the position")
 
     def conditions(self, max_specific_thrust: float) -> Iterable[Condition]:
-        """What is given, as conditions of a stage."""
+        """The given components, as conditions of a stage."""
         for quantity in FIXABLE:
             for direction, value in zip(np.eye(3), getattr(self, quantity.value).tolist(), strict=True):
                 if not np.isnan(value):
