@@ -81,7 +81,7 @@ class TracedLoop:
 
     @cached_property
     def _changing(self) -> set[int]:
-        """What inputs and carry change."""
+        """Values that inputs and carry change."""
         changing = {*self.inputs, *self.carry}
         for number, operation in enumerate(self.trace.operations):
             if not changing.isdisjoint(operation.arguments):

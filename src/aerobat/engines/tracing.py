@@ -55,7 +55,7 @@ class Operation:
 
 @dataclass
 class Trace:
-    """What symbols write down when they are computed with."""
+    """Record of the operations that symbols take part in."""
 
     operations: list[Operation] = field(default_factory=list)
     _numbers: dict[Any, int] = field(default_factory=dict)

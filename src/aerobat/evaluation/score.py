@@ -91,7 +91,7 @@ class Scores:
 
     @property
     def outcomes(self) -> tuple[Outcome, ...]:
-        """What each flight came to."""
+        """Outcome of each flight."""
         return tuple(score.outcome for score in self)
 
     def _outcome(self, k: int, passed: tuple[Passage, ...]) -> tuple[Outcome, str]:

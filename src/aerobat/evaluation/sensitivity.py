@@ -208,7 +208,7 @@ def _sensitivity(
 
 
 def _tangent(setup: FlightSetup, name: str, unit: Array) -> LoopParameters:
-    """How the loop's parameters change with a quantity, along `unit`; leaves (vehicles,)."""
+    """Derivative of the loop's parameters in a quantity, along `unit`; leaves (vehicles,)."""
     still: LoopParameters = tree_map(np.zeros_like, setup.parameters)
     observer, model, plant, metrics = still.own
     if name in _GAINS:

@@ -31,7 +31,7 @@ def mix(mixer: Mixer, load: Wrench) -> PerRotor:
 
 
 def within_limits(rotors: Rotors, thrusts: PerRotor) -> Scalar:
-    """Whether thrusts [N] are within all limits."""
+    """True where thrusts [N] are within all limits."""
     inside: Scalar = True
     for f, low, high, slack in zip(thrusts, rotors.min_thrust, rotors.max_thrust, rotors.slack, strict=True):
         inside = inside & (f >= low - slack) & (f <= high + slack)

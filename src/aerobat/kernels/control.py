@@ -29,7 +29,7 @@ _MIN_PART = 0.3  # [-] of the commanded specific thrust, kept where the vehicle 
 
 
 class FeatureFlags(NamedTuple):
-    """What the controller adds to the paper's law; see `aerobat.control.Controller`."""
+    """Features beyond the paper's law; see `aerobat.control.Controller`."""
 
     moment_feedforward: bool
     motor_lag_compensation: bool
@@ -53,7 +53,7 @@ class Commands(NamedTuple):
 
 
 class ControllerState(NamedTuple):
-    """What evolves in the controller from tick to tick, its commands among it."""
+    """State of the controller from tick to tick, its commands among it."""
 
     outer: PositionLoopState
     attitude_integral: Vector  # [rad·s]

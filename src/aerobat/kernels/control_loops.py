@@ -49,7 +49,7 @@ class Lookahead(NamedTuple):
 
 
 class ReferencePoint(NamedTuple):
-    """What the controller tracks at one tick; world frame."""
+    """Reference of the controller at one tick; world frame."""
 
     position: Vector  # [m]
     velocity: Vector  # [m/s]
@@ -130,7 +130,7 @@ def _drag(
 
 
 class AttitudeCommand(NamedTuple):
-    """What the inner loop tracks."""
+    """Reference of the inner loop."""
 
     specific_thrust: Vector  # [m/s²] world, along the desired b3
     q_world_body: Quaternion

@@ -28,7 +28,7 @@ class MassProperties(NamedTuple):
 
 
 class EnvironmentParameters(NamedTuple):
-    """What acts on every body; see `aerobat.environment.Environment`."""
+    """Gravity and wind, which act on every body; see `aerobat.environment.Environment`."""
 
     gravity: Scalar  # [m/s²] along −z
     wind: Vector  # [m/s] velocity of the air, world

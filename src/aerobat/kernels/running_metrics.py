@@ -23,7 +23,7 @@ class MetricsInput(NamedTuple):
 
 
 class MetricsParameters(NamedTuple):
-    """What a flight is judged by."""
+    """Criteria by which a flight is judged."""
 
     divergence_radius_sq: Scalar  # [m²] of squared position error, beyond which a vehicle has diverged
     ground: Scalar  # [m] height, −infinity where there is none

@@ -29,7 +29,7 @@ Detail = TypeVar("Detail")
 
 @dataclass(frozen=True, eq=False)
 class Solution(Generic[Detail]):
-    """What a planner's program answered: a trajectory, or a sentence about why there is none."""
+    """Answer of a planner's program: a trajectory, or a sentence about why there is none."""
 
     source: Detail  # whatever the planner tightens by and reads its stages from
     duration: float  # [s]

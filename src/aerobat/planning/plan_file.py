@@ -31,7 +31,7 @@ FORMAT = "aerobat-plan-1"
 
 @dataclass(frozen=True)
 class _Evidence:
-    """What a document holds beside problem and vehicle: the fields of Plan of those names."""
+    """Content of a document beside problem and vehicle: the fields of Plan of those names."""
 
     planner: str
     order: int | None

@@ -90,7 +90,7 @@ def sampled_margin(trajectory: Trajectory, vehicle: Vehicle, environment: Enviro
 
 
 def rotor_findings(certificate: Certificate, side: Side) -> list[Finding]:
-    """What a certificate says of each rotor's thrust on one side."""
+    """Findings of a certificate about each rotor's thrust on one side."""
     return [f for f in certificate.findings if f.quantity.startswith("rotor ") and f.side is side]
 
 

@@ -81,7 +81,7 @@ class Condition:
         return self.lower - weight, self.upper - weight
 
     def weight(self, gravity: float) -> float:
-        """What gravity [m/s²] adds to the derivative of position along the direction to make the quantity."""
+        """Difference [m/s²] that gravity makes between the quantity and the derivative of position."""
         return gravity * float(self.direction[2]) if self.quantity is Quantity.SPECIFIC_THRUST else 0.0
 
     @property

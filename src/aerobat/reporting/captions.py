@@ -10,7 +10,7 @@ from aerobat.simulation import Flight
 
 
 def plan_caption(plan: Plan) -> str:
-    """How a plan came about."""
+    """Origin of a plan in a few words."""
     dt = "" if plan.dt is None else f" of {plan.dt:.4f} s"
     order = "" if plan.order is None else f", order {plan.order}"
     cost = "" if plan.cost is None else f", cost {plan.cost:.6g}"
@@ -19,7 +19,7 @@ def plan_caption(plan: Plan) -> str:
 
 
 def score_caption(score: Score) -> str:
-    """How a flight went."""
+    """Course of a flight in a few words."""
     return (
         f"{score.sentence}; position error at most {length(score.max_position_error_m)}, "
         f"attitude error at most {score.max_attitude_error_deg:.2f}°, "

@@ -133,7 +133,7 @@ def _facts(comparison: Comparison, entry: Entry) -> dict[str, str]:
 
 
 def _name(entry: Entry) -> str:
-    """What tells a planner from others of its kind."""
+    """Label that tells a planner from others of its kind."""
     if entry.plan is None:
         return entry.planner
     return f"{entry.planner}, {entry.plan.intervals} segments"
@@ -167,7 +167,7 @@ def _draw_rows(figure: Figure, comparison: Comparison, colours: Sequence[str], t
 
 
 def _draw_thrusts(axes: Axes, plan: Plan, vehicle: Vehicle, colour: str) -> None:
-    """What flatness asks of all rotors, up to the plan's end."""
+    """Thrusts that flatness asks of all rotors, up to the plan's end."""
     reference = plan_reference(plan, vehicle)
     axes.plot(reference.times, reference.rotor_thrusts, color=colour, linewidth=1.1)
     axes.axvline(plan.duration, color=colour, linewidth=2.4)

@@ -107,7 +107,7 @@ class RigidBodyPlant:
 
 
 class LogRow(NamedTuple):
-    """What is kept of each tick."""
+    """Row of the log, kept of each tick."""
 
     motion: Motion
     commands: Commands

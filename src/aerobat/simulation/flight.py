@@ -106,7 +106,7 @@ class Flight:
 
     @cached_property
     def setpoint(self) -> Setpoint:
-        """What the trajectory asked (of the first vehicle, where vehicles differ), (T, ·)."""
+        """Set-points of the trajectory (of the first vehicle, where vehicles differ), (T, ·)."""
         return _setpoint(self.series)
 
     @property

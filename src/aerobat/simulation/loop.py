@@ -35,14 +35,14 @@ class Clock(NamedTuple):
 
 
 class LoopParameters(NamedTuple):
-    """What does not change along a flight."""
+    """Parameters that do not change along a flight."""
 
     start: Body  # the true state at first
     own: tuple[Tree, ...]  # of each component
 
 
 class LoopInput(NamedTuple):
-    """What comes from outside at a tick."""
+    """Inputs from outside at a tick."""
 
     clock: Clock
     reference: ReferencePoint

@@ -59,7 +59,7 @@ class ReferenceSource:
         return setpoint_rows(self._setpoint, slice(begin - first, end - first))
 
     def chunk(self, begin: int, end: int) -> ReferencePoint:
-        """What the controller tracks at the ticks from `begin` to before `end`, all of one block."""
+        """References of the controller at the ticks from `begin` to before `end`, all of one block."""
         self._make(begin)
         first = self._block * BLOCK
         points: ReferencePoint = tree_map(lambda leaf: leaf[begin - first : end - first], self._points)

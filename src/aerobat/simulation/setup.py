@@ -91,15 +91,15 @@ class Flyable(Protocol):
 
     @property
     def trajectory(self) -> Trajectory:
-        """What is flown."""
+        """The trajectory to fly."""
 
     @property
     def vehicle(self) -> Vehicle | None:
-        """What it was planned for."""
+        """The vehicle it was planned for."""
 
     @property
     def problem(self) -> Any:
-        """What it solves, with its environment."""
+        """The problem it solves, with its environment."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -222,7 +222,7 @@ class _Codegen:
 
     @contextmanager
     def _counting(self, begin: Any, end: Any, step: int) -> Iterator[Any]:
-        """What is written inside runs for begin, begin + step, ..., below end."""
+        """Context whose code runs for begin, begin + step, ..., below end."""
         b = self._builder
         slot = self._slot(begin)
         test, body, after = (b.append_basic_block() for _ in range(3))

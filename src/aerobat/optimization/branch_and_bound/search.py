@@ -70,7 +70,7 @@ class BestFirstSearch:
 
     @property
     def status(self) -> Status:
-        """What is proven so far."""
+        """The cost bounds proven so far."""
         if self.best is not None:
             return "time_limit" if self._improves(self.bound) else "optimal"
         return "infeasible" if self.bound == inf else "unknown"

@@ -72,7 +72,7 @@ class BranchAndBound:
 
 
 class _Factorization:
-    """What depends on the matrices, on which rows are equalities and on the rows of the stages alone."""
+    """All that depends on the matrices, on which rows are equalities and on the rows of the stages alone."""
 
     def __init__(self, program: AssignmentProgram, implicit_equalities: Mask) -> None:
         self._program = program

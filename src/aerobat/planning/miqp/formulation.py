@@ -156,7 +156,7 @@ class Formulation:
         return frozen(matrix.reshape(len(self._rows), 3 * self.chain.intervals), "rows")
 
     def _free(self, dt: float) -> Array:
-        """What each row is without input, normalised, (m,)."""
+        """Value of each row without input, normalised, (m,)."""
         free = np.concatenate(
             [self.chain.free(self.initial, dt), np.zeros((self.chain.intervals, 1, 3))], axis=1
         )

@@ -30,7 +30,7 @@ class IntegratorChain:
 
     @cached_property
     def forced(self) -> Array:
-        """What the inputs add at interval ends, (N, r, N): derivative d at the end of interval n per input.
+        """Effect of the inputs at interval ends, (N, r, N): derivative d at the end of interval n per input.
 
         An input on interval i < n acts through the Taylor weights of the time since: with k = n − i,
         ((k + 1)^(r−d) − k^(r−d)) / (r − d)!.
@@ -44,7 +44,7 @@ class IntegratorChain:
         return np.asarray(np.stack(powers, axis=1) * weights[:, None])
 
     def free(self, initial: Array, dt: float) -> Array:
-        """What the initial state (r, 3) in SI units leads to without input, normalised, (N, r, 3)."""
+        """Effect of the initial state (r, 3), in SI units, without input, normalised, (N, r, 3)."""
         scaled = initial * self.scales(dt)[:, None]
         ends = np.arange(1.0, self.intervals + 1)
         taylor = np.zeros((self.intervals, self.order, self.order))

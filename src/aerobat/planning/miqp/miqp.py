@@ -110,7 +110,7 @@ class _Planning:
     slots: tuple[int, ...] | None = None  # of the last solution: where the next solve begins
 
     def attempt(self, dt: float) -> Judged[AssignmentResult] | None:
-        """What one dt comes to; None where nothing is found that the rotors can follow within all limits."""
+        """Outcome of one dt; None where nothing is found that the rotors can follow within all limits."""
         program = _ProgramAtDt(self, dt)
         jumps = self.config.order == JERK_ORDER
         judged = certified_solve(

@@ -185,7 +185,7 @@ class _Descent:
         )
 
     def _certified(self, program: _SlowedStart | _Exchange, rounds: int) -> Judged[_Path] | None:
-        """What a program comes to, if it is certified; the best is kept."""
+        """Outcome of a program, if it is certified; the best is kept."""
         found = certified_solve(program, self.problem, self.vehicle, self.recorder, rounds)
         if not found.feasible:
             return None

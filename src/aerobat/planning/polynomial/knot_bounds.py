@@ -24,7 +24,7 @@ class Bound:
 
     @classmethod
     def of(cls, condition: Condition, gravity: float) -> Bound:
-        """What a condition asks of its derivative."""
+        """Bound that a condition puts on its derivative."""
         bounds = condition.kinematic_bounds(gravity)
         return cls(condition.quantity.derivative, condition.direction, *bounds)
 
@@ -46,7 +46,7 @@ class Bound:
 
 
 def path_bounds(problem: Problem, sequence: StageSequence, gravity: float) -> tuple[Bound, ...]:
-    """What holds along the whole path: the problem's limits, and what its sequence asks always."""
+    """Bounds along the whole path: the problem's limits, and what its sequence asks always."""
     limits = (
         Bound(derivative, axis, float(low), float(high))
         for derivative in range(len(DERIVATIVES))

@@ -115,7 +115,7 @@ class KnotProgram:
         return _Rows(ca.vec(values), np.tile(lower, len(times)), np.tile(upper, len(times)))
 
     def _path(self) -> Iterator[_Rows]:
-        """What holds along the whole path, at all samples but the very ends, which are fixed."""
+        """Constraints along the whole path, at all samples but the very ends, which are fixed."""
         last = len(self.samples) - 1
         for bound in self.bounds:
             for i, s in enumerate(self.samples):
@@ -123,7 +123,7 @@ class KnotProgram:
                 yield from self._within(bound, i, _powers(inner, bound.derivative), self.reserve)
 
     def _stages(self) -> Iterator[_Rows]:
-        """What the stages ask, each at its place."""
+        """Constraints of the stages, each at its place."""
         ca, variables = import_casadi(), self._variables
         for j, stage in enumerate(self.guess.stages):
             s = variables.place(j)

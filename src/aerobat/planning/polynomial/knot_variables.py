@@ -168,7 +168,7 @@ class KnotVariables:
 
     @cached_property
     def _effect(self) -> Array:
-        """What offsets add to those, row after row, (segments · 10 · d, offsets)."""
+        """Effect of offsets on those, row after row, (segments · 10 · d, offsets)."""
         length = self.vehicle.max_specific_thrust * self._mean**2 / perm(POLYNOMIAL_DEGREE, 2)
         sizes = np.array([length * perm(POLYNOMIAL_DEGREE, k) / self._mean**k for k in range(END_ORDER)])
         rows = self._rows()

@@ -102,7 +102,7 @@ class _Planning:
         self.scaling = config.time_scaling or timed
 
     def attempt(self, duration: float) -> Judged[None] | None:
-        """What one duration comes to; None unless it meets its stages and the vehicle can fly it."""
+        """Outcome of one duration; None unless it meets its stages and the vehicle can fly it."""
         program = _ClosedForm(self, duration)
         judged = certified_solve(program, self.problem, self.vehicle, self.recorder)
         stopped = len(self.recorder.attempts) == self.config.stop_after

@@ -84,13 +84,13 @@ class Mesh:
 
     @cached_property
     def fractions(self) -> Array:
-        """What part of each phase each interval takes, (P, K)."""
+        """Part of each phase that each interval takes, (P, K)."""
         counts = np.array(self.intervals)
         return np.repeat(np.diag(1.0 / counts), counts, axis=1)
 
     @cached_property
     def scale(self) -> Array:
-        """What is large for each unknown, in SI units, (size,)."""
+        """Scale of each unknown, in SI units, (size,)."""
         phases, _, inputs = self._sizes
         states, inputs = self.total + 1, inputs // INPUTS
         return np.concatenate(

@@ -39,7 +39,7 @@ ALONG_Z = np.zeros(3), np.array([0.0, 0.0, inf])  # bounds on a thrust direction
 
 @dataclass(frozen=True, eq=False)
 class End:
-    """What is fixed at one end of the motion; body rates are zero there."""
+    """State fixed at one end of the motion; body rates are zero there."""
 
     position: Array  # [m], (3,)
     velocity: Array  # [m/s], (3,)
@@ -49,7 +49,7 @@ class End:
 
 @dataclass(frozen=True, eq=False)
 class NodeBounds:
-    """What holds at every node: limits, and the range of the rotors' thrusts or, where they lag, commands."""
+    """Bounds at every node: limits, and the range of the rotors' thrusts or, where they lag, commands."""
 
     lower: Array  # [N], (n,)
     upper: Array  # [N], (n,)

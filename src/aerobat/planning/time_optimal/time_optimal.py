@@ -127,7 +127,7 @@ class _Point:
 
 @dataclass(frozen=True, eq=False)
 class _TightenedBounds:
-    """What is held at nodes, a little within what shall hold everywhere."""
+    """Bounds held at nodes, a little within what shall hold everywhere."""
 
     limits: Limits
     low_backoff: float = 0.0  # [N] above the rotors' least thrusts
@@ -252,7 +252,7 @@ def _within_plane(problem: Problem, guess: WarmStart) -> tuple[Condition, ...]:
 
 
 def _end(state: EndState, vehicle: Vehicle, environment: Environment) -> End:
-    """What an end state asks of the thrust."""
+    """Thrust that an end state asks for."""
     thrust = end_thrust(state.velocity, state.acceleration, vehicle, environment)
     norm = float(np.linalg.norm(thrust))
     along = float(thrust @ (state.velocity - environment.wind)) / norm

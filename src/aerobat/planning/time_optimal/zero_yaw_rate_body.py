@@ -76,7 +76,7 @@ class ZeroYawRateBody:
 
     @cached_property
     def _model(self) -> ControllerModel:
-        """What the kernels know of the vehicle, in plain floats."""
+        """The kernels' view of the vehicle, in plain floats."""
         drag = lateral_drag(self.vehicle) * self.vehicle.mass
         flat = replace(self.vehicle, drag_body=np.array([drag, drag, self.vehicle.drag_body[2]]))
         parameters = controller_parameters(Controller(), Fleet.of([flat]), self.environment)

@@ -27,7 +27,7 @@ def _free() -> Array:
 
 @declared
 class Waypoint:
-    """What is given where one passes by, world frame; components that are NaN are free.
+    """Components fixed at one point of the path, world frame; components that are NaN are free.
 
     `up` asks that the thrust points there, with exactly `thrust` per mass, or, without it, with at least a
     fraction of what the vehicle has. Raises SpecError when nothing is given, or acceleration and attitude

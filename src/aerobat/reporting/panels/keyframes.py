@@ -79,7 +79,7 @@ class Keyframes:
 
 
 def plan_keyframes(plan: Plan, vehicle: Vehicle) -> Keyframes:
-    """What `plan` asks of `vehicle` at its stages, and where those are few, at equal steps of time."""
+    """Keyframes of `plan` for `vehicle` at its stages, and where those are few, at equal steps of time."""
     shown = [Keyframe(stage.name, stage.time, stage.interval, stage.gate) for stage in plan.stages]
     if len(shown) < FEWEST:
         steps = np.linspace(0.0, plan.duration, STEPS + 1).tolist()

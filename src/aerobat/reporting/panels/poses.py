@@ -41,7 +41,7 @@ class PoseHistory:
 
     @property
     def is_flat(self) -> bool:
-        """Whether the path is much longer than high."""
+        """True if the path is much longer than high."""
         return is_flat(self.position)
 
     def rows(self, times: Sequence[float] | Array) -> list[int]:
@@ -62,13 +62,13 @@ class PoseHistory:
 
 
 def is_flat(positions: Array) -> bool:
-    """Whether a path (T, 3) is much longer than high."""
+    """True if a path (T, 3) is much longer than high."""
     extents = np.ptp(positions, axis=0)
     return bool(extents[2] < FLATNESS_RATIO * extents.max())
 
 
 def plan_reference(plan: Plan, vehicle: Vehicle) -> Reference:
-    """What a plan asks of a vehicle from start to goal, sampled for drawing."""
+    """Reference of a plan for a vehicle from start to goal, sampled for drawing."""
     return reference(plan.trajectory, vehicle, rate=POSE_RATE, environment=plan.problem.environment)
 
 

@@ -41,7 +41,7 @@ class Camera:
         return np.asarray(points @ self.screen.T)
 
     def nearness(self, points: Array) -> Array:
-        """How far toward the viewer points lie [m], (..., 3) -> (...)."""
+        """Depth of points toward the viewer [m], (..., 3) -> (...)."""
         return np.asarray(points @ self.toward)
 
 
@@ -73,7 +73,7 @@ def _spread(path: Array, corners: Array, size: Array, cameras: list[Camera]) -> 
 
 
 def _openness(gates: Sequence[Gate], cameras: list[Camera]) -> Array:
-    """How open the least open gate looks, (cameras,); the root lets the path weigh more than the gates."""
+    """Openness of the least open gate, (cameras,); the root lets the path weigh more than the gates."""
     normals = np.array([gate.normal for gate in gates]).reshape(-1, 3)
     openness = np.abs(np.array([camera.toward for camera in cameras]) @ normals.T)
     return np.asarray(np.sqrt(openness.min(axis=1, initial=1.0)))
