@@ -171,8 +171,8 @@ def test_what_cannot_be_asked_is_refused():
     ("options", "sentence"),
     [
         ({"intervals": 3}, "intervals must be 4 or more, got 3"),
-        ({"reserve": 0.6}, "reserve must be a part"),
-        ({"reserve": float("nan")}, "reserve must be a part"),
+        ({"reserve": 0.6}, r"TimeOptimal\.reserve must be less than 0\.5, got 0\.6"),
+        ({"reserve": float("nan")}, r"TimeOptimal\.reserve must be a finite number"),
         ({"iterations": 0}, "iterations must be 1 or more"),
     ],
 )
