@@ -29,7 +29,8 @@ QUAD = replace(
     inertia=AGILE.inertia * 1.04 + 1e-4 * np.ones((3, 3)) * np.trace(AGILE.inertia),
 )  # not quite the nominal one
 PATH, RATE = loops(6.0), 500.0
-GAINS = tuple(f.name for f in fields(Controller) if f.type == "float" and f.name != "lead_time_constant")
+NUMBERS = tuple(f.name for f in fields(Controller) if isinstance(f.default, float))
+GAINS = tuple(name for name in NUMBERS if name != "lead_time_constant")
 FIVE = ("position_gain", "velocity_gain", "integral_gain", "attitude_frequency", "attitude_damping")
 ROTORS = ("lag", "torque_coefficient", "min_thrust", "max_thrust", "position_body")
 START = BodyState(
@@ -93,7 +94,7 @@ def test_slopes_in_gains(name: str, everything: Sensitivity) -> None:
 def test_gains_have_slopes_on_weak_rotors_too(name: str, max_bandwidth: float) -> None:
     """Where the vehicle, not the controller, sets how fast the loops are."""
     value = getattr(TIGHT, name)
-    gains = replace(TIGHT, **{name: Dual(value, value)}).gains(max_bandwidth, DualOps(FloatOps))
+    gains = TIGHT.gains(max_bandwidth, DualOps(FloatOps), **{name: Dual(value, value)})
     got = [dual(gain).tangent or 0.0 for gain in gains]
 
     def changed(moves: Array) -> Array:
