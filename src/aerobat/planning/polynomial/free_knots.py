@@ -36,9 +36,8 @@ from aerobat.problem.problem import Problem
 from aerobat.vehicle import Vehicle
 
 COARSE = 2  # segments to begin with, which are quick and come near the least time
-ROUNDS = 30  # of solving, at most, until one is certified
+ROUNDS = 30  # of solving, at most, for one number of segments
 LITTLE_GAIN = 2e-3  # of the duration, from one certified path to the next: the end
-V_GAIN = 2e-3
 COARSE_SAMPLES = 25  # of each segment at first
 FINE_SAMPLES = 16  # of each of more segments, which turn less
 TRUST_RADIUS = 2.0  # of all segments together, in scaled variables, see KnotVariables
@@ -138,12 +137,12 @@ class _Descent:
             guess = found.solution.source.guess
         for segments in sorted({COARSE, self.config.segments}):
             program = _Exchange(self, replace(guess, trajectory=refit(guess.trajectory, segments)))
-            gain = 1.0
-            while gain > LITTLE_GAIN:
-                before, found = program.guess, self._certified(program, ROUNDS)
+            gain, end = 1.0, len(self.recorder.attempts) + ROUNDS
+            while gain > LITTLE_GAIN and (left := end - len(self.recorder.attempts)) > 0:
+                before, found = program.guess, self._certified(program, left)
                 if found is None:
                     break
-                program.guess = found.solution.source.guess
+                program.go_on_from(found.solution.source.guess)
                 gain = 1.0 - found.solution.duration / before.trajectory.duration
             guess = program.guess
 
@@ -252,8 +251,19 @@ class _Exchange:
         path = descent.path(found, unsolved=answer.violation)
         return descent.solution(path, status, answer.iterations, answer.time)
 
+    def go_on_from(self, certified: WarmStart) -> None:
+        """Begin again from a certified path, in the whole trust region."""
+        self.guess = certified
+        self._radius = TRUST_RADIUS / certified.trajectory.segments
+
     def tighten(self, solution: Solution[_Path], certificate: Certificate | None) -> bool:
-        """Sample where limits are exceeded, and go on from there, or in a smaller region if by too much."""
+        """Sample where limits are exceeded, and go on from there, or in a smaller region if by too much.
+
+        A path slower than the best that is certified is given up: tightening only slows it further.
+        """
+        best = self._descent.best
+        if best is not None and solution.duration >= best.solution.duration:
+            return False
         found, violation = solution.source.guess, solution.source.violation
         for finding in () if certificate is None else certificate.findings:
             if finding.verdict is not Verdict.HOLDS:
