@@ -183,6 +183,9 @@ def test_a_saved_plan_is_flown_as_it_is(capsys) -> None:
     code, _, err = run(capsys, "fly", "out/mars/mars.plan", "--order", "5")
     assert code == 2
     assert "--order plans anew" in err
+    code, _, err = run(capsys, "fly", "out/mars/mars.plan", "--angle", "0")
+    assert code == 2
+    assert "--angle plans anew" in err
 
 
 def test_a_picture_that_cannot_be_drawn_leaves_the_earlier_run_whole(capsys, monkeypatch) -> None:

@@ -2,7 +2,6 @@
 
 import json
 import pickle
-from collections.abc import Callable
 from dataclasses import fields, replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -17,6 +16,7 @@ import aerobat as ab
 from aerobat.declaration import Registry, from_table, to_table
 from aerobat.errors import SpecError
 from aerobat.problem import GatePassage, StageSequence
+from refusals import complaint
 
 START, GOAL = ab.at_rest((0, 0, 0)), ab.at_rest((9, 0, 0))
 THREE = tuple(ab.tilted_gate(np.array([x, 0.0, 1.0]), name=f"gate {x:g}") for x in (2.0, 4.0, 6.0))
@@ -42,15 +42,6 @@ GOOD: dict[type, dict[str, Any]] = {
 }
 NO_NUMBERS = ("1", True, 1j, None, HUGE, np.nan, object())
 FIELDS = [(cls, each.name) for cls in GOOD for each in fields(cls)]  # type: ignore[arg-type]
-
-
-def complaint(make: Callable[[], Any]) -> str:
-    """What is wrong, if anything; an error of any other kind passes through."""
-    try:
-        make()
-    except SpecError as error:
-        return str(error)
-    return ""
 
 
 @pytest.mark.parametrize(("cls", "field"), FIELDS, ids=lambda x: getattr(x, "__name__", x))

@@ -3,7 +3,6 @@
 import pickle
 import subprocess
 import sys
-from collections.abc import Callable
 from dataclasses import dataclass, fields, replace
 from typing import Any
 
@@ -13,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import aerobat as ab
-from aerobat.errors import SpecError
+from refusals import complaint
 
 SETTINGS = (
     ab.StateNoise,
@@ -40,15 +39,6 @@ JUNK = st.one_of(
     st.dictionaries(st.text(max_size=3), st.floats(), max_size=2),
     st.sampled_from([10**400, ab.Miqp(), ab.GridSearch(), ab.Limits(), object()]),
 )
-
-
-def complaint(make: Callable[[], Any]) -> str:
-    """What is wrong, if anything; an error of any other kind passes through."""
-    try:
-        make()
-    except SpecError as error:
-        return str(error)
-    return ""
 
 
 @pytest.mark.parametrize(("cls", "field"), NUMBERS, ids=lambda x: getattr(x, "__name__", x))

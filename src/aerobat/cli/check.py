@@ -11,7 +11,7 @@ from typing import Annotated
 from cyclopts import Parameter
 
 from aerobat.certification import Envelope, certify
-from aerobat.cli.options import CheckOptions
+from aerobat.cli.options import DEFAULT_VEHICLE, CheckOptions
 from aerobat.environment import Environment
 from aerobat.interchange import read_plan
 from aerobat.planning import Plan
@@ -21,7 +21,6 @@ from aerobat.reporting.tables import certificate_table, show
 from aerobat.vehicle import load_vehicle
 
 NOT_CERTIFIED = 1
-ASSUMED_VEHICLE = "agile-quad"
 
 
 def check(plan: Path, options: Annotated[CheckOptions, Parameter(name="*")] = CheckOptions()) -> None:
@@ -44,7 +43,7 @@ def check(plan: Path, options: Annotated[CheckOptions, Parameter(name="*")] = Ch
     if options.heading is not None:
         trajectory = replace(trajectory, heading=radians(options.heading))
     own_vehicle = found.vehicle if isinstance(found, Plan) else None
-    vehicle = named_vehicle or own_vehicle or load_vehicle(ASSUMED_VEHICLE)
+    vehicle = named_vehicle or own_vehicle or load_vehicle(DEFAULT_VEHICLE)
     environment = found.problem.environment if isinstance(found, Plan) else Environment()
     envelope = Envelope(
         speed=options.max_speed or inf,

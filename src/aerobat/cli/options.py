@@ -17,6 +17,7 @@ flying = Group("Flying", sort_key=2)
 limiting = Group("Limits", sort_key=2)
 output = Group("Output", sort_key=3)
 
+DEFAULT_VEHICLE = "agile-quad"
 POSITIVE = validators.Number(gt=0)
 Plugins = partial(
     Parameter,

@@ -10,7 +10,7 @@ from math import isfinite, radians
 from pathlib import Path
 from typing import Any
 
-from aerobat.cli.options import PlanningOptions, TaskOptions, offered_options, option_name
+from aerobat.cli.options import DEFAULT_VEHICLE, PlanningOptions, TaskOptions, offered_options, option_name
 from aerobat.errors import SpecError
 from aerobat.planning import (
     Attempt,
@@ -29,7 +29,7 @@ from aerobat.vehicle import Vehicle, load_vehicle
 def read_task(name: str, options: TaskOptions, paper: bool = False) -> tuple[Problem, Vehicle]:
     """The problem and the vehicle that a command names."""
     problem = load_problem(name)
-    vehicle = load_vehicle(options.vehicle or ("hexarotor" if paper else "agile-quad"))
+    vehicle = load_vehicle(options.vehicle or ("hexarotor" if paper else DEFAULT_VEHICLE))
     if options.angle is not None:
         problem = _tilted(problem, options.angle)
     return (problem.as_in_paper() if paper else problem), vehicle
@@ -91,19 +91,24 @@ def _read_plan(path: Path, options: PlanningOptions) -> Plan:
     """A saved plan, for its own vehicle or another. Raises SpecError for options that plan anew."""
     names = ["planner", "paper", "angle", *(option_name(flag) for flag in offered_options())]
     for name in names:
-        if getattr(options, name):
+        if _is_given(getattr(options, name)):
             flag = "--" + name.replace("_", "-")
             raise SpecError(f"{flag} plans anew, but {path} is a plan; leave it out, or name a problem")
     found = load_plan(path)
     if options.vehicle is None and found.vehicle is not None:
         return found
-    return with_certificate(found, load_vehicle(options.vehicle or "agile-quad"))
+    return with_certificate(found, load_vehicle(options.vehicle or DEFAULT_VEHICLE))
+
+
+def _is_given(value: Any) -> bool:
+    """True for an option that was given, a zero among them."""
+    return value is not None and value is not False
 
 
 def _check_options(options: PlanningOptions, planner: str) -> None:
     """Refuse options that mean nothing to a planner."""
     for flag, offers in offered_options().items():
-        if planner not in offers and getattr(options, option_name(flag)):
+        if planner not in offers and _is_given(getattr(options, option_name(flag))):
             takers = " or ".join(offers)
             raise SpecError(f"{flag} is for --planner {takers}, not {planner}; leave one of them out")
     if options.paper and planner != "miqp":
