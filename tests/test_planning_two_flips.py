@@ -12,7 +12,7 @@ import pytest
 from aerobat.optimization import AssignmentProgram, solver
 from aerobat.planning.miqp import formulate
 from aerobat.problem import CustomManeuver, load_problem
-from aerobat.problem.stage import Condition, Quantity
+from aerobat.problem.condition import Condition, Quantity
 from aerobat.trajectory import Trajectory
 
 EXAMPLE = Path(__file__).parents[1] / "examples" / "two-flips.toml"

@@ -18,6 +18,7 @@ from aerobat.environment import Environment
 from aerobat.errors import SpecError
 from aerobat.flatness.parallel_transport import Frames, TimeInterval, frames
 from aerobat.kernels import flatness as kernel
+from aerobat.problem.condition import ForceBalance
 from aerobat.states import FlatState, Setpoint, Wrench
 from aerobat.trajectory import Trajectory
 from aerobat.vehicle import Vehicle
@@ -163,6 +164,12 @@ def lateral_drag(vehicle: Vehicle) -> float:
 def axial_drag(vehicle: Vehicle) -> float:
     """The drag coefficient along the thrust less that across it, per mass, (d_z − d)/m [1/s]."""
     return float(vehicle.drag_body[2]) / vehicle.mass - lateral_drag(vehicle)
+
+
+def force_balance(environment: Environment, vehicle: Vehicle | None = None) -> ForceBalance:
+    """What thrust works against in an environment; without a vehicle there is no drag."""
+    drag = 0.0 if vehicle is None else lateral_drag(vehicle)
+    return ForceBalance(environment.gravity, drag, environment.wind)
 
 
 def end_thrust(velocity: Array, acceleration: Array, vehicle: Vehicle, environment: Environment) -> Array:

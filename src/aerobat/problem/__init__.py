@@ -1,5 +1,6 @@
 """What is wanted: gates, maneuvers as lists of stages, problems. No optimization happens here."""
 
+from aerobat.problem.condition import Attitude, Condition, ForceBalance, LinearBound, Quantity
 from aerobat.problem.files import load_problem, problem_names, write_problem
 from aerobat.problem.gate import Gate, tilted_gate
 from aerobat.problem.maneuvers import (
@@ -15,19 +16,22 @@ from aerobat.problem.maneuvers import (
     registered_maneuvers,
 )
 from aerobat.problem.problem import PAPER_LIMITS, EndState, Limits, Problem, at_rest
-from aerobat.problem.stage import Condition, Quantity, Stage, StageSequence
+from aerobat.problem.stage import Stage, StageSequence
 
 __all__ = [
     "PAPER_LIMITS",
+    "Attitude",
     "Condition",
     "CustomManeuver",
     "EndState",
     "Flip",
+    "ForceBalance",
     "Gate",
     "GatePassage",
     "HalfFlip",
     "Limits",
     "Line",
+    "LinearBound",
     "Maneuver",
     "Problem",
     "Quantity",

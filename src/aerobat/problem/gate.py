@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from functools import cached_property
 from math import degrees, radians
 from typing import Any, ClassVar
@@ -24,7 +25,7 @@ from aerobat.declaration import (
     unknown_name,
 )
 from aerobat.errors import SpecError
-from aerobat.problem.stage import Condition, Quantity
+from aerobat.problem.condition import Condition, ConeAngle, Quantity, in_degrees, in_radians
 
 
 @declared
@@ -43,12 +44,16 @@ class Gate:
     width: Positive = 1.0  # [m] of the opening
     height: Positive = 0.6  # [m] of the opening
     name: Label = "gate"  # by which stages and waypoints refer to it
+    # [rad] between the thrust axis and `up` in the gate, at most, where a maneuver asks for its attitude
+    attitude_tolerance: ConeAngle = radians(5.0)
 
     SHORTHANDS: ClassVar[Mapping[str, str]] = {
         "heading_deg": "[deg] direction of passage, from x toward y (0)",
         "elevation_deg": "[deg] climb of the direction of passage (0)",
         "tilt_deg": "[deg] roll about the passage, to the right: 90 sideways, 180 upside down (0)",
+        "attitude_tolerance_deg": "[deg] `attitude_tolerance` in degrees (5)",
     }
+    ANGLES: ClassVar[tuple[str, ...]] = ("heading_deg", "elevation_deg", "tilt_deg")
 
     def __post_init__(self) -> None:
         """Check."""
@@ -58,9 +63,10 @@ class Gate:
     @classmethod
     def expand(cls, table: dict[str, Any]) -> dict[str, Any]:
         """Replace the angles by `normal` and `up`, which are given instead of them or not at all."""
-        angles = {key: table.pop(key) for key in cls.SHORTHANDS if key in table}
+        table = in_radians(table, "attitude_tolerance")
+        angles = {key: table.pop(key) for key in cls.ANGLES if key in table}
         if "normal" not in table and "up" not in table:
-            attitude = [radians(number(angles.get(key, 0.0), key)) for key in cls.SHORTHANDS]
+            attitude = [radians(number(angles.get(key, 0.0), key)) for key in cls.ANGLES]
             table["normal"], table["up"] = _directions(*attitude)
         elif angles:
             raise FieldError(next(iter(angles)), "stands beside normal and up; give one or the other")
@@ -68,10 +74,11 @@ class Gate:
 
     def abbreviate(self, table: dict[str, Any]) -> dict[str, Any]:
         """Write `normal` and `up` as angles where those say exactly the same."""
+        table = in_degrees(table, "attitude_tolerance")
         for digits in (9, 17):
             angles = {
                 key: round(degrees(angle), digits)
-                for key, angle in zip(self.SHORTHANDS, self.angles, strict=True)
+                for key, angle in zip(self.ANGLES, self.angles, strict=True)
             }
             again = from_table(Gate, {"position": self.position, **angles})
             if (again.normal == self.normal).all() and (again.up == self.up).all():
@@ -106,7 +113,8 @@ class Gate:
     def tilted(self, tilt: float) -> Gate:
         """The same gate with another tilt [rad]."""
         heading, elevation, _ = self.angles
-        return tilted_gate(self.position, heading, elevation, tilt, self.width, self.height, self.name)
+        normal, up = _directions(heading, elevation, tilt)
+        return replace(self, normal=normal, up=up)
 
 
 def tilted_gate(

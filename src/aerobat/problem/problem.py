@@ -27,7 +27,7 @@ from aerobat.declaration import (
 )
 from aerobat.environment import Environment
 from aerobat.errors import SpecError
-from aerobat.problem.gate import Gate, named_gate
+from aerobat.problem.gate import Gate, at_centre, named_gate
 from aerobat.problem.maneuvers import MANEUVERS, Line, Maneuver
 from aerobat.problem.stage import StageSequence
 
@@ -194,9 +194,15 @@ class Problem:
     def stages(self, max_specific_thrust: float) -> StageSequence:
         """The maneuver's stages through the problem's gates, for a vehicle that has so much thrust [m/s²].
 
+        All that a stage asks is among its conditions, its gate's centre and its attitude too.
         Raises SpecError for gates that do not suit the maneuver.
         """
-        return self.maneuver.stage_sequence(self.gates, max_specific_thrust)
+        sequence = self.maneuver.stage_sequence(self.gates, max_specific_thrust)
+        stages = (
+            stage.explicit(() if stage.gate is None else at_centre(self.gate(stage.gate)))
+            for stage in sequence.stages
+        )
+        return replace(sequence, stages=tuple(stages))
 
     def gate(self, name: str) -> Gate:
         """The gate of that name. Raises SpecError when there is none."""

@@ -15,10 +15,12 @@ import numpy as np
 
 from aerobat.arrays import Array, Indices, frozen
 from aerobat.errors import SpecError
+from aerobat.flatness import force_balance
 from aerobat.optimization import AssignmentProgram, SlottedStage
 from aerobat.planning.miqp.integrator import INPUT_NAMES, IntegratorChain
+from aerobat.problem.condition import Condition
 from aerobat.problem.problem import DERIVATIVES, Limits, Problem
-from aerobat.problem.stage import Condition, Stage, StageSequence
+from aerobat.problem.stage import Stage, StageSequence
 
 UNIT_AXES = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
@@ -132,7 +134,8 @@ class Formulation:
     def _path_rows(self) -> Iterable[tuple[Row, float, float]]:
         for condition in self.sequence.path_constraints:
             for interval in range(self.chain.intervals - 1):
-                yield _row(condition, interval), *condition.kinematic_bounds(self.problem.environment.gravity)
+                bound = condition.bound(force_balance(self.problem.environment))
+                yield _row(condition, interval), *bound.limits
 
     @cached_property
     def _derivatives(self) -> Array:
@@ -166,10 +169,7 @@ class Formulation:
 
     def _slots(self, stage: Stage) -> range:
         """The intervals at whose ends a stage may hold; none when it is fixed outside them."""
-        ends, fixed = range(self.chain.intervals - 1), stage.fixed_interval(self.chain.intervals)
-        if fixed is None:
-            return ends
-        return range(fixed, fixed + 1) if fixed in ends else range(0)
+        return stage.slots(self.chain.intervals)
 
     @cached_property
     def _stage_rows(self) -> tuple[Indices, ...]:
@@ -184,11 +184,9 @@ class Formulation:
     @cached_property
     def _stage_bounds(self) -> tuple[Array, ...]:
         """For each stage the bounds of its conditions in SI units, (conditions, 2)."""
-        gravity = self.problem.environment.gravity
-        return tuple(
-            np.array([c.kinematic_bounds(gravity) for c in stage.conditions]).reshape(-1, 2)
-            for stage in self.sequence.stages
-        )
+        balance = force_balance(self.problem.environment)
+        bounds = ([c.bound(balance) for c in stage.conditions] for stage in self.sequence.stages)
+        return tuple(np.array([b.limits for b in stage]).reshape(-1, 2) for stage in bounds)
 
     def _assigned(self, i: int, scale: Array, free: Array) -> SlottedStage:
         stage, rows, bounds = self.sequence.stages[i], self._stage_rows[i], self._stage_bounds[i]

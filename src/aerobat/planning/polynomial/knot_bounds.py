@@ -8,8 +8,9 @@ from math import inf
 import numpy as np
 
 from aerobat.arrays import Array
+from aerobat.problem.condition import Condition, ForceBalance
 from aerobat.problem.problem import DERIVATIVES, Problem
-from aerobat.problem.stage import Condition, StageSequence
+from aerobat.problem.stage import StageSequence
 from aerobat.trajectory import Trajectory
 
 
@@ -25,8 +26,8 @@ class Bound:
     @classmethod
     def of(cls, condition: Condition, gravity: float) -> Bound:
         """Bound that a condition puts on its derivative."""
-        bounds = condition.kinematic_bounds(gravity)
-        return cls(condition.quantity.derivative, condition.direction, *bounds)
+        bound = condition.bound(ForceBalance(gravity))
+        return cls(condition.quantity.derivative, condition.direction, *bound.limits)
 
     @property
     def scale(self) -> float:

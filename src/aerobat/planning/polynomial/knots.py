@@ -9,6 +9,7 @@ from math import sqrt
 import numpy as np
 
 from aerobat.arrays import Array
+from aerobat.problem.condition import ForceBalance
 from aerobat.problem.problem import Problem
 from aerobat.problem.stage import Stage, StageSequence
 from aerobat.trajectory import Trajectory
@@ -51,9 +52,9 @@ def violated_stage(sequence: StageSequence, trajectory: Trajectory, gravity: flo
     values = [trajectory.evaluate(trajectory.knots[1:-1], k) for k in range(3)]
     for stage, flat in zip(sequence.stages, np.stack(values, axis=1), strict=True):
         for condition in stage.conditions:
-            derivative = flat[condition.quantity.derivative]
-            value = float(condition.direction @ derivative) + condition.weight(gravity)
-            if not condition.lower - STAGE_TOLERANCE <= value <= condition.upper + STAGE_TOLERANCE:
+            bound = condition.bound(ForceBalance(gravity))
+            value = float(bound.value(flat))
+            if bound.excess(flat) > STAGE_TOLERANCE:
                 return (
                     f"the stage '{stage.name}' asks {condition.quantity.value} between {condition.lower:.4g} "
                     f"and {condition.upper:.4g}, the closed form gives {value:.4g}"
@@ -82,4 +83,4 @@ def _equalities(stage: Stage, derivative: int, gravity: float) -> Iterator[tuple
             value = float(np.clip(hover, condition.lower, condition.upper))
         elif condition.lower < condition.upper:
             continue
-        yield condition.direction, value - condition.weight(gravity)
+        yield condition.direction, value - condition.bound(ForceBalance(gravity)).constant

@@ -24,8 +24,8 @@ from aerobat.planning.time_optimal.zero_yaw_rate_body import (
     VELOCITY,
     ZeroYawRateBody,
 )
+from aerobat.problem.condition import Condition, ForceBalance
 from aerobat.problem.problem import Limits
-from aerobat.problem.stage import Condition
 from aerobat.vehicle import Vehicle
 
 SHORTEST_PHASE = 1e-3  # [s]
@@ -128,7 +128,8 @@ class OptimalControl:
     def _hold(self, rows: _Rows, condition: Condition, values: Any) -> None:
         """A condition on values (3, m) of its derivative."""
         along = import_casadi().DM(condition.direction).T @ values
-        rows.hold(along, *condition.kinematic_bounds(self.environment.gravity))
+        bound = condition.bound(ForceBalance(self.environment.gravity))
+        rows.hold(along, *bound.limits)
 
     def _around(self, collocation: Collocation, derivative: int, node: int) -> Iterator[Any]:
         """A derivative up to acceleration at an inner node, (3, 1); on both sides where it may jump."""

@@ -31,8 +31,8 @@ from aerobat.planning.rotor_margin import rotor_findings
 from aerobat.planning.time_optimal.collocation import CollocatedMotion, Mesh
 from aerobat.planning.time_optimal.program import BOUNDED_DERIVATIVES, End, NodeBounds, OptimalControl
 from aerobat.planning.warm_start import Reserve, WarmStart, plans_to_begin_from, require_attitudes
+from aerobat.problem.condition import Condition, Quantity
 from aerobat.problem.problem import EndState, Limits, Problem
-from aerobat.problem.stage import Condition, Quantity
 from aerobat.so3 import UP
 from aerobat.vehicle import Vehicle
 

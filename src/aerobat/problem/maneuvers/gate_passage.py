@@ -5,8 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from aerobat.declaration import NonNegative, declared
-from aerobat.problem.gate import Gate, at_centre
-from aerobat.problem.stage import Condition, Quantity, Stage
+from aerobat.problem.condition import Attitude, Condition, Quantity
+from aerobat.problem.gate import Gate
+from aerobat.problem.stage import CrossingTime, Stage
+
+PLANNED_SHARE = 0.5  # of a gate's tolerance of attitude: the plan's, the rest is left to the flight
 
 
 @declared
@@ -14,25 +17,42 @@ class GatePassage:
     """The manner in which a gate is passed, beyond meeting its centre.
 
     A `perpendicular` passage moves along the gate's direction of passage, at `speed` or faster, and not
-    across it, so that a vehicle of some size fits through. The gate is met at half the duration when
-    `centred`, and otherwise one interval later, at the end of interval N/2, as in the authors' reference
-    code; there the velocity is free.
+    across it, so that a vehicle of some size fits through. It is `upright` with the thrust axis along the
+    gate's upright, within half its tolerance, where the maneuver asks for an attitude at all; otherwise only
+    in the plane of the maneuver's turn, as in the paper. `centred` means that the gate is met by the
+    fraction `at`, and otherwise one interval later, at the end of interval N/2, as in the authors'
+    reference code; there the velocity is free.
     """
 
     perpendicular: bool = True  # move along the gate's direction of passage and not across it
     speed: NonNegative = 0.0  # [m/s] at least, along the direction of passage
-    centred: bool = True  # at half the duration; false: one interval later, as in the paper's code
+    at: CrossingTime = "free"  # when, as a part of the duration
+    centred: bool = True  # at `at`; false: one interval later, as in the paper's code
+    upright: bool = True  # the thrust axis along the gate's upright, not only in the plane of the turn
 
-    def stage(self, gate: Gate, conditions: Sequence[Condition]) -> Stage:
-        """The stage of passing `gate` with `conditions` on top."""
-        velocity: list[Condition] = []
+    def stage(
+        self, gate: Gate, conditions: Sequence[Condition] = (), min_thrust: float | None = None
+    ) -> Stage:
+        """The stage of passing `gate`.
+
+        Args:
+            gate: the gate, whose centre is met.
+            conditions: what holds there in place of the gate's attitude, where the passage is not upright.
+            min_thrust: least specific thrust [m/s²] along the gate's upright; None: no attitude is asked.
+        """
+        asked: list[Condition] = []
         if self.perpendicular:
-            velocity = [Condition(Quantity.VELOCITY, gate.normal, lower=self.speed)]
-            velocity += [Condition(Quantity.VELOCITY, across, 0.0, 0.0) for across in (gate.lateral, gate.up)]
-        asked = (*at_centre(gate), *velocity, *conditions)
-        return Stage(gate.name, asked, at=0.5, interval_offset=0 if self.centred else 1, gate=gate.name)
+            asked = [Condition(Quantity.VELOCITY, gate.normal, lower=self.speed)]
+            asked += [Condition(Quantity.VELOCITY, axis, 0.0, 0.0) for axis in (gate.lateral, gate.up)]
+        attitude = None
+        if self.upright and min_thrust is not None:
+            attitude = Attitude(gate.up, PLANNED_SHARE * gate.attitude_tolerance, min_thrust)
+        else:
+            asked += conditions
+        offset = 0 if self.centred else 1
+        return Stage(gate.name, tuple(asked), self.at, offset, gate.name, attitude)
 
 
-PAPER_PASSAGE = GatePassage(perpendicular=False, centred=False)
+PAPER_PASSAGE = GatePassage(perpendicular=False, at=0.5, centred=False, upright=False)
 PAPER_LATERAL = 18.0  # [m/s²] ε_y and ε_x of the authors' reference code
 PAPER_INVERTED = 25.0  # [m/s²] ε_z of the authors' reference code

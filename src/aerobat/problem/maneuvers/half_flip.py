@@ -9,10 +9,12 @@ import numpy as np
 
 from aerobat.declaration import Positive
 from aerobat.errors import SpecError
+from aerobat.problem.condition import Condition, Quantity, thrust_in_plane
 from aerobat.problem.gate import Gate, only_gate
 from aerobat.problem.maneuvers.gate_passage import PAPER_LATERAL, PAPER_PASSAGE, GatePassage
 from aerobat.problem.maneuvers.maneuver import Maneuver, maneuver
-from aerobat.problem.stage import Condition, Quantity, StageSequence, thrust_along
+from aerobat.problem.stage import StageSequence
+from aerobat.so3 import UP
 
 
 @maneuver("half-flip")
@@ -27,14 +29,15 @@ class HalfFlip(Maneuver):
     THRUST_FRACTION: ClassVar[float] = 0.2  # of the greatest specific thrust
 
     def stage_sequence(self, gates: Sequence[Gate], max_specific_thrust: float) -> StageSequence:
-        """Return one stage, the gate, and upright thrust at all times: (a_z + g) tan α = a_y, α ≤ 90°.
+        """Return one stage, the gate, and thrust that never points down: (a_z + g) tan α = a_y, α ≤ 90°.
 
         Raises SpecError unless there is one gate, its upright not below the horizontal.
         """
         gate = only_gate(gates, self.kind)
-        conditions = thrust_along(gate.up, gate.normal, self._min_thrust(gate, max_specific_thrust))
-        upright = Condition(Quantity.SPECIFIC_THRUST, np.array([0.0, 0.0, 1.0]), lower=0.0)
-        return StageSequence((self.passage.stage(gate, conditions),), (upright,))
+        minimum = self._min_thrust(gate, max_specific_thrust)
+        in_plane = thrust_in_plane(gate.up, gate.normal, minimum)
+        never_upside_down = Condition(Quantity.SPECIFIC_THRUST, UP, lower=0.0)
+        return StageSequence((self.passage.stage(gate, in_plane, minimum),), (never_upside_down,))
 
     def as_in_paper(self) -> HalfFlip:
         """Return it with ε_y = 18 m/s²."""

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 
 from aerobat.problem.gate import Gate
 from aerobat.problem.maneuvers.gate_passage import PAPER_PASSAGE, GatePassage
@@ -13,16 +12,13 @@ from aerobat.problem.stage import StageSequence
 
 @maneuver("line")
 class Line(Maneuver):
-    """From start to goal with no attitude asked, through gates in their order; a single one at mid-time."""
+    """From start to goal with no attitude asked, through gates in their order."""
 
     passage: GatePassage = GatePassage()  # how the gates are passed
 
     def stage_sequence(self, gates: Sequence[Gate], max_specific_thrust: float) -> StageSequence:
         """Return no stages but the gates."""
-        stages = tuple(self.passage.stage(gate, ()) for gate in gates)
-        if len(stages) > 1:  # when each is passed is for the search to choose
-            stages = tuple(replace(stage, at=None, interval_offset=0) for stage in stages)
-        return StageSequence(stages)
+        return StageSequence(tuple(self.passage.stage(gate) for gate in gates))
 
     def as_in_paper(self) -> Line:
         """Return it with the gate passed as there."""

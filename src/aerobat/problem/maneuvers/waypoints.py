@@ -11,11 +11,12 @@ import numpy as np
 from pydantic import Field
 
 from aerobat.arrays import Array
-from aerobat.declaration import FieldError, PartialVector, Positive, UnitVector, declared, unit
+from aerobat.declaration import FieldError, PartialVector, Positive, UnitVector, declared
 from aerobat.errors import SpecError
-from aerobat.problem.gate import Gate, at_centre, named_gate
+from aerobat.problem.condition import Attitude, Condition, Quantity
+from aerobat.problem.gate import Gate
 from aerobat.problem.maneuvers.maneuver import Maneuver, maneuver
-from aerobat.problem.stage import Condition, Quantity, Stage, StageSequence
+from aerobat.problem.stage import Stage, StageSequence
 
 THRUST_FRACTION = 0.2  # of the greatest specific thrust: the least along an attitude that names no thrust
 FIXABLE = (Quantity.POSITION, Quantity.VELOCITY, Quantity.ACCELERATION)
@@ -53,21 +54,22 @@ class Waypoint:
         if free and self.up is None and self.gate is None:
             raise SpecError("nothing is given; give at least one component of the position")
 
-    def conditions(self, max_specific_thrust: float) -> Iterable[Condition]:
-        """The given components, as conditions of a stage."""
+    def conditions(self) -> Iterable[Condition]:
+        """The given components and a given thrust, as conditions of a stage."""
         for quantity in FIXABLE:
             for direction, value in zip(np.eye(3), getattr(self, quantity.value).tolist(), strict=True):
                 if not np.isnan(value):
                     yield Condition(quantity, direction, value, value)
-        if self.up is None:
-            return
-        if self.thrust is None:
-            for axis in _across(self.up):
-                yield Condition(Quantity.SPECIFIC_THRUST, axis, 0.0, 0.0)
-            yield Condition(Quantity.SPECIFIC_THRUST, self.up, lower=THRUST_FRACTION * max_specific_thrust)
+        if self.up is None or self.thrust is None:
             return
         for direction, value in zip(np.eye(3), (self.thrust * self.up).tolist(), strict=True):
             yield Condition(Quantity.SPECIFIC_THRUST, direction, value, value)
+
+    def attitude(self, max_specific_thrust: float) -> Attitude | None:
+        """The attitude that `up` asks for with no thrust given."""
+        if self.up is None or self.thrust is not None:
+            return None
+        return Attitude(self.up, min_thrust=THRUST_FRACTION * max_specific_thrust)
 
 
 @maneuver("waypoints")
@@ -90,7 +92,15 @@ class Waypoints(Maneuver):
     def stage_sequence(self, gates: Sequence[Gate], max_specific_thrust: float) -> StageSequence:
         """Return a stage a waypoint, in order, each at a time that the planner chooses."""
         return StageSequence(
-            tuple(self._stage(i, gates, max_specific_thrust) for i in range(len(self.waypoints)))
+            tuple(
+                Stage(
+                    name=waypoint.gate or f"waypoint {number}",
+                    conditions=tuple(waypoint.conditions()),
+                    gate=waypoint.gate,
+                    attitude=waypoint.attitude(max_specific_thrust),
+                )
+                for number, waypoint in enumerate(self.waypoints, 1)
+            )
         )
 
     @property
@@ -103,17 +113,3 @@ class Waypoints(Maneuver):
         """The times of all waypoints and of the end [s], if every one is given."""
         times = [*(w.time for w in self.waypoints), self.duration]
         return None if None in times else tuple(t for t in times if t is not None)
-
-    def _stage(self, i: int, gates: Sequence[Gate], max_specific_thrust: float) -> Stage:
-        waypoint = self.waypoints[i]
-        conditions = tuple(waypoint.conditions(max_specific_thrust))
-        if waypoint.gate is None:
-            return Stage(f"waypoint {i + 1}", conditions)
-        gate = named_gate(gates, waypoint.gate)
-        return Stage(gate.name, (*at_centre(gate), *conditions), gate=gate.name)
-
-
-def _across(direction: Array) -> tuple[Array, Array]:
-    """Two unit vectors normal to a unit vector and to each other."""
-    first = unit(np.cross(direction, np.eye(3)[int(np.argmin(np.abs(direction)))]))
-    return first, unit(np.cross(direction, first))

@@ -1,0 +1,226 @@
+"""Conditions on the state at one instant: linear ones, and the attitude, which is where the thrust points."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from enum import StrEnum
+from math import degrees, inf, radians, sqrt, tan
+from typing import Annotated, Any, ClassVar
+
+import numpy as np
+from pydantic import Field, Strict
+
+from aerobat.arrays import Array
+from aerobat.declaration import (
+    Direction,
+    FieldError,
+    NonNegative,
+    Number,
+    UnitVector,
+    declared,
+    number,
+    unit,
+)
+from aerobat.errors import SpecError
+from aerobat.so3 import UP
+from aerobat.states import STANDARD_GRAVITY
+
+ConeAngle = Annotated[float, Field(ge=0, lt=1.5, description="number from 0 to 1.5 (86°)")]  # [rad]
+
+
+class Quantity(StrEnum):
+    """The quantity that a condition is about, all in the world frame."""
+
+    POSITION = "position"  # [m]
+    VELOCITY = "velocity"  # [m/s]
+    ACCELERATION = "acceleration"  # [m/s²]
+    SPECIFIC_THRUST = "specific_thrust"  # thrust over mass, a + g e3 + (d/m) (v − wind) [m/s²]
+
+    @property
+    def derivative(self) -> int:
+        """The highest derivative of position that the quantity is made of."""
+        return {Quantity.POSITION: 0, Quantity.VELOCITY: 1}.get(self, 2)
+
+
+@dataclass(frozen=True, eq=False)
+class ForceBalance:
+    """What the thrust works against, per mass: f = a + g e₃ + d (v − wind), with the drag d across it."""
+
+    gravity: float = STANDARD_GRAVITY  # [m/s²]
+    drag: float = 0.0  # [1/s] across the thrust axis, over the mass
+    wind: Array = field(default_factory=lambda: np.zeros(3))  # [m/s] world, (3,)
+
+    @property
+    def constant(self) -> Array:
+        """The part of f [m/s²] that no motion changes, (3,)."""
+        return np.asarray(self.gravity * UP - self.drag * self.wind)
+
+
+@dataclass(frozen=True, eq=False)
+class LinearBound:
+    """lower ≤ weights[0] · p + weights[1] · v + weights[2] · a + constant ≤ upper, SI units, world frame."""
+
+    weights: Array  # (3, 3), a row for each derivative of position
+    constant: float
+    lower: float
+    upper: float
+
+    @property
+    def limits(self) -> tuple[float, float]:
+        """The bounds less the constant: those of the weighted derivatives alone."""
+        return self.lower - self.constant, self.upper - self.constant
+
+    @property
+    def derivatives(self) -> tuple[int, ...]:
+        """The derivatives of position that count."""
+        return tuple(np.flatnonzero(self.weights.any(axis=1)).tolist())
+
+    @property
+    def scale(self) -> float:
+        """The size of what is bounded, for comparing with others."""
+        if -inf < self.lower < self.upper < inf:
+            return self.upper - self.lower
+        return max((abs(x) for x in self.limits if abs(x) < inf), default=0.0) or 1.0
+
+    def value(self, derivatives: Array) -> Array:
+        """The value bounded, (...), of position, velocity and acceleration (..., 3, 3)."""
+        return np.asarray(np.sum(self.weights * derivatives, axis=(-2, -1)) + self.constant)
+
+    def excess(self, derivatives: Array) -> Array:
+        """By how much the bounds are exceeded, at least zero, (...), of derivatives (..., 3, 3)."""
+        value = self.value(derivatives)
+        return np.maximum(np.maximum(self.lower - value, value - self.upper), 0.0)
+
+
+@declared
+class Condition:
+    """lower ≤ direction · quantity ≤ upper, in SI units; the direction need not have length one.
+
+    Raises SpecError for a zero direction, and for bounds that are missing or in the wrong order.
+    """
+
+    # specific thrust is a + g e₃ and, where a vehicle is known, its drag per mass
+    quantity: Annotated[Quantity, Strict(False)]
+    direction: Direction  # world frame; need not have length one
+    lower: Number = -inf  # least value of their product, in the quantity's SI unit
+    upper: Number = inf  # greatest value of their product
+
+    SHORTHANDS: ClassVar[Mapping[str, str]] = {"equals": "both bounds at once"}
+
+    def __post_init__(self) -> None:
+        """Check."""
+        if self.lower == -inf and self.upper == inf:
+            raise SpecError("needs lower, upper or equals; give one")
+        if self.lower > self.upper:
+            raise FieldError("lower", f"must not exceed upper, got {self.lower:g} and {self.upper:g}")
+
+    @classmethod
+    def expand(cls, table: dict[str, Any]) -> dict[str, Any]:
+        """Replace `equals` by both bounds."""
+        if "equals" in table:
+            if "lower" in table or "upper" in table:
+                raise FieldError("equals", "stands beside lower or upper; give one or the other")
+            table["lower"] = table["upper"] = number(table.pop("equals"), "equals")
+        return table
+
+    def abbreviate(self, table: dict[str, Any]) -> dict[str, Any]:
+        """Write two equal bounds as `equals`."""
+        if self.lower == self.upper:
+            del table["lower"], table["upper"]
+            table["equals"] = self.lower
+        return table
+
+    def bound(self, balance: ForceBalance) -> LinearBound:
+        """The bound that it puts on position, velocity and acceleration."""
+        weights = np.zeros((3, 3))
+        weights[self.quantity.derivative] = self.direction
+        constant = 0.0
+        if self.quantity is Quantity.SPECIFIC_THRUST:
+            weights[1] = balance.drag * self.direction
+            constant = float(self.direction @ balance.constant)
+        return LinearBound(weights, constant, self.lower, self.upper)
+
+    @property
+    def min_thrust(self) -> float:
+        """The least specific thrust [m/s²] that satisfies the condition; zero when it asks none."""
+        if self.quantity is not Quantity.SPECIFIC_THRUST:
+            return 0.0
+        return max(self.lower, -self.upper, 0.0) / float(np.linalg.norm(self.direction))
+
+
+@declared
+class Attitude:
+    """Thrust along a direction: its axis within a cone about `up`, and so much of it at least.
+
+    Linear conditions hold it in the square pyramid inside the cone, exactly along `up` with no tolerance.
+    """
+
+    up: UnitVector  # where the thrust points, world
+    tolerance: ConeAngle = 0.0  # [rad] between the thrust axis and `up`, at most
+    min_thrust: NonNegative = 0.0  # [m/s²] specific thrust along `up`, at least
+
+    SHORTHANDS: ClassVar[Mapping[str, str]] = {"tolerance_deg": "[deg] `tolerance` in degrees"}
+
+    @classmethod
+    def expand(cls, table: dict[str, Any]) -> dict[str, Any]:
+        """Replace `tolerance_deg`."""
+        return in_radians(table, "tolerance")
+
+    def abbreviate(self, table: dict[str, Any]) -> dict[str, Any]:
+        """Write the tolerance in degrees where that says exactly the same."""
+        return in_degrees(table, "tolerance")
+
+    @property
+    def conditions(self) -> tuple[Condition, ...]:
+        """The linear conditions that hold it."""
+        along = Condition(Quantity.SPECIFIC_THRUST, self.up, lower=self.min_thrust)
+        if self.tolerance == 0.0:
+            none = (Condition(Quantity.SPECIFIC_THRUST, axis, 0.0, 0.0) for axis in across(self.up))
+            return (*none, along)
+        slope = tan(self.tolerance) / sqrt(2.0)
+        faces = (sign * axis - slope * self.up for axis in across(self.up) for sign in (1.0, -1.0))
+        return (*(Condition(Quantity.SPECIFIC_THRUST, face, upper=0.0) for face in faces), along)
+
+
+def thrust_in_plane(direction: Array, axis: Array, minimum: float) -> tuple[Condition, ...]:
+    """Specific thrust along `direction` in the plane normal to `axis`: none across, a minimum along.
+
+    Args:
+        direction: where the thrust points, world frame, (3,).
+        axis: normal to the plane that the condition is about, (3,).
+        minimum: least thrust along `direction` [m/s²]; -inf leaves its size and sign free.
+    """
+    across_it = Condition(Quantity.SPECIFIC_THRUST, unit(np.cross(axis, direction)), 0.0, 0.0)
+    if minimum == -inf:
+        return (across_it,)
+    return (across_it, Condition(Quantity.SPECIFIC_THRUST, unit(direction), lower=minimum))
+
+
+def across(direction: Array) -> tuple[Array, Array]:
+    """Two unit vectors normal to a unit vector and to each other."""
+    first = unit(np.cross(direction, np.eye(3)[int(np.argmin(np.abs(direction)))]))
+    return first, unit(np.cross(direction, first))
+
+
+def in_radians(table: dict[str, Any], name: str) -> dict[str, Any]:
+    """The table with an angle's shorthand in degrees replaced. Raises SpecError where both are given."""
+    shorthand = f"{name}_deg"
+    if shorthand not in table:
+        return table
+    if name in table:
+        raise SpecError(f"{name} and {shorthand} are both given; give one of them")
+    table[name] = radians(number(table.pop(shorthand), shorthand))
+    return table
+
+
+def in_degrees(table: dict[str, Any], name: str) -> dict[str, Any]:
+    """The table with an angle in degrees where those say exactly the same."""
+    if name not in table:
+        return table
+    angle = table[name]
+    for angle_deg in (round(degrees(angle), 9), degrees(angle)):
+        if radians(angle_deg) == angle:
+            del table[name]
+            return table | {f"{name}_deg": angle_deg}
+    return table
