@@ -19,6 +19,7 @@ import numpy as np
 
 from aerobat.environment import Environment
 from aerobat.problem import (
+    Attitude,
     Condition,
     EndState,
     Gate,
@@ -42,6 +43,7 @@ PLACES = {  # where each class stands in a file
     Environment: "`[environment]`",
     GatePassage: "`[maneuver.passage]`",
     Stage: "`[[maneuver.stages]]`",
+    Attitude: "`attitude` of a stage: where the thrust points, its drag counted",
     Condition: "`conditions` and `path_constraints`: lower ≤ direction · quantity ≤ upper",
     Waypoint: "`[[maneuver.waypoints]]`",
     Rotor: "`[[rotors]]`",
@@ -63,9 +65,10 @@ kind = "stages"
 [[maneuver.stages]]
 name = "knife edge"
 conditions = [
-    { quantity = "specific_thrust", direction = [0.0, 0.0, 1.0], equals = 0.0 },
-    { quantity = "specific_thrust", direction = [1.0, 0.0, 0.0], lower = 10.0 },
+    { quantity = "velocity", direction = [0.0, 0.0, 1.0], lower = 0.0 },
 ]
+attitude = { up = [1.0, 0.0, 0.0], tolerance_deg = 3.0, min_thrust = 10.0 }
+at = [0.3, 0.6]
 ```
 """
 WAYPOINTS = """
@@ -91,7 +94,8 @@ def page() -> str:
     parts += [section(cls) for cls in (EndState, Gate, Limits, Environment)]
     parts += ["### Maneuvers\n", "`[maneuver]` has a `kind`, and what that kind takes:\n"]
     parts += [kind(name, cls) for name, cls in registered_maneuvers().items() if of_package(cls)]
-    parts += [section(GatePassage), section(Stage), section(Condition), STAGES, section(Waypoint), WAYPOINTS]
+    parts += [section(GatePassage), section(Stage), section(Attitude), section(Condition)]
+    parts += [STAGES, section(Waypoint), WAYPOINTS]
     parts += ["## Vehicle (`--vehicle vehicle.toml`)\n", preset("vehicle", "agile-quad"), table(Vehicle)]
     parts += [section(Rotor)]
     return "\n".join(part.strip("\n") + "\n" for part in parts) + "\n" + WRITTEN + by_hand

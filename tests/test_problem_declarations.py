@@ -200,7 +200,7 @@ def test_a_flip_through_two_gates_is_refused() -> None:
 def test_a_line_passes_three_gates_in_their_order_at_times_of_the_planners_choice() -> None:
     sequence = ab.Problem("slalom", START, GOAL, ab.Line(), THREE).stages(30.0)
     assert [stage.gate for stage in sequence.stages] == ["gate 2", "gate 4", "gate 6"]
-    assert [stage.at for stage in sequence.stages] == [None] * 3
+    assert [stage.at for stage in sequence.stages] == ["free"] * 3
     assert sequence.ordered
     centres = [[c.lower for c in stage.conditions if c.quantity == "position"] for stage in sequence.stages]
     assert centres == [[2.0, 0.0, 1.0], [4.0, 0.0, 1.0], [6.0, 0.0, 1.0]]

@@ -8,9 +8,11 @@ from hypothesis import strategies as st
 from aerobat import so3
 from aerobat.errors import SpecError
 from aerobat.problem import (
+    Attitude,
     Condition,
     CustomManeuver,
     Flip,
+    ForceBalance,
     GatePassage,
     HalfFlip,
     Line,
@@ -55,13 +57,14 @@ def test_the_flip_in_paper_mode_is_the_papers_section_ii_a(thrust: tuple[float, 
 def test_the_paper_imposes_no_order_and_fixes_only_the_gate() -> None:
     course = flip_of_the_paper()
     assert not course.ordered
-    assert [s.fixed_interval(20) for s in course.stages] == [None, None, 10, None, None]
+    anywhere = range(19)
+    assert [s.slots(20) for s in course.stages] == [anywhere, anywhere, range(10, 11), anywhere, anywhere]
 
 
-def test_a_flip_of_ours_meets_its_gate_half_way_squarely_and_in_its_direction() -> None:
+def test_a_flip_of_ours_meets_its_gate_at_any_time_squarely_and_in_its_direction() -> None:
     problem = load_problem("flip-roll")
     gate = problem.stages(50.0).stages[2]
-    assert gate.fixed_interval(20) == 9  # ends at half the duration
+    assert gate.slots(20) == range(19)
     velocity = {tuple(c.direction): (c.lower, c.upper) for c in gate.conditions if c.quantity == "velocity"}
     assert velocity[(0.0, 1.0, 0.0)] == (0.0, np.inf)
     assert sorted(velocity.values()) == [(0.0, 0.0), (0.0, 0.0), (0.0, np.inf)]
@@ -97,7 +100,8 @@ def test_the_half_flip_ties_lateral_to_vertical_thrust_by_the_tangent_of_the_til
     """(a_z + g) tan α = a_y, a_y ≥ ε_y; our tilt is to the right, the paper's α to the left."""
     tilt = np.deg2rad(tilt_deg)
     gate = tilted_gate(np.zeros(3), tilt=tilt)
-    (stage,) = HalfFlip(min_lateral_thrust=18.0).stage_sequence([gate], 50.0).stages
+    in_plane = GatePassage(upright=False)
+    (stage,) = HalfFlip(18.0, in_plane).stage_sequence([gate], 50.0).stages
     fitting = np.array([along, -lateral, lateral / np.tan(tilt) - G])
     assert holds(stage, fitting)
     assert not holds(stage, np.add(fitting, [0, 0, 1.0]))
@@ -114,7 +118,8 @@ def test_the_half_flip_never_turns_over() -> None:
 def test_a_line_asks_nothing_but_the_gate_it_may_have() -> None:
     assert Line().stage_sequence([], 50.0).stages == ()
     (stage,) = Line().stage_sequence([tilted_gate(np.ones(3))], 50.0).stages
-    assert {c.quantity for c in stage.conditions} == {Quantity.POSITION, Quantity.VELOCITY}
+    assert {c.quantity for c in stage.conditions} == {Quantity.VELOCITY}
+    assert stage.attitude is None
 
 
 def test_a_spelled_out_maneuver_may_pass_the_problems_gate() -> None:
@@ -125,9 +130,106 @@ def test_a_spelled_out_maneuver_may_pass_the_problems_gate() -> None:
     assert (course.stages[1].gate, course.stages[1].at) == (gate.name, 0.4)
 
 
+angles = st.floats(0.0, 6.28)
+
+
+@given(st.floats(0.0, 1.4), st.floats(0.0, 1.6), angles, st.floats(-3.1, 3.1))
+def test_thrust_that_meets_an_attitudes_conditions_lies_in_its_cone_and_fills_half_of_it(
+    tolerance: float, off: float, around: float, tilt: float
+) -> None:
+    """Never outside the cone; inside it wherever the thrust is nearer than the pyramid's faces."""
+    gate = tilted_gate(np.zeros(3), 0.3, tilt=tilt)
+    attitude = Attitude(gate.up, tolerance, min_thrust=5.0)
+    stage = Stage("gate", attitude=attitude).explicit()
+    sideways = np.cos(around) * gate.lateral + np.sin(around) * gate.normal
+    thrust = 20.0 * (np.cos(off) * gate.up + np.sin(off) * sideways)
+    if holds(stage, thrust - [0.0, 0.0, G]):
+        assert off <= tolerance + 1e-7
+    elif 20.0 * np.cos(off) >= 5.0:
+        assert np.tan(off) > np.tan(tolerance) / np.sqrt(2.0) - 1e-9
+
+
+@given(st.floats(0.0, 3.0), st.floats(-30.0, 30.0), st.floats(-10.0, 10.0), angles)
+def test_a_condition_on_thrust_counts_the_drag_that_turns_the_vehicle(
+    drag: float, speed: float, wind: float, heading: float
+) -> None:
+    """The bound's value is that of a + g e3 + d (v − wind), whatever the motion."""
+    balance = ForceBalance(9.0, drag, np.array([wind, 0.0, -wind]))
+    direction = np.array([np.cos(heading), np.sin(heading), 0.5])
+    motion = np.array([[1.0, 2.0, 3.0], [speed, -speed, 2.0], [4.0, 5.0, -6.0]])
+    bound = Condition("specific_thrust", direction, lower=-1.0, upper=2.0).bound(balance)
+    thrust = motion[2] + [0.0, 0.0, 9.0] + drag * (motion[1] - [wind, 0.0, -wind])
+    assert bound.value(motion) == pytest.approx(direction @ thrust, abs=1e-9)
+    assert bound.limits == (-1.0 - bound.constant, 2.0 - bound.constant)
+    assert bound.excess(motion) == pytest.approx(
+        max(-1.0 - direction @ thrust, direction @ thrust - 2.0, 0.0)
+    )
+
+
+@given(st.floats(23.0, 337.0), st.floats(-180.0, 180.0))
+def test_a_flip_passes_a_gate_at_any_angle_of_its_turn_upright_there(
+    turn_deg: float, axis_deg: float
+) -> None:
+    """The gate's stage asks the gate's own upright; those before and after it keep the order of the turn."""
+    axis = np.deg2rad(axis_deg)
+    gate = tilted_gate(np.zeros(3), axis, tilt=np.deg2rad(turn_deg))
+    assert gate.normal @ [np.cos(axis), np.sin(axis), 0.0] == pytest.approx(1.0)
+    stages = Flip(axis_deg).stage_sequence([gate], 50.0).stages
+    (at_gate,) = (stage for stage in stages if stage.gate)
+    np.testing.assert_array_equal(at_gate.attitude.up, gate.up)
+    others = [float(stage.name.rstrip("°")) for stage in stages if not stage.gate]
+    before = others[: stages.index(at_gate)]
+    assert others == sorted(others)
+    assert all(angle < turn_deg + 1e-6 for angle in before)
+    assert all(abs(angle - turn_deg) > 22.4 for angle in others)
+    assert len(others) >= 3
+
+
+@pytest.mark.parametrize(
+    ("axis_deg", "heading_deg", "tilt_deg", "sentence"),
+    [
+        (0.0, 0.0, 0.0, "next to upright"),
+        (0.0, 0.0, 10.0, "next to upright"),
+        (0.0, 90.0, 90.0, "outside the plane .* turn about 90 or -90"),
+        (90.0, 0.0, 120.0, "outside the plane .* turn about 0 or -180"),
+    ],
+)
+def test_a_flip_that_contradicts_its_gate_is_refused_in_words(
+    axis_deg: float, heading_deg: float, tilt_deg: float, sentence: str
+) -> None:
+    gate = tilted_gate(np.zeros(3), np.deg2rad(heading_deg), tilt=np.deg2rad(tilt_deg))
+    with pytest.raises(SpecError, match=sentence):
+        Flip(axis_deg).stage_sequence([gate], 50.0)
+
+
+def test_maneuvers_ask_their_gates_attitude_about_both_axes_within_half_its_tolerance() -> None:
+    for name in ("flip-roll", "flip-pitch", "flip-roll-translation", "half-flip"):
+        problem = load_problem(name)
+        (gate,) = problem.gates
+        (stage,) = (stage for stage in problem.stages(50.0).stages if stage.gate)
+        for leaning in (gate.normal, gate.lateral):
+            for angle, fits in ((0.0, True), (0.03, True), (0.06, False)):
+                thrust = 30.0 * (np.cos(angle) * gate.up + np.sin(angle) * leaning)
+                assert holds(stage, thrust - [0.0, 0.0, G]) is fits
+        assert stage.attitude.tolerance == pytest.approx(np.deg2rad(2.5))
+
+
+@given(st.floats(0.0, 0.9), st.floats(0.05, 1.0), st.integers(3, 60))
+def test_a_window_holds_the_interval_ends_within_it(first: float, length: float, intervals: int) -> None:
+    last = min(first + length, 1.0)
+    ends = [(slot + 1) / intervals for slot in Stage("s", at=(first, last)).slots(intervals)]
+    within = [k / intervals for k in range(1, intervals) if first - 1e-9 <= k / intervals <= last + 1e-9]
+    assert ends == pytest.approx(within)
+
+
 @pytest.mark.parametrize(
     "wrong",
     [
+        lambda: Stage("s", at=(0.6, 0.4)),
+        lambda: Stage("s", at=(0.5, 1.5)),
+        lambda: Stage("s", at="early"),
+        lambda: Attitude((0.0, 0.0, 1.0), tolerance=1.6),
+        lambda: Attitude((0.0, 0.0, 1.0), min_thrust=-1.0),
         lambda: Flip(axis_deg=np.inf),
         lambda: Flip(min_lateral_thrust=-1.0),
         lambda: Flip(min_inverted_thrust=0.0),

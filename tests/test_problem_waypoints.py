@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from aerobat.errors import SpecError
-from aerobat.problem import Quantity, Waypoint, Waypoints, tilted_gate
+from aerobat.problem import Gate, Problem, Quantity, Waypoint, Waypoints, at_rest, tilted_gate
 
 FREE = np.nan
 components = st.lists(st.one_of(st.just(FREE), st.floats(-50, 50)), min_size=3, max_size=3)
@@ -37,20 +37,26 @@ def test_an_attitude_holds_exactly_for_thrust_along_it(direction) -> None:
     for waypoint, least in ((Waypoint(up=direction, thrust=12.0), 12.0), (Waypoint(up=direction), 8.0)):
         (stage,) = sequence(waypoint).stages
         for thrust, holds in ((least * up, True), (0.9 * least * up, False), (-least * up, False)):
-            met = [c.lower - 1e-9 <= c.direction @ thrust <= c.upper + 1e-9 for c in stage.conditions]
+            asked = stage.explicit().conditions
+            met = [c.lower - 1e-9 <= c.direction @ thrust <= c.upper + 1e-9 for c in asked]
             assert all(met) == holds
-            assert {c.quantity for c in stage.conditions} == {Quantity.SPECIFIC_THRUST}
+            assert {c.quantity for c in asked} == {Quantity.SPECIFIC_THRUST}
 
 
 def test_waypoints_are_passed_in_order_and_the_gate_at_its_centre() -> None:
     gate = tilted_gate(np.array([1.0, 2.0, 3.0]))
-    passed = sequence(Waypoint(position=(0, 0, 1)), Waypoint(gate="gate"), gates=[gate])
+
+    def problem(*gates: Gate) -> Problem:
+        maneuver = Waypoints((Waypoint(position=(0, 0, 1)), Waypoint(gate="gate")))
+        return Problem("course", at_rest((0, 0, 0)), at_rest((5, 0, 0)), maneuver, gates)
+
+    passed = problem(gate).stages(40.0)
     assert passed.ordered
     assert [s.name for s in passed.stages] == ["waypoint 1", "gate"]
-    assert [s.at for s in passed.stages] == [None, None]
+    assert [s.at for s in passed.stages] == ["free", "free"]
     assert [c.lower for c in passed.stages[1].conditions] == [1.0, 2.0, 3.0]
     with pytest.raises(SpecError, match="no gate named 'gate'"):
-        sequence(Waypoint(gate="gate"))
+        problem()
 
 
 @pytest.mark.parametrize(
