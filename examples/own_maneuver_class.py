@@ -9,7 +9,6 @@ from pathlib import Path
 
 import aerobat as ab
 from aerobat.declaration import Positive
-from aerobat.problem import StageSequence
 
 
 @ab.maneuver("slalom")
@@ -18,14 +17,10 @@ class Slalom(ab.Maneuver):
 
     min_thrust: Positive = 10.0  # [m/s²] specific thrust there, at least
 
-    def stage_sequence(self, gates: Sequence[ab.Gate], max_specific_thrust: float) -> StageSequence:
+    def stage_sequence(self, gates: Sequence[ab.Gate], max_specific_thrust: float) -> ab.StageSequence:
         """Return one stage for each gate."""
-        stages = []
-        for gate in gates:
-            across = ab.Condition("specific_thrust", gate.lateral, lower=0.0, upper=0.0)
-            along = ab.Condition("specific_thrust", gate.up, lower=self.min_thrust)
-            stages.append(ab.Stage(gate.name, (across, along), gate=gate.name))
-        return ab.CustomManeuver(tuple(stages)).stage_sequence(gates, max_specific_thrust)
+        stages = (ab.Stage(gate.name, gate=gate.name, min_upright_thrust=self.min_thrust) for gate in gates)
+        return ab.StageSequence(tuple(stages))
 
 
 PROBLEM = """

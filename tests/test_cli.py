@@ -201,3 +201,17 @@ def test_a_picture_that_cannot_be_drawn_leaves_the_earlier_run_whole(capsys, mon
     assert err == "aerobat: cannot write out/line: No space left on device\n"
     assert {path.name: path.read_bytes() for path in Path("out/line").iterdir()} == before
     assert [path.name for path in Path("out").iterdir()] == ["line"]
+
+
+@pytest.mark.parametrize("command", [["problems"], ["plan", "line", "--json"], ["fly", "--help"]])
+def test_a_reader_that_has_enough_ends_a_command_without_a_word(command: list[str], tmp_path: Path) -> None:
+    """As `aerobat ... | head` does: the pipe is closed before anything is read."""
+    process = subprocess.Popen(
+        [sys.executable, "-m", "aerobat", *command],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        cwd=tmp_path,
+    )
+    process.stdout.close()
+    assert process.stderr.read() == b""
+    assert process.wait() != 0

@@ -176,7 +176,8 @@ def test_a_flip_passes_a_gate_at_any_angle_of_its_turn_upright_there(
     assert gate.normal @ [np.cos(axis), np.sin(axis), 0.0] == pytest.approx(1.0)
     stages = Flip(axis_deg).stage_sequence([gate], 50.0).stages
     (at_gate,) = (stage for stage in stages if stage.gate)
-    np.testing.assert_array_equal(at_gate.attitude.up, gate.up)
+    np.testing.assert_array_equal(at_gate.explicit(gate).attitude.up, gate.up)
+    assert at_gate.min_upright_thrust == 10.0
     others = [float(stage.name.rstrip("°")) for stage in stages if not stage.gate]
     before = others[: stages.index(at_gate)]
     assert others == sorted(others)
@@ -228,6 +229,8 @@ def test_a_window_holds_the_interval_ends_within_it(first: float, length: float,
         lambda: Stage("s", at=(0.6, 0.4)),
         lambda: Stage("s", at=(0.5, 1.5)),
         lambda: Stage("s", at="early"),
+        lambda: Stage("s", min_upright_thrust=5.0),
+        lambda: Stage("s", gate="gate", min_upright_thrust=5.0, attitude=Attitude((0.0, 0.0, 1.0))),
         lambda: Attitude((0.0, 0.0, 1.0), tolerance=1.6),
         lambda: Attitude((0.0, 0.0, 1.0), min_thrust=-1.0),
         lambda: Flip(axis_deg=np.inf),

@@ -24,6 +24,7 @@ from .planning import (
     registered_planners,
 )
 from .problem import (
+    Attitude,
     Condition,
     CustomManeuver,
     EndState,
@@ -37,6 +38,7 @@ from .problem import (
     Problem,
     Quantity,
     Stage,
+    StageSequence,
     Waypoint,
     Waypoints,
     at_rest,
@@ -58,6 +60,7 @@ from .vehicle import Rotor, Vehicle, load_vehicle, vehicle_names, write_vehicle
 
 __all__ = [
     "AerobatError",
+    "Attitude",
     "BackendMissing",
     "BisectionSearch",
     "BodyState",
@@ -100,6 +103,7 @@ __all__ = [
     "Setpoint",
     "SpecError",
     "Stage",
+    "StageSequence",
     "StateNoise",
     "TimeOptimal",
     "TimeScaling",

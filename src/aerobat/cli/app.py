@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import atexit
 import gc
+import os
 import sys
 from collections.abc import Iterator, Sequence
 
@@ -14,6 +15,7 @@ from aerobat.errors import AerobatError, Infeasible
 BAD_INPUT = 2
 INFEASIBLE = 3
 INTERRUPTED = 130
+BROKEN_PIPE = 141  # as shells say it
 IMPORT_FLAG = "--import"
 
 # each is one file and one function of this name, imported when it is asked for
@@ -52,6 +54,10 @@ def main(arguments: Sequence[str] | None = None) -> None:
     try:
         _import_plugins(tokens)
         app(tokens, exit_on_error=False, print_error=False, result_action="return_value")
+        sys.stdout.flush()
+    except BrokenPipeError:  # whoever read has enough
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        sys.exit(BROKEN_PIPE)
     except CycloptsError as error:
         _exit(" ".join(str(error).split()), BAD_INPUT)
     except Infeasible as error:

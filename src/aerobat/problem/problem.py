@@ -27,7 +27,7 @@ from aerobat.declaration import (
 )
 from aerobat.environment import Environment
 from aerobat.errors import SpecError
-from aerobat.problem.gate import Gate, at_centre, named_gate
+from aerobat.problem.gate import Gate, named_gate
 from aerobat.problem.maneuvers import MANEUVERS, Line, Maneuver
 from aerobat.problem.stage import StageSequence
 
@@ -198,10 +198,7 @@ class Problem:
         Raises SpecError for gates that do not suit the maneuver.
         """
         sequence = self.maneuver.stage_sequence(self.gates, max_specific_thrust)
-        stages = (
-            stage.explicit(() if stage.gate is None else at_centre(self.gate(stage.gate)))
-            for stage in sequence.stages
-        )
+        stages = (s.explicit(None if s.gate is None else self.gate(s.gate)) for s in sequence.stages)
         return replace(sequence, stages=tuple(stages))
 
     def gate(self, name: str) -> Gate:

@@ -8,8 +8,9 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from aerobat.declaration import FieldError, Fraction, Label, declared
+from aerobat.declaration import FieldError, Fraction, Label, NonNegative, declared
 from aerobat.problem.condition import Attitude, Condition
+from aerobat.problem.gate import Gate, at_centre
 
 Edge = Annotated[float, Field(ge=0, le=1)]  # [-] of the duration
 # [-] when a stage holds, as a part of the duration: anywhere, between two fractions of it, or at one
@@ -17,6 +18,7 @@ CrossingTime = Annotated[
     Literal["free"] | Fraction | tuple[Edge, Edge],
     Field(description='`"free"`, a fraction of the duration between 0 and 1, or a window of two of them'),
 ]
+PLANNED_SHARE = 0.5  # of a gate's tolerance of attitude: the plan's
 ROUNDING = 1e-9  # [-] of an interval
 
 
@@ -25,7 +27,8 @@ class Stage:
     """Conditions that hold together at one instant, which the search chooses where `at` leaves it a choice.
 
     A fraction fixes it to the last interval that ends by then, or `interval_offset` intervals after that
-    one. `gate` names the gate that it passes, whose centre it meets; `attitude` is where its thrust points.
+    one. `gate` names the gate that it passes, whose centre it meets, with the thrust axis along its upright
+    where `min_upright_thrust` is given: within half its tolerance, the rest is left to the flight.
     """
 
     name: Label  # shown in reports and pictures
@@ -33,10 +36,17 @@ class Stage:
     at: CrossingTime = "free"  # when, as a part of the duration
     interval_offset: Annotated[int, Field(ge=0, le=10_000)] = 0  # intervals after that
     gate: str | None = None  # name of the gate whose centre is passed
-    attitude: Attitude | None = None  # where the thrust points
+    # specific thrust along the gate's upright, at least; left out, no attitude is asked of the gate
+    min_upright_thrust: NonNegative | None = None  # [m/s²]
+    attitude: Attitude | None = None  # where the thrust points, instead
 
     def __post_init__(self) -> None:
         """Check."""
+        if self.min_upright_thrust is not None:
+            if self.gate is None:
+                raise FieldError("min_upright_thrust", "needs gate, whose upright is meant; name it")
+            if self.attitude is not None:
+                raise FieldError("min_upright_thrust", "stands beside attitude; give one of them")
         if isinstance(self.at, tuple) and not self.at[0] < self.at[1]:
             raise FieldError("at", f": its window must rise, got {self.at[0]:g} to {self.at[1]:g}")
 
@@ -59,10 +69,16 @@ class Stage:
         earliest = max(ceil(first * intervals - ROUNDING) - 1, 0)
         return range(earliest, min(floor(last * intervals + ROUNDING), intervals - 1))
 
-    def explicit(self, at_gate: tuple[Condition, ...] = ()) -> Stage:
-        """The same with all that it asks among its conditions: a gate's, its own, its attitude's."""
-        attitude = () if self.attitude is None else self.attitude.conditions
-        return replace(self, conditions=(*at_gate, *self.conditions, *attitude))
+    def explicit(self, gate: Gate | None = None) -> Stage:
+        """The same at its gate, with all that it asks among its conditions: also where, and its attitude."""
+        attitude = self.attitude
+        if gate is not None and self.min_upright_thrust is not None:
+            tolerance = PLANNED_SHARE * gate.attitude_tolerance
+            attitude = Attitude(gate.up, tolerance, self.min_upright_thrust)
+        there = () if gate is None else at_centre(gate)
+        pointing = () if attitude is None else attitude.conditions
+        conditions = (*there, *self.conditions, *pointing)
+        return replace(self, conditions=conditions, min_upright_thrust=None, attitude=attitude)
 
 
 @declared

@@ -5,11 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from aerobat.declaration import NonNegative, declared
-from aerobat.problem.condition import Attitude, Condition, Quantity
+from aerobat.problem.condition import Condition, Quantity
 from aerobat.problem.gate import Gate
 from aerobat.problem.stage import CrossingTime, Stage
-
-PLANNED_SHARE = 0.5  # of a gate's tolerance of attitude: the plan's, the rest is left to the flight
 
 
 @declared
@@ -44,13 +42,11 @@ class GatePassage:
         if self.perpendicular:
             asked = [Condition(Quantity.VELOCITY, gate.normal, lower=self.speed)]
             asked += [Condition(Quantity.VELOCITY, axis, 0.0, 0.0) for axis in (gate.lateral, gate.up)]
-        attitude = None
-        if self.upright and min_thrust is not None:
-            attitude = Attitude(gate.up, PLANNED_SHARE * gate.attitude_tolerance, min_thrust)
-        else:
+        if not self.upright:
             asked += conditions
+            min_thrust = None
         offset = 0 if self.centred else 1
-        return Stage(gate.name, tuple(asked), self.at, offset, gate.name, attitude)
+        return Stage(gate.name, tuple(asked), self.at, offset, gate.name, min_thrust)
 
 
 PAPER_PASSAGE = GatePassage(perpendicular=False, at=0.5, centred=False, upright=False)
