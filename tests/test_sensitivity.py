@@ -14,7 +14,6 @@ from aerobat.engines.duals import Dual, DualOps, dual
 from aerobat.engines.floats import FloatOps
 from aerobat.errors import SpecError
 from aerobat.evaluation import Sensitivity, score_flights, sensitivity
-from aerobat.evaluation.score import attitude_error, position_error
 from aerobat.problem import load_problem
 from aerobat.simulation import StateNoise, fly
 from aerobat.states import BodyState
@@ -44,8 +43,8 @@ def flown(vehicle: Vehicle | list[Vehicle] = QUAD, **options: Any) -> Array:
     """The three errors of a flight or of each of a batch, from its log, (..., 3)."""
     given = {"controller": TIGHT, "start": START, "nominal": NOMINAL, "rate": RATE, "engine": "compiled"}
     flight = fly(PATH, vehicle, **(given | options))
-    square = position_error(flight) ** 2
-    angle = attitude_error(flight) ** 2
+    square = flight.position_error**2
+    angle = flight.attitude_error**2
     return np.stack([square.mean(axis=-1), angle.mean(axis=-1), square[..., -1]], axis=-1)
 
 

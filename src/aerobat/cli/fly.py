@@ -10,6 +10,7 @@ from aerobat.cli.options import FlyingOptions, PlanningOptions
 from aerobat.cli.run_folder import finish
 from aerobat.cli.tasks import planned
 from aerobat.evaluation import score
+from aerobat.planning import nominal_flight
 from aerobat.simulation import StateNoise
 from aerobat.simulation.fly import fly as simulate
 
@@ -32,5 +33,9 @@ def fly(
     """
     noise = StateNoise.fused().scaled(flying.noise) if flying.noise else None
     plan = planned(problem, options)
-    flight = simulate(plan, noise=noise, seed=flying.seed)
+    assert plan.vehicle is not None, "a command plans for a vehicle"
+    if noise is None:  # the flight that the plan was judged by
+        flight = nominal_flight(plan.trajectory, plan.vehicle, plan.problem.environment)
+    else:
+        flight = simulate(plan, noise=noise, seed=flying.seed)
     finish(plan, options, flight, score(flight, plan, plan.vehicle))

@@ -21,6 +21,7 @@ from aerobat.planning import (
     planner_class,
     planner_options,
     with_certificate,
+    with_flyability,
 )
 from aerobat.problem import Problem, load_problem
 from aerobat.vehicle import Vehicle, load_vehicle
@@ -45,7 +46,7 @@ def planned(name: str, options: PlanningOptions) -> Plan:
         if not options.paper:
             return plan(problem, planner, vehicle, progress)
         # the paper plans without a vehicle; whether this one can fly it is told all the same
-        return with_certificate(plan(problem, planner, progress=progress), vehicle)
+        return with_flyability(with_certificate(plan(problem, planner, progress=progress), vehicle))
 
 
 def make_planner(options: PlanningOptions) -> Planner:
@@ -97,7 +98,7 @@ def _read_plan(path: Path, options: PlanningOptions) -> Plan:
     found = load_plan(path)
     if options.vehicle is None and found.vehicle is not None:
         return found
-    return with_certificate(found, load_vehicle(options.vehicle or DEFAULT_VEHICLE))
+    return with_flyability(with_certificate(found, load_vehicle(options.vehicle or DEFAULT_VEHICLE)))
 
 
 def _is_given(value: Any) -> bool:

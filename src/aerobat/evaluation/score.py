@@ -7,7 +7,6 @@ from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
-from aerobat import so3
 from aerobat.arrays import Array
 from aerobat.errors import SpecError
 from aerobat.evaluation.passage import (
@@ -133,7 +132,7 @@ def score(flight: Flight, goal: Problem | Plan, vehicle: Vehicle | None = None) 
         vehicle = goal.vehicle
     gates = gates_of(goal)
     states = flight.states
-    square, angle = position_error(flight) ** 2, attitude_error(flight)
+    square, angle = flight.position_error**2, flight.attitude_error
     diverged = flight.outcome is not Outcome.COMPLETE
     found = []
     instants = planned_passages(goal, gates, flight.times, flight.setpoint.flat.position)
@@ -178,16 +177,6 @@ def scores_of(metrics: RunningMetrics, gates: tuple[Gate, ...], fleet: Fleet) ->
         is_finite=metrics.is_finite > 0.5,
         ground_time=np.where(never, np.nan, metrics.ground_time),
     )
-
-
-def position_error(flight: Flight) -> Array:
-    """|p − p_ref| [m], (..., T)."""
-    return np.asarray(np.linalg.norm(flight.states.position - flight.setpoint.flat.position, axis=-1))
-
-
-def attitude_error(flight: Flight) -> Array:
-    """The angle between actual and reference attitude [rad], (..., T)."""
-    return so3.angle_between(flight.states.q_world_body, flight.setpoint.q_world_body)
 
 
 def _passage_of(passage: Passage, k: int) -> Passage:

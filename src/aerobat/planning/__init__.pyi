@@ -1,4 +1,5 @@
 from .certified_solve import Judged, Solution, certified_solve, with_certificate
+from .flyability import flight_error, nominal_flight, with_flyability
 from .miqp import Miqp
 from .plan_file import load_plan
 from .planners import (
@@ -14,14 +15,16 @@ from .planners import (
 from .polynomial.free_knots import FreeKnots
 from .polynomial.min_snap import MinSnap, TimeScaling
 from .recorder import Attempt, Recorder
-from .result import PlacedStage, Plan
+from .result import FLYABLE_ERROR, Flyability, PlacedStage, Plan
 from .rotor_margin import RotorMargin
 from .search import BisectionSearch, GridSearch
 from .time_optimal.time_optimal import TimeOptimal
 
 __all__ = [
+    "FLYABLE_ERROR",
     "Attempt",
     "BisectionSearch",
+    "Flyability",
     "FreeKnots",
     "GridSearch",
     "Judged",
@@ -37,7 +40,9 @@ __all__ = [
     "TimeOptimal",
     "TimeScaling",
     "certified_solve",
+    "flight_error",
     "load_plan",
+    "nominal_flight",
     "option",
     "plan",
     "planner",
@@ -45,4 +50,5 @@ __all__ = [
     "planner_options",
     "registered_planners",
     "with_certificate",
+    "with_flyability",
 ]

@@ -130,9 +130,9 @@ def certificate_for(trajectory: Trajectory, problem: Problem, vehicle: Vehicle) 
 
 
 def with_certificate(plan: Plan, vehicle: Vehicle) -> Plan:
-    """The plan with the certificate of a vehicle, whichever it was made for."""
+    """The plan with the certificate of a vehicle, whichever it was made for; not flown by it yet."""
     certificate = certificate_for(plan.trajectory, plan.problem, vehicle)
-    return replace(plan, vehicle=vehicle, certificate=certificate)
+    return replace(plan, vehicle=vehicle, certificate=certificate, flyability=None)
 
 
 def tightened(bounds: Limits, limits: Limits, trajectory: Trajectory, derivatives: int) -> Limits | None:

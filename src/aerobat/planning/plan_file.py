@@ -2,8 +2,8 @@
 
 A .plan file is a NumPy .npz archive without pickles. Its arrays `durations` (S,), `coefficients`
 (S, degree + 1, 3) and `heading` are the trajectory's, bit for bit; `document` holds, as UTF-8 JSON, the rest:
-the problem and the vehicle as the tables of their files, how the plan was made, its stages, attempts and
-certificate, and the version of Aerobat that wrote it.
+the problem and the vehicle as the tables of their files, how the plan was made, its stages, attempts,
+certificate and flyability, and the version of Aerobat that wrote it.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from aerobat.certification import Certificate
 from aerobat.declaration import from_table, to_table
 from aerobat.errors import SpecError
 from aerobat.planning.recorder import Attempt
-from aerobat.planning.result import PlacedStage, Plan
+from aerobat.planning.result import Flyability, PlacedStage, Plan
 from aerobat.problem.problem import Problem
 from aerobat.storage import read_arrays, whole_file
 from aerobat.trajectory import Trajectory
@@ -44,6 +44,7 @@ class _Evidence:
     bound: float | None
     gap: float | None
     certificate: Certificate | None
+    flyability: Flyability | None = None
 
 
 def save_plan(plan: Plan, path: str | Path) -> None:

@@ -17,6 +17,7 @@ from pydantic import Field
 
 from aerobat.declaration import Registry
 from aerobat.planning.certified_solve import with_certificate
+from aerobat.planning.flyability import with_flyability
 from aerobat.planning.recorder import Progress
 from aerobat.planning.result import Plan
 from aerobat.problem.problem import Problem
@@ -58,7 +59,7 @@ def plan(
     vehicle: Vehicle | None = None,
     progress: Progress | None = None,
 ) -> Plan:
-    """Plan a problem; with a vehicle, for its rotors and with its certificate.
+    """Plan a problem; with a vehicle, for its rotors, with its certificate and its own simulated flight.
 
     Raises Infeasible, whose message names the bound that binds and whose `attempts` hold the evidence, and
     SpecError for input that makes no sense.
@@ -74,7 +75,9 @@ def plan(
         vehicle.require_hover(problem.environment.gravity)
     chosen = planner_class(planner)() if isinstance(planner, str) else planner
     found = chosen.plan(problem, vehicle, progress)
-    return found if vehicle is None or found.certificate is not None else with_certificate(found, vehicle)
+    if vehicle is None:
+        return found
+    return with_flyability(found if found.certificate is not None else with_certificate(found, vehicle))
 
 
 def option(default: Any, help: str, off: str | None = None, command_default: Any = None) -> Any:

@@ -23,6 +23,47 @@ class PlacedStage:
     gate: str | None = None  # the name of the gate that is passed there
 
 
+FLYABLE_ERROR = 0.05  # [m] that a plan's own flight may leave its path by, a frame's usual clearance
+
+
+@dataclass(frozen=True)
+class Flyability:
+    """A plan's own flights: the simulated closed loop, nothing unknown, and with the reserve used up.
+
+    The disturbance is the largest that the rotors' reserve buys at every instant: all rotors give less than
+    commanded by a fraction of it, of which no rotor's limit need take notice.
+    """
+
+    error: float  # [m] the largest position error of the nominal flight, 5 m or more where it diverges
+    disturbance: float  # [N] by which every rotor may miss its thrust; 0 where nothing is left
+    disturbed_fraction: float  # [-] the same over the largest thrust of a rotor
+    disturbed_error: float  # [m] the largest position error where all rotors give less by that fraction
+
+    @property
+    def flies(self) -> bool:
+        """True if the nominal flight stays within FLYABLE_ERROR of the path."""
+        return self.error <= FLYABLE_ERROR
+
+    def __str__(self) -> str:
+        """The finding in a sentence without its full stop."""
+        if not self.flies:
+            return (
+                f"not flyable: its own flight leaves the path by {_length(self.error)}, "
+                f"{_length(FLYABLE_ERROR)} at most allowed, a defect of the plan, not of the flight"
+            )
+        if not self.disturbance:
+            return f"flies within {_length(self.error)}, with no reserve left"
+        return (
+            f"flies within {_length(self.error)}; the reserve left, {self.disturbance:.2g} N, is "
+            f"{100 * self.disturbed_fraction:.2g} % of a rotor's thrust: with as much less from all rotors "
+            f"within {_length(self.disturbed_error)}"
+        )
+
+
+def _length(metres: float) -> str:
+    return f"{metres:.2f} m" if metres >= 1.0 else f"{100 * metres:.2g} cm"
+
+
 @dataclass(frozen=True)
 class Plan:
     """A trajectory that solves a problem, and the evidence for it."""
@@ -41,6 +82,7 @@ class Plan:
     gap: float | None = None  # (cost − bound) / cost
     vehicle: Vehicle | None = None  # what it was planned or certified for
     certificate: Certificate | None = None  # for the vehicle, over continuous time
+    flyability: Flyability | None = None  # of the vehicle's own flight, simulated
 
     @property
     def duration(self) -> float:
@@ -51,6 +93,11 @@ class Plan:
     def certified(self) -> bool:
         """True if it is proven that its vehicle can fly it within all limits."""
         return self.certificate is not None and self.certificate.certified
+
+    @property
+    def flies(self) -> bool:
+        """True if its vehicle, simulated, follows it within FLYABLE_ERROR."""
+        return self.flyability is not None and self.flyability.flies
 
     @property
     def margin(self) -> RotorMargin | None:
@@ -86,9 +133,10 @@ class Plan:
         stages = ", ".join(f"{s.name} at {s.time:.2f} s" for s in self.stages) or "no stages"
         margin = "" if self.margin is None else f"; rotors {self.margin}"
         proof = "" if self.certificate is None else f"; {self.certificate}"
+        flown = "" if self.flyability is None else f"; {self.flyability}"
         dt = "" if self.dt is None else f" of {self.dt:.4f} s"
         backend = f" ({self.backend})" if self.backend else ""
         return (
             f"{self.problem.name}: {self.duration:.3f} s in {self.intervals} intervals{dt}, {self.status} by "
-            f"{self.planner}{backend}; {stages}{margin}{proof}"
+            f"{self.planner}{backend}; {stages}{margin}{proof}{flown}"
         )

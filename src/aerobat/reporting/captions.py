@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from aerobat.evaluation.score import Score, attitude_error, position_error
+from aerobat.evaluation.score import Score
 from aerobat.planning import Plan
 from aerobat.simulation import Flight
 
@@ -31,8 +31,8 @@ def score_caption(score: Score) -> str:
 def error_caption(flight: Flight) -> str:
     """The largest errors of a flight, or of a batch."""
     return (
-        f"position error at most {length(float(position_error(flight).max()))}, "
-        f"attitude error at most {np.rad2deg(attitude_error(flight).max()):.2f}°"
+        f"position error at most {length(float(flight.position_error.max()))}, "
+        f"attitude error at most {np.rad2deg(flight.attitude_error.max()):.2f}°"
     )
 
 

@@ -7,7 +7,7 @@ from dataclasses import asdict
 from typing import Any
 
 from aerobat.evaluation.score import Score
-from aerobat.planning import Plan
+from aerobat.planning import Flyability, Plan
 
 
 def report(plan: Plan, score: Score | None = None, vehicle: str | None = None) -> dict[str, Any]:
@@ -35,6 +35,17 @@ def _flight(score: Score) -> dict[str, Any]:
         for passage in facts["passages"]
     ]
     return facts
+
+
+def _flyability(found: Flyability) -> dict[str, Any]:
+    return {
+        "flies": found.flies,
+        "error_m": found.error,
+        "disturbance_n": found.disturbance,
+        "disturbed_fraction": found.disturbed_fraction,
+        "disturbed_error_m": found.disturbed_error,
+        "sentence": str(found),
+    }
 
 
 def _plan(plan: Plan) -> dict[str, Any]:
@@ -72,4 +83,5 @@ def _plan(plan: Plan) -> dict[str, Any]:
         "bounded_moments": plan.certificate and not plan.certificate.discontinuities,
         "rotor_feasible": plan.certificate and plan.certificate.certified,
         "certificate": plan.certificate and plan.certificate.record(),
+        "flyability": plan.flyability and _flyability(plan.flyability),
     }

@@ -85,6 +85,8 @@ def _plan_facts(plan: Plan) -> Iterable[tuple[str, str]]:
         yield "rotors", str(plan.margin)
     if plan.certificate is not None:
         yield "proof", ("" if plan.certificate.certified else "not certified: ") + plan.certificate.why
+    if plan.flyability is not None:
+        yield "flyability", str(plan.flyability)
 
 
 def _optimality(plan: Plan) -> str:

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from aerobat import so3
 from aerobat.arrays import Array, frozen
 from aerobat.environment import Environment
 from aerobat.errors import SpecError
@@ -108,6 +109,17 @@ class Flight:
     def setpoint(self) -> Setpoint:
         """Set-points of the trajectory (of the first vehicle, where vehicles differ), (T, ·)."""
         return _setpoint(self.series)
+
+    @cached_property
+    def position_error(self) -> Array:
+        """|p − p_ref| [m], (..., T)."""
+        off = self.series["position"] - self.series["setpoint_position"]
+        return np.asarray(np.linalg.norm(off, axis=-1))
+
+    @cached_property
+    def attitude_error(self) -> Array:
+        """The angle between actual and reference attitude [rad], (..., T)."""
+        return so3.angle_between(self.series["q_world_body"], self.series["setpoint_q_world_body"])
 
     @property
     def is_batch(self) -> bool:

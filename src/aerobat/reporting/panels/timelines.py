@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from aerobat.arrays import Array
-from aerobat.evaluation.score import attitude_error, position_error
 from aerobat.planning import PlacedStage, Plan
 from aerobat.reporting.page import HEADING, heading, legend, size_of
 from aerobat.reporting.panels.keyframes import maneuver_plane, plan_keyframes
@@ -27,7 +26,7 @@ NAME_WIDTH, LETTER = 0.36, 0.065  # [in] that a stage's name takes at least, and
 
 def draw_position_error(axes: Axes, flight: Flight) -> None:
     """Draw the distance between actual and reference position, in the unit that suits its largest value."""
-    error = position_error(flight)
+    error = flight.position_error
     unit, size = next((u for u in LENGTHS if error.max() >= u[1]), LENGTHS[-1])
     draw_series(axes, flight.times, error / size, INK)
     axes.set(ylabel=f"position error [{unit}]", ylim=(0.0, _top(error / size, 0.01)))
@@ -35,7 +34,7 @@ def draw_position_error(axes: Axes, flight: Flight) -> None:
 
 def draw_attitude_error(axes: Axes, flight: Flight) -> None:
     """Draw the angle between actual and reference attitude."""
-    error = np.rad2deg(attitude_error(flight))
+    error = np.rad2deg(flight.attitude_error)
     draw_series(axes, flight.times, error, INK)
     axes.set(ylabel="attitude error [°]", ylim=(0.0, _top(error, 0.01)))
 

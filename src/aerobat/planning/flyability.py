@@ -1,0 +1,76 @@
+"""A plan's own flight: the closed loop of its vehicle, simulated before the plan is returned.
+
+A certificate proves that the rotors can follow a path; that the loop of controller and rotors does, lag
+included, only a flight shows. What is flown is the plan's trajectory by its vehicle in its environment, with
+the default controller and nothing unknown; then once more with the reserve that the certificate leaves used
+up, all rotors giving less than commanded by the same fraction δ. As rotors that give (1 − δ) f move a body
+as f moves one of 1/(1 − δ) times the mass, inertia and drag, that is what flies then, told otherwise.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import lru_cache
+
+from aerobat.environment import Environment
+from aerobat.errors import SpecError
+from aerobat.planning.result import Flyability, Plan
+from aerobat.simulation import Flight, FlightConfig, Outcome, fly
+from aerobat.simulation.outcome import DIVERGENCE_RADIUS
+from aerobat.trajectory import Trajectory
+from aerobat.vehicle import Vehicle
+
+
+def flight_error(trajectory: Trajectory, vehicle: Vehicle, environment: Environment) -> float:
+    """The largest position error [m] of a vehicle's nominal flight; 5 m or more where it diverges."""
+    return _largest_error(nominal_flight(trajectory, vehicle, environment))
+
+
+def with_flyability(plan: Plan) -> Plan:
+    """The plan for a vehicle with the findings of its own flights. Raises SpecError without a vehicle."""
+    if plan.vehicle is None:
+        raise SpecError("a plan without a vehicle has no flight of its own; plan it for one")
+    flown = (plan.trajectory, plan.vehicle, plan.problem.environment)
+    disturbance = max(plan.certificate.margin or 0.0, 0.0) if plan.certificate else 0.0
+    fraction = disturbance / float(plan.vehicle.max_thrusts.max())
+    return replace(
+        plan,
+        flyability=Flyability(
+            error=flight_error(*flown),
+            disturbance=disturbance,
+            disturbed_fraction=fraction,
+            disturbed_error=_largest_error(disturbed_flight(*flown, fraction)),
+        ),
+    )
+
+
+@lru_cache(maxsize=2)
+def nominal_flight(trajectory: Trajectory, vehicle: Vehicle, environment: Environment) -> Flight:
+    """The flight of a plan by default settings, nothing unknown; the latest two are kept."""
+    return fly(trajectory, vehicle, environment=environment)
+
+
+def disturbed_flight(
+    trajectory: Trajectory, vehicle: Vehicle, environment: Environment, fraction: float
+) -> Flight:
+    """The flight of a vehicle whose rotors all give less than commanded.
+
+    Args:
+        trajectory: The path [m] over time [s], world.
+        vehicle: What flies it.
+        environment: Where.
+        fraction: Of every rotor's thrust what is missing [-], below 1.
+    """
+    factor = 1.0 / (1.0 - fraction)
+    weak = replace(
+        vehicle,
+        mass=factor * vehicle.mass,
+        inertia=factor * vehicle.inertia,
+        drag_body=factor * vehicle.drag_body,
+    )
+    return fly(trajectory, weak, environment=environment, config=FlightConfig(nominal=vehicle))
+
+
+def _largest_error(flight: Flight) -> float:
+    error = float(flight.position_error.max())
+    return error if flight.outcome is Outcome.COMPLETE else max(error, DIVERGENCE_RADIUS)

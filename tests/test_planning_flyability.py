@@ -1,0 +1,120 @@
+"""A plan flies itself before it is returned: what its loop of controller and rotors makes of it is said."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+import aerobat as ab
+from aerobat.errors import SpecError
+from aerobat.planning import FLYABLE_ERROR, Flyability, flight_error, with_certificate, with_flyability
+from aerobat.reporting.report_json import report
+from aerobat.trajectory import Trajectory
+
+QUAD = ab.load_vehicle("agile-quad")
+CRAZYFLIE = ab.load_vehicle("crazyflie")
+
+
+@pytest.fixture(scope="module")
+def plan() -> ab.Plan:
+    windy = ab.Environment(gravity=9.7, wind=(1.0, -0.5, 0.2))
+    problem = replace(ab.load_problem("half-flip"), heading=0.4, environment=windy)
+    return ab.plan(problem, vehicle=replace(QUAD, drag_body=(0.1, 0.1, 0.05)))
+
+
+def flyability(plan: ab.Plan) -> Flyability:
+    assert plan.flyability is not None
+    return plan.flyability
+
+
+def sagging() -> ab.Plan:
+    """A certified plan that its vehicle cannot follow: a quarter of a second is the lag of its rotors.
+
+    The lag is in no rotor's thrust by flatness, and slow enough to be beyond what commands can lead.
+    """
+    slow = replace(QUAD, rotors=tuple(replace(rotor, lag=0.25) for rotor in QUAD.rotors))
+    return with_flyability(with_certificate(ab.plan(ab.load_problem("half-flip"), vehicle=QUAD), slow))
+
+
+def test_flyability_is_the_score_of_the_plan_s_own_flight(plan: ab.Plan) -> None:
+    error = ab.score(ab.fly(plan), plan).max_position_error_m
+    assert flyability(plan).error == pytest.approx(error, rel=1e-9)
+    assert plan.vehicle is not None
+    assert flight_error(plan.trajectory, plan.vehicle, plan.problem.environment) == flyability(plan).error
+    assert 0.0 < error < FLYABLE_ERROR
+    assert plan.flies
+
+
+def test_the_reserve_is_what_the_certificate_leaves(plan: ab.Plan) -> None:
+    assert plan.certificate is not None
+    assert plan.vehicle is not None
+    found = flyability(plan)
+    assert found.disturbance == plan.certificate.margin
+    assert found.disturbed_fraction == found.disturbance / plan.vehicle.max_thrusts.max()
+
+
+def test_a_mass_that_grows_with_inertia_and_drag_is_thrust_that_falls_short() -> None:
+    """As the rotors' own effect, allocation and lag, says: the accelerations of 97 % of each thrust."""
+    fraction = 0.03
+    plan = ab.plan(ab.load_problem("line"), vehicle=CRAZYFLIE)
+    assert plan.certificate is not None
+    margin = fraction * float(CRAZYFLIE.max_thrusts.max())
+    findings = tuple(
+        replace(f, bound=f.limit + margin * (1 if f.side.value == "min" else -1)) if f.limit else f
+        for f in plan.certificate.findings
+    )
+    told = with_flyability(replace(plan, certificate=replace(plan.certificate, findings=findings)))
+    scale = 1.0 / (1.0 - fraction)
+    heavy = replace(
+        CRAZYFLIE,
+        mass=scale * CRAZYFLIE.mass,
+        inertia=scale * CRAZYFLIE.inertia,
+        drag_body=scale * CRAZYFLIE.drag_body,
+    )
+    error = ab.score(ab.fly(plan, heavy, nominal=CRAZYFLIE), plan).max_position_error_m
+    assert flyability(told).disturbed_fraction == pytest.approx(fraction, rel=1e-9)
+    assert flyability(told).disturbed_error == pytest.approx(error, rel=1e-6)
+    assert flyability(told).disturbed_error > 2.0 * flyability(told).error
+
+
+def test_without_a_reserve_nothing_is_bought(plan: ab.Plan) -> None:
+    heavy = replace(QUAD, mass=2.5 * QUAD.mass)
+    bare = with_flyability(with_certificate(plan, heavy))
+    assert not bare.certified
+    assert flyability(bare).disturbance == flyability(bare).disturbed_fraction == 0.0
+    assert flyability(bare).disturbed_error == flyability(bare).error
+
+
+def test_a_certified_plan_that_does_not_fly_says_so_as_a_defect_of_its_own() -> None:
+    plan = sagging()
+    assert plan.certified
+    assert not plan.flies
+    assert flyability(plan).error > FLYABLE_ERROR
+    for text in (str(plan), str(report(plan)["plan"]["flyability"]["sentence"])):
+        assert "a defect of the plan, not of the flight" in text
+    assert report(plan)["plan"]["flyability"]["flies"] is False
+
+
+def test_a_flight_that_diverges_is_no_small_error() -> None:
+    """It is lost, wherever it was last."""
+    away = Trajectory([1.0], [[[0.0, 0.0, 0.0], [0.0, 0.0, 0.0], [90.0, 0.0, 0.0]]])
+    assert flight_error(away, QUAD, ab.Environment()) >= 5.0
+
+
+def test_flyability_survives_the_plan_s_file(plan: ab.Plan, tmp_path: Path) -> None:
+    plan.save(tmp_path / "half.plan")
+    assert ab.load_plan(tmp_path / "half.plan").flyability == plan.flyability
+
+
+def test_a_certificate_for_another_vehicle_takes_the_old_one_s_flights_away(plan: ab.Plan) -> None:
+    assert with_certificate(plan, CRAZYFLIE).flyability is None
+    assert not with_certificate(plan, CRAZYFLIE).flies
+
+
+def test_a_plan_without_a_vehicle_flies_nothing() -> None:
+    plan = ab.plan(ab.load_problem("line"))
+    assert plan.flyability is None
+    with pytest.raises(SpecError, match="plan it for one"):
+        with_flyability(plan)
