@@ -71,14 +71,25 @@ def random_case(seed: int, k: int, kinds: tuple[str, ...] = ()) -> Case:
             continue
 
 
+def hard_case(seed: int, k: int) -> Case:
+    """A flip or half-flip, limited, for a vehicle that is as weak as flips allow: many have no plan."""
+    rng = np.random.default_rng([seed, k, 1])
+    easy = random_case(seed, k, ("flip", "half-flip"))
+    weaker = STANDARD_GRAVITY * rng.uniform(1.5, 2.4) / easy.vehicle.max_specific_thrust
+    rotors = tuple(replace(r, max_thrust=weaker * r.max_thrust, min_thrust=0.0) for r in easy.vehicle.rotors)
+    limits = easy.problem.limits
+    if rng.uniform() < 0.5:
+        limits = replace(limits, velocity=rng.uniform(4.0, 8.0))
+    problem = replace(easy.problem, limits=limits, name=f"hard-{seed}-{k}")
+    return Case(problem, replace(easy.vehicle, rotors=rotors), easy.kind)
+
+
 def random_vehicle(rng: np.random.Generator) -> Vehicle:
     """A preset, with drag where it has none, or an irregular quad-, hexa- or octorotor."""
     if rng.uniform() < PRESET_FRACTION:
         preset = load_vehicle(str(rng.choice(PRESETS)))
-        lateral = rng.uniform(*DRAG) * preset.mass
-        return (
-            preset if preset.drag_body.any() else replace(preset, drag_body=lateral * np.array([1, 1, 0.6]))
-        )
+        drag = rng.uniform(*DRAG) * preset.mass * np.array([1.0, 1.0, 0.6])
+        return preset if preset.drag_body.any() else replace(preset, drag_body=drag)
     while True:
         try:
             vehicle = _irregular(rng)
@@ -119,9 +130,10 @@ def flip(rng: np.random.Generator, vehicle: Vehicle) -> Problem:
     start, height = 0.7 * rng.normal(size=3), rng.uniform(3.5, 7.0)
     leg = rng.choice([0.0, 1.0]) * rng.uniform(1.5, 6.0) * _level(rng.uniform(-np.pi, np.pi))
     goal = start + leg + [0.0, 0.0, rng.normal(0.0, 0.4)]
-    middle = start + rng.uniform(0.3, 0.7) * leg + [0.0, 0.0, height]
-    heading, offset = rng.uniform(-180.0, 180.0), rng.choice([90.0, -90.0, 150.0, rng.uniform(-180.0, 180.0)])
-    gate = tilted_gate(middle + [*rng.normal(0, 0.3, 2), 0.0], np.deg2rad(heading), tilt=np.pi)
+    middle = start + rng.uniform(0.3, 0.7) * leg + [*rng.normal(0, 0.3, 2), height]
+    heading = rng.uniform(-180.0, 180.0)
+    offset = rng.choice([90.0, -90.0, 150.0, rng.uniform(-180.0, 180.0)])
+    gate = tilted_gate(middle, np.deg2rad(heading), tilt=np.pi)
     return _problem(start, goal, Flip(axis_deg=float(heading + offset)), gate)
 
 
@@ -218,9 +230,8 @@ def _limited(rng: np.random.Generator, problem: Problem, vehicle: Vehicle) -> Pr
     if rng.uniform() < 0.5:
         limits = replace(limits, velocity=rng.uniform(6.0, 14.0))
     if rng.uniform() < 0.25:
-        limits = replace(
-            limits, acceleration=STANDARD_GRAVITY + rng.uniform(0.6, 1.2) * vehicle.max_specific_thrust
-        )
+        acceleration = STANDARD_GRAVITY + rng.uniform(0.6, 1.2) * vehicle.max_specific_thrust
+        limits = replace(limits, acceleration=acceleration)
     if rng.uniform() < 0.2:
         room = rng.uniform([1.0, 1.0, 1.0], [4.0, 4.0, 4.0])
         limits = replace(limits, lower=ends.min(axis=0) - room, upper=ends.max(axis=0) + room)

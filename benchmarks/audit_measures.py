@@ -1,0 +1,195 @@
+"""Measures of plans, made without the code that they judge: from polynomials and flights."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, fields, replace
+from typing import Any
+
+import numpy as np
+
+from aerobat import so3
+from aerobat.arrays import Array
+from aerobat.errors import AerobatError, Infeasible
+from aerobat.flatness import reference
+from aerobat.planning import Plan, Planner, plan, planner_class, planner_options
+from aerobat.problem import Condition, CustomManeuver, Flip, Gate, HalfFlip, Problem, Quantity
+from aerobat.simulation import Flight, fly
+from aerobat.vehicle import Vehicle
+
+PLANNERS = ("miqp", "min-snap", "free-knots", "time-optimal")
+YARDSTICK = "time-optimal at equal reserve"  # without any reserve that others do not keep
+SAMPLES = 100_000
+CHUNK = 10_000
+CROSSING_WINDOW = 0.25  # [s] around the planned instant
+DEFAULT_TOLERANCE_DEG = 5.0  # of a gate's attitude
+
+
+@dataclass(frozen=True)
+class Attempted:
+    """The outcome of one call of a planner."""
+
+    plan: Plan | None
+    status: str  # planned, infeasible, or the name of an exception that nobody foresaw
+    message: str
+    seconds: float  # of the processor
+
+
+def attempted(call: Callable[[], Plan]) -> Attempted:
+    """The outcome of planning, whatever it is."""
+    began = time.process_time()
+    found, status, message = None, "planned", ""
+    try:
+        found = call()
+    except Infeasible as error:
+        status, message = "infeasible", str(error)
+    except AerobatError as error:
+        status, message = "refused", str(error)
+    except Exception as error:
+        status, message = type(error).__name__, str(error)
+    return Attempted(found, status, message, time.process_time() - began)
+
+
+def planner_of(name: str, **settings: Any) -> Planner:
+    """A planner as the command line makes it, or, the yardstick, as the others' defaults compare with."""
+    if name == YARDSTICK:
+        return planner_class("time-optimal")(**settings)
+    cls: Any = planner_class(name)
+    given = {o.name: o.command_default for o in planner_options(cls) if o.command_default is not None}
+    return cls(**(given | settings))  # type: ignore[no-any-return]
+
+
+def plan_facts(problem: Problem, vehicle: Vehicle, name: str) -> dict[str, Any]:
+    """All that tables state of one planner's plan of a problem."""
+    made = attempted(lambda: plan(problem, planner_of(name), vehicle))
+    row: dict[str, Any] = {"status": made.status, "message": made.message, "seconds": made.seconds}
+    if made.plan is None:
+        return row
+    row |= {
+        "duration": made.plan.duration,
+        "certified": made.plan.certified,
+        "why": str(made.plan.certificate),
+        "said": said_of_flight(made.plan),
+    }
+    if name == YARDSTICK:
+        return row
+    row["violation"], row["violated"] = worst_violation(made.plan, vehicle)
+    try:
+        flight = fly(made.plan, vehicle)
+    except AerobatError as error:
+        return row | {"status": "not flown", "message": str(error)}
+    error = np.linalg.norm(flight.states.position - flight.setpoint.flat.position, axis=-1)
+    row |= {"error": float(error.max()), "outcome": flight.outcome.name}
+    if isinstance(problem.maneuver, Flip | HalfFlip):
+        row |= gate_attitude(made.plan, flight, vehicle)
+    return row
+
+
+def said_of_flight(found: Plan) -> str:
+    """The words of a plan about its own flight, if it has any."""
+    names = [f.name for f in fields(found)]
+    return next((str(getattr(found, n)) for n in ("flyability", "rehearsal", "flown") if n in names), "")
+
+
+def thrust(found: Plan, vehicle: Vehicle, times: Array, drag: bool = True) -> Array:
+    """The thrust per mass that a path takes [m/s²], across the drag along it left out, (..., 3)."""
+    environment = found.problem.environment
+    airspeed = found.trajectory.evaluate(times, 1) - environment.wind
+    lateral = vehicle.drag_body[:2].mean() / vehicle.mass if drag else 0.0
+    return np.asarray(found.trajectory.evaluate(times, 2) + environment.weight + lateral * airspeed)
+
+
+def gate_attitude(found: Plan, flight: Flight, vehicle: Vehicle) -> dict[str, float]:
+    """The largest angle [deg] between thrust axis and upright of gates, in the plan and in its flight."""
+    planned, flown, tolerances = [0.0], [0.0], [DEFAULT_TOLERANCE_DEG]
+    for stage in found.stages:
+        if stage.gate is None:
+            continue
+        gate = found.problem.gate(stage.gate)
+        planned.append(degrees_between(thrust(found, vehicle, np.array(stage.time)), gate.up))
+        flown.append(degrees_between(axis_at_crossing(flight, gate, stage.time), gate.up))
+        tolerances.append(float(np.rad2deg(getattr(gate, "attitude_tolerance", np.deg2rad(5.0)))))
+    return {"planned_deg": max(planned), "flown_deg": max(flown), "tolerance_deg": max(tolerances)}
+
+
+def axis_at_crossing(flight: Flight, gate: Gate, planned: float) -> Array:
+    """The thrust axis where the flight crosses the gate's plane nearest the planned instant, (3,)."""
+    times, ahead = flight.times, (flight.states.position - gate.position) @ gate.normal
+    crossings = np.flatnonzero((ahead[:-1] < 0.0) & (ahead[1:] >= 0.0))
+    near = crossings[np.abs(times[crossings] - planned) < CROSSING_WINDOW]
+    k = int(np.argmin(np.abs(times - planned)))
+    if len(near):
+        k = int(near[np.argmin(np.abs(times[near] - planned))])
+    return np.asarray(so3.thrust_axis(flight.states.q_world_body[k]))
+
+
+def degrees_between(a: Array, b: Array) -> float:
+    """The angle between two vectors [deg]."""
+    return float(np.rad2deg(np.arctan2(np.linalg.norm(np.cross(a, b)), a @ b)))
+
+
+def worst_violation(found: Plan, vehicle: Vehicle) -> tuple[float, str]:
+    """The worst excess over limits, ground and `always` conditions in many samples, in SI units, and of what.
+
+    Of thrust conditions the thrust with its drag counts.
+    """
+    problem, worst = found.problem, (0.0, "")
+    sequence = problem.stages(vehicle.max_specific_thrust)
+    for times in np.array_split(np.linspace(0.0, found.duration, SAMPLES), SAMPLES // CHUNK):
+        for condition in sequence.path_constraints:
+            values = quantity(found, vehicle, times, condition) @ condition.direction
+            over = max(float(condition.lower - values.min()), float(values.max() - condition.upper))
+            worst = max(worst, (over, f"always {condition.quantity.value}"))
+        for derivative in range(4):
+            lower, upper = problem.path_limits.of(derivative)
+            if np.isinf(lower).all() and np.isinf(upper).all():
+                continue
+            values = found.trajectory.evaluate(times, derivative)
+            over = float(np.maximum(lower - values, values - upper).max())
+            worst = max(worst, (over, f"limits of derivative {derivative}"))
+    return worst
+
+
+def quantity(found: Plan, vehicle: Vehicle, times: Array, condition: Condition) -> Array:
+    """The quantity that a condition is about, along a plan, (T, 3)."""
+    if condition.quantity is Quantity.SPECIFIC_THRUST:
+        return thrust(found, vehicle, times)
+    return found.trajectory.evaluate(times, condition.quantity.derivative)
+
+
+def worst_command(found: Plan, vehicle: Vehicle, rate: float = 2000.0) -> float:
+    """The worst excess [N] of rotor commands f + lag·f' over their limits, in samples inside segments."""
+    worst = -np.inf
+    for begin, end in zip(found.trajectory.knots[:-1], found.trajectory.knots[1:], strict=True):
+        inner = np.linspace(begin, end, max(int((end - begin) * rate), 5) + 2)[1:-1]
+        thrusts = reference(
+            found.trajectory, vehicle, inner, environment=found.problem.environment
+        ).rotor_thrusts
+        commands = thrusts + vehicle.lags * np.gradient(thrusts, inner, axis=0)
+        over = np.maximum(vehicle.min_thrusts - commands, commands - vehicle.max_thrusts)
+        worst = max(worst, float(over.max()))
+    return worst
+
+
+def attitude_variant(problem: Problem, vehicle: Vehicle, both_axes: bool) -> Problem:
+    """A flip or half-flip as stages, its thrust in the gate without component across, about one axis or two.
+
+    About one axis, the turn's or the passage's, the thrust along that axis stays free.
+    """
+    sequence = problem.stages(vehicle.max_specific_thrust)
+    stages = []
+    for stage in sequence.stages:
+        if stage.gate is not None:
+            gate = problem.gate(stage.gate)
+            axis = gate.normal if problem.maneuver.turn_axis is None else problem.maneuver.turn_axis
+            asks = [c for c in stage.conditions if c.quantity is Quantity.VELOCITY]
+            minimum = HalfFlip.THRUST_FRACTION * vehicle.max_specific_thrust
+            asks.append(Condition(Quantity.SPECIFIC_THRUST, gate.up, lower=minimum))
+            asks.append(Condition(Quantity.SPECIFIC_THRUST, np.cross(axis, gate.up), 0.0, 0.0))
+            if both_axes:
+                asks.append(Condition(Quantity.SPECIFIC_THRUST, axis, 0.0, 0.0))
+            stage = replace(stage, conditions=tuple(asks))
+        stages.append(stage)
+    maneuver = CustomManeuver(tuple(stages), sequence.path_constraints, sequence.ordered)
+    return replace(problem, maneuver=maneuver)

@@ -1,0 +1,166 @@
+"""Tables of what an audit measured, each line beside its floor."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from statistics import median
+from typing import Any
+
+from audit_measures import PLANNERS, YARDSTICK
+
+Row = dict[str, Any]
+VIOLATION = 1e-6  # [SI]: less is rounding
+MAX_ERROR = 0.05  # [m] flown, of a certified plan
+YARDSTICK_SLACK = 0.995
+FORESEEN = ("planned", "infeasible")
+
+
+def defect(row: Row) -> str:
+    """What is wrong with a row, in a few words; nothing otherwise."""
+    if row["status"] not in FORESEEN:
+        return f"{row['status']}: {row['message']}"
+    if row["what"] == "plans" and row["status"] == "planned":
+        if not row["certified"]:
+            return f"uncertified plan: {row['why']}"
+        if row.get("violation", 0.0) > VIOLATION:
+            return f"certified, {row['violated']} violated by {row['violation']:.3g}"
+        if row.get("error", 0.0) > MAX_ERROR or row.get("outcome", "COMPLETE") != "COMPLETE":
+            return f"certified, flown {100 * row['error']:.1f} cm off, {row['outcome']}; said: {row['said']}"
+        if (
+            max(row.get("planned_deg", 0.0), row.get("flown_deg", 0.0))
+            > row.get("tolerance_deg", 180.0) + 0.5
+        ):
+            return f"attitude in the gate {row['planned_deg']:.1f}° off, flown {row['flown_deg']:.1f}°"
+    if row.get("planned_by") or row.get("free_knots"):
+        return f"refused, planned by {row['planned_by'] or 'free knots'}"
+    if row.get("shorter"):
+        return f"{row['duration']:.3f} s, but {min(row['shorter']):.3f} s can be planned"
+    return ""
+
+
+def attitude(rows: list[Row]) -> Iterable[str]:
+    for name in PLANNERS:
+        for kind in ("flip", "half-flip"):
+            own = [r for r in _certified(rows, name) if r["kind"] == kind and "planned_deg" in r]
+            if own:
+                yield (
+                    f"{name:>14} {kind:>9} {len(own):4} plans: plan {_spread(own, 'planned_deg', '°')}, "
+                    f"flight {_spread(own, 'flown_deg', '°')}; beyond the tolerance: {_beyond(own)}"
+                )
+
+
+def _beyond(rows: list[Row]) -> str:
+    counts = [sum(r[key] > r["tolerance_deg"] for r in rows) for key in ("planned_deg", "flown_deg")]
+    return f"{counts[0]} planned, {counts[1]} flown (floor: none)"
+
+
+def conditions(rows: list[Row]) -> Iterable[str]:
+    for name in PLANNERS:
+        own = [r for r in _certified(rows, name) if "violation" in r]
+        if own:
+            bad = [r for r in own if r["violation"] > VIOLATION]
+            yield (
+                f"{name:>14} {len(own):4} plans: {len(bad)} violate what holds always (floor: none), by "
+                f"{max(r['violation'] for r in own):.3g} at most"
+            )
+
+
+def flyability(rows: list[Row]) -> Iterable[str]:
+    for name in PLANNERS:
+        own = [r for r in _certified(rows, name) if "error" in r]
+        if own:
+            off = [r for r in own if r["error"] > MAX_ERROR or r["outcome"] != "COMPLETE"]
+            silent, most = sum(not r["said"] for r in off), max(r["error"] for r in own)
+            yield (
+                f"{name:>14} {len(own):4} plans: {100 * (1 - len(off) / len(own)):.1f} % within 5 cm (floor: "
+                f"99 %), {silent} of {len(off)} others in silence, at most {100 * most:.1f} cm"
+            )
+
+
+def durations(rows: list[Row]) -> Iterable[str]:
+    best = {(r["seed"], r["k"]): r["duration"] for r in _certified(rows, YARDSTICK)}
+    for name, floor in zip(PLANNERS, ("1.25", "-", "1.05", "-"), strict=True):
+        own = [r for r in _certified(rows, name) if (r["seed"], r["k"]) in best]
+        ratios = sorted(r["duration"] / best[r["seed"], r["k"]] for r in own)
+        if ratios:
+            under = sum(ratio < YARDSTICK_SLACK for ratio in ratios)
+            yield (
+                f"{name:>14} {len(ratios):4} plans: median {median(ratios):.3f} (floor: {floor}), "
+                f"{ratios[0]:.3f} to {ratios[-1]:.3f}; {under} under {YARDSTICK_SLACK} (floor: none)"
+            )
+
+
+def speed(rows: list[Row]) -> Iterable[str]:
+    for name in (*PLANNERS, YARDSTICK):
+        own = sorted(r["seconds"] for r in rows if r["what"] == "plans" and r["planner"] == name)
+        if own:
+            yield f"{name:>14} {len(own):4} calls: median {median(own):.2f} s, {own[-1]:.2f} s at most"
+
+
+def outcomes(rows: list[Row]) -> Iterable[str]:
+    for name in (*PLANNERS, YARDSTICK):
+        own = [r for r in rows if r["what"] == "plans" and r["planner"] == name]
+        if own:
+            counts = {"certified": len([*_certified(rows, name)])}
+            counts["uncertified"] = sum(r["status"] == "planned" for r in own) - counts["certified"]
+            for row in own:
+                if row["status"] != "planned":
+                    counts[row["status"]] = counts.get(row["status"], 0) + 1
+            yield f"{name:>14} {len(own):4} calls: " + ", ".join(
+                f"{n} {status}" for status, n in counts.items()
+            )
+
+
+def refusals(rows: list[Row]) -> Iterable[str]:
+    tried = [r for r in rows if r["what"] == "refusals"]
+    own = [r for r in tried if "planned_by" in r]
+    if tried:
+        wrong, free = sum(bool(r["planned_by"]) for r in own), sum(r["free_knots"] for r in own)
+        yield (
+            f"{len(own)} refusals of {len(tried)} problems: {wrong} planned with another N or at a fixed dt "
+            f"(floor: none), {free} by free-knots (floor: none)"
+        )
+
+
+def smallest_dt(rows: list[Row]) -> Iterable[str]:
+    own = [r for r in rows if r["what"] == "smallest-dt" and "shorter" in r]
+    if own:
+        missed = [1.0 - min(r["shorter"]) / r["duration"] for r in own if r["shorter"]]
+        yield (
+            f"{len(own)} plans: {len(missed)} are not the shortest (floor: none), by "
+            f"{100 * max(missed, default=0.0):.0f} % at most"
+        )
+
+
+def price(rows: list[Row]) -> Iterable[str]:
+    own = [r for r in rows if r["what"] == "price" and r.get("one_axis")]
+    for name, key in (("as it stands", "duration"), ("exactly upright", "both_axes")):
+        ratios = sorted(r[key] / r["one_axis"] - 1.0 for r in own if r.get(key))
+        if ratios:
+            yield (
+                f"{name:>16} {len(ratios):4} of {len(own)}: {100 * median(ratios):+.1f} % at the median, "
+                f"{100 * ratios[0]:+.1f} to {100 * ratios[-1]:+.1f} %"
+            )
+
+
+def _certified(rows: list[Row], planner: str) -> list[Row]:
+    own = [r for r in rows if r["what"] == "plans" and r["planner"] == planner]
+    return [r for r in own if r.get("certified")]
+
+
+def _spread(rows: list[Row], key: str, unit: str) -> str:
+    values = [r[key] for r in rows]
+    return f"{median(values):.2f}{unit} (at most {max(values):.2f}{unit})"
+
+
+TABLES: dict[str, Callable[[list[Row]], Iterable[str]]] = {
+    "Outcomes": outcomes,
+    "Attitude in the gate, medians": attitude,
+    "Conditions in 10^5 samples of certified plans": conditions,
+    "Flyability of certified plans": flyability,
+    "Durations over time-optimal's": durations,
+    "Speed, processor time": speed,
+    "Refusals by MIQP": refusals,
+    "Smallest dt of MIQP": smallest_dt,
+    "Price in duration of the attitude in the gate, over thrust along one axis left free": price,
+}
