@@ -7,8 +7,9 @@
 certificate: attitude in gates, `always` conditions and limits in 10^5 samples, errors flown, durations over
 those of time-optimal plans, times. `refusals` tries again what the MIQP refuses, with other N, orders and
 durations and with free knots. `smallest-dt` looks for shorter plans than the MIQP's, 1 % at a time. `price`
-compares durations with the attitude in the gate asked about both axes and about one. Rows are appended to
-the results' file; those that it holds are not measured again. Problems whose result is a defect are saved.
+compares durations with those of an attitude in the gate that is asked only in the plane of the turn, and of a
+passage at half the duration. Rows are appended to the results' file; those that it holds are not measured
+again. Problems whose result is a defect are saved as files.
 """
 
 from __future__ import annotations
@@ -29,7 +30,7 @@ from typing import Any
 import numpy as np
 
 from aerobat.planning import FreeKnots, GridSearch, Miqp, plan
-from audit_measures import PLANNERS, YARDSTICK, Attempted, attempted, attitude_variant, plan_facts
+from audit_measures import PLANNERS, YARDSTICK, Attempted, attempted, plan_facts, with_passage
 from audit_tables import TABLES, defect
 from random_problems import KINDS, Case, hard_case, random_case, write_case
 
@@ -173,10 +174,10 @@ def smallest_dt(task: Task, case: Case) -> Row:
 
 
 def price(task: Task, case: Case) -> Row:
-    """Durations of the MIQP's plans as the problem stands, with the attitude about both axes, about one."""
+    """Durations of the MIQP's plans: as it stands, upright in the plane of the turn only, passed half-way."""
     row = facts(attempted(partial(plan, case.problem, Miqp(), case.vehicle)))
-    for name, both in (("both_axes", True), ("one_axis", False)):
-        variant = attitude_variant(case.problem, case.vehicle, both)
+    for name, changes in (("in_plane", {"upright": False}), ("half_way", {"at": 0.5})):
+        variant = with_passage(case.problem, **changes)
         row[name] = facts(attempted(partial(plan, variant, Miqp(), case.vehicle))).get("duration")
     return row
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -14,7 +14,7 @@ from aerobat.arrays import Array
 from aerobat.errors import AerobatError, Infeasible
 from aerobat.flatness import reference
 from aerobat.planning import Plan, Planner, plan, planner_class, planner_options
-from aerobat.problem import Condition, CustomManeuver, Flip, Gate, HalfFlip, Problem, Quantity
+from aerobat.problem import Condition, Flip, Gate, HalfFlip, Problem, Quantity
 from aerobat.simulation import Flight, fly
 from aerobat.vehicle import Vehicle
 
@@ -23,7 +23,6 @@ YARDSTICK = "time-optimal at equal reserve"  # without any reserve that others d
 SAMPLES = 100_000
 CHUNK = 10_000
 CROSSING_WINDOW = 0.25  # [s] around the planned instant
-DEFAULT_TOLERANCE_DEG = 5.0  # of a gate's attitude
 
 
 @dataclass(frozen=True)
@@ -87,9 +86,8 @@ def plan_facts(problem: Problem, vehicle: Vehicle, name: str) -> dict[str, Any]:
 
 
 def said_of_flight(found: Plan) -> str:
-    """The words of a plan about its own flight, if it has any."""
-    names = [f.name for f in fields(found)]
-    return next((str(getattr(found, n)) for n in ("flyability", "rehearsal", "flown") if n in names), "")
+    """The words of a plan about its own flight where it does not follow its path."""
+    return "" if found.flies else str(found.flyability)
 
 
 def thrust(found: Plan, vehicle: Vehicle, times: Array, drag: bool = True) -> Array:
@@ -102,14 +100,14 @@ def thrust(found: Plan, vehicle: Vehicle, times: Array, drag: bool = True) -> Ar
 
 def gate_attitude(found: Plan, flight: Flight, vehicle: Vehicle) -> dict[str, float]:
     """The largest angle [deg] between thrust axis and upright of gates, in the plan and in its flight."""
-    planned, flown, tolerances = [0.0], [0.0], [DEFAULT_TOLERANCE_DEG]
+    planned, flown, tolerances = [0.0], [0.0], [0.0]
     for stage in found.stages:
         if stage.gate is None:
             continue
         gate = found.problem.gate(stage.gate)
         planned.append(degrees_between(thrust(found, vehicle, np.array(stage.time)), gate.up))
         flown.append(degrees_between(axis_at_crossing(flight, gate, stage.time), gate.up))
-        tolerances.append(float(np.rad2deg(getattr(gate, "attitude_tolerance", np.deg2rad(5.0)))))
+        tolerances.append(float(np.rad2deg(gate.attitude_tolerance)))
     return {"planned_deg": max(planned), "flown_deg": max(flown), "tolerance_deg": max(tolerances)}
 
 
@@ -172,24 +170,8 @@ def worst_command(found: Plan, vehicle: Vehicle, rate: float = 2000.0) -> float:
     return worst
 
 
-def attitude_variant(problem: Problem, vehicle: Vehicle, both_axes: bool) -> Problem:
-    """A flip or half-flip as stages, its thrust in the gate without component across, about one axis or two.
-
-    About one axis, the turn's or the passage's, the thrust along that axis stays free.
-    """
-    sequence = problem.stages(vehicle.max_specific_thrust)
-    stages = []
-    for stage in sequence.stages:
-        if stage.gate is not None:
-            gate = problem.gate(stage.gate)
-            axis = gate.normal if problem.maneuver.turn_axis is None else problem.maneuver.turn_axis
-            asks = [c for c in stage.conditions if c.quantity is Quantity.VELOCITY]
-            minimum = HalfFlip.THRUST_FRACTION * vehicle.max_specific_thrust
-            asks.append(Condition(Quantity.SPECIFIC_THRUST, gate.up, lower=minimum))
-            asks.append(Condition(Quantity.SPECIFIC_THRUST, np.cross(axis, gate.up), 0.0, 0.0))
-            if both_axes:
-                asks.append(Condition(Quantity.SPECIFIC_THRUST, axis, 0.0, 0.0))
-            stage = replace(stage, conditions=tuple(asks))
-        stages.append(stage)
-    maneuver = CustomManeuver(tuple(stages), sequence.path_constraints, sequence.ordered)
-    return replace(problem, maneuver=maneuver)
+def with_passage(problem: Problem, **changes: Any) -> Problem:
+    """A flip or half-flip with another manner of passing its gate."""
+    maneuver: Any = problem.maneuver
+    passage = replace(maneuver.passage, **changes)
+    return replace(problem, maneuver=replace(maneuver, passage=passage))

@@ -40,11 +40,11 @@ def defect(row: Row) -> str:
 
 def attitude(rows: list[Row]) -> Iterable[str]:
     for name in PLANNERS:
-        for kind in ("flip", "half-flip"):
+        for kind in ("flip", "half-flip", "tilted-flip"):
             own = [r for r in _certified(rows, name) if r["kind"] == kind and "planned_deg" in r]
             if own:
                 yield (
-                    f"{name:>14} {kind:>9} {len(own):4} plans: plan {_spread(own, 'planned_deg', '°')}, "
+                    f"{name:>14} {kind:>11} {len(own):4} plans: plan {_spread(own, 'planned_deg', '°')}, "
                     f"flight {_spread(own, 'flown_deg', '°')}; beyond the tolerance: {_beyond(own)}"
                 )
 
@@ -133,12 +133,12 @@ def smallest_dt(rows: list[Row]) -> Iterable[str]:
 
 
 def price(rows: list[Row]) -> Iterable[str]:
-    own = [r for r in rows if r["what"] == "price" and r.get("one_axis")]
-    for name, key in (("as it stands", "duration"), ("exactly upright", "both_axes")):
-        ratios = sorted(r[key] / r["one_axis"] - 1.0 for r in own if r.get(key))
+    own = [r for r in rows if r["what"] == "price" and r.get("duration")]
+    for name, key in (("upright in the plane of the turn only", "in_plane"), ("passed half-way", "half_way")):
+        ratios = sorted(r["duration"] / r[key] - 1.0 for r in own if r.get(key))
         if ratios:
             yield (
-                f"{name:>16} {len(ratios):4} of {len(own)}: {100 * median(ratios):+.1f} % at the median, "
+                f"over {name} ({len(ratios)} of {len(own)}): {100 * median(ratios):+.1f} % at the median, "
                 f"{100 * ratios[0]:+.1f} to {100 * ratios[-1]:+.1f} %"
             )
 
@@ -162,5 +162,5 @@ TABLES: dict[str, Callable[[list[Row]], Iterable[str]]] = {
     "Speed, processor time": speed,
     "Refusals by MIQP": refusals,
     "Smallest dt of MIQP": smallest_dt,
-    "Price in duration of the attitude in the gate, over thrust along one axis left free": price,
+    "Price in duration of the attitude in the gate, and what its free time gains": price,
 }

@@ -22,6 +22,7 @@ from aerobat.problem import (
     CustomManeuver,
     Flip,
     Gate,
+    GatePassage,
     HalfFlip,
     Limits,
     Line,
@@ -35,6 +36,7 @@ from aerobat.problem import (
     tilted_gate,
     write_problem,
 )
+from aerobat.problem.stage import CrossingTime
 from aerobat.states import STANDARD_GRAVITY
 from aerobat.vehicle import Rotor, Vehicle, load_vehicle, write_vehicle
 
@@ -55,12 +57,12 @@ class Case:
 
 
 def random_case(seed: int, k: int, kinds: tuple[str, ...] = ()) -> Case:
-    """Case `k` of a seed; of one of these kinds, by default any of `KINDS`."""
+    """Case `k` of a seed; of one of these kinds, by default any of `MIXED`."""
     rng = np.random.default_rng([seed, k])
-    drawn = int(rng.integers(len(KINDS)))  # drawn whatever the kinds are, so that the vehicle stays the same
+    drawn = int(rng.integers(len(MIXED)))  # drawn whatever the kinds are, so that the vehicle stays the same
     vehicle = random_vehicle(rng)
-    names = kinds or tuple(KINDS)
-    kind = tuple(KINDS)[drawn] if not kinds else names[drawn % len(names)]
+    names = kinds or MIXED
+    kind = names[drawn % len(names)]
     while True:
         problem = KINDS[kind](rng, vehicle)
         try:
@@ -137,6 +139,17 @@ def flip(rng: np.random.Generator, vehicle: Vehicle) -> Problem:
     return _problem(start, goal, Flip(axis_deg=float(heading + offset)), gate)
 
 
+def tilted_flip(rng: np.random.Generator, vehicle: Vehicle) -> Problem:
+    """A flip through a gate at any angle of the turn, passed along the axis: when is free, or not quite."""
+    problem = flip(rng, vehicle)
+    gate, tilt = problem.gates[0], rng.uniform(70.0, 290.0)
+    heading = np.rad2deg(gate.angles[0]) + rng.choice([0.0, 180.0])
+    begin = rng.uniform(0.3, 0.6)
+    at: CrossingTime = ("free", 0.5, (float(begin), float(begin + 0.2)))[int(rng.integers(3))]
+    maneuver = Flip(axis_deg=float(heading), passage=GatePassage(at=at))
+    return replace(problem, maneuver=maneuver, gates=(gate.tilted(np.deg2rad(tilt)),))
+
+
 def half_flip(rng: np.random.Generator, vehicle: Vehicle) -> Problem:
     """A half-flip through a gate of any tilt, near the way or beside it, in one of three sloped."""
     start, heading = 0.7 * rng.normal(size=3), rng.uniform(-np.pi, np.pi)
@@ -177,7 +190,7 @@ def gate_line(rng: np.random.Generator, vehicle: Vehicle) -> Problem:
 def stages(rng: np.random.Generator, vehicle: Vehicle) -> Problem:
     """Stages spelled out: a point on the way, and a thrust tilted to a side at a time or anywhere."""
     tour = _tour(rng, 3)
-    at = rng.choice([0.0, rng.uniform(0.3, 0.7)]) or None
+    fraction = rng.choice([0.0, rng.uniform(0.3, 0.7)])
     tilt, heading = rng.uniform(0.3, 1.4), rng.uniform(-np.pi, np.pi)
     side = _level(heading)
     thrust = 0.2 * vehicle.max_specific_thrust
@@ -190,8 +203,8 @@ def stages(rng: np.random.Generator, vehicle: Vehicle) -> Problem:
     )
     upright = (Condition(Quantity.SPECIFIC_THRUST, np.array([0.0, 0.0, 1.0]), lower=0.0),)
     always = upright if rng.uniform() < 0.5 else ()
-    course = (Stage("point", point, at=at), Stage("lean", lean))
-    return _problem(tour[0], tour[2], CustomManeuver(course, always, ordered=at is None))
+    course = (Stage("point", point, at=float(fraction) or "free"), Stage("lean", lean))
+    return _problem(tour[0], tour[2], CustomManeuver(course, always, ordered=not fraction))
 
 
 KINDS: dict[str, Callable[[np.random.Generator, Vehicle], Problem]] = {
@@ -200,7 +213,9 @@ KINDS: dict[str, Callable[[np.random.Generator, Vehicle], Problem]] = {
     "waypoints": waypoints,
     "line": gate_line,
     "stages": stages,
+    "tilted-flip": tilted_flip,
 }
+MIXED = ("flip", "half-flip", "waypoints", "line", "stages")  # where no kind is asked for
 
 
 def _problem(start: Array, goal: Array, maneuver: Maneuver, *gates: Gate) -> Problem:
