@@ -125,7 +125,7 @@ def grow(ops: Any, rate: Any, carry: Any, push: Any) -> Any:
     return (x, ops.select(x > 2.0, True, ever)), (x, ops.select(ever, 0.0, x))
 
 
-@pytest.mark.parametrize("engine", ["floats", "numpy", "compiled", "jax"])
+@pytest.mark.parametrize("engine", ["floats", "bytecode", "numpy", "compiled", "jax"])
 def test_a_loop_carries_slopes_along(engine: str) -> None:
     """x_n = a^n has the slope n a^(n-1), whatever runs the loop."""
     rate, ticks = np.array([0.9, 1.0, 1.01, 1.02, 1.1]), 50

@@ -13,6 +13,7 @@ from aerobat.engines import ENGINE_NAMES, CompiledLoop, choose, logged_ticks
 from aerobat.engines.engine import first_row
 from aerobat.engines.pytree import tree_leaves, tree_map
 
+FAST = ("floats", "bytecode", "numpy", "compiled")  # to be ready
 VEHICLES, TICKS = 21, 1003
 
 
@@ -97,7 +98,7 @@ def test_one_scan_chunks_of_any_size_and_single_steps_give_the_same_bits(engine:
 
 
 @settings(max_examples=15, deadline=None)
-@given(st.lists(st.integers(1, 199), max_size=5), st.sampled_from(["floats", "numpy", "compiled"]))
+@given(st.lists(st.integers(1, 199), max_size=5), st.sampled_from(FAST))
 def test_any_cuts_give_the_same_bits(cuts: list[int], engine: str) -> None:
     inputs = drawn(200, 5)
     loop = loop_of(engine, inputs)
@@ -129,7 +130,7 @@ def test_branches_of_a_carry_do_not_know_of_each_other(engine: str) -> None:
     assert_same(loop.scan(carry, rest), first)
 
 
-@pytest.mark.parametrize("engine", ["floats", "numpy", "compiled"])
+@pytest.mark.parametrize("engine", FAST)
 def test_inputs_that_are_overwritten_after_a_scan_leave_its_carry_alone(engine: str) -> None:
     def remembering(ops: Any, stiffness: Any, inputs: Inputs) -> Any:
         return inputs.own

@@ -7,7 +7,7 @@ import pytest
 
 from aerobat import so3
 from aerobat.control import Controller
-from aerobat.engines import FLOATS, NUMPY, choose
+from aerobat.engines import BYTECODE, FLOATS, NUMPY, choose
 from aerobat.errors import BackendMissing, SpecError
 from aerobat.simulation import Flight, Outcome, StateNoise, fly
 from aerobat.states import BodyState
@@ -15,7 +15,7 @@ from aerobat.trajectory import Trajectory
 from aerobat.vehicle import load_vehicle
 
 QUAD, HEXA = load_vehicle("agile-quad"), load_vehicle("hexarotor")
-EXACT = ("floats", "numpy", "compiled", "jax")  # in float64
+EXACT = ("floats", "bytecode", "numpy", "compiled", "jax")  # in float64
 SERIES = ("commands", "thrusts", "saturated")
 AT_REST = Trajectory(np.array([1.0]), np.zeros((1, 1, 3)))
 
@@ -50,7 +50,7 @@ def assert_same(a: Flight, b: Flight, atol: float = 0.0) -> None:
 
 
 @pytest.mark.parametrize("vehicle", [QUAD, HEXA], ids=["4 rotors", "6 rotors"])
-@pytest.mark.parametrize("engine", ["numpy", "compiled", "jax"])
+@pytest.mark.parametrize("engine", ["bytecode", "numpy", "compiled", "jax"])
 def test_engines_agree_with_floats_to_rounding_over_3000_steps(engine: str, vehicle) -> None:
     noise = StateNoise.fused()
     flights = [fly(loops(6.0), vehicle, engine=name, noise=noise, seed=4) for name in ("floats", engine)]
@@ -79,6 +79,14 @@ def test_each_vehicle_of_a_batch_flies_as_it_would_alone(engine: str) -> None:
         assert_same(batch[k], alone, atol=1e-12)
 
 
+def test_bytecode_flies_as_floats_do_to_the_last_bit() -> None:
+    starts, noise = near(3), StateNoise.fused()
+    plain, traced = (
+        fly(loops(1.0), HEXA, start=starts, noise=noise, engine=name) for name in ("floats", "bytecode")
+    )
+    assert_same(plain, traced, atol=0.0)
+
+
 def test_one_vehicle_takes_many_starts() -> None:
     starts = near(3)
     batch = fly(AT_REST, QUAD, start=starts)
@@ -95,13 +103,14 @@ def test_quadrotors_of_any_size_fly_in_one_batch() -> None:
     np.testing.assert_array_equal(batch.max_thrusts, [QUAD.max_thrusts, crazyflie.max_thrusts])
 
 
-def test_short_flights_are_flown_by_floats_and_the_rest_by_what_is_fastest(monkeypatch) -> None:
-    assert choose("auto", 1, 1000) is FLOATS
+def test_flights_are_flown_by_what_is_fastest_for_so_many_ticks(monkeypatch) -> None:
+    assert choose("auto", 1, 200) is FLOATS
+    assert choose("auto", 2, 1000) is BYTECODE
     assert choose("auto", 100, 1000).name == "compiled"
-    assert fly(AT_REST, QUAD).engine == "floats"
+    assert fly(AT_REST, QUAD).engine == "bytecode"
     assert fly(AT_REST, [QUAD] * 30).engine == "compiled"
     monkeypatch.setattr("aerobat.engines.find_spec", lambda name: None)
-    assert choose("auto", 1, 10_000) is FLOATS
+    assert choose("auto", 1, 10_000) is BYTECODE
     assert choose("auto", 100, 1000) is NUMPY
     for engine, extra in (("compiled", "fast"), ("jax", "jax")):
         with pytest.raises(BackendMissing, match=rf'pip install "aerobat\[{extra}\]"'):
@@ -182,7 +191,10 @@ def test_a_slow_controller_does_not_coarsen_the_physics() -> None:
         ({"vehicle": [QUAD, HEXA]}, "need as many rotors"),
         ({"nominal": HEXA}, "need as many rotors"),
         ({"vehicle": [QUAD, replace(QUAD, drag_body=np.ones(3))]}, "differ in drag per mass"),
-        ({"engine": "abacus"}, "engine must be one of auto, floats, numpy, compiled, jax, jax-float32"),
+        (
+            {"engine": "abacus"},
+            "engine must be one of auto, floats, bytecode, numpy, compiled, jax, jax-float32",
+        ),
         ({"rate": 0.0}, r"^FlightConfig\.rate must be positive"),
         ({"rate": np.nan}, r"^FlightConfig\.rate must be a finite number"),
         ({"seed": -1, "noise": StateNoise.fused()}, "seed must be a whole number"),

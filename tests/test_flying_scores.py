@@ -18,7 +18,7 @@ from aerobat.simulation import Outcome, StateNoise, fly
 from aerobat.states import BodyState
 from aerobat.vehicle import Vehicle, load_vehicle
 
-EXACT = ("floats", "numpy", "compiled", "jax")  # in float64
+EXACT = ("floats", "bytecode", "numpy", "compiled", "jax")  # in float64
 QUAD = load_vehicle("agile-quad")
 
 

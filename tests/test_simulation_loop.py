@@ -123,7 +123,7 @@ def log(signals: Any) -> Any:
     return signals["slow"], signals["plant"], signals["follower"]
 
 
-@pytest.mark.parametrize("engine", ["floats", "numpy", "compiled", "jax"])
+@pytest.mark.parametrize("engine", ["floats", "bytecode", "numpy", "compiled", "jax"])
 def test_a_component_steps_at_its_own_period_and_holds_between(engine: str) -> None:
     """And one without feedthrough is seen a tick later, wherever in the order it stands."""
     components = (Counter(4, "slow"), Counter(1, "plant", feedthrough=False), Follower("plant"))

@@ -1,4 +1,4 @@
-"""Kernels on Python floats, one vehicle after another: the reference, and the fastest for a few."""
+"""Kernels on Python floats as they stand, one vehicle after another: the reference for all engines."""
 
 from __future__ import annotations
 

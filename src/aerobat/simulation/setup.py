@@ -60,7 +60,8 @@ class FlightConfig:
     seed: Annotated[int | np.random.SeedSequence, PlainValidator(_seed)] = 0  # of the noise
     start: Annotated[BodyState, AS_IT_IS] | None = None  # true, by default the trajectory's; or a batch's
     nominal: Vehicle | None = None  # that controller and set-points are made for; by default what flies
-    engine: str = "auto"  # floats, numpy, compiled, jax, jax-float32, or the fastest that is installed
+    # floats, bytecode, numpy, compiled, jax, jax-float32, or the fastest that is installed
+    engine: str = "auto"
     log_rate: Positive | None = None  # [1/s] of the flight's rows, rate over a whole number; by default rate
 
     def __post_init__(self) -> None:
