@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -22,6 +23,7 @@ PLANNERS = ("miqp", "min-snap", "free-knots", "time-optimal")
 YARDSTICK = "time-optimal at equal reserve"  # without any reserve that others do not keep
 SAMPLES = 100_000
 CHUNK = 10_000
+ROTOR_RATE = 1000.0  # [1/s] of rotor thrusts
 CROSSING_WINDOW = 0.25  # [s] around the planned instant
 
 
@@ -74,6 +76,8 @@ def plan_facts(problem: Problem, vehicle: Vehicle, name: str) -> dict[str, Any]:
     if name == YARDSTICK:
         return row
     row["violation"], row["violated"] = worst_violation(made.plan, vehicle)
+    if made.plan.certified:
+        row["thrust_excess"], row["command_excess"] = rotor_excess(made.plan, vehicle)
     try:
         flight = fly(made.plan, vehicle)
     except AerobatError as error:
@@ -156,18 +160,25 @@ def quantity(found: Plan, vehicle: Vehicle, times: Array, condition: Condition) 
     return found.trajectory.evaluate(times, condition.quantity.derivative)
 
 
-def worst_command(found: Plan, vehicle: Vehicle, rate: float = 2000.0) -> float:
-    """The worst excess [N] of rotor commands f + lag·f' over their limits, in samples inside segments."""
-    worst = -np.inf
-    for begin, end in zip(found.trajectory.knots[:-1], found.trajectory.knots[1:], strict=True):
-        inner = np.linspace(begin, end, max(int((end - begin) * rate), 5) + 2)[1:-1]
-        thrusts = reference(
-            found.trajectory, vehicle, inner, environment=found.problem.environment
-        ).rotor_thrusts
-        commands = thrusts + vehicle.lags * np.gradient(thrusts, inner, axis=0)
-        over = np.maximum(vehicle.min_thrusts - commands, commands - vehicle.max_thrusts)
-        worst = max(worst, float(over.max()))
-    return worst
+def rotor_excess(found: Plan, vehicle: Vehicle) -> tuple[float, float]:
+    """The worst excess of rotor thrusts and of commands f + lag·f' in samples, in ranges of the rotor.
+
+    Derivatives are differences of samples inside segments, where thrusts are smooth.
+    """
+    low, high, worst = vehicle.min_thrusts, vehicle.max_thrusts, np.full(2, -np.inf)
+    inner = [
+        np.linspace(begin, end, max(int((end - begin) * ROTOR_RATE), 5) + 2)[1:-1]
+        for begin, end in pairwise(found.trajectory.knots)
+    ]
+    environment, times = found.problem.environment, np.concatenate(inner)
+    along = reference(found.trajectory, vehicle, times, environment=environment).rotor_thrusts
+    ends = np.cumsum([len(segment) for segment in inner])[:-1]
+    for segment, thrusts in zip(inner, np.split(along, ends), strict=True):
+        commands = thrusts + vehicle.lags * np.gradient(thrusts, segment, axis=0, edge_order=2)
+        for i, values in enumerate((thrusts, commands[1:-1])):
+            over = np.maximum(low - values, values - high) / (high - low)
+            worst[i] = max(worst[i], float(over.max()))
+    return float(worst[0]), float(worst[1])
 
 
 def with_passage(problem: Problem, **changes: Any) -> Problem:

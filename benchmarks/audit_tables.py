@@ -10,6 +10,8 @@ from audit_measures import PLANNERS, YARDSTICK
 
 Row = dict[str, Any]
 VIOLATION = 1e-6  # [SI]: less is rounding
+ROTOR_EXCESS = 1e-6  # of a rotor's range
+COMMAND_EXCESS = 1e-3  # likewise; they are differences of samples
 MAX_ERROR = 0.05  # [m] flown, of a certified plan
 YARDSTICK_SLACK = 0.995
 FORESEEN = ("planned", "infeasible")
@@ -24,6 +26,9 @@ def defect(row: Row) -> str:
             return f"uncertified plan: {row['why']}"
         if row.get("violation", 0.0) > VIOLATION:
             return f"certified, {row['violated']} violated by {row['violation']:.3g}"
+        if row.get("thrust_excess", 0.0) > ROTOR_EXCESS or row.get("command_excess", 0.0) > COMMAND_EXCESS:
+            excess = f"{row['thrust_excess']:.2g}, commands by {row['command_excess']:.2g} of their range"
+            return f"certified, rotor thrusts beyond their limits by {excess}"
         if row.get("error", 0.0) > MAX_ERROR or row.get("outcome", "COMPLETE") != "COMPLETE":
             return f"certified, flown {100 * row['error']:.1f} cm off, {row['outcome']}; said: {row['said']}"
         if (
@@ -62,6 +67,18 @@ def conditions(rows: list[Row]) -> Iterable[str]:
             yield (
                 f"{name:>14} {len(own):4} plans: {len(bad)} violate what holds always (floor: none), by "
                 f"{max(r['violation'] for r in own):.3g} at most"
+            )
+
+
+def rotors(rows: list[Row]) -> Iterable[str]:
+    for name in PLANNERS:
+        own = [r for r in _certified(rows, name) if "thrust_excess" in r]
+        if own:
+            thrusts = sum(r["thrust_excess"] > ROTOR_EXCESS for r in own)
+            commands = sum(r["command_excess"] > COMMAND_EXCESS for r in own)
+            yield (
+                f"{name:>14} {len(own):4} plans: thrusts beyond their limits in {thrusts}, commands in "
+                f"{commands} (floor: none)"
             )
 
 
@@ -157,6 +174,7 @@ TABLES: dict[str, Callable[[list[Row]], Iterable[str]]] = {
     "Outcomes": outcomes,
     "Attitude in the gate, medians": attitude,
     "Conditions in 10^5 samples of certified plans": conditions,
+    "Rotors in samples of certified plans": rotors,
     "Flyability of certified plans": flyability,
     "Durations over time-optimal's": durations,
     "Speed, processor time": speed,
