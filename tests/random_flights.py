@@ -1,8 +1,12 @@
-"""Random vehicles on random trajectories in 3D, their rotors near the limits, to judge certificates."""
+"""Random vehicles on random trajectories in 3D, their rotors near the limits, to judge certificates.
+
+Rotors have no lag, or commands that come as near to their limits as the thrusts of those without.
+"""
 
 from dataclasses import dataclass, field, replace
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from aerobat import so3
 from aerobat.certification import Certificate
@@ -15,6 +19,7 @@ from aerobat.vehicle import Rotor, Vehicle
 
 MARGINS = (-0.2, 0.2)  # of a rotor's range, between which the margin is sought
 HALVINGS = 14
+STENCIL_STEP = 2e-4  # of a segment, of differences
 
 
 @dataclass(frozen=True)
@@ -34,11 +39,17 @@ class Sampled:
     determined: bool
 
 
-def random_flight(seed: int) -> Flight:
-    """One with its time scaled so that the rotors come as close to their limits as drawn."""
+def random_flight(seed: int, lags: bool = False) -> Flight:
+    """One with its time scaled so that the rotors come as close to their limits as drawn.
+
+    With `lags` the rotors have some, no two alike, and the path is smooth enough for them.
+    """
     rng = np.random.default_rng(seed)
     vehicle = irregular(rng)
-    trajectory = tour(rng)
+    if lags:
+        drawn = rng.permutation([0.0, *rng.uniform(0.005, 0.08, len(vehicle.rotors) - 1)])
+        vehicle = with_lags(vehicle, drawn)
+    trajectory = tour(rng, 5 if lags else 4)
     trajectory = replace(trajectory, heading=rng.uniform(-3, 3))
     margin = rng.uniform(*MARGINS)
     environment = Environment(wind=seed % 2 * 5 * rng.normal(size=3))
@@ -48,6 +59,14 @@ def random_flight(seed: int) -> Flight:
         near = Flight(vehicle, stretched(trajectory, np.exp(middle)), environment)
         low, high = (middle, high) if sampled(near, 300).margin < margin else (low, middle)
     return replace(near, trajectory=stretched(trajectory, np.exp(high)))
+
+
+def with_lags(vehicle: Vehicle, lags: ArrayLike) -> Vehicle:
+    """The vehicle with other rotors' time constants [s], (n,) or one for all."""
+    each = np.broadcast_to(lags, len(vehicle.rotors)).tolist()
+    return replace(
+        vehicle, rotors=tuple(replace(r, lag=lag) for r, lag in zip(vehicle.rotors, each, strict=True))
+    )
 
 
 def irregular(rng: np.random.Generator) -> Vehicle:
@@ -75,17 +94,17 @@ def rotor(rng: np.random.Generator, size: float, strength: float, index: int, co
         min_thrust=strength * rng.uniform(-0.05, 0.05),
         max_thrust=strength * rng.uniform(0.8, 1.2),
         torque_coefficient=size * rng.uniform(0.1, 0.5),
-        lag=0.02,
+        lag=0.0,
         radius=0.1,
     )
 
 
-def tour(rng: np.random.Generator) -> Trajectory:
-    """Up to 8 segments through random states, or 20 intervals of constant snap."""
+def tour(rng: np.random.Generator, order: int) -> Trajectory:
+    """Up to 8 segments through random states, or 20 intervals of constant inputs, of this order at least."""
     if rng.uniform() < 0.25:
-        initial = rng.normal(size=(4, 3)) * [[1.0], [1.0], [3.0], [5.0]]
+        initial = rng.normal(size=(order, 3)) * np.array([1.0, 1.0, 3.0, 5.0, 10.0])[:order, None]
         return Trajectory.from_inputs(initial, 30 * rng.normal(size=(20, 3)), 0.1)
-    segments, order = int(rng.integers(1, 9)), int(rng.integers(4, 7))
+    segments, order = int(rng.integers(1, 9)), int(rng.integers(order, 7))
     size = np.array([3.0, 3.0, 4.0, 6.0, 10.0, 20.0])[:order, None]
     states = size * rng.normal(size=(segments + 1, order, 3))
     durations = rng.uniform(0.4, 1.6, segments)
@@ -120,8 +139,26 @@ def at(flight: Flight, times: np.ndarray, before: np.ndarray) -> Sampled:
     times = np.concatenate([before[before < times[0]], times])
     found = reference(flight.trajectory, flight.vehicle, times, environment=flight.environment)
     low, high = flight.vehicle.min_thrusts, flight.vehicle.max_thrusts
-    gaps = np.minimum(found.rotor_thrusts - low, high - found.rotor_thrusts) / (high - low)
-    return Sampled(float(gaps.min()), not found.undetermined)
+    rotors = [found.rotor_thrusts, *([commands(flight, times)] if flight.vehicle.lags.any() else [])]
+    gaps = [np.minimum(each - low, high - each) / (high - low) for each in rotors]
+    return Sampled(float(np.min(gaps)), not found.undetermined)
+
+
+def commands(flight: Flight, times: np.ndarray) -> np.ndarray:
+    """f + τ f' [N] at rising times, (T, n), by differences of f on the same segment, of fourth order."""
+    trajectory = flight.trajectory
+    segment = np.clip(np.searchsorted(trajectory.knots, times, side="right") - 1, 0, trajectory.segments - 1)
+    start, duration = trajectory.knots[segment], trajectory.durations[segment]
+    step = STENCIL_STEP * duration
+    middle = np.clip(times, start + 3 * step, start + duration - 3 * step)
+    stencil = middle[:, None] + step[:, None] * np.array([-2.0, -1.0, 1.0, 2.0])
+    unique, places = np.unique(stencil, return_inverse=True)
+    thrusts = reference(trajectory, flight.vehicle, unique, environment=flight.environment).rotor_thrusts[
+        places.reshape(stencil.shape)
+    ]
+    rates = np.einsum("k,tkn->tn", [1.0, -8.0, 8.0, -1.0], thrusts) / (12 * step[:, None])
+    at_middle = reference(trajectory, flight.vehicle, middle, environment=flight.environment).rotor_thrusts
+    return at_middle + flight.vehicle.lags * rates
 
 
 def certified_margin(flight: Flight, certificate: Certificate) -> float:

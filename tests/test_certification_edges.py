@@ -17,9 +17,9 @@ from aerobat.states import STANDARD_GRAVITY
 from aerobat.trajectory import Trajectory
 from aerobat.trajectory.minimum_effort import minimum_effort
 from aerobat.vehicle import load_vehicle
-from random_flights import certified_margin, irregular, random_flight, sampled, stretched
+from random_flights import certified_margin, irregular, random_flight, sampled, stretched, with_lags
 
-VEHICLE = load_vehicle("agile-quad")
+VEHICLE = with_lags(load_vehicle("agile-quad"), 0.0)
 WEIGHT = VEHICLE.mass * STANDARD_GRAVITY
 REST = [[0.0, 0.0, 0.0]] * 4
 
@@ -89,7 +89,7 @@ def test_a_speed_limit_met_exactly_holds(speed):
 
 
 def test_a_plan_that_runs_along_its_velocity_limit_is_certified():
-    made = plan(load_problem("line"), vehicle=load_vehicle("crazyflie"))
+    made = plan(load_problem("line"), vehicle=with_lags(load_vehicle("crazyflie"), 0.0))
     velocity = finding_of(made.certificate, "velocity x")
     assert velocity.value == pytest.approx(velocity.limit, rel=1e-9)
     assert made.certificate.certified, made.certificate.why

@@ -19,9 +19,9 @@ from aerobat.states import STANDARD_GRAVITY
 from aerobat.trajectory import Trajectory
 from aerobat.trajectory.minimum_effort import minimum_effort
 from aerobat.vehicle import load_vehicle
-from random_flights import Flight, certified_margin, moved, random_flight, sampled
+from random_flights import Flight, certified_margin, moved, random_flight, sampled, with_lags
 
-VEHICLE = load_vehicle("agile-quad")
+VEHICLE = with_lags(load_vehicle("agile-quad"), 0.0)
 UP = np.array([0.0, 0.0, 1.0])
 TIGHT = 1e-6  # of a rotor's range
 

@@ -27,7 +27,8 @@ class Side(StrEnum):
 class Finding:
     """The minimum or the maximum of one quantity, enclosed between `value` and `bound`."""
 
-    quantity: str  # "speed", "tilt", "thrust", "body rate", "moment", "rotor 0", "velocity x", ...
+    # "speed", "tilt", "thrust", "body rate", "moment", "rotor 0", "rotor 0 command", "velocity x", ...
+    quantity: str
     unit: str
     side: Side
     value: float  # reached at `time`
@@ -63,23 +64,31 @@ class Finding:
 
 @dataclass(frozen=True)
 class Discontinuity:
-    """A jump between two segments that no finite forces and moments can make."""
+    """A jump between two segments that no finite forces and moments can make, or no rotor with lag."""
 
-    quantity: str  # "position", "velocity", "thrust direction" or "body rate"
+    quantity: str  # "position", "velocity", "thrust direction", "body rate" or "rotor thrusts"
     unit: str
-    norm: float
+    norm: float  # of rotor thrusts the largest
     time: float  # [s]
 
     def __str__(self) -> str:
         """One sentence without its full stop."""
         means = "force" if self.quantity in ("position", "velocity") else "moment"
         jump = f"{self.norm:.2g} {self.unit}"
+        if self.quantity == "rotor thrusts":
+            return (
+                f"{self.quantity} jump by up to {jump} at {self.time:.3f} s, which rotors with lag cannot "
+                "follow; plan with continuous snap (--order 5)"
+            )
         return f"{self.quantity} jumps by {jump} at {self.time:.3f} s, which no {means} can do"
 
 
 @dataclass(frozen=True)
 class Certificate:
-    """Findings along the whole of a trajectory, between samples and knots too."""
+    """Findings along the whole of a trajectory, between samples and knots too.
+
+    A rotor with lag τ has its command f + τ f' among them beside its thrust f, each within its limits.
+    """
 
     findings: tuple[Finding, ...]
     undetermined: tuple[TimeInterval, ...]  # where thrust vanishes, and with it the attitude
@@ -93,15 +102,20 @@ class Certificate:
 
     @property
     def worst(self) -> Finding | None:
-        """The rotor thrust with the smallest margin; None if no attitude is ever determined."""
+        """The rotor's thrust or command with the smallest margin; None if no attitude is ever determined.
+
+        Of those that are violated if any is.
+        """
         rotors = [finding for finding in self.findings if finding.quantity.startswith("rotor ")]
-        return min(rotors, key=_margin, default=None)
+        violated = [finding for finding in rotors if finding.verdict is Verdict.VIOLATED]
+        return min(violated or rotors, key=_margin, default=None)
 
     @property
     def margin(self) -> float | None:
         """By how much [N] the rotors are proven to stay within their limits; negative: beyond by so much.
 
-        Of the times at which attitude is determined; None if there are none.
+        Of thrusts and, where rotors lag, of commands, at the times at which attitude is determined; None if
+        there are none.
         """
         return self.worst.margin if self.worst else None
 

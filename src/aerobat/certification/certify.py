@@ -7,20 +7,31 @@ beside this file says why that is a proof.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
+from aerobat.arrays import Array
 from aerobat.certification import quantities
 from aerobat.certification.attitude import ThrustDirectionRates
 from aerobat.certification.certificate import Certificate, Finding, Side
 from aerobat.certification.continuity import discontinuities
+from aerobat.certification.enclosure import chebyshev
 from aerobat.certification.enclosure.interpolation_error import accuracy
-from aerobat.certification.enclosure.queries import ChebyshevSeries, ExtremumQuery, angle, both_sides, root
+from aerobat.certification.enclosure.queries import (
+    SUMMATION_ROUNDING,
+    ChebyshevSeries,
+    ExtremumQuery,
+    angle,
+    both_sides,
+    root,
+)
 from aerobat.certification.envelope import Envelope
 from aerobat.certification.kinematics import kinematic_findings
 from aerobat.certification.subdivision import subdivide
 from aerobat.certification.thrust_curve import ThrustCurve
 from aerobat.environment import Environment
-from aerobat.flatness.references import UNDETERMINED
+from aerobat.flatness.references import UNDETERMINED, force_balance
 from aerobat.trajectory import Trajectory
 from aerobat.trajectory.subintervals import Subintervals
 from aerobat.vehicle import Vehicle
@@ -38,16 +49,17 @@ def certify(
     """Prove that a vehicle can fly a trajectory within its limits at every instant, or refute it.
 
     Quantities are those of `flatness.reference`: the thrust of every rotor and their
-    sum, tilt, body rate, moment and speed, and per axis what `envelope.limits` bounds. Bounds are proven
+    sum, tilt, body rate, moment and speed, per axis what `envelope.limits` bounds, and what
+    `envelope.conditions` do; of a rotor with lag the command too. Bounds are proven
     over continuous time, rounding included. A limit nearer than about 1e-7 of a rotor's range (1e-5 after
-    tens of seconds) stays undecided, as does all that needs an attitude where thrust, and with it the
-    attitude, is undetermined; speed and what `envelope.limits` bounds may meet their limits exactly
-    (`kinematics.LIMIT_TOLERANCE`).
+    tens of seconds, and of a command) stays undecided, as does all that needs an attitude where thrust, and
+    with it the attitude, is undetermined; speed and what `envelope.limits` and `envelope.conditions` bound
+    may meet their limits exactly (`kinematics.LIMIT_TOLERANCE`).
     Raises SpecError for derivatives beyond all reason.
 
     Args:
         trajectory: The path [m] over time [s], world, and its heading [rad].
-        vehicle: What flies it; its rotors' limits [N] are those that count.
+        vehicle: What flies it; its rotors' limits [N] and its body rate's [rad/s] are those that count.
         environment: Gravity and wind, by default those of a calm day on Earth. Drag acts on the velocity
             relative to the wind; speed and its limit are relative to the ground.
         envelope: What else it shall stay within, by default nothing.
@@ -57,30 +69,40 @@ def certify(
     curve = ThrustCurve.of(trajectory, vehicle, environment, INTERPOLATION_DEGREE)
     floor = UNDETERMINED * environment.gravity
     found = subdivide(curve, floor)
+    series = interpolated(curve, found.pieces, everywhere=not found.vanishing) if len(found.pieces) else None
     findings: list[Finding] = []
-    if len(found.pieces):
-        series = interpolated(curve, found.pieces, everywhere=not found.vanishing)
+    if series is not None:
         findings += series.answers(_queries(vehicle, envelope))
-    findings += kinematic_findings(trajectory, envelope)
-    return Certificate(tuple(findings), found.vanishing, discontinuities(curve, floor))
+    findings += kinematic_findings(trajectory, envelope, force_balance(environment, vehicle))
+    return Certificate(tuple(findings), found.vanishing, discontinuities(curve, floor, series))
 
 
 def _queries(vehicle: Vehicle, envelope: Envelope) -> list[ExtremumQuery]:
     """The extrema of the columns of `quantities.values` that a certificate states."""
     count = len(vehicle.rotors)
     low, high = vehicle.min_thrusts, vehicle.max_thrusts
+    body_rate = min(envelope.body_rate, vehicle.max_body_rate)
     rotors = [query for i in range(count) for query in both_sides(f"rotor {i}", "N", i, low[i], high[i])]
+    commands = [
+        query
+        for i in np.flatnonzero(vehicle.lags)
+        for query in both_sides(f"rotor {i} command", "N", count + 4 + int(i), low[i], high[i])
+    ]
     return [
         *rotors,
+        *commands,
         *both_sides("thrust", "N", count, low.sum(), high.sum()),
         ExtremumQuery("tilt", "rad", Side.MAX, envelope.tilt, count + 1, -1, angle),
-        ExtremumQuery("body rate", "rad/s", Side.MAX, envelope.body_rate, count + 2, 1, root),
+        ExtremumQuery("body rate", "rad/s", Side.MAX, body_rate, count + 2, 1, root),
         ExtremumQuery("moment", "N·m", Side.MAX, envelope.moment, count + 3, 1, root),
     ]
 
 
 def interpolated(curve: ThrustCurve, pieces: Subintervals, everywhere: bool) -> ChebyshevSeries:
-    """All quantities along pieces that follow each other, in the frame that is carried along them."""
+    """All quantities along pieces that follow each other, in the frame that is carried along them.
+
+    The columns of `quantities.values`, and behind them the commands of the rotors where any has a lag.
+    """
     vehicle, basis = curve.vehicle, curve.basis
     values = curve.on(pieces)
     series = curve.series(values)
@@ -89,8 +111,40 @@ def interpolated(curve: ThrustCurve, pieces: Subintervals, everywhere: bool) -> 
     omega, omega_dot = rates.body(rates.carried(curve.trajectory.heading))
     bound = accuracy(curve.norms(series, pieces), seconds, curve.sums[pieces.interval], vehicle)
     # errors of the frame's angle add up from piece to piece
-    angle_error = np.cumsum(bound.twist_remainder + basis.lebesgue * bound.twist_rounding)
-    error = bound.remainder + basis.lebesgue * (bound.rounding + angle_error[:, None] * bound.per_radian)
+    own_error = (bound.twist_remainder + basis.lebesgue * bound.twist_rounding)[:, None]
+    angle_error = np.cumsum(own_error, axis=0)
+    error = bound.remainder + basis.lebesgue * (bound.rounding + angle_error * bound.per_radian)
     columns = basis.analysis @ quantities.values(vehicle, values, omega, omega_dot)
     scale = quantities.scales(vehicle)
-    return ChebyshevSeries(curve.trajectory, pieces, columns, error, scale, TIGHTNESS, everywhere)
+    found = ChebyshevSeries(curve.trajectory, pieces, columns, error, scale, TIGHTNESS, everywhere)
+    if not vehicle.lags.any():
+        return found
+    # what is interpolated is off by so much, and its derivative by what that makes of it
+    noise = bound.rounding + own_error * bound.per_radian + SUMMATION_ROUNDING * np.abs(columns).sum(axis=1)
+    rate_error = bound.rate_remainder + (angle_error - own_error) * bound.rate_per_radian
+    rate_error += 2 / seconds[:, None] * basis.steepening * noise
+    return _with_commands(found, rate_error, vehicle, basis)
+
+
+def _with_commands(
+    found: ChebyshevSeries, rate_error: Array, vehicle: Vehicle, basis: chebyshev.Basis
+) -> ChebyshevSeries:
+    """The series with the commands f + τ f' of all rotors behind them.
+
+    Args:
+        found: The thrusts f among others.
+        rate_error: Of the derivatives of its series [1/s], (P, Q).
+        vehicle: What flies, with n rotors.
+        basis: Of interpolation.
+    """
+    count = len(vehicle.rotors)
+    thrusts = found.series[..., :count]
+    per_second = 2 / found.pieces.seconds(found.trajectory)[:, None, None]
+    commands = thrusts + vehicle.lags * per_second * (basis.derivative @ thrusts)
+    error = found.error[:, :count] + vehicle.lags * rate_error[:, :count]
+    return replace(
+        found,
+        series=np.concatenate([found.series, commands], axis=-1),
+        error=np.concatenate([found.error, error], axis=-1),
+        scale=np.concatenate([found.scale, found.scale[:count]]),
+    )

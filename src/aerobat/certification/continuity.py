@@ -1,4 +1,7 @@
-"""Jumps between segments: of what forces and moments make, only thrust's norm and the moments may."""
+"""Jumps between segments: of what forces and moments make, only thrust's norm and the moments may.
+
+Where rotors lag behind their commands, their thrusts may not either.
+"""
 
 from __future__ import annotations
 
@@ -7,7 +10,11 @@ import math
 import numpy as np
 
 from aerobat.arrays import Array
+from aerobat.certification import quantities
 from aerobat.certification.certificate import Discontinuity
+from aerobat.certification.enclosure.interpolation_error import first_order
+from aerobat.certification.enclosure.queries import ChebyshevSeries
+from aerobat.certification.quantities import MagnitudeBounds
 from aerobat.certification.thrust_curve import ThrustCurve
 from aerobat.trajectory import Trajectory
 
@@ -15,10 +22,17 @@ NEGLIGIBLE_JUMP = 1e-6  # of the largest value at knots: less than any controlle
 CANCELLATION = 1e3  # units in the last place of the largest coefficient that fitting a segment may cost
 
 
-def discontinuities(curve: ThrustCurve, floor: float) -> tuple[Discontinuity, ...]:
+def discontinuities(
+    curve: ThrustCurve, floor: float, found: ChebyshevSeries | None
+) -> tuple[Discontinuity, ...]:
     """The jump of lowest order at every inner knot where one cannot be flown; directions above the floor.
 
     Rates are compared as b3' in the world: with b3 the same on both sides that is the body rates' jump.
+
+    Args:
+        curve: What is flown.
+        floor: Of |f| [m/s²], below which no attitude is determined.
+        found: Series of the rotors' thrusts, in the first columns; None where no attitude ever is.
     """
     trajectory = curve.trajectory
     ends = curve.at(np.arange(trajectory.segments), np.tile([0.0, 1.0], (trajectory.segments, 1)))
@@ -34,18 +48,52 @@ def discontinuities(curve: ThrustCurve, floor: float) -> tuple[Discontinuity, ..
     speeds = np.linalg.norm(db3, axis=-1)
     spin = _tolerance(trajectory, df, 3) / min_thrust + 2 * turn * np.maximum(speeds[1:, 0], speeds[:-1, 1])
     everywhere = np.full(len(determined), True)
+    thrust = _thrust_jumps(curve, ends, min_thrust, found)
     checks = (
         ("position", "m", _jump(position), _tolerance(trajectory, position, 0), everywhere),
         ("velocity", "m/s", _jump(velocity), _tolerance(trajectory, velocity, 1), everywhere),
         ("thrust direction", "rad", _jump(b3), turn, determined),
         ("body rate", "rad/s", _jump(db3), spin, determined),
+        ("rotor thrusts", "N", thrust, np.zeros_like(thrust), determined),
     )
-    found: dict[int, Discontinuity] = {}
+    jumps: dict[int, Discontinuity] = {}
     for name, unit, norm, tolerance, counts in checks:
         for knot in np.flatnonzero(counts & (norm > tolerance)):
             time = float(trajectory.knots[knot + 1])
-            found.setdefault(int(knot), Discontinuity(name, unit, float(norm[knot]), time))
-    return tuple(found[knot] for knot in sorted(found))
+            jumps.setdefault(int(knot), Discontinuity(name, unit, float(norm[knot]), time))
+    return tuple(jumps[knot] for knot in sorted(jumps))
+
+
+def _thrust_jumps(curve: ThrustCurve, ends: Array, min_thrust: Array, found: ChebyshevSeries | None) -> Array:
+    """The largest jump [N] of a lagging rotor's thrust at each inner knot, (S - 1,); zero if rounding's.
+
+    Args:
+        curve: What is flown.
+        ends: v, f, f', f'' at both ends of segments, (S, 2, 4, 3).
+        min_thrust: |f| at inner knots, at least [m/s²], (S - 1,).
+        found: Series of the rotors' thrusts, in the first columns.
+    """
+    vehicle, jumps = curve.vehicle, np.zeros(len(min_thrust))
+    if found is None or not vehicle.lags.any():
+        return jumps
+    count, pieces = len(vehicle.rotors), found.pieces
+    inner = np.flatnonzero((np.diff(pieces.interval) == 1) & (pieces.start[1:] == 0.0))
+    values = found.ends()[..., :count]
+    size = np.abs(values[inner + 1, 0] - values[inner, 1])
+    excess = size > _thrust_tolerances(curve, ends, min_thrust)[pieces.interval[inner]]
+    jumps[pieces.interval[inner]] = np.where(excess & (vehicle.lags > 0), size, 0.0).max(axis=1)
+    return jumps
+
+
+def _thrust_tolerances(curve: ThrustCurve, ends: Array, min_thrust: Array) -> Array:
+    """The largest jumps of the rotors' thrusts that rounding may make, at each inner knot, (S - 1, n)."""
+    off = [_tolerance(curve.trajectory, ends[:, :, k], k + 1) for k in range(4)]
+    norms = np.linalg.norm(ends, axis=-1)
+    speed, thrust, jerk, snap = np.maximum(norms[1:, 0], norms[:-1, 1]).T
+    omega = jerk / min_thrust
+    real = MagnitudeBounds(thrust, np.ones_like(thrust), omega, snap / min_thrust + 2 * omega**2)
+    errors = first_order(real, min_thrust, speed, np.stack(off, axis=-1), curve.vehicle)
+    return quantities.errors(curve.vehicle, real, errors)[:, : len(curve.vehicle.rotors)]
 
 
 def _jump(ends: Array) -> Array:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from aerobat.declaration import Limit, declared
-from aerobat.problem import Limits
+from aerobat.problem import Condition, Limits
 
 NO_LIMITS = Limits()
 
@@ -14,7 +14,7 @@ NO_LIMITS = Limits()
 class Envelope:
     """Limits over continuous time; infinite where there is none.
 
-    `limits` bounds position and its derivatives per axis, as a problem does.
+    `limits` bounds position and its derivatives per axis, as a problem does; `conditions` hold throughout.
     """
 
     speed: Limit = np.inf  # [m/s] |v|
@@ -22,3 +22,4 @@ class Envelope:
     body_rate: Limit = np.inf  # [rad/s] |ω|
     moment: Limit = np.inf  # [N·m] |M|
     limits: Limits = NO_LIMITS
+    conditions: tuple[Condition, ...] = ()

@@ -125,8 +125,13 @@ def refuted_by_samples(
 
 
 def certificate_for(trajectory: Trajectory, problem: Problem, vehicle: Vehicle) -> Certificate:
-    """The certificate of a trajectory for the vehicle's limits and the problem's, over continuous time."""
-    return certify(trajectory, vehicle, problem.environment, Envelope(limits=problem.path_limits))
+    """The certificate of a trajectory for the vehicle's limits and the problem's, over continuous time.
+
+    What the problem's maneuver asks throughout is among them.
+    """
+    throughout = problem.stages(vehicle.max_specific_thrust).path_constraints
+    envelope = Envelope(limits=problem.path_limits, conditions=throughout)
+    return certify(trajectory, vehicle, problem.environment, envelope)
 
 
 def with_certificate(plan: Plan, vehicle: Vehicle) -> Plan:

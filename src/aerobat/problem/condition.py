@@ -142,6 +142,12 @@ class Condition:
         return LinearBound(weights, constant, self.lower, self.upper)
 
     @property
+    def name(self) -> str:
+        """The quantity that it bounds, in words."""
+        direction = ", ".join(f"{x:.4g}" for x in self.direction)
+        return f"{self.quantity.replace('_', ' ')} along ({direction})"
+
+    @property
     def min_thrust(self) -> float:
         """The least specific thrust [m/s²] that satisfies the condition; zero when it asks none."""
         if self.quantity is not Quantity.SPECIFIC_THRUST:

@@ -14,6 +14,7 @@ from aerobat.arrays import Array, frozen
 from aerobat.declaration import (
     FieldError,
     Label,
+    Limit,
     NonNegative,
     Positive,
     Vector3,
@@ -74,6 +75,7 @@ class Vehicle:
     ]  # [kg·m²] about the centre of mass, body axes
     rotors: tuple[Rotor, ...]  # four or more
     drag_body: Vector3 = field(default_factory=lambda: np.zeros(3))  # [kg/s] force_body = -drag_body·v_body
+    max_body_rate: Limit = np.inf  # [rad/s] |ω|, at most
     description: str = ""  # where its numbers come from
 
     SHORTHANDS: ClassVar[Mapping[str, str]] = {"rotor_defaults": "any keys of rotors, for all of them"}

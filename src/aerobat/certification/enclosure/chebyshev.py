@@ -21,6 +21,7 @@ class Basis:
     nodes: Array  # Chebyshev points, both ends among them, (K + 1,)
     analysis: Array  # values at the nodes -> coefficients, (K + 1, K + 1)
     halves: Array  # coefficients -> those of either half, stretched to [-1, 1], (2, K + 1, K + 1)
+    derivative: Array  # coefficients -> those of the derivative, (K + 1, K + 1)
 
     @property
     def degree(self) -> int:
@@ -32,6 +33,11 @@ class Basis:
         """By how much interpolation magnifies errors of values, at most (Trefethen, ATAP, theorem 15.2)."""
         return float(1 + 2 / np.pi * np.log(self.degree + 1))
 
+    @property
+    def steepening(self) -> float:
+        """By how much its derivative magnifies errors of values, at most (Duffin and Schaeffer, 1941)."""
+        return float(self.degree**2)
+
 
 @lru_cache(maxsize=16)
 def basis(degree: int) -> Basis:
@@ -39,12 +45,25 @@ def basis(degree: int) -> Basis:
     nodes = np.asarray(-np.cos(np.pi * np.arange(degree + 1) / degree))
     analysis = np.linalg.inv(chebyshev.chebvander(nodes, degree))
     halves = [analysis @ chebyshev.chebvander((nodes + side) / 2, degree) for side in (-1, 1)]
-    return Basis(nodes, np.asarray(analysis), np.array(halves))
+    derivative = np.zeros((degree + 1, degree + 1))
+    derivative[:-1] = chebyshev.chebder(np.eye(degree + 1))
+    return Basis(nodes, np.asarray(analysis), np.array(halves), derivative)
 
 
 def growth(degree: int, rho: Array) -> Array:
     """The largest |T_k| on Bernstein ellipses, (ρᵏ + ρ⁻ᵏ)/2, (K + 1, R); one for ρ = 1, the interval."""
     return np.asarray(np.cosh(np.multiply.outer(np.arange(degree + 1), np.log(rho))))
+
+
+def tails(degree: int, rho: Array) -> tuple[Array, Array]:
+    """Σ 4 ρ⁻ᵏ and Σ 4 k² ρ⁻ᵏ over all k beyond a degree, (R,) each.
+
+    So far, on [-1, 1], are interpolants of this degree from a function that is at most 1 on the ellipse ρ,
+    and their derivatives from its derivative.
+    """
+    x, m = 1 / rho, degree + 1
+    first = 4 * x**m / (1 - x)
+    return first, first * (m**2 + 2 * m * x / (1 - x) + x * (1 + x) / (1 - x) ** 2)
 
 
 def integral(values: Array, basis: Basis) -> Array:

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from aerobat.arrays import Array
 from aerobat.certification import quantities
-from aerobat.certification.enclosure.chebyshev import EVALUATION_ROUNDING, growth
+from aerobat.certification.enclosure.chebyshev import EVALUATION_ROUNDING, growth, tails
 from aerobat.certification.quantities import MagnitudeBounds
 from aerobat.flatness.references import axial_drag
 from aerobat.vehicle import Vehicle
@@ -40,6 +40,8 @@ class InterpolationError:
     twist_remainder: Array  # [rad] of the angle by which the frame turns along the piece, (P,)
     twist_rounding: Array  # [rad], and of the frame's hand-over from piece to piece, (P,)
     per_radian: Array  # what an error in the frame's angle does to a quantity [1/rad], (P, Q)
+    rate_remainder: Array  # as `remainder`, of time derivatives [1/s], (P, Q)
+    rate_per_radian: Array  # what a constant error in the frame's angle does to them [1/(rad s)], (P, Q)
 
 
 @dataclass(frozen=True)
@@ -69,19 +71,26 @@ def accuracy(norms: Array, seconds: Array, sums: Array, vehicle: Vehicle) -> Int
     around = on_ellipses(norms, seconds / 2, vehicle)
     real = MagnitudeBounds(*(bound[:, 0] for bound in vars(around.magnitudes).values()))
     min_thrust = norms[:, 0, 1] - norms[:, 1:, 1].sum(axis=1)
-    rounded = _rounded(real, min_thrust, norms, EVALUATION_ROUNDING * sums, vehicle)
-    decay = 4 / (RHO[1:] ** (norms.shape[1] - 1) * (RHO[1:] - 1))
+    speed = norms[..., 0].sum(axis=1)
+    rounded = first_order(real, min_thrust, speed, EVALUATION_ROUNDING * sums, vehicle)
+    decay, rate_decay = tails(norms.shape[1] - 1, RHO[1:])
     bounds = np.where(around.regular[..., None], quantities.bounds(vehicle, around.magnitudes), np.inf)
     twist = np.where(around.regular, around.twist, np.inf)
-    none = np.zeros_like(min_thrust)
-    turned = MagnitudeBounds(none, none, real.omega, real.omega_dot)
+    none = np.zeros_like(around.twist)
+    turned = MagnitudeBounds(none, none, around.magnitudes.omega, around.magnitudes.omega_dot)
+    per_radian = quantities.errors(vehicle, around.magnitudes, turned)
+    per_radian[:, 1:][~around.regular[:, 1:]] = np.inf
+    away = (RHO[1:] + 1 / RHO[1:]) / 2 - 1  # of an ellipse from the piece, by Cauchy's inequality
+    per_second = 2 / seconds[:, None]
     return InterpolationError(
         magnitude=bounds[:, 0],
         remainder=(bounds[:, 1:] * decay[:, None]).min(axis=1),
         rounding=quantities.errors(vehicle, real, rounded),
         twist_remainder=2 * (twist[:, 1:] * decay).min(axis=1),
         twist_rounding=seconds * rounded.omega + EVALUATION_ROUNDING,
-        per_radian=quantities.errors(vehicle, real, turned),
+        per_radian=per_radian[:, 0],
+        rate_remainder=per_second * (bounds[:, 1:] * rate_decay[:, None]).min(axis=1),
+        rate_per_radian=per_second * (per_radian[:, 1:] / away[:, None]).min(axis=1),
     )
 
 
@@ -114,12 +123,19 @@ def _off_zero(mean: Array, away: Array) -> NDArray[np.bool_]:
     return np.asarray(2 * away * mean + away**2 < 0.999 * mean**2)
 
 
-def _rounded(
-    real: MagnitudeBounds, min_thrust: Array, norms: Array, off: Array, vehicle: Vehicle
+def first_order(
+    real: MagnitudeBounds, min_thrust: Array, speed: Array, off: Array, vehicle: Vehicle
 ) -> MagnitudeBounds:
-    """First-order errors of what flatness gives if v, f, f', f'' are `off` by so much, (P, 4)."""
+    """First-order errors of what flatness gives if v, f, f', f'' are off by so much.
+
+    Args:
+        real: Bounds of what it gives, (P,) each.
+        min_thrust: |f| at least [m/s²], (P,).
+        speed: |v| at most [m/s], (P,).
+        off: Errors of v, f, f', f'', (P, 4).
+        vehicle: What flies.
+    """
     f, df, ddf = (off[:, 1:] / min_thrust[:, None]).T
-    speed = norms[..., 0].sum(axis=1)
     return MagnitudeBounds(
         thrust=vehicle.mass * (off[:, 1] + abs(axial_drag(vehicle)) * (off[:, 0] + 2 * f * speed)),
         cos_tilt=2 * f,

@@ -62,6 +62,11 @@ class ChebyshevSeries:
     tightness: float  # of enclosures, as `SeriesBatch` has it
     everywhere: bool  # whether the pieces make up the whole trajectory
 
+    def ends(self) -> Array:
+        """The values at both ends of the pieces, (P, 2, Q)."""
+        alternating = (-1.0) ** np.arange(self.series.shape[1])
+        return np.stack([alternating @ self.series, self.series.sum(axis=1)], axis=1)
+
     def answers(self, queries: Sequence[ExtremumQuery]) -> list[Finding]:
         """A finding for each query; none at all if there are no pieces."""
         count = len(self.pieces)
