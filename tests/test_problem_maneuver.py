@@ -139,7 +139,7 @@ def test_thrust_that_meets_an_attitudes_conditions_lies_in_its_cone_and_fills_ha
 ) -> None:
     """Never outside the cone; inside it wherever the thrust is nearer than the pyramid's faces."""
     gate = tilted_gate(np.zeros(3), 0.3, tilt=tilt)
-    attitude = Attitude(gate.up, tolerance, min_thrust=5.0)
+    attitude = Attitude(gate.up, 5.0, tolerance)
     stage = Stage("gate", attitude=attitude).explicit()
     sideways = np.cos(around) * gate.lateral + np.sin(around) * gate.normal
     thrust = 20.0 * (np.cos(off) * gate.up + np.sin(off) * sideways)
@@ -229,9 +229,11 @@ def test_a_window_holds_the_interval_ends_within_it(first: float, length: float,
         lambda: Stage("s", at=(0.6, 0.4)),
         lambda: Stage("s", at=(0.5, 1.5)),
         lambda: Stage("s", at="early"),
+        lambda: Stage("s", at=True),
+        lambda: Stage("s", at=(0.2, 0.4, 0.6)),
         lambda: Stage("s", min_upright_thrust=5.0),
-        lambda: Stage("s", gate="gate", min_upright_thrust=5.0, attitude=Attitude((0.0, 0.0, 1.0))),
-        lambda: Attitude((0.0, 0.0, 1.0), tolerance=1.6),
+        lambda: Stage("s", gate="gate", min_upright_thrust=5.0, attitude=Attitude((0.0, 0.0, 1.0), 5.0)),
+        lambda: Attitude((0.0, 0.0, 1.0), 5.0, tolerance=1.6),
         lambda: Attitude((0.0, 0.0, 1.0), min_thrust=-1.0),
         lambda: Flip(axis_deg=np.inf),
         lambda: Flip(min_lateral_thrust=-1.0),

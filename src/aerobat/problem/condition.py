@@ -15,8 +15,8 @@ from aerobat.arrays import Array
 from aerobat.declaration import (
     Direction,
     FieldError,
-    NonNegative,
     Number,
+    Positive,
     UnitVector,
     declared,
     number,
@@ -163,8 +163,8 @@ class Attitude:
     """
 
     up: UnitVector  # where the thrust points, world
+    min_thrust: Positive  # [m/s²] specific thrust along `up`, at least
     tolerance: ConeAngle = 0.0  # [rad] between the thrust axis and `up`, at most
-    min_thrust: NonNegative = 0.0  # [m/s²] specific thrust along `up`, at least
 
     SHORTHANDS: ClassVar[Mapping[str, str]] = {"tolerance_deg": "[deg] `tolerance` in degrees"}
 

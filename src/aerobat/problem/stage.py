@@ -4,19 +4,33 @@ from __future__ import annotations
 
 from dataclasses import replace
 from math import ceil, floor
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
-from pydantic import Field
+from pydantic import Field, PlainValidator
 
-from aerobat.declaration import FieldError, Fraction, Label, NonNegative, declared
+from aerobat.declaration import FieldError, Label, Positive, declared, shown
 from aerobat.problem.condition import Attitude, Condition
 from aerobat.problem.gate import Gate, at_centre
 
-Edge = Annotated[float, Field(ge=0, le=1)]  # [-] of the duration
+
+def _crossing_time(value: Any) -> Any:
+    """The value, a window as a tuple. Raises FieldError for what is no time."""
+    window = value if isinstance(value, list | tuple) else (value,)
+    numbers = all(isinstance(x, int | float) and not isinstance(x, bool) for x in window)
+    if value == "free" or (numbers and len(window) == 1 and 0.0 < window[0] < 1.0):
+        return value
+    if not (numbers and len(window) == 2 and 0.0 <= window[0] < window[1] <= 1.0):
+        raise FieldError(
+            "", f'must be "free", a fraction between 0 and 1, or two that rise, got {shown(value)}'
+        )
+    return float(window[0]), float(window[1])
+
+
 # [-] when a stage holds, as a part of the duration: anywhere, between two fractions of it, or at one
 CrossingTime = Annotated[
-    Literal["free"] | Fraction | tuple[Edge, Edge],
-    Field(description='`"free"`, a fraction of the duration between 0 and 1, or a window of two of them'),
+    Literal["free"] | float | tuple[float, float],
+    PlainValidator(_crossing_time),
+    Field(description='`"free"`, a fraction of the duration between 0 and 1, or two that rise, a window'),
 ]
 PLANNED_SHARE = 0.5  # of a gate's tolerance of attitude: the plan's
 ROUNDING = 1e-9  # [-] of an interval
@@ -37,7 +51,7 @@ class Stage:
     interval_offset: Annotated[int, Field(ge=0, le=10_000)] = 0  # intervals after that
     gate: str | None = None  # name of the gate whose centre is passed
     # specific thrust along the gate's upright, at least; left out, no attitude is asked of the gate
-    min_upright_thrust: NonNegative | None = None  # [m/s²]
+    min_upright_thrust: Positive | None = None  # [m/s²]
     attitude: Attitude | None = None  # where the thrust points, instead
 
     def __post_init__(self) -> None:
@@ -47,8 +61,6 @@ class Stage:
                 raise FieldError("min_upright_thrust", "needs gate, whose upright is meant; name it")
             if self.attitude is not None:
                 raise FieldError("min_upright_thrust", "stands beside attitude; give one of them")
-        if isinstance(self.at, tuple) and not self.at[0] < self.at[1]:
-            raise FieldError("at", f": its window must rise, got {self.at[0]:g} to {self.at[1]:g}")
 
     @property
     def window(self) -> tuple[float, float]:
@@ -74,7 +86,7 @@ class Stage:
         attitude = self.attitude
         if gate is not None and self.min_upright_thrust is not None:
             tolerance = PLANNED_SHARE * gate.attitude_tolerance
-            attitude = Attitude(gate.up, tolerance, self.min_upright_thrust)
+            attitude = Attitude(gate.up, self.min_upright_thrust, tolerance)
         there = () if gate is None else at_centre(gate)
         pointing = () if attitude is None else attitude.conditions
         conditions = (*there, *self.conditions, *pointing)

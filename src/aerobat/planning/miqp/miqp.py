@@ -112,7 +112,7 @@ class _Planning:
     def attempt(self, dt: float) -> Judged[AssignmentResult] | None:
         """Outcome of one dt; None where nothing is found that the rotors can follow within all limits."""
         program = _ProgramAtDt(self, dt)
-        jumps = self.config.order == JERK_ORDER
+        jumps = self.config.order <= JERK_ORDER + 1
         judged = certified_solve(
             program, self.formulation.problem, self.vehicle, self.recorder, ROUNDS, jumps
         )

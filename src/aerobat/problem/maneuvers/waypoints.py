@@ -69,7 +69,7 @@ class Waypoint:
         """The attitude that `up` asks for with no thrust given."""
         if self.up is None or self.thrust is not None:
             return None
-        return Attitude(self.up, min_thrust=THRUST_FRACTION * max_specific_thrust)
+        return Attitude(self.up, THRUST_FRACTION * max_specific_thrust)
 
 
 @maneuver("waypoints")
