@@ -21,7 +21,8 @@ class RotorMargin:
     """The distance of the rotors from their limits along a trajectory, by flatness.
 
     `min_thrust` is the least thrust of the rotor that comes closest to its lower limit, `max_thrust` the
-    largest of the one that comes closest to its upper limit: with equal rotors, of all of them.
+    largest of the one that comes closest to its upper limit: with equal rotors, of all of them. Of a rotor
+    with lag it is the thrust that is commanded.
     """
 
     min_thrust: float  # [N]
@@ -90,7 +91,7 @@ def sampled_margin(trajectory: Trajectory, vehicle: Vehicle, environment: Enviro
 
 
 def rotor_findings(certificate: Certificate, side: Side) -> list[Finding]:
-    """Findings of a certificate about each rotor's thrust on one side."""
+    """Findings of a certificate about each rotor's thrust, and its command if it lags, on one side."""
     return [f for f in certificate.findings if f.quantity.startswith("rotor ") and f.side is side]
 
 
