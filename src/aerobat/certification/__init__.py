@@ -2,6 +2,15 @@
 
 from aerobat.certification.certificate import Certificate, Discontinuity, Finding, Side, Verdict
 from aerobat.certification.certify import certify
-from aerobat.certification.envelope import Envelope
+from aerobat.certification.envelope import Envelope, PlannedPassage
 
-__all__ = ["Certificate", "Discontinuity", "Envelope", "Finding", "Side", "Verdict", "certify"]
+__all__ = [
+    "Certificate",
+    "Discontinuity",
+    "Envelope",
+    "Finding",
+    "PlannedPassage",
+    "Side",
+    "Verdict",
+    "certify",
+]

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, replace
 from enum import StrEnum
+from math import degrees
 
 from aerobat.flatness import TimeInterval
 
@@ -25,7 +27,10 @@ class Side(StrEnum):
 
 @dataclass(frozen=True)
 class Finding:
-    """The minimum or the maximum of one quantity, enclosed between `value` and `bound`."""
+    """The minimum or the maximum of one quantity, enclosed between `value` and `bound`.
+
+    Where it names a `gate`, it is about the passage there alone, and `value` and `bound` are the same.
+    """
 
     # "speed", "tilt", "thrust", "body rate", "moment", "rotor 0", "rotor 0 command", "velocity x", ...
     quantity: str
@@ -36,6 +41,7 @@ class Finding:
     time: float  # [s]
     limit: float | None
     verdict: Verdict
+    gate: str | None = None  # passed at that time
 
     @property
     def margin(self) -> float | None:
@@ -49,17 +55,34 @@ class Finding:
     def __str__(self) -> str:
         """One sentence without its full stop."""
         change = "rises" if self.side is Side.MAX else "falls"
-        value = round(self.value, 9) + 0.0  # what is zero but for rounding reads as zero
-        reached = f"{self.quantity} {change} to {value:.4g} {self.unit} at {self.time:.3f} s"
+        reached = f"{self.quantity} {change} to {self.shown(self.value)} at {self.time:.3f} s"
+        if self.gate is not None:
+            reached = f"gate '{self.gate}' {self.quantity} {self._of_limit} at {self.time:.3f} s"
         margin = self.margin
         if self.limit is None or margin is None:
             return reached
         if self.verdict is Verdict.VIOLATED:
             where = "above" if self.side is Side.MAX else "below"
-            return f"{reached}, {-margin:.2g} {self.unit} {where} its limit"
+            return f"{reached}, {self.shown(-margin, 2)} {where} its limit"
+        if self.gate is not None:
+            return reached
         if self.verdict is Verdict.UNDECIDED and margin < 0:
             return f"{reached}, nearer to its limit than can be told"
-        return f"{reached}, {margin:.2g} {self.unit} within its limit"
+        return f"{reached}, {self.shown(margin, 2)} within its limit"
+
+    def shown(self, value: float, digits: int = 4) -> str:
+        """A value of this quantity with its unit, angles in degrees."""
+        number = degrees(value) if self.unit == "rad" else value
+        unit = "°" if self.unit == "rad" else f" {self.unit}"
+        return f"{round(number, 9) + 0.0:.{digits}g}{unit}"  # what is zero but for rounding reads as zero
+
+    @property
+    def _of_limit(self) -> str:
+        """The value beside the limit."""
+        if self.limit is None:
+            return self.shown(self.value)
+        word = "of" if self.side is Side.MAX else "of at least"
+        return f"{self.shown(self.value, 2)} {word} {self.shown(self.limit, 2)}"
 
 
 @dataclass(frozen=True)
@@ -134,6 +157,11 @@ class Certificate:
             if finding.verdict is Verdict.UNDECIDED:
                 return f"cannot decide: {finding}"
         return f"certified: {self.worst}"
+
+    def with_passages(self, passages: Sequence[Finding]) -> Certificate:
+        """The same with the findings about passages through gates."""
+        others = tuple(finding for finding in self.findings if finding.gate is None)
+        return replace(self, findings=(*others, *passages))
 
     def record(self) -> dict[str, object]:
         """Plain data: dictionaries, lists, numbers, strings and None."""

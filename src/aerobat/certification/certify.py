@@ -27,7 +27,8 @@ from aerobat.certification.enclosure.queries import (
     root,
 )
 from aerobat.certification.envelope import Envelope
-from aerobat.certification.kinematics import kinematic_findings
+from aerobat.certification.path.kinematics import kinematic_findings
+from aerobat.certification.path.passages import passage_findings
 from aerobat.certification.subdivision import subdivide
 from aerobat.certification.thrust_curve import ThrustCurve
 from aerobat.environment import Environment
@@ -50,11 +51,12 @@ def certify(
 
     Quantities are those of `flatness.reference`: the thrust of every rotor and their
     sum, tilt, body rate, moment and speed, per axis what `envelope.limits` bounds, and what
-    `envelope.conditions` do; of a rotor with lag the command too. Bounds are proven
+    `envelope.conditions` do; of a rotor with lag the command too, and what `envelope.passages` ask at their
+    instants. Bounds are proven
     over continuous time, rounding included. A limit nearer than about 1e-7 of a rotor's range (1e-5 after
     tens of seconds, and of a command) stays undecided, as does all that needs an attitude where thrust, and
     with it the attitude, is undetermined; speed and what `envelope.limits` and `envelope.conditions` bound
-    may meet their limits exactly (`kinematics.LIMIT_TOLERANCE`).
+    may meet their limits exactly (`path.kinematics.LIMIT_TOLERANCE`).
     Raises SpecError for derivatives beyond all reason.
 
     Args:
@@ -73,7 +75,9 @@ def certify(
     findings: list[Finding] = []
     if series is not None:
         findings += series.answers(_queries(vehicle, envelope))
-    findings += kinematic_findings(trajectory, envelope, force_balance(environment, vehicle))
+    balance = force_balance(environment, vehicle)
+    findings += kinematic_findings(trajectory, envelope, balance)
+    findings += passage_findings(trajectory, envelope.passages, balance)
     return Certificate(tuple(findings), found.vanishing, discontinuities(curve, floor, series))
 
 

@@ -4,17 +4,40 @@ from __future__ import annotations
 
 import numpy as np
 
-from aerobat.declaration import Limit, declared
-from aerobat.problem import Condition, Limits
+from aerobat.declaration import Limit, NonNegative, declared
+from aerobat.problem import Condition, Gate, Limits, Quantity, Stage
 
+CROSSING_SPEED = 1e-3  # [m/s] a path that is slower in the gate's plane does not cross it
+PARALLEL = 1e-6  # [-] a direction with less of the gate's normal lies in its plane
 NO_LIMITS = Limits()
+
+
+@declared
+class PlannedPassage:
+    """A gate to be passed at an instant: its plane crossed in its direction, inside its opening."""
+
+    gate: Gate
+    time: NonNegative  # [s]
+    upright: bool = True  # the thrust axis along the gate's upright, within its tolerance
+    min_speed: NonNegative = CROSSING_SPEED  # [m/s] in the gate's direction; 0 where it may be met along it
+
+    @classmethod
+    def of(cls, stage: Stage, gate: Gate, time: float) -> PlannedPassage:
+        """The passage that a stage asks for, placed at a time [s]."""
+        for condition in stage.conditions:
+            along = float(condition.direction @ gate.normal)
+            forward = condition.upper if along > 0 else -condition.lower
+            if condition.quantity is Quantity.VELOCITY and abs(along) > PARALLEL and forward <= 0:
+                return cls(gate, time, stage.attitude is not None, min_speed=0.0)
+        return cls(gate, time, stage.attitude is not None)
 
 
 @declared
 class Envelope:
     """Limits over continuous time; infinite where there is none.
 
-    `limits` bounds position and its derivatives per axis, as a problem does; `conditions` hold throughout.
+    `limits` bounds position and its derivatives per axis, as a problem does; `conditions` hold throughout,
+    and `passages` at their instants.
     """
 
     speed: Limit = np.inf  # [m/s] |v|
@@ -23,3 +46,4 @@ class Envelope:
     moment: Limit = np.inf  # [N·m] |M|
     limits: Limits = NO_LIMITS
     conditions: tuple[Condition, ...] = ()
+    passages: tuple[PlannedPassage, ...] = ()

@@ -15,7 +15,7 @@ from aerobat.cli.options import DEFAULT_VEHICLE, CheckOptions
 from aerobat.environment import Environment
 from aerobat.interchange import read_plan
 from aerobat.planning import Plan
-from aerobat.problem import Limits
+from aerobat.planning.certified_solve import envelope_for
 from aerobat.reporting.report_json import to_json
 from aerobat.reporting.tables import certificate_table, show
 from aerobat.vehicle import load_vehicle
@@ -45,12 +45,12 @@ def check(plan: Path, options: Annotated[CheckOptions, Parameter(name="*")] = Ch
     own_vehicle = found.vehicle if isinstance(found, Plan) else None
     vehicle = named_vehicle or own_vehicle or load_vehicle(DEFAULT_VEHICLE)
     environment = found.problem.environment if isinstance(found, Plan) else Environment()
-    envelope = Envelope(
+    envelope = replace(
+        envelope_for(found.problem, vehicle, found.stages) if isinstance(found, Plan) else Envelope(),
         speed=options.max_speed or inf,
         tilt=inf if options.max_tilt is None else radians(options.max_tilt),
         body_rate=inf if options.max_rate is None else radians(options.max_rate),
         moment=options.max_moment or inf,
-        limits=found.problem.path_limits if isinstance(found, Plan) else Limits(),
     )
     certificate = certify(trajectory, vehicle, environment, envelope)
     if options.json:

@@ -6,18 +6,22 @@ its certificate over continuous time, which therefore is always that of the traj
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Generic, Protocol, TypeVar
 
 import numpy as np
 
 from aerobat.arrays import Array
-from aerobat.certification import Certificate, Envelope, certify
+from aerobat.certification import Certificate, Envelope, PlannedPassage, certify
+from aerobat.certification.path.passages import passage_findings
 from aerobat.errors import SpecError
+from aerobat.flatness.references import force_balance
 from aerobat.planning.recorder import Attempt, Recorder
-from aerobat.planning.result import Plan
+from aerobat.planning.result import PlacedStage, Plan
 from aerobat.planning.rotor_margin import sampled_margin
 from aerobat.problem.problem import Limits, Problem
+from aerobat.problem.stage import Stage
 from aerobat.trajectory import Trajectory
 from aerobat.vehicle import Vehicle
 
@@ -82,9 +86,15 @@ class Judged(Generic[Detail]):
             certificate=self.certificate,
             **facts,
         )
-        if self.vehicle is None or self.certificate is not None:
+        if self.vehicle is None:
             return plan
-        return with_certificate(plan, self.vehicle)
+        if self.certificate is None:
+            return with_certificate(plan, self.vehicle)
+        passages = planned_passages(plan.stages, self.problem, self.vehicle)
+        findings = passage_findings(
+            trajectory, passages, force_balance(self.problem.environment, self.vehicle)
+        )
+        return replace(plan, certificate=self.certificate.with_passages(findings))
 
 
 def certified_solve(
@@ -124,19 +134,44 @@ def refuted_by_samples(
     return replace(solution, failure=str(sampled), margin=sampled.margin)
 
 
-def certificate_for(trajectory: Trajectory, problem: Problem, vehicle: Vehicle) -> Certificate:
+def certificate_for(
+    trajectory: Trajectory, problem: Problem, vehicle: Vehicle, stages: Sequence[PlacedStage] = ()
+) -> Certificate:
     """The certificate of a trajectory for the vehicle's limits and the problem's, over continuous time.
 
-    What the problem's maneuver asks throughout is among them.
+    Args:
+        trajectory: What is judged.
+        problem: What its maneuver asks throughout is among the limits.
+        vehicle: What flies it.
+        stages: Where they are placed: the gates among them are passed then.
     """
+    return certify(trajectory, vehicle, problem.environment, envelope_for(problem, vehicle, stages))
+
+
+def envelope_for(problem: Problem, vehicle: Vehicle, stages: Sequence[PlacedStage] = ()) -> Envelope:
+    """The limits of a problem for a vehicle, with the gates that are passed at placed stages."""
     throughout = problem.stages(vehicle.max_specific_thrust).path_constraints
-    envelope = Envelope(limits=problem.path_limits, conditions=throughout)
-    return certify(trajectory, vehicle, problem.environment, envelope)
+    passages = planned_passages(stages, problem, vehicle)
+    return Envelope(limits=problem.path_limits, conditions=throughout, passages=passages)
+
+
+def planned_passages(
+    stages: Sequence[PlacedStage], problem: Problem, vehicle: Vehicle
+) -> tuple[PlannedPassage, ...]:
+    """The gates that are passed at placed stages, as the problem's own stages ask, in their order."""
+    asked = list(problem.stages(vehicle.max_specific_thrust).stages)
+    found = []
+    for place in stages:
+        if place.gate is not None:
+            stage = next((stage for stage in asked if stage.gate == place.gate), Stage(place.name))
+            asked = [other for other in asked if other is not stage]
+            found.append(PlannedPassage.of(stage, problem.gate(place.gate), place.time))
+    return tuple(found)
 
 
 def with_certificate(plan: Plan, vehicle: Vehicle) -> Plan:
     """The plan with the certificate of a vehicle, whichever it was made for; not flown by it yet."""
-    certificate = certificate_for(plan.trajectory, plan.problem, vehicle)
+    certificate = certificate_for(plan.trajectory, plan.problem, vehicle, plan.stages)
     return replace(plan, vehicle=vehicle, certificate=certificate, flyability=None)
 
 

@@ -1,0 +1,1 @@
+"""Findings that need no attitude: speed, derivatives, conditions, and passages through gates."""

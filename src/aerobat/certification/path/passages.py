@@ -1,0 +1,82 @@
+"""Passages through gates, at the instants at which they are planned.
+
+Path and thrust at one instant are known but for rounding; solvers meet their equations to PASSAGE_TOLERANCE.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from aerobat.arrays import Array
+from aerobat.certification.certificate import Finding, Side, Verdict
+from aerobat.certification.envelope import PlannedPassage
+from aerobat.flatness.references import UNDETERMINED
+from aerobat.problem.condition import ForceBalance
+from aerobat.trajectory import Trajectory
+
+PASSAGE_TOLERANCE = 1e-6  # [m, m/s, rad] by which a passage may miss what is asked: what solvers leave
+PLANE_DISTANCE = 1e-3  # [m] from the gate's plane, within which a path is said to be in it
+
+
+def passage_findings(
+    trajectory: Trajectory, passages: Sequence[PlannedPassage], balance: ForceBalance
+) -> list[Finding]:
+    """The findings about each passage: in the gate's plane, through it, inside the opening, upright."""
+    return [
+        finding for passage in passages for finding in _Instant.of(trajectory, passage, balance).findings()
+    ]
+
+
+@dataclass(frozen=True)
+class _Instant:
+    """The state at a planned passage, relative to the gate's centre."""
+
+    passage: PlannedPassage
+    offset: Array  # [m], (3,)
+    velocity: Array  # [m/s], (3,)
+    thrust: Array  # specific, drag counted [m/s²], (3,)
+    floor: float  # [m/s²] of |thrust|, below which no attitude is determined
+
+    @classmethod
+    def of(cls, trajectory: Trajectory, passage: PlannedPassage, balance: ForceBalance) -> _Instant:
+        """The state on a trajectory."""
+        time = np.array([min(passage.time, trajectory.duration)])
+        position, velocity, acceleration = (trajectory.evaluate(time, k)[0] for k in range(3))
+        thrust = acceleration + balance.drag * velocity + balance.constant
+        floor = UNDETERMINED * balance.gravity
+        return cls(passage, position - passage.gate.position, velocity, thrust, floor)
+
+    def findings(self) -> list[Finding]:
+        """What is asked of the passage, and what it does."""
+        gate = self.passage.gate
+        along, across, up = (float(self.offset @ axis) for axis in (gate.normal, gate.lateral, gate.up))
+        speed = float(self.velocity @ gate.normal)
+        found = [
+            self._at_most("distance from the plane", "m", abs(along), PLANE_DISTANCE),
+            self._at_most("offset sideways", "m", abs(across), gate.width / 2),
+            self._at_most("offset upward", "m", abs(up), gate.height / 2),
+            self._finding("speed through", "m/s", Side.MIN, speed, self.passage.min_speed),
+        ]
+        return [*found, *self._attitude()] if self.passage.upright else found
+
+    def _attitude(self) -> list[Finding]:
+        """The angle between the thrust axis and the gate's upright, undecided where there is no thrust."""
+        gate = self.passage.gate
+        sine, cosine = np.linalg.norm(np.cross(gate.up, self.thrust)), gate.up @ self.thrust
+        angle = float(np.arctan2(sine, cosine))
+        found = self._at_most("attitude", "rad", angle, gate.attitude_tolerance)
+        if np.linalg.norm(self.thrust) < self.floor:
+            return [replace(found, verdict=Verdict.UNDECIDED)]
+        return [found]
+
+    def _at_most(self, quantity: str, unit: str, value: float, limit: float) -> Finding:
+        return self._finding(quantity, unit, Side.MAX, value, limit)
+
+    def _finding(self, quantity: str, unit: str, side: Side, value: float, limit: float) -> Finding:
+        margin = limit - value if side is Side.MAX else value - limit
+        verdict = Verdict.HOLDS if margin >= -PASSAGE_TOLERANCE else Verdict.VIOLATED
+        time, gate = self.passage.time, self.passage.gate.name
+        return Finding(quantity, unit, side, value, value, time, limit, verdict, gate)
