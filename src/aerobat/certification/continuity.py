@@ -19,6 +19,7 @@ from aerobat.certification.thrust_curve import ThrustCurve
 from aerobat.trajectory import Trajectory
 
 NEGLIGIBLE_JUMP = 1e-6  # of the largest value at knots: less than any controller or solver can tell
+COMMAND_RESOLUTION = 1 / 2000  # of a rotor's range: the steps of DShot, a digital protocol of motor commands
 CANCELLATION = 1e3  # units in the last place of the largest coefficient that fitting a segment may cost
 
 
@@ -65,7 +66,7 @@ def discontinuities(
 
 
 def _thrust_jumps(curve: ThrustCurve, ends: Array, min_thrust: Array, found: ChebyshevSeries | None) -> Array:
-    """The largest jump [N] of a lagging rotor's thrust at each inner knot, (S - 1,); zero if rounding's.
+    """The largest jump [N] of a lagging rotor's thrust at each inner knot, (S - 1,); zero if negligible.
 
     Args:
         curve: What is flown.
@@ -86,14 +87,15 @@ def _thrust_jumps(curve: ThrustCurve, ends: Array, min_thrust: Array, found: Che
 
 
 def _thrust_tolerances(curve: ThrustCurve, ends: Array, min_thrust: Array) -> Array:
-    """The largest jumps of the rotors' thrusts that rounding may make, at each inner knot, (S - 1, n)."""
+    """The jumps of the rotors' thrusts that rounding makes or commands are too coarse for, (S - 1, n)."""
     off = [_tolerance(curve.trajectory, ends[:, :, k], k + 1) for k in range(4)]
     norms = np.linalg.norm(ends, axis=-1)
     speed, thrust, jerk, snap = np.maximum(norms[1:, 0], norms[:-1, 1]).T
     omega = jerk / min_thrust
     real = MagnitudeBounds(thrust, np.ones_like(thrust), omega, snap / min_thrust + 2 * omega**2)
     errors = first_order(real, min_thrust, speed, np.stack(off, axis=-1), curve.vehicle)
-    return quantities.errors(curve.vehicle, real, errors)[:, : len(curve.vehicle.rotors)]
+    rounding = quantities.errors(curve.vehicle, real, errors)[:, : len(curve.vehicle.rotors)]
+    return np.maximum(rounding, COMMAND_RESOLUTION * (curve.vehicle.max_thrusts - curve.vehicle.min_thrusts))
 
 
 def _jump(ends: Array) -> Array:

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable
+from itertools import groupby
 from math import isnan
 
 from rich.console import Console
 from rich.table import Table
 
-from aerobat.certification import Certificate, Side
+from aerobat.certification import Certificate, Finding, Side, Verdict
 from aerobat.evaluation.score import Score
 from aerobat.planning import Plan
 from aerobat.problem import Problem
@@ -51,20 +53,56 @@ def show(table: Table) -> None:
 
 
 def certificate_table(certificate: Certificate, title: str) -> Table:
-    """Proven limits, one a row, and the largest values of quantities without a limit."""
+    """Proven limits, one a row, and the largest values of quantities without a limit.
+
+    Of all rotors' thrusts, and of all their commands, those nearest to either limit; a gate that is passed as
+    it is asked has one row.
+    """
     headings = ("quantity", "reaches", "at", "limit", "margin", "verdict")
     table = Table(*headings, title=title, title_justify="left", box=None, pad_edge=False)
-    for finding in certificate.findings:
-        if finding.limit is None and finding.side is Side.MIN:
-            continue
-        limit = "–" if finding.limit is None else f"{finding.limit:.4g} {finding.unit}"
-        margin = "" if finding.margin is None else f"{finding.margin:.3g} {finding.unit}"
-        verdict = "" if finding.limit is None else finding.verdict.value
-        reached = f"{finding.side.value} {finding.value:.4g} {finding.unit}"
-        table.add_row(finding.quantity, reached, f"{finding.time:.3f} s", limit, margin, verdict)
+    along = [finding for finding in certificate.findings if finding.gate is None]
+    for finding in _nearest_rotors(along):
+        if finding.limit is not None or finding.side is Side.MAX:
+            table.add_row(*_finding_row(finding))
+    for row in _passage_rows(finding for finding in certificate.findings if finding.gate is not None):
+        table.add_row(*row)
     table.caption = ("" if certificate.certified else "not certified: ") + certificate.why
     table.caption_justify = "left"
     return table
+
+
+def _nearest_rotors(findings: Iterable[Finding]) -> Iterable[Finding]:
+    """The findings, of all rotors' thrusts and commands those with the smallest margin on either side."""
+    nearest: dict[tuple[str, Side], Finding] = {}
+    for finding in findings:
+        key = re.sub(r"^rotor \d+", "rotor", finding.quantity), finding.side
+        known = nearest.setdefault(key, finding)
+        if (finding.margin or 0.0) < (known.margin or 0.0):
+            nearest[key] = finding
+    return nearest.values()
+
+
+def _passage_rows(findings: Iterable[Finding]) -> Iterable[tuple[str, ...]]:
+    """A row a passage through a gate; where it is not as asked, a row for all that is not."""
+    for (gate, time), group in groupby(findings, lambda finding: (finding.gate, finding.time)):
+        passage = list(group)
+        wrong = [finding for finding in passage if finding.verdict is not Verdict.HOLDS]
+        if wrong:
+            yield from map(_finding_row, wrong)
+        else:
+            reached = ", ".join(f"{each.quantity} {each.shown(each.value, 2)}" for each in passage)
+            yield f"gate '{gate}'", reached, f"{time:.3f} s", "", "", Verdict.HOLDS.value
+
+
+def _finding_row(finding: Finding) -> tuple[str, ...]:
+    return (
+        finding.quantity if finding.gate is None else f"gate '{finding.gate}' {finding.quantity}",
+        f"{finding.side.value} {finding.shown(finding.value)}",
+        f"{finding.time:.3f} s",
+        "–" if finding.limit is None else finding.shown(finding.limit),
+        "" if finding.margin is None else finding.shown(finding.margin, 3),
+        "" if finding.limit is None else finding.verdict.value,
+    )
 
 
 def _plan_facts(plan: Plan) -> Iterable[tuple[str, str]]:

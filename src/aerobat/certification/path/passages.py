@@ -55,9 +55,9 @@ class _Instant:
         along, across, up = (float(self.offset @ axis) for axis in (gate.normal, gate.lateral, gate.up))
         speed = float(self.velocity @ gate.normal)
         found = [
-            self._at_most("distance from the plane", "m", abs(along), PLANE_DISTANCE),
-            self._at_most("offset sideways", "m", abs(across), gate.width / 2),
-            self._at_most("offset upward", "m", abs(up), gate.height / 2),
+            self._at_most("off plane", "m", abs(along), PLANE_DISTANCE),
+            self._at_most("sideways", "m", abs(across), gate.width / 2),
+            self._at_most("upward", "m", abs(up), gate.height / 2),
             self._finding("speed through", "m/s", Side.MIN, speed, self.passage.min_speed),
         ]
         return [*found, *self._attitude()] if self.passage.upright else found
