@@ -43,7 +43,8 @@ class Gurobi:
     ) -> AssignmentResult:
         """As `Solver.solve`; the result's time is Gurobi's own Runtime.
 
-        Raises AerobatError where the licence is missing or too small for the program.
+        Raises AerobatError where the licence is missing or too small for the program, KeyboardInterrupt
+        where Gurobi was stopped by one.
         """
         import gurobipy
 
@@ -86,6 +87,8 @@ class _GurobiModel:
         self._set_cost()
         model = self._model
         model.optimize()
+        if model.Status == self._grb.INTERRUPTED:
+            raise KeyboardInterrupt
         meaning: dict[int, Status] = {
             self._grb.OPTIMAL: "optimal",
             self._grb.INFEASIBLE: "infeasible",

@@ -18,6 +18,7 @@ from numpy.typing import ArrayLike
 
 from aerobat.arrays import Array, frozen, frozen_bounds
 from aerobat.errors import BackendMissing, SpecError
+from aerobat.optimization.interrupts import interrupts_kept
 
 _OPTIONS = {"print_time": False, "show_eval_warnings": False, "ipopt.print_level": 0, "ipopt.sb": "yes"}
 _MAX_VIOLATION = 1e-6  # that a result may have and be called converged
@@ -124,6 +125,7 @@ def solve_nonlinear(
     Raises:
         SpecError: `start` has the wrong size.
         BackendMissing: CasADi is not installed.
+        KeyboardInterrupt: it came while IPOPT ran, which has no say in it.
     """
     began = perf_counter()
     x0 = frozen(start, "start", (int(program.variables.numel()),))
@@ -135,9 +137,10 @@ def solve_nonlinear(
     if initial_barrier is not None:
         options |= {"ipopt.mu_init": initial_barrier, "ipopt.bound_push": 1e-6, "ipopt.bound_frac": 1e-6}
     symbols = {"x": program.variables, "f": program.objective, "g": program.constraints}
-    solver = import_casadi().nlpsol("program", "ipopt", symbols, options)
     bounds = {"lbg": program.lower, "ubg": program.upper, "lbx": program.x_min, "ubx": program.x_max}
-    x = np.asarray(solver(x0=x0, **bounds)["x"], dtype=float).reshape(-1)
+    with interrupts_kept():
+        solver = import_casadi().nlpsol("program", "ipopt", symbols, options)
+        x = np.asarray(solver(x0=x0, **bounds)["x"], dtype=float).reshape(-1)
     x.flags.writeable = False
     status = str(solver.stats()["return_status"])
     violation = program.violation(x)

@@ -32,7 +32,10 @@ class Scip:
         time_limit: float | None = None,
         start: Sequence[int] | None = None,
     ) -> AssignmentResult:
-        """As `Solver.solve`; the result's time is SCIP's own."""
+        """As `Solver.solve`; the result's time is SCIP's own.
+
+        Raises KeyboardInterrupt where SCIP was stopped by one.
+        """
         import pyscipopt
 
         program.check_start(start)
@@ -69,6 +72,8 @@ class _ScipModel:
         self._set_cost()
         model = self._model
         model.optimize()
+        if model.getStatus() == "userinterrupt":
+            raise KeyboardInterrupt
         slots = x = None
         if model.getNSols():
             values = {key: model.getVal(binary) for key, binary in variables.items()}
