@@ -1,6 +1,6 @@
 """An interrupt that a solver saw is one that its caller sees, whatever the solver makes of it."""
 
-from __future__ import annotations
+from __future__ import contextlib
 
 import signal
 import threading
@@ -95,11 +95,12 @@ def test_gurobi_stopped_by_an_interrupt_gives_no_result(monkeypatch) -> None:
 
 
 def test_an_interrupt_that_was_swallowed_within_is_raised_at_the_end() -> None:
-    with pytest.raises(KeyboardInterrupt), interrupts_kept():
-        try:
+    def swallowing() -> None:
+        with interrupts_kept(), contextlib.suppress(KeyboardInterrupt):
             signal.raise_signal(signal.SIGINT)
-        except KeyboardInterrupt:
-            pass
+
+    with pytest.raises(KeyboardInterrupt):
+        swallowing()
     assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
 
 

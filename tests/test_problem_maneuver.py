@@ -66,8 +66,8 @@ def test_a_flip_of_ours_meets_its_gate_at_any_time_squarely_and_in_its_direction
     gate = problem.stages(50.0).stages[2]
     assert gate.slots(20) == range(19)
     velocity = {tuple(c.direction): (c.lower, c.upper) for c in gate.conditions if c.quantity == "velocity"}
-    assert velocity[(0.0, 1.0, 0.0)] == (0.5, np.inf)  # never standing still in the gate
-    assert sorted(velocity.values()) == [(0.0, 0.0), (0.0, 0.0), (0.5, np.inf)]
+    assert velocity[(0.0, 1.0, 0.0)] == (1.0, np.inf)  # never standing still in the gate
+    assert sorted(velocity.values()) == [(0.0, 0.0), (0.0, 0.0), (1.0, np.inf)]
 
 
 @given(st.floats(-180, 180), st.floats(10.0, 60.0))

@@ -15,15 +15,15 @@ class GatePassage:
     """The manner in which a gate is passed, beyond meeting its centre.
 
     A `perpendicular` passage moves along the gate's direction of passage, at `speed` or faster, and not
-    across it, so that a vehicle of some size fits through; one that stood still there could turn back. It is `upright` with the thrust axis along the
-    gate's upright, within half its tolerance, where the maneuver asks for an attitude at all; otherwise only
-    in the plane of the maneuver's turn, as in the paper. `centred` means that the gate is met by the
-    fraction `at`, and otherwise one interval later, at the end of interval N/2, as in the authors'
-    reference code; there the velocity is free.
+    across it, so that a vehicle of some size fits through; one that stood still there could turn back. It is
+    `upright` with the thrust axis along the gate's upright, within half its tolerance, where the maneuver
+    asks for an attitude at all; otherwise only in the plane of the maneuver's turn, as in the paper.
+    `centred` means that the gate is met by the fraction `at`, and otherwise one interval later, at the end of
+    interval N/2, as in the authors' reference code; there the velocity is free.
     """
 
     perpendicular: bool = True  # move along the gate's direction of passage and not across it
-    speed: NonNegative = 0.5  # [m/s] at least, along the direction of passage
+    speed: NonNegative = 1.0  # [m/s] at least, along the direction of passage
     at: CrossingTime = "free"  # when, as a part of the duration
     centred: bool = True  # at `at`; false: one interval later, as in the paper's code
     upright: bool = True  # the thrust axis along the gate's upright, not only in the plane of the turn
