@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import signal
 import threading
+from contextlib import suppress
 
 import pytest
 
@@ -95,11 +96,12 @@ def test_gurobi_stopped_by_an_interrupt_gives_no_result(monkeypatch) -> None:
 
 
 def test_an_interrupt_that_was_swallowed_within_is_raised_at_the_end() -> None:
-    with pytest.raises(KeyboardInterrupt), interrupts_kept():
-        try:
+    def swallow() -> None:
+        with interrupts_kept(), suppress(KeyboardInterrupt):
             signal.raise_signal(signal.SIGINT)
-        except KeyboardInterrupt:
-            pass
+
+    with pytest.raises(KeyboardInterrupt):
+        swallow()
     assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
 
 
