@@ -1,9 +1,10 @@
 """An interrupt that a solver saw is one that its caller sees, whatever the solver makes of it."""
 
-from __future__ import contextlib
+from __future__ import annotations
 
 import signal
 import threading
+from contextlib import suppress
 
 import pytest
 
@@ -95,12 +96,12 @@ def test_gurobi_stopped_by_an_interrupt_gives_no_result(monkeypatch) -> None:
 
 
 def test_an_interrupt_that_was_swallowed_within_is_raised_at_the_end() -> None:
-    def swallowing() -> None:
-        with interrupts_kept(), contextlib.suppress(KeyboardInterrupt):
+    def swallow() -> None:
+        with interrupts_kept(), suppress(KeyboardInterrupt):
             signal.raise_signal(signal.SIGINT)
 
     with pytest.raises(KeyboardInterrupt):
-        swallowing()
+        swallow()
     assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
 
 

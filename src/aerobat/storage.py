@@ -46,9 +46,10 @@ def whole_file(path: str | os.PathLike[str]) -> Iterator[Path]:
 def whole_folder(path: str | os.PathLike[str], is_ours: Callable[[str], bool]) -> Iterator[Path]:
     """Yield an empty folder that takes the place of `path`, as one, when the block ends well.
 
-    Whatever ends it, at `path` is either what was there before or all of the new, never a mixture. What
-    killed processes have left beside it is removed. Raises SpecError when the place cannot be written, and
-    for a folder that holds anything whose name is not ours: that is somebody's work.
+    Whatever ends it, at `path` is either what was there before or all of the new, never a mixture, and no
+    parent is left that was made for nothing. What killed processes have left beside it is removed. Raises
+    SpecError when the place cannot be written, and for a folder that holds anything whose name is not ours:
+    that is somebody's work.
 
     Args:
         path: The folder to make or to replace; missing parents are made.
@@ -59,6 +60,7 @@ def whole_folder(path: str | os.PathLike[str], is_ours: Callable[[str], bool]) -
         foreign = sorted(name for name in _entries(target) if not is_ours(name))
         if foreign:
             raise SpecError(f"{path}/ holds {foreign[0]}, which no run wrote; give a folder of its own")
+        made = [parent for parent in target.parents if not parent.exists()]
         target.parent.mkdir(parents=True, exist_ok=True)
         _remove_abandoned(target)
         staging = target.parent / f".{target.name}.{os.getpid()}{_STAGING}"
@@ -76,6 +78,10 @@ def whole_folder(path: str | os.PathLike[str], is_ours: Callable[[str], bool]) -
         raise SpecError(f"cannot write {path}: {error.strerror or error}") from None
     finally:
         shutil.rmtree(staging, ignore_errors=True)
+        if not target.exists():
+            with suppress(OSError):  # somebody else's by now
+                for parent in made:
+                    parent.rmdir()
 
 
 def write_whole(path: str | os.PathLike[str], content: str | bytes) -> None:

@@ -1,5 +1,5 @@
 """The command line: plan | fly | check | compare | vehicles | problems."""
 
-from aerobat.cli.app import main
+from aerobat.cli.entry import main
 
 __all__ = ["main"]

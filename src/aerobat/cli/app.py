@@ -4,18 +4,13 @@ from __future__ import annotations
 
 import atexit
 import gc
-import os
-import sys
 from collections.abc import Iterator, Sequence
 
 from cyclopts import App, CycloptsError
 
-from aerobat.errors import AerobatError, Infeasible
+from aerobat.cli.entry import ExitCode
+from aerobat.errors import SpecError
 
-BAD_INPUT = 2
-INFEASIBLE = 3
-INTERRUPTED = 130
-BROKEN_PIPE = 141  # as shells say it
 IMPORT_FLAG = "--import"
 
 # each is one file and one function of this name, imported when it is asked for
@@ -35,37 +30,27 @@ app = App(
     Try `aerobat fly flip-roll`: it plans a flip through a gate, flies it in simulation, says whether it
     went well and why not, and writes the plan, the flight, a picture and a report to out/flip-roll/.
     """,
-    help_epilogue="""Exit codes: 0 done; 1 `check` did not certify the trajectory; 2 the input is wrong (one
-    sentence says where); 3 no plan exists (one sentence says which bound binds and what would free it).
+    help_epilogue="""Exit codes: 0 all is well; 1 not certified, or not flown as it should be (off its path,
+    past a gate, into its frame or the ground): all is written, and the report says why; 2 the input is wrong
+    or the output cannot be written (one sentence says where); 3 no plan was found (one sentence says which
+    bound binds and what would free it); 130 interrupted, with nothing written.
     """,
+    suppress_keyboard_interrupt=False,
 )
 for name, help in COMMANDS.items():
     app.command(f"aerobat.cli.{name}:{name}", name=name, help=help)
 
 
-def main(arguments: Sequence[str] | None = None) -> None:
-    """Run the command line on `arguments`, by default those of the process.
-
-    Whatever is foreseen ends in one sentence on standard error, and an exit code.
-    """
+def run(arguments: Sequence[str]) -> ExitCode:
+    """Run the command that `arguments` name. Raises SpecError for those that make no sense."""
     gc.set_threshold(100_000, 50, 50)  # a short process need not look for cyclic garbage often,
     atexit.register(gc.freeze)  # and least of all when it ends: a tenth of the main job
-    tokens = sys.argv[1:] if arguments is None else arguments
     try:
-        _import_plugins(tokens)
-        app(tokens, exit_on_error=False, print_error=False, result_action="return_value")
-        sys.stdout.flush()
-    except BrokenPipeError:  # whoever read has enough
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        sys.exit(BROKEN_PIPE)
+        _import_plugins(arguments)
+        code = app(arguments, exit_on_error=False, print_error=False, result_action="return_value")
     except CycloptsError as error:
-        _exit(" ".join(str(error).split()), BAD_INPUT)
-    except Infeasible as error:
-        _exit(str(error), INFEASIBLE)
-    except AerobatError as error:
-        _exit(str(error), BAD_INPUT)
-    except KeyboardInterrupt:
-        _exit("interrupted", INTERRUPTED)
+        raise SpecError(" ".join(str(error).split())) from None
+    return code if isinstance(code, ExitCode) else ExitCode.WELL  # some, and help, have nothing to judge
 
 
 def _import_plugins(tokens: Sequence[str]) -> None:
@@ -85,8 +70,3 @@ def _import_paths(tokens: Sequence[str]) -> Iterator[str]:
             yield following
         elif token.startswith(f"{IMPORT_FLAG}="):
             yield token.removeprefix(f"{IMPORT_FLAG}=")
-
-
-def _exit(sentence: str, code: int) -> None:
-    print(f"aerobat: {sentence}", file=sys.stderr)
-    sys.exit(code)

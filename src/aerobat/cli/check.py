@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from dataclasses import replace
 from math import inf, radians
 from pathlib import Path
@@ -11,6 +10,7 @@ from typing import Annotated
 from cyclopts import Parameter
 
 from aerobat.certification import Envelope, certify
+from aerobat.cli.entry import ExitCode
 from aerobat.cli.options import DEFAULT_VEHICLE, CheckOptions
 from aerobat.environment import Environment
 from aerobat.interchange import read_plan
@@ -20,10 +20,8 @@ from aerobat.reporting.report_json import to_json
 from aerobat.reporting.tables import certificate_table, show
 from aerobat.vehicle import load_vehicle
 
-NOT_CERTIFIED = 1
 
-
-def check(plan: Path, options: Annotated[CheckOptions, Parameter(name="*")] = CheckOptions()) -> None:
+def check(plan: Path, options: Annotated[CheckOptions, Parameter(name="*")] = CheckOptions()) -> ExitCode:
     """Prove over continuous time that a vehicle can fly a trajectory, or say when and why it cannot.
 
     The proof covers every rotor's thrust and, where limits are given, speed, tilt, body rates and moments. It
@@ -62,5 +60,4 @@ def check(plan: Path, options: Annotated[CheckOptions, Parameter(name="*")] = Ch
                 f"assumed, as the file holds no more than a path: gravity {environment.gravity:g} m/s², no "
                 "wind, no limits of a problem"
             )
-    if not certificate.certified:
-        sys.exit(NOT_CERTIFIED)
+    return ExitCode.WELL if certificate.certified else ExitCode.NOT_WELL

@@ -6,6 +6,7 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
+from aerobat.cli.entry import ExitCode
 from aerobat.cli.options import FlyingOptions, PlanningOptions
 from aerobat.cli.run_folder import finish
 from aerobat.cli.tasks import planned
@@ -19,12 +20,12 @@ def fly(
     problem: str,
     options: Annotated[PlanningOptions, Parameter(name="*")] = PlanningOptions(),
     flying: Annotated[FlyingOptions, Parameter(name="*")] = FlyingOptions(),
-) -> None:
+) -> ExitCode:
     """Plan a maneuver, fly it in simulation, and report.
 
     Prints a short table and writes to the output folder, as one: PROBLEM.plan (the whole plan), plan.csv
     (position, velocity, acceleration and jerk at 100 Hz), flight.npz (everything that was simulated),
-    report.png and report.json.
+    report.png and report.json. Exits with 0 only if the plan is certified and the flight went well.
 
     Parameters
     ----------
@@ -38,4 +39,4 @@ def fly(
         flight = nominal_flight(plan.trajectory, plan.vehicle, plan.problem.environment)
     else:
         flight = simulate(plan, noise=noise, seed=flying.seed)
-    finish(plan, options, flight, score(flight, plan, plan.vehicle))
+    return finish(plan, options, flight, score(flight, plan, plan.vehicle))

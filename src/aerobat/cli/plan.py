@@ -6,19 +6,23 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
+from aerobat.cli.entry import ExitCode
 from aerobat.cli.options import PlanningOptions
 from aerobat.cli.run_folder import finish
 from aerobat.cli.tasks import planned
 
 
-def plan(problem: str, options: Annotated[PlanningOptions, Parameter(name="*")] = PlanningOptions()) -> None:
+def plan(
+    problem: str, options: Annotated[PlanningOptions, Parameter(name="*")] = PlanningOptions()
+) -> ExitCode:
     """Plan a maneuver and stop there.
 
-    As `aerobat fly`, without the flight: writes PROBLEM.plan, plan.csv, report.png and report.json.
+    As `aerobat fly`, without the flight: writes PROBLEM.plan, plan.csv, report.png and report.json. Exits
+    with 0 only if the plan is certified and flies.
 
     Parameters
     ----------
     problem
         A name that `aerobat problems` lists, or a problem's TOML file.
     """
-    finish(planned(problem, options), options)
+    return finish(planned(problem, options), options)

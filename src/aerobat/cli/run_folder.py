@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
-from contextlib import AbstractContextManager
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
+from aerobat.cli.entry import ExitCode
+from aerobat.cli.interrupts import end_interrupts
 from aerobat.cli.options import TaskOptions
 from aerobat.evaluation import Score
 from aerobat.interchange.csv import write_csv
@@ -19,15 +22,21 @@ from aerobat.storage import whole_folder
 FILES = ("plan.npz", "plan.csv", "flight.npz", "report.json", "report.png", "compare.json", "compare.png")
 
 
-def run_folder(folder: Path) -> AbstractContextManager[Path]:
-    """Yield an empty folder that replaces that of an earlier run as one; see `whole_folder`."""
-    return whole_folder(folder, lambda name: name in FILES or name.endswith(".plan"))
+@contextmanager
+def run_folder(folder: Path) -> Iterator[Path]:
+    """Yield an empty folder that replaces that of an earlier run as one; see `whole_folder`.
+
+    Ctrl-C comes in time until that happens, and means nothing afterwards: a run is interrupted or done.
+    """
+    with whole_folder(folder, lambda name: name in FILES or name.endswith(".plan")) as staging:
+        yield staging
+        end_interrupts()
 
 
 def finish(
     plan: Plan, options: TaskOptions, flight: Flight | None = None, score: Score | None = None
-) -> None:
-    """Write what was made, then say what it is."""
+) -> ExitCode:
+    """Write what was made, then say what it is; the exit code tells if all is well."""
     assert plan.vehicle is not None, "a command plans for a vehicle"
     folder = options.out or Path("out") / plan.problem.name
     facts = to_json(report(plan, score, plan.vehicle.name))
@@ -40,6 +49,15 @@ def finish(
         (staging / "report.png").write_bytes(png(report_figure(plan, plan.vehicle, flight, score)))
     if options.json:
         print(facts)
-        return
-    show(summary_table(plan, score, plan.vehicle.name))
-    print(f"\nwritten to {folder}/")
+    else:
+        show(summary_table(plan, score, plan.vehicle.name))
+        print(f"\nwritten to {folder}/")
+    return ExitCode.WELL if _is_well(plan, score) else ExitCode.NOT_WELL
+
+
+def _is_well(plan: Plan, score: Score | None) -> bool:
+    """True if the plan is certified and its flight, else its own nominal one, went well."""
+    certified = plan.certificate is not None and plan.certificate.certified
+    if score is not None:
+        return certified and score.outcome.is_success
+    return certified and plan.flyability is not None and plan.flyability.flies

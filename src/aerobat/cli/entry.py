@@ -1,0 +1,66 @@
+"""The beginning and the end of a run: each way in which it can go has an exit code and a sentence.
+
+Little is imported here, so that Ctrl-C and broken terminals are provided for when the rest is.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+from enum import IntEnum
+
+from aerobat.cli.interrupts import interruptible
+from aerobat.cli.terminal import discard, provide_streams, say
+from aerobat.errors import AerobatError, Infeasible
+
+
+class ExitCode(IntEnum):
+    """What a run came to, for scripts."""
+
+    WELL = 0
+    NOT_WELL = 1  # not certified, or not flown as it should be
+    BAD_INPUT = 2
+    NO_PLAN = 3
+    INTERRUPTED = 130  # as shells say it, and the next
+    BROKEN_PIPE = 141
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Run the command line on `arguments`, by default those of the process.
+
+    Whatever is foreseen ends in one sentence on standard error, and an exit code.
+    """
+    code = ExitCode.INTERRUPTED
+    try:
+        with interruptible(afterwards=arguments is not None):
+            provide_streams()
+            code = _run(sys.argv[1:] if arguments is None else arguments)
+    except KeyboardInterrupt:
+        say("interrupted")
+    if code is not ExitCode.WELL:
+        sys.exit(code)
+
+
+def _run(arguments: Sequence[str]) -> ExitCode:
+    """Run a command, and say in a sentence why where it comes to no end of its own."""
+    try:
+        from aerobat.cli.app import run
+
+        code = run(arguments)
+        sys.stdout.flush()
+    except BrokenPipeError:  # whoever read has enough
+        discard(sys.stdout)
+        return ExitCode.BROKEN_PIPE
+    except Infeasible as error:
+        say(str(error))
+        return ExitCode.NO_PLAN
+    except AerobatError as error:
+        say(str(error))
+        return ExitCode.BAD_INPUT
+    except OSError as error:
+        if error.filename is not None:  # of a file, which is nobody's fault but ours
+            raise
+        discard(sys.stdout)
+        say(f"cannot write to standard output: {error.strerror or error}")
+        return ExitCode.BAD_INPUT
+    return code

@@ -1,0 +1,75 @@
+"""Standard streams as they come: closed, full, or of few characters."""
+
+from __future__ import annotations
+
+import codecs
+import io
+import os
+import sys
+from contextlib import suppress
+from typing import TextIO
+
+# what tables and sentences hold beside ASCII, for terminals that have no more
+ASCII = {
+    "·": "-",
+    "–": "-",
+    "…": "...",
+    "°": " deg",
+    "²": "^2",
+    "³": "^3",
+    "×": "x",
+    "δ": "delta",
+    "ω": "omega",
+    "Σ": "sum of ",
+    "∫": "integral of ",
+    "≤": "<=",
+    "≥": ">=",
+    "→": "->",
+    "‘": "'",
+    "’": "'",
+    "“": '"',
+    "”": '"',
+}
+_ERRORS = "aerobat-in-ascii"  # the name of the error handler below
+
+
+def provide_streams() -> None:
+    """Give closed streams a place that takes everything, and each stream a way to write any character.
+
+    A closed descriptor would be the next file's that is opened, and printing would end in it.
+    """
+    for name, mode in (
+        ("stdin", "r"),
+        ("stdout", "w"),
+        ("stderr", "w"),
+    ):  # descriptors are given in this order
+        if getattr(sys, name) is None:
+            setattr(sys, name, open(os.devnull, mode, encoding="utf-8"))  # noqa: SIM115
+    codecs.register_error(_ERRORS, _in_ascii)
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper) and codecs.lookup(stream.encoding).name != "utf-8":
+            stream.reconfigure(errors=_ERRORS)
+
+
+def discard(stream: TextIO) -> None:
+    """Let a stream that no longer takes anything take it in silence, what is in its buffer too."""
+    with suppress(OSError):
+        os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
+
+
+def say(sentence: str) -> None:
+    """Print a sentence to standard error, if that takes it."""
+    try:
+        print(f"aerobat: {sentence}", file=sys.stderr, flush=True)
+    except OSError:
+        discard(sys.stderr)
+
+
+def _in_ascii(error: UnicodeError) -> tuple[str, int]:
+    """What a codec cannot write, in ASCII: known signs in kind, others escaped as JSON has it."""
+    if not isinstance(error, UnicodeEncodeError):
+        raise error
+    import json
+
+    signs = error.object[error.start : error.end]
+    return "".join(ASCII.get(sign) or json.dumps(sign)[1:-1] for sign in signs), error.end
