@@ -1,9 +1,10 @@
 """Certificates against dense sampling: random flights in 3D, 4 and 6 rotors, margins of -20 to +20 %.
 
-    uv run python benchmarks/certificate.py [--trajectories N] [--points N]
+    uv run python benchmarks/certificate.py [--trajectories N] [--points N] [--lags]
 
 A certificate fails if it accepts what a sample refutes, or refuses what has a margin of 1 % of a rotor's
-range in all samples, attitude determined. The flights are those that the tests take a few of. What it
+range in all samples, attitude determined. With --lags the rotors lag, and commands are judged too, samples of
+them by differences that are good for 1e-6. The flights are those that the tests take a few of. What it
 refuses it either refutes, by a violation with its time, or says that it cannot decide.
 """
 
@@ -23,6 +24,7 @@ from aerobat.certification import Certificate, Verdict, certify
 from random_flights import certified_margin, random_flight, sampled
 
 ENOUGH = 0.01  # of a rotor's range: a margin that must be certified
+SAMPLED = 1e-6  # of a rotor's range: what samples are good for
 
 
 @dataclass(frozen=True)
@@ -38,7 +40,7 @@ class Row:
     @property
     def wrongly_accepted(self) -> bool:
         """A sample is outside, or without an attitude."""
-        return self.outcome == "accepted" and not self.flyable(0.0)
+        return self.outcome == "accepted" and not self.flyable(-SAMPLED)
 
     @property
     def wrongly_refused(self) -> bool:
@@ -54,9 +56,10 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("--trajectories", type=int, default=1000, help="random flights (1000)")
     parser.add_argument("--points", type=int, default=100_000, help="samples of each (100000)")
+    parser.add_argument("--lags", action="store_true", help="rotors lag behind their commands")
     options = parser.parse_args()
-    judge(0, 1000)  # a warm-up
-    rows = [judge(seed, options.points) for seed in range(options.trajectories)]
+    judge(0, 1000, options.lags)  # a warm-up
+    rows = [judge(seed, options.points, options.lags) for seed in range(options.trajectories)]
     print(f"{len(rows)} trajectories, {options.points} samples each; the floor: 0, 0, 50 ms at the median")
     print(f"wrong acceptances, refuted by a sample            {sum(row.wrongly_accepted for row in rows):4}")
     print(f"wrong refusals, of a margin of 1 % in all samples {sum(row.wrongly_refused for row in rows):4}")
@@ -81,8 +84,8 @@ def report(name: str, rows: list[Row]) -> None:
     )
 
 
-def judge(seed: int, points: int) -> Row:
-    flight = random_flight(seed)
+def judge(seed: int, points: int, lags: bool) -> Row:
+    flight = random_flight(seed, lags)
     began = time.perf_counter()
     certificate = certify(flight.trajectory, flight.vehicle, flight.environment)
     seconds = time.perf_counter() - began

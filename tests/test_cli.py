@@ -215,3 +215,33 @@ def test_a_reader_that_has_enough_ends_a_command_without_a_word(command: list[st
     process.stdout.close()
     assert process.stderr.read() == b""
     assert process.wait() != 0
+
+
+def test_check_says_commands_rates_and_gates_in_words_and_in_numbers(capsys) -> None:
+    run(capsys, "plan", "half-flip", "--order", "5")
+    code, out, err = run(capsys, "check", "out/half-flip")
+    assert (code, err) == (0, "")
+    rows = out.splitlines()
+    assert (
+        sum(row.startswith("rotor ") for row in rows) == 4
+    )  # of thrusts and of commands, nearest each limit
+    assert sum(" command " in row for row in rows[:-2]) == 2
+    assert any(row.startswith("body rate") and "15 rad/s" in row for row in rows)
+    assert any(row.startswith("specific thrust along") and "0 m/s²" in row for row in rows)
+    assert any(row.startswith("gate 'gate'") and "holds" in row for row in rows)
+    findings = json.loads(run(capsys, "check", "out/half-flip", "--json")[1])["findings"]
+    assert {f["quantity"] for f in findings if f["gate"] == "gate"} >= {
+        "attitude",
+        "speed through",
+        "sideways",
+    }
+    assert {f"rotor {i} command" for i in range(4)} <= {f["quantity"] for f in findings}
+    assert "specific thrust along (0, 0, 1)" in {f["quantity"] for f in findings}
+
+
+def test_check_names_the_vehicle_that_it_assumes_of_a_bare_path(capsys) -> None:
+    run(capsys, "plan", "line", "--order", "5")
+    for options, assumed in (([], True), (["--vehicle", "agile-quad"], False)):
+        out = " ".join(run(capsys, "check", "out/line/plan.csv", *options)[1].split())
+        assert "no limits, stages or gates of a problem" in out
+        assert ("the vehicle agile-quad" in out) is assumed

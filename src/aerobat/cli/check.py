@@ -18,16 +18,17 @@ from aerobat.planning import Plan
 from aerobat.planning.certified_solve import envelope_for
 from aerobat.reporting.report_json import to_json
 from aerobat.reporting.tables import certificate_table, show
-from aerobat.vehicle import load_vehicle
+from aerobat.vehicle import Vehicle, load_vehicle
 
 
 def check(plan: Path, options: Annotated[CheckOptions, Parameter(name="*")] = CheckOptions()) -> ExitCode:
     """Prove over continuous time that a vehicle can fly a trajectory, or say when and why it cannot.
 
-    The proof covers every rotor's thrust and, where limits are given, speed, tilt, body rates and moments. It
-    does not sample: between any two instants it bounds what happens. Of a .plan file it judges what was
-    planned: its vehicle, its environment, its heading and its problem's limits; other files hold only the
-    path, and what is assumed is said. Exits with 0 only if all is proven.
+    The proof covers every rotor's thrust, its command where it lags, the vehicle's body rate and, where
+    limits are given, speed, tilt and moments. It does not sample: between any two instants it bounds what
+    happens. Of a .plan file it judges what was planned: its vehicle, its environment, its heading, its
+    problem's limits, what its maneuver asks throughout, and each gate as it is passed; other files hold only
+    the path, and what is assumed is said. Exits with 0 only if all is proven.
 
     Parameters
     ----------
@@ -56,8 +57,12 @@ def check(plan: Path, options: Annotated[CheckOptions, Parameter(name="*")] = Ch
     else:
         show(certificate_table(certificate, f"{plan} · {vehicle.name}"))
         if not isinstance(found, Plan):
-            print(
-                f"assumed, as the file holds no more than a path: gravity {environment.gravity:g} m/s², no "
-                "wind, no limits of a problem"
-            )
+            print(_assumed(options, vehicle, environment))
     return ExitCode.WELL if certificate.certified else ExitCode.NOT_WELL
+
+
+def _assumed(options: CheckOptions, vehicle: Vehicle, environment: Environment) -> str:
+    """All that a file with no more than a path leaves open and no option says."""
+    facts = [] if options.vehicle else [f"the vehicle {vehicle.name}"]
+    facts += [f"gravity {environment.gravity:g} m/s²", "no wind", "no limits, stages or gates of a problem"]
+    return "assumed, as the file holds no more than a path: " + ", ".join(facts)

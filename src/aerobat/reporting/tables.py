@@ -49,7 +49,7 @@ def problems_table(problems: Iterable[Problem]) -> Table:
 def show(table: Table) -> None:
     """Print a table to standard output, full width in a pipe."""
     console = Console()
-    console.print(table, width=None if console.is_terminal else 120)
+    (console if console.is_terminal else Console(width=120)).print(table)
 
 
 def certificate_table(certificate: Certificate, title: str) -> Table:
