@@ -1,139 +1,194 @@
-"""Passages through gates: the nearest approach to the centre of each, around the planned instant."""
+"""Passages through gates: the crossing of each gate's plane, in its direction, next to the planned instant.
+
+A crossing counts once the vehicle's centre gets PASSAGE_DEPTH beyond the plane before it comes back to it;
+one that stops in the gate, turns back, or comes from the other side has not passed. A path may cross
+obliquely, as the paper's do, whose gates leave the velocity free: it is judged where it crosses, by the
+gate's plane all the same. One that moves along the plane passes no gate.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from math import degrees, inf
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from aerobat import so3
 from aerobat.arrays import Array
-from aerobat.kernels.running_metrics import Snapshot
+from aerobat.kernels.running_metrics import GateProgress, Snapshot
 from aerobat.planning import Plan
 from aerobat.problem.gate import Gate
 from aerobat.problem.problem import Problem
+from aerobat.problem.stage import Stage
 from aerobat.vehicle.fleet import Fleet
 
-PASSAGE_WINDOW = 0.25  # [s] around the planned passage in which the actual one is looked for
+PASSAGE_WINDOW = 0.25  # [s] around the planned instant in which the crossing is looked for
+PASSAGE_DEPTH = 0.05  # [m] beyond the plane, where who crosses it has not merely stopped in it
+ZEROS = (np.zeros(1),) * 3
+NEVER = Snapshot(np.full(1, inf), ZEROS, ZEROS, (np.ones(1), *ZEROS))
 
 
 @dataclass(frozen=True)
 class Passage:
-    """A gate passed, at the nearest approach to its centre; NaN where a flight ended before it.
+    """A gate's plane crossed in its direction, next to the planned instant; NaN where it was not.
 
     Of many flights, the fields but the name are arrays (flights,).
     """
 
     gate: str
-    time: float  # [s]
-    miss: float  # [m] distance from the centre
+    time: float  # [s] of the crossing
+    miss: float  # [m] from the centre there
     inside: bool  # true if the centre of mass went through the opening
     speed: float  # [m/s]
-    attitude_error_deg: float  # angle between the thrust axis and the gate's upright
+    attitude_error_deg: float  # angle between the thrust axis and the gate's upright, or what a stage asks
+    attitude_tolerance_deg: float  # largest that is allowed; NaN where no attitude is asked
     clearance: float  # [m] from the outermost rotor tip to the frame; negative: a collision; NaN: unknown
+    planned: float  # [s] when it was to be crossed; NaN where the flight had ended before
+    backward_time: float  # [s] of a crossing against the direction about then
+    max_distance: float  # [m] beyond the plane about then, negative: before it
+    min_distance: float  # [m] likewise
 
 
-def gates_of(goal: Problem | Plan) -> tuple[Gate, ...]:
-    """The gates in the order in which a problem's stages pass them; all of them where no stage names one."""
-    problem = goal.problem if isinstance(goal, Plan) else goal
-    passed = [stage.gate for stage in problem.stages(1.0).stages if stage.gate is not None]
-    return tuple(map(problem.gate, passed)) or problem.gates
+@dataclass(frozen=True, eq=False)
+class PlannedPassage:
+    """A gate to be passed, when, and with which attitude."""
+
+    gate: Gate
+    time: float  # [s]
+    up: Array  # where the thrust axis shall point, world, (3,)
+    attitude_tolerance: float  # [rad] infinite where no attitude is asked
 
 
-def planned_passages(
-    goal: Problem | Plan, gates: tuple[Gate, ...], times: Array, position: Array
-) -> tuple[float, ...]:
-    """The planned instant [s] of each gate's passage.
+def planned_passages(goal: Problem | Plan, times: Array, position: Array) -> tuple[PlannedPassage, ...]:
+    """The passages of gates in the order of the stages, of all gates where no stage names one.
 
-    That of a plan's stage, or of the set-points' nearest approach, after the last one of the same gate.
+    When is said by a plan's stages; otherwise by the set-points' nearest approach to the gate's centre, after
+    the last one of the same gate.
 
     Args:
         goal: the problem, or a plan for it.
-        gates: of the goal, see `gates_of`.
         times: of the set-points [s], (T,).
         position: of the set-points [m], (T, 3).
     """
+    problem = goal.problem if isinstance(goal, Plan) else goal
+    stages = [stage for stage in problem.stages(1.0).stages if stage.gate is not None]
     if isinstance(goal, Plan):
-        planned = tuple(stage.time for stage in goal.stages if stage.gate is not None)
-        if planned:
-            return planned
+        placed = [stage for stage in goal.stages if stage.gate is not None]
+        if placed:
+            by_name = {stage.name: stage for stage in stages}
+            return tuple(
+                _planned(problem.gate(str(stage.gate)), stage.time, by_name.get(stage.name))
+                for stage in placed
+            )
+    asked: list[tuple[Gate, Stage | None]] = [(problem.gate(str(stage.gate)), stage) for stage in stages]
+    asked = asked or [(gate, None) for gate in problem.gates]
+    instants = _nearest_instants([gate for gate, _ in asked], times, position)
+    return tuple(_planned(gate, t, stage) for (gate, stage), t in zip(asked, instants, strict=True))
+
+
+def _planned(gate: Gate, time: float, stage: Stage | None) -> PlannedPassage:
+    if stage is None or stage.attitude is None:
+        return PlannedPassage(gate, time, gate.up, inf)
+    return PlannedPassage(gate, time, stage.attitude.up, gate.attitude_tolerance)
+
+
+def _nearest_instants(gates: Sequence[Gate], times: Array, position: Array) -> Iterator[float]:
     latest: dict[str, float] = {}
-    found = []
     for gate in gates:
         distance = np.linalg.norm(position - gate.position, axis=-1)
         after = latest.get(gate.name, -np.inf) + PASSAGE_WINDOW
         latest[gate.name] = float(times[int(np.argmin(np.where(times > after, distance, np.inf)))])
-        found.append(latest[gate.name])
-    return tuple(found)
+        yield latest[gate.name]
 
 
-def passage_window(times: Array, planned: float) -> NDArray[np.bool_]:
-    """The times (T,) [s] at which a flight is looked at for a passage planned at an instant [s]."""
-    return np.asarray(np.abs(times - planned) <= PASSAGE_WINDOW)
-
-
-def passages(gate: Gate, nearest: Snapshot, distance_sq: Array, fleet: Fleet | None) -> Passage:
+def passages(planned: PlannedPassage, progress: GateProgress, stop: Array, fleet: Fleet | None) -> Passage:
     """Passages of many flights through one gate.
 
     Args:
-        gate: the gate.
-        nearest: the vehicles next to it, offsets from its centre as their positions; leaves (flights,).
-        distance_sq: the offsets' squares [m²], infinite where a flight ended before the gate, (flights,).
+        planned: what was to be passed.
+        progress: of the vehicles, offsets from the gate's centre as positions; leaves (flights,).
+        stop: when flights diverged [s], NaN for those that did not, (flights,).
         fleet: the vehicles, for the clearance.
     """
-    offset, velocity, q = (np.stack(part, axis=-1) for part in nearest[1:])
+    gate = planned.gate
+    time = progress.crossing.time
+    offset, velocity, q = (np.stack(part, axis=-1) for part in progress.crossing[1:])
     q = so3.normalize(q)
-    reached = np.isfinite(distance_sq)
+    crossed = np.isfinite(time)
+    ended_before = ~crossed & (stop <= planned.time)
 
-    def known(values: Array) -> Array:
-        return np.where(reached, values, np.nan)
+    def known(values: Array | float, where: NDArray[np.bool_] = crossed) -> Array:
+        return np.where(where, values, np.nan)
 
     across, up = np.abs(offset @ gate.lateral), np.abs(offset @ gate.up)
-    tilt = np.arccos(np.clip(so3.thrust_axis(q) @ gate.up, -1, 1))
+    tilt = np.arccos(np.clip(so3.thrust_axis(q) @ planned.up, -1, 1))
     clearance = np.full(len(q), np.nan) if fleet is None else _clearance(gate, fleet, offset, q)
-    return Passage(
-        gate.name,
-        time=known(nearest.time),  # type: ignore[arg-type] # arrays, see Passage
-        miss=known(np.linalg.norm(offset, axis=-1)),  # type: ignore[arg-type]
-        inside=reached & (across < gate.width / 2) & (up < gate.height / 2),  # type: ignore[arg-type]
-        speed=known(np.linalg.norm(velocity, axis=-1)),  # type: ignore[arg-type]
-        attitude_error_deg=known(np.rad2deg(tilt)),  # type: ignore[arg-type]
-        clearance=known(clearance),  # type: ignore[arg-type]
-    )
+    tolerance = degrees(planned.attitude_tolerance) if planned.attitude_tolerance < inf else np.nan
+    fields: dict[str, Any] = {
+        "time": known(time),
+        "miss": known(np.linalg.norm(offset, axis=-1)),
+        "inside": crossed & (across < gate.width / 2) & (up < gate.height / 2),
+        "speed": known(np.linalg.norm(velocity, axis=-1)),
+        "attitude_error_deg": known(np.rad2deg(tilt)),
+        "attitude_tolerance_deg": np.full(len(q), tolerance),
+        "clearance": known(clearance),
+        "planned": known(planned.time, ~ended_before),
+        "backward_time": known(progress.backward, np.isfinite(progress.backward)),
+        "max_distance": known(progress.max_distance, ~ended_before),
+        "min_distance": known(progress.min_distance, ~ended_before),
+    }
+    return Passage(gate.name, **fields)
 
 
-def nearest_approach(
-    window: NDArray[np.bool_], gate: Gate, times: Array, states: Sequence[Array]
-) -> tuple[Snapshot, Array]:
-    """Snapshot next to a gate on a polyline of states, and the square of its distance; leaves (1,).
+def gate_progress(planned: PlannedPassage, times: Array, states: Sequence[Array]) -> GateProgress:
+    """Progress at the end of a flight along a polyline of states; leaves (1,).
 
     Args:
-        window: the times that count, (T,).
-        gate: the gate.
+        planned: what was to be passed.
         times: of the states [s], (T,).
         states: positions, velocities and attitudes, (T, ·).
     """
-    if not window.any():
-        nowhere = (np.zeros((1, 3)), np.zeros((1, 3)), so3.IDENTITY[None])
-        return _snapshot(np.zeros(1), nowhere), np.full(1, np.inf)
-    offset = states[0][window] - gate.position
-    steps = np.diff(offset, axis=0, append=offset[-1:])
-    squares = np.maximum(np.sum(steps**2, axis=1), 1e-300)
-    fractions = np.clip(-np.sum(offset * steps, axis=1) / squares, 0.0, 1.0)
-    k = int(np.argmin(np.linalg.norm(offset + fractions[:, None] * steps, axis=1)))
-    nxt = min(k + 1, len(offset) - 1)
+    offset = states[0] - planned.gate.position
+    distance = offset @ planned.gate.normal
+    is_beyond = distance > 0.0
+    change = np.diff(is_beyond.astype(int))
+    parts = (offset, *states[1:])
+    found = []
+    for k in np.flatnonzero(change > 0):
+        ahead = is_beyond[k + 1 :]
+        until = len(ahead) if ahead.all() else int(np.argmin(ahead))
+        if distance[k + 1 : k + 1 + until].max() >= PASSAGE_DEPTH:
+            found.append(_crossing(k, distance, times, parts))
+    crossing = _nearest(planned.time, found)
+    backward = _nearest(
+        planned.time, [_crossing(k, distance, times, parts) for k in np.flatnonzero(change < 0)]
+    )
+    in_window = np.abs(times - planned.time) <= PASSAGE_WINDOW
+    about = distance[in_window] if in_window.any() else distance[-1:]
+    return GateProgress(
+        NEVER,
+        np.zeros(1),
+        NEVER if crossing is None else crossing,
+        np.full(1, np.inf) if backward is None else backward.time,
+        np.array([about.max()]),
+        np.array([about.min()]),
+    )
 
-    def at(values: Array) -> Array:
-        return np.asarray(values[k] + fractions[k] * (values[nxt] - values[k]))[None]
 
-    near = (at(offset), at(states[1][window]), at(states[2][window]))
-    return _snapshot(at(times[window]), near), np.sum(near[0] ** 2, axis=-1)
+def _crossing(k: np.intp, distance: Array, times: Array, parts: Sequence[Array]) -> Snapshot:
+    """The state where the plane is crossed between two rows, leaves (1,)."""
+    fraction = -distance[k] / (distance[k + 1] - distance[k])
+    time, *rest = (part[k] + fraction * (part[k + 1] - part[k]) for part in (times, *parts))
+    return Snapshot(np.array([time]), *(tuple(part[:, None]) for part in rest))
 
 
-def _snapshot(time: Array, parts: Sequence[Array]) -> Snapshot:
-    return Snapshot(time, *(tuple(np.moveaxis(part, -1, 0)) for part in parts))
+def _nearest(planned: float, crossings: Sequence[Snapshot]) -> Snapshot | None:
+    """The crossing next to an instant [s], the first of several; None where none is in the window."""
+    near = [each for each in crossings if abs(each.time[0] - planned) <= PASSAGE_WINDOW]
+    return min(near, key=lambda each: abs(each.time[0] - planned), default=None)
 
 
 def _clearance(gate: Gate, fleet: Fleet, offset: Array, q: Array) -> Array:

@@ -10,19 +10,18 @@ import numpy as np
 from aerobat.arrays import Array
 from aerobat.errors import SpecError
 from aerobat.evaluation.passage import (
+    PASSAGE_DEPTH,
     Passage,
-    gates_of,
-    nearest_approach,
-    passage_window,
+    PlannedPassage,
+    gate_progress,
     passages,
     planned_passages,
 )
 from aerobat.kernels.running_metrics import RunningMetrics
 from aerobat.planning import Plan
-from aerobat.problem.gate import Gate
 from aerobat.problem.problem import Problem
 from aerobat.simulation.flight import Flight
-from aerobat.simulation.outcome import Outcome
+from aerobat.simulation.outcome import Outcome, length
 from aerobat.vehicle import Vehicle
 from aerobat.vehicle.fleet import Fleet
 
@@ -42,9 +41,11 @@ class Score:
 
     def __str__(self) -> str:
         """One line for people."""
+        error = (
+            "" if self.outcome.is_success else f"position error {length(self.max_position_error_m)} at most, "
+        )
         return (
-            f"{self.sentence}; position error {100 * self.max_position_error_m:.2f} cm at most, "
-            f"attitude error {self.rms_attitude_error_deg:.2f}° RMS, "
+            f"{self.sentence}; {error}attitude error {self.rms_attitude_error_deg:.2f}° RMS, "
             f"saturated {100 * self.saturated_fraction:.1f} % of the time"
         )
 
@@ -103,46 +104,70 @@ class Scores:
             found.append((float(self.ground_time[k]), Outcome.HIT_GROUND, {}))
         for passage in passed:
             label = "the gate" if len(passed) == 1 else f"gate '{passage.gate}'"
-            numbers = {"gate": label, "miss": passage.miss, "excess_cm": -100 * passage.clearance}
-            if np.isfinite(passage.time) and not passage.inside:
-                found.append((passage.time, Outcome.MISSED_GATE, numbers))
-            elif passage.clearance < 0.0:
-                found.append((passage.time, Outcome.HIT_FRAME, numbers))
+            wrong = _what_went_wrong(passage)
+            if wrong is not None:
+                outcome, time, numbers = wrong
+                found.append((time, outcome, {"gate": label, **numbers}))
         if found:
             time, outcome, numbers = min(found, key=lambda event: event[0])
             return outcome, outcome.sentence(time=time, **numbers)
+        error = length(float(self.max_position_error_m[k]))
         if not passed:
-            return Outcome.COMPLETE, Outcome.COMPLETE.sentence()
+            return Outcome.COMPLETE, Outcome.COMPLETE.sentence(error=error)
         worst = max(passed, key=lambda passage: passage.miss)
         gates = "the gate" if len(passed) == 1 else f"all {len(passed)} gates, the worst"
-        numbers = {"gate": gates, "speed": worst.speed, "miss_mm": 1000 * worst.miss}
+        numbers = {"gate": gates, "speed": worst.speed, "miss_mm": 1000 * worst.miss, "error": error}
         return Outcome.THROUGH_GATES, Outcome.THROUGH_GATES.sentence(**numbers)
+
+
+def _what_went_wrong(passage: Passage) -> tuple[Outcome, float, dict[str, object]] | None:
+    """What is wrong with a passage, when [s], and its numbers; None where nothing is, or nothing is known."""
+    if np.isnan(passage.planned):
+        return None
+    if np.isnan(passage.time):
+        return _instead(passage)
+    if not passage.inside:
+        return Outcome.MISSED_GATE, passage.time, {"miss": passage.miss}
+    if passage.clearance < 0.0:
+        return Outcome.HIT_FRAME, passage.time, {"excess_cm": -100 * passage.clearance}
+    if passage.attitude_error_deg > passage.attitude_tolerance_deg:
+        numbers: dict[str, object] = {
+            "angle": passage.attitude_error_deg,
+            "tolerance": passage.attitude_tolerance_deg,
+        }
+        return Outcome.WRONG_ATTITUDE, passage.time, numbers
+    return None
+
+
+def _instead(passage: Passage) -> tuple[Outcome, float, dict[str, object]]:
+    """What happened in place of a crossing in the gate's direction."""
+    if passage.max_distance <= 0.0:
+        return Outcome.SHORT_OF_GATE, passage.planned, {"short": -passage.max_distance}
+    if passage.max_distance >= PASSAGE_DEPTH and np.isfinite(passage.backward_time):
+        return Outcome.BACKWARDS, passage.backward_time, {}
+    if passage.min_distance <= 0.0:
+        return Outcome.STOPPED_IN_GATE, passage.planned, {"beyond_cm": 100 * passage.max_distance}
+    return Outcome.EARLY, passage.planned, {"early": passage.min_distance}
 
 
 def score(flight: Flight, goal: Problem | Plan, vehicle: Vehicle | None = None) -> Score:
     """Score one flight; with the vehicle, by default the plan's, its clearance in the gates too.
 
     Errors are against the set-points in the flight: position as a distance [m], attitude as the angle of
-    the relative rotation [deg]. With a plan, gates are looked for around its stages' instants; with the
-    problem alone, around the set-points' nearest approaches. Raises SpecError for a batch of flights.
+    the relative rotation [deg]. With a plan, gates are to be passed at its stages' instants; with the
+    problem alone, at the set-points' nearest approaches. Raises SpecError for a batch of flights.
     """
     if flight.is_batch:
         raise SpecError("score takes one flight at a time; of a batch, score flight[k]")
     if vehicle is None and isinstance(goal, Plan):
         vehicle = goal.vehicle
-    gates = gates_of(goal)
     states = flight.states
     square, angle = flight.position_error**2, flight.attitude_error
     diverged = flight.outcome is not Outcome.COMPLETE
-    found = []
-    instants = planned_passages(goal, gates, flight.times, flight.setpoint.flat.position)
-    for gate, planned in zip(gates, instants, strict=True):
-        window = passage_window(flight.times, planned)
-        if diverged and planned >= flight.times[-1]:  # still under way to it
-            window[:] = False
-        parts = (states.position, states.velocity, states.q_world_body)
-        nearest, distance_sq = nearest_approach(window, gate, flight.times, parts)
-        found.append(passages(gate, nearest, distance_sq, None if vehicle is None else Fleet.of([vehicle])))
+    stop = np.array([flight.ends if diverged else np.nan])
+    parts = (states.position, states.velocity, states.q_world_body)
+    fleet = None if vehicle is None else Fleet.of([vehicle])
+    planned = planned_passages(goal, flight.times, flight.setpoint.flat.position)
     ground = flight.environment.ground
     below = np.zeros(1, bool) if ground is None else states.position[:, 2] < ground
     return Scores(
@@ -151,17 +176,19 @@ def score(flight: Flight, goal: Problem | Plan, vehicle: Vehicle | None = None) 
         max_attitude_error_deg=np.rad2deg([angle.max()]),
         rms_attitude_error_deg=np.rad2deg(np.sqrt([np.mean(angle**2)])),
         saturated_fraction=np.array([flight.saturated.mean()]),
-        passages=tuple(found),
-        stop=np.array([flight.ends if diverged else np.nan]),
+        passages=tuple(
+            passages(each, gate_progress(each, flight.times, parts), stop, fleet) for each in planned
+        ),
+        stop=stop,
         is_finite=np.array([flight.outcome is not Outcome.STATE_NOT_FINITE]),
         ground_time=np.array([flight.times[int(np.argmax(below))] if below.any() else np.nan]),
     )[0]
 
 
-def scores_of(metrics: RunningMetrics, gates: tuple[Gate, ...], fleet: Fleet) -> Scores:
+def scores_of(metrics: RunningMetrics, planned: tuple[PlannedPassage, ...], fleet: Fleet) -> Scores:
     """Scores of flights that were added up as they were flown, from their last metrics, leaves (flights,)."""
     ticks = np.maximum(metrics.ticks, 1.0)
-    diverged = metrics.flying < 0.5
+    stop = np.where(metrics.flying < 0.5, metrics.stop, np.nan)
     never = np.isinf(metrics.ground_time)
     return Scores(
         max_position_error_m=np.sqrt(metrics.max_square),
@@ -170,10 +197,10 @@ def scores_of(metrics: RunningMetrics, gates: tuple[Gate, ...], fleet: Fleet) ->
         rms_attitude_error_deg=np.rad2deg(np.sqrt(metrics.sum_square_angle / ticks)),
         saturated_fraction=metrics.saturated / ticks,
         passages=tuple(
-            passages(gate, approach.nearest, approach.distance_sq, fleet)
-            for gate, approach in zip(gates, metrics.gates, strict=True)
+            passages(each, progress, stop, fleet)
+            for each, progress in zip(planned, metrics.gates, strict=True)
         ),
-        stop=np.where(diverged, metrics.stop, np.nan),
+        stop=stop,
         is_finite=metrics.is_finite > 0.5,
         ground_time=np.where(never, np.nan, metrics.ground_time),
     )

@@ -13,13 +13,17 @@ from aerobat.engines.components import components
 from aerobat.engines.pytree import tree_map
 from aerobat.environment import Environment
 from aerobat.errors import SpecError
-from aerobat.evaluation.passage import gates_of, passage_window, planned_passages
+from aerobat.evaluation.passage import (
+    PASSAGE_DEPTH,
+    PASSAGE_WINDOW,
+    PlannedPassage,
+    planned_passages,
+)
 from aerobat.evaluation.score import Scores, scores_of
 from aerobat.kernels import running_metrics
 from aerobat.kernels.ops import Ops
-from aerobat.kernels.running_metrics import MetricsInput, MetricsParameters, RunningMetrics
+from aerobat.kernels.running_metrics import GatePlane, MetricsInput, MetricsParameters, RunningMetrics
 from aerobat.planning import Plan
-from aerobat.problem.gate import Gate
 from aerobat.problem.problem import Problem
 from aerobat.simulation.loop import Signals
 from aerobat.simulation.outcome import DIVERGENCE_RADIUS
@@ -61,15 +65,14 @@ class MetricsMonitor:
 
 @dataclass(frozen=True, eq=False)
 class MetricsSource:
-    """The instants of ticks, and which of them are about a gate's planned passage."""
+    """The instants of ticks."""
 
     times: Array
-    windows: tuple[Array, ...]
     per_vehicle: bool = False
 
     def chunk(self, begin: int, end: int) -> MetricsInput:
         """See `Source.chunk`."""
-        return MetricsInput(self.times[begin:end], tuple(window[begin:end] for window in self.windows))
+        return MetricsInput(self.times[begin:end])
 
 
 def score_flights(
@@ -102,17 +105,16 @@ def score_flights(
         raise SpecError("log_rate: a scored flight keeps no rows; leave it out")
     if environment is None:
         environment = (goal.problem if isinstance(goal, Plan) else goal).environment
-    gates = gates_of(goal)
     setup = prepare(plan, vehicles, environment=environment, config=settings)
     blocks = range(0, len(setup.times), BLOCK)
     parts = [setup.reference.setpoint(k, min(k + BLOCK, len(setup.times))).flat.position for k in blocks]
-    planned = planned_passages(goal, gates, setup.times, np.concatenate(parts))
-    setup = with_metrics(setup, gates, planned)
+    planned = planned_passages(goal, setup.times, np.concatenate(parts))
+    setup = with_metrics(setup, planned)
     loop = setup.compile(log=metrics_row)
     carry = loop.init(setup.first_tick)
     for begin, end in setup.chunks():
         carry, rows = loop.scan(carry, setup.inputs(begin, end), end)
-    return scores_of(tree_map(lambda leaf: leaf[:, -1], rows), gates, setup.fleet)
+    return scores_of(tree_map(lambda leaf: leaf[:, -1], rows), planned, setup.fleet)
 
 
 def metrics_row(signals: Signals) -> RunningMetrics:
@@ -121,20 +123,23 @@ def metrics_row(signals: Signals) -> RunningMetrics:
     return metrics
 
 
-def with_metrics(
-    setup: FlightSetup, gates: tuple[Gate, ...] = (), planned: tuple[float, ...] = ()
-) -> FlightSetup:
-    """The same flight with its metrics added up; the gates with the instants [s] of their passages."""
-    vehicles, times = len(setup.fleet), setup.times
-    windows = tuple(passage_window(times, instant).astype(float) for instant in planned)
-    centres = tuple(components(np.broadcast_to(gate.position, (vehicles, 3))) for gate in gates)
+def with_metrics(setup: FlightSetup, planned: tuple[PlannedPassage, ...] = ()) -> FlightSetup:
+    """The same flight with its metrics added up, those of planned passages among them."""
+    vehicles = len(setup.fleet)
+    planes = tuple(_plane(passage, vehicles) for passage in planned)
     ground = -np.inf if setup.environment.ground is None else setup.environment.ground
-    parameters = MetricsParameters(
-        np.full(vehicles, DIVERGENCE_RADIUS**2), np.full(vehicles, ground), centres
-    )
+    parameters = MetricsParameters(np.full(vehicles, DIVERGENCE_RADIUS**2), np.full(vehicles, ground), planes)
     return replace(
         setup,
-        components=(*setup.components, MetricsMonitor(len(windows))),
+        components=(*setup.components, MetricsMonitor(len(planes))),
         parameters=setup.parameters._replace(own=(*setup.parameters.own, parameters)),
-        sources=(*setup.sources, MetricsSource(times, windows)),
+        sources=(*setup.sources, MetricsSource(setup.times)),
     )
+
+
+def _plane(passage: PlannedPassage, vehicles: int) -> GatePlane:
+    """A planned passage as kernels read it, leaves (vehicles,)."""
+    gate = passage.gate
+    centre, normal = (components(np.broadcast_to(v, (vehicles, 3))) for v in (gate.position, gate.normal))
+    numbers = (np.full(vehicles, x) for x in (passage.time, PASSAGE_WINDOW, PASSAGE_DEPTH))
+    return GatePlane(centre, normal, *numbers)

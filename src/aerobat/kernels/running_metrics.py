@@ -1,4 +1,4 @@
-"""Metrics of a flight, added up tick by tick: errors, saturation, divergence, the approach of each gate."""
+"""Metrics of a flight, added up tick by tick: errors, saturation, divergence, the crossing of each gate."""
 
 from __future__ import annotations
 
@@ -12,14 +12,21 @@ from aerobat.kernels.quaternions import angle_between
 from aerobat.kernels.rigid_body import Body
 from aerobat.kernels.vectors import ZERO, add_scaled, dot, subtract
 
-_TINY = 1e-30  # [m²] keeps 0/0 away, in single precision too
-
 
 class MetricsInput(NamedTuple):
     """The instant of a tick."""
 
     time: Scalar  # [s]
-    in_gate_window: tuple[Scalar, ...]  # for each gate 1 around its planned passage, 0 elsewhere
+
+
+class GatePlane(NamedTuple):
+    """A gate as a plane to be crossed at a time."""
+
+    centre: Vector  # [m]
+    normal: Vector  # direction of passage, a unit vector
+    planned: Scalar  # [s] when it is to be crossed
+    window: Scalar  # [s] by which the crossing may be earlier or later
+    depth: Scalar  # [m] beyond the plane that makes a crossing a passage
 
 
 class MetricsParameters(NamedTuple):
@@ -27,7 +34,7 @@ class MetricsParameters(NamedTuple):
 
     divergence_radius_sq: Scalar  # [m²] of squared position error, beyond which a vehicle has diverged
     ground: Scalar  # [m] height, −infinity where there is none
-    gates: tuple[Vector, ...]  # [m] the centres of their openings
+    gates: tuple[GatePlane, ...]
 
 
 class Snapshot(NamedTuple):
@@ -39,12 +46,15 @@ class Snapshot(NamedTuple):
     q_world_body: Quaternion  # between two ticks not quite of unit length
 
 
-class GateApproach(NamedTuple):
-    """The nearest approach to a gate's centre so far, straight between ticks."""
+class GateProgress(NamedTuple):
+    """A flight before and behind a gate's plane so far, straight between ticks; offsets as positions."""
 
-    in_window: Scalar  # 1 if the last tick was in the window
-    nearest: Snapshot  # its position is the offset [m] from the gate's centre
-    distance_sq: Scalar  # [m²] infinite before the window
+    latest: Snapshot  # the last crossing in the direction of passage
+    beyond: Scalar  # 1 since that crossing, until it comes back
+    crossing: Snapshot  # of those after which it got far enough beyond, the nearest to the planned instant
+    backward: Scalar  # [s] the crossing against the direction next to that instant, infinite if there is none
+    max_distance: Scalar  # [m] beyond the plane, of ticks in the window; −infinite before it
+    min_distance: Scalar  # [m] likewise
 
 
 class RunningMetrics(NamedTuple):
@@ -61,14 +71,15 @@ class RunningMetrics(NamedTuple):
     sum_square_angle: Scalar  # [rad²]
     saturated: Scalar  # ticks
     last: Snapshot
-    gates: tuple[GateApproach, ...]
+    gates: tuple[GateProgress, ...]
 
 
 def init(gates: int) -> RunningMetrics:
     """Metrics before the first tick of a flight through so many gates."""
     nowhere = Snapshot(0.0, ZERO, ZERO, (1.0, 0.0, 0.0, 0.0))
-    approach = GateApproach(0.0, nowhere, inf)
-    return RunningMetrics(1.0, 1.0, 0.0, inf, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, nowhere, gates * (approach,))
+    never = nowhere._replace(time=inf)
+    progress = GateProgress(never, 0.0, never, inf, -inf, inf)
+    return RunningMetrics(1.0, 1.0, 0.0, inf, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, nowhere, gates * (progress,))
 
 
 def step(
@@ -115,29 +126,55 @@ def step(
         saturated=metrics.saturated + ops.select(saturated, counts, 0.0),
         last=now,
         gates=tuple(
-            _approached(ops, approach, metrics.last, now, gate, ops.select(counted, in_window, 0.0))
-            for approach, gate, in_window in zip(
-                metrics.gates, parameters.gates, inputs.in_gate_window, strict=True
-            )
+            _progress(ops, progress, plane, (metrics.last, now), (metrics.ticks > 0.5, counted))
+            for progress, plane in zip(metrics.gates, parameters.gates, strict=True)
         ),
     )
 
 
-def _approached(
-    ops: Ops, approach: GateApproach, last: Snapshot, now: Snapshot, gate: Vector, in_window: Scalar
-) -> GateApproach:
-    """The nearest of all in the window, with the piece from the last tick to this one."""
-    now = now._replace(position=subtract(now.position, gate))
-    last = last._replace(position=subtract(last.position, gate))
-    since = _either(ops, approach.in_window > 0.5, last, now)
-    change = subtract(now.position, since.position)
-    fraction = -dot(since.position, change) / ops.maximum(dot(change, change), _TINY)
-    fraction = ops.minimum(ops.maximum(fraction, 0.0), 1.0)
-    here = _between(since, now, fraction)
-    square = dot(here.position, here.position)
-    nearer = (in_window > 0.5) & (square < approach.distance_sq)
-    nearest = _either(ops, nearer, here, approach.nearest)
-    return GateApproach(in_window, nearest, ops.select(nearer, square, approach.distance_sq))
+def _progress(
+    ops: Ops,
+    progress: GateProgress,
+    plane: GatePlane,
+    snapshots: tuple[Snapshot, Snapshot],
+    counted: tuple[Scalar, Scalar],
+) -> GateProgress:
+    """Progress a tick later.
+
+    Args:
+        ops: of the arithmetic.
+        progress: before the tick.
+        plane: the gate's.
+        snapshots: the last tick's and this one's.
+        counted: true where there was a last tick, and where this one counts.
+    """
+    last, now = (one._replace(position=subtract(one.position, plane.centre)) for one in snapshots)
+    before, behind = dot(last.position, plane.normal), dot(now.position, plane.normal)
+    both = counted[0] & counted[1]
+    forward = both & (before <= 0.0) & (behind > 0.0)
+    back = both & (before > 0.0) & (behind <= 0.0)
+    change = ops.select(forward, behind - before, ops.select(back, behind - before, 1.0))
+    here = _between(last, now, -before / change)
+    latest = _either(ops, forward, here, progress.latest)
+    beyond = ops.select(forward, 1.0, ops.select(back, 0.0, progress.beyond))
+    off_time = _magnitude(ops, latest.time - plane.planned)
+    nearer = off_time < _magnitude(ops, progress.crossing.time - plane.planned)
+    passed = counted[1] & (beyond > 0.5) & (behind >= plane.depth) & (off_time <= plane.window) & nearer
+    back_off_time = _magnitude(ops, here.time - plane.planned)
+    nearer_back = back_off_time < _magnitude(ops, progress.backward - plane.planned)
+    in_window = counted[1] & (_magnitude(ops, now.time - plane.planned) <= plane.window)
+    return GateProgress(
+        latest,
+        beyond,
+        _either(ops, passed, latest, progress.crossing),
+        ops.select(back & (back_off_time <= plane.window) & nearer_back, here.time, progress.backward),
+        ops.select(in_window, ops.maximum(progress.max_distance, behind), progress.max_distance),
+        ops.select(in_window, ops.minimum(progress.min_distance, behind), progress.min_distance),
+    )
+
+
+def _magnitude(ops: Ops, x: Scalar) -> Scalar:
+    return ops.maximum(x, -x)
 
 
 def _between(a: Snapshot, b: Snapshot, fraction: Scalar) -> Snapshot:

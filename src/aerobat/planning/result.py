@@ -9,6 +9,7 @@ from aerobat.certification import Certificate
 from aerobat.planning.recorder import Attempt
 from aerobat.planning.rotor_margin import RotorMargin
 from aerobat.problem.problem import Problem
+from aerobat.simulation.outcome import length
 from aerobat.trajectory import Trajectory
 from aerobat.vehicle import Vehicle
 
@@ -48,20 +49,16 @@ class Flyability:
         """The finding in a sentence without its full stop."""
         if not self.flies:
             return (
-                f"not flyable: its own flight leaves the path by {_length(self.error)}, "
-                f"{_length(FLYABLE_ERROR)} at most allowed, a defect of the plan, not of the flight"
+                f"not flyable: its own flight leaves the path by {length(self.error)}, "
+                f"{100 * FLYABLE_ERROR:g} cm at most allowed, a defect of the plan, not of the flight"
             )
         if not self.disturbance:
-            return f"flies within {_length(self.error)}, with no reserve left"
+            return f"flies within {length(self.error)}, with no reserve left"
         return (
-            f"flies within {_length(self.error)}; the reserve left, {self.disturbance:.2g} N, is "
+            f"flies within {length(self.error)}; the reserve left, {self.disturbance:.2g} N, is "
             f"{100 * self.disturbed_fraction:.2g} % of a rotor's thrust: with as much less from all rotors "
-            f"within {_length(self.disturbed_error)}"
+            f"within {length(self.disturbed_error)}"
         )
-
-
-def _length(metres: float) -> str:
-    return f"{metres:.2f} m" if metres >= 1.0 else f"{100 * metres:.2g} cm"
 
 
 @dataclass(frozen=True)

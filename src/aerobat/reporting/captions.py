@@ -7,6 +7,7 @@ import numpy as np
 from aerobat.evaluation.score import Score
 from aerobat.planning import Plan
 from aerobat.simulation import Flight
+from aerobat.simulation.outcome import length
 
 
 def plan_caption(plan: Plan) -> str:
@@ -20,8 +21,11 @@ def plan_caption(plan: Plan) -> str:
 
 def score_caption(score: Score) -> str:
     """Course of a flight in a few words."""
+    error = (
+        "" if score.outcome.is_success else f"position error at most {length(score.max_position_error_m)}, "
+    )
     return (
-        f"{score.sentence}; position error at most {length(score.max_position_error_m)}, "
+        f"{score.sentence}; {error}"
         f"attitude error at most {score.max_attitude_error_deg:.2f}°, "
         f"{score.rms_attitude_error_deg:.2f}° RMS, "
         f"saturated {100 * score.saturated_fraction:.1f} % of the time"
@@ -34,8 +38,3 @@ def error_caption(flight: Flight) -> str:
         f"position error at most {length(float(flight.position_error.max()))}, "
         f"attitude error at most {np.rad2deg(flight.attitude_error.max()):.2f}°"
     )
-
-
-def length(metres: float) -> str:
-    """A length with the unit that suits it."""
-    return f"{metres:.2f} m" if metres >= 1.0 else f"{100 * metres:.2f} cm"

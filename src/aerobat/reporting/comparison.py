@@ -12,7 +12,6 @@ from rich.table import Table
 from rich.text import Text
 
 from aerobat.planning import Plan
-from aerobat.reporting.captions import length
 from aerobat.reporting.page import (
     AXIS,
     COLUMNS,
@@ -30,6 +29,7 @@ from aerobat.reporting.panels.poses import is_flat, plan_reference
 from aerobat.reporting.panels.signals import draw_limits, fit_to_limits
 from aerobat.reporting.style import BLUE, INK, MUTED, NORMAL, RED, SKY, SMALL, TITLE, YELLOW
 from aerobat.simulation import Outcome
+from aerobat.simulation.outcome import length
 from aerobat.studies.compare import Comparison, Entry
 from aerobat.vehicle import Vehicle
 
@@ -83,7 +83,7 @@ def comparison_table(comparison: Comparison) -> Table:
     notes = [
         f"{_name(entry)}: {entry.outcome}"
         for entry in comparison.entries
-        if entry.outcome != Outcome.COMPLETE.value
+        if entry.score is None or entry.score.outcome is not Outcome.COMPLETE
     ]
     table.caption = Text("\n".join(notes)) if notes else None  # as it stands: brackets are no markup
     return table

@@ -141,11 +141,16 @@ def _flight_facts(score: Score | None) -> Iterable[tuple[str, str]]:
     yield "attitude error", _pair(score.max_attitude_error_deg, score.rms_attitude_error_deg, "°")
     for passage in score.passages:
         clearance = "" if isnan(passage.clearance) else f", {100 * passage.clearance:.0f} cm clear"
+        allowed = (
+            ""
+            if isnan(passage.attitude_tolerance_deg)
+            else f" of {passage.attitude_tolerance_deg:.3g}° allowed"
+        )
         passed = (
-            f"{1000 * passage.miss:.1f} mm off, {passage.attitude_error_deg:.2f}° off, "
+            f"{1000 * passage.miss:.1f} mm off, {passage.attitude_error_deg:.2f}°{allowed}, "
             f"at {passage.speed:.2f} m/s{clearance}"
         )
-        yield passage.gate, "not reached" if isnan(passage.time) else passed
+        yield passage.gate, "not passed" if isnan(passage.time) else passed
     yield "saturated", f"{100 * score.saturated_fraction:.1f} % of the time"
 
 

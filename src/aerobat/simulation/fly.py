@@ -17,7 +17,7 @@ from aerobat.environment import Environment
 from aerobat.simulation.components import LogRow
 from aerobat.simulation.flight import SERIES, Flight, setpoint_rows, setpoint_series
 from aerobat.simulation.noise import body_states
-from aerobat.simulation.outcome import DIVERGENCE_RADIUS, Outcome
+from aerobat.simulation.outcome import DIVERGENCE_RADIUS, Outcome, length
 from aerobat.simulation.setup import FlightConfig, FlightSetup, Flyable, prepare
 from aerobat.states import Setpoint
 from aerobat.trajectory import Trajectory
@@ -131,5 +131,6 @@ def _endings(
         last = {Outcome.COMPLETE: len(times) - 1, Outcome.DIVERGED: k, Outcome.STATE_NOT_FINITE: k - 1}
         ends.append(max(last[outcome], 0))
         outcomes.append(outcome)
-        sentences.append(outcome.sentence(time=float(times[ends[-1]])))
+        worst = float(distance[vehicle, : ends[-1] + 1].max())
+        sentences.append(outcome.sentence(time=float(times[ends[-1]]), error=length(worst)))
     return np.array(ends), tuple(outcomes), tuple(sentences)

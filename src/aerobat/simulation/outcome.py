@@ -7,13 +7,33 @@ from enum import Enum
 DIVERGENCE_RADIUS = 5.0  # [m] of position error: no controller is expected back from there
 
 
-class Outcome(Enum):
-    """The end of a flight; the value is a sentence to be filled with its numbers."""
+def length(metres: float) -> str:
+    """A length with the unit that suits it."""
+    return f"{metres:.2f} m" if metres >= 1.0 else f"{100 * metres:.2f} cm"
 
-    COMPLETE = "flown to the end"
-    THROUGH_GATES = "through {gate} at {speed:.1f} m/s, {miss_mm:.1f} mm off its centre"
+
+class Outcome(Enum):
+    """The end of a flight; the value is a sentence to be filled with its numbers.
+
+    A gate is missed in five ways: beside its opening, backwards, short of its plane, stopped in it, or beyond
+    it too early.
+    """
+
+    COMPLETE = "flown to the end, {error} off its path at most"
+    THROUGH_GATES = (
+        "through {gate} at {speed:.1f} m/s, {miss_mm:.1f} mm off its centre, {error} off its path at most"
+    )
     MISSED_GATE = "missed {gate}, {miss:.2f} m off its centre at {time:.2f} s"
+    BACKWARDS = "missed {gate}, crossed its plane backwards at {time:.2f} s"
+    SHORT_OF_GATE = "missed {gate}, {short:.2f} m short of its plane about {time:.2f} s"
+    STOPPED_IN_GATE = "stopped in {gate}, {beyond_cm:.1f} cm beyond its plane about {time:.2f} s"
+    EARLY = (
+        "missed {gate}, {early:.2f} m or more beyond its plane about {time:.2f} s, when it was to be crossed"
+    )
     HIT_FRAME = "hit the frame of {gate}, {excess_cm:.1f} cm too wide at {time:.2f} s"
+    WRONG_ATTITUDE = (
+        "passed {gate} tilted by {angle:.1f}° from its upright at {time:.2f} s, {tolerance:.3g}° allowed"
+    )
     HIT_GROUND = "hit the ground at {time:.2f} s"
     DIVERGED = "diverged at {time:.2f} s: position error above {radius:g} m"
     STATE_NOT_FINITE = "diverged at {time:.2f} s: its state is no longer a number"
@@ -22,6 +42,17 @@ class Outcome(Enum):
     def is_success(self) -> bool:
         """True where nothing went wrong."""
         return self in (Outcome.COMPLETE, Outcome.THROUGH_GATES)
+
+    @property
+    def is_miss(self) -> bool:
+        """True where a gate was not passed."""
+        return self in (
+            Outcome.MISSED_GATE,
+            Outcome.BACKWARDS,
+            Outcome.SHORT_OF_GATE,
+            Outcome.STOPPED_IN_GATE,
+            Outcome.EARLY,
+        )
 
     def sentence(self, **numbers: object) -> str:
         """The sentence with its numbers."""
