@@ -10,6 +10,7 @@ import numpy as np
 
 from aerobat.declaration import AS_IT_IS, NonNegative
 from aerobat.errors import Infeasible
+from aerobat.flatness import force_balance
 from aerobat.optimization import solver
 from aerobat.planning.certified_solve import Judged
 from aerobat.planning.miqp.attempts import Attempts, Placement, flyable_order, plan_of
@@ -123,7 +124,8 @@ def formulate(problem: Problem, order: int, intervals: int, vehicle: Vehicle | N
     sequence = problem.stages(thrust)
     if vehicle is not None:
         _check_thrust(sequence, vehicle)
-    return Formulation(problem, sequence, IntegratorChain(order, intervals))
+    balance = force_balance(problem.environment, vehicle)
+    return Formulation(problem, sequence, IntegratorChain(order, intervals), balance)
 
 
 def _check_thrust(sequence: StageSequence, vehicle: Vehicle) -> None:

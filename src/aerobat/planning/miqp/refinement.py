@@ -13,7 +13,6 @@ from functools import cached_property
 import numpy as np
 
 from aerobat.arrays import Array, Indices, Mask
-from aerobat.flatness import force_balance
 from aerobat.optimization.prox_linear import Linearization, prox_linear
 from aerobat.planning.miqp.formulation import Formulation
 from aerobat.planning.miqp.path_rows import PathRows, of_conditions
@@ -141,7 +140,7 @@ class PathProgram:
     def path(self) -> PathRows:
         """Limits, and what holds throughout."""
         problem, sequence = self.formulation.problem, self.formulation.sequence
-        balance = force_balance(problem.environment, self.vehicle)
+        balance = self.formulation.balance
         return PathRows.of(problem.path_limits, self.chain.order, sequence.path_constraints, balance)
 
     @cached_property
@@ -156,7 +155,7 @@ class PathProgram:
 
         Places (q,), weights (q, 6, 3), bounds (q,), and which are one side of an equality.
         """
-        balance = force_balance(self.formulation.problem.environment, self.vehicle)
+        balance = self.formulation.balance
         found = []
         for i, stage in enumerate(self.formulation.sequence.stages, 1):
             for condition in stage.conditions:
