@@ -13,7 +13,7 @@ into axes that are given relative to the upright ones.
 from __future__ import annotations
 
 from aerobat.kernels.ops import Matrix, Scalar, Vector
-from aerobat.kernels.vectors import add, add_scaled, cross, dot, transform
+from aerobat.kernels.vectors import add, add_scaled, cross, dot, scale, transform
 
 
 def specific_thrust(
@@ -46,3 +46,35 @@ def moment(inertia: Matrix, omega: Vector, omega_dot: Vector) -> Vector:
 def collective(mass: Scalar, axial_drag: Scalar, norm: Scalar, b3: Vector, airspeed: Vector) -> Scalar:
     """The collective thrust [N] behind a specific thrust of this norm, drag along b3 made up for."""
     return mass * (norm + axial_drag * dot(b3, airspeed))
+
+
+def angular_jerk(b3: Vector, jerk: Vector, snap: Vector, crackle: Vector) -> Vector:
+    """ω'' [rad/s³] along the body's axes of a body as in `body_rates`; `crackle` is f'''/n.
+
+    The derivative of the components of ω' in axes that turn with ω, so that a moment's rate is that of its
+    components.
+    """
+    omega, omega_dot = body_rates(b3, jerk, snap)
+    along = dot(b3, jerk)
+    along_rate = dot(jerk, jerk) + dot(b3, snap) - 2.0 * along * along
+    turning = add_scaled(cross(b3, crackle), -2.0 * along, cross(b3, snap))
+    world = add(cross(jerk, snap), turning)
+    world = add_scaled(add_scaled(world, -2.0 * along_rate, omega), -2.0 * along, omega_dot)
+    return add_scaled(world, -1.0, cross(omega, omega_dot))
+
+
+def moment_rate(inertia: Matrix, omega: Vector, omega_dot: Vector, angular_jerk: Vector) -> Vector:
+    """The derivative J ω'' + ω' × J ω + ω × J ω' of `moment` [N·m/s]; body axes."""
+    gyroscopic = add(cross(omega_dot, transform(inertia, omega)), cross(omega, transform(inertia, omega_dot)))
+    return add(transform(inertia, angular_jerk), gyroscopic)
+
+
+def collective_rate(
+    mass: Scalar, axial_drag: Scalar, b3: Vector, thrust: tuple[Scalar, Vector], air: tuple[Vector, Vector]
+) -> Scalar:
+    """The derivative of `collective` [N/s]; `thrust` is |f| and f', `air` airspeed and acceleration."""
+    norm, thrust_jerk = thrust
+    airspeed, acceleration = air
+    along = dot(b3, thrust_jerk)
+    turning = scale(1.0 / norm, add_scaled(thrust_jerk, -along, b3))
+    return mass * (along + axial_drag * (dot(turning, airspeed) + dot(b3, acceleration)))

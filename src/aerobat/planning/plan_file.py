@@ -45,6 +45,7 @@ class _Evidence:
     gap: float | None
     certificate: Certificate | None
     flyability: Flyability | None = None
+    rescue: str = ""
 
 
 def save_plan(plan: Plan, path: str | Path) -> None:

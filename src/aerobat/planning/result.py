@@ -80,6 +80,7 @@ class Plan:
     vehicle: Vehicle | None = None  # what it was planned or certified for
     certificate: Certificate | None = None  # for the vehicle, over continuous time
     flyability: Flyability | None = None  # of the vehicle's own flight, simulated
+    rescue: str = ""  # what found it, where what was asked for found nothing
 
     @property
     def duration(self) -> float:
@@ -131,9 +132,10 @@ class Plan:
         margin = "" if self.margin is None else f"; rotors {self.margin}"
         proof = "" if self.certificate is None else f"; {self.certificate}"
         flown = "" if self.flyability is None else f"; {self.flyability}"
+        rescue = f"; {self.rescue}" if self.rescue else ""
         dt = "" if self.dt is None else f" of {self.dt:.4f} s"
         backend = f" ({self.backend})" if self.backend else ""
         return (
             f"{self.problem.name}: {self.duration:.3f} s in {self.intervals} intervals{dt}, {self.status} by "
-            f"{self.planner}{backend}; {stages}{margin}{proof}{flown}"
+            f"{self.planner}{backend}; {stages}{margin}{proof}{flown}{rescue}"
         )

@@ -58,6 +58,7 @@ def _plan(plan: Plan) -> dict[str, Any]:
         "duration_s": plan.duration,
         "cost": plan.cost,
         "status": plan.status,
+        "rescue": plan.rescue,
         "bound": plan.bound,
         "gap": plan.gap,
         "backend": plan.backend,

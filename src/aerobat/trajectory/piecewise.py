@@ -62,7 +62,7 @@ class Trajectory:
 
     @classmethod
     def from_inputs(
-        cls, initial: ArrayLike, inputs: ArrayLike, dt: float, heading: float = 0.0
+        cls, initial: ArrayLike, inputs: ArrayLike, dt: ArrayLike, heading: float = 0.0
     ) -> Trajectory:
         """Integrate exactly a chain of r integrators whose input is constant on each interval.
 
@@ -71,25 +71,29 @@ class Trajectory:
         Args:
             initial: Position, velocity, ... at t = 0 [m/s^k], world, (r, 3).
             inputs: The r-th derivative of position on each interval [m/s^r], world, (N, 3).
-            dt: How long an interval is [s].
+            dt: How long an interval is [s]: one number for all, or (N,).
             heading: The trajectory's [rad].
         """
         state = frozen(initial, "initial", (None, 3))
         inputs = frozen(inputs, "inputs", (None, 3))
-        dt = float(frozen(dt, "dt", ()))
-        if state.ndim != 2 or inputs.ndim != 2 or not len(state) or not len(inputs) or dt <= 0:
-            raise SpecError("from_inputs needs initial (r, 3), inputs (N, 3) and a positive dt")
+        steps = frozen(dt, "dt")
+        fits = steps.shape in ((), inputs.shape[:1]) and state.ndim == inputs.ndim == 2
+        if not fits or not len(state) or not len(inputs) or (steps <= 0).any():
+            raise SpecError("from_inputs needs initial (r, 3), inputs (N, 3) and a positive dt, or N of them")
+        steps = np.broadcast_to(steps, len(inputs))
         # scaled by dt^k/k! the derivatives at an interval's start are its coefficients, and
         # those at its end are the same polynomial expanded about s = 1
         order = len(state)
-        scale = np.array([dt**k / math.factorial(k) for k in range(order + 1)])[:, None]
+        factorials = np.array([math.factorial(k) for k in range(order + 1)])
+        scale = (steps[:, None] ** np.arange(order + 1) / factorials)[..., None]
         pascal = np.array([[math.comb(j, k) for j in range(order + 1)] for k in range(order)], dtype=float)
         coefficients = np.empty((len(inputs), order + 1, 3))
-        coefficients[:, order] = scale[order] * inputs
-        coefficients[0, :order] = scale[:order] * state
+        coefficients[:, order] = scale[:, order] * inputs
+        coefficients[0, :order] = scale[0, :order] * state
         for n in range(1, len(inputs)):
-            coefficients[n, :order] = pascal @ coefficients[n - 1]
-        return cls(np.full(len(inputs), dt), coefficients, heading)
+            longer = (steps[n] / steps[n - 1]) ** np.arange(order)[:, None]
+            coefficients[n, :order] = longer * (pascal @ coefficients[n - 1])
+        return cls(steps, coefficients, heading)
 
     def __repr__(self) -> str:
         """Say in a few words what this trajectory is."""

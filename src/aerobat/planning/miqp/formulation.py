@@ -1,7 +1,8 @@
 """Problem → program: the paper's (1) as a convex QP over the inputs, plus stages assigned to intervals.
 
 The variables are the normalised inputs of the integrator chain, axis by axis: x = (w_x, w_y, w_z), 3N of them
-with w = dt^r u. The matrices do not depend on dt; only the bounds do.
+with w = dt^r u. The matrices do not depend on dt; only the bounds do. Where a vehicle has drag, conditions on
+its specific thrust weigh velocity and acceleration together, which dt weighs differently: then the rows do.
 """
 
 from __future__ import annotations
@@ -15,10 +16,9 @@ import numpy as np
 
 from aerobat.arrays import Array, Indices, frozen
 from aerobat.errors import SpecError
-from aerobat.flatness import force_balance
 from aerobat.optimization import AssignmentProgram, SlottedStage
 from aerobat.planning.miqp.integrator import INPUT_NAMES, IntegratorChain
-from aerobat.problem.condition import Condition
+from aerobat.problem.condition import Condition, ForceBalance, Quantity
 from aerobat.problem.problem import DERIVATIVES, Limits, Problem
 from aerobat.problem.stage import Stage, StageSequence
 
@@ -27,11 +27,15 @@ UNIT_AXES = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
 @dataclass(frozen=True)
 class Row:
-    """direction · (derivative of position at the end of an interval), or the input over it."""
+    """direction · (derivative of position at the end of an interval), or the input over it.
+
+    `drag` times the derivative below it is added.
+    """
 
     interval: int
     derivative: int
     direction: tuple[float, float, float]
+    drag: float = 0.0  # [1/s]
 
 
 @dataclass(frozen=True)
@@ -48,6 +52,7 @@ class Formulation:
     problem: Problem
     sequence: StageSequence
     chain: IntegratorChain
+    balance: ForceBalance  # what specific thrust works against
 
     def __post_init__(self) -> None:
         """Check."""
@@ -64,19 +69,16 @@ class Formulation:
                     f"{INPUT_NAMES[self.chain.order]}; plan with --order {derivative} or drop it"
                 )
 
-    def program(self, dt: float, bounds: Limits | None = None) -> AssignmentProgram:
-        """The program at one dt [s]; its matrices are the same arrays for all dt.
-
-        `bounds` are imposed in place of the problem's limits, at most tighter.
-        """
+    def program(self, dt: float) -> AssignmentProgram:
+        """The program at one dt [s]; without drag its matrices are the same arrays for all dt."""
         scale, free = dt**self._derivatives, self._free(dt)
-        lower, upper = self._limits if bounds is None else _columns(self._bounded_rows(bounds))
+        lower, upper = self._limits
         goal = self.problem.goal.derivatives(self.chain.order) * self.chain.scales(dt)[:, None]
         reached = self.chain.free(self.initial, dt)[-1]
         return AssignmentProgram(
             equality=self._equality,
             target=(goal - reached).T.ravel(),
-            rows=self._matrix,
+            rows=self._matrix if not self._drags.any() else self._rows_at(dt),
             lower=lower * scale - free,
             upper=upper * scale - free,
             stages=tuple(self._assigned(i, scale, free) for i in range(len(self.sequence.stages))),
@@ -108,19 +110,15 @@ class Formulation:
 
     @cached_property
     def _rows(self) -> dict[Row, tuple[float, float]]:
-        """Every row that limits or stages speak of, with the problem's limits in SI units."""
-        return self._bounded_rows(self.problem.path_limits)
-
-    def _bounded_rows(self, bounds: Limits) -> dict[Row, tuple[float, float]]:
-        """The rows with bounds on the state and the input: the same rows, whatever is bounded how tightly."""
+        """Every row that limits or stages speak of, with the limits in SI units."""
         rows: dict[Row, tuple[float, float]] = {}
-        for row, lower, upper in (*self._limit_rows(bounds), *self._path_rows()):
+        for row, lower, upper in (*self._limit_rows(self.problem.path_limits), *self._path_rows()):
             low, high = rows.get(row, (-inf, inf))
             rows[row] = (max(low, lower), min(high, upper))
         for stage in self.sequence.stages:
             for interval in self._slots(stage):
                 for condition in stage.conditions:
-                    rows.setdefault(_row(condition, interval), (-inf, inf))
+                    rows.setdefault(self._row(condition, interval), (-inf, inf))
         return rows
 
     def _limit_rows(self, bounds: Limits) -> Iterable[tuple[Row, float, float]]:
@@ -134,8 +132,7 @@ class Formulation:
     def _path_rows(self) -> Iterable[tuple[Row, float, float]]:
         for condition in self.sequence.path_constraints:
             for interval in range(self.chain.intervals - 1):
-                bound = condition.bound(force_balance(self.problem.environment))
-                yield _row(condition, interval), *bound.limits
+                yield self._row(condition, interval), *condition.bound(self.balance).limits
 
     @cached_property
     def _derivatives(self) -> Array:
@@ -146,26 +143,54 @@ class Formulation:
         return np.array([row.direction for row in self._rows]).reshape(-1, 3)
 
     @cached_property
+    def _drags(self) -> Array:
+        return np.array([row.drag for row in self._rows])
+
+    @cached_property
     def _limits(self) -> tuple[Array, Array]:
         return _columns(self._rows)
 
     @cached_property
     def _matrix(self) -> Array:
-        """All rows over the inputs, (m, 3N)."""
-        response = np.concatenate([self.chain.forced, np.eye(self.chain.intervals)[:, None]], axis=1)
-        intervals = [row.interval for row in self._rows]
-        per_axis = response[intervals, self._derivatives.astype(int)]
+        """All rows over the inputs without drag, (m, 3N)."""
+        return self._assembled(self._response[self._places])
+
+    def _rows_at(self, dt: float) -> Array:
+        """All rows over the inputs at one dt, (m, 3N)."""
+        intervals, derivatives = self._places
+        below = self._response[intervals, np.maximum(derivatives - 1, 0)]
+        return self._assembled(self._response[self._places] + (dt * self._drags)[:, None] * below)
+
+    def _assembled(self, per_axis: Array) -> Array:
         matrix = self._directions[:, :, None] * per_axis[:, None, :]
         return frozen(matrix.reshape(len(self._rows), 3 * self.chain.intervals), "rows")
+
+    @cached_property
+    def _response(self) -> Array:
+        """Effect of the inputs on the derivatives at interval ends and on themselves, (N, r + 1, N)."""
+        return np.concatenate([self.chain.forced, np.eye(self.chain.intervals)[:, None]], axis=1)
+
+    @cached_property
+    def _places(self) -> tuple[Indices, Indices]:
+        """The interval and the derivative of each row, (m,) each."""
+        intervals = np.array([row.interval for row in self._rows], dtype=np.intp)
+        return intervals, self._derivatives.astype(np.intp)
 
     def _free(self, dt: float) -> Array:
         """Value of each row without input, normalised, (m,)."""
         free = np.concatenate(
             [self.chain.free(self.initial, dt), np.zeros((self.chain.intervals, 1, 3))], axis=1
         )
-        intervals = [row.interval for row in self._rows]
-        per_axis = free[intervals, self._derivatives.astype(int)]
+        intervals, derivatives = self._places
+        per_axis = free[intervals, derivatives]
+        per_axis = per_axis + (dt * self._drags)[:, None] * free[intervals, np.maximum(derivatives - 1, 0)]
         return np.asarray(np.sum(per_axis * self._directions, axis=-1))
+
+    def _row(self, condition: Condition, interval: int) -> Row:
+        x, y, z = condition.direction.tolist()
+        about_thrust = condition.quantity is Quantity.SPECIFIC_THRUST
+        drag = self.balance.drag if about_thrust else 0.0
+        return Row(interval, condition.quantity.derivative, (x, y, z), drag)
 
     def _slots(self, stage: Stage) -> range:
         """The intervals at whose ends a stage may hold; none when it is fixed outside them."""
@@ -176,7 +201,7 @@ class Formulation:
         """For each stage the rows of its conditions, (slots, conditions)."""
         index = {row: i for i, row in enumerate(self._rows)}
         tables = (
-            [[index[_row(c, n)] for c in stage.conditions] for n in self._slots(stage)]
+            [[index[self._row(c, n)] for c in stage.conditions] for n in self._slots(stage)]
             for stage in self.sequence.stages
         )
         return tuple(np.array(table, dtype=np.intp) for table in tables)
@@ -184,8 +209,7 @@ class Formulation:
     @cached_property
     def _stage_bounds(self) -> tuple[Array, ...]:
         """For each stage the bounds of its conditions in SI units, (conditions, 2)."""
-        balance = force_balance(self.problem.environment)
-        bounds = ([c.bound(balance) for c in stage.conditions] for stage in self.sequence.stages)
+        bounds = ([c.bound(self.balance) for c in stage.conditions] for stage in self.sequence.stages)
         return tuple(np.array([b.limits for b in stage]).reshape(-1, 2) for stage in bounds)
 
     def _assigned(self, i: int, scale: Array, free: Array) -> SlottedStage:
@@ -198,8 +222,3 @@ def _columns(rows: dict[Row, tuple[float, float]]) -> tuple[Array, Array]:
     """The lower and the upper bounds of rows, (m,) each."""
     bounds = np.array(list(rows.values())).reshape(-1, 2)
     return bounds[:, 0], bounds[:, 1]
-
-
-def _row(condition: Condition, interval: int) -> Row:
-    x, y, z = condition.direction.tolist()
-    return Row(interval, condition.quantity.derivative, (x, y, z))

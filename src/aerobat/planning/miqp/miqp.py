@@ -2,47 +2,52 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from functools import partial
 from math import sqrt
 from typing import Annotated, Literal
 
 import numpy as np
 
-from aerobat.certification import Certificate
 from aerobat.declaration import AS_IT_IS, NonNegative
 from aerobat.errors import Infeasible
-from aerobat.optimization import AssignmentResult, Solver, solver
-from aerobat.planning.certified_solve import Judged, Solution, certified_solve, refuted_by_samples, tightened
+from aerobat.flatness import force_balance
+from aerobat.optimization import solver
+from aerobat.planning.certified_solve import Judged
+from aerobat.planning.miqp.attempts import Attempts, Placement, flyable_order, plan_of
 from aerobat.planning.miqp.diagnosis import why_infeasible
 from aerobat.planning.miqp.formulation import Formulation
 from aerobat.planning.miqp.integrator import IntegratorChain, Intervals, Order
+from aerobat.planning.miqp.refinement import descended, settled
+from aerobat.planning.miqp.rescue import rescued_plan
+from aerobat.planning.miqp.shortest import shortest
 from aerobat.planning.planners import Planner, option, planner
 from aerobat.planning.recorder import Progress, Recorder
-from aerobat.planning.result import PlacedStage, Plan
-from aerobat.planning.search import BisectionSearch, GridSearch, Search
-from aerobat.problem.problem import Limits, Problem
+from aerobat.planning.result import Plan
+from aerobat.planning.search import GridSearch, Search
+from aerobat.problem.problem import Problem
 from aerobat.problem.stage import StageSequence
-from aerobat.trajectory import Trajectory
 from aerobat.vehicle import Vehicle
 
 # without a vehicle, stages that ask a fraction of its thrust assume what a hexarotor in the paper's class has
 ASSUMED_THRUST_TO_WEIGHT = 5.0
-ROUNDS = 4  # of solving at one dt, at most, with bounds tightened by what was exceeded between interval ends
-JERK_ORDER = 3  # the order whose body rates jump between intervals
 
 
 @planner("miqp")
 class Miqp(Planner):
-    """The paper's mixed-integer program (Section II).
+    """The paper's mixed-integer program (Section II), refined within what a vehicle can do.
 
-    Without a `search`, dt is the first feasible of the paper's grid when there is no vehicle, and otherwise
-    the smallest, to half a percent, at which a plan is certified. With a vehicle the problem's limits hold
-    between interval ends too: where a solution exceeds any, its bounds are tightened by as much, and it is
-    solved again. Only with jerk as input, order 3, body rates jump, which its certificate then says.
+    Without a vehicle, dt is the first feasible of the paper's grid, or what `search` finds. With one,
+    programs along a scan on dt say where stages lie; from there the intervals, equal in each phase between
+    stages, become as short as rotors, their commands, body rate, limits and conditions allow. With a vehicle
+    and a `search` intervals stay equal, dt is the search's, and only programs whose own path cannot be flown
+    are refined. What is returned is certified, but for orders whose jumps no rotor can make, as the
+    certificate then says.
     """
 
-    order: Order = option(
-        4, "The derivative that is piecewise constant, 3 jerk (the paper's), 4 snap, 5 crackle."
+    order: Order | None = option(
+        None,
+        "The derivative that is piecewise constant, 3 jerk (the paper's), 4 snap, 5 crackle. Default: 5 for "
+        "rotors with lag, else 4.",
     )
     intervals: Intervals = option(20, "N, the number of intervals.")
     search: Annotated[Search, AS_IT_IS] | None = None
@@ -52,31 +57,55 @@ class Miqp(Planner):
     time_limit: NonNegative | None = option(  # [s]
         None, "Seconds for each program; the best plan found by then is taken and its gap reported."
     )
+    rescue: bool = option(
+        True, "Give up where nothing is found, and try no other intervals, order or planner.", off="no-rescue"
+    )
 
     def plan(
         self, problem: Problem, vehicle: Vehicle | None = None, progress: Progress | None = None
     ) -> Plan:
-        """The plan of the smallest dt that the search finds.
+        """The shortest plan found.
 
-        With a vehicle, its rotor thrusts stay within limits along the whole trajectory. Raises
-        Infeasible, naming the bound that binds, SpecError for input that makes no sense, and
-        BackendMissing when the solver is not installed.
+        With a vehicle, it is certified. Raises Infeasible, naming the bound that binds, SpecError for input
+        that makes no sense, and BackendMissing when the solver is not installed.
         """
-        formulation = formulate(problem, self.order, self.intervals, vehicle)
-        planning = _Planning(self, formulation, vehicle, solver(self.backend), Recorder(progress))
-        found = self._search(problem, vehicle).smallest(planning.attempt)
-        if found is None:
-            attempts = planning.recorder.attempts
-            raise Infeasible(why_infeasible(formulation, attempts, vehicle), attempts)
-        return planning.result(found)
+        recorder = Recorder(progress)
+        try:
+            return self._planned(problem, vehicle, recorder)
+        except Infeasible as infeasible:
+            if vehicle is None or not self.rescue or not infeasible.attempts:
+                raise
+            rescued = rescued_plan(self, problem, vehicle, recorder)
+            if rescued is None:
+                raise
+            return rescued
 
-    def _search(self, problem: Problem, vehicle: Vehicle | None) -> Search:
-        if self.search is not None:
-            return self.search
-        if vehicle is None:
-            return GridSearch()
-        first = duration_lower_bound(problem, vehicle) / self.intervals
-        return BisectionSearch(first, last=max(4.0, 2.0 * first))
+    def _planned(self, problem: Problem, vehicle: Vehicle | None, recorder: Recorder) -> Plan:
+        order = flyable_order(vehicle) if self.order is None else self.order
+        formulation = formulate(problem, order, self.intervals, vehicle)
+        attempts = Attempts(formulation, vehicle, solver(self.backend), self.time_limit, recorder)
+        if vehicle is None or self.search is not None:
+            found = (self.search or GridSearch()).smallest(partial(_attempt, attempts))
+        else:
+            first = duration_lower_bound(problem, vehicle) / self.intervals
+            found = shortest(attempts, first, last=max(4.0, 2.0 * first))
+        if found is None:
+            raise Infeasible(why_infeasible(formulation, recorder.attempts, vehicle), recorder.attempts)
+        return plan_of(attempts, found, self.backend)
+
+
+def _attempt(attempts: Attempts, dt: float) -> Judged[Placement] | None:
+    """Outcome of one dt; None where nothing is found that is certified."""
+    placement = Placement(attempts.solve(dt), dt)
+    judged = attempts.judge(placement, dt)
+    if judged.feasible or placement.answer.x is None or attempts.vehicle is None:
+        return judged if judged.feasible else None
+    start = attempts.start(placement, held=True)
+    path = descended(start.program, start.x)
+    if path is None:
+        return None
+    refined = attempts.refined(placement, partial(settled, path))
+    return refined if refined.feasible else None
 
 
 def formulate(problem: Problem, order: int, intervals: int, vehicle: Vehicle | None = None) -> Formulation:
@@ -95,102 +124,8 @@ def formulate(problem: Problem, order: int, intervals: int, vehicle: Vehicle | N
     sequence = problem.stages(thrust)
     if vehicle is not None:
         _check_thrust(sequence, vehicle)
-    return Formulation(problem, sequence, IntegratorChain(order, intervals))
-
-
-@dataclass
-class _Planning:
-    """One run of the search: what all attempts share."""
-
-    config: Miqp
-    formulation: Formulation
-    vehicle: Vehicle | None
-    solver: Solver
-    recorder: Recorder
-    slots: tuple[int, ...] | None = None  # of the last solution: where the next solve begins
-
-    def attempt(self, dt: float) -> Judged[AssignmentResult] | None:
-        """Outcome of one dt; None where nothing is found that the rotors can follow within all limits."""
-        program = _ProgramAtDt(self, dt)
-        jumps = self.config.order <= JERK_ORDER + 1
-        judged = certified_solve(
-            program, self.formulation.problem, self.vehicle, self.recorder, ROUNDS, jumps
-        )
-        return judged if judged.feasible else None
-
-    def result(self, found: Judged[AssignmentResult]) -> Plan:
-        """The plan of what the search settled on."""
-        answer, dt = found.solution.source, found.solution.dt or 0.0
-        stages = zip(self.formulation.sequence.stages, answer.slots or (), strict=True)
-        return found.plan(
-            self.recorder,
-            planner="miqp",
-            order=self.config.order,
-            status=answer.status,
-            backend=self.config.backend,
-            stages=tuple(PlacedStage(s.name, slot, (slot + 1) * dt, s.gate) for s, slot in stages),
-            bound=self.formulation.cost(answer.bound, dt),
-            gap=answer.gap,
-        )
-
-
-@dataclass
-class _ProgramAtDt:
-    """The program at one dt, with bounds at interval ends that are as tight as what lies between needs."""
-
-    planning: _Planning
-    dt: float
-    bounds: Limits | None = None  # tighter than the problem's limits
-
-    def solve(self) -> Solution[AssignmentResult]:
-        """Its solution; a failure where it has none, or where samples show that the rotors cannot follow."""
-        planning, formulation = self.planning, self.planning.formulation
-        program = formulation.program(self.dt, self.bounds)
-        answer = planning.solver.solve(program, time_limit=planning.config.time_limit, start=planning.slots)
-        if answer.x is None:
-            late = answer.status == "unknown"
-            failure = "no solution was found in time" if late else "the program has no solution"
-            return self._solution(answer, failure=failure)
-        planning.slots = answer.slots
-        trajectory = Trajectory.from_inputs(
-            formulation.initial,
-            formulation.inputs(answer.x, self.dt),
-            self.dt,
-            formulation.problem.heading,
-        )
-        solution = self._solution(answer, trajectory, formulation.cost(answer.cost, self.dt))
-        return refuted_by_samples(solution, formulation.problem, planning.vehicle)
-
-    def tighten(self, solution: Solution[AssignmentResult], certificate: Certificate | None) -> bool:
-        """Tighten bounds on the state; the input itself is constant on each interval and exceeds nothing."""
-        if solution.trajectory is None or certificate is None or (certificate.margin or 0.0) < 0.0:
-            return False  # rotors are helped by a longer dt only
-        chain, limits = self.planning.formulation.chain, self.planning.formulation.problem.path_limits
-        imposed = limits if self.bounds is None else self.bounds
-        bounds = tightened(imposed, limits, solution.trajectory, chain.order)
-        if bounds is None or bounds is imposed:
-            return False
-        self.bounds = bounds
-        return True
-
-    def _solution(
-        self,
-        answer: AssignmentResult,
-        trajectory: Trajectory | None = None,
-        cost: float | None = None,
-        failure: str | None = None,
-    ) -> Solution[AssignmentResult]:
-        return Solution(
-            source=answer,
-            duration=self.dt * self.planning.config.intervals,
-            trajectory=trajectory,
-            status=answer.status,
-            nodes=answer.nodes,
-            solve_time=answer.time,
-            cost=cost,
-            dt=self.dt,
-            failure=failure,
-        )
+    balance = force_balance(problem.environment, vehicle)
+    return Formulation(problem, sequence, IntegratorChain(order, intervals), balance)
 
 
 def _check_thrust(sequence: StageSequence, vehicle: Vehicle) -> None:

@@ -1,0 +1,330 @@
+"""A path through fixed slots within what its vehicle can do: the shortest, or one of a fixed interval.
+
+Branch and bound knows bounds per axis only. What it finds is refined here with rotors, commands, body rate,
+limits and conditions held at places along all intervals; the variables are the inputs, how long the intervals
+of each phase are, and the mean interval. Goal and stages are met exactly at every step.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+
+import numpy as np
+
+from aerobat.arrays import Array, Indices, Mask
+from aerobat.optimization.prox_linear import Linearization, prox_linear
+from aerobat.planning.miqp.formulation import Formulation
+from aerobat.planning.miqp.path_rows import PathRows, of_conditions
+from aerobat.planning.miqp.phases import DERIVATIVES, PhasedChain, Places, Samples
+from aerobat.planning.miqp.rotor_rows import RotorRows
+from aerobat.trajectory import Trajectory
+from aerobat.vehicle import Vehicle
+
+PARTS = 4  # of each interval, at whose ends constraints are held
+DENSE_PARTS = 16  # at whose ends they are looked at afterwards
+NEAR = 0.15  # of a constraint's range: nearer ones are rows of a step
+ROTOR_BACKOFF = 2e-4  # of a rotor's range, which the certificate can tell
+ROTOR_SLACK = 0.5 * ROTOR_BACKOFF  # of that, by which a path may miss it
+EXCESS_FACTOR = 1.2  # backoff for each unit of excess between places
+EXCESS_BACKOFF = 1e-4  # and so much more, for what moves while it is made up for
+NEGLIGIBLE = 5e-10  # of a constraint's range
+REACH = 0.15  # of the mean interval and of each phase's, in one step
+SETTLING_STRETCH = 3e-4  # of the mean interval: leaves room for meeting all constraints exactly
+SETTLING_STEPS = 8  # at most
+MIN_RATIO = 0.3  # of an interval to the mean
+RATIO_SCALE = 0.3  # change of a ratio that counts as much as a whole unit of ln h
+MENDABLE = 2e-3  # of a constraint's range: an excess that settling mends
+MAX_STEPS = 40  # of a descent
+SECOND_STEPS = 20  # of another, once backed off
+ROUNDS = 8  # of settling, at most
+
+
+@dataclass(frozen=True, eq=False)
+class PathProgram:
+    """Paths through fixed slots as a smooth program, all constraints as fractions of their ranges."""
+
+    formulation: Formulation
+    vehicle: Vehicle
+    slots: tuple[int, ...]  # one a stage
+    equal: bool  # intervals all of the same length, or phases each of their own
+    scale_of_input: float  # a normalised input that counts
+    held: bool = False  # times as they are: any path within all constraints will do
+    reserve: float = ROTOR_BACKOFF  # of what the vehicle can do, kept everywhere
+    backoff: Array = field(default_factory=lambda: np.zeros(0))  # of each interval and constraint, (N, c)
+
+    @cached_property
+    def chain(self) -> PhasedChain:
+        """Its intervals in phases, one phase where all are equal."""
+        intervals = self.formulation.chain.intervals
+        ends = [intervals] if self.equal else sorted({slot + 1 for slot in self.slots} | {intervals})
+        return PhasedChain(self.formulation.initial, tuple(np.diff([0, *ends]).tolist()))
+
+    @property
+    def cost(self) -> Array:
+        """The logarithm of the mean interval, where the shortest is wanted."""
+        cost = np.zeros(self._size)
+        cost[-1] = float(not self.held)
+        return cost
+
+    @cached_property
+    def scale(self) -> Array:
+        """How far each variable moves for a change that counts."""
+        inputs = 3 * self.chain.intervals
+        scale = np.full(self._size, self.scale_of_input * np.sqrt(self.chain.intervals))
+        scale[inputs:] = RATIO_SCALE
+        scale[-1] = 1.0
+        return scale
+
+    @cached_property
+    def reach(self) -> Array:
+        """The farthest that one step may go."""
+        reach = np.full(self._size, np.inf)
+        reach[3 * self.chain.intervals :] = 0.0 if self.held else REACH
+        return reach
+
+    @cached_property
+    def bounded(self) -> tuple[Array, Array, Array]:
+        """Ratios that add up, none of them tiny, and stages within their windows of time."""
+        counts, intervals = np.array(self.chain.counts, dtype=float), self.chain.intervals
+        if self.equal or self.held:
+            return np.zeros((0, self._size)), np.zeros(0), np.zeros(0)
+        phases = np.eye(len(counts))
+        rows, lower, upper = [counts / intervals, *phases], [1.0], [1.0]
+        lower += [MIN_RATIO] * len(counts)
+        upper += [np.inf] * len(counts)
+        for stage, slot in zip(self.formulation.sequence.stages, self.slots, strict=True):
+            first, last = stage.window
+            if stage.interval_offset:
+                first = last = (slot + 1) / intervals
+            if (first, last) != (0.0, 1.0):
+                rows.append(self.chain.knot_shifts[slot + 1] / intervals)
+                lower.append(first)
+                upper.append(last)
+        matrix = np.zeros((len(rows), self._size))
+        matrix[:, 3 * intervals : -1] = rows
+        return matrix, np.array(lower), np.array(upper)
+
+    def at(self, x: Array) -> PathPoint | None:
+        """The path next to x that meets goal and stages exactly."""
+        if not np.isfinite(x).all() or (x[3 * self.chain.intervals : -1] <= 0.0).any():
+            return None
+        instants = self.chain.samples(x, self._instants)
+        rows, residual = self._met(instants)
+        step = np.linalg.lstsq(rows[:, : 3 * self.chain.intervals], -residual, rcond=1e-12)[0]
+        moved = x.copy()
+        moved[: len(step)] += step
+        return PathPoint(self, moved)
+
+    def backed_off(self, excess: Array) -> PathProgram:
+        """The same with constraints tighter by what is exceeded in each interval, (N, c)."""
+        old = self.backoff if self.backoff.size else np.zeros_like(excess)
+        return replace(self, backoff=old + EXCESS_FACTOR * excess + EXCESS_BACKOFF * (excess > 0.0))
+
+    @cached_property
+    def _size(self) -> int:
+        return 3 * self.chain.intervals + len(self.chain.counts) + 1
+
+    @cached_property
+    def places(self) -> Places:
+        """Where constraints are held."""
+        return Places.even(self.chain.intervals, PARTS)
+
+    @cached_property
+    def rotors(self) -> RotorRows:
+        """What the vehicle can do."""
+        problem = self.formulation.problem
+        return RotorRows(self.vehicle, problem.environment, problem.heading)
+
+    @cached_property
+    def path(self) -> PathRows:
+        """Limits, and what holds throughout."""
+        problem, sequence = self.formulation.problem, self.formulation.sequence
+        balance = self.formulation.balance
+        return PathRows.of(problem.path_limits, self.chain.order, sequence.path_constraints, balance)
+
+    @cached_property
+    def _instants(self) -> Places:
+        """The goal, then the stages."""
+        ends = np.array([self.chain.intervals - 1, *self.slots], dtype=np.intp)
+        return Places(ends, np.ones(len(ends)))
+
+    @cached_property
+    def _stage_rows(self) -> tuple[Indices, Array, Array, Mask]:
+        """Conditions of stages as weights · derivatives ≤ bounds, with the places they hold at.
+
+        Places (q,), weights (q, 6, 3), bounds (q,), and which are one side of an equality.
+        """
+        balance = self.formulation.balance
+        found = []
+        for i, stage in enumerate(self.formulation.sequence.stages, 1):
+            for condition in stage.conditions:
+                equal = condition.lower == condition.upper
+                rows = list(of_conditions((condition,), balance))
+                found += [(i, *row, equal) for row in (rows[:1] if equal else rows)]
+        return (
+            np.array([row[0] for row in found], dtype=np.intp),
+            np.array([row[1] for row in found]).reshape(-1, DERIVATIVES, 3),
+            np.array([row[2] for row in found]),
+            np.array([row[3] for row in found], dtype=bool),
+        )
+
+    def _met(self, instants: Samples) -> tuple[Array, Array]:
+        """What is met exactly, goal and equalities of stages: rows over the variables, and residuals."""
+        order = self.chain.order
+        goal = self.formulation.problem.goal.derivatives(order)
+        unit = np.eye(order * 3).reshape(-1, order, 3)
+        weights = np.zeros((len(unit), DERIVATIVES, 3))
+        weights[:, :order] = unit
+        places, stage_weights, bounds, equal = self._stage_rows
+        weights = np.concatenate([weights, stage_weights[equal]])
+        at = np.concatenate([np.zeros(len(unit), dtype=np.intp), places[equal]])
+        values = np.sum(weights * instants.derivatives[at], axis=(1, 2))
+        rows = instants.rows(at, weights)
+        size = np.linalg.norm(rows[:, : 3 * self.chain.intervals], axis=1)
+        size[size == 0.0] = 1.0
+        return rows / size[:, None], (values - np.concatenate([goal.ravel(), bounds[equal]])) / size
+
+
+@dataclass(frozen=True, eq=False)
+class PathPoint:
+    """One path of a program."""
+
+    program: PathProgram
+    x: Array
+
+    @cached_property
+    def trajectory(self) -> Trajectory:
+        """The path, exactly."""
+        return self.program.chain.trajectory(self.x, self.program.formulation.problem.heading)
+
+    @cached_property
+    def violation(self) -> float:
+        """The largest excess, as a fraction of its constraint's range, a trifle of what rows aim at aside."""
+        rotor_columns = self._values.shape[1] - len(self.program.path.bounds)
+        rotors = self._values[:, :rotor_columns].max(initial=-1.0) - ROTOR_SLACK
+        others = max(self._values[:, rotor_columns:].max(initial=-1.0), self._stage_values.max(initial=-1.0))
+        return float(max(rotors, others - NEGLIGIBLE))
+
+    def linearization(self) -> Linearization:
+        """The constraints near the path."""
+        program = self.program
+        place, column = np.nonzero(self._values > -NEAR)
+        weights = self._slopes(place, column)
+        values = self._values[place, column]
+        at, stage_weights, _, equal = program._stage_rows
+        rows = [self._samples.rows(place, weights), self._instants.rows(at[~equal], stage_weights[~equal])]
+        equality, residual = program._met(self._instants)
+        return Linearization(
+            values=np.concatenate([values, self._stage_values]),
+            rows=np.concatenate(rows),
+            residual=residual,
+            equality=equality,
+        )
+
+    def excess(self, parts: int) -> Array:
+        """By how much constraints are exceeded in each interval, (N, c), at places this dense."""
+        chain = self.program.chain
+        samples = chain.samples(self.x, Places.even(chain.intervals, parts))
+        frames = self.program.rotors.frames(samples.times, samples.derivatives)
+        values = self._constraints(samples, frames).reshape(chain.intervals, parts + 1, -1)
+        worst = values.max(axis=1)
+        return np.where(worst > NEGLIGIBLE, worst, 0.0)
+
+    def near(self, margin: float) -> Array:
+        """1 where constraints are nearer to their bounds than the margin in an interval, else 0, (N, c).
+
+        Zero for limits on the path in the first and the last interval, where start and goal may lie on them.
+        """
+        values = self._values.reshape(self.program.chain.intervals, PARTS + 1, -1)
+        near = np.asarray(values.max(axis=1) > -margin, dtype=float)
+        path = len(self.program.path.bounds)
+        if path:
+            near[[0, -1], -path:] = 0.0
+        return near
+
+    @cached_property
+    def _samples(self) -> Samples:
+        return self.program.chain.samples(self.x, self.program.places)
+
+    @cached_property
+    def _instants(self) -> Samples:
+        return self.program.chain.samples(self.x, self.program._instants)
+
+    @cached_property
+    def _frames(self) -> Array:
+        return self.program.rotors.frames(self._samples.times, self._samples.derivatives)
+
+    @cached_property
+    def _values(self) -> Array:
+        """The constraints at places, backed off, (m, c)."""
+        program = self.program
+        values = self._constraints(self._samples, self._frames)
+        values[:, : -len(program.path.bounds) or None] += program.reserve
+        return values + program.backoff[program.places.interval] if program.backoff.size else values
+
+    @cached_property
+    def _stage_values(self) -> Array:
+        """Inequalities of stages."""
+        at, weights, bounds, equal = self.program._stage_rows
+        values = np.sum(weights * self._instants.derivatives[at], axis=(1, 2)) - bounds
+        return np.asarray(values[~equal])
+
+    def _constraints(self, samples: Samples, frames: Array) -> Array:
+        rotors = self.program.rotors.values(samples.derivatives, frames)
+        return np.concatenate([rotors, self.program.path.values(samples.derivatives)], axis=1)
+
+    def _slopes(self, place: Indices, column: Indices) -> Array:
+        """Of constraints by the derivatives at their places, (q, 6, 3)."""
+        path = self.program.path.weights
+        rotor_columns = self._values.shape[1] - len(path)
+        of_path = column >= rotor_columns
+        slopes = np.empty((len(place), DERIVATIVES, 3))
+        slopes[of_path] = path[column[of_path] - rotor_columns]
+        at, index = np.unique(place[~of_path], return_inverse=True)
+        by_place = self.program.rotors.slopes(self._samples.derivatives[at], self._frames[at])
+        slopes[~of_path] = by_place[index, column[~of_path]]
+        return slopes
+
+
+def descended(program: PathProgram, start: Array, max_steps: int = MAX_STEPS) -> PathPoint | None:
+    """The path that a descent ends at; None where it is far from what it should keep within.
+
+    Args:
+        program: What is sought.
+        start: The variables to begin with.
+        max_steps: Of the descent, at most.
+    """
+    point = program.at(start)
+    point = None if point is None else prox_linear(program, point, max_steps).point
+    return None if point is None or point.violation > MENDABLE else point
+
+
+def finished(point: PathPoint) -> PathPoint | None:
+    """What a descent ended at, within all constraints between places too; None where that fails.
+
+    Once more down, backed off from what is exceeded between places; what is then left takes a trifle of time.
+    """
+    backed_off = point.program.backed_off(point.excess(DENSE_PARTS))
+    return settled(descended(backed_off, point.x, SECOND_STEPS) or point)
+
+
+def settled(point: PathPoint) -> PathPoint | None:
+    """The path flown a trifle slower, within all constraints; None where that is not enough."""
+    stretch = 0.0
+    for _ in range(ROUNDS):
+        excess = point.excess(DENSE_PARTS)
+        if point.violation <= 0.0 and not excess.any():
+            return point
+        held = point.program.held
+        program = replace(point.program.backed_off(excess), held=True)
+        x = point.x.copy()
+        if not held:
+            stretch = max(2.0 * stretch, SETTLING_STRETCH)
+            x[-1] += stretch
+        moved = program.at(x)
+        if moved is None:
+            return None
+        moved = prox_linear(program, moved, SETTLING_STEPS).point
+        point = PathPoint(replace(program, held=held), moved.x)
+    return None

@@ -1,0 +1,56 @@
+"""What else may find a plan where the intervals and the order that were asked for find none."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+from aerobat.errors import BackendMissing, Infeasible, SpecError
+from aerobat.planning.miqp.attempts import flyable_order
+from aerobat.planning.miqp.integrator import INPUT_NAMES
+from aerobat.planning.planners import Planner, planner_class
+from aerobat.planning.recorder import Recorder
+from aerobat.planning.result import Plan
+from aerobat.problem.problem import Problem
+from aerobat.vehicle import Vehicle
+
+if TYPE_CHECKING:
+    from aerobat.planning.miqp.miqp import Miqp
+
+MORE_INTERVALS = (1.3, 1.8)  # times as many
+
+
+def rescued_plan(asked: Miqp, problem: Problem, vehicle: Vehicle, recorder: Recorder) -> Plan | None:
+    """The first plan that another setting or planner finds, which says so; None where all fail.
+
+    Args:
+        asked: The planner that found none.
+        problem: What is planned.
+        vehicle: What shall fly it.
+        recorder: The attempts so far; those that follow are passed on to its `progress`.
+    """
+    for planner, how in _alternatives(asked, vehicle):
+        try:
+            plan = planner.plan(problem, vehicle, recorder.progress)
+        except (Infeasible, SpecError, BackendMissing):
+            continue
+        if plan.certified:
+            attempts = (*recorder.attempts, *plan.attempts)
+            wanted = f"miqp found none with {asked.intervals} intervals"
+            return replace(plan, attempts=attempts, rescue=f"{wanted}; planned {how}")
+    return None
+
+
+def _alternatives(asked: Miqp, vehicle: Vehicle) -> Iterator[tuple[Planner, str]]:
+    """Planners, and how they plan in words."""
+    for factor in MORE_INTERVALS:
+        intervals = round(factor * asked.intervals)
+        yield replace(asked, intervals=intervals, rescue=False), f"with {intervals}"
+    first = flyable_order(vehicle)
+    for order in range(first, max(INPUT_NAMES) + 1):
+        if order != (asked.order or first):
+            yield replace(asked, order=order, rescue=False), f"with order {order}"
+    if asked.search is not None:
+        yield replace(asked, search=None, rescue=False), "with intervals that differ"
+    yield planner_class("free-knots")(), "by free-knots"

@@ -1,0 +1,107 @@
+"""The shortest path that a vehicle can fly: from programs along a scan on dt, each refined from its slots.
+
+The programs know no rotors. Those of small dt, which the vehicle cannot fly, have their stages where a fast
+path has them: from there the descent ends at shorter paths than from those that it can.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from functools import partial
+from math import inf
+
+from aerobat.planning.certified_solve import Judged
+from aerobat.planning.flyability import flight_error
+from aerobat.planning.miqp.attempts import Attempts, Placement
+from aerobat.planning.miqp.refinement import PathPoint, descended, finished
+from aerobat.planning.result import FLYABLE_ERROR
+
+GROWTH = 1.15  # of dt, from one program to the next
+COARSE_GROWTH = 1.3  # where a path is further off than that
+COARSE = 4.0  # of a constraint's range
+FAR = 1.3  # of a constraint's range: a path that exceeds it by more is no place to begin,
+FALLING = 1.25  # unless the excess falls no faster than by this factor from one program to the next
+STARTS = 2  # that lead to a path
+MAX_STARTS = 6
+RESERVES = (0.02, 0.05, 0.1, 0.2)  # of the rotors' ranges, for paths that leave the controller too little
+
+
+def shortest(attempts: Attempts, first: float, last: float) -> Judged[Placement] | None:
+    """The shortest certified path found, or None.
+
+    Args:
+        attempts: Made and recorded here.
+        first: The scan's smallest dt [s].
+        last: The scan's largest dt [s].
+    """
+    scan = _Scan(attempts, first, last)
+    ends: list[tuple[Placement, PathPoint]] = []
+    for tried, start in enumerate(scan.starts()):
+        path = descended(start.path.program, start.path.x) if start.path else None
+        if path is not None:
+            ends.append((start, path))
+        if len(ends) == STARTS or tried + 1 == MAX_STARTS:
+            break
+    for start, path in sorted(ends, key=lambda end: float(end[1].x[-1])):
+        judged = attempts.refined(start, partial(finished, path))
+        if judged.feasible:
+            return flyable(attempts, judged)
+    return scan.certified()
+
+
+def flyable(attempts: Attempts, judged: Judged[Placement]) -> Judged[Placement]:
+    """The same, or with a reserve for the controller where its own flight leaves the path."""
+    vehicle, environment = attempts.vehicle, attempts.formulation.problem.environment
+    for reserve in RESERVES:
+        path, trajectory = judged.solution.source.path, judged.solution.trajectory
+        assert vehicle is not None
+        assert trajectory is not None
+        if path is None or flight_error(trajectory, vehicle, environment) <= FLYABLE_ERROR:
+            return judged
+        kept = descended(replace(path.program, reserve=reserve), path.x)
+        if kept is not None:
+            reserved = attempts.refined(judged.solution.source, partial(finished, kept))
+            judged = reserved if reserved.feasible else judged
+    return judged
+
+
+@dataclass
+class _Scan:
+    """Programs along dt, up to the first whose own path the vehicle can fly."""
+
+    attempts: Attempts
+    first: float  # [s]
+    last: float  # [s]
+    flown: Placement | None = None  # the answer that the vehicle can fly as it is
+
+    def starts(self) -> Iterator[Placement]:
+        """Answers that are not far from what the vehicle can do, each as a path of its program."""
+        dt, before = self.first, inf
+        while dt <= self.last:
+            placement = Placement(self.attempts.solve(dt), dt)
+            violation = inf
+            if placement.answer.x is not None:
+                placement = replace(placement, path=self.attempts.start(placement))
+                violation = placement.path.violation if placement.path else inf
+            self._record(placement, violation)
+            if violation <= 0.0:
+                self.flown = replace(placement, path=None)
+            if violation <= FAR or (violation < inf and violation * FALLING > before):
+                yield placement
+            if violation <= 0.0:
+                return
+            dt, before = dt * (GROWTH if violation < COARSE else COARSE_GROWTH), violation
+
+    def certified(self) -> Judged[Placement] | None:
+        """The answer that the vehicle can fly as it is, certified, or None."""
+        if self.flown is None:
+            return None
+        judged = self.attempts.judge(self.flown, self.flown.dt)
+        return judged if judged.feasible else None
+
+    def _record(self, placement: Placement, violation: float) -> None:
+        if violation > 0.0:
+            excess = f"beyond what the vehicle can do by {100 * violation:.3g} % of a limit's range"
+            failure = None if violation == inf else excess
+            self.attempts.judge(replace(placement, path=None), placement.dt, failure)
