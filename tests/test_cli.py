@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -85,6 +86,29 @@ def test_paper_mode_prints_the_known_optimum(capsys) -> None:
     assert report["flight"]["max_position_error_m"] < 0.05
 
 
+def test_the_papers_own_law_flies_where_it_is_asked_for_and_the_full_one_elsewhere(capsys) -> None:
+    """As the paper's half-flip goes with nothing beyond its law: 98 cm and 124° off."""
+    flights = {}
+    for options in ((), ("--controller", "paper")):
+        _, out, _ = run(capsys, "fly", "half-flip", "--paper", *options, "--json")
+        flight = json.loads(out)["flight"]
+        flights[flight["controller"]] = flight
+    assert flights["full"]["max_position_error_m"] < 0.03
+    assert flights["paper"]["max_position_error_m"] == pytest.approx(0.985, abs=0.005)
+    assert flights["paper"]["max_attitude_error_deg"] == pytest.approx(124.3, abs=0.5)
+
+
+def test_every_report_says_how_the_plan_flew_and_which_controller_did(capsys) -> None:
+    _, out, _ = run(capsys, "fly", "half-flip")
+    assert "flyability" in out
+    assert "the reserve left" in out
+    assert re.search(r"controller +full", out)
+    _, out, _ = run(capsys, "plan", "half-flip", "--json")
+    flyability = json.loads(out)["plan"]["flyability"]
+    assert flyability["flies"] is True
+    assert 0.0 < flyability["error_m"] < flyability["disturbed_error_m"] < 0.05
+
+
 def test_the_gates_tilt_is_what_angle_says(capsys) -> None:
     _, out, _ = run(capsys, "fly", "half-flip", "--angle", "40", "--json")
     states = load_flight("out/half-flip/flight.npz").states
@@ -122,6 +146,7 @@ def test_help_tells_every_command_and_option(capsys) -> None:
     assert all(command in out for command in ("fly", "plan", "check", "compare", "vehicles", "Exit codes"))
     _, out, _ = run(capsys, "fly", "--help")
     options = "vehicle planner order intervals segments stop-after backend paper angle out json seed noise"
+    assert "--controller" in out
     assert all(f"--{option}" in out for option in options.split())
 
 

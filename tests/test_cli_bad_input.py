@@ -149,6 +149,7 @@ ARGUMENT_FAULTS = {
     "unknown command": (["loop", "line"], "loop"),
     "no problem": (["fly"], "problem"),
     "negative noise": (["fly", "line", "--noise", "-1"], "noise"),
+    "unknown controller": (["fly", "line", "--controller", "papr"], "did you mean 'paper'?"),
     "negative seed": (["fly", "line", "--seed", "-1"], "seed"),
     "negative time": (["plan", "line", "--time-limit", "-1"], "time_limit"),
     "output over a file": (["plan", "line", "--out", "taken"], "taken"),

@@ -3,7 +3,6 @@
 import subprocess
 import sys
 from dataclasses import replace
-from types import SimpleNamespace
 
 import matplotlib
 import numpy as np
@@ -221,13 +220,7 @@ def test_a_flight_that_went_astray_does_not_shrink_the_picture():
     flight = simulated("flip-roll")
     position = flight.states.position.copy()
     position[len(position) // 2 :] += 1000.0
-    stray = SimpleNamespace(
-        times=flight.times,
-        setpoint=flight.setpoint,
-        states=replace(flight.states, position=position),
-        thrusts=flight.thrusts,
-        vehicles=flight.vehicles,
-    )
+    stray = replace(flight, series={**flight.series, "position": position})
     ordinary, lost = (draw(f, planned("flip-roll")).axes[0].get_ylim() for f in (flight, stray))
     assert np.ptp(lost) < 2.0 * np.ptp(ordinary)
 

@@ -8,8 +8,9 @@ from cyclopts import Parameter
 
 from aerobat.cli.entry import ExitCode
 from aerobat.cli.options import FlyingOptions, PlanningOptions
-from aerobat.cli.run_folder import finish
+from aerobat.cli.run_folder import Flown, finish
 from aerobat.cli.tasks import planned
+from aerobat.control import Controller, named_controller
 from aerobat.evaluation import score
 from aerobat.planning import nominal_flight
 from aerobat.simulation import StateNoise
@@ -33,10 +34,11 @@ def fly(
         A name that `aerobat problems` lists, a problem's TOML file, or a .plan file, which is flown as it is.
     """
     noise = StateNoise.fused().scaled(flying.noise) if flying.noise else None
+    controller = named_controller(flying.controller)
     plan = planned(problem, options)
     assert plan.vehicle is not None, "a command plans for a vehicle"
-    if noise is None:  # the flight that the plan was judged by
+    if noise is None and controller == Controller():  # the flight that the plan was judged by
         flight = nominal_flight(plan.trajectory, plan.vehicle, plan.problem.environment)
     else:
-        flight = simulate(plan, noise=noise, seed=flying.seed)
-    return finish(plan, options, flight, score(flight, plan, plan.vehicle))
+        flight = simulate(plan, controller=controller, noise=noise, seed=flying.seed)
+    return finish(plan, options, Flown(flight, score(flight, plan, plan.vehicle), flying.controller))

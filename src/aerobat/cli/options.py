@@ -104,7 +104,7 @@ class PlanningOptions(TaskOptions):
     paper: Annotated[bool, Parameter(group=planning, negative="", show_default=False)] = False
     """Exactly the paper's formulation with its reference parameters: miqp of order 3, bounds per axis,
     unsigned and unordered stages, dt the first feasible of 50 steps from 0.1 to 4 s; no vehicle in
-    planning."""
+    planning. Flown by --controller all the same."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -113,6 +113,10 @@ class FlyingOptions:
 
     noise: Annotated[float, Parameter(group=flying, validator=validators.Number(gte=0))] = 0.0
     """The error of the state that the controller sees: 0 none, 1 that of motion capture and IMU fused."""
+
+    controller: Annotated[str, Parameter(group=flying)] = "full"
+    """The control law: full, or paper, the paper's own without moment feed-forward, motor-lag compensation
+    and tilt before yaw."""
 
     seed: Annotated[int, Parameter(group=flying, validator=validators.Number(gte=0))] = 0
     """The seed of that noise: the same seed, the same flight."""

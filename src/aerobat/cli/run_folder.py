@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
 
 from aerobat.cli.entry import ExitCode
@@ -33,13 +34,21 @@ def run_folder(folder: Path) -> Iterator[Path]:
         end_interrupts()
 
 
-def finish(
-    plan: Plan, options: TaskOptions, flight: Flight | None = None, score: Score | None = None
-) -> ExitCode:
+@dataclass(frozen=True)
+class Flown:
+    """A plan's flight, its score, and the name of the controller that flew it."""
+
+    flight: Flight
+    score: Score
+    controller: str
+
+
+def finish(plan: Plan, options: TaskOptions, flown: Flown | None = None) -> ExitCode:
     """Write what was made, then say what it is; the exit code tells if all is well."""
     assert plan.vehicle is not None, "a command plans for a vehicle"
     folder = options.out or Path("out") / plan.problem.name
-    facts = to_json(report(plan, score, plan.vehicle.name))
+    flight, score, controller = (flown.flight, flown.score, flown.controller) if flown else (None, None, None)
+    facts = to_json(report(plan, score, plan.vehicle.name, controller))
     with run_folder(folder) as staging:
         plan.save(staging / f"{plan.problem.name}.plan")
         write_csv(plan.trajectory, staging / "plan.csv")
@@ -50,14 +59,11 @@ def finish(
     if options.json:
         print(facts)
     else:
-        show(summary_table(plan, score, plan.vehicle.name))
+        show(summary_table(plan, score, plan.vehicle.name, controller))
         print(f"\nwritten to {folder}/")
     return ExitCode.WELL if _is_well(plan, score) else ExitCode.NOT_WELL
 
 
 def _is_well(plan: Plan, score: Score | None) -> bool:
-    """True if the plan is certified and its flight, else its own nominal one, went well."""
-    certified = plan.certificate is not None and plan.certificate.certified
-    if score is not None:
-        return certified and score.outcome.is_success
-    return certified and plan.flyability is not None and plan.flyability.flies
+    """True if the plan is certified and flies, and its flight, if there is one, went well."""
+    return plan.certified and plan.flies and (score is None or score.outcome.is_success)

@@ -97,7 +97,7 @@ def _read_plan(path: Path, options: PlanningOptions) -> Plan:
             raise SpecError(f"{flag} plans anew, but {path} is a plan; leave it out, or name a problem")
     found = load_plan(path)
     if options.vehicle is None and found.vehicle is not None:
-        return found
+        return found if found.flyability is not None else with_flyability(found)
     return with_flyability(with_certificate(found, load_vehicle(options.vehicle or DEFAULT_VEHICLE)))
 
 

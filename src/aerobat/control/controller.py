@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
-from types import SimpleNamespace
+from collections.abc import Mapping
+from types import MappingProxyType, SimpleNamespace
 from typing import Any
 
 import numpy as np
 
-from aerobat.declaration import NonNegative, declared
+from aerobat.declaration import NonNegative, declared, unknown_name
 from aerobat.kernels.control import FeatureFlags
 from aerobat.kernels.control_loops import Gains
 from aerobat.kernels.ops import Scalar
@@ -22,7 +23,7 @@ class Controller:
 
     Gains are per unit of mass and of inertia, so that one set suits all vehicles; one whose rotors are too
     weak for the attitude loop gets both loops slowed down alike (`gains`). The three switches add to the
-    paper's law what its tracking error depends on; with all off it is the paper's law.
+    paper's law what its tracking error depends on; with all off it is the paper's law (`paper`).
     """
 
     position_gain: NonNegative = 25.0  # [1/s²]
@@ -39,6 +40,11 @@ class Controller:
     moment_feedforward: bool = True  # the moment that the reference asks, J ω' + ω × Jω
     motor_lag_compensation: bool = True  # commands that lead the rotors' lag
     prioritize_tilt: bool = True  # on saturation, give up the yaw moment before roll and pitch
+
+    @classmethod
+    def paper(cls) -> Controller:
+        """The paper's own law at the same gains, with body-frame rates but nothing beyond it."""
+        return cls(moment_feedforward=False, motor_lag_compensation=False, prioritize_tilt=False)
 
     @property
     def feature_flags(self) -> FeatureFlags:
@@ -77,3 +83,13 @@ class Controller:
             max_attitude_integral=setting.max_attitude_integral * like,
             lead_time_constant=max(setting.lead_time_constant, _SMALLEST) * like,
         )
+
+
+CONTROLLERS: Mapping[str, Controller] = MappingProxyType({"full": Controller(), "paper": Controller.paper()})
+
+
+def named_controller(name: str) -> Controller:
+    """The controller of CONTROLLERS by its name. Raises SpecError when there is none."""
+    if name not in CONTROLLERS:
+        raise unknown_name("controller", name, CONTROLLERS)
+    return CONTROLLERS[name]

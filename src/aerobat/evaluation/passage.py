@@ -44,10 +44,10 @@ class Passage:
     inside: bool  # true if the centre of mass went through the opening
     speed: float  # [m/s]
     attitude_error_deg: float  # angle between the thrust axis and the gate's upright, or what a stage asks
-    attitude_tolerance_deg: float  # largest that is allowed; NaN where no attitude is asked
+    attitude_tolerance_deg: float  # largest that is allowed; infinite where no attitude is asked
     clearance: float  # [m] from the outermost rotor tip to the frame; negative: a collision; NaN: unknown
     planned: float  # [s] when it was to be crossed; NaN where the flight had ended before
-    backward_time: float  # [s] of a crossing against the direction about then
+    backward_time: float  # [s] of a crossing against the direction about then; infinite where there is none
     max_distance: float  # [m] beyond the plane about then, negative: before it
     min_distance: float  # [m] likewise
 
@@ -126,17 +126,16 @@ def passages(planned: PlannedPassage, progress: GateProgress, stop: Array, fleet
     across, up = np.abs(offset @ gate.lateral), np.abs(offset @ gate.up)
     tilt = np.arccos(np.clip(so3.thrust_axis(q) @ planned.up, -1, 1))
     clearance = np.full(len(q), np.nan) if fleet is None else _clearance(gate, fleet, offset, q)
-    tolerance = degrees(planned.attitude_tolerance) if planned.attitude_tolerance < inf else np.nan
     fields: dict[str, Any] = {
         "time": known(time),
         "miss": known(np.linalg.norm(offset, axis=-1)),
         "inside": crossed & (across < gate.width / 2) & (up < gate.height / 2),
         "speed": known(np.linalg.norm(velocity, axis=-1)),
         "attitude_error_deg": known(np.rad2deg(tilt)),
-        "attitude_tolerance_deg": np.full(len(q), tolerance),
+        "attitude_tolerance_deg": np.full(len(q), degrees(planned.attitude_tolerance)),
         "clearance": known(clearance),
         "planned": known(planned.time, ~ended_before),
-        "backward_time": known(progress.backward, np.isfinite(progress.backward)),
+        "backward_time": progress.backward,
         "max_distance": known(progress.max_distance, ~ended_before),
         "min_distance": known(progress.min_distance, ~ended_before),
     }

@@ -4,21 +4,31 @@ from __future__ import annotations
 
 import json
 from dataclasses import asdict
+from math import inf
 from typing import Any
 
 from aerobat.evaluation.score import Score
 from aerobat.planning import Flyability, Plan
 
 
-def report(plan: Plan, score: Score | None = None, vehicle: str | None = None) -> dict[str, Any]:
-    """The content of report.json; units are in the keys. `flight` is missing when nothing was flown."""
+def report(
+    plan: Plan, score: Score | None = None, vehicle: str | None = None, controller: str | None = None
+) -> dict[str, Any]:
+    """The content of report.json; units are in the keys. `flight` is missing when nothing was flown.
+
+    Args:
+        plan: what was planned.
+        score: of its flight.
+        vehicle: the name of what flew it, by default the plan's.
+        controller: the name of the controller that did.
+    """
     facts: dict[str, Any] = {
         "problem": plan.problem.name,
         "vehicle": vehicle or (None if plan.vehicle is None else plan.vehicle.name),
         "plan": _plan(plan),
     }
     if score is not None:
-        facts["flight"] = _flight(score)
+        facts["flight"] = _flight(score) | ({} if controller is None else {"controller": controller})
     return facts
 
 
@@ -28,10 +38,10 @@ def to_json(facts: dict[str, Any] | list[dict[str, Any]]) -> str:
 
 
 def _flight(score: Score) -> dict[str, Any]:
-    """A score; what is not known is None, as JSON has no NaN."""
+    """A score; what is not known or not limited is None, as JSON has neither NaN nor infinity."""
     facts = asdict(score) | {"outcome": score.outcome.name.lower()}
     facts["passages"] = [
-        {name: None if value != value else value for name, value in passage.items()}
+        {name: None if value != value or value == inf else value for name, value in passage.items()}
         for passage in facts["passages"]
     ]
     return facts

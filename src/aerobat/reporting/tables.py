@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable
 from itertools import groupby
-from math import isnan
+from math import isinf, isnan
 
 from rich.console import Console
 from rich.table import Table
@@ -17,13 +17,20 @@ from aerobat.problem import Problem
 from aerobat.vehicle import Vehicle
 
 
-def summary_table(plan: Plan, score: Score | None, vehicle: str) -> Table:
-    """The plan and its flight, a fact a row."""
+def summary_table(plan: Plan, score: Score | None, vehicle: str, controller: str | None = None) -> Table:
+    """The plan and its flight, a fact a row.
+
+    Args:
+        plan: what was planned.
+        score: of its flight, where there is one.
+        vehicle: the name of what flew it.
+        controller: the name of the controller that did.
+    """
     table = Table(title=f"{plan.problem.name} · {vehicle}", title_justify="left", show_header=False, box=None)
     table.add_column(style="bold", no_wrap=True)
     table.add_column(no_wrap=True)
     table.add_column()
-    for heading, facts in (("plan", _plan_facts(plan)), ("flight", _flight_facts(score))):
+    for heading, facts in (("plan", _plan_facts(plan)), ("flight", _flight_facts(score, controller))):
         for i, (name, fact) in enumerate(facts):
             table.add_row(heading if i == 0 else "", name, fact)
     return table
@@ -133,17 +140,19 @@ def _optimality(plan: Plan) -> str:
     return f"within {100 * plan.gap:.2g} % of the optimum"
 
 
-def _flight_facts(score: Score | None) -> Iterable[tuple[str, str]]:
+def _flight_facts(score: Score | None, controller: str | None) -> Iterable[tuple[str, str]]:
     if score is None:
         return
     yield "outcome", score.sentence
+    if controller is not None:
+        yield "controller", controller
     yield "position error", _pair(100 * score.max_position_error_m, 100 * score.rms_position_error_m, "cm")
     yield "attitude error", _pair(score.max_attitude_error_deg, score.rms_attitude_error_deg, "°")
     for passage in score.passages:
         clearance = "" if isnan(passage.clearance) else f", {100 * passage.clearance:.0f} cm clear"
         allowed = (
             ""
-            if isnan(passage.attitude_tolerance_deg)
+            if isinf(passage.attitude_tolerance_deg)
             else f" of {passage.attitude_tolerance_deg:.3g}° allowed"
         )
         passed = (
