@@ -12,6 +12,7 @@ import numpy as np
 from aerobat.errors import AerobatError
 from aerobat.optimization import big_m
 from aerobat.optimization.assignment import AssignmentProgram
+from aerobat.optimization.confirmation import confirmed
 from aerobat.optimization.result import AssignmentResult, Status, verified
 
 _TOO_LARGE = 10010  # Gurobi's error number for a model beyond the size of the licence
@@ -60,7 +61,7 @@ class Gurobi:
                     claim = _GurobiModel(gurobipy, model, scaling.program).claim(start)
         except gurobipy.GurobiError as error:
             raise AerobatError(_message(error, program)) from None
-        return verified(program, scaling.unscaled(claim))
+        return confirmed(program, verified(program, scaling.unscaled(claim)))
 
 
 class _GurobiModel:

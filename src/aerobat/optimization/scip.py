@@ -11,6 +11,7 @@ import numpy as np
 
 from aerobat.optimization import big_m
 from aerobat.optimization.assignment import AssignmentProgram
+from aerobat.optimization.confirmation import confirmed
 from aerobat.optimization.result import AssignmentResult, Status, verified
 
 _MEANING: dict[str, Status] = {"optimal": "optimal", "infeasible": "infeasible"}
@@ -44,7 +45,8 @@ class Scip:
         if time_limit is not None:
             model.setParam("limits/time", time_limit)
         scaling = big_m.scaled(program)
-        return verified(program, scaling.unscaled(_ScipModel(pyscipopt, model, scaling.program).claim()))
+        claim = _ScipModel(pyscipopt, model, scaling.program).claim()
+        return confirmed(program, verified(program, scaling.unscaled(claim)))
 
 
 class _ScipModel:
