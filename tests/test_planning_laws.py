@@ -21,6 +21,7 @@ from aerobat.planning import (
     planner_options,
     registered_planners,
 )
+from aerobat.planning.certified_solve import envelope_for
 from aerobat.problem import EndState, Limits, Problem, Waypoint, Waypoints, at_rest, load_problem
 from aerobat.vehicle import load_vehicle
 
@@ -82,9 +83,8 @@ def test_a_plan_for_another_gravity_is_certified_for_that_one_only(name: str) ->
 def test_a_flip_on_mars_is_certified_on_mars() -> None:
     mars = replace(load_problem("flip-roll"), environment=Environment(gravity=3.7))
     found = plan(mars, vehicle=QUAD)
-    assert found.certificate == ab.certify(
-        found.trajectory, QUAD, mars.environment, ab.Envelope(limits=mars.path_limits)
-    )
+    envelope = envelope_for(mars, QUAD, found.stages)
+    assert found.certificate == ab.certify(found.trajectory, QUAD, mars.environment, envelope)
     assert found.certified
     on_earth = ab.certify(found.trajectory, QUAD, envelope=ab.Envelope(limits=mars.path_limits))
     assert on_earth.margin != pytest.approx(found.certificate.margin, abs=0.1)
