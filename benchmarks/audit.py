@@ -37,8 +37,7 @@ from random_problems import KINDS, Case, hard_case, random_case, write_case
 RETRIED_INTERVALS = (10, 13, 14, 16, 20, 25, 30, 40)
 FIXED_DURATIONS = 40  # tried, from the shortest conceivable to LONGEST [s]
 LONGEST = 12.0  # [s]
-STEP = 0.01  # of the duration
-STEPS = 40
+SHORTER = (0.01, 0.02, 0.03, 0.04, 0.05, 0.07, 0.1, 0.13, 0.16, 0.2, 0.25, 0.3)  # of the duration
 Row = dict[str, Any]
 
 
@@ -139,7 +138,11 @@ def refusals(task: Task, case: Case) -> Row:
     row["intervals"] = intervals
     if row["status"] != "infeasible":
         return row
-    ways = {f"N = {n}, order {r}": Miqp(r, n) for n in RETRIED_INTERVALS for r in (4, 5)}
+    ways = {
+        f"N = {n}, order {r or 'its own'}": Miqp(r, n, rescue=False)
+        for n in RETRIED_INTERVALS
+        for r in (None, 4, 5)
+    }
     durations = np.geomspace(0.6, LONGEST, FIXED_DURATIONS)
     ways |= {f"{t:.2f} s, N = {intervals}": at_duration(t, intervals) for t in durations.tolist()}
     planned = next((way for way, made in ways.items() if planned_by_miqp(case, made)), "")
@@ -147,9 +150,9 @@ def refusals(task: Task, case: Case) -> Row:
     return row | {"planned_by": planned, "free_knots": free["status"] == "planned" and free["certified"]}
 
 
-def at_duration(duration: float, intervals: int, order: int = 4) -> Miqp:
+def at_duration(duration: float, intervals: int) -> Miqp:
     dt = duration / intervals
-    return Miqp(order, intervals, search=GridSearch(dt, dt, 1))  # type: ignore[arg-type]
+    return Miqp(intervals=intervals, search=GridSearch(dt, dt, 1), rescue=False)
 
 
 def planned_by_miqp(case: Case, planner: Miqp) -> Row | None:
@@ -165,10 +168,10 @@ def smallest_dt(task: Task, case: Case) -> Row:
     if made.plan is None:
         return row
     shorter = []
-    for i in range(1, STEPS + 1):
-        wanted = made.plan.duration * (1.0 - STEP * i)
+    for fraction in SHORTER:
+        wanted = made.plan.duration * (1.0 - fraction)
         found = planned_by_miqp(case, at_duration(wanted, Miqp().intervals))
-        if found is not None and found["duration"] < made.plan.duration * (1.0 - STEP / 2):
+        if found is not None and found["duration"] < made.plan.duration * (1.0 - SHORTER[0] / 2):
             shorter.append(found["duration"])
     return row | {"shorter": shorter}
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import signal
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -21,6 +22,7 @@ from aerobat.vehicle import Vehicle
 
 PLANNERS = ("miqp", "min-snap", "free-knots", "time-optimal")
 YARDSTICK = "time-optimal at equal reserve"  # without any reserve that others do not keep
+PATIENCE = 120.0  # [s] of the processor, for one call
 SAMPLES = 100_000
 CHUNK = 10_000
 ROTOR_RATE = 1000.0  # [1/s] of rotor thrusts
@@ -41,6 +43,8 @@ def attempted(call: Callable[[], Plan]) -> Attempted:
     """The outcome of planning, whatever it is."""
     began = time.process_time()
     found, status, message = None, "planned", ""
+    signal.signal(signal.SIGVTALRM, _give_up)
+    signal.setitimer(signal.ITIMER_VIRTUAL, PATIENCE)
     try:
         found = call()
     except Infeasible as error:
@@ -49,7 +53,13 @@ def attempted(call: Callable[[], Plan]) -> Attempted:
         status, message = "refused", str(error)
     except Exception as error:
         status, message = type(error).__name__, str(error)
+    finally:
+        signal.setitimer(signal.ITIMER_VIRTUAL, 0.0)
     return Attempted(found, status, message, time.process_time() - began)
+
+
+def _give_up(number: int, frame: object) -> None:
+    raise TimeoutError(f"no answer after {PATIENCE:g} s of the processor")
 
 
 def planner_of(name: str, **settings: Any) -> Planner:

@@ -77,7 +77,7 @@ def hard_case(seed: int, k: int) -> Case:
     """A flip or half-flip, limited, for a vehicle that is as weak as flips allow: many have no plan."""
     rng = np.random.default_rng([seed, k, 1])
     easy = random_case(seed, k, ("flip", "half-flip"))
-    weaker = STANDARD_GRAVITY * rng.uniform(1.5, 2.4) / easy.vehicle.max_specific_thrust
+    weaker = STANDARD_GRAVITY * rng.uniform(1.25, 2.0) / easy.vehicle.max_specific_thrust
     rotors = tuple(replace(r, max_thrust=weaker * r.max_thrust, min_thrust=0.0) for r in easy.vehicle.rotors)
     limits = easy.problem.limits
     if rng.uniform() < 0.5:

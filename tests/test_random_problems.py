@@ -53,4 +53,4 @@ def test_hard_cases_are_flips_of_weak_vehicles() -> None:
     for k in CASES:
         case = hard_case(0, k)
         assert case.kind in ("flip", "half-flip")
-        assert 1.5 <= case.vehicle.thrust_to_weight < 2.4
+        assert 1.25 <= case.vehicle.thrust_to_weight < 2.0
