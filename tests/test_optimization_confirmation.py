@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from aerobat.optimization import AssignmentProgram, solver
+from aerobat.optimization import solver
 from paper_program import HALF_FLIP, half_flip
 
 FEASIBLE = half_flip(HALF_FLIP)
