@@ -181,7 +181,7 @@ def end_thrust(velocity: Array, acceleration: Array, vehicle: Vehicle, environme
         vehicle: Its drag counts.
         environment: Its gravity and wind count.
     """
-    none = np.zeros(3)
+    none = np.zeros_like(acceleration)
     airspeed = velocity - environment.wind
     return specific_thrust(vehicle, environment, airspeed, acceleration, none, none)[..., 0, :]
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from aerobat.arrays import Array
-from aerobat.flatness import reference
+from aerobat.flatness import end_thrust, reference
 from aerobat.planning import Plan
 from aerobat.reporting.scene.camera import Camera
 from aerobat.vehicle import Vehicle
@@ -61,7 +61,7 @@ class Keyframes:
     instants: tuple[Keyframe, ...]
     position: Array  # [m], (k, 3)
     q_world_body: Array  # (k, 4)
-    thrust: Array  # [m/s²] specific thrust a + g e3, (k, 3)
+    thrust: Array  # [m/s²] specific thrust, drag counted, (k, 3)
 
     def only(self, kept: list[int]) -> Keyframes:
         """Some of them."""
@@ -88,8 +88,9 @@ def plan_keyframes(plan: Plan, vehicle: Vehicle) -> Keyframes:
     times = [keyframe.time for keyframe in shown]
     environment = plan.problem.environment
     setpoint = reference(plan.trajectory, vehicle, times=times, environment=environment).setpoint
-    thrust = setpoint.flat.acceleration + environment.weight
-    return Keyframes(tuple(shown), setpoint.flat.position, setpoint.q_world_body, thrust)
+    flat = setpoint.flat
+    thrust = end_thrust(flat.velocity, flat.acceleration, vehicle, environment)
+    return Keyframes(tuple(shown), flat.position, setpoint.q_world_body, thrust)
 
 
 def maneuver_plane(plan: Plan, thrust: Array) -> ManeuverPlane:

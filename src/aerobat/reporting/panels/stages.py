@@ -178,7 +178,7 @@ def _draw_components(axes: Axes, places: Array, arrows: Array, unit: float, plan
     """The thrust's components (k, 2) [in] as arrows from the vehicles, with keys; 1 m/s² is `unit` long."""
     size = size_of(axes)
     key = max(KEYS[KEYS * unit <= KEY], default=KEYS[0])
-    names = (f"a along {plane.name}", "a + g along z")
+    names = (f"thrust along {plane.name}", "thrust along z")
     for part, colour, name, place in zip(COMPONENTS, (BLUE, RED), names, (1.3, 3.05), strict=True):
         quiver = axes.quiver(
             *places.T, *(arrows * part).T, color=colour, units="inches", scale_units="inches", angles="uv",

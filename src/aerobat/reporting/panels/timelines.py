@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from aerobat.arrays import Array
+from aerobat.flatness import end_thrust
 from aerobat.planning import PlacedStage, Plan
 from aerobat.reporting.page import HEADING, heading, legend, size_of
 from aerobat.reporting.panels.keyframes import maneuver_plane, plan_keyframes
@@ -66,14 +67,15 @@ def rotor_colours(vehicle: Vehicle) -> list[str]:
 
 
 def draw_specific_thrust(axes: Axes, plan: Plan, vehicle: Vehicle) -> None:
-    """Draw a_z + g and the lateral acceleration in the plane of the turn, with dots at the stages."""
+    """Draw the specific thrust, drag counted, in the plane of the turn, with dots at the stages."""
     plane = maneuver_plane(plan, plan_keyframes(plan, vehicle).thrust)
     times = plan.trajectory.sample(200.0)
     stages = np.array([stage.time for stage in plan.stages])
     for at, style in ((times, "-"), (stages, "o")):
-        thrust = plan.trajectory.evaluate(at, 2) + plan.problem.environment.weight
+        velocity, acceleration = (plan.trajectory.evaluate(at, derivative) for derivative in (1, 2))
+        thrust = end_thrust(velocity, acceleration, vehicle, plan.problem.environment)
         parts = plane.camera.project(thrust)
-        for column, colour, name in ((1, RED, "a + g along z"), (0, BLUE, f"a along {plane.name}")):
+        for column, colour, name in ((1, RED, "along z"), (0, BLUE, f"along {plane.name}")):
             label = name if style == "-" else ""
             axes.plot(at, parts[:, column], style, color=colour, markersize=3.5, label=label)
     axes.axhline(0.0, color=FAINT, linewidth=0.8)
