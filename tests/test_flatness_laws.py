@@ -14,6 +14,7 @@ from aerobat.errors import SpecError
 from aerobat.flatness import reference, reference_of
 from aerobat.states import STANDARD_GRAVITY, FlatState
 from aerobat.trajectory import Trajectory
+from aerobat.trajectory.minimum_effort import minimum_effort
 from aerobat.vehicle import load_vehicle, wrench
 
 seeds = st.integers(0, 2**32 - 1)
@@ -170,6 +171,26 @@ def test_attitude_does_not_depend_on_the_times_asked_for(seed):
         found = reference(trajectory, VEHICLE, times=times)
         turned = so3.angle_between(found.setpoint.q_world_body, fine.setpoint.q_world_body[asked])
         assert turned.max() < 1e-9
+
+
+@settings(max_examples=15)
+@given(seed=seeds, drag=st.sampled_from([0.0, 0.3]))
+def test_nor_where_the_thrust_is_of_a_higher_degree_than_what_stands_for_it_between_times(seed, drag):
+    """Degree 9, as of closed-form plans, whose segments turn by a lot."""
+    rng = np.random.default_rng(seed)
+    knots = np.full((5, 5, 3), np.nan)
+    knots[:, 0] = rng.normal(size=(5, 3)) * 2.0
+    knots[[0, -1], 1:] = 0.0
+    trajectory = minimum_effort(knots, rng.uniform(0.6, 1.2, 4))
+    vehicle = replace(VEHICLE, drag_body=np.full(3, drag))
+    fine = reference(trajectory, vehicle, rate=1000.0)
+    if fine.undetermined:
+        return
+    for times in (fine.times[-1:], fine.times[::400]):
+        asked = np.searchsorted(fine.times, times)
+        found = reference(trajectory, vehicle, times=times)
+        turned = so3.angle_between(found.setpoint.q_world_body, fine.setpoint.q_world_body[asked])
+        assert turned.max() < 1e-4
 
 
 @settings(max_examples=15)

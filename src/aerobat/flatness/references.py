@@ -24,6 +24,8 @@ from aerobat.trajectory import Trajectory
 from aerobat.vehicle import Vehicle
 from aerobat.vehicle.allocation import rotor_thrusts
 
+QUINTIC = 5  # the degree of what stands for the thrust between nodes
+PARTS = 16  # of a segment whose thrust is of a higher one: quintics err by the sixth power of their length
 UNDETERMINED = 1e-3  # the attitude is undetermined where |f| is below this fraction of gravity
 
 
@@ -62,15 +64,18 @@ def reference(
     environment = environment or Environment()
     times = _rising(trajectory.sample(rate) if rate is not None else times)
     flat = trajectory.flat(times)
-    # both sides of every knot join the times, which show the later side
-    sides = (_thrust_on_segments(trajectory, vehicle, environment, s) for s in (1.0, 0.0))
-    thrust = np.concatenate([*sides, _thrust(flat, vehicle, environment)])
-    segment_boundaries = np.concatenate([trajectory.knots[1:], trajectory.knots[:-1]])
-    nodes = np.concatenate([segment_boundaries, times])
-    side = np.repeat([0, 1, 2], [trajectory.segments, trajectory.segments, len(times)])
+    # both sides of every knot join the times, which show the later side, and what quintics need between
+    inner = _nodes_for_quintics(trajectory, vehicle)
+    parts = [1.0, 0.0, *inner]
+    curve = [_thrust_on_segments(trajectory, vehicle, environment, s) for s in parts]
+    thrust = np.concatenate([*curve, _thrust(flat, vehicle, environment)])
+    joining = np.concatenate([trajectory.knots[:-1] + s * trajectory.durations for s in parts])
+    joining[: trajectory.segments] = trajectory.knots[1:]
+    nodes = np.concatenate([joining, times])
+    side = np.repeat([0, *[1] * (len(parts) - 1), 2], [*[trajectory.segments] * len(parts), len(times)])
     order = np.lexsort((side, nodes))
     path = _frames(nodes[order], thrust[order], environment, trajectory.heading)
-    at = path.samples[np.argsort(order)[len(segment_boundaries) :]]
+    at = path.samples[np.argsort(order)[len(joining) :]]
     return _assembled(times, flat, path, at, vehicle, environment)
 
 
@@ -189,6 +194,12 @@ def end_thrust(velocity: Array, acceleration: Array, vehicle: Vehicle, environme
 def _thrust(flat: FlatState, vehicle: Vehicle, environment: Environment) -> Array:
     airspeed = flat.velocity - environment.wind
     return specific_thrust(vehicle, environment, airspeed, flat.acceleration, flat.jerk, flat.snap)
+
+
+def _nodes_for_quintics(trajectory: Trajectory, vehicle: Vehicle) -> list[float]:
+    """Normalised times within each segment between which the thrust is all but a quintic, if it is none."""
+    degree = trajectory.degree - (1 if lateral_drag(vehicle) > 0.0 else 2)
+    return [] if degree <= QUINTIC else np.linspace(0.0, 1.0, PARTS + 1)[1:-1].tolist()
 
 
 def _thrust_on_segments(
