@@ -94,8 +94,8 @@ def test_a_plan_whose_gate_is_elsewhere_then_is_not_certified(flip):
 def test_a_plan_that_passes_the_gate_tilted_is_not_certified():
     # flown slower the path is the same, and the thrust another
     fast = plan(load_problem("half-flip"), Miqp(order=5), VEHICLE)
-    slow = Trajectory(1.05 * fast.trajectory.durations, fast.trajectory.coefficients)
-    stages = tuple(replace(s, time=1.05 * s.time) for s in fast.stages)
+    slow = Trajectory(1.3 * fast.trajectory.durations, fast.trajectory.coefficients)
+    stages = tuple(replace(s, time=1.3 * s.time) for s in fast.stages)
     certificate = with_certificate(replace(fast, trajectory=slow, stages=stages), VEHICLE).certificate
     (violated,) = (f for f in certificate.findings if f.verdict is Verdict.VIOLATED)
     assert (violated.quantity, violated.unit, violated.limit) == ("attitude", "rad", np.deg2rad(5.0))
