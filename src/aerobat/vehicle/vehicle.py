@@ -229,7 +229,7 @@ def _check_inertia(inertia: Array) -> None:
 
 def _check_rank(allocation: Array) -> None:
     """All of thrust, roll, pitch and yaw must be had independently; rows differ in unit, so are scaled."""
-    sizes = np.linalg.norm(allocation, axis=1, keepdims=True)
+    sizes = np.abs(allocation).max(axis=1, keepdims=True)
     rank = np.linalg.matrix_rank(allocation / np.where(sizes > 0, sizes, 1.0))
     if rank < 4:
         raise FieldError(
