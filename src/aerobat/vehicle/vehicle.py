@@ -75,7 +75,7 @@ class Vehicle:
     ]  # [kg·m²] about the centre of mass, body axes
     rotors: tuple[Rotor, ...]  # four or more
     drag_body: Vector3 = field(default_factory=lambda: np.zeros(3))  # [kg/s] force_body = -drag_body·v_body
-    max_body_rate: Limit = np.inf  # [rad/s] |ω|, at most
+    max_body_rate: Limit = np.inf  # [rad/s] the largest norm of ω
     description: str = ""  # where its numbers come from
 
     SHORTHANDS: ClassVar[Mapping[str, str]] = {"rotor_defaults": "any keys of rotors, for all of them"}
