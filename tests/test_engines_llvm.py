@@ -1,6 +1,7 @@
 """Machine code: the same bits whatever flies beside, how many threads there are, and how wide a block is."""
 
 import math
+import os
 from dataclasses import replace
 from functools import partial
 from typing import Any
@@ -12,7 +13,7 @@ import pytest
 from aerobat.engines import FLOATS, Engine, run_whole
 from aerobat.engines.llvm import ENGINE
 from aerobat.engines.llvm.codegen import Layout, module
-from aerobat.engines.llvm.engine import MachineLoop, machine_code, target_machine
+from aerobat.engines.llvm.engine import MachineLoop, available_cores, machine_code, target_machine
 from aerobat.engines.traced_loop import trace_loop
 from aerobat.simulation import StateNoise, fly
 from aerobat.trajectory import Trajectory
@@ -111,3 +112,9 @@ def test_no_multiplication_is_fused_with_an_addition(width: int) -> None:
     assert "mul" in assembly
     assert "fmadd" not in assembly
     assert "fma" not in assembly
+
+
+def test_processors_are_counted_where_the_system_does_not_say_which_may_be_used(monkeypatch) -> None:
+    """As on macOS and Windows."""
+    monkeypatch.delattr(os, "sched_getaffinity", raising=False)
+    assert available_cores() == (os.cpu_count() or 1)

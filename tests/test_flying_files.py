@@ -70,11 +70,11 @@ def changed(**arrays: object) -> Callable[[Path], None]:
         (lambda path: path.write_bytes(b"PK\x03\x04 torn"), "not a whole .npz"),
         (lambda path: path.write_text("time,x,y,z\n"), "not a whole .npz"),
         (lambda path: np.save(path.open("wb"), np.zeros(3)), "not a whole .npz"),
-        (lambda path: np.savez(path, a=np.zeros(3)), "no array 'format'"),
+        (lambda path: np.savez(path, a=np.zeros(3)), "holds something else"),
         (lambda path: np.savez(path, format=np.array([{}], dtype=object)), "not a whole .npz"),
         (
             changed(format="aerobat-flight-1"),
-            "format is aerobat-flight-1, not aerobat-flight-2; fly it again",
+            "holds aerobat-flight-1, not aerobat-flight-2; fly it again",
         ),
         (changed(outcomes=["LANDED"]), "no array 'LANDED'"),
         (changed(thrusts=None), "no array 'thrusts'"),

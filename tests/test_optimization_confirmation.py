@@ -7,8 +7,8 @@ import pytest
 from aerobat.optimization import solver
 from paper_program import HALF_FLIP, half_flip
 
-FEASIBLE = half_flip(HALF_FLIP)
-INFEASIBLE = half_flip(HALF_FLIP, dt=0.02)
+FEASIBLE = half_flip(HALF_FLIP, dt=0.18)
+INFEASIBLE = half_flip(HALF_FLIP, dt=0.1)
 
 
 @pytest.fixture(params=["scip", "gurobi"])

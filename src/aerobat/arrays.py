@@ -31,10 +31,10 @@ def frozen_bounds(value: ArrayLike, name: str, shape: Sequence[int | None] | Non
     """As `frozen`, but infinities may stand for bounds that do not bind. Raises SpecError."""
     try:
         array = np.array(value)
-    except ValueError:  # ragged
-        raise SpecError(f"{name} must be numbers, got {value!r}") from None
+    except (ValueError, TypeError):  # ragged, or nothing of the kind
+        raise SpecError(f"{name} must be numbers, got {_shown(value)}") from None
     if array.dtype.kind not in "fiu":  # text and truth are no numbers
-        raise SpecError(f"{name} must be numbers, got {value!r}")
+        raise SpecError(f"{name} must be numbers, got {_shown(value)}")
     array = array.astype(np.float64, copy=False)
     if shape is not None and not _fits(array.shape, shape):
         wanted = ", ".join("n" if size is None else str(size) for size in shape)
@@ -43,6 +43,12 @@ def frozen_bounds(value: ArrayLike, name: str, shape: Sequence[int | None] | Non
         raise SpecError(f"{name} must be numbers; it contains a NaN")
     array.flags.writeable = False
     return array
+
+
+def _shown(value: object) -> str:
+    """A value in a few words on one line."""
+    text = " ".join(repr(value).split())
+    return text if len(text) <= 60 else f"{text[:57]}..."
 
 
 def _fits(shape: tuple[int, ...], wanted: Sequence[int | None]) -> bool:

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 from aerobat.declaration import from_table, unknown_name
 from aerobat.errors import SpecError
+from aerobat.storage import read_whole, whole_file
 
 if TYPE_CHECKING:
     from importlib.resources.abc import Traversable
@@ -17,6 +18,8 @@ if TYPE_CHECKING:
     Document = Path | Traversable
 
 T = TypeVar("T")
+
+MAX_DOCUMENT = 2**24  # bytes: a hundred thousand waypoints
 
 
 def document_names(presets: Traversable) -> tuple[str, ...]:
@@ -62,8 +65,6 @@ def write_document(path: str | os.PathLike[str], table: Mapping[str, Any], kind:
     """Write `table` as a TOML file, whole or not at all. Raises SpecError when the file cannot be written."""
     import tomli_w
 
-    from aerobat.storage import whole_file
-
     with in_document(Path(path), kind), whole_file(Path(path)) as temporary:
         temporary.write_text(tomli_w.dumps(table), encoding="utf-8")
 
@@ -87,13 +88,16 @@ def within(prefix: str) -> Iterator[None]:
 
 def _read(path: Document) -> str:
     try:
-        return path.read_bytes().decode("utf-8")
+        content = read_whole(path, MAX_DOCUMENT) if isinstance(path, Path) else path.read_bytes()
+        return content.decode("utf-8-sig")
     except FileNotFoundError:
         raise SpecError("there is no such file; check the path") from None
     except IsADirectoryError:
         raise SpecError("this is a folder; give the path of a .toml file") from None
     except UnicodeDecodeError as error:
         raise SpecError(f"byte {error.start} is not UTF-8 text; save the file as UTF-8") from None
+    except SpecError:
+        raise
     except (OSError, ValueError) as error:
         raise SpecError(f"cannot be read: {_reason(error)}") from None
 

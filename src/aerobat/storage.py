@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import ctypes
+import errno
+import io
 import os
 import shutil
+import stat
 import tempfile
 import zipfile
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
@@ -90,21 +93,55 @@ def write_whole(path: str | os.PathLike[str], content: str | bytes) -> None:
         temporary.write_bytes(content.encode() if isinstance(content, str) else content)
 
 
+def read_whole(path: str | os.PathLike[str], max_size: int) -> bytes:
+    """Return a file's whole content.
+
+    Raises OSError where it cannot be read, and SpecError for what is no file of at most `max_size` bytes: a
+    pipe or a device may never end.
+    """
+    descriptor = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0))
+    with os.fdopen(descriptor, "rb") as file:
+        found = os.fstat(descriptor)
+        if stat.S_ISDIR(found.st_mode):
+            raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR))
+        if not stat.S_ISREG(found.st_mode):
+            raise SpecError("it is a pipe or a device, not a file; give a file's path")
+        if found.st_size > max_size:
+            raise SpecError(f"it has {found.st_size / 2**20:.0f} MiB, more than {max_size // 2**20} MiB")
+        return file.read()
+
+
 def read_arrays(path: str | os.PathLike[str], what: str) -> dict[str, NDArray[Any]]:
     """The arrays of an .npz file that holds a `what`. Raises SpecError, one sentence, for any other file."""
     try:
-        with np.load(path, allow_pickle=False) as file:
-            return dict(file)
+        content = read_whole(path, MAX_ARRAYS)
     except FileNotFoundError:
         raise SpecError(f"{what} file {path}: there is no such file; check the path") from None
-    except OSError as error:
-        raise SpecError(f"{what} file {path}: it cannot be read ({error.strerror or error})") from None
-    except (ValueError, TypeError, EOFError, zipfile.BadZipFile):
-        raise SpecError(
-            f"{what} file {path}: it is not a whole .npz file of a {what}; save it again"
-        ) from None
+    except SpecError as error:
+        raise SpecError(f"{what} file {path}: {error}") from None
+    except (OSError, ValueError) as error:
+        reason = error.strerror if isinstance(error, OSError) and error.strerror else error
+        raise SpecError(f"{what} file {path}: it cannot be read ({reason})") from None
+    try:
+        with zipfile.ZipFile(io.BytesIO(content)) as archive:
+            unpacked = sum(entry.file_size for entry in archive.infolist())
+        if unpacked <= MAX_ARRAYS:  # else it is small only as it is packed
+            with np.load(io.BytesIO(content), allow_pickle=False) as file:
+                return dict(file)
+    except Exception:  # zlib, lzma, struct, tokenize, memory: a damaged archive can end in anything
+        pass
+    raise SpecError(f"{what} file {path}: it is not a whole .npz file of a {what}; save it again")
 
 
+def format_of(content: Mapping[str, NDArray[Any]]) -> str:
+    """The format that an .npz file says it has, in a few words."""
+    named = content.get("format")
+    if named is None or named.shape or named.dtype.kind != "U" or not str(named).isprintable():
+        return "something else"
+    return str(named)[:40]
+
+
+MAX_ARRAYS = 2**31  # bytes of an .npz file, packed or not: hours of flight at 500 Hz
 _STAGING = ".aerobat-part"
 _AT_FDCWD, _RENAME_SWAP = -100, 2  # of renameat2(2) and renamex_np(2)
 

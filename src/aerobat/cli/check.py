@@ -12,6 +12,7 @@ from cyclopts import Parameter
 from aerobat.certification import Envelope, certify
 from aerobat.cli.entry import ExitCode
 from aerobat.cli.options import DEFAULT_VEHICLE, CheckOptions
+from aerobat.cli.tasks import named_vehicle
 from aerobat.environment import Environment
 from aerobat.interchange import read_plan
 from aerobat.planning import Plan
@@ -36,13 +37,13 @@ def check(plan: Path, options: Annotated[CheckOptions, Parameter(name="*")] = Ch
         A .plan file, a CSV file (rows of position, velocity, acceleration, jerk), or a folder that
         `aerobat plan` or `aerobat fly` wrote.
     """
-    named_vehicle = None if options.vehicle is None else load_vehicle(options.vehicle)
+    chosen = None if options.vehicle is None else named_vehicle(options.vehicle)
     found = read_plan(plan, options.rate)
     trajectory = found.trajectory if isinstance(found, Plan) else found
     if options.heading is not None:
         trajectory = replace(trajectory, heading=radians(options.heading))
     own_vehicle = found.vehicle if isinstance(found, Plan) else None
-    vehicle = named_vehicle or own_vehicle or load_vehicle(DEFAULT_VEHICLE)
+    vehicle = chosen or own_vehicle or load_vehicle(DEFAULT_VEHICLE)
     environment = found.problem.environment if isinstance(found, Plan) else Environment()
     envelope = replace(
         envelope_for(found.problem, vehicle, found.stages) if isinstance(found, Plan) else Envelope(),

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from aerobat.cli.options import DEFAULT_VEHICLE, PlanningOptions, TaskOptions, offered_options, option_name
+from aerobat.cli.terminal import say
 from aerobat.errors import SpecError
 from aerobat.planning import (
     Attempt,
@@ -24,16 +25,24 @@ from aerobat.planning import (
     with_flyability,
 )
 from aerobat.problem import Problem, load_problem
-from aerobat.vehicle import Vehicle, load_vehicle
+from aerobat.vehicle import Vehicle, implausibilities, load_vehicle
 
 
 def read_task(name: str, options: TaskOptions, paper: bool = False) -> tuple[Problem, Vehicle]:
     """The problem and the vehicle that a command names."""
     problem = load_problem(name)
-    vehicle = load_vehicle(options.vehicle or ("hexarotor" if paper else DEFAULT_VEHICLE))
+    vehicle = named_vehicle(options.vehicle or ("hexarotor" if paper else DEFAULT_VEHICLE))
     if options.angle is not None:
         problem = _tilted(problem, options.angle)
     return (problem.as_in_paper() if paper else problem), vehicle
+
+
+def named_vehicle(name: str) -> Vehicle:
+    """The vehicle of that name; what it hardly can be is told, and no more."""
+    vehicle = load_vehicle(name)
+    for doubt in implausibilities(vehicle):
+        say(f"warning: vehicle '{vehicle.name}': {doubt}")
+    return vehicle
 
 
 def planned(name: str, options: PlanningOptions) -> Plan:
@@ -98,7 +107,7 @@ def _read_plan(path: Path, options: PlanningOptions) -> Plan:
     found = load_plan(path)
     if options.vehicle is None and found.vehicle is not None:
         return found if found.flyability is not None else with_flyability(found)
-    return with_flyability(with_certificate(found, load_vehicle(options.vehicle or DEFAULT_VEHICLE)))
+    return with_flyability(with_certificate(found, named_vehicle(options.vehicle or DEFAULT_VEHICLE)))
 
 
 def _is_given(value: Any) -> bool:

@@ -10,7 +10,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from aerobat.arrays import Array
-from aerobat.declaration.sentences import unknown_key
+from aerobat.declaration.sentences import FieldError, shown, unknown_key
 from aerobat.errors import SpecError
 
 T = TypeVar("T")
@@ -21,6 +21,8 @@ def from_table(cls: type[T], table: Mapping[str, Any]) -> T:
 
     Raises FieldError, one sentence that names the field from here on, when the table does not fit.
     """
+    if not isinstance(table, Mapping):
+        raise FieldError("", f"must be a table, got {shown(table)}")
     declaration: Any = cls
     known = [*(field.name for field in dataclasses.fields(declaration)), *getattr(cls, "SHORTHANDS", ())]
     for key in table:

@@ -17,11 +17,12 @@ import numpy as np
 
 from aerobat.arrays import Array
 from aerobat.errors import SpecError
-from aerobat.storage import write_whole
+from aerobat.storage import read_whole, write_whole
 from aerobat.trajectory import Trajectory
 from aerobat.trajectory.polynomial import hermite
 
 CSV_COLUMNS = 12
+MAX_CSV = 2**28  # bytes: some hours at 100 Hz
 SAME_TIME = 1e-12  # [s], a step this near to a period is one
 
 
@@ -54,17 +55,24 @@ def read_csv(path: str | os.PathLike[str], rate: float = 100.0) -> Trajectory:
         raise SpecError(f"{path}: line {line}: times, the thirteenth numbers, must start at 0 and rise")
     scale = steps[:, None, None] ** np.arange(4)[:, None]
     derivatives = rows[:, :CSV_COLUMNS].reshape(-1, 4, 3)
-    return Trajectory(steps, hermite(scale * derivatives[:-1], scale * derivatives[1:]))
+    try:
+        with np.errstate(over="ignore", invalid="ignore"):
+            return Trajectory(steps, hermite(scale * derivatives[:-1], scale * derivatives[1:]))
+    except SpecError as error:
+        raise SpecError(f"{path}: {error}") from None
 
 
 def _parse(path: Path) -> Array:
     """The file's numbers, (rows, 12 or 13)."""
     try:
-        text = path.read_text(encoding="utf-8")
-    except OSError as error:
-        raise SpecError(f"{path}: cannot be read: {error.strerror}") from None
+        text = read_whole(path, MAX_CSV).decode("utf-8-sig")
+    except SpecError as error:
+        raise SpecError(f"{path}: {error}") from None
     except UnicodeDecodeError:
         raise SpecError(f"{path}: is not a text file") from None
+    except (OSError, ValueError) as error:
+        reason = error.strerror if isinstance(error, OSError) else error
+        raise SpecError(f"{path}: cannot be read: {reason}") from None
     lines = text.splitlines()
     rows = [_parse_row(line, f"{path}: line {number}") for number, line in enumerate(lines, 1)]
     if len(rows) < 2:

@@ -22,7 +22,7 @@ from aerobat.errors import SpecError
 from aerobat.planning.recorder import Attempt
 from aerobat.planning.result import Flyability, PlacedStage, Plan
 from aerobat.problem.problem import Problem
-from aerobat.storage import read_arrays, whole_file
+from aerobat.storage import format_of, read_arrays, whole_file
 from aerobat.trajectory import Trajectory
 from aerobat.vehicle import Vehicle
 
@@ -74,7 +74,7 @@ def save_plan(plan: Plan, path: str | Path) -> None:
 def load_plan(path: str | Path) -> Plan:
     """Read what `Plan.save` wrote, exactly. Raises SpecError, one sentence, for any other file."""
     content = read_arrays(path, "plan")
-    found = str(content.get("format", "something else"))
+    found = format_of(content)
     if found != FORMAT:
         raise SpecError(f"plan file {path}: it holds {found}, not {FORMAT}; plan again and save that")
     try:
@@ -91,7 +91,7 @@ def load_plan(path: str | Path) -> Plan:
         raise SpecError(f"plan file {path}: it has no {error.args[0]!r}; save it again") from None
     except SpecError as error:
         raise SpecError(f"plan file {path}: {error}") from None
-    except (TypeError, ValueError):  # not JSON, not such a document
+    except (TypeError, ValueError, AttributeError, RecursionError):  # not JSON, not such a document
         raise SpecError(f"plan file {path}: it is damaged; save it again") from None
 
 

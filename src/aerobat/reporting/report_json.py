@@ -9,6 +9,7 @@ from typing import Any
 
 from aerobat.evaluation.score import Score
 from aerobat.planning import Flyability, Plan
+from aerobat.vehicle import implausibilities
 
 
 def report(
@@ -25,6 +26,7 @@ def report(
     facts: dict[str, Any] = {
         "problem": plan.problem.name,
         "vehicle": vehicle or (None if plan.vehicle is None else plan.vehicle.name),
+        "warnings": [] if plan.vehicle is None else list(implausibilities(plan.vehicle)),
         "plan": _plan(plan),
     }
     if score is not None:

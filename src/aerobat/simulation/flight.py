@@ -18,7 +18,7 @@ from aerobat.environment import Environment
 from aerobat.errors import SpecError
 from aerobat.simulation.outcome import Outcome
 from aerobat.states import BodyState, FlatState, Setpoint, Wrench
-from aerobat.storage import read_arrays, whole_file
+from aerobat.storage import format_of, read_arrays, whole_file
 
 _FORMAT = "aerobat-flight-2"
 _ROTORS = -1  # in a shape: as many as the vehicles have
@@ -172,8 +172,8 @@ def load_flight(path: str | Path) -> Flight:
     """Read a flight that `Flight.save` wrote. Raises SpecError, one sentence, for any other file."""
     content = read_arrays(path, "flight")
     try:
-        if str(content["format"]) != _FORMAT:
-            raise SpecError(f"its format is {content['format']}, not {_FORMAT}; fly it again")
+        if format_of(content) != _FORMAT:
+            raise SpecError(f"it holds {format_of(content)}, not {_FORMAT}; fly it again")
         ground = float(content["ground"])
         return Flight(
             times=content["times"],
@@ -190,6 +190,8 @@ def load_flight(path: str | Path) -> Flight:
         raise SpecError(f"flight file {path}: it has no array {error.args[0]!r}; save it again") from None
     except SpecError as error:
         raise SpecError(f"flight file {path}: {error}") from None
+    except (TypeError, ValueError):  # arrays of other kinds and shapes
+        raise SpecError(f"flight file {path}: it is damaged; save it again") from None
 
 
 def setpoint_series(setpoint: Setpoint) -> dict[str, Array]:

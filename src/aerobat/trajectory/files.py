@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from aerobat.errors import SpecError
-from aerobat.storage import read_arrays, whole_file
+from aerobat.storage import format_of, read_arrays, whole_file
 from aerobat.trajectory.piecewise import Trajectory
 
 _FORMAT = "aerobat-trajectory-2"
@@ -32,12 +32,12 @@ def save_trajectory(trajectory: Trajectory, path: str | Path) -> None:
 def load_trajectory(path: str | Path) -> Trajectory:
     """Read what `save_trajectory` wrote, exactly. Raises SpecError, one sentence, for any other file."""
     content = read_arrays(path, "trajectory")
-    found = str(content.get("format", "something else"))
+    found = format_of(content)
     if found not in (_FORMAT, _WITHOUT_HEADING):
         raise SpecError(f"trajectory file {path}: it holds {found}, not {_FORMAT}; give a trajectory's file")
     try:
-        heading = float(content["heading"]) if found == _FORMAT else 0.0
-        return Trajectory(content["durations"], content["coefficients"], heading)
+        heading = content["heading"] if found == _FORMAT else np.zeros(())
+        return Trajectory(content["durations"], content["coefficients"], heading)  # type: ignore[arg-type]
     except KeyError as error:
         raise SpecError(f"trajectory file {path}: it has no array {error.args[0]!r}; save it again") from None
     except SpecError as error:

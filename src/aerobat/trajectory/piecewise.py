@@ -15,6 +15,10 @@ from aerobat.states import FlatState
 from aerobat.trajectory import polynomial
 
 TIME_TOLERANCE = 1e-9  # [s], by which a time may miss the ends of a trajectory
+MAX_DEGREE = 30  # powers of normalised time tell no more apart in float64
+MAX_MAGNITUDE = 1e30  # [m/s^k] of a derivative up to snap: products of several stay far from overflow
+MAX_DURATION = 1e6  # [s], eleven days
+MAX_SAMPLES = 10_000_000
 KNOT_TOLERANCE = 1e-12  # [s], a time that misses a knot by rounding is meant to be on it
 
 
@@ -32,7 +36,7 @@ class Trajectory:
 
     Neighbouring segments need not agree in any derivative: at a knot the values of the segment that
     begins there count, and `on_segments` shows both sides. Raises SpecError for durations that are not
-    positive, numbers that are not finite and shapes that do not match.
+    positive, numbers that are not finite or that no motion has, and shapes that do not match.
 
     At the start the attitude is the smallest rotation from upright to the thrust, turned about it by the
     heading, and from there it is carried along without spin.
@@ -53,6 +57,12 @@ class Trajectory:
                 f"coefficients must have the shape (segments, degree + 1, 3) with {len(durations)} "
                 f"segments as in durations, got {coefficients.shape}"
             )
+        if coefficients.shape[1] > MAX_DEGREE + 1:
+            raise SpecError(
+                f"coefficients must be of degree {MAX_DEGREE} at most, got {coefficients.shape[1] - 1}; "
+                "cut long polynomials into segments"
+            )
+        _check_magnitude(durations, coefficients)
         object.__setattr__(self, "durations", durations)
         object.__setattr__(self, "coefficients", coefficients)
         heading = frozen(self.heading, "heading")
@@ -146,6 +156,8 @@ class Trajectory:
         if not (math.isfinite(rate) and rate > 0):
             raise SpecError(f"rate must be a positive number of samples a second, got {rate!r}")
         whole_steps = max(math.floor((self.duration - TIME_TOLERANCE) * rate), 0)
+        if whole_steps > MAX_SAMPLES:
+            raise SpecError(f"rate must ask for {MAX_SAMPLES} samples at most, {rate!r} asks {whole_steps}")
         return np.append(np.arange(whole_steps + 1) / rate, self.duration)
 
     def jumps(self, derivative: int) -> Array:
@@ -202,3 +214,20 @@ class Trajectory:
             Extremum(float(norms.flat[smallest]), float(times.flat[smallest])),
             Extremum(float(norms.flat[largest]), float(times.flat[largest])),
         )
+
+
+def _check_magnitude(durations: Array, coefficients: Array) -> None:
+    """Refuse numbers that no vehicle's motion has, whose squares would overflow where they are used."""
+    if not durations.sum() <= MAX_DURATION:
+        raise SpecError(f"durations must add up to {MAX_DURATION:g} s at most, got {durations.sum():g} s")
+    powers = np.arange(coefficients.shape[1])
+    bound = np.ones_like(powers, dtype=float)
+    for derivative in range(5):
+        with np.errstate(all="ignore"):
+            sizes = np.einsum("skd,k->s", np.abs(coefficients), bound) / durations**derivative
+        if not (sizes <= MAX_MAGNITUDE).all():  # infinite and NaN neither
+            raise SpecError(
+                f"coefficients and durations must keep every derivative below {MAX_MAGNITUDE:g} m/s^k, "
+                f"segment {int(np.argmin(sizes <= MAX_MAGNITUDE))} does not; check their units"
+            )
+        bound = bound * np.maximum(powers - derivative, 0)

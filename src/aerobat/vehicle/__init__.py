@@ -7,12 +7,14 @@ from aerobat.vehicle.allocation import (
     wrench,
 )
 from aerobat.vehicle.files import load_vehicle, vehicle_names, write_vehicle
+from aerobat.vehicle.plausibility import implausibilities
 from aerobat.vehicle.vehicle import Rotor, Vehicle
 
 __all__ = [
     "Rotor",
     "Vehicle",
     "collective_range",
+    "implausibilities",
     "load_vehicle",
     "mixer",
     "rotor_thrusts",

@@ -75,7 +75,7 @@ class Vehicle:
     ]  # [kg·m²] about the centre of mass, body axes
     rotors: tuple[Rotor, ...]  # four or more
     drag_body: Vector3 = field(default_factory=lambda: np.zeros(3))  # [kg/s] force_body = -drag_body·v_body
-    max_body_rate: Limit = np.inf  # [rad/s] |ω|, at most
+    max_body_rate: Limit = np.inf  # [rad/s] the largest norm of ω
     description: str = ""  # where its numbers come from
 
     SHORTHANDS: ClassVar[Mapping[str, str]] = {"rotor_defaults": "any keys of rotors, for all of them"}
@@ -229,7 +229,7 @@ def _check_inertia(inertia: Array) -> None:
 
 def _check_rank(allocation: Array) -> None:
     """All of thrust, roll, pitch and yaw must be had independently; rows differ in unit, so are scaled."""
-    sizes = np.linalg.norm(allocation, axis=1, keepdims=True)
+    sizes = np.abs(allocation).max(axis=1, keepdims=True)
     rank = np.linalg.matrix_rank(allocation / np.where(sizes > 0, sizes, 1.0))
     if rank < 4:
         raise FieldError(

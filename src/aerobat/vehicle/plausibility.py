@@ -1,0 +1,122 @@
+"""Values that a vehicle may have and hardly has: most often a unit that was meant to be another one.
+
+Nothing is refused here. Each threshold is beyond what is built, and its reason stands beside it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from math import hypot, log, sqrt
+
+import numpy as np
+
+from aerobat.vehicle.vehicle import Rotor, Vehicle
+
+MAX_ARM = 10.0  # [m] the widest passenger multirotors have rotors 5 m from their centre
+MAX_LAG = 1.0  # [s] propellers of a metre and more take 0.3 s; with more nothing hovers stably
+MAX_TORQUE_PER_RADIUS = 10.0  # [-] c/R is the ratio C_Q/C_T, 0.05 to 0.3; Section V of the paper has 8
+MAX_RADIUS_PER_ARM = 2.0  # [-] neighbours on a cross touch from 0.7 of the arm; at twice it all share a disc
+MAX_GYRATION = 1.0  # [-] radius of gyration over the reach of arm and propeller: all of the mass at the tips
+MIN_GYRATION = 0.03  # [-] over the arm: motors alone, a fifth of the mass at the arms' ends, make it 0.3
+MAX_THRUST_TO_WEIGHT = 40.0  # [-] record racers come to 25
+# what is most often built, to choose between units that would all do
+TYPICAL_ARM = 0.2  # [m]
+TYPICAL_LAG = 0.03  # [s]
+TYPICAL_TORQUE_PER_RADIUS = 0.1
+TYPICAL_RADIUS_PER_ARM = 0.6
+TYPICAL_GYRATION = 0.35  # over the reach
+
+LENGTHS = (("mm", 1e-3), ("cm", 1e-2), ("inches", 0.0254))
+TIMES = (("ms", 1e-3), ("µs", 1e-6))
+INERTIAS = (("g·m²", 1e-3), ("kg·cm²", 1e-4), ("kg·mm²", 1e-6), ("g·cm²", 1e-7), ("g·mm²", 1e-9))
+Units = Sequence[tuple[str, float]]  # names, each with its size in the SI unit
+
+
+@dataclass(frozen=True)
+class _Check:
+    """A length or a time of a rotor, how large it is at most, and what it is most often."""
+
+    field: str
+    value: Callable[[Rotor], float]
+    most: Callable[[Rotor], float]
+    typical: Callable[[Rotor], float]
+    unit: str
+    units: Units
+
+
+def implausibilities(vehicle: Vehicle) -> tuple[str, ...]:
+    """Return a sentence for each kind of value that hardly any vehicle has, with the unit probably meant."""
+    return (*_of_rotors(vehicle.rotors), *_of_inertia(vehicle), *_of_thrust(vehicle))
+
+
+def _of_rotors(rotors: Sequence[Rotor]) -> Iterator[str]:
+    """Findings of the first rotor that has any, of each kind: the others most often share it."""
+    for check in _CHECKS:
+        for i, rotor in enumerate(rotors):
+            value, most = check.value(rotor), check.most(rotor)
+            if value > most:
+                remedy = _remedy(value, (0.0, most), check.typical(rotor), check.units)
+                yield (
+                    f"rotors[{i}].{check.field} is {value:.4g} {check.unit}, where {most:.3g} would be "
+                    f"a lot; {remedy}"
+                )
+                break
+
+
+def _of_inertia(vehicle: Vehicle) -> Iterator[str]:
+    mass, largest = vehicle.mass, float(np.linalg.eigvalsh(vehicle.inertia)[-1])
+    arm = max(map(_arm, vehicle.rotors))
+    reach = arm + max(rotor.radius for rotor in vehicle.rotors)
+    low, high = mass * (MIN_GYRATION * arm) ** 2, mass * (MAX_GYRATION * reach) ** 2
+    if not low <= largest <= high:
+        remedy = _remedy(largest, (low, high), mass * (TYPICAL_GYRATION * reach) ** 2, INERTIAS)
+        yield (
+            f"inertia of {largest:.3g} kg·m² is that of {mass:g} kg at {sqrt(largest / mass):.3g} m from the "
+            f"centre, where the rotors reach {reach:.3g} m; {remedy}"
+        )
+
+
+def _of_thrust(vehicle: Vehicle) -> Iterator[str]:
+    if vehicle.thrust_to_weight > MAX_THRUST_TO_WEIGHT:
+        yield (
+            f"max_thrust adds up to {vehicle.thrust_to_weight:.3g} times the weight of mass, "
+            f"{vehicle.mass:g} kg; is mass in kg, and max_thrust in N, not in grams of force?"
+        )
+
+
+def _remedy(value: float, limits: tuple[float, float], typical: float, units: Units) -> str:
+    """A question after the unit in which the value would be plausible, and most like what is built."""
+    low, high = limits
+    plausible = {name: value * size for name, size in units if low < value * size <= high}
+    if not plausible:
+        return "check its unit"
+    likely = min(plausible, key=lambda name: abs(log(plausible[name] / typical)))
+    return f"was it typed in {likely}?"
+
+
+def _arm(rotor: Rotor) -> float:
+    """The distance [m] of a rotor from the centre of mass."""
+    return hypot(*rotor.position_body.tolist())
+
+
+_CHECKS = (
+    _Check("position_body", _arm, lambda _: MAX_ARM, lambda _: TYPICAL_ARM, "m from the centre", LENGTHS),
+    _Check("lag", lambda rotor: rotor.lag, lambda _: MAX_LAG, lambda _: TYPICAL_LAG, "s", TIMES),
+    _Check(
+        "radius",
+        lambda rotor: rotor.radius,
+        lambda rotor: MAX_RADIUS_PER_ARM * _arm(rotor),
+        lambda rotor: TYPICAL_RADIUS_PER_ARM * _arm(rotor),
+        "m",
+        LENGTHS,
+    ),
+    _Check(
+        "torque_coefficient",
+        lambda rotor: rotor.torque_coefficient,
+        lambda rotor: MAX_TORQUE_PER_RADIUS * rotor.radius,
+        lambda rotor: TYPICAL_TORQUE_PER_RADIUS * rotor.radius,
+        "m",
+        LENGTHS,
+    ),
+)
