@@ -14,6 +14,7 @@ import numpy as np
 from aerobat import so3
 from aerobat.arrays import Array
 from aerobat.errors import AerobatError, Infeasible
+from aerobat.evaluation import score
 from aerobat.flatness import reference
 from aerobat.planning import Plan, Planner, plan, planner_class, planner_options
 from aerobat.problem import Condition, Flip, Gate, HalfFlip, Problem, Quantity
@@ -93,7 +94,8 @@ def plan_facts(problem: Problem, vehicle: Vehicle, name: str) -> dict[str, Any]:
     except AerobatError as error:
         return row | {"status": "not flown", "message": str(error)}
     error = np.linalg.norm(flight.states.position - flight.setpoint.flat.position, axis=-1)
-    row |= {"error": float(error.max()), "outcome": flight.outcome.name}
+    scored = score(flight, made.plan, vehicle)
+    row |= {"error": float(error.max()), "outcome": scored.outcome.name, "sentence": scored.sentence}
     if isinstance(problem.maneuver, Flip | HalfFlip):
         row |= gate_attitude(made.plan, flight, vehicle)
     return row

@@ -14,6 +14,7 @@ ROTOR_EXCESS = 1e-6  # of a rotor's range
 COMMAND_EXCESS = 1e-3  # likewise; they are differences of samples
 MAX_ERROR = 0.05  # [m] flown, of a certified plan
 YARDSTICK_SLACK = 0.995
+SUCCESS = ("COMPLETE", "THROUGH_GATES")
 FORESEEN = ("planned", "infeasible")
 
 
@@ -29,8 +30,9 @@ def defect(row: Row) -> str:
         if row.get("thrust_excess", 0.0) > ROTOR_EXCESS or row.get("command_excess", 0.0) > COMMAND_EXCESS:
             excess = f"{row['thrust_excess']:.2g}, commands by {row['command_excess']:.2g} of their range"
             return f"certified, rotor thrusts beyond their limits by {excess}"
-        if row.get("error", 0.0) > MAX_ERROR or row.get("outcome", "COMPLETE") != "COMPLETE":
-            return f"certified, flown {100 * row['error']:.1f} cm off, {row['outcome']}; said: {row['said']}"
+        if row.get("error", 0.0) > MAX_ERROR or row.get("outcome", "COMPLETE") not in SUCCESS:
+            said = f"{row.get('sentence', row['outcome'])}; said: {row['said']}"
+            return f"certified, flown {100 * row['error']:.1f} cm off, {said}"
         if (
             max(row.get("planned_deg", 0.0), row.get("flown_deg", 0.0))
             > row.get("tolerance_deg", 180.0) + 0.5
@@ -86,7 +88,7 @@ def flyability(rows: list[Row]) -> Iterable[str]:
     for name in PLANNERS:
         own = [r for r in _certified(rows, name) if "error" in r]
         if own:
-            off = [r for r in own if r["error"] > MAX_ERROR or r["outcome"] != "COMPLETE"]
+            off = [r for r in own if r["error"] > MAX_ERROR or r["outcome"] not in SUCCESS]
             silent, most = sum(not r["said"] for r in off), max(r["error"] for r in own)
             yield (
                 f"{name:>14} {len(own):4} plans: {100 * (1 - len(off) / len(own)):.1f} % within 5 cm (floor: "
