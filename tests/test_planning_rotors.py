@@ -40,7 +40,7 @@ def test_rotors_without_lag_are_planned_with_snap_which_may_jump(quad: Vehicle) 
 def test_thrusts_that_jump_are_not_certified_for_rotors_with_lag(quad: Vehicle) -> None:
     found = plan(load_problem("half-flip"), Miqp(order=4), quad)
     assert not found.certified
-    assert "jumps" in found.certificate.why
+    assert "rotor thrusts jump" in found.certificate.why
 
 
 @pytest.mark.parametrize("name", MANEUVERS)
@@ -170,12 +170,3 @@ def test_the_half_flip_of_the_example_passes_its_gate_at_twice_the_papers_speed(
     (gate,) = found.stages
     assert np.linalg.norm(found.trajectory.evaluate(gate.time, 1)) >= 16.0
     assert found.certified
-
-
-def test_samples_save_time_only_the_plan_is_the_certificates(quad: Vehicle, monkeypatch) -> None:
-    """Without the samples that refute most attempts, every one is certified or refused by its proof."""
-    sampled = plan(load_problem("flip-roll"), vehicle=quad)
-    monkeypatch.setattr("aerobat.planning.miqp.miqp.refuted_by_samples", lambda solution, *_: solution)
-    proven = plan(load_problem("flip-roll"), vehicle=quad)
-    assert proven.duration == sampled.duration
-    assert proven.certificate == sampled.certificate
