@@ -20,14 +20,27 @@ def quad() -> Vehicle:
 
 
 @pytest.mark.parametrize("name", MANEUVERS)
-@pytest.mark.parametrize("order", [4, 5])
 @pytest.mark.parametrize("vehicle", ["agile-quad", "hexarotor", "crazyflie"])
-def test_a_plan_keeps_every_rotor_within_its_limits(name: str, order: int, vehicle: str) -> None:
+def test_a_plan_keeps_every_rotor_within_its_limits(name: str, vehicle: str) -> None:
     craft = load_vehicle(vehicle)
-    found = plan(load_problem(name), Miqp(order=order), craft)
+    found = plan(load_problem(name), vehicle=craft)
     assert found.certified
+    assert found.order == 5
     assert found.margin.min_thrust >= craft.min_thrusts.min()
     assert found.margin.max_thrust <= craft.max_thrusts.max()
+
+
+def test_rotors_without_lag_are_planned_with_snap_which_may_jump(quad: Vehicle) -> None:
+    prompt = replace(quad, rotors=tuple(replace(r, lag=0.0) for r in quad.rotors))
+    found = plan(load_problem("half-flip"), vehicle=prompt)
+    assert found.certified
+    assert found.order == 4
+
+
+def test_thrusts_that_jump_are_not_certified_for_rotors_with_lag(quad: Vehicle) -> None:
+    found = plan(load_problem("half-flip"), Miqp(order=4), quad)
+    assert not found.certified
+    assert "rotor thrusts jump" in found.certificate.why
 
 
 @pytest.mark.parametrize("name", MANEUVERS)
@@ -44,8 +57,8 @@ def test_flips_about_any_horizontal_axis_are_the_same_flip_turned(axis_deg: floa
     heading = np.deg2rad(axis_deg + 90.0)  # thrust swings to the left of the axis, where the gate leads
     gate = tilted_gate(roll.gates[0].position, heading + np.pi, tilt=np.pi)
     turned = replace(roll, gates=(gate,), maneuver=Flip(axis_deg))
-    planner = Miqp(search=BisectionSearch(0.1, 0.2))
-    assert plan(turned, planner, quad).cost == pytest.approx(plan(roll, planner, quad).cost, rel=1e-5)
+    straight, about = (plan(problem, vehicle=quad) for problem in (roll, turned))
+    assert about.duration == pytest.approx(straight.duration, rel=0.02)
 
 
 @pytest.mark.parametrize("tilt_deg", [-90.0, -60.0, -20.0, 0.0, 15.0, 45.0, 80.0, 90.0])
@@ -59,7 +72,8 @@ def test_the_half_flip_passes_a_gate_at_any_tilt_with_its_thrust_along_the_uprig
     (passage,) = found.stages
     thrust = found.trajectory.evaluate(passage.time, 2) + [0.0, 0.0, STANDARD_GRAVITY]  # noqa: RUF005
     sideways = thrust - (thrust @ gate.normal) * gate.normal
-    np.testing.assert_allclose(sideways / np.linalg.norm(sideways), gate.up, atol=1e-5)
+    cosine = sideways @ gate.up / np.linalg.norm(sideways)
+    assert np.arccos(min(cosine, 1.0)) <= 0.5 * gate.attitude_tolerance + 1e-9
 
 
 def test_the_gate_is_passed_squarely(quad: Vehicle) -> None:
@@ -90,18 +104,25 @@ def test_running_out_of_time_is_not_called_infeasible() -> None:
     assert {a.status for a in failure.value.attempts} == {"unknown"}
 
 
-def test_an_optimal_plan_reports_its_bound(quad: Vehicle) -> None:
-    found = plan(load_problem("flip-roll"), vehicle=quad)
+def test_an_optimal_plan_reports_its_bound() -> None:
+    found = plan(load_problem("flip-roll").as_in_paper(), Miqp(order=3))
     assert found.status == "optimal"
     assert found.bound == pytest.approx(found.cost, rel=1e-9)
     assert found.gap < 1e-9
+
+
+def test_a_refined_plan_claims_no_bound(quad: Vehicle) -> None:
+    found = plan(load_problem("flip-roll"), vehicle=quad)
+    assert found.status == "locally optimal"
+    assert found.cost == pytest.approx(found.duration)
+    assert (found.bound, found.gap, found.dt) == (None, None, None)
 
 
 def test_a_vehicle_too_weak_for_the_maneuver_is_told_which_rotor_lacks_what() -> None:
     weak = load_vehicle("agile-quad")
     weak = replace(weak, rotors=tuple(replace(r, max_thrust=2.2) for r in weak.rotors))
     with pytest.raises(Infeasible, match=r"agile-quad can fly: at best, .*rotor"):
-        plan(load_problem("flip-roll"), vehicle=weak)
+        plan(load_problem("flip-roll"), Miqp(rescue=False), weak)
 
 
 @pytest.mark.parametrize("intervals", [2, 3, 4])
@@ -131,7 +152,7 @@ def test_a_symmetric_vehicle_flies_the_same_plan_at_any_multiple_of_90_degrees_o
     straight, turned = (
         plan(replace(load_problem("flip-roll"), heading=angle), vehicle=quad) for angle in (0.0, heading)
     )
-    assert turned.duration == pytest.approx(straight.duration, rel=1e-9)
+    assert turned.duration == pytest.approx(straight.duration, rel=1e-3)
 
 
 def test_a_moving_start_and_goal_are_met(quad: Vehicle) -> None:
@@ -149,12 +170,3 @@ def test_the_half_flip_of_the_example_passes_its_gate_at_twice_the_papers_speed(
     (gate,) = found.stages
     assert np.linalg.norm(found.trajectory.evaluate(gate.time, 1)) >= 16.0
     assert found.certified
-
-
-def test_samples_save_time_only_the_plan_is_the_certificates(quad: Vehicle, monkeypatch) -> None:
-    """Without the samples that refute most attempts, every one is certified or refused by its proof."""
-    sampled = plan(load_problem("flip-roll"), vehicle=quad)
-    monkeypatch.setattr("aerobat.planning.miqp.miqp.refuted_by_samples", lambda solution, *_: solution)
-    proven = plan(load_problem("flip-roll"), vehicle=quad)
-    assert proven.duration == sampled.duration
-    assert proven.certificate == sampled.certificate

@@ -95,11 +95,6 @@ class ProxLinearResult(Generic[P]):
     converged: bool  # no step gains more than little
     steps: int  # QPs solved
 
-    @property
-    def feasible(self) -> bool:
-        """True if no constraint is violated."""
-        return self.point.violation <= 0.0
-
 
 def prox_linear(program: SmoothProgram[P], start: P, max_steps: int = 40) -> ProxLinearResult[P]:
     """Descend from a point; it ends at a local optimum, out of steps or where no step leads on.

@@ -25,7 +25,7 @@ from aerobat.problem.stage import Stage
 from aerobat.trajectory import Trajectory
 from aerobat.vehicle import Vehicle
 
-BACKOFF = 1e-4  # of a bound: by how much more than what was exceeded it is tightened
+BACKOFF = 1e-4  # of a bound, of one at or next to zero in SI units: it is tightened by so much more
 NEGLIGIBLE = 1e-9  # in SI units: an excess that means nothing
 
 Detail = TypeVar("Detail")
@@ -201,7 +201,7 @@ def _backoff(excess: Array, bound: Array) -> Array:
     """A little more than what is exceeded, and nothing where nothing but rounding is."""
     backoff = np.zeros_like(excess)
     exceeded = excess > NEGLIGIBLE
-    backoff[exceeded] = excess[exceeded] + BACKOFF * np.abs(bound[exceeded])
+    backoff[exceeded] = excess[exceeded] + BACKOFF * np.maximum(np.abs(bound[exceeded]), 1.0)
     return backoff
 
 

@@ -15,7 +15,7 @@ from aerobat.kernels.rigid_body import Body, EnvironmentParameters
 from aerobat.kernels.vectors import add
 from aerobat.simulation.loop import Signals
 
-MAX_STEP = 0.002  # [s] of RK4: enough for 1e-8 m in the fastest flips
+MAX_STEP = 0.002  # [s] of RK4: enough for 1e-6 m in the fastest flips
 
 
 @dataclass(frozen=True)

@@ -14,7 +14,12 @@ from aerobat.optimization.branch_and_bound.null_space import UNBOUNDED
 
 # DAQP's marks on a row, and its exit flags
 _AT_UPPER, _AT_LOWER, _IGNORED = 1, 3, 4
-_SOLVED, _INFEASIBLE = 1, -1
+_SOLVED, _INFEASIBLE, _OVERDETERMINED = 1, -1, -6
+_EQUAL = 1e-11  # bounds as near as that make an equality, in units of the larger
+_CONTRADICTION = (
+    1e-7  # on rows of unit norm, beside the larger bound: by which equalities contradict each other
+)
+_INDEPENDENT = 1e-8  # of a row of unit norm: what is left of it where it is no combination of others
 _SETTINGS = {"primal_tol": 1e-9}  # on rows of unit norm
 _CAREFUL_SETTINGS = {"pivot_tol": 1e-4, "sing_tol": 1e-13, "dual_tol": 1e-10}  # where the usual ones fail
 
@@ -79,6 +84,12 @@ class LeastDistanceQP:
         y, flag, multipliers = self._run(lower, upper, warm, cutoff)
         if flag not in (_SOLVED, _INFEASIBLE):
             y, flag, multipliers = self._run(lower, upper, cold, cutoff)
+        if flag == _OVERDETERMINED:  # equalities depend on each other
+            redundant = self._redundant(lower, upper)
+            if redundant is None:
+                return None
+            cold[redundant] = _IGNORED
+            y, flag, multipliers = self._run(lower, upper, cold, cutoff)
         if flag not in (_SOLVED, _INFEASIBLE):
             usual_settings = self._model.settings
             self._model.settings = _CAREFUL_SETTINGS
@@ -90,6 +101,26 @@ class LeastDistanceQP:
             return None
         active = multipliers.nonzero()[0]
         return QPSolution(y, 0.5 * float(y @ y), lower, upper, active, multipliers[active])
+
+    def _redundant(self, lower: Array, upper: Array) -> Indices | None:
+        """Equalities that follow from others; None where no y satisfies all."""
+        larger = np.maximum(np.abs(lower), np.abs(upper))
+        equal = np.flatnonzero(upper - lower <= _EQUAL * np.maximum(larger, 1.0))
+        rows, target = self._rows[equal], upper[equal]
+        missed = rows @ np.linalg.lstsq(rows, target, rcond=_INDEPENDENT)[0] - target
+        if (np.abs(missed) > _CONTRADICTION * np.maximum(larger[equal], 1.0)).any():
+            return None
+        basis = np.zeros((0, rows.shape[1]))
+        redundant = []
+        for i, row in zip(equal.tolist(), rows, strict=True):
+            rest = row - basis.T @ (basis @ row)
+            rest = rest - basis.T @ (basis @ rest)
+            norm = float(np.linalg.norm(rest))
+            if norm > _INDEPENDENT:
+                basis = np.vstack([basis, rest / norm])
+            else:
+                redundant.append(i)
+        return np.array(redundant, dtype=np.intp)
 
     def _run(
         self, lower: Array, upper: Array, sense: NDArray[np.intc], cutoff: float

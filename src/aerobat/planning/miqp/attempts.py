@@ -11,6 +11,7 @@ import numpy as np
 from aerobat.certification import Certificate, Verdict
 from aerobat.optimization import AssignmentResult, Solver
 from aerobat.planning.certified_solve import Judged, Solution, certified_solve
+from aerobat.planning.miqp.diagnosis import NOT_CONVERGED, OUT_OF_TIME
 from aerobat.planning.miqp.formulation import Formulation
 from aerobat.planning.miqp.refinement import PathPoint, PathProgram, settled
 from aerobat.planning.recorder import Recorder
@@ -56,9 +57,23 @@ class Attempts:
         """True if the order makes what no moment, or no rotor with lag, can do; its certificate says so."""
         return self.formulation.chain.order < flyable_order(self.vehicle)
 
-    def judge(self, placement: Placement, dt: float | None, failure: str | None = None) -> Judged[Placement]:
-        """Certify a program's answer, or what it was refined to."""
-        return self._certified(_Answered(self, placement, dt, failure), 1)
+    def judge(
+        self, placement: Placement, dt: float, failure: str | None = None, excess: float = 0.0
+    ) -> Judged[Placement]:
+        """Certify a program's answer.
+
+        Args:
+            placement: The answer.
+            dt: Its own [s].
+            failure: Why the vehicle cannot follow it, where that is known without a certificate.
+            excess: By how much, as a fraction of a constraint's range, negative.
+        """
+        span = (
+            0.0
+            if self.vehicle is None
+            else float(np.ptp([*self.vehicle.min_thrusts, *self.vehicle.max_thrusts]))
+        )
+        return self._certified(_Answered(self, placement, dt, failure, excess * span or None), 1)
 
     def refined(self, start: Placement, find: Callable[[], PathPoint | None]) -> Judged[Placement]:
         """Certify the path that is found, backing off from what a certificate refutes."""
@@ -102,8 +117,9 @@ class _Answered:
 
     attempts: Attempts
     placement: Placement
-    dt: float | None
+    dt: float
     failure: str | None
+    margin: float | None  # [N] of the rotors, where it is known to be negative
 
     def solve(self) -> Solution[Placement]:
         """The answer, whatever it is."""
@@ -119,6 +135,7 @@ class _Answered:
             cost=self.attempts.formulation.cost(answer.cost, dt) if solved else None,
             dt=dt,
             failure=self.failure or (None if solved else self._why_unsolved()),
+            margin=self.margin,
         )
 
     def tighten(self, solution: Solution[Placement], certificate: Certificate | None) -> bool:
@@ -129,7 +146,7 @@ class _Answered:
         if self.placement.answer.status == "infeasible":
             return "the program has no solution"
         limited = self.attempts.time_limit is not None
-        return "no solution was found in time" if limited else "the solver did not converge"
+        return OUT_OF_TIME if limited else NOT_CONVERGED
 
 
 @dataclass
@@ -164,9 +181,14 @@ class _Refined:
             status="feasible" if held else "locally optimal",
             nodes=0,
             solve_time=seconds,
-            cost=None if held else trajectory.duration,
+            cost=self._effort(path) if held else trajectory.duration,
             dt=self.start.dt if held else None,
         )
+
+    def _effort(self, path: PathPoint) -> float:
+        """The sum of |u|² over intervals, in SI units."""
+        inputs, _, mean = path.program.chain.unpack(path.x)
+        return self.attempts.formulation.cost(float(np.sum(inputs**2)), mean)
 
     def tighten(self, solution: Solution[Placement], certificate: Certificate | None) -> bool:
         """Back off everywhere, and settle again."""

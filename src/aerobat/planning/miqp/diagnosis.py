@@ -14,6 +14,8 @@ from aerobat.planning.recorder import Attempt
 from aerobat.problem.problem import DERIVATIVES, UNITS
 from aerobat.vehicle import Vehicle
 
+OUT_OF_TIME = "no solution was found in time"
+NOT_CONVERGED = "the solver did not converge"
 PROBES = 4  # durations at which a relaxed problem is tried
 
 
@@ -28,7 +30,7 @@ def why_infeasible(formulation: Formulation, attempts: Sequence[Attempt], vehicl
             f"{said} that {vehicle.name} can fly: at best, {best}; lower the maneuver's thrusts, "
             "move the gate nearer, or take a stronger vehicle"
         )
-    if any(a.status == "unknown" for a in attempts):
+    if any(a.outcome == OUT_OF_TIME for a in attempts):
         return (
             f"{said} that was found in the time given; allow more with --time-limit, or use fewer intervals"
         )

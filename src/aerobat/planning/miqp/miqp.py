@@ -11,7 +11,7 @@ import numpy as np
 from aerobat.declaration import AS_IT_IS, NonNegative
 from aerobat.errors import Infeasible
 from aerobat.flatness import force_balance
-from aerobat.optimization import solver
+from aerobat.optimization import AssignmentProgram, solver
 from aerobat.planning.certified_solve import Judged
 from aerobat.planning.miqp.attempts import Attempts, Placement, flyable_order, plan_of
 from aerobat.planning.miqp.diagnosis import why_infeasible
@@ -24,6 +24,7 @@ from aerobat.planning.planners import Planner, option, planner
 from aerobat.planning.recorder import Progress, Recorder
 from aerobat.planning.result import Plan
 from aerobat.planning.search import GridSearch, Search
+from aerobat.problem.condition import ForceBalance
 from aerobat.problem.problem import Problem
 from aerobat.problem.stage import StageSequence
 from aerobat.vehicle import Vehicle
@@ -125,7 +126,28 @@ def formulate(problem: Problem, order: int, intervals: int, vehicle: Vehicle | N
     if vehicle is not None:
         _check_thrust(sequence, vehicle)
     balance = force_balance(problem.environment, vehicle)
+    _check_stages(sequence, balance)
     return Formulation(problem, sequence, IntegratorChain(order, intervals), balance)
+
+
+def _check_stages(sequence: StageSequence, balance: ForceBalance) -> None:
+    """Refuse a stage whose own conditions exclude each other, at whatever time."""
+    for stage in sequence.stages:
+        bounds = [condition.bound(balance) for condition in stage.conditions]
+        if not bounds:
+            continue
+        instant = AssignmentProgram(
+            equality=np.zeros((0, 9)),
+            target=np.zeros(0),
+            rows=np.array([bound.weights.ravel() for bound in bounds]),
+            lower=np.array([bound.limits[0] for bound in bounds]),
+            upper=np.array([bound.limits[1] for bound in bounds]),
+        )
+        if solver("builtin").solve(instant).status == "infeasible":
+            raise Infeasible(
+                f"the conditions of the stage '{stage.name}' exclude each other: no position, velocity and "
+                "acceleration satisfies them all; change or drop one of them"
+            )
 
 
 def _check_thrust(sequence: StageSequence, vehicle: Vehicle) -> None:

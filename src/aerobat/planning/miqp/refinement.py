@@ -206,6 +206,15 @@ class PathPoint:
         others = max(self._values[:, rotor_columns:].max(initial=-1.0), self._stage_values.max(initial=-1.0))
         return float(max(rotors, others - NEGLIGIBLE))
 
+    @property
+    def excess_sentence(self) -> str:
+        """Which constraint is exceeded most, by how much and when."""
+        place, column = np.unravel_index(int(self._values.argmax()), self._values.shape)
+        names = self.program.rotors.names[: self._values.shape[1] - len(self.program.path.bounds)]
+        name = names[column] if column < len(names) else "a limit or condition on the path is"
+        excess, time = 100.0 * float(self._values[place, column]), float(self._samples.times[place])
+        return f"{name} beyond its limit by {excess:.3g} % of its range at {time:.2f} s"
+
     def linearization(self) -> Linearization:
         """The constraints near the path."""
         program = self.program

@@ -38,6 +38,14 @@ class RotorRows:
     environment: Environment
     heading: float  # [rad]
 
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Of the constraints, each in a few words."""
+        rotors = range(len(self.vehicle.rotors))
+        kinds = ["thrust", "command"] if self.vehicle.lags.any() else ["thrust"]
+        sides = (f"the {kind} of rotor {i} is" for kind in kinds for _ in ("low", "high") for i in rotors)
+        return (*sides, "the collective thrust is next to nothing,", "the body rate is")
+
     def frames(self, times: Array, derivatives: Array) -> Array:
         """Body axes in the world, as columns, (m, 3, 3), along a path's derivatives (m, 6, 3)."""
         velocity, acceleration, jerk, snap = np.moveaxis(derivatives[:, 1:5], 1, 0)

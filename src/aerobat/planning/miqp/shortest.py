@@ -102,6 +102,5 @@ class _Scan:
 
     def _record(self, placement: Placement, violation: float) -> None:
         if violation > 0.0:
-            excess = f"beyond what the vehicle can do by {100 * violation:.3g} % of a limit's range"
-            failure = None if violation == inf else excess
-            self.attempts.judge(replace(placement, path=None), placement.dt, failure)
+            failure = placement.path.excess_sentence if placement.path else None
+            self.attempts.judge(replace(placement, path=None), placement.dt, failure, -violation)

@@ -1,0 +1,72 @@
+"""The prox-linear method: it ends at local optima, from outside the constraints too."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+
+from aerobat.optimization.assignment import AssignmentProgram, SlottedStage
+from aerobat.optimization.backends import solver
+from aerobat.optimization.prox_linear import Linearization, prox_linear
+
+
+class Disc:
+    """A linear cost in the disc |x| ≤ 1 of the plane, with x₃ = x₁² as an equality."""
+
+    def __init__(self, cost):
+        self.cost = np.array(cost)
+        self.scale = np.ones(3)
+        self.reach = np.full(3, 0.5)
+        self.bounded = (np.zeros((0, 3)), np.zeros(0), np.zeros(0))
+
+    def at(self, x):
+        return DiscPoint(np.array([x[0], x[1], x[0] ** 2]))
+
+
+@dataclass(frozen=True, eq=False)
+class DiscPoint:
+    x: np.ndarray
+
+    @property
+    def violation(self):
+        return float(self.x[0] ** 2 + self.x[1] ** 2 - 1.0)
+
+    def linearization(self):
+        row = np.array([[2 * self.x[0], 2 * self.x[1], 0.0]])
+        equality = np.array([[-2 * self.x[0], 0.0, 1.0]])
+        return Linearization(
+            np.array([self.violation]), row, np.array([self.x[2] - self.x[0] ** 2]), equality
+        )
+
+
+@pytest.mark.parametrize("start", [(0.1, 0.2, 0.01), (3.0, -4.0, 9.0)])
+def test_the_optimum_of_a_linear_cost_in_a_disc_is_on_its_edge(start):
+    program = Disc([3.0, 4.0, 0.0])
+    result = prox_linear(program, program.at(np.array(start)), 80)
+    assert result.converged
+    np.testing.assert_allclose(result.point.x[:2], [-0.6, -0.8], atol=0.02)
+    assert result.point.violation < 1e-3
+
+
+def test_without_a_cost_the_first_point_inside_will_do():
+    program = Disc([0.0, 0.0, 0.0])
+    inside = program.at(np.array([0.1, 0.2, 0.0]))
+    assert prox_linear(program, inside).steps == 0
+    result = prox_linear(program, program.at(np.array([3.0, 0.0, 0.0])))
+    assert result.point.violation <= 1e-9
+
+
+@pytest.mark.parametrize(("third", "status"), [(2.0, "optimal"), (2.5, "infeasible")])
+def test_equalities_that_depend_on_each_other_are_told_from_those_that_contradict(third, status):
+    """Bounds that meet only when stages are placed: x + y = 2 once as a row of its own, once as a sum."""
+    rows = np.array([[1.0, 0.0], [0.0, 1.0], [1.0, 1.0]])
+    stage = SlottedStage("all", (0, 1), [[0, 1, 2], [0, 1, 2]], [1.0, 1.0, third], [1.0, 1.0, third])
+    program = AssignmentProgram(
+        equality=np.zeros((0, 2)),
+        target=np.zeros(0),
+        rows=rows,
+        lower=np.full(3, -np.inf),
+        upper=np.full(3, np.inf),
+        stages=(stage,),
+    )
+    assert solver("builtin").solve(program).status == status
