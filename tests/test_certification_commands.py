@@ -111,7 +111,7 @@ def test_a_climb_whose_thrust_rises_too_fast_for_a_lagging_rotor_is_refused_for_
 
 @pytest.mark.parametrize("order", [4, 5])
 def test_thrusts_that_jump_at_knots_are_refused_of_rotors_with_lag_alone(order):
-    inputs = 500 * np.random.default_rng(0).normal(size=(6, 3))
+    inputs = 500 * np.random.default_rng(2).normal(size=(6, 3))
     path = Trajectory.from_inputs(np.zeros((order, 3)), inputs, 0.3)
     assert not certify(path, with_lags(VEHICLE, 0.0)).discontinuities
     jumps = certify(path, VEHICLE).discontinuities
@@ -120,9 +120,9 @@ def test_thrusts_that_jump_at_knots_are_refused_of_rotors_with_lag_alone(order):
         return
     assert [jump.time for jump in jumps] == pytest.approx(path.knots[1:-1])
     for jump in jumps:
-        beside = jump.time + np.array([-1e-9, 1e-9])
-        before, after = reference(path, VEHICLE, beside).rotor_thrusts
-        assert jump.norm == pytest.approx(np.abs(after - before).max(), rel=1e-5)
+        times = np.append(np.linspace(0.0, jump.time - 1e-9, 300), jump.time + 1e-9)
+        before, after = reference(path, VEHICLE, times).rotor_thrusts[-2:]
+        assert jump.norm == pytest.approx(np.abs(after - before).max(), rel=1e-3)
         assert str(jump) == (
             f"rotor thrusts jump by up to {jump.norm:.2g} N at {jump.time:.3f} s, which rotors with lag "
             "cannot follow; plan with continuous snap (--order 5)"
