@@ -122,11 +122,13 @@ def test_the_crossing_next_to_the_planned_instant_counts(cruise: ab.Flight) -> N
 
 def test_the_attitude_in_the_gate_is_judged_where_a_stage_asks_it(cruise: ab.Flight) -> None:
     tilted = moved(cruise, lambda p: p, turn=(0.2, 0.0, 0.0))
-    asked = ab.score(tilted, through(gate(), Attitude(UP)), QUAD)
+    asked = ab.score(tilted, through(gate(), Attitude(UP, min_thrust=5.0)), QUAD)
     assert asked.outcome is Outcome.WRONG_ATTITUDE
     assert asked.sentence == ("passed the gate tilted by 11.5° from its upright at 1.00 s, 5° allowed")
     wide = replace(gate(), attitude_tolerance=0.21)
-    assert ab.score(tilted, through(wide, Attitude(UP)), QUAD).outcome is Outcome.THROUGH_GATES
+    assert (
+        ab.score(tilted, through(wide, Attitude(UP, min_thrust=5.0)), QUAD).outcome is Outcome.THROUGH_GATES
+    )
     free = ab.score(tilted, through(gate()), QUAD)
     assert free.outcome is Outcome.THROUGH_GATES
     assert np.isinf(free.passages[0].attitude_tolerance_deg)
@@ -137,11 +139,12 @@ def test_a_plan_that_turns_the_vehicle_in_the_gate_is_told_so_by_its_flight() ->
     """The half-flip as it was asked by half, thrust along the passage free, its goal far away."""
     half_flip = replace(ab.load_problem("half-flip"), goal=ab.at_rest((15.0, 0.0, 0.0)))
     by_half = ab.HalfFlip(passage=ab.GatePassage(upright=False))
-    planned = ab.plan(replace(half_flip, maneuver=by_half), vehicle=QUAD)
-    result = ab.score(ab.fly(planned), replace(planned, problem=half_flip))
+    planned = ab.plan(replace(half_flip, maneuver=by_half))
+    flight = ab.fly(planned, QUAD)
+    result = ab.score(flight, replace(planned, problem=half_flip))
     assert result.passages[0].attitude_error_deg > 20.0
     assert result.outcome is Outcome.WRONG_ATTITUDE
-    assert ab.score(ab.fly(planned), planned).outcome is Outcome.THROUGH_GATES  # as nothing was asked
+    assert ab.score(flight, planned).outcome is Outcome.THROUGH_GATES  # as nothing was asked
 
 
 def test_a_flight_to_its_end_names_its_largest_error(cruise: ab.Flight) -> None:
@@ -171,10 +174,15 @@ PATHS = {
 }
 
 
-@pytest.mark.parametrize("engine", EXACT)
-@pytest.mark.parametrize("path", PATHS)
+@pytest.mark.parametrize(
+    ("path", "engine"),
+    [
+        *((path, "bytecode") for path in PATHS),
+        *(("twice", engine) for engine in EXACT if engine != "bytecode"),
+    ],
+)
 def test_passages_are_the_same_from_a_log_and_as_they_are_flown(path: str, engine: str) -> None:
-    problem = through(gate(20.0), Attitude(UP))
+    problem = through(gate(20.0), Attitude(UP, min_thrust=5.0))
     scored = ab.score_flights(PATHS[path], QUAD, problem=problem, engine=engine)
     assert_same(scored[0], ab.score(ab.fly(PATHS[path], QUAD), problem, QUAD), 1e-9)
 
