@@ -35,7 +35,7 @@ SETTLING_STEPS = 8  # at most
 MIN_RATIO = 0.3  # of an interval to the mean
 RATIO_SCALE = 0.3  # change of a ratio that counts as much as a whole unit of ln h
 MENDABLE = 2e-3  # of a constraint's range: an excess that settling mends
-MAX_STEPS = 40  # of a descent
+MAX_STEPS = 30  # of a descent
 SECOND_STEPS = 20  # of another, once backed off
 ROUNDS = 8  # of settling, at most
 
