@@ -13,6 +13,7 @@ from aerobat.certification import Envelope, certify
 from aerobat.cli.entry import ExitCode
 from aerobat.cli.options import DEFAULT_VEHICLE, CheckOptions
 from aerobat.cli.tasks import named_vehicle
+from aerobat.cli.terminal import print_json
 from aerobat.environment import Environment
 from aerobat.interchange import read_plan
 from aerobat.planning import Plan
@@ -54,7 +55,7 @@ def check(plan: Path, options: Annotated[CheckOptions, Parameter(name="*")] = Ch
     )
     certificate = certify(trajectory, vehicle, environment, envelope)
     if options.json:
-        print(to_json(certificate.record()))
+        print_json(to_json(certificate.record()))
     else:
         show(certificate_table(certificate, f"{plan} · {vehicle.name}"))
         if not isinstance(found, Plan):

@@ -10,6 +10,7 @@ from cyclopts import Parameter
 from aerobat.cli.options import TaskOptions
 from aerobat.cli.run_folder import run_folder
 from aerobat.cli.tasks import planning_progress, read_task
+from aerobat.cli.terminal import print_json
 from aerobat.reporting.comparison import comparison_figure, comparison_rows, comparison_table
 from aerobat.reporting.page import png
 from aerobat.reporting.report_json import to_json
@@ -37,7 +38,7 @@ def compare(problem: str, options: Annotated[TaskOptions, Parameter(name="*")] =
         (staging / "compare.json").write_text(rows + "\n", encoding="utf-8")
         (staging / "compare.png").write_bytes(png(comparison_figure(comparison)))
     if options.json:
-        print(rows)
+        print_json(rows)
         return
     show(comparison_table(comparison))
     print(f"\nwritten to {folder}/")

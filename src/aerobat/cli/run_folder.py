@@ -10,6 +10,7 @@ from pathlib import Path
 from aerobat.cli.entry import ExitCode
 from aerobat.cli.interrupts import end_interrupts
 from aerobat.cli.options import TaskOptions
+from aerobat.cli.terminal import print_json
 from aerobat.evaluation import Score
 from aerobat.interchange.csv import write_csv
 from aerobat.planning import Plan
@@ -57,7 +58,7 @@ def finish(plan: Plan, options: TaskOptions, flown: Flown | None = None) -> Exit
         (staging / "report.json").write_text(facts + "\n", encoding="utf-8")
         (staging / "report.png").write_bytes(png(report_figure(plan, plan.vehicle, flight, score)))
     if options.json:
-        print(facts)
+        print_json(facts)
     else:
         show(summary_table(plan, score, plan.vehicle.name, controller))
         print(f"\nwritten to {folder}/")

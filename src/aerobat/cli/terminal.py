@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import codecs
 import io
+import json
 import os
 import sys
+import unicodedata
 from contextlib import suppress
 from typing import TextIO
 
@@ -65,11 +67,21 @@ def say(sentence: str) -> None:
         discard(sys.stderr)
 
 
+def print_json(text: str) -> None:
+    """Print JSON, of which no character is lost: those that standard output cannot write are escaped."""
+    encoding = getattr(sys.stdout, "encoding", None) or "utf-8"
+    if codecs.lookup(encoding).name != "utf-8":
+        text = "".join(sign if sign.isascii() else json.dumps(sign)[1:-1] for sign in text)
+    print(text)
+
+
 def _in_ascii(error: UnicodeError) -> tuple[str, int]:
-    """What a codec cannot write, in ASCII: known signs in kind, others escaped as JSON has it."""
+    """What a codec cannot write, in ASCII: known signs in kind, letters without their accents, else "?"."""
     if not isinstance(error, UnicodeEncodeError):
         raise error
-    import json
-
     signs = error.object[error.start : error.end]
-    return "".join(ASCII.get(sign) or json.dumps(sign)[1:-1] for sign in signs), error.end
+    return "".join(ASCII.get(sign) or _without_accents(sign) for sign in signs), error.end
+
+
+def _without_accents(sign: str) -> str:
+    return unicodedata.normalize("NFKD", sign).encode("ascii", "ignore").decode() or "?"

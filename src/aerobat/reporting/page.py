@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from io import BytesIO
@@ -91,6 +92,7 @@ def legend(axes: Axes, above: float) -> None:
 def png(figure: Figure) -> bytes:
     """The bytes of a figure's PNG file: the same for the same data, deflated fast."""
     file = BytesIO()
-    with house_style():
+    with house_style(), warnings.catch_warnings():
+        warnings.filterwarnings("ignore", "Glyph .* missing", UserWarning)  # a box stands for it
         figure.savefig(file, format="png", dpi=figure.dpi, pil_kwargs={"compress_level": 1})
     return file.getvalue()

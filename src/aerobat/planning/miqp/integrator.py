@@ -18,7 +18,7 @@ from aerobat.declaration import declared
 
 INPUT_NAMES = {3: "jerk", 4: "snap", 5: "crackle"}
 Order = Annotated[int, Field(ge=min(INPUT_NAMES), le=max(INPUT_NAMES))]
-Intervals = Annotated[int, Field(ge=1, le=10_000)]
+Intervals = Annotated[int, Field(ge=1, le=1000)]  # as many take half a gigabyte of matrices
 
 
 @declared
