@@ -124,7 +124,7 @@ def measured(tasks: list[Task], jobs: int) -> Iterator[tuple[Task, Row]]:
 def measure(task: Task) -> tuple[Task, Row]:
     case = task.case
     row = {"what": task.what, "seed": task.seed, "k": task.k, "kind": case.kind, "planner": task.planner}
-    return task, row | {"vehicle": case.vehicle.name} | MEASURES[task.what](task, case)
+    return task, row | {"case": case.problem.name} | MEASURES[task.what](task, case)
 
 
 def plans(task: Task, case: Case) -> Row:

@@ -97,10 +97,10 @@ def flyability(rows: list[Row]) -> Iterable[str]:
 
 
 def durations(rows: list[Row]) -> Iterable[str]:
-    best = {(r["seed"], r["k"]): r["duration"] for r in _certified(rows, YARDSTICK)}
+    best = {r["case"]: r["duration"] for r in _certified(rows, YARDSTICK)}
     for name, floor in zip(PLANNERS, ("1.25", "-", "1.05", "-"), strict=True):
-        own = [r for r in _certified(rows, name) if (r["seed"], r["k"]) in best]
-        ratios = sorted(r["duration"] / best[r["seed"], r["k"]] for r in own)
+        own = [r for r in _certified(rows, name) if r["case"] in best]
+        ratios = sorted(r["duration"] / best[r["case"]] for r in own)
         if ratios:
             under = sum(ratio < YARDSTICK_SLACK for ratio in ratios)
             yield (
