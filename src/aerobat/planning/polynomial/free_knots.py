@@ -105,7 +105,7 @@ class FreeKnots(Planner):
         if self.start is not None:
             yield self.start
         closed_form: list[Planner] = [MinSnap()] if problem.maneuver.through_points else []
-        yield from plans_to_begin_from([*closed_form, Miqp()], problem, vehicle)
+        yield from plans_to_begin_from([*closed_form, Miqp(rescue=False)], problem, vehicle)
         yield Miqp().plan(problem)
 
 
