@@ -142,7 +142,7 @@ def test_what_cannot_be_certified_is_no_plan() -> None:
     falling = EndState((0.0, 0.0, 0.01), (0.0, 0.0, -4.0))
     problem = Problem("crash", falling, at_rest((3.0, 0.0, 1.0)), environment=Environment(ground=0.0))
     with pytest.raises(ab.Infeasible) as refused:
-        plan(problem, Miqp(search=ab.BisectionSearch(0.02, 0.3)), QUAD)
+        plan(problem, Miqp(search=ab.BisectionSearch(0.02, 0.3), rescue=False), QUAD)
     assert not any(attempt.feasible for attempt in refused.value.attempts)
 
 
@@ -201,7 +201,7 @@ def test_the_command_lines_options_follow_from_the_fields() -> None:
         if name != "straight"
     }
     assert flags == {
-        "miqp": ["--order", "--intervals", "--backend", "--time-limit"],
+        "miqp": ["--order", "--intervals", "--backend", "--time-limit", "--no-rescue"],
         "min-snap": ["--order", "--stop-after"],
         "free-knots": ["--segments", "--reserve"],
         "time-optimal": ["--reserve", "--in-space"],
