@@ -10,8 +10,8 @@ from aerobat.errors import Infeasible
 from aerobat.flatness import force_balance, reference
 from aerobat.planning import GridSearch, Miqp, plan
 from aerobat.planning.certified_solve import certificate_for, tightened
-from aerobat.planning.miqp.phases import PhasedChain, Places
-from aerobat.planning.miqp.rotor_rows import RotorRows
+from aerobat.planning.miqp.refinement.phases import PhasedChain, Places
+from aerobat.planning.miqp.refinement.rotor_rows import RotorRows
 from aerobat.problem import (
     Condition,
     CustomManeuver,

@@ -13,16 +13,15 @@ from functools import cached_property
 import numpy as np
 
 from aerobat.arrays import Array, Indices, Mask
-from aerobat.optimization.prox_linear import Linearization, prox_linear
+from aerobat.optimization.prox_linear import Linearization
 from aerobat.planning.miqp.formulation import Formulation
-from aerobat.planning.miqp.path_rows import PathRows, of_conditions
-from aerobat.planning.miqp.phases import DERIVATIVES, PhasedChain, Places, Samples
-from aerobat.planning.miqp.rotor_rows import RotorRows
+from aerobat.planning.miqp.refinement.path_rows import PathRows, of_conditions
+from aerobat.planning.miqp.refinement.phases import DERIVATIVES, PhasedChain, Places, Samples
+from aerobat.planning.miqp.refinement.rotor_rows import RotorRows
 from aerobat.trajectory import Trajectory
 from aerobat.vehicle import Vehicle
 
 PARTS = 4  # of each interval, at whose ends constraints are held
-DENSE_PARTS = 16  # at whose ends they are looked at afterwards
 NEAR = 0.15  # of a constraint's range: nearer ones are rows of a step
 ROTOR_BACKOFF = 2e-4  # of a rotor's range, which the certificate can tell
 ROTOR_SLACK = 0.5 * ROTOR_BACKOFF  # of that, by which a path may miss it
@@ -30,14 +29,8 @@ EXCESS_FACTOR = 1.2  # backoff for each unit of excess between places
 EXCESS_BACKOFF = 1e-4  # and so much more, for what moves while it is made up for
 NEGLIGIBLE = 5e-10  # of a constraint's range
 REACH = 0.15  # of the mean interval and of each phase's, in one step
-SETTLING_STRETCH = 3e-4  # of the mean interval: leaves room for meeting all constraints exactly
-SETTLING_STEPS = 8  # at most
 MIN_RATIO = 0.3  # of an interval to the mean
 RATIO_SCALE = 0.3  # change of a ratio that counts as much as a whole unit of ln h
-MENDABLE = 2e-3  # of a constraint's range: an excess that settling mends
-MAX_STEPS = 30  # of a descent
-SECOND_STEPS = 20  # of another, once backed off
-ROUNDS = 8  # of settling, at most
 
 
 @dataclass(frozen=True, eq=False)
@@ -294,46 +287,3 @@ class PathPoint:
         by_place = self.program.rotors.slopes(self._samples.derivatives[at], self._frames[at])
         slopes[~of_path] = by_place[index, column[~of_path]]
         return slopes
-
-
-def descended(program: PathProgram, start: Array, max_steps: int = MAX_STEPS) -> PathPoint | None:
-    """The path that a descent ends at; None where it is far from what it should keep within.
-
-    Args:
-        program: What is sought.
-        start: The variables to begin with.
-        max_steps: Of the descent, at most.
-    """
-    point = program.at(start)
-    point = None if point is None else prox_linear(program, point, max_steps).point
-    return None if point is None or point.violation > MENDABLE else point
-
-
-def finished(point: PathPoint) -> PathPoint | None:
-    """What a descent ended at, within all constraints between places too; None where that fails.
-
-    Once more down, backed off from what is exceeded between places; what is then left takes a trifle of time.
-    """
-    backed_off = point.program.backed_off(point.excess(DENSE_PARTS))
-    return settled(descended(backed_off, point.x, SECOND_STEPS) or point)
-
-
-def settled(point: PathPoint) -> PathPoint | None:
-    """The path flown a trifle slower, within all constraints; None where that is not enough."""
-    stretch = 0.0
-    for _ in range(ROUNDS):
-        excess = point.excess(DENSE_PARTS)
-        if point.violation <= 0.0 and not excess.any():
-            return point
-        held = point.program.held
-        program = replace(point.program.backed_off(excess), held=True)
-        x = point.x.copy()
-        if not held:
-            stretch = max(2.0 * stretch, SETTLING_STRETCH)
-            x[-1] += stretch
-        moved = program.at(x)
-        if moved is None:
-            return None
-        moved = prox_linear(program, moved, SETTLING_STEPS).point
-        point = PathPoint(replace(program, held=held), moved.x)
-    return None

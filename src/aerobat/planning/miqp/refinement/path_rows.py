@@ -9,7 +9,7 @@ from math import isfinite
 import numpy as np
 
 from aerobat.arrays import Array
-from aerobat.planning.miqp.phases import DERIVATIVES
+from aerobat.planning.miqp.refinement.phases import DERIVATIVES
 from aerobat.problem.condition import Condition, ForceBalance
 from aerobat.problem.problem import Limits
 

@@ -1,0 +1,60 @@
+"""From a start to a path within all constraints: descents, and what settles the rest."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from aerobat.arrays import Array
+from aerobat.optimization.prox_linear import prox_linear
+from aerobat.planning.miqp.refinement.path_program import PathPoint, PathProgram
+
+DENSE_PARTS = 16  # at whose ends they are looked at afterwards
+SECOND_STEPS = 20  # of another, once backed off
+ROUNDS = 8  # of settling, at most
+MENDABLE = 2e-3  # of a constraint's range: an excess that settling mends
+MAX_STEPS = 30  # of a descent
+SETTLING_STRETCH = 3e-4  # of the mean interval: leaves room for meeting all constraints exactly
+SETTLING_STEPS = 8  # at most
+
+
+def descended(program: PathProgram, start: Array, max_steps: int = MAX_STEPS) -> PathPoint | None:
+    """The path that a descent ends at; None where it is far from what it should keep within.
+
+    Args:
+        program: What is sought.
+        start: The variables to begin with.
+        max_steps: Of the descent, at most.
+    """
+    point = program.at(start)
+    point = None if point is None else prox_linear(program, point, max_steps).point
+    return None if point is None or point.violation > MENDABLE else point
+
+
+def finished(point: PathPoint) -> PathPoint | None:
+    """What a descent ended at, within all constraints between places too; None where that fails.
+
+    Once more down, backed off from what is exceeded between places; what is then left takes a trifle of time.
+    """
+    backed_off = point.program.backed_off(point.excess(DENSE_PARTS))
+    return settled(descended(backed_off, point.x, SECOND_STEPS) or point)
+
+
+def settled(point: PathPoint) -> PathPoint | None:
+    """The path flown a trifle slower, within all constraints; None where that is not enough."""
+    stretch = 0.0
+    for _ in range(ROUNDS):
+        excess = point.excess(DENSE_PARTS)
+        if point.violation <= 0.0 and not excess.any():
+            return point
+        held = point.program.held
+        program = replace(point.program.backed_off(excess), held=True)
+        x = point.x.copy()
+        if not held:
+            stretch = max(2.0 * stretch, SETTLING_STRETCH)
+            x[-1] += stretch
+        moved = program.at(x)
+        if moved is None:
+            return None
+        moved = prox_linear(program, moved, SETTLING_STEPS).point
+        point = PathPoint(replace(program, held=held), moved.x)
+    return None
