@@ -10,7 +10,7 @@ out.mkdir(parents=True, exist_ok=True)
 
 vehicle = ab.load_vehicle("agile-quad")  # a preset's name, or a TOML file
 problem = ab.load_problem("flip-roll")  # the paper's maneuver, or a TOML file
-plan = ab.plan(problem, ab.Miqp(order=4), vehicle)  # within its rotors' limits, proven
+plan = ab.plan(problem, ab.Miqp(), vehicle)  # within its rotors' limits, proven
 print(plan)
 plan.save(out / "flip.plan")  # everything; ab.load_plan and `aerobat fly flip.plan` read it back
 

@@ -12,7 +12,7 @@ nominal = ab.load_vehicle("agile-quad")
 actual = replace(nominal, mass=1.03 * nominal.mass)  # heavier than its controller takes it to be
 usual = ab.Controller()
 first = np.array([getattr(usual, name) for name in GAINS])
-plan = ab.plan(ab.load_problem("flip-roll"), ab.Miqp(order=4), vehicle=nominal)
+plan = ab.plan(ab.load_problem("flip-roll"), ab.Miqp(), vehicle=nominal)
 
 
 def tuned(factors: np.ndarray) -> ab.Controller:

@@ -117,6 +117,8 @@ def _plan_facts(plan: Plan) -> Iterable[tuple[str, str]]:
     backend = f", {plan.backend}" if plan.backend else ""
     pieces = "1 interval" if plan.intervals == 1 else f"{plan.intervals} intervals"
     yield "planner", f"{plan.planner}{order}, {pieces}{backend}"
+    if plan.rescue:
+        yield "rescue", plan.rescue
     dt = "" if plan.dt is None else f"dt {plan.dt:.4f} s "
     yield "duration", f"{plan.duration:.3f} s, {dt}after {len(plan.attempts)} attempts"
     if plan.cost is not None:
