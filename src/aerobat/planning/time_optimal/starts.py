@@ -76,6 +76,7 @@ def _sources(
 
 
 def _planners(problem: Problem, guess: Miqp) -> Iterator[tuple[Planner, bool, str]]:
+    guess = replace(guess, rescue=False)  # by free knots, which begin where this planner can itself
     yield guess, True, "miqp's plan"
     if problem.maneuver.through_points:
         yield MinSnap(), True, "min-snap's plan"
