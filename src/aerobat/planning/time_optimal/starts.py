@@ -23,6 +23,7 @@ from aerobat.vehicle import Vehicle
 SLOWER = 1.5  # times the duration of a plan that knows no rotors
 PACE_SPREAD = 0.4  # standard deviation of the logarithm of a phase's pace, where paces are drawn
 SEED = 0
+NEAR_PLANE = 0.05  # of a path's length: what leaves a plane by less may begin in it
 ASIDE = 0.1  # of a path's length, by which it is bent out of its plane: symmetry is an optimum of its own
 
 
@@ -84,15 +85,16 @@ def _planners(problem: Problem, guess: Miqp) -> Iterator[tuple[Planner, bool, st
 
 
 def _variations(sources: list[tuple[WarmStart, str]], planar: bool) -> Iterator[Start]:
-    """Every source in its plane and in space; then all of them again at other paces, without end."""
+    """Every source in the plane of one that lies in any, and in space; then at other paces, without end."""
+    plane = next((plane for guess, _ in sources if (plane := guess.plane()) is not None), None)
     paced, rng = sources, np.random.default_rng(SEED)
     while sources:
         for guess, origin in paced:
-            plane = guess.plane()
-            if plane is not None:
+            near = plane is not None and _distance(guess, plane) <= NEAR_PLANE * _extent(guess)
+            if plane is not None and (near or planar):
                 yield Start(guess, plane, np.zeros(3), f"{origin}, in a plane")
             if plane is None or not planar:
-                aside = np.zeros(3) if plane is None else ASIDE * _extent(guess) * plane
+                aside = ASIDE * _extent(guess) * plane if plane is not None and near else np.zeros(3)
                 yield Start(guess, None, aside, origin)
         paced = [
             (
@@ -101,6 +103,12 @@ def _variations(sources: list[tuple[WarmStart, str]], planar: bool) -> Iterator[
             )
             for guess, origin in sources
         ]
+
+
+def _distance(start: WarmStart, normal: Array) -> float:
+    """How far a path's segments lead from a plane through its start [m]."""
+    points = start.trajectory.on_segments([0.0, 0.5, 1.0])
+    return float(np.abs((points - points[0, 0]) @ normal).max())
 
 
 def _extent(start: WarmStart) -> float:
