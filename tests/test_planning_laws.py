@@ -204,5 +204,5 @@ def test_the_command_lines_options_follow_from_the_fields() -> None:
         "miqp": ["--order", "--intervals", "--backend", "--time-limit", "--no-rescue"],
         "min-snap": ["--order", "--stop-after"],
         "free-knots": ["--segments", "--reserve"],
-        "time-optimal": ["--reserve", "--in-space"],
+        "time-optimal": ["--reserve", "--starts", "--planar"],
     }

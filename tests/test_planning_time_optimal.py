@@ -37,12 +37,12 @@ def section_v(max_thrust: float, inertia: float) -> Vehicle:
 
 @pytest.fixture(scope="module")
 def flip() -> Plan:
-    return TimeOptimal().plan(load_problem("flip-roll"), QUAD)
+    return TimeOptimal(starts=2).plan(load_problem("flip-roll"), QUAD)
 
 
 @pytest.fixture(scope="module")
 def half_flip() -> Plan:
-    return TimeOptimal(intervals=40).plan(load_problem("half-flip"), QUAD)
+    return TimeOptimal(intervals=40, starts=2).plan(load_problem("half-flip"), QUAD)
 
 
 @pytest.mark.parametrize(
@@ -53,7 +53,7 @@ def half_flip() -> Plan:
 def test_section_v_takes_its_least_time_and_a_rigid_body_without_control_arrives(max_thrust, inertia, least):
     """Least times of the planar problem by multiple shooting of the rigid body; feed-forward alone after."""
     vehicle, problem = section_v(max_thrust, inertia), load_problem("section-v")
-    found = TimeOptimal().plan(problem, vehicle)
+    found = TimeOptimal(planar=True, starts=2).plan(problem, vehicle)
     assert found.duration == pytest.approx(least, rel=5e-3)
     assert found.certificate.certified
     assert np.ptp(found.trajectory.coefficients[..., 1]) < 1e-5
@@ -65,19 +65,19 @@ def test_section_v_takes_its_least_time_and_a_rigid_body_without_control_arrives
 
 def test_in_space_there_is_a_faster_way_than_in_the_plane():
     vehicle = section_v(18.0, 0.012)
-    in_space = TimeOptimal(intervals=40, planar=False).plan(load_problem("section-v"), vehicle)
+    in_space = TimeOptimal(intervals=40).plan(load_problem("section-v"), vehicle)
     assert in_space.duration < 1.11
 
 
 def test_a_maneuver_that_lies_in_no_plane_is_planned_in_space():
     bent = Waypoints((Waypoint(position=(1.0, 1.0, 0.0)),))
     problem = Problem("bent", at_rest((0, 0, 0)), at_rest((2, 0, 0)), bent)
-    found = TimeOptimal(intervals=20).plan(problem, QUAD)
+    found = TimeOptimal(intervals=20, starts=1).plan(problem, QUAD)
     assert found.trajectory.evaluate(found.stages[0].time) == pytest.approx([1.0, 1.0, 0.0], abs=1e-6)
 
 
 def test_more_intervals_change_little(half_flip):
-    coarser = TimeOptimal(intervals=28).plan(half_flip.problem, QUAD)
+    coarser = TimeOptimal(intervals=28, starts=2).plan(half_flip.problem, QUAD)
     assert coarser.trajectory.segments < half_flip.trajectory.segments
     assert coarser.duration == pytest.approx(half_flip.duration, rel=0.015)
 
@@ -86,7 +86,7 @@ def test_more_intervals_change_little(half_flip):
 def test_a_flip_is_certified_and_flown_within_2_cm(name, request):
     found = request.getfixturevalue(name)
     assert found.certified
-    assert found.attempts[-1].feasible
+    assert any(attempt.feasible for attempt in found.attempts)
     flown = fly(found.trajectory, QUAD)
     assert np.linalg.norm(flown.states.position - flown.setpoint.flat.position, axis=-1).max() < 0.02
 
@@ -117,7 +117,7 @@ def test_the_half_flip_passes_its_gate_squarely_and_banked_as_the_gate_is(half_f
     assert half_flip.trajectory.evaluate(passage.time) == pytest.approx(gate.position, abs=1e-6)
     assert velocity == pytest.approx(gate.normal * np.linalg.norm(velocity), abs=1e-5)
     assert thrust @ gate.up > 0.2 * QUAD.max_specific_thrust - 1e-5
-    assert thrust @ gate.lateral == pytest.approx(0.0, abs=1e-5)
+    assert thrust @ gate.up > np.cos(gate.attitude_tolerance / 2) * np.linalg.norm(thrust) - 1e-6
 
 
 def test_lagging_rotors_can_follow(flip):
@@ -131,19 +131,19 @@ def test_lagging_rotors_can_follow(flip):
 def test_limits_hold_between_nodes_and_cost_time():
     limits = Limits(upper=np.array([np.inf, np.inf, 0.05]), velocity=5.0, acceleration=20.0, jerk=150.0)
     free = Problem("dash", at_rest((0, 0, 0)), at_rest((4, 0, 0)))
-    bound = TimeOptimal(intervals=20).plan(replace(free, limits=limits), QUAD)
+    bound = TimeOptimal(intervals=20, starts=1).plan(replace(free, limits=limits), QUAD)
     for derivative in range(4):
         (lower, upper), (least, most) = limits.of(derivative), bound.trajectory.component_range(derivative)
         assert (lower - 1e-9 <= least).all()
         assert (most <= upper + 1e-9).all()
     assert bound.certificate.certified
-    assert bound.duration > TimeOptimal(intervals=20).plan(free, QUAD).duration
+    assert bound.duration > TimeOptimal(intervals=20, starts=1).plan(free, QUAD).duration
 
 
 def test_ends_in_motion_are_met():
     start = EndState(np.zeros(3), np.array([2.0, 0.0, 0.0]), np.array([0.0, 1.0, 0.0]))
     goal = EndState(np.array([6.0, 1.0, 1.0]), np.array([0.0, -1.0, 0.0]))
-    path = TimeOptimal(intervals=30).plan(Problem("moving", start, goal), QUAD).trajectory
+    path = TimeOptimal(intervals=30, starts=1).plan(Problem("moving", start, goal), QUAD).trajectory
     for end, state in ((0.0, start), (path.duration, goal)):
         for derivative, value in enumerate(state.derivatives(3)):
             assert path.evaluate(end, derivative) == pytest.approx(value, abs=1e-5)
@@ -151,7 +151,8 @@ def test_ends_in_motion_are_met():
 
 def test_a_reserve_is_kept_from_every_rotors_limits_and_costs_time():
     vehicle, problem = section_v(18.0, 0.12), load_problem("section-v")
-    plans = [TimeOptimal(20, reserve).plan(problem, vehicle) for reserve in (0.0, 0.05)]
+    planners = [TimeOptimal(20, reserve, starts=1, planar=True) for reserve in (0.0, 0.05)]
+    plans = [planner.plan(problem, vehicle) for planner in planners]
     assert plans[1].margin.margin > 0.04 * 18.0
     assert plans[1].duration > plans[0].duration
 
@@ -184,9 +185,9 @@ def test_options_that_make_no_sense_are_refused(options, sentence):
 def test_a_search_that_ends_with_nothing_says_where_and_what_to_change():
     seen = []
     with pytest.raises(Infeasible, match=r"limit of iterations; ask less .* or give more") as raised:
-        TimeOptimal(iterations=2).plan(load_problem("line"), QUAD, seen.append)
+        TimeOptimal(iterations=2, starts=2).plan(load_problem("line"), QUAD, seen.append)
     assert list(raised.value.attempts) == seen
-    assert len(seen) == 2
+    assert all(not attempt.feasible for attempt in seen)
 
 
 def test_without_casadi_the_remedy_is_the_command_that_installs_it(monkeypatch):

@@ -5,6 +5,7 @@ CasADi is optional: whatever needs it calls `import_casadi()`, which says how to
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from importlib import import_module
@@ -21,6 +22,14 @@ from aerobat.errors import BackendMissing, SpecError
 from aerobat.optimization.interrupts import interrupts_kept
 
 _OPTIONS = {"print_time": False, "show_eval_warnings": False, "ipopt.print_level": 0, "ipopt.sb": "yes"}
+_WARM = {
+    "ipopt.warm_start_init_point": "yes",
+    "ipopt.warm_start_bound_push": 1e-9,
+    "ipopt.warm_start_bound_frac": 1e-9,
+    "ipopt.warm_start_slack_bound_push": 1e-9,
+    "ipopt.warm_start_slack_bound_frac": 1e-9,
+    "ipopt.warm_start_mult_bound_push": 1e-9,
+}
 _MAX_VIOLATION = 1e-6  # that a result may have and be called converged
 _CONVERGED = ("Solve_Succeeded", "Solved_To_Acceptable_Level")
 _MEANING = {
@@ -58,6 +67,8 @@ class NonlinearProgram:
     upper: Array
     x_min: Array = field(default_factory=lambda: np.array(-inf))  # (n,), or one number for all
     x_max: Array = field(default_factory=lambda: np.array(inf))
+    # CasADi functions in place of CasADi's own derivatives: grad_f, jac_g and hess_lag of its IPOPT
+    derivatives: Mapping[str, Any] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         """Check and broadcast."""
@@ -92,6 +103,7 @@ class NonlinearResult:
     """The point that a solve ended at; cost and violation are recomputed from the program."""
 
     x: Array  # (n,)
+    multipliers: tuple[Array, Array]  # of the bounds on x, (n,), and of the constraints, (m,)
     cost: float
     violation: float  # of the worst constraint or bound, in its own unit
     converged: bool  # IPOPT found an optimum, and the violation is within 1e-6
@@ -107,6 +119,7 @@ def solve_nonlinear(
     max_iterations: int = 500,
     tolerance: float = 1e-8,
     initial_barrier: float | None = None,
+    multipliers: tuple[Array, Array] | None = None,
     time_limit: float | None = None,
     exact_hessian: bool = True,
 ) -> NonlinearResult:
@@ -119,6 +132,7 @@ def solve_nonlinear(
         tolerance: of IPOPT, on the scaled optimality conditions.
         initial_barrier: the first barrier parameter; None is IPOPT's 0.1, and 1e-4 or less keeps a start that
             is nearly optimal.
+        multipliers: of a result near the start, which with a small first barrier parameter saves iterations.
         time_limit: [s]; None sets no limit.
         exact_hessian: False has the Hessian built up by BFGS updates.
 
@@ -130,22 +144,30 @@ def solve_nonlinear(
     began = perf_counter()
     x0 = frozen(start, "start", (int(program.variables.numel()),))
     options: dict[str, Any] = {**_OPTIONS, "ipopt.max_iter": max_iterations, "ipopt.tol": tolerance}
+    options |= program.derivatives
     if time_limit is not None:
         options["ipopt.max_wall_time"] = time_limit
     if not exact_hessian:
         options["ipopt.hessian_approximation"] = "limited-memory"
     if initial_barrier is not None:
         options |= {"ipopt.mu_init": initial_barrier, "ipopt.bound_push": 1e-6, "ipopt.bound_frac": 1e-6}
+    known = {}
+    if multipliers is not None:
+        options |= _WARM
+        known = dict(zip(("lam_x0", "lam_g0"), multipliers, strict=True))
     symbols = {"x": program.variables, "f": program.objective, "g": program.constraints}
     bounds = {"lbg": program.lower, "ubg": program.upper, "lbx": program.x_min, "ubx": program.x_max}
     with interrupts_kept():
         solver = import_casadi().nlpsol("program", "ipopt", symbols, options)
-        x = np.asarray(solver(x0=x0, **bounds)["x"], dtype=float).reshape(-1)
-    x.flags.writeable = False
+        answer = solver(x0=x0, **known, **bounds)
+    x, *found = (np.asarray(answer[name], dtype=float).reshape(-1) for name in ("x", "lam_x", "lam_g"))
+    for array in (x, *found):
+        array.flags.writeable = False
     status = str(solver.stats()["return_status"])
     violation = program.violation(x)
     return NonlinearResult(
         x=x,
+        multipliers=(found[0], found[1]),
         cost=program.cost(x),
         violation=violation,
         converged=status in _CONVERGED and violation <= _MAX_VIOLATION,

@@ -46,6 +46,7 @@ class _Evidence:
     certificate: Certificate | None
     flyability: Flyability | None = None
     rescue: str = ""
+    starts: tuple[float, ...] = ()
 
 
 def save_plan(plan: Plan, path: str | Path) -> None:

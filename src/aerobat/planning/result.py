@@ -81,6 +81,7 @@ class Plan:
     certificate: Certificate | None = None  # for the vehicle, over continuous time
     flyability: Flyability | None = None  # of the vehicle's own flight, simulated
     rescue: str = ""  # what found it, where what was asked for found nothing
+    starts: tuple[float, ...] = ()  # [s] that first, coarse solves from several starts came to, rising
 
     @property
     def duration(self) -> float:
@@ -101,6 +102,11 @@ class Plan:
     def margin(self) -> RotorMargin | None:
         """The certificate's findings about rotors, in short; None without a vehicle."""
         return None if self.certificate is None else RotorMargin.of(self.certificate)
+
+    @property
+    def spread(self) -> float | None:
+        """By how much more the slowest start came to than the fastest [-]; None of fewer than two."""
+        return self.starts[-1] / self.starts[0] - 1.0 if len(self.starts) > 1 else None
 
     @property
     def intervals(self) -> int:

@@ -64,6 +64,7 @@ def comparison_rows(comparison: Comparison) -> list[dict[str, Any]]:
             "min_margin_n": _margin(entry.plan),
             "planning_s": entry.planning_time,
             "max_position_error_m": entry.score and entry.score.max_position_error_m,
+            "note": entry.note,
         }
         for entry in comparison.entries
     ]
@@ -85,6 +86,7 @@ def comparison_table(comparison: Comparison) -> Table:
         for entry in comparison.entries
         if entry.score is None or entry.score.outcome is not Outcome.COMPLETE
     ]
+    notes += [f"{_name(entry)}: {entry.note}" for entry in comparison.entries if entry.note]
     table.caption = Text("\n".join(notes)) if notes else None  # as it stands: brackets are no markup
     return table
 
@@ -191,7 +193,8 @@ def _write_facts(figure: Figure, comparison: Comparison, entry: Entry, bottom: f
     for x, (name, fact) in zip(PLACES, _facts(comparison, entry).items(), strict=True):
         wrong = name == "certified" and not entry.certified
         write(figure, x, bottom + 0.6, fact, size=TITLE, color=RED if wrong else INK)
-    note = fill(f"planned in {entry.planning_time:.2f} s; {entry.outcome}", SENTENCE)
+    facts = (f"planned in {entry.planning_time:.2f} s", entry.note, entry.outcome)
+    note = fill("; ".join(filter(None, facts)), SENTENCE)
     write(figure, PLACES[0], bottom + 0.42, note, size=SMALL, color=MUTED, va="top")
 
 

@@ -74,6 +74,8 @@ def _plan(plan: Plan) -> dict[str, Any]:
         "bound": plan.bound,
         "gap": plan.gap,
         "backend": plan.backend,
+        "starts_s": list(plan.starts),
+        "spread": plan.spread,
         "nodes": plan.nodes,
         "solve_time_s": plan.solve_time,
         "stages": [{"name": s.name, "interval": s.interval, "time_s": s.time} for s in plan.stages],

@@ -123,6 +123,9 @@ def _plan_facts(plan: Plan) -> Iterable[tuple[str, str]]:
     yield "duration", f"{plan.duration:.3f} s, {dt}after {len(plan.attempts)} attempts"
     if plan.cost is not None:
         yield "cost", f"{plan.cost:.7g}, {_optimality(plan)}"
+    if plan.spread is not None:
+        coarse = f"{plan.starts[0]:.3f} to {plan.starts[-1]:.3f} s on a coarse mesh"
+        yield "starts", f"{len(plan.starts)}, {coarse}, {100 * plan.spread:.2g} % apart"
     yield "nodes", f"{plan.nodes}, solved in {1000 * plan.solve_time:.0f} ms"
     if plan.stages and plan.dt is not None:
         yield "stage intervals", ", ".join(f"{s.name} {s.interval}" for s in plan.stages)

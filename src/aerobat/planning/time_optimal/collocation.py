@@ -9,11 +9,12 @@ to the next,
 and so, twice, for the position, whose acceleration is such a quintic. A solution therefore *is* a piecewise
 polynomial of degree seven, with the rigid body's thrust direction, body rates, moments and collective thrust
 at both ends of every interval: nothing is interpolated between the program and what is flown.
+
+All this is a sum of what either side of an interval contributes, of its own state and of the input.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -22,9 +23,11 @@ import numpy as np
 
 from aerobat.arrays import Array
 from aerobat.optimization.nonlinear import import_casadi
+from aerobat.optimization.separable import Indices
 from aerobat.planning.time_optimal.zero_yaw_rate_body import (
     INPUTS,
     POSITION,
+    RATES,
     STATES,
     VELOCITY,
     ZeroYawRateBody,
@@ -34,36 +37,23 @@ from aerobat.trajectory import Trajectory, polynomial
 STATE_SCALE = np.repeat([1.0, 5.0, 1.0, 5.0], [3, 3, 4, 2])  # what is large in SI units
 QUINTIC = polynomial.hermite(np.eye(6)[:3], np.eye(6)[3:])  # powers of y (rows) from y, y', y'' at both ends
 INTEGRAL = 1.0 / np.arange(1, 7)  # of each power over [0, 1]
-BETWEEN = np.array([0.25, 0.5, 0.75])  # of an interval: where limits on what may swing there are held too
 DOUBLE_INTEGRAL = INTEGRAL / np.arange(2, 8)
+BOUNDED_DERIVATIVES = 5  # position to snap, that limits can bound
 
 
 @dataclass(frozen=True, eq=False)
 class CollocatedMotion:
-    """States and inputs over all phases in SI units: arrays, or symbols of the same shapes."""
+    """States and inputs over all phases in SI units."""
 
-    phases: Any  # durations [s], (P,)
-    states: Any  # at the nodes, (12, K + 1)
-    starts: Any  # inputs at the starts of the intervals, (3, K)
-    ends: Any  # and at their ends, (3, K)
-
-
-@dataclass(frozen=True, eq=False)
-class Rates:
-    """x', x'', x''' at the starts and at the ends of all intervals, (12, K) each."""
-
-    starts: tuple[Any, Any, Any]
-    ends: tuple[Any, Any, Any]
-
-    def normalised(self, durations: Any) -> list[Any]:
-        """The six of them with respect to normalised time, where x' has the unit of x per second."""
-        rows = import_casadi().repmat(durations, STATES, 1)
-        return [rate * rows**k for side in (self.starts, self.ends) for k, rate in enumerate(side)]
+    phases: Array  # durations [s], (P,)
+    states: Array  # at the nodes, (12, K + 1)
+    starts: Array  # inputs at the starts of the intervals, (3, K)
+    ends: Array  # and at their ends, (3, K)
 
 
 @dataclass(frozen=True, eq=False)
 class Mesh:
-    """Phases cut into intervals, and how a motion on them is written as one column of scaled unknowns.
+    """Phases cut into intervals, and where a motion on them stands in one column of scaled unknowns.
 
     The input of a `continuous` motion is the same on both sides of every inner node.
     """
@@ -83,111 +73,143 @@ class Mesh:
         return len(self.scale)
 
     @cached_property
+    def phase_of(self) -> Indices:
+        """The phase of each interval, which is the place of its duration too, (K,)."""
+        return np.repeat(np.arange(len(self.intervals)), self.intervals)
+
+    @cached_property
     def fractions(self) -> Array:
-        """Part of each phase that each interval takes, (P, K)."""
-        counts = np.array(self.intervals)
-        return np.repeat(np.diag(1.0 / counts), counts, axis=1)
+        """Part of its phase that each interval takes, (K,)."""
+        return np.asarray(1.0 / np.array(self.intervals)[self.phase_of])
+
+    @cached_property
+    def states(self) -> Indices:
+        """Places of the states at the nodes, (K + 1, 12)."""
+        return len(self.intervals) + np.arange(STATES * (self.total + 1)).reshape(-1, STATES)
+
+    @cached_property
+    def inputs(self) -> Indices:
+        """Places of the inputs at the starts and at the ends of the intervals, (2, K, 3)."""
+        count = self.total + 1 if self.continuous else 2 * self.total
+        places = self.states.max() + 1 + np.arange(INPUTS * count).reshape(-1, INPUTS)
+        return np.stack([places[: self.total], places[-self.total :]])
 
     @cached_property
     def scale(self) -> Array:
         """Scale of each unknown, in SI units, (size,)."""
-        phases, _, inputs = self._sizes
-        states, inputs = self.total + 1, inputs // INPUTS
-        return np.concatenate(
-            [np.ones(phases), np.tile(STATE_SCALE, states), np.tile(self.input_scale, inputs)]
-        )
+        inputs = (self.inputs.max() + 1 - self.inputs.min()) // INPUTS
+        states = np.tile(STATE_SCALE, self.total + 1)
+        return np.concatenate([np.ones(len(self.intervals)), states, np.tile(self.input_scale, inputs)])
+
+    def side_unknowns(self, last: int) -> Indices:
+        """Places of what a side of each interval depends on: duration, its state, both inputs, (K, 19)."""
+        states = self.states[1:] if last else self.states[:-1]
+        return np.hstack([self.phase_of[:, None], states, *self.inputs])
+
+    def durations(self, phases: Array) -> Array:
+        """Of the intervals [s], (K,)."""
+        return phases[self.phase_of] * self.fractions
 
     def pack(self, motion: CollocatedMotion) -> Array:
-        """The column of unknowns of a motion in numbers, (size,)."""
-        first = motion.starts[:, :1] if self.continuous else motion.starts
-        columns = (motion.states, first, motion.ends)
-        return np.concatenate([motion.phases, *(column.T.ravel() for column in columns)]) / self.scale
-
-    def unpack(self, column: Any) -> CollocatedMotion:
-        """The motion of a column of unknowns, in symbols."""
-        ca, K = import_casadi(), self.total
-        cuts = np.cumsum([0, *self._sizes]).tolist()
-        phases, states, inputs = ca.vertsplit(column * self.scale, cuts)
-        inputs = ca.reshape(inputs, INPUTS, -1)
-        starts = inputs[:, :K]
-        ends = inputs[:, 1:] if self.continuous else inputs[:, K:]
-        return CollocatedMotion(phases, ca.reshape(states, STATES, K + 1), starts, ends)
+        """The column of unknowns of a motion, (size,)."""
+        column = np.empty(self.size)
+        column[: len(self.intervals)] = motion.phases
+        column[self.states] = motion.states.T
+        column[self.inputs[1]] = motion.ends.T
+        column[self.inputs[0]] = motion.starts.T
+        return column / self.scale
 
     def read(self, column: Array) -> CollocatedMotion:
-        """The motion of a column of unknowns, in numbers."""
-        motion = self.unpack(import_casadi().DM(column))
-        states, starts, ends = (part.full() for part in (motion.states, motion.starts, motion.ends))
-        return CollocatedMotion(motion.phases.full()[:, 0], states, starts, ends)
-
-    @property
-    def _sizes(self) -> tuple[int, int, int]:
-        inputs = self.total + 1 if self.continuous else 2 * self.total
-        return len(self.intervals), STATES * (self.total + 1), INPUTS * inputs
+        """The motion of a column of unknowns."""
+        si = column * self.scale
+        starts, ends = si[self.inputs]
+        return CollocatedMotion(si[: len(self.intervals)], si[self.states].T, starts.T, ends.T)
 
 
-@dataclass(frozen=True, eq=False)
-class Collocation:
-    """A motion on a mesh with what the equations of motion make of it, in numbers or symbols."""
+class IntervalSide:
+    """One side of an interval in CasADi's symbols SX: what it contributes to the interval's quintic."""
 
-    body: ZeroYawRateBody
-    mesh: Mesh
-    motion: CollocatedMotion
+    def __init__(self, body: ZeroYawRateBody, input_scale: Array, last: int) -> None:
+        sx = import_casadi().SX
+        self.unknowns = sx.sym("z", 1 + STATES + 2 * INPUTS)  # scaled, as `Mesh.side_unknowns` orders them
+        self.fraction = sx.sym("fraction")
+        self.last = last
+        z = self.unknowns * np.concatenate([[1.0], STATE_SCALE, input_scale, input_scale])
+        self.duration = z[0] * self.fraction
+        self.state = z[1 : 1 + STATES]
+        start, end = z[1 + STATES : 1 + STATES + INPUTS], z[1 + STATES + INPUTS :]
+        self.input = end if last else start
+        self.slope = (end - start) / self.duration
+        self.rates = body.derivatives(self.state, self.input, self.slope)
 
-    @cached_property
-    def durations(self) -> Any:
-        """Of the intervals [s], (1, K)."""
-        return import_casadi().reshape(self.motion.phases, 1, -1) @ import_casadi().DM(self.mesh.fractions)
+    def defect(self) -> Any:
+        """Its part of how far the quintics miss the next state, (12,)."""
+        h, ca = self.duration, import_casadi()
+        signed = self.state if self.last else -self.state
+        missed = signed - h * self._combined(INTEGRAL)
+        fallen = h**2 * self._combined(DOUBLE_INTEGRAL)[VELOCITY]
+        position = signed[POSITION] - fallen
+        if not self.last:
+            position -= h * self.state[VELOCITY]
+        return ca.vertcat(position, missed[VELOCITY.start :])
 
-    @cached_property
-    def rates(self) -> Rates:
-        """The state's derivatives."""
-        return Rates(*self._on_both_sides(self.body.derivatives))
+    def here(self) -> list[Any]:
+        """Position to snap at this side, (3,) each."""
+        return [self.state[POSITION], self.state[VELOCITY], *(rate[VELOCITY] for rate in self.rates)]
 
-    @cached_property
-    def rotors(self) -> tuple[tuple[Any, Any], tuple[Any, Any]]:
-        """The rotors' thrusts and commands [N], at the starts and at the ends, (n, K) each."""
-        starts, ends = self._on_both_sides(self.body.rotors)
-        return starts, ends
+    def between(self, s: float) -> list[Any]:
+        """Its part of position to snap at a fraction s of the interval, (3,) each."""
+        h, powers = self.duration, np.vander([s], 6, increasing=True)[0]
+        parts = [
+            h**2 * self._combined(DOUBLE_INTEGRAL * powers * s**2)[VELOCITY],
+            h * self._combined(INTEGRAL * powers * s)[VELOCITY],
+        ]
+        for derivative in range(3):
+            basis = polynomial.differentiate(np.eye(6)[..., None], derivative)[..., 0]
+            slopes = basis @ powers[: basis.shape[1]]
+            parts.append(self._combined(slopes)[VELOCITY] / h**derivative)
+        if not self.last:
+            parts[0] += self.state[POSITION] + s * h * self.state[VELOCITY]
+            parts[1] += self.state[VELOCITY]
+        return parts
 
-    def defects(self) -> Any:
-        """By how much the quintics miss the next states, (12, K)."""
-        ca, x0, x1 = import_casadi(), self.motion.states[:, :-1], self.motion.states[:, 1:]
-        h = ca.repmat(self.durations, 3, 1)
-        ends = self.rates.normalised(self.durations)
-        missed = x1 - x0 - _combined(INTEGRAL @ QUINTIC, ends) * ca.repmat(self.durations, STATES, 1)
-        fallen = _combined(DOUBLE_INTEGRAL @ QUINTIC, [rate[VELOCITY, :] for rate in ends])
-        position = x1[POSITION, :] - x0[POSITION, :] - h * x0[VELOCITY, :] - h**2 * fallen
-        return ca.vertcat(position, missed[VELOCITY.start :, :])
+    def body_rate(self, s: float) -> Any:
+        """ω_x and ω_y at a fraction s of the interval, from its first side, (2,)."""
+        turning, change = self.input[1:], self.slope[1:] * self.duration
+        return self.state[RATES] + self.duration * (s * turning + s**2 / 2.0 * change)
 
-    def between(self, derivative: int) -> Iterator[Any]:
-        """Acceleration, jerk or snap of the trajectory within all intervals, (3, K) at each place."""
-        ends = [rate[VELOCITY, :] for rate in self.rates.normalised(self.durations)]
-        basis = polynomial.differentiate(QUINTIC[None], derivative - 2)[0]
-        scale = import_casadi().repmat(self.durations, 3, 1) ** (derivative - 2)
-        for powers in np.vander(BETWEEN, len(basis), increasing=True):
-            yield _combined(powers @ basis, ends) / scale
-
-    def trajectory(self, heading: float) -> Trajectory:
-        """The trajectory of a motion in numbers, from its start on, continuous to the last digit."""
-        ends = [import_casadi().DM(rate).full()[VELOCITY] for rate in self.rates.normalised(self.durations)]
-        durations = import_casadi().DM(self.durations).full()[0]
-        quintics = np.einsum("ij,jdk->kid", QUINTIC, ends) * durations[:, None, None] ** 2
-        twice = (np.arange(1, 7) * np.arange(2, 8))[:, None]
-        coefficients = np.concatenate([np.zeros((self.mesh.total, 2, 3)), quintics / twice], axis=1)
-        position, velocity = self.motion.states[POSITION, 0], self.motion.states[VELOCITY, 0]
-        for piece, h in zip(coefficients, durations.tolist(), strict=True):
-            piece[:2] = position, h * velocity
-            position, velocity = piece.sum(axis=0), np.arange(8) @ piece / h
-        return Trajectory(durations, coefficients, heading)
-
-    def _on_both_sides(self, function: Any) -> tuple[tuple[Any, ...], tuple[Any, ...]]:
-        motion, columns = self.motion, function.map(self.mesh.total)
-        slope = (motion.ends - motion.starts) / import_casadi().repmat(self.durations, INPUTS, 1)
-        return (
-            columns(motion.states[:, :-1], motion.starts, slope),
-            columns(motion.states[:, 1:], motion.ends, slope),
+    def _combined(self, weights: Array) -> Any:
+        """Weighted sum of the powers of the quintic, of this side's part of it."""
+        columns = (weights @ QUINTIC)[3:] if self.last else (weights @ QUINTIC)[:3]
+        return sum(
+            w * self.duration**k * rate
+            for k, (w, rate) in enumerate(zip(columns.tolist(), self.rates, strict=True))
         )
 
 
-def _combined(weights: Array, terms: list[Any]) -> Any:
-    return sum(weight * term for weight, term in zip(weights.tolist(), terms, strict=True))
+def trajectory_of(body: ZeroYawRateBody, mesh: Mesh, motion: CollocatedMotion, heading: float) -> Trajectory:
+    """The trajectory of a motion, from its start on, continuous to the last digit.
+
+    Args:
+        body: The equations of motion.
+        mesh: Where the motion has its nodes.
+        motion: States and inputs there.
+        heading: Of the trajectory [rad].
+    """
+    durations = mesh.durations(motion.phases)
+    slope = (motion.ends - motion.starts) / durations
+    columns = body.derivatives.map(mesh.total)
+    sides = (motion.states[:, :-1], motion.starts), (motion.states[:, 1:], motion.ends)
+    ends = [
+        rate.full()[VELOCITY] * durations**k
+        for state, u in sides
+        for k, rate in enumerate(columns(state, u, slope))
+    ]
+    quintics = np.einsum("ij,jdk->kid", QUINTIC, ends) * durations[:, None, None] ** 2
+    twice = (np.arange(1, 7) * np.arange(2, 8))[:, None]
+    coefficients = np.concatenate([np.zeros((mesh.total, 2, 3)), quintics / twice], axis=1)
+    position, velocity = motion.states[POSITION, 0], motion.states[VELOCITY, 0]
+    for piece, h in zip(coefficients, durations.tolist(), strict=True):
+        piece[:2] = position, h * velocity
+        position, velocity = piece.sum(axis=0), np.arange(8) @ piece / h
+    return Trajectory(durations, coefficients, heading)

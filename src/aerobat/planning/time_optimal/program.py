@@ -2,19 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass, field
-from functools import cached_property
 from math import inf
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from aerobat.arrays import Array
-from aerobat.environment import Environment
-from aerobat.optimization.nonlinear import NonlinearProgram, import_casadi
-from aerobat.planning.time_optimal.collocation import CollocatedMotion, Collocation, Mesh
+from aerobat.optimization.nonlinear import NonlinearProgram
+from aerobat.optimization.separable import (
+    Element,
+    ElementFunction,
+    Indices,
+    SeparableFunction,
+    separable_program,
+)
+from aerobat.planning.time_optimal.bounds import Backoff
+from aerobat.planning.time_optimal.collocation import CollocatedMotion, Mesh
+from aerobat.planning.time_optimal.elements import BETWEEN, Elements, is_of_direction, weighted_sum
 from aerobat.planning.time_optimal.zero_yaw_rate_body import (
     ATTITUDE,
     INPUTS,
@@ -22,19 +27,16 @@ from aerobat.planning.time_optimal.zero_yaw_rate_body import (
     RATES,
     STATES,
     VELOCITY,
-    ZeroYawRateBody,
 )
-from aerobat.problem.condition import Condition, ForceBalance
-from aerobat.problem.problem import Limits
-from aerobat.vehicle import Vehicle
+from aerobat.problem.condition import Condition
+from aerobat.problem.stage import Stage
 
 SHORTEST_PHASE = 1e-3  # [s]
 # [s] for one change of an input by half its range in each interval: far below what is reported, it settles
 # what the duration leaves open
 CHANGE_COST = 1e-4
-BOUNDED_DERIVATIVES = 5  # position to snap, that limits can bound
-KINEMATIC = (POSITION, VELOCITY)
-ALONG_Z = np.zeros(3), np.array([0.0, 0.0, inf])  # bounds on a thrust direction in body axes
+PLANE_TOLERANCE = 1e-6  # [m] to either side of it: equalities would repeat those of gates and waypoints in it
+ALONG_Z = (0.0, 0.0, 0.0), (0.0, 0.0, inf)  # bounds on a thrust direction in body axes
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,18 +45,7 @@ class End:
 
     position: Array  # [m], (3,)
     velocity: Array  # [m/s], (3,)
-    thrust: Array  # a + g e3 + (d/m) v [m/s²], the direction of the thrust axis, (3,)
-    collective: float  # [N] that this takes
-
-
-@dataclass(frozen=True, eq=False)
-class NodeBounds:
-    """Bounds at every node: limits, and the range of the rotors' thrusts or, where they lag, commands."""
-
-    lower: Array  # [N], (n,)
-    upper: Array  # [N], (n,)
-    min_collective: float  # [N] of all together, which keeps the attitude determined
-    limits: Limits
+    thrust: Array  # f = a + g e3 + (d/m) w [m/s²], along the thrust axis, (3,)
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,147 +56,164 @@ class OptimalControl:
     their thrusts are continuous, from those that go with one end's acceleration to those of the other.
     """
 
-    vehicle: Vehicle
-    environment: Environment
-    intervals: tuple[int, ...]  # of each phase, (P,)
+    elements: Elements
     start: End
     q_start: Array  # (4,)
     goal: End
-    stages: tuple[tuple[Condition, ...], ...]  # (P - 1,)
-    path_constraints: tuple[Condition, ...]
+    stages: tuple[Stage, ...]  # (P - 1,)
+    min_thrust: float  # [m/s²] specific thrust at least, which keeps the attitude determined
+    reserve: float  # of each rotor's range, kept from either of its ends
 
-    @cached_property
-    def body(self) -> ZeroYawRateBody:
-        """The equations of motion."""
-        return ZeroYawRateBody(self.vehicle, self.environment)
+    def mesh(self, intervals: tuple[int, ...]) -> Mesh:
+        """The unknowns of so many intervals in each phase."""
+        return Mesh(intervals, self.elements.continuous, self.elements.input_scale)
 
-    @cached_property
-    def mesh(self) -> Mesh:
-        """The unknowns."""
-        vehicle = self.vehicle
-        spread = np.abs(vehicle.allocation[:INPUTS]) @ (vehicle.max_thrusts - vehicle.min_thrusts) / 2
-        scale = spread / np.array([1.0, vehicle.inertia[0, 0], vehicle.inertia[1, 1]])
-        return Mesh(self.intervals, bool(vehicle.lags.any()), scale)
-
-    def of(self, motion: CollocatedMotion) -> Collocation:
-        """A motion with its rates and rotor thrusts."""
-        return Collocation(self.body, self.mesh, motion)
-
-    def program(self, bounds: NodeBounds) -> NonlinearProgram:
-        """The program of the mesh's unknowns."""
-        column = import_casadi().MX.sym("motion", self.mesh.size)
-        collocation = self.of(self.mesh.unpack(column))
+    def program(self, mesh: Mesh, backoff: Backoff) -> NonlinearProgram:
+        """The program of a mesh's unknowns, with bounds tightened at nodes."""
         rows = _Rows()
-        rows.hold(collocation.defects(), 0.0, 0.0)
-        self._hold_rotors(rows, collocation, bounds)
-        rows.hold(self.body.thrust_axes(collocation.motion.states[:, -1]).T @ self.goal.thrust, *ALONG_Z)
-        self._hold_stages(rows, collocation)
-        self._hold_limits(rows, collocation, bounds.limits)
-        lower, upper = (self.mesh.pack(motion) for motion in self._box(bounds.min_collective))
-        return NonlinearProgram(column, self._cost(collocation.motion), *rows.stacked(), lower, upper)
+        self._hold_intervals(rows, mesh, backoff)
+        self._hold_nodes(rows, mesh, backoff)
+        for index, stage in enumerate(self.stages):
+            self._hold_stage(rows, mesh, index, stage)
+        rows.hold(self.elements.goal_thrust, mesh.states[-1:], *ALONG_Z, self.goal.thrust)
+        lower, upper = (mesh.pack(motion) for motion in self._box(mesh))
+        return separable_program(
+            SeparableFunction(self._cost(mesh), mesh.size, 1),
+            SeparableFunction(rows.elements, mesh.size, rows.count),
+            lower=np.concatenate(rows.lower),
+            upper=np.concatenate(rows.upper),
+            x_min=lower,
+            x_max=upper,
+        )
 
-    def _hold_rotors(self, rows: _Rows, collocation: Collocation, bounds: NodeBounds) -> None:
-        """A rotor that lags stays within its limits if its commands do."""
-        for thrusts, commands in collocation.rotors:
-            rows.hold(commands if self.mesh.continuous else thrusts, bounds.lower, bounds.upper)
+    def _hold_intervals(self, rows: _Rows, mesh: Mesh, backoff: Backoff) -> None:
+        """The equations of motion, rotors, and bounds on the path where it may jump at nodes, or between."""
+        elements, bounds = self.elements, self.elements.bounds
+        path = len(bounds.path)
+        lower, upper = bounds.lower + backoff.low, bounds.upper - backoff.high
+        kept = self.reserve * bounds.sizes[path:-1]
+        jumping = [i for i, bound in enumerate(bounds.path) if not elements.has_one_value(bound)]
+        still, between = np.zeros((mesh.total, STATES)), len(BETWEEN)
+        shared = rows.reserve(
+            np.hstack([still, np.tile(lower[:, :path], between)]),
+            np.hstack([still, np.tile(upper[:, :path], between)]),
+        )
+        for last in (0, 1):
+            least, most = [lower[:, path:-1] + kept], [upper[:, path:-1] - kept]
+            least.append(lower[:, jumping])
+            most.append(upper[:, jumping])
+            if elements.bounds_rate and not last:
+                least.append(np.full((mesh.total, between), -inf))
+                most.append(np.tile(self._squared_rates(upper[:, -1:]), between))
+            own = rows.reserve(np.hstack(least), np.hstack(most))
+            unknowns, fractions = mesh.side_unknowns(last), mesh.fractions[:, None]
+            rows.elements.append(Element(elements.sides[last], unknowns, fractions, np.hstack([shared, own])))
 
-    def _hold_stages(self, rows: _Rows, collocation: Collocation) -> None:
-        for node, conditions in zip(np.cumsum(self.intervals).tolist(), self.stages, strict=False):
-            for condition in conditions:
-                for values in self._around(collocation, condition.quantity.derivative, node):
-                    self._hold(rows, condition, values)
+    def _hold_nodes(self, rows: _Rows, mesh: Mesh, backoff: Backoff) -> None:
+        """At inner nodes: bounds on what has one value there, the body rate, the plane."""
+        bounds = self.elements.bounds
+        path = [i for i, bound in enumerate(bounds.path) if self.elements.has_one_value(bound)]
+        low, high = (np.maximum(b[:-1], b[1:]) for b in (backoff.low, backoff.high))
+        rates = self._squared_rates(bounds.upper[-1] - high[:, -1:])
+        across = np.full_like(rates, inf if self.elements.plane is None else PLANE_TOLERANCE)
+        lower = np.hstack([(bounds.lower + low)[:, path], np.full_like(rates, -inf), -across])
+        upper = np.hstack([(bounds.upper - high)[:, path], rates, across])
+        if np.isfinite([lower, upper]).any():
+            unknowns = np.hstack([mesh.states[1:-1], mesh.inputs[1, :-1]])
+            rows.hold(self.elements.node, unknowns, lower, upper)
 
-    def _hold_limits(self, rows: _Rows, collocation: Collocation, limits: Limits) -> None:
-        for derivative in range(BOUNDED_DERIVATIVES):
-            lower, upper = limits.of(derivative)
-            for axis in np.flatnonzero(np.isfinite(lower) | np.isfinite(upper)).tolist():
-                for values in self._everywhere(collocation, derivative):
-                    rows.hold(values[axis, :], lower[axis], upper[axis])
-        for condition in self.path_constraints:
-            for values in self._everywhere(collocation, condition.quantity.derivative):
-                self._hold(rows, condition, values)
+    def _hold_stage(self, rows: _Rows, mesh: Mesh, index: int, stage: Stage) -> None:
+        """What a stage asks of the node where it holds, and when."""
+        node = int(np.cumsum(mesh.intervals)[index])
+        for jumping, conditions in _by_continuity(stage):
+            function, lower, upper = self.elements.at_stage(conditions)
+            for side in (1, 0) if jumping and not mesh.continuous else (1,):
+                u = mesh.inputs[side, node - side]
+                rows.hold(function, np.hstack([mesh.states[node], u])[None], lower, upper)
+        phases = np.arange(len(mesh.intervals))
+        earliest, latest = stage.window
+        before = (phases <= index).astype(float)
+        for fraction, low, high in ((earliest, 0.0, 0.0 if latest == earliest else inf), (latest, -inf, 0.0)):
+            if 0.0 < fraction < 1.0 and (fraction == earliest or latest > earliest):
+                rows.hold(weighted_sum(len(phases)), phases[None], low, high, before - fraction)
 
-    def _hold(self, rows: _Rows, condition: Condition, values: Any) -> None:
-        """A condition on values (3, m) of its derivative."""
-        along = import_casadi().DM(condition.direction).T @ values
-        bound = condition.bound(ForceBalance(self.environment.gravity))
-        rows.hold(along, *bound.limits)
+    def _squared_rates(self, rates: Array) -> Array:
+        return np.asarray((rates / self.elements.rate_scale) ** 2)
 
-    def _around(self, collocation: Collocation, derivative: int, node: int) -> Iterator[Any]:
-        """A derivative up to acceleration at an inner node, (3, 1); on both sides where it may jump."""
-        if derivative < 2:
-            yield collocation.motion.states[KINEMATIC[derivative], node]
-            return
-        yield collocation.rates.starts[0][VELOCITY, node]
-        if not self.mesh.continuous:
-            yield collocation.rates.ends[0][VELOCITY, node - 1]
-
-    def _everywhere(self, collocation: Collocation, derivative: int) -> Iterator[Any]:
-        """A derivative up to snap wherever it is not fixed, (3, m) each; on both sides where it may jump."""
-        rates = collocation.rates
-        if derivative < 2:
-            yield collocation.motion.states[KINEMATIC[derivative], 1:-1]
-        elif derivative == 2 and self.mesh.continuous:
-            yield rates.starts[0][VELOCITY, 1:]
-        else:
-            yield rates.starts[derivative - 2][VELOCITY, :]
-            yield rates.ends[derivative - 2][VELOCITY, :]
-        if derivative >= 2:
-            yield from collocation.between(derivative)
-
-    def _box(self, min_collective: float) -> tuple[CollocatedMotion, CollocatedMotion]:
+    def _box(self, mesh: Mesh) -> tuple[CollocatedMotion, CollocatedMotion]:
         """The least and the most that every unknown may be: what is fixed, and little else."""
-        lower, upper = self._all(-inf), self._all(inf)
+        lower, upper = (_filled(mesh, value) for value in (-inf, inf))
         lower.phases[:] = SHORTEST_PHASE
-        lower.starts[0] = lower.ends[0] = min_collective
+        lower.starts[0] = lower.ends[0] = self.min_thrust
         for motion in (lower, upper):
-            self._fix_ends(motion)
+            for node, end in ((0, self.start), (-1, self.goal)):
+                motion.states[POSITION, node] = end.position
+                motion.states[VELOCITY, node] = end.velocity
+                motion.states[RATES, node] = 0.0
+            motion.states[ATTITUDE, 0] = self.q_start
+            if mesh.continuous:
+                motion.starts[:, 0] = np.linalg.norm(self.start.thrust), 0.0, 0.0
+                motion.ends[:, -1] = np.linalg.norm(self.goal.thrust), 0.0, 0.0
         return lower, upper
 
-    def _all(self, value: float) -> CollocatedMotion:
-        """A motion whose every number is the same."""
-        total = self.mesh.total
-        shapes = ((len(self.intervals),), (STATES, total + 1), (INPUTS, total), (INPUTS, total))
-        return CollocatedMotion(*(np.full(shape, value) for shape in shapes))
-
-    def _fix_ends(self, motion: CollocatedMotion) -> None:
-        """Fix a motion's ends."""
-        for node, end in ((0, self.start), (-1, self.goal)):
-            motion.states[POSITION, node] = end.position
-            motion.states[VELOCITY, node] = end.velocity
-            motion.states[RATES, node] = 0.0
-        motion.states[ATTITUDE, 0] = self.q_start
-        if self.mesh.continuous:
-            motion.starts[:, 0] = self.start.collective, 0.0, 0.0
-            motion.ends[:, -1] = self.goal.collective, 0.0, 0.0
-
-    def _cost(self, motion: CollocatedMotion) -> Any:
+    def _cost(self, mesh: Mesh) -> list[Element]:
         """The duration, and a little for changing the input."""
-        ca, scale = import_casadi(), import_casadi().DM(1.0 / self.mesh.input_scale)
-        changes = (motion.ends - motion.starts, motion.starts[:, 1:] - motion.ends[:, :-1])
-        spread = sum(ca.sumsqr(ca.diag(scale) @ change) for change in changes)
-        return ca.sum1(motion.phases) + CHANGE_COST / self.mesh.total * spread
+        phases = np.arange(len(mesh.intervals))[None]
+        changes = [np.hstack([mesh.inputs[0], mesh.inputs[1]])]
+        if not mesh.continuous:
+            changes.append(np.hstack([mesh.inputs[1, :-1], mesh.inputs[0, 1:]]))
+        weight = CHANGE_COST / mesh.total
+        duration = _cost_element(weighted_sum(phases.size), phases, np.ones(phases.size))
+        return [duration, *(_cost_element(self.elements.change, change, weight) for change in changes)]
 
 
 @dataclass
 class _Rows:
     """Constraints as they come."""
 
-    expressions: list[Any] = field(default_factory=list)
+    elements: list[Element] = field(default_factory=list)
     lower: list[Array] = field(default_factory=list)
     upper: list[Array] = field(default_factory=list)
+    count: int = 0
 
-    def hold(self, values: Any, lower: ArrayLike, upper: ArrayLike) -> None:
-        """lower ≤ values ≤ upper, every column alike."""
-        rows, columns = values.shape
-        self.expressions.append(import_casadi().vec(values))
-        self.lower.append(np.tile(np.broadcast_to(lower, rows), columns))
-        self.upper.append(np.tile(np.broadcast_to(upper, rows), columns))
+    def reserve(self, lower: Array, upper: Array) -> Indices:
+        """Rows of their own with these bounds, of the bounds' shape."""
+        rows = self.count + np.arange(lower.size).reshape(lower.shape)
+        self.lower.append(lower.ravel())
+        self.upper.append(upper.ravel())
+        self.count += lower.size
+        return rows
 
-    def stacked(self) -> tuple[Any, Array, Array]:
-        """All of them in one column."""
-        return (
-            import_casadi().vertcat(*self.expressions),
-            np.concatenate(self.lower),
-            np.concatenate(self.upper),
-        )
+    def hold(
+        self,
+        function: ElementFunction,
+        unknowns: Indices,
+        lower: ArrayLike,
+        upper: ArrayLike,
+        parameters: ArrayLike = (),
+    ) -> None:
+        """lower ≤ values ≤ upper at every place, with the same parameters."""
+        rows = self.reserve(np.atleast_2d(lower), np.atleast_2d(upper))
+        self.elements.append(Element(function, unknowns, _repeated(parameters, len(unknowns)), rows))
+
+
+def _cost_element(function: ElementFunction, unknowns: Indices, parameters: ArrayLike) -> Element:
+    rows = np.zeros((len(unknowns), 1), dtype=int)
+    return Element(function, unknowns, _repeated(parameters, len(unknowns)), rows)
+
+
+def _repeated(parameters: ArrayLike, places: int) -> Array:
+    return np.tile(np.atleast_1d(np.asarray(parameters, dtype=float)), (places, 1))
+
+
+def _by_continuity(stage: Stage) -> list[tuple[bool, tuple[Condition, ...]]]:
+    """A stage's conditions: those on what cannot jump, and those on what can."""
+    jumping = [c for c in stage.conditions if c.quantity.derivative == 2 and not is_of_direction(c)]
+    steady = [c for c in stage.conditions if not any(c is other for other in jumping)]
+    return [(may, tuple(group)) for may, group in ((False, steady), (True, jumping)) if group]
+
+
+def _filled(mesh: Mesh, value: float) -> CollocatedMotion:
+    """A motion whose every number is the same."""
+    shapes = ((len(mesh.intervals),), (STATES, mesh.total + 1), (INPUTS, mesh.total), (INPUTS, mesh.total))
+    return CollocatedMotion(*(np.full(shape, value) for shape in shapes))

@@ -1,32 +1,28 @@
 """The rigid body that never spins about its thrust axis, in CasADi's symbols.
 
-Its state is x = (p, v, q, ω_x, ω_y), its input u = (T, ω'_x, ω'_y): collective thrust [N] and angular
-accelerations about the body's x and y [rad/s²]. The moments are those that these and ω_z = 0 need,
-M = J ω' + ω × J ω. Flatness and the controller carry the attitude in the same way, without spin.
+Its state is x = (p, v, q, ω_x, ω_y), its input u = (n, ω'_x, ω'_y): the norm of the specific thrust f [m/s²]
+and angular accelerations about the body's x and y [rad/s²]. With w the velocity relative to the air and the
+drag d across the thrust axis, d_z along it,
+
+    p' = v    v' = n b3 − g e3 − (d/m) w    q' = ½ q ⊗ (0, ω)
+
+and the rotors bear T = m n + (d_z − d) b3·w and the moments that ω_z = 0 needs, M = J ω' + ω × J ω. Flatness
+and the controller carry the attitude in the same way, without spin, and count drag in the same way.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
-import numpy as np
-
-from aerobat.control import Controller
-from aerobat.control.parameters import controller_parameters
-from aerobat.engines.pytree import tree_map
 from aerobat.environment import Environment
-from aerobat.flatness import lateral_drag
-from aerobat.kernels import rigid_body
-from aerobat.kernels.allocation import mix
-from aerobat.kernels.control import ControllerModel
-from aerobat.kernels.quaternions import axes
-from aerobat.kernels.rigid_body import Body, Wrench
-from aerobat.kernels.vectors import add, cross, transform
+from aerobat.flatness import axial_drag, lateral_drag
+from aerobat.kernels.flatness import collective, moment
+from aerobat.kernels.quaternions import axes, quaternion_rate
 from aerobat.optimization.nonlinear import import_casadi
 from aerobat.vehicle import Vehicle
-from aerobat.vehicle.fleet import Fleet
+from aerobat.vehicle.allocation import mixer
 
 STATES = 12
 INPUTS = 3
@@ -54,16 +50,16 @@ class ZeroYawRateBody:
     def rotors(self) -> Any:
         """(x, u, u') -> the rotors' least-norm thrusts [N], and their commands f + τ f' [N], each (n,)."""
         ca = import_casadi()
-        thrusts = ca.vertcat(*mix(self._model.mixer, self._load()))
+        thrusts = ca.DM(mixer(self.vehicle)) @ self._wrench()
         commands = thrusts + ca.DM(self.vehicle.lags) * self._along(thrusts)
         return self._function("rotors", [thrusts, commands])
 
     @cached_property
-    def thrust_axes(self) -> Any:
+    def axes(self) -> Any:
         """x -> the body axes in the world as columns, (3, 3)."""
         ca = import_casadi()
         columns = [ca.vertcat(*axis) for axis in axes(_scalars(self._x[ATTITUDE]))]
-        return ca.Function("thrust_axes", [self._x], [ca.horzcat(*columns)])
+        return ca.Function("axes", [self._x], [ca.horzcat(*columns)])
 
     @cached_property
     def _symbols(self) -> tuple[Any, Any, Any]:
@@ -75,30 +71,31 @@ class ZeroYawRateBody:
         return self._symbols[0]
 
     @cached_property
-    def _model(self) -> ControllerModel:
-        """The kernels' view of the vehicle, in plain floats."""
-        drag = lateral_drag(self.vehicle) * self.vehicle.mass
-        flat = replace(self.vehicle, drag_body=np.array([drag, drag, self.vehicle.drag_body[2]]))
-        parameters = controller_parameters(Controller(), Fleet.of([flat]), self.environment)
-        model: ControllerModel = tree_map(lambda leaf: leaf[0].item(), parameters)
-        return model
+    def _omega(self) -> tuple[Any, Any, float]:
+        wx, wy = _scalars(self._x[RATES])
+        return wx, wy, 0.0
 
-    def _body(self) -> Body:
-        p, v, q, (wx, wy) = (_scalars(self._x[part]) for part in (POSITION, VELOCITY, ATTITUDE, RATES))
-        return Body(p, v, q, (wx, wy, 0.0))
-
-    def _load(self) -> Wrench:
-        inertia, omega = self._model.airframe.mass_properties.inertia, self._body().omega_body
-        thrust, ax, ay = _scalars(self._symbols[1])
-        return Wrench(thrust, add(transform(inertia, (ax, ay, 0.0)), cross(omega, transform(inertia, omega))))
+    @cached_property
+    def _airspeed(self) -> Any:
+        return self._x[VELOCITY] - import_casadi().DM(self.environment.wind)
 
     def _rate(self) -> Any:
-        """x' by the kernel that the simulation runs (paper, eqs. (3) and (4))."""
-        rate = rigid_body.derivative(
-            self._model.airframe.mass_properties, self._model.environment, self._body(), self._load()
-        )
-        wx, wy, _ = rate.omega_body
-        return import_casadi().vertcat(*rate.position, *rate.velocity, *rate.q_world_body, wx, wy)
+        """x'."""
+        ca, u = import_casadi(), self._symbols[1]
+        *_, b3 = axes(_scalars(self._x[ATTITUDE]))
+        drag = lateral_drag(self.vehicle) * self._airspeed
+        acceleration = u[0] * ca.vertcat(*b3) - ca.DM(self.environment.weight) - drag
+        turning = quaternion_rate(_scalars(self._x[ATTITUDE]), self._omega)
+        return ca.vertcat(self._x[VELOCITY], acceleration, *turning, u[1:])
+
+    def _wrench(self) -> Any:
+        """Collective thrust [N] and moments [N·m], (4,)."""
+        n, *turning = _scalars(self._symbols[1])
+        *_, b3 = axes(_scalars(self._x[ATTITUDE]))
+        airspeed = _scalars(self._airspeed)
+        thrust = collective(self.vehicle.mass, axial_drag(self.vehicle), n, b3, airspeed)
+        moments = moment(self.vehicle.inertia.tolist(), self._omega, (*turning, 0.0))
+        return import_casadi().vertcat(thrust, *moments)
 
     def _along(self, expression: Any) -> Any:
         """The time derivative of an expression in x and u."""

@@ -1,0 +1,157 @@
+"""The optimal control on a mesh as a program that can be solved, tightened and solved again."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from aerobat import so3
+from aerobat.arrays import Array
+from aerobat.certification import Certificate
+from aerobat.flatness import end_thrust
+from aerobat.optimization.nonlinear import NonlinearResult, solve_nonlinear
+from aerobat.planning.certified_solve import Solution
+from aerobat.planning.time_optimal.bounds import Backoff
+from aerobat.planning.time_optimal.collocation import CollocatedMotion, Mesh, trajectory_of
+from aerobat.planning.time_optimal.elements import Elements
+from aerobat.planning.time_optimal.program import End, OptimalControl
+from aerobat.planning.time_optimal.starts import Start, initial_motion
+from aerobat.planning.warm_start import WarmStart
+from aerobat.problem.problem import EndState
+from aerobat.so3 import UP
+from aerobat.trajectory import Trajectory
+
+THRUST_FLOOR = 0.02  # of the largest collective thrust: more, and the attitude stays determined
+# times the reserve, of the largest collective thrust, at least: feedback turns a small thrust by a lot
+THRUST_RESERVE = 3.0
+END_SHARE = 0.5  # of the thrust that either end asks: a floor may be no higher
+WARM_BARRIER = 1e-6  # the first barrier parameter of a solve that starts from a solution
+
+
+@dataclass(frozen=True, eq=False)
+class SolvedMotion:
+    """Where a solve ended, and of which program."""
+
+    program: CollocatedProgram
+    motion: CollocatedMotion
+    answer: NonlinearResult
+
+    @property
+    def trajectory(self) -> Trajectory:
+        """The motion's trajectory."""
+        elements = self.program.control.elements
+        return trajectory_of(elements.body, self.program.mesh, self.motion, elements.problem.heading)
+
+    @property
+    def start(self) -> Start:
+        """The motion as a start of other programs."""
+        start = self.program.start
+        times = tuple(np.cumsum(self.motion.phases)[:-1].tolist())
+        guess = WarmStart(self.trajectory, start.guess.stages, times)
+        return replace(start, guess=guess, aside=np.zeros(3))
+
+
+class CollocatedProgram:
+    """The optimal control from a start on a mesh, its bounds at nodes as tight as what lies between needs.
+
+    Args:
+        elements: Of the program's functions.
+        start: The motion to begin from.
+        reserve: Of each rotor's range, kept from either of its ends.
+        intervals: About how many in all.
+        min_intervals: Of each phase, at least.
+        max_iterations: Of each solve.
+        tolerance: Of each solve, on the scaled optimality conditions.
+    """
+
+    def __init__(
+        self,
+        elements: Elements,
+        start: Start,
+        reserve: float,
+        intervals: int,
+        min_intervals: int,
+        max_iterations: int,
+        tolerance: float = 1e-8,
+    ) -> None:
+        self.control, self.start = optimal_control(elements, start, reserve), start
+        self.mesh: Mesh = self.control.mesh(start.guess.allocate_intervals(intervals, min_intervals))
+        self.duration = start.guess.trajectory.duration  # [s] of the start, or of what was solved ahead
+        self._max_iterations, self._tolerance = max_iterations, tolerance
+        self._backoff = Backoff.none(self.mesh.total, elements.bounds)
+        self._barrier: float | None = None
+        self._multipliers: tuple[Array, Array] | None = None
+        self._x = self.mesh.pack(initial_motion(start, self.mesh, elements.problem, elements.vehicle))
+        self._ahead: Solution[SolvedMotion] | None = None
+
+    def solve_ahead(self) -> None:
+        """Solve, and keep the solution for the next `solve`; the duration is infinite where there is none."""
+        self._ahead = self.solve()
+        self.duration = np.inf if self._ahead.trajectory is None else self._ahead.duration
+
+    def solve(self) -> Solution[SolvedMotion]:
+        """The solution near the last one, or near the start."""
+        if self._ahead is not None:
+            ahead, self._ahead = self._ahead, None
+            return ahead
+        solved = self.solved()
+        answer, duration = solved.answer, float(solved.motion.phases.sum())
+        return Solution(
+            source=solved,
+            duration=duration,
+            trajectory=solved.trajectory if answer.converged else None,
+            status="locally optimal" if answer.converged else "unknown",
+            nodes=answer.iterations,
+            solve_time=answer.time,
+            cost=duration if answer.converged else None,
+            failure=None if answer.converged else f"the solver {answer.status}",
+        )
+
+    def solved(self) -> SolvedMotion:
+        """The motion that the solver ends at, whether converged or not."""
+        answer = solve_nonlinear(
+            self.control.program(self.mesh, self._backoff),
+            self._x,
+            max_iterations=self._max_iterations,
+            tolerance=self._tolerance,
+            initial_barrier=self._barrier,
+            multipliers=self._multipliers,
+        )
+        return SolvedMotion(self, self.mesh.read(answer.x), answer)
+
+    def tighten(self, solution: Solution[SolvedMotion], certificate: Certificate | None) -> bool:
+        """Tighten what is held at nodes by what is exceeded between them, and go on from the solution."""
+        if solution.trajectory is None or certificate is None:
+            return False
+        backoff = self._backoff.grown(self.control.elements.bounds, solution.trajectory)
+        if backoff is None:
+            return False
+        answer = solution.source.answer
+        self._backoff, self._barrier = backoff, WARM_BARRIER
+        self._x, self._multipliers = answer.x, answer.multipliers
+        return True
+
+
+def optimal_control(elements: Elements, start: Start, reserve: float) -> OptimalControl:
+    """The optimal control through the stages in the order of a start, a reserve kept from rotors' limits."""
+    problem, vehicle = elements.problem, elements.vehicle
+    first, last = (_end(state, elements) for state in (problem.start, problem.goal))
+    floor = max(THRUST_FLOOR, THRUST_RESERVE * reserve) * vehicle.max_specific_thrust
+    at_ends = min(float(np.linalg.norm(end.thrust)) for end in (first, last))
+    upright = so3.smallest_rotation(UP, first.thrust / np.linalg.norm(first.thrust))
+    return OptimalControl(
+        elements=elements,
+        start=first,
+        q_start=so3.multiply(upright, so3.about_axis(UP, np.array(problem.heading))),
+        goal=last,
+        stages=start.guess.stages,
+        min_thrust=min(floor, END_SHARE * at_ends),
+        reserve=reserve,
+    )
+
+
+def _end(state: EndState, elements: Elements) -> End:
+    environment = elements.problem.environment
+    thrust = end_thrust(state.velocity, state.acceleration, elements.vehicle, environment)
+    return End(state.position, state.velocity, thrust)

@@ -1,0 +1,178 @@
+"""The functions that the program is made of, each of a few scaled unknowns, whatever the mesh."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from functools import cached_property
+from math import inf
+from typing import Any
+
+import numpy as np
+
+from aerobat.arrays import Array
+from aerobat.flatness import force_balance
+from aerobat.optimization.nonlinear import import_casadi
+from aerobat.optimization.separable import ElementFunction
+from aerobat.planning.time_optimal.bounds import Bounds, PathBound
+from aerobat.planning.time_optimal.collocation import STATE_SCALE, IntervalSide
+from aerobat.planning.time_optimal.zero_yaw_rate_body import (
+    INPUTS,
+    POSITION,
+    RATES,
+    STATES,
+    VELOCITY,
+    ZeroYawRateBody,
+)
+from aerobat.problem.condition import Condition, Quantity
+from aerobat.problem.problem import Problem
+from aerobat.vehicle import Vehicle
+
+BETWEEN = (0.25, 0.5, 0.75)  # of an interval: where bounds on the path are held too, beside its nodes
+RATE_SCALE = 10.0  # [rad/s] of body rates that have no bound
+
+
+@dataclass(frozen=True, eq=False)
+class Elements:
+    """What a vehicle's motion through a problem, in a plane if there is one, is made of."""
+
+    problem: Problem
+    vehicle: Vehicle
+    plane: Array | None = None  # its normal, (3,); it holds the start
+
+    @cached_property
+    def body(self) -> ZeroYawRateBody:
+        """The equations of motion."""
+        return ZeroYawRateBody(self.vehicle, self.problem.environment)
+
+    @cached_property
+    def bounds(self) -> Bounds:
+        """What holds all along."""
+        return Bounds.of(self.problem, self.vehicle)
+
+    @property
+    def continuous(self) -> bool:
+        """True where the input cannot jump, for the rotors lag."""
+        return bool(self.vehicle.lags.any())
+
+    @property
+    def input_scale(self) -> Array:
+        """The size of the inputs [m/s², rad/s², rad/s²], (3,)."""
+        vehicle = self.vehicle
+        spread = np.abs(vehicle.allocation[:INPUTS]) @ (vehicle.max_thrusts - vehicle.min_thrusts) / 2
+        return np.asarray(spread / [vehicle.mass, vehicle.inertia[0, 0], vehicle.inertia[1, 1]])
+
+    @property
+    def rate_scale(self) -> float:
+        """The size of body rates [rad/s]."""
+        return min(self.vehicle.max_body_rate, RATE_SCALE)
+
+    @property
+    def bounds_rate(self) -> bool:
+        """True where the vehicle's body rate has a bound."""
+        return self.vehicle.max_body_rate < inf
+
+    def has_one_value(self, bound: PathBound) -> bool:
+        """True where a bound's quantity cannot jump at a node."""
+        return bound.order < 2 or (bound.order == 2 and self.continuous)
+
+    @cached_property
+    def sides(self) -> tuple[ElementFunction, ElementFunction]:
+        """What either side of an interval contributes to the rows of both, and its own rows.
+
+        Of both: defects, path bounds between nodes. Its own: rotors, path bounds that may jump at nodes, and
+        squared body rates between nodes, of the first side alone.
+        """
+        first, last = (self._side(last) for last in (0, 1))
+        return first, last
+
+    def _side(self, last: int) -> ElementFunction:
+        ca, side = import_casadi(), IntervalSide(self.body, self.input_scale, last)
+        thrusts, commands = self.body.rotors(side.state, side.input, side.slope)
+        path = self.bounds.path
+        between = [_weighted(b, side.between(s)) for s in BETWEEN for b in path]
+        jumping = [_weighted(b, side.here()) for b in path if not self.has_one_value(b)]
+        rotors = commands if self.continuous else thrusts
+        turning = []
+        if self.bounds_rate and not last:
+            turning = [ca.sumsqr(side.body_rate(s)) / self.rate_scale**2 for s in BETWEEN]
+        values = ca.vertcat(side.defect(), *between, rotors, *jumping, *turning)
+        return ElementFunction(ca.Function("side", [side.unknowns, side.fraction], [values]))
+
+    @cached_property
+    def node(self) -> ElementFunction:
+        """Path bounds that have one value, the squared body rate, and the distance from the plane."""
+        ca, node = import_casadi(), _Node(self)
+        path = [_weighted(b, node.derivatives) for b in self.bounds.path if self.has_one_value(b)]
+        rate = ca.sumsqr(node.state[RATES]) / self.rate_scale**2
+        normal = np.zeros(3) if self.plane is None else self.plane
+        across = ca.dot(ca.DM(normal), node.state[POSITION] - ca.DM(self.problem.start.position))
+        return node.function(ca.vertcat(*path, rate, across))
+
+    def at_stage(self, conditions: tuple[Condition, ...]) -> tuple[ElementFunction, Array, Array]:
+        """Values of conditions at a node, and their bounds; drag is counted."""
+        ca, node = import_casadi(), _Node(self)
+        balance = force_balance(self.problem.environment, self.vehicle)
+        values, ends = [], []
+        for condition in conditions:
+            bound = PathBound.of(condition.bound(balance))
+            if is_of_direction(condition):
+                values.append(ca.dot(ca.DM(condition.direction), node.thrust_axis))
+                ends.append((condition.lower, condition.upper))
+            else:
+                values.append(_weighted(bound, node.derivatives))
+                ends.append((bound.lower, bound.upper))
+        lower, upper = np.array(ends).T
+        return node.function(ca.vertcat(*values)), lower, upper
+
+    @cached_property
+    def goal_thrust(self) -> ElementFunction:
+        """A thrust (3,), the parameter, in body axes."""
+        ca = import_casadi()
+        z, thrust = ca.SX.sym("z", STATES), ca.SX.sym("thrust", 3)
+        return ElementFunction(ca.Function("goal", [z, thrust], [self.body.axes(z * STATE_SCALE).T @ thrust]))
+
+    @cached_property
+    def change(self) -> ElementFunction:
+        """The squared change of scaled inputs (2, 3), times the parameter."""
+        ca = import_casadi()
+        z, weight = ca.SX.sym("z", 2 * INPUTS), ca.SX.sym("weight")
+        change = weight * ca.sumsqr(z[INPUTS:] - z[:INPUTS])
+        return ElementFunction(ca.Function("change", [z, weight], [change]))
+
+
+def weighted_sum(count: int) -> ElementFunction:
+    """The function of so many unknowns that is their sum, weighted by as many parameters."""
+    ca = import_casadi()
+    z, weights = ca.SX.sym("z", count), ca.SX.sym("weights", count)
+    return ElementFunction(ca.Function("sum", [z, weights], [ca.dot(weights, z)]))
+
+
+def is_of_direction(condition: Condition) -> bool:
+    """True of conditions on the thrust's direction alone, which cannot jump where the thrust may."""
+    on_thrust = condition.quantity is Quantity.SPECIFIC_THRUST
+    return on_thrust and {condition.lower, condition.upper} <= {-inf, 0.0, inf}
+
+
+class _Node:
+    """A node in symbols: its scaled state and input, and what they mean."""
+
+    def __init__(self, elements: Elements) -> None:
+        ca = import_casadi()
+        self.unknowns = ca.SX.sym("z", STATES + INPUTS)
+        z = self.unknowns * np.concatenate([STATE_SCALE, elements.input_scale])
+        self.state = z[:STATES]
+        self.thrust_axis = elements.body.axes(self.state)[:, 2]
+        rates = elements.body.derivatives(self.state, z[STATES:], ca.DM.zeros(INPUTS))
+        self.derivatives = [self.state[POSITION], self.state[VELOCITY], rates[0][VELOCITY]]
+
+    def function(self, values: Any) -> ElementFunction:
+        """The function of values here."""
+        ca = import_casadi()
+        return ElementFunction(ca.Function("node", [self.unknowns, ca.SX.sym("none", 0)], [values]))
+
+
+def _weighted(bound: PathBound, derivatives: Iterable[Any]) -> Any:
+    """A bound's quantity of derivatives of position in symbols."""
+    ca, pairs = import_casadi(), zip(bound.weights, derivatives, strict=False)
+    return sum(ca.dot(ca.DM(weights), values) for weights, values in pairs if weights.any())

@@ -1,0 +1,156 @@
+"""The race of starts: all on a coarse mesh, the best on a fine one, the fastest that is certified wins."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+
+from aerobat.planning.certified_solve import Judged, certified_solve
+from aerobat.planning.flyability import flight_error
+from aerobat.planning.recorder import Attempt, Recorder
+from aerobat.planning.result import FLYABLE_ERROR
+from aerobat.planning.time_optimal.collocated_program import CollocatedProgram, SolvedMotion
+from aerobat.planning.time_optimal.elements import Elements
+from aerobat.planning.time_optimal.starts import Start
+from aerobat.problem.problem import Problem
+from aerobat.vehicle import Vehicle
+
+MIN_INTERVALS = 4  # of a phase
+COARSE_INTERVALS = 24  # in all, of first solves, whose durations come a few percent too long
+COARSE_MIN_INTERVALS = 2  # of a phase
+COARSE_ITERATIONS = 150  # at most: what takes longer is no start
+COARSE_TOLERANCE = 1e-4
+COARSE_VIOLATION = 1e-2  # of constraints, at most: enough to begin the fine solve from
+FINALISTS = 2  # in a plane and in space each, the fastest on the coarse mesh, to be solved on the fine one
+SAME = 1e-3  # of the duration: starts that come to nearly the same have come to the same motion
+ROUNDS = 8  # of solving, at most
+MORE_RESERVE = 1.6  # times the reserve, each time that the plan's own flight leaves its path
+RESERVE_RAISES = 4  # at most
+MAX_RESERVE = 0.4
+
+
+@dataclass
+class Race:
+    """One run of the planner."""
+
+    problem: Problem
+    vehicle: Vehicle
+    recorder: Recorder
+    intervals: int  # of the fine mesh
+    iterations: int  # of each solve, at most
+    reserve: float  # of each rotor's range
+    durations: tuple[float, ...] = ()  # [s] that starts came to on the coarse mesh, rising
+    _elements: dict[tuple[bool, bool], Elements] = field(default_factory=dict)
+
+    def winner(self, starts: Sequence[Start], body: Vehicle) -> Judged[SolvedMotion] | None:
+        """The fastest that is certified, of the finalists; of the others the first, if none of them is.
+
+        Args:
+            starts: Where to begin.
+            body: The vehicle, or one much like it that is easier to plan for.
+        """
+        finalists, others = _finalists(self._coarse(starts, body))
+        for program in finalists:
+            program.solve_ahead()
+        best: Judged[SolvedMotion] | None = None
+        for program in sorted(finalists, key=lambda program: program.duration):
+            if best is None or program.duration < best.solution.duration:
+                found = self._certified(program)
+                if found is not None and (best is None or found.solution.duration < best.solution.duration):
+                    best = found
+        return best or next(filter(None, map(self._certified, others)), None)
+
+    def flyable(self, found: Judged[SolvedMotion]) -> Judged[SolvedMotion]:
+        """What was found, with so much more reserve that its own flight stays on its path.
+
+        Where no reserve is wanted it stays as it is, and where none is enough the best is returned.
+        """
+        best, reserve = (self._flight_error(found), found), self.reserve
+        for _ in range(RESERVE_RAISES if reserve > 0.0 else 0):
+            if best[0] <= FLYABLE_ERROR:
+                break
+            reserve = min(MORE_RESERVE * reserve, MAX_RESERVE)
+            last = found.solution.source
+            again = self._certified(self._fine(last.program.control.elements, last.start, reserve))
+            if again is not None:
+                found = again
+                best = min(best, (self._flight_error(found), found), key=lambda pair: pair[0])
+        return best[1]
+
+    def _coarse(self, starts: Sequence[Start], body: Vehicle) -> list[CollocatedProgram]:
+        """Fine programs from where coarse ones end, the fastest first."""
+        ended: list[CollocatedProgram] = []
+        for start in starts:
+            elements = self._elements_for(start, body)
+            solved = CollocatedProgram(
+                elements,
+                start,
+                self.reserve,
+                min(COARSE_INTERVALS, self.intervals),
+                COARSE_MIN_INTERVALS,
+                min(COARSE_ITERATIONS, self.iterations),
+                COARSE_TOLERANCE,
+            ).solved()
+            usable = solved.answer.violation < COARSE_VIOLATION
+            self._record(solved, usable)
+            if usable:
+                ended.append(self._fine(elements, solved.start, self.reserve))
+        ended.sort(key=lambda program: program.duration)
+        self.durations = tuple(program.duration for program in ended)
+        return ended
+
+    def _fine(self, elements: Elements, start: Start, reserve: float) -> CollocatedProgram:
+        return CollocatedProgram(elements, start, reserve, self.intervals, MIN_INTERVALS, self.iterations)
+
+    def _elements_for(self, start: Start, body: Vehicle) -> Elements:
+        """The functions of programs in the start's plane or in space, which starts share."""
+        key = start.plane is None, body is self.vehicle
+        if key not in self._elements:
+            self._elements[key] = Elements(self.problem, body, start.plane)
+        return self._elements[key]
+
+    def _flight_error(self, found: Judged[SolvedMotion]) -> float:
+        trajectory = found.solution.source.trajectory
+        return flight_error(trajectory, self.vehicle, self.problem.environment)
+
+    def _certified(self, program: CollocatedProgram) -> Judged[SolvedMotion] | None:
+        found = certified_solve(program, self.problem, self.vehicle, self.recorder, ROUNDS)
+        return found if found.feasible else None
+
+    def _record(self, solved: SolvedMotion, usable: bool) -> None:
+        duration, answer = float(solved.motion.phases.sum()), solved.answer
+        ended = f"{duration:.3f} s on a coarse mesh" if usable else f"the solver {answer.status}"
+        attempt = Attempt(
+            duration=duration,
+            feasible=False,
+            status="unknown",
+            outcome=f"from {solved.program.start.origin}: {ended}",
+            cost=duration if usable else None,
+            nodes=answer.iterations,
+            solve_time=answer.time,
+        )
+        self.recorder.record(attempt)
+
+
+def _finalists(
+    programs: Sequence[CollocatedProgram],
+) -> tuple[list[CollocatedProgram], list[CollocatedProgram]]:
+    """The programs to be solved finely, the fastest of each kind that came to different durations; the rest.
+
+    In a plane and in space are two kinds: a coarse mesh is dearer to what turns about two axes.
+    """
+    taken: list[CollocatedProgram] = []
+    for program in programs:
+        alike = [p for p in taken if (p.start.plane is None) == (program.start.plane is None)]
+        new = all(program.duration > (1.0 + SAME) * p.duration for p in alike)
+        if new and len(alike) < FINALISTS:
+            taken.append(program)
+    return taken, [program for program in programs if program not in taken]
+
+
+def with_smoother(vehicle: Vehicle, lag: float) -> tuple[Vehicle, ...]:
+    """The vehicle; if its rotors have no lag, next one of so much [s]: jumping thrusts are harder to find."""
+    if vehicle.lags.any():
+        return (vehicle,)
+    rotors = tuple(replace(rotor, lag=lag) for rotor in vehicle.rotors)
+    return vehicle, replace(vehicle, rotors=rotors)

@@ -1,0 +1,151 @@
+"""Where the program begins: other planners' plans, at their pace and at others, in a plane and in space."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from itertools import islice
+
+import numpy as np
+
+from aerobat.arrays import Array
+from aerobat.errors import Infeasible
+from aerobat.flatness import force_balance, reference
+from aerobat.planning.miqp import Miqp
+from aerobat.planning.planners import Planner
+from aerobat.planning.polynomial.min_snap import MinSnap
+from aerobat.planning.result import Plan
+from aerobat.planning.time_optimal.collocation import CollocatedMotion, Mesh
+from aerobat.planning.warm_start import WarmStart
+from aerobat.problem.problem import Problem
+from aerobat.vehicle import Vehicle
+
+SLOWER = 1.5  # times the duration of a plan that knows no rotors
+PACE_SPREAD = 0.4  # standard deviation of the logarithm of a phase's pace, where paces are drawn
+SEED = 0
+NEAR_PLANE = 0.05  # of a path's length: what leaves a plane by less may begin in it
+ASIDE = 0.1  # of a path's length, by which it is bent out of its plane: symmetry is an optimum of its own
+
+
+@dataclass(frozen=True, eq=False)
+class Start:
+    """A motion to begin from, whether it is kept in its plane, and where it comes from."""
+
+    guess: WarmStart
+    plane: Array | None  # the normal of the plane that is kept, (3,)
+    aside: Array  # [m] by which positions are moved halfway, less before and after, (3,)
+    origin: str
+
+
+def starts(
+    problem: Problem, vehicle: Vehicle, guess: Miqp, planar: bool, count: int, first: Plan | None
+) -> tuple[Start, ...]:
+    """So many starts, the likeliest first; all in the maneuver's vertical plane where that is asked.
+
+    Args:
+        problem: What is planned.
+        vehicle: What flies it.
+        guess: The mixed-integer planner that plans for the vehicle's rotors, then without.
+        planar: Whether plans that lie in a plane keep to it.
+        count: How many.
+        first: A plan to begin with.
+
+    Raises:
+        Infeasible: A stage asks more thrust than the vehicle has.
+    """
+    sources = list(_sources(problem, vehicle, guess, first))
+    return tuple(islice(_variations(sources, planar), count))
+
+
+def _sources(
+    problem: Problem, vehicle: Vehicle, guess: Miqp, first: Plan | None
+) -> Iterator[tuple[WarmStart, str]]:
+    sequence = problem.stages(vehicle.max_specific_thrust)
+    if first is not None:
+        yield WarmStart.of(first, sequence), f"{first.planner}'s plan"
+    for planner, rotors, origin in _planners(problem, guess):
+        try:
+            plan = planner.plan(problem, vehicle if rotors else None)
+        except Infeasible as infeasible:
+            if not infeasible.attempts:  # refused at once, and whatever the planner
+                raise
+            continue
+        start = WarmStart.of(plan, sequence)
+        yield start, origin
+        if not rotors:
+            yield start.time_scaled(SLOWER), f"{origin}, slower"
+
+
+def _planners(problem: Problem, guess: Miqp) -> Iterator[tuple[Planner, bool, str]]:
+    guess = replace(guess, rescue=False)  # by free knots, which begin where this planner can itself
+    yield guess, True, "miqp's plan"
+    if problem.maneuver.through_points:
+        yield MinSnap(), True, "min-snap's plan"
+    yield guess, False, "miqp's plan without a vehicle"
+
+
+def _variations(sources: list[tuple[WarmStart, str]], planar: bool) -> Iterator[Start]:
+    """Every source in the plane of one that lies in any, and in space; then at other paces, without end."""
+    plane = next((plane for guess, _ in sources if (plane := guess.plane()) is not None), None)
+    paced, rng = sources, np.random.default_rng(SEED)
+    while sources:
+        for guess, origin in paced:
+            near = plane is not None and _distance(guess, plane) <= NEAR_PLANE * _extent(guess)
+            if plane is not None and (near or planar):
+                yield Start(guess, plane, np.zeros(3), f"{origin}, in a plane")
+            if plane is None or not planar:
+                aside = ASIDE * _extent(guess) * plane if plane is not None and near else np.zeros(3)
+                yield Start(guess, None, aside, origin)
+        paced = [
+            (
+                _at_other_pace(guess, np.exp(rng.normal(0.0, PACE_SPREAD, len(guess.phases)))),
+                f"{origin}, at another pace",
+            )
+            for guess, origin in sources
+        ]
+
+
+def _distance(start: WarmStart, normal: Array) -> float:
+    """How far a path's segments lead from a plane through its start [m]."""
+    points = start.trajectory.on_segments([0.0, 0.5, 1.0])
+    return float(np.abs((points - points[0, 0]) @ normal).max())
+
+
+def _extent(start: WarmStart) -> float:
+    """The longest side of the box around the ends of a path's segments [m]."""
+    return float(np.ptp(start.trajectory.on_segments([0.0, 1.0]), axis=(0, 1)).max())
+
+
+def _at_other_pace(start: WarmStart, factors: Array) -> WarmStart:
+    """The same path with each phase longer by a factor; its derivatives jump where phases meet."""
+    trajectory = start.trajectory
+    middles = (trajectory.knots[:-1] + trajectory.knots[1:]) / 2.0
+    durations = trajectory.durations * factors[np.searchsorted(start.times, middles)]
+    times = np.cumsum(start.phases * factors)[:-1]
+    return replace(start, trajectory=replace(trajectory, durations=durations), times=tuple(times.tolist()))
+
+
+def initial_motion(start: Start, mesh: Mesh, problem: Problem, vehicle: Vehicle) -> CollocatedMotion:
+    """States and inputs of the vehicle along a start at the mesh's nodes, inputs within twice their scale.
+
+    Args:
+        start: The motion to begin from.
+        mesh: Its phases and nodes.
+        problem: Its environment counts.
+        vehicle: What flies.
+    """
+    environment = problem.environment
+    guess = start.guess
+    times = np.concatenate([[0.0], np.cumsum(mesh.durations(guess.phases))])
+    times = np.minimum(times, guess.trajectory.duration)
+    setpoint = reference(guess.trajectory, vehicle, times, environment=environment).setpoint
+    flat, balance = setpoint.flat, force_balance(environment, vehicle)
+    thrust = flat.acceleration + balance.constant + balance.drag * flat.velocity
+    rates = setpoint.omega_body[:, :2]
+    place = flat.position + np.sin(np.pi * times / times[-1])[:, None] * start.aside
+    states = np.concatenate([place, flat.velocity, setpoint.q_world_body, rates], axis=1).T
+    norm = np.linalg.norm(thrust, axis=-1)[:, None]
+    inputs = np.concatenate([norm, setpoint.omega_dot_body[:, :2]], axis=1).T
+    bound = 2.0 * mesh.input_scale[:, None]
+    inputs = np.clip(inputs, -bound, bound)
+    return CollocatedMotion(guess.phases, states, inputs[:, :-1], inputs[:, 1:])
