@@ -58,6 +58,8 @@ class NonlinearProgram:
     upper: Array
     x_min: Array = field(default_factory=lambda: np.array(-inf))  # (n,), or one number for all
     x_max: Array = field(default_factory=lambda: np.array(inf))
+    jacobian: Any = None  # the CasADi function (x, p) -> (g, g's Jacobian), where it is known better
+    hessian: Any = None  # (x, p, λ_f, λ_g) -> upper triangle of the Hessian of λ_f f + λ_g·g, likewise
 
     def __post_init__(self) -> None:
         """Check and broadcast."""
@@ -134,6 +136,10 @@ def solve_nonlinear(
         options["ipopt.max_wall_time"] = time_limit
     if not exact_hessian:
         options["ipopt.hessian_approximation"] = "limited-memory"
+    if program.jacobian is not None:
+        options["jac_g"] = program.jacobian
+    if program.hessian is not None and exact_hessian:
+        options["hess_lag"] = program.hessian
     if initial_barrier is not None:
         options |= {"ipopt.mu_init": initial_barrier, "ipopt.bound_push": 1e-6, "ipopt.bound_frac": 1e-6}
     symbols = {"x": program.variables, "f": program.objective, "g": program.constraints}
