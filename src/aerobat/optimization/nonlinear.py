@@ -20,8 +20,14 @@ from aerobat.arrays import Array, frozen, frozen_bounds
 from aerobat.errors import BackendMissing, SpecError
 from aerobat.optimization.interrupts import interrupts_kept
 
-_OPTIONS = {"print_time": False, "show_eval_warnings": False, "ipopt.print_level": 0, "ipopt.sb": "yes"}
 _MAX_VIOLATION = 1e-6  # that a result may have and be called converged
+_OPTIONS = {
+    "print_time": False,
+    "show_eval_warnings": False,
+    "ipopt.print_level": 0,
+    "ipopt.sb": "yes",
+    "ipopt.constr_viol_tol": _MAX_VIOLATION / 10.0,
+}
 _CONVERGED = ("Solve_Succeeded", "Solved_To_Acceptable_Level")
 _MEANING = {
     "Solve_Succeeded": "solved to the tolerance",

@@ -66,9 +66,10 @@ class FreeKnots(Planner):
             guess = WarmStart.of(start, sequence)
             course = Course.of(problem, vehicle, sequence, guess)
             descent = Descent(course, recorder, self.reserve, self.still_ends, self.iterations)
-            descent.run(start, guess, self.segments)
-            if (found := descent.plan()) is not None:
-                return found
+            for segments in (self.segments, 2 * self.segments):
+                descent.run(start, guess, segments)
+                if (found := descent.plan()) is not None:
+                    return found
         raise Infeasible(
             f"no polynomials are certified to fly '{problem.name}' with {vehicle.name}: at the last attempt "
             f"{recorder.attempts[-1].outcome}; give more segments, or ask less of stages and limits",

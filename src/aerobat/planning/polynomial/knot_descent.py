@@ -9,6 +9,7 @@ it end at a feasible point (Mitsos 2011).
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from math import inf
 
 import numpy as np
 
@@ -28,13 +29,15 @@ from aerobat.problem.problem import Problem
 from aerobat.problem.stage import StageSequence
 from aerobat.vehicle import Vehicle
 
-ROUNDS = 24  # of solving, at most, from one start
-LITTLE_GAIN = 0.005  # of the duration, from one certified path to the next: the end
+ROUNDS = 12  # of solving, at most, from one start
+LITTLE_GAIN = 0.01  # of the duration, that certainty between samples costs: the end
 TRUST_RADIUS = 2.0  # in scaled variables, see KnotVariables
+MIN_RADIUS = 0.2  # a smaller region may hold no path that mends what is exceeded
 SHRINK = 3.0  # by how much the trust region is smaller where a limit is exceeded between samples
-TRUSTED = 0.2  # of a limit's range: an excess between samples beyond it means that the solver has cheated
+TRUSTED = 0.5  # of a limit's range: an excess between samples beyond it means that the solver has cheated
 SOLVED = 1e-3  # the same at samples: more means that the region is too large
 FIRST_BACKOFF = 1e-4  # of every limit's range, kept at samples
+MAX_BACKOFF = 0.02  # that is added at once: where much is exceeded, samples mend most of it
 RELATIVE_STAGE_TOLERANCE = 1e-5  # of a condition's size: by how much a stage may be missed through rounding
 SLOWER = 1.2  # times the duration, each time that a start is slowed
 SLOWED = 15  # times, at most
@@ -48,6 +51,7 @@ class Path:
     violation: ConstraintViolation
     start: Plan | None = None  # whose path it is, if it is another planner's
     unsolved: float = 0.0  # of a limit's range, left by the solver at samples
+    confined: bool = False  # by the trust region
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,9 +74,9 @@ class Course:
         limits = PathLimits(rotors, frame.origin, path_bounds(problem, sequence, balance))
         return cls(problem, vehicle, frame, limits, balance)
 
-    def path(self, guess: WarmStart, start: Plan | None = None, unsolved: float = 0.0) -> Path:
+    def path(self, guess: WarmStart, start: Plan | None = None) -> Path:
         """A guess, looked at densely."""
-        return Path(guess, ConstraintViolation.of(guess.trajectory, self.limits), start, unsolved)
+        return Path(guess, ConstraintViolation.of(guess.trajectory, self.limits), start)
 
     def solution(self, path: Path, status: str, nodes: int = 0, solve_time: float = 0.0) -> Solution[Path]:
         """A path as a solution; a failure where it misses a stage, or exceeds limits."""
@@ -92,10 +96,10 @@ class Course:
         )
 
     def paced(self, guess: WarmStart) -> WarmStart:
-        """The guess, as slow as where it exceeds limits least."""
+        """The guess; where it exceeds limits by far, as slow as where it exceeds them least."""
         slower = [guess]
         violations = [self.path(guess).violation.worst]
-        while violations[-1] > 0.0 and len(slower) <= SLOWED:
+        while violations[0] > TRUSTED and violations[-1] > 0.0 and len(slower) <= SLOWED:
             slower.append(slower[-1].time_scaled(SLOWER))
             violations.append(self.path(slower[-1]).violation.worst)
         return slower[int(np.argmin(violations))]
@@ -131,12 +135,10 @@ class Descent:
         self._certified(_Start(self.course, start, guess), 1)
         guess = self.course.paced(replace(guess, trajectory=refit(guess.trajectory, segments)))
         program, end = _Exchange(self, guess), len(self.recorder.attempts) + ROUNDS
-        gain = 1.0
-        while gain > LITTLE_GAIN and (left := end - len(self.recorder.attempts)) > 0:
+        while (left := end - len(self.recorder.attempts)) > 0:
             before = program.guess.trajectory.duration
-            if (found := self._certified(program, left)) is None:
+            if (found := self._certified(program, left)) is None or program.little_to_gain(found, before):
                 return
-            gain = 1.0 - found.solution.duration / before
             program.go_on_from(found.solution.source.guess)
 
     def plan(self) -> Plan | None:
@@ -192,6 +194,7 @@ class _Exchange:
         self._samples = chebyshev_samples(guess.trajectory.segments)
         self._radius = TRUST_RADIUS
         self._backoff = FIRST_BACKOFF + descent.reserve
+        self._relaxed: Path | None = None  # the first solution near the guess
 
     def solve(self) -> Solution[Path]:
         """The fastest path within the trust region around the guess."""
@@ -209,12 +212,24 @@ class _Exchange:
         program = KnotProgram(variables, course.limits, self._samples, course.balance, self._backoff)
         found, answer = program.solve(descent.iterations)
         status = "locally optimal" if answer.converged else "unknown"
-        path = course.path(found, unsolved=answer.violation)
+        path = replace(
+            course.path(found), unsolved=answer.violation, confined=variables.confine(answer.x)
+        )
+        if self._relaxed is None:
+            self._relaxed = path
         return course.solution(path, status, answer.iterations, answer.time)
+
+    def little_to_gain(self, found: Judged[Path], before: float) -> bool:
+        """True if what is certified is hardly faster than before, or as fast as where samples alone count."""
+        relaxed, duration = self._relaxed, found.solution.duration
+        settled = relaxed is not None and not relaxed.confined
+        limit = relaxed.guess.trajectory.duration if relaxed is not None and settled else inf
+        return duration <= (1.0 + LITTLE_GAIN) * limit and settled or duration >= (1.0 - LITTLE_GAIN) * before
 
     def go_on_from(self, certified: WarmStart) -> None:
         """Begin again from a certified path, in the whole trust region and with the least backoff."""
         self.guess = certified
+        self._relaxed = None
         self._radius = TRUST_RADIUS
         self._backoff = FIRST_BACKOFF + self._descent.reserve
 
@@ -232,8 +247,12 @@ class _Exchange:
             if finding.verdict is not Verdict.HOLDS:
                 violation = violation.add_counterexample(path.guess.trajectory, finding.time)
         self._samples = violation.joined(self._samples)
-        self._radius /= SHRINK
-        if path.unsolved <= SOLVED and violation.worst <= TRUSTED:
+        solved = path.unsolved <= SOLVED
+        if not solved and self._radius <= MIN_RADIUS:
+            return False
+        if not solved or violation.worst > 0.0:
+            self._radius = max(self._radius / SHRINK, MIN_RADIUS)
+        if solved and violation.worst <= TRUSTED:
             self.guess = path.guess
-            self._backoff += max(violation.worst, FIRST_BACKOFF) / 2.0
+            self._backoff += min(max(violation.worst, FIRST_BACKOFF) / 2.0, MAX_BACKOFF)
         return True

@@ -105,7 +105,7 @@ class RotorConstraints:
             rotors += lag * rates
         values = [(rotors - low) / (high - low), squared / self.environment.gravity**2]
         if self._rate_is_limited:
-            values.append(dot(omega, omega) / getattr(self.vehicle, 'max_body_rate', inf)**2)
+            values.append(dot(omega, omega) / self.vehicle.max_body_rate**2)
         return ca.vertcat(*values)
 
     @property
@@ -114,7 +114,7 @@ class RotorConstraints:
 
     @property
     def _rate_is_limited(self) -> bool:
-        return getattr(self.vehicle, 'max_body_rate', inf) < inf
+        return self.vehicle.max_body_rate < inf
 
     @cached_property
     def _turning_axis(self) -> Array:
