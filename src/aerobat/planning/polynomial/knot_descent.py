@@ -9,7 +9,6 @@ it end at a feasible point (Mitsos 2011).
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from math import inf
 
 import numpy as np
 
@@ -30,7 +29,7 @@ from aerobat.problem.stage import StageSequence
 from aerobat.vehicle import Vehicle
 
 ROUNDS = 12  # of solving, at most, from one start
-LITTLE_GAIN = 0.01  # of the duration, that certainty between samples costs: the end
+LITTLE_GAIN = 0.02  # of the duration, that certainty between samples costs: the end
 TRUST_RADIUS = 2.0  # in scaled variables, see KnotVariables
 MIN_RADIUS = 0.2  # a smaller region may hold no path that mends what is exceeded
 SHRINK = 3.0  # by how much the trust region is smaller where a limit is exceeded between samples
@@ -51,7 +50,6 @@ class Path:
     violation: ConstraintViolation
     start: Plan | None = None  # whose path it is, if it is another planner's
     unsolved: float = 0.0  # of a limit's range, left by the solver at samples
-    confined: bool = False  # by the trust region
 
 
 @dataclass(frozen=True, eq=False)
@@ -194,7 +192,7 @@ class _Exchange:
         self._samples = chebyshev_samples(guess.trajectory.segments)
         self._radius = TRUST_RADIUS
         self._backoff = FIRST_BACKOFF + descent.reserve
-        self._relaxed: Path | None = None  # the first solution near the guess
+        self._relaxed: float | None = None  # [s] the duration of the first solution near the guess
 
     def solve(self) -> Solution[Path]:
         """The fastest path within the trust region around the guess."""
@@ -212,19 +210,15 @@ class _Exchange:
         program = KnotProgram(variables, course.limits, self._samples, course.balance, self._backoff)
         found, answer = program.solve(descent.iterations)
         status = "locally optimal" if answer.converged else "unknown"
-        path = replace(
-            course.path(found), unsolved=answer.violation, confined=variables.confine(answer.x)
-        )
+        path = replace(course.path(found), unsolved=answer.violation)
         if self._relaxed is None:
-            self._relaxed = path
+            self._relaxed = found.trajectory.duration
         return course.solution(path, status, answer.iterations, answer.time)
 
     def little_to_gain(self, found: Judged[Path], before: float) -> bool:
         """True if what is certified is hardly faster than before, or as fast as where samples alone count."""
-        relaxed, duration = self._relaxed, found.solution.duration
-        settled = relaxed is not None and not relaxed.confined
-        limit = relaxed.guess.trajectory.duration if relaxed is not None and settled else inf
-        return duration <= (1.0 + LITTLE_GAIN) * limit and settled or duration >= (1.0 - LITTLE_GAIN) * before
+        duration, relaxed = found.solution.duration, self._relaxed or 0.0
+        return duration <= (1.0 + LITTLE_GAIN) * relaxed or duration >= (1.0 - LITTLE_GAIN) * before
 
     def go_on_from(self, certified: WarmStart) -> None:
         """Begin again from a certified path, in the whole trust region and with the least backoff."""

@@ -30,7 +30,7 @@ from aerobat.planning.polynomial.path_limits import (
 from aerobat.planning.warm_start import WarmStart
 from aerobat.problem.condition import ForceBalance, LinearBound
 
-TOLERANCE = 1e-4  # of IPOPT
+TOLERANCE = 1e-3  # of IPOPT
 WARM = 1e-3  # the first barrier parameter
 NORMAL = 1e-9  # what a direction has of a plane that it is normal to
 
@@ -56,23 +56,24 @@ class KnotProgram:
     @cached_property
     def _program(self) -> NonlinearProgram:
         ca, variables = import_casadi(), self.variables
-        x, along, seldom = ca.MX.sym("x", variables.size), self._along, self._seldom[0]
-        lower, upper = self._along_limits
+        x = ca.MX.sym("x", variables.size)
+        seldom, seldom_slopes, seldom_curvature, seldom_limits = self._seldom()
+        lower, upper = self._along_limits()
         count = len(self.samples)
         cost = np.zeros(variables.size)
         cost[:count] = 1.0 / count
         multipliers = ca.MX.sym("multipliers", len(lower) + seldom.numel_out(0))
         none, weight = ca.MX.sym("p", 0, 1), ca.MX.sym("w")
         sampled, curved = multipliers[: len(lower)], multipliers[len(lower) :]
-        second = self._hessian(x, sampled) + self._seldom[2](x, curved)
-        slopes = ca.vertcat(self._jacobian(x), self._seldom[1](x))
-        values = ca.vertcat(along(x), seldom(x))
+        second = self._hessian(x, sampled) + seldom_curvature(x, curved)
+        slopes = ca.vertcat(self._jacobian(x), seldom_slopes(x))
+        values = ca.vertcat(self._along(x), seldom(x))
         return NonlinearProgram(
             x,
             ca.dot(ca.DM(cost), x),
             values,
-            np.concatenate([lower, self._seldom_limits[0]]),
-            np.concatenate([upper, self._seldom_limits[1]]),
+            np.concatenate([lower, seldom_limits[0]]),
+            np.concatenate([upper, seldom_limits[1]]),
             *variables.box,
             jacobian=ca.Function("jacobian", [x, none], [values, slopes], ["x", "p"], ["g", "jac_g_x"]),
             hessian=ca.Function(
@@ -127,35 +128,28 @@ class KnotProgram:
         ca, local = import_casadi(), matrix @ x + constant
         return ca.reshape(local[:-1], self.limits.dimensions, len(ORDERS)).T, local[-1]
 
-    @cached_property
     def _along_limits(self) -> tuple[Array, Array]:
         """Limits of all values at samples; linear bounds do not count at the very ends, which are fixed."""
-        ends = [np.tile(limits[:, None], sum(map(len, self.samples))) for limits in self.limits.limits(self.reserve)]
-        count = len(self.limits.bounds)
-        if count:
-            for column in (0, -1):
-                ends[0][-count:, column], ends[1][-count:, column] = -inf, inf
-        return ends[0].T.ravel(), ends[1].T.ravel()
+        count = sum(map(len, self.samples))
+        lower, upper = (np.tile(limits, (count, 1)) for limits in self.limits.limits(self.reserve))
+        linear = slice(self.limits.size - len(self.limits.bounds), None)
+        lower[[0, -1], linear], upper[[0, -1], linear] = -inf, inf
+        return lower.ravel(), upper.ravel()
 
-    @cached_property
-    def _seldom(self) -> tuple[Any, Any, Any]:
-        """Values of the stages and their order, their Jacobian, and their product's Hessian, of x."""
+    def _seldom(self) -> tuple[Any, Any, Any, tuple[Array, Array]]:
+        """Values of the stages as a function of x, their Jacobian, their product's Hessian, their limits."""
         ca = import_casadi()
         x = ca.SX.sym("x", self.variables.size)
-        values = ca.vertcat(*(value for value, _, _ in self._rows(x)), ca.SX(0, 1))
+        rows = self._rows(x)
+        values = ca.vertcat(*(value for value, _, _ in rows), ca.SX(0, 1))
         weights = ca.SX.sym("multipliers", values.numel())
-        functions = (
+        limits = np.array([(lower, upper) for _, lower, upper in rows]).reshape(-1, 2)
+        return (
             ca.Function("values", [x], [values]),
             ca.Function("jacobian", [x], [ca.jacobian(values, x)]),
             ca.Function("hessian", [x, weights], [ca.hessian(ca.dot(values, weights), x)[0]]),
+            (limits[:, 0], limits[:, 1]),
         )
-        return functions
-
-    @cached_property
-    def _seldom_limits(self) -> tuple[Array, Array]:
-        limits = [(lower, upper) for _, lower, upper in self._rows(import_casadi().SX.sym("x", self.variables.size))]
-        ends = np.array(limits).reshape(-1, 2)
-        return ends[:, 0], ends[:, 1]
 
     def _rows(self, x: Any) -> list[tuple[Any, float, float]]:
         """Constraints of the stages, each at its place, and of their order and windows."""

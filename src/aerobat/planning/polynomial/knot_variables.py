@@ -25,7 +25,6 @@ from aerobat.vehicle import Vehicle
 
 SNAP = END_ORDER - 1
 JERK = SNAP - 1
-NEAR = 0.9  # of the box's size, its edge
 SHORTEST = 0.3  # of the mean, the least duration of a segment: shorter ones spoil the numbers
 
 
@@ -101,15 +100,6 @@ class KnotVariables:
             np.concatenate([shortest, free, offsets - self.radius]),
             np.concatenate([parts * stretch, free + 1.0, offsets + self.radius]),
         )
-
-    def confine(self, x: Array) -> bool:
-        """True if values of x come near the edge of the box, places aside."""
-        (_, _, lower), (_, _, upper) = map(self._split, self.box)
-        parts, _, offsets = self._split(x)
-        longer = parts / self._parts > 1.0 + NEAR * self.radius
-        shorter = parts / self._parts < 1.0 / (1.0 + NEAR * self.radius)
-        near = (offsets < NEAR * lower) | (offsets > NEAR * upper)
-        return bool(longer.any() or shorter.any() or near.any())
 
     def local(self, segment: int) -> tuple[Array, Array]:
         """A segment's E, row after row, and its T as a linear function of x: matrix and constant."""
