@@ -29,7 +29,8 @@ from aerobat.problem.stage import StageSequence
 from aerobat.vehicle import Vehicle
 
 ROUNDS = 12  # of solving, at most, from one start
-LITTLE_GAIN = 0.02  # of the duration, that certainty between samples costs: the end
+LITTLE_GAIN = 0.005  # of the duration, from one certified path to the next: the end
+LITTLE_LOSS = 0.02  # of the duration, that certainty between samples costs: the end where no box confines
 TRUST_RADIUS = 2.0  # in scaled variables, see KnotVariables
 MIN_RADIUS = 0.2  # a smaller region may hold no path that mends what is exceeded
 SHRINK = 3.0  # by how much the trust region is smaller where a limit is exceeded between samples
@@ -40,6 +41,7 @@ MAX_BACKOFF = 0.02  # that is added at once: where much is exceeded, samples men
 RELATIVE_STAGE_TOLERANCE = 1e-5  # of a condition's size: by how much a stage may be missed through rounding
 SLOWER = 1.2  # times the duration, each time that a start is slowed
 SLOWED = 15  # times, at most
+CONVERGED = "locally optimal"  # the status of such a solution
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,6 +52,7 @@ class Path:
     violation: ConstraintViolation
     start: Plan | None = None  # whose path it is, if it is another planner's
     unsolved: float = 0.0  # of a limit's range, left by the solver at samples
+    confined: bool = False  # by the trust region
 
 
 @dataclass(frozen=True, eq=False)
@@ -150,7 +153,7 @@ class Descent:
             self.recorder,
             planner="free-knots",
             order=5 if start is None else start.order,
-            status="locally optimal" if start is None else "feasible",
+            status=CONVERGED if start is None else "feasible",
             backend="ipopt" if start is None else start.backend,
             stages=tuple(PlacedStage(s.name, segment, time, s.gate) for s, segment, time in stages),
         )
@@ -209,8 +212,9 @@ class _Exchange:
         )
         program = KnotProgram(variables, course.limits, self._samples, course.balance, self._backoff)
         found, answer = program.solve(descent.iterations)
-        status = "locally optimal" if answer.converged else "unknown"
-        path = replace(course.path(found), unsolved=answer.violation)
+        status = CONVERGED if answer.converged else "unknown"
+        confined = variables.near_edge(answer.x)
+        path = replace(course.path(found), unsolved=answer.violation, confined=confined)
         if self._relaxed is None:
             self._relaxed = found.trajectory.duration
         return course.solution(path, status, answer.iterations, answer.time)
@@ -218,7 +222,8 @@ class _Exchange:
     def little_to_gain(self, found: Judged[Path], before: float) -> bool:
         """True if what is certified is hardly faster than before, or as fast as where samples alone count."""
         duration, relaxed = found.solution.duration, self._relaxed or 0.0
-        return duration <= (1.0 + LITTLE_GAIN) * relaxed or duration >= (1.0 - LITTLE_GAIN) * before
+        settled = not found.solution.source.confined and duration <= (1.0 + LITTLE_LOSS) * relaxed
+        return settled or duration >= (1.0 - LITTLE_GAIN) * before
 
     def go_on_from(self, certified: WarmStart) -> None:
         """Begin again from a certified path, in the whole trust region and with the least backoff."""
@@ -232,19 +237,19 @@ class _Exchange:
 
         A path slower than the best that is certified is given up: tightening only slows it further.
         """
-        best = self._descent.best
-        if best is not None and solution.duration >= best.solution.duration:
+        best, path = self._descent.best, solution.source
+        solved = path.unsolved <= SOLVED
+        converged = solution.status == CONVERGED
+        if converged and best is not None and solution.duration >= best.solution.duration:
             return False
-        path = solution.source
         violation = path.violation
         for finding in () if certificate is None else certificate.findings:
             if finding.verdict is not Verdict.HOLDS:
                 violation = violation.add_counterexample(path.guess.trajectory, finding.time)
         self._samples = violation.joined(self._samples)
-        solved = path.unsolved <= SOLVED
         if not solved and self._radius <= MIN_RADIUS:
             return False
-        if not solved or violation.worst > 0.0:
+        if not (solved and converged) or violation.worst > 0.0:
             self._radius = max(self._radius / SHRINK, MIN_RADIUS)
         if solved and violation.worst <= TRUSTED:
             self.guess = path.guess

@@ -25,6 +25,7 @@ from aerobat.vehicle import Vehicle
 
 SNAP = END_ORDER - 1
 JERK = SNAP - 1
+NEAR_EDGE = 0.95  # of the way to it
 SHORTEST = 0.3  # of the mean, the least duration of a segment: shorter ones spoil the numbers
 
 
@@ -100,6 +101,13 @@ class KnotVariables:
             np.concatenate([shortest, free, offsets - self.radius]),
             np.concatenate([parts * stretch, free + 1.0, offsets + self.radius]),
         )
+
+    def near_edge(self, x: Array) -> bool:
+        """True if values of x lie near the edge of the box, places aside."""
+        parts, _, offsets = self._split(x)
+        edge = NEAR_EDGE * self.radius
+        stretched = np.maximum(parts / self._parts, self._parts / parts).max() > 1.0 + edge
+        return bool(stretched or np.abs(offsets).max(initial=0.0) > edge)
 
     def local(self, segment: int) -> tuple[Array, Array]:
         """A segment's E, row after row, and its T as a linear function of x: matrix and constant."""
