@@ -49,12 +49,13 @@ class KnotProgram:
         """The solution near the guess, as the next guess. Raises BackendMissing without CasADi."""
         start = self.variables.start
         answer = solve_nonlinear(
-            self._program, start, max_iterations=iterations, tolerance=TOLERANCE, initial_barrier=WARM
+            self.program, start, max_iterations=iterations, tolerance=TOLERANCE, initial_barrier=WARM
         )
         return self.variables.read(answer.x), answer
 
     @cached_property
-    def _program(self) -> NonlinearProgram:
+    def program(self) -> NonlinearProgram:
+        """Its symbols, limits and exact derivatives."""
         ca, variables = import_casadi(), self.variables
         x = ca.MX.sym("x", variables.size)
         seldom, seldom_slopes, seldom_curvature, seldom_limits = self._seldom()
