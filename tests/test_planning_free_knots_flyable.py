@@ -1,8 +1,7 @@
-"""What free knots hold along the whole path: commands of lagging rotors, rates, attitudes with drag, windows."""
+"""What free knots and min-snap hold: commands of lagging rotors, rates, attitudes with drag, windows."""
 
 from dataclasses import replace
 
-import casadi as ca
 import numpy as np
 import pytest
 
@@ -21,6 +20,8 @@ from aerobat.planning.warm_start import WarmStart
 from aerobat.problem import GatePassage, HalfFlip, Problem, Waypoint, Waypoints, at_rest, load_problem
 from aerobat.problem.stage import CrossingTime
 from aerobat.vehicle import Vehicle, load_vehicle
+
+ca = pytest.importorskip("casadi")
 
 SAMPLES = 10_000
 HALF_FLIP = load_problem("half-flip")
@@ -109,7 +110,10 @@ def test_a_gate_is_passed_when_its_stage_asks(at: CrossingTime) -> None:
 
 
 def test_derivatives_given_to_the_solver_are_those_of_differentiation() -> None:
-    problem, vehicle = replace(tilted(50.0), environment=Environment(wind=(1.0, -2.0, 0.5))), load_vehicle("crazyflie")
+    problem, vehicle = (
+        replace(tilted(50.0), environment=Environment(wind=(1.0, -2.0, 0.5))),
+        load_vehicle("crazyflie"),
+    )
     start = MinSnap(stop_after=5).plan(problem, vehicle)
     sequence = problem.stages(vehicle.max_specific_thrust)
     guess = WarmStart.of(start, sequence)

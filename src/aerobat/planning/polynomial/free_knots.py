@@ -72,7 +72,8 @@ class FreeKnots(Planner):
                     return found
         raise Infeasible(
             f"no polynomials are certified to fly '{problem.name}' with {vehicle.name}: at the last attempt "
-            f"{recorder.attempts[-1].outcome}; give more segments, or ask less of stages and limits",
+            f"{recorder.attempts[-1].outcome}; widen what binds there, ask less of the stages, or give more "
+            "segments",
             recorder.attempts,
         )
 

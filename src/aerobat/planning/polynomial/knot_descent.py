@@ -30,7 +30,8 @@ from aerobat.vehicle import Vehicle
 
 ROUNDS = 12  # of solving, at most, from one start
 LITTLE_GAIN = 0.005  # of the duration, from one certified path to the next: the end
-LITTLE_LOSS = 0.02  # of the duration, that certainty between samples costs: the end where no box confines
+LITTLE_LOSS = 0.02  # of the duration, that certainty between samples costs: the end if the start was near
+LARGE_GAIN = 0.2  # of the duration: the start was far, trust regions confine what follows it
 TRUST_RADIUS = 2.0  # in scaled variables, see KnotVariables
 MIN_RADIUS = 0.2  # a smaller region may hold no path that mends what is exceeded
 SHRINK = 3.0  # by how much the trust region is smaller where a limit is exceeded between samples
@@ -52,7 +53,6 @@ class Path:
     violation: ConstraintViolation
     start: Plan | None = None  # whose path it is, if it is another planner's
     unsolved: float = 0.0  # of a limit's range, left by the solver at samples
-    confined: bool = False  # by the trust region
 
 
 @dataclass(frozen=True, eq=False)
@@ -192,6 +192,7 @@ class _Exchange:
     def __init__(self, descent: Descent, guess: WarmStart) -> None:
         self.guess = guess
         self._descent = descent
+        self._begun = guess.trajectory.duration
         self._samples = chebyshev_samples(guess.trajectory.segments)
         self._radius = TRUST_RADIUS
         self._backoff = FIRST_BACKOFF + descent.reserve
@@ -213,8 +214,7 @@ class _Exchange:
         program = KnotProgram(variables, course.limits, self._samples, course.balance, self._backoff)
         found, answer = program.solve(descent.iterations)
         status = CONVERGED if answer.converged else "unknown"
-        confined = variables.near_edge(answer.x)
-        path = replace(course.path(found), unsolved=answer.violation, confined=confined)
+        path = replace(course.path(found), unsolved=answer.violation)
         if self._relaxed is None:
             self._relaxed = found.trajectory.duration
         return course.solution(path, status, answer.iterations, answer.time)
@@ -222,7 +222,8 @@ class _Exchange:
     def little_to_gain(self, found: Judged[Path], before: float) -> bool:
         """True if what is certified is hardly faster than before, or as fast as where samples alone count."""
         duration, relaxed = found.solution.duration, self._relaxed or 0.0
-        settled = not found.solution.source.confined and duration <= (1.0 + LITTLE_LOSS) * relaxed
+        near = duration >= (1.0 - LARGE_GAIN) * self._begun
+        settled = near and duration <= (1.0 + LITTLE_LOSS) * relaxed
         return settled or duration >= (1.0 - LITTLE_GAIN) * before
 
     def go_on_from(self, certified: WarmStart) -> None:

@@ -88,12 +88,17 @@ class KnotProgram:
 
     @cached_property
     def _places(self) -> list[tuple[Any, ...]]:
-        """For each segment: its unknowns as a function of x, its samples' weights and frames, their number."""
+        """Of each segment, its unknowns as a function of x; its samples' weights, frames and number."""
         ca = import_casadi()
         trajectory = self.variables.guess.trajectory
         frames = self.limits.frames(trajectory, self.samples)
         return [
-            (*map(ca.sparsify, map(ca.DM, self.variables.local(i))), ca.DM(self.limits.at(s)), ca.DM(frame), len(s))
+            (
+                *map(ca.sparsify, map(ca.DM, self.variables.local(i))),
+                ca.DM(self.limits.at(s)),
+                ca.DM(frame),
+                len(s),
+            )
             for i, (s, frame) in enumerate(zip(self.samples, frames, strict=True))
         ]
 
@@ -161,7 +166,7 @@ class KnotProgram:
             segment, s = variables.segments[j], x[columns[j]]
             matrix, constant = variables.local(segment)
             ends, duration = self._ends(ca.sparsify(ca.DM(matrix)), ca.DM(constant), x)
-            coefficients = ca.DM(TO_COEFFICIENTS) @ (duration**ca.DM(ORDERS.astype(float)) * ends)
+            coefficients = ca.DM(TO_COEFFICIENTS) @ (duration ** ca.DM(ORDERS.astype(float)) * ends)
             for condition in stage.conditions:
                 rows += self._held(condition.bound(self.balance), coefficients, duration, s)
             earliest, latest = stage.window
@@ -175,7 +180,9 @@ class KnotProgram:
                 rows.append((x[columns[j + 1]] - x[columns[j]], 0.0, inf))
         return rows
 
-    def _held(self, bound: LinearBound, coefficients: Any, duration: Any, s: Any) -> list[tuple[Any, float, float]]:
+    def _held(
+        self, bound: LinearBound, coefficients: Any, duration: Any, s: Any
+    ) -> list[tuple[Any, float, float]]:
         """A bound at a place in a segment; nothing where no variable matters."""
         ca, axes = import_casadi(), self.limits.rotors.axes
         value = float(bound.weights[0] @ self.limits.origin)

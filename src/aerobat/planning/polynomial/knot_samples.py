@@ -7,8 +7,8 @@ from math import ceil
 
 import numpy as np
 
-from aerobat.planning.polynomial.path_limits import END_ORDER, PathLimits, Samples
 from aerobat.arrays import Array
+from aerobat.planning.polynomial.path_limits import END_ORDER, PathLimits, Samples
 from aerobat.trajectory import Trajectory, polynomial
 
 SAMPLES = 80  # of all segments together at first
@@ -40,7 +40,7 @@ class ConstraintViolation:
             worst=float(values.max()),
             limit=limits.names[row],
             time=float(trajectory.knots[segment] + s[place] * trajectory.durations[segment]),
-            peaks=tuple(s[p] for p in peaks.any(axis=1)),
+            peaks=tuple(s[p.any(axis=0)] for p in peaks),
         )
 
     def __str__(self) -> str:

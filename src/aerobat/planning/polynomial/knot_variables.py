@@ -25,7 +25,6 @@ from aerobat.vehicle import Vehicle
 
 SNAP = END_ORDER - 1
 JERK = SNAP - 1
-NEAR_EDGE = 0.95  # of the way to it
 SHORTEST = 0.3  # of the mean, the least duration of a segment: shorter ones spoil the numbers
 
 
@@ -102,13 +101,6 @@ class KnotVariables:
             np.concatenate([parts * stretch, free + 1.0, offsets + self.radius]),
         )
 
-    def near_edge(self, x: Array) -> bool:
-        """True if values of x lie near the edge of the box, places aside."""
-        parts, _, offsets = self._split(x)
-        edge = NEAR_EDGE * self.radius
-        stretched = np.maximum(parts / self._parts, self._parts / parts).max() > 1.0 + edge
-        return bool(stretched or np.abs(offsets).max(initial=0.0) > edge)
-
     def local(self, segment: int) -> tuple[Array, Array]:
         """A segment's E, row after row, and its T as a linear function of x: matrix and constant."""
         rows = 2 * END_ORDER * self.frame.dimensions
@@ -175,7 +167,9 @@ class KnotVariables:
         end[:JERK] = state.derivatives(JERK)
         end[JERK] = jerk * along + (0.0 if self.still_ends else -drag) * end[JERK - 1]
         if self._shared == END_ORDER:
-            end[SNAP] = float(along @ end[SNAP]) * along - drag * (end[JERK] - float(along @ end[JERK]) * along)
+            end[SNAP] = float(along @ end[SNAP]) * along - drag * (
+                end[JERK] - float(along @ end[JERK]) * along
+            )
 
     @cached_property
     def _effect(self) -> Array:

@@ -202,7 +202,7 @@ class _ClosedForm:
             for unit in np.eye(still.size)
         ]
         own = np.linalg.solve(np.eye(still.size) - np.array(columns).T, constant)
-        return self._with_drag_of(own.reshape(stages, 3))
+        return self._with_drag_of(np.asarray(own).reshape(stages, 3))
 
     def _with_drag_of(self, velocities: Array) -> Trajectory:
         """The closed form, with the drag of some velocities at the stages [m/s], (K - 2, 3)."""

@@ -69,7 +69,10 @@ class PathLimits:
         found = []
         for i, (s, frame) in enumerate(zip(samples, frames, strict=True)):
             ends = [trajectory.on_segments([0.0, 1.0], k)[i] for k in range(END_ORDER)]
-            inside = np.concatenate(np.swapaxes(ends, 0, 1)) - np.where(ORDERS == 0, 1.0, 0.0)[:, None] * self.origin
+            inside = (
+                np.concatenate(np.swapaxes(ends, 0, 1))
+                - np.where(ORDERS == 0, 1.0, 0.0)[:, None] * self.origin
+            )
             mapped = self.values.map("values", "serial", len(s), [0, 1], [])
             values = np.array(mapped(inside @ self.rotors.axes, trajectory.durations[i], self.at(s), frame))
             found.append(np.maximum(lower - values, values - upper))
@@ -153,7 +156,9 @@ class PathLimits:
                 factors *= exponents - j
             powers_of = ca.vertcat(
                 *(
-                    ca.horzcat(*(duration ** int(n - times) if f else 0 for n, f in zip(row, fs, strict=True)))
+                    ca.horzcat(
+                        *(duration ** int(n - times) if f else 0 for n, f in zip(row, fs, strict=True))
+                    )
                     for row, fs in zip(exponents, factors, strict=True)
                 )
             )
@@ -186,9 +191,7 @@ class PathLimits:
         return ca.vertcat(*values)
 
 
-def path_bounds(
-    problem: Problem, sequence: StageSequence, balance: ForceBalance
-) -> dict[str, LinearBound]:
+def path_bounds(problem: Problem, sequence: StageSequence, balance: ForceBalance) -> dict[str, LinearBound]:
     """Bounds along the whole path by their names: the problem's limits, and what its sequence asks always.
 
     Limits' weights (6, 3) have a row for each derivative, position to crackle.

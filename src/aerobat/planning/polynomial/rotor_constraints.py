@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from aerobat import so3
-from aerobat.arrays import Array
+from aerobat.arrays import Array, Mask
 from aerobat.environment import Environment
 from aerobat.flatness import axial_drag, lateral_drag, reference
 from aerobat.kernels import flatness as kernel
@@ -68,10 +68,10 @@ class RotorConstraints:
         return np.array(lower), np.array([*np.ones(count), inf, *rate])
 
     @property
-    def has_range(self) -> Array:
+    def has_range(self) -> Mask:
         """Whether a value has a range of which a part can be kept: not the floor of thrust, (size,)."""
         lower, upper = self.limits
-        return (lower == 0.0) | (upper < inf)
+        return np.asarray((lower == 0.0) | (upper < inf))
 
     def frames(self, trajectory: Trajectory, times: Array) -> Array:
         """Body axes in the world along a trajectory, (9, n): x, y and z; or the axis of turning, (3, n)."""
