@@ -45,7 +45,7 @@ def margin(plan: Plan) -> float:
 
 @pytest.fixture(scope="module")
 def plans() -> dict[str, Plan]:
-    return {name: FreeKnots().plan(SECTION_V, vehicle(name)) for name in SETS}
+    return {name: FreeKnots(segments=2).plan(SECTION_V, vehicle(name)) for name in SETS}
 
 
 @pytest.mark.parametrize("name", SETS)
@@ -83,7 +83,7 @@ def test_still_ends_have_no_jerk() -> None:
 
 
 def test_reserve_leaves_the_rotors_more_at_the_cost_of_time(plans: dict[str, Plan]) -> None:
-    plan = FreeKnots(reserve=0.05).plan(SECTION_V, vehicle("B"))
+    plan = FreeKnots(segments=2, reserve=0.05).plan(SECTION_V, vehicle("B"))
     assert certified(plan)
     assert margin(plan) > 2.0 * margin(plans["B"])
     assert plan.duration > plans["B"].duration
@@ -97,7 +97,7 @@ def test_more_segments_are_faster(plans: dict[str, Plan]) -> None:
 
 def test_limits_of_the_problem_hold_everywhere(plans: dict[str, Plan]) -> None:
     limits = Limits(velocity=4.5, acceleration=9.0)
-    slower = FreeKnots().plan(replace(SECTION_V, limits=limits), vehicle("A"))
+    slower = FreeKnots(segments=2).plan(replace(SECTION_V, limits=limits), vehicle("A"))
     assert np.abs(slower.trajectory.component_range(1)).max() <= 4.5 + 1e-9
     assert np.abs(slower.trajectory.component_range(2)).max() <= 9.0 + 1e-9
     assert slower.status == "locally optimal"
@@ -112,7 +112,7 @@ def test_random_starts_end_certified(seed: int, plans: dict[str, Plan]) -> None:
     start = MinSnap(time_scaling=TimeScaling.ALL, stop_after=1).plan(
         replace(SECTION_V, maneuver=waypoints), vehicle("B")
     )
-    plan = FreeKnots(start=start).plan(SECTION_V, vehicle("B"))
+    plan = FreeKnots(segments=2, start=start).plan(SECTION_V, vehicle("B"))
     assert certified(plan)
     assert plan.duration / SETS["B"][2] < 1.12
 

@@ -21,7 +21,6 @@ from aerobat.arrays import Array, frozen, frozen_bounds
 from aerobat.errors import BackendMissing, SpecError
 from aerobat.optimization.interrupts import interrupts_kept
 
-_OPTIONS = {"print_time": False, "show_eval_warnings": False, "ipopt.print_level": 0, "ipopt.sb": "yes"}
 _WARM = {
     "ipopt.warm_start_init_point": "yes",
     "ipopt.warm_start_bound_push": 1e-9,
@@ -31,6 +30,13 @@ _WARM = {
     "ipopt.warm_start_mult_bound_push": 1e-9,
 }
 _MAX_VIOLATION = 1e-6  # that a result may have and be called converged
+_OPTIONS = {
+    "print_time": False,
+    "show_eval_warnings": False,
+    "ipopt.print_level": 0,
+    "ipopt.sb": "yes",
+    "ipopt.constr_viol_tol": _MAX_VIOLATION / 10.0,
+}
 _CONVERGED = ("Solve_Succeeded", "Solved_To_Acceptable_Level")
 _MEANING = {
     "Solve_Succeeded": "solved to the tolerance",

@@ -1,14 +1,12 @@
 """Free knots as a nonlinear program: the fastest polynomials of degree 9 near a guess that rotors can follow.
 
-Its variables are the derivatives of position at the knots (position to jerk shared by both neighbours, so
-that body rates are continuous; snap one for each side), snap at both ends, where jerk is zero, the segments'
-durations, and where in its segment each stage holds. All stay in a box around the guess: limits hold at
-samples only, and a solver that is free to leap finds motions that cheat between them.
+Its variables are the derivatives of position at the knots, the segments' durations, and where in its segment
+each stage holds, see KnotVariables. All stay in a box around the guess: limits hold at samples only, and a
+solver that is free to leap finds motions that cheat between them.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
@@ -19,143 +17,185 @@ import numpy as np
 
 from aerobat.arrays import Array
 from aerobat.optimization.nonlinear import NonlinearProgram, NonlinearResult, import_casadi, solve_nonlinear
-from aerobat.planning.polynomial.knot_bounds import Bound
-from aerobat.planning.polynomial.knot_variables import (
-    END_ORDER,
+from aerobat.planning.polynomial.knot_variables import KnotVariables
+from aerobat.planning.polynomial.path_limits import (
+    ORDERS,
     POLYNOMIAL_DEGREE,
-    Frame,
-    KnotVariables,
+    TO_COEFFICIENTS,
+    PathLimits,
+    Samples,
+    bound_scale,
+    scaled,
 )
-from aerobat.planning.polynomial.rotor_constraints import RotorConstraints
 from aerobat.planning.warm_start import WarmStart
-from aerobat.problem.problem import Problem
-from aerobat.vehicle import Vehicle
+from aerobat.problem.condition import ForceBalance, LinearBound
 
-FLOOR = 0.02
-TOLERANCE = 1e-5  # of IPOPT
+TOLERANCE = 1e-3  # of IPOPT
 WARM = 1e-3  # the first barrier parameter
 NORMAL = 1e-9  # what a direction has of a plane that it is normal to
-
-
-@dataclass(frozen=True, eq=False)
-class _Rows:
-    """lower ≤ value ≤ upper, columns."""
-
-    value: Any
-    lower: Array
-    upper: Array
 
 
 @dataclass(frozen=True, eq=False)
 class KnotProgram:
     """The program around a guess, whose segments it keeps; an answer is the next one's guess."""
 
-    problem: Problem
-    vehicle: Vehicle
-    guess: WarmStart
-    samples: tuple[Array, ...]  # normalised times in each segment at which limits hold
-    bounds: tuple[Bound, ...]  # that hold along the whole path
-    radius: float  # of the trust region, a box in scaled variables
+    variables: KnotVariables
+    limits: PathLimits
+    samples: Samples  # at which limits hold
+    balance: ForceBalance  # that the stages' conditions on thrust are about
     reserve: float  # of every limit's range, kept at samples
-    still_ends: bool = False  # see KnotVariables
 
     def solve(self, iterations: int) -> tuple[WarmStart, NonlinearResult]:
         """The solution near the guess, as the next guess. Raises BackendMissing without CasADi."""
-        start = self._variables.start
+        start = self.variables.start
         answer = solve_nonlinear(
-            self._program, start, max_iterations=iterations, tolerance=TOLERANCE, initial_barrier=WARM
+            self.program, start, max_iterations=iterations, tolerance=TOLERANCE, initial_barrier=WARM
         )
-        return self._variables.read(answer.x), answer
+        return self.variables.read(answer.x), answer
 
     @cached_property
-    def _variables(self) -> KnotVariables:
-        trajectory = self.guess.trajectory
-        segments = np.searchsorted(trajectory.knots[1:-1], self.guess.times, side="right")
-        return KnotVariables(
-            self.problem,
-            self.vehicle,
-            self.guess,
-            tuple(segments.tolist()),
-            Frame.around(self.guess, self.problem.environment.wind),
-            self.radius,
-            self.still_ends,
-        )
-
-    @cached_property
-    def _program(self) -> NonlinearProgram:
-        ca, variables = import_casadi(), self._variables
-        rows = [self._rotors(), *self._path(), *self._stages(), *self._order()]
-        durations = [variables.duration(i) for i in range(len(self.samples))]
+    def program(self) -> NonlinearProgram:
+        """Its symbols, limits and exact derivatives."""
+        ca, variables = import_casadi(), self.variables
+        x = ca.MX.sym("x", variables.size)
+        seldom, seldom_slopes, seldom_curvature, seldom_limits = self._seldom()
+        lower, upper = self._along_limits()
+        count = len(self.samples)
+        cost = np.zeros(variables.size)
+        cost[:count] = 1.0 / count
+        multipliers = ca.MX.sym("multipliers", len(lower) + seldom.numel_out(0))
+        none, weight = ca.MX.sym("p", 0, 1), ca.MX.sym("w")
+        sampled, curved = multipliers[: len(lower)], multipliers[len(lower) :]
+        second = self._hessian(x, sampled) + seldom_curvature(x, curved)
+        slopes = ca.vertcat(self._jacobian(x), seldom_slopes(x))
+        values = ca.vertcat(self._along(x), seldom(x))
         return NonlinearProgram(
-            variables.x,
-            sum(durations) / self.guess.trajectory.duration,
-            ca.vertcat(*(row.value for row in rows)),
-            np.concatenate([row.lower for row in rows]),
-            np.concatenate([row.upper for row in rows]),
+            x,
+            ca.dot(ca.DM(cost), x),
+            values,
+            np.concatenate([lower, seldom_limits[0]]),
+            np.concatenate([upper, seldom_limits[1]]),
             *variables.box,
+            derivatives={
+                "jac_g": ca.Function("jac_g", [x, none], [values, slopes], ["x", "p"], ["g", "jac_g_x"]),
+                "hess_lag": ca.Function(
+                    "hess_lag",
+                    [x, none, weight, multipliers],
+                    [ca.triu(second)],
+                    ["x", "p", "lam_f", "lam_g"],
+                    ["triu_hess_gamma_x_x"],
+                ),
+            },
         )
 
-    def _rotors(self) -> _Rows:
-        """Limits of rotors and the floor of thrust at all samples."""
-        ca, trajectory, variables = import_casadi(), self.guess.trajectory, self._variables
-        rotors = RotorConstraints(
-            self.vehicle, variables.frame.axes, self.problem.environment, self.problem.heading
-        )
-        moving = [
-            ca.vertcat(*((ca.DM(_powers(s, k)) @ variables.coefficients[i]).T for k in range(1, END_ORDER)))
-            for i, s in enumerate(self.samples)
+    @cached_property
+    def _places(self) -> list[tuple[Any, ...]]:
+        """Of each segment, its unknowns as a function of x; its samples' weights, frames and number."""
+        ca = import_casadi()
+        trajectory = self.variables.guess.trajectory
+        frames = self.limits.frames(trajectory, self.samples)
+        return [
+            (
+                *map(ca.sparsify, map(ca.DM, self.variables.local(i))),
+                ca.DM(self.limits.at(s)),
+                ca.DM(frame),
+                len(s),
+            )
+            for i, (s, frame) in enumerate(zip(self.samples, frames, strict=True))
         ]
-        durations = [ca.repmat(variables.duration(i), 1, len(s)) for i, s in enumerate(self.samples)]
-        segments = zip(trajectory.knots[:-1], trajectory.durations, self.samples, strict=True)
-        times = np.concatenate([start + duration * s for start, duration, s in segments])
-        frames = ca.DM(rotors.frames(trajectory, np.minimum(times, trajectory.duration)))
-        values = rotors.function.map(len(times))(ca.horzcat(*moving), ca.horzcat(*durations), frames)
-        lower, upper = np.full(rotors.size, self.reserve), np.full(rotors.size, 1.0 - self.reserve)
-        lower[-1], upper[-1] = FLOOR**2, inf
-        return _Rows(ca.vec(values), np.tile(lower, len(times)), np.tile(upper, len(times)))
 
-    def _path(self) -> Iterator[_Rows]:
-        """Constraints along the whole path, at all samples but the very ends, which are fixed."""
-        last = len(self.samples) - 1
-        for bound in self.bounds:
-            for i, s in enumerate(self.samples):
-                inner = s[((s > 0.0) | (i > 0)) & ((s < 1.0) | (i < last))]
-                yield from self._within(bound, i, _powers(inner, bound.derivative), self.reserve)
+    def _along(self, x: Any) -> Any:
+        """All values at samples, a column."""
+        ca, rows = import_casadi(), []
+        for matrix, constant, weights, frames, count in self._places:
+            mapped = self.limits.values.map("values", "serial", count, [0, 1], [])
+            rows.append(ca.vec(mapped(*self._ends(matrix, constant, x), weights, frames)))
+        return ca.vertcat(*rows)
 
-    def _stages(self) -> Iterator[_Rows]:
-        """Constraints of the stages, each at its place."""
-        ca, variables = import_casadi(), self._variables
-        for j, stage in enumerate(self.guess.stages):
-            s = variables.place(j)
-            for bound in (
-                Bound.of(condition, self.problem.environment.gravity) for condition in stage.conditions
-            ):
-                k = bound.derivative
-                at = ca.horzcat(*(perm(p, k) * s ** max(p - k, 0) for p in range(POLYNOMIAL_DEGREE + 1)))
-                yield from self._within(bound, variables.segments[j], at, 0.0)
+    def _jacobian(self, x: Any) -> Any:
+        ca, rows = import_casadi(), []
+        for matrix, constant, weights, frames, count in self._places:
+            mapped = self.limits.jacobian.map("jacobian", "serial", count, [0, 1], [])
+            _, turned = mapped(*self._ends(matrix, constant, x), weights, frames)
+            rows.append(turned.T @ matrix)
+        return ca.vertcat(*rows)
 
-    def _within(self, bound: Bound, segment: int, at: Any, reserve: float) -> Iterator[_Rows]:
-        """Rows that keep a bound with a reserve at powers `at` (n, 10); none where no variable matters."""
-        ca, variables = import_casadi(), self._variables
-        along = bound.direction @ variables.frame.axes
-        if np.abs(along).max() < NORMAL:
-            return
-        coefficients = variables.coefficients[segment] @ ca.DM(along)
-        value = ca.mtimes(at, coefficients) / variables.duration(segment) ** bound.derivative
-        offset = float(bound.direction @ variables.frame.origin) if bound.derivative == 0 else 0.0
-        count = int(value.numel())
-        lower, upper = (bound.lower - offset) / bound.scale, (bound.upper - offset) / bound.scale
-        yield _Rows(value / bound.scale, np.full(count, lower + reserve), np.full(count, upper - reserve))
+    def _hessian(self, x: Any, multipliers: Any) -> Any:
+        ca, size = import_casadi(), self.limits.size
+        parts, first = 0, 0
+        for matrix, constant, weights, frames, count in self._places:
+            mapped = self.limits.hessian.map("hessian", "serial", count, [0, 1], [0])
+            own = ca.reshape(multipliers[first : first + size * count], size, count)
+            first += size * count
+            local = mapped(*self._ends(matrix, constant, x), weights, frames, own)
+            parts += matrix.T @ local @ matrix
+        return parts
 
-    def _order(self) -> Iterator[_Rows]:
-        """Stages in one segment keep their order."""
-        variables = self._variables
+    def _ends(self, matrix: Any, constant: Any, x: Any) -> tuple[Any, Any]:
+        """E and T of a segment."""
+        ca, local = import_casadi(), matrix @ x + constant
+        return ca.reshape(local[:-1], self.limits.dimensions, len(ORDERS)).T, local[-1]
+
+    def _along_limits(self) -> tuple[Array, Array]:
+        """Limits of all values at samples; linear bounds do not count at the very ends, which are fixed."""
+        count = sum(map(len, self.samples))
+        lower, upper = (np.tile(limits, (count, 1)) for limits in self.limits.limits(self.reserve))
+        linear = slice(self.limits.size - len(self.limits.bounds), None)
+        lower[[0, -1], linear], upper[[0, -1], linear] = -inf, inf
+        return lower.ravel(), upper.ravel()
+
+    def _seldom(self) -> tuple[Any, Any, Any, tuple[Array, Array]]:
+        """Values of the stages as a function of x, their Jacobian, their product's Hessian, their limits."""
+        ca = import_casadi()
+        x = ca.SX.sym("x", self.variables.size)
+        rows = self._rows(x)
+        values = ca.vertcat(*(value for value, _, _ in rows), ca.SX(0, 1))
+        weights = ca.SX.sym("multipliers", values.numel())
+        limits = np.array([(lower, upper) for _, lower, upper in rows]).reshape(-1, 2)
+        return (
+            ca.Function("values", [x], [values]),
+            ca.Function("jacobian", [x], [ca.jacobian(values, x)]),
+            ca.Function("hessian", [x, weights], [ca.hessian(ca.dot(values, weights), x)[0]]),
+            (limits[:, 0], limits[:, 1]),
+        )
+
+    def _rows(self, x: Any) -> list[tuple[Any, float, float]]:
+        """Constraints of the stages, each at its place, and of their order and windows."""
+        ca, variables = import_casadi(), self.variables
+        columns, rows = variables.place_columns, []
+        starts = ca.cumsum(ca.vertcat(0, x[: len(self.samples)]))
+        for j, stage in enumerate(variables.guess.stages):
+            segment, s = variables.segments[j], x[columns[j]]
+            matrix, constant = variables.local(segment)
+            ends, duration = self._ends(ca.sparsify(ca.DM(matrix)), ca.DM(constant), x)
+            coefficients = ca.DM(TO_COEFFICIENTS) @ (duration ** ca.DM(ORDERS.astype(float)) * ends)
+            for condition in stage.conditions:
+                rows += self._held(condition.bound(self.balance), coefficients, duration, s)
+            earliest, latest = stage.window
+            time = starts[segment] + x[segment] * s
+            if earliest > 0.0:
+                rows.append((time / starts[-1], earliest, latest))
+            elif latest < 1.0:
+                rows.append((time / starts[-1], -inf, latest))
         for j, (segment, following) in enumerate(pairwise(variables.segments)):
             if segment == following:
-                yield _Rows(variables.place(j + 1) - variables.place(j), np.zeros(1), np.full(1, inf))
+                rows.append((x[columns[j + 1]] - x[columns[j]], 0.0, inf))
+        return rows
 
-
-def _powers(s: Array, derivative: int) -> Array:
-    """The k-th derivatives of 1, s, ..., s⁹ at normalised times s (n,), (n, 10)."""
-    columns = [perm(p, derivative) * s ** max(p - derivative, 0) for p in range(POLYNOMIAL_DEGREE + 1)]
-    return np.stack(columns, axis=-1)
+    def _held(
+        self, bound: LinearBound, coefficients: Any, duration: Any, s: Any
+    ) -> list[tuple[Any, float, float]]:
+        """A bound at a place in a segment; nothing where no variable matters."""
+        ca, axes = import_casadi(), self.limits.rotors.axes
+        value = float(bound.weights[0] @ self.limits.origin)
+        matters = False
+        for k in bound.derivatives:
+            along = bound.weights[k] @ axes
+            if np.abs(along).max() < NORMAL:
+                continue
+            matters = True
+            at = ca.horzcat(*(perm(p, k) * s ** max(p - k, 0) for p in range(POLYNOMIAL_DEGREE + 1)))
+            value += at @ coefficients @ ca.DM(along) / duration**k
+        if not matters:
+            return []
+        return [(value / bound_scale(bound), *scaled(bound))]

@@ -3,55 +3,67 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from math import ceil
 
 import numpy as np
 
 from aerobat.arrays import Array
-from aerobat.environment import Environment
-from aerobat.flatness import reference
-from aerobat.planning.polynomial.knot_bounds import Bound
-from aerobat.planning.polynomial.knot_variables import END_ORDER
+from aerobat.planning.polynomial.path_limits import END_ORDER, PathLimits, Samples
 from aerobat.trajectory import Trajectory, polynomial
-from aerobat.vehicle import Vehicle
 
+SAMPLES = 80  # of all segments together at first
+MIN_SAMPLES = 16  # of each: more than a polynomial of degree 9 needs
 DENSE = 81  # places in a segment that are looked at
 JUST_INSIDE = 1e-9  # of a duration from its knots, where a segment is still itself and not its neighbour
 APART = 1e-4  # of a duration, the least distance of samples
 
-Samples = tuple[Array, ...]  # normalised times in each segment, rising
-
 
 @dataclass(frozen=True, eq=False)
 class ConstraintViolation:
-    """By how much a trajectory exceeds limits, and where."""
+    """By how much a trajectory exceeds limits, where, and which most."""
 
     worst: float  # as a fraction of the limit's range; negative: all hold
-    peaks: Samples  # where more is exceeded than beside it
+    limit: str  # the name of the one that is exceeded most
+    time: float  # [s] when
+    peaks: Samples  # normalised times in each segment at which a limit is exceeded more than beside them
 
     @classmethod
-    def of(
-        cls, trajectory: Trajectory, vehicle: Vehicle, environment: Environment, bounds: tuple[Bound, ...]
-    ) -> ConstraintViolation:
-        """Of rotor thrusts and of bounds along a trajectory."""
+    def of(cls, trajectory: Trajectory, limits: PathLimits) -> ConstraintViolation:
+        """Of limits along a trajectory, at a dense look."""
         s = np.linspace(0.0, 1.0, DENSE)
-        over = [_rotors(trajectory, vehicle, environment, s)]
-        over += [bound.excess(trajectory.on_segments(s, bound.derivative)) / bound.scale for bound in bounds]
-        values = np.max(over, axis=0)
-        neighbours = np.pad(values, ((0, 0), (1, 1)), constant_values=-np.inf)
-        peaks = (values > 0.0) & (values >= neighbours[:, :-2]) & (values >= neighbours[:, 2:])
-        return cls(float(values.max()), tuple(s[p] for p in peaks))
+        inside = np.clip(s, JUST_INSIDE, 1.0 - JUST_INSIDE)
+        values = limits.excess(trajectory, (inside,) * trajectory.segments)
+        neighbours = np.pad(values, ((0, 0), (0, 0), (1, 1)), constant_values=-np.inf)
+        peaks = (values > 0.0) & (values >= neighbours[..., :-2]) & (values >= neighbours[..., 2:])
+        segment, row, place = np.unravel_index(np.argmax(values), values.shape)
+        return cls(
+            worst=float(values.max()),
+            limit=limits.names[row],
+            time=float(trajectory.knots[segment] + s[place] * trajectory.durations[segment]),
+            peaks=tuple(s[p.any(axis=0)] for p in peaks),
+        )
 
-    def add_counterexample(self, trajectory: Trajectory, time: float, excess: float) -> ConstraintViolation:
-        """The same, and an excess, a fraction of its limit's range, at a time [s] where all seemed well."""
+    def __str__(self) -> str:
+        """One sentence without its full stop."""
+        return f"{self.limit}: exceeded by {100.0 * self.worst:.2g} % of the range at {self.time:.3f} s"
+
+    def add_counterexample(self, trajectory: Trajectory, time: float) -> ConstraintViolation:
+        """The same, and a time [s] at which a limit is exceeded where all seemed well."""
         peaks = list(self.peaks)
         i = int(np.searchsorted(trajectory.knots[1:-1], time, side="right"))
         place = np.clip((time - trajectory.knots[i]) / trajectory.durations[i], 0.0, 1.0)
         peaks[i] = np.append(peaks[i], place)
-        return replace(self, worst=max(self.worst, excess), peaks=tuple(peaks))
+        return replace(self, peaks=tuple(peaks))
 
     def joined(self, samples: Samples) -> Samples:
         """Samples, and the peaks that are not among them."""
         return tuple(_with(old, new) for old, new in zip(samples, self.peaks, strict=True))
+
+
+def chebyshev_samples(segments: int) -> Samples:
+    """The first samples: denser toward the knots, as polynomials vary most there."""
+    count = max(ceil(SAMPLES / segments), MIN_SAMPLES)
+    return ((1.0 - np.cos(np.linspace(0.0, np.pi, count))) / 2.0,) * segments
 
 
 def refit(trajectory: Trajectory, segments: int) -> Trajectory:
@@ -72,16 +84,6 @@ def refit(trajectory: Trajectory, segments: int) -> Trajectory:
     ends = np.stack([trajectory.evaluate(inside, k) for k in range(END_ORDER)], axis=2)
     ends *= (durations[:, None] ** np.arange(END_ORDER))[..., None]
     return Trajectory(durations, polynomial.hermite(ends[0], ends[1]), trajectory.heading)
-
-
-def _rotors(trajectory: Trajectory, vehicle: Vehicle, environment: Environment, s: Array) -> Array:
-    """The excess of the worst rotor's thrust at normalised times s (n,) of every segment, (S, n)."""
-    inside = np.clip(s, JUST_INSIDE, 1.0 - JUST_INSIDE)
-    times = trajectory.knots[:-1, None] + trajectory.durations[:, None] * inside
-    thrusts = reference(trajectory, vehicle, times.ravel(), environment=environment).rotor_thrusts
-    low, high = vehicle.min_thrusts, vehicle.max_thrusts
-    over = np.maximum(low - thrusts, thrusts - high) / (high - low)
-    return np.asarray(over.max(axis=1).reshape(times.shape))
 
 
 def _with(old: Array, new: Array) -> Array:

@@ -5,26 +5,27 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 from math import perm
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from aerobat.arrays import Array
-from aerobat.flatness import end_thrust
-from aerobat.optimization.nonlinear import import_casadi
+from aerobat.flatness import end_thrust, lateral_drag
+from aerobat.planning.polynomial.path_limits import (
+    END_ORDER,
+    ORDERS,
+    POLYNOMIAL_DEGREE,
+    TO_COEFFICIENTS,
+)
 from aerobat.planning.warm_start import WarmStart
 from aerobat.problem.problem import EndState, Problem
 from aerobat.so3 import UP
-from aerobat.trajectory import Trajectory, polynomial
+from aerobat.trajectory import Trajectory
 from aerobat.vehicle import Vehicle
 
-END_ORDER = 5  # derivatives at either end of a segment that make its polynomial: position to snap
 SNAP = END_ORDER - 1
-JERK = SNAP - 1  # the highest derivative that both neighbours of a knot share
-POLYNOMIAL_DEGREE = 2 * END_ORDER - 1
+JERK = SNAP - 1
 SHORTEST = 0.3  # of the mean, the least duration of a segment: shorter ones spoil the numbers
-TO_COEFFICIENTS = polynomial.hermite(np.eye(2 * END_ORDER)[:END_ORDER], np.eye(2 * END_ORDER)[END_ORDER:])
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,9 +66,10 @@ class Frame:
 class KnotVariables:
     """x: durations, as parts of their mean; the stages' places, 0 to 1; offsets from a guess's derivatives.
 
-    Offsets are of position to jerk at the inner knots, of snap at both ends of every segment, and, unless
-    ends are still, of jerk along the thrust at the start and at the goal: there the body is at rest but its
-    thrust may be changing. One is a large offset: what the greatest specific thrust does in a mean duration.
+    Offsets are of position to jerk at the inner knots; of snap there too, one for both neighbours if rotors
+    lag, whose thrusts cannot jump, else one for each. At the ends the body does not turn but its thrust may
+    be changing: of jerk along the thrust, unless ends are still, and of snap along it if rotors lag, else of
+    all snap. One is a large offset: what the greatest specific thrust does in a mean duration.
     """
 
     problem: Problem
@@ -78,10 +80,10 @@ class KnotVariables:
     radius: float  # of the box
     still_ends: bool  # without jerk
 
-    @cached_property
-    def x(self) -> Any:
-        """The symbols, a column."""
-        return import_casadi().MX.sym("x", len(self.start))
+    @property
+    def size(self) -> int:
+        """The number of unknowns."""
+        return len(self.start)
 
     @cached_property
     def start(self) -> Array:
@@ -90,7 +92,7 @@ class KnotVariables:
 
     @property
     def box(self) -> tuple[Array, Array]:
-        """The least and the most that they may be."""
+        """The least and the most that they may be; places within their stages' windows at most."""
         parts, places, offsets = self._split(self.start)
         stretch, free = 1.0 + self.radius, np.zeros_like(places)
         shortest = np.maximum(parts / stretch, np.minimum(parts, SHORTEST))
@@ -99,37 +101,26 @@ class KnotVariables:
             np.concatenate([parts * stretch, free + 1.0, offsets + self.radius]),
         )
 
-    def duration(self, segment: int) -> Any:
-        """A segment's duration [s]."""
-        return self._mean * self.x[segment]
+    def local(self, segment: int) -> tuple[Array, Array]:
+        """A segment's E, row after row, and its T as a linear function of x: matrix and constant."""
+        rows = 2 * END_ORDER * self.frame.dimensions
+        matrix = np.zeros((rows + 1, self.size))
+        matrix[:rows, -self._effect.shape[1] :] = self._effect[rows * segment : rows * (segment + 1)]
+        matrix[rows, segment] = self._mean
+        return matrix, np.append(self._base.ravel()[rows * segment : rows * (segment + 1)], 0.0)
 
-    def place(self, stage: int) -> Any:
-        """Where in its segment a stage holds."""
-        return self.x[len(self._parts) + stage]
-
-    @cached_property
-    def coefficients(self) -> list[Any]:
-        """Of every segment, in the frame, (10, d) each."""
-        ca, d = import_casadi(), self.frame.dimensions
-        offsets = self.x[len(self._parts) + len(self._places) :]
-        values = ca.DM(self._base.ravel()) + ca.sparsify(ca.DM(self._effect)) @ offsets
-        ends = ca.vertsplit(ca.reshape(values, d, len(self._base)).T, 2 * END_ORDER)
-        powers = [
-            ca.vertcat(*2 * [self.duration(i) ** k for k in range(END_ORDER)])
-            for i in range(len(self._parts))
-        ]
-        return [
-            ca.DM(TO_COEFFICIENTS) @ (ca.repmat(power, 1, d) * end)
-            for power, end in zip(powers, ends, strict=True)
-        ]
+    @property
+    def place_columns(self) -> range:
+        """Which unknowns are the stages' places."""
+        return range(len(self._parts), len(self._parts) + len(self._places))
 
     def read(self, x: Array) -> WarmStart:
         """The trajectory and the stages' times that values of x (n,) stand for."""
         parts, places, offsets = self._split(x)
         durations = self._mean * parts
         values = self._base.ravel() + self._effect @ offsets
-        powers = np.tile(durations[:, None] ** np.arange(END_ORDER), 2)[..., None]
-        coefficients = TO_COEFFICIENTS @ (powers * values.reshape(len(parts), 2 * END_ORDER, -1))
+        factors = (durations[:, None] ** ORDERS)[..., None]
+        coefficients = TO_COEFFICIENTS @ (factors * values.reshape(len(parts), 2 * END_ORDER, -1))
         trajectory = Trajectory(durations, self.frame.outside(coefficients), self.problem.heading)
         segments = list(self.segments)
         times = trajectory.knots[segments] + durations[segments] * places
@@ -153,45 +144,65 @@ class KnotVariables:
         since = np.array(self.guess.times) - trajectory.knots[segments]
         return np.clip(since / trajectory.durations[segments], 0.0, 1.0)
 
+    @property
+    def _shared(self) -> int:
+        """The number of derivatives that both neighbours of a knot share."""
+        return END_ORDER if self.vehicle.lags.any() else SNAP
+
     @cached_property
     def _base(self) -> Array:
         """The guess's derivatives at both ends of all segments, in the frame, (segments · 10, d)."""
-        trajectory, problem = self.guess.trajectory, self.problem
+        trajectory, shared = self.guess.trajectory, self._shared
         ends = np.stack([trajectory.on_segments([0.0, 1.0], k) for k in range(END_ORDER)], axis=2)
-        shared = (ends[1:, 0, :SNAP] + ends[:-1, 1, :SNAP]) / 2.0
-        ends[1:, 0, :SNAP] = ends[:-1, 1, :SNAP] = shared
-        for end, state in ((ends[0, 0], problem.start), (ends[-1, 1], problem.goal)):
-            along, jerk = self._thrust_direction(state), end[JERK].copy()
-            end[:SNAP] = state.derivatives(SNAP)
-            end[JERK] += 0.0 if self.still_ends else along * (along @ jerk)
+        mean = (ends[1:, 0, :shared] + ends[:-1, 1, :shared]) / 2.0
+        ends[1:, 0, :shared] = ends[:-1, 1, :shared] = mean
+        for end, state in ((ends[0, 0], self.problem.start), (ends[-1, 1], self.problem.goal)):
+            self._settle(end, state)
         return self.frame.inside(ends).reshape(-1, self.frame.dimensions)
+
+    def _settle(self, end: Array, state: EndState) -> None:
+        """Give an end (5, 3) its state's derivatives and the rest of the body, which turns with f' or f''."""
+        along, drag = self._thrust_direction(state), lateral_drag(self.vehicle)
+        jerk = 0.0 if self.still_ends else float(along @ end[JERK])
+        end[:JERK] = state.derivatives(JERK)
+        end[JERK] = jerk * along + (0.0 if self.still_ends else -drag) * end[JERK - 1]
+        if self._shared == END_ORDER:
+            end[SNAP] = float(along @ end[SNAP]) * along - drag * (
+                end[JERK] - float(along @ end[JERK]) * along
+            )
 
     @cached_property
     def _effect(self) -> Array:
         """Effect of offsets on those, row after row, (segments · 10 · d, offsets)."""
-        length = self.vehicle.max_specific_thrust * self._mean**2 / perm(POLYNOMIAL_DEGREE, 2)
-        sizes = np.array([length * perm(POLYNOMIAL_DEGREE, k) / self._mean**k for k in range(END_ORDER)])
         rows = self._rows()
         free = np.flatnonzero(rows.ravel() >= 0)
-        selection = np.zeros((rows.size, int(rows.max()) + 1))
-        selection[free, rows.ravel()[free]] = np.broadcast_to(sizes, rows.shape).ravel()[free]
+        selection = np.zeros((rows.size, int(rows.max(initial=-1)) + 1))
+        selection[free, rows.ravel()[free]] = np.broadcast_to(self._sizes, rows.shape).ravel()[free]
         effect: Array = np.kron(selection, np.eye(self.frame.dimensions)).astype(float)
-        if self.still_ends:
-            return effect
-        jerks = np.zeros((rows.size, self.frame.dimensions, 2))
-        for column, (row, end) in enumerate(
-            ((JERK, self.problem.start), (JERK - END_ORDER, self.problem.goal))
-        ):
-            jerks[row, :, column] = sizes[JERK] * self._thrust_direction(end) @ self.frame.axes
-        return np.hstack([effect, jerks.reshape(len(effect), 2)])
+        along = ([] if self.still_ends else [JERK]) + ([SNAP] if self._shared == END_ORDER else [])
+        columns = np.zeros((rows.size, self.frame.dimensions, 2 * len(along)))
+        for i, order in enumerate(along):
+            for j, (row, state) in enumerate(
+                ((order, self.problem.start), (order - END_ORDER, self.problem.goal))
+            ):
+                direction = self._thrust_direction(state) @ self.frame.axes
+                columns[row, :, 2 * i + j] = self._sizes[order] * direction
+        return np.hstack([effect, columns.reshape(len(effect), -1)])
+
+    @property
+    def _sizes(self) -> Array:
+        """A large offset of each derivative, (5,)."""
+        length = self.vehicle.max_specific_thrust * self._mean**2 / perm(POLYNOMIAL_DEGREE, 2)
+        return np.array([length * perm(POLYNOMIAL_DEGREE, k) / self._mean**k for k in range(END_ORDER)])
 
     def _rows(self) -> NDArray[np.intp]:
-        """The number of the offset of each derivative at each end of each segment; -1: fixed, (S, 2, 5)."""
-        count = self.guess.trajectory.segments
+        """The number of the offset of each derivative at each end of each segment; -1: none, (S, 2, 5)."""
+        count, shared = self.guess.trajectory.segments, self._shared
         rows = np.full((count, 2, END_ORDER), -1)
-        knots = np.arange(SNAP * (count - 1)).reshape(count - 1, SNAP)
-        rows[1:, 0, :SNAP] = rows[:-1, 1, :SNAP] = knots
-        rows[:, :, SNAP] = knots.size + np.arange(2 * count).reshape(count, 2)
+        knots = np.arange(shared * (count - 1)).reshape(count - 1, shared)
+        rows[1:, 0, :shared] = rows[:-1, 1, :shared] = knots
+        if shared == SNAP:
+            rows[:, :, SNAP] = knots.size + np.arange(2 * count).reshape(count, 2)
         return rows
 
     def _thrust_direction(self, state: EndState) -> Array:

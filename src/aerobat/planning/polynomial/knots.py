@@ -9,7 +9,7 @@ from math import sqrt
 import numpy as np
 
 from aerobat.arrays import Array
-from aerobat.problem.condition import ForceBalance
+from aerobat.problem.condition import ForceBalance, Quantity
 from aerobat.problem.problem import Problem
 from aerobat.problem.stage import Stage, StageSequence
 from aerobat.trajectory import Trajectory
@@ -19,18 +19,28 @@ SHORTEST_LEG = 0.2  # [s] that a leg is given at first
 STAGE_TOLERANCE = 1e-6  # in SI units: by how much a condition may be missed through rounding
 
 
-def fixed_at_knots(problem: Problem, sequence: StageSequence, order: int, gravity: float) -> Array:
+def fixed_at_knots(
+    problem: Problem, sequence: StageSequence, order: int, balance: ForceBalance, velocities: Array
+) -> Array:
     """Position and its derivatives below `order` at start, stages and goal, (K, order, 3); NaN: free.
 
     The closed form takes each axis alone and equalities only. So conditions in oblique directions fix, by
-    least norm, every component that they touch; a lower bound on thrust fixes the thrust to it, or to the
-    hover's if that is more; other inequalities are left free, to be checked afterwards.
+    least norm, every component that they touch. An attitude fixes the thrust to exactly its direction, and a
+    lower bound on thrust to itself or to the hover's if that is more; other inequalities are left free, to
+    be checked afterwards.
+
+    Args:
+        problem: Its ends are fixed.
+        sequence: Its stages' equalities are fixed.
+        order: How many derivatives there are.
+        balance: Of thrust, acceleration and drag.
+        velocities: At the stages [m/s], of which the drag is taken, (K - 2, 3).
     """
     fixed = np.full((len(sequence.stages) + 2, order, 3), np.nan)
     fixed[0], fixed[-1] = problem.start.derivatives(order), problem.goal.derivatives(order)
-    for knot, stage in enumerate(sequence.stages, 1):
+    for knot, (stage, velocity) in enumerate(zip(sequence.stages, velocities, strict=True), 1):
         for derivative in range(3):
-            fixed[knot, derivative] = _fixed(stage, derivative, gravity)
+            fixed[knot, derivative] = _fixed(stage, derivative, balance, velocity)
     return fixed
 
 
@@ -47,24 +57,31 @@ def first_times(problem: Problem, fixed: Array, max_specific_thrust: float) -> A
     return durations
 
 
-def violated_stage(sequence: StageSequence, trajectory: Trajectory, gravity: float) -> str | None:
+def violated_stage(sequence: StageSequence, trajectory: Trajectory, balance: ForceBalance) -> str | None:
     """The first stage that a trajectory with a knot a stage misses, in a sentence; or None."""
     values = [trajectory.evaluate(trajectory.knots[1:-1], k) for k in range(3)]
-    for stage, flat in zip(sequence.stages, np.stack(values, axis=1), strict=True):
+    fractions = trajectory.knots[1:-1] / trajectory.duration
+    for stage, flat, fraction in zip(sequence.stages, np.stack(values, axis=1), fractions, strict=True):
         for condition in stage.conditions:
-            bound = condition.bound(ForceBalance(gravity))
+            bound = condition.bound(balance)
             value = float(bound.value(flat))
             if bound.excess(flat) > STAGE_TOLERANCE:
                 return (
                     f"the stage '{stage.name}' asks {condition.quantity.value} between {condition.lower:.4g} "
                     f"and {condition.upper:.4g}, the closed form gives {value:.4g}"
                 )
+        earliest, latest = stage.window
+        if not earliest - STAGE_TOLERANCE <= fraction <= latest + STAGE_TOLERANCE:
+            return (
+                f"the stage '{stage.name}' asks to be passed between {earliest:.4g} and {latest:.4g} of the "
+                f"duration, the closed form passes it at {fraction:.4g}"
+            )
     return None
 
 
-def _fixed(stage: Stage, derivative: int, gravity: float) -> Array:
+def _fixed(stage: Stage, derivative: int, balance: ForceBalance, velocity: Array) -> Array:
     """The components (3,) that a stage fixes of one derivative, NaN where it leaves them free."""
-    rows = list(_equalities(stage, derivative, gravity))
+    rows = list(_equalities(stage, derivative, balance, velocity))
     if not rows:
         return np.full(3, np.nan)
     directions = np.array([direction for direction, _ in rows])
@@ -72,15 +89,23 @@ def _fixed(stage: Stage, derivative: int, gravity: float) -> Array:
     return np.where(directions.any(axis=0), solution, np.nan)
 
 
-def _equalities(stage: Stage, derivative: int, gravity: float) -> Iterator[tuple[Array, float]]:
-    """Directions and values of what a stage fixes of one derivative."""
+def _equalities(
+    stage: Stage, derivative: int, balance: ForceBalance, velocity: Array
+) -> Iterator[tuple[Array, float]]:
+    """Directions and values of what a stage fixes of one derivative at a velocity."""
+    if stage.attitude is not None and derivative == Quantity.SPECIFIC_THRUST.derivative:
+        thrust = max(stage.attitude.min_thrust, balance.gravity) * stage.attitude.up
+        yield from zip(np.eye(3), thrust - balance.constant - balance.drag * velocity, strict=True)
+        return
     for condition in stage.conditions:
         if condition.quantity.derivative != derivative:
             continue
         value = condition.lower
         if condition.min_thrust > 0.0 and condition.lower < condition.upper:
-            hover = gravity * float(np.linalg.norm(condition.direction))
+            hover = balance.gravity * float(np.linalg.norm(condition.direction))
             value = float(np.clip(hover, condition.lower, condition.upper))
         elif condition.lower < condition.upper:
             continue
-        yield condition.direction, value - condition.bound(ForceBalance(gravity)).constant
+        bound = condition.bound(balance)
+        drag = float(bound.weights[1] @ velocity) if derivative == 2 else 0.0
+        yield condition.direction, value - bound.constant - drag

@@ -14,6 +14,7 @@ from aerobat.arrays import Array
 from aerobat.certification import Certificate
 from aerobat.declaration import AS_IT_IS, Count
 from aerobat.errors import Infeasible, SpecError
+from aerobat.flatness import force_balance
 from aerobat.planning.certified_solve import Judged, Solution, certified_solve, refuted_by_samples
 from aerobat.planning.planners import Planner, option, planner
 from aerobat.planning.polynomial.knots import first_times, fixed_at_knots, violated_stage
@@ -22,6 +23,7 @@ from aerobat.planning.result import PlacedStage, Plan
 from aerobat.planning.search import BisectionSearch, GridSearch, Search
 from aerobat.problem.problem import Problem
 from aerobat.problem.stage import StageSequence
+from aerobat.trajectory import Trajectory
 from aerobat.trajectory.minimum_effort import ContinuityRule, minimum_effort
 from aerobat.vehicle import Vehicle
 
@@ -92,14 +94,19 @@ class _Planning:
     def __init__(
         self, config: MinSnap, problem: Problem, vehicle: Vehicle | None, recorder: Recorder
     ) -> None:
-        gravity = problem.environment.gravity
-        thrust = FIRST_GUESS_THRUST_TO_WEIGHT * gravity if vehicle is None else vehicle.max_specific_thrust
+        weight = problem.environment.gravity
+        thrust = FIRST_GUESS_THRUST_TO_WEIGHT * weight if vehicle is None else vehicle.max_specific_thrust
         self.config, self.problem, self.vehicle, self.recorder = config, problem, vehicle, recorder
         self.sequence: StageSequence = problem.stages(thrust)
-        self.fixed = fixed_at_knots(problem, self.sequence, config.order, gravity)
-        self.durations = first_times(problem, self.fixed, thrust)
+        self.balance = force_balance(problem.environment, vehicle)
+        still = np.zeros((len(self.sequence.stages), 3))
+        self.durations = first_times(problem, self.fixed(still), thrust)
         timed = TimeScaling.ALL if problem.maneuver.first_times is None else TimeScaling.FIRST
         self.scaling = config.time_scaling or timed
+
+    def fixed(self, velocities: Array) -> Array:
+        """All that is fixed at the knots, given the velocities at the stages [m/s], (K - 2, 3)."""
+        return fixed_at_knots(self.problem, self.sequence, self.config.order, self.balance, velocities)
 
     def attempt(self, duration: float) -> Judged[None] | None:
         """Outcome of one duration; None unless it meets its stages and the vehicle can fly it."""
@@ -121,10 +128,13 @@ class _Planning:
         return durations
 
     def why_infeasible(self) -> str:
-        """One sentence, from the last attempt, the slowest."""
+        """One sentence, from the last attempt, the slowest, and the last that its stages let pass."""
         attempts = self.recorder.attempts
         longest = max(attempts, key=lambda attempt: attempt.duration)
         shortest = min(attempt.duration for attempt in attempts)
+        flown = [attempt for attempt in attempts if attempt.margin is not None and attempt is not longest]
+        nearest = max(flown, key=lambda attempt: attempt.duration, default=None)
+        before = "" if nearest is None else f"at {nearest.duration:.3g} s {nearest.outcome}; "
         remedy = (
             "scale the times of all segments, or give others"
             if self.scaling is TimeScaling.FIRST
@@ -132,7 +142,7 @@ class _Planning:
         )
         return (
             f"'{self.problem.name}' has no closed-form path that flies at any duration from {shortest:.3g} "
-            f"to {longest.duration:.3g} s: at the last, {longest.outcome}; {remedy}"
+            f"to {longest.duration:.3g} s: {before}at the last, {longest.outcome}; {remedy}"
         )
 
     def result(self, found: Judged[None]) -> Plan:
@@ -160,9 +170,8 @@ class _ClosedForm:
         """The path; a failure where it misses a stage or samples refute it."""
         started = perf_counter()
         planning, problem, order = self.planning, self.planning.problem, self.planning.config.order
-        durations = planning.scaled(self.duration)
-        trajectory = minimum_effort(planning.fixed, durations, planning.config.rule, problem.heading)
-        failure = violated_stage(planning.sequence, trajectory, problem.environment.gravity)
+        trajectory = self._trajectory()
+        failure = violated_stage(planning.sequence, trajectory, planning.balance)
         solution = Solution(
             source=None,
             duration=self.duration,
@@ -174,6 +183,33 @@ class _ClosedForm:
             failure=failure,
         )
         return refuted_by_samples(solution, problem, planning.vehicle)
+
+    def _trajectory(self) -> Trajectory:
+        """The closed form whose drag at the stages is that of its own velocities there.
+
+        Those are an affine function of the velocities of which the drag is taken, v ↦ M v + c, found column
+        by column; what is wanted is v = M v + c.
+        """
+        stages = len(self.planning.sequence.stages)
+        still = np.zeros((stages, 3))
+        trajectory = self._with_drag_of(still)
+        if self.planning.balance.drag == 0.0 or not stages:
+            return trajectory
+        there = trajectory.knots[1:-1]
+        constant = trajectory.evaluate(there, 1).ravel()
+        columns = [
+            self._with_drag_of(unit.reshape(stages, 3)).evaluate(there, 1).ravel() - constant
+            for unit in np.eye(still.size)
+        ]
+        own = np.linalg.solve(np.eye(still.size) - np.array(columns).T, constant)
+        return self._with_drag_of(np.asarray(own).reshape(stages, 3))
+
+    def _with_drag_of(self, velocities: Array) -> Trajectory:
+        """The closed form, with the drag of some velocities at the stages [m/s], (K - 2, 3)."""
+        planning = self.planning
+        durations = planning.scaled(self.duration)
+        fixed = planning.fixed(velocities)
+        return minimum_effort(fixed, durations, planning.config.rule, planning.problem.heading)
 
     def tighten(self, solution: Solution[None], certificate: Certificate | None) -> bool:
         """A longer duration is all that helps."""
