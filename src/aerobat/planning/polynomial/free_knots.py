@@ -34,8 +34,8 @@ class FreeKnots(Planner):
     two segments have room for a flip's five. Rotors that lag are held to their limits by their commands,
     their thrusts continuous. At the ends the body does not turn, but its thrust may be changing, so that
     there is jerk along it, unless `still_ends` asks for none. A `reserve`, a fraction of every limit's range,
-    is kept at samples from either end, for the controller: without one, four segments leave rotors without lag, whose thrusts may jump, 13 cm
-    off the paper's second example; one percent makes that 4 mm.
+    is kept at samples from either end, for the controller: without one, four segments leave rotors without
+    lag, whose thrusts may jump, 13 cm off the paper's second example; one percent makes that 4 mm.
     """
 
     segments: Annotated[int, Field(ge=2)] = option(
