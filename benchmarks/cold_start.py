@@ -31,7 +31,7 @@ def main() -> None:
     runs = int(sys.argv[1]) if len(sys.argv) > 1 else 11
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "plan.npz"
-        trajectory = ab.plan(ab.load_problem(FLIP), ab.Miqp(order=4), ab.load_vehicle(VEHICLE)).trajectory
+        trajectory = ab.plan(ab.load_problem(FLIP), ab.Miqp(), ab.load_vehicle(VEHICLE)).trajectory
         ab.save_trajectory(trajectory, path)
         code = FLIGHT.format(path=str(path), vehicle=VEHICLE, rate=RATE, rows=int(RATE * trajectory.duration))
         pairs = [(seconds(code), seconds(IMPORTS)) for _ in range(runs + 1)][1:]  # after a warm-up

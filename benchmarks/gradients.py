@@ -23,7 +23,7 @@ FLOOR = 0.050  # [s]
 def main() -> None:
     runs = int(sys.argv[1]) if len(sys.argv) > 1 else 9
     vehicle, problem = ab.load_vehicle("agile-quad"), ab.load_problem("flip-roll")
-    flip = ab.plan(problem, ab.Miqp(order=4), vehicle).trajectory
+    flip = ab.plan(problem, ab.Miqp(), vehicle).trajectory
 
     def exact(engine: str) -> list[float]:
         answer = ab.sensitivity(flip, FIVE, vehicle, engine=engine).mean_square_position_error

@@ -60,7 +60,7 @@ exit:
 def main() -> None:
     runs = int(sys.argv[1]) if len(sys.argv) > 1 else 5
     crew, start = dispersed(ab.load_vehicle("agile-quad"))
-    plan = ab.plan(ab.load_problem("flip-roll"), ab.Miqp(order=4), crew[0])
+    plan = ab.plan(ab.load_problem("flip-roll"), ab.Miqp(), crew[0])
     paths = [in_a_row(plan.trajectory, count) for count in FLIPS]
     flights = {(name, path): flight(path, crew, start, name) for name in ENGINES for path in paths}
     peers = ready()

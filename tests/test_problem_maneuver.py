@@ -7,6 +7,7 @@ from hypothesis import strategies as st
 
 from aerobat import so3
 from aerobat.errors import SpecError
+from aerobat.planning.miqp import Miqp
 from aerobat.problem import (
     Attitude,
     Condition,
@@ -16,9 +17,11 @@ from aerobat.problem import (
     GatePassage,
     HalfFlip,
     Line,
+    Problem,
     Quantity,
     Stage,
     StageSequence,
+    at_rest,
     load_problem,
     tilted_gate,
 )
@@ -251,3 +254,26 @@ def test_a_window_holds_the_interval_ends_within_it(first: float, length: float,
 def test_a_maneuver_that_cannot_be_is_refused(wrong) -> None:
     with pytest.raises(SpecError):
         wrong()
+
+
+@pytest.mark.parametrize(
+    ("condition", "sentence"),
+    [
+        (Condition("velocity", (1.0, 0.0, 0.0), lower=1.0), "start: its velocity along .* lies outside"),
+        (Condition("specific_thrust", (0.0, 0.0, 1.0), lower=11.0), "start: its specific_thrust along"),
+        (Condition("position", (1.0, 0.0, 0.0), upper=2.0), "goal: its position along"),
+    ],
+)
+def test_ends_that_contradict_what_is_asked_throughout_are_refused(condition, sentence) -> None:
+    maneuver = CustomManeuver((Stage("kick"),), (condition,))
+    with pytest.raises(SpecError, match=sentence):
+        Problem("never", at_rest((0.0, 0.0, 0.0)), at_rest((5.0, 0.0, 0.0)), maneuver)
+
+
+def test_a_window_in_which_no_interval_ends_is_told_as_such() -> None:
+    stage = Stage("late", (Condition("velocity", (1.0, 0.0, 0.0), lower=1.0),), at=(0.0, 0.02))
+    problem = Problem("window", at_rest((0.0, 0.0, 0.0)), at_rest((5.0, 0.0, 0.0)), CustomManeuver((stage,)))
+    with pytest.raises(
+        SpecError, match="'late' may hold between 0 and 0.02 .* none of 20 intervals ends; widen"
+    ):
+        Miqp().plan(problem)

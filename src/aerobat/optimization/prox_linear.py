@@ -94,6 +94,7 @@ class ProxLinearResult(Generic[P]):
     point: P
     converged: bool  # no step gains more than little
     steps: int  # QPs solved
+    feasible: P | None = None  # the last one on the way without violation
 
 
 def prox_linear(program: SmoothProgram[P], start: P, max_steps: int = 40) -> ProxLinearResult[P]:
@@ -105,24 +106,26 @@ def prox_linear(program: SmoothProgram[P], start: P, max_steps: int = 40) -> Pro
         max_steps: QPs, at most.
     """
     point = start
+    feasible = start if start.violation <= 0.0 else None
     linearization = point.linearization()
     proximity = _FIRST_PROXIMITY
     penalty = _PENALTY
     for steps in range(1, max_steps + 1):
         if not program.cost.any() and point.violation <= 0.0:
-            return ProxLinearResult(point, True, steps - 1)
+            return ProxLinearResult(point, True, steps - 1, point)
         merit = _merit(program, point, penalty)
         step = _step(program, point.x, linearization, proximity, penalty)
         trial = None if step is None else program.at(point.x + step[0])
         if step is None or trial is None:
             proximity *= 5.0
             if proximity > _MAX_PROXIMITY:
-                return ProxLinearResult(point, False, steps)
+                return ProxLinearResult(point, False, steps, feasible)
             continue
         promised = merit - float(program.cost @ (point.x + step[0])) - penalty * step[1]
         gained = merit - _merit(program, trial, penalty)
         if gained > _ACCEPTED * promised and gained > 0.0:
             point = trial
+            feasible = point if point.violation <= 0.0 else feasible
             linearization = point.linearization()
             proximity = max(proximity / (4.0 if gained > _TRUSTED * promised else 1.5), _MIN_PROXIMITY)
         else:
@@ -130,10 +133,10 @@ def prox_linear(program: SmoothProgram[P], start: P, max_steps: int = 40) -> Pro
         flat = promised < _LITTLE_PROMISED
         if (flat and gained < _LITTLE_GAIN) or proximity > _MAX_PROXIMITY:
             if point.violation <= 0.0 or penalty >= _MAX_PENALTY:
-                return ProxLinearResult(point, flat, steps)
+                return ProxLinearResult(point, flat, steps, feasible)
             penalty *= _PENALTY_GROWTH
             proximity = _FIRST_PROXIMITY
-    return ProxLinearResult(point, False, max_steps)
+    return ProxLinearResult(point, False, max_steps, feasible)
 
 
 def _merit(program: SmoothProgram[Any], point: Point, penalty: float) -> float:

@@ -27,13 +27,14 @@ from aerobat.declaration import (
 )
 from aerobat.environment import Environment
 from aerobat.errors import SpecError
+from aerobat.problem.condition import Condition, ForceBalance, Quantity
 from aerobat.problem.gate import Gate, named_gate
 from aerobat.problem.maneuvers import MANEUVERS, Line, Maneuver
 from aerobat.problem.stage import StageSequence
 
 DERIVATIVES = ("position", "velocity", "acceleration", "jerk", "snap", "crackle")
 UNITS = ("m", "m/s", "m/s²", "m/s³", "m/s⁴", "m/s⁵")
-ZERO = (0.0, 0.0, 0.0)
+ROUNDING = 1e-9  # of a bound's size
 
 
 @declared
@@ -113,7 +114,8 @@ def _file_name(name: str) -> str:
 class Problem:
     """A maneuver between two states, free of any vehicle.
 
-    Raises SpecError when an end lies outside the limits, or the maneuver lacks its gate.
+    Raises SpecError when an end lies outside the limits or contradicts what the maneuver asks throughout, or
+    the maneuver lacks its gate.
     """
 
     name: Annotated[Label, AfterValidator(_file_name)]  # also names the output folder
@@ -137,8 +139,9 @@ class Problem:
         for i, name in enumerate(names):
             if name in names[:i]:
                 raise FieldError(f"gates[{i}].name", f": there are two gates named '{name}'; rename one")
-        self.stages(1.0)
         self._check_within_limits()
+        for i, condition in enumerate(self.stages(1.0).path_constraints):
+            self._check_ends(i, condition)
 
     @classmethod
     def expand(cls, table: dict[str, Any]) -> dict[str, Any]:
@@ -171,6 +174,25 @@ class Problem:
                 self._check_point(f"{end}.{quantity}", state.derivatives(3)[derivative], derivative)
         for i, gate in enumerate(self.gates):
             self._check_point(f"gates[{i}].position", gate.position, 0)
+
+    def _check_ends(self, number: int, condition: Condition) -> None:
+        """Refuse ends that contradict what holds throughout; drag, of a vehicle unknown here, is left out."""
+        balance = ForceBalance(self.environment.gravity)
+        for end, state in (("start", self.start), ("goal", self.goal)):
+            bound = condition.bound(balance)
+            still = (state.velocity == self.environment.wind).all()
+            if condition.quantity is Quantity.SPECIFIC_THRUST and not still:
+                continue
+            derivatives = state.derivatives(3)
+            if bound.excess(derivatives) > ROUNDING * bound.scale:
+                along = ", ".join(f"{x:g}" for x in condition.direction)
+                value = float(bound.value(derivatives))
+                raise FieldError(
+                    end,
+                    f": its {condition.quantity.value} along ({along}), {value:g}, lies outside what the "
+                    f"maneuver asks throughout, path_constraints[{number}]: from {condition.lower:g} to "
+                    f"{condition.upper:g}; change either",
+                )
 
     def _check_point(self, name: str, value: Array, derivative: int) -> None:
         lower, upper = self.path_limits.of(derivative)

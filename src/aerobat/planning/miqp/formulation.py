@@ -57,7 +57,14 @@ class Formulation:
     def __post_init__(self) -> None:
         """Check."""
         ends, stages = self.chain.intervals - 1, len(self.sequence.stages)
-        if ends < max(stages, 1) or not all(self._slots(s) for s in self.sequence.stages):
+        nowhere = [s for s in self.sequence.stages if not self._slots(s)]
+        if nowhere and ends >= max(stages, 1):
+            first, last = nowhere[0].window
+            raise SpecError(
+                f"the stage '{nowhere[0].name}' may hold between {first:g} and {last:g} of the duration, "
+                f"where none of {self.chain.intervals} intervals ends; widen its `at`, or use more intervals"
+            )
+        if ends < max(stages, 1):
             raise SpecError(
                 f"intervals: {self.chain.intervals} leave {ends} interval ends between start and goal for "
                 f"the {stages} stages of '{self.problem.name}'; use at least {max(2 * stages, 3)}"

@@ -36,18 +36,35 @@ def shortest(attempts: Attempts, first: float, last: float) -> Judged[Placement]
         last: The scan's largest dt [s].
     """
     scan = _Scan(attempts, first, last)
+    starts = scan.starts()
     ends: list[tuple[Placement, PathPoint]] = []
-    for tried, start in enumerate(scan.starts()):
-        path = descended(start.path.program, start.path.x) if start.path else None
-        if path is not None:
-            ends.append((start, path))
+    for tried, start in enumerate(starts):
+        ends += _descents(start)
         if len(ends) == STARTS or tried + 1 == MAX_STARTS:
             break
     for start, path in sorted(ends, key=lambda end: float(end[1].x[-1])):
         judged = attempts.refined(start, partial(finished, path))
         if judged.feasible:
             return flyable(attempts, judged)
+    return _slower(attempts, scan, starts)
+
+
+def _slower(attempts: Attempts, scan: _Scan, starts: Iterator[Placement]) -> Judged[Placement] | None:
+    """The path from the first program that the vehicle can fly as it is, shortened if that succeeds."""
+    for start in starts:
+        if start.path is None or start.path.violation > 0.0:
+            continue
+        for _, path in _descents(start):
+            judged = attempts.refined(start, partial(finished, path))
+            if judged.feasible:
+                return flyable(attempts, judged)
     return scan.certified()
+
+
+def _descents(start: Placement) -> list[tuple[Placement, PathPoint]]:
+    """A start with the path that a descent from it ends at, if it ends at one."""
+    path = descended(start.path.program, start.path.x) if start.path else None
+    return [] if path is None else [(start, path)]
 
 
 def flyable(attempts: Attempts, judged: Judged[Placement]) -> Judged[Placement]:

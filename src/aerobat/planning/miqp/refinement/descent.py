@@ -18,7 +18,7 @@ SETTLING_STEPS = 8  # at most
 
 
 def descended(program: PathProgram, start: Array, max_steps: int = MAX_STEPS) -> PathPoint | None:
-    """The path that a descent ends at; None where it is far from what it should keep within.
+    """The path that a descent ends at, or the last within all constraints, if it ends far from that; or None.
 
     Args:
         program: What is sought.
@@ -26,8 +26,10 @@ def descended(program: PathProgram, start: Array, max_steps: int = MAX_STEPS) ->
         max_steps: Of the descent, at most.
     """
     point = program.at(start)
-    point = None if point is None else prox_linear(program, point, max_steps).point
-    return None if point is None or point.violation > MENDABLE else point
+    if point is None:
+        return None
+    found = prox_linear(program, point, max_steps)
+    return found.feasible if found.point.violation > MENDABLE else found.point
 
 
 def finished(point: PathPoint) -> PathPoint | None:
