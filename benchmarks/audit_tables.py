@@ -91,8 +91,9 @@ def flyability(rows: list[Row]) -> Iterable[str]:
             off = [r for r in own if r["error"] > MAX_ERROR or r["outcome"] not in SUCCESS]
             silent, most = sum(not r["said"] for r in off), max(r["error"] for r in own)
             yield (
-                f"{name:>14} {len(own):4} plans: {100 * (1 - len(off) / len(own)):.1f} % within 5 cm (floor: "
-                f"99 %), {silent} of {len(off)} others in silence, at most {100 * most:.1f} cm"
+                f"{name:>14} {len(own):4} plans: {100 * (1 - len(off) / len(own)):.1f} % within 5 cm, "
+                f"through gates (floor: 99 %), {silent} of {len(off)} others in silence, "
+                f"at most {100 * most:.1f} cm"
             )
 
 

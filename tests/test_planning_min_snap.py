@@ -1,14 +1,24 @@
 """The closed-form planner: the paper's Section V-D as printed, and what it does on other problems."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
 from aerobat.errors import Infeasible, SpecError
 from aerobat.flatness import reference
 from aerobat.planning import MinSnap, Plan, TimeScaling, plan
-from aerobat.problem import GatePassage, HalfFlip, Problem, Waypoint, Waypoints, at_rest, load_problem
+from aerobat.problem import (
+    Condition,
+    CustomManeuver,
+    GatePassage,
+    Line,
+    Problem,
+    Stage,
+    Waypoint,
+    Waypoints,
+    at_rest,
+    load_problem,
+    tilted_gate,
+)
 from aerobat.states import STANDARD_GRAVITY
 from aerobat.vehicle import load_vehicle
 
@@ -90,10 +100,11 @@ def test_a_gate_is_passed_with_its_attitude() -> None:
 
 
 def test_what_the_closed_form_cannot_see_is_checked_and_told() -> None:
-    """It knows no inequality: a gate asked to be passed fast is missed, in a sentence."""
-    fast = replace(load_problem("half-flip"), maneuver=HalfFlip(passage=GatePassage(speed=30.0)))
-    with pytest.raises(Infeasible, match=r"'gate' asks velocity between 30.*closed form gives") as error:
-        plan(fast, MinSnap(), load_vehicle("agile-quad"))
+    """It knows no inequality: a detour that is asked by one is missed, in a sentence."""
+    aside = Stage("aside", (Condition("position", np.array([0.0, 1.0, 0.0]), lower=2.0),))
+    problem = Problem("aside", at_rest(np.zeros(3)), at_rest((5.0, 0.0, 0.0)), CustomManeuver((aside,)))
+    with pytest.raises(Infeasible, match=r"'aside' asks position between 2 .*closed form gives") as error:
+        plan(problem, MinSnap(), load_vehicle("agile-quad"))
     assert error.value.attempts
 
 
@@ -101,3 +112,12 @@ def test_what_the_closed_form_cannot_see_is_checked_and_told() -> None:
 def test_settings_that_mean_nothing_are_refused(wrong: dict[str, int]) -> None:
     with pytest.raises(SpecError, match=next(iter(wrong))):
         MinSnap(**wrong)
+
+
+def test_a_gate_is_passed_as_fast_as_its_passage_asks() -> None:
+    gate = tilted_gate((2.0, 0.5, 1.0), heading=0.6)  # oblique: its velocities across fix all components
+    problem = Problem("oblique", at_rest((0.0, 0.0, 1.0)), at_rest((4.0, 2.0, 1.0)), Line(), (gate,))
+    found = plan(problem, MinSnap(), load_vehicle("agile-quad"))
+    passing = found.trajectory.evaluate(found.stages[0].time, 1)
+    assert passing @ gate.normal >= GatePassage().speed - 1e-6
+    assert found.certified

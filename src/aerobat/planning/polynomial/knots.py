@@ -26,8 +26,8 @@ def fixed_at_knots(
 
     The closed form takes each axis alone and equalities only. So conditions in oblique directions fix, by
     least norm, every component that they touch. An attitude fixes the thrust to exactly its direction, and a
-    lower bound on thrust to itself or to the hover's if that is more; other inequalities are left free, to
-    be checked afterwards.
+    lower bound on thrust to itself or to the hover's if that is more, one on speed to itself or to the
+    velocity given; other inequalities are left free, to be checked afterwards.
 
     Args:
         problem: Its ends are fixed.
@@ -104,6 +104,8 @@ def _equalities(
         if condition.min_thrust > 0.0 and condition.lower < condition.upper:
             hover = balance.gravity * float(np.linalg.norm(condition.direction))
             value = float(np.clip(hover, condition.lower, condition.upper))
+        elif condition.quantity is Quantity.VELOCITY and 0.0 < condition.lower < condition.upper:
+            value = min(max(value, float(condition.direction @ velocity)), condition.upper)
         elif condition.lower < condition.upper:
             continue
         bound = condition.bound(balance)
