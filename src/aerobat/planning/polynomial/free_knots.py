@@ -24,6 +24,8 @@ from aerobat.planning.warm_start import Reserve, WarmStart, plans_to_begin_from,
 from aerobat.problem.problem import Problem
 from aerobat.vehicle import Vehicle
 
+COARSE = 4  # segments to begin with where there shall be more: they are quick and come near the least time
+
 
 @planner("free-knots")
 class FreeKnots(Planner):
@@ -39,7 +41,7 @@ class FreeKnots(Planner):
     """
 
     segments: Annotated[int, Field(ge=2)] = option(
-        4,
+        COARSE,
         "How many polynomial segments. 2 leaves something to the controller; 8 comes closer to time-optimal "
         "and takes longer.",
     )
@@ -70,10 +72,13 @@ class FreeKnots(Planner):
             guess = WarmStart.of(start, sequence)
             course = Course.of(problem, vehicle, sequence, guess)
             descent = Descent(course, recorder, self.reserve, self.still_ends, self.iterations)
-            for segments in (self.segments, 2 * self.segments):
-                descent.run(start, guess, segments)
-                if (found := descent.plan()) is not None:
-                    return found
+            descent.consider(start, guess)
+            for segments in sorted({min(COARSE, self.segments), self.segments}):
+                descent.run(guess, segments)
+            if descent.best is None:
+                descent.run(guess, 2 * self.segments)
+            if (found := descent.plan()) is not None:
+                return found
         raise Infeasible(
             f"no polynomials are certified to fly '{problem.name}' with {vehicle.name}: at the last attempt "
             f"{recorder.attempts[-1].outcome}; widen what binds there, ask less of the stages, or give more "

@@ -131,9 +131,13 @@ class Descent:
     iterations: int  # of each solve, at most
     best: Judged[Path] | None = None
 
-    def run(self, start: Plan, guess: WarmStart, segments: int) -> None:
-        """Free the knots of a plan, with so many segments."""
+    def consider(self, start: Plan, guess: WarmStart) -> None:
+        """Keep the path of another planner's plan, as it is, where it is certified."""
         self._certified(_Start(self.course, start, guess), 1)
+
+    def run(self, guess: WarmStart, segments: int) -> None:
+        """Free the knots of a path, or of the best that is certified, with so many segments."""
+        guess = guess if self.best is None else self.best.solution.source.guess
         guess = self.course.paced(replace(guess, trajectory=refit(guess.trajectory, segments)))
         program, end = _Exchange(self, guess), len(self.recorder.attempts) + ROUNDS
         while (left := end - len(self.recorder.attempts)) > 0:
