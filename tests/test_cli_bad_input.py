@@ -187,10 +187,11 @@ def refused(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> str:
     out, err = capsys.readouterr()
     assert stop.value.code == 2, err
     assert out == ""
-    assert err.startswith("aerobat: ")
-    assert err.count("\n") == 1
+    *suspicions, sentence = err.splitlines()
+    assert all(line.startswith("aerobat: warning: ") for line in suspicions)
+    assert sentence.startswith("aerobat: ")
     assert snapshot(Path()) == before
-    return err
+    return sentence
 
 
 def snapshot(folder: Path) -> dict[str, bytes]:

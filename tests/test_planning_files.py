@@ -11,6 +11,7 @@ import pytest
 
 import aerobat as ab
 from aerobat.errors import SpecError
+from aerobat.planning.certified_solve import envelope_for
 from aerobat.storage import read_arrays
 
 VEHICLE = ab.load_vehicle("agile-quad")
@@ -41,8 +42,8 @@ def test_a_plan_survives_its_file(plan: ab.Plan, tmp_path: Path) -> None:
 def test_the_certificate_in_the_file_is_that_of_what_the_file_holds(plan: ab.Plan, tmp_path: Path) -> None:
     plan.save(tmp_path / "half.plan")
     again = ab.load_plan(tmp_path / "half.plan")
-    envelope = ab.Envelope(limits=again.problem.path_limits)
     assert again.vehicle is not None
+    envelope = envelope_for(again.problem, again.vehicle, again.stages)
     found = ab.certify(again.trajectory, again.vehicle, again.problem.environment, envelope)
     assert found == again.certificate
 
