@@ -19,7 +19,9 @@ from aerobat.certification.thrust_curve import ThrustCurve
 from aerobat.trajectory import Trajectory
 
 NEGLIGIBLE_JUMP = 1e-6  # of the largest value at knots: less than any controller or solver can tell
-COMMAND_RESOLUTION = 1 / 2000  # of a rotor's range: the steps of DShot, a digital protocol of motor commands
+COMMAND_RESOLUTION = (
+    1 / 1000
+)  # of a rotor's range: the steps of a pulse of 1000 to 2000 µs, as motors take commands
 CANCELLATION = 1e3  # units in the last place of the largest coefficient that fitting a segment may cost
 
 
