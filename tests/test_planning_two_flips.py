@@ -26,7 +26,7 @@ def two_flips(intervals: int, duration: float = DURATION) -> AssignmentProgram:
 
 
 def in_the_plane(problem: Problem) -> Problem:
-    """The problem with gates that ask their attitude in the plane of the turn, as the known optimum has it."""
+    """The problem whose gates ask their attitude in the plane of the turn, as the known optimum has it."""
     upside_down = (
         Condition(Quantity.SPECIFIC_THRUST, (0.0, 1.0, 0.0), 0.0, 0.0),
         Condition(Quantity.SPECIFIC_THRUST, (0.0, 0.0, 1.0), upper=-7.0),
