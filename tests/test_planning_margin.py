@@ -1,4 +1,7 @@
-"""The certificate's rotor margin against dense sampling; samples can refute a trajectory but prove none."""
+"""The certificate's rotor margin against dense sampling; samples can refute a trajectory but prove none.
+
+Thrusts are compared where rotors do not lag; where they do, thrusts and commands.
+"""
 
 from dataclasses import replace
 
@@ -18,10 +21,12 @@ from aerobat.planning.rotor_margin import sampled_margin
 from aerobat.states import STANDARD_GRAVITY, FlatState
 from aerobat.trajectory import Trajectory
 from aerobat.vehicle import load_vehicle, mixer
+from random_flights import Flight, commands, with_lags
 
 seeds = st.integers(0, 2**32 - 1)
-QUAD = load_vehicle("agile-quad")
-HEXA = load_vehicle("hexarotor")
+LAGGING = load_vehicle("agile-quad")
+QUAD = with_lags(LAGGING, 0.0)
+HEXA = with_lags(load_vehicle("hexarotor"), 0.0)
 DRAGGED = replace(QUAD, name="dragged", drag_body=np.array([0.3, 0.3, 0.1]))
 UP = np.array([0.0, 0.0, 1.0])
 
@@ -71,6 +76,18 @@ def test_margin_is_that_of_dense_sampling(order, vehicle):
         assert found.margin == min(found.low_margin, found.high_margin)
         assert found.low_margin == pytest.approx(found.min_thrust - vehicle.min_thrusts[0], abs=1e-6 * scale)
         assert found.high_margin == pytest.approx(vehicle.max_thrusts[0] - found.max_thrust, abs=1e-6 * scale)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_margin_of_rotors_with_lag_is_that_of_their_thrusts_and_commands_together(seed):
+    flight = Flight(LAGGING, tumbling(seed, order=5))
+    given = commands(flight, np.linspace(0.0, flight.trajectory.duration, 20_000))
+    thrusts = np.concatenate([given, densely(flight.trajectory, LAGGING, 2000).reshape(-1, 4)])
+    found = rotor_margin(flight.trajectory, LAGGING)
+    scale = np.abs(thrusts).max()  # commands jump at knots, and differences stop 0.06 % of a segment short
+    assert found.max_thrust == pytest.approx(thrusts.max(), abs=5e-4 * scale)
+    assert found.min_thrust == pytest.approx(thrusts.min(), abs=5e-4 * scale)
+    assert found.margin < rotor_margin(flight.trajectory, QUAD).margin
 
 
 @settings(max_examples=25)
@@ -178,10 +195,10 @@ def test_turning_trajectory_and_vehicle_together_changes_nothing(seed, heading):
 
 
 @settings(max_examples=25)
-@given(seed=seeds, order=st.integers(3, 5))
-def test_samples_never_refute_more_than_the_certificate_does(seed, order):
+@given(seed=seeds, order=st.integers(3, 5), vehicle=st.sampled_from([QUAD, LAGGING]))
+def test_samples_never_refute_more_than_the_certificate_does(seed, order, vehicle):
     trajectory = tumbling(seed, order, segments=5)
-    certificate, sampled = certify(trajectory, QUAD), sampled_margin(trajectory, QUAD, Environment())
+    certificate, sampled = certify(trajectory, vehicle), sampled_margin(trajectory, vehicle, Environment())
     if certificate.undetermined:
         return
     proven = RotorMargin.of(certificate)

@@ -22,7 +22,7 @@ class RotorMargin:
 
     `min_thrust` is the least thrust of the rotor that comes closest to its lower limit, `max_thrust` the
     largest of the one that comes closest to its upper limit: with equal rotors, of all of them. Of a rotor
-    with lag it is the thrust that is commanded.
+    with lag the thrust that is commanded counts as well, wherever a certificate says so.
     """
 
     min_thrust: float  # [N]
@@ -69,8 +69,9 @@ class RotorMargin:
 
 
 def sampled_margin(trajectory: Trajectory, vehicle: Vehicle, environment: Environment) -> RotorMargin:
-    """The margin at samples only, never smaller than the true one: where it is negative, no proof is needed.
+    """The margin of thrusts at samples only, never smaller than the true one: negative, it needs no proof.
 
+    What rotors with lag are commanded could only make it smaller, and is left to the certificate.
     Costs a seventh of a certificate, and most attempts of a search on durations are far beyond their limits.
     """
     s = np.linspace(0.0, 1.0, SAMPLES_PER_DEGREE * max(trajectory.degree, 1), endpoint=False)
