@@ -5,34 +5,66 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from aerobat.arrays import Array
 from aerobat.control import Controller
+from aerobat.evaluation import Passage
 from aerobat.evaluation.score import score
 from aerobat.planning import Miqp, Plan, plan
 from aerobat.problem import Problem, load_problem
+from aerobat.problem.stage import PLANNED_SHARE
 from aerobat.simulation import Flight, StateNoise, fly
 from aerobat.vehicle import Vehicle, load_vehicle
 
 MANEUVERS = ["flip-roll", "flip-roll-translation", "flip-pitch", "half-flip", "line"]
 
 
-def planned(problem: Problem, vehicle: Vehicle, order: int = 4) -> Plan:
-    return plan(problem, Miqp(order=order), vehicle)
+def planned(problem: Problem, vehicle: Vehicle) -> Plan:
+    """A plan at the limits of the rotors, of the order that those take, with its certificate."""
+    found = plan(problem, Miqp(), vehicle)
+    assert found.certified
+    return found
+
+
+def with_rotors(vehicle: Vehicle, **changes: float) -> Vehicle:
+    return replace(vehicle, rotors=tuple(replace(r, **changes) for r in vehicle.rotors))
+
+
+def check_passage(flight: Flight, passage: Passage) -> None:
+    """A gate met to millimetres, in the planned attitude, which may use PLANNED_SHARE of its tolerance."""
+    assert passage.miss < 0.005
+    assert passage.clearance > 0.0
+    at_gate = np.searchsorted(flight.times, passage.time)
+    assert np.rad2deg(flight.attitude_error[at_gate]) < 0.75
+    assert passage.attitude_error_deg < PLANNED_SHARE * passage.attitude_tolerance_deg + 0.75
 
 
 @pytest.mark.parametrize("maneuver", MANEUVERS)
-@pytest.mark.parametrize("order", [4, 5])
 @pytest.mark.parametrize("name", ["agile-quad", "hexarotor"])
-def test_rotor_feasible_plans_are_tracked_to_millimetres(name: str, order: int, maneuver: str) -> None:
+def test_certified_plans_are_tracked_to_millimetres(name: str, maneuver: str) -> None:
+    """At the rotors' limits, with no reserve; 2 mm, 0.5° and in the gate 0.35° were measured."""
     vehicle, problem = load_vehicle(name), load_problem(maneuver)
     assert all(r.lag == 0.02 for r in vehicle.rotors)
-    result = score(fly(planned(problem, vehicle, order).trajectory, vehicle), problem, vehicle)
-    assert result.max_position_error_m < 0.005
+    flight = fly(planned(problem, vehicle).trajectory, vehicle)
+    result = score(flight, problem, vehicle)
+    assert result.max_position_error_m < 0.004
     assert result.rms_attitude_error_deg < 0.5
-    if problem.gates:
-        (passage,) = result.passages
-        assert passage.miss < 0.005
-        assert passage.attitude_error_deg < 1.0
-        assert passage.clearance > 0.0
+    for passage in result.passages:
+        check_passage(flight, passage)
+
+
+@pytest.mark.parametrize("maneuver", MANEUVERS)
+@pytest.mark.parametrize("name", ["agile-quad", "hexarotor"])
+def test_thrusts_that_jump_are_tracked_to_millimetres_by_rotors_without_lag(name: str, maneuver: str) -> None:
+    """Order 4, which rotors with lag are refused; 3.1 mm and 0.7° were measured, for moments that jump."""
+    vehicle, problem = with_rotors(load_vehicle(name), lag=0.0), load_problem(maneuver)
+    found = planned(problem, vehicle)
+    assert found.trajectory.jumps(4).max() > 1.0
+    flight = fly(found.trajectory, vehicle)
+    result = score(flight, problem, vehicle)
+    assert result.max_position_error_m < 0.005
+    assert result.rms_attitude_error_deg < 1.0
+    for passage in result.passages:
+        check_passage(flight, passage)
 
 
 @pytest.mark.parametrize("maneuver", MANEUVERS)
@@ -56,18 +88,18 @@ def test_the_papers_plans_are_tracked_to_centimetres_at_a_thrust_to_weight_of_fi
 @pytest.mark.parametrize("file", ["examples/fast-half-flip.toml", "examples/power-loop.toml"])
 def test_the_examples_fly(file: str) -> None:
     vehicle, problem = load_vehicle("agile-quad"), load_problem(file)
-    result = score(fly(planned(problem, vehicle).trajectory, vehicle), problem, vehicle)
+    flight = fly(planned(problem, vehicle).trajectory, vehicle)
+    result = score(flight, problem, vehicle)
     assert result.max_position_error_m < 0.01
-    assert result.passages[0].clearance > 0.0
+    check_passage(flight, result.passages[0])
 
 
 def test_the_half_flip_passes_a_gate_at_90_degrees_at_twice_the_speed_of_the_papers() -> None:
     vehicle, problem = load_vehicle("agile-quad"), load_problem("examples/fast-half-flip.toml")
-    found = planned(problem, vehicle)
-    assert found.certified
-    result = score(fly(found.trajectory, vehicle), problem, vehicle)
-    assert result.passages[0].speed > 16.0
-    assert result.passages[0].attitude_error_deg < 1.0
+    flight = fly(planned(problem, vehicle).trajectory, vehicle)
+    (passage,) = score(flight, problem, vehicle).passages
+    assert passage.speed > 16.0
+    check_passage(flight, passage)
 
 
 @pytest.mark.parametrize("switch", ["moment_feedforward", "motor_lag_compensation"])
@@ -91,16 +123,26 @@ def test_a_plan_flies_the_same_whichever_way_the_vehicle_heads() -> None:
         np.testing.assert_allclose(turned.states.position, straight.states.position, atol=1e-6)
 
 
-def test_dispersed_vehicles_stay_within_a_hand_of_the_path() -> None:
-    """Mass 3 %, inertia 10 %, each rotor 3 %, lag 25 % (1σ): planned for one vehicle, flown by 40 others."""
+def test_dispersed_vehicles_stay_within_a_hand_of_a_path_that_leaves_a_reserve() -> None:
+    """Mass 3 %, inertia 10 %, each rotor 3 %, lag 25 % (1σ): planned for one vehicle, flown by 40 others.
+
+    Thrust over mass then varies by 3.4 %, of which a tenth of the thrust in reserve is three times as much.
+    With it, half stay within 2.5 cm and 95 % within 5 cm; without, within 6 cm and 24 cm.
+    """
     vehicle, problem = load_vehicle("agile-quad"), load_problem("flip-roll")
+    (strongest,) = {r.max_thrust for r in vehicle.rotors}
     rng = np.random.default_rng(7)
     others = [dispersed(vehicle, rng) for _ in range(40)]
-    trajectory = planned(problem, vehicle).trajectory
-    flights = fly(trajectory, others, nominal=vehicle)
-    worst = [score(flights[k], problem).max_position_error_m for k in range(len(others))]
-    assert np.median(worst) < 0.05
-    assert np.quantile(worst, 0.95) < 0.12
+
+    def worst(share: float) -> Array:
+        path = planned(problem, with_rotors(vehicle, max_thrust=share * strongest)).trajectory
+        flights = fly(path, others, nominal=vehicle)
+        return np.array([score(flights[k], problem).max_position_error_m for k in range(len(others))])
+
+    with_reserve, without = worst(0.9), worst(1.0)
+    assert np.median(with_reserve) < 0.05
+    assert np.quantile(with_reserve, 0.95) < 0.08
+    assert np.quantile(without, 0.95) > 2 * np.quantile(with_reserve, 0.95)
 
 
 def dispersed(vehicle: Vehicle, rng: np.random.Generator) -> Vehicle:
