@@ -111,8 +111,8 @@ def test_a_climb_whose_thrust_rises_too_fast_for_a_lagging_rotor_is_refused_for_
 
 @pytest.mark.parametrize("order", [4, 5])
 def test_thrusts_that_jump_at_knots_are_refused_of_rotors_with_lag_alone(order):
-    inputs = 2000 * np.random.default_rng(2).normal(size=(6, 3))
-    path = Trajectory.from_inputs(np.zeros((order, 3)), inputs, 0.3)
+    inputs = 500 * np.random.default_rng(2).normal(size=(6, 3))
+    path = Trajectory.from_inputs(np.zeros((order, 3)), inputs, 0.15)
     assert not certify(path, with_lags(VEHICLE, 0.0)).discontinuities
     jumps = certify(path, VEHICLE).discontinuities
     if order == 5:
