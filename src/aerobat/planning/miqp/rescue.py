@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from aerobat.errors import BackendMissing, Infeasible, SpecError
 from aerobat.planning.miqp.attempts import flyable_order
 from aerobat.planning.miqp.integrator import INPUT_NAMES
-from aerobat.planning.planners import Planner, planner_class
+from aerobat.planning.planners import Planner
 from aerobat.planning.recorder import Recorder
 from aerobat.planning.result import Plan
 from aerobat.problem.problem import Problem
@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from aerobat.planning.miqp.miqp import Miqp
 
 MORE_INTERVALS = (1.3, 1.8)  # times as many
+FLYING_RESERVE = 0.03  # of every limit's range, for the controller: rotors without lag leave it none
 
 
 def rescued_plan(asked: Miqp, problem: Problem, vehicle: Vehicle, recorder: Recorder) -> Plan | None:
@@ -53,4 +54,6 @@ def _alternatives(asked: Miqp, vehicle: Vehicle) -> Iterator[tuple[Planner, str]
             yield replace(asked, order=order, rescue=False), f"with order {order}"
     if asked.search is not None:
         yield replace(asked, search=None, rescue=False), "with intervals that differ"
-    yield planner_class("free-knots")(), "by free-knots"
+    from aerobat.planning.polynomial.free_knots import FreeKnots
+
+    yield FreeKnots(reserve=FLYING_RESERVE), "by free-knots"
