@@ -183,3 +183,14 @@ def test_slopes_of_rotor_rows_are_their_differences(flown: Trajectory, quad: Veh
     expected = (ahead - behind) / 2e-6
     found = np.einsum("mcka,mka->mc", slopes, step)
     np.testing.assert_allclose(found, expected, rtol=1e-4, atol=1e-5 * np.abs(expected).max())
+
+
+def test_a_reserve_is_kept_for_the_controller_and_costs_time(quad: Vehicle) -> None:
+    """Of each rotor's range, thrusts and commands, all but what lies between the places it is held at."""
+    problem = load_problem("half-flip")
+    plain, kept = (Miqp(reserve=reserve).plan(problem, quad) for reserve in (0.0, 0.05))
+    assert kept.certificate is not None
+    assert kept.certificate.margin >= 0.04 * quad.max_thrusts.max()
+    assert plain.certificate is not None
+    assert plain.certificate.margin < 0.01 * quad.max_thrusts.max()
+    assert plain.duration < kept.duration < 1.1 * plain.duration

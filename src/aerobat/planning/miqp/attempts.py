@@ -43,6 +43,7 @@ class Attempts:
     solver: Solver
     time_limit: float | None
     recorder: Recorder
+    reserve: float = 0.0  # of what the vehicle can do, kept for the controller
     slots: tuple[int, ...] | None = None  # of the last solution: where the next solve begins
 
     def solve(self, dt: float) -> AssignmentResult:
@@ -87,6 +88,7 @@ class Attempts:
         assert answer.slots is not None
         size = max(float(np.linalg.norm(answer.x)) / np.sqrt(chain.intervals), SMALL_INPUT)
         program = PathProgram(self.formulation, self.vehicle, answer.slots, held, size, held)
+        program = replace(program, reserve=program.reserve + self.reserve)
         return PathPoint(program, program.chain.variables(answer.x.reshape(3, -1).T, placement.dt))
 
     def trajectory(self, answer: AssignmentResult, dt: float) -> Trajectory:

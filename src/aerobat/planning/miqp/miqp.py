@@ -24,6 +24,7 @@ from aerobat.planning.planners import Planner, option, planner
 from aerobat.planning.recorder import Progress, Recorder
 from aerobat.planning.result import Plan
 from aerobat.planning.search import GridSearch, Search
+from aerobat.planning.warm_start import Reserve
 from aerobat.problem.condition import ForceBalance
 from aerobat.problem.problem import Problem
 from aerobat.problem.stage import StageSequence
@@ -58,6 +59,11 @@ class Miqp(Planner):
     time_limit: NonNegative | None = option(  # [s]
         None, "Seconds for each program; the best plan found by then is taken and its gap reported."
     )
+    reserve: Reserve = option(
+        0.0,
+        "The fraction of every limit of the rotors that is kept from either of its ends for the controller, "
+        "as unknown masses, winds and rotors need it.",
+    )
     rescue: bool = option(
         True, "Give up where nothing is found, and try no other intervals, order or planner.", off="no-rescue"
     )
@@ -84,7 +90,9 @@ class Miqp(Planner):
     def _planned(self, problem: Problem, vehicle: Vehicle | None, recorder: Recorder) -> Plan:
         order = flyable_order(vehicle) if self.order is None else self.order
         formulation = formulate(problem, order, self.intervals, vehicle)
-        attempts = Attempts(formulation, vehicle, solver(self.backend), self.time_limit, recorder)
+        attempts = Attempts(
+            formulation, vehicle, solver(self.backend), self.time_limit, recorder, self.reserve
+        )
         if vehicle is None or self.search is not None:
             found = (self.search or GridSearch()).smallest(partial(_attempt, attempts))
         else:
@@ -99,9 +107,11 @@ def _attempt(attempts: Attempts, dt: float) -> Judged[Placement] | None:
     """Outcome of one dt; None where nothing is found that is certified."""
     placement = Placement(attempts.solve(dt), dt)
     judged = attempts.judge(placement, dt)
-    if judged.feasible or placement.answer.x is None or attempts.vehicle is None:
+    if placement.answer.x is None or attempts.vehicle is None:
         return judged if judged.feasible else None
     start = attempts.start(placement, held=True)
+    if judged.feasible and (not attempts.reserve or start.violation <= 0.0):
+        return judged
     path = descended(start.program, start.x)
     if path is None:
         return None

@@ -76,7 +76,8 @@ def flyable(attempts: Attempts, judged: Judged[Placement]) -> Judged[Placement]:
         assert trajectory is not None
         if path is None or flight_error(trajectory, vehicle, environment) <= FLYABLE_ERROR:
             return judged
-        kept = descended(replace(path.program, reserve=reserve), path.x)
+        program = replace(path.program, reserve=max(reserve, path.program.reserve))
+        kept = descended(program, path.x)
         if kept is not None:
             reserved = attempts.refined(judged.solution.source, partial(finished, kept))
             judged = reserved if reserved.feasible else judged
