@@ -201,7 +201,7 @@ def test_the_command_lines_options_follow_from_the_fields() -> None:
         if name != "straight"
     }
     assert flags == {
-        "miqp": ["--order", "--intervals", "--backend", "--time-limit", "--no-rescue"],
+        "miqp": ["--order", "--intervals", "--backend", "--time-limit", "--reserve", "--no-rescue"],
         "min-snap": ["--order", "--stop-after"],
         "free-knots": ["--segments", "--reserve"],
         "time-optimal": ["--reserve", "--starts", "--planar"],
