@@ -101,7 +101,7 @@ def _read_plan(path: Path, options: PlanningOptions) -> Plan:
     """A saved plan, for its own vehicle or another. Raises SpecError for options that plan anew."""
     names = ["planner", "paper", "angle", *(option_name(flag) for flag in offered_options())]
     for name in names:
-        if _is_given(getattr(options, name)):
+        if _is_given(getattr(options, name, None)):
             flag = "--" + name.replace("_", "-")
             raise SpecError(f"{flag} plans anew, but {path} is a plan; leave it out, or name a problem")
     found = load_plan(path)
@@ -118,7 +118,8 @@ def _is_given(value: Any) -> bool:
 def _check_options(options: PlanningOptions, planner: str) -> None:
     """Refuse options that mean nothing to a planner."""
     for flag, offers in offered_options().items():
-        if planner not in offers and _is_given(getattr(options, option_name(flag))):
+        # a planner registered after the command's options were made brings some that nobody can have given
+        if planner not in offers and _is_given(getattr(options, option_name(flag), None)):
             takers = " or ".join(offers)
             raise SpecError(f"{flag} is for --planner {takers}, not {planner}; leave one of them out")
     if options.paper and planner != "miqp":
