@@ -4,7 +4,6 @@ from aerobat.flatness.parallel_transport import TimeInterval
 from aerobat.flatness.references import (
     Reference,
     axial_drag,
-    end_thrust,
     force_balance,
     lateral_drag,
     reference,
@@ -15,7 +14,6 @@ __all__ = [
     "Reference",
     "TimeInterval",
     "axial_drag",
-    "end_thrust",
     "force_balance",
     "lateral_drag",
     "reference",

@@ -177,20 +177,6 @@ def force_balance(environment: Environment, vehicle: Vehicle | None = None) -> F
     return ForceBalance(environment.gravity, drag, environment.wind)
 
 
-def end_thrust(velocity: Array, acceleration: Array, vehicle: Vehicle, environment: Environment) -> Array:
-    """Specific thrust f [m/s²] (..., 3) at a velocity and an acceleration of a path, world.
-
-    Args:
-        velocity: Relative to the ground [m/s], world, (..., 3).
-        acceleration: [m/s²] world, (..., 3).
-        vehicle: Its drag counts.
-        environment: Its gravity and wind count.
-    """
-    none = np.zeros_like(acceleration)
-    airspeed = velocity - environment.wind
-    return specific_thrust(vehicle, environment, airspeed, acceleration, none, none)[..., 0, :]
-
-
 def _thrust(flat: FlatState, vehicle: Vehicle, environment: Environment) -> Array:
     airspeed = flat.velocity - environment.wind
     return specific_thrust(vehicle, environment, airspeed, flat.acceleration, flat.jerk, flat.snap)

@@ -15,12 +15,9 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from aerobat.arrays import Array
+from aerobat.arrays import Array, Indices
 from aerobat.optimization.nonlinear import NonlinearProgram, import_casadi
-
-Indices = NDArray[np.intp]
 
 
 @dataclass(frozen=True, eq=False)

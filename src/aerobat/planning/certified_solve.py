@@ -113,7 +113,8 @@ def certified_solve(
         vehicle: What shall fly it; without one every solution will do.
         recorder: Keeps an attempt a solve.
         rounds: Solves, at most.
-        jumps: Whether body rates may jump between segments, which no moment can do, as the certificate says.
+        jumps: Whether body rates, or thrusts of rotors with lag, may jump between segments, which no moment
+            and no rotor can do, as the certificate says.
     """
     for left in reversed(range(rounds)):
         judged = _judged(program.solve(), problem, vehicle, recorder, jumps)

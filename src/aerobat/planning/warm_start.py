@@ -11,7 +11,7 @@ from pydantic import Field
 
 from aerobat.arrays import Array
 from aerobat.errors import Infeasible, SpecError
-from aerobat.flatness import end_thrust
+from aerobat.flatness import force_balance
 from aerobat.flatness.references import UNDETERMINED
 from aerobat.planning.planners import Planner
 from aerobat.planning.result import Plan
@@ -73,7 +73,9 @@ def require_attitudes(planner: str, problem: Problem, vehicle: Vehicle | None) -
     if vehicle is None:
         raise SpecError(f"the {planner} planner needs a vehicle: no limits, no least time; give --vehicle")
     for name, state in (("start", problem.start), ("goal", problem.goal)):
-        thrust = end_thrust(state.velocity, state.acceleration, vehicle, problem.environment)
+        thrust = force_balance(problem.environment, vehicle).specific_thrust(
+            state.velocity, state.acceleration
+        )
         if np.linalg.norm(thrust) < UNDETERMINED * problem.environment.gravity:
             raise SpecError(
                 f"{name}.acceleration asks no thrust, which leaves the attitude there open; change it"

@@ -56,6 +56,10 @@ class ForceBalance:
         """The part of f [m/s²] that no motion changes, (3,)."""
         return np.asarray(self.gravity * UP - self.drag * self.wind)
 
+    def specific_thrust(self, velocity: Array, acceleration: Array) -> Array:
+        """f [m/s²], world, (..., 3), at a velocity relative to the ground and an acceleration."""
+        return np.asarray(acceleration + self.drag * velocity + self.constant)
+
 
 @dataclass(frozen=True, eq=False)
 class LinearBound:

@@ -104,7 +104,7 @@ def _bounded(curve: PolynomialCurve, condition: Condition, balance: ForceBalance
     quantity, unit = condition.quantity, UNITS[condition.quantity.derivative]
     vectors = state[:, :, quantity.derivative]
     if quantity is Quantity.SPECIFIC_THRUST:
-        vectors = vectors + balance.drag * state[:, :, 1] + balance.constant
+        vectors = balance.specific_thrust(state[:, :, 1], vectors)
     largest = float(np.abs(vectors).max() * np.linalg.norm(condition.direction))
     sides = both_sides(condition.name, unit, 0, condition.lower, condition.upper)
     queries = [_lenient(side, largest) for side in sides if np.isfinite(side.limit)]

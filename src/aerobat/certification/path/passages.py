@@ -45,7 +45,7 @@ class _Instant:
         """The state on a trajectory."""
         time = np.array([min(passage.time, trajectory.duration)])
         position, velocity, acceleration = (trajectory.evaluate(time, k)[0] for k in range(3))
-        thrust = acceleration + balance.drag * velocity + balance.constant
+        thrust = balance.specific_thrust(velocity, acceleration)
         floor = UNDETERMINED * balance.gravity
         return cls(passage, position - passage.gate.position, velocity, thrust, floor)
 

@@ -59,13 +59,12 @@ class Attempts:
         return self.formulation.chain.order < flyable_order(self.vehicle)
 
     def judge(
-        self, placement: Placement, dt: float, failure: str | None = None, excess: float = 0.0
+        self, placement: Placement, failure: str | None = None, excess: float = 0.0
     ) -> Judged[Placement]:
         """Certify a program's answer.
 
         Args:
             placement: The answer.
-            dt: Its own [s].
             failure: Why the vehicle cannot follow it, where that is known without a certificate.
             excess: By how much, as a fraction of a constraint's range, negative.
         """
@@ -74,7 +73,7 @@ class Attempts:
             if self.vehicle is None
             else float(np.ptp([*self.vehicle.min_thrusts, *self.vehicle.max_thrusts]))
         )
-        return self._certified(_Answered(self, placement, dt, failure, excess * span or None), 1)
+        return self._certified(_Answered(self, placement, failure, excess * span or None), 1)
 
     def refined(self, start: Placement, find: Callable[[], PathPoint | None]) -> Judged[Placement]:
         """Certify the path that is found, backing off from what a certificate refutes."""
@@ -119,7 +118,6 @@ class _Answered:
 
     attempts: Attempts
     placement: Placement
-    dt: float
     failure: str | None
     margin: float | None  # [N] of the rotors, where it is known to be negative
 

@@ -106,7 +106,7 @@ class Miqp(Planner):
 def _attempt(attempts: Attempts, dt: float) -> Judged[Placement] | None:
     """Outcome of one dt; None where nothing is found that is certified."""
     placement = Placement(attempts.solve(dt), dt)
-    judged = attempts.judge(placement, dt)
+    judged = attempts.judge(placement)
     if placement.answer.x is None or attempts.vehicle is None:
         return judged if judged.feasible else None
     start = attempts.start(placement, held=True)

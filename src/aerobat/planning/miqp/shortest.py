@@ -115,10 +115,10 @@ class _Scan:
         """The answer that the vehicle can fly as it is, certified, or None."""
         if self.flown is None:
             return None
-        judged = self.attempts.judge(self.flown, self.flown.dt)
+        judged = self.attempts.judge(self.flown)
         return judged if judged.feasible else None
 
     def _record(self, placement: Placement, violation: float) -> None:
         if violation > 0.0:
             failure = placement.path.excess_sentence if placement.path else None
-            self.attempts.judge(replace(placement, path=None), placement.dt, failure, -violation)
+            self.attempts.judge(replace(placement, path=None), failure, -violation)

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from aerobat.arrays import Array
-from aerobat.flatness import end_thrust, lateral_drag
+from aerobat.flatness import force_balance, lateral_drag
 from aerobat.planning.polynomial.path_limits import (
     END_ORDER,
     ORDERS,
@@ -207,5 +207,7 @@ class KnotVariables:
 
     def _thrust_direction(self, state: EndState) -> Array:
         """Where the thrust points at an end, (3,)."""
-        thrust = end_thrust(state.velocity, state.acceleration, self.vehicle, self.problem.environment)
+        thrust = force_balance(self.problem.environment, self.vehicle).specific_thrust(
+            state.velocity, state.acceleration
+        )
         return np.asarray(thrust / np.linalg.norm(thrust))

@@ -9,7 +9,7 @@ import numpy as np
 from aerobat import so3
 from aerobat.arrays import Array
 from aerobat.certification import Certificate
-from aerobat.flatness import end_thrust
+from aerobat.flatness import force_balance
 from aerobat.optimization.nonlinear import NonlinearResult, solve_nonlinear
 from aerobat.planning.certified_solve import Solution
 from aerobat.planning.time_optimal.bounds import Backoff
@@ -153,5 +153,5 @@ def optimal_control(elements: Elements, start: Start, reserve: float) -> Optimal
 
 def _end(state: EndState, elements: Elements) -> End:
     environment = elements.problem.environment
-    thrust = end_thrust(state.velocity, state.acceleration, elements.vehicle, environment)
+    thrust = force_balance(environment, elements.vehicle).specific_thrust(state.velocity, state.acceleration)
     return End(state.position, state.velocity, thrust)

@@ -21,9 +21,8 @@ from typing import Any
 
 import numpy as np
 
-from aerobat.arrays import Array
+from aerobat.arrays import Array, Indices
 from aerobat.optimization.nonlinear import import_casadi
-from aerobat.optimization.separable import Indices
 from aerobat.planning.time_optimal.zero_yaw_rate_body import (
     INPUTS,
     POSITION,

@@ -8,12 +8,11 @@ from math import inf
 import numpy as np
 from numpy.typing import ArrayLike
 
-from aerobat.arrays import Array
+from aerobat.arrays import Array, Indices
 from aerobat.optimization.nonlinear import NonlinearProgram
 from aerobat.optimization.separable import (
     Element,
     ElementFunction,
-    Indices,
     SeparableFunction,
     separable_program,
 )

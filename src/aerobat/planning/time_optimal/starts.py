@@ -139,8 +139,8 @@ def initial_motion(start: Start, mesh: Mesh, problem: Problem, vehicle: Vehicle)
     times = np.concatenate([[0.0], np.cumsum(mesh.durations(guess.phases))])
     times = np.minimum(times, guess.trajectory.duration)
     setpoint = reference(guess.trajectory, vehicle, times, environment=environment).setpoint
-    flat, balance = setpoint.flat, force_balance(environment, vehicle)
-    thrust = flat.acceleration + balance.constant + balance.drag * flat.velocity
+    flat = setpoint.flat
+    thrust = force_balance(environment, vehicle).specific_thrust(flat.velocity, flat.acceleration)
     rates = setpoint.omega_body[:, :2]
     place = flat.position + np.sin(np.pi * times / times[-1])[:, None] * start.aside
     states = np.concatenate([place, flat.velocity, setpoint.q_world_body, rates], axis=1).T

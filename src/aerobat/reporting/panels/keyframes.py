@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from aerobat.arrays import Array
-from aerobat.flatness import end_thrust, reference
+from aerobat.flatness import force_balance, reference
 from aerobat.planning import Plan
 from aerobat.reporting.scene.camera import Camera
 from aerobat.vehicle import Vehicle
@@ -89,7 +89,7 @@ def plan_keyframes(plan: Plan, vehicle: Vehicle) -> Keyframes:
     environment = plan.problem.environment
     setpoint = reference(plan.trajectory, vehicle, times=times, environment=environment).setpoint
     flat = setpoint.flat
-    thrust = end_thrust(flat.velocity, flat.acceleration, vehicle, environment)
+    thrust = force_balance(environment, vehicle).specific_thrust(flat.velocity, flat.acceleration)
     return Keyframes(tuple(shown), flat.position, setpoint.q_world_body, thrust)
 
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from aerobat.arrays import Array
-from aerobat.flatness import end_thrust
+from aerobat.flatness import force_balance
 from aerobat.planning import PlacedStage, Plan
 from aerobat.reporting.page import HEADING, heading, legend, size_of
 from aerobat.reporting.panels.keyframes import maneuver_plane, plan_keyframes
@@ -73,7 +73,7 @@ def draw_specific_thrust(axes: Axes, plan: Plan, vehicle: Vehicle) -> None:
     stages = np.array([stage.time for stage in plan.stages])
     for at, style in ((times, "-"), (stages, "o")):
         velocity, acceleration = (plan.trajectory.evaluate(at, derivative) for derivative in (1, 2))
-        thrust = end_thrust(velocity, acceleration, vehicle, plan.problem.environment)
+        thrust = force_balance(plan.problem.environment, vehicle).specific_thrust(velocity, acceleration)
         parts = plane.camera.project(thrust)
         for column, colour, name in ((1, RED, "along z"), (0, BLUE, f"along {plane.name}")):
             label = name if style == "-" else ""
