@@ -20,7 +20,7 @@ from aerobat.reporting.page import png
 from aerobat.reporting.panels import path as path_panel
 from aerobat.reporting.panels.keyframes import maneuver_plane, plan_keyframes
 from aerobat.reporting.scene.glyphs import gate_bars
-from aerobat.reporting.style import BLUE, RED, YELLOW
+from aerobat.reporting.style import BLUE, RED, SKY, YELLOW
 from reporting_cases import PROBLEMS, planned, require_legible, simulated, two_flips
 
 pytestmark = pytest.mark.filterwarnings("error")  # drawing warns of nothing
@@ -79,7 +79,7 @@ def test_drawn_errors_are_those_of_the_flight():
     figure = page("half-flip")
     distance = np.linalg.norm(flight.states.position - flight.setpoint.flat.position, axis=1)
     position = panel_of(figure, "position error")
-    unit = {"[m]": 1.0, "[cm]": 1e-2, "[mm]": 1e-3}[position.get_ylabel().split()[-1]]
+    unit = {"[m]": 1.0, "[cm]": 1e-2}[position.get_ylabel().split()[-1]]
     times, drawn = position.get_lines()[0].get_data()
     np.testing.assert_allclose(times, flight.times)
     np.testing.assert_allclose(unit * np.asarray(drawn), distance, rtol=1e-12)
@@ -119,7 +119,7 @@ def test_arrows_are_the_specific_thrust_at_the_scale_of_their_keys(problem):
     keys = {key.Q: key for key in axes.get_children() if isinstance(key, QuiverKey)}
     reference = plan_keyframes(plan, vehicle)
     plane = maneuver_plane(plan, reference.thrust)
-    for colour, column in ((BLUE, 0), (RED, 1)):
+    for colour, column in ((SKY, 0), (BLUE, 1)):
         quiver = quivers[np.array(to_rgba(colour)).tobytes()]
         value = float(keys[quiver].label.split()[-2])
         drawn = (quiver.U, quiver.V)[column] * value / keys[quiver].U
@@ -127,6 +127,19 @@ def test_arrows_are_the_specific_thrust_at_the_scale_of_their_keys(problem):
         for place, thrust in zip(quiver.get_offsets(), drawn, strict=True):
             k = np.linalg.norm(plane.camera.project(reference.position) - place, axis=1).argmin()
             assert thrust == pytest.approx(expected[k], abs=1e-6)
+
+
+def pixels_of(figure, colour):
+    """How many pixels of a page are of a colour, or of one that nobody tells from it."""
+    figure.canvas.draw()
+    picture = np.asarray(figure.canvas.buffer_rgba())[..., :3].astype(int)
+    return int((np.abs(picture - 255 * np.array(to_rgba(colour)[:3])).max(axis=-1) < 12).sum())
+
+
+@pytest.mark.parametrize("problem", PROBLEMS)
+def test_nothing_is_red_where_nothing_is_wrong(problem):
+    assert all(pixels_of(figure, RED) == 0 for figure in pages(problem, "agile-quad"))
+    assert pixels_of(page(problem), BLUE) > 100
 
 
 def test_stages_may_come_in_any_order():
@@ -210,7 +223,7 @@ def test_a_batch_of_flights_is_drawn_whole():
     assert any("7 flights" in text.get_text() for text in figure.texts)
     axes = panel_of(figure, "position error")
     bundle = next(c for c in axes.collections if len(c.get_segments()) == 7)
-    unit = {"[m]": 1.0, "[cm]": 1e-2, "[mm]": 1e-3}[axes.get_ylabel().split()[-1]]
+    unit = {"[m]": 1.0, "[cm]": 1e-2}[axes.get_ylabel().split()[-1]]
     distances = np.linalg.norm(batch.states.position - batch.setpoint.flat.position, axis=-1)
     for segment, distance in zip(bundle.get_segments(), distances, strict=True):
         np.testing.assert_allclose(unit * segment[:, 1], distance, rtol=1e-12)
@@ -315,3 +328,19 @@ def test_stages_that_would_cover_each_other_follow_one_another():
     centres = [np.mean([p.vertices.mean(axis=0) for p in gate.get_paths()], axis=0) for gate in gates]
     passed = [place for place, s in zip(quiver.get_offsets(), plan.stages, strict=True) if s.gate is not None]
     np.testing.assert_allclose(centres, passed, atol=0.05)
+
+
+def test_stages_in_a_row_are_each_shown_in_the_plane_of_their_thrust():
+    plan, _ = two_flips()
+    vehicle = ab.load_vehicle("agile-quad")
+    axes = next(a for a in two_flips_page().axes if a.get_ylabel().startswith("stages in order"))
+    quivers = {q.get_facecolor()[0].tobytes(): q for q in axes.collections if isinstance(q, Quiver)}
+    level, upward = (quivers[np.array(to_rgba(colour)).tobytes()] for colour in (SKY, BLUE))
+    keys = {key.Q: key for key in axes.get_children() if isinstance(key, QuiverKey)}
+    scale = float(keys[level].label.split()[-2]) / keys[level].U
+    thrust = plan_keyframes(plan, vehicle).thrust
+    across = np.linalg.norm(thrust[:, :2], axis=1)
+    shown = across > 0.1 * np.linalg.norm(thrust, axis=1)  # a vertical one lies in any plane
+    assert shown.sum() >= 4
+    np.testing.assert_allclose(np.abs(scale * level.U)[shown], across[shown], rtol=0.01)
+    np.testing.assert_allclose(scale * upward.V, thrust[:, 2], atol=1e-9)

@@ -13,9 +13,10 @@ from aerobat.reporting.panels.labels import spread_out
 from aerobat.reporting.scene.axes_box import box_around, draw_axes_box
 from aerobat.reporting.scene.camera import Camera, best_view
 from aerobat.reporting.scene.glyphs import (
+    direction_marks,
     enlargement,
     gate_bars,
-    side_tint,
+    side_face,
     span,
     thrust_axis_shape,
     vehicle_shapes,
@@ -117,7 +118,18 @@ def test_a_drawn_thrust_axis_is_the_attitude_s(name, position, q):
 def test_upright_and_inverted_vehicles_differ_in_colour():
     above = Camera(0.3, 0.4)
     inverted = np.array([0.0, 1.0, 0.0, 0.0])
-    assert side_tint(so3.IDENTITY, above) != side_tint(inverted, above)
+    assert side_face(so3.IDENTITY, above) != side_face(inverted, above)
+
+
+@given(cameras, st.lists(points, min_size=3, max_size=3))
+def test_arrowheads_point_the_way_that_is_travelled(camera, path):
+    path = np.array(path)
+    ahead = camera.project(path[2] - path[0])
+    assume(np.linalg.norm(ahead) > 1e-3)
+    [mark] = direction_marks(path, [1], camera, 0.1)
+    tip, left, _, right = camera.project(mark.points[:4])
+    forward = tip - (left + right) / 2
+    np.testing.assert_allclose(forward / np.linalg.norm(forward), ahead / np.linalg.norm(ahead), atol=1e-6)
 
 
 @given(st.sampled_from(vehicle_names()), st.floats(0.01, 5.0))

@@ -115,8 +115,9 @@ class Scores:
         if not passed:
             return Outcome.COMPLETE, Outcome.COMPLETE.sentence(error=error)
         worst = max(passed, key=lambda passage: passage.miss)
-        gates = "the gate" if len(passed) == 1 else f"all {len(passed)} gates, the worst"
-        numbers = {"gate": gates, "speed": worst.speed, "miss_mm": 1000 * worst.miss, "error": error}
+        several = "both" if len(passed) == 2 else f"all {len(passed)}"
+        gates = "the gate" if len(passed) == 1 else f"{several} gates, the worst"
+        numbers = {"gate": gates, "speed": worst.speed, "miss": length(worst.miss), "error": error}
         return Outcome.THROUGH_GATES, Outcome.THROUGH_GATES.sentence(**numbers)
 
 

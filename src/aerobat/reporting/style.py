@@ -5,7 +5,8 @@ from __future__ import annotations
 from typing import Any
 
 # Blue, yellow and red tell apart in any kind of colour vision and in grey (Paul Tol's high-contrast scheme,
-# the red made stronger); all else is a shade of one slate.
+# the red made stronger); all else is a shade of one slate. Yellow is a gate; red says that something is
+# wrong, and nothing else.
 BLUE = "#004488"
 YELLOW = "#ddaa33"
 RED = "#c8334e"

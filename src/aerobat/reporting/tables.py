@@ -14,6 +14,7 @@ from aerobat.certification import Certificate, Finding, Side, Verdict
 from aerobat.evaluation.score import Score
 from aerobat.planning import Plan
 from aerobat.problem import Problem
+from aerobat.simulation.outcome import length
 from aerobat.vehicle import Vehicle
 
 
@@ -161,7 +162,7 @@ def _flight_facts(score: Score | None, controller: str | None) -> Iterable[tuple
             else f" of {passage.attitude_tolerance_deg:.3g}° allowed"
         )
         passed = (
-            f"{1000 * passage.miss:.1f} mm off, {passage.attitude_error_deg:.2f}°{allowed}, "
+            f"{length(passage.miss)} off, {passage.attitude_error_deg:.2f}°{allowed}, "
             f"at {passage.speed:.2f} m/s{clearance}"
         )
         yield passage.gate, "not passed" if isnan(passage.time) else passed

@@ -20,9 +20,7 @@ class Outcome(Enum):
     """
 
     COMPLETE = "flown to the end, {error} off its path at most"
-    THROUGH_GATES = (
-        "through {gate} at {speed:.1f} m/s, {miss_mm:.1f} mm off its centre, {error} off its path at most"
-    )
+    THROUGH_GATES = "through {gate} at {speed:.1f} m/s, {miss} off its centre, {error} off its path at most"
     MISSED_GATE = "missed {gate}, {miss:.2f} m off its centre at {time:.2f} s"
     BACKWARDS = "missed {gate}, crossed its plane backwards at {time:.2f} s"
     SHORT_OF_GATE = "missed {gate}, {short:.2f} m short of its plane about {time:.2f} s"

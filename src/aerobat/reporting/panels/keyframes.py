@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from aerobat import so3
 from aerobat.arrays import Array
 from aerobat.flatness import force_balance, reference
 from aerobat.planning import Plan
@@ -15,6 +16,7 @@ from aerobat.vehicle import Vehicle
 FEWEST = 5  # keyframes shown; where a maneuver has fewer stages, equal steps of time join them
 STEPS = 8
 ROUND_HEADING = 15.0  # [deg]
+UPRIGHT = 0.1  # of a thrust: with less across the vertical it lies in any vertical plane
 THIN = 0.02  # of a path's extent: what spreads less to its sides lies in a plane
 
 
@@ -32,6 +34,12 @@ class ManeuverPlane:
     def camera(self) -> Camera:
         """The view straight onto the plane, its horizontal axis to the right."""
         return Camera(float(np.deg2rad(self.heading_deg - 90.0)))
+
+    def of_thrust(self, thrust: Array) -> ManeuverPlane:
+        """The vertical plane in which a specific thrust (3,) lies; this one if that is all but vertical."""
+        if np.linalg.norm(thrust[:2]) < UPRIGHT * np.linalg.norm(thrust):
+            return self
+        return ManeuverPlane(round(float(np.rad2deg(np.arctan2(thrust[1], thrust[0]))), 0))
 
     @property
     def name(self) -> str:
@@ -52,6 +60,7 @@ class Keyframe:
     time: float  # [s]
     interval: int | None = None
     gate: str | None = None  # the name of the gate that is passed then
+    along: float | None = None  # [deg] the heading of the plane that it is shown in, where that is its own
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,14 +77,28 @@ class Keyframes:
         instants = tuple(self.instants[k] for k in kept)
         return Keyframes(instants, self.position[kept], self.q_world_body[kept], self.thrust[kept])
 
-    def unfolded(self, camera: Camera, downward: bool, pitch: float) -> Keyframes:
-        """The same, shifted on the camera's picture to follow one another in steps of `pitch` [m].
+    def storyboard(self, plane: ManeuverPlane, downward: bool, pitch: float) -> tuple[Keyframes, Array]:
+        """The same in a row, each turned about the vertical until its thrust lies in the plane.
 
-        They go downward, or to the right; across that direction each stays where it is.
+        Args:
+            plane: That is shown.
+            downward: True where they follow one another downward, false for to the right.
+            pitch: From one to the next [m].
+
+        Returns:
+            The keyframes, told in which plane each is shown, and their turns, (k, 4).
         """
-        direction = -camera.screen[1] if downward else camera.screen[0]
-        shifts = pitch * np.arange(len(self.instants)) - self.position @ direction
-        return replace(self, position=self.position + shifts[:, None] * direction)
+        headings = [plane.of_thrust(thrust) for thrust in self.thrust]
+        angles = np.deg2rad([plane.heading_deg - own.heading_deg for own in headings])
+        turns = np.stack([so3.about_axis(so3.UP, angle) for angle in angles])
+        direction = -plane.camera.screen[1] if downward else plane.camera.screen[0]
+        shown = Keyframes(
+            tuple(replace(k, along=own.heading_deg) for k, own in zip(self.instants, headings, strict=True)),
+            pitch * np.arange(len(turns))[:, None] * direction,
+            so3.multiply(turns, self.q_world_body),
+            so3.rotate(turns, self.thrust),
+        )
+        return shown, turns
 
 
 def plan_keyframes(plan: Plan, vehicle: Vehicle) -> Keyframes:

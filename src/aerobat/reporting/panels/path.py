@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -15,18 +16,19 @@ from aerobat.reporting.panels.poses import PoseHistory
 from aerobat.reporting.scene.axes_box import box_around, draw_axes_box
 from aerobat.reporting.scene.camera import Camera, best_view
 from aerobat.reporting.scene.glyphs import (
+    direction_marks,
     drop_line,
     enlargement,
     gate_corners,
     gate_shapes,
     shadow,
-    side_tint,
+    side_face,
     span,
     thrust_axis_shape,
     vehicle_shapes,
 )
 from aerobat.reporting.scene.shapes import Shape, draw_depth_sorted, polyline
-from aerobat.reporting.style import BAND, BLUE, HAIR, INK, RED
+from aerobat.reporting.style import BAND, BLUE, HAIR, INK
 from aerobat.vehicle import Vehicle
 
 if TYPE_CHECKING:
@@ -34,6 +36,8 @@ if TYPE_CHECKING:
 
 POSES = 20  # time steps at which the vehicle is drawn, fewer where it would cover itself
 SIZE = 0.085  # of the vehicle as drawn, relative to the path's extent
+MARKED = 3  # of so many gaps between drawn vehicles one has an arrowhead
+DIRECTION = 0.03  # of an arrowhead, likewise
 BELOW = 0.06  # by which a reference path is drawn under an actual one, likewise
 ACTUAL_WIDTH, REFERENCE_WIDTH = 1.3, 4.0  # [pt]
 ALONE_WIDTH = 1.6  # [pt] of a reference path that nobody flew
@@ -77,7 +81,9 @@ def draw_path(
     for k in rows:
         position, q = poses.position[k], poses.q_world_body[k]
         shapes.append(thrust_axis_shape(vehicle, position, q, scale))
-        shapes += vehicle_shapes(vehicle, position, q, scale, side_tint(q, camera))
+        shapes += vehicle_shapes(vehicle, position, q, scale, side_face(q, camera))
+    between = [(a + b) // 2 for a, b in pairwise(rows)]
+    shapes += direction_marks(poses.position, between[1::MARKED], camera, DIRECTION * reference.extent)
     draw_depth_sorted(axes, shapes, camera)
     axes.plot([], [], color=BAND, linewidth=REFERENCE_WIDTH if actual else ALONE_WIDTH, label="reference")
     if actual:
@@ -85,7 +91,7 @@ def draw_path(
     _mark_stages(axes, camera, reference, [stage for stage in stages if stage.gate is None])
     mark_ends(axes, camera.project(reference.position[[0, -1]]))
     size = "" if scale == 1.0 else f", {scale:g} times its size"
-    return f"vehicle every {step:.2f} s{size}; blue seen from above, red from below"
+    return f"vehicle every {step:.2f} s{size}; blue seen from above, white from below"
 
 
 def pose_samples(poses: PoseHistory, size: float, gates: Sequence[Gate]) -> tuple[list[int], float]:
@@ -125,8 +131,8 @@ def _mark_stages(axes: Axes, camera: Camera, reference: PoseHistory, stages: Seq
 
 
 def mark_ends(axes: Axes, places: Array) -> None:
-    """Mark the end by a red disc and the start by a smaller blue one, which shows on it; add a legend."""
-    for place, colour, size, name in ((places[0], BLUE, 5.5, "start"), (places[1], RED, 10.0, "end")):
+    """Mark the end by a dark disc and the start by a smaller blue one, which shows on it; add a legend."""
+    for place, colour, size, name in ((places[0], BLUE, 5.5, "start"), (places[1], INK, 10.0, "end")):
         axes.plot(
             *place[:, None], "o", color=colour, mec="white", mew=0.8, markersize=size, label=name,
             zorder=6.0 - 0.1 * size,

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from aerobat import so3
 from aerobat.arrays import Array
 from aerobat.planning import Plan
 from aerobat.problem.gate import Gate
@@ -23,14 +24,14 @@ from aerobat.reporting.panels.labels import spread_out
 from aerobat.reporting.scene.camera import Camera
 from aerobat.reporting.scene.glyphs import enlargement, gate_section, span, vehicle_shapes
 from aerobat.reporting.scene.shapes import draw_depth_sorted
-from aerobat.reporting.style import BAND, BLUE, FAINT, INK, MUTED, NORMAL, RED, SMALL
+from aerobat.reporting.style import BAND, BLUE, FAINT, INK, MUTED, NORMAL, SKY, SMALL
 from aerobat.vehicle import Vehicle
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 ARROW = 1.0  # [in] the longest arrow
-UNFOLDED = 0.5  # of the usual size of arrows and vehicles, where stages follow one another
+STORYBOARD = 0.6  # of the usual size of arrows and vehicles, where stages follow one another
 KEY = 0.4  # [in] the longest key arrow
 KEY_HEIGHT = 0.38  # [in] of the keys above the axes
 VEHICLE = 0.6  # [in] a vehicle, about
@@ -47,7 +48,8 @@ KEYS = np.array([0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0])  # [m/s
 def draw_stages(axes: Axes, plan: Plan, vehicle: Vehicle) -> str:
     """Draw the stages in the maneuver's plane; return a note on what is shown.
 
-    Where they would cover each other in that plane, they follow one another along the panel's longer side.
+    Where they would cover each other in that plane, as those of a maneuver that stays in place or leaves it,
+    they follow one another along the panel's longer side, each in the vertical plane of its own thrust.
     """
     shots = plan_keyframes(plan, vehicle)
     plane = maneuver_plane(plan, shots.thrust)
@@ -66,9 +68,9 @@ def draw_stages(axes: Axes, plan: Plan, vehicle: Vehicle) -> str:
         note = "a stage holds at the end of interval n" if plan.stages else "equal steps of time"
     else:
         shots = shots.only([k for k, keyframe in enumerate(shots.instants) if keyframe.interval is not None])
-        shots, gates = _unfold(axes, shots, gates, camera, reach, column)
-        scale = _draw(axes, shots, gates, plane, vehicle, column, UNFOLDED)
-        note = "in order, each held at the end of interval n"
+        shots, gates = _storyboard(axes, shots, gates, plane)
+        scale = _draw(axes, shots, gates, plane, vehicle, column, STORYBOARD)
+        note = "in order, each seen across its thrust"
     return note if scale == 1.0 else f"{note}; vehicle {scale:g} times its size"
 
 
@@ -90,25 +92,22 @@ def _apart(shots: Keyframes, camera: Camera, distance: float) -> list[int]:
     return sorted(kept)
 
 
-def _unfold(
-    axes: Axes, shots: Keyframes, gates: Sequence[Gate], camera: Camera, reach: float, column: float
+def _storyboard(
+    axes: Axes, shots: Keyframes, gates: Sequence[Gate], plane: ManeuverPlane
 ) -> tuple[Keyframes, tuple[Gate, ...]]:
     """Stages that follow one another along the panel's longer side, each with the gate that it passes."""
     width, height = size_of(axes)
     downward = height >= width
-    across = float(np.ptp(camera.project(shots.position)[:, 0 if downward else 1])) + reach
-    aspect = height / (width - 2 * column) if downward else width / (height - STAGE_ROW)
-    pitch = across * aspect / (len(shots.instants) + 1)
-    unfolded = shots.unfolded(camera, downward, pitch)
+    shown, turns = shots.storyboard(plane, downward, 1.0)
     moved = []
-    for k, keyframe in enumerate(shots.instants):
-        shift = unfolded.position[k] - shots.position[k]
-        moved += [replace(g, position=g.position + shift) for g in gates if g.name == keyframe.gate]
-    if downward:
-        axes.set(yticks=[], ylabel="stages in order, downward")
-    else:
-        axes.set(xticks=[], xlabel="stages in order")
-    return unfolded, tuple(moved)
+    for keyframe, position, turn in zip(shown.instants, shown.position, turns, strict=True):
+        for gate in gates:
+            if gate.name == keyframe.gate:
+                normal, up = so3.rotate(turn, gate.normal), so3.rotate(turn, gate.up)
+                moved.append(replace(gate, position=position, normal=normal, up=up))
+    axes.set(xticks=[], yticks=[], ylabel="stages in order, downward" if downward else "")
+    axes.set(xlabel="h: horizontal, along each stage's own angle" if downward else "stages in order")
+    return shown, tuple(moved)
 
 
 def _draw(
@@ -179,7 +178,7 @@ def _draw_components(axes: Axes, places: Array, arrows: Array, unit: float, plan
     size = size_of(axes)
     key = max(KEYS[KEYS * unit <= KEY], default=KEYS[0])
     names = (f"thrust along {plane.name}", "thrust along z")
-    for part, colour, name, place in zip(COMPONENTS, (BLUE, RED), names, (1.3, 3.05), strict=True):
+    for part, colour, name, place in zip(COMPONENTS, (SKY, BLUE), names, (1.3, 3.05), strict=True):
         quiver = axes.quiver(
             *places.T, *(arrows * part).T, color=colour, units="inches", scale_units="inches", angles="uv",
             scale=1.0, width=0.024, headwidth=4.2, headlength=4.6, headaxislength=4.2, minlength=0, zorder=3,
@@ -221,7 +220,8 @@ def _write_name(axes: Axes, keyframe: Keyframe, anchor: Array, side: str) -> Non
         axes.text(x, y, f"{keyframe.time:.2f} s", size=SMALL, color=MUTED, ha=side, va=up)
         return
     axes.text(x, y, keyframe.name, size=NORMAL, weight="bold", ha=side, va="top" if below else "bottom")
-    facts = f"{keyframe.time:.2f} s\nn = {keyframe.interval}"
+    plane = "" if keyframe.along is None else f", h along {keyframe.along:g}°"
+    facts = f"{keyframe.time:.2f} s\nn = {keyframe.interval}{plane}"
     axes.text(x, y, "\n" * below + facts, size=SMALL, color=MUTED, linespacing=1.15, ha=side, va="top")
 
 

@@ -13,15 +13,15 @@ from aerobat.planning import PlacedStage, Plan
 from aerobat.reporting.page import HEADING, heading, legend, size_of
 from aerobat.reporting.panels.keyframes import maneuver_plane, plan_keyframes
 from aerobat.reporting.panels.labels import spread_out
-from aerobat.reporting.style import BLUE, FAINT, INK, MUTED, RED, SMALL, YELLOW
+from aerobat.reporting.style import BLUE, FAINT, INK, MUTED, SKY, SMALL, YELLOW
 from aerobat.simulation import Flight
 from aerobat.vehicle import Vehicle
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-SPIN_RAMPS = {1: ("#00315f", "#6fa3d4"), -1: ("#8e1730", "#e89aa8")}  # dark to light, by the sense of turning
-LENGTHS = (("m", 1.0), ("cm", 1e-2), ("mm", 1e-3))
+SPIN_RAMPS = {1: ("#00315f", "#6fa3d4"), -1: ("#1c2b39", "#8b97a3")}  # dark to light, by the sense of turning
+LENGTHS = (("m", 1.0), ("cm", 1e-2))
 NAME_WIDTH, LETTER = 0.36, 0.065  # [in] that a stage's name takes at least, and by the letter
 
 
@@ -41,7 +41,7 @@ def draw_attitude_error(axes: Axes, flight: Flight) -> None:
 
 
 def draw_rotor_thrusts(axes: Axes, times: Array, thrusts: Array, vehicle: Vehicle) -> None:
-    """Draw every rotor's thrust (..., T, n) [N], blue or red by its sense of turning, and dashed limits."""
+    """Draw every rotor's thrust (..., T, n) [N], blue or grey by its sense of turning, and dashed limits."""
     colours = rotor_colours(vehicle)
     for i, colour in enumerate(colours):
         draw_series(axes, times, thrusts[..., i], colour, width=1.0, label=f"{i}" if i else "rotor 0")
@@ -55,7 +55,7 @@ def draw_rotor_thrusts(axes: Axes, times: Array, thrusts: Array, vehicle: Vehicl
 
 
 def rotor_colours(vehicle: Vehicle) -> list[str]:
-    """A colour a rotor: shades of blue for counter-clockwise ones, of red for clockwise ones."""
+    """A colour a rotor: shades of blue for counter-clockwise ones, of grey for clockwise ones."""
     from matplotlib.colors import to_hex, to_rgb
 
     colours = [""] * len(vehicle.rotors)
@@ -75,7 +75,7 @@ def draw_specific_thrust(axes: Axes, plan: Plan, vehicle: Vehicle) -> None:
         velocity, acceleration = (plan.trajectory.evaluate(at, derivative) for derivative in (1, 2))
         thrust = force_balance(plan.problem.environment, vehicle).specific_thrust(velocity, acceleration)
         parts = plane.camera.project(thrust)
-        for column, colour, name in ((1, RED, "along z"), (0, BLUE, f"along {plane.name}")):
+        for column, colour, name in ((1, BLUE, "along z"), (0, SKY, f"along {plane.name}")):
             label = name if style == "-" else ""
             axes.plot(at, parts[:, column], style, color=colour, markersize=3.5, label=label)
     axes.axhline(0.0, color=FAINT, linewidth=0.8)

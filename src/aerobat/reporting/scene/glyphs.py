@@ -11,7 +11,7 @@ from aerobat.arrays import Array
 from aerobat.problem.gate import Gate
 from aerobat.reporting.scene.camera import Camera
 from aerobat.reporting.scene.shapes import Colour, Shape
-from aerobat.reporting.style import BLUE, FAINT, INK, RED, YELLOW
+from aerobat.reporting.style import BLUE, FAINT, INK, MUTED, YELLOW
 from aerobat.vehicle import Vehicle
 
 TURN = np.linspace(0.0, 2.0 * np.pi, 19)
@@ -22,6 +22,10 @@ EDGE_ON = 0.2  # a gate whose normal is this square to the view is seen edge-on
 MAST = 0.35  # the height of a rotor above its arm, as a fraction of the rotor's radius
 LIGHT = np.array([0.3, -0.5, 0.81])  # where light comes from in shaded pictures
 SHADES = {YELLOW: ("#8f6a12", "#f0c964")}  # darkest and lightest side of a bar
+SEEN_FROM_ABOVE: Colour = (BLUE, 0.45)
+SEEN_FROM_BELOW: Colour = ("white", 0.9)
+# forward and left, relative to its length: a barb, closed
+ARROWHEAD = np.array([[0.6, 0.0], [-0.4, 0.38], [-0.2, 0.0], [-0.4, -0.38], [0.6, 0.0]])
 ENLARGEMENTS = (1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0, 15.0, 20.0, 30.0, 50.0, 100.0)
 
 
@@ -38,9 +42,23 @@ def enlargement(vehicle: Vehicle, size: float) -> float:
 
 
 def vehicle_shapes(
-    vehicle: Vehicle, position: Array, q_world_body: Array, scale: float, tint: str = INK, weight: float = 1.0
+    vehicle: Vehicle,
+    position: Array,
+    q_world_body: Array,
+    scale: float,
+    face: Colour = (INK, 0.35),
+    weight: float = 1.0,
 ) -> list[Shape]:
-    """A vehicle at a position (3,) in an attitude (4,): arms and masts, then a disc for each rotor."""
+    """A vehicle at a position (3,) in an attitude (4,): arms and masts, then a disc for each rotor.
+
+    Args:
+        vehicle: Whose rotors are drawn.
+        position: Of its centre of mass [m], world, (3,).
+        q_world_body: Its attitude, (4,).
+        scale: By which it is drawn larger than it is.
+        face: Of the discs.
+        weight: Of all lines, relative to the usual one.
+    """
     shapes, discs = [], []
     for rotor in vehicle.rotors:
         top = rotor.position_body + np.array([0.0, 0.0, MAST * rotor.radius])
@@ -48,7 +66,7 @@ def vehicle_shapes(
         disc = top + rotor.radius * CIRCLE
         arm, disc = (position + scale * so3.rotate(q_world_body, part) for part in (arm, disc))
         shapes.append(Shape(arm, edge=INK, width=1.3 * weight))
-        discs.append(Shape(disc, face=(tint, 0.35), edge=(tint, 0.95), width=0.7 * weight))
+        discs.append(Shape(disc, face=face, edge=INK, width=0.7 * weight))
     return shapes + discs
 
 
@@ -58,9 +76,32 @@ def thrust_axis_shape(vehicle: Vehicle, position: Array, q_world_body: Array, sc
     return Shape(np.array([position, tip]), edge=INK, width=0.9)
 
 
-def side_tint(q_world_body: Array, camera: Camera) -> str:
-    """Blue for a vehicle seen from above, red for one seen from below: upright tells from inverted."""
-    return BLUE if float(so3.thrust_axis(q_world_body) @ camera.toward) >= 0.0 else RED
+def side_face(q_world_body: Array, camera: Camera) -> Colour:
+    """The face of discs seen from above, blue, or from below, white: upright tells from inverted."""
+    return SEEN_FROM_ABOVE if float(so3.thrust_axis(q_world_body) @ camera.toward) >= 0.0 else SEEN_FROM_BELOW
+
+
+def direction_marks(path: Array, rows: Sequence[int], camera: Camera, size: float) -> list[Shape]:
+    """Arrowheads along a path that say in which direction it is travelled.
+
+    Args:
+        path: Positions [m], (T, 3).
+        rows: Where the arrowheads lie; none where the path runs toward the viewer, or stands still.
+        camera: That they face.
+        size: Of an arrowhead [m].
+    """
+    shapes = []
+    for k in rows:
+        ahead = camera.project(path[min(k + 1, len(path) - 1)] - path[max(k - 1, 0)])
+        length = float(np.linalg.norm(ahead))
+        if length > 0.0:
+            forward, left = (
+                ahead / length @ camera.screen,
+                np.array([-ahead[1], ahead[0]]) / length @ camera.screen,
+            )
+            corners = path[k] + size * (ARROWHEAD[:, :1] * forward + ARROWHEAD[:, 1:] * left)
+            shapes.append(Shape(corners, face=MUTED, edge="white", width=0.5, depth_bias=size))
+    return shapes
 
 
 def gate_bars(gate: Gate) -> list[Array]:
