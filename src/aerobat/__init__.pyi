@@ -50,6 +50,7 @@ from .problem import (
     write_problem,
 )
 from .reporting.comparison import comparison_figure
+from .reporting.data_frames import to_dataframe
 from .reporting.figures import draw
 from .reporting.tracking import tracking_figure
 from .simulation import Flight, FlightConfig, Outcome, StateNoise, fly, load_flight, prepare
@@ -142,6 +143,7 @@ __all__ = [
     "score_flights",
     "sensitivity",
     "tilted_gate",
+    "to_dataframe",
     "tracking_figure",
     "vehicle_names",
     "write_csv",

@@ -8,11 +8,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from aerobat.arrays import Array
+from aerobat.declaration import by_value, door
 
 STANDARD_GRAVITY = 9.81  # [m/s²] as the paper has it
 
 
-@dataclass(frozen=True)
+@door
+@by_value
+@dataclass(frozen=True, eq=False)
 class BodyState:
     """The state of a rigid body."""
 
@@ -22,7 +25,9 @@ class BodyState:
     omega_body: Array  # [rad/s] body axes, (..., 3)
 
 
-@dataclass(frozen=True)
+@door
+@by_value
+@dataclass(frozen=True, eq=False)
 class FlatState:
     """Position and its derivatives, the flat outputs of a multirotor; all world frame, (..., 3)."""
 
@@ -33,7 +38,9 @@ class FlatState:
     snap: Array  # [m/s⁴]
 
 
-@dataclass(frozen=True)
+@door
+@by_value
+@dataclass(frozen=True, eq=False)
 class Wrench:
     """The rotors' effect on the body: collective thrust along +z and moments, body frame."""
 
@@ -41,7 +48,9 @@ class Wrench:
     moment_body: Array  # [N·m], (..., 3)
 
 
-@dataclass(frozen=True)
+@door
+@by_value
+@dataclass(frozen=True, eq=False)
 class Setpoint:
     """A trajectory's demand on a vehicle: the flat state and all that flatness derives from it."""
 

@@ -7,6 +7,7 @@ from dataclasses import asdict, dataclass, replace
 from enum import StrEnum
 from math import degrees
 
+from aerobat.declaration import by_value, door, in_notebooks, short
 from aerobat.flatness import TimeInterval
 
 
@@ -106,7 +107,11 @@ class Discontinuity:
         return f"{self.quantity} jumps by {jump} at {self.time:.3f} s, which no {means} can do"
 
 
-@dataclass(frozen=True)
+@door
+@in_notebooks
+@short
+@by_value
+@dataclass(frozen=True, eq=False, repr=False)
 class Certificate:
     """Findings along the whole of a trajectory, between samples and knots too.
 

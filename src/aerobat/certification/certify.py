@@ -31,9 +31,11 @@ from aerobat.certification.path.kinematics import kinematic_findings
 from aerobat.certification.path.passages import passage_findings
 from aerobat.certification.subdivision import subdivide
 from aerobat.certification.thrust_curve import ThrustCurve
+from aerobat.declaration import door
 from aerobat.environment import Environment
+from aerobat.flatness import Planned, environment_of, vehicle_of
 from aerobat.flatness.references import UNDETERMINED, force_balance
-from aerobat.trajectory import Trajectory
+from aerobat.trajectory import Trajectory, as_trajectory
 from aerobat.trajectory.subintervals import Subintervals
 from aerobat.vehicle import Vehicle
 
@@ -41,9 +43,10 @@ INTERPOLATION_DEGREE = 20  # of interpolation
 TIGHTNESS = 1e-7  # of a rotor's range: how near the proven bounds are to what is reached
 
 
+@door
 def certify(
-    trajectory: Trajectory,
-    vehicle: Vehicle,
+    trajectory: Trajectory | Planned,
+    vehicle: Vehicle | str | None = None,
     environment: Environment | None = None,
     envelope: Envelope | None = None,
 ) -> Certificate:
@@ -60,14 +63,18 @@ def certify(
     Raises SpecError for derivatives beyond all reason.
 
     Args:
-        trajectory: The path [m] over time [s], world, and its heading [rad].
-        vehicle: What flies it; its rotors' limits [N] and its body rate's [rad/s] are those that count.
-        environment: Gravity and wind, by default those of a calm day on Earth. Drag acts on the velocity
-            relative to the wind; speed and its limit are relative to the ground.
+        trajectory: The path [m] over time [s], world, and its heading [rad]; of a plan its path alone, what
+            its problem asks beside is proven in `plan.certificate`.
+        vehicle: What flies it, or its name, by default the plan's; its rotors' limits [N] and its body rate's
+            [rad/s] are those that count.
+        environment: Gravity and wind, by default the plan's, else those of a calm day on Earth. Drag acts on
+            the velocity relative to the wind; speed and its limit are relative to the ground.
         envelope: What else it shall stay within, by default nothing.
     """
     envelope = Envelope() if envelope is None else envelope
-    environment = Environment() if environment is None else environment
+    vehicle = vehicle_of(trajectory, vehicle)
+    environment = environment_of(trajectory, environment)
+    trajectory = as_trajectory(trajectory)
     curve = ThrustCurve.of(trajectory, vehicle, environment, INTERPOLATION_DEGREE)
     floor = UNDETERMINED * environment.gravity
     found = subdivide(curve, floor)

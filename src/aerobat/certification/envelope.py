@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from aerobat.declaration import Limit, NonNegative, declared
+from aerobat.declaration import Limit, NonNegative, TiltLimit, declared
 from aerobat.problem import Condition, Gate, Limits, Quantity, Stage
 
 CROSSING_SPEED = 1e-3  # [m/s] a path that is slower in the gate's plane does not cross it
@@ -41,7 +41,7 @@ class Envelope:
     """
 
     speed: Limit = np.inf  # [m/s] |v|
-    tilt: Limit = np.inf  # [rad] between the thrust axis and the vertical; beyond pi it limits nothing
+    tilt: TiltLimit = np.inf  # [rad] between the thrust axis and the vertical; beyond pi it limits nothing
     body_rate: Limit = np.inf  # [rad/s] |ω|
     moment: Limit = np.inf  # [N·m] |M|
     limits: Limits = NO_LIMITS

@@ -5,10 +5,13 @@ then run through the same checks, and whatever is wrong becomes one sentence tha
 """
 
 from aerobat.declaration.declared import declared
+from aerobat.declaration.doors import door
 from aerobat.declaration.field_types import (
     AS_IT_IS,
+    Angle,
     Corner,
     Count,
+    Derivative,
     Direction,
     Fraction,
     Label,
@@ -16,22 +19,28 @@ from aerobat.declaration.field_types import (
     NonNegative,
     Number,
     PartialVector,
+    PathName,
     PerAxis,
     Positive,
+    TiltLimit,
     UnitVector,
     Vector3,
     finite,
     number,
     unit,
 )
+from aerobat.declaration.notebooks import in_notebooks
 from aerobat.declaration.registry import Registry, import_plugin
 from aerobat.declaration.sentences import FieldError, shown, unknown_key, unknown_name, within_field
 from aerobat.declaration.tables import from_table, to_table
+from aerobat.declaration.values import by_value, short
 
 __all__ = [
     "AS_IT_IS",
+    "Angle",
     "Corner",
     "Count",
+    "Derivative",
     "Direction",
     "FieldError",
     "Fraction",
@@ -40,16 +49,22 @@ __all__ = [
     "NonNegative",
     "Number",
     "PartialVector",
+    "PathName",
     "PerAxis",
     "Positive",
     "Registry",
+    "TiltLimit",
     "UnitVector",
     "Vector3",
+    "by_value",
     "declared",
+    "door",
     "finite",
     "from_table",
     "import_plugin",
+    "in_notebooks",
     "number",
+    "short",
     "shown",
     "to_table",
     "unit",

@@ -14,11 +14,12 @@ from pydantic_core import CoreSchema, core_schema
 
 from aerobat.declaration.sentences import FieldError, first_complaint, shown, unknown_key
 from aerobat.declaration.tables import from_table
+from aerobat.declaration.values import by_value
 from aerobat.errors import SpecError
 
 T = TypeVar("T")
 
-_CONFIG = ConfigDict(
+CONFIG = ConfigDict(
     strict=True,  # text, true and false are not numbers
     allow_inf_nan=False,
     arbitrary_types_allowed=True,
@@ -38,14 +39,11 @@ def declared(cls: type[T]) -> type[T]:
     `expand(table)` replaces them by fields on reading, and the method `abbreviate(table)` does the reverse on
     writing.
     """
-    made: Any = pydantic_dataclass(frozen=True, eq=False, config=_CONFIG)(cls)
+    made: Any = pydantic_dataclass(frozen=True, eq=False, config=CONFIG)(cls)
     made.__get_pydantic_core_schema__ = classmethod(_field_schema)
     made.__checked_init__ = _checked(made.__init__)
     made.__init__ = _named_init(made)
-    made.__eq__ = _equal
-    made.__hash__ = _hash
-    made.__reduce__ = _reduce
-    return made  # type: ignore[no-any-return]
+    return by_value(made)
 
 
 def _checked(init: Callable[..., None]) -> Callable[..., None]:
@@ -53,7 +51,7 @@ def _checked(init: Callable[..., None]) -> Callable[..., None]:
 
     def checked_init(self: Any, values: Mapping[str, Any]) -> None:
         try:
-            init(self, **{name: _plain(value) for name, value in values.items()})
+            init(self, **{name: plain(value) for name, value in values.items()})
         except ValidationError as error:
             raise first_complaint(error) from None
 
@@ -81,7 +79,7 @@ def _named_init(cls: Any) -> Callable[..., None]:
     return __init__
 
 
-def _plain(value: Any) -> Any:
+def plain(value: Any) -> Any:
     """A list as a tuple, a NumPy scalar as Python's."""
     if isinstance(value, list):
         return tuple(value)
@@ -101,30 +99,3 @@ def _field_schema(cls: Any, source: Any, handler: Any) -> CoreSchema:
         return value
 
     return core_schema.no_info_plain_validator_function(read)
-
-
-def _content(self: Any) -> tuple[Any, ...]:
-    values = (getattr(self, field.name) for field in dataclasses.fields(self))
-    return tuple(
-        (value.shape, value.tobytes()) if isinstance(value, np.ndarray) else value for value in values
-    )
-
-
-def _equal(self: Any, other: object) -> Any:
-    if type(self) is not type(other):
-        return NotImplemented
-    return self is other or _content(self) == _content(other)
-
-
-def _hash(self: Any) -> int:
-    """The content's hash, computed once: vehicles are keys of caches."""
-    known: int | None = self.__dict__.get("_hash")
-    if known is None:
-        known = hash((type(self).__qualname__, _content(self)))
-        object.__setattr__(self, "_hash", known)
-    return known
-
-
-def _reduce(self: Any) -> tuple[Any, ...]:
-    """Pickled by its fields and checked anew: what comes back is read-only too."""
-    return type(self), tuple(getattr(self, field.name) for field in dataclasses.fields(self))

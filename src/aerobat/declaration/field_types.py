@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import os
 import sys
 from collections.abc import Mapping
-from math import hypot, isfinite, nan
+from math import hypot, inf, isfinite, nan, radians, tau
 from typing import Annotated, Any
 
 import numpy as np
@@ -17,6 +18,7 @@ from aerobat.declaration.sentences import FieldError, shown, unknown_key, within
 
 _ROUND_OFF = 1e-12  # [-] components of a unit vector that are zero but for it
 _UNIT = 1e-15  # [-] how far from one a norm may be by round-off
+_FULL_TURN = tau * (1.0 + _ROUND_OFF)  # [rad] more is hardly meant, and hardly in radians
 
 
 def unit(direction: ArrayLike) -> Array:
@@ -50,7 +52,7 @@ def _shaped(numbers: Any, value: Any, shape: tuple[int, ...]) -> Array:
         made = np.empty(0)
     if made.shape != shape:
         wanted = " x ".join(map(str, shape)) + " numbers"
-        raise FieldError("", f"must be {wanted}, got {_extent(value)}")
+        raise FieldError("", f"must be {wanted}, got {shown(value)}")
     made.flags.writeable = False
     return made
 
@@ -77,11 +79,6 @@ def _numbers(value: Any, place: str, infinite: bool) -> Any:
     if isinstance(value, float) or abs(value) > sys.float_info.max:
         raise FieldError(place, f"must be a finite number, got {shown(value)}")
     return float(value)
-
-
-def _extent(value: Any) -> str:
-    size = np.shape(value) if hasattr(value, "__array__") else None
-    return f"an array of the shape {size}" if size else shown(value)
 
 
 def _vector(value: Any) -> Array:
@@ -136,6 +133,27 @@ def _not_nan(value: float) -> float:
     return value
 
 
+def _radians(angle: float) -> float:
+    if abs(angle) > _FULL_TURN:
+        raise FieldError(
+            "",
+            f"must be an angle in radians, from -2π to 2π, got {angle:g}; "
+            f"{angle:g}° is {radians(angle):.4g} rad",
+        )
+    return angle
+
+
+def _path(value: Any) -> Any:
+    text = os.fspath(value) if isinstance(value, str | os.PathLike) else None
+    if not isinstance(text, str) or not text or "\0" in text:
+        raise FieldError("", f"must be a path, got {shown(value)}")
+    try:
+        os.fsencode(text)
+    except UnicodeError:
+        raise FieldError("", f"must be a path that can be written, got {shown(value)}") from None
+    return value
+
+
 class _Instance:
     """Marks a type whose values are taken as they are, of that class, and whose own fields nobody checks."""
 
@@ -161,6 +179,15 @@ Number = Annotated[
     AfterValidator(_not_nan),
     Field(description="number, `inf` and `-inf` too"),
 ]
+Angle = Annotated[float, AfterValidator(_radians), Field(description="number of radians, from −2π to 2π")]
+TiltLimit = Annotated[
+    float,
+    Field(gt=0, allow_inf_nan=True),
+    AfterValidator(lambda angle: angle if angle == inf else _radians(angle)),
+    Field(description="number of radians to 2π, `inf` for no limit"),
+]
+Derivative = Annotated[int, Field(ge=0, le=5, description="whole number from 0, the position, to 5, crackle")]
+PathName = Annotated[str | os.PathLike[str], PlainValidator(_path), Field(description="path")]
 Label = Annotated[str, AfterValidator(_one_line), Field(description="one line of text")]
 Vector3 = Annotated[Array, PlainValidator(_vector), Field(description="three numbers")]
 Direction = Annotated[Array, PlainValidator(_direction), Field(description="three numbers, not all zero")]

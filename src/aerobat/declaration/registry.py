@@ -11,6 +11,8 @@ from types import MappingProxyType
 from typing import Any, Generic, TypeVar
 
 from aerobat.declaration.declared import declared
+from aerobat.declaration.doors import door
+from aerobat.declaration.field_types import PathName
 from aerobat.declaration.sentences import FieldError, shown, unknown_name
 from aerobat.declaration.tables import from_table
 from aerobat.errors import SpecError
@@ -44,6 +46,8 @@ class Registry(Generic[T]):
 
     def add(self, name: str, cls: type[T]) -> type[T]:
         """Declare `cls` and register it as `name`. Raises SpecError for what does not fit or is taken."""
+        if not isinstance(cls, type):
+            raise SpecError(f"a {self._noun} is a class, got {shown(cls)}; write its name above a class")
         if not issubclass(cls, self._base):
             raise SpecError(f"{cls.__name__} must inherit from {self._base.__name__} to be a {self._noun}")
         if cls.__module__ != self._modules.get(name):
@@ -101,7 +105,8 @@ class Registry(Generic[T]):
             _import(entry.load, f"{self._group} of the installed package {entry.value}")
 
 
-def import_plugin(path: str | Path) -> None:
+@door
+def import_plugin(path: PathName) -> None:
     """Run a user's Python file, which registers maneuvers and planners of its own, once.
 
     Raises SpecError when there is no such file or it fails.

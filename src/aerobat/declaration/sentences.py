@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import dataclasses
 import reprlib
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any
 
+import numpy as np
 from pydantic import ValidationError
 
 from aerobat.errors import SpecError
@@ -129,8 +131,24 @@ def _dotted(location: Sequence[str | int]) -> str:
     return name
 
 
+def with_article(noun: str) -> str:
+    """The noun with its indefinite article."""
+    return f"{'an' if noun[0] in 'AEIOaeio' else 'a'} {noun}"
+
+
+def one_of(names: Sequence[str]) -> str:
+    """Alternatives in words: "a, b or c"."""
+    return " or ".join(filter(None, (", ".join(names[:-1]), names[-1])))
+
+
 def shown(value: Any) -> str:
     """The value as an error shows it, short."""
+    if dataclasses.is_dataclass(value):
+        return (
+            f"the class {value.__name__}" if isinstance(value, type) else with_article(type(value).__name__)
+        )
+    if hasattr(value, "__array__") and np.ndim(value):
+        return f"an array of the shape {np.shape(value)}"
     if isinstance(value, dict):
         return "a table"
     if isinstance(value, list | tuple):

@@ -11,6 +11,7 @@ import numpy as np
 
 from aerobat.arrays import Array
 from aerobat.declaration.sentences import FieldError, shown, unknown_key
+from aerobat.declaration.values import is_default
 from aerobat.errors import SpecError
 
 T = TypeVar("T")
@@ -44,22 +45,12 @@ def to_table(value: Any) -> dict[str, Any]:
     table = {
         field.name: _plain(getattr(value, field.name))
         for field in dataclasses.fields(value)
-        if not _is_default(value, field)
+        if not is_default(value, field)
     }
     kind = {"kind": value.kind} if hasattr(value, "kind") else {}
     if kind and "kind" not in vars(type(value)):
         raise SpecError(f"{type(value).__name__} has no place in a file: it is not registered")
     return kind | (value.abbreviate(table) if hasattr(value, "abbreviate") else table)
-
-
-def _is_default(value: Any, field: dataclasses.Field[Any]) -> bool:
-    if field.default is dataclasses.MISSING and field.default_factory is dataclasses.MISSING:
-        return False
-    default = field.default if field.default_factory is dataclasses.MISSING else field.default_factory()
-    current = getattr(value, field.name)
-    if isinstance(current, np.ndarray) and default is not None:
-        return np.array_equal(current, np.broadcast_to(np.asarray(default), current.shape), equal_nan=True)
-    return bool(current is default if default is None else current == default)
 
 
 def _plain(value: Any) -> Any:

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from aerobat import so3
 from aerobat.arrays import Array
+from aerobat.declaration import by_value
 from aerobat.kernels.running_metrics import GateProgress, Snapshot
 from aerobat.planning import Plan
 from aerobat.problem.gate import Gate
@@ -31,7 +32,8 @@ ZEROS = (np.zeros(1),) * 3
 NEVER = Snapshot(np.full(1, inf), ZEROS, ZEROS, (np.ones(1), *ZEROS))
 
 
-@dataclass(frozen=True)
+@by_value
+@dataclass(frozen=True, eq=False)
 class Passage:
     """A gate's plane crossed in its direction, next to the planned instant; NaN where it was not.
 

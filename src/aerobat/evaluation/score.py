@@ -8,6 +8,7 @@ from dataclasses import dataclass, fields, replace
 import numpy as np
 
 from aerobat.arrays import Array
+from aerobat.declaration import by_value, door, in_notebooks, short
 from aerobat.errors import SpecError
 from aerobat.evaluation.passage import (
     PASSAGE_DEPTH,
@@ -19,14 +20,16 @@ from aerobat.evaluation.passage import (
 )
 from aerobat.kernels.running_metrics import RunningMetrics
 from aerobat.planning import Plan
-from aerobat.problem.problem import Problem
+from aerobat.problem import Problem, as_problem
 from aerobat.simulation.flight import Flight
-from aerobat.simulation.outcome import Outcome, length
-from aerobat.vehicle import Vehicle
+from aerobat.simulation.outcome import Outcome, counted, length
+from aerobat.vehicle import Vehicle, as_vehicle
 from aerobat.vehicle.fleet import Fleet
 
 
-@dataclass(frozen=True)
+@in_notebooks
+@by_value
+@dataclass(frozen=True, eq=False)
 class Score:
     """A flight in numbers."""
 
@@ -50,7 +53,9 @@ class Score:
         )
 
 
-@dataclass(frozen=True, eq=False)
+@short
+@by_value
+@dataclass(frozen=True, eq=False, repr=False)
 class Scores:
     """The scores of many flights: arrays with one entry a flight; `scores[k]` is one flight's Score."""
 
@@ -73,6 +78,7 @@ class Scores:
     def __len__(self) -> int:
         return len(self.stop)
 
+    @door
     def __getitem__(self, k: int) -> Score:
         """The score of one flight."""
         if not -len(self) <= k < len(self):
@@ -88,6 +94,11 @@ class Scores:
 
     def __iter__(self) -> Iterator[Score]:
         return (self[k] for k in range(len(self)))
+
+    def __str__(self) -> str:
+        """One line for people."""
+        error = f"position error {length(float(self.max_position_error_m.max()))} at most"
+        return f"{len(self)} flights: {counted(self.outcomes)}; {error}"
 
     @property
     def outcomes(self) -> tuple[Outcome, ...]:
@@ -151,7 +162,8 @@ def _instead(passage: Passage) -> tuple[Outcome, float, dict[str, object]]:
     return Outcome.EARLY, passage.planned, {"early": passage.min_distance}
 
 
-def score(flight: Flight, goal: Problem | Plan, vehicle: Vehicle | None = None) -> Score:
+@door
+def score(flight: Flight, goal: Problem | Plan | str, vehicle: Vehicle | str | None = None) -> Score:
     """Score one flight; with the vehicle, by default the plan's, its clearance in the gates too.
 
     Errors are against the set-points in the flight: position as a distance [m], attitude as the angle of
@@ -160,6 +172,7 @@ def score(flight: Flight, goal: Problem | Plan, vehicle: Vehicle | None = None) 
     """
     if flight.is_batch:
         raise SpecError("score takes one flight at a time; of a batch, score flight[k]")
+    goal = as_problem(goal) if isinstance(goal, str) else goal
     if vehicle is None and isinstance(goal, Plan):
         vehicle = goal.vehicle
     states = flight.states
@@ -167,7 +180,7 @@ def score(flight: Flight, goal: Problem | Plan, vehicle: Vehicle | None = None) 
     diverged = flight.outcome is not Outcome.COMPLETE
     stop = np.array([flight.ends if diverged else np.nan])
     parts = (states.position, states.velocity, states.q_world_body)
-    fleet = None if vehicle is None else Fleet.of([vehicle])
+    fleet = None if vehicle is None else Fleet.of([as_vehicle(vehicle)])
     planned = planned_passages(goal, flight.times, flight.setpoint.flat.position)
     ground = flight.environment.ground
     below = np.zeros(1, bool) if ground is None else states.position[:, 2] < ground

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from aerobat.arrays import Array
+from aerobat.declaration import door
 from aerobat.engines.components import components
 from aerobat.engines.pytree import tree_map
 from aerobat.environment import Environment
@@ -24,7 +25,7 @@ from aerobat.kernels import running_metrics
 from aerobat.kernels.ops import Ops
 from aerobat.kernels.running_metrics import GatePlane, MetricsInput, MetricsParameters, RunningMetrics
 from aerobat.planning import Plan
-from aerobat.problem.problem import Problem
+from aerobat.problem import Problem, as_problem
 from aerobat.simulation.loop import Signals
 from aerobat.simulation.outcome import DIVERGENCE_RADIUS
 from aerobat.simulation.reference_source import BLOCK
@@ -75,11 +76,12 @@ class MetricsSource:
         return MetricsInput(self.times[begin:end])
 
 
+@door
 def score_flights(
     plan: Plan | Trajectory,
-    vehicles: Vehicle | Sequence[Vehicle] | None = None,
+    vehicles: Vehicle | str | Sequence[Vehicle | str] | None = None,
     *,
-    problem: Problem | None = None,
+    problem: Problem | str | None = None,
     environment: Environment | None = None,
     config: FlightConfig = FlightConfig(),  # noqa: B008 - frozen
     **changes: Any,
@@ -88,8 +90,8 @@ def score_flights(
 
     Args:
         plan: what is flown; a bare trajectory needs vehicles and a problem.
-        vehicles: what flies it, by default the plan's.
-        problem: what is judged by, by default the plan's.
+        vehicles: what flies it, or their names, by default the plan's.
+        problem: what is judged by, or its name, by default the plan's.
         environment: where, by default the problem's.
         config: how.
         changes: fields of FlightConfig that replace those of `config`, as `seed=3`.
@@ -97,7 +99,7 @@ def score_flights(
     Raises SpecError for arguments that do not fit together, BackendMissing for an engine that is not
     installed.
     """
-    goal = problem if problem is not None else plan
+    goal = plan if problem is None else as_problem(problem)
     if isinstance(goal, Trajectory):
         raise SpecError("problem is missing: a trajectory says not what it is judged by")
     settings = replace(config, **changes)

@@ -14,7 +14,7 @@ from aerobat import so3
 from aerobat.arrays import Array
 from aerobat.control import Controller
 from aerobat.control.parameters import max_bandwidth
-from aerobat.declaration import unknown_name
+from aerobat.declaration import by_value, door, short, unknown_name
 from aerobat.engines.components import components, matrix_components
 from aerobat.engines.duals import Dual, DualOps, differentiated, dual
 from aerobat.engines.engine import Init, Step, first_row
@@ -23,6 +23,7 @@ from aerobat.engines.pytree import Tree, tree_leaves, tree_map
 from aerobat.environment import Environment
 from aerobat.errors import SpecError
 from aerobat.evaluation.score_flights import metrics_row, with_metrics
+from aerobat.flatness import Planned
 from aerobat.kernels.control_loops import Gains
 from aerobat.kernels.motors import Airframe
 from aerobat.kernels.ops import Ops, Scalar
@@ -30,7 +31,7 @@ from aerobat.kernels.rigid_body import Body
 from aerobat.kernels.vectors import dot, subtract
 from aerobat.simulation.loop import LoopInput, LoopParameters, compose
 from aerobat.simulation.noise import body_states
-from aerobat.simulation.setup import FlightConfig, FlightSetup, Flyable, prepare
+from aerobat.simulation.setup import FlightConfig, FlightSetup, prepare
 from aerobat.trajectory import Trajectory
 from aerobat.vehicle import Vehicle
 
@@ -55,7 +56,9 @@ _SHAPES: Mapping[str, tuple[int, ...]] = {
 }
 
 
-@dataclass(frozen=True, eq=False)
+@short
+@by_value
+@dataclass(frozen=True, eq=False, repr=False)
 class Gradient:
     """A number that a flight comes to, and its slopes in named quantities.
 
@@ -66,6 +69,7 @@ class Gradient:
     slopes: Mapping[str, Array]  # by the quantity's name, (..., *its shape), in its unit
 
 
+@by_value
 @dataclass(frozen=True, eq=False)
 class Sensitivity:
     """The errors of a flight against its set-points, and how they change."""
@@ -85,10 +89,11 @@ class _Sums(NamedTuple):
     flying: Scalar
 
 
+@door
 def sensitivity(
-    plan: Flyable | Trajectory,
+    plan: Planned | Trajectory,
     of: str | Sequence[str],
-    vehicle: Vehicle | Sequence[Vehicle] | None = None,
+    vehicle: Vehicle | str | Sequence[Vehicle | str] | None = None,
     *,
     environment: Environment | None = None,
     config: FlightConfig = FlightConfig(),  # noqa: B008 - frozen
@@ -102,7 +107,7 @@ def sensitivity(
             "mass", "inertia", "drag_body"; of each of its rotors "rotors.position_body", "rotors.min_thrust",
             "rotors.max_thrust", "rotors.torque_coefficient", "rotors.lag"; "start.position",
             "start.velocity", "start.attitude" (a rotation [rad] about body axes), "start.omega_body".
-        vehicle: what flies it, by default the plan's.
+        vehicle: what flies it, or its name, by default the plan's.
         environment: where, by default the problem's.
         config: how.
         changes: fields of FlightConfig that replace those of `config`.

@@ -1,5 +1,6 @@
 """Differential flatness: what a vehicle must do to fly a trajectory, inverted or not."""
 
+from aerobat.flatness.flyable import Flyable, Planned, environment_of, vehicle_of
 from aerobat.flatness.parallel_transport import TimeInterval
 from aerobat.flatness.references import (
     Reference,
@@ -11,11 +12,15 @@ from aerobat.flatness.references import (
 )
 
 __all__ = [
+    "Flyable",
+    "Planned",
     "Reference",
     "TimeInterval",
     "axial_drag",
+    "environment_of",
     "force_balance",
     "lateral_drag",
     "reference",
     "reference_of",
+    "vehicle_of",
 ]

@@ -14,13 +14,15 @@ from numpy.typing import ArrayLike, NDArray
 
 from aerobat import so3
 from aerobat.arrays import Array, frozen
+from aerobat.declaration import Angle, Positive, by_value, door, short
 from aerobat.environment import Environment
 from aerobat.errors import SpecError
+from aerobat.flatness.flyable import Planned, environment_of, vehicle_of
 from aerobat.flatness.parallel_transport import Frames, TimeInterval, frames
 from aerobat.kernels import flatness as kernel
 from aerobat.problem.condition import ForceBalance
 from aerobat.states import FlatState, Setpoint, Wrench
-from aerobat.trajectory import Trajectory
+from aerobat.trajectory import Trajectory, as_trajectory
 from aerobat.vehicle import Vehicle
 from aerobat.vehicle.allocation import rotor_thrusts
 
@@ -29,7 +31,9 @@ PARTS = 16  # of a segment whose thrust is of a higher one: quintics err by the 
 UNDETERMINED = 1e-3  # the attitude is undetermined where |f| is below this fraction of gravity
 
 
-@dataclass(frozen=True, eq=False)
+@short
+@by_value
+@dataclass(frozen=True, eq=False, repr=False)
 class Reference:
     """All that a vehicle must do to follow a trajectory, at every time of a series."""
 
@@ -39,11 +43,12 @@ class Reference:
     undetermined: tuple[TimeInterval, ...]  # where |f| is next to nothing, between samples too
 
 
+@door
 def reference(
-    trajectory: Trajectory,
-    vehicle: Vehicle,
+    trajectory: Trajectory | Planned,
+    vehicle: Vehicle | str | None = None,
     times: ArrayLike | None = None,
-    rate: float | None = None,
+    rate: Positive | None = None,
     environment: Environment | None = None,
 ) -> Reference:
     """Derive from `trajectory` what `vehicle` must do, at `times`, or at `rate` and the very end.
@@ -53,15 +58,17 @@ def reference(
     on the times. Raises SpecError unless one of times and rate is given, rising and in the trajectory.
 
     Args:
-        trajectory: The path and its heading.
-        vehicle: What flies it; its limits do not matter here.
+        trajectory: The path and its heading, or a plan.
+        vehicle: What flies it, or its name, by default the plan's; its limits do not matter here.
         times: When [s], (T,), none before the last.
         rate: Samples a second [1/s], instead of times.
-        environment: Gravity and wind, by default those of a calm day on Earth.
+        environment: Gravity and wind, by default the plan's, of a trajectory those of a calm day on Earth.
     """
     if (times is None) == (rate is None):
         raise SpecError("reference needs either times or a rate, not both")
-    environment = environment or Environment()
+    vehicle = vehicle_of(trajectory, vehicle)
+    environment = environment_of(trajectory, environment)
+    trajectory = as_trajectory(trajectory)
     times = _rising(trajectory.sample(rate) if rate is not None else times)
     flat = trajectory.flat(times)
     # both sides of every knot join the times, which show the later side, and what quintics need between
@@ -79,12 +86,13 @@ def reference(
     return _assembled(times, flat, path, at, vehicle, environment)
 
 
+@door
 def reference_of(
     times: ArrayLike,
     flat: FlatState,
     vehicle: Vehicle,
     environment: Environment | None = None,
-    heading: float = 0.0,
+    heading: Angle = 0.0,
 ) -> Reference:
     """Derive from a series of flat states what `vehicle` must do; as `reference` otherwise.
 

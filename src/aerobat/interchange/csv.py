@@ -10,15 +10,15 @@ the first twelve columns, as the reference code does, reads both.
 from __future__ import annotations
 
 import math
-import os
 from pathlib import Path
 
 import numpy as np
 
 from aerobat.arrays import Array
+from aerobat.declaration import PathName, Positive, door
 from aerobat.errors import SpecError
 from aerobat.storage import read_whole, write_whole
-from aerobat.trajectory import Trajectory
+from aerobat.trajectory import Carrier, Trajectory, as_trajectory
 from aerobat.trajectory.polynomial import hermite
 
 CSV_COLUMNS = 12
@@ -26,12 +26,14 @@ MAX_CSV = 2**28  # bytes: some hours at 100 Hz
 SAME_TIME = 1e-12  # [s], a step this near to a period is one
 
 
-def write_csv(trajectory: Trajectory, path: str | os.PathLike[str], rate: float = 100.0) -> None:
+@door
+def write_csv(trajectory: Trajectory | Carrier, path: PathName, rate: Positive = 100.0) -> None:
     """Write rows of p, v, a, j at `rate` [1/s] and at the very end, digits enough to read them back exactly.
 
     At a knot the row shows the later segment. The file appears whole or not at all. Raises SpecError for a
     rate that is not positive, and where the file cannot be written.
     """
+    trajectory = as_trajectory(trajectory)
     times = trajectory.sample(rate)
     rows = np.concatenate([trajectory.evaluate(times, k) for k in range(4)], axis=1)
     if abs(times[-1] - (len(times) - 1) / rate) > SAME_TIME:
@@ -39,14 +41,13 @@ def write_csv(trajectory: Trajectory, path: str | os.PathLike[str], rate: float 
     write_whole(path, "".join(",".join(map(repr, row)) + "\n" for row in rows.tolist()))
 
 
-def read_csv(path: str | os.PathLike[str], rate: float = 100.0) -> Trajectory:
+@door
+def read_csv(path: PathName, rate: Positive = 100.0) -> Trajectory:
     """The trajectory of degree 7 through p, v, a, j of all rows, `rate` [1/s] apart unless times are given.
 
     Between rows it differs from what was written by the error of that interpolation. Raises SpecError, naming
     the line, for rows that are not 12 or 13 finite numbers, all as many, with rising times from 0.
     """
-    if not (math.isfinite(rate) and rate > 0):
-        raise SpecError(f"rate must be a positive number of rows a second, got {rate!r}")
     rows = _parse(Path(path))
     times = rows[:, CSV_COLUMNS] if rows.shape[1] > CSV_COLUMNS else np.arange(len(rows)) / rate
     steps = np.diff(times)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from aerobat.declaration import PathName, Positive, door
 from aerobat.errors import SpecError
 from aerobat.interchange.csv import read_csv
 from aerobat.planning import Plan, load_plan
@@ -12,7 +13,8 @@ from aerobat.trajectory import Trajectory, load_trajectory
 PATTERNS = ("*.plan", "plan.npz", "plan.csv")  # of what a folder may hold, the first that is there counts
 
 
-def read_plan(path: str | Path, rate: float = 100.0) -> Plan | Trajectory:
+@door
+def read_plan(path: PathName, rate: Positive = 100.0) -> Plan | Trajectory:
     """Read a .plan file as a plan, or the bare trajectory in an .npz or CSV file with `rate` [1/s] rows.
 
     Of a folder, the plan that a run has left there is read. Raises SpecError, one sentence, when there is
@@ -26,7 +28,8 @@ def read_plan(path: str | Path, rate: float = 100.0) -> Plan | Trajectory:
     return load_trajectory(path) if path.suffix == ".npz" else read_csv(path, rate)
 
 
-def read_trajectory(path: str | Path, rate: float = 100.0) -> Trajectory:
+@door
+def read_trajectory(path: PathName, rate: Positive = 100.0) -> Trajectory:
     """Read the trajectory alone of whatever `read_plan` reads. Raises SpecError as it does."""
     found = read_plan(path, rate)
     return found.trajectory if isinstance(found, Plan) else found

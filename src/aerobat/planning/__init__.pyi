@@ -5,6 +5,7 @@ from .plan_file import load_plan
 from .planners import (
     Planner,
     PlannerOption,
+    as_planner,
     option,
     plan,
     planner,
@@ -39,6 +40,7 @@ __all__ = [
     "Solution",
     "TimeOptimal",
     "TimeScaling",
+    "as_planner",
     "certified_solve",
     "flight_error",
     "load_plan",

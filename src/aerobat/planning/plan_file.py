@@ -11,13 +11,12 @@ from __future__ import annotations
 import json
 from dataclasses import dataclass, fields
 from importlib.metadata import version
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from aerobat.certification import Certificate
-from aerobat.declaration import from_table, to_table
+from aerobat.declaration import PathName, door, from_table, to_table
 from aerobat.errors import SpecError
 from aerobat.planning.recorder import Attempt
 from aerobat.planning.result import Flyability, PlacedStage, Plan
@@ -49,7 +48,7 @@ class _Evidence:
     starts: tuple[float, ...] = ()
 
 
-def save_plan(plan: Plan, path: str | Path) -> None:
+def save_plan(plan: Plan, path: PathName) -> None:
     """Write a plan with its problem, vehicle and certificate, whole or not at all.
 
     Raises SpecError when the file cannot be written, or for a maneuver that is not registered.
@@ -72,7 +71,8 @@ def save_plan(plan: Plan, path: str | Path) -> None:
         )
 
 
-def load_plan(path: str | Path) -> Plan:
+@door
+def load_plan(path: PathName) -> Plan:
     """Read what `Plan.save` wrote, exactly. Raises SpecError, one sentence, for any other file."""
     content = read_arrays(path, "plan")
     found = format_of(content)

@@ -10,18 +10,19 @@ import dataclasses
 from abc import abstractmethod
 from collections.abc import Callable, Mapping
 from dataclasses import MISSING, dataclass, field, fields
-from types import MappingProxyType
+from types import MappingProxyType, ModuleType
 from typing import Any, Protocol, TypeVar, cast, dataclass_transform, get_type_hints, runtime_checkable
 
 from pydantic import Field
 
-from aerobat.declaration import Registry
+from aerobat.declaration import Label, Registry, door, shown
+from aerobat.errors import SpecError
 from aerobat.planning.certified_solve import with_certificate
 from aerobat.planning.flyability import with_flyability
 from aerobat.planning.recorder import Progress
 from aerobat.planning.result import Plan
-from aerobat.problem.problem import Problem
-from aerobat.vehicle import Vehicle
+from aerobat.problem import Problem, as_problem
+from aerobat.vehicle import Vehicle, as_vehicle, vehicle_names
 
 
 @runtime_checkable
@@ -53,10 +54,11 @@ PLANNERS: Registry[Planner] = Registry(
 )
 
 
+@door
 def plan(
-    problem: Problem,
+    problem: Problem | str,
     planner: Planner | str = "miqp",
-    vehicle: Vehicle | None = None,
+    vehicle: Vehicle | str | None = None,
     progress: Progress | None = None,
 ) -> Plan:
     """Plan a problem; with a vehicle, for its rotors, with its certificate and its own simulated flight.
@@ -65,21 +67,37 @@ def plan(
     SpecError for input that makes no sense.
 
     Args:
-        problem: What is planned.
+        problem: What is planned, or its name.
         planner: How to plan, say `Miqp(order=5)`, or a registered name, whose defaults are taken.
-        vehicle: What shall fly it, within its rotors' limits; without one the plan knows no limits but the
-            problem's.
+        vehicle: What shall fly it, or its name, within its rotors' limits; without one the plan knows no
+            limits but the problem's.
         progress: Called with every attempt as it ends.
     """
+    problem = as_problem(problem)
+    vehicle = None if vehicle is None else as_vehicle(vehicle)
     if vehicle is not None:
         vehicle.require_hover(problem.environment.gravity)
-    chosen = planner_class(planner)() if isinstance(planner, str) else planner
-    found = chosen.plan(problem, vehicle, progress)
+    found = as_planner(planner).plan(problem, vehicle, progress)
     if vehicle is None:
         return found
     return with_flyability(found if found.certificate is not None else with_certificate(found, vehicle))
 
 
+def as_planner(planner: Planner | str) -> Planner:
+    """The planner, of itself or of its registered name, with its defaults.
+
+    Raises SpecError for a name that no planner has, and for what only looks like a planner.
+    """
+    if isinstance(planner, str):
+        if planner in vehicle_names():
+            raise SpecError(f"{planner!r} is a vehicle, not a planner; give vehicle={planner!r}")
+        return planner_class(planner)()
+    if isinstance(planner, type | ModuleType):
+        raise SpecError(f"planner must be a Planner or a name, got {shown(planner)}; make one, as Miqp()")
+    return planner
+
+
+@door
 def option(default: Any, help: str, off: str | None = None, command_default: Any = None) -> Any:
     """A dataclass field with its help, which the command line offers as an option.
 
@@ -93,11 +111,14 @@ def option(default: Any, help: str, off: str | None = None, command_default: Any
     return field(default=default, metadata=metadata)
 
 
+@door
 @dataclass_transform(frozen_default=True, field_specifiers=(dataclasses.field, Field))
-def planner(name: str) -> Callable[[type[P]], type[P]]:
+def planner(name: Label) -> Callable[[type[P]], type[P]]:
     """Declare the class that follows and register it: by `name`, `plan` and the command line know it."""
 
     def register(cls: type[P]) -> type[P]:
+        if "plan" in vars(cls):
+            cls.plan = door(cls.plan)  # type: ignore[method-assign]
         return cast(type[P], PLANNERS.add(name, cls))
 
     return register

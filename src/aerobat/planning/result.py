@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from pathlib import Path
 
 from aerobat.certification import Certificate
+from aerobat.declaration import PathName, by_value, door, in_notebooks, short
 from aerobat.planning.recorder import Attempt
 from aerobat.planning.rotor_margin import RotorMargin
 from aerobat.problem.problem import Problem
@@ -61,7 +61,11 @@ class Flyability:
         )
 
 
-@dataclass(frozen=True)
+@door
+@in_notebooks
+@short
+@by_value
+@dataclass(frozen=True, eq=False, repr=False)
 class Plan:
     """A trajectory that solves a problem, and the evidence for it."""
 
@@ -123,7 +127,8 @@ class Plan:
         """Time in the solver over all attempts [s]."""
         return sum(attempt.solve_time for attempt in self.attempts)
 
-    def save(self, path: str | Path) -> None:
+    @door
+    def save(self, path: PathName) -> None:
         """Write the whole plan as one file, whole or not at all; `load_plan` reads it back.
 
         Raises SpecError when the file cannot be written.

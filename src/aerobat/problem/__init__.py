@@ -1,7 +1,7 @@
 """What is wanted: gates, maneuvers as lists of stages, problems. No optimization happens here."""
 
 from aerobat.problem.condition import Attitude, Condition, ForceBalance, LinearBound, Quantity
-from aerobat.problem.files import load_problem, problem_names, write_problem
+from aerobat.problem.files import as_problem, load_problem, problem_names, write_problem
 from aerobat.problem.gate import Gate, tilted_gate
 from aerobat.problem.maneuvers import (
     CustomManeuver,
@@ -39,6 +39,7 @@ __all__ = [
     "StageSequence",
     "Waypoint",
     "Waypoints",
+    "as_problem",
     "at_rest",
     "load_problem",
     "maneuver",

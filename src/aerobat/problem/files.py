@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 from importlib.resources import files
-from pathlib import Path
 
-from aerobat.declaration import to_table
+from aerobat.declaration import PathName, door, to_table
 from aerobat.documents import document_names, read_document, resolve_document, write_document
 from aerobat.problem.problem import Problem
 
@@ -17,7 +16,8 @@ def problem_names() -> tuple[str, ...]:
     return document_names(PRESETS)
 
 
-def load_problem(name: str | Path) -> Problem:
+@door
+def load_problem(name: PathName) -> Problem:
     """Return a built-in problem by its name, or the one in a TOML file.
 
     Raises SpecError, in one sentence that names the field, when there is no such problem or it is malformed.
@@ -25,6 +25,12 @@ def load_problem(name: str | Path) -> Problem:
     return read_document(resolve_document(name, PRESETS, "problem"), Problem, "problem")
 
 
-def write_problem(problem: Problem, path: str | Path) -> None:
+def as_problem(problem: Problem | str) -> Problem:
+    """The problem, of itself or of what `load_problem` takes. Raises SpecError as that does."""
+    return load_problem(problem) if isinstance(problem, str) else problem
+
+
+@door
+def write_problem(problem: Problem | str, path: PathName) -> None:
     """Write a problem as TOML, whole or not at all. Raises SpecError when the file cannot be written."""
-    write_document(path, to_table(problem), "problem")
+    write_document(path, to_table(as_problem(problem)), "problem")

@@ -6,19 +6,22 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property
 from math import degrees, radians
-from typing import Any, ClassVar
+from typing import Any, ClassVar, cast
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from aerobat import so3
 from aerobat.arrays import Array
 from aerobat.declaration import (
+    Angle,
     FieldError,
     Label,
     Positive,
     UnitVector,
     Vector3,
     declared,
+    door,
     from_table,
     number,
     unit,
@@ -110,21 +113,23 @@ class Gate:
         upright = tilted_gate(self.position, heading, elevation)
         return heading, elevation, float(np.arctan2(-self.up @ upright.lateral, self.up @ upright.up))
 
-    def tilted(self, tilt: float) -> Gate:
+    @door
+    def tilted(self, tilt: Angle) -> Gate:
         """The same gate with another tilt [rad]."""
         heading, elevation, _ = self.angles
         normal, up = _directions(heading, elevation, tilt)
         return replace(self, normal=normal, up=up)
 
 
+@door
 def tilted_gate(
-    position: Array,
-    heading: float = 0.0,
-    elevation: float = 0.0,
-    tilt: float = 0.0,
-    width: float = 1.0,
-    height: float = 0.6,
-    name: str = "gate",
+    position: ArrayLike,
+    heading: Angle = 0.0,
+    elevation: Angle = 0.0,
+    tilt: Angle = 0.0,
+    width: Positive = 1.0,
+    height: Positive = 0.6,
+    name: Label = "gate",
 ) -> Gate:
     """Return the gate whose attitude is given by angles.
 
@@ -142,8 +147,8 @@ def tilted_gate(
     Raises:
         SpecError: a number is not finite, or a side not positive.
     """
-    normal, up = _directions(number(heading, "heading"), number(elevation, "elevation"), number(tilt, "tilt"))
-    return Gate(position, normal, up, width, height, name)
+    normal, up = _directions(heading, elevation, tilt)
+    return Gate(cast(Array, position), normal, up, width, height, name)
 
 
 def at_centre(gate: Gate) -> tuple[Condition, ...]:

@@ -14,12 +14,17 @@ from pydantic import AfterValidator, PlainValidator
 
 from aerobat.arrays import Array
 from aerobat.declaration import (
+    Angle,
     Corner,
+    Count,
+    Derivative,
     FieldError,
     Label,
     PerAxis,
+    Positive,
     Vector3,
     declared,
+    door,
     from_table,
     number,
     to_table,
@@ -45,7 +50,8 @@ class EndState:
     velocity: Vector3 = field(default_factory=lambda: np.zeros(3))  # [m/s] world
     acceleration: Vector3 = field(default_factory=lambda: np.zeros(3))  # [m/s²] world
 
-    def derivatives(self, order: int) -> Array:
+    @door
+    def derivatives(self, order: Count) -> Array:
         """Position and its derivatives below `order`, (order, 3)."""
         known = [self.position, self.velocity, self.acceleration]
         return np.array([known[k] if k < len(known) else np.zeros(3) for k in range(order)])
@@ -75,14 +81,16 @@ class Limits:
         if not (self.lower < self.upper).all():
             raise FieldError("lower", "must be below upper on every axis")
 
-    def of(self, derivative: int) -> tuple[Array, Array]:
+    @door
+    def of(self, derivative: Derivative) -> tuple[Array, Array]:
         """The lower and upper bounds of a derivative of position, each (3,)."""
         if derivative == 0:
             return self.lower, self.upper
         bound = np.asarray(getattr(self, DERIVATIVES[derivative]))
         return -bound, bound
 
-    def without(self, derivative: int) -> Limits:
+    @door
+    def without(self, derivative: Derivative) -> Limits:
         """The same limits with those on one derivative taken away."""
         if derivative == 0:
             return replace(self, lower=np.full(3, -np.inf), upper=np.full(3, np.inf))
@@ -124,7 +132,7 @@ class Problem:
     maneuver: Annotated[Maneuver, PlainValidator(MANEUVERS.read)] = Line()  # what happens on the way
     gates: tuple[Gate, ...] = ()  # openings to pass
     limits: Limits = field(default_factory=Limits)  # bounds on the path
-    heading: float = 0.0  # [rad] about the thrust axis at the start, carried along without spin
+    heading: Angle = 0.0  # [rad] about the thrust axis at the start, carried along without spin
     environment: Environment = field(default_factory=Environment)  # where it is flown
     description: str = ""  # what it is, for people
 
@@ -194,6 +202,14 @@ class Problem:
                     f"{condition.upper:g}; change either",
                 )
 
+    def __str__(self) -> str:
+        """One line for people."""
+        ends = (f"({x:g}, {y:g}, {z:g})" for x, y, z in (self.start.position, self.goal.position))
+        through = ", ".join(f"'{gate.name}'" for gate in self.gates)
+        gates = f" through {through}" if through else ""
+        facts = f"{self.name}: {self.maneuver.kind} from {' to '.join(ends)} m{gates}"
+        return "; ".join(filter(None, (facts, " ".join(self.description.split()))))
+
     def _check_point(self, name: str, value: Array, derivative: int) -> None:
         lower, upper = self.path_limits.of(derivative)
         for axis, x, low, high in zip("xyz", value, lower, upper, strict=True):
@@ -213,7 +229,8 @@ class Problem:
             return self.limits
         return replace(self.limits, lower=np.maximum(self.limits.lower, [-np.inf, -np.inf, ground]))
 
-    def stages(self, max_specific_thrust: float) -> StageSequence:
+    @door
+    def stages(self, max_specific_thrust: Positive) -> StageSequence:
         """The maneuver's stages through the problem's gates, for a vehicle that has so much thrust [m/s²].
 
         All that a stage asks is among its conditions, its gate's centre and its attitude too.
@@ -223,6 +240,7 @@ class Problem:
         stages = (s.explicit(None if s.gate is None else self.gate(s.gate)) for s in sequence.stages)
         return replace(sequence, stages=tuple(stages))
 
+    @door
     def gate(self, name: str) -> Gate:
         """The gate of that name. Raises SpecError when there is none."""
         return named_gate(self.gates, name)
@@ -232,6 +250,7 @@ class Problem:
         return replace(self, maneuver=self.maneuver.as_in_paper(), limits=PAPER_LIMITS)
 
 
+@door
 def at_rest(position: ArrayLike) -> EndState:
     """At rest at `position` [m], (3,)."""
     return EndState(cast(Array, position))

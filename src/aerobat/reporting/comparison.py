@@ -11,6 +11,7 @@ import numpy as np
 from rich.table import Table
 from rich.text import Text
 
+from aerobat.declaration import door
 from aerobat.planning import Plan
 from aerobat.reporting.page import (
     AXIS,
@@ -91,6 +92,7 @@ def comparison_table(comparison: Comparison) -> Table:
     return table
 
 
+@door
 def comparison_figure(comparison: Comparison) -> Figure:
     """One page: all paths in one picture, then each planner's rotor thrusts on a common time axis.
 

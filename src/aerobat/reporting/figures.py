@@ -6,6 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from aerobat.declaration import door
+from aerobat.errors import SpecError
 from aerobat.evaluation.score import Score
 from aerobat.planning import Plan
 from aerobat.reporting.captions import error_caption, plan_caption, score_caption
@@ -15,7 +17,7 @@ from aerobat.reporting.panels.path import draw_path
 from aerobat.reporting.panels.poses import PoseHistory, actual_poses, plan_reference, reference_poses
 from aerobat.reporting.panels.stages import draw_stages
 from aerobat.simulation import Flight
-from aerobat.vehicle import Vehicle, load_vehicle
+from aerobat.vehicle import Vehicle, as_vehicle
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -65,13 +67,26 @@ TIMELINES_BELOW = FlightLayout(
 )
 
 
-def draw(flight: Flight, plan: Plan | None = None, vehicle: Vehicle | None = None) -> Figure:
+@door
+def draw(flight: Flight | Plan, plan: Plan | None = None, vehicle: Vehicle | str | None = None) -> Figure:
     """Draw a page on a flight, or a batch: path and attitude, errors, rotor thrusts.
 
-    With the plan, its gates and stages too. The vehicle may be left out where it is a preset. Raises
-    SpecError where it is not.
+    With the plan, its gates and stages too. Of a plan alone, its path, stages and thrusts.
+
+    Args:
+        flight: What is drawn.
+        plan: What was flown.
+        vehicle: What flew, or its name; by default the plan's, or the preset of the flight's name.
+
+    Raises SpecError where the vehicle is not known.
     """
-    vehicle = load_vehicle(flight.vehicles[0]) if vehicle is None else vehicle
+    if vehicle is None and isinstance(own := plan or flight, Plan):
+        vehicle = own.vehicle
+    if isinstance(flight, Plan):
+        if vehicle is None:
+            raise SpecError("vehicle is missing: a plan without one says not what to draw; give vehicle=...")
+        return report_figure(flight, as_vehicle(vehicle))
+    vehicle = as_vehicle(flight.vehicles[0] if vehicle is None else vehicle)
     actual = actual_poses(flight)
     reference = reference_poses(flight if plan is None else plan_reference(plan, vehicle))
     layout = TIMELINES_BELOW if reference.is_flat else TIMELINES_BESIDE

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from itertools import groupby
 from math import isinf, isnan
 
@@ -27,12 +27,20 @@ def summary_table(plan: Plan, score: Score | None, vehicle: str, controller: str
         vehicle: the name of what flew it.
         controller: the name of the controller that did.
     """
-    table = Table(title=f"{plan.problem.name} · {vehicle}", title_justify="left", show_header=False, box=None)
+    facts = {"plan": plan_facts(plan)}
+    if score is not None:
+        facts["flight"] = flight_facts(score, controller)
+    return facts_table(f"{plan.problem.name} · {vehicle}", facts)
+
+
+def facts_table(title: str, facts: Mapping[str, Iterable[tuple[str, str]]]) -> Table:
+    """Facts, one a row, under their headings."""
+    table = Table(title=title or None, title_justify="left", show_header=False, box=None)
     table.add_column(style="bold", no_wrap=True)
     table.add_column(no_wrap=True)
     table.add_column()
-    for heading, facts in (("plan", _plan_facts(plan)), ("flight", _flight_facts(score, controller))):
-        for i, (name, fact) in enumerate(facts):
+    for heading, rows in facts.items():
+        for i, (name, fact) in enumerate(rows):
             table.add_row(heading if i == 0 else "", name, fact)
     return table
 
@@ -113,7 +121,8 @@ def _finding_row(finding: Finding) -> tuple[str, ...]:
     )
 
 
-def _plan_facts(plan: Plan) -> Iterable[tuple[str, str]]:
+def plan_facts(plan: Plan) -> Iterable[tuple[str, str]]:
+    """Facts of a plan, each with its name."""
     order = "" if plan.order is None else f", order {plan.order}"
     backend = f", {plan.backend}" if plan.backend else ""
     pieces = "1 interval" if plan.intervals == 1 else f"{plan.intervals} intervals"
@@ -146,9 +155,8 @@ def _optimality(plan: Plan) -> str:
     return f"within {100 * plan.gap:.2g} % of the optimum"
 
 
-def _flight_facts(score: Score | None, controller: str | None) -> Iterable[tuple[str, str]]:
-    if score is None:
-        return
+def flight_facts(score: Score, controller: str | None = None) -> Iterable[tuple[str, str]]:
+    """Facts of a flight, each with its name."""
     yield "outcome", score.sentence
     if controller is not None:
         yield "controller", controller

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from aerobat.declaration import door
 from aerobat.errors import SpecError
 from aerobat.evaluation.score import score
 from aerobat.flatness import Reference, reference
@@ -24,7 +25,7 @@ from aerobat.reporting.panels.signals import (
     shade,
 )
 from aerobat.simulation import Flight
-from aerobat.vehicle import Vehicle
+from aerobat.vehicle import Vehicle, as_vehicle
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -99,7 +100,8 @@ class TrackingPage:
         return [panel(self.figure, left, y, width, pitch - GAP) for y in bottoms]
 
 
-def tracking_figure(plan: Plan, vehicle: Vehicle, flight: Flight) -> Figure:
+@door
+def tracking_figure(plan: Plan, vehicle: Vehicle | str, flight: Flight) -> Figure:
     """Draw a page on what a plan asks and what its flight gave (paper, Figs. 8, 9 and 10).
 
     The path with the vehicle's attitude; positions and velocities; tracking errors; collective thrust,
@@ -110,6 +112,7 @@ def tracking_figure(plan: Plan, vehicle: Vehicle, flight: Flight) -> Figure:
     """
     if flight.is_batch:
         raise SpecError("tracking_figure draws one flight; of a batch, give flight[k]")
+    vehicle = as_vehicle(vehicle)
     asked = reference(plan.trajectory, vehicle, rate=TRACKING_RATE, environment=plan.problem.environment)
     rotors = None if plan.margin is None else f"rotors asked for {plan.margin}"
     proof = rotors if plan.certificate is None else plan.certificate.why

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
@@ -14,9 +13,10 @@ from numpy.typing import NDArray
 
 from aerobat import so3
 from aerobat.arrays import Array, frozen
+from aerobat.declaration import PathName, by_value, door, in_notebooks, short
 from aerobat.environment import Environment
 from aerobat.errors import SpecError
-from aerobat.simulation.outcome import Outcome
+from aerobat.simulation.outcome import Outcome, counted
 from aerobat.states import BodyState, FlatState, Setpoint, Wrench
 from aerobat.storage import format_of, read_arrays, whole_file
 
@@ -60,7 +60,11 @@ SERIES = (
 )
 
 
-@dataclass(frozen=True, eq=False)
+@door
+@in_notebooks
+@short
+@by_value
+@dataclass(frozen=True, eq=False, repr=False)
 class Flight:
     """One flight, or a batch of them: then the vehicles' series carry a leading axis of vehicles.
 
@@ -83,6 +87,9 @@ class Flight:
         times = frozen(self.times, "times", (None,))
         if times.ndim != 1 or (np.diff(times) <= 0).any():
             raise SpecError("times must be one list of rising numbers of seconds")
+        missing = [one.name for one in SERIES if one.name not in self.series]
+        if missing:
+            raise SpecError(f"a flight needs the series {missing[0]!r}; its names are those of SERIES")
         many, rotors = np.shape(self.series["ends"]), np.shape(self.series["max_thrusts"])[-1:]
         alike = len(self.vehicles) == len(self.outcomes) == len(self.sentences)
         if not rotors or not alike or many not in ((), (len(self.vehicles),)):
@@ -121,6 +128,13 @@ class Flight:
         """The angle between actual and reference attitude [rad], (..., T)."""
         return so3.angle_between(self.series["q_world_body"], self.series["setpoint_q_world_body"])
 
+    def __str__(self) -> str:
+        """One line for people."""
+        about = f"{self.times[-1]:.3f} s in {len(self.times)} rows by the engine {self.engine}"
+        if not self.is_batch:
+            return f"{self.vehicles[0]}: {self.sentences[0]}; {about}"
+        return f"{len(self.outcomes)} flights: {counted(self.outcomes)}; {about}"
+
     @property
     def is_batch(self) -> bool:
         """True for a batch, false for one flight."""
@@ -133,6 +147,7 @@ class Flight:
             raise SpecError("outcome is asked of one flight; of a batch, ask flight[k].outcome or outcomes")
         return self.outcomes[0]
 
+    @door
     def __getitem__(self, vehicle: int) -> Flight:
         """The flight of one vehicle of a batch, as if it had flown alone. Raises SpecError for one flight."""
         if not self.is_batch:
@@ -152,7 +167,8 @@ class Flight:
             environment=self.environment,
         )
 
-    def save(self, path: str | Path) -> None:
+    @door
+    def save(self, path: PathName) -> None:
         """Write the flight as a NumPy .npz file, whole or not at all.
 
         Its arrays: times; each of SERIES; the text vehicles, outcomes, sentences, engine; gravity, wind and
@@ -168,7 +184,8 @@ class Flight:
             np.savez(file, format=_FORMAT, **arrays)
 
 
-def load_flight(path: str | Path) -> Flight:
+@door
+def load_flight(path: PathName) -> Flight:
     """Read a flight that `Flight.save` wrote. Raises SpecError, one sentence, for any other file."""
     content = read_arrays(path, "flight")
     try:

@@ -10,23 +10,26 @@ import numpy as np
 from numpy.typing import NDArray
 
 from aerobat.arrays import Array
+from aerobat.declaration import door
 from aerobat.engines import logged_ticks
 from aerobat.engines.components import from_components
 from aerobat.engines.pytree import tree_map, tree_stack
 from aerobat.environment import Environment
+from aerobat.flatness import Planned
 from aerobat.simulation.components import LogRow
 from aerobat.simulation.flight import SERIES, Flight, setpoint_rows, setpoint_series
 from aerobat.simulation.noise import body_states
 from aerobat.simulation.outcome import DIVERGENCE_RADIUS, Outcome, length
-from aerobat.simulation.setup import FlightConfig, FlightSetup, Flyable, prepare
+from aerobat.simulation.setup import FlightConfig, FlightSetup, prepare
 from aerobat.states import Setpoint
 from aerobat.trajectory import Trajectory
 from aerobat.vehicle import Vehicle
 
 
+@door
 def fly(
-    plan: Flyable | Trajectory,
-    vehicle: Vehicle | Sequence[Vehicle] | None = None,
+    plan: Planned | Trajectory,
+    vehicle: Vehicle | str | Sequence[Vehicle | str] | None = None,
     *,
     environment: Environment | None = None,
     config: FlightConfig = FlightConfig(),  # noqa: B008 - frozen
@@ -40,7 +43,7 @@ def fly(
 
     Args:
         plan: what is flown; a bare trajectory needs a vehicle.
-        vehicle: what flies it, by default the plan's.
+        vehicle: what flies it, or its name, by default the plan's.
         environment: where, by default the problem's; for a bare trajectory a calm day on Earth.
         config: how.
         changes: fields of FlightConfig that replace those of `config`, as `seed=3`.

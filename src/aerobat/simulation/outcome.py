@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections import Counter
+from collections.abc import Iterable
 from enum import Enum
 
 DIVERGENCE_RADIUS = 5.0  # [m] of position error: no controller is expected back from there
@@ -10,6 +12,12 @@ DIVERGENCE_RADIUS = 5.0  # [m] of position error: no controller is expected back
 def length(metres: float) -> str:
     """A length with the unit that suits it."""
     return f"{metres:.2f} m" if metres >= 1.0 else f"{100 * metres:.2f} cm"
+
+
+def counted(outcomes: Iterable[Outcome]) -> str:
+    """Counts of the ends of flights, the most frequent first."""
+    counts = Counter(outcome.name.lower().replace("_", " ") for outcome in outcomes)
+    return ", ".join(f"{count} {name}" for name, count in counts.most_common())
 
 
 class Outcome(Enum):

@@ -15,13 +15,13 @@ from aerobat import so3
 from aerobat.arrays import Array, frozen
 from aerobat.control import Controller
 from aerobat.control.parameters import airframe_parameters, controller_parameters, environment_parameters
-from aerobat.declaration import AS_IT_IS, FieldError, Positive, declared, shown
+from aerobat.declaration import AS_IT_IS, FieldError, Positive, declared, door, shown
 from aerobat.engines import CompiledLoop, Engine, choose
 from aerobat.engines.engine import first_row
 from aerobat.engines.pytree import Tree, tree_map
 from aerobat.environment import Environment
 from aerobat.errors import SpecError
-from aerobat.flatness import lateral_drag
+from aerobat.flatness import Planned, environment_of, lateral_drag, vehicle_of
 from aerobat.kernels.rigid_body import Body
 from aerobat.simulation.components import (
     PlantParameters,
@@ -34,8 +34,8 @@ from aerobat.simulation.loop import Component, Log, LoopInput, LoopParameters, c
 from aerobat.simulation.noise import NoiseSource, StateNoise, bodies
 from aerobat.simulation.reference_source import BLOCK, ReferenceSource
 from aerobat.states import BodyState
-from aerobat.trajectory import Trajectory
-from aerobat.vehicle import Vehicle
+from aerobat.trajectory import Trajectory, as_trajectory
+from aerobat.vehicle import Vehicle, as_vehicle
 from aerobat.vehicle.fleet import Fleet
 
 _VEHICLE_TICKS = 160_000  # whose own inputs are made at once, so that they take little memory (50 MB)
@@ -85,22 +85,6 @@ class Source(Protocol):
 
     def chunk(self, begin: int, end: int) -> Tree:
         """The inputs of the ticks from `begin` to before `end`, leaves (ticks,) or (ticks, vehicles)."""
-
-
-class Flyable(Protocol):
-    """A plan as far as flying goes."""
-
-    @property
-    def trajectory(self) -> Trajectory:
-        """The trajectory to fly."""
-
-    @property
-    def vehicle(self) -> Vehicle | None:
-        """The vehicle it was planned for."""
-
-    @property
-    def problem(self) -> Any:
-        """The problem it solves, with its environment."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -165,9 +149,10 @@ class FlightSetup:
         return pairwise(sorted(cuts))
 
 
+@door
 def prepare(
-    plan: Flyable | Trajectory,
-    vehicle: Vehicle | Sequence[Vehicle] | None = None,
+    plan: Planned | Trajectory,
+    vehicle: Vehicle | str | Sequence[Vehicle | str] | None = None,
     *,
     environment: Environment | None = None,
     config: FlightConfig = FlightConfig(),  # noqa: B008 - frozen
@@ -180,7 +165,7 @@ def prepare(
 
     Args:
         plan: what is flown; a bare trajectory needs a vehicle.
-        vehicle: what flies it, by default the plan's.
+        vehicle: what flies it, or its name, by default the plan's.
         environment: where, by default the problem's; for a bare trajectory a calm day on Earth.
         config: how.
         changes: fields of FlightConfig that replace those of `config`, as `seed=3`.
@@ -188,19 +173,12 @@ def prepare(
     Raises SpecError for arguments that do not fit together.
     """
     config = replace(config, **changes)
-    if isinstance(plan, Trajectory):
-        trajectory = plan
-    else:
-        trajectory = plan.trajectory
-        environment = environment or plan.problem.environment
-        vehicle = plan.vehicle if vehicle is None else vehicle
-    if vehicle is None:
-        raise SpecError("vehicle is missing: a trajectory, or a plan without one, says not what flies it")
-    environment = environment or Environment()
-    flying, nominal = _broadcast_vehicles(vehicle, config)
-    is_batch = not isinstance(vehicle, Vehicle) or _batch_of(config.start) != ()
+    environment = environment_of(plan, environment)
+    flying, nominal = _broadcast_vehicles(_vehicles(plan, vehicle), config)
+    is_fleet = isinstance(vehicle, Sequence) and not isinstance(vehicle, str)
+    is_batch = is_fleet or _batch_of(config.start) != ()
     delay = config.controller.actuation_delay(1.0 / config.rate)
-    reference = ReferenceSource(trajectory, nominal[0], environment, config.rate, delay)
+    reference = ReferenceSource(as_trajectory(plan), nominal[0], environment, config.rate, delay)
     fleet = Fleet.of(flying)
     nominal_fleet = fleet if nominal is flying else Fleet.of(nominal)
     model = controller_parameters(config.controller, nominal_fleet, environment)
@@ -229,15 +207,21 @@ def prepare(
     )
 
 
+def _vehicles(
+    plan: Planned | Trajectory, vehicle: Vehicle | str | Sequence[Vehicle | str] | None
+) -> list[Vehicle]:
+    """The vehicles that are named, by default the plan's own."""
+    if vehicle is None or isinstance(vehicle, Vehicle | str):
+        return [vehicle_of(plan, vehicle)]
+    return [as_vehicle(each) for each in vehicle]
+
+
 def _batch_of(start: BodyState | None) -> tuple[int, ...]:
     return () if start is None else np.shape(start.position)[:-1]
 
 
-def _broadcast_vehicles(
-    vehicle: Vehicle | Sequence[Vehicle], config: FlightConfig
-) -> tuple[list[Vehicle], list[Vehicle]]:
+def _broadcast_vehicles(flying: list[Vehicle], config: FlightConfig) -> tuple[list[Vehicle], list[Vehicle]]:
     """The vehicles that fly, one for each start, and the nominal ones."""
-    flying = [vehicle] if isinstance(vehicle, Vehicle) else list(vehicle)
     starts = _batch_of(config.start)
     if starts and len(flying) == 1:
         flying = flying * starts[0]

@@ -7,16 +7,18 @@ from dataclasses import dataclass, replace
 from time import perf_counter
 from typing import Any
 
-from aerobat.errors import BackendMissing, Infeasible
+from aerobat.declaration import by_value, door, in_notebooks, short
+from aerobat.errors import BackendMissing, Infeasible, SpecError
 from aerobat.evaluation.score import Score, score
-from aerobat.planning import Attempt, Plan, Planner, plan, registered_planners
+from aerobat.planning import Attempt, Plan, Planner, as_planner, plan, registered_planners
 from aerobat.planning.time_optimal import TimeOptimal
-from aerobat.problem.problem import Problem
+from aerobat.problem import Problem, as_problem
 from aerobat.simulation import Flight, fly
-from aerobat.vehicle import Vehicle
+from aerobat.vehicle import Vehicle, as_vehicle
 
 
-@dataclass(frozen=True)
+@by_value
+@dataclass(frozen=True, eq=False)
 class Entry:
     """The result of one planner: a plan and its flight, or the reason why there is none."""
 
@@ -35,7 +37,11 @@ class Entry:
         return certificate is not None and certificate.certified
 
 
-@dataclass(frozen=True)
+@door
+@in_notebooks
+@short
+@by_value
+@dataclass(frozen=True, eq=False, repr=False)
 class Comparison:
     """All planners on one problem and one vehicle."""
 
@@ -43,16 +49,26 @@ class Comparison:
     vehicle: Vehicle
     entries: tuple[Entry, ...]
 
+    def __str__(self) -> str:
+        """One line for people."""
+        found = (
+            f"{entry.planner} {'no plan' if entry.plan is None else f'{entry.plan.duration:.3f} s'}"
+            for entry in self.entries
+        )
+        return f"{self.problem.name} on {self.vehicle.name}: {', '.join(found)}"
+
+    @door
     def ratio(self, entry: Entry) -> float | None:
         """An entry's duration over the time-optimal plan's, where there are both."""
         optimal = next((e.plan for e in self.entries if e.planner == "time-optimal"), None)
         return None if optimal is None or entry.plan is None else entry.plan.duration / optimal.duration
 
 
+@door
 def compare(
-    problem: Problem,
-    vehicle: Vehicle,
-    planners: Sequence[tuple[str, Planner]] | None = None,
+    problem: Problem | str,
+    vehicle: Vehicle | str,
+    planners: Sequence[tuple[str, Planner] | str] | None = None,
     progress: Callable[[Attempt], None] | None = None,
 ) -> Comparison:
     """Plan a problem with each planner and fly each plan.
@@ -63,12 +79,15 @@ def compare(
     that makes no sense.
 
     Args:
-        problem: What is planned.
-        vehicle: What flies it.
-        planners: Each with a name; by default all that are registered.
+        problem: What is planned, or its name.
+        vehicle: What flies it, or its name.
+        planners: Each with a name, or the name of a registered one; by default all that are registered.
         progress: Called with every attempt as it ends.
     """
-    compared = all_planners() if planners is None else planners
+    problem, vehicle = as_problem(problem), as_vehicle(vehicle)
+    compared = all_planners() if planners is None else [_named(each) for each in planners]
+    if not compared:
+        raise SpecError("planners must be one planner or more; leave them out for all")
     entries = tuple(_entry(name, planner, problem, vehicle, progress) for name, planner in compared)
     entries = tuple(
         _improved(entry, planner, entries, progress) if isinstance(planner, TimeOptimal) else entry
@@ -79,6 +98,13 @@ def compare(
             f"no planner finds a plan for '{problem.name}' on {vehicle.name}: {entries[0].outcome}"
         )
     return Comparison(problem, vehicle, entries)
+
+
+def _named(planner: tuple[str, Planner] | str) -> tuple[str, Planner]:
+    """The planner with its name."""
+    if isinstance(planner, str):
+        return planner, as_planner(planner)
+    return planner[0], as_planner(planner[1])
 
 
 def all_planners() -> tuple[tuple[str, Planner], ...]:

@@ -1,7 +1,18 @@
 """Position over time: piecewise polynomials, their extrema, and those of minimum effort."""
 
+from aerobat.trajectory.carrier import Carrier, HasTrajectory, as_trajectory
 from aerobat.trajectory.files import load_trajectory, save_trajectory
 from aerobat.trajectory.minimum_effort import ContinuityRule, minimum_effort
 from aerobat.trajectory.piecewise import Extremum, Trajectory
 
-__all__ = ["ContinuityRule", "Extremum", "Trajectory", "load_trajectory", "minimum_effort", "save_trajectory"]
+__all__ = [
+    "Carrier",
+    "ContinuityRule",
+    "Extremum",
+    "HasTrajectory",
+    "Trajectory",
+    "as_trajectory",
+    "load_trajectory",
+    "minimum_effort",
+    "save_trajectory",
+]

@@ -2,23 +2,25 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 
+from aerobat.declaration import PathName, door
 from aerobat.errors import SpecError
 from aerobat.storage import format_of, read_arrays, whole_file
+from aerobat.trajectory.carrier import Carrier, as_trajectory
 from aerobat.trajectory.piecewise import Trajectory
 
 _FORMAT = "aerobat-trajectory-2"
 _WITHOUT_HEADING = "aerobat-trajectory-1"  # read with heading 0
 
 
-def save_trajectory(trajectory: Trajectory, path: str | Path) -> None:
+@door
+def save_trajectory(trajectory: Trajectory | Carrier, path: PathName) -> None:
     """Write durations (S,), coefficients (S, degree + 1, 3) and heading as an .npz file, whole or not at all.
 
     Raises SpecError when the file cannot be written.
     """
+    trajectory = as_trajectory(trajectory)
     with whole_file(path) as temporary, temporary.open("wb") as file:
         np.savez(
             file,
@@ -29,7 +31,8 @@ def save_trajectory(trajectory: Trajectory, path: str | Path) -> None:
         )
 
 
-def load_trajectory(path: str | Path) -> Trajectory:
+@door
+def load_trajectory(path: PathName) -> Trajectory:
     """Read what `save_trajectory` wrote, exactly. Raises SpecError, one sentence, for any other file."""
     content = read_arrays(path, "trajectory")
     found = format_of(content)

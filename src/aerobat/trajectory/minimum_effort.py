@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from aerobat.arrays import AXES, Array, Mask, frozen
+from aerobat.declaration import Angle, door
 from aerobat.errors import SpecError
 from aerobat.trajectory.knot_conditions import KnotConditions
 from aerobat.trajectory.piecewise import Trajectory
@@ -30,11 +31,12 @@ class ContinuityRule(StrEnum):
     )
 
 
+@door
 def minimum_effort(
     fixed: ArrayLike,
     durations: ArrayLike,
-    rule: ContinuityRule = ContinuityRule.VARIATIONAL,
-    heading: float = 0.0,
+    rule: ContinuityRule | str = ContinuityRule.VARIATIONAL,
+    heading: Angle = 0.0,
 ) -> Trajectory:
     """Polynomials of degree 2s - 1 on n segments, through what is fixed at their n + 1 knots.
 
@@ -133,7 +135,7 @@ def _split(fixed: ArrayLike, segments: int) -> tuple[Array, Mask]:
     return frozen(np.where(known, array, 0.0), "fixed"), known
 
 
-def _checked(rule: ContinuityRule) -> ContinuityRule:
+def _checked(rule: ContinuityRule | str) -> ContinuityRule:
     try:
         return ContinuityRule(rule)
     except ValueError:

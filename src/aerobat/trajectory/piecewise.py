@@ -9,7 +9,8 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from aerobat.arrays import Array, frozen
+from aerobat.arrays import Array, frozen, frozen_bounds
+from aerobat.declaration import Angle, FieldError, Positive, by_value, door, short, shown
 from aerobat.errors import SpecError
 from aerobat.states import FlatState
 from aerobat.trajectory import polynomial
@@ -30,6 +31,9 @@ class Extremum:
     time: float  # [s]
 
 
+@door
+@short
+@by_value
 @dataclass(frozen=True, eq=False, repr=False)
 class Trajectory:
     """Position over time, p(t) = Σ_k c_k s^k with s = (t - knot)/T on each segment; starts at t = 0.
@@ -44,7 +48,7 @@ class Trajectory:
 
     durations: Array  # [s], (S,)
     coefficients: Array  # [m], (S, degree + 1, 3), powers of normalised time rising
-    heading: float = 0.0  # [rad] about the thrust axis at the start
+    heading: Angle = 0.0  # [rad] about the thrust axis at the start
 
     def __post_init__(self) -> None:
         """Copy, check and write-protect the arrays."""
@@ -65,14 +69,12 @@ class Trajectory:
         _check_magnitude(durations, coefficients)
         object.__setattr__(self, "durations", durations)
         object.__setattr__(self, "coefficients", coefficients)
-        heading = frozen(self.heading, "heading")
-        if heading.ndim:
-            raise SpecError(f"heading must be one angle in rad, got {heading}")
-        object.__setattr__(self, "heading", float(heading))
+        object.__setattr__(self, "heading", float(self.heading))
 
     @classmethod
+    @door
     def from_inputs(
-        cls, initial: ArrayLike, inputs: ArrayLike, dt: ArrayLike, heading: float = 0.0
+        cls, initial: ArrayLike, inputs: ArrayLike, dt: ArrayLike, heading: Angle = 0.0
     ) -> Trajectory:
         """Integrate exactly a chain of r integrators whose input is constant on each interval.
 
@@ -105,8 +107,8 @@ class Trajectory:
             coefficients[n, :order] = longer * (pascal @ coefficients[n - 1])
         return cls(steps, coefficients, heading)
 
-    def __repr__(self) -> str:
-        """Say in a few words what this trajectory is."""
+    def __str__(self) -> str:
+        """A few words about this trajectory."""
         return f"Trajectory({self.segments} segments of degree {self.degree}, {self.duration:.6g} s)"
 
     @property
@@ -149,12 +151,11 @@ class Trajectory:
 
         With 0 and 1 among s, both sides of every knot are there.
         """
-        return polynomial.evaluate(self._rates(derivative)[:, None], s)
+        return polynomial.evaluate(self._rates(derivative)[:, None], _numbers(s, "s"))
 
-    def sample(self, rate: float) -> Array:
+    @door
+    def sample(self, rate: Positive) -> Array:
         """Times 0, 1/rate, 2/rate, ... [s], and the end as the last even if its step is shorter."""
-        if not (math.isfinite(rate) and rate > 0):
-            raise SpecError(f"rate must be a positive number of samples a second, got {rate!r}")
         whole_steps = max(math.floor((self.duration - TIME_TOLERANCE) * rate), 0)
         if whole_steps > MAX_SAMPLES:
             raise SpecError(f"rate must ask for {MAX_SAMPLES} samples at most, {rate!r} asks {whole_steps}")
@@ -167,6 +168,7 @@ class Trajectory:
 
     def effort(self, derivative: int) -> float:
         """∫ |d^k p/dt^k|² dt over the whole trajectory, exactly."""
+        _check_derivative(derivative)
         quadratic = polynomial.gram(self.degree, derivative)
         per_segment = np.einsum("sid,ij,sjd->s", self.coefficients, quadratic, self.coefficients)
         return float(np.sum(per_segment / self.durations ** (2 * derivative - 1)))
@@ -184,7 +186,8 @@ class Trajectory:
             values.append(polynomial.evaluate(component[:, None], s).ravel())
         return np.min(values, axis=1), np.max(values, axis=1)
 
-    def specific_thrust_range(self, gravity: float) -> tuple[Extremum, Extremum]:
+    @door
+    def specific_thrust_range(self, gravity: Positive) -> tuple[Extremum, Extremum]:
         """The smallest and the largest |a + g e3| [m/s²] over continuous time, exactly."""
         thrust = self._rates(2).copy()
         thrust[:, 0, 2] += gravity
@@ -192,12 +195,13 @@ class Trajectory:
 
     def _rates(self, derivative: int) -> Array:
         """Coefficients of d^k p/dt^k on each segment, (S, K, 3)."""
+        _check_derivative(derivative)
         scale = self.durations[:, None, None] ** derivative
         return np.asarray(polynomial.differentiate(self.coefficients, derivative) / scale)
 
     def _locate(self, t: ArrayLike) -> tuple[NDArray[np.intp], Array]:
         """The segment of each time and the normalised time in it. Raises SpecError outside the trajectory."""
-        times = np.asarray(t, dtype=float)
+        times = _numbers(t, "times")
         if not ((times >= -TIME_TOLERANCE) & (times <= self.duration + TIME_TOLERANCE)).all():
             raise SpecError(f"times must lie in [0, {self.duration:.9g}] s, the trajectory's span")
         times = np.clip(times, 0.0, self.duration)
@@ -214,6 +218,20 @@ class Trajectory:
             Extremum(float(norms.flat[smallest]), float(times.flat[smallest])),
             Extremum(float(norms.flat[largest]), float(times.flat[largest])),
         )
+
+
+def _check_derivative(derivative: int) -> None:
+    """Raise SpecError for what counts no derivative; higher ones than this all vanish."""
+    if type(derivative) is not int or not 0 <= derivative <= MAX_DEGREE + 1:
+        complaint = f"must be a whole number from 0 to {MAX_DEGREE + 1}, got {shown(derivative)}"
+        raise FieldError("derivative", complaint)
+
+
+def _numbers(value: ArrayLike, name: str) -> Array:
+    """The numbers, as they are where they are an array of them. Raises SpecError."""
+    if isinstance(value, np.ndarray) and value.dtype == np.float64:
+        return value
+    return frozen_bounds(value, name)
 
 
 def _check_magnitude(durations: Array, coefficients: Array) -> None:

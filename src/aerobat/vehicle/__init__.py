@@ -6,13 +6,14 @@ from aerobat.vehicle.allocation import (
     rotor_thrusts,
     wrench,
 )
-from aerobat.vehicle.files import load_vehicle, vehicle_names, write_vehicle
+from aerobat.vehicle.files import as_vehicle, load_vehicle, vehicle_names, write_vehicle
 from aerobat.vehicle.plausibility import implausibilities
 from aerobat.vehicle.vehicle import Rotor, Vehicle
 
 __all__ = [
     "Rotor",
     "Vehicle",
+    "as_vehicle",
     "collective_range",
     "implausibilities",
     "load_vehicle",

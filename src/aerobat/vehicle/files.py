@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import os
 from importlib.resources import files
 
-from aerobat.declaration import to_table
+from aerobat.declaration import PathName, door, to_table
 from aerobat.documents import document_names, read_document, resolve_document, write_document
 from aerobat.vehicle.vehicle import Vehicle
 
@@ -17,7 +16,8 @@ def vehicle_names() -> tuple[str, ...]:
     return document_names(PRESETS)
 
 
-def load_vehicle(name_or_path: str | os.PathLike[str]) -> Vehicle:
+@door
+def load_vehicle(name_or_path: PathName) -> Vehicle:
     """Return a vehicle that comes with Aerobat, by its name, or the one in a TOML file, by its path.
 
     Raises SpecError, in one sentence that names the file and the field, when there is no such vehicle, the
@@ -27,6 +27,12 @@ def load_vehicle(name_or_path: str | os.PathLike[str]) -> Vehicle:
     return read_document(path, Vehicle, "vehicle", name=path.name.removesuffix(".toml"))
 
 
-def write_vehicle(vehicle: Vehicle, path: str | os.PathLike[str]) -> None:
+def as_vehicle(vehicle: Vehicle | str) -> Vehicle:
+    """The vehicle, of itself or of what `load_vehicle` takes. Raises SpecError as that does."""
+    return load_vehicle(vehicle) if isinstance(vehicle, str) else vehicle
+
+
+@door
+def write_vehicle(vehicle: Vehicle | str, path: PathName) -> None:
     """Write a vehicle as TOML, whole or not at all. Raises SpecError when the file cannot be written."""
-    write_document(path, to_table(vehicle), "vehicle")
+    write_document(path, to_table(as_vehicle(vehicle)), "vehicle")

@@ -19,6 +19,7 @@ from aerobat.declaration import (
     Positive,
     Vector3,
     declared,
+    door,
     finite,
     from_table,
     unknown_key,
@@ -161,7 +162,8 @@ class Vehicle:
         source = " ".join(self.description.split())  # one line, however it was written
         return f"{facts}; {source}" if source else facts
 
-    def require_hover(self, gravity: float) -> None:
+    @door
+    def require_hover(self, gravity: Positive) -> None:
         """Raise SpecError, naming the rotors, unless they can hold a level hover under `gravity` [m/s²]."""
         weight = self.mass * gravity
         total = self.max_thrusts.sum()

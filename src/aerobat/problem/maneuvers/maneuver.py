@@ -11,7 +11,7 @@ from typing import ClassVar, TypeVar, cast, dataclass_transform
 from pydantic import Field
 
 from aerobat.arrays import Array
-from aerobat.declaration import Registry
+from aerobat.declaration import Label, Registry, door
 from aerobat.errors import SpecError
 from aerobat.problem.gate import Gate
 from aerobat.problem.stage import StageSequence
@@ -62,8 +62,9 @@ M = TypeVar("M", bound=Maneuver)
 MANEUVERS: Registry[Maneuver] = Registry(Maneuver, "maneuver", "aerobat.maneuvers")  # type: ignore[type-abstract]
 
 
+@door
 @dataclass_transform(frozen_default=True, field_specifiers=(dataclasses.field, Field))
-def maneuver(kind: str) -> Callable[[type[M]], type[M]]:
+def maneuver(kind: Label) -> Callable[[type[M]], type[M]]:
     """Declare the class that follows and register it: `kind` is its name in problem files."""
 
     def register(cls: type[M]) -> type[M]:

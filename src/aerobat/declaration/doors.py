@@ -1,0 +1,245 @@
+"""The decorator for what users call: arguments are checked by their annotations before anything happens.
+
+A number is finite and neither text nor bool, an array holds numbers, a class takes its instances, a path can
+be one; what does not fit is one sentence that names the argument and, where it fits another, that one. The
+annotations are read when a function is first called, so that importing stays quick.
+"""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import wraps
+from types import NoneType, UnionType
+from typing import Any, TypeVar, Union, cast, get_args, get_origin, get_type_hints
+
+import numpy as np
+from numpy.typing import ArrayLike
+from pydantic import TypeAdapter, ValidationError
+
+from aerobat.declaration.declared import CONFIG, plain
+from aerobat.declaration.sentences import FieldError, first_complaint, one_of, shown, with_article
+from aerobat.errors import SpecError
+
+F = TypeVar("F", bound=Callable[..., Any])
+Check = Callable[[Any], Any]  # the value to go on with; raises FieldError
+
+_NUMBERS = (bool, int, float, complex)  # of which Python takes one for another
+_ARRAYS = frozenset(get_args(ArrayLike))
+
+
+def door(function: F) -> F:
+    """Make a function, or the making of a class's values, raise SpecError for arguments that do not fit.
+
+    Neither the function nor its type changes otherwise.
+    """
+    if isinstance(function, type):
+        made: Any = function
+        made.__init__ = _checked(made.__init__, made.__name__, made)
+        return function
+    name = function.__qualname__.rpartition("<locals>.")[2]
+    return cast(F, _checked(function, name, function))
+
+
+def _checked(function: Callable[..., Any], name: str, annotated: Any) -> Callable[..., Any]:
+    arguments: _Arguments | None = None
+
+    @wraps(function)
+    def checked(*args: Any, **kwargs: Any) -> Any:
+        nonlocal arguments
+        if arguments is None:
+            arguments = _Arguments(function, name, annotated)
+        fitting = arguments.fitting(args, kwargs)
+        return function(*fitting.args, **fitting.kwargs)
+
+    return checked
+
+
+class _Arguments:
+    """The arguments of one function, each with its check."""
+
+    def __init__(self, function: Callable[..., Any], name: str, annotated: Any) -> None:
+        self._name = name
+        self._signature = inspect.signature(function)
+        parameters = self._signature.parameters.values()
+        self._names = [p.name for p in parameters if p.name != "self"]
+        named = {p.name for p in parameters if p.kind is not p.VAR_KEYWORD}
+        hints = _hints(annotated, named)
+        self._classes = {name: _classes(hint) for name, hint in hints.items()}
+        self._checks = {name: check_of(hint) for name, hint in hints.items()}
+
+    def fitting(self, args: Sequence[Any], kwargs: Mapping[str, Any]) -> inspect.BoundArguments:
+        """The arguments to go on with. Raises SpecError."""
+        try:
+            bound = self._signature.bind(*args, **kwargs)
+        except TypeError as error:
+            known = ", ".join(self._names) or "nothing"
+            raise SpecError(f"{self._name}: {error}; it takes {known}") from None
+        for name, check in self._checks.items():
+            if name not in bound.arguments:
+                continue
+            value = bound.arguments[name]
+            if isinstance(value, self._classes[name]):
+                continue
+            try:
+                bound.arguments[name] = check(value)
+            except FieldError as error:
+                hint = self._meant(value, name)
+                raise SpecError(f"{self._name}: {error.inside(name)}{hint}") from None
+        return bound
+
+    def _meant(self, value: Any, wrong: str) -> str:
+        """The argument that would take the value."""
+        if isinstance(value, str | NoneType):
+            return ""
+        others = (name for name, classes in self._classes.items() if name != wrong)
+        fits = next((name for name in others if isinstance(value, self._classes[name])), None)
+        return "" if fits is None else f"; did you mean {fits}=...?"
+
+
+def _hints(annotated: Any, names: set[str]) -> dict[str, Any]:
+    """The annotations of the arguments alone: what is returned may be known to type checkers only."""
+    if isinstance(annotated, type):
+        return {
+            name: hint
+            for name, hint in get_type_hints(annotated, include_extras=True).items()
+            if name in names
+        }
+    own = {name: hint for name, hint in annotated.__annotations__.items() if name in names}
+    holder: Any = type(annotated.__name__, (), {"__annotations__": own})
+    try:
+        return get_type_hints(holder, annotated.__globals__, include_extras=True)
+    except NameError:  # a user's own annotations, of names that only type checkers know
+        return {}
+
+
+def _alternatives(hint: Any) -> Iterator[Any]:
+    """The members of a union; of all that NumPy makes arrays of, ArrayLike alone."""
+    members = get_args(hint) if get_origin(hint) in (Union, UnionType) else (hint,)
+    if _ARRAYS and set(members) >= _ARRAYS:
+        yield ArrayLike
+        members = tuple(member for member in members if member not in _ARRAYS)
+    yield from members
+
+
+def _classes(hint: Any) -> tuple[type, ...]:
+    """The classes whose instances an argument takes as they are."""
+    found = (each for each in _alternatives(hint) if isinstance(each, type))
+    return tuple(each for each in found if each is not Any and each not in _NUMBERS)
+
+
+def check_of(hint: Any) -> Check:
+    """The check of values by an annotation."""
+    alternatives = list(_alternatives(hint))
+    checks = [_check_of_one(each) for each in alternatives]
+
+    def check(value: Any) -> Any:
+        complaints = []
+        for one in checks:
+            try:
+                return one(value)
+            except FieldError as error:
+                complaints.append(error)
+        told = [c for c, each in zip(complaints, alternatives, strict=True) if each is not NoneType]
+        inner = [each for each in told if each.field]
+        if len(told) == 1 or inner:
+            raise (inner or told)[0]
+        names = one_of([_described(each) for each in alternatives if each is not NoneType])
+        raise FieldError("", f"must be {names}, got {shown(value)}")
+
+    return check
+
+
+def _check_of_one(hint: Any) -> Check:
+    origin = get_origin(hint)
+    if hint is Any or isinstance(hint, TypeVar):
+        return lambda value: value
+    if hint is ArrayLike or origin is np.ndarray:
+        return _array
+    if origin in (Sequence, tuple):
+        return _sequence_of(*get_args(hint))
+    if origin is Callable:
+        return _callable
+    if origin is Mapping:
+        return _instance_of(Mapping)
+    if isinstance(hint, type) and hint not in _NUMBERS:
+        return _instance_of(hint)
+    return _declared_as(hint)
+
+
+def _declared_as(hint: Any) -> Check:
+    """The check by a type of fields, as those of declared classes."""
+    adapter: Any = None
+
+    def check(value: Any) -> Any:
+        nonlocal adapter
+        adapter = adapter or TypeAdapter(hint, config=CONFIG)
+        try:
+            return adapter.validate_python(plain(value))
+        except ValidationError as error:
+            raise first_complaint(error) from None
+
+    return check
+
+
+def _instance_of(cls: type) -> Check:
+    def check(value: Any) -> Any:
+        if not isinstance(value, cls):
+            raise FieldError("", f"must be {_described(cls)}, got {shown(value)}")
+        return value
+
+    return check
+
+
+def _sequence_of(*members: Any) -> Check:
+    """The check of a sequence: of one kind, or of a fixed number of entries."""
+    is_fixed = len(members) > 1 and members[-1] is not ...
+    checks = [check_of(member) for member in members if member is not ...]
+
+    def check(value: Any) -> Any:
+        if not isinstance(value, Sequence) or isinstance(value, str | bytes):
+            raise FieldError("", f"must be a list, got {shown(value)}")
+        if is_fixed and len(value) != len(checks):
+            raise FieldError("", f"must have {len(checks)} entries, got {shown(value)}")
+        for i, each in enumerate(value):
+            try:
+                checks[i if is_fixed else 0](each)
+            except FieldError as error:
+                raise error.inside(f"[{i}]") from None
+        return value
+
+    return check
+
+
+def _array(value: Any) -> Any:
+    """The value, numbers of which NumPy makes one array."""
+    try:
+        kind = np.asarray(value).dtype.kind
+    except (ValueError, TypeError, OverflowError):  # ragged, or nothing of the kind
+        kind = "O"
+    if kind not in "fiu":  # text, truth and complex numbers are none
+        raise FieldError("", f"must be numbers, got {shown(value)}")
+    return value
+
+
+def _callable(value: Any) -> Any:
+    if not callable(value):
+        raise FieldError("", f"must be a function, got {shown(value)}")
+    return value
+
+
+def _described(hint: Any) -> str:
+    """The words for a type."""
+    if hint is str:
+        return "a name"
+    if hint is ArrayLike or get_origin(hint) is np.ndarray:
+        return "numbers"
+    if get_origin(hint) in (Sequence, tuple, Mapping):
+        return "a list of them"
+    if hint in (int, float):
+        return "a number"
+    if getattr(hint, "__metadata__", None):
+        told = (getattr(each, "description", None) for each in hint.__metadata__)
+        said = next(filter(None, told), None)
+        return with_article(said) if said else _described(get_args(hint)[0])
+    return with_article(getattr(hint, "__name__", None) or str(hint))

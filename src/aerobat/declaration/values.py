@@ -1,0 +1,117 @@
+"""Values: compared, hashed, copied and pickled by their content, and told in a line."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping
+from enum import Enum
+from typing import Any, TypeVar
+
+import numpy as np
+
+T = TypeVar("T")
+
+_NAN = "nan"  # in place of what is not equal to itself
+_FEW = 9  # entries: a longer list is told by its length
+
+
+def by_value(cls: type[T]) -> type[T]:
+    """Let a frozen dataclass be its content: equality, hash, pickling, and a line as its text.
+
+    Arrays count by shape and numbers, NaN equals NaN. A class that has a text or a representation of its own
+    keeps it.
+    """
+    made: Any = cls
+    made.__eq__ = _equal
+    made.__hash__ = _hash
+    made.__reduce__ = _reduce
+    if made.__str__ is object.__str__:
+        made.__str__ = _text
+    return cls
+
+
+def short(cls: type[T]) -> type[T]:
+    """Let a class be represented by its text, where its content fills pages."""
+    made: Any = cls
+    made.__repr__ = _representation
+    return cls
+
+
+def _representation(self: Any) -> str:
+    name, text = type(self).__name__, str(self)
+    return text if text.startswith(f"{name}(") else f"<{name}: {text}>"
+
+
+def _content(self: Any) -> tuple[Any, ...]:
+    return tuple(_comparable(getattr(self, field.name)) for field in dataclasses.fields(self))
+
+
+def _comparable(value: Any) -> Any:
+    if isinstance(value, np.ndarray):
+        is_float = value.dtype.kind == "f"
+        return value.shape, (value + 0.0 if is_float else value).tobytes()  # no negative zeros
+    if isinstance(value, tuple):
+        return tuple(map(_comparable, value))
+    if isinstance(value, Mapping):
+        return tuple((key, _comparable(value[key])) for key in sorted(value))
+    return _NAN if isinstance(value, float) and value != value else value
+
+
+def _equal(self: Any, other: object) -> Any:
+    if type(self) is not type(other):
+        return NotImplemented
+    return self is other or (hash(self) == hash(other) and _content(self) == _content(other))
+
+
+def _hash(self: Any) -> int:
+    """The content's hash, computed once: vehicles and trajectories are keys of caches."""
+    known: int | None = self.__dict__.get("_hash")
+    if known is None:
+        known = hash((type(self).__qualname__, _content(self)))
+        object.__setattr__(self, "_hash", known)
+    return known
+
+
+def _reduce(self: Any) -> tuple[Any, ...]:
+    """Pickled by its fields and checked anew: what comes back is read-only too."""
+    values = (getattr(self, field.name) for field in dataclasses.fields(self))
+    return type(self), tuple(dict(value) if isinstance(value, Mapping) else value for value in values)
+
+
+def _text(self: Any) -> str:
+    """The class with the fields that are not at their defaults."""
+    shown = (
+        f"{field.name}={_short(getattr(self, field.name))}"
+        for field in dataclasses.fields(self)
+        if not is_default(self, field)
+    )
+    return f"{type(self).__name__}({', '.join(shown)})"
+
+
+def _short(value: Any) -> str:
+    if isinstance(value, np.ndarray):
+        if value.size > _FEW:
+            return f"array of {' x '.join(map(str, value.shape))}"
+        return _short(tuple(value.tolist())) if value.ndim else f"{value:g}"
+    if isinstance(value, tuple | list):
+        if len(value) > _FEW:
+            return f"{len(value)} entries"
+        return f"({', '.join(map(_short, value))})"
+    if isinstance(value, Mapping):
+        return f"({', '.join(map(str, value))})"
+    if isinstance(value, Enum):
+        return value.name.lower()
+    if isinstance(value, float):
+        return f"{value:.6g}"
+    return str(value) if dataclasses.is_dataclass(value) else repr(value)
+
+
+def is_default(value: Any, field: dataclasses.Field[Any]) -> bool:
+    """True where a field of a value has what it has when nothing is said."""
+    if field.default is dataclasses.MISSING and field.default_factory is dataclasses.MISSING:
+        return False
+    default = field.default if field.default_factory is dataclasses.MISSING else field.default_factory()
+    current = getattr(value, field.name)
+    if isinstance(current, np.ndarray) and default is not None:
+        return np.array_equal(current, np.broadcast_to(np.asarray(default), current.shape), equal_nan=True)
+    return bool(current is default if default is None else current == default)

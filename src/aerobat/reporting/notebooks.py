@@ -1,0 +1,104 @@
+"""Values in notebooks: the tables of a terminal as HTML, above them the pictures of reports."""
+
+from __future__ import annotations
+
+from base64 import b64encode
+from functools import lru_cache, singledispatch
+from io import StringIO
+from typing import TYPE_CHECKING, Any
+
+from rich.console import Console
+from rich.table import Table
+
+from aerobat.certification import Certificate
+from aerobat.errors import SpecError
+from aerobat.evaluation.score import Score
+from aerobat.planning import Plan
+from aerobat.reporting.comparison import comparison_figure, comparison_table
+from aerobat.reporting.figures import draw
+from aerobat.reporting.page import png as png_of
+from aerobat.reporting.tables import certificate_table, facts_table, flight_facts, plan_facts
+from aerobat.simulation import Flight
+from aerobat.studies.compare import Comparison
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+COLUMNS = 120  # letters to a line of a table
+PRE = '<pre style="line-height: 1.3; overflow-x: auto">{code}</pre>'
+KEPT = 8  # pictures: a notebook asks for one twice
+
+
+def html(value: Any) -> str:
+    """HTML of a plan, a flight, a score, a certificate or a comparison."""
+    console = Console(record=True, file=StringIO(), width=COLUMNS, force_jupyter=False)
+    console.print(_table(value))
+    text = console.export_html(inline_styles=True, code_format=PRE)
+    picture = png(value)
+    if picture is None:
+        return text
+    encoded = b64encode(picture).decode()
+    return f'<img style="max-width: 100%" src="data:image/png;base64,{encoded}"/>{text}'
+
+
+@lru_cache(maxsize=KEPT)
+def png(value: Any) -> bytes | None:
+    """The picture of a value as PNG; None where it has none, or what is to be drawn is not known."""
+    try:
+        figure = _figure(value)
+    except SpecError:  # a plan without a vehicle, a flight of one that is no preset
+        return None
+    return None if figure is None else png_of(figure)
+
+
+@singledispatch
+def _table(value: Any) -> Table:
+    """The facts, a row each."""
+    raise NotImplementedError
+
+
+@_table.register
+def _(plan: Plan) -> Table:
+    vehicle = "" if plan.vehicle is None else f" · {plan.vehicle.name}"
+    return facts_table(f"{plan.problem.name}{vehicle}", {"plan": plan_facts(plan)})
+
+
+@_table.register
+def _(flight: Flight) -> Table:
+    return facts_table(str(flight), {})
+
+
+@_table.register
+def _(score: Score) -> Table:
+    return facts_table("", {"flight": flight_facts(score)})
+
+
+@_table.register
+def _(certificate: Certificate) -> Table:
+    return certificate_table(certificate, "certificate")
+
+
+@_table.register
+def _(comparison: Comparison) -> Table:
+    return comparison_table(comparison)
+
+
+@singledispatch
+def _figure(value: Any) -> Figure | None:
+    """The picture; None of what has none."""
+    return None
+
+
+@_figure.register
+def _(value: Plan) -> Figure | None:
+    return draw(value)
+
+
+@_figure.register
+def _(value: Flight) -> Figure | None:
+    return draw(value)
+
+
+@_figure.register
+def _(value: Comparison) -> Figure | None:
+    return comparison_figure(value)
