@@ -17,7 +17,7 @@ def plan(
 ) -> ExitCode:
     """Plan a maneuver and stop there.
 
-    As `aerobat fly`, without the flight: writes PROBLEM.plan, plan.csv, report.png and report.json. Exits
+    As `aerobat fly`, without the flight: writes PROBLEM.plan, plan.csv, report.png, report.json, run.toml. Exits
     with 0 only if the plan is certified and flies.
 
     Parameters
@@ -25,4 +25,5 @@ def plan(
     problem
         A name that `aerobat problems` lists, or a problem's TOML file.
     """
-    return finish(planned(problem, options), options)
+    found, record = planned(problem, options, "plan")
+    return finish(found, record, options)
