@@ -26,7 +26,8 @@ from aerobat.errors import SpecError
 def whole_file(path: str | os.PathLike[str]) -> Iterator[Path]:
     """A temporary path beside `path`, renamed to it when the block ends well, removed when it does not.
 
-    What killed processes have left in that folder is removed. Missing parent folders are made. Raises SpecError when the place cannot be written.
+    What killed processes have left in that folder is removed. Missing parent folders are made. Raises
+    SpecError when the place cannot be written.
     """
     target = Path(path)
     try:
@@ -177,7 +178,7 @@ def _exchange(a: Path, b: Path) -> None:
 
 
 def _sync(path: Path) -> None:
-    """Have the disk hold a file, or a folder's entries where the system can, before anything depends on it."""
+    """Have the disk hold a file, or a folder's entries where the system can, before it is renamed."""
     is_folder = path.is_dir()
     try:
         descriptor = os.open(path, os.O_RDONLY if is_folder else os.O_RDWR)

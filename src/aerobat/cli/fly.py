@@ -28,7 +28,8 @@ def fly(
 
     Prints a short table and writes to the output folder, as one: PROBLEM.plan (the whole plan), plan.csv
     (position, velocity, acceleration and jerk at 100 Hz), flight.npz (everything that was simulated),
-    report.png, report.json, and run.toml, from which `aerobat repeat` does all of it again. Exits with 0 only if the plan is certified and the flight went well.
+    report.png, report.json, and run.toml, from which `aerobat repeat` does all of it again. Exits with 0 only
+    if the plan is certified and the flight went well.
 
     Parameters
     ----------

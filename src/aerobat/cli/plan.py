@@ -17,8 +17,8 @@ def plan(
 ) -> ExitCode:
     """Plan a maneuver and stop there.
 
-    As `aerobat fly`, without the flight: writes PROBLEM.plan, plan.csv, report.png, report.json, run.toml. Exits
-    with 0 only if the plan is certified and flies.
+    As `aerobat fly`, without the flight: writes PROBLEM.plan, plan.csv, report.png, report.json and run.toml.
+    Exits with 0 only if the plan is certified and flies.
 
     Parameters
     ----------

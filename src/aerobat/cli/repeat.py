@@ -5,10 +5,10 @@ from __future__ import annotations
 import json
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
-import numpy as np
 from cyclopts import Parameter
+from numpy.typing import NDArray
 
 from aerobat.cli.compare import COMPARISON, comparison_of, finish_comparison
 from aerobat.cli.entry import ExitCode
@@ -51,7 +51,7 @@ def repeat(
     plan = old.plan if record.planner is None else plan_of(record)
     again = flown(plan, record.flight) if record.command == "fly" else None
     code = finish(plan, record, options, again)
-    return _told(folder, record, old.difference(_Run(plan, again and again.flight)), code)
+    return _told(folder, record, old.difference(_Run(plan, again.flight if again else None)), code)
 
 
 def _repeat_comparison(folder: Path, record: RunRecord, options: RepeatOptions) -> ExitCode:
@@ -94,17 +94,15 @@ class _Run:
 
     def difference(self, other: _Run) -> str:
         """How another run differs, in words; nothing where it does not."""
-        mine, its = self.plan.trajectory, other.plan.trajectory
-        if not _same(mine.durations, its.durations) or not _same(mine.coefficients, its.coefficients):
-            return f"the plan takes {its.duration:.9g} s, there {mine.duration:.9g} s"
-        if self.flight is not None and other.flight is not None:
-            names = [
-                n for n, series in self.flight.series.items() if not _same(series, other.flight.series[n])
-            ]
-            if names:
-                return f"the plan is the same, the flight's {', '.join(names)} are not"
-        return ""
+        own, its = self.plan.trajectory, other.plan.trajectory
+        if not _same(own.durations, its.durations) or not _same(own.coefficients, its.coefficients):
+            return f"the plan takes {its.duration:.9g} s, there {own.duration:.9g} s"
+        if self.flight is None or other.flight is None:
+            return ""
+        its_series = other.flight.series
+        names = [name for name, series in self.flight.series.items() if not _same(series, its_series[name])]
+        return f"the plan is the same, the flight's {', '.join(names)} are not" if names else ""
 
 
-def _same(a: np.ndarray, b: np.ndarray) -> bool:
+def _same(a: NDArray[Any], b: NDArray[Any]) -> bool:
     return a.shape == b.shape and a.tobytes() == b.tobytes()
