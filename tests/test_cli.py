@@ -46,7 +46,7 @@ def test_fly_writes_the_plan_the_flight_the_picture_and_the_report(capsys) -> No
     code, out, err = run(capsys, "fly", "flip-roll")
     assert (code, err) == (0, "")
     folder = Path("out/flip-roll")
-    written = ["flight.npz", "flip-roll.plan", "plan.csv", "report.json", "report.png"]
+    written = ["flight.npz", "flip-roll.plan", "plan.csv", "report.json", "report.png", "run.toml"]
     assert sorted(p.name for p in folder.iterdir()) == written
     report = json.loads((folder / "report.json").read_text())
     assert report["plan"].keys() >= PLAN_KEYS
@@ -74,7 +74,7 @@ def test_plan_stops_after_planning(capsys) -> None:
     assert code == 0
     assert "flight" not in json.loads(out)
     written = sorted(p.name for p in Path("out/half-flip").iterdir())
-    assert written == ["half-flip.plan", "plan.csv", "report.json", "report.png"]
+    assert written == ["half-flip.plan", "plan.csv", "report.json", "report.png", "run.toml"]
 
 
 def test_paper_mode_prints_the_known_optimum(capsys) -> None:
@@ -111,9 +111,10 @@ def test_every_report_says_how_the_plan_flew_and_which_controller_did(capsys) ->
 
 def test_the_gates_tilt_is_what_angle_says(capsys) -> None:
     _, out, _ = run(capsys, "fly", "half-flip", "--angle", "40", "--json")
-    states = load_flight("out/half-flip/flight.npz").states
+    flight = load_flight("out/half-flip-40deg/flight.npz")
+    states = flight.states
     gate = json.loads(out)["plan"]["stages"][0]["time_s"]
-    k = int(np.argmin(np.abs(load_flight("out/half-flip/flight.npz").times - gate)))
+    k = int(np.argmin(np.abs(flight.times - gate)))
     w, x, y, z = states.q_world_body[k]
     thrust = np.array([2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y)])
     assert np.rad2deg(np.arctan2(-thrust[1], thrust[2])) == pytest.approx(
@@ -183,11 +184,11 @@ def test_check_judges_what_was_planned_not_what_it_would_assume(capsys) -> None:
     """The plan's own vehicle, heading, gravity, wind and limits: the certificate is the plan's."""
     Path("mars.toml").write_text(MARS)
     run(capsys, "plan", "mars.toml", "--vehicle", "crazyflie")
-    planned = json.loads(Path("out/mars/report.json").read_text())["plan"]["certificate"]
-    code, out, err = run(capsys, "check", "out/mars", "--json")
+    planned = json.loads(Path("out/mars-crazyflie/report.json").read_text())["plan"]["certificate"]
+    code, out, err = run(capsys, "check", "out/mars-crazyflie", "--json")
     assert (code, err) == (0, "")
     assert json.loads(out) == planned
-    code, out, _ = run(capsys, "check", "out/mars/mars.plan", "--vehicle", "hexarotor", "--json")
+    code, out, _ = run(capsys, "check", "out/mars-crazyflie/mars.plan", "--vehicle", "hexarotor", "--json")
     assert json.loads(out) != planned
 
 
@@ -215,14 +216,14 @@ def test_a_saved_plan_is_flown_as_it_is(capsys) -> None:
     assert "--angle plans anew" in err
 
 
-def test_a_picture_that_cannot_be_drawn_leaves_the_earlier_run_whole(capsys, monkeypatch) -> None:
+def test_a_folder_that_cannot_be_filled_leaves_the_earlier_run_whole(capsys, monkeypatch) -> None:
     run(capsys, "fly", "line")
     before = {path.name: path.read_bytes() for path in Path("out/line").iterdir()}
 
     def fail(*_: object) -> bytes:
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr("aerobat.cli.run_folder.png", fail)
+    monkeypatch.setattr("aerobat.cli.run_folder.write_record", fail)
     code, _, err = run(capsys, "fly", "line", "--order", "5")
     assert code == 2
     assert err == "aerobat: cannot write out/line: No space left on device\n"

@@ -108,7 +108,7 @@ def test_a_planner_of_ones_own_is_called_by_its_name_with_its_options(folder: Pa
     ours = ("--import", "my_planner.py", "--planner", "mine")
     done = aerobat(folder, "plan", "line", *ours, "--my-option", "3")
     assert (done.returncode, done.stderr) == (0, "")
-    plan = ab.load_plan(folder / "out/line/line.plan")
+    plan = ab.load_plan(folder / "out/line-mine/line.plan")
     assert (plan.planner, plan.duration) == ("mine", 3.0)
     assert plan.certified  # by plan(), for a planner that knows nothing of certificates
 

@@ -13,12 +13,12 @@ from pathlib import Path
 import pytest
 
 from aerobat.errors import SpecError
-from aerobat.storage import whole_folder
+from aerobat.storage import whole_folder, write_whole
 
 NAMES = [f"part-{i}" for i in range(6)]
 WRITER = """
 import sys
-from aerobat.storage import whole_folder
+from aerobat.storage import whole_folder, write_whole
 for mark in range(1_000_000):
     with whole_folder(sys.argv[1], lambda name: name.startswith("part-")) as folder:
         for i in range(6):
@@ -96,5 +96,24 @@ def test_killed_at_any_instant_it_is_the_old_run_or_the_new_one_and_the_next_run
         marks = {text for _, text in contents(target)}
         assert len(marks) == 1
         assert len(os.listdir(target)) == 6
-    written(target, "end")
-    assert os.listdir(tmp_path) == ["run"]
+    written(tmp_path / "another", "end")
+    assert sorted(os.listdir(tmp_path)) == ["another", "run"]
+
+
+@pytest.mark.skipif(os.name != "posix", reason="only there a process can be asked for")
+def test_what_dead_processes_left_is_cleared_and_nothing_else(tmp_path: Path) -> None:
+    with subprocess.Popen([sys.executable, "-c", ""]) as process:
+        dead = process.pid
+    (tmp_path / f".run.{dead}.aerobat-part").mkdir()
+    (tmp_path / f".run.{dead}.aerobat-part" / "part-0").write_text("half")
+    (tmp_path / f".flip.x_1.{dead}.aerobat-part.plan").write_text("half")
+    kept = [
+        f".v{dead}.{os.getpid()}.aerobat-part",  # of one that runs
+        f".v.{dead}.{os.getpid()}.aerobat-part.toml",
+        ".mine.aerobat-part",
+        f".mine.{dead}",
+    ]
+    for name in kept:
+        (tmp_path / name).write_text("")
+    write_whole(tmp_path / "file", "whole")
+    assert sorted(os.listdir(tmp_path)) == sorted([*kept, "file"])

@@ -6,6 +6,7 @@ import ctypes
 import errno
 import io
 import os
+import re
 import shutil
 import stat
 import tempfile
@@ -25,12 +26,15 @@ from aerobat.errors import SpecError
 def whole_file(path: str | os.PathLike[str]) -> Iterator[Path]:
     """A temporary path beside `path`, renamed to it when the block ends well, removed when it does not.
 
-    Missing parent folders are made. Raises SpecError when the place cannot be written.
+    What killed processes have left in that folder is removed. Missing parent folders are made. Raises
+    SpecError when the place cannot be written.
     """
     target = Path(path)
     try:
         target.parent.mkdir(parents=True, exist_ok=True)
-        handle, name = tempfile.mkstemp(dir=target.parent, prefix=f".{target.stem}-", suffix=target.suffix)
+        _remove_abandoned(target.parent)
+        suffix = f".{os.getpid()}{_STAGING}{target.suffix}"
+        handle, name = tempfile.mkstemp(dir=target.parent, prefix=f".{target.stem}.", suffix=suffix)
         os.close(handle)
     except OSError as error:
         raise SpecError(f"cannot write {target}: {error.strerror or error}") from None
@@ -38,6 +42,7 @@ def whole_file(path: str | os.PathLike[str]) -> Iterator[Path]:
     try:
         yield temporary
         temporary.chmod(0o666 & ~_umask())
+        _sync(temporary)
         temporary.replace(target)
     except OSError as error:
         raise SpecError(f"cannot write {target}: {error.strerror or error}") from None
@@ -50,7 +55,7 @@ def whole_folder(path: str | os.PathLike[str], is_ours: Callable[[str], bool]) -
     """Yield an empty folder that takes the place of `path`, as one, when the block ends well.
 
     Whatever ends it, at `path` is either what was there before or all of the new, never a mixture, and no
-    parent is left that was made for nothing. What killed processes have left beside it is removed. Raises
+    parent is left that was made for nothing. What killed processes have left in its parent is removed. Raises
     SpecError when the place cannot be written, and for a folder that holds anything whose name is not ours:
     that is somebody's work.
 
@@ -65,7 +70,7 @@ def whole_folder(path: str | os.PathLike[str], is_ours: Callable[[str], bool]) -
             raise SpecError(f"{path}/ holds {foreign[0]}, which no run wrote; give a folder of its own")
         made = [parent for parent in target.parents if not parent.exists()]
         target.parent.mkdir(parents=True, exist_ok=True)
-        _remove_abandoned(target)
+        _remove_abandoned(target.parent)
         staging = target.parent / f".{target.name}.{os.getpid()}{_STAGING}"
         shutil.rmtree(staging, ignore_errors=True)
         staging.mkdir()
@@ -73,6 +78,8 @@ def whole_folder(path: str | os.PathLike[str], is_ours: Callable[[str], bool]) -
         raise SpecError(f"cannot write {path}: {error.strerror or error}") from None
     try:
         yield staging
+        for written in (*staging.iterdir(), staging):
+            _sync(written)
         if target.exists():
             _exchange(staging, target)
         else:
@@ -143,6 +150,7 @@ def format_of(content: Mapping[str, NDArray[Any]]) -> str:
 
 MAX_ARRAYS = 2**31  # bytes of an .npz file, packed or not: hours of flight at 500 Hz
 _STAGING = ".aerobat-part"
+_ABANDONED = re.compile(r"\..*\.(\d{1,9})" + re.escape(_STAGING) + ".*")  # its process
 _AT_FDCWD, _RENAME_SWAP = -100, 2  # of renameat2(2) and renamex_np(2)
 
 
@@ -169,17 +177,39 @@ def _exchange(a: Path, b: Path) -> None:
     aside.rename(a)
 
 
-def _remove_abandoned(target: Path) -> None:
-    """Remove what processes that no longer run have left beside a folder."""
+def _sync(path: Path) -> None:
+    """Have the disk hold a file, or a folder's entries where the system can, before it is renamed."""
+    is_folder = path.is_dir()
+    try:
+        descriptor = os.open(path, os.O_RDONLY if is_folder else os.O_RDWR)
+        try:
+            os.fsync(descriptor)
+        finally:
+            os.close(descriptor)
+    except OSError:
+        if not is_folder:
+            raise
+
+
+def _remove_abandoned(folder: Path) -> None:
+    """Remove what processes that no longer run have left in a folder: .NAME.PROCESS followed by our mark."""
     if os.name != "posix":  # elsewhere asking for a process may end it
         return
-    for left in target.parent.glob(f".{target.name}.*{_STAGING}*"):
-        with suppress(ValueError, PermissionError):
-            process = int(left.name.removeprefix(f".{target.name}.").split(".")[0])
+    for left in folder.glob(f".*{_STAGING}*"):
+        named = _ABANDONED.fullmatch(left.name)
+        with suppress(PermissionError):
             try:
-                os.kill(process, 0)
+                if named is not None:
+                    os.kill(int(named[1]), 0)
             except ProcessLookupError:
-                shutil.rmtree(left, ignore_errors=True)
+                _remove(left)
+
+
+def _remove(path: Path) -> None:
+    if path.is_dir():
+        shutil.rmtree(path, ignore_errors=True)
+    else:
+        path.unlink(missing_ok=True)
 
 
 def _umask() -> int:

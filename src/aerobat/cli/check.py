@@ -11,7 +11,8 @@ from cyclopts import Parameter
 
 from aerobat.certification import Envelope, certify
 from aerobat.cli.entry import ExitCode
-from aerobat.cli.options import DEFAULT_VEHICLE, CheckOptions
+from aerobat.cli.options import CheckOptions
+from aerobat.cli.run_record import default_vehicle
 from aerobat.cli.tasks import named_vehicle
 from aerobat.cli.terminal import print_json
 from aerobat.environment import Environment
@@ -44,7 +45,7 @@ def check(plan: Path, options: Annotated[CheckOptions, Parameter(name="*")] = Ch
     if options.heading is not None:
         trajectory = replace(trajectory, heading=radians(options.heading))
     own_vehicle = found.vehicle if isinstance(found, Plan) else None
-    vehicle = chosen or own_vehicle or load_vehicle(DEFAULT_VEHICLE)
+    vehicle = chosen or own_vehicle or load_vehicle(default_vehicle())
     environment = found.problem.environment if isinstance(found, Plan) else Environment()
     envelope = replace(
         envelope_for(found.problem, vehicle, found.stages) if isinstance(found, Plan) else Envelope(),

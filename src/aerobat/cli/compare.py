@@ -2,20 +2,23 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Annotated
 
 from cyclopts import Parameter
 
-from aerobat.cli.options import TaskOptions
-from aerobat.cli.run_folder import run_folder
+from aerobat.cli.options import OutputOptions, TaskOptions
+from aerobat.cli.run_folder import run_folder, written_to
+from aerobat.cli.run_record import RunRecord
 from aerobat.cli.tasks import planning_progress, read_task
 from aerobat.cli.terminal import print_json
 from aerobat.reporting.comparison import comparison_figure, comparison_rows, comparison_table
 from aerobat.reporting.page import png
 from aerobat.reporting.report_json import to_json
 from aerobat.reporting.tables import show
+from aerobat.studies.compare import Comparison
 from aerobat.studies.compare import compare as compare_planners
+
+COMPARISON = "compare.json"
 
 
 def compare(problem: str, options: Annotated[TaskOptions, Parameter(name="*")] = TaskOptions()) -> None:
@@ -30,15 +33,33 @@ def compare(problem: str, options: Annotated[TaskOptions, Parameter(name="*")] =
         A name that `aerobat problems` lists, or a problem's TOML file.
     """
     task, vehicle = read_task(problem, options)
+    record = RunRecord(
+        command="compare",
+        problem=task,
+        vehicle=vehicle,
+        angle=options.angle,
+        plugins=tuple(map(str, options.plugins)),
+    )
+    finish_comparison(comparison_of(record), record, options)
+
+
+def comparison_of(record: RunRecord) -> Comparison:
+    """All planners on a run's problem."""
     with planning_progress() as progress:
-        comparison = compare_planners(task, vehicle, progress=progress)
-    folder = options.out or Path("out") / f"{task.name}-compare"
+        return compare_planners(record.problem, record.vehicle, progress=progress)
+
+
+def finish_comparison(comparison: Comparison, record: RunRecord, options: OutputOptions) -> None:
+    """Write a comparison, then show it."""
     rows = to_json(comparison_rows(comparison))
-    with run_folder(folder) as staging:
-        (staging / "compare.json").write_text(rows + "\n", encoding="utf-8")
-        (staging / "compare.png").write_bytes(png(comparison_figure(comparison)))
+    picture = png(comparison_figure(comparison))
+    folder = options.out or record.folder
+    replaced = folder.exists()
+    with run_folder(folder, record) as staging:
+        (staging / COMPARISON).write_text(rows + "\n", encoding="utf-8")
+        (staging / "compare.png").write_bytes(picture)
     if options.json:
         print_json(rows)
         return
     show(comparison_table(comparison))
-    print(f"\nwritten to {folder}/")
+    print(f"\n{written_to(folder, replaced)}")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Annotated
 
 from cyclopts import Parameter
@@ -9,10 +10,11 @@ from cyclopts import Parameter
 from aerobat.cli.entry import ExitCode
 from aerobat.cli.options import FlyingOptions, PlanningOptions
 from aerobat.cli.run_folder import Flown, finish
+from aerobat.cli.run_record import FlightSettings
 from aerobat.cli.tasks import planned
 from aerobat.control import Controller, named_controller
 from aerobat.evaluation import score
-from aerobat.planning import nominal_flight
+from aerobat.planning import Plan, nominal_flight
 from aerobat.simulation import StateNoise
 from aerobat.simulation.fly import fly as simulate
 
@@ -26,19 +28,28 @@ def fly(
 
     Prints a short table and writes to the output folder, as one: PROBLEM.plan (the whole plan), plan.csv
     (position, velocity, acceleration and jerk at 100 Hz), flight.npz (everything that was simulated),
-    report.png and report.json. Exits with 0 only if the plan is certified and the flight went well.
+    report.png, report.json, and run.toml, from which `aerobat repeat` does all of it again. Exits with 0 only
+    if the plan is certified and the flight went well.
 
     Parameters
     ----------
     problem
-        A name that `aerobat problems` lists, a problem's TOML file, or a .plan file, which is flown as it is.
+        A name that `aerobat problems` lists, a problem's TOML file, or a .plan file or a run's folder, whose
+        plan is flown as it is.
     """
-    noise = StateNoise.fused().scaled(flying.noise) if flying.noise else None
-    controller = named_controller(flying.controller)
-    plan = planned(problem, options)
+    named_controller(flying.controller)  # refused before anything is planned
+    plan, record = planned(problem, options, "fly")
+    settings = FlightSettings(flying.controller, flying.noise, flying.seed)
+    return finish(plan, replace(record, flight=settings), options, flown(plan, settings))
+
+
+def flown(plan: Plan, settings: FlightSettings) -> Flown:
+    """The flight of a plan, and its score."""
     assert plan.vehicle is not None, "a command plans for a vehicle"
+    noise = StateNoise.fused().scaled(settings.noise) if settings.noise else None
+    controller = named_controller(settings.controller)
     if noise is None and controller == Controller():  # the flight that the plan was judged by
         flight = nominal_flight(plan.trajectory, plan.vehicle, plan.problem.environment)
     else:
-        flight = simulate(plan, controller=controller, noise=noise, seed=flying.seed)
-    return finish(plan, options, Flown(flight, score(flight, plan, plan.vehicle), flying.controller))
+        flight = simulate(plan, controller=controller, noise=noise, seed=settings.seed)
+    return Flown(flight, score(flight, plan, plan.vehicle), settings.controller)

@@ -17,7 +17,6 @@ flying = Group("Flying", sort_key=2)
 limiting = Group("Limits", sort_key=2)
 output = Group("Output", sort_key=3)
 
-DEFAULT_VEHICLE = "agile-quad"
 POSITIVE = validators.Number(gt=0)
 Plugins = partial(
     Parameter,
@@ -30,7 +29,26 @@ Options = TypeVar("Options", bound=type[Any])
 
 
 @dataclass(frozen=True, kw_only=True)
-class TaskOptions:
+class OutputOptions:
+    """Where results go."""
+
+    out: Annotated[Path | None, Parameter(group=output)] = None
+    """The folder to write to, replaced as a whole. Default: out/PROBLEM, with all that is not default in its
+    name, as in out/half-flip-crazyflie-45deg-free-knots."""
+
+    json: Annotated[bool, Parameter(group=output, negative="", show_default=False)] = False
+    """Print the report as JSON on standard output, and nothing else."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class RepeatOptions(OutputOptions):
+    """Options of a run that is repeated."""
+
+    plugins: Annotated[tuple[Path, ...], Plugins(group=planning)] = ()
+
+
+@dataclass(frozen=True, kw_only=True)
+class TaskOptions(OutputOptions):
     """The problem's and the vehicle's options, and where results go."""
 
     vehicle: Annotated[str | None, Parameter(group=planning)] = None
@@ -41,12 +59,6 @@ class TaskOptions:
     """The tilt of a half-flip's gate in degrees, -90 to 90, to the right when positive."""
 
     plugins: Annotated[tuple[Path, ...], Plugins(group=planning)] = ()
-
-    out: Annotated[Path | None, Parameter(group=output)] = None
-    """The folder to write to, replaced as a whole. Default: out/PROBLEM."""
-
-    json: Annotated[bool, Parameter(group=output, negative="", show_default=False)] = False
-    """Print the report as JSON on standard output, and nothing else."""
 
 
 def offered_options() -> dict[str, dict[str, PlannerOption]]:

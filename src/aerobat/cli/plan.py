@@ -17,12 +17,13 @@ def plan(
 ) -> ExitCode:
     """Plan a maneuver and stop there.
 
-    As `aerobat fly`, without the flight: writes PROBLEM.plan, plan.csv, report.png and report.json. Exits
-    with 0 only if the plan is certified and flies.
+    As `aerobat fly`, without the flight: writes PROBLEM.plan, plan.csv, report.png, report.json and run.toml.
+    Exits with 0 only if the plan is certified and flies.
 
     Parameters
     ----------
     problem
         A name that `aerobat problems` lists, or a problem's TOML file.
     """
-    return finish(planned(problem, options), options)
+    found, record = planned(problem, options, "plan")
+    return finish(found, record, options)

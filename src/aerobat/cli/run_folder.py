@@ -9,7 +9,8 @@ from pathlib import Path
 
 from aerobat.cli.entry import ExitCode
 from aerobat.cli.interrupts import end_interrupts
-from aerobat.cli.options import TaskOptions
+from aerobat.cli.options import OutputOptions
+from aerobat.cli.run_record import RECORD, RunRecord, write_record
 from aerobat.cli.terminal import print_json
 from aerobat.evaluation import Score
 from aerobat.interchange.csv import write_csv
@@ -21,18 +22,35 @@ from aerobat.reporting.tables import show, summary_table
 from aerobat.simulation import Flight
 from aerobat.storage import whole_folder
 
-FILES = ("plan.npz", "plan.csv", "flight.npz", "report.json", "report.png", "compare.json", "compare.png")
+FLIGHT = "flight.npz"
+FILES = (
+    RECORD,
+    FLIGHT,
+    "plan.npz",
+    "plan.csv",
+    "report.json",
+    "report.png",
+    "compare.json",
+    "compare.png",
+)
 
 
 @contextmanager
-def run_folder(folder: Path) -> Iterator[Path]:
+def run_folder(folder: Path, record: RunRecord) -> Iterator[Path]:
     """Yield an empty folder that replaces that of an earlier run as one; see `whole_folder`.
 
-    Ctrl-C comes in time until that happens, and means nothing afterwards: a run is interrupted or done.
+    The record comes with it. Ctrl-C comes in time until that happens, and means nothing afterwards: a run is
+    interrupted or done.
     """
     with whole_folder(folder, lambda name: name in FILES or name.endswith(".plan")) as staging:
         yield staging
+        write_record(record, staging)
         end_interrupts()
+
+
+def written_to(folder: Path, replaced: bool) -> str:
+    """Where a run is now, and what is there no longer, in a line."""
+    return f"written to {folder}/" + (", in the place of an earlier run" if replaced else "")
 
 
 @dataclass(frozen=True)
@@ -44,24 +62,33 @@ class Flown:
     controller: str
 
 
-def finish(plan: Plan, options: TaskOptions, flown: Flown | None = None) -> ExitCode:
-    """Write what was made, then say what it is; the exit code tells if all is well."""
+def finish(plan: Plan, record: RunRecord, options: OutputOptions, flown: Flown | None = None) -> ExitCode:
+    """Write what was made, then say what it is; the exit code tells if all is well.
+
+    Args:
+        plan: What was planned.
+        record: What it takes to do it again.
+        options: Where to write, and in what form to say it.
+        flown: The plan's flight, if it was flown.
+    """
     assert plan.vehicle is not None, "a command plans for a vehicle"
-    folder = options.out or Path("out") / plan.problem.name
+    folder = options.out or record.folder
     flight, score, controller = (flown.flight, flown.score, flown.controller) if flown else (None, None, None)
     facts = to_json(report(plan, score, plan.vehicle.name, controller))
-    with run_folder(folder) as staging:
+    picture = png(report_figure(plan, plan.vehicle, flight, score))
+    replaced = folder.exists()
+    with run_folder(folder, record) as staging:
         plan.save(staging / f"{plan.problem.name}.plan")
         write_csv(plan.trajectory, staging / "plan.csv")
         if flight is not None:
-            flight.save(staging / "flight.npz")
+            flight.save(staging / FLIGHT)
         (staging / "report.json").write_text(facts + "\n", encoding="utf-8")
-        (staging / "report.png").write_bytes(png(report_figure(plan, plan.vehicle, flight, score)))
+        (staging / "report.png").write_bytes(picture)
     if options.json:
         print_json(facts)
     else:
         show(summary_table(plan, score, plan.vehicle.name, controller))
-        print(f"\nwritten to {folder}/")
+        print(f"\n{written_to(folder, replaced)}")
     return ExitCode.WELL if _is_well(plan, score) else ExitCode.NOT_WELL
 
 

@@ -8,30 +8,31 @@ from contextlib import contextmanager
 from dataclasses import replace
 from math import isfinite, radians
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
-from aerobat.cli.options import DEFAULT_VEHICLE, PlanningOptions, TaskOptions, offered_options, option_name
+from aerobat.cli.options import PlanningOptions, TaskOptions, offered_options, option_name
+from aerobat.cli.run_record import RunRecord, default_vehicle
 from aerobat.cli.terminal import say
 from aerobat.errors import SpecError
+from aerobat.interchange import read_plan
 from aerobat.planning import (
     Attempt,
     Plan,
     Planner,
-    load_plan,
     plan,
     planner_class,
     planner_options,
     with_certificate,
     with_flyability,
 )
-from aerobat.problem import Problem, load_problem
+from aerobat.problem import Problem, load_problem, problem_names
 from aerobat.vehicle import Vehicle, implausibilities, load_vehicle
 
 
 def read_task(name: str, options: TaskOptions, paper: bool = False) -> tuple[Problem, Vehicle]:
     """The problem and the vehicle that a command names."""
     problem = load_problem(name)
-    vehicle = named_vehicle(options.vehicle or ("hexarotor" if paper else DEFAULT_VEHICLE))
+    vehicle = named_vehicle(options.vehicle or default_vehicle(paper))
     if options.angle is not None:
         problem = _tilted(problem, options.angle)
     return (problem.as_in_paper() if paper else problem), vehicle
@@ -45,17 +46,48 @@ def named_vehicle(name: str) -> Vehicle:
     return vehicle
 
 
-def planned(name: str, options: PlanningOptions) -> Plan:
-    """The plan that a command names, certified for its vehicle: of a problem, or from a .plan file."""
-    if name.endswith(".plan"):
-        return _read_plan(Path(name), options)
+def planned(name: str, options: PlanningOptions, command: Literal["fly", "plan"]) -> tuple[Plan, RunRecord]:
+    """The plan that a command names, certified for its vehicle, and what it takes to make it again.
+
+    Args:
+        name: Of a problem, or a plan's file or folder.
+        options: As they were given.
+        command: That plans.
+    """
+    source = plan_source(name)
+    if source is not None:
+        plan = _read_plan(source, options)
+        assert plan.vehicle is not None, "a plan that is read is certified for a vehicle"
+        return plan, RunRecord(command=command, problem=plan.problem, vehicle=plan.vehicle, source=name)
     problem, vehicle = read_task(name, options, options.paper)
-    planner = make_planner(options)
+    record = RunRecord(
+        command=command,
+        problem=problem,
+        vehicle=vehicle,
+        planner=make_planner(options),
+        paper=options.paper,
+        angle=options.angle,
+        plugins=tuple(map(str, options.plugins)),
+    )
+    return plan_of(record), record
+
+
+def plan_of(record: RunRecord) -> Plan:
+    """The plan of a run, made anew."""
+    assert record.planner is not None, "a plan that came from a file is not made"
     with planning_progress() as progress:
-        if not options.paper:
-            return plan(problem, planner, vehicle, progress)
+        if not record.paper:
+            return plan(record.problem, record.planner, record.vehicle, progress)
         # the paper plans without a vehicle; whether this one can fly it is told all the same
-        return with_flyability(with_certificate(plan(problem, planner, progress=progress), vehicle))
+        found = plan(record.problem, record.planner, progress=progress)
+        return with_flyability(with_certificate(found, record.vehicle))
+
+
+def plan_source(name: str) -> Path | None:
+    """The file or folder that holds a plan, where a command names one, and no problem."""
+    path = Path(name)
+    is_folder = name not in problem_names() and path.is_dir() and path.suffix != ".toml"
+    return path if path.suffix == ".plan" or is_folder else None
 
 
 def make_planner(options: PlanningOptions) -> Planner:
@@ -104,10 +136,12 @@ def _read_plan(path: Path, options: PlanningOptions) -> Plan:
         if _is_given(getattr(options, name, None)):
             flag = "--" + name.replace("_", "-")
             raise SpecError(f"{flag} plans anew, but {path} is a plan; leave it out, or name a problem")
-    found = load_plan(path)
+    found = read_plan(path)
+    if not isinstance(found, Plan):
+        raise SpecError(f"{path} holds a path alone and no plan; give a .plan file")
     if options.vehicle is None and found.vehicle is not None:
         return found if found.flyability is not None else with_flyability(found)
-    return with_flyability(with_certificate(found, named_vehicle(options.vehicle or DEFAULT_VEHICLE)))
+    return with_flyability(with_certificate(found, named_vehicle(options.vehicle or default_vehicle())))
 
 
 def _is_given(value: Any) -> bool:

@@ -13,6 +13,7 @@ from aerobat.errors import AerobatError
 from aerobat.optimization import big_m
 from aerobat.optimization.assignment import AssignmentProgram
 from aerobat.optimization.confirmation import confirmed
+from aerobat.optimization.deadline import shorter
 from aerobat.optimization.result import AssignmentResult, Status, verified
 
 _TOO_LARGE = 10010  # Gurobi's error number for a model beyond the size of the licence
@@ -57,7 +58,8 @@ class Gurobi:
                 env.setParam("Threads", self.threads)
                 env.start()
                 with gurobipy.Model(env=env) as model:
-                    model.Params.TimeLimit = inf if time_limit is None else time_limit
+                    limit = shorter(time_limit)
+                    model.Params.TimeLimit = inf if limit is None else limit
                     claim = _GurobiModel(gurobipy, model, scaling.program).claim(start)
         except gurobipy.GurobiError as error:
             raise AerobatError(_message(error, program)) from None

@@ -19,6 +19,7 @@ from numpy.typing import ArrayLike
 
 from aerobat.arrays import Array, frozen, frozen_bounds
 from aerobat.errors import BackendMissing, SpecError
+from aerobat.optimization.deadline import shorter
 from aerobat.optimization.interrupts import interrupts_kept
 
 _WARM = {
@@ -29,6 +30,7 @@ _WARM = {
     "ipopt.warm_start_slack_bound_frac": 1e-9,
     "ipopt.warm_start_mult_bound_push": 1e-9,
 }
+_SHORTEST = 1e-9  # [s] the shortest limit that IPOPT takes
 _MAX_VIOLATION = 1e-6  # that a result may have and be called converged
 _OPTIONS = {
     "print_time": False,
@@ -151,8 +153,8 @@ def solve_nonlinear(
     x0 = frozen(start, "start", (int(program.variables.numel()),))
     options: dict[str, Any] = {**_OPTIONS, "ipopt.max_iter": max_iterations, "ipopt.tol": tolerance}
     options |= program.derivatives
-    if time_limit is not None:
-        options["ipopt.max_wall_time"] = time_limit
+    if (limit := shorter(time_limit)) is not None:
+        options["ipopt.max_wall_time"] = max(limit, _SHORTEST)
     if not exact_hessian:
         options["ipopt.hessian_approximation"] = "limited-memory"
     if initial_barrier is not None:

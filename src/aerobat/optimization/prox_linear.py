@@ -17,6 +17,7 @@ from typing import Any, Generic, Protocol, TypeVar
 import numpy as np
 
 from aerobat.arrays import Array
+from aerobat.optimization.deadline import out_of_time
 
 _PENALTY = 2.0  # M: of the cost for each unit of violation
 _MAX_PENALTY = 200.0  # for violations that the first penalty leaves,
@@ -97,13 +98,16 @@ class ProxLinearResult(Generic[P]):
     feasible: P | None = None  # the last one on the way without violation
 
 
-def prox_linear(program: SmoothProgram[P], start: P, max_steps: int = 40) -> ProxLinearResult[P]:
-    """Descend from a point; it ends at a local optimum, out of steps or where no step leads on.
+def prox_linear(
+    program: SmoothProgram[P], start: P, max_steps: int = 40, in_time: bool = False
+) -> ProxLinearResult[P]:
+    """Descend from a point; it ends at a local optimum, out of steps or time, or where no step leads on.
 
     Args:
         program: What is minimized; where its cost is zero, the first point without violation will do.
         start: Where to begin, feasible or not.
         max_steps: QPs, at most.
+        in_time: Whether it ends where no time is left, as a descent may and what mends a path may not.
     """
     point = start
     feasible = start if start.violation <= 0.0 else None
@@ -111,6 +115,8 @@ def prox_linear(program: SmoothProgram[P], start: P, max_steps: int = 40) -> Pro
     proximity = _FIRST_PROXIMITY
     penalty = _PENALTY
     for steps in range(1, max_steps + 1):
+        if in_time and out_of_time():
+            break
         if not program.cost.any() and point.violation <= 0.0:
             return ProxLinearResult(point, True, steps - 1, point)
         merit = _merit(program, point, penalty)

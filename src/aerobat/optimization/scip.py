@@ -12,6 +12,7 @@ import numpy as np
 from aerobat.optimization import big_m
 from aerobat.optimization.assignment import AssignmentProgram
 from aerobat.optimization.confirmation import confirmed
+from aerobat.optimization.deadline import shorter
 from aerobat.optimization.result import AssignmentResult, Status, verified
 
 _MEANING: dict[str, Status] = {"optimal": "optimal", "infeasible": "infeasible"}
@@ -42,8 +43,8 @@ class Scip:
         program.check_start(start)
         model = pyscipopt.Model()
         model.hideOutput()
-        if time_limit is not None:
-            model.setParam("limits/time", time_limit)
+        if (limit := shorter(time_limit)) is not None:
+            model.setParam("limits/time", limit)
         scaling = big_m.scaled(program)
         claim = _ScipModel(pyscipopt, model, scaling.program).claim()
         return confirmed(program, verified(program, scaling.unscaled(claim)))

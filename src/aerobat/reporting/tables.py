@@ -150,6 +150,8 @@ def plan_facts(plan: Plan) -> Iterable[tuple[str, str]]:
 
 
 def _optimality(plan: Plan) -> str:
+    if plan.status == "time_limit" and plan.gap is None:
+        return "the best found by the time limit"
     if plan.gap is None or plan.gap < 1e-6:
         return plan.status
     return f"within {100 * plan.gap:.2g} % of the optimum"

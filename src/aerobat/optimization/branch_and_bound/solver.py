@@ -17,6 +17,7 @@ from aerobat.optimization.branch_and_bound.least_distance import LeastDistanceQP
 from aerobat.optimization.branch_and_bound.lower_bounds import DualBounds
 from aerobat.optimization.branch_and_bound.null_space import NullSpace, split_coupled
 from aerobat.optimization.branch_and_bound.search import BestFirstSearch
+from aerobat.optimization.deadline import shorter
 from aerobat.optimization.result import AssignmentResult, Status, verified
 
 _MATRICES = ("rows", "equality", "hessian", "gradient")
@@ -48,7 +49,8 @@ class BranchAndBound:
         """As `Solver.solve`; the result's time is that of the whole call."""
         program.check_start(start)
         began = perf_counter()
-        deadline = inf if time_limit is None else began + time_limit
+        limit = shorter(time_limit)
+        deadline = inf if limit is None else began + limit
         result = verified(program, self._claim(program, deadline, start))
         return replace(result, time=perf_counter() - began)
 

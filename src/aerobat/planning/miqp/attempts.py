@@ -10,6 +10,7 @@ import numpy as np
 
 from aerobat.certification import Certificate, Verdict
 from aerobat.optimization import AssignmentResult, Solver
+from aerobat.optimization.deadline import out_of_time
 from aerobat.planning.certified_solve import Judged, Solution, certified_solve
 from aerobat.planning.miqp.diagnosis import NOT_CONVERGED, OUT_OF_TIME
 from aerobat.planning.miqp.formulation import Formulation
@@ -41,7 +42,6 @@ class Attempts:
     formulation: Formulation
     vehicle: Vehicle | None
     solver: Solver
-    time_limit: float | None
     recorder: Recorder
     reserve: float = 0.0  # of what the vehicle can do, kept for the controller
     slots: tuple[int, ...] | None = None  # of the last solution: where the next solve begins
@@ -49,9 +49,14 @@ class Attempts:
     def solve(self, dt: float) -> AssignmentResult:
         """The paper's program at one dt."""
         program = self.formulation.program(dt)
-        answer = self.solver.solve(program, time_limit=self.time_limit, start=self.slots)
+        answer = self.solver.solve(program, start=self.slots)
         self.slots = answer.slots or self.slots
         return answer
+
+    @property
+    def is_over(self) -> bool:
+        """True where no time is left for another; the first is made in any case."""
+        return bool(self.recorder.attempts) and out_of_time()
 
     @property
     def jumps(self) -> bool:
@@ -145,8 +150,7 @@ class _Answered:
     def _why_unsolved(self) -> str:
         if self.placement.answer.status == "infeasible":
             return "the program has no solution"
-        limited = self.attempts.time_limit is not None
-        return OUT_OF_TIME if limited else NOT_CONVERGED
+        return OUT_OF_TIME if out_of_time() else NOT_CONVERGED
 
 
 @dataclass

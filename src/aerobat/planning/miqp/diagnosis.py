@@ -30,10 +30,6 @@ def why_infeasible(formulation: Formulation, attempts: Sequence[Attempt], vehicl
             f"{said} that {vehicle.name} can fly: at best, {best}; lower the maneuver's thrusts, "
             "move the gate nearer, or take a stronger vehicle"
         )
-    if any(a.outcome == OUT_OF_TIME for a in attempts):
-        return (
-            f"{said} that was found in the time given; allow more with --time-limit, or use fewer intervals"
-        )
     binding = list(_binding(formulation, tried))
     if not binding:
         return (

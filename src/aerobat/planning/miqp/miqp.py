@@ -12,6 +12,7 @@ from aerobat.declaration import AS_IT_IS, NonNegative
 from aerobat.errors import Infeasible
 from aerobat.flatness import force_balance
 from aerobat.optimization import AssignmentProgram, solver
+from aerobat.optimization.deadline import out_of_time, within_time
 from aerobat.planning.certified_solve import Judged
 from aerobat.planning.miqp.attempts import Attempts, Placement, flyable_order, plan_of
 from aerobat.planning.miqp.diagnosis import why_infeasible
@@ -24,6 +25,7 @@ from aerobat.planning.planners import Planner, option, planner
 from aerobat.planning.recorder import Progress, Recorder
 from aerobat.planning.result import Plan
 from aerobat.planning.search import GridSearch, Search
+from aerobat.planning.time_limit import TIME_LIMIT, stopped, too_short
 from aerobat.planning.warm_start import Reserve
 from aerobat.problem.condition import ForceBalance
 from aerobat.problem.problem import Problem
@@ -57,7 +59,7 @@ class Miqp(Planner):
         "builtin", "The solver, builtin, gurobi or scip (the last two are optional extras)."
     )
     time_limit: NonNegative | None = option(  # [s]
-        None, "Seconds for each program; the best plan found by then is taken and its gap reported."
+        None, TIME_LIMIT
     )
     reserve: Reserve = option(
         0.0,
@@ -77,34 +79,37 @@ class Miqp(Planner):
         that makes no sense, and BackendMissing when the solver is not installed.
         """
         recorder = Recorder(progress)
-        try:
-            return self._planned(problem, vehicle, recorder)
-        except Infeasible as infeasible:
-            if vehicle is None or not self.rescue or not infeasible.attempts:
-                raise
-            rescued = rescued_plan(self, problem, vehicle, recorder)
-            if rescued is None:
-                raise
-            return rescued
+        with within_time(self.time_limit):
+            try:
+                return stopped(self._planned(problem, vehicle, recorder))
+            except Infeasible as infeasible:
+                if vehicle is None or not self.rescue or not infeasible.attempts:
+                    raise
+                rescued = rescued_plan(self, problem, vehicle, recorder)
+                if rescued is None:
+                    raise
+                return rescued
 
     def _planned(self, problem: Problem, vehicle: Vehicle | None, recorder: Recorder) -> Plan:
         order = flyable_order(vehicle) if self.order is None else self.order
         formulation = formulate(problem, order, self.intervals, vehicle)
-        attempts = Attempts(
-            formulation, vehicle, solver(self.backend), self.time_limit, recorder, self.reserve
-        )
+        attempts = Attempts(formulation, vehicle, solver(self.backend), recorder, self.reserve)
         if vehicle is None or self.search is not None:
             found = (self.search or GridSearch()).smallest(partial(_attempt, attempts))
         else:
             first = duration_lower_bound(problem, vehicle) / self.intervals
             found = shortest(attempts, first, last=max(4.0, 2.0 * first))
         if found is None:
+            if out_of_time():
+                raise too_short(problem, self.time_limit, recorder.attempts, "use fewer intervals")
             raise Infeasible(why_infeasible(formulation, recorder.attempts, vehicle), recorder.attempts)
         return plan_of(attempts, found, self.backend)
 
 
 def _attempt(attempts: Attempts, dt: float) -> Judged[Placement] | None:
-    """Outcome of one dt; None where nothing is found that is certified."""
+    """Outcome of one dt; None where nothing is found that is certified, or no time is left."""
+    if attempts.is_over:
+        return None
     placement = Placement(attempts.solve(dt), dt)
     judged = attempts.judge(placement)
     if placement.answer.x is None or attempts.vehicle is None:

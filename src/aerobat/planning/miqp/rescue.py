@@ -7,6 +7,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from aerobat.errors import BackendMissing, Infeasible, SpecError
+from aerobat.optimization.deadline import out_of_time
 from aerobat.planning.miqp.attempts import flyable_order
 from aerobat.planning.miqp.integrator import INPUT_NAMES
 from aerobat.planning.planners import Planner
@@ -32,6 +33,8 @@ def rescued_plan(asked: Miqp, problem: Problem, vehicle: Vehicle, recorder: Reco
         recorder: The attempts so far; those that follow are passed on to its `progress`.
     """
     for planner, how in _alternatives(asked, vehicle):
+        if out_of_time():
+            return None
         try:
             plan = planner.plan(problem, vehicle, recorder.progress)
         except (Infeasible, SpecError, BackendMissing):

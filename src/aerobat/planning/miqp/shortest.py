@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 from functools import partial
 from math import inf
 
+from aerobat.optimization.deadline import out_of_time
 from aerobat.planning.certified_solve import Judged
 from aerobat.planning.flyability import flight_error
 from aerobat.planning.miqp.attempts import Attempts, Placement
@@ -40,7 +41,7 @@ def shortest(attempts: Attempts, first: float, last: float) -> Judged[Placement]
     ends: list[tuple[Placement, PathPoint]] = []
     for tried, start in enumerate(starts):
         ends += _descents(start)
-        if len(ends) == STARTS or tried + 1 == MAX_STARTS:
+        if len(ends) == STARTS or tried + 1 == MAX_STARTS or out_of_time():
             break
     for start, path in sorted(ends, key=lambda end: float(end[1].x[-1])):
         judged = attempts.refined(start, partial(finished, path))
@@ -74,7 +75,7 @@ def flyable(attempts: Attempts, judged: Judged[Placement]) -> Judged[Placement]:
         path, trajectory = judged.solution.source.path, judged.solution.trajectory
         assert vehicle is not None
         assert trajectory is not None
-        if path is None or flight_error(trajectory, vehicle, environment) <= FLYABLE_ERROR:
+        if path is None or out_of_time() or flight_error(trajectory, vehicle, environment) <= FLYABLE_ERROR:
             return judged
         program = replace(path.program, reserve=max(reserve, path.program.reserve))
         kept = descended(program, path.x)
@@ -96,7 +97,7 @@ class _Scan:
     def starts(self) -> Iterator[Placement]:
         """Answers that are not far from what the vehicle can do, each as a path of its program."""
         dt, before = self.first, inf
-        while dt <= self.last:
+        while dt <= self.last and not self.attempts.is_over:
             placement = Placement(self.attempts.solve(dt), dt)
             violation = inf
             if placement.answer.x is not None:

@@ -11,8 +11,9 @@ from typing import Annotated, ClassVar
 
 from pydantic import Field
 
-from aerobat.declaration import AS_IT_IS, Count
+from aerobat.declaration import AS_IT_IS, Count, NonNegative
 from aerobat.errors import Infeasible
+from aerobat.optimization.deadline import out_of_time, within_time
 from aerobat.optimization.nonlinear import import_casadi
 from aerobat.planning.miqp import Miqp
 from aerobat.planning.planners import Planner, option, planner
@@ -20,8 +21,10 @@ from aerobat.planning.polynomial.knot_descent import Course, Descent
 from aerobat.planning.polynomial.min_snap import MinSnap
 from aerobat.planning.recorder import Progress, Recorder
 from aerobat.planning.result import Plan
+from aerobat.planning.time_limit import TIME_LIMIT, stopped, too_short
 from aerobat.planning.warm_start import Reserve, WarmStart, plans_to_begin_from, require_attitudes
 from aerobat.problem.problem import Problem
+from aerobat.problem.stage import StageSequence
 from aerobat.vehicle import Vehicle
 
 COARSE = 4  # segments to begin with where there shall be more: they are quick and come near the least time
@@ -54,6 +57,7 @@ class FreeKnots(Planner):
         command_default=0.03,
     )
     iterations: Count = 50  # at most, each solve
+    time_limit: NonNegative | None = option(None, TIME_LIMIT)  # [s]
     COMPARED: ClassVar[tuple[dict[str, int], ...]] = ({"segments": 2}, {"segments": 8})
 
     def plan(
@@ -68,17 +72,12 @@ class FreeKnots(Planner):
         import_casadi()
         sequence = problem.stages(vehicle.max_specific_thrust)
         recorder = Recorder(progress)
-        for start in self._starts(problem, vehicle):
-            guess = WarmStart.of(start, sequence)
-            course = Course.of(problem, vehicle, sequence, guess)
-            descent = Descent(course, recorder, self.reserve, self.still_ends, self.iterations)
-            descent.consider(start, guess)
-            for segments in sorted({min(COARSE, self.segments), self.segments}):
-                descent.run(guess, segments)
-            if descent.best is None:
-                descent.run(guess, 2 * self.segments)
-            if (found := descent.plan()) is not None:
-                return found
+        with within_time(self.time_limit):
+            found = self._planned(problem, vehicle, sequence, recorder)
+            if found is not None:
+                return stopped(found)
+            if out_of_time():
+                raise too_short(problem, self.time_limit, recorder.attempts)
         raise Infeasible(
             f"no polynomials are certified to fly '{problem.name}' with {vehicle.name}: at the last attempt "
             f"{recorder.attempts[-1].outcome}; widen what binds there, ask less of the stages, or give more "
@@ -86,10 +85,31 @@ class FreeKnots(Planner):
             recorder.attempts,
         )
 
+    def _planned(
+        self, problem: Problem, vehicle: Vehicle, sequence: StageSequence, recorder: Recorder
+    ) -> Plan | None:
+        """The fastest certified plan from the first start that leads to one."""
+        for start in self._starts(problem, vehicle):
+            guess = WarmStart.of(start, sequence)
+            course = Course.of(problem, vehicle, sequence, guess)
+            descent = Descent(course, recorder, self.reserve, self.still_ends, self.iterations)
+            descent.consider(start, guess)
+            for segments in sorted({min(COARSE, self.segments), self.segments}):
+                if not out_of_time():
+                    descent.run(guess, segments)
+            if descent.best is None and not out_of_time():
+                descent.run(guess, 2 * self.segments)
+            if (found := descent.plan()) is not None:
+                return found
+            if out_of_time():
+                break
+        return None
+
     def _starts(self, problem: Problem, vehicle: Vehicle) -> Iterator[Plan]:
         """Plans to begin from, the best first; the last knows no rotors."""
         if self.start is not None:
             yield self.start
         closed_form: list[Planner] = [MinSnap()] if problem.maneuver.through_points else []
         yield from plans_to_begin_from([*closed_form, Miqp(rescue=False)], problem, vehicle)
-        yield Miqp().plan(problem)
+        if not out_of_time():
+            yield Miqp().plan(problem)

@@ -14,6 +14,7 @@ import numpy as np
 
 from aerobat.certification import Certificate, Verdict
 from aerobat.flatness import force_balance
+from aerobat.optimization.deadline import out_of_time
 from aerobat.planning.certified_solve import Judged, Solution, certified_solve
 from aerobat.planning.polynomial.knot_program import KnotProgram
 from aerobat.planning.polynomial.knot_samples import ConstraintViolation, chebyshev_samples, refit
@@ -140,7 +141,7 @@ class Descent:
         guess = guess if self.best is None else self.best.solution.source.guess
         guess = self.course.paced(replace(guess, trajectory=refit(guess.trajectory, segments)))
         program, end = _Exchange(self, guess), len(self.recorder.attempts) + ROUNDS
-        while (left := end - len(self.recorder.attempts)) > 0:
+        while (left := end - len(self.recorder.attempts)) > 0 and not out_of_time():
             before = program.guess.trajectory.duration
             if (found := self._certified(program, left)) is None or program.little_to_gain(found, before):
                 return
@@ -243,6 +244,8 @@ class _Exchange:
         A path slower than the best that is certified is given up: tightening only slows it further.
         """
         best, path = self._descent.best, solution.source
+        if out_of_time():
+            return False
         solved = path.unsolved <= SOLVED
         converged = solution.status == CONVERGED
         if converged and best is not None and solution.duration >= best.solution.duration:

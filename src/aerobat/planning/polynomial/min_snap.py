@@ -12,15 +12,17 @@ from pydantic import Field, Strict
 
 from aerobat.arrays import Array
 from aerobat.certification import Certificate
-from aerobat.declaration import AS_IT_IS, Count
+from aerobat.declaration import AS_IT_IS, Count, NonNegative
 from aerobat.errors import Infeasible, SpecError
 from aerobat.flatness import force_balance
+from aerobat.optimization.deadline import out_of_time, within_time
 from aerobat.planning.certified_solve import Judged, Solution, certified_solve, refuted_by_samples
 from aerobat.planning.planners import Planner, option, planner
 from aerobat.planning.polynomial.knots import first_times, fixed_at_knots, violated_stage
 from aerobat.planning.recorder import Progress, Recorder
 from aerobat.planning.result import PlacedStage, Plan
 from aerobat.planning.search import BisectionSearch, GridSearch, Search
+from aerobat.planning.time_limit import TIME_LIMIT, stopped, too_short
 from aerobat.problem.problem import Problem
 from aerobat.problem.stage import StageSequence
 from aerobat.trajectory import Trajectory
@@ -62,6 +64,8 @@ class MinSnap(Planner):
         None, "Stop the search at this attempt, whether the vehicle can fly it or not (paper, Fig. 10)."
     )
 
+    time_limit: NonNegative | None = option(None, TIME_LIMIT)  # [s]
+
     def plan(
         self, problem: Problem, vehicle: Vehicle | None = None, progress: Progress | None = None
     ) -> Plan:
@@ -72,13 +76,16 @@ class MinSnap(Planner):
         """
         planning = _Planning(self, problem, vehicle, Recorder(progress))
         first = float(planning.durations.sum())
-        if vehicle is None:
-            found = planning.attempt(first)
-        else:
-            found = self._search(planning.scaling, first).smallest(planning.attempt)
-        if found is None:
-            raise Infeasible(planning.why_infeasible(), planning.recorder.attempts)
-        return planning.result(found)
+        with within_time(self.time_limit):
+            if vehicle is None:
+                found = planning.attempt(first)
+            else:
+                found = self._search(planning.scaling, first).smallest(planning.attempt)
+            if found is not None:
+                return stopped(planning.result(found))
+            if out_of_time():
+                raise too_short(problem, self.time_limit, planning.recorder.attempts)
+        raise Infeasible(planning.why_infeasible(), planning.recorder.attempts)
 
     def _search(self, scaling: TimeScaling, first: float) -> Search:
         if self.search is not None:
@@ -109,7 +116,12 @@ class _Planning:
         return fixed_at_knots(self.problem, self.sequence, self.config.order, self.balance, velocities)
 
     def attempt(self, duration: float) -> Judged[None] | None:
-        """Outcome of one duration; None unless it meets its stages and the vehicle can fly it."""
+        """Outcome of one duration; None unless it meets its stages and the vehicle can fly it.
+
+        Of all but the first, None where no time is left.
+        """
+        if self.recorder.attempts and out_of_time():
+            return None
         program = _ClosedForm(self, duration)
         judged = certified_solve(program, self.problem, self.vehicle, self.recorder)
         stopped = len(self.recorder.attempts) == self.config.stop_after

@@ -10,6 +10,7 @@ from aerobat import so3
 from aerobat.arrays import Array
 from aerobat.certification import Certificate
 from aerobat.flatness import force_balance
+from aerobat.optimization.deadline import out_of_time
 from aerobat.optimization.nonlinear import NonlinearResult, solve_nonlinear
 from aerobat.planning.certified_solve import Solution
 from aerobat.planning.time_optimal.bounds import Backoff
@@ -122,7 +123,7 @@ class CollocatedProgram:
 
     def tighten(self, solution: Solution[SolvedMotion], certificate: Certificate | None) -> bool:
         """Tighten what is held at nodes by what is exceeded between them, and go on from the solution."""
-        if solution.trajectory is None or certificate is None:
+        if solution.trajectory is None or certificate is None or out_of_time():
             return False
         backoff = self._backoff.grown(self.control.elements.bounds, solution.trajectory)
         if backoff is None:

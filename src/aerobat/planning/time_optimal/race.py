@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
+from aerobat.optimization.deadline import out_of_time, time_left, within_time
 from aerobat.planning.certified_solve import Judged, certified_solve
 from aerobat.planning.flyability import flight_error
 from aerobat.planning.recorder import Attempt, Recorder
@@ -27,6 +28,8 @@ ROUNDS = 8  # of solving, at most
 MORE_RESERVE = 1.6  # times the reserve, each time that the plan's own flight leaves its path
 RESERVE_RAISES = 4  # at most
 MAX_RESERVE = 0.4
+COARSE_TIME = 0.4  # of the time that is left, where there is a limit, for all coarse solves,
+AHEAD_TIME = 0.7  # of what is left then for the first of each fine one
 
 
 @dataclass
@@ -49,9 +52,11 @@ class Race:
             starts: Where to begin.
             body: The vehicle, or one much like it that is easier to plan for.
         """
-        finalists, others = _finalists(self._coarse(starts, body))
-        for program in finalists:
-            program.solve_ahead()
+        with within_time(_part(COARSE_TIME)):
+            finalists, others = _finalists(self._coarse(starts, body))
+        with within_time(_part(AHEAD_TIME)):
+            for program in finalists:
+                program.solve_ahead()
         best: Judged[SolvedMotion] | None = None
         for program in sorted(finalists, key=lambda program: program.duration):
             if best is None or program.duration < best.solution.duration:
@@ -67,7 +72,7 @@ class Race:
         """
         best, reserve = (self._flight_error(found), found), self.reserve
         for _ in range(RESERVE_RAISES if reserve > 0.0 else 0):
-            if best[0] <= FLYABLE_ERROR:
+            if best[0] <= FLYABLE_ERROR or out_of_time():
                 break
             reserve = min(MORE_RESERVE * reserve, MAX_RESERVE)
             last = found.solution.source
@@ -81,6 +86,8 @@ class Race:
         """Fine programs from where coarse ones end, the fastest first."""
         ended: list[CollocatedProgram] = []
         for start in starts:
+            if ended and out_of_time():
+                break
             elements = self._elements_for(start, body)
             solved = CollocatedProgram(
                 elements,
@@ -130,6 +137,12 @@ class Race:
             solve_time=answer.time,
         )
         self.recorder.record(attempt)
+
+
+def _part(fraction: float) -> float | None:
+    """A fraction of the time that is left [s]; None without a limit."""
+    left = time_left()
+    return None if left is None else fraction * left
 
 
 def _finalists(

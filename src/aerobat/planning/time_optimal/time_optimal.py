@@ -16,14 +16,16 @@ from typing import Annotated
 import numpy as np
 from pydantic import Field
 
-from aerobat.declaration import AS_IT_IS, Count
+from aerobat.declaration import AS_IT_IS, Count, NonNegative
 from aerobat.errors import Infeasible, SpecError
+from aerobat.optimization.deadline import out_of_time, within_time
 from aerobat.optimization.nonlinear import import_casadi
 from aerobat.planning.certified_solve import Judged
 from aerobat.planning.miqp import Miqp
 from aerobat.planning.planners import Planner, option, planner
 from aerobat.planning.recorder import Progress, Recorder
 from aerobat.planning.result import PlacedStage, Plan
+from aerobat.planning.time_limit import TIME_LIMIT, stopped, too_short
 from aerobat.planning.time_optimal.collocated_program import SolvedMotion
 from aerobat.planning.time_optimal.collocation import BOUNDED_DERIVATIVES
 from aerobat.planning.time_optimal.race import MIN_INTERVALS, Race, with_smoother
@@ -59,6 +61,7 @@ class TimeOptimal(Planner):
     )
     planar: bool = option(False, "Stay in the maneuver's vertical plane, where it has one.")
     iterations: Count = 500  # at most, each solve
+    time_limit: NonNegative | None = option(None, TIME_LIMIT)  # [s]
     guess: Miqp = field(default_factory=Miqp)
     start: Annotated[Plan, AS_IT_IS] | None = None
 
@@ -76,14 +79,16 @@ class TimeOptimal(Planner):
                 "limits.crackle cannot be held by the time-optimal planner, whose moments jump; drop it"
             )
         import_casadi()
-        recorder = Recorder(progress)
-        race = Race(problem, vehicle, recorder, self.intervals, self.iterations, self.reserve)
-        begun = starts(problem, vehicle, self.guess, self.planar, self.starts, self.start)
-        for body in with_smoother(vehicle, SMOOTHING_LAG):
-            found = race.winner(begun, body)
-            if found is not None:
-                return _plan(race.flyable(found), race)
-        attempts = recorder.attempts
+        race = Race(problem, vehicle, Recorder(progress), self.intervals, self.iterations, self.reserve)
+        attempts = race.recorder.attempts
+        with within_time(self.time_limit):
+            begun = starts(problem, vehicle, self.guess, self.planar, self.starts, self.start)
+            for body in with_smoother(vehicle, SMOOTHING_LAG):
+                found = race.winner(begun, body)
+                if found is not None:
+                    return stopped(_plan(race.flyable(found), race))
+                if out_of_time():
+                    raise too_short(problem, self.time_limit, attempts)
         raise Infeasible(
             f"no motion of '{problem.name}' was found that {vehicle.name} can do: at the last attempt "
             f"{attempts[-1].outcome}; ask less of its stages and limits, or give more intervals",

@@ -28,7 +28,7 @@ def descended(program: PathProgram, start: Array, max_steps: int = MAX_STEPS) ->
     point = program.at(start)
     if point is None:
         return None
-    found = prox_linear(program, point, max_steps)
+    found = prox_linear(program, point, max_steps, in_time=True)
     return found.feasible if found.point.violation > MENDABLE else found.point
 
 

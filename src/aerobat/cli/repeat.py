@@ -1,0 +1,108 @@
+"""`aerobat repeat`: a run again from its folder, compared with what lies there."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any
+
+from cyclopts import Parameter
+from numpy.typing import NDArray
+
+from aerobat.cli.compare import COMPARISON, comparison_of, finish_comparison
+from aerobat.cli.entry import ExitCode
+from aerobat.cli.fly import flown
+from aerobat.cli.options import RepeatOptions
+from aerobat.cli.run_folder import FLIGHT, finish
+from aerobat.cli.run_record import RunRecord, installed_versions, read_record
+from aerobat.cli.tasks import plan_of
+from aerobat.cli.terminal import say
+from aerobat.errors import SpecError
+from aerobat.interchange import read_plan
+from aerobat.planning import Plan
+from aerobat.reporting.comparison import comparison_rows
+from aerobat.simulation import Flight, load_flight
+
+SAME = ("planner", "duration_s")  # of a comparison's rows: times of the clock are not
+
+
+def repeat(
+    folder: Path, options: Annotated[RepeatOptions, Parameter(name="*")] = RepeatOptions()
+) -> ExitCode:
+    """Do a run again from its folder, and say if it came to the same.
+
+    Takes problem, vehicle, planner, options and seed from the run.toml there, plans and flies anew, and
+    writes to FOLDER-repeated unless --out says otherwise. With the same versions of the libraries the plan
+    and the flight are the same, bit for bit; a run that ended by --time-limit need not be. Exits with 0 only
+    if they are, and all is well.
+
+    Parameters
+    ----------
+    folder
+        A folder that `aerobat plan`, `fly` or `compare` wrote.
+    """
+    record = read_record(folder)
+    out = options.out or folder.with_name(f"{folder.resolve().name}-repeated")
+    options = RepeatOptions(out=out, json=options.json)
+    if record.command == "compare":
+        return _repeat_comparison(folder, record, options)
+    old = _Run.read(folder, record)
+    plan = old.plan if record.planner is None else plan_of(record)
+    again = flown(plan, record.flight) if record.command == "fly" else None
+    code = finish(plan, record, options, again)
+    return _told(folder, record, old.difference(_Run(plan, again.flight if again else None)), code)
+
+
+def _repeat_comparison(folder: Path, record: RunRecord, options: RepeatOptions) -> ExitCode:
+    try:
+        old = [[row[name] for name in SAME] for row in json.loads((folder / COMPARISON).read_bytes())]
+    except (OSError, ValueError, TypeError, KeyError):
+        raise SpecError(f"{folder}/ has no {COMPARISON} that can be read; compare anew") from None
+    comparison = comparison_of(record)
+    rows = [[row[name] for name in SAME] for row in comparison_rows(comparison)]
+    finish_comparison(comparison, record, options)
+    return _told(folder, record, "" if rows == old else "durations are others", ExitCode.WELL)
+
+
+def _told(folder: Path, record: RunRecord, difference: str, code: ExitCode) -> ExitCode:
+    """Say on standard error how a repeated run compares; one that differs is not well."""
+    if not difference:
+        say(f"the same as in {folder}/, bit for bit")
+        return code
+    now = installed_versions()
+    changed = [name for name in {*now, *record.versions} if now.get(name) != record.versions.get(name)]
+    versions = f" (other versions of {', '.join(sorted(changed))})" if changed else ""
+    say(f"not the same as in {folder}/: {difference}{versions}")
+    return ExitCode.NOT_WELL
+
+
+@dataclass(frozen=True)
+class _Run:
+    """What a run came to."""
+
+    plan: Plan
+    flight: Flight | None
+
+    @classmethod
+    def read(cls, folder: Path, record: RunRecord) -> _Run:
+        """What lies in a run's folder."""
+        plan = read_plan(folder)
+        if not isinstance(plan, Plan):
+            raise SpecError(f"{folder}/ holds no .plan file; run anew")
+        return cls(plan, load_flight(folder / FLIGHT) if record.command == "fly" else None)
+
+    def difference(self, other: _Run) -> str:
+        """How another run differs, in words; nothing where it does not."""
+        own, its = self.plan.trajectory, other.plan.trajectory
+        if not _same(own.durations, its.durations) or not _same(own.coefficients, its.coefficients):
+            return f"the plan takes {its.duration:.9g} s, there {own.duration:.9g} s"
+        if self.flight is None or other.flight is None:
+            return ""
+        its_series = other.flight.series
+        names = [name for name, series in self.flight.series.items() if not _same(series, its_series[name])]
+        return f"the plan is the same, the flight's {', '.join(names)} are not" if names else ""
+
+
+def _same(a: NDArray[Any], b: NDArray[Any]) -> bool:
+    return a.shape == b.shape and a.tobytes() == b.tobytes()

@@ -1,0 +1,111 @@
+"""What a run was: all that it takes to repeat it, as `run.toml` in its folder."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import field
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from platform import python_version
+from typing import Annotated, Any, Literal
+
+from pydantic import Field, PlainValidator
+
+from aerobat.declaration import NonNegative, declared, to_table
+from aerobat.documents import read_document, write_document
+from aerobat.errors import SpecError
+from aerobat.planning import Planner
+from aerobat.planning.planners import PLANNERS
+from aerobat.problem import Problem
+from aerobat.vehicle import Vehicle
+
+RECORD = "run.toml"
+LIBRARIES = ("numpy", "scipy", "daqp", "casadi", "gurobipy", "pyscipopt", "llvmlite", "jax")
+
+
+def _planner(value: Any) -> Planner | None:
+    return None if value is None else PLANNERS.read(value)
+
+
+@declared
+class FlightSettings:
+    """How a plan was flown."""
+
+    controller: str = "full"
+    noise: NonNegative = 0.0  # times that of motion capture and IMU fused
+    seed: Annotated[int, Field(ge=0)] = 0  # of that noise
+
+
+@declared
+class RunRecord:
+    """A run in full: with the same libraries it gives the same numbers again.
+
+    Without a planner, the plan came from a file and lies in the folder; `compare` takes all planners.
+    """
+
+    command: Literal["fly", "plan", "compare"]
+    problem: Problem  # as it was planned, with --angle and --paper
+    vehicle: Vehicle
+    planner: Annotated[Planner | None, PlainValidator(_planner)] = None
+    paper: bool = False  # planned without the vehicle
+    angle: float | None = None  # [deg] that --angle gave, for the folder's name
+    source: str | None = None  # the file that the plan came from
+    flight: FlightSettings = FlightSettings()
+    plugins: tuple[str, ...] = ()  # files that --import named
+    versions: Mapping[str, str] = field(default_factory=dict)  # of what made it
+    format: Literal["aerobat-run-1"] = "aerobat-run-1"
+
+    @property
+    def folder(self) -> Path:
+        """Where the run is written unless another place is given: whatever is not default is in the name."""
+        parts = [self.problem.name]
+        if self.vehicle.name != default_vehicle(self.paper):
+            parts.append(self.vehicle.name)
+        if self.angle is not None:
+            parts.append(f"{self.angle:g}deg")
+        if self.command == "compare":
+            parts.append("compare")
+        elif self.planner is None:
+            parts.append("flown" if self.command == "fly" else "judged")
+        elif self.planner_name != "miqp":
+            parts.append(self.planner_name)
+        if self.paper:
+            parts.append("paper")
+        return Path("out") / "-".join(re.sub(r"[^\w.-]+", "-", part) for part in parts)
+
+    @property
+    def planner_name(self) -> str:
+        """The registered name of the planner."""
+        return str(getattr(self.planner, "kind", ""))
+
+
+def default_vehicle(paper: bool = False) -> str:
+    """The name of the vehicle that is taken where none is given."""
+    return "hexarotor" if paper else "agile-quad"
+
+
+def write_record(record: RunRecord, folder: Path) -> None:
+    """Write a run's record to its folder, with the versions of all that may change its numbers."""
+    facts = {"format": record.format, "versions": installed_versions()}
+    write_document(folder / RECORD, to_table(record) | facts, "run")
+
+
+def read_record(folder: Path) -> RunRecord:
+    """What a folder says of its run. Raises SpecError, one sentence, where it says nothing that is whole."""
+    if not folder.is_dir():
+        raise SpecError(f"{folder} is no folder; give the folder of a run")
+    if not (folder / RECORD).exists():
+        raise SpecError(f"{folder}/ has no {RECORD}, so that no run can be repeated from it; run anew")
+    return read_document(folder / RECORD, RunRecord, "run")
+
+
+def installed_versions() -> dict[str, str]:
+    """The versions of Python, Aerobat and the libraries that its numbers come from."""
+    found = {"aerobat": version("aerobat"), "python": python_version()}
+    for library in LIBRARIES:
+        try:
+            found[library] = version(library)
+        except PackageNotFoundError:
+            continue
+    return found

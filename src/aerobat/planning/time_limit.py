@@ -1,0 +1,40 @@
+"""A limit on the time of planning: what all planners say of it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+from aerobat.errors import Infeasible
+from aerobat.optimization.deadline import out_of_time
+from aerobat.planning.recorder import Attempt
+from aerobat.planning.result import Plan
+from aerobat.problem.problem import Problem
+
+TIME_LIMIT = "Seconds for planning; the best plan found by then is taken, and said to be that."
+
+
+def stopped(plan: Plan) -> Plan:
+    """The plan; where no time is left, as the best that was found by then."""
+    return replace(plan, status="time_limit") if out_of_time() else plan
+
+
+def too_short(
+    problem: Problem,
+    limit: float | None,
+    attempts: Sequence[Attempt],
+    remedy: str = "take the planner miqp, which is quick",
+) -> Infeasible:
+    """The error of a search whose time was over before anything was found.
+
+    Args:
+        problem: What was planned.
+        limit: The planner's own [s]; None where another's ended it.
+        attempts: What was tried.
+        remedy: What else may help.
+    """
+    given = "the time given" if limit is None else f"{limit:g} s"
+    return Infeasible(
+        f"no plan of '{problem.name}' was found in {given}; allow more with --time-limit, or {remedy}",
+        tuple(attempts),
+    )

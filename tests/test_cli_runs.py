@@ -1,0 +1,167 @@
+"""A run can be repeated from its folder, and folders of different runs do not mix."""
+
+from __future__ import annotations
+
+import tomllib
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+import tomli_w
+
+from aerobat import cli
+from aerobat.cli.run_record import RunRecord, read_record
+from aerobat.interchange import read_trajectory
+from aerobat.planning import Miqp, load_plan
+from aerobat.problem import load_problem
+from aerobat.simulation import load_flight
+from aerobat.vehicle import load_vehicle
+
+RUNS = {
+    "a flight with noise": ("fly", "line", "--noise", "1", "--seed", "7", "--order", "5"),
+    "an angle and another vehicle": ("fly", "half-flip", "--angle", "-30", "--vehicle", "crazyflie"),
+    "the paper's program and law": ("fly", "flip-roll", "--paper", "--controller", "paper"),
+    "another planner, no flight": ("plan", "section-v", "--planner", "min-snap", "--stop-after", "3"),
+    "a problem and a vehicle of one's own": (
+        "fly",
+        "mine.toml",
+        "--vehicle",
+        "heavy.toml",
+        "--reserve",
+        "0.1",
+    ),
+}
+MINE = """
+name = "mine"
+heading_deg = 30.0
+start = { position = [0.1, 0.2, 1.3] }
+goal = { position = [2.7, 0.0, 1.0] }
+environment = { gravity = 3.7, wind = [0.0, 1.0, 0.0], ground = 0.0 }
+limits = { velocity = [2.5, inf, 1.5] }
+maneuver = { kind = "line" }
+"""
+
+
+@pytest.fixture(autouse=True)
+def _elsewhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    from aerobat.vehicle import write_vehicle
+
+    monkeypatch.chdir(tmp_path)
+    Path("mine.toml").write_text(MINE)
+    write_vehicle(replace(load_vehicle("agile-quad"), name="heavy", mass=1.1), "heavy.toml")
+
+
+def code(*arguments: str) -> int:
+    try:
+        cli.main(arguments)
+    except SystemExit as stop:
+        return int(stop.code or 0)
+    return 0
+
+
+@pytest.mark.parametrize("run", RUNS)
+def test_a_run_repeated_from_its_folder_alone_gives_the_same_bits(run: str, capsys) -> None:
+    well = code(*RUNS[run], "--out", "first")
+    for file in ("mine.toml", "heavy.toml"):
+        Path(file).unlink()  # the folder holds their contents
+    capsys.readouterr()
+    assert code("repeat", "first") == well
+    assert capsys.readouterr().err == "aerobat: the same as in first/, bit for bit\n"
+    first, again = (read_trajectory(folder) for folder in ("first", "first-repeated"))
+    np.testing.assert_array_equal(first.coefficients, again.coefficients)
+    if RUNS[run][0] == "fly":
+        flights = [load_flight(f"{folder}/flight.npz") for folder in ("first", "first-repeated")]
+        for name, series in flights[0].series.items():
+            np.testing.assert_array_equal(series, flights[1].series[name])
+    assert Path("first/run.toml").read_text() == Path("first-repeated/run.toml").read_text()
+
+
+def test_a_saved_plan_that_was_flown_is_flown_again_not_planned(capsys) -> None:
+    code("plan", "line", "--order", "5")
+    assert code("fly", "out/line", "--noise", "1") == 0
+    assert code("repeat", "out/line-flown") == 0
+    assert "the same as" in capsys.readouterr().err
+
+
+def test_a_comparison_is_repeated_too(capsys, monkeypatch) -> None:
+    monkeypatch.setattr("aerobat.studies.compare.registered_planners", lambda: {"miqp": Miqp})
+    assert code("compare", "line") == 0
+    assert code("repeat", "out/line-compare") == 0
+    assert "the same as in out/line-compare/" in capsys.readouterr().err
+
+
+def test_a_repetition_that_comes_to_something_else_says_what_and_exits_with_1(capsys) -> None:
+    code("fly", "line", "--order", "5")
+    record = tomllib.loads(Path("out/line/run.toml").read_text())
+    record["problem"]["goal"]["position"] = [8.0, 0.0, 0.0]
+    record["versions"]["numpy"] = "1.0"
+    Path("out/line/run.toml").write_text(tomli_w.dumps(record))
+    capsys.readouterr()
+    assert code("repeat", "out/line") == 1
+    err = capsys.readouterr().err
+    assert err.startswith("aerobat: not the same as in out/line/: the plan takes ")
+    assert err.endswith("(other versions of numpy)\n")
+
+
+def test_runs_that_differ_in_more_than_settings_have_folders_of_their_own() -> None:
+    problem, quad, other = load_problem("half-flip"), load_vehicle("agile-quad"), load_vehicle("crazyflie")
+    from aerobat.planning import planner_class
+
+    folders = [
+        RunRecord(
+            command=command, problem=problem, vehicle=vehicle, planner=planner and planner_class(planner)(),
+            angle=angle, paper=paper,
+        ).folder
+        for command in ("fly", "compare")
+        for planner in (("miqp", "min-snap", "free-knots", None) if command == "fly" else (None,))
+        for vehicle in (quad, other)
+        for angle in (None, 0.0, 45.0)
+        for paper in (False, True)
+    ]  # fmt: skip
+    assert len(set(folders)) == len(folders)
+    assert Path("out/half-flip") in folders
+
+
+def test_a_folders_name_holds_nothing_that_leads_elsewhere() -> None:
+    strange = replace(load_vehicle("agile-quad"), name="../a b/c:d")
+    record = RunRecord(command="fly", problem=load_problem("line"), vehicle=strange, planner=Miqp())
+    assert record.folder.parent == Path("out")
+    assert ":" not in record.folder.name
+
+
+def test_an_earlier_run_that_is_replaced_is_said_and_leaves_nothing_behind(capsys) -> None:
+    code("fly", "line", "--order", "5")
+    assert capsys.readouterr().out.endswith("written to out/line/\n")
+    code("plan", "line", "--order", "5")
+    assert capsys.readouterr().out.endswith("written to out/line/, in the place of an earlier run\n")
+    assert not Path("out/line/flight.npz").exists()
+
+
+def test_check_judges_a_folder_for_the_vehicle_that_flew(capsys) -> None:
+    code("fly", "line", "--vehicle", "heavy.toml", "--order", "5")
+    capsys.readouterr()
+    assert code("check", "out/line-heavy") == 0
+    assert "heavy" in capsys.readouterr().out
+    assert load_plan("out/line-heavy/line.plan").vehicle == read_record(Path("out/line-heavy")).vehicle
+
+
+@pytest.mark.parametrize(
+    ("content", "named"),
+    [
+        (None, "has no run.toml"),
+        (b"\xff\xfe", "run.toml"),
+        (b"command = 'fly'", "problem"),
+        (b"[problem", "not valid TOML"),
+        (b"format = 'aerobat-run-9'", "run.toml"),
+    ],
+)
+def test_a_folder_whose_run_is_not_whole_is_refused_in_a_sentence(content, named: str, capsys) -> None:
+    Path("run").mkdir()
+    if content is not None:
+        Path("run/run.toml").write_bytes(content)
+    assert code("repeat", "run") == 2
+    err = capsys.readouterr().err
+    assert named in err
+    assert err.count("\n") == 1
+    assert [path.name for path in Path().iterdir() if path.is_dir()] == ["run"]
