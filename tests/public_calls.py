@@ -1,4 +1,4 @@
-"""Public functions, methods and classes, each with a call that is right, and values that are wrong in it."""
+"""Public functions, methods and classes, each with the arguments of a call that is right."""
 
 from __future__ import annotations
 
@@ -6,7 +6,6 @@ import dataclasses
 import inspect
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from decimal import Decimal
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -24,11 +23,6 @@ class Door:
     name: str
     call: Callable[..., Any]
     right: dict[str, Any]
-
-    def annotation(self, argument: str) -> str:
-        """The annotation of an argument, as text."""
-        parameter = inspect.signature(self.call).parameters.get(argument)
-        return "" if parameter is None else str(parameter.annotation)
 
 
 class NoPlan(ab.Planner):
@@ -53,72 +47,10 @@ def flight() -> ab.Flight:
     return ab.fly(plan(), rate=100.0, engine="floats")
 
 
-def _ignored(attempt: object) -> None:
+def ignored(attempt: object) -> None:
     pass
 
 
-def zoo() -> dict[str, Any]:
-    """Values that few arguments take, by what they are called."""
-    many = {
-        "None": None,
-        "True": True,
-        "text": "0.85",
-        "line": "a\nb",
-        "up": "../../up",
-        "nul": "a\0b",
-        "surrogate": "\ud800",
-        "empty": "",
-        "long": "x" * 5000,
-        "bytes": b"1",
-        "complex": 1j,
-        "huge": 10**400,
-        "nan": np.nan,
-        "inf": np.inf,
-        "-inf": -np.inf,
-        "-1": -1,
-        "0": 0,
-        "-0.5": -0.5,
-        "90": 90,
-        "1e15": 1e15,
-        "1e300": 1e300,
-        "1e-300": 1e-300,
-        "list": [],
-        "nones": [None],
-        "texts": ["1"],
-        "ragged": [[1.0], 2.0],
-        "dict": {},
-        "table": {"name": 1},
-        "set": {1.0},
-        "object": object(),
-        "class": ab.Vehicle,
-        "module": ab,
-        "function": _ignored,
-        "ellipsis": ...,
-        "decimal": Decimal("1.5"),
-        "range": range(3),
-        "generator": iter(()),
-        "path": Path("no/such/file"),
-        "array": np.ones((2, 2)),
-        "nothing": np.empty(0),
-        "nans": np.full(3, np.nan),
-        "complexes": np.ones(3, complex),
-        "words": np.array(["a", "b", "c"]),
-        "truths": np.ones(3, bool),
-        "int64": np.int64(-7),
-        "float32": np.float32(np.nan),
-        "vehicle": ab.load_vehicle("crazyflie"),
-        "problem": ab.load_problem("line"),
-        "plan": plan(),
-        "trajectory": plan().trajectory,
-        "flight": flight(),
-        "planner": NoPlan(),
-        "envelope": ab.Envelope(),
-    }
-    return many
-
-
-NEVER = ("bytes", "complex", "set", "object", "class", "module", "ellipsis", "complexes", "words")
-TEXTS = ("text", "line", "up", "nul", "surrogate", "empty", "long")
 RESULTS = ("Gradient", "Passage", "Score", "Scores", "Sensitivity", "Reference")  # made by no user
 NOT_CALLED = ("AerobatError", "BackendMissing", "Infeasible", "SpecError", "Maneuver", "Planner")
 ENUMS = ("ContinuityRule", "Outcome", "Quantity", "TimeScaling")
@@ -131,7 +63,7 @@ def doors(folder: Path) -> Iterator[Door]:
         if name in RESULTS or name in NOT_CALLED or name in ENUMS:
             continue
         if inspect.isclass(public):
-            yield Door(name, public, _content(_instance(public)))
+            yield Door(name, public, _content(instance(public)))
         else:
             yield Door(name, public, _arguments(name, folder))
     yield from _flights()
@@ -150,9 +82,9 @@ def _arguments(name: str, folder: Path) -> dict[str, Any]:
             "problem": plan().problem,
             "vehicle": agile,
             "planners": [("x", NoPlan())],
-            "progress": _ignored,
+            "progress": ignored,
         },
-        "comparison_figure": {"comparison": _instance(ab.Comparison)},
+        "comparison_figure": {"comparison": instance(ab.Comparison)},
         "draw": {"flight": flight(), "plan": plan(), "vehicle": agile},
         "fly": {
             "plan": plan(),
@@ -174,7 +106,7 @@ def _arguments(name: str, folder: Path) -> dict[str, Any]:
             "heading": 0.1,
         },
         "option": {"default": 1, "help": "x", "off": "no-x", "command_default": 2},
-        "plan": {"problem": plan().problem, "planner": NoPlan(), "vehicle": agile, "progress": _ignored},
+        "plan": {"problem": plan().problem, "planner": NoPlan(), "vehicle": agile, "progress": ignored},
         "planner": {"name": "x"},
         "prepare": {"plan": plan(), "vehicle": agile, **here, "config": ab.FlightConfig()},
         "problem_names": {},
@@ -276,9 +208,9 @@ def _methods(folder: Path) -> Iterator[Door]:
         (
             "Miqp.plan",
             ab.Miqp(rescue=False).plan,
-            {"problem": _hopeless(), "vehicle": agile, "progress": _ignored},
+            {"problem": _hopeless(), "vehicle": agile, "progress": ignored},
         ),
-        ("MinSnap.plan", ab.MinSnap().plan, {"problem": _hopeless(), "vehicle": agile, "progress": _ignored}),
+        ("MinSnap.plan", ab.MinSnap().plan, {"problem": _hopeless(), "vehicle": agile, "progress": ignored}),
     ]
     for name, method, right in calls:
         yield Door(name, method, right)
@@ -305,7 +237,7 @@ def _files(folder: Path) -> dict[str, Path]:
     return files
 
 
-def _instance(cls: type) -> Any:
+def instance(cls: type) -> Any:
     """A value of a public class."""
     made = {
         ab.Attitude: lambda: ab.Attitude((0.0, 0.0, 1.0), 5.0, 0.1),
@@ -328,8 +260,20 @@ def _instance(cls: type) -> Any:
         ab.Waypoint: lambda: ab.Waypoint((0.0, 0.0, 1.0)),
         ab.Waypoints: lambda: ab.Waypoints((ab.Waypoint((0.0, 0.0, 1.0)),)),
         ab.Wrench: lambda: flight().setpoint.wrench,
+        ab.Reference: lambda: ab.reference(plan(), times=[0.0, 0.1]),
+        ab.Score: lambda: ab.score(flight(), plan()),
+        ab.Scores: lambda: ab.score_flights(plan(), ["agile-quad"] * 2, rate=100.0),
+        ab.Sensitivity: lambda: ab.sensitivity(plan(), "mass", rate=100.0),
+        ab.Gradient: lambda: instance(ab.Sensitivity).mean_square_position_error,
+        ab.Passage: _passage,
     }
     return made.get(cls, cls)()
+
+
+def _passage() -> ab.Passage:
+    """One that is not known."""
+    problem = ab.load_problem("half-flip")
+    return ab.score(flight(), problem).passages[0]
 
 
 def _comparison() -> ab.Comparison:
@@ -341,11 +285,8 @@ def _content(value: Any) -> dict[str, Any]:
     return {field.name: getattr(value, field.name) for field in dataclasses.fields(value)}
 
 
-def must_be_refused(door: Door, argument: str, kind: str) -> bool:
-    """True where no reading of the annotation takes a value of this kind."""
-    annotation = door.annotation(argument)
-    if "Any" in annotation or argument in ("default", "command_default"):
-        return False
-    right = door.right[argument]
-    is_number = isinstance(right, int | float | np.ndarray) and not isinstance(right, bool)
-    return kind in NEVER or (is_number and kind in (*TEXTS, "True", "truths"))
+VALUES = [
+    public
+    for public in (getattr(ab, name) for name in ab.__all__)
+    if dataclasses.is_dataclass(public) and isinstance(public, type)
+]
