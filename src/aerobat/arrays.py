@@ -29,13 +29,7 @@ def frozen(value: ArrayLike, name: str, shape: Sequence[int | None] | None = Non
 
 def frozen_bounds(value: ArrayLike, name: str, shape: Sequence[int | None] | None = None) -> Array:
     """As `frozen`, but infinities may stand for bounds that do not bind. Raises SpecError."""
-    try:
-        array = np.array(value)
-    except (ValueError, TypeError):  # ragged, or nothing of the kind
-        raise SpecError(f"{name} must be numbers, got {_shown(value)}") from None
-    if array.dtype.kind not in "fiu":  # text and truth are no numbers
-        raise SpecError(f"{name} must be numbers, got {_shown(value)}")
-    array = array.astype(np.float64, copy=False)
+    array = np.array(numbers(value, name))
     if shape is not None and not _fits(array.shape, shape):
         wanted = ", ".join("n" if size is None else str(size) for size in shape)
         raise SpecError(f"{name} must have the shape ({wanted}), got {array.shape}")
@@ -43,6 +37,17 @@ def frozen_bounds(value: ArrayLike, name: str, shape: Sequence[int | None] | Non
         raise SpecError(f"{name} must be numbers; it contains a NaN")
     array.flags.writeable = False
     return array
+
+
+def numbers(value: ArrayLike, name: str) -> Array:
+    """The numbers, NaN among them, copied only where they are no float64 array. Raises SpecError."""
+    try:
+        array = np.asarray(value)
+    except (ValueError, TypeError, OverflowError):  # ragged, or nothing of the kind
+        raise SpecError(f"{name} must be numbers, got {_shown(value)}") from None
+    if array.dtype.kind not in "fiu":  # text, truth and complex numbers are none
+        raise SpecError(f"{name} must be numbers, got {_shown(value)}")
+    return array.astype(np.float64, copy=False)
 
 
 def _shown(value: object) -> str:

@@ -14,6 +14,10 @@ class SpecError(AerobatError, ValueError):
     """The input is wrong (a vehicle, a problem, an argument): the message names the field and the remedy."""
 
 
+class OutOfRange(SpecError, IndexError):
+    """There is no entry of that number: the message says how many there are."""
+
+
 class Infeasible(AerobatError):
     """No plan satisfies the problem: the message says which bound binds and what would free it.
 

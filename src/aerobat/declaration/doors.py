@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from pydantic import TypeAdapter, ValidationError
 
+from aerobat.arrays import numbers
 from aerobat.declaration.declared import CONFIG, plain
 from aerobat.declaration.sentences import FieldError, first_complaint, one_of, shown, with_article
 from aerobat.errors import SpecError
@@ -214,11 +215,9 @@ def _sequence_of(*members: Any) -> Check:
 def _array(value: Any) -> Any:
     """The value, numbers of which NumPy makes one array."""
     try:
-        kind = np.asarray(value).dtype.kind
-    except (ValueError, TypeError, OverflowError):  # ragged, or nothing of the kind
-        kind = "O"
-    if kind not in "fiu":  # text, truth and complex numbers are none
-        raise FieldError("", f"must be numbers, got {shown(value)}")
+        numbers(value, "")
+    except SpecError:
+        raise FieldError("", f"must be numbers, got {shown(value)}") from None
     return value
 
 

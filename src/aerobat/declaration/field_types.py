@@ -6,6 +6,7 @@ import os
 import sys
 from collections.abc import Mapping
 from math import hypot, inf, isfinite, nan, radians, tau
+from types import ModuleType
 from typing import Annotated, Any
 
 import numpy as np
@@ -18,6 +19,7 @@ from aerobat.declaration.sentences import FieldError, shown, unknown_key, within
 
 _ROUND_OFF = 1e-12  # [-] components of a unit vector that are zero but for it
 _UNIT = 1e-15  # [-] how far from one a norm may be by round-off
+_CONTROL = {*map(chr, range(32)), "\x7f"}  # letters that no path needs and no terminal shows
 _FULL_TURN = tau * (1.0 + _ROUND_OFF)  # [rad] more is hardly meant, and hardly in radians
 
 
@@ -145,7 +147,7 @@ def _radians(angle: float) -> float:
 
 def _path(value: Any) -> Any:
     text = os.fspath(value) if isinstance(value, str | os.PathLike) else None
-    if not isinstance(text, str) or not text or "\0" in text:
+    if not isinstance(text, str) or _CONTROL & set(text):
         raise FieldError("", f"must be a path, got {shown(value)}")
     try:
         os.fsencode(text)
@@ -158,7 +160,14 @@ class _Instance:
     """Marks a type whose values are taken as they are, of that class, and whose own fields nobody checks."""
 
     def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
-        return core_schema.is_instance_schema(source)
+        """Instances alone: a module or a class may have all that a protocol asks for, and is none."""
+
+        def instance(value: Any) -> Any:
+            if isinstance(value, type | ModuleType) or not isinstance(value, source):
+                raise FieldError("", f"must be of the type {source.__name__}, got {shown(value)}")
+            return value
+
+        return core_schema.no_info_plain_validator_function(instance)
 
 
 def _one_line(text: str) -> str:
@@ -168,6 +177,7 @@ def _one_line(text: str) -> str:
 
 
 Positive = Annotated[float, Field(gt=0, description="positive number")]
+Gravity = Annotated[float, Field(gt=0, le=1e9, description="positive number")]
 NonNegative = Annotated[float, Field(ge=0, description="number ≥ 0")]
 Fraction = Annotated[float, Field(gt=0, lt=1, description="number between 0 and 1")]
 Limit = Annotated[float, Field(gt=0, allow_inf_nan=True, description="positive number, `inf` for no limit")]
@@ -190,6 +200,7 @@ Derivative = Annotated[int, Field(ge=0, le=5, description="whole number from 0, 
 PathName = Annotated[str | os.PathLike[str], PlainValidator(_path), Field(description="path")]
 Label = Annotated[str, AfterValidator(_one_line), Field(description="one line of text")]
 Vector3 = Annotated[Array, PlainValidator(_vector), Field(description="three numbers")]
+VectorLike = Annotated[ArrayLike, PlainValidator(_vector), Field(description="three numbers")]
 Direction = Annotated[Array, PlainValidator(_direction), Field(description="three numbers, not all zero")]
 UnitVector = Annotated[Array, PlainValidator(unit), Field(description="three numbers, scaled to length one")]
 PartialVector = Annotated[

@@ -13,6 +13,8 @@ from pydantic import ValidationError
 
 from aerobat.errors import SpecError
 
+_LONGEST = 60  # letters of a name that is looked for among others
+
 
 class FieldError(SpecError):
     """A value that does not fit its declaration.
@@ -52,9 +54,9 @@ def unknown_key(key: str, known: Iterable[str]) -> UnknownKey:
 def unknown_name(kind: str, name: str, known: Iterable[str]) -> SpecError:
     """The error that says no `kind` has this name, which known name is closest, and which there are."""
     known = tuple(known)
-    guess = closest(name, known)
+    guess = closest(name[:_LONGEST], known)
     hint = f"did you mean {guess!r}? Known: " if guess else "known: "
-    return SpecError(f"no {kind} named {name!r}; {hint}{', '.join(known)}")
+    return SpecError(f"no {kind} named {shown(name)}; {hint}{', '.join(known)}")
 
 
 def closest(name: str, known: Iterable[str]) -> str | None:

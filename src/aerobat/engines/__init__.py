@@ -5,6 +5,7 @@ from __future__ import annotations
 from importlib import import_module
 from importlib.util import find_spec
 
+from aerobat.declaration import shown
 from aerobat.engines.bytecode import BYTECODE
 from aerobat.engines.engine import CompiledLoop, Engine, logged_ticks, run_whole
 from aerobat.engines.floats import FLOATS
@@ -42,7 +43,7 @@ def choose(name: str, vehicles: int, ticks: int) -> Engine:
     if name == "auto":
         name = _fastest(vehicles, ticks)
     if name not in ENGINE_NAMES:
-        raise SpecError(f"engine must be one of auto, {', '.join(ENGINE_NAMES)}, got {name!r}")
+        raise SpecError(f"engine must be one of auto, {', '.join(ENGINE_NAMES)}, got {shown(name)}")
     if name not in _OPTIONAL:
         return {"floats": FLOATS, "bytecode": BYTECODE, "numpy": NUMPY}[name]
     library, extra, module, value = _OPTIONAL[name]

@@ -7,7 +7,7 @@ from dataclasses import field
 import numpy as np
 
 from aerobat.arrays import Array
-from aerobat.declaration import Positive, Vector3, declared
+from aerobat.declaration import Gravity, Vector3, declared
 from aerobat.so3 import UP
 from aerobat.states import STANDARD_GRAVITY
 
@@ -20,7 +20,7 @@ class Environment:
     does.
     """
 
-    gravity: Positive = STANDARD_GRAVITY  # [m/s²] along -z
+    gravity: Gravity = STANDARD_GRAVITY  # [m/s²] along -z
     wind: Vector3 = field(default_factory=lambda: np.zeros(3))  # [m/s] velocity of the air
     ground: float | None = None  # [m] height z that no path goes below; left out, no ground
 

@@ -8,8 +8,8 @@ from dataclasses import dataclass, fields, replace
 import numpy as np
 
 from aerobat.arrays import Array
-from aerobat.declaration import by_value, door, in_notebooks, short
-from aerobat.errors import SpecError
+from aerobat.declaration import by_value, door, in_notebooks, short, shown
+from aerobat.errors import OutOfRange, SpecError
 from aerobat.evaluation.passage import (
     PASSAGE_DEPTH,
     Passage,
@@ -82,7 +82,7 @@ class Scores:
     def __getitem__(self, k: int) -> Score:
         """The score of one flight."""
         if not -len(self) <= k < len(self):
-            raise IndexError(f"there are {len(self)} flights, no flight {k}")
+            raise OutOfRange(f"there are {len(self)} flights, no flight {shown(k)}; count from 0")
         passed = tuple(_passage_of(passage, k) for passage in self.passages)
         outcome, sentence = self._outcome(k, passed)
         return Score(

@@ -42,6 +42,11 @@ class Reference:
     rotor_thrusts: Array  # [N], as flatness has them, limits or not, (T, n)
     undetermined: tuple[TimeInterval, ...]  # where |f| is next to nothing, between samples too
 
+    def __str__(self) -> str:
+        """One line for people."""
+        thrusts = f"{self.rotor_thrusts.min():.2f} to {self.rotor_thrusts.max():.2f} N"
+        return f"{len(self.times)} times to {self.times[-1]:.3f} s, rotors asked for {thrusts}"
+
 
 @door
 def reference(

@@ -19,6 +19,7 @@ from aerobat.declaration import PathName, Positive, door
 from aerobat.errors import SpecError
 from aerobat.storage import read_whole, write_whole
 from aerobat.trajectory import Carrier, Trajectory, as_trajectory
+from aerobat.trajectory.piecewise import MAX_DURATION
 from aerobat.trajectory.polynomial import hermite
 
 CSV_COLUMNS = 12
@@ -49,6 +50,8 @@ def read_csv(path: PathName, rate: Positive = 100.0) -> Trajectory:
     the line, for rows that are not 12 or 13 finite numbers, all as many, with rising times from 0.
     """
     rows = _parse(Path(path))
+    if not len(rows) / rate <= MAX_DURATION:
+        raise SpecError(f"rate must make it {MAX_DURATION:g} s at most, got {rate:g} rows a second")
     times = rows[:, CSV_COLUMNS] if rows.shape[1] > CSV_COLUMNS else np.arange(len(rows)) / rate
     steps = np.diff(times)
     if times[0] != 0 or not (steps > 0).all():

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
 from aerobat.declaration import PathName, Positive, door
@@ -21,7 +22,7 @@ def read_plan(path: PathName, rate: Positive = 100.0) -> Plan | Trajectory:
     none, when there are several, or when the file is malformed.
     """
     path = Path(path)
-    if path.is_dir():
+    if os.path.isdir(path):  # of a name that is too long, Path raises
         path = _only_plan(path)
     if path.suffix == ".plan":
         return load_plan(path)

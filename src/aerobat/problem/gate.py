@@ -9,7 +9,6 @@ from math import degrees, radians
 from typing import Any, ClassVar, cast
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from aerobat import so3
 from aerobat.arrays import Array
@@ -20,6 +19,7 @@ from aerobat.declaration import (
     Positive,
     UnitVector,
     Vector3,
+    VectorLike,
     declared,
     door,
     from_table,
@@ -123,7 +123,7 @@ class Gate:
 
 @door
 def tilted_gate(
-    position: ArrayLike,
+    position: VectorLike,
     heading: Angle = 0.0,
     elevation: Angle = 0.0,
     tilt: Angle = 0.0,

@@ -9,20 +9,19 @@ from math import degrees, radians
 from typing import Annotated, Any, ClassVar, cast
 
 import numpy as np
-from numpy.typing import ArrayLike
-from pydantic import AfterValidator, PlainValidator
+from pydantic import AfterValidator, Field, PlainValidator
 
 from aerobat.arrays import Array
 from aerobat.declaration import (
     Angle,
     Corner,
-    Count,
     Derivative,
     FieldError,
     Label,
     PerAxis,
     Positive,
     Vector3,
+    VectorLike,
     declared,
     door,
     from_table,
@@ -51,7 +50,7 @@ class EndState:
     acceleration: Vector3 = field(default_factory=lambda: np.zeros(3))  # [m/s²] world
 
     @door
-    def derivatives(self, order: Count) -> Array:
+    def derivatives(self, order: Annotated[int, Field(ge=1, le=100)]) -> Array:
         """Position and its derivatives below `order`, (order, 3)."""
         known = [self.position, self.velocity, self.acceleration]
         return np.array([known[k] if k < len(known) else np.zeros(3) for k in range(order)])
@@ -251,6 +250,6 @@ class Problem:
 
 
 @door
-def at_rest(position: ArrayLike) -> EndState:
+def at_rest(position: VectorLike) -> EndState:
     """At rest at `position` [m], (3,)."""
     return EndState(cast(Array, position))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from base64 import b64encode
-from functools import lru_cache, singledispatch
+from functools import lru_cache
 from io import StringIO
 from typing import TYPE_CHECKING, Any
 
@@ -38,7 +38,7 @@ def html(value: Any) -> str:
     if picture is None:
         return text
     encoded = b64encode(picture).decode()
-    return f'<img style="max-width: 100%" src="data:image/png;base64,{encoded}"/>{text}'
+    return f'<img style="max-width: 100%" src="data:image/png;base64,{encoded}">{text}'
 
 
 @lru_cache(maxsize=KEPT)
@@ -51,54 +51,22 @@ def png(value: Any) -> bytes | None:
     return None if figure is None else png_of(figure)
 
 
-@singledispatch
 def _table(value: Any) -> Table:
     """The facts, a row each."""
-    raise NotImplementedError
+    if isinstance(value, Plan):
+        vehicle = "" if value.vehicle is None else f" · {value.vehicle.name}"
+        return facts_table(f"{value.problem.name}{vehicle}", {"plan": plan_facts(value)})
+    if isinstance(value, Score):
+        return facts_table("", {"flight": flight_facts(value)})
+    if isinstance(value, Certificate):
+        return certificate_table(value, "certificate")
+    if isinstance(value, Comparison):
+        return comparison_table(value)
+    return facts_table(str(value), {})
 
 
-@_table.register
-def _(plan: Plan) -> Table:
-    vehicle = "" if plan.vehicle is None else f" · {plan.vehicle.name}"
-    return facts_table(f"{plan.problem.name}{vehicle}", {"plan": plan_facts(plan)})
-
-
-@_table.register
-def _(flight: Flight) -> Table:
-    return facts_table(str(flight), {})
-
-
-@_table.register
-def _(score: Score) -> Table:
-    return facts_table("", {"flight": flight_facts(score)})
-
-
-@_table.register
-def _(certificate: Certificate) -> Table:
-    return certificate_table(certificate, "certificate")
-
-
-@_table.register
-def _(comparison: Comparison) -> Table:
-    return comparison_table(comparison)
-
-
-@singledispatch
 def _figure(value: Any) -> Figure | None:
     """The picture; None of what has none."""
-    return None
-
-
-@_figure.register
-def _(value: Plan) -> Figure | None:
-    return draw(value)
-
-
-@_figure.register
-def _(value: Flight) -> Figure | None:
-    return draw(value)
-
-
-@_figure.register
-def _(value: Comparison) -> Figure | None:
-    return comparison_figure(value)
+    if isinstance(value, Comparison):
+        return comparison_figure(value)
+    return draw(value) if isinstance(value, Plan | Flight) else None

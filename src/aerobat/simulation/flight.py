@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 
 from aerobat import so3
 from aerobat.arrays import Array, frozen
-from aerobat.declaration import PathName, by_value, door, in_notebooks, short
+from aerobat.declaration import PathName, by_value, door, in_notebooks, short, shown
 from aerobat.environment import Environment
-from aerobat.errors import SpecError
+from aerobat.errors import OutOfRange, SpecError
 from aerobat.simulation.outcome import Outcome, counted
 from aerobat.states import BodyState, FlatState, Setpoint, Wrench
 from aerobat.storage import format_of, read_arrays, whole_file
@@ -152,6 +152,9 @@ class Flight:
         """The flight of one vehicle of a batch, as if it had flown alone. Raises SpecError for one flight."""
         if not self.is_batch:
             raise SpecError("this is one flight, not a batch: use it without an index")
+        count = len(self.vehicles)
+        if not -count <= vehicle < count:
+            raise OutOfRange(f"there are {count} flights, no flight {shown(vehicle)}; count from 0")
         rows = slice(0, int(np.searchsorted(self.times, self.series["ends"][vehicle], side="right")))
         picked = {}
         for one in SERIES:

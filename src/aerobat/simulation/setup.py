@@ -9,13 +9,13 @@ from itertools import pairwise
 from typing import Annotated, Any, Protocol
 
 import numpy as np
-from pydantic import PlainValidator
+from pydantic import Field, PlainValidator
 
 from aerobat import so3
 from aerobat.arrays import Array, frozen
 from aerobat.control import Controller
 from aerobat.control.parameters import airframe_parameters, controller_parameters, environment_parameters
-from aerobat.declaration import AS_IT_IS, FieldError, Positive, declared, door, shown
+from aerobat.declaration import AS_IT_IS, FieldError, declared, door, shown
 from aerobat.engines import CompiledLoop, Engine, choose
 from aerobat.engines.engine import first_row
 from aerobat.engines.pytree import Tree, tree_map
@@ -42,6 +42,10 @@ _VEHICLE_TICKS = 160_000  # whose own inputs are made at once, so that they take
 _MIN_CHUNK = 16  # ticks
 
 
+ControlRate = Annotated[float, Field(ge=1, le=1e6, description="number from 1 to 1e6")]
+LogRate = Annotated[float, Field(ge=1e-3, le=1e6, description="number from 0.001 to 1e6")]
+
+
 def _seed(value: Any) -> int | np.random.SeedSequence:
     if isinstance(value, np.random.SeedSequence):
         return value
@@ -55,14 +59,14 @@ class FlightConfig:
     """Settings of a flight, whatever plan is flown."""
 
     controller: Controller = field(default_factory=Controller)
-    rate: Positive = 500.0  # [1/s] of the controller
+    rate: ControlRate = 500.0  # [1/s] of the controller
     noise: StateNoise | None = None  # errors of the state that the controller sees
     seed: Annotated[int | np.random.SeedSequence, PlainValidator(_seed)] = 0  # of the noise
     start: Annotated[BodyState, AS_IT_IS] | None = None  # true, by default the trajectory's; or a batch's
     nominal: Vehicle | None = None  # that controller and set-points are made for; by default what flies
     # floats, bytecode, numpy, compiled, jax, jax-float32, or the fastest that is installed
     engine: str = "auto"
-    log_rate: Positive | None = None  # [1/s] of the flight's rows, rate over a whole number; by default rate
+    log_rate: LogRate | None = None  # [1/s] of the flight's rows, rate over a whole number; by default rate
 
     def __post_init__(self) -> None:
         stride = self.rate / (self.log_rate or self.rate)

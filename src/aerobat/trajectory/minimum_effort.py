@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from aerobat.arrays import AXES, Array, Mask, frozen
-from aerobat.declaration import Angle, door
+from aerobat.declaration import Angle, door, shown
 from aerobat.errors import SpecError
 from aerobat.trajectory.knot_conditions import KnotConditions
 from aerobat.trajectory.piecewise import Trajectory
@@ -139,4 +139,4 @@ def _checked(rule: ContinuityRule | str) -> ContinuityRule:
     try:
         return ContinuityRule(rule)
     except ValueError:
-        raise SpecError(f"rule must be one of {', '.join(ContinuityRule)}, got {rule!r}") from None
+        raise SpecError(f"rule must be one of {', '.join(ContinuityRule)}, got {shown(rule)}") from None

@@ -5,11 +5,13 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from pydantic import Field
 
-from aerobat.arrays import Array, frozen, frozen_bounds
+from aerobat.arrays import Array, frozen, numbers
 from aerobat.declaration import Angle, FieldError, Positive, by_value, door, short, shown
 from aerobat.errors import SpecError
 from aerobat.states import FlatState
@@ -93,6 +95,11 @@ class Trajectory:
         if not fits or not len(state) or not len(inputs) or (steps <= 0).any():
             raise SpecError("from_inputs needs initial (r, 3), inputs (N, 3) and a positive dt, or N of them")
         steps = np.broadcast_to(steps, len(inputs))
+        if not steps.sum() <= MAX_DURATION or not np.abs(inputs).max() <= MAX_MAGNITUDE:
+            raise SpecError(
+                f"from_inputs needs {MAX_DURATION:g} s at most, and inputs below {MAX_MAGNITUDE:g} m/s^k; "
+                "check their units"
+            )
         # scaled by dt^k/k! the derivatives at an interval's start are its coefficients, and
         # those at its end are the same polynomial expanded about s = 1
         order = len(state)
@@ -151,7 +158,7 @@ class Trajectory:
 
         With 0 and 1 among s, both sides of every knot are there.
         """
-        return polynomial.evaluate(self._rates(derivative)[:, None], _numbers(s, "s"))
+        return polynomial.evaluate(self._rates(derivative)[:, None], _normalised(s))
 
     @door
     def sample(self, rate: Positive) -> Array:
@@ -187,7 +194,9 @@ class Trajectory:
         return np.min(values, axis=1), np.max(values, axis=1)
 
     @door
-    def specific_thrust_range(self, gravity: Positive) -> tuple[Extremum, Extremum]:
+    def specific_thrust_range(
+        self, gravity: Annotated[float, Field(ge=0, le=1e9)]
+    ) -> tuple[Extremum, Extremum]:
         """The smallest and the largest |a + g e3| [m/s²] over continuous time, exactly."""
         thrust = self._rates(2).copy()
         thrust[:, 0, 2] += gravity
@@ -201,7 +210,7 @@ class Trajectory:
 
     def _locate(self, t: ArrayLike) -> tuple[NDArray[np.intp], Array]:
         """The segment of each time and the normalised time in it. Raises SpecError outside the trajectory."""
-        times = _numbers(t, "times")
+        times = numbers(t, "times")
         if not ((times >= -TIME_TOLERANCE) & (times <= self.duration + TIME_TOLERANCE)).all():
             raise SpecError(f"times must lie in [0, {self.duration:.9g}] s, the trajectory's span")
         times = np.clip(times, 0.0, self.duration)
@@ -227,11 +236,12 @@ def _check_derivative(derivative: int) -> None:
         raise FieldError("derivative", complaint)
 
 
-def _numbers(value: ArrayLike, name: str) -> Array:
-    """The numbers, as they are where they are an array of them. Raises SpecError."""
-    if isinstance(value, np.ndarray) and value.dtype == np.float64:
-        return value
-    return frozen_bounds(value, name)
+def _normalised(s: ArrayLike) -> Array:
+    """Normalised times. Raises SpecError outside a segment."""
+    times = numbers(s, "s")
+    if not ((times >= 0.0) & (times <= 1.0)).all():
+        raise SpecError("s must lie in [0, 1], from a segment's start to its end")
+    return times
 
 
 def _check_magnitude(durations: Array, coefficients: Array) -> None:

@@ -8,7 +8,7 @@ from functools import cached_property
 from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
-from pydantic import Field, PlainValidator
+from pydantic import BeforeValidator, Field, PlainValidator
 
 from aerobat.arrays import Array, frozen
 from aerobat.declaration import (
@@ -36,6 +36,13 @@ def _inertia(value: Any) -> Array:
     return finite(np.diag(finite(value, 3)) if vector else value, 3, 3)
 
 
+def _no_truth(value: Any) -> Any:
+    """The value; Python takes True for 1."""
+    if isinstance(value, bool):
+        raise FieldError("", f"must be 1 or -1, got {value}")
+    return value
+
+
 @declared
 class Rotor:
     """A motor with its propeller, thrust along the body's +z, first-order in its command.
@@ -44,8 +51,8 @@ class Rotor:
     """
 
     position_body: Vector3  # [m] from the centre of mass
-    spin: Literal[
-        1, -1
+    spin: Annotated[
+        Literal[1, -1], BeforeValidator(_no_truth)
     ]  # 1 counter-clockwise seen from above, -1 clockwise; the body feels -spin·c·f about +z
     min_thrust: float  # [N] negative for a variable pitch
     max_thrust: Positive  # [N] at full throttle

@@ -1,0 +1,292 @@
+"""Public functions, methods and classes, each with the arguments of a call that is right."""
+
+from __future__ import annotations
+
+import dataclasses
+import inspect
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import aerobat as ab
+from aerobat.studies.compare import Entry
+
+
+@dataclass(frozen=True)
+class Door:
+    """Something public that is called, and the arguments of a call that succeeds."""
+
+    name: str
+    call: Callable[..., Any]
+    right: dict[str, Any]
+
+
+class NoPlan(ab.Planner):
+    """A planner that finds nothing, at once."""
+
+    def plan(self, problem: ab.Problem, vehicle: ab.Vehicle | None = None, progress: Any = None) -> ab.Plan:
+        """Refuse."""
+        raise ab.Infeasible("there is nothing to be found")
+
+
+@cache
+def plan() -> ab.Plan:
+    """A plan of a fifth of a second, on a straight line."""
+    trajectory = ab.Trajectory.from_inputs(np.zeros((4, 3)), np.full((2, 3), 100.0), 0.1)
+    line = ab.Problem("short", ab.at_rest((0.0, 0.0, 0.0)), ab.at_rest((0.0, 0.0, 0.1)))
+    return ab.Plan(line, trajectory, "none", vehicle=ab.load_vehicle("agile-quad"))
+
+
+@cache
+def flight() -> ab.Flight:
+    """Its flight."""
+    return ab.fly(plan(), rate=100.0, engine="floats")
+
+
+def ignored(attempt: object) -> None:
+    pass
+
+
+RESULTS = ("Gradient", "Passage", "Score", "Scores", "Sensitivity", "Reference")  # made by no user
+NOT_CALLED = ("AerobatError", "BackendMissing", "Infeasible", "SpecError", "Maneuver", "Planner")
+ENUMS = ("ContinuityRule", "Outcome", "Quantity", "TimeScaling")
+
+
+def doors(folder: Path) -> Iterator[Door]:
+    """All that is public and called; files go to the folder."""
+    for name in ab.__all__:
+        public = getattr(ab, name)
+        if name in RESULTS or name in NOT_CALLED or name in ENUMS:
+            continue
+        if inspect.isclass(public):
+            yield Door(name, public, _content(instance(public)))
+        else:
+            yield Door(name, public, _arguments(name, folder))
+    yield from _flights()
+    yield from _methods(folder)
+
+
+def _arguments(name: str, folder: Path) -> dict[str, Any]:
+    """The arguments of a public function."""
+    agile = ab.load_vehicle("agile-quad")
+    here = {"environment": ab.Environment()}
+    saved = _files(folder)
+    calls: dict[str, dict[str, Any]] = {
+        "at_rest": {"position": (0.0, 0.0, 1.0)},
+        "certify": {"trajectory": plan().trajectory, "vehicle": agile, **here, "envelope": ab.Envelope()},
+        "compare": {
+            "problem": plan().problem,
+            "vehicle": agile,
+            "planners": [("x", NoPlan())],
+            "progress": ignored,
+        },
+        "comparison_figure": {"comparison": instance(ab.Comparison)},
+        "draw": {"flight": flight(), "plan": plan(), "vehicle": agile},
+        "fly": {
+            "plan": plan(),
+            "vehicle": agile,
+            **here,
+            "config": ab.FlightConfig(rate=100.0, engine="floats"),
+        },
+        "import_plugin": {"path": saved["plugin"]},
+        "load_flight": {"path": saved["flight"]},
+        "load_plan": {"path": saved["plan"]},
+        "load_problem": {"name": "line"},
+        "load_trajectory": {"path": saved["trajectory"]},
+        "load_vehicle": {"name_or_path": "agile-quad"},
+        "maneuver": {"kind": "x"},
+        "minimum_effort": {
+            "fixed": np.zeros((2, 3, 3)),
+            "durations": [1.0],
+            "rule": ab.ContinuityRule.HIGHEST,
+            "heading": 0.1,
+        },
+        "option": {"default": 1, "help": "x", "off": "no-x", "command_default": 2},
+        "plan": {"problem": plan().problem, "planner": NoPlan(), "vehicle": agile, "progress": ignored},
+        "planner": {"name": "x"},
+        "prepare": {"plan": plan(), "vehicle": agile, **here, "config": ab.FlightConfig()},
+        "problem_names": {},
+        "read_csv": {"path": saved["csv"], "rate": 100.0},
+        "read_plan": {"path": saved["plan"], "rate": 100.0},
+        "read_trajectory": {"path": saved["trajectory"], "rate": 100.0},
+        "reference": {
+            "trajectory": plan().trajectory,
+            "vehicle": agile,
+            "times": [0.1],
+            "rate": None,
+            **here,
+        },
+        "registered_maneuvers": {},
+        "registered_planners": {},
+        "save_trajectory": {"trajectory": plan().trajectory, "path": folder / "saved.npz"},
+        "score": {"flight": flight(), "goal": plan(), "vehicle": agile},
+        "score_flights": {
+            "plan": plan(),
+            "vehicles": [agile],
+            "problem": plan().problem,
+            **here,
+            "config": ab.FlightConfig(rate=100.0, engine="floats"),
+        },
+        "sensitivity": {
+            "plan": plan(),
+            "of": "mass",
+            "vehicle": agile,
+            **here,
+            "config": ab.FlightConfig(rate=100.0, engine="floats"),
+        },
+        "tilted_gate": {
+            "position": (0.0, 0.0, 1.0),
+            "heading": 0.1,
+            "elevation": 0.1,
+            "tilt": 0.1,
+            "width": 1.0,
+            "height": 1.0,
+            "name": "a gate",
+        },
+        "to_dataframe": {"table": plan()},
+        "tracking_figure": {"plan": plan(), "vehicle": agile, "flight": flight()},
+        "vehicle_names": {},
+        "write_csv": {"trajectory": plan().trajectory, "path": folder / "saved.csv", "rate": 100.0},
+        "write_problem": {"problem": plan().problem, "path": folder / "saved.toml"},
+        "write_vehicle": {"vehicle": agile, "path": folder / "saved.toml"},
+    }
+    return calls[name]
+
+
+def _flights() -> Iterator[Door]:
+    """A flight with each of its settings given by name."""
+    settings = _content(ab.FlightConfig(rate=100.0, engine="floats"))
+    fixed = {name: settings[name] for name in ("rate", "engine")}
+    for name, value in settings.items():
+        yield Door(f"fly({name}=)", _flown, fixed | {name: value})
+
+
+def _flown(**changes: Any) -> ab.Flight:
+    return ab.fly(plan(), **changes)
+
+
+def _methods(folder: Path) -> Iterator[Door]:
+    """The methods of values that take arguments."""
+    problem, agile, trajectory = (
+        ab.load_problem("half-flip"),
+        ab.load_vehicle("agile-quad"),
+        plan().trajectory,
+    )
+    gate = problem.gates[0]
+    calls: list[tuple[str, Callable[..., Any], dict[str, Any]]] = [
+        ("Limits.of", problem.limits.of, {"derivative": 1}),
+        ("Limits.without", problem.limits.without, {"derivative": 1}),
+        ("EndState.derivatives", problem.start.derivatives, {"order": 3}),
+        ("Problem.stages", problem.stages, {"max_specific_thrust": 30.0}),
+        ("Problem.gate", problem.gate, {"name": "gate"}),
+        ("Gate.tilted", gate.tilted, {"tilt": 0.1}),
+        ("Maneuver.with_gate_tilt", problem.maneuver.with_gate_tilt, {"gates": [gate], "tilt": 0.1}),
+        ("Vehicle.require_hover", agile.require_hover, {"gravity": 9.81}),
+        ("Trajectory.evaluate", trajectory.evaluate, {"t": 0.1, "derivative": 1}),
+        ("Trajectory.flat", trajectory.flat, {"t": 0.1}),
+        ("Trajectory.on_segments", trajectory.on_segments, {"s": [0.1], "derivative": 1}),
+        ("Trajectory.sample", trajectory.sample, {"rate": 100.0}),
+        ("Trajectory.jumps", trajectory.jumps, {"derivative": 1}),
+        ("Trajectory.effort", trajectory.effort, {"derivative": 1}),
+        ("Trajectory.peak", trajectory.peak, {"derivative": 1}),
+        ("Trajectory.component_range", trajectory.component_range, {"derivative": 1}),
+        ("Trajectory.specific_thrust_range", trajectory.specific_thrust_range, {"gravity": 9.81}),
+        (
+            "Trajectory.from_inputs",
+            ab.Trajectory.from_inputs,
+            {"initial": np.zeros((3, 3)), "inputs": np.ones((2, 3)), "dt": 0.1, "heading": 0.1},
+        ),
+        ("Plan.save", plan().save, {"path": folder / "saved.plan"}),
+        ("Flight.save", flight().save, {"path": folder / "saved.npz"}),
+        ("Flight[]", ab.fly(plan(), [agile, agile], rate=100.0).__getitem__, {"vehicle": 1}),
+        ("Scores[]", ab.score_flights(plan(), [agile, agile], rate=100.0).__getitem__, {"k": 1}),
+        ("StateNoise.scaled", ab.StateNoise.fused().scaled, {"factor": 2.0}),
+        (
+            "Miqp.plan",
+            ab.Miqp(rescue=False).plan,
+            {"problem": _hopeless(), "vehicle": agile, "progress": ignored},
+        ),
+        ("MinSnap.plan", ab.MinSnap().plan, {"problem": _hopeless(), "vehicle": agile, "progress": ignored}),
+    ]
+    for name, method, right in calls:
+        yield Door(name, method, right)
+
+
+@cache
+def _hopeless() -> ab.Problem:
+    """A problem that every planner refuses at once."""
+    up = ab.Condition("specific_thrust", (0.0, 0.0, 1.0), lower=1e3)
+    return dataclasses.replace(plan().problem, maneuver=ab.CustomManeuver((ab.Stage("up", (up,)),)))
+
+
+@cache
+def _files(folder: Path) -> dict[str, Path]:
+    """A file of each kind."""
+    files = {name: folder / f"a.{name}" for name in ("plan", "csv")}
+    files |= {name: folder / f"{name}.npz" for name in ("flight", "trajectory")}
+    files["plugin"] = folder / "plugin.py"
+    files["plugin"].write_text("")
+    plan().save(files["plan"])
+    flight().save(files["flight"])
+    ab.write_csv(plan(), files["csv"])
+    ab.save_trajectory(plan(), files["trajectory"])
+    return files
+
+
+def instance(cls: type) -> Any:
+    """A value of a public class."""
+    made = {
+        ab.Attitude: lambda: ab.Attitude((0.0, 0.0, 1.0), 5.0, 0.1),
+        ab.BodyState: lambda: ab.BodyState(np.zeros(3), np.zeros(3), np.array([1.0, 0, 0, 0]), np.zeros(3)),
+        ab.Certificate: lambda: ab.certify(plan()),
+        ab.Comparison: _comparison,
+        ab.Condition: lambda: ab.Condition("velocity", (1.0, 0.0, 0.0), upper=1.0),
+        ab.CustomManeuver: lambda: ab.CustomManeuver((ab.Stage("a"),)),
+        ab.EndState: lambda: ab.at_rest((0.0, 0.0, 1.0)),
+        ab.FlatState: lambda: plan().trajectory.flat(0.1),
+        ab.Flight: flight,
+        ab.Gate: lambda: ab.tilted_gate((0.0, 0.0, 1.0)),
+        ab.Plan: plan,
+        ab.Problem: lambda: ab.load_problem("half-flip"),
+        ab.Rotor: lambda: ab.load_vehicle("agile-quad").rotors[0],
+        ab.Setpoint: lambda: flight().setpoint,
+        ab.Stage: lambda: ab.Stage("a"),
+        ab.Trajectory: lambda: plan().trajectory,
+        ab.Vehicle: lambda: ab.load_vehicle("agile-quad"),
+        ab.Waypoint: lambda: ab.Waypoint((0.0, 0.0, 1.0)),
+        ab.Waypoints: lambda: ab.Waypoints((ab.Waypoint((0.0, 0.0, 1.0)),)),
+        ab.Wrench: lambda: flight().setpoint.wrench,
+        ab.Reference: lambda: ab.reference(plan(), times=[0.0, 0.1]),
+        ab.Score: lambda: ab.score(flight(), plan()),
+        ab.Scores: lambda: ab.score_flights(plan(), ["agile-quad"] * 2, rate=100.0),
+        ab.Sensitivity: lambda: ab.sensitivity(plan(), "mass", rate=100.0),
+        ab.Gradient: lambda: instance(ab.Sensitivity).mean_square_position_error,
+        ab.Passage: _passage,
+    }
+    return made.get(cls, cls)()
+
+
+def _passage() -> ab.Passage:
+    """One that is not known."""
+    problem = ab.load_problem("half-flip")
+    return ab.score(flight(), problem).passages[0]
+
+
+def _comparison() -> ab.Comparison:
+    entry = Entry("none", plan(), None, None, 0.0, "planned")
+    return ab.Comparison(plan().problem, ab.load_vehicle("agile-quad"), (entry,))
+
+
+def _content(value: Any) -> dict[str, Any]:
+    return {field.name: getattr(value, field.name) for field in dataclasses.fields(value)}
+
+
+VALUES = [
+    public
+    for public in (getattr(ab, name) for name in ab.__all__)
+    if dataclasses.is_dataclass(public) and isinstance(public, type)
+]
