@@ -54,6 +54,7 @@ def compare(
     vehicle: Vehicle,
     planners: Sequence[tuple[str, Planner]] | None = None,
     progress: Callable[[Attempt], None] | None = None,
+    begin: Callable[[str], None] | None = None,
 ) -> Comparison:
     """Plan a problem with each planner and fly each plan.
 
@@ -67,13 +68,19 @@ def compare(
         vehicle: What flies it.
         planners: Each with a name; by default all that are registered.
         progress: Called with every attempt as it ends.
+        begin: Called with each planner's name when its turn comes.
     """
     compared = all_planners() if planners is None else planners
-    entries = tuple(_entry(name, planner, problem, vehicle, progress) for name, planner in compared)
-    entries = tuple(
-        _improved(entry, planner, entries, progress) if isinstance(planner, TimeOptimal) else entry
-        for entry, (_, planner) in zip(entries, compared, strict=True)
-    )
+    begin = begin or (lambda name: None)
+    found = []
+    for name, planner in compared:
+        begin(name)
+        found.append(_entry(name, planner, problem, vehicle, progress))
+    for i, (name, planner) in enumerate(compared):
+        if isinstance(planner, TimeOptimal):
+            begin(f"{name} again")
+            found[i] = _improved(found[i], planner, found, progress)
+    entries = tuple(found)
     if all(entry.plan is None for entry in entries):
         raise Infeasible(
             f"no planner finds a plan for '{problem.name}' on {vehicle.name}: {entries[0].outcome}"
