@@ -7,9 +7,10 @@ from typing import Annotated
 from cyclopts import Parameter
 
 from aerobat.cli.options import OutputOptions, TaskOptions
+from aerobat.cli.progress import planning_progress
 from aerobat.cli.run_folder import run_folder, written_to
 from aerobat.cli.run_record import RunRecord
-from aerobat.cli.tasks import planning_progress, read_task
+from aerobat.cli.tasks import read_task
 from aerobat.cli.terminal import print_json
 from aerobat.reporting.comparison import comparison_figure, comparison_rows, comparison_table
 from aerobat.reporting.page import png
@@ -46,7 +47,9 @@ def compare(problem: str, options: Annotated[TaskOptions, Parameter(name="*")] =
 def comparison_of(record: RunRecord) -> Comparison:
     """All planners on a run's problem."""
     with planning_progress() as progress:
-        return compare_planners(record.problem, record.vehicle, progress=progress)
+        return compare_planners(
+            record.problem, record.vehicle, progress=progress.record, begin=progress.begin
+        )
 
 
 def finish_comparison(comparison: Comparison, record: RunRecord, options: OutputOptions) -> None:

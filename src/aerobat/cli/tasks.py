@@ -2,21 +2,18 @@
 
 from __future__ import annotations
 
-import sys
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
 from dataclasses import replace
 from math import isfinite, radians
 from pathlib import Path
 from typing import Any, Literal
 
 from aerobat.cli.options import PlanningOptions, TaskOptions, offered_options, option_name
+from aerobat.cli.progress import planning_progress
 from aerobat.cli.run_record import RunRecord, default_vehicle
 from aerobat.cli.terminal import say
 from aerobat.errors import SpecError
 from aerobat.interchange import read_plan
 from aerobat.planning import (
-    Attempt,
     Plan,
     Planner,
     plan,
@@ -75,11 +72,11 @@ def planned(name: str, options: PlanningOptions, command: Literal["fly", "plan"]
 def plan_of(record: RunRecord) -> Plan:
     """The plan of a run, made anew."""
     assert record.planner is not None, "a plan that came from a file is not made"
-    with planning_progress() as progress:
+    with planning_progress(record.planner_name) as progress:
         if not record.paper:
-            return plan(record.problem, record.planner, record.vehicle, progress)
+            return plan(record.problem, record.planner, record.vehicle, progress.record)
         # the paper plans without a vehicle; whether this one can fly it is told all the same
-        found = plan(record.problem, record.planner, progress=progress)
+        found = plan(record.problem, record.planner, progress=progress.record)
         return with_flyability(with_certificate(found, record.vehicle))
 
 
@@ -105,18 +102,6 @@ def make_planner(options: PlanningOptions) -> Planner:
         elif option.command_default is not None:
             settings[option.name] = option.command_default
     return cls(**settings)
-
-
-@contextmanager
-def planning_progress() -> Iterator[Callable[[Attempt], None] | None]:
-    """The attempts as they come, on a terminal; nothing in a pipe."""
-    if not sys.stderr.isatty():
-        yield None
-        return
-    from rich.console import Console
-
-    with Console(stderr=True).status("planning") as status:
-        yield lambda a: status.update(f"planning: {a.duration:.3f} s, {a.outcome}")
 
 
 def _tilted(problem: Problem, angle: float) -> Problem:

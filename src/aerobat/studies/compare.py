@@ -70,6 +70,7 @@ def compare(
     vehicle: Vehicle | str,
     planners: Sequence[tuple[str, Planner] | str] | None = None,
     progress: Callable[[Attempt], None] | None = None,
+    begin: Callable[[str], None] | None = None,
 ) -> Comparison:
     """Plan a problem with each planner and fly each plan.
 
@@ -83,16 +84,22 @@ def compare(
         vehicle: What flies it, or its name.
         planners: Each with a name, or the name of a registered one; by default all that are registered.
         progress: Called with every attempt as it ends.
+        begin: Called with each planner's name when its turn comes.
     """
     problem, vehicle = as_problem(problem), as_vehicle(vehicle)
     compared = all_planners() if planners is None else [_named(each) for each in planners]
     if not compared:
         raise SpecError("planners must be one planner or more; leave them out for all")
-    entries = tuple(_entry(name, planner, problem, vehicle, progress) for name, planner in compared)
-    entries = tuple(
-        _improved(entry, planner, entries, progress) if isinstance(planner, TimeOptimal) else entry
-        for entry, (_, planner) in zip(entries, compared, strict=True)
-    )
+    begin = begin or (lambda name: None)
+    found = []
+    for name, planner in compared:
+        begin(name)
+        found.append(_entry(name, planner, problem, vehicle, progress))
+    for i, (name, planner) in enumerate(compared):
+        if isinstance(planner, TimeOptimal):
+            begin(f"{name} again")
+            found[i] = _improved(found[i], planner, found, progress)
+    entries = tuple(found)
     if all(entry.plan is None for entry in entries):
         raise Infeasible(
             f"no planner finds a plan for '{problem.name}' on {vehicle.name}: {entries[0].outcome}"

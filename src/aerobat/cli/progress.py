@@ -1,0 +1,102 @@
+"""What long planning is at: on a terminal always, in a pipe a line on standard error every few seconds."""
+
+from __future__ import annotations
+
+import os
+import sys
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from math import inf, isfinite
+from time import perf_counter
+
+from aerobat.cli.terminal import say
+from aerobat.errors import SpecError
+from aerobat.planning import Attempt
+
+PERIOD = 5.0  # [s] between lines in a pipe, unless the environment says otherwise
+VARIABLE = "AEROBAT_PROGRESS"
+
+
+class PlanningProgress:
+    """What planning has come to by now.
+
+    Args:
+        planner: The name of the planner that begins.
+        clock: Seconds that rise.
+    """
+
+    def __init__(self, planner: str = "", clock: Callable[[], float] = perf_counter) -> None:
+        self._clock = clock
+        self.begin(planner)
+
+    def begin(self, planner: str) -> None:
+        """Another planner's turn."""
+        self._planner = planner
+        self._began = self._clock()
+        self._best = inf  # [s] the shortest duration that will do
+        self._tried = 0
+        self._last = ""
+
+    def record(self, attempt: Attempt) -> None:
+        """Take note of an attempt that ended."""
+        self._tried += 1
+        self._last = f"{attempt.duration:.3f} s, {attempt.outcome}"
+        if attempt.feasible:
+            self._best = min(self._best, attempt.duration)
+
+    def __str__(self) -> str:
+        """Which planner, for how long, how good so far, and what it tried last."""
+        best = "no plan so far" if self._best == inf else f"{self._best:.3f} s so far"
+        last = f"; attempt {self._tried}: {self._last}" if self._tried else ""
+        return f"planning with {self._planner} for {self._clock() - self._began:.0f} s: {best}{last}"
+
+    def __rich__(self) -> str:
+        """The line, drawn anew whenever a terminal shows it, and none of its brackets taken for markup."""
+        from rich.markup import escape
+
+        return escape(str(self))
+
+
+@contextmanager
+def planning_progress(planner: str = "") -> Iterator[PlanningProgress]:
+    """Show what is recorded in the block, by whichever way standard error has."""
+    progress = PlanningProgress(planner)
+    if sys.stderr.isatty():
+        from rich.console import Console
+
+        with Console(stderr=True).status(progress):
+            yield progress
+        return
+    ended = threading.Event()
+    teller = threading.Thread(target=tell, args=(progress, ended.wait, period()), daemon=True)
+    teller.start()
+    try:
+        yield progress
+    finally:
+        ended.set()
+        teller.join()
+
+
+def tell(progress: PlanningProgress, wait: Callable[[float], bool], seconds: float) -> None:
+    """Say where planning is, again and again.
+
+    Args:
+        progress: Where it is.
+        wait: Waits for so many seconds [s], less where planning ends: then it returns true.
+        seconds: From one line to the next [s].
+    """
+    while not wait(seconds):
+        say(str(progress))
+
+
+def period() -> float:
+    """The seconds between lines. Raises SpecError where the environment gives no such number."""
+    text = os.environ.get(VARIABLE, "")
+    try:
+        seconds = float(text or PERIOD)
+    except ValueError:
+        seconds = inf
+    if not (isfinite(seconds) and seconds > 0.0):
+        raise SpecError(f"{VARIABLE} must be a positive number of seconds between lines, got {text!r}")
+    return min(seconds, threading.TIMEOUT_MAX)
