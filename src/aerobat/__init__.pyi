@@ -57,7 +57,7 @@ from .simulation import Flight, FlightConfig, Outcome, StateNoise, fly, load_fli
 from .states import BodyState, FlatState, Setpoint, Wrench
 from .studies.compare import Comparison, compare
 from .trajectory import ContinuityRule, Trajectory, load_trajectory, minimum_effort, save_trajectory
-from .vehicle import Rotor, Vehicle, load_vehicle, vehicle_names, write_vehicle
+from .vehicle import Rotor, Vehicle, implausibilities, load_vehicle, vehicle_names, write_vehicle
 
 __all__ = [
     "AerobatError",
@@ -119,6 +119,7 @@ __all__ = [
     "comparison_figure",
     "draw",
     "fly",
+    "implausibilities",
     "import_plugin",
     "load_flight",
     "load_plan",
