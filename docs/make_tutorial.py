@@ -20,6 +20,7 @@ def executed(path: Path, folder: Path) -> nbformat.NotebookNode:
 
 
 def main() -> None:
+    """Run the tutorial and write it."""
     with TemporaryDirectory() as folder:
         notebook = executed(TUTORIAL, Path(folder))
     for cell in notebook.cells:
