@@ -13,6 +13,7 @@ SECOND_STEPS = 20  # of another, once backed off
 ROUNDS = 8  # of settling, at most
 MENDABLE = 2e-3  # of a constraint's range: an excess that settling mends
 MAX_STEPS = 30  # of a descent
+TOLERATED = 1e-4  # of a constraint's range: what a descent may leave to settling
 SETTLING_STRETCH = 3e-4  # of the mean interval: leaves room for meeting all constraints exactly
 SETTLING_STEPS = 8  # at most
 
@@ -28,7 +29,7 @@ def descended(program: PathProgram, start: Array, max_steps: int = MAX_STEPS) ->
     point = program.at(start)
     if point is None:
         return None
-    found = prox_linear(program, point, max_steps, in_time=True)
+    found = prox_linear(program, point, max_steps, TOLERATED, in_time=True)
     return found.feasible if found.point.violation > MENDABLE else found.point
 
 
