@@ -8,8 +8,10 @@ import pytest
 
 from aerobat.errors import Infeasible
 from aerobat.flatness import force_balance, reference
+from aerobat.optimization import solver
 from aerobat.planning import GridSearch, Miqp, plan
 from aerobat.planning.certified_solve import certificate_for, tightened
+from aerobat.planning.miqp.miqp import formulate
 from aerobat.planning.miqp.refinement.phases import PhasedChain, Places
 from aerobat.planning.miqp.refinement.rotor_rows import RotorRows
 from aerobat.problem import (
@@ -45,6 +47,15 @@ def test_thirteen_intervals_are_not_called_infeasible_because_bounds_were_tighte
     found = plan(problem, Miqp(intervals=13, rescue=False), load_vehicle("hexarotor"))
     assert found.certified
     assert found.intervals == 13
+
+
+def test_a_flip_too_fast_for_its_limits_is_refuted_by_the_candidates_of_one_stage(quad: Vehicle) -> None:
+    """Not by all pairs of them, of which there are four times as many."""
+    problem, intervals = load_problem("flip-roll"), 20
+    program = formulate(problem, 5, intervals, quad).program(0.05)
+    result = solver("builtin").solve(program)
+    assert result.status == "infeasible"
+    assert result.nodes <= intervals
 
 
 def test_a_path_along_the_floor_is_certified_and_its_proof_is_its_own(quad: Vehicle) -> None:
