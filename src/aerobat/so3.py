@@ -128,7 +128,7 @@ def _any_normal(a: Array) -> Array:
 
 
 def _length(array: Array) -> Array:
-    return np.sqrt(np.einsum("...i,...i->...", array, array))
+    return np.asarray(np.sqrt(np.einsum("...i,...i->...", array, array)))
 
 
 def _vector(array: ArrayLike) -> Vector:

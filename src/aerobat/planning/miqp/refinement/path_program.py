@@ -103,10 +103,9 @@ class PathProgram:
         if not np.isfinite(x).all() or (x[3 * self.chain.intervals : -1] <= 0.0).any():
             return None
         instants = self.chain.samples(x, self._instants)
-        places, weights, bounds = self._met
-        rows = instants.input_rows(places, weights)
+        rows = instants.input_rows(*self._met[:2])
         size = _sizes(rows)
-        residual = _residual(instants, places, weights, bounds) / size
+        residual = _residual(instants, *self._met) / size
         step = np.linalg.lstsq(rows / size[:, None], -residual, rcond=1e-12)[0]
         moved = x.copy()
         moved[: len(step)] += step
@@ -217,14 +216,12 @@ class PathPoint:
         values = self._values[place, column]
         at, stage_weights, _, equal = program._stage_rows
         rows = [self._samples.rows(place, weights), self._instants.rows(at[~equal], stage_weights[~equal])]
-        met_at, met_weights, met_bounds = program._met
-        equality = self._instants.rows(met_at, met_weights)
+        equality = self._instants.rows(*program._met[:2])
         size = _sizes(equality[:, : 3 * program.chain.intervals])
-        residual = _residual(self._instants, met_at, met_weights, met_bounds) / size
         return Linearization(
             values=np.concatenate([values, self._stage_values]),
             rows=np.concatenate(rows),
-            residual=residual,
+            residual=_residual(self._instants, *program._met) / size,
             equality=equality / size[:, None],
         )
 
