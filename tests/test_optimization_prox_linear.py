@@ -56,6 +56,14 @@ def test_without_a_cost_the_first_point_inside_will_do():
     assert result.point.violation <= 1e-9
 
 
+def test_a_violation_that_is_tolerated_costs_no_further_steps():
+    program = Disc([3.0, 4.0, 0.0])
+    start = program.at(np.array([-0.601, -0.801, 0.0]))
+    careful, lenient = (prox_linear(program, start, 80, tolerance) for tolerance in (0.0, 1e-2))
+    assert lenient.point.violation <= 1e-2
+    assert lenient.steps < careful.steps
+
+
 @pytest.mark.parametrize(("third", "status"), [(2.0, "optimal"), (2.5, "infeasible")])
 def test_equalities_that_depend_on_each_other_are_told_from_those_that_contradict(third, status):
     """Bounds that meet only when stages are placed: x + y = 2 once as a row of its own, once as a sum."""

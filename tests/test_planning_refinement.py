@@ -8,8 +8,10 @@ import pytest
 
 from aerobat.errors import Infeasible
 from aerobat.flatness import force_balance, reference
+from aerobat.optimization import solver
 from aerobat.planning import GridSearch, Miqp, plan
 from aerobat.planning.certified_solve import certificate_for, tightened
+from aerobat.planning.miqp.miqp import formulate
 from aerobat.planning.miqp.refinement.phases import PhasedChain, Places
 from aerobat.planning.miqp.refinement.rotor_rows import RotorRows
 from aerobat.problem import (
@@ -45,6 +47,15 @@ def test_thirteen_intervals_are_not_called_infeasible_because_bounds_were_tighte
     found = plan(problem, Miqp(intervals=13, rescue=False), load_vehicle("hexarotor"))
     assert found.certified
     assert found.intervals == 13
+
+
+def test_a_flip_too_fast_for_its_limits_is_refuted_by_the_candidates_of_one_stage(quad: Vehicle) -> None:
+    """Not by all pairs of them, of which there are four times as many."""
+    problem, intervals = load_problem("flip-roll"), 20
+    program = formulate(problem, 5, intervals, quad).program(0.05)
+    result = solver("builtin").solve(program)
+    assert result.status == "infeasible"
+    assert result.nodes <= intervals
 
 
 def test_a_path_along_the_floor_is_certified_and_its_proof_is_its_own(quad: Vehicle) -> None:
@@ -176,12 +187,13 @@ def test_rotor_rows_are_thrusts_and_commands_as_flatness_has_them(flown: Traject
 def test_slopes_of_rotor_rows_are_their_differences(flown: Trajectory, quad: Vehicle) -> None:
     times = flown.knots[2:6] + 0.4 * flown.durations[2:6]
     rows, derivatives, frames = sampled(flown, quad, times)
-    slopes = rows.slopes(derivatives, frames)
+    place, column = np.nonzero(np.ones(rows.values(derivatives, frames).shape))
+    slopes = rows.slopes(derivatives, frames, place, column)
     rng = np.random.default_rng(0)
     step = rng.normal(size=derivatives.shape) * np.abs(derivatives).max(axis=(0, 2))[:, None]
     ahead, behind = (rows.values(derivatives + h * step, frames) for h in (1e-6, -1e-6))
     expected = (ahead - behind) / 2e-6
-    found = np.einsum("mcka,mka->mc", slopes, step)
+    found = np.sum(slopes * step[place], axis=(1, 2)).reshape(expected.shape)
     np.testing.assert_allclose(found, expected, rtol=1e-4, atol=1e-5 * np.abs(expected).max())
 
 

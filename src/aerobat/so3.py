@@ -39,7 +39,7 @@ def conjugate(q: ArrayLike) -> Array:
 def normalize(q: ArrayLike) -> Array:
     """q / |q|, (..., 4)."""
     q = np.asarray(q, dtype=float)
-    return np.asarray(q / np.linalg.norm(q, axis=-1, keepdims=True))
+    return np.asarray(q / _length(q)[..., None])
 
 
 def rotate(q: ArrayLike, v: ArrayLike) -> Array:
@@ -82,8 +82,8 @@ def angle_between(p: ArrayLike, q: ArrayLike) -> Array:
 
 def axes(q: ArrayLike) -> Array:
     """The rotation matrix of q, (..., 4) -> (..., 3, 3); its columns are the body axes in the world."""
-    q = np.asarray(q, dtype=float)
-    return np.stack([rotate(q, e) for e in np.eye(3)], axis=-1)
+    b1, b2, b3 = (_joined(axis) for axis in quaternions.axes(_quaternion(q)))
+    return np.stack([b1, b2, b3], axis=-1)
 
 
 def thrust_axis(q: ArrayLike) -> Array:
@@ -93,9 +93,12 @@ def thrust_axis(q: ArrayLike) -> Array:
 
 def about_axis(axis: ArrayLike, angle: ArrayLike) -> Array:
     """The rotation by `angle` [rad] (...) about the unit vector `axis` (..., 3)."""
-    half = np.asarray(angle, dtype=float)[..., None] / 2
-    sine = np.sin(half) * np.asarray(axis, dtype=float)
-    return np.concatenate([np.broadcast_to(np.cos(half), (*sine.shape[:-1], 1)), sine], axis=-1)
+    half = np.asarray(angle, dtype=float) / 2
+    axis = np.asarray(axis, dtype=float)
+    q = np.empty((*np.broadcast_shapes(half.shape, axis.shape[:-1]), 4))
+    q[..., 0] = np.cos(half)
+    q[..., 1:] = np.sin(half)[..., None] * axis
+    return q
 
 
 def smallest_rotation(a: ArrayLike, b: ArrayLike) -> Array:
@@ -107,10 +110,13 @@ def smallest_rotation(a: ArrayLike, b: ArrayLike) -> Array:
     # half-way vector h = (a + b)/|a + b|: q = (a·h, a × h) with a·h = |a + b|/2, which stays accurate where
     # a + b is hardly more than rounding
     h = a + b
-    norm = np.linalg.norm(h, axis=-1, keepdims=True)
+    norm = _length(h)
     opposite = norm < 1e-12
-    h = np.where(opposite, _any_normal(a), h / np.where(opposite, 1.0, norm))
-    return normalize(np.concatenate([np.where(opposite, 0.0, norm / 2.0), cross(a, h)], axis=-1))
+    if opposite.any():
+        h = np.where(opposite[..., None], _any_normal(a), h)
+    h = h / np.where(opposite, 1.0, norm)[..., None]
+    cosine = np.where(opposite, 0.0, norm / 2.0)
+    return normalize(_joined((cosine, *vectors.cross(_vector(a), _vector(h)))))
 
 
 def _any_normal(a: Array) -> Array:
@@ -119,6 +125,10 @@ def _any_normal(a: Array) -> Array:
     candidate = np.where(np.abs(a[..., 1:2]) < 0.9, [0.0, -1.0, 0.0], [1.0, 0.0, 0.0])
     normal = candidate - np.sum(candidate * a, axis=-1, keepdims=True) * a
     return np.asarray(normal / np.linalg.norm(normal, axis=-1, keepdims=True))
+
+
+def _length(array: Array) -> Array:
+    return np.asarray(np.sqrt(np.einsum("...i,...i->...", array, array)))
 
 
 def _vector(array: ArrayLike) -> Vector:

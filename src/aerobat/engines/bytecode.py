@@ -58,12 +58,13 @@ class BytecodeLoop(CompiledLoop):
     def scan(self, carry: Tree, inputs: Tree, log_stride: int = 1) -> tuple[Tree, Tree]:
         """See `CompiledLoop.scan`."""
         ticks = tick_count(inputs)
-        is_logged = np.isin(np.arange(ticks), logged_ticks(ticks, log_stride)).tolist()
+        is_logged = np.zeros(ticks, dtype=bool)
+        is_logged[logged_ticks(ticks, log_stride)] = True
         leaves = tree_leaves(inputs)
         before = zip(*map(_floats, tree_leaves(carry)), strict=True) if self._loop.carry else repeat(())
         carries, columns = [], []
         for vehicle, (parameters, state) in enumerate(zip(self._parameters, before, strict=False)):
-            state, rows = self._scan(parameters, state, _ticks(leaves, vehicle), is_logged)
+            state, rows = self._scan(parameters, state, _ticks(leaves, vehicle), is_logged.tolist())
             carries.append(state)
             columns.append([np.array(column) for column in zip(*rows, strict=True)])
         outputs = [np.stack(column) for column in zip(*columns, strict=True)]

@@ -72,7 +72,8 @@ class Engine:
 
 def logged_ticks(ticks: int, log_stride: int) -> NDArray[np.intp]:
     """Ticks whose rows a scan returns: the first, each `log_stride` ticks after it, and the last."""
-    return np.unique(np.append(np.arange(0, ticks, log_stride), ticks - 1))
+    logged = np.arange(0, ticks, log_stride)
+    return logged if logged[-1] == ticks - 1 else np.append(logged, ticks - 1)
 
 
 def run_whole(engine: Engine, init: Init, step: Step, parameters: Tree, inputs: Tree) -> Tree:

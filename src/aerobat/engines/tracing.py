@@ -66,29 +66,30 @@ class Trace:
 
     def input(self, name: str, logical: bool = False) -> Symbol:
         """A new symbol."""
-        return Symbol(self, self._number(Operation("input", (), name, logical)))
+        return Symbol(self, self._number("input", (), name, logical))
 
     def symbol(self, value: Any) -> Symbol:
         """A symbol as it is; a number as a constant."""
         if isinstance(value, Symbol):
             return value
         logical = isinstance(value, bool)
-        constant = Operation("constant", (), value if logical else float(value), logical)
-        return Symbol(self, self._number(constant))
+        content = value if logical else float(value)
+        return Symbol(self, self._number("constant", (), content, logical))
 
     def apply(self, name: str, *arguments: Any) -> Symbol:
         """A function of symbols and numbers."""
-        numbers = tuple(self.symbol(argument).number for argument in arguments)
+        numbers = tuple([self.symbol(argument).number for argument in arguments])
         known = [self.operations[number] for number in numbers]
-        if all(operation.name == "constant" for operation in known):
+        constants = [operation.name == "constant" for operation in known]
+        if all(constants):
             return self.symbol(FUNCTIONS[name](*(operation.content for operation in known)))
-        unchanged = _unchanged(name, numbers, known)
+        unchanged = _unchanged(name, numbers, known) if any(constants) or name == "select" else None
         if unchanged is not None:
             return Symbol(self, unchanged)
         if name in _COMMUTATIVE:
             numbers = tuple(sorted(numbers))
         logical = name in _LOGICAL or (name == "select" and known[1].logical)
-        return Symbol(self, self._number(Operation(name, numbers, "", logical)))
+        return Symbol(self, self._number(name, numbers, "", logical))
 
     def needed(self, roots: Iterable[int]) -> set[int]:
         """The values that others are computed from, these included."""
@@ -101,12 +102,14 @@ class Trace:
                 waiting.extend(self.operations[number].arguments)
         return found
 
-    def _number(self, operation: Operation) -> int:
+    def _number(
+        self, name: str, arguments: tuple[int, ...], content: float | bool | str, logical: bool
+    ) -> int:
         # 0.0 and -0.0 are equal, True and 1.0 too: the text tells them apart
-        key = (operation.name, operation.arguments, repr(operation.content))
+        key = (name, arguments, repr(content) if name == "constant" else content)
         number = self._numbers.setdefault(key, len(self.operations))
         if number == len(self.operations):
-            self.operations.append(operation)
+            self.operations.append(Operation(name, arguments, content, logical))
         return number
 
 

@@ -99,7 +99,11 @@ class ProxLinearResult(Generic[P]):
 
 
 def prox_linear(
-    program: SmoothProgram[P], start: P, max_steps: int = 40, in_time: bool = False
+    program: SmoothProgram[P],
+    start: P,
+    max_steps: int = 40,
+    tolerance: float = 0.0,
+    in_time: bool = False,
 ) -> ProxLinearResult[P]:
     """Descend from a point; it ends at a local optimum, out of steps or time, or where no step leads on.
 
@@ -107,6 +111,7 @@ def prox_linear(
         program: What is minimized; where its cost is zero, the first point without violation will do.
         start: Where to begin, feasible or not.
         max_steps: QPs, at most.
+        tolerance: A violation that is not worth a greater penalty.
         in_time: Whether it ends where no time is left, as a descent may and what mends a path may not.
     """
     point = start
@@ -138,10 +143,10 @@ def prox_linear(
             proximity *= 5.0
         flat = promised < _LITTLE_PROMISED
         if (flat and gained < _LITTLE_GAIN) or proximity > _MAX_PROXIMITY:
-            if point.violation <= 0.0 or penalty >= _MAX_PENALTY:
+            if point.violation <= tolerance or penalty >= _MAX_PENALTY:
                 return ProxLinearResult(point, flat, steps, feasible)
             penalty *= _PENALTY_GROWTH
-            proximity = _FIRST_PROXIMITY
+            proximity = max(proximity, _FIRST_PROXIMITY) if flat else _FIRST_PROXIMITY
     return ProxLinearResult(point, False, max_steps, feasible)
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 from dataclasses import field, replace
+from functools import lru_cache
 from math import degrees, radians
 from typing import Annotated, Any, ClassVar, cast
 
@@ -235,9 +236,7 @@ class Problem:
         All that a stage asks is among its conditions, its gate's centre and its attitude too.
         Raises SpecError for gates that do not suit the maneuver.
         """
-        sequence = self.maneuver.stage_sequence(self.gates, max_specific_thrust)
-        stages = (s.explicit(None if s.gate is None else self.gate(s.gate)) for s in sequence.stages)
-        return replace(sequence, stages=tuple(stages))
+        return _explicit_stages(self.maneuver, self.gates, float(max_specific_thrust))
 
     @door
     def gate(self, name: str) -> Gate:
@@ -247,6 +246,16 @@ class Problem:
     def as_in_paper(self) -> Problem:
         """The same problem as the paper formulates it, with the reference code's limits and ε."""
         return replace(self, maneuver=self.maneuver.as_in_paper(), limits=PAPER_LIMITS)
+
+
+@lru_cache(maxsize=64)
+def _explicit_stages(
+    maneuver: Maneuver, gates: tuple[Gate, ...], max_specific_thrust: float
+) -> StageSequence:
+    """As `Problem.stages`, kept: planner, certificate and score each ask for the same."""
+    sequence = maneuver.stage_sequence(gates, max_specific_thrust)
+    stages = (s.explicit(None if s.gate is None else named_gate(gates, s.gate)) for s in sequence.stages)
+    return replace(sequence, stages=tuple(stages))
 
 
 @door

@@ -56,13 +56,15 @@ def fly(
     engine = setup.engine()
     loop = setup.compile(engine)
     logged = logged_ticks(len(setup.times), stride)
+    is_logged = np.zeros(len(setup.times), dtype=bool)
+    is_logged[logged] = True
     carry = loop.init(setup.first_tick)
     rows, setpoints = [], []
     for begin, end in setup.chunks(stride):
         chunk_stride = end if begin % stride else stride
         carry, chunk = loop.scan(carry, setup.inputs(begin, end), chunk_stride)
         ticks = begin + logged_ticks(end - begin, chunk_stride)
-        kept = np.isin(ticks, logged)
+        kept = is_logged[ticks]
         rows.append(chunk if kept.all() else tree_map(partial(np.compress, kept, axis=1), chunk))
         setpoints.append(setpoint_rows(setup.reference.setpoint(begin, end), ticks[kept] - begin))
     log = rows[0] if len(rows) == 1 else tree_stack(rows, lambda parts: np.concatenate(parts, axis=-1))

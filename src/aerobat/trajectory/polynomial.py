@@ -98,7 +98,7 @@ def _roots(coefficients: Array) -> Array:
     """
     roots = np.zeros((len(coefficients), max(coefficients.shape[1] - 1, 0)))
     degrees = _true_degrees(coefficients)
-    for degree in np.unique(degrees[degrees > 0]):
+    for degree in sorted(set(degrees[degrees > 0].tolist())):
         rows = np.flatnonzero(degrees == degree)
         companion = np.zeros((len(rows), degree, degree))
         companion[:, np.arange(1, degree), np.arange(degree - 1)] = 1.0

@@ -138,10 +138,11 @@ class BestFirstSearch:
             children = self._children(node)
             if children is None:
                 return
-            child = None
+            child, in_pairs = None, True
             while child is None and self._improves(children.evaluate_best()) and perf_counter() < deadline:
-                branch = children.pop(self._cutoff, in_pairs=True)
+                branch = children.pop(self._cutoff, in_pairs)
                 child = self._child(node, children.lower_bounds, branch)
+                in_pairs = False  # where a pair fails, a candidate alone may: that excludes all its pairs
             self._push(children.bound, node, children)
             node = child
         if node is not None:

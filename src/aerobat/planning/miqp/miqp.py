@@ -18,7 +18,7 @@ from aerobat.planning.miqp.attempts import Attempts, Placement, flyable_order, p
 from aerobat.planning.miqp.diagnosis import why_infeasible
 from aerobat.planning.miqp.formulation import Formulation
 from aerobat.planning.miqp.integrator import IntegratorChain, Intervals, Order
-from aerobat.planning.miqp.refinement import descended, settled
+from aerobat.planning.miqp.refinement import descent, settled
 from aerobat.planning.miqp.rescue import rescued_plan
 from aerobat.planning.miqp.shortest import shortest
 from aerobat.planning.planners import Planner, option, planner
@@ -117,7 +117,7 @@ def _attempt(attempts: Attempts, dt: float) -> Judged[Placement] | None:
     start = attempts.start(placement, held=True)
     if judged.feasible and (not attempts.reserve or start.violation <= 0.0):
         return judged
-    path = descended(start.program, start.x)
+    path = descent(start.program, start.x).path
     if path is None:
         return None
     refined = attempts.refined(placement, partial(settled, path))

@@ -15,7 +15,7 @@ from aerobat.optimization.deadline import out_of_time
 from aerobat.planning.certified_solve import Judged
 from aerobat.planning.flyability import flight_error
 from aerobat.planning.miqp.attempts import Attempts, Placement
-from aerobat.planning.miqp.refinement import PathPoint, descended, finished
+from aerobat.planning.miqp.refinement import Descent, PathPoint, descent, finished
 from aerobat.planning.result import FLYABLE_ERROR
 
 GROWTH = 1.15  # of dt, from one program to the next
@@ -39,8 +39,14 @@ def shortest(attempts: Attempts, first: float, last: float) -> Judged[Placement]
     scan = _Scan(attempts, first, last)
     starts = scan.starts()
     ends: list[tuple[Placement, PathPoint]] = []
+    known: set[tuple[int, ...] | None] = set()  # slots whose shortest path is known
     for tried, start in enumerate(starts):
-        ends += _descents(start)
+        if start.answer.slots in known:
+            break
+        end = _descent(start)
+        ends += [(start, end.path)] if end.path else []
+        if end.path and end.direct:
+            known.add(start.answer.slots)
         if len(ends) == STARTS or tried + 1 == MAX_STARTS or out_of_time():
             break
     for start, path in sorted(ends, key=lambda end: float(end[1].x[-1])):
@@ -55,17 +61,18 @@ def _slower(attempts: Attempts, scan: _Scan, starts: Iterator[Placement]) -> Jud
     for start in starts:
         if start.path is None or start.path.violation > 0.0:
             continue
-        for _, path in _descents(start):
-            judged = attempts.refined(start, partial(finished, path))
-            if judged.feasible:
-                return flyable(attempts, judged)
+        path = _descent(start).path
+        if path is None:
+            continue
+        judged = attempts.refined(start, partial(finished, path))
+        if judged.feasible:
+            return flyable(attempts, judged)
     return scan.certified()
 
 
-def _descents(start: Placement) -> list[tuple[Placement, PathPoint]]:
-    """A start with the path that a descent from it ends at, if it ends at one."""
-    path = descended(start.path.program, start.path.x) if start.path else None
-    return [] if path is None else [(start, path)]
+def _descent(start: Placement) -> Descent:
+    """Where a descent from a start ends."""
+    return descent(start.path.program, start.path.x) if start.path else Descent(None, False)
 
 
 def flyable(attempts: Attempts, judged: Judged[Placement]) -> Judged[Placement]:
@@ -78,7 +85,7 @@ def flyable(attempts: Attempts, judged: Judged[Placement]) -> Judged[Placement]:
         if path is None or out_of_time() or flight_error(trajectory, vehicle, environment) <= FLYABLE_ERROR:
             return judged
         program = replace(path.program, reserve=max(reserve, path.program.reserve))
-        kept = descended(program, path.x)
+        kept = descent(program, path.x).path
         if kept is not None:
             reserved = attempts.refined(judged.solution.source, partial(finished, kept))
             judged = reserved if reserved.feasible else judged

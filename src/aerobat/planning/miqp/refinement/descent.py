@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 from aerobat.arrays import Array
 from aerobat.optimization.prox_linear import prox_linear
@@ -13,12 +13,22 @@ SECOND_STEPS = 20  # of another, once backed off
 ROUNDS = 8  # of settling, at most
 MENDABLE = 2e-3  # of a constraint's range: an excess that settling mends
 MAX_STEPS = 30  # of a descent
+FEW_STEPS = 20  # in which a descent converges that others from the same slots end beside
+TOLERATED = 1e-4  # of a constraint's range: what a descent may leave to settling
 SETTLING_STRETCH = 3e-4  # of the mean interval: leaves room for meeting all constraints exactly
 SETTLING_STEPS = 8  # at most
 
 
-def descended(program: PathProgram, start: Array, max_steps: int = MAX_STEPS) -> PathPoint | None:
-    """The path that a descent ends at, or the last within all constraints, if it ends far from that; or None.
+@dataclass(frozen=True, eq=False)
+class Descent:
+    """Where a descent ended."""
+
+    path: PathPoint | None  # its end, or the last within all constraints, if it ends far from that
+    direct: bool  # it converged in few steps
+
+
+def descent(program: PathProgram, start: Array, max_steps: int = MAX_STEPS) -> Descent:
+    """Descend from a start to a local optimum, or as near as the steps lead.
 
     Args:
         program: What is sought.
@@ -27,9 +37,10 @@ def descended(program: PathProgram, start: Array, max_steps: int = MAX_STEPS) ->
     """
     point = program.at(start)
     if point is None:
-        return None
-    found = prox_linear(program, point, max_steps, in_time=True)
-    return found.feasible if found.point.violation > MENDABLE else found.point
+        return Descent(None, False)
+    found = prox_linear(program, point, max_steps, TOLERATED, in_time=True)
+    path = found.feasible if found.point.violation > MENDABLE else found.point
+    return Descent(path, found.converged and found.steps <= FEW_STEPS)
 
 
 def finished(point: PathPoint) -> PathPoint | None:
@@ -38,7 +49,7 @@ def finished(point: PathPoint) -> PathPoint | None:
     Once more down, backed off from what is exceeded between places; what is then left takes a trifle of time.
     """
     backed_off = point.program.backed_off(point.excess(DENSE_PARTS))
-    return settled(descended(backed_off, point.x, SECOND_STEPS) or point)
+    return settled(descent(backed_off, point.x, SECOND_STEPS).path or point)
 
 
 def settled(point: PathPoint) -> PathPoint | None:

@@ -103,8 +103,10 @@ class PathProgram:
         if not np.isfinite(x).all() or (x[3 * self.chain.intervals : -1] <= 0.0).any():
             return None
         instants = self.chain.samples(x, self._instants)
-        rows, residual = self._met(instants)
-        step = np.linalg.lstsq(rows[:, : 3 * self.chain.intervals], -residual, rcond=1e-12)[0]
+        rows = instants.input_rows(*self._met[:2])
+        size = _sizes(rows)
+        residual = _residual(instants, *self._met) / size
+        step = np.linalg.lstsq(rows / size[:, None], -residual, rcond=1e-12)[0]
         moved = x.copy()
         moved[: len(step)] += step
         return PathPoint(self, moved)
@@ -162,21 +164,19 @@ class PathProgram:
             np.array([row[3] for row in found], dtype=bool),
         )
 
-    def _met(self, instants: Samples) -> tuple[Array, Array]:
-        """What is met exactly, goal and equalities of stages: rows over the variables, and residuals."""
+    @cached_property
+    def _met(self) -> tuple[Indices, Array, Array]:
+        """What is met exactly, goal and equalities of stages: places (p,), weights (p, 6, 3), bounds (p,)."""
         order = self.chain.order
         goal = self.formulation.problem.goal.derivatives(order)
-        unit = np.eye(order * 3).reshape(-1, order, 3)
-        weights = np.zeros((len(unit), DERIVATIVES, 3))
-        weights[:, :order] = unit
+        weights = np.zeros((3 * order, DERIVATIVES, 3))
+        weights[:, :order] = np.eye(3 * order).reshape(-1, order, 3)
         places, stage_weights, bounds, equal = self._stage_rows
-        weights = np.concatenate([weights, stage_weights[equal]])
-        at = np.concatenate([np.zeros(len(unit), dtype=np.intp), places[equal]])
-        values = np.sum(weights * instants.derivatives[at], axis=(1, 2))
-        rows = instants.rows(at, weights)
-        size = np.linalg.norm(rows[:, : 3 * self.chain.intervals], axis=1)
-        size[size == 0.0] = 1.0
-        return rows / size[:, None], (values - np.concatenate([goal.ravel(), bounds[equal]])) / size
+        return (
+            np.concatenate([np.zeros(3 * order, dtype=np.intp), places[equal]]),
+            np.concatenate([weights, stage_weights[equal]]),
+            np.concatenate([goal.ravel(), bounds[equal]]),
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -216,12 +216,13 @@ class PathPoint:
         values = self._values[place, column]
         at, stage_weights, _, equal = program._stage_rows
         rows = [self._samples.rows(place, weights), self._instants.rows(at[~equal], stage_weights[~equal])]
-        equality, residual = program._met(self._instants)
+        equality = self._instants.rows(*program._met[:2])
+        size = _sizes(equality[:, : 3 * program.chain.intervals])
         return Linearization(
             values=np.concatenate([values, self._stage_values]),
             rows=np.concatenate(rows),
-            residual=residual,
-            equality=equality,
+            residual=_residual(self._instants, *program._met) / size,
+            equality=equality / size[:, None],
         )
 
     def excess(self, parts: int) -> Array:
@@ -283,7 +284,17 @@ class PathPoint:
         of_path = column >= rotor_columns
         slopes = np.empty((len(place), DERIVATIVES, 3))
         slopes[of_path] = path[column[of_path] - rotor_columns]
-        at, index = np.unique(place[~of_path], return_inverse=True)
-        by_place = self.program.rotors.slopes(self._samples.derivatives[at], self._frames[at])
-        slopes[~of_path] = by_place[index, column[~of_path]]
+        at, columns = place[~of_path], column[~of_path]
+        slopes[~of_path] = self.program.rotors.slopes(self._samples.derivatives, self._frames, at, columns)
         return slopes
+
+
+def _sizes(rows: Array) -> Array:
+    """Their norms, 1 for rows of zeros."""
+    size = np.linalg.norm(rows, axis=1)
+    return np.where(size > 0.0, size, 1.0)
+
+
+def _residual(instants: Samples, places: Indices, weights: Array, bounds: Array) -> Array:
+    """By how much Σ weights · derivatives at places exceed bounds, (p,)."""
+    return np.asarray(np.sum(weights * instants.derivatives[places], axis=(1, 2)) - bounds)

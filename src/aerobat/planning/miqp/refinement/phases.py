@@ -47,16 +47,86 @@ class Places:
 class Samples:
     """A path's derivatives at places, in SI units, and how they follow from the variables."""
 
-    times: Array  # [s], (m,)
-    derivatives: Array  # (m, 6, 3)
-    by_input: Array  # (m, 6, N), the same for each axis
-    by_time: Array  # (m, 6, 3, P + 1): by ρ and by ln h
+    chain: PhasedChain
+    x: Array
+    places: Places
+
+    @cached_property
+    def times(self) -> Array:
+        """When the places are passed [s], (m,)."""
+        return self._mean * self._at
+
+    @cached_property
+    def derivatives(self) -> Array:
+        """Position to crackle, (m, 6, 3)."""
+        return self._values * self._unscaled[:, None]
+
+    @cached_property
+    def by_input(self) -> Array:
+        """Their slopes by the normalised inputs, the same for each axis, (m, 6, N)."""
+        return self._response * self._unscaled[:, None]
+
+    @cached_property
+    def by_time(self) -> Array:
+        """Their slopes by ρ and by ln h, (m, 6, 3, P + 1)."""
+        inputs = self.chain.unpack(self.x)[0]
+        by_ratio = self.chain.by_ratio(self._values, self._elapsed, np.diff(inputs, axis=0), self.places)
+        powers = np.arange(float(self.chain.order))[:, None]
+        by_mean = self._free @ (powers * self._initial) - np.arange(DERIVATIVES)[:, None] * self._values
+        return np.concatenate([by_ratio, by_mean[..., None]], axis=-1) * self._unscaled[:, None, None]
 
     def rows(self, places: Indices, weights: Array) -> Array:
         """Rows over the variables, (q, 3N + P + 1), of Σ weights · derivatives at places (q,), (q, 6, 3)."""
-        by_input = np.einsum("qka,qkn->qan", weights, self.by_input[places], optimize=True)
-        by_time = np.einsum("qka,qkap->qp", weights, self.by_time[places], optimize=True)
-        return np.concatenate([by_input.reshape(len(weights), 3 * self.by_input.shape[-1]), by_time], axis=1)
+        flat = 3 * DERIVATIVES
+        by_time = self.by_time.reshape(len(self.by_time), flat, -1)[places]
+        by_time = (weights.reshape(len(weights), 1, flat) @ by_time)[:, 0]
+        return np.concatenate([self.input_rows(places, weights), by_time], axis=1)
+
+    def input_rows(self, places: Indices, weights: Array) -> Array:
+        """The columns of these rows that belong to inputs, (q, 3N)."""
+        by_input: Array = weights.swapaxes(1, 2) @ self.by_input[places]
+        return by_input.reshape(len(weights), 3 * self.chain.intervals)
+
+    @cached_property
+    def _mean(self) -> float:
+        return self.chain.unpack(self.x)[2]
+
+    @cached_property
+    def _unscaled(self) -> Array:
+        return self._mean ** -np.arange(float(DERIVATIVES))
+
+    @cached_property
+    def _initial(self) -> Array:
+        """The initial state, normalised, (r, 3)."""
+        return self.chain.initial * self._mean ** np.arange(float(self.chain.order))[:, None]
+
+    @cached_property
+    def _knots(self) -> Array:
+        return self.chain.normalized_knots(self.x)
+
+    @cached_property
+    def _at(self) -> Array:
+        """Normalised times, (m,)."""
+        interval, fraction = self.places.interval, self.places.fraction
+        return (1.0 - fraction) * self._knots[interval] + fraction * self._knots[interval + 1]
+
+    @cached_property
+    def _elapsed(self) -> Array:
+        """Normalised times since knots, (m, N + 1)."""
+        return np.maximum(self._at[:, None] - self._knots, 0.0)
+
+    @cached_property
+    def _response(self) -> Array:
+        return self.chain.response(self._elapsed, self.places.interval)
+
+    @cached_property
+    def _free(self) -> Array:
+        return self.chain.taylor(self._at)
+
+    @cached_property
+    def _values(self) -> Array:
+        """The derivatives, normalised."""
+        return self._free @ self._initial + self._response @ self.chain.unpack(self.x)[0]
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,24 +169,11 @@ class PhasedChain:
 
     def samples(self, x: Array, places: Places) -> Samples:
         """The derivatives at places, with their slopes."""
-        inputs, ratios, mean = self.unpack(x)
-        knots = np.concatenate([[0.0], np.cumsum(ratios[self._phase])])
-        at = (1.0 - places.fraction) * knots[places.interval] + places.fraction * knots[places.interval + 1]
-        elapsed = np.clip(at[:, None] - knots, 0.0, None)
-        response = self._response(elapsed, places.interval)
-        powers = np.arange(float(self.order))[:, None]
-        initial = self.initial * mean**powers
-        free = self._taylor(at)
-        values = free @ initial + response @ inputs
-        unscaled = mean ** -np.arange(float(DERIVATIVES))[:, None]
-        by_mean = free @ (powers * initial) - np.arange(float(DERIVATIVES))[:, None] * values
-        by_ratio = self._by_ratio(values, elapsed, np.diff(inputs, axis=0), places)
-        return Samples(
-            times=mean * at,
-            derivatives=values * unscaled,
-            by_input=response * unscaled,
-            by_time=np.concatenate([by_ratio, by_mean[..., None]], axis=-1) * unscaled[..., None],
-        )
+        return Samples(self, x, places)
+
+    def normalized_knots(self, x: Array) -> Array:
+        """Where intervals begin and end, in units of the mean interval, (N + 1,)."""
+        return np.concatenate([[0.0], np.cumsum(self.unpack(x)[1][self._phase])])
 
     @cached_property
     def _phase(self) -> Indices:
@@ -128,7 +185,7 @@ class PhasedChain:
         one_hot = np.eye(len(self.counts))[self._phase]
         return np.concatenate([np.zeros((1, len(self.counts))), np.cumsum(one_hot, axis=0)])
 
-    def _response(self, elapsed: Array, interval: Indices) -> Array:
+    def response(self, elapsed: Array, interval: Indices) -> Array:
         """Normalised derivatives per input, (m, 6, N), after the times since knots, (m, N + 1)."""
         response = np.zeros((len(elapsed), DERIVATIVES, self.intervals))
         power = np.ones_like(elapsed)
@@ -138,7 +195,7 @@ class PhasedChain:
         response[np.arange(len(elapsed)), self.order, interval] = 1.0
         return response
 
-    def _taylor(self, at: Array) -> Array:
+    def taylor(self, at: Array) -> Array:
         """Normalised derivatives at times (m,) per initial derivative, (m, 6, r)."""
         taylor = np.zeros((len(at), DERIVATIVES, self.order))
         for d in range(self.order):
@@ -146,7 +203,7 @@ class PhasedChain:
                 taylor[:, d, k] = at ** (k - d) / factorial(k - d)
         return taylor
 
-    def _by_ratio(self, values: Array, elapsed: Array, jumps: Array, places: Places) -> Array:
+    def by_ratio(self, values: Array, elapsed: Array, jumps: Array, places: Places) -> Array:
         """Slopes of the normalised derivatives by ρ, (m, 6, 3, P): places move, and knots before them."""
         m = len(elapsed)
         moved = self.knot_shifts[places.interval].copy()

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from aerobat import so3
-from aerobat.arrays import Array
+from aerobat.arrays import Array, Indices
 from aerobat.environment import Environment
 from aerobat.flatness import axial_drag, lateral_drag
 from aerobat.flatness.parallel_transport import frames
@@ -26,7 +26,7 @@ from aerobat.vehicle import Vehicle, mixer
 
 MIN_THRUST = 0.05  # of gravity: specific thrust is kept above, lest the attitude be undetermined
 COMPLEX_STEP = 1e-20
-TINY = 1e-18  # beside the square of a limit: a body at rest has a rate with a slope
+TINY = 1e-18  # [rad²/s²] beside the square of a rate, which a body at rest has with a slope
 MOVING = slice(1, 6)  # velocity to crackle: what thrusts depend on
 
 
@@ -56,17 +56,30 @@ class RotorRows:
 
     def values(self, derivatives: Array, frames: Array) -> Array:
         """The constraints at derivatives (m, 6, 3), (m, c)."""
-        values: Array = self._constraints(self._moving(derivatives) @ frames, frames)
+        weights, offsets = self._linear
+        values: Array = self._demands(self._moving(derivatives) @ frames, frames) @ weights.T + offsets
         return values
 
-    def slopes(self, derivatives: Array, frames: Array) -> Array:
-        """Their slopes by the derivatives, (m, c, 6, 3)."""
-        local = self._moving(derivatives) @ frames
+    def slopes(self, derivatives: Array, frames: Array, place: Indices, column: Indices) -> Array:
+        """Slopes of some constraints by the derivatives at their places, (q, 6, 3).
+
+        Args:
+            derivatives: Of the path, (m, 6, 3).
+            frames: Body axes there, (m, 3, 3).
+            place: Where each of the constraints is looked at, (q,).
+            column: Which one it is, (q,).
+        """
+        looked_at = np.zeros(len(frames), dtype=bool)
+        looked_at[place] = True
+        frames = frames[looked_at]
+        local = self._moving(derivatives[looked_at]) @ frames
         directions = np.eye(15).reshape(15, 1, 5, 3)
-        values = self._constraints(local + 1j * COMPLEX_STEP * directions, frames)
-        by_local = np.moveaxis(values.imag / COMPLEX_STEP, 0, -1).reshape(*values.shape[1:], 5, 3)
-        slopes = np.zeros((*values.shape[1:], 6, 3))
-        slopes[..., MOVING, :] = by_local @ np.swapaxes(frames, -1, -2)[:, None]
+        demands = self._demands(local + 1j * COMPLEX_STEP * directions, frames)
+        by_local = np.moveaxis(demands.imag / COMPLEX_STEP, 0, -1).reshape(*demands.shape[1:], 5, 3)
+        by_world = (by_local @ np.swapaxes(frames, -1, -2)[:, None]).reshape(*demands.shape[1:], 15)
+        slopes = np.zeros((len(place), 6, 3))
+        index = looked_at.cumsum()[place] - 1
+        slopes[:, MOVING] = (self._linear[0][column, None] @ by_world[index]).reshape(len(place), 5, 3)
         return slopes
 
     def _moving(self, derivatives: Array) -> Array:
@@ -75,35 +88,49 @@ class RotorRows:
         moving[:, 0] -= self.environment.wind
         return moving
 
-    def _constraints(self, moving: Any, frames: Array) -> Any:
-        """The constraints of airspeed to crackle in body axes (..., m, 5, 3), (..., m, c)."""
+    def _demands(self, moving: Any, frames: Array) -> Any:
+        """What constraints are linear in, of airspeed to crackle in body axes (..., m, 5, 3), (..., m, 10).
+
+        Collective thrust and moment, their derivatives, the specific thrust and the body rate.
+        """
         drag = lateral_drag(self.vehicle)
         airspeed, acceleration, jerk, snap, crackle = np.moveaxis(moving, -2, 0)
         weight = self.environment.weight @ frames
         f, f1, f2 = kernel.specific_thrust(weight, drag, airspeed, acceleration, jerk, snap)
         vectors = [_components(x) for x in (f, f1, f2, crackle + drag * snap, airspeed, acceleration)]
-        norm = dot(vectors[0], vectors[0]) ** 0.5
+        norm = np.sqrt(dot(vectors[0], vectors[0]))
         b3, *rates = (scale(1.0 / norm, vector) for vector in vectors[:4])
         omega, omega_dot = kernel.body_rates(b3, rates[0], rates[1])
         turning = [omega, omega_dot, kernel.angular_jerk(b3, *rates)]
-        wrench, wrench_rate = self._wrenches(b3, norm, vectors, turning)
-        thrusts = wrench @ self._mixer
-        low, high = self.vehicle.min_thrusts, self.vehicle.max_thrusts
+        rate = np.sqrt(dot(omega, omega) + TINY)
+        return np.stack([*self._wrenches(b3, norm, vectors, turning), norm, rate], axis=-1)
+
+    @cached_property
+    def _linear(self) -> tuple[Array, Array]:
+        """Weights (c, 10) and offsets (c,) of the constraints, of what they are linear in."""
+        vehicle, inverse = self.vehicle, mixer(self.vehicle)
+        low, high = vehicle.min_thrusts, vehicle.max_thrusts
         span = high - low
-        commands = thrusts + self.vehicle.lags * (wrench_rate @ self._mixer)
-        columns = [(low - thrusts) / span, (thrusts - high) / span]
-        if self.vehicle.lags.any():
-            columns += [(low - commands) / span, (commands - high) / span]
-        columns.append((MIN_THRUST - norm / self.environment.gravity)[..., None])
-        if np.isfinite(self.vehicle.max_body_rate):
-            rate = (dot(omega, omega) / self.vehicle.max_body_rate**2 + TINY) ** 0.5
-            columns.append((rate - 1.0)[..., None])
-        return np.concatenate(columns, axis=-1)
+        thrusts = np.concatenate([inverse, np.zeros_like(inverse)], axis=1) / span[:, None]
+        commands = np.concatenate([inverse, vehicle.lags[:, None] * inverse], axis=1) / span[:, None]
+        rotors = [-thrusts, thrusts]
+        offsets = [low / span, -high / span]
+        if vehicle.lags.any():
+            rotors += [-commands, commands]
+            offsets *= 2
+        others = np.diag([-1.0 / self.environment.gravity, 1.0 / vehicle.max_body_rate])
+        other_offsets = np.array([MIN_THRUST, -1.0])
+        kept = 1 + np.isfinite(vehicle.max_body_rate)
+        rows = np.concatenate(rotors)
+        weights = np.zeros((len(rows) + kept, 10))
+        weights[: len(rows), :8] = rows
+        weights[len(rows) :, 8:] = others[:kept]
+        return weights, np.concatenate([*offsets, other_offsets[:kept]])
 
     def _wrenches(
         self, b3: Vector, norm: Any, vectors: list[Vector], turning: list[Vector]
-    ) -> tuple[Any, Any]:
-        """Collective thrust and moment (..., m, 4), and their derivatives.
+    ) -> tuple[Any, ...]:
+        """Collective thrust and moment, then their derivatives, (..., m) each.
 
         Args:
             b3: the thrust axis.
@@ -118,11 +145,7 @@ class RotorRows:
         thrust_rate = kernel.collective_rate(mass, axial, b3, (norm, f1), (airspeed, acceleration))
         moment = kernel.moment(inertia, local[0], local[1])
         moment_rate = kernel.moment_rate(inertia, *local)
-        return np.stack([thrust, *moment], axis=-1), np.stack([thrust_rate, *moment_rate], axis=-1)
-
-    @cached_property
-    def _mixer(self) -> Array:
-        return mixer(self.vehicle).T
+        return thrust, *moment, thrust_rate, *moment_rate
 
 
 def _components(vectors: Any) -> Vector:
