@@ -60,7 +60,8 @@ def certify(
     tens of seconds, and of a command) stays undecided, as does all that needs an attitude where thrust, and
     with it the attitude, is undetermined; speed and what `envelope.limits` and `envelope.conditions` bound
     may meet their limits exactly (`path.kinematics.LIMIT_TOLERANCE`).
-    Raises SpecError for derivatives beyond all reason.
+    Dead rotors are left out, and the others counted without them. Raises SpecError for derivatives beyond all
+    reason, and for a vehicle that its dead rotors leave without control.
 
     Args:
         trajectory: The path [m] over time [s], world, and its heading [rad]; of a plan its path alone, what
@@ -72,7 +73,7 @@ def certify(
         envelope: What else it shall stay within, by default nothing.
     """
     envelope = Envelope() if envelope is None else envelope
-    vehicle = vehicle_of(trajectory, vehicle)
+    vehicle = vehicle_of(trajectory, vehicle).without_dead_rotors()
     environment = environment_of(trajectory, environment)
     trajectory = as_trajectory(trajectory)
     curve = ThrustCurve.of(trajectory, vehicle, environment, INTERPOLATION_DEGREE)

@@ -29,10 +29,12 @@ def airframe_parameters(fleet: Fleet) -> Airframe:
         matrix_components(np.asarray(np.linalg.inv(fleet.inertia))),
         components(fleet.drag_body),
     )
+    ranges = fleet.max_thrusts - fleet.min_thrusts
+    ranges = np.where(ranges > 0.0, ranges, ranges.max(axis=-1, keepdims=True))  # dead rotors have none
     rotors = Rotors(
         components(fleet.min_thrusts),
         components(fleet.max_thrusts),
-        components(_SLACK * (fleet.max_thrusts - fleet.min_thrusts)),
+        components(_SLACK * ranges),
         components(1.0 / np.maximum(fleet.lags, _MIN_TIME_CONSTANT)),
         matrix_components(fleet.allocation),
     )

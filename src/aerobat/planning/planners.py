@@ -63,8 +63,9 @@ def plan(
 ) -> Plan:
     """Plan a problem; with a vehicle, for its rotors, with its certificate and its own simulated flight.
 
-    Raises Infeasible, whose message names the bound that binds and whose `attempts` hold the evidence, and
-    SpecError for input that makes no sense.
+    A plan is for the rotors that give thrust, and counts them without the dead ones. Raises Infeasible, whose
+    message names the bound that binds and whose `attempts` hold the evidence, and SpecError for input that
+    makes no sense.
 
     Args:
         problem: What is planned, or its name.
@@ -76,6 +77,7 @@ def plan(
     problem = as_problem(problem)
     vehicle = None if vehicle is None else as_vehicle(vehicle)
     if vehicle is not None:
+        vehicle = vehicle.without_dead_rotors()
         vehicle.require_hover(problem.environment.gravity)
     found = as_planner(planner).plan(problem, vehicle, progress)
     if vehicle is None:

@@ -234,6 +234,8 @@ def _broadcast_vehicles(flying: list[Vehicle], config: FlightConfig) -> tuple[li
     if starts and starts != (len(flying),):
         raise SpecError(f"start must carry one leading axis of {len(flying)} vehicles or none, got {starts}")
     nominal = flying if config.nominal is None else [config.nominal]
+    for controlled in nominal:
+        controlled.without_dead_rotors()
     if len({len(each.rotors) for each in (*flying, nominal[0])}) > 1:
         raise SpecError(
             "vehicle: all vehicles of one flight, and the nominal one, need as many rotors; fly others apart"

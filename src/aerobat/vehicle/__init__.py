@@ -8,7 +8,8 @@ from aerobat.vehicle.allocation import (
 )
 from aerobat.vehicle.files import as_vehicle, load_vehicle, vehicle_names, write_vehicle
 from aerobat.vehicle.plausibility import implausibilities
-from aerobat.vehicle.vehicle import Rotor, Vehicle
+from aerobat.vehicle.rotor import Rotor
+from aerobat.vehicle.vehicle import Vehicle
 
 __all__ = [
     "Rotor",

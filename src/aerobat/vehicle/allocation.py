@@ -6,7 +6,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from aerobat.arrays import Array, frozen
+from aerobat.arrays import Array
 from aerobat.states import Wrench
 from aerobat.vehicle.vehicle import Vehicle
 
@@ -15,8 +15,13 @@ _SLACK = 1e-12  # a rotor with a smaller share of the collective thrust bears no
 
 @lru_cache(maxsize=128)
 def mixer(vehicle: Vehicle) -> Array:
-    """The least-norm inverse of the allocation matrix, (n, 4)."""
-    return frozen(np.linalg.pinv(vehicle.allocation), "mixer")
+    """The inverse of the allocation by which loads are shared among rotors, (n, 4).
+
+    The least-norm one wherever that can be flown, see `mixing_matrix`. Raises SpecError for a vehicle that
+    its dead rotors leave without control.
+    """
+    vehicle.without_dead_rotors()
+    return vehicle.mixer
 
 
 def wrench(vehicle: Vehicle, thrusts: Array) -> Wrench:
@@ -26,7 +31,7 @@ def wrench(vehicle: Vehicle, thrusts: Array) -> Wrench:
 
 
 def rotor_thrusts(vehicle: Vehicle, wrench: Wrench) -> Array:
-    """The least-norm rotor thrusts [N] that make a wrench exactly, (..., n), limits ignored."""
+    """Rotor thrusts [N] that make a wrench exactly, by the vehicle's mixer, (..., n), limits ignored."""
     inverse = mixer(vehicle)
     collective = np.asarray(wrench.thrust, dtype=float)[..., None] * inverse[:, 0]
     return np.asarray(collective + np.asarray(wrench.moment_body, dtype=float) @ inverse[:, 1:].T)

@@ -9,6 +9,7 @@ from functools import cached_property
 import numpy as np
 
 from aerobat.arrays import Array
+from aerobat.vehicle.hover import mixing_matrix
 from aerobat.vehicle.vehicle import Vehicle
 
 _SLACK = 1e-12  # a rotor with a smaller fraction of the collective thrust bears none of it
@@ -70,13 +71,15 @@ class Fleet:
 
     @cached_property
     def mixer(self) -> Array:
-        """The least-norm inverses of the allocations, (vehicles, n, 4)."""
-        flat = self.allocation.reshape(len(self), -1)
-        same = (flat == flat[0]).all()  # the inverse is dear, and most fleets differ in other things
-        distinct, place = (
-            (flat[:1], np.zeros(len(self), int)) if same else np.unique(flat, axis=0, return_inverse=True)
+        """The vehicles' mixers, (vehicles, n, 4)."""
+        rows = np.concatenate(
+            [self.allocation.reshape(len(self), -1), self.max_thrusts > 0.0, self.min_thrusts >= 0.0], axis=1
         )
-        inverses = np.linalg.pinv(distinct.reshape(-1, *self.allocation.shape[1:]))
+        same = (rows == rows[0]).all()  # the inverse is dear, and most fleets differ in other things
+        first, place = np.zeros(1, np.intp), np.zeros(len(self), np.intp)
+        if not same:
+            _, first, place = np.unique(rows, axis=0, return_index=True, return_inverse=True)
+        inverses = mixing_matrix(self.allocation[first], self.min_thrusts[first], self.max_thrusts[first])
         return np.asarray(inverses[place.reshape(-1)])
 
     @cached_property

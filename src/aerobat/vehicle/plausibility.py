@@ -11,7 +11,8 @@ from math import hypot, log, sqrt
 
 import numpy as np
 
-from aerobat.vehicle.vehicle import Rotor, Vehicle
+from aerobat.vehicle.rotor import Rotor
+from aerobat.vehicle.vehicle import Vehicle
 
 MAX_ARM = 10.0  # [m] the widest passenger multirotors have rotors 5 m from their centre
 MAX_LAG = 1.0  # [s] propellers of a metre and more take 0.3 s; with more nothing hovers stably
@@ -20,6 +21,7 @@ MAX_RADIUS_PER_ARM = 2.0  # [-] neighbours on a cross touch from 0.7 of the arm;
 MAX_GYRATION = 1.0  # [-] radius of gyration over the reach of arm and propeller: all of the mass at the tips
 MIN_GYRATION = 0.03  # [-] over the arm: motors alone, a fifth of the mass at the arms' ends, make it 0.3
 MAX_THRUST_TO_WEIGHT = 40.0  # [-] record racers come to 25
+MIN_THRUST_TO_WEIGHT = 0.1  # [-] on Earth: too little for the Moon too
 # what is most often built, to choose between units that would all do
 TYPICAL_ARM = 0.2  # [m]
 TYPICAL_LAG = 0.03  # [s]
@@ -82,6 +84,11 @@ def _of_thrust(vehicle: Vehicle) -> Iterator[str]:
         yield (
             f"max_thrust adds up to {vehicle.thrust_to_weight:.3g} times the weight of mass, "
             f"{vehicle.mass:g} kg; is mass in kg, and max_thrust in N, not in grams of force?"
+        )
+    elif vehicle.thrust_to_weight < MIN_THRUST_TO_WEIGHT:
+        yield (
+            f"max_thrust adds up to {vehicle.thrust_to_weight:.2g} of the weight of mass, {vehicle.mass:g} "
+            "kg; is mass in kg, max_thrust in N, k_f in N/(rad/s)², not N/rpm², max_rpm in rpm, not rad/s?"
         )
 
 

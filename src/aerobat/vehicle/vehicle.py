@@ -3,19 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import field, fields
+from dataclasses import field, fields, replace
 from functools import cached_property
-from typing import Annotated, Any, ClassVar, Literal
+from typing import Annotated, Any, ClassVar
 
 import numpy as np
-from pydantic import BeforeValidator, Field, PlainValidator
+from pydantic import Field, PlainValidator
 
 from aerobat.arrays import Array, frozen
 from aerobat.declaration import (
     FieldError,
     Label,
     Limit,
-    NonNegative,
     Positive,
     Vector3,
     declared,
@@ -23,9 +22,12 @@ from aerobat.declaration import (
     finite,
     from_table,
     unknown_key,
+    within_field,
 )
 from aerobat.errors import SpecError
 from aerobat.states import STANDARD_GRAVITY
+from aerobat.vehicle.hover import mixing_matrix, overloaded, why_no_hover
+from aerobat.vehicle.rotor import Rotor, rotor_table
 
 _ROUNDING = 1e-9  # [-] relative: inertias are written with a few digits
 
@@ -34,38 +36,6 @@ def _inertia(value: Any) -> Array:
     """The matrix, of itself or of three principal moments."""
     vector = np.ndim(value) == 1 if hasattr(value, "__array__") else not _is_matrix(value)
     return finite(np.diag(finite(value, 3)) if vector else value, 3, 3)
-
-
-def _no_truth(value: Any) -> Any:
-    """The value; Python takes True for 1."""
-    if isinstance(value, bool):
-        raise FieldError("", f"must be 1 or -1, got {value}")
-    return value
-
-
-@declared
-class Rotor:
-    """A motor with its propeller, thrust along the body's +z, first-order in its command.
-
-    Raises SpecError, naming the field, for values that no rotor has.
-    """
-
-    position_body: Vector3  # [m] from the centre of mass
-    spin: Annotated[
-        Literal[1, -1], BeforeValidator(_no_truth)
-    ]  # 1 counter-clockwise seen from above, -1 clockwise; the body feels -spin·c·f about +z
-    min_thrust: float  # [N] negative for a variable pitch
-    max_thrust: Positive  # [N] at full throttle
-    torque_coefficient: NonNegative  # [m] c: N·m of drag torque per N of thrust
-    lag: NonNegative  # [s] time constant; zero for a thrust that follows its command at once
-    radius: Positive  # [m] of the propeller
-
-    def __post_init__(self) -> None:
-        if not self.min_thrust < self.max_thrust:
-            raise FieldError(
-                "min_thrust",
-                f"must be below max_thrust, got {self.min_thrust:g} N and {self.max_thrust:g} N",
-            )
 
 
 @declared
@@ -86,7 +56,11 @@ class Vehicle:
     max_body_rate: Limit = np.inf  # [rad/s] the largest norm of ω
     description: str = ""  # where its numbers come from
 
-    SHORTHANDS: ClassVar[Mapping[str, str]] = {"rotor_defaults": "any keys of rotors, for all of them"}
+    SHORTHANDS: ClassVar[Mapping[str, str]] = {
+        "rotor_defaults": "any keys of rotors, for all of them",
+        "centre_of_mass": "[m] where the centre of mass lies, in the axes and from the origin from which "
+        "position_body is then counted ([0, 0, 0])",
+    }
 
     def __post_init__(self) -> None:
         _check_inertia(self.inertia)
@@ -94,21 +68,25 @@ class Vehicle:
             raise FieldError("drag_body", f"must not be negative, got {self.drag_body.tolist()} kg/s")
         if len(self.rotors) < 4:
             raise FieldError("rotors", f"must be 4 or more, got {len(self.rotors)}")
-        _check_rank(self.allocation)
-        self._check_balance()
+        if not self.dead_rotors:  # with some, see `without_dead_rotors`
+            self._check_control()
 
     @classmethod
     def expand(cls, table: dict[str, Any]) -> dict[str, Any]:
-        """Make every rotor, with the keys of `rotor_defaults` that it lacks."""
+        """Make every rotor, with the keys of `rotor_defaults` that it lacks, about the centre of mass."""
         defaults = table.pop("rotor_defaults", {})
         if not isinstance(defaults, Mapping):
             raise FieldError("rotor_defaults", "must be a table; begin it with [rotor_defaults]")
-        keys = [each.name for each in fields(Rotor)]
+        keys = [*(each.name for each in fields(Rotor)), *Rotor.SHORTHANDS]
         for key in defaults:
             if key not in keys:
                 raise unknown_key(key, keys).inside("rotor_defaults")
         if isinstance(rotors := table.get("rotors"), list | tuple):
             table["rotors"] = tuple(_rotor(rotor, defaults, f"rotors[{i}]") for i, rotor in enumerate(rotors))
+        if "centre_of_mass" in table:
+            with within_field("centre_of_mass"):
+                centre = finite(table.pop("centre_of_mass"), 3)
+            table["rotors"] = tuple(_about(centre, rotor) for rotor in table.get("rotors", ()))
         return table
 
     def abbreviate(self, table: dict[str, Any]) -> dict[str, Any]:
@@ -150,6 +128,29 @@ class Vehicle:
         drag_torque = [-rotor.spin * rotor.torque_coefficient for rotor in self.rotors]
         return frozen([np.ones_like(x), y, -x, drag_torque], "allocation")
 
+    @cached_property
+    def mixer(self) -> Array:
+        """The inverse of the allocation by which loads are shared among rotors, (n, 4)."""
+        return frozen(mixing_matrix(self.allocation, self.min_thrusts, self.max_thrusts), "mixer")
+
+    @cached_property
+    def dead_rotors(self) -> tuple[int, ...]:
+        """Which rotors give no thrust, counted from 0."""
+        return tuple(i for i, rotor in enumerate(self.rotors) if rotor.is_dead)
+
+    def without_dead_rotors(self) -> Vehicle:
+        """Return the vehicle as it flies: itself, or with those rotors only that give thrust.
+
+        Raises SpecError, one sentence that says what can be controlled yet, where they do not suffice.
+        """
+        if not self.dead_rotors:
+            return self
+        try:
+            self._check_control()
+        except FieldError as error:
+            raise SpecError(f"vehicle '{self.name}': {error}") from None
+        return replace(self, rotors=tuple(rotor for rotor in self.rotors if not rotor.is_dead))
+
     @property
     def max_specific_thrust(self) -> float:
         """All rotors at full thrust, per mass [m/s²]."""
@@ -179,7 +180,7 @@ class Vehicle:
                 f"rotors cannot lift {self.name}: their max_thrust adds up to {total:.4g} N, its weight is "
                 f"{weight:.4g} N; raise max_thrust or lower mass"
             )
-        hover = weight * np.linalg.pinv(self.allocation)[:, 0]
+        hover = weight * self.mixer[:, 0]
         wrong = (hover < self.min_thrusts) | (hover > self.max_thrusts)
         if wrong.any():
             i = int(np.argmax(wrong))
@@ -188,17 +189,24 @@ class Vehicle:
                 f"{self.min_thrusts[i]:.4g} to {self.max_thrusts[i]:.4g} N; check position_body, spin, limits"
             )
 
-    def _check_balance(self) -> None:
-        """Refuse rotors that can hold a level hover under no gravity whatever."""
-        fractions = np.linalg.pinv(self.allocation)[:, 0]  # of the weight that each rotor bears
-        wrong = (fractions <= _ROUNDING) & (self.min_thrusts >= 0.0)
-        if wrong.any():
-            i = int(np.argmax(wrong))
+    def _rank(self) -> int:
+        """Of thrust, roll, pitch and yaw, how many can be had independently."""
+        allocation = self.allocation * (self.max_thrusts > 0.0)
+        sizes = np.abs(allocation).max(axis=1, keepdims=True)  # rows differ in unit
+        return int(np.linalg.matrix_rank(allocation / np.where(sizes > 0, sizes, 1.0)))
+
+    def _check_control(self) -> None:
+        """Refuse rotors that give no independent control, or no level hover under any gravity."""
+        limits = self.min_thrusts, self.max_thrusts
+        rank = self._rank()
+        if rank < 4 and not self.dead_rotors:
             raise FieldError(
                 "rotors",
-                f"cannot hold a level hover: rotors[{i}] would bear {fractions[i]:.2g} of the weight, "
-                f"but gives {self.min_thrusts[i]:.4g} N or more; check position_body, spin, limits",
+                "must give thrust, roll, pitch and yaw independently, but their allocation has rank "
+                f"{rank} instead of 4; vary position_body, spin or torque_coefficient",
             )
+        if rank < 4 or overloaded(self.mixer[:, 0], *limits).any():
+            raise FieldError("rotors", why_no_hover(self.allocation, *limits))
 
 
 def _is_matrix(value: Any) -> bool:
@@ -209,15 +217,21 @@ def _rotor(table: Any, defaults: Mapping[str, Any], place: str) -> Any:
     """The rotor of a table and what it lacks. Raises FieldError, naming where the value at fault stands."""
     if not isinstance(table, Mapping):
         return table
-    for each in fields(Rotor):
-        if each.name not in table and each.name not in defaults:
-            complaint = "is missing; add it there or, for all rotors, in [rotor_defaults]"
-            raise FieldError(f"{place}.{each.name}", complaint)
     try:
-        return from_table(Rotor, {**defaults, **table})
+        values = rotor_table(table, defaults)
+        for each in fields(Rotor):
+            if each.name not in values:
+                complaint = "is missing; add it there or, for all rotors, in [rotor_defaults]"
+                raise FieldError(each.name, complaint)
+        return from_table(Rotor, values)
     except FieldError as error:
         key = error.field.partition("[")[0]
         raise error.inside("rotor_defaults" if key in defaults and key not in table else place) from None
+
+
+def _about(centre: Array, rotor: Any) -> Any:
+    """A rotor placed about the centre of mass."""
+    return replace(rotor, position_body=rotor.position_body - centre) if isinstance(rotor, Rotor) else rotor
 
 
 def _check_inertia(inertia: Array) -> None:
@@ -233,16 +247,4 @@ def _check_inertia(inertia: Array) -> None:
             "inertia",
             "belongs to no rigid body: its largest principal moment exceeds the sum of the others, "
             f"{largest:.4g} > {smallest:.4g} + {middle:.4g} kg·m²; check the values",
-        )
-
-
-def _check_rank(allocation: Array) -> None:
-    """All of thrust, roll, pitch and yaw must be had independently; rows differ in unit, so are scaled."""
-    sizes = np.abs(allocation).max(axis=1, keepdims=True)
-    rank = np.linalg.matrix_rank(allocation / np.where(sizes > 0, sizes, 1.0))
-    if rank < 4:
-        raise FieldError(
-            "rotors",
-            "must give thrust, roll, pitch and yaw independently, but their allocation has rank "
-            f"{rank} instead of 4; vary position_body, spin or torque_coefficient",
         )

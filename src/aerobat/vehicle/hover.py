@@ -1,0 +1,125 @@
+"""Which rotors bear a vehicle, and what is left of its control where they do not suffice.
+
+With the allocation A, a level hover divides the weight in fractions g with A g = (1, 0, 0, 0). To steer from
+it in every direction, every rotor that only pushes must bear some of it: g > 0.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import numpy as np
+
+from aerobat.arrays import Array
+
+ROUNDING = 1e-9  # [-] a fraction of the weight that is none
+MIN_FRACTION = 1e-3  # [-] of the weight; a rotor that can bear no more has no room to steer
+
+
+def mixing_matrix(allocation: Array, min_thrusts: Array, max_thrusts: Array) -> Array:
+    """Inverses of allocations by which loads are shared among rotors, (..., n, 4).
+
+    The least-norm ones over the rotors that give thrust. Where that would have a rotor pull that can only
+    push, and another way of sharing the weight does not, the first column is the one whose smallest fraction
+    is the largest.
+
+    Args:
+        allocation: from rotor thrusts to thrust and moments, (..., 4, n).
+        min_thrusts: [N], (..., n).
+        max_thrusts: [N], (..., n); zero for a dead rotor.
+    """
+    lives = np.where(max_thrusts > 0.0, 1.0, 0.0)
+    inverses = np.asarray(np.linalg.pinv(allocation * lives[..., None, :]), dtype=np.float64)
+    inverses *= lives[..., None]  # zeros without rounding
+    unbalanced = overloaded(inverses[..., 0], min_thrusts, max_thrusts).any(axis=-1)
+    for at in map(tuple, np.argwhere(unbalanced)):
+        balanced, smallest = balanced_fractions(allocation[at], min_thrusts[at], max_thrusts[at])
+        if smallest > MIN_FRACTION:
+            inverses[at][:, 0] = balanced
+    return inverses
+
+
+def overloaded(fractions: Array, min_thrusts: Array, max_thrusts: Array) -> Array:
+    """True for the rotors that would have to pull in a hover, or to stand still, and can only push."""
+    return np.asarray((fractions <= ROUNDING) & (min_thrusts >= 0.0) & (max_thrusts > 0.0))
+
+
+def balanced_fractions(allocation: Array, min_thrusts: Array, max_thrusts: Array) -> tuple[Array, float]:
+    """The fractions of the weight in a hover whose smallest is the largest, (n,), and that smallest one.
+
+    A linear program: max t with A g = e1 and g ≥ t, for rotors that only push; minus infinity where there is
+    no hover at all. `allocation` may lack rows of moments that are left to themselves.
+    """
+    pushes = (max_thrusts > 0.0) & (min_thrusts >= 0.0)
+    above = np.c_[-np.eye(len(pushes))[pushes], np.ones(int(pushes.sum()))]
+    rewards = np.r_[np.zeros(len(pushes)), 1.0]
+    found = _maximized(rewards, allocation, min_thrusts, max_thrusts, above)
+    return (found[:-1], float(found[-1])) if found is not None else (np.full(len(pushes), np.nan), -np.inf)
+
+
+def why_no_hover(allocation: Array, min_thrusts: Array, max_thrusts: Array) -> str:
+    """The complaint about rotors that cannot hover and steer in every direction, and what they can do yet."""
+    dead = np.flatnonzero(max_thrusts == 0.0)
+    without = f" without {_named(dead.tolist())} (max_thrust = 0)" if len(dead) else ""
+    _, without_yaw = balanced_fractions(allocation[:3], min_thrusts, max_thrusts)
+    if without_yaw <= MIN_FRACTION:
+        rest = (
+            "at best spinning remains, not planned here"
+            if len(dead)
+            else "check position_body, centre_of_mass"
+        )
+        return (
+            f"cannot hold a level hover{without}: the centre of mass is not inside the polygon of those that "
+            f"push; {rest}"
+        )
+    idle = [
+        i
+        for i in np.flatnonzero((max_thrusts > 0.0) & (min_thrusts >= 0.0)).tolist()
+        if _largest_fraction(i, allocation, min_thrusts, max_thrusts) <= MIN_FRACTION
+    ]
+    why = f"{_named(idle)} would have to stop" if idle else "their torques do not cancel"
+    return (
+        f"cannot hold a level hover and yaw{without}: {why}; thrust, roll and pitch remain, not enough to "
+        "plan for; change some spin"
+    )
+
+
+def _largest_fraction(i: int, allocation: Array, min_thrusts: Array, max_thrusts: Array) -> float:
+    """The largest part of the weight that rotor `i` can bear in a hover; infinity where there is no hover."""
+    found = _maximized(np.eye(len(max_thrusts) + 1)[i], allocation, min_thrusts, max_thrusts)
+    return np.inf if found is None else float(found[i])
+
+
+def _maximized(
+    rewards: Array, allocation: Array, min_thrusts: Array, max_thrusts: Array, above: Array | None = None
+) -> Array | None:
+    """The fractions g ≥ 0 of a hover, and t from 0 to 1, that maximize a linear reward; None without a hover.
+
+    Args:
+        rewards: of g and t, (n + 1,).
+        allocation: with A g = e1, (4, n), or fewer rows.
+        min_thrusts: [N], (n,); rotors that can pull may bear anything up to the whole weight, either way.
+        max_thrusts: [N], (n,); dead rotors bear nothing.
+        above: rows that g and t shall make no more than zero, (rows, n + 1).
+    """
+    from scipy.optimize import linprog  # only once something is out of the ordinary
+
+    sizes = np.abs(allocation).max(axis=1, keepdims=True)
+    rows = allocation / np.where(sizes > 0.0, sizes, 1.0)
+    most = np.where(max_thrusts > 0.0, 1.0, 0.0)
+    bounds = np.c_[np.where(min_thrusts < 0.0, -most, 0.0), most]
+    found = linprog(
+        -rewards,
+        A_ub=above,
+        b_ub=None if above is None else np.zeros(len(above)),
+        A_eq=np.c_[rows, np.zeros(len(rows))],
+        b_eq=np.eye(len(rows))[0],  # the first row's size is one
+        bounds=np.r_[bounds, [[0.0, 1.0]]],
+    )
+    return np.asarray(found.x) if found.status == 0 else None
+
+
+def _named(rotors: Iterable[int]) -> str:
+    """Rotors as a file counts them: "rotors[1] and rotors[4]"."""
+    names = [f"rotors[{i}]" for i in rotors]
+    return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"
