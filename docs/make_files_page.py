@@ -12,6 +12,7 @@ import re
 import types
 from enum import Enum
 from importlib.resources import files
+from importlib.resources.abc import Traversable
 from pathlib import Path
 from typing import Any, Literal, get_args, get_origin, get_type_hints
 
@@ -34,6 +35,7 @@ from aerobat.problem import (
 from aerobat.vehicle import Rotor, Vehicle
 
 PAGE = Path(__file__).parent / "files.md"
+ANNOTATED = PAGE.parent.parent / "examples" / "vehicles" / "annotated.toml"
 WRITTEN = "## What a run writes"  # from here on the page is written by hand
 
 PLACES = {  # where each class stands in a file
@@ -84,6 +86,47 @@ waypoints = [
 ]
 ```
 """
+VEHICLE = """
+`aerobat vehicles agile-quad --out mine.toml` writes a built-in vehicle's file to begin with, the source of
+every number beside it; `aerobat vehicles mine.toml` says how yours is understood, and what looks wrong. All
+that a file may hold, [annotated](../examples/vehicles/annotated.toml):
+"""
+ROTOR = """
+A rotor's own keys go before those of `[rotor_defaults]`, by whichever keys they are given. In N/rpm², `k_f`
+is a number 91.19 times smaller.
+
+Rotors are commanded in thrust. What a data sheet says beyond its ends is lost: the curve between idle and
+full throttle, which a motor controller is taken to undo; a torque that is not proportional to thrust; the
+voltage that sags; and that it is the speed that lags, by which a large step of thrust rises later and falls
+sooner than here.
+
+A rotor with `max_thrust = 0` is dead. Where the others still hold a level hover and yaw, plans, proofs and
+flights are theirs, counted without it; where they do not, one sentence says which of them would have to
+stop, and what remains. A hexarotor whose spins alternate keeps no control of yaw without any of its rotors,
+one with spins 1, 1, -1, -1, 1, -1 does without any of the first four; an octorotor does without any.
+"""
+IMPORT = """
+### From URDF and SDF
+
+`aerobat vehicles iris.sdf --out iris.toml`, or `aerobat.import_vehicle("iris.sdf")`, reads mass, inertia,
+centre of mass and rotors of a robot's description; `--vehicle iris.sdf` flies it as it is.
+
+| there | here |
+| --- | --- |
+| all links' masses and inertias, joints at zero | `mass`, `inertia`, `centre_of_mass`: one rigid body |
+| motor model: `linkName`, or the child of `jointName` | a rotor at that link's centre of mass |
+| `motorConstant` · `maxRotVelocity`² | `max_thrust` |
+| `momentConstant`, `turningDirection` | `torque_coefficient`, `spin` |
+| the larger of `timeConstantUp` and `timeConstantDown`, of the speed | `lag`, of the thrust |
+| `rotorDragCoefficient` · the speed in hover, all rotors | `drag_body` along x and y |
+| the cylinder or box that collides of the rotor's link | `radius` |
+| gym-pybullet-drones' `<properties>` in a URDF | `max_thrust`, `torque_coefficient`, `radius` |
+
+Without motor models rotors are the links named after rotors or propellers, and what is missing, most often
+`spin`, `max_thrust`, `torque_coefficient` and `lag`, is told and left to be added. Lost are the angular
+momentum of turning rotors, `rollingMomentCoefficient`, other plugins, sensors, and models that are included
+but not merged. Rotors that do not push along the body's +z, xacro macros and templates are refused.
+"""
 
 
 def page() -> str:
@@ -96,8 +139,8 @@ def page() -> str:
     parts += [kind(name, cls) for name, cls in registered_maneuvers().items() if of_package(cls)]
     parts += [section(GatePassage), section(Stage), section(Attitude), section(Condition)]
     parts += [STAGES, section(Waypoint), WAYPOINTS]
-    parts += ["## Vehicle (`--vehicle vehicle.toml`)\n", preset("vehicle", "agile-quad"), table(Vehicle)]
-    parts += [section(Rotor)]
+    parts += ["## Vehicle (`--vehicle vehicle.toml`)\n", VEHICLE, fenced(ANNOTATED), table(Vehicle)]
+    parts += [section(Rotor), ROTOR, IMPORT]
     return "\n".join(part.strip("\n") + "\n" for part in parts) + "\n" + WRITTEN + by_hand
 
 
@@ -108,8 +151,12 @@ def of_package(cls: type) -> bool:
 
 def preset(room: str, name: str) -> str:
     """A built-in file, as an example."""
-    text = (files(f"aerobat.{room}") / "presets" / f"{name}.toml").read_text(encoding="utf-8")
-    return f"```toml\n{text.strip()}\n```\n"
+    return fenced(files(f"aerobat.{room}") / "presets" / f"{name}.toml")
+
+
+def fenced(path: Path | Traversable) -> str:
+    """A TOML file, as an example."""
+    return f"```toml\n{path.read_text(encoding='utf-8').strip()}\n```\n"
 
 
 def section(cls: type) -> str:

@@ -1,6 +1,8 @@
 """Vehicle files: the presets hold the published numbers; whatever is wrong in a file is one sentence."""
 
+import dataclasses
 import os
+import re
 import tomllib
 from collections.abc import Callable
 from importlib.resources import files
@@ -13,10 +15,14 @@ import tomli_w
 from hypothesis import given
 from hypothesis import strategies as st
 
+from aerobat.declaration import from_table
 from aerobat.errors import SpecError
-from aerobat.vehicle import Vehicle, load_vehicle, vehicle_names
+from aerobat.planning import plan
+from aerobat.problem import load_problem
+from aerobat.vehicle import Rotor, Vehicle, implausibilities, load_vehicle, vehicle_names
 
 PRESETS = files("aerobat.vehicle") / "presets"
+ANNOTATED = Path(__file__).parent.parent / "examples" / "vehicles" / "annotated.toml"
 AGILE_QUAD = (PRESETS / "agile-quad.toml").read_text(encoding="utf-8")
 
 
@@ -323,3 +329,36 @@ def test_any_value_anywhere_loads_or_is_one_sentence(
     else:
         inner[key] = junk
     assert complaint_about(written(tmp_path_factory.getbasetemp(), content)).isprintable()
+
+
+def test_the_annotated_example_has_every_key_that_a_vehicle_may_have() -> None:
+    text = ANNOTATED.read_text(encoding="utf-8")
+    keys = {field.name for cls in (Vehicle, Rotor) for field in dataclasses.fields(cls)}
+    for key in keys | set(Vehicle.SHORTHANDS) | set(Rotor.SHORTHANDS):
+        assert f"{key}]" in text or f"{key} = " in text, key
+    racer = load_vehicle(ANNOTATED)
+    assert implausibilities(racer) == ()
+    np.testing.assert_allclose(racer.max_thrusts, 7.2, rtol=1e-3)
+    np.testing.assert_allclose(racer.rotors[0].position_body, [0.094, 0.088, -0.011])
+
+
+def test_what_the_annotated_example_says_instead_is_as_good() -> None:
+    """Each commented key, put in the place of what it stands for, gives nearly the same vehicle."""
+    racer = load_vehicle(ANNOTATED)
+    content = tomllib.loads(ANNOTATED.read_text(encoding="utf-8"))
+    lines = ANNOTATED.read_text(encoding="utf-8").splitlines()
+    commented = [line.removeprefix("# ") for line in lines if re.match(r"# \w+ = ", line)]
+    instead = tomllib.loads("\n".join(commented))
+    others = {key: content["rotor_defaults"][key] for key in ("lag", "radius")}
+    curve = {"thrust_curve": instead.pop("thrust_curve")}
+    matrix = {"inertia": instead.pop("inertia")}
+    for defaults in (curve, instead):
+        other = from_table(Vehicle, content | matrix | {"rotor_defaults": others | defaults})
+        np.testing.assert_allclose(other.max_thrusts, racer.max_thrusts, rtol=1e-3)
+        np.testing.assert_allclose(other.allocation, racer.allocation, rtol=0, atol=5e-4)
+
+
+def test_a_maneuver_is_flown_by_the_annotated_example() -> None:
+    found = plan(load_problem("flip-roll"), vehicle=load_vehicle(ANNOTATED))
+    assert found.certificate.certified
+    assert found.flies

@@ -7,6 +7,7 @@ from .evaluation import Gradient, Passage, Score, Scores, Sensitivity, score, sc
 from .flatness import Reference, reference
 from .interchange.csv import read_csv, write_csv
 from .interchange.read import read_plan, read_trajectory
+from .interchange.robots import import_vehicle
 from .planning import (
     BisectionSearch,
     FreeKnots,
@@ -121,6 +122,7 @@ __all__ = [
     "fly",
     "implausibilities",
     "import_plugin",
+    "import_vehicle",
     "load_flight",
     "load_plan",
     "load_problem",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
@@ -20,6 +21,7 @@ if TYPE_CHECKING:
 T = TypeVar("T")
 
 MAX_DOCUMENT = 2**24  # bytes: a hundred thousand waypoints
+_NUMBERS = re.compile(r"\[\n((?:\s*[-+\w.]+,\n)+)\s*\]")  # a list of numbers, each on a line of its own
 
 
 def document_names(presets: Traversable) -> tuple[str, ...]:
@@ -58,15 +60,20 @@ def read_document(path: str | Document, cls: type[T], kind: str, **defaults: Any
     """
     document = Path(path) if isinstance(path, str) else path
     with in_document(document, kind):
-        return from_table(cls, defaults | _parse(_read(document)))
+        return from_table(cls, defaults | _parse(read_text(document)))
 
 
 def write_document(path: str | os.PathLike[str], table: Mapping[str, Any], kind: str) -> None:
     """Write `table` as a TOML file, whole or not at all. Raises SpecError when the file cannot be written."""
+    with in_document(Path(path), kind), whole_file(Path(path)) as temporary:
+        temporary.write_text(to_toml(table), encoding="utf-8")
+
+
+def to_toml(table: Mapping[str, Any]) -> str:
+    """The text of a TOML file that holds `table`, lists of numbers on one line."""
     import tomli_w
 
-    with in_document(Path(path), kind), whole_file(Path(path)) as temporary:
-        temporary.write_text(tomli_w.dumps(table), encoding="utf-8")
+    return _NUMBERS.sub(lambda found: f"[{' '.join(found[1].split()).rstrip(',')}]", tomli_w.dumps(table))
 
 
 @contextmanager
@@ -86,14 +93,15 @@ def within(prefix: str) -> Iterator[None]:
         raise SpecError(f"{prefix}{error}") from None
 
 
-def _read(path: Document) -> str:
+def read_text(path: Document) -> str:
+    """A file's text. Raises SpecError, one sentence without the file's name, where it cannot be read."""
     try:
         content = read_whole(path, MAX_DOCUMENT) if isinstance(path, Path) else path.read_bytes()
         return content.decode("utf-8-sig")
     except FileNotFoundError:
         raise SpecError("there is no such file; check the path") from None
     except IsADirectoryError:
-        raise SpecError("this is a folder; give the path of a .toml file") from None
+        raise SpecError("this is a folder; give the path of a file") from None
     except UnicodeDecodeError as error:
         raise SpecError(f"byte {error.start} is not UTF-8 text; save the file as UTF-8") from None
     except SpecError:

@@ -13,6 +13,7 @@ from aerobat.cli.run_record import RunRecord, default_vehicle
 from aerobat.cli.terminal import say
 from aerobat.errors import SpecError
 from aerobat.interchange import read_plan
+from aerobat.interchange.robots.description import SUFFIXES, import_vehicle
 from aerobat.planning import (
     Plan,
     Planner,
@@ -36,8 +37,8 @@ def read_task(name: str, options: TaskOptions, paper: bool = False) -> tuple[Pro
 
 
 def named_vehicle(name: str) -> Vehicle:
-    """The vehicle of that name; what it hardly can be is told, and no more."""
-    vehicle = load_vehicle(name)
+    """The vehicle of that name or file, a robot's among them; what it hardly can be is told, and no more."""
+    vehicle = import_vehicle(name) if name.endswith(SUFFIXES) else load_vehicle(name)
     for doubt in implausibilities(vehicle):
         say(f"warning: vehicle '{vehicle.name}': {doubt}")
     return vehicle

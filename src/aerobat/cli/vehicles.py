@@ -1,11 +1,65 @@
-"""`aerobat vehicles`: what there is to fly."""
+"""`aerobat vehicles`: what there is to fly, and files to begin one's own with."""
 
 from __future__ import annotations
 
+from pathlib import Path
+from typing import Annotated
+
+from cyclopts import Parameter
+
+from aerobat.cli.options import output
+from aerobat.cli.tasks import named_vehicle
+from aerobat.cli.terminal import say
+from aerobat.documents import in_document
+from aerobat.errors import SpecError
+from aerobat.interchange.robots.description import SUFFIXES, read_robot_description
 from aerobat.reporting.tables import show, vehicles_table
-from aerobat.vehicle import load_vehicle, vehicle_names
+from aerobat.storage import write_whole
+from aerobat.vehicle import load_vehicle, vehicle_names, vehicle_text
 
 
-def vehicles() -> None:
-    """List the built-in vehicles."""
-    show(vehicles_table(load_vehicle(name) for name in vehicle_names()))
+def vehicles(
+    vehicle: str | None = None, /, *, out: Annotated[Path | None, Parameter(group=output)] = None
+) -> None:
+    """List the built-in vehicles; of one that is named, print the file, to begin one's own with.
+
+    aerobat vehicles agile-quad --out mine.toml      a built-in one, with the source of every number
+    aerobat vehicles mine.toml                       your own, as it was understood; doubts are told
+    aerobat vehicles iris.sdf --out iris.toml        imported from a URDF or SDF file, with what is missing
+
+    Parameters
+    ----------
+    vehicle
+        A name that is listed, a vehicle's TOML file, or a robot's URDF or SDF file.
+    out
+        The file to write instead of printing; it must not be there yet.
+    """
+    if vehicle is not None:
+        _give(_text(vehicle), out)
+    elif out is not None:
+        raise SpecError("--out writes one vehicle; name it")
+    else:
+        show(vehicles_table(load_vehicle(name) for name in vehicle_names()))
+
+
+def _text(name: str) -> str:
+    """A vehicle's file. What is missing in it, or hardly can be, is told."""
+    if not name.endswith(SUFFIXES):
+        named_vehicle(name)
+        return vehicle_text(name)
+    with in_document(Path(name), "robot"):
+        found = read_robot_description(name)
+    if found.missing:
+        say(f"warning: {name} says nothing of the rotors' {', '.join(found.missing)}; add them")
+    else:
+        named_vehicle(name)
+    return found.toml()
+
+
+def _give(text: str, out: Path | None) -> None:
+    if out is None:
+        print(text, end="")
+        return
+    if out.exists():
+        raise SpecError(f"--out {out} is there already; name a new file")
+    write_whole(out, text)

@@ -6,7 +6,7 @@ from aerobat.vehicle.allocation import (
     rotor_thrusts,
     wrench,
 )
-from aerobat.vehicle.files import as_vehicle, load_vehicle, vehicle_names, write_vehicle
+from aerobat.vehicle.files import as_vehicle, load_vehicle, vehicle_names, vehicle_text, write_vehicle
 from aerobat.vehicle.plausibility import implausibilities
 from aerobat.vehicle.rotor import Rotor
 from aerobat.vehicle.vehicle import Vehicle
@@ -21,6 +21,7 @@ __all__ = [
     "mixer",
     "rotor_thrusts",
     "vehicle_names",
+    "vehicle_text",
     "wrench",
     "write_vehicle",
 ]

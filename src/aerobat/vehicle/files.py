@@ -5,7 +5,7 @@ from __future__ import annotations
 from importlib.resources import files
 
 from aerobat.declaration import PathName, door, to_table
-from aerobat.documents import document_names, read_document, resolve_document, write_document
+from aerobat.documents import document_names, read_document, resolve_document, to_toml, write_document
 from aerobat.vehicle.vehicle import Vehicle
 
 PRESETS = files("aerobat.vehicle") / "presets"
@@ -30,6 +30,18 @@ def load_vehicle(name_or_path: PathName) -> Vehicle:
 def as_vehicle(vehicle: Vehicle | str) -> Vehicle:
     """The vehicle, of itself or of what `load_vehicle` takes. Raises SpecError as that does."""
     return load_vehicle(vehicle) if isinstance(vehicle, str) else vehicle
+
+
+@door
+def vehicle_text(name_or_path: PathName) -> str:
+    """The text of a vehicle's file: a preset's own, with its sources, or one's own as it was understood.
+
+    Raises SpecError as `load_vehicle` does.
+    """
+    vehicle = load_vehicle(name_or_path)
+    if name_or_path in vehicle_names():
+        return resolve_document(name_or_path, PRESETS, "vehicle").read_text(encoding="utf-8")
+    return to_toml(to_table(vehicle))
 
 
 @door

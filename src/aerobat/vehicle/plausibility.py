@@ -11,6 +11,7 @@ from math import hypot, log, sqrt
 
 import numpy as np
 
+from aerobat.errors import SpecError
 from aerobat.vehicle.rotor import Rotor
 from aerobat.vehicle.vehicle import Vehicle
 
@@ -49,7 +50,24 @@ class _Check:
 
 def implausibilities(vehicle: Vehicle) -> tuple[str, ...]:
     """Return a sentence for each kind of value that hardly any vehicle has, with the unit probably meant."""
-    return (*_of_rotors(vehicle.rotors), *_of_inertia(vehicle), *_of_thrust(vehicle))
+    found = (*_of_dead_rotors(vehicle), *_of_rotors(vehicle.rotors), *_of_inertia(vehicle))
+    return (*found, *_of_thrust(vehicle))
+
+
+def _of_dead_rotors(vehicle: Vehicle) -> Iterator[str]:
+    """Which rotors are dead, and what remains flyable."""
+    if not vehicle.dead_rotors:
+        return
+    try:
+        flying = vehicle.without_dead_rotors()
+    except SpecError as error:
+        yield str(error)
+        return
+    names = ", ".join(f"rotors[{i}]" for i in vehicle.dead_rotors)
+    yield (
+        f"max_thrust of {names} is 0: {len(flying.rotors)} others still give thrust, roll, pitch and yaw; "
+        "plans and reports count them by themselves"
+    )
 
 
 def _of_rotors(rotors: Sequence[Rotor]) -> Iterator[str]:

@@ -1,0 +1,107 @@
+"""Links of a robot as one rigid body."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from aerobat.arrays import Array
+from aerobat.errors import SpecError
+
+
+class Pose(NamedTuple):
+    """A frame in another one: what is at x there is at `rotation` x + `origin` here."""
+
+    rotation: Array  # (3, 3)
+    origin: Array  # [m], (3,)
+
+    @classmethod
+    def of(cls, origin: Array, roll_pitch_yaw: Array) -> Pose:
+        """The frame at an origin, turned by roll, pitch and yaw [rad] about the fixed x, y and z."""
+        (cr, cp, cy), (sr, sp, sy) = np.cos(roll_pitch_yaw), np.sin(roll_pitch_yaw)
+        about_x = np.array([[1, 0, 0], [0, cr, -sr], [0, sr, cr]])
+        about_y = np.array([[cp, 0, sp], [0, 1, 0], [-sp, 0, cp]])
+        about_z = np.array([[cy, -sy, 0], [sy, cy, 0], [0, 0, 1]])
+        return cls(about_z @ about_y @ about_x, origin)
+
+    def then(self, inner: Pose) -> Pose:
+        """The frame `inner` of this one, where this one is given."""
+        return Pose(self.rotation @ inner.rotation, self.rotation @ inner.origin + self.origin)
+
+
+IDENTITY = Pose(np.eye(3), np.zeros(3))
+
+
+@dataclass(frozen=True)
+class Link:
+    """A link in the frame of its model."""
+
+    name: str
+    pose: Pose
+    mass: float  # [kg]
+    centre: Array  # [m] of its mass, (3,)
+    inertia: Array  # [kg·m²] about that centre, the model's axes, (3, 3)
+    radius: float | None  # [m] of what collides around its z axis
+
+
+@dataclass(frozen=True)
+class Motor:
+    """A rotor of which more is known than its place, by the link that turns."""
+
+    link: str
+    spin: int  # 1 counter-clockwise seen from above
+    k_f: float  # [N/(rad/s)²]
+    torque_coefficient: float  # [m]
+    max_speed: float  # [rad/s]
+    lag: float  # [s]
+    drag: float  # [N/(rad/s · m/s)] across its axis
+
+
+@dataclass(frozen=True)
+class Robot:
+    """A robot's links and motors; what a file says of all its rotors stands in `rotor_defaults`."""
+
+    name: str
+    links: tuple[Link, ...]
+    motors: tuple[Motor, ...]
+    rotor_defaults: dict[str, float]
+    notes: tuple[str, ...]
+
+
+def link_of(name: str, pose: Pose, inertial: Pose, mass: float, moments: Array, radius: float | None) -> Link:
+    """A link of what its file says. Raises SpecError for a mass below zero.
+
+    Args:
+        name: of the link.
+        pose: its frame in the model's.
+        inertial: the frame of its inertia in its own, at its centre of mass.
+        mass: [kg].
+        moments: ixx, iyy, izz, ixy, ixz, iyz [kg·m²], (6,).
+        radius: [m] of what collides.
+    """
+    if mass < 0.0:
+        raise SpecError(f"link '{name}': mass must be 0 or more, got {mass:g} kg")
+    xx, yy, zz, xy, xz, yz = moments
+    at = pose.then(inertial)
+    inertia = at.rotation @ np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]) @ at.rotation.T
+    return Link(name, pose, mass, at.origin, (inertia + inertia.T) / 2, radius)
+
+
+def merged(links: Iterable[Link]) -> tuple[float, Array, Array]:
+    """Mass [kg], centre of mass [m] (3,) and inertia [kg·m²] about it (3, 3) of links that hold together.
+
+    By the parallel-axis theorem, J = Σ J_i + m_i (|r_i|² 1 − r_i r_iᵀ) with r_i from the common centre.
+    """
+    links = tuple(links)
+    mass = sum(link.mass for link in links)
+    if mass <= 0.0:
+        raise SpecError("no link has a mass; give each its <inertial>")
+    centre = sum((link.mass * link.centre for link in links), np.zeros(3)) / mass
+    inertia = np.zeros((3, 3))
+    for link in links:
+        arm = link.centre - centre
+        inertia += link.inertia + link.mass * (arm @ arm * np.eye(3) - np.outer(arm, arm))
+    return mass, centre, inertia

@@ -1,0 +1,132 @@
+"""Robots in SDF: links at poses, given relative to the model or to each other."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from aerobat.errors import SpecError
+from aerobat.interchange.robots.body import IDENTITY, Link, Pose, Robot, link_of
+from aerobat.interchange.robots.markup import by_name, child_number, name_of, numbers, parse_xml
+from aerobat.interchange.robots.motors import read_motors
+
+if TYPE_CHECKING:
+    from xml.etree.ElementTree import Element
+
+MOMENTS = ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")
+FRAMES = ("link", "joint", "frame")  # what a pose may be relative to
+MODEL_FRAME = "__model__"
+
+
+def read_sdf(root: Element, path: Path) -> Robot:
+    """Return the only model under an SDF file's root, in the model's frame.
+
+    A model that it includes with merge="true" counts as its own, where its folder lies beside that of the
+    file, as Gazebo's model://NAME says. Raises SpecError, naming the link, for what is malformed.
+    """
+    models = [*root.findall("model"), *root.findall("world/model")]
+    if len(models) != 1:
+        raise SpecError(f"must hold one model, got {len(models)}; give the file of the vehicle itself")
+    model = models[0]
+    parts = [model, *_merged(model, path)]
+    frames = by_name(each for part in parts for tag in FRAMES for each in part.findall(tag))
+    elements = [each for part in parts for each in part.findall("link")]
+    links, notes = [], []
+    for element in elements:
+        name = name_of(element, "link")
+        if element.find("inertial") is None:
+            notes.append(f"link '{name}' has no <inertial>: taken as massless, by Gazebo as 1 kg")
+        links.append(_link(name, element, _pose_of(name, frames)))
+    inner = [name_of(each, "model") for each in model.findall("model")]
+    inner += [_uri(each) for each in model.findall("include") if not _is_merged(each)]
+    notes += [f"'{name}', a model within the model, is left out" for name in inner]
+    children = {
+        name_of(j, "joint"): (j.findtext("child") or "").strip() for p in parts for j in p.findall("joint")
+    }
+    motors = tuple(motor for part in parts for motor in read_motors(part, children))
+    return Robot(name_of(model, "model"), tuple(links), motors, {}, tuple(notes))
+
+
+def _merged(model: Element, path: Path) -> list[Element]:
+    """The models that are merged into this one, without those that they merge in turn."""
+    found = []
+    for include in filter(_is_merged, model.findall("include")):
+        uri = _uri(include)
+        name = uri.removeprefix("model://").strip("/")
+        file = path.resolve().parent.parent / name / "model.sdf"
+        if not uri.startswith("model://") or not file.is_file():
+            raise SpecError(
+                f"it includes {uri!r}, which is not at {file}; put that model's folder beside its own"
+            )
+        inner = parse_xml(file).find("model")
+        if inner is None:
+            raise SpecError(f"it includes {uri!r}, which holds no model")
+        found.append(inner)
+    return found
+
+
+def _is_merged(include: Element) -> bool:
+    """True for what becomes part of the model; other inclusions are models of their own, held by joints."""
+    return include.get("merge") in ("true", "1")
+
+
+def _uri(include: Element) -> str:
+    return (include.findtext("uri") or "").strip()
+
+
+def _link(name: str, element: Element, pose: Pose) -> Link:
+    inertial = element.find("inertial")
+    if inertial is None:
+        return link_of(name, pose, IDENTITY, 0.0, np.zeros(6), _radius(element, name))
+    inertia = inertial.find("inertia")
+    what = f"link '{name}'"
+    moments = [0.0 if inertia is None else child_number(inertia, key, what) for key in MOMENTS]
+    mass = child_number(inertial, "mass", what)
+    return link_of(name, pose, _pose(inertial, what), mass, np.array(moments), _radius(element, name))
+
+
+def _radius(link: Element, name: str) -> float | None:
+    """The radius [m] of the cylinder that collides, or half the longer side of the box."""
+    for cylinder in link.iterfind("collision/geometry/cylinder"):
+        return child_number(cylinder, "radius", f"link '{name}': cylinder")
+    for box in link.iterfind("collision/geometry/box"):
+        return float(numbers(box.findtext("size"), 3, f"link '{name}': box size")[:2].max()) / 2
+    return None
+
+
+def _pose(element: Element, what: str) -> Pose:
+    """The pose that stands in an element, relative to whatever it is relative to."""
+    pose = element.find("pose")
+    if pose is None:
+        return IDENTITY
+    if pose.get("rotation_format", "euler_rpy") != "euler_rpy":
+        raise SpecError(f"{what}: its pose is no roll, pitch and yaw; write it as euler_rpy")
+    values = numbers(pose.text, 6, f"{what}: pose")
+    angles = np.radians(values[3:]) if pose.get("degrees") in ("true", "1") else values[3:]
+    return Pose.of(values[:3], angles)
+
+
+def _pose_of(name: str, frames: dict[str, Element]) -> Pose:
+    """The pose of a link, joint or frame in the model's frame, by whatever it is relative to."""
+    chain: list[Element] = []
+    while name != MODEL_FRAME:
+        if name not in frames:
+            raise SpecError(f"a pose is relative to '{name}', which is not there")
+        if frames[name] in chain:
+            raise SpecError(f"the pose of '{name}' is relative to itself")
+        chain.append(frames[name])
+        name = _reference_frame(frames[name])
+    found = IDENTITY
+    for element in reversed(chain):
+        found = found.then(_pose(element, f"{element.tag} '{element.get('name')}'"))
+    return found
+
+
+def _reference_frame(element: Element) -> str:
+    """What an element's pose is relative to, unless it says so: the model; of a joint its child."""
+    pose = element.find("pose")
+    given = "" if pose is None else pose.get("relative_to", "")
+    usual = (element.findtext("child") or "") if element.tag == "joint" else element.get("attached_to", "")
+    return given.strip() or usual.strip() or MODEL_FRAME

@@ -1,0 +1,125 @@
+"""Robots in URDF: a tree of links and joints, all joints at zero."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from aerobat.arrays import Array
+from aerobat.errors import SpecError
+from aerobat.interchange.robots.body import IDENTITY, Link, Pose, Robot, link_of
+from aerobat.interchange.robots.markup import by_name, name_of, numbers
+from aerobat.interchange.robots.motors import read_motors
+
+if TYPE_CHECKING:
+    from xml.etree.ElementTree import Element
+
+MOMENTS = ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")
+
+
+def read_urdf(root: Element, path: Path) -> Robot:
+    """Return the robot under a URDF file's root, in the frame of its first link.
+
+    gym-pybullet-drones' `<properties>`, thrust2weight, kf, km and prop_radius, are read too. Raises
+    SpecError, naming the link or the joint, for what is malformed.
+    """
+    elements = by_name(root.findall("link"))
+    poses = _poses(root, elements)
+    links = tuple(_link(name, element, poses[name]) for name, element in elements.items())
+    defaults = _properties(root.find("properties"), links)
+    children = {name_of(j, "joint"): _end(j, "child") for j in root.findall("joint")}
+    return Robot(root.get("name") or path.stem, links, read_motors(root, children), defaults, ())
+
+
+def _poses(root: Element, links: dict[str, Element]) -> dict[str, Pose]:
+    """Each link's frame in that of the first one, by the joints between."""
+    above: dict[str, tuple[str, Pose]] = {}
+    for joint in root.findall("joint"):
+        name, parent, child = name_of(joint, "joint"), _end(joint, "parent"), _end(joint, "child")
+        for end in (parent, child):
+            if end not in links:
+                raise SpecError(f"joint '{name}' names the link '{end}', which is not there")
+        if child in above:
+            raise SpecError(f"link '{child}' hangs on two joints, '{name}' among them")
+        above[child] = parent, _origin(joint, f"joint '{name}'")
+    roots = [name for name in links if name not in above]
+    if len(roots) != 1:
+        which = " and ".join(f"'{name}'" for name in roots[:2]) or "none"
+        raise SpecError(f"one link must be the root of the others, got {which}; join them")
+    poses = {roots[0]: IDENTITY}
+    for name in links:
+        _follow(name, above, poses)
+    return poses
+
+
+def _follow(name: str, above: dict[str, tuple[str, Pose]], poses: dict[str, Pose]) -> None:
+    """Find the poses of a link and of those between it and one whose pose is known."""
+    chain = [name]
+    while chain[-1] not in poses:
+        parent = above[chain[-1]][0]
+        if parent in chain:
+            raise SpecError(f"link '{parent}' hangs on itself by its joints")
+        chain.append(parent)
+    for child in reversed(chain[:-1]):
+        parent, joint = above[child]
+        poses[child] = poses[parent].then(joint)
+
+
+def _link(name: str, element: Element, pose: Pose) -> Link:
+    inertial = element.find("inertial")
+    if inertial is None:
+        return link_of(name, pose, IDENTITY, 0.0, np.zeros(6), _radius(element, name))
+    mass, inertia = inertial.find("mass"), inertial.find("inertia")
+    moments = [_attribute(inertia, key, f"link '{name}': inertia") for key in MOMENTS]
+    return link_of(
+        name,
+        pose,
+        _origin(inertial, f"link '{name}': inertial"),
+        _attribute(mass, "value", f"link '{name}': mass"),
+        np.array(moments),
+        _radius(element, name),
+    )
+
+
+def _radius(link: Element, name: str) -> float | None:
+    """The radius [m] of the cylinder that collides, or half the longer side of the box."""
+    for cylinder in link.iterfind("collision/geometry/cylinder"):
+        return _attribute(cylinder, "radius", f"link '{name}': cylinder")
+    for box in link.iterfind("collision/geometry/box"):
+        return float(numbers(box.get("size"), 3, f"link '{name}': box size")[:2].max()) / 2
+    return None
+
+
+def _origin(element: Element, what: str) -> Pose:
+    origin = element.find("origin")
+    if origin is None:
+        return IDENTITY
+    places: list[Array] = [numbers(origin.get(key), 3, f"{what}: origin {key}") for key in ("xyz", "rpy")]
+    return Pose.of(*places)
+
+
+def _attribute(element: Element | None, key: str, what: str) -> float:
+    return 0.0 if element is None else float(numbers(element.get(key), 1, f"{what} {key}")[0])
+
+
+def _end(joint: Element, which: str) -> str:
+    found = joint.find(which)
+    link = "" if found is None else found.get("link", "").strip()
+    if not link:
+        raise SpecError(f"joint '{name_of(joint, 'joint')}' names no {which} link")
+    return link
+
+
+def _properties(element: Element | None, links: tuple[Link, ...]) -> dict[str, float]:
+    """What gym-pybullet-drones says of all rotors; thrust2weight stays one, until they are counted."""
+    if element is None:
+        return {}
+    found = {
+        key: _attribute(element, key, "properties") for key in ("thrust2weight", "kf", "km", "prop_radius")
+    }
+    given = {"thrust_to_weight": found["thrust2weight"], "radius": found["prop_radius"]}
+    if found["kf"] > 0.0:
+        given["torque_coefficient"] = found["km"] / found["kf"]
+    return {key: value for key, value in given.items() if value > 0.0}
