@@ -5,8 +5,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from aerobat.environment import Environment
 from aerobat.errors import SpecError
-from aerobat.problem import Gate, Problem, Quantity, Waypoint, Waypoints, at_rest, tilted_gate
+from aerobat.problem import Gate, Limits, Problem, Quantity, Waypoint, Waypoints, at_rest, tilted_gate
 
 FREE = np.nan
 components = st.lists(st.one_of(st.just(FREE), st.floats(-50, 50)), min_size=3, max_size=3)
@@ -77,3 +78,14 @@ def test_waypoints_are_passed_in_order_and_the_gate_at_its_centre() -> None:
 def test_nonsense_is_refused_in_a_sentence_that_names_it(wrong, sentence) -> None:
     with pytest.raises(SpecError, match=sentence):
         wrong()
+
+
+def test_a_waypoint_under_ground_or_outside_the_limits_is_refused_by_its_name() -> None:
+    low = Waypoints((Waypoint(position=(4.0, 0.0, 0.5)), Waypoint(position=(5.0, np.nan, -1.0))))
+    with pytest.raises(
+        SpecError, match=r"maneuver: 'waypoint 2' asks for z from -1 to -1 m, outside .*\[-0.5, inf]"
+    ):
+        Problem("low", at_rest((0, 0, 0)), at_rest((9, 0, 0)), low, environment=Environment(ground=-0.5))
+    limits = Limits(upper=(3.0, 9.0, 9.0))
+    with pytest.raises(SpecError, match=r"'waypoint 1' asks for x from 4 to 4 m, outside .*\[-inf, 3]"):
+        Problem("far", at_rest((0, 0, 0)), at_rest((2, 0, 0)), low, limits=limits)

@@ -121,6 +121,20 @@ def test_what_a_data_sheet_lacks_or_says_twice_is_one_sentence(
     assert str(caught.value).partition("mine.toml: ")[2].startswith(complaint)
 
 
+@pytest.mark.parametrize(
+    "said",
+    [
+        THRUSTS,
+        {"k_f": 1e-5, "k_m": 2e-7, "min_rpm": 900, "max_rpm": 7000},
+        {"thrust_curve": [[0, 0.1, 0.01], [1, 4.0, 0.1]]},
+    ],
+)
+def test_a_rotor_is_killed_by_one_key_whatever_else_is_said_of_its_thrust(said: dict) -> None:
+    for vehicle in (made(said, {"max_thrust": 0}), made(THRUSTS, said | {"max_thrust": 0})):
+        assert vehicle.dead_rotors == (0,)
+        assert vehicle.rotors[0].min_thrust == 0.0
+
+
 @pytest.mark.parametrize("wrong", [{"k_f": 1e-7}, {"max_rpm": 733}])
 def test_a_coefficient_per_rpm_and_a_speed_in_radians_are_suspected(wrong: dict) -> None:
     right = {"k_f": 1e-5, "k_m": 2e-7, "min_rpm": 0, "max_rpm": 7000}

@@ -148,7 +148,9 @@ class Problem:
             if name in names[:i]:
                 raise FieldError(f"gates[{i}].name", f": there are two gates named '{name}'; rename one")
         self._check_within_limits()
-        for i, condition in enumerate(self.stages(1.0).path_constraints):
+        sequence = self.stages(1.0)
+        self._check_stages(sequence)
+        for i, condition in enumerate(sequence.path_constraints):
             self._check_ends(i, condition)
 
     @classmethod
@@ -182,6 +184,26 @@ class Problem:
                 self._check_point(f"{end}.{quantity}", state.derivatives(3)[derivative], derivative)
         for i, gate in enumerate(self.gates):
             self._check_point(f"gates[{i}].position", gate.position, 0)
+
+    def _check_stages(self, sequence: StageSequence) -> None:
+        """Refuse stages at places outside the limits or under ground."""
+        for stage in sequence.stages:
+            for condition in stage.conditions:
+                if condition.quantity is Quantity.POSITION:
+                    self._check_place(stage.name, condition)
+
+    def _check_place(self, stage: str, condition: Condition) -> None:
+        """Refuse a condition on one axis's position that the limits leave no room for."""
+        lower, upper = self.path_limits.of(0)
+        for axis, along, low, high in zip("xyz", condition.direction.tolist(), lower, upper, strict=True):
+            if abs(along) == np.linalg.norm(condition.direction):
+                first, last = sorted((condition.lower / along, condition.upper / along))
+                if first > high or last < low:
+                    raise FieldError(
+                        "maneuver",
+                        f": '{stage}' asks for {axis} from {first:g} to {last:g} m, outside the limits and "
+                        f"the ground, [{low:g}, {high:g}]; move it or widen them",
+                    )
 
     def _check_ends(self, number: int, condition: Condition) -> None:
         """Refuse ends that contradict what holds throughout; drag, of a vehicle unknown here, is left out."""

@@ -92,9 +92,11 @@ class _Source(NamedTuple):
 def rotor_table(own: Mapping[str, Any], defaults: Mapping[str, Any]) -> dict[str, Any]:
     """The fields of a rotor, from its own keys and, where they say nothing, from those of all rotors.
 
-    A dead rotor's least thrust is zero, whatever the idle of the others. Raises FieldError for shorthands
-    that lack one another, and where two keys of one table give one field.
+    A rotor whose own `max_thrust` is 0 is dead, whatever else is said of its thrust. Raises FieldError for
+    shorthands that lack one another, and where two keys of one table give one field.
     """
+    if own.get("max_thrust") == 0:
+        own, defaults = _of_dead_rotor(own, defaults)
     merged = {**defaults, **own}
     table: dict[str, _Source] = {}
     for source in (
@@ -109,10 +111,20 @@ def rotor_table(own: Mapping[str, Any], defaults: Mapping[str, Any]) -> dict[str
             raise FieldError(source.field, f"is given twice, by {by}; leave one of them out")
         if known is None or source.is_own:
             table[source.field] = source
-    values = {name: source.value for name, source in table.items()}
-    if values.get("max_thrust") == 0 and not ("min_thrust" in table and table["min_thrust"].is_own):
-        values["min_thrust"] = 0.0
-    return values
+    return {name: source.value for name, source in table.items()}
+
+
+def _of_dead_rotor(
+    own: Mapping[str, Any], defaults: Mapping[str, Any]
+) -> tuple[dict[str, Any], dict[str, Any]]:
+    """The tables without what they say of thrusts otherwise; a curve is asked where nothing else has torques."""
+    speeds = ("min_rpm", "max_rpm")
+    own = {key: value for key, value in own.items() if key not in speeds} | {"min_thrust": 0.0}
+    defaults = {key: value for key, value in defaults.items() if key not in speeds}
+    curve = own.pop("thrust_curve", None)
+    if curve is not None and not {"torque_coefficient", "k_m"} & {*own, *defaults}:
+        defaults["thrust_curve"] = curve
+    return own, defaults
 
 
 def _plain(table: Mapping[str, Any], is_own: bool) -> Iterator[_Source]:

@@ -14,9 +14,11 @@ from aerobat.optimization.deadline import out_of_time
 from aerobat.planning.certified_solve import Judged, Solution, certified_solve
 from aerobat.planning.miqp.diagnosis import NOT_CONVERGED, OUT_OF_TIME
 from aerobat.planning.miqp.formulation import Formulation
+from aerobat.planning.miqp.integrator import INPUT_NAMES
 from aerobat.planning.miqp.refinement import PathPoint, PathProgram, settled
 from aerobat.planning.recorder import Recorder
 from aerobat.planning.result import PlacedStage, Plan
+from aerobat.problem.problem import Problem
 from aerobat.trajectory import Trajectory
 from aerobat.vehicle import Vehicle
 
@@ -219,6 +221,12 @@ class _Refined:
 def flyable_order(vehicle: Vehicle | None) -> int:
     """The lowest order whose paths jump in nothing that a vehicle cannot make jump."""
     return MOMENT_ORDER + (vehicle is not None and bool(vehicle.lags.any()))
+
+
+def default_order(problem: Problem, vehicle: Vehicle | None) -> int:
+    """The lowest order that is flyable, and whose input the problem's limits bound or leave alone."""
+    limited = [k for k in INPUT_NAMES if np.isfinite(problem.limits.of(k)[1]).any()]
+    return max([flyable_order(vehicle), *limited])
 
 
 def plan_of(attempts: Attempts, judged: Judged[Placement], backend: str) -> Plan:

@@ -14,7 +14,7 @@ from aerobat.flatness import force_balance
 from aerobat.optimization import AssignmentProgram, solver
 from aerobat.optimization.deadline import out_of_time, within_time
 from aerobat.planning.certified_solve import Judged
-from aerobat.planning.miqp.attempts import Attempts, Placement, flyable_order, plan_of
+from aerobat.planning.miqp.attempts import Attempts, Placement, default_order, plan_of
 from aerobat.planning.miqp.diagnosis import why_infeasible
 from aerobat.planning.miqp.formulation import Formulation
 from aerobat.planning.miqp.integrator import IntegratorChain, Intervals, Order
@@ -51,7 +51,7 @@ class Miqp(Planner):
     order: Order | None = option(
         None,
         "The derivative that is piecewise constant, 3 jerk (the paper's), 4 snap, 5 crackle. Default: 5 for "
-        "rotors with lag, else 4.",
+        "rotors with lag and where a problem limits it, else 4.",
     )
     intervals: Intervals = option(20, "N, the number of intervals.")
     search: Annotated[Search, AS_IT_IS] | None = None
@@ -91,7 +91,7 @@ class Miqp(Planner):
                 return rescued
 
     def _planned(self, problem: Problem, vehicle: Vehicle | None, recorder: Recorder) -> Plan:
-        order = flyable_order(vehicle) if self.order is None else self.order
+        order = default_order(problem, vehicle) if self.order is None else self.order
         formulation = formulate(problem, order, self.intervals, vehicle)
         attempts = Attempts(formulation, vehicle, solver(self.backend), recorder, self.reserve)
         if vehicle is None or self.search is not None:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from aerobat.errors import BackendMissing, Infeasible, SpecError
 from aerobat.optimization.deadline import out_of_time
-from aerobat.planning.miqp.attempts import flyable_order
+from aerobat.planning.miqp.attempts import default_order
 from aerobat.planning.miqp.integrator import INPUT_NAMES
 from aerobat.planning.planners import Planner
 from aerobat.planning.recorder import Recorder
@@ -32,7 +32,7 @@ def rescued_plan(asked: Miqp, problem: Problem, vehicle: Vehicle, recorder: Reco
         vehicle: What shall fly it.
         recorder: The attempts so far; those that follow are passed on to its `progress`.
     """
-    for planner, how in _alternatives(asked, vehicle):
+    for planner, how in _alternatives(asked, default_order(problem, vehicle)):
         if out_of_time():
             return None
         try:
@@ -46,12 +46,11 @@ def rescued_plan(asked: Miqp, problem: Problem, vehicle: Vehicle, recorder: Reco
     return None
 
 
-def _alternatives(asked: Miqp, vehicle: Vehicle) -> Iterator[tuple[Planner, str]]:
-    """Planners, and how they plan in words."""
+def _alternatives(asked: Miqp, first: int) -> Iterator[tuple[Planner, str]]:
+    """Planners, and how they plan in words; `first` is the order that is taken where none is asked for."""
     for factor in MORE_INTERVALS:
         intervals = round(factor * asked.intervals)
         yield replace(asked, intervals=intervals, rescue=False), f"with {intervals}"
-    first = flyable_order(vehicle)
     for order in range(first, max(INPUT_NAMES) + 1):
         if order != (asked.order or first):
             yield replace(asked, order=order, rescue=False), f"with order {order}"
