@@ -37,6 +37,13 @@ def test_rotors_without_lag_are_planned_with_snap_which_may_jump(quad: Vehicle) 
     assert found.order == 4
 
 
+def test_crackle_is_the_input_where_a_problem_limits_it(quad: Vehicle) -> None:
+    prompt = replace(quad, rotors=tuple(replace(r, lag=0.0) for r in quad.rotors))
+    found = plan(replace(load_problem("half-flip"), limits=Limits(crackle=2e5)), vehicle=prompt)
+    assert found.certified
+    assert found.order == 5
+
+
 def test_thrusts_that_jump_are_not_certified_for_rotors_with_lag(quad: Vehicle) -> None:
     found = plan(load_problem("half-flip"), Miqp(order=4), quad)
     assert not found.certified
