@@ -117,7 +117,7 @@ def rotor_table(own: Mapping[str, Any], defaults: Mapping[str, Any]) -> dict[str
 def _of_dead_rotor(
     own: Mapping[str, Any], defaults: Mapping[str, Any]
 ) -> tuple[dict[str, Any], dict[str, Any]]:
-    """The tables without what they say of thrusts otherwise; a curve is asked where nothing else has torque."""
+    """The tables without what they say of thrusts; a curve is asked for torques if nothing else is."""
     speeds = ("min_rpm", "max_rpm")
     own = {key: value for key, value in own.items() if key not in speeds} | {"min_thrust": 0.0}
     defaults = {key: value for key, value in defaults.items() if key not in speeds}

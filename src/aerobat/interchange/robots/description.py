@@ -10,7 +10,6 @@ sensors, and shapes but for the rotors' radii. A URDF says nothing of thrusts un
 
 from __future__ import annotations
 
-import os
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -20,7 +19,7 @@ from typing import Any
 
 import numpy as np
 
-from aerobat.declaration import from_table
+from aerobat.declaration import PathName, door, from_table
 from aerobat.documents import in_document, to_toml
 from aerobat.errors import SpecError
 from aerobat.interchange.robots.body import Link, Motor, Robot, merged
@@ -68,7 +67,8 @@ class VehicleDescription:
         return "\n".join([*lines, "", to_toml(self.table)])
 
 
-def import_vehicle(path: str | os.PathLike[str]) -> Vehicle:
+@door
+def import_vehicle(path: PathName) -> Vehicle:
     """Return the vehicle that a URDF or SDF file describes; `aerobat.interchange.robots` says what is lost.
 
     Raises SpecError, one sentence that names the file, when it is malformed, describes no multirotor, or does
@@ -78,7 +78,8 @@ def import_vehicle(path: str | os.PathLike[str]) -> Vehicle:
         return read_robot_description(path).vehicle()
 
 
-def read_robot_description(path: str | os.PathLike[str]) -> VehicleDescription:
+@door
+def read_robot_description(path: PathName) -> VehicleDescription:
     """Return what a URDF or SDF file says of a vehicle. Raises SpecError, a sentence, for nonsense."""
     path = Path(path)
     root = parse_xml(path)
