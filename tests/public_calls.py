@@ -97,6 +97,7 @@ def _arguments(name: str, folder: Path) -> dict[str, Any]:
         "load_plan": {"path": saved["plan"]},
         "load_problem": {"name": "line"},
         "load_trajectory": {"path": saved["trajectory"]},
+        "implausibilities": {"vehicle": ab.load_vehicle("agile-quad")},
         "import_vehicle": {"path": Path(__file__).parent / "cases" / "robots" / "iris.sdf"},
         "load_vehicle": {"name_or_path": "agile-quad"},
         "maneuver": {"kind": "x"},
