@@ -52,7 +52,7 @@ def test_long_values_are_represented_by_their_line(value: Any) -> None:
 
 
 def test_what_is_read_from_its_file_equals_what_was_written(tmp_path: Path) -> None:
-    problem, vehicle = ab.load_problem("two-flips"), ab.load_vehicle("crazyflie")
+    problem, vehicle = ab.load_problem("section-v"), ab.load_vehicle("crazyflie")
     certified = dataclasses.replace(plan(), certificate=ab.certify(plan()), starts=(1.0, 2.0))
     certified.save(tmp_path / "a.plan")
     flight().save(tmp_path / "a.npz")
@@ -130,8 +130,8 @@ def test_notebooks_show_a_table_and_where_there_is_one_a_picture(name: str, told
 
 def test_a_plan_without_a_vehicle_has_a_table_and_no_picture() -> None:
     bare = dataclasses.replace(plan(), vehicle=None)
-    assert bare._repr_png_() is None  # type: ignore[attr-defined]
-    assert "short" in bare._repr_html_()  # type: ignore[attr-defined]
+    assert bare._repr_png_() is None
+    assert "short" in bare._repr_html_()
 
 
 def test_tables_hold_the_numbers_of_what_they_are_made_of() -> None:
