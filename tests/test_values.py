@@ -17,6 +17,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import aerobat as ab
+from aerobat.flatness import reference_of
 from public_calls import VALUES, flight, instance, plan
 
 LINE = 500  # letters: what a terminal shows in a few lines
@@ -84,6 +85,24 @@ def test_what_is_not_known_equals_what_is_not_known() -> None:
     one, other = (ab.BodyState(np.array([x, np.nan, 0]), *[np.zeros(3)] * 3) for x in (0.0, -0.0))
     assert one == other
     assert hash(one) == hash(other)
+
+
+def test_what_can_still_change_is_compared_as_it_is() -> None:
+    position = np.zeros(3)
+    one, other = ab.BodyState(position, *[np.zeros(3)] * 3), ab.BodyState(np.zeros(3), *[np.zeros(3)] * 3)
+    assert one == other
+    position[0] = 1.0
+    assert one != other
+    assert hash(one) != hash(other)
+
+
+def test_a_value_that_was_compared_is_used_as_before() -> None:
+    times = [0.0, 0.1]
+    flat = plan().trajectory.flat(times)
+    again = ab.reference(plan(), times=times).setpoint.flat
+    assert flat == again
+    hash(again)
+    assert reference_of(times, again, ab.load_vehicle("agile-quad")).setpoint.flat == flat
 
 
 class Markup(HTMLParser):
