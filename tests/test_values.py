@@ -5,6 +5,7 @@ from __future__ import annotations
 import copy
 import dataclasses
 import pickle
+import sys
 from base64 import b64encode
 from collections.abc import Callable
 from html.parser import HTMLParser
@@ -167,3 +168,11 @@ def test_tables_hold_the_numbers_of_what_they_are_made_of() -> None:
     assert ab.to_dataframe(plan()).empty
     compared = ab.to_dataframe(instance(ab.Comparison))
     assert compared["duration_s"].tolist() == [plan().duration]
+
+
+def test_without_pandas_a_table_says_how_to_get_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "pandas", None)
+    with pytest.raises(
+        ab.BackendMissing, match=r'needs pandas; install it with pip install "aerobat.pandas."$'
+    ):
+        ab.to_dataframe(flight())
