@@ -107,6 +107,10 @@ MEANT: dict[str, tuple[Callable[[], Any], str]] = {
         lambda: ab.load_plan("a\0b"),
         "load_plan: path must be a path, got 'a\\x00b'",
     ),
+    "a heading of the flight": (
+        lambda: ab.fly(plan(), yaw=90),
+        "FlightConfig.yaw is not a known key; ",
+    ),
     "a flight that is not there": (
         lambda: ab.fly(plan(), [QUAD, QUAD], rate=100.0)[2],
         "there are 2 flights, no flight 2; count from 0",
