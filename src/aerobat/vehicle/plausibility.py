@@ -11,6 +11,7 @@ from math import hypot, log, sqrt
 
 import numpy as np
 
+from aerobat.declaration import door
 from aerobat.vehicle.vehicle import Rotor, Vehicle
 
 MAX_ARM = 10.0  # [m] the widest passenger multirotors have rotors 5 m from their centre
@@ -45,6 +46,7 @@ class _Check:
     units: Units
 
 
+@door
 def implausibilities(vehicle: Vehicle) -> tuple[str, ...]:
     """Return a sentence for each kind of value that hardly any vehicle has, with the unit probably meant."""
     return (*_of_rotors(vehicle.rotors), *_of_inertia(vehicle), *_of_thrust(vehicle))
