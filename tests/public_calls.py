@@ -92,6 +92,7 @@ def _arguments(name: str, folder: Path) -> dict[str, Any]:
             **here,
             "config": ab.FlightConfig(rate=100.0, engine="floats"),
         },
+        "implausibilities": {"vehicle": agile},
         "import_plugin": {"path": saved["plugin"]},
         "load_flight": {"path": saved["flight"]},
         "load_plan": {"path": saved["plan"]},

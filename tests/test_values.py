@@ -5,6 +5,7 @@ from __future__ import annotations
 import copy
 import dataclasses
 import pickle
+import sys
 from base64 import b64encode
 from collections.abc import Callable
 from html.parser import HTMLParser
@@ -17,6 +18,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import aerobat as ab
+from aerobat.flatness import reference_of
 from public_calls import VALUES, flight, instance, plan
 
 LINE = 500  # letters: what a terminal shows in a few lines
@@ -52,7 +54,7 @@ def test_long_values_are_represented_by_their_line(value: Any) -> None:
 
 
 def test_what_is_read_from_its_file_equals_what_was_written(tmp_path: Path) -> None:
-    problem, vehicle = ab.load_problem("two-flips"), ab.load_vehicle("crazyflie")
+    problem, vehicle = ab.load_problem("section-v"), ab.load_vehicle("crazyflie")
     certified = dataclasses.replace(plan(), certificate=ab.certify(plan()), starts=(1.0, 2.0))
     certified.save(tmp_path / "a.plan")
     flight().save(tmp_path / "a.npz")
@@ -84,6 +86,24 @@ def test_what_is_not_known_equals_what_is_not_known() -> None:
     one, other = (ab.BodyState(np.array([x, np.nan, 0]), *[np.zeros(3)] * 3) for x in (0.0, -0.0))
     assert one == other
     assert hash(one) == hash(other)
+
+
+def test_what_can_still_change_is_compared_as_it_is() -> None:
+    position = np.zeros(3)
+    one, other = ab.BodyState(position, *[np.zeros(3)] * 3), ab.BodyState(np.zeros(3), *[np.zeros(3)] * 3)
+    assert one == other
+    position[0] = 1.0
+    assert one != other
+    assert hash(one) != hash(other)
+
+
+def test_a_value_that_was_compared_is_used_as_before() -> None:
+    times = [0.0, 0.1]
+    flat = plan().trajectory.flat(times)
+    again = ab.reference(plan(), times=times).setpoint.flat
+    assert flat == again
+    hash(again)
+    assert reference_of(times, again, ab.load_vehicle("agile-quad")).setpoint.flat == flat
 
 
 class Markup(HTMLParser):
@@ -130,8 +150,8 @@ def test_notebooks_show_a_table_and_where_there_is_one_a_picture(name: str, told
 
 def test_a_plan_without_a_vehicle_has_a_table_and_no_picture() -> None:
     bare = dataclasses.replace(plan(), vehicle=None)
-    assert bare._repr_png_() is None  # type: ignore[attr-defined]
-    assert "short" in bare._repr_html_()  # type: ignore[attr-defined]
+    assert bare._repr_png_() is None
+    assert "short" in bare._repr_html_()
 
 
 def test_tables_hold_the_numbers_of_what_they_are_made_of() -> None:
@@ -148,3 +168,11 @@ def test_tables_hold_the_numbers_of_what_they_are_made_of() -> None:
     assert ab.to_dataframe(plan()).empty
     compared = ab.to_dataframe(instance(ab.Comparison))
     assert compared["duration_s"].tolist() == [plan().duration]
+
+
+def test_without_pandas_a_table_says_how_to_get_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "pandas", None)
+    with pytest.raises(
+        ab.BackendMissing, match=r'needs pandas; install it with pip install "aerobat.pandas."$'
+    ):
+        ab.to_dataframe(flight())

@@ -64,11 +64,13 @@ def _equal(self: Any, other: object) -> Any:
 
 
 def _hash(self: Any) -> int:
-    """The content's hash, computed once: vehicles and trajectories are keys of caches."""
+    """The content's hash, kept where nothing can change it: vehicles and trajectories are keys of caches."""
     known: int | None = self.__dict__.get("_hash")
     if known is None:
         known = hash((type(self).__qualname__, _content(self)))
-        object.__setattr__(self, "_hash", known)
+        parts = (getattr(self, field.name) for field in dataclasses.fields(self))
+        if not any(isinstance(part, np.ndarray) and part.flags.writeable for part in parts):
+            object.__setattr__(self, "_hash", known)
     return known
 
 

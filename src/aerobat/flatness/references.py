@@ -7,7 +7,7 @@ RA-L 2018); of unequal ones across the mean is taken.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -113,7 +113,8 @@ def reference_of(
     """
     environment = environment or Environment()
     times = _rising(times)
-    flat = FlatState(**{name: frozen(x, name, (len(times), 3)) for name, x in vars(flat).items()})
+    parts = {field.name: getattr(flat, field.name) for field in fields(flat)}
+    flat = FlatState(**{name: frozen(x, name, (len(times), 3)) for name, x in parts.items()})
     if any(series.ndim != 2 for series in vars(flat).values()):
         raise SpecError("the flat states must be one series, with a row for each time and no further axes")
     path = _frames(times, _thrust(flat, vehicle, environment), environment, heading)

@@ -43,7 +43,8 @@ def to_dataframe(table: Flight | Plan | Comparison | Scores) -> DataFrame:
     try:
         from pandas import DataFrame
     except ImportError:
-        raise BackendMissing("to_dataframe needs pandas; pip install 'aerobat[pandas]'") from None
+        remedy = 'pip install "aerobat[pandas]"'
+        raise BackendMissing(f"to_dataframe needs pandas; install it with {remedy}") from None
     if isinstance(table, Plan):
         return DataFrame([asdict(attempt) for attempt in table.attempts], columns=_names(Attempt))
     if isinstance(table, Comparison):

@@ -1,0 +1,152 @@
+"""Names for objects, plans for trajectories, and a sentence for what is meant otherwise."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable
+from math import inf, pi
+from typing import Any
+
+import numpy as np
+import pytest
+
+import aerobat as ab
+from public_calls import NoPlan, flight, plan
+from refusals import complaint
+
+LINE = ab.load_problem("line")
+QUAD = ab.load_vehicle("agile-quad")
+
+
+def test_a_problem_a_planner_and_a_vehicle_go_by_their_names() -> None:
+    assert ab.plan("line").trajectory == ab.plan(LINE, "miqp").trajectory
+    with pytest.raises(ab.Infeasible, match="nothing to be found"):
+        ab.plan("line", NoPlan(), "agile-quad")
+    with pytest.raises(ab.Infeasible, match="no planner finds a plan for 'line' on agile-quad"):
+        ab.compare("line", "agile-quad", [("none", NoPlan())])
+    assert ab.fly(plan(), "agile-quad", rate=100.0, engine="floats") == flight()
+    assert ab.fly(plan(), ["agile-quad"] * 2, rate=100.0).vehicles == ("agile-quad",) * 2
+    assert ab.score(flight(), "line", "agile-quad").outcome is ab.Outcome.COMPLETE
+    assert len(ab.score_flights(plan(), "agile-quad", problem="line", rate=100.0)) == 1
+    assert ab.certify(plan().trajectory, "agile-quad") == ab.certify(plan())
+
+
+def test_a_plan_stands_for_its_trajectory_its_vehicle_and_its_environment(tmp_path: Any) -> None:
+    windy = ab.Environment(gravity=5.0, wind=(1.0, 0.0, 0.0))
+    elsewhere = dataclasses.replace(plan(), problem=dataclasses.replace(plan().problem, environment=windy))
+    trajectory = plan().trajectory
+    assert ab.certify(elsewhere) == ab.certify(trajectory, QUAD, windy)
+    assert ab.reference(elsewhere, rate=10.0) == ab.reference(trajectory, QUAD, rate=10.0, environment=windy)
+    ab.save_trajectory(plan(), tmp_path / "a.npz")
+    ab.write_csv(plan(), tmp_path / "a.csv")
+    assert ab.load_trajectory(tmp_path / "a.npz") == trajectory
+    assert ab.read_csv(tmp_path / "a.csv").duration == trajectory.duration
+
+
+def test_a_plan_is_drawn_without_a_flight_and_a_flight_with_the_vehicle_of_its_plan() -> None:
+    titles = [text.get_text() for text in ab.draw(plan()).texts]
+    assert any("short" in title and "agile-quad" in title for title in titles)
+    mine = dataclasses.replace(QUAD, name="mine")
+    own = dataclasses.replace(plan(), vehicle=mine)
+    flown = ab.fly(own, rate=100.0)
+    assert ab.draw(flown, own).texts
+    assert complaint(lambda: ab.draw(flown)).startswith("no vehicle named 'mine'")
+    assert complaint(lambda: ab.draw(dataclasses.replace(plan(), vehicle=None))).startswith("vehicle is miss")
+
+
+MEANT: dict[str, tuple[Callable[[], Any], str]] = {
+    "a vehicle for the planner": (
+        lambda: ab.plan(LINE, QUAD),
+        "plan: planner must be a Planner or a name, got a Vehicle; did you mean vehicle=...?",
+    ),
+    "a vehicle's name for the planner": (
+        lambda: ab.plan("line", "agile-quad"),
+        "'agile-quad' is a vehicle, not a planner; give vehicle='agile-quad'",
+    ),
+    "a planner that is not made": (
+        lambda: ab.plan(LINE, ab.Miqp),
+        "planner must be a Planner or a name, got the class Miqp; make one, as Miqp()",
+    ),
+    "a vehicle for the plan": (
+        lambda: ab.fly(QUAD, plan()),
+        "fly: plan must be a plan or a Trajectory, got a Vehicle; did you mean vehicle=...?",
+    ),
+    "a misspelt problem": (
+        lambda: ab.plan("flip-rol"),
+        "no problem named 'flip-rol'; did you mean 'flip-roll'? Known: ",
+    ),
+    "a quantity that is none": (
+        lambda: ab.Condition("thrust", (0.0, 0.0, 1.0), lower=1.0),
+        "Condition.quantity must be 'position', 'velocity', 'acceleration' or ",
+    ),
+    "a derivative that is none": (
+        lambda: LINE.limits.of(9),
+        "Limits.of: derivative must be 5 or less, got 9",
+    ),
+    "a negative derivative": (
+        lambda: plan().trajectory.evaluate(0.0, -1),
+        "derivative must be a whole number from 0 to 31, got -1",
+    ),
+    "samples beyond all memory": (
+        lambda: plan().trajectory.sample(1e15),
+        "rate must ask for 10000000 samples at most, 1000000000000000.0 asks ",
+    ),
+    "a mass in text": (
+        lambda: dataclasses.replace(QUAD, mass="0.85"),
+        "Vehicle.mass must be a number, got '0.85'",
+    ),
+    "a folder in a problem's name": (
+        lambda: dataclasses.replace(LINE, name="../../up"),
+        "Problem.name must be letters, digits, spaces, points and dashes, got '../../up'",
+    ),
+    "a line's end in a problem's name": (
+        lambda: dataclasses.replace(LINE, name="a\nb"),
+        "Problem.name must be one line of text, got 'a\\nb'",
+    ),
+    "a NUL in a path": (
+        lambda: ab.load_plan("a\0b"),
+        "load_plan: path must be a path, got 'a\\x00b'",
+    ),
+    "a heading of the flight": (
+        lambda: ab.fly(plan(), yaw=90),
+        "FlightConfig.yaw is not a known key; ",
+    ),
+    "a flight that is not there": (
+        lambda: ab.fly(plan(), [QUAD, QUAD], rate=100.0)[2],
+        "there are 2 flights, no flight 2; count from 0",
+    ),
+}
+
+
+@pytest.mark.parametrize("case", MEANT)
+def test_what_is_meant_otherwise_is_told_in_a_sentence(case: str) -> None:
+    call, said = MEANT[case]
+    assert complaint(call).startswith(said)
+
+
+DEGREES: dict[str, Callable[[float], Any]] = {
+    "heading": lambda angle: dataclasses.replace(LINE, heading=angle),
+    "tilt": lambda angle: ab.tilted_gate((0.0, 0.0, 0.0), tilt=angle),
+    "elevation": lambda angle: ab.tilted_gate((0.0, 0.0, 0.0), elevation=angle),
+    "Trajectory: heading": lambda angle: dataclasses.replace(plan().trajectory, heading=angle),
+    "Envelope.tilt": lambda angle: ab.Envelope(tilt=angle),
+    "Gate.tilted: tilt": lambda angle: ab.tilted_gate((0.0, 0.0, 0.0)).tilted(angle),
+}
+
+
+@pytest.mark.parametrize("name", DEGREES)
+def test_degrees_where_radians_are_meant_are_told_in_radians(name: str) -> None:
+    said = complaint(lambda: DEGREES[name](90.0))
+    assert f"{name} must be an angle in radians, from -2π to 2π, got 90; 90° is 1.571 rad" in said
+    assert complaint(lambda: DEGREES[name](2.0 * pi)) == ""
+
+
+def test_a_tilt_without_limit_and_any_number_of_degrees_are_what_they_say() -> None:
+    assert ab.Envelope(tilt=inf) == ab.Envelope()
+    assert ab.Flip(axis_deg=270.0).axis_deg == 270.0
+
+
+def test_numbers_of_numpy_are_numbers() -> None:
+    assert ab.fly(plan(), rate=np.float32(100.0), engine="floats") == flight()
+    assert ab.Miqp(intervals=np.int64(12)).intervals == 12
+    assert plan().trajectory.sample(np.float64(10.0)).tolist() == plan().trajectory.sample(10.0).tolist()
