@@ -5,14 +5,15 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Mapping
 from itertools import groupby
-from math import isinf, isnan
+from math import degrees, isinf, isnan
 
 from rich.console import Console
 from rich.table import Table
+from rich.text import Text
 
 from aerobat.certification import Certificate, Finding, Side, Verdict
 from aerobat.evaluation.score import Score
-from aerobat.planning import Plan
+from aerobat.planning import Assessment, Plan
 from aerobat.problem import Problem
 from aerobat.simulation.outcome import length
 from aerobat.vehicle import Vehicle
@@ -121,7 +122,7 @@ def _finding_row(finding: Finding) -> tuple[str, ...]:
     )
 
 
-def plan_facts(plan: Plan) -> Iterable[tuple[str, str]]:
+def plan_facts(plan: Plan) -> Iterable[tuple[str, str | Text]]:
     """Facts of a plan, each with its name."""
     order = "" if plan.order is None else f", order {plan.order}"
     backend = f", {plan.backend}" if plan.backend else ""
@@ -147,6 +148,19 @@ def plan_facts(plan: Plan) -> Iterable[tuple[str, str]]:
         yield "proof", ("" if plan.certificate.certified else "not certified: ") + plan.certificate.why
     if plan.flyability is not None:
         yield "flyability", str(plan.flyability)
+    if plan.assessment is not None:
+        yield from _assessment_facts(plan.assessment)
+
+
+def _assessment_facts(found: Assessment) -> Iterable[tuple[str, str | Text]]:
+    """Rows about what is possible and about room and rates; warnings in red."""
+    if not found.poor:
+        yield "possible", found.sentence
+    angles = ((found.max_tilt, "of tilt"), (found.max_body_rate, "a second"))
+    turned = [f"{degrees(angle):.0f}° {what}" for angle, what in angles if angle is not None]
+    yield "reaches", ", ".join([str(found.room), f"{found.max_speed:.1f} m/s", *turned])
+    for warning in found.warnings:
+        yield "warning", Text(warning, style="red")
 
 
 def _optimality(plan: Plan) -> str:
