@@ -8,10 +8,10 @@ limited.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import inf, log1p, sqrt
+from math import expm1, inf, log1p, sqrt
 
 UNDAMPED = 1e-7  # [1/s] a smaller damping is lost in rounding
-HALVINGS = 45  # of the largest speed's interval
+HALVINGS = 40  # of the interval of times in which it speeds up
 
 
 @dataclass(frozen=True)
@@ -34,50 +34,53 @@ class DampedPoint:
             start: Velocity at the start [m/s].
             end: Velocity at the end [m/s].
         """
-        slowest = max(start, end)
-        fastest = self._fastest()
-        if min(self.forward, self.backward) <= 0.0 or not slowest < fastest:
+        slowest, terminal = max(start, end), self._terminal_speed
+        if min(self.forward, self.backward) <= 0.0 or slowest >= min(self.max_speed, terminal):
             return 0.0
-        covered, time = self._by_way_of(slowest, start, end)
+        shortest = self._speeding_time(start, slowest)
+        covered, time = self._by_way_of(shortest, start, end)
         if covered >= distance:
             return time
-        if fastest < inf and self.max_speed <= fastest:
-            covered, time = self._by_way_of(self.max_speed, start, end)
+        if self.max_speed < terminal:
+            covered, time = self._by_way_of(self._speeding_time(start, self.max_speed), start, end)
             if covered <= distance:
                 return time + (distance - covered) / self.max_speed
-        return self._by_way_of(self._peak(distance, start, end, slowest), start, end)[1]
+        return self._by_way_of(self._longest_speeding(distance, start, end, shortest), start, end)[1]
 
-    def _fastest(self) -> float:
-        """The speed [m/s] that is never exceeded."""
-        return min(self.max_speed, inf if self.damping < UNDAMPED else self.forward / self.damping)
+    @property
+    def _terminal_speed(self) -> float:
+        """The speed [m/s] at which drag takes all of the thrust."""
+        return inf if self.damping < UNDAMPED else self.forward / self.damping
 
-    def _peak(self, distance: float, start: float, end: float, slowest: float) -> float:
-        """A largest speed [m/s] with which so much or a little less is covered."""
-        undamped = sqrt(
-            (2.0 * distance + start**2 / self.forward + end**2 / self.backward)
-            / (1.0 / self.forward + 1.0 / self.backward)
-        )
+    def _speeding_time(self, start: float, speed: float) -> float:
+        """How long [s] it takes to a speed."""
         if self.damping < UNDAMPED:
-            return undamped
-        low, high = slowest, self._fastest()
+            return (speed - start) / self.forward
+        return -log1p(-self.damping * (speed - start) / (self.forward - self.damping * start)) / self.damping
+
+    def _longest_speeding(self, distance: float, start: float, end: float, shortest: float) -> float:
+        """How long [s] it speeds up, or a little less, to cover so much."""
+        if self.damping < UNDAMPED:
+            squared = 2.0 * distance + start**2 / self.forward + end**2 / self.backward
+            return self._speeding_time(start, sqrt(squared / (1.0 / self.forward + 1.0 / self.backward)))
+        low, step = shortest, sqrt(2.0 * distance / self.forward)
+        while self._by_way_of(low + step, start, end)[0] < distance:
+            low, step = low + step, 2.0 * step
         for _ in range(HALVINGS):
-            middle = 0.5 * (low + high)
-            if self._by_way_of(middle, start, end)[0] < distance:
-                low = middle
-            else:
-                high = middle
+            step *= 0.5
+            if self._by_way_of(low + step, start, end)[0] < distance:
+                low += step
         return low
 
-    def _by_way_of(self, peak: float, start: float, end: float) -> tuple[float, float]:
-        """The distance [m] and the time [s] of speeding up to a speed and slowing down from it."""
-        covered = time = 0.0
-        for thrust, initial, final in ((self.forward, start, peak), (-self.backward, peak, end)):
-            change = final - initial
-            if self.damping < UNDAMPED:
-                part = change / thrust
-                covered += 0.5 * (initial + final) * part
-            else:
-                part = -log1p(-self.damping * change / (thrust - self.damping * initial)) / self.damping
-                covered += (thrust * part - change) / self.damping
-            time += part
-        return covered, time
+    def _by_way_of(self, speeding: float, start: float, end: float) -> tuple[float, float]:
+        """The distance [m] and the time [s] of speeding up for so long [s] and slowing down from there."""
+        if self.damping < UNDAMPED:
+            peak = start + self.forward * speeding
+            slowing = (peak - end) / self.backward
+            return 0.5 * (start + peak) * speeding + 0.5 * (peak + end) * slowing, speeding + slowing
+        k, terminal = self.damping, self._terminal_speed
+        peak = start - (terminal - start) * expm1(-k * speeding)
+        slowing = log1p(k * (peak - end) / (self.backward + k * end)) / k
+        up = terminal * speeding - (peak - start) / k
+        down = ((peak - end) - self.backward * slowing) / k
+        return up + down, speeding + slowing
