@@ -13,7 +13,9 @@ from aerobat.cli.entry import main
 from aerobat.planning import Plan, with_assessment, with_second_opinion
 from aerobat.planning.miqp.remedies import advice
 from aerobat.planning.rotor_margin import RotorMargin
+from aerobat.reporting.figures import report_figure
 from aerobat.reporting.report_json import report
+from aerobat.reporting.style import RED
 from aerobat.reporting.tables import summary_table
 from aerobat.vehicle import Rotor
 
@@ -180,3 +182,15 @@ def test_no_shortfall_of_a_rotor_reads_as_nothing(thrust: float, short: float) -
     assert "-0.00 " not in told
     assert " 0.00 N too little" not in told
     assert f"{short:.2g}" in told or f"{short:.2f}" in told
+
+
+def test_a_page_tells_warnings_in_red_and_nothing_else_on_it_is_red() -> None:
+    """But what rotors do beyond their limits: there are none such here."""
+    far = along([(0.0, 0.0, 1.0), (2.0, 400.0, 1.3), (4.0, 0.0, 1.0)], 60.0)
+    near = along([(0.0, 0.0, 1.0), (2.0, 0.4, 1.3), (4.0, 0.0, 1.0)])
+    for found, warnings in ((far, 1), (near, 0)):
+        figure = report_figure(found, QUAD)
+        said = [text.get_text() for text in figure.texts if text.get_color() == RED]
+        assert len(said) == warnings
+        lines = [line for axes in figure.axes for line in axes.lines]
+        assert RED not in [line.get_color() for line in lines]

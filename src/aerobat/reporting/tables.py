@@ -156,8 +156,8 @@ def _assessment_facts(found: Assessment) -> Iterable[tuple[str, str | Text]]:
     """Rows about what is possible and about room and rates; warnings in red."""
     if not found.poor:
         yield "possible", found.sentence
-    angles = ((found.max_tilt, "of tilt"), (found.max_body_rate, "a second"))
-    turned = [f"{degrees(angle):.0f}° {what}" for angle, what in angles if angle is not None]
+    angles = ((found.max_tilt, "° of tilt"), (found.max_body_rate, "°/s"))
+    turned = [f"{degrees(angle):.0f}{unit}" for angle, unit in angles if angle is not None]
     yield "reaches", ", ".join([str(found.room), f"{found.max_speed:.1f} m/s", *turned])
     for warning in found.warnings:
         yield "warning", Text(warning, style="red")

@@ -1,6 +1,6 @@
 """A lower bound on the duration of any motion that solves a problem, by physics alone, in milliseconds.
 
-The derivation is in docs/theory.md, section 12. Along each of a few directions a vehicle is a point of
+The derivation is in docs/theory.md, section 13. Along each of a few directions a vehicle is a point of
 bounded thrust, damped by its drag, which comes to rest wherever it turns; and its thrust axis has to turn
 from the attitude of one stage to that of the next. Whatever else is left out could only take longer.
 """
