@@ -8,6 +8,7 @@ from .flatness import Reference, reference
 from .interchange.csv import read_csv, write_csv
 from .interchange.read import read_plan, read_trajectory
 from .planning import (
+    Assessment,
     BisectionSearch,
     FreeKnots,
     GridSearch,
@@ -22,6 +23,7 @@ from .planning import (
     plan,
     planner,
     registered_planners,
+    with_second_opinion,
 )
 from .problem import (
     Attitude,
@@ -61,6 +63,7 @@ from .vehicle import Rotor, Vehicle, implausibilities, load_vehicle, vehicle_nam
 
 __all__ = [
     "AerobatError",
+    "Assessment",
     "Attitude",
     "BackendMissing",
     "BisectionSearch",
@@ -147,6 +150,7 @@ __all__ = [
     "to_dataframe",
     "tracking_figure",
     "vehicle_names",
+    "with_second_opinion",
     "write_csv",
     "write_problem",
     "write_vehicle",

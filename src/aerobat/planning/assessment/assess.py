@@ -9,6 +9,7 @@ import numpy as np
 
 from aerobat.arrays import Array
 from aerobat.certification import Certificate, Side
+from aerobat.declaration import door
 from aerobat.errors import BackendMissing, Infeasible, SpecError
 from aerobat.planning.assessment.assessment import Assessment, Box, Point, SecondOpinion
 from aerobat.planning.assessment.lower_bound import least_duration
@@ -30,10 +31,12 @@ def with_assessment(plan: Plan) -> Plan:
     return replace(plan, assessment=_assessment(plan, plan.vehicle))
 
 
+@door
 def with_second_opinion(plan: Plan, progress: Progress | None = None) -> Plan:
     """The plan; where its assessment finds it suspicious, with what free knots make of the same problem.
 
-    They begin from the plan. That takes a second or two of the processor. Time-optimal plans need none.
+    They begin from the plan. That takes a second or two of the processor. Time-optimal plans need none, and a
+    plan whose time was limited gets none.
     Raises SpecError without a vehicle.
 
     Args:
@@ -43,7 +46,7 @@ def with_second_opinion(plan: Plan, progress: Progress | None = None) -> Plan:
     plan = plan if plan.assessment is not None else with_assessment(plan)
     assessment = plan.assessment
     assert assessment is not None
-    if not assessment.suspicious or plan.planner == "time-optimal":
+    if not assessment.suspicious or plan.planner == "time-optimal" or plan.status == "time_limit":
         return plan
     return replace(plan, assessment=replace(assessment, opinion=_second_opinion(plan, progress)))
 
