@@ -51,7 +51,15 @@ def ignored(attempt: object) -> None:
     pass
 
 
-RESULTS = ("Gradient", "Passage", "Score", "Scores", "Sensitivity", "Reference")  # made by no user
+RESULTS = (
+    "Assessment",
+    "Gradient",
+    "Passage",
+    "Score",
+    "Scores",
+    "Sensitivity",
+    "Reference",
+)  # made by no user
 NOT_CALLED = ("AerobatError", "BackendMissing", "Infeasible", "SpecError", "Maneuver", "Planner")
 ENUMS = ("ContinuityRule", "Outcome", "Quantity", "TimeScaling")
 
@@ -98,7 +106,6 @@ def _arguments(name: str, folder: Path) -> dict[str, Any]:
         "load_plan": {"path": saved["plan"]},
         "load_problem": {"name": "line"},
         "load_trajectory": {"path": saved["trajectory"]},
-        "implausibilities": {"vehicle": ab.load_vehicle("agile-quad")},
         "import_vehicle": {"path": Path(__file__).parent / "cases" / "robots" / "iris.sdf"},
         "load_vehicle": {"name_or_path": "agile-quad"},
         "maneuver": {"kind": "x"},
@@ -152,6 +159,7 @@ def _arguments(name: str, folder: Path) -> dict[str, Any]:
         },
         "to_dataframe": {"table": plan()},
         "tracking_figure": {"plan": plan(), "vehicle": agile, "flight": flight()},
+        "with_second_opinion": {"plan": plan(), "progress": None},
         "vehicle_names": {},
         "write_csv": {"trajectory": plan().trajectory, "path": folder / "saved.csv", "rate": 100.0},
         "write_problem": {"problem": plan().problem, "path": folder / "saved.toml"},

@@ -9,6 +9,7 @@ from .interchange.csv import read_csv, write_csv
 from .interchange.read import read_plan, read_trajectory
 from .interchange.robots import import_vehicle
 from .planning import (
+    Assessment,
     BisectionSearch,
     FreeKnots,
     GridSearch,
@@ -23,6 +24,7 @@ from .planning import (
     plan,
     planner,
     registered_planners,
+    with_second_opinion,
 )
 from .problem import (
     Attitude,
@@ -62,6 +64,7 @@ from .vehicle import Rotor, Vehicle, implausibilities, load_vehicle, vehicle_nam
 
 __all__ = [
     "AerobatError",
+    "Assessment",
     "Attitude",
     "BackendMissing",
     "BisectionSearch",
@@ -149,6 +152,7 @@ __all__ = [
     "to_dataframe",
     "tracking_figure",
     "vehicle_names",
+    "with_second_opinion",
     "write_csv",
     "write_problem",
     "write_vehicle",

@@ -20,8 +20,10 @@ from aerobat.planning import (
     plan,
     planner_class,
     planner_options,
+    with_assessment,
     with_certificate,
     with_flyability,
+    with_second_opinion,
 )
 from aerobat.problem import Problem, load_problem, problem_names
 from aerobat.vehicle import Vehicle, implausibilities, load_vehicle
@@ -75,10 +77,11 @@ def plan_of(record: RunRecord) -> Plan:
     assert record.planner is not None, "a plan that came from a file is not made"
     with planning_progress(record.planner_name) as progress:
         if not record.paper:
-            return plan(record.problem, record.planner, record.vehicle, progress.record)
+            found = plan(record.problem, record.planner, record.vehicle, progress.record)
+            return with_second_opinion(found, progress.record)
         # the paper plans without a vehicle; whether this one can fly it is told all the same
         found = plan(record.problem, record.planner, progress=progress.record)
-        return with_flyability(with_certificate(found, record.vehicle))
+        return _told(found, record.vehicle)
 
 
 def plan_source(name: str) -> Path | None:
@@ -125,9 +128,15 @@ def _read_plan(path: Path, options: PlanningOptions) -> Plan:
     found = read_plan(path)
     if not isinstance(found, Plan):
         raise SpecError(f"{path} holds a path alone and no plan; give a .plan file")
-    if options.vehicle is None and found.vehicle is not None:
-        return found if found.flyability is not None else with_flyability(found)
-    return with_flyability(with_certificate(found, named_vehicle(options.vehicle or default_vehicle())))
+    if options.vehicle is not None or found.vehicle is None:
+        return _told(found, named_vehicle(options.vehicle or default_vehicle()))
+    found = found if found.flyability is not None else with_flyability(found)
+    return found if found.assessment is not None else with_assessment(found)
+
+
+def _told(found: Plan, vehicle: Vehicle) -> Plan:
+    """The plan with all that is told of a vehicle which it was not made for."""
+    return with_assessment(with_flyability(with_certificate(found, vehicle)))
 
 
 def _is_given(value: Any) -> bool:

@@ -54,9 +54,14 @@ _MEANING = {
 }
 
 
+def has_casadi() -> bool:
+    """True if CasADi is installed."""
+    return find_spec("casadi") is not None
+
+
 def import_casadi() -> Any:
     """The casadi module. Raises BackendMissing, with the command that installs it, where it is not there."""
-    if find_spec("casadi") is None:
+    if not has_casadi():
         raise BackendMissing('nonlinear programs need CasADi; install it with pip install "aerobat[casadi]"')
     return import_module("casadi")
 

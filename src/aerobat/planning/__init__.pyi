@@ -1,3 +1,6 @@
+from .assessment.assess import with_assessment, with_second_opinion
+from .assessment.assessment import Assessment, Box, SecondOpinion
+from .assessment.lower_bound import least_duration
 from .certified_solve import Judged, Solution, certified_solve, with_certificate
 from .flyability import flight_error, nominal_flight, with_flyability
 from .miqp import Miqp
@@ -23,8 +26,10 @@ from .time_optimal.time_optimal import TimeOptimal
 
 __all__ = [
     "FLYABLE_ERROR",
+    "Assessment",
     "Attempt",
     "BisectionSearch",
+    "Box",
     "Flyability",
     "FreeKnots",
     "GridSearch",
@@ -37,12 +42,14 @@ __all__ = [
     "PlannerOption",
     "Recorder",
     "RotorMargin",
+    "SecondOpinion",
     "Solution",
     "TimeOptimal",
     "TimeScaling",
     "as_planner",
     "certified_solve",
     "flight_error",
+    "least_duration",
     "load_plan",
     "nominal_flight",
     "option",
@@ -51,6 +58,8 @@ __all__ = [
     "planner_class",
     "planner_options",
     "registered_planners",
+    "with_assessment",
     "with_certificate",
     "with_flyability",
+    "with_second_opinion",
 ]

@@ -171,13 +171,13 @@ def planned_passages(
 
 
 def with_certificate(plan: Plan, vehicle: Vehicle) -> Plan:
-    """The plan with the certificate of a vehicle, whichever it was made for; not flown by it yet.
+    """The plan with the certificate of a vehicle, whichever it was made for; not flown nor assessed yet.
 
     Raises SpecError for a vehicle that its dead rotors leave without control.
     """
     vehicle = vehicle.without_dead_rotors()
     certificate = certificate_for(plan.trajectory, plan.problem, vehicle, plan.stages)
-    return replace(plan, vehicle=vehicle, certificate=certificate, flyability=None)
+    return replace(plan, vehicle=vehicle, certificate=certificate, flyability=None, assessment=None)
 
 
 def tightened(bounds: Limits, limits: Limits, trajectory: Trajectory, derivatives: int) -> Limits | None:

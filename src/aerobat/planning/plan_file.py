@@ -3,7 +3,7 @@
 A .plan file is a NumPy .npz archive without pickles. Its arrays `durations` (S,), `coefficients`
 (S, degree + 1, 3) and `heading` are the trajectory's, bit for bit; `document` holds, as UTF-8 JSON, the rest:
 the problem and the vehicle as the tables of their files, how the plan was made, its stages, attempts,
-certificate and flyability, and the version of Aerobat that wrote it.
+certificate, flyability and assessment, and the version of Aerobat that wrote it.
 """
 
 from __future__ import annotations
@@ -18,6 +18,7 @@ import numpy as np
 from aerobat.certification import Certificate
 from aerobat.declaration import PathName, door, from_table, to_table
 from aerobat.errors import SpecError
+from aerobat.planning.assessment.assessment import Assessment
 from aerobat.planning.recorder import Attempt
 from aerobat.planning.result import Flyability, PlacedStage, Plan
 from aerobat.problem.problem import Problem
@@ -44,6 +45,7 @@ class _Evidence:
     gap: float | None
     certificate: Certificate | None
     flyability: Flyability | None = None
+    assessment: Assessment | None = None
     rescue: str = ""
     starts: tuple[float, ...] = ()
 

@@ -17,6 +17,7 @@ from pydantic import Field
 
 from aerobat.declaration import Label, Registry, door, shown
 from aerobat.errors import SpecError
+from aerobat.planning.assessment.assess import with_assessment
 from aerobat.planning.certified_solve import with_certificate
 from aerobat.planning.flyability import with_flyability
 from aerobat.planning.recorder import Progress
@@ -61,7 +62,7 @@ def plan(
     vehicle: Vehicle | str | None = None,
     progress: Progress | None = None,
 ) -> Plan:
-    """Plan a problem; with a vehicle, for its rotors, with its certificate and its own simulated flight.
+    """Plan a problem; with a vehicle, for its rotors, with its certificate, its own flight, its assessment.
 
     A plan is for the rotors that give thrust, and counts them without the dead ones. Raises Infeasible, whose
     message names the bound that binds and whose `attempts` hold the evidence, and SpecError for input that
@@ -82,7 +83,8 @@ def plan(
     found = as_planner(planner).plan(problem, vehicle, progress)
     if vehicle is None:
         return found
-    return with_flyability(found if found.certificate is not None else with_certificate(found, vehicle))
+    certified = found if found.certificate is not None else with_certificate(found, vehicle)
+    return with_assessment(with_flyability(certified))
 
 
 def as_planner(planner: Planner | str) -> Planner:

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 from aerobat.certification import Certificate
 from aerobat.declaration import PathName, by_value, door, in_notebooks, short
+from aerobat.planning.assessment.assessment import Assessment
 from aerobat.planning.recorder import Attempt
 from aerobat.planning.rotor_margin import RotorMargin
 from aerobat.problem.problem import Problem
@@ -84,6 +85,7 @@ class Plan:
     vehicle: Vehicle | None = None  # what it was planned or certified for
     certificate: Certificate | None = None  # for the vehicle, over continuous time
     flyability: Flyability | None = None  # of the vehicle's own flight, simulated
+    assessment: Assessment | None = None  # beside what is possible and usual, for the vehicle
     rescue: str = ""  # what found it, where what was asked for found nothing
     starts: tuple[float, ...] = ()  # [s] that first, coarse solves from several starts came to, rising
 
@@ -143,10 +145,11 @@ class Plan:
         margin = "" if self.margin is None else f"; rotors {self.margin}"
         proof = "" if self.certificate is None else f"; {self.certificate}"
         flown = "" if self.flyability is None else f"; {self.flyability}"
+        assessed = "" if self.assessment is None else f"; {self.assessment}"
         rescue = f"; {self.rescue}" if self.rescue else ""
         dt = "" if self.dt is None else f" of {self.dt:.4f} s"
         backend = f" ({self.backend})" if self.backend else ""
         return (
             f"{self.problem.name}: {self.duration:.3f} s in {self.intervals} intervals{dt}, {self.status} by "
-            f"{self.planner}{backend}; {stages}{margin}{proof}{flown}{rescue}"
+            f"{self.planner}{backend}; {stages}{margin}{proof}{flown}{assessed}{rescue}"
         )

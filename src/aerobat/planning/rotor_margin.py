@@ -58,14 +58,13 @@ class RotorMargin:
 
     def __str__(self) -> str:
         """The outcome in a few words."""
-        words = f"{self.min_thrust:.2f} to {self.max_thrust:.2f} N, "
+        words = f"{_newtons(self.min_thrust)} to {_newtons(self.max_thrust)} N, "
+        off = f"{_newtons(abs(self.margin))} N"
         if self.margin >= 0:
-            return words + f"within limits by {self.margin:.2f} N"
+            return words + f"within limits by {off}"
         if self.low_margin < self.high_margin:
-            return (
-                words + f"{-self.margin:.2f} N too little for rotor {self.min_rotor} at {self.min_time:.3f} s"
-            )
-        return words + f"{-self.margin:.2f} N too much for rotor {self.max_rotor} at {self.max_time:.3f} s"
+            return words + f"{off} too little for rotor {self.min_rotor} at {self.min_time:.3f} s"
+        return words + f"{off} too much for rotor {self.max_rotor} at {self.max_time:.3f} s"
 
 
 def sampled_margin(trajectory: Trajectory, vehicle: Vehicle, environment: Environment) -> RotorMargin:
@@ -94,6 +93,11 @@ def sampled_margin(trajectory: Trajectory, vehicle: Vehicle, environment: Enviro
 def rotor_findings(certificate: Certificate, side: Side) -> list[Finding]:
     """Findings of a certificate about each rotor's thrust, and its command if it lags, on one side."""
     return [f for f in certificate.findings if f.quantity.startswith("rotor ") and f.side is side]
+
+
+def _newtons(thrust: float) -> str:
+    """A thrust with two decimals, or two digits where those would show too little of it."""
+    return f"{thrust:.2f}" if abs(thrust) >= 0.095 or thrust == 0.0 else f"{thrust:.2g}"
 
 
 def _closest(certificate: Certificate, side: Side) -> Finding:

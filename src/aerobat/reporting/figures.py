@@ -161,7 +161,8 @@ def _pictures(
     """A page with its two pictures, and the bottoms [in] of its rows of timelines, top row first."""
     layout = PICTURES_STACKED if reference.is_flat else PICTURES_SIDE_BY_SIDE
     foot = AXIS + PITCH * (rows - 1) + ROW + TITLES
-    figure = blank_page(foot + layout.height, f"{plan.problem.name} · {vehicle.name}", facts)
+    warnings = () if plan.assessment is None else plan.assessment.warnings
+    figure = blank_page(foot + layout.height, f"{plan.problem.name} · {vehicle.name}", facts, warnings)
     path, stages = (
         panel(figure, left, foot + bottom, width, height)
         for left, bottom, width, height in (layout.path, layout.stages)

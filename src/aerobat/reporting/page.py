@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, cast
 import numpy as np
 
 from aerobat.arrays import Array
-from aerobat.reporting.style import HEADLINE, MUTED, NORMAL, RC, SMALL, TITLE
+from aerobat.reporting.style import HEADLINE, MUTED, NORMAL, RC, RED, SMALL, TITLE
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -39,17 +39,25 @@ def house_style() -> Iterator[None]:
         yield
 
 
-def blank_page(height: float, title: str, facts: Sequence[str]) -> Figure:
-    """A page with its title and lines of facts under it; `height` [in] is what remains below them."""
+def blank_page(height: float, title: str, facts: Sequence[str], warnings: Sequence[str] = ()) -> Figure:
+    """A page with its title and lines under it.
+
+    Args:
+        height: What remains below them [in].
+        title: The page's.
+        facts: A line each.
+        warnings: A line each, in red.
+    """
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
-    figure = Figure(figsize=(PAGE_WIDTH, height + HEAD + FACT * len(facts)), dpi=DPI)
+    lines = [*((fact, MUTED) for fact in facts), *((warning, RED) for warning in warnings)]
+    figure = Figure(figsize=(PAGE_WIDTH, height + HEAD + FACT * len(lines)), dpi=DPI)
     FigureCanvasAgg(figure)
     top = figure.get_size_inches()[1]
     write(figure, MARGIN, top - 0.34, title, size=HEADLINE, weight="bold", va="center")
-    for k, fact in enumerate(facts):
-        write(figure, MARGIN, top - 0.62 - FACT * k, fact, size=NORMAL, color=MUTED, va="center")
+    for k, (line, colour) in enumerate(lines):
+        write(figure, MARGIN, top - 0.62 - FACT * k, line, size=NORMAL, color=colour, va="center")
     return figure
 
 

@@ -8,7 +8,7 @@ from math import inf
 from typing import Any
 
 from aerobat.evaluation.score import Score
-from aerobat.planning import Flyability, Plan
+from aerobat.planning import Assessment, Flyability, Plan
 from aerobat.vehicle import implausibilities
 
 
@@ -60,6 +60,22 @@ def _flyability(found: Flyability) -> dict[str, Any]:
     }
 
 
+def _assessment(found: Assessment) -> dict[str, Any]:
+    return {
+        "least_duration_s": found.least_duration,
+        "ratio": None if found.ratio == inf else found.ratio,
+        "poor": found.poor,
+        "second_opinion": found.opinion and asdict(found.opinion),
+        "room_m": [list(found.room.lower), list(found.room.upper)],
+        "lowest_m": found.lowest,
+        "max_speed_m_s": found.max_speed,
+        "max_tilt_rad": found.max_tilt,
+        "max_body_rate_rad_s": found.max_body_rate,
+        "warnings": list(found.warnings),
+        "sentence": str(found),
+    }
+
+
 def _plan(plan: Plan) -> dict[str, Any]:
     margin = plan.margin
     return {
@@ -99,4 +115,5 @@ def _plan(plan: Plan) -> dict[str, Any]:
         "rotor_feasible": plan.certificate and plan.certificate.certified,
         "certificate": plan.certificate and plan.certificate.record(),
         "flyability": plan.flyability and _flyability(plan.flyability),
+        "assessment": plan.assessment and _assessment(plan.assessment),
     }

@@ -5,17 +5,20 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Mapping
 from itertools import groupby
-from math import isinf, isnan
+from math import degrees, isinf, isnan
 
 from rich.console import Console
 from rich.table import Table
+from rich.text import Text
 
 from aerobat.certification import Certificate, Finding, Side, Verdict
 from aerobat.evaluation.score import Score
-from aerobat.planning import Plan
+from aerobat.planning import Assessment, Plan
 from aerobat.problem import Problem
 from aerobat.simulation.outcome import length
 from aerobat.vehicle import Vehicle
+
+Fact = tuple[str, str | Text]  # a name, and what is to be said
 
 
 def summary_table(plan: Plan, score: Score | None, vehicle: str, controller: str | None = None) -> Table:
@@ -27,13 +30,13 @@ def summary_table(plan: Plan, score: Score | None, vehicle: str, controller: str
         vehicle: the name of what flew it.
         controller: the name of the controller that did.
     """
-    facts = {"plan": plan_facts(plan)}
+    facts: dict[str, Iterable[Fact]] = {"plan": plan_facts(plan)}
     if score is not None:
         facts["flight"] = flight_facts(score, controller)
     return facts_table(f"{plan.problem.name} · {vehicle}", facts)
 
 
-def facts_table(title: str, facts: Mapping[str, Iterable[tuple[str, str]]]) -> Table:
+def facts_table(title: str, facts: Mapping[str, Iterable[Fact]]) -> Table:
     """Facts, one a row, under their headings."""
     table = Table(title=title or None, title_justify="left", show_header=False, box=None)
     table.add_column(style="bold", no_wrap=True)
@@ -121,7 +124,7 @@ def _finding_row(finding: Finding) -> tuple[str, ...]:
     )
 
 
-def plan_facts(plan: Plan) -> Iterable[tuple[str, str]]:
+def plan_facts(plan: Plan) -> Iterable[Fact]:
     """Facts of a plan, each with its name."""
     order = "" if plan.order is None else f", order {plan.order}"
     backend = f", {plan.backend}" if plan.backend else ""
@@ -147,6 +150,19 @@ def plan_facts(plan: Plan) -> Iterable[tuple[str, str]]:
         yield "proof", ("" if plan.certificate.certified else "not certified: ") + plan.certificate.why
     if plan.flyability is not None:
         yield "flyability", str(plan.flyability)
+    if plan.assessment is not None:
+        yield from _assessment_facts(plan.assessment)
+
+
+def _assessment_facts(found: Assessment) -> Iterable[Fact]:
+    """Rows about what is possible and about room and rates; warnings in red."""
+    if not found.poor:
+        yield "possible", found.sentence
+    angles = ((found.max_tilt, "° of tilt"), (found.max_body_rate, "°/s"))
+    turned = [f"{degrees(angle):.0f}{unit}" for angle, unit in angles if angle is not None]
+    yield "reaches", ", ".join([str(found.room), f"{found.max_speed:.1f} m/s", *turned])
+    for warning in found.warnings:
+        yield "warning", Text(warning, style="red")
 
 
 def _optimality(plan: Plan) -> str:
@@ -157,7 +173,7 @@ def _optimality(plan: Plan) -> str:
     return f"within {100 * plan.gap:.2g} % of the optimum"
 
 
-def flight_facts(score: Score, controller: str | None = None) -> Iterable[tuple[str, str]]:
+def flight_facts(score: Score, controller: str | None = None) -> Iterable[Fact]:
     """Facts of a flight, each with its name."""
     yield "outcome", score.sentence
     if controller is not None:

@@ -99,7 +99,7 @@ def compare(
         if isinstance(planner, TimeOptimal):
             begin(f"{name} again")
             found[i] = _improved(found[i], planner, found, progress)
-    entries = tuple(found)
+    entries = tuple(_with_twin(entry, found[:i]) for i, entry in enumerate(found))
     if all(entry.plan is None for entry in entries):
         raise Infeasible(
             f"no planner finds a plan for '{problem.name}' on {vehicle.name}: {entries[0].outcome}"
@@ -144,6 +144,16 @@ def _improved(
     return replace(again, note=note, planning_time=entry.planning_time + again.planning_time)
 
 
+def _with_twin(entry: Entry, before: Sequence[Entry]) -> Entry:
+    """The entry, with a note where one before it has the very same path."""
+    for other in before:
+        same = entry.plan and other.plan and entry.plan.trajectory == other.plan.trajectory
+        if same:
+            notes = (entry.note, f"the same path as {other.planner}'s")
+            return replace(entry, note="; ".join(filter(None, notes)))
+    return entry
+
+
 def _entry(
     name: str,
     planner: Planner,
@@ -159,4 +169,6 @@ def _entry(
     spent = perf_counter() - started
     flight = fly(found, vehicle)
     flown = score(flight, found, vehicle)
-    return Entry(name, found, flight, flown, spent, flown.sentence)
+    warnings = () if found.assessment is None else found.assessment.warnings
+    note = "; ".join(filter(None, (found.rescue, *warnings)))
+    return Entry(name, found, flight, flown, spent, flown.sentence, note)

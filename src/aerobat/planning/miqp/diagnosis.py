@@ -1,4 +1,7 @@
-"""Why nothing feasible was found: which bound binds, and what would free it."""
+"""Why nothing feasible was found: which bound binds, and what would free it.
+
+Nothing is advised that was not tried.
+"""
 
 from __future__ import annotations
 
@@ -26,10 +29,7 @@ def why_infeasible(formulation: Formulation, attempts: Sequence[Attempt], vehicl
     solved = [a for a in attempts if a.cost is not None]
     if solved and vehicle is not None:
         best = max(solved, key=lambda a: -inf if a.margin is None else a.margin).outcome
-        return (
-            f"{said} that {vehicle.name} can fly: at best, {best}; lower the maneuver's thrusts, "
-            "move the gate nearer, or take a stronger vehicle"
-        )
+        return f"{said} that {vehicle.name} can fly: at best, {best}"
     binding = list(_binding(formulation, tried))
     if not binding:
         return (

@@ -19,6 +19,7 @@ from aerobat.planning.miqp.diagnosis import why_infeasible
 from aerobat.planning.miqp.formulation import Formulation
 from aerobat.planning.miqp.integrator import IntegratorChain, Intervals, Order
 from aerobat.planning.miqp.refinement import descent, settled
+from aerobat.planning.miqp.remedies import advice
 from aerobat.planning.miqp.rescue import rescued_plan
 from aerobat.planning.miqp.shortest import shortest
 from aerobat.planning.planners import Planner, option, planner
@@ -86,9 +87,12 @@ class Miqp(Planner):
                 if vehicle is None or not self.rescue or not infeasible.attempts:
                     raise
                 rescued = rescued_plan(self, problem, vehicle, recorder)
-                if rescued is None:
+                if rescued is not None:
+                    return rescued
+                if out_of_time() or not any(attempt.cost is not None for attempt in infeasible.attempts):
                     raise
-                return rescued
+                advised = f"{infeasible}; {advice(self, problem, vehicle)}"
+                raise Infeasible(advised, infeasible.attempts) from None
 
     def _planned(self, problem: Problem, vehicle: Vehicle | None, recorder: Recorder) -> Plan:
         order = default_order(problem, vehicle) if self.order is None else self.order

@@ -63,7 +63,8 @@ class FreeKnots(Planner):
     def plan(
         self, problem: Problem, vehicle: Vehicle | None = None, progress: Progress | None = None
     ) -> Plan:
-        """The fastest certified plan found; the plan that it began from, where none is faster.
+        """The fastest certified plan found; where none is faster, one of fewer segments, or the plan that it
+        began from, which `rescue` then says.
 
         Raises SpecError without a vehicle and for input that makes no sense, Infeasible when nothing is
         certified, BackendMissing without CasADi.
@@ -80,8 +81,7 @@ class FreeKnots(Planner):
                 raise too_short(problem, self.time_limit, recorder.attempts)
         raise Infeasible(
             f"no polynomials are certified to fly '{problem.name}' with {vehicle.name}: at the last attempt "
-            f"{recorder.attempts[-1].outcome}; widen what binds there, ask less of the stages, or give more "
-            "segments",
+            f"{recorder.attempts[-1].outcome}; widen what binds there, or give other --segments",
             recorder.attempts,
         )
 
@@ -99,7 +99,7 @@ class FreeKnots(Planner):
                     descent.run(guess, segments)
             if descent.best is None and not out_of_time():
                 descent.run(guess, 2 * self.segments)
-            if (found := descent.plan()) is not None:
+            if (found := descent.plan(self.segments)) is not None:
                 return found
             if out_of_time():
                 break

@@ -147,13 +147,16 @@ class Descent:
                 return
             program.go_on_from(found.solution.source.guess)
 
-    def plan(self) -> Plan | None:
-        """The plan of what is certified, its start's path where that is the best; None if nothing is."""
+    def plan(self, segments: int) -> Plan | None:
+        """The plan of what is certified, its start's path where that is the best; None if nothing is.
+
+        It says so where the best has not so many `segments`.
+        """
         if self.best is None:
             return None
         path, start = self.best.solution.source.guess, self.best.solution.source.start
-        segments = np.searchsorted(path.trajectory.knots[1:-1], path.times, side="right").tolist()
-        stages = zip(path.stages, segments, path.times, strict=True)
+        numbers = np.searchsorted(path.trajectory.knots[1:-1], path.times, side="right").tolist()
+        stages = zip(path.stages, numbers, path.times, strict=True)
         return self.best.plan(
             self.recorder,
             planner="free-knots",
@@ -161,6 +164,7 @@ class Descent:
             status=CONVERGED if start is None else "feasible",
             backend="ipopt" if start is None else start.backend,
             stages=tuple(PlacedStage(s.name, segment, time, s.gate) for s, segment, time in stages),
+            rescue=_instead(start, path.trajectory.segments, segments),
         )
 
     def _certified(self, program: _Start | _Exchange, rounds: int) -> Judged[Path] | None:
@@ -172,6 +176,15 @@ class Descent:
         if self.best is None or found.solution.duration < self.best.solution.duration:
             self.best = found
         return found
+
+
+def _instead(start: Plan | None, found: int, asked: int) -> str:
+    """A sentence about what is returned instead of a path of so many segments, if anything is."""
+    if start is not None:
+        return f"free-knots found none faster than the path that it began from, {start.planner}'s"
+    if found != asked:
+        return f"free-knots found none faster with {asked} segments; planned with {found}"
+    return ""
 
 
 @dataclass

@@ -1,0 +1,135 @@
+"""What is to be said of a plan beside its proof: how near it is to what is possible, and where it goes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import degrees, dist, inf, radians
+
+POOR = 1.4  # times a duration that is possible: a plan that takes longer is poor
+SUSPICIOUS = 2.0  # times the lower bound, which falls short of what is possible by up to so much
+DIVE = 1.0  # [m] below all that is asked for, the height at which indoor flights often start
+ASTRAY = 5.0  # [m] beyond all that is asked for, and beyond its size again: no flip needs so much room
+GYRO_RANGE = radians(2000.0)  # [rad/s] of common gyroscopes
+
+Point = tuple[float, float, float]
+
+
+@dataclass(frozen=True)
+class Box:
+    """A box along the world's axes."""
+
+    lower: Point  # [m]
+    upper: Point  # [m]
+
+    @property
+    def size(self) -> float:
+        """The length of its diagonal [m]."""
+        return dist(self.lower, self.upper)
+
+    def excess(self, other: Box) -> float:
+        """How far it goes beyond another, along the axis on which it goes farthest [m]."""
+        below = (b - a for a, b in zip(self.lower, other.lower, strict=True))
+        above = (a - b for a, b in zip(self.upper, other.upper, strict=True))
+        return max(*below, *above, 0.0)
+
+    def __str__(self) -> str:
+        ends = zip("xyz", self.lower, self.upper, strict=True)
+        spans = (
+            f"{axis} {round(low, 2) + 0.0:.2f} to {round(high, 2) + 0.0:.2f}" for axis, low, high in ends
+        )
+        return ", ".join(spans) + " m"  # what is zero but for rounding reads as zero
+
+
+@dataclass(frozen=True)
+class SecondOpinion:
+    """Another planner's answer to the same problem, made where a plan is suspicious."""
+
+    options: str  # of the command line, by which it is planned
+    duration: float | None  # [s] of a plan that is certified and flies; None: none was found
+    missing: str = ""  # why it could not be asked for
+
+
+@dataclass(frozen=True)
+class Assessment:
+    """A plan beside what is possible, and beside the room and the rates that are usual."""
+
+    duration: float  # [s] of the plan
+    least_duration: float  # [s] that no motion of the vehicle that solves the problem falls short of
+    room: Box  # that the path stays in
+    asked: Box  # of start, goal, gates and wherever stages ask to be
+    max_speed: float  # [m/s]
+    max_tilt: float | None  # [rad]; None where no attitude is determined
+    max_body_rate: float | None  # [rad/s]; None likewise
+    ground: float | None = None  # [m] of the environment, which the certificate is about
+    rate_limit: float = inf  # [rad/s] of the vehicle, likewise
+    opinion: SecondOpinion | None = None  # where there is one
+
+    @property
+    def lowest(self) -> float:
+        """The height of the lowest point [m]."""
+        return self.room.lower[2]
+
+    @property
+    def dive(self) -> float:
+        """How far the lowest point lies below all that is asked for [m]."""
+        return max(self.asked.lower[2] - self.lowest, 0.0)
+
+    @property
+    def ratio(self) -> float:
+        """The duration over the lower bound; infinite where that is zero."""
+        return self.duration / self.least_duration if self.least_duration else inf
+
+    @property
+    def suspicious(self) -> bool:
+        """True if the duration is so much above the lower bound that only another plan tells what it is."""
+        return self.ratio > SUSPICIOUS
+
+    @property
+    def poor(self) -> bool:
+        """True if a second opinion is so much shorter."""
+        known = None if self.opinion is None else self.opinion.duration
+        return known is not None and self.duration > POOR * known
+
+    @property
+    def sentence(self) -> str:
+        """How near the duration is to what is possible, in a sentence without its full stop."""
+        at_most = "how near to the shortest possible is not known"
+        if self.ratio < inf:
+            least = f"{self.least_duration:.3f} s or more"
+            at_most = f"at most {self.ratio:.2f} times the shortest possible, which takes {least}"
+        if self.opinion is None:
+            return at_most
+        if self.opinion.missing:
+            return f"{at_most}; no second opinion: {self.opinion.missing}"
+        if self.opinion.duration is None:
+            return f"{at_most}; {self.opinion.options} finds none that is shorter"
+        found = f"{self.opinion.duration:.3f} s ({self.opinion.options})"
+        if self.poor:
+            times = self.duration / self.opinion.duration
+            return f"poor: {times:.1f} times as long as need be; free-knots finds {found}"
+        return f"{at_most}; free-knots finds {found}"
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What a person should know before flying it, each a sentence without its full stop."""
+        found = [self.sentence] if self.poor else []
+        if self.room.excess(self.asked) > ASTRAY + self.asked.size:
+            found.append(
+                f"goes astray: {self.room.excess(self.asked):.0f} m beyond start, goal, gates and stages, "
+                f"which lie within {self.asked.size:.3g} m; give limits.lower and limits.upper"
+            )
+        if self.ground is None and self.dive > DIVE:
+            found.append(
+                f"dives {self.dive:.1f} m below start, goal, gates and stages, to z = {self.lowest:.2f} m; "
+                "give environment.ground to keep it above"
+            )
+        if self.rate_limit == inf and (self.max_body_rate or 0.0) > GYRO_RANGE:
+            found.append(
+                f"turns at {degrees(self.max_body_rate or 0.0):.0f}°/s, more than common gyroscopes measure, "
+                f"{degrees(GYRO_RANGE):.0f}°/s; give the vehicle's max_body_rate"
+            )
+        return tuple(found)
+
+    def __str__(self) -> str:
+        """All of it in one sentence without its full stop."""
+        return "; ".join([*self.warnings] if self.poor else [self.sentence, *self.warnings])

@@ -1,0 +1,86 @@
+"""The least time in which a point moves along a line, its thrust bounded and its velocity damped.
+
+ẍ = c − k ẋ with c between two bounds is linear with real eigenvalues, so that the fastest motion thrusts
+forward all the way up to its largest speed and backward from there, with a cruise between where the speed is
+limited.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import expm1, inf, log1p, sqrt
+
+UNDAMPED = 1e-7  # [1/s] a smaller damping is lost in rounding
+HALVINGS = 40  # of the interval of times in which it speeds up
+
+
+@dataclass(frozen=True)
+class DampedPoint:
+    """A point on a line."""
+
+    forward: float  # [m/s²] the largest thrust per mass, positive
+    backward: float  # [m/s²] the same against the direction, positive
+    damping: float = 0.0  # [1/s] k
+    max_speed: float = inf  # [m/s] forward
+
+    def least_time(self, distance: float, start: float = 0.0, end: float = 0.0) -> float:
+        """The least time [s] that a motion forward takes; 0 where it could not be made at all.
+
+        Where one speed cannot become the other within the distance without turning back, the time of that
+        change alone.
+
+        Args:
+            distance: How far [m], not negative.
+            start: Velocity at the start [m/s].
+            end: Velocity at the end [m/s].
+        """
+        slowest, terminal = max(start, end), self._terminal_speed
+        if min(self.forward, self.backward) <= 0.0 or slowest >= min(self.max_speed, terminal):
+            return 0.0
+        shortest = self._speeding_time(start, slowest)
+        covered, time = self._by_way_of(shortest, start, end)
+        if covered >= distance:
+            return time
+        if self.max_speed < terminal:
+            covered, time = self._by_way_of(self._speeding_time(start, self.max_speed), start, end)
+            if covered <= distance:
+                return time + (distance - covered) / self.max_speed
+        return self._by_way_of(self._longest_speeding(distance, start, end, shortest), start, end)[1]
+
+    @property
+    def _terminal_speed(self) -> float:
+        """The speed [m/s] at which drag takes all of the thrust."""
+        return inf if self.damping < UNDAMPED else self.forward / self.damping
+
+    def _speeding_time(self, start: float, speed: float) -> float:
+        """How long [s] it takes to a speed."""
+        if self.damping < UNDAMPED:
+            return (speed - start) / self.forward
+        return -log1p(-self.damping * (speed - start) / (self.forward - self.damping * start)) / self.damping
+
+    def _longest_speeding(self, distance: float, start: float, end: float, shortest: float) -> float:
+        """How long [s] it speeds up, or a little less, to cover so much."""
+        if self.damping < UNDAMPED:
+            squared = 2.0 * distance + start**2 / self.forward + end**2 / self.backward
+            return self._speeding_time(start, sqrt(squared / (1.0 / self.forward + 1.0 / self.backward)))
+        low, step = shortest, sqrt(2.0 * distance / self.forward)
+        while self._by_way_of(low + step, start, end)[0] < distance:
+            low, step = low + step, 2.0 * step
+        for _ in range(HALVINGS):
+            step *= 0.5
+            if self._by_way_of(low + step, start, end)[0] < distance:
+                low += step
+        return low
+
+    def _by_way_of(self, speeding: float, start: float, end: float) -> tuple[float, float]:
+        """The distance [m] and the time [s] of speeding up for so long [s] and slowing down from there."""
+        if self.damping < UNDAMPED:
+            peak = start + self.forward * speeding
+            slowing = (peak - end) / self.backward
+            return 0.5 * (start + peak) * speeding + 0.5 * (peak + end) * slowing, speeding + slowing
+        k, terminal = self.damping, self._terminal_speed
+        peak = start - (terminal - start) * expm1(-k * speeding)
+        slowing = log1p(k * (peak - end) / (self.backward + k * end)) / k
+        up = terminal * speeding - (peak - start) / k
+        down = ((peak - end) - self.backward * slowing) / k
+        return up + down, speeding + slowing

@@ -1,0 +1,275 @@
+"""A lower bound on the duration of any motion that solves a problem, by physics alone, in milliseconds.
+
+The derivation is in docs/theory.md, section 13. Along each of a few directions a vehicle is a point of
+bounded thrust, damped by its drag, which comes to rest wherever it turns; and its thrust axis has to turn
+from the attitude of one stage to that of the next. Whatever else is left out could only take longer.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from enum import Enum
+from itertools import pairwise, product
+from math import inf, pi, sqrt
+
+import numpy as np
+
+from aerobat.arrays import Array
+from aerobat.flatness import force_balance
+from aerobat.flatness.references import axial_drag
+from aerobat.planning.assessment.damped_point import DampedPoint
+from aerobat.problem.condition import Condition, ForceBalance, Quantity
+from aerobat.problem.problem import EndState, Problem
+from aerobat.problem.stage import StageSequence
+from aerobat.so3 import UP
+from aerobat.vehicle import Vehicle
+
+PARALLEL = 1e-9  # [-] how near to 1 the cosine between two directions is that are one
+MANY_ROTORS = 12  # whose moments are bounded axis by axis: the vertices of all would be too many
+HALVINGS = 3  # of the interval of durations by which speeds are bounded
+
+
+def least_duration(problem: Problem, vehicle: Vehicle) -> float:
+    """The time [s] that no motion of the vehicle that solves the problem can fall short of.
+
+    Raises SpecError for gates that do not suit the maneuver.
+    """
+    sequence = problem.stages(vehicle.max_specific_thrust)
+    lines = [_Line.of(problem, vehicle, sequence, n) for n in _directions(problem, sequence)]
+
+    def moving(duration: float) -> float:
+        thrust = _max_thrust(problem, vehicle, duration)
+        return max(line.least_time(thrust) for line in lines)
+
+    longest = moving(0.0)
+    shortest = longest if axial_drag(vehicle) == 0.0 else _least_consistent(moving, longest)
+    return max(shortest, _turning_time(problem, vehicle, sequence))
+
+
+def _least_consistent(least: Callable[[float], float], longest: float) -> float:
+    """A time T [s] that no motion falls short of, where those of duration T take `least(T)`, which falls."""
+    shortest = least(longest)
+    for _ in range(HALVINGS):
+        middle = 0.5 * (shortest + longest)
+        if (there := least(middle)) > middle:
+            shortest = middle
+        else:
+            shortest, longest = max(shortest, there), middle
+    return shortest
+
+
+def _max_thrust(problem: Problem, vehicle: Vehicle, duration: float) -> float:
+    """The largest |f| [m/s²] within a duration.
+
+    Where drag along the thrust axis differs from that across it, the airspeed adds to it. Drag only ever
+    slows, so that in the duration no more airspeed is gained than thrust and weight give.
+    """
+    environment, drag = problem.environment, abs(axial_drag(vehicle))
+    if drag == 0.0:
+        return vehicle.max_specific_thrust
+    pull = vehicle.max_specific_thrust + environment.gravity
+    gained = float(np.linalg.norm(problem.start.velocity - environment.wind)) + pull * duration
+    limited = float(np.linalg.norm(problem.limits.velocity) + np.linalg.norm(environment.wind))
+    return vehicle.max_specific_thrust + drag * min(gained, limited)
+
+
+def _directions(problem: Problem, sequence: StageSequence) -> Iterator[Array]:
+    """The axes, those of conditions on the position, and those between points that are met."""
+    found = [*np.eye(3)]
+    found += [c.direction for s in sequence.stages for c in s.conditions if c.quantity is Quantity.POSITION]
+    points = [problem.start.position, *(g.position for g in problem.gates), problem.goal.position]
+    found += [b - a for a, b in pairwise(points)]
+    seen: list[Array] = []
+    for vector in found:
+        length = float(np.linalg.norm(vector))
+        if length > 0.0 and not any(_along(vector, other) for other in seen):
+            seen.append(vector / length)
+            yield seen[-1]
+
+
+def _along(vector: Array, direction: Array) -> float:
+    """The factor by which a vector is a multiple of a unit vector; 0 where it is none."""
+    factor = float(vector @ direction)
+    return factor if abs(factor) >= (1.0 - PARALLEL) * float(np.linalg.norm(vector)) else 0.0
+
+
+class _Turn(Enum):
+    """The manner in which a line is met at a place."""
+
+    ABOVE = "at or beyond it"
+    BELOW = "at or short of it"
+    AT = "there"
+
+
+@dataclass(frozen=True)
+class _Place:
+    """A place on a line that is met in its turn; what lies above or below it turns there, so is at rest."""
+
+    turn: _Turn
+    position: float  # [m]
+    velocity: float = 0.0  # [m/s]
+
+
+@dataclass(frozen=True)
+class _Line:
+    """A problem seen along one direction."""
+
+    groups: tuple[tuple[_Place, ...], ...]  # start, what each stage asks, goal
+    ordered: bool
+    lower: float  # [m/s²] of the thrust along it that is allowed throughout
+    upper: float  # [m/s²]
+    constant: float  # [m/s²] of the thrust along it, what does not accelerate
+    damping: float  # [1/s]
+    max_speed: float  # [m/s]
+
+    @classmethod
+    def of(cls, problem: Problem, vehicle: Vehicle, sequence: StageSequence, direction: Array) -> _Line:
+        """A problem's line of a direction, (3,)."""
+        balance = force_balance(problem.environment, vehicle)
+        lower, upper = _range(Quantity.SPECIFIC_THRUST, sequence.path_constraints, direction)
+        crossed = np.flatnonzero(direction)
+        speeds = np.asarray(problem.limits.velocity)[crossed]
+        ends = (
+            (_Place(_Turn.AT, float(end.position @ direction), float(end.velocity @ direction)),)
+            for end in (problem.start, problem.goal)
+        )
+        start, goal = ends
+        return cls(
+            groups=(start, *(_places(stage.conditions, direction) for stage in sequence.stages), goal),
+            ordered=sequence.ordered,
+            lower=lower,
+            upper=upper,
+            constant=float(balance.constant @ direction),
+            damping=balance.drag,
+            max_speed=float(np.abs(direction[crossed]) @ speeds),
+        )
+
+    def least_time(self, max_thrust: float) -> float:
+        """The longest of the least times [s] by way of places that have to be met one after another.
+
+        Of stages in no order only one at a time counts.
+        """
+        forward = min(max_thrust, self.upper) - self.constant
+        backward = min(max_thrust, -self.lower) + self.constant
+        up = DampedPoint(forward, backward, self.damping, self.max_speed)
+        down = DampedPoint(backward, forward, self.damping, self.max_speed)
+        start, *stages, goal = self.groups
+        courses = [stages] if self.ordered or not stages else [[stage] for stage in stages]
+        return max(_longest([start, *course, goal], up, down) for course in courses)
+
+
+def _longest(groups: Sequence[Sequence[_Place]], up: DampedPoint, down: DampedPoint) -> float:
+    """The longest time [s] from the first place to the last by way of any of those between."""
+    longest = dict.fromkeys(groups[0], 0.0)
+    for group in groups[1:]:
+        reached = {
+            place: max(time + _leg(before, place, up, down) for before, time in longest.items())
+            for place in group
+        }
+        longest |= {place: max(time, longest.get(place, -inf)) for place, time in reached.items()}
+    return max(0.0, *reached.values())
+
+
+def _leg(a: _Place, b: _Place, up: DampedPoint, down: DampedPoint) -> float:
+    """The least time [s] from one place to another; -inf where the second does not ask to go on to it."""
+    distance = b.position - a.position
+    if distance == 0.0:
+        return up.least_time(0.0, a.velocity, b.velocity) if a.turn is b.turn is _Turn.AT else -inf
+    if distance > 0.0:
+        blocked = a.turn is _Turn.ABOVE or b.turn is _Turn.BELOW
+        return -inf if blocked else up.least_time(distance, a.velocity, b.velocity)
+    blocked = a.turn is _Turn.BELOW or b.turn is _Turn.ABOVE
+    return -inf if blocked else down.least_time(-distance, -a.velocity, -b.velocity)
+
+
+def _places(conditions: Sequence[Condition], direction: Array) -> tuple[_Place, ...]:
+    """The places along a direction that a stage asks to be met."""
+    lower, upper = _range(Quantity.POSITION, conditions, direction)
+    slow, fast = _range(Quantity.VELOCITY, conditions, direction)
+    found = [_Place(_Turn.ABOVE, lower), _Place(_Turn.BELOW, upper)]
+    if lower == upper and slow == fast:
+        found.append(_Place(_Turn.AT, lower, slow))
+    return tuple(place for place in found if abs(place.position) < inf)
+
+
+def _range(quantity: Quantity, conditions: Sequence[Condition], direction: Array) -> tuple[float, float]:
+    """The bounds that conditions put on a quantity along a direction."""
+    lower, upper = -inf, inf
+    asked = [c for c in conditions if c.quantity is quantity]
+    for condition in asked:
+        factor = _along(condition.direction, direction)
+        if factor != 0.0:
+            ends = sorted((condition.lower / factor, condition.upper / factor))
+            lower, upper = max(lower, ends[0]), min(upper, ends[1])
+    fixed = [c for c in asked if c.lower == c.upper]
+    if lower < upper and len(fixed) == 3:
+        rows = np.array([c.direction for c in fixed])
+        if np.linalg.matrix_rank(rows) == 3:
+            lower = upper = float(np.linalg.solve(rows, [c.lower for c in fixed]) @ direction)
+    return lower, upper
+
+
+def _turning_time(problem: Problem, vehicle: Vehicle, sequence: StageSequence) -> float:
+    """The least time [s] in which the thrust axis passes the attitudes that stages ask, one after another."""
+    attitudes = [stage.attitude for stage in sequence.stages if stage.attitude is not None]
+    cones = [_Cone(attitude.up, attitude.tolerance) for attitude in attitudes]
+    balance = force_balance(problem.environment, vehicle)
+    start, goal = (_Cone.of(end, balance) for end in (problem.start, problem.goal))
+    if not sequence.ordered:
+        return max((_turn(vehicle, start, cone) + _turn(vehicle, goal, cone) for cone in cones), default=0.0)
+    if not cones:
+        return 0.0
+    inner = sum(a.angle(b) for a, b in pairwise(cones)) / vehicle.max_body_rate
+    return _turn(vehicle, start, cones[0]) + inner + _turn(vehicle, goal, cones[-1])
+
+
+@dataclass(frozen=True, eq=False)
+class _Cone:
+    """Directions of the thrust, and at an end of the motion the rate at which it turns there."""
+
+    axis: Array  # a unit vector, (3,)
+    half_angle: float = 0.0  # [rad]
+    rate: float = 0.0  # [rad/s]
+
+    @classmethod
+    def of(cls, end: EndState, balance: ForceBalance) -> _Cone:
+        """The direction at an end, where jerk is zero and only drag may turn the thrust."""
+        thrust = balance.specific_thrust(end.velocity, end.acceleration)
+        norm = float(np.linalg.norm(thrust))
+        if norm == 0.0:
+            return cls(UP, half_angle=pi)
+        rate = balance.drag * float(np.linalg.norm(np.cross(thrust, end.acceleration))) / norm**2
+        return cls(thrust / norm, rate=rate)
+
+    def angle(self, other: _Cone) -> float:
+        """The least angle [rad] from a direction in one to a direction in the other."""
+        apart = float(np.arccos(np.clip(self.axis @ other.axis, -1.0, 1.0)))
+        return max(apart - self.half_angle - other.half_angle, 0.0)
+
+
+def _turn(vehicle: Vehicle, end: _Cone, cone: _Cone) -> float:
+    """The least time [s] from an end of the motion to an attitude, or back, whatever the rate there."""
+    angle, acceleration, limit = end.angle(cone), max_angular_acceleration(vehicle), vehicle.max_body_rate
+    if acceleration == inf or end.rate >= limit:
+        return angle / limit
+    spun_up = (limit - end.rate) / acceleration
+    if limit < inf and 0.5 * (limit + end.rate) * spun_up <= angle:
+        return spun_up + (angle - 0.5 * (limit + end.rate) * spun_up) / limit
+    return (sqrt(end.rate**2 + 2.0 * acceleration * angle) - end.rate) / acceleration
+
+
+def max_angular_acceleration(vehicle: Vehicle) -> float:
+    """A bound [rad/s²] on the angular acceleration about axes across the thrust, of a body without spin.
+
+    Infinite where products of inertia with the thrust axis tie it to the rate.
+    """
+    inertia = vehicle.inertia
+    if inertia[2, :2].any():
+        return inf
+    effects = np.linalg.solve(inertia[:2, :2], vehicle.allocation[1:3])  # [rad/s² per N], (2, n)
+    limits = np.stack([vehicle.min_thrusts, vehicle.max_thrusts])
+    if len(vehicle.rotors) > MANY_ROTORS:
+        return float(np.linalg.norm(np.max(limits[:, None] * effects, axis=0).sum(axis=1)))
+    vertices = effects @ np.array(list(product(*limits.T))).T
+    return float(np.linalg.norm(vertices, axis=0).max())

@@ -1,0 +1,200 @@
+"""A plan beside what is possible and usual: what is poor, goes astray, dives or spins too fast says so."""
+
+import json
+from dataclasses import replace
+from math import cos, radians, sin
+
+import numpy as np
+import pytest
+from rich.console import Console
+
+import aerobat as ab
+from aerobat.cli.entry import main
+from aerobat.planning import Plan, with_assessment, with_second_opinion
+from aerobat.planning.miqp.remedies import advice
+from aerobat.planning.rotor_margin import RotorMargin
+from aerobat.reporting.figures import report_figure
+from aerobat.reporting.report_json import report
+from aerobat.reporting.style import RED
+from aerobat.reporting.tables import summary_table
+from aerobat.vehicle import Rotor
+
+QUAD = ab.load_vehicle("agile-quad")
+LINE = ab.Problem("line", ab.at_rest((0.0, 0.0, 1.0)), ab.at_rest((4.0, 0.0, 1.0)))
+
+
+def nimble(drag_body: tuple[float, float, float]) -> ab.Vehicle:
+    """The quadrotor of 0.65 kg and rotors of 14 N with which a double flip once took 29 s."""
+    rotors = tuple(
+        Rotor((0.1 * x, 0.1 * y, 0.0), spin, 0.1, 14.0, 0.014, 0.0, 0.0635)
+        for x, y, spin in ((1, 1, -1), (-1, -1, -1), (1, -1, 1), (-1, 1, 1))
+    )
+    return ab.Vehicle("nimble", 0.65, (0.003, 0.003, 0.005), rotors, drag_body)
+
+
+def double_flip() -> ab.Problem:
+    """Seven stages, a quarter of a turn apart, in place."""
+    stages = []
+    for angle in np.arange(90.0, 720.0, 90.0):
+        along = (0.0, -sin(radians(angle)), cos(radians(angle)))
+        across = (0.0, cos(radians(angle)), sin(radians(angle)))
+        conditions = (
+            ab.Condition("specific_thrust", along, lower=6.0),
+            ab.Condition("specific_thrust", across, 0.0, 0.0),
+        )
+        stages.append(ab.Stage(f"{angle:g}°", conditions))
+    there = ab.at_rest((0.0, 0.0, 1.0))
+    return ab.Problem("double-flip", there, there, ab.CustomManeuver(tuple(stages)))
+
+
+def along(positions: list[tuple[float, float, float]], duration: float = 4.0) -> Plan:
+    """A plan of LINE by way of points at equal times, assessed."""
+    fixed = [
+        [p, *(None,) * 3] if 0 < i < len(positions) - 1 else [p, *((0.0,) * 3,) * 3]
+        for i, p in enumerate(positions)
+    ]
+    values = np.full((len(positions), 4, 3), np.nan)
+    for i, row in enumerate(fixed):
+        for k, value in enumerate(row):
+            if value is not None:
+                values[i, k] = value
+    path = ab.minimum_effort(values, np.full(len(positions) - 1, duration / (len(positions) - 1)))
+    return with_assessment(Plan(LINE, path, "by hand", vehicle=QUAD))
+
+
+def test_a_half_flip_on_the_papers_vehicle_is_proven_near_the_best() -> None:
+    """It once took 8.48 s, where time-optimal takes 1.93, and nothing hinted at it."""
+    found = ab.plan(ab.load_problem("half-flip"), vehicle=ab.load_vehicle("section-v"))
+    assert found.assessment is not None
+    assert found.assessment.ratio < 1.4
+    assert found.assessment.warnings == ()
+
+
+@pytest.mark.parametrize("drag", [0.0, 0.3])
+def test_a_double_flip_that_is_poor_says_so_and_names_what_does_better(drag: float) -> None:
+    pytest.importorskip("casadi")
+    found = with_second_opinion(ab.plan(double_flip(), vehicle=nimble((drag, drag, drag / 2))))
+    assessment = found.assessment
+    assert assessment is not None
+    assert assessment.opinion is not None
+    assert assessment.opinion.duration is not None
+    assert assessment.poor == (found.duration > 1.4 * assessment.opinion.duration)
+    assert not assessment.poor or str(assessment).startswith("poor: ")
+    assert f"{assessment.opinion.duration:.3f} s (--planner free-knots --segments 2)" in str(found)
+
+
+def test_a_plan_that_is_proven_near_the_best_is_given_no_second_opinion() -> None:
+    found = ab.plan(ab.load_problem("line"), vehicle=QUAD)
+    assert with_second_opinion(found) is found
+
+
+def test_a_plan_of_a_hundred_times_its_size_raises_an_alarm() -> None:
+    near = along([(0.0, 0.0, 1.0), (2.0, 0.4, 1.3), (4.0, 0.0, 1.0)])
+    assert near.assessment is not None
+    assert near.assessment.warnings == ()
+    far = along([(0.0, 0.0, 1.0), (2.0, 400.0, 1.3), (4.0, 0.0, 1.0)])
+    assert "goes astray: 400 m beyond start, goal, gates and stages" in str(far)
+
+
+def test_a_dive_is_told_unless_a_ground_bounds_it() -> None:
+    found = along([(0.0, 0.0, 1.0), (2.0, 0.0, -1.5), (4.0, 0.0, 1.0)])
+    assert "dives 2.5 m below start, goal, gates and stages, to z = -1.50 m" in str(found)
+    bounded = replace(LINE, environment=ab.Environment(ground=-2.0))
+    told = with_assessment(replace(found, problem=bounded)).assessment
+    assert told is not None
+    assert told.warnings == ()
+
+
+def test_rates_beyond_common_gyroscopes_are_told_unless_the_vehicle_bounds_them() -> None:
+    found = ab.plan(LINE, vehicle=QUAD).assessment
+    assert found is not None
+    fast = replace(found, max_body_rate=radians(2070.0))
+    assert fast.warnings == ()  # within what the vehicle itself allows, which the certificate is about
+    (warning,) = replace(fast, rate_limit=np.inf).warnings
+    assert warning.startswith("turns at 2070°/s")
+
+
+def test_the_room_is_the_box_that_samples_of_the_path_fill() -> None:
+    found = ab.plan(ab.load_problem("flip-roll"), vehicle=QUAD)
+    assert found.assessment is not None
+    positions = found.trajectory.evaluate(np.linspace(0.0, found.duration, 4001))
+    np.testing.assert_allclose(found.assessment.room.lower, positions.min(axis=0), atol=1e-5)
+    np.testing.assert_allclose(found.assessment.room.upper, positions.max(axis=0), atol=1e-5)
+    speeds = np.linalg.norm(found.trajectory.evaluate(np.linspace(0.0, found.duration, 4001), 1), axis=-1)
+    assert found.assessment.max_speed == pytest.approx(speeds.max(), rel=1e-5)
+    assert found.assessment.max_tilt == pytest.approx(np.pi, abs=radians(3.0))
+    assert found.assessment.asked.upper[2] == 5.5
+
+
+def test_table_and_report_tell_the_assessment_and_the_table_its_warnings_in_red(tmp_path) -> None:
+    found = along([(0.0, 0.0, 1.0), (2.0, 0.0, -1.5), (4.0, 0.0, 1.0)])
+    found.save(tmp_path / "dive.plan")
+    assert ab.load_plan(tmp_path / "dive.plan").assessment == found.assessment
+    console = Console(width=200, force_terminal=True, color_system="standard")
+    with console.capture() as capture:
+        console.print(summary_table(found, None, "agile-quad"))
+    assert "\x1b[31mdives 2.5 m below" in capture.get()
+    told = report(found)["plan"]["assessment"]
+    assert told["lowest_m"] == pytest.approx(-1.5, abs=0.05)
+    assert told["ratio"] > 1.0
+    assert told["second_opinion"] is None
+    assert "dives" in told["warnings"][0]
+
+
+def test_the_command_line_tells_how_near_a_plan_is_to_what_is_possible(tmp_path, capsys) -> None:
+    main(["plan", "line", "--json", "--out", str(tmp_path / "out")])
+    told = json.loads(capsys.readouterr().out)["plan"]["assessment"]
+    assert told["sentence"].startswith(f"at most {told['ratio']:.2f} times the shortest possible")
+
+
+def test_equal_rows_of_a_comparison_say_so() -> None:
+    first, second = ab.compare(LINE, QUAD, [("one", ab.Miqp()), ("two", ab.Miqp())]).entries
+    assert (first.note, second.note) == ("", "the same path as one's")
+
+
+@pytest.mark.parametrize("iterations", [8, 20])
+def test_free_knots_say_what_they_return_in_place_of_so_many_segments(iterations: int) -> None:
+    pytest.importorskip("casadi")
+    start = ab.plan(LINE, vehicle=QUAD)
+    found = ab.plan(LINE, ab.FreeKnots(segments=6, start=start, iterations=iterations), QUAD)
+    assert bool(found.rescue) == (found.intervals != 6)
+    if found.duration == start.duration:
+        assert "none faster than the path that it began from, miqp's" in str(found)
+    elif found.rescue:
+        assert f"none faster with 6 segments; planned with {found.intervals}" in str(found)
+
+
+def test_advice_is_given_only_of_changes_that_were_followed_with_success() -> None:
+    """A line has no gate to move nearer; a vehicle too weak for a flip is helped by stronger rotors."""
+    weak = replace(QUAD, rotors=tuple(replace(r, max_thrust=2.2) for r in QUAD.rotors))
+    flip, asked = ab.load_problem("flip-roll"), ab.Miqp(intervals=12, rescue=False)
+    with pytest.raises(ab.Infeasible) as refusal:
+        ab.plan(flip, asked, weak)
+    assert "stronger" not in str(refusal.value)
+    assert "gate" not in str(refusal.value)
+    told = advice(asked, flip, weak)
+    assert "it is planned with 1.5 times the max_thrust" in told
+    strong = replace(weak, rotors=tuple(replace(r, max_thrust=3.3) for r in weak.rotors))
+    assert ab.plan(flip, asked, strong).certified
+    assert "limits.velocity" not in told
+
+
+@pytest.mark.parametrize("thrust", [-3e-3, -1e-5, 1e-4])
+@pytest.mark.parametrize("short", [2e-3, 4e-9, 0.3])
+def test_no_shortfall_of_a_rotor_reads_as_nothing(thrust: float, short: float) -> None:
+    told = str(RotorMargin(thrust, 0.1, 0, 3.92, 0.2, 1, -short, 1.0))
+    assert "-0.00 " not in told
+    assert " 0.00 N too little" not in told
+    assert f"{short:.2g}" in told or f"{short:.2f}" in told
+
+
+def test_a_page_tells_warnings_in_red_and_nothing_else_on_it_is_red() -> None:
+    """But what rotors do beyond their limits: there are none such here."""
+    far = along([(0.0, 0.0, 1.0), (2.0, 400.0, 1.3), (4.0, 0.0, 1.0)], 60.0)
+    near = along([(0.0, 0.0, 1.0), (2.0, 0.4, 1.3), (4.0, 0.0, 1.0)])
+    for found, warnings in ((far, 1), (near, 0)):
+        figure = report_figure(found, QUAD)
+        said = [text.get_text() for text in figure.texts if text.get_color() == RED]
+        assert len(said) == warnings
+        lines = [line for axes in figure.axes for line in axes.lines]
+        assert RED not in [line.get_color() for line in lines]
