@@ -202,7 +202,7 @@ def test_the_command_lines_options_follow_from_the_fields() -> None:
     }
     assert flags == {
         "miqp": ["--order", "--intervals", "--backend", "--time-limit", "--reserve", "--no-rescue"],
-        "min-snap": ["--order", "--stop-after"],
-        "free-knots": ["--segments", "--reserve"],
-        "time-optimal": ["--reserve", "--starts", "--planar"],
+        "min-snap": ["--order", "--stop-after", "--time-limit"],
+        "free-knots": ["--segments", "--reserve", "--time-limit"],
+        "time-optimal": ["--reserve", "--starts", "--planar", "--time-limit"],
     }

@@ -137,7 +137,7 @@ DEGREES: dict[str, Callable[[float], Any]] = {
 @pytest.mark.parametrize("name", DEGREES)
 def test_degrees_where_radians_are_meant_are_told_in_radians(name: str) -> None:
     said = complaint(lambda: DEGREES[name](90.0))
-    assert f"{name} must be an angle in radians, from -2π to 2π, got 90; 90° is 1.571 rad" in said
+    assert f"{name} must be an angle in radians, from -4π to 4π, got 90; 90° is 1.571 rad" in said
     assert complaint(lambda: DEGREES[name](2.0 * pi)) == ""
 
 

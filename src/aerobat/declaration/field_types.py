@@ -20,7 +20,7 @@ from aerobat.declaration.sentences import FieldError, shown, unknown_key, within
 _ROUND_OFF = 1e-12  # [-] components of a unit vector that are zero but for it
 _UNIT = 1e-15  # [-] how far from one a norm may be by round-off
 _CONTROL = {*map(chr, range(32)), "\x7f"}  # letters that no path needs and no terminal shows
-_FULL_TURN = tau * (1.0 + _ROUND_OFF)  # [rad] more is hardly meant, and hardly in radians
+_TWO_TURNS = 2.0 * tau * (1.0 + _ROUND_OFF)  # [rad] sums of angles stay within; more is hardly in radians
 
 
 def unit(direction: ArrayLike) -> Array:
@@ -136,10 +136,10 @@ def _not_nan(value: float) -> float:
 
 
 def _radians(angle: float) -> float:
-    if abs(angle) > _FULL_TURN:
+    if abs(angle) > _TWO_TURNS:
         raise FieldError(
             "",
-            f"must be an angle in radians, from -2π to 2π, got {angle:g}; "
+            f"must be an angle in radians, from -4π to 4π, got {angle:g}; "
             f"{angle:g}° is {radians(angle):.4g} rad",
         )
     return angle
@@ -189,12 +189,12 @@ Number = Annotated[
     AfterValidator(_not_nan),
     Field(description="number, `inf` and `-inf` too"),
 ]
-Angle = Annotated[float, AfterValidator(_radians), Field(description="number of radians, from −2π to 2π")]
+Angle = Annotated[float, AfterValidator(_radians), Field(description="number of radians, from −4π to 4π")]
 TiltLimit = Annotated[
     float,
     Field(gt=0, allow_inf_nan=True),
     AfterValidator(lambda angle: angle if angle == inf else _radians(angle)),
-    Field(description="number of radians to 2π, `inf` for no limit"),
+    Field(description="number of radians to 4π, `inf` for no limit"),
 ]
 Derivative = Annotated[int, Field(ge=0, le=5, description="whole number from 0, the position, to 5, crackle")]
 PathName = Annotated[str | os.PathLike[str], PlainValidator(_path), Field(description="path")]
