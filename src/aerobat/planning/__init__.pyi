@@ -1,6 +1,7 @@
 from .certified_solve import Judged, Solution, certified_solve, with_certificate
 from .flyability import flight_error, nominal_flight, with_flyability
 from .miqp import Miqp
+from .passages import planned_passages
 from .plan_file import load_plan
 from .planners import (
     Planner,
@@ -47,6 +48,7 @@ __all__ = [
     "nominal_flight",
     "option",
     "plan",
+    "planned_passages",
     "planner",
     "planner_class",
     "planner_options",

@@ -38,7 +38,7 @@ class Outcome(Enum):
     )
     HIT_FRAME = "hit the frame of {gate}, {excess_cm:.1f} cm too wide at {time:.2f} s"
     WRONG_ATTITUDE = (
-        "passed {gate} tilted by {angle:.1f}° from its upright at {time:.2f} s, {tolerance:.3g}° allowed"
+        "passed {gate} {angle:.1f}° off the attitude asked at {time:.2f} s, {tolerance:.3g}° allowed"
     )
     HIT_GROUND = "hit the ground at {time:.2f} s"
     DIVERGED = "diverged at {time:.2f} s: position error above {radius:g} m"
