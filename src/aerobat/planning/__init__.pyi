@@ -1,5 +1,5 @@
 from .certified_solve import Judged, Solution, certified_solve, with_certificate
-from .flyability import flight_error, nominal_flight, with_flyability
+from .flyability import flight_error, nominal_flight, own_flight, with_flyability
 from .miqp import Miqp
 from .passages import planned_passages
 from .plan_file import load_plan
@@ -17,7 +17,7 @@ from .planners import (
 from .polynomial.free_knots import FreeKnots
 from .polynomial.min_snap import MinSnap, TimeScaling
 from .recorder import Attempt, Recorder
-from .result import FLYABLE_ERROR, Flyability, PlacedStage, Plan
+from .result import FLYABLE_ERROR, FlownPassage, Flyability, OwnFlight, PlacedStage, Plan
 from .rotor_margin import RotorMargin
 from .search import BisectionSearch, GridSearch
 from .time_optimal.time_optimal import TimeOptimal
@@ -26,12 +26,14 @@ __all__ = [
     "FLYABLE_ERROR",
     "Attempt",
     "BisectionSearch",
+    "FlownPassage",
     "Flyability",
     "FreeKnots",
     "GridSearch",
     "Judged",
     "MinSnap",
     "Miqp",
+    "OwnFlight",
     "PlacedStage",
     "Plan",
     "Planner",
@@ -47,6 +49,7 @@ __all__ = [
     "load_plan",
     "nominal_flight",
     "option",
+    "own_flight",
     "plan",
     "planned_passages",
     "planner",

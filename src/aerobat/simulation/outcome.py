@@ -11,7 +11,9 @@ DIVERGENCE_RADIUS = 5.0  # [m] of position error: no controller is expected back
 
 def length(metres: float) -> str:
     """A length with the unit that suits it."""
-    return f"{metres:.2f} m" if metres >= 1.0 else f"{100 * metres:.2f} cm"
+    if metres >= 1.0:
+        return f"{metres:.2f} m"
+    return f"{100 * metres:.2f} cm" if metres >= 1e-3 else f"{1000 * metres:.2f} mm"
 
 
 def counted(outcomes: Iterable[Outcome]) -> str:

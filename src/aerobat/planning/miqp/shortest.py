@@ -13,10 +13,10 @@ from math import inf
 
 from aerobat.optimization.deadline import out_of_time
 from aerobat.planning.certified_solve import Judged
-from aerobat.planning.flyability import flight_error
+from aerobat.planning.flyability import own_flight
 from aerobat.planning.miqp.attempts import Attempts, Placement
 from aerobat.planning.miqp.refinement import Descent, PathPoint, descent, finished
-from aerobat.planning.result import FLYABLE_ERROR
+from aerobat.planning.result import OwnFlight
 
 GROWTH = 1.15  # of dt, from one program to the next
 COARSE_GROWTH = 1.3  # where a path is further off than that
@@ -76,20 +76,31 @@ def _descent(start: Placement) -> Descent:
 
 
 def flyable(attempts: Attempts, judged: Judged[Placement]) -> Judged[Placement]:
-    """The same, or with a reserve for the controller where its own flight leaves the path."""
-    vehicle, environment = attempts.vehicle, attempts.formulation.problem.environment
+    """The same, or with a reserve for the controller where its own flight has a defect and that helps.
+
+    Where no reserve is enough the best is returned.
+    """
+    best = last = _own_flight(attempts, judged), judged
     for reserve in RESERVES:
-        path, trajectory = judged.solution.source.path, judged.solution.trajectory
-        assert vehicle is not None
-        assert trajectory is not None
-        if path is None or out_of_time() or flight_error(trajectory, vehicle, environment) <= FLYABLE_ERROR:
-            return judged
-        program = replace(path.program, reserve=max(reserve, path.program.reserve))
-        kept = descent(program, path.x).path
-        if kept is not None:
-            reserved = attempts.refined(judged.solution.source, partial(finished, kept))
-            judged = reserved if reserved.feasible else judged
-    return judged
+        source = last[1].solution.source
+        if source.path is None or last[0].flies or out_of_time():
+            break
+        program = replace(source.path.program, reserve=max(reserve, source.path.program.reserve))
+        kept = descent(program, source.path.x).path
+        if kept is None:
+            continue
+        reserved = attempts.refined(source, partial(finished, kept))
+        if reserved.feasible:
+            last = _own_flight(attempts, reserved), reserved
+            best = min(best, last, key=lambda pair: pair[0].rank)
+    return best[1]
+
+
+def _own_flight(attempts: Attempts, judged: Judged[Placement]) -> OwnFlight:
+    trajectory, vehicle = judged.solution.trajectory, attempts.vehicle
+    assert vehicle is not None
+    assert trajectory is not None
+    return own_flight(trajectory, vehicle, attempts.formulation.problem, attempts.placed(judged))
 
 
 @dataclass
