@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from dataclasses import replace
 from pathlib import Path
 
@@ -22,6 +23,9 @@ from aerobat.planning.flyability import disturbed_flight
 from aerobat.reporting.report_json import report
 from aerobat.simulation import Outcome
 from aerobat.trajectory import Trajectory
+
+sys.path.append(str(Path(__file__).parents[1] / "benchmarks"))
+from random_problems import random_case
 
 QUAD = ab.load_vehicle("agile-quad")
 CRAZYFLIE = ab.load_vehicle("crazyflie")
@@ -142,6 +146,14 @@ def test_a_plan_that_only_looks_through_its_gate_does_not_fly() -> None:
     assert not found.flies
     assert ab.score(ab.fly(found), found).outcome is Outcome.STOPPED_IN_GATE
     assert "its own flight stopped in gate 'gate', 3.9 cm beyond its plane" in str(found)
+
+
+def test_the_miqp_passes_faster_through_a_gate_that_its_path_would_turn_back_in() -> None:
+    case = random_case(0, 147, ("flip", "half-flip"))
+    made = ab.plan(case.problem, vehicle=case.vehicle)
+    assert made.certified
+    assert made.flies
+    assert ab.score(ab.fly(made), made).outcome is Outcome.THROUGH_GATES
 
 
 def test_a_flight_that_diverges_is_no_small_error() -> None:

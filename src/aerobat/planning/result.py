@@ -50,6 +50,11 @@ class OwnFlight:
         return not self.defects
 
     @property
+    def misses(self) -> bool:
+        """True if it does not pass through the plane of a gate that is asked, or not as far as counts."""
+        return any(passage.failure and passage.attitude_error is None for passage in self.passages)
+
+    @property
     def rank(self) -> tuple[int, float]:
         """The number of defects, and the error [m]: the better of two flights has the lesser."""
         return len(self.defects), self.error
