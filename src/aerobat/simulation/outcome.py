@@ -13,7 +13,7 @@ def length(metres: float) -> str:
     """A length with the unit that suits it."""
     if metres >= 1.0:
         return f"{metres:.2f} m"
-    return f"{100 * metres:.2f} cm" if metres >= 1e-3 else f"{1000 * metres:.2f} mm"
+    return f"{100 * metres:.2f} cm" if metres >= 1e-3 else f"{100 * metres:.2g} cm"
 
 
 def counted(outcomes: Iterable[Outcome]) -> str:
