@@ -8,12 +8,15 @@ from enum import Enum
 
 DIVERGENCE_RADIUS = 5.0  # [m] of position error: no controller is expected back from there
 
+NO_LENGTH = 1e-6  # [m] less is rounding
+
 
 def length(metres: float) -> str:
     """A length with the unit that suits it."""
     if metres >= 1.0:
         return f"{metres:.2f} m"
-    return f"{100 * metres:.2f} cm" if metres >= 1e-3 else f"{100 * metres:.2g} cm"
+    digits = ".2g" if NO_LENGTH < metres < 1e-3 else ".2f"
+    return f"{100 * metres:{digits}} cm"
 
 
 def counted(outcomes: Iterable[Outcome]) -> str:
