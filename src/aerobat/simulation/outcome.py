@@ -7,7 +7,6 @@ from collections.abc import Iterable
 from enum import Enum
 
 DIVERGENCE_RADIUS = 5.0  # [m] of position error: no controller is expected back from there
-
 NO_LENGTH = 1e-6  # [m] less is rounding
 
 
