@@ -8,10 +8,24 @@ import pytest
 from aerobat import so3
 from aerobat.certification import Certificate, Envelope, Finding, PlannedPassage, Verdict, certify
 from aerobat.certification.envelope import CROSSING_SPEED
+from aerobat.evaluation import score
 from aerobat.flatness import reference
 from aerobat.planning import Miqp, Plan, load_plan, plan, with_certificate
-from aerobat.problem import Condition, Gate, Problem, Stage, Waypoint, Waypoints, at_rest, load_problem
-from aerobat.problem.condition import across
+from aerobat.problem import (
+    Condition,
+    CustomManeuver,
+    Gate,
+    Problem,
+    Stage,
+    Waypoint,
+    Waypoints,
+    at_rest,
+    load_problem,
+    tilted_gate,
+)
+from aerobat.problem.condition import Attitude, across
+from aerobat.problem.stage import PLANNED_SHARE
+from aerobat.simulation import fly
 from aerobat.trajectory import Trajectory
 from aerobat.vehicle import load_vehicle
 from random_flights import random_flight, with_lags
@@ -37,7 +51,8 @@ def level(speed: float) -> Trajectory:
 
 
 def judged(path: Trajectory, gate: Gate, **asked: object) -> dict[str, Finding]:
-    passage = PlannedPassage(gate, 1.0, **asked)
+    attitude = {"up": gate.up, "attitude_tolerance": gate.attitude_tolerance}
+    passage = PlannedPassage(gate, 1.0, **(attitude | asked))
     return passage_of(certify(path, VEHICLE, envelope=Envelope(passages=(passage,))))
 
 
@@ -64,7 +79,7 @@ def test_each_finding_is_what_flatness_says_at_that_instant(seed):
         flight.trajectory,
         flight.vehicle,
         flight.environment,
-        Envelope(passages=(PlannedPassage(gate, time),)),
+        Envelope(passages=(PlannedPassage(gate, time, gate.up, gate.attitude_tolerance),)),
     )
     times = np.linspace(0, time, 200)
     there = reference(flight.trajectory, flight.vehicle, times, environment=flight.environment).setpoint
@@ -148,4 +163,18 @@ def test_where_there_is_no_thrust_no_attitude_is_told():
     falling = Trajectory([2.0], [[[0, 0, 0], [2.0, 0, 0], [0, 0, -2 * 9.81]]])
     gate = Gate(falling.evaluate(np.array([1.0]))[0], AHEAD, UP)
     assert judged(falling, gate)["attitude"].verdict is Verdict.UNDECIDED
-    assert "attitude" not in judged(falling, gate, upright=False)
+    assert "attitude" not in judged(falling, gate, attitude_tolerance=np.inf)
+
+
+def test_an_attitude_of_its_own_in_a_gate_is_what_certificate_and_score_judge_by():
+    """Upright, through a gate that is tilted by 40°."""
+    gate = tilted_gate(np.array([3.0, 0.0, 1.0]), tilt=np.deg2rad(40.0), width=2.0, height=2.0)
+    stage = Stage("gate", gate="gate", attitude=Attitude(UP, min_thrust=5.0, tolerance=0.5))
+    ends = at_rest([0, 0, 1]), at_rest([6, 0, 1])
+    made = plan(Problem("upright", *ends, CustomManeuver((stage,)), (gate,)), Miqp(order=5), VEHICLE)
+    found = passage_of(made.certificate)["attitude"]
+    (passage,) = score(fly(made), made).passages
+    assert made.certified
+    assert found.value <= PLANNED_SHARE * gate.attitude_tolerance < 0.5
+    assert found.limit == gate.attitude_tolerance == pytest.approx(np.deg2rad(passage.attitude_tolerance_deg))
+    assert np.rad2deg(found.value) == pytest.approx(passage.attitude_error_deg, abs=0.5)

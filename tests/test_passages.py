@@ -11,9 +11,9 @@ import pytest
 import aerobat as ab
 from aerobat import so3
 from aerobat.arrays import Array
-from aerobat.evaluation.passage import PASSAGE_DEPTH
 from aerobat.problem.condition import Attitude
 from aerobat.simulation import Outcome
+from aerobat.simulation.passage import PASSAGE_DEPTH
 from test_flying_scores import EXACT, QUAD, assert_same
 from test_flying_scores import near as starts_near
 
@@ -124,7 +124,7 @@ def test_the_attitude_in_the_gate_is_judged_where_a_stage_asks_it(cruise: ab.Fli
     tilted = moved(cruise, lambda p: p, turn=(0.2, 0.0, 0.0))
     asked = ab.score(tilted, through(gate(), Attitude(UP, min_thrust=5.0)), QUAD)
     assert asked.outcome is Outcome.WRONG_ATTITUDE
-    assert asked.sentence == ("passed the gate tilted by 11.5° from its upright at 1.00 s, 5° allowed")
+    assert asked.sentence == ("passed the gate 11.5° off the attitude asked at 1.00 s, 5° allowed")
     wide = replace(gate(), attitude_tolerance=0.21)
     assert (
         ab.score(tilted, through(wide, Attitude(UP, min_thrust=5.0)), QUAD).outcome is Outcome.THROUGH_GATES

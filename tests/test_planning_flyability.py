@@ -2,17 +2,30 @@
 
 from __future__ import annotations
 
+import sys
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import aerobat as ab
 from aerobat.errors import SpecError
-from aerobat.planning import FLYABLE_ERROR, Flyability, flight_error, with_certificate, with_flyability
+from aerobat.planning import (
+    FLYABLE_ERROR,
+    Flyability,
+    PlacedStage,
+    flight_error,
+    with_certificate,
+    with_flyability,
+)
 from aerobat.planning.flyability import disturbed_flight
 from aerobat.reporting.report_json import report
+from aerobat.simulation import Outcome
 from aerobat.trajectory import Trajectory
+
+sys.path.append(str(Path(__file__).parents[1] / "benchmarks"))
+from random_problems import random_case
 
 QUAD = ab.load_vehicle("agile-quad")
 CRAZYFLIE = ab.load_vehicle("crazyflie")
@@ -93,6 +106,54 @@ def test_a_certified_plan_that_does_not_fly_says_so_as_a_defect_of_its_own() -> 
     for text in (str(plan), str(report(plan)["plan"]["flyability"]["sentence"])):
         assert "a defect of the plan, not of the flight" in text
     assert report(plan)["plan"]["flyability"]["flies"] is False
+
+
+def test_a_plan_whose_flight_does_not_hold_the_gate_s_attitude_says_so(plan: ab.Plan, tmp_path: Path) -> None:
+    """Its gate, asked later to be passed more exactly than it was planned."""
+    (gate,) = plan.problem.gates
+    stricter = replace(plan.problem, gates=(replace(gate, attitude_tolerance=np.deg2rad(0.2)),))
+    strict = with_flyability(replace(plan, problem=stricter))
+    (passage,) = flyability(strict).passages
+    (scored,) = ab.score(ab.fly(strict), strict).passages
+    assert passage.attitude_error is not None
+    assert np.rad2deg(passage.attitude_error) == pytest.approx(scored.attitude_error_deg)
+    assert scored.attitude_error_deg > 0.2
+    assert not strict.flies
+    sentence = f"its own flight passed gate 'gate' {scored.attitude_error_deg:.1f}° off the attitude asked"
+    assert sentence in str(strict)
+    assert "0.2° allowed, a defect of the plan" in str(strict)
+    (facts,) = report(strict)["plan"]["flyability"]["passages"]
+    assert facts["failure"] == passage.failure
+    assert facts["attitude_error_deg"] == pytest.approx(scored.attitude_error_deg)
+    assert facts["attitude_tolerance_deg"] == pytest.approx(0.2)
+    strict.save(tmp_path / "strict.plan")
+    assert ab.load_plan(tmp_path / "strict.plan").flyability == strict.flyability
+
+
+def test_a_plan_that_only_looks_through_its_gate_does_not_fly() -> None:
+    """Into the plane by 4 cm and back: that passes no gate, says the score, and so says the plan."""
+    s = np.polynomial.Polynomial([0, 0, 0, 10, -15, 6]).coef
+    there, back = np.outer(s, [1.04, 0.0, 0.0]), np.outer(s, [-1.04, 0.0, 0.0])
+    back[0, 0] = 1.04
+    path = Trajectory([2.0, 2.0], [there, back])
+    gate = ab.tilted_gate((1.0, 0.0, 0.0))
+    crossing = np.polynomial.Polynomial([-1.0, *(1.04 * s[1:])]).roots()
+    time = 2.0 * next(root.real for root in crossing if abs(root.imag) < 1e-9 and 0.0 < root.real < 1.0)
+    problem = ab.Problem("look", ab.at_rest((0, 0, 0)), ab.at_rest((0, 0, 0)), gates=(gate,))
+    looking = ab.Plan(problem, path, "by hand", stages=(PlacedStage("gate", 0, time, "gate"),), vehicle=QUAD)
+    found = with_flyability(looking)
+    assert flyability(found).error < FLYABLE_ERROR
+    assert not found.flies
+    assert ab.score(ab.fly(found), found).outcome is Outcome.STOPPED_IN_GATE
+    assert "its own flight stopped in gate 'gate', 3.9 cm beyond its plane" in str(found)
+
+
+def test_the_miqp_passes_faster_through_a_gate_that_its_path_would_turn_back_in() -> None:
+    case = random_case(0, 147, ("flip", "half-flip"))
+    made = ab.plan(case.problem, vehicle=case.vehicle)
+    assert made.certified
+    assert made.flies
+    assert ab.score(ab.fly(made), made).outcome is Outcome.THROUGH_GATES
 
 
 def test_a_flight_that_diverges_is_no_small_error() -> None:

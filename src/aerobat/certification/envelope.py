@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from aerobat.declaration import Limit, NonNegative, TiltLimit, declared
+from aerobat.declaration import Limit, NonNegative, Number, TiltLimit, UnitVector, declared
 from aerobat.problem import Condition, Gate, Limits, Quantity, Stage
 
 CROSSING_SPEED = 1e-3  # [m/s] a path that is slower in the gate's plane does not cross it
@@ -18,18 +18,24 @@ class PlannedPassage:
 
     gate: Gate
     time: NonNegative  # [s]
-    upright: bool = True  # the thrust axis along the gate's upright, within its tolerance
+    up: UnitVector  # where the thrust axis shall point
+    attitude_tolerance: Number = np.inf  # [rad] between them, at most; infinite where no attitude is asked
     min_speed: NonNegative = CROSSING_SPEED  # [m/s] in the gate's direction; 0 where it may be met along it
 
     @classmethod
     def of(cls, stage: Stage, gate: Gate, time: float) -> PlannedPassage:
-        """The passage that a stage asks for, placed at a time [s]."""
-        for condition in stage.conditions:
-            along = float(condition.direction @ gate.normal)
-            forward = condition.upper if along > 0 else -condition.lower
-            if condition.quantity is Quantity.VELOCITY and abs(along) > PARALLEL and forward <= 0:
-                return cls(gate, time, stage.attitude is not None, min_speed=0.0)
-        return cls(gate, time, stage.attitude is not None)
+        """The passage that a stage of `Problem.stages` asks for, placed at a time [s]."""
+        min_speed = 0.0 if any(_keeps_from(gate, each) for each in stage.conditions) else CROSSING_SPEED
+        if stage.attitude is None:
+            return cls(gate, time, gate.up, min_speed=min_speed)
+        return cls(gate, time, stage.attitude.up, gate.attitude_tolerance, min_speed)
+
+
+def _keeps_from(gate: Gate, condition: Condition) -> bool:
+    """True if a condition forbids to move in the gate's direction."""
+    along = float(condition.direction @ gate.normal)
+    forward = condition.upper if along > 0 else -condition.lower
+    return condition.quantity is Quantity.VELOCITY and abs(along) > PARALLEL and forward <= 0
 
 
 @declared

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from types import MappingProxyType, SimpleNamespace
 from typing import Any
@@ -50,15 +49,6 @@ class Controller:
     def feature_flags(self) -> FeatureFlags:
         """The switches: all that makes the control law another one, its gains being numbers."""
         return FeatureFlags(self.moment_feedforward, self.motor_lag_compensation, self.prioritize_tilt)
-
-    def actuation_delay(self, period: float) -> float:
-        """Time [s] that commands given every `period` [s] take, on the average, to become thrust.
-
-        The lead leaves a first-order filter in place of the rotors' lag; sampled, it delays a ramp so long.
-        """
-        if not self.motor_lag_compensation:
-            return 0.0
-        return period / -math.expm1(-period / max(self.lead_time_constant, _SMALLEST))
 
     def gains(self, max_bandwidth: Scalar, ops: Any = np, **instead: Scalar) -> Gains:
         """The gains for a vehicle whose attitude loop must not be faster than `max_bandwidth` [rad/s].

@@ -4,6 +4,7 @@ A class is declared once, with `@declared` and a type for each field; calling it
 then run through the same checks, and whatever is wrong becomes one sentence that names the field.
 """
 
+from aerobat.declaration.angles import in_degrees, in_radians
 from aerobat.declaration.declared import declared
 from aerobat.declaration.doors import door
 from aerobat.declaration.field_types import (
@@ -66,7 +67,9 @@ __all__ = [
     "finite",
     "from_table",
     "import_plugin",
+    "in_degrees",
     "in_notebooks",
+    "in_radians",
     "number",
     "short",
     "shown",

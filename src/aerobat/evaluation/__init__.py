@@ -1,8 +1,8 @@
 """Evaluation: how well flights went, and what that depends on."""
 
-from aerobat.evaluation.passage import Passage
 from aerobat.evaluation.score import Score, Scores, score
 from aerobat.evaluation.score_flights import score_flights
 from aerobat.evaluation.sensitivity import Gradient, Sensitivity, sensitivity
+from aerobat.simulation.passage import Passage
 
 __all__ = ["Gradient", "Passage", "Score", "Scores", "Sensitivity", "score", "score_flights", "sensitivity"]

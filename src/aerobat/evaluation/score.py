@@ -3,26 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, fields
 
 import numpy as np
 
 from aerobat.arrays import Array
+from aerobat.certification import PlannedPassage
 from aerobat.declaration import by_value, door, in_notebooks, short, shown
 from aerobat.errors import OutOfRange, SpecError
-from aerobat.evaluation.passage import (
-    PASSAGE_DEPTH,
-    Passage,
-    PlannedPassage,
-    gate_progress,
-    passages,
-    planned_passages,
-)
+from aerobat.evaluation.passages import passages_asked
 from aerobat.kernels.running_metrics import RunningMetrics
 from aerobat.planning import Plan
 from aerobat.problem import Problem, as_problem
 from aerobat.simulation.flight import Flight
 from aerobat.simulation.outcome import Outcome, counted, length
+from aerobat.simulation.passage import Passage, flown_passages, passages
 from aerobat.vehicle import Vehicle, as_vehicle
 from aerobat.vehicle.fleet import Fleet
 
@@ -83,7 +78,7 @@ class Scores:
         """The score of one flight."""
         if not -len(self) <= k < len(self):
             raise OutOfRange(f"there are {len(self)} flights, no flight {shown(k)}; count from 0")
-        passed = tuple(_passage_of(passage, k) for passage in self.passages)
+        passed = tuple(passage.of_flight(k) for passage in self.passages)
         outcome, sentence = self._outcome(k, passed)
         return Score(
             **{field.name: float(getattr(self, field.name)[k]) for field in fields(self)[:5]},
@@ -115,9 +110,8 @@ class Scores:
             found.append((float(self.ground_time[k]), Outcome.HIT_GROUND, {}))
         for passage in passed:
             label = "the gate" if len(passed) == 1 else f"gate '{passage.gate}'"
-            wrong = _what_went_wrong(passage)
-            if wrong is not None:
-                outcome, time, numbers = wrong
+            if passage.failure is not None:
+                outcome, time, numbers = passage.failure
                 found.append((time, outcome, {"gate": label, **numbers}))
         if found:
             time, outcome, numbers = min(found, key=lambda event: event[0])
@@ -130,36 +124,6 @@ class Scores:
         gates = "the gate" if len(passed) == 1 else f"{several} gates, the worst"
         numbers = {"gate": gates, "speed": worst.speed, "miss": length(worst.miss), "error": error}
         return Outcome.THROUGH_GATES, Outcome.THROUGH_GATES.sentence(**numbers)
-
-
-def _what_went_wrong(passage: Passage) -> tuple[Outcome, float, dict[str, object]] | None:
-    """What is wrong with a passage, when [s], and its numbers; None where nothing is, or nothing is known."""
-    if np.isnan(passage.planned):
-        return None
-    if np.isnan(passage.time):
-        return _instead(passage)
-    if not passage.inside:
-        return Outcome.MISSED_GATE, passage.time, {"miss": passage.miss}
-    if passage.clearance < 0.0:
-        return Outcome.HIT_FRAME, passage.time, {"excess_cm": -100 * passage.clearance}
-    if passage.attitude_error_deg > passage.attitude_tolerance_deg:
-        numbers: dict[str, object] = {
-            "angle": passage.attitude_error_deg,
-            "tolerance": passage.attitude_tolerance_deg,
-        }
-        return Outcome.WRONG_ATTITUDE, passage.time, numbers
-    return None
-
-
-def _instead(passage: Passage) -> tuple[Outcome, float, dict[str, object]]:
-    """What happened in place of a crossing in the gate's direction."""
-    if passage.max_distance <= 0.0:
-        return Outcome.SHORT_OF_GATE, passage.planned, {"short": -passage.max_distance}
-    if passage.max_distance >= PASSAGE_DEPTH and np.isfinite(passage.backward_time):
-        return Outcome.BACKWARDS, passage.backward_time, {}
-    if passage.min_distance <= 0.0:
-        return Outcome.STOPPED_IN_GATE, passage.planned, {"beyond_cm": 100 * passage.max_distance}
-    return Outcome.EARLY, passage.planned, {"early": passage.min_distance}
 
 
 @door
@@ -179,9 +143,8 @@ def score(flight: Flight, goal: Problem | Plan | str, vehicle: Vehicle | str | N
     square, angle = flight.position_error**2, flight.attitude_error
     diverged = flight.outcome is not Outcome.COMPLETE
     stop = np.array([flight.ends if diverged else np.nan])
-    parts = (states.position, states.velocity, states.q_world_body)
     fleet = None if vehicle is None else Fleet.of([as_vehicle(vehicle)])
-    planned = planned_passages(goal, flight.times, flight.setpoint.flat.position)
+    planned = passages_asked(goal, flight.times, flight.setpoint.flat.position)
     ground = flight.environment.ground
     below = np.zeros(1, bool) if ground is None else states.position[:, 2] < ground
     return Scores(
@@ -190,9 +153,7 @@ def score(flight: Flight, goal: Problem | Plan | str, vehicle: Vehicle | str | N
         max_attitude_error_deg=np.rad2deg([angle.max()]),
         rms_attitude_error_deg=np.rad2deg(np.sqrt([np.mean(angle**2)])),
         saturated_fraction=np.array([flight.saturated.mean()]),
-        passages=tuple(
-            passages(each, gate_progress(each, flight.times, parts), stop, fleet) for each in planned
-        ),
+        passages=tuple(flown_passages(flight, planned, fleet)),
         stop=stop,
         is_finite=np.array([flight.outcome is not Outcome.STATE_NOT_FINITE]),
         ground_time=np.array([flight.times[int(np.argmax(below))] if below.any() else np.nan]),
@@ -217,12 +178,4 @@ def scores_of(metrics: RunningMetrics, planned: tuple[PlannedPassage, ...], flee
         stop=stop,
         is_finite=metrics.is_finite > 0.5,
         ground_time=np.where(never, np.nan, metrics.ground_time),
-    )
-
-
-def _passage_of(passage: Passage, k: int) -> Passage:
-    """One flight's passage, in plain numbers."""
-    return replace(
-        passage,
-        **{field.name: getattr(passage, field.name)[k].item() for field in fields(passage)[1:]},
     )

@@ -9,17 +9,13 @@ from typing import Any
 import numpy as np
 
 from aerobat.arrays import Array
+from aerobat.certification import PlannedPassage
 from aerobat.declaration import door
 from aerobat.engines.components import components
 from aerobat.engines.pytree import tree_map
 from aerobat.environment import Environment
 from aerobat.errors import SpecError
-from aerobat.evaluation.passage import (
-    PASSAGE_DEPTH,
-    PASSAGE_WINDOW,
-    PlannedPassage,
-    planned_passages,
-)
+from aerobat.evaluation.passages import passages_asked
 from aerobat.evaluation.score import Scores, scores_of
 from aerobat.kernels import running_metrics
 from aerobat.kernels.ops import Ops
@@ -28,6 +24,7 @@ from aerobat.planning import Plan
 from aerobat.problem import Problem, as_problem
 from aerobat.simulation.loop import Signals
 from aerobat.simulation.outcome import DIVERGENCE_RADIUS
+from aerobat.simulation.passage import PASSAGE_DEPTH, PASSAGE_WINDOW
 from aerobat.simulation.reference_source import BLOCK
 from aerobat.simulation.setup import FlightConfig, FlightSetup, prepare
 from aerobat.trajectory import Trajectory
@@ -110,7 +107,7 @@ def score_flights(
     setup = prepare(plan, vehicles, environment=environment, config=settings)
     blocks = range(0, len(setup.times), BLOCK)
     parts = [setup.reference.setpoint(k, min(k + BLOCK, len(setup.times))).flat.position for k in blocks]
-    planned = planned_passages(goal, setup.times, np.concatenate(parts))
+    planned = passages_asked(goal, setup.times, np.concatenate(parts))
     setup = with_metrics(setup, planned)
     loop = setup.compile(log=metrics_row)
     carry = loop.init(setup.first_tick)

@@ -18,12 +18,13 @@ from aerobat.kernels.control_loops import (
     integrate_attitude_error,
     reference_moment,
     step_position_loop,
+    thrust_demand,
 )
 from aerobat.kernels.motors import Airframe
 from aerobat.kernels.ops import Ops, PerRotor, Scalar, Vector
 from aerobat.kernels.quaternions import axes
 from aerobat.kernels.rigid_body import Body, EnvironmentParameters, Wrench
-from aerobat.kernels.vectors import ZERO, add, dot, norm
+from aerobat.kernels.vectors import ZERO, add, dot, norm, subtract
 
 _MIN_PART = 0.3  # [-] of the commanded specific thrust, kept where the vehicle points away from it
 
@@ -64,10 +65,11 @@ class ControllerState(NamedTuple):
 def init(ops: Ops, model: ControllerModel, body: Body, reference: ReferencePoint) -> ControllerState:
     """The state before the first tick, with the rotors at what the trajectory asks there."""
     mass_properties, rotors = model.airframe
-    moment = reference_moment(mass_properties.inertia, axes(body.q_world_body), reference.ahead)
-    feedforward = Wrench(mass_properties.mass * norm(ops, reference.specific_thrust), moment)
+    moment = reference_moment(mass_properties.inertia, axes(body.q_world_body), reference)
+    demand = thrust_demand(mass_properties, model.environment, reference)
+    feedforward = Wrench(mass_properties.mass * norm(ops, demand.value), moment)
     thrusts = motors.clamp(ops, rotors, mix(model.mixer, feedforward))
-    outer = init_position_loop(ops, model.gains, mass_properties, model.environment, body, reference)
+    outer = init_position_loop(ops, model.gains, body, reference)
     return ControllerState(outer, ZERO, thrusts, Commands(thrusts, False))
 
 
@@ -82,52 +84,53 @@ def step(
 ) -> ControllerState:
     """The state, new commands included, `elapsed` [s] after the last tick."""
     mass_properties, rotors = model.airframe
-    outer = step_position_loop(
-        ops, model.gains, mass_properties, model.environment, state.outer, body, reference, elapsed
-    )
-    attitude = attitude_command(ops, outer, reference)
+    outer = step_position_loop(ops, model.gains, state.outer, body, reference, elapsed)
+    demand = thrust_demand(mass_properties, model.environment, reference)
+    attitude = attitude_command(ops, outer, demand, reference)
     body_axes = axes(body.q_world_body)
     error = attitude_error(ops, body, body_axes, attitude)
     # while rotors saturate, the attitude error says nothing about a lasting moment
     counted = ops.select(state.commands.saturated, 0.0, elapsed)
     integral = integrate_attitude_error(ops, model.gains, state.attitude_integral, error, counted)
-    moment = feedback_moment(model.gains, mass_properties.inertia, error, integral)
+    moment, change = feedback_moment(model.gains, mass_properties.inertia, error, integral), ZERO
     if flags.moment_feedforward:
-        moment = add(moment, reference_moment(mass_properties.inertia, body_axes, reference.ahead))
-    load = Wrench(_collective(ops, mass_properties.mass, body_axes[2], attitude, reference), moment)
+        now, then = (
+            reference_moment(mass_properties.inertia, body_axes, rates)
+            for rates in (reference, reference.ahead)
+        )
+        moment, change = add(moment, now), subtract(then, now)
+    load = Wrench(_collective(ops, mass_properties.mass, body_axes[2], attitude), moment)
+    ahead = Wrench(mass_properties.mass * reference.ahead.thrust_change, change)
     decay_factors = motors.decay_factors(ops, rotors, elapsed)
     thrusts = motors.first_order_response(state.thrusts, state.commands.thrusts, decay_factors)
-    commands = _commands(ops, flags, model, load, thrusts, decay_factors, elapsed)
+    commands = _commands(ops, flags, model, (load, ahead), thrusts, decay_factors, elapsed)
     return ControllerState(outer, integral, thrusts, commands)
 
 
-def _collective(
-    ops: Ops, mass: Scalar, b3: Vector, attitude: AttitudeCommand, reference: ReferencePoint
-) -> Scalar:
+def _collective(ops: Ops, mass: Scalar, b3: Vector, attitude: AttitudeCommand) -> Scalar:
     """The collective thrust [N]: the commanded specific thrust along b3, whichever way the vehicle points.
 
     Pointing away it would vanish, and with it the means to turn back: a part of |f| is kept.
     """
     f = attitude.specific_thrust
-    along = ops.maximum(dot(f, b3), _MIN_PART * norm(ops, f))
-    return mass * (along + reference.ahead.thrust_change)
+    return mass * ops.maximum(dot(f, b3), _MIN_PART * norm(ops, f))
 
 
 def _commands(
     ops: Ops,
     flags: FeatureFlags,
     model: ControllerModel,
-    load: Wrench,
+    loads: tuple[Wrench, Wrench],
     thrusts: PerRotor,
     decay_factors: PerRotor,
     period: Scalar,
 ) -> Commands:
-    """Commands for a load, with the rotors now at `thrusts` [N].
+    """Commands for a load, and for the change that the reference makes of it until the next tick.
 
     The load is brought within limits first, and the lead then clipped rotor by rotor: it exceeds them for
     moments only, in which each rotor does best to hurry.
     """
-    rotors = model.airframe.rotors
+    rotors, (load, ahead) = model.airframe.rotors, loads
     desired = mix(model.mixer, load)
     feasible = within_limits(rotors, desired)
     if flags.prioritize_tilt:
@@ -135,18 +138,22 @@ def _commands(
         desired = tuple(ops.select(feasible, f, g) for f, g in zip(desired, desaturated, strict=True))
     if flags.motor_lag_compensation:
         fraction = 1.0 - ops.exp(-period / model.gains.lead_time_constant)
-        desired = _leading(thrusts, desired, decay_factors, fraction)
+        desired = _leading(thrusts, desired, mix(model.mixer, ahead), decay_factors, fraction)
     changed = ops.select(feasible & within_limits(rotors, desired), False, True)
     return Commands(motors.clamp(ops, rotors, desired), changed)
 
 
-def _leading(thrusts: PerRotor, desired: PerRotor, decay_factors: PerRotor, fraction: Scalar) -> PerRotor:
+def _leading(
+    thrusts: PerRotor, desired: PerRotor, changes: PerRotor, decay_factors: PerRotor, fraction: Scalar
+) -> PerRotor:
     """Commands [N] that bring the rotors, in one period, a `fraction` of the way from `thrusts` to `desired`.
 
-    With fraction = 1 − e^(−period/T) it is u = f + τ f' behind a low-pass of time constant T. Written about
-    where the rotors are believed to be, it goes on pushing after a saturation until they have got there.
+    And further by the reference's `changes`: along a reference that is followed they are u = f + τ f', and
+    what differs from it stands behind a low-pass of time constant T, with fraction = 1 − e^(−period/T).
+    Written about where the rotors are believed to be, it goes on pushing after a saturation until they have
+    got there.
     """
     return tuple(
-        f + (w - f) * fraction / (1.0 - left)
-        for f, w, left in zip(thrusts, desired, decay_factors, strict=True)
+        f + ((w - f) * fraction + change) / (1.0 - left)
+        for f, w, change, left in zip(thrusts, desired, changes, decay_factors, strict=True)
     )

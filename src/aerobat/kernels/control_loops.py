@@ -41,9 +41,13 @@ class Gains(NamedTuple):
 
 
 class Lookahead(NamedTuple):
-    """Reference for the rotors at the time when this tick's commands will have taken effect."""
+    """Reference at the next tick, when this one's commands have taken effect.
 
-    thrust_change: Scalar  # [m/s²] |f| then, less |f| now
+    Its rates are taken along its own axes and then given in world axes as if those stood as now: the rotors
+    turn with the body.
+    """
+
+    thrust_change: Scalar  # [m/s²] of the collective over the mass, from now to then
     omega: Vector  # [rad/s] world
     omega_dot: Vector  # [rad/s²] world
 
@@ -53,10 +57,11 @@ class ReferencePoint(NamedTuple):
 
     position: Vector  # [m]
     velocity: Vector  # [m/s]
-    specific_thrust: Vector  # [m/s²] f = a + g·e3
+    specific_thrust: Vector  # [m/s²] a + g·e3, without drag
     jerk: Vector  # [m/s³]
     q_world_body: Quaternion  # transported along the trajectory without spin, then yawed
     omega: Vector  # [rad/s]
+    omega_dot: Vector  # [rad/s²]
     ahead: Lookahead
 
 
@@ -64,29 +69,18 @@ class PositionLoopState(NamedTuple):
     """State and output of the outer loop."""
 
     integral: Vector  # [m·s] of the position error
-    acceleration: Vector  # [m/s²] feedback, and what makes up for the drag
+    acceleration: Vector  # [m/s²] feedback
     jerk: Vector  # [m/s³] its filtered derivative
 
 
-def init_position_loop(
-    ops: Ops,
-    gains: Gains,
-    mass_properties: MassProperties,
-    environment: EnvironmentParameters,
-    body: Body,
-    reference: ReferencePoint,
-) -> PositionLoopState:
+def init_position_loop(ops: Ops, gains: Gains, body: Body, reference: ReferencePoint) -> PositionLoopState:
     """The state before the first tick: no integral, and an answer that has stood for long."""
-    return PositionLoopState(
-        ZERO, _feedback_acceleration(ops, gains, mass_properties, environment, ZERO, body, reference), ZERO
-    )
+    return PositionLoopState(ZERO, _feedback_acceleration(ops, gains, ZERO, body, reference), ZERO)
 
 
 def step_position_loop(
     ops: Ops,
     gains: Gains,
-    mass_properties: MassProperties,
-    environment: EnvironmentParameters,
     state: PositionLoopState,
     body: Body,
     reference: ReferencePoint,
@@ -95,7 +89,7 @@ def step_position_loop(
     """The answer `elapsed` [s] after the last one."""
     error = subtract(reference.position, body.position)
     integral = clamp_norm(ops, add_scaled(state.integral, elapsed, error), gains.max_integral)
-    acceleration = _feedback_acceleration(ops, gains, mass_properties, environment, integral, body, reference)
+    acceleration = _feedback_acceleration(ops, gains, integral, body, reference)
     difference = scale(1.0 / elapsed, subtract(acceleration, state.acceleration))
     fraction = elapsed / (gains.jerk_filter + elapsed)
     jerk = add_scaled(state.jerk, fraction, subtract(difference, state.jerk))
@@ -103,30 +97,46 @@ def step_position_loop(
 
 
 def _feedback_acceleration(
-    ops: Ops,
-    gains: Gains,
-    mass_properties: MassProperties,
-    environment: EnvironmentParameters,
-    integral: Vector,
-    body: Body,
-    reference: ReferencePoint,
+    ops: Ops, gains: Gains, integral: Vector, body: Body, reference: ReferencePoint
 ) -> Vector:
     proportional = scale(gains.position, subtract(reference.position, body.position))
     damping = scale(gains.velocity, subtract(reference.velocity, body.velocity))
     feedback = add_scaled(add(proportional, damping), gains.integral, integral)
-    return subtract(
-        clamp_norm(ops, feedback, gains.max_feedback), _drag(mass_properties, environment, reference)
+    return clamp_norm(ops, feedback, gains.max_feedback)
+
+
+class ThrustDemand(NamedTuple):
+    """Specific thrust that follows the reference against drag, and its derivative; world frame."""
+
+    value: Vector  # [m/s²]
+    rate: Vector  # [m/s³]
+
+
+def thrust_demand(
+    mass_properties: MassProperties, environment: EnvironmentParameters, reference: ReferencePoint
+) -> ThrustDemand:
+    """The reference's specific thrust, the drag that is expected along the trajectory made up for.
+
+    With u = Rᵀ (v − w) and C = D/m it is a + g e₃ + R C u, whose rate is j + R (C u' + ω × C u), where
+    u' = Rᵀ a − ω × u.
+    """
+    body_axes = axes(reference.q_world_body)
+    x, y, z = reference.specific_thrust
+    acceleration = to_body(body_axes, (x, y, z - environment.gravity))
+    airspeed = to_body(body_axes, subtract(reference.velocity, environment.wind))
+    omega = to_body(body_axes, reference.omega)
+    drag = _over_mass(mass_properties, airspeed)
+    change = _over_mass(mass_properties, subtract(acceleration, cross(omega, airspeed)))
+    return ThrustDemand(
+        add(reference.specific_thrust, to_world(body_axes, drag)),
+        add(reference.jerk, to_world(body_axes, add(change, cross(omega, drag)))),
     )
 
 
-def _drag(
-    mass_properties: MassProperties, environment: EnvironmentParameters, reference: ReferencePoint
-) -> Vector:
-    """The acceleration by drag that is expected along the trajectory [m/s²], world."""
-    body_axes = axes(reference.q_world_body)
-    u, v, w = to_body(body_axes, subtract(reference.velocity, environment.wind))
-    dx, dy, dz = mass_properties.drag_body
-    return scale(-1.0 / mass_properties.mass, to_world(body_axes, (dx * u, dy * v, dz * w)))
+def _over_mass(mass_properties: MassProperties, airspeed: Vector) -> Vector:
+    """The drag at an airspeed over the mass, against it; body axes."""
+    (dx, dy, dz), (u, v, w) = mass_properties.drag_body, airspeed
+    return scale(1.0 / mass_properties.mass, (dx * u, dy * v, dz * w))
 
 
 class AttitudeCommand(NamedTuple):
@@ -144,13 +154,21 @@ class AttitudeError(NamedTuple):
     omega: Vector  # [rad/s]
 
 
-def attitude_command(ops: Ops, outer: PositionLoopState, reference: ReferencePoint) -> AttitudeCommand:
+def attitude_command(
+    ops: Ops, outer: PositionLoopState, demand: ThrustDemand, reference: ReferencePoint
+) -> AttitudeCommand:
     """The reference attitude, turned by the smallest rotation from its thrust axis to the commanded one.
 
-    Rates: ω = b3 × f'/|f| with the jerk of reference and feedback in f', and the reference's spin about b3.
+    Rates: ω = b3 × f'/|f| with the rates of demand and feedback in f', and the reference's spin about b3.
     Where the commanded specific thrust vanishes the reference attitude is kept.
+
+    Args:
+        ops: of the arithmetic.
+        outer: the outer loop's feedback.
+        demand: the thrust that the reference asks for.
+        reference: the reference.
     """
-    f = add(reference.specific_thrust, outer.acceleration)
+    f = add(demand.value, outer.acceleration)
     size = norm(ops, f)
     determined = size > _MIN_THRUST
     shrink = 1.0 / ops.maximum(size, _MIN_THRUST)
@@ -162,7 +180,7 @@ def attitude_command(ops: Ops, outer: PositionLoopState, reference: ReferencePoi
         ops.select(determined, f[2] * shrink, z),
     )
     q = multiply(smallest_rotation(ops, nominal, b3, b1), reference.q_world_body)
-    swing = cross(b3, scale(shrink, add(reference.jerk, outer.jerk)))
+    swing = cross(b3, scale(shrink, add(demand.rate, outer.jerk)))
     return AttitudeCommand(f, q, add_scaled(swing, dot(nominal, reference.omega), b3))
 
 
@@ -191,7 +209,7 @@ def feedback_moment(gains: Gains, inertia: Matrix, error: AttitudeError, integra
     return transform(inertia, add_scaled(acceleration, gains.attitude_integral, integral))
 
 
-def reference_moment(inertia: Matrix, body_axes: Axes, ahead: Lookahead) -> Vector:
+def reference_moment(inertia: Matrix, body_axes: Axes, rates: ReferencePoint | Lookahead) -> Vector:
     """The moment that the reference asks [N·m], J ω' + ω × Jω, with its rates in the body's own axes."""
-    omega, omega_dot = to_body(body_axes, ahead.omega), to_body(body_axes, ahead.omega_dot)
+    omega, omega_dot = to_body(body_axes, rates.omega), to_body(body_axes, rates.omega_dot)
     return flatness.moment(inertia, omega, omega_dot)

@@ -2,8 +2,9 @@ from .assessment.assess import with_assessment, with_second_opinion
 from .assessment.assessment import Assessment, Box, SecondOpinion
 from .assessment.lower_bound import least_duration
 from .certified_solve import Judged, Solution, certified_solve, with_certificate
-from .flyability import flight_error, nominal_flight, with_flyability
+from .flyability import flight_error, nominal_flight, own_flight, with_flyability
 from .miqp import Miqp
+from .passages import planned_passages
 from .plan_file import load_plan
 from .planners import (
     Planner,
@@ -19,7 +20,7 @@ from .planners import (
 from .polynomial.free_knots import FreeKnots
 from .polynomial.min_snap import MinSnap, TimeScaling
 from .recorder import Attempt, Recorder
-from .result import FLYABLE_ERROR, Flyability, PlacedStage, Plan
+from .result import FLYABLE_ERROR, FlownPassage, Flyability, OwnFlight, PlacedStage, Plan
 from .rotor_margin import RotorMargin
 from .search import BisectionSearch, GridSearch
 from .time_optimal.time_optimal import TimeOptimal
@@ -30,12 +31,14 @@ __all__ = [
     "Attempt",
     "BisectionSearch",
     "Box",
+    "FlownPassage",
     "Flyability",
     "FreeKnots",
     "GridSearch",
     "Judged",
     "MinSnap",
     "Miqp",
+    "OwnFlight",
     "PlacedStage",
     "Plan",
     "Planner",
@@ -53,7 +56,9 @@ __all__ = [
     "load_plan",
     "nominal_flight",
     "option",
+    "own_flight",
     "plan",
+    "planned_passages",
     "planner",
     "planner_class",
     "planner_options",

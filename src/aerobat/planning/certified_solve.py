@@ -13,15 +13,15 @@ from typing import Any, Generic, Protocol, TypeVar
 import numpy as np
 
 from aerobat.arrays import Array
-from aerobat.certification import Certificate, Envelope, PlannedPassage, certify
+from aerobat.certification import Certificate, Envelope, certify
 from aerobat.certification.path.passages import passage_findings
 from aerobat.errors import SpecError
 from aerobat.flatness.references import force_balance
+from aerobat.planning.passages import planned_passages
 from aerobat.planning.recorder import Attempt, Recorder
 from aerobat.planning.result import PlacedStage, Plan
 from aerobat.planning.rotor_margin import sampled_margin
 from aerobat.problem.problem import Limits, Problem
-from aerobat.problem.stage import Stage
 from aerobat.trajectory import Trajectory
 from aerobat.vehicle import Vehicle
 
@@ -90,7 +90,7 @@ class Judged(Generic[Detail]):
             return plan
         if self.certificate is None:
             return with_certificate(plan, self.vehicle)
-        passages = planned_passages(plan.stages, self.problem, self.vehicle)
+        passages = planned_passages(plan.stages, self.problem)
         findings = passage_findings(
             trajectory, passages, force_balance(self.problem.environment, self.vehicle)
         )
@@ -152,22 +152,8 @@ def certificate_for(
 def envelope_for(problem: Problem, vehicle: Vehicle, stages: Sequence[PlacedStage] = ()) -> Envelope:
     """The limits of a problem for a vehicle, with the gates that are passed at placed stages."""
     throughout = problem.stages(vehicle.max_specific_thrust).path_constraints
-    passages = planned_passages(stages, problem, vehicle)
+    passages = planned_passages(stages, problem)
     return Envelope(limits=problem.path_limits, conditions=throughout, passages=passages)
-
-
-def planned_passages(
-    stages: Sequence[PlacedStage], problem: Problem, vehicle: Vehicle
-) -> tuple[PlannedPassage, ...]:
-    """The gates that are passed at placed stages, as the problem's own stages ask, in their order."""
-    asked = list(problem.stages(vehicle.max_specific_thrust).stages)
-    found = []
-    for place in stages:
-        if place.gate is not None:
-            stage = next((stage for stage in asked if stage.gate == place.gate), Stage(place.name))
-            asked = [other for other in asked if other is not stage]
-            found.append(PlannedPassage.of(stage, problem.gate(place.gate), place.time))
-    return tuple(found)
 
 
 def with_certificate(plan: Plan, vehicle: Vehicle) -> Plan:

@@ -29,30 +29,64 @@ FLYABLE_ERROR = 0.05  # [m] that a plan's own flight may leave its path by, a fr
 
 
 @dataclass(frozen=True)
-class Flyability:
-    """A plan's own flights: the simulated closed loop, nothing unknown, and with the reserve used up.
+class FlownPassage:
+    """A gate in a plan's own flight."""
+
+    gate: str
+    attitude_error: float | None  # [rad] between the thrust axis and where it shall point; None: not crossed
+    attitude_tolerance: float | None  # [rad] that is allowed; None where no attitude is asked
+    failure: str = ""  # what went wrong, in words; empty where it was passed as asked
+
+
+@dataclass(frozen=True, kw_only=True)
+class OwnFlight:
+    """A plan's own nominal flight: the simulated closed loop, nothing unknown."""
+
+    error: float  # [m] the largest position error, 5 m or more where it diverges
+    passages: tuple[FlownPassage, ...] = ()  # the planned ones, in their order; frames are not looked at
+
+    @property
+    def flies(self) -> bool:
+        """True if it stays within FLYABLE_ERROR of the path and passes the gates as they ask."""
+        return not self.defects
+
+    @property
+    def misses(self) -> bool:
+        """True if it does not pass through the plane of a gate that is asked, or not as far as counts."""
+        return any(passage.failure and passage.attitude_error is None for passage in self.passages)
+
+    @property
+    def rank(self) -> tuple[int, float]:
+        """The number of defects, and the error [m]: the better of two flights has the lesser."""
+        return len(self.defects), self.error
+
+    @property
+    def defects(self) -> tuple[str, ...]:
+        """All that it does wrong, in words."""
+        failed = tuple(passage.failure for passage in self.passages if passage.failure)
+        if self.error <= FLYABLE_ERROR:
+            return failed
+        allowed = f"{100 * FLYABLE_ERROR:g} cm at most allowed"
+        return (f"leaves the path by {length(self.error)}, {allowed}", *failed)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Flyability(OwnFlight):
+    """A plan's own flights: the nominal one, and one with the reserve used up.
 
     The disturbance is the largest that the rotors' reserve buys at every instant: all rotors give less than
     commanded by a fraction of it, of which no rotor's limit need take notice.
     """
 
-    error: float  # [m] the largest position error of the nominal flight, 5 m or more where it diverges
     disturbance: float  # [N] by which every rotor may miss its thrust; 0 where nothing is left
     disturbed_fraction: float  # [-] the same over the largest thrust of a rotor
     disturbed_error: float  # [m] the largest position error where all rotors give less by that fraction
 
-    @property
-    def flies(self) -> bool:
-        """True if the nominal flight stays within FLYABLE_ERROR of the path."""
-        return self.error <= FLYABLE_ERROR
-
     def __str__(self) -> str:
         """The finding in a sentence without its full stop."""
-        if not self.flies:
-            return (
-                f"not flyable: its own flight leaves the path by {length(self.error)}, "
-                f"{100 * FLYABLE_ERROR:g} cm at most allowed, a defect of the plan, not of the flight"
-            )
+        if self.defects:
+            found = " and ".join(self.defects)
+            return f"not flyable: its own flight {found}, a defect of the plan, not of the flight"
         if not self.disturbance:
             return f"flies within {length(self.error)}, with no reserve left"
         return (
@@ -101,7 +135,7 @@ class Plan:
 
     @property
     def flies(self) -> bool:
-        """True if its vehicle, simulated, follows it within FLYABLE_ERROR."""
+        """True if its vehicle, simulated, keeps to it within FLYABLE_ERROR and passes its gates as asked."""
         return self.flyability is not None and self.flyability.flies
 
     @property

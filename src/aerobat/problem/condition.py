@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
-from math import degrees, inf, radians, sqrt, tan
+from math import inf, sqrt, tan
 from typing import Annotated, Any, ClassVar
 
 import numpy as np
@@ -19,6 +19,8 @@ from aerobat.declaration import (
     Positive,
     UnitVector,
     declared,
+    in_degrees,
+    in_radians,
     number,
     unit,
 )
@@ -211,26 +213,3 @@ def across(direction: Array) -> tuple[Array, Array]:
     """Two unit vectors normal to a unit vector and to each other."""
     first = unit(np.cross(direction, np.eye(3)[int(np.argmin(np.abs(direction)))]))
     return first, unit(np.cross(direction, first))
-
-
-def in_radians(table: dict[str, Any], name: str) -> dict[str, Any]:
-    """The table with an angle's shorthand in degrees replaced. Raises SpecError where both are given."""
-    shorthand = f"{name}_deg"
-    if shorthand not in table:
-        return table
-    if name in table:
-        raise SpecError(f"{name} and {shorthand} are both given; give one of them")
-    table[name] = radians(number(table.pop(shorthand), shorthand))
-    return table
-
-
-def in_degrees(table: dict[str, Any], name: str) -> dict[str, Any]:
-    """The table with an angle in degrees where those say exactly the same."""
-    if name not in table:
-        return table
-    angle = table[name]
-    for angle_deg in (round(degrees(angle), 9), degrees(angle)):
-        if radians(angle_deg) == angle:
-            del table[name]
-            return table | {f"{name}_deg": angle_deg}
-    return table

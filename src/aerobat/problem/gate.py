@@ -23,12 +23,14 @@ from aerobat.declaration import (
     declared,
     door,
     from_table,
+    in_degrees,
+    in_radians,
     number,
     unit,
     unknown_name,
 )
 from aerobat.errors import SpecError
-from aerobat.problem.condition import Condition, ConeAngle, Quantity, in_degrees, in_radians
+from aerobat.problem.condition import Condition, ConeAngle, Quantity
 
 
 @declared

@@ -6,7 +6,6 @@ import re
 from collections.abc import Mapping
 from dataclasses import field, replace
 from functools import lru_cache
-from math import degrees, radians
 from typing import Annotated, Any, ClassVar, cast
 
 import numpy as np
@@ -26,7 +25,8 @@ from aerobat.declaration import (
     declared,
     door,
     from_table,
-    number,
+    in_degrees,
+    in_radians,
     to_table,
     within_field,
 )
@@ -163,20 +163,12 @@ class Problem:
                 raise SpecError("gate and gates are both given; give all gates as tables [[gates]]")
             with within_field("gate"):
                 table["gates"] = (from_table(Gate, table.pop("gate")),)
-        if "heading_deg" in table:
-            if "heading" in table:
-                raise SpecError("heading and heading_deg are both given; give one of them")
-            table["heading"] = radians(number(table.pop("heading_deg"), "heading_deg"))
-        return table
+        return in_radians(table, "heading")
 
     def abbreviate(self, table: dict[str, Any]) -> dict[str, Any]:
         """Write the heading in degrees where those say exactly the same; what is short comes first."""
         table.setdefault("maneuver", to_table(self.maneuver))
-        heading = table.pop("heading", 0.0)
-        for heading_deg in (round(degrees(heading), 9), degrees(heading)):
-            if heading and radians(heading_deg) == heading:
-                return {"heading_deg": heading_deg} | table
-        return table | ({"heading": heading} if heading else {})
+        return in_degrees(table, "heading")
 
     def _check_within_limits(self) -> None:
         for derivative, quantity in enumerate(DERIVATIVES[:3]):
@@ -215,11 +207,10 @@ class Problem:
                 continue
             derivatives = state.derivatives(3)
             if bound.excess(derivatives) > ROUNDING * bound.scale:
-                along = ", ".join(f"{x:g}" for x in condition.direction)
                 value = float(bound.value(derivatives))
                 raise FieldError(
                     end,
-                    f": its {condition.quantity.value} along ({along}), {value:g}, lies outside what the "
+                    f": its {condition.name}, {value:g}, lies outside what the "
                     f"maneuver asks throughout, path_constraints[{number}]: from {condition.lower:g} to "
                     f"{condition.upper:g}; change either",
                 )

@@ -42,7 +42,8 @@ class Stage:
 
     A fraction fixes it to the last interval that ends by then, or `interval_offset` intervals after that
     one. `gate` names the gate that it passes, whose centre it meets, with the thrust axis along its upright
-    where `min_upright_thrust` is given: within half its tolerance, the rest is left to the flight.
+    where `min_upright_thrust` is given, or as `attitude` says: within half the gate's tolerance, at most, the
+    rest is left to the flight.
     """
 
     name: Label  # shown in reports and pictures
@@ -84,9 +85,12 @@ class Stage:
     def explicit(self, gate: Gate | None = None) -> Stage:
         """The same at its gate, with all that it asks among its conditions: also where, and its attitude."""
         attitude = self.attitude
-        if gate is not None and self.min_upright_thrust is not None:
+        if gate is not None:
             tolerance = PLANNED_SHARE * gate.attitude_tolerance
-            attitude = Attitude(gate.up, self.min_upright_thrust, tolerance)
+            if self.min_upright_thrust is not None:
+                attitude = Attitude(gate.up, self.min_upright_thrust, tolerance)
+            elif attitude is not None:
+                attitude = replace(attitude, tolerance=min(attitude.tolerance, tolerance))
         there = () if gate is None else at_centre(gate)
         pointing = () if attitude is None else attitude.conditions
         conditions = (*there, *self.conditions, *pointing)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from dataclasses import asdict
-from math import inf
+from math import degrees, inf
 from typing import Any
 
 from aerobat.evaluation.score import Score
@@ -56,6 +56,15 @@ def _flyability(found: Flyability) -> dict[str, Any]:
         "disturbance_n": found.disturbance,
         "disturbed_fraction": found.disturbed_fraction,
         "disturbed_error_m": found.disturbed_error,
+        "passages": [
+            {
+                "gate": passage.gate,
+                "attitude_error_deg": _in_degrees(passage.attitude_error),
+                "attitude_tolerance_deg": _in_degrees(passage.attitude_tolerance),
+                "failure": passage.failure or None,
+            }
+            for passage in found.passages
+        ],
         "sentence": str(found),
     }
 
@@ -74,6 +83,10 @@ def _assessment(found: Assessment) -> dict[str, Any]:
         "warnings": list(found.warnings),
         "sentence": str(found),
     }
+
+
+def _in_degrees(angle: float | None) -> float | None:
+    return None if angle is None else degrees(angle)
 
 
 def _plan(plan: Plan) -> dict[str, Any]:

@@ -196,4 +196,5 @@ def flight_facts(score: Score, controller: str | None = None) -> Iterable[Fact]:
 
 
 def _pair(largest: float, rms: float, unit: str) -> str:
-    return f"{largest:.2f} {unit} at most, {rms:.2f} {unit} RMS"
+    most, mean = (f"{x:.2f}" if x >= 0.1 else f"{x:.2g}" for x in (largest, rms))
+    return f"{most} {unit} at most, {mean} {unit} RMS"

@@ -7,11 +7,15 @@ from collections.abc import Iterable
 from enum import Enum
 
 DIVERGENCE_RADIUS = 5.0  # [m] of position error: no controller is expected back from there
+NO_LENGTH = 1e-6  # [m] less is rounding
 
 
 def length(metres: float) -> str:
     """A length with the unit that suits it."""
-    return f"{metres:.2f} m" if metres >= 1.0 else f"{100 * metres:.2f} cm"
+    if metres >= 1.0:
+        return f"{metres:.2f} m"
+    digits = ".2g" if NO_LENGTH < metres < 1e-3 else ".2f"
+    return f"{100 * metres:{digits}} cm"
 
 
 def counted(outcomes: Iterable[Outcome]) -> str:
@@ -38,7 +42,7 @@ class Outcome(Enum):
     )
     HIT_FRAME = "hit the frame of {gate}, {excess_cm:.1f} cm too wide at {time:.2f} s"
     WRONG_ATTITUDE = (
-        "passed {gate} tilted by {angle:.1f}° from its upright at {time:.2f} s, {tolerance:.3g}° allowed"
+        "passed {gate} {angle:.1f}° off the attitude asked at {time:.2f} s, {tolerance:.3g}° allowed"
     )
     HIT_GROUND = "hit the ground at {time:.2f} s"
     DIVERGED = "diverged at {time:.2f} s: position error above {radius:g} m"

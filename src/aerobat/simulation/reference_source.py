@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from aerobat import so3
 from aerobat.arrays import Array
 from aerobat.engines.components import components
-from aerobat.engines.pytree import tree_map
+from aerobat.engines.pytree import Tree, tree_map
 from aerobat.environment import Environment
 from aerobat.flatness import reference
 from aerobat.kernels.control_loops import Lookahead, ReferencePoint
@@ -30,7 +30,6 @@ class ReferenceSource:
         vehicle: Vehicle,
         environment: Environment,
         rate: float,
-        actuation_delay: float,
     ) -> None:
         """Prepare to make set-points.
 
@@ -39,13 +38,11 @@ class ReferenceSource:
             vehicle: the nominal one.
             environment: where it flies.
             rate: of the ticks [1/s].
-            actuation_delay: the time [s] that commands take to become thrust.
         """
         self.times = trajectory.sample(rate)
         self._trajectory = trajectory
         self._vehicle = vehicle
         self._environment = environment
-        self._delay = actuation_delay
         self._period = 1.0 / rate
         self._block = -1
 
@@ -83,31 +80,47 @@ class ReferenceSource:
         block = tick // BLOCK
         if block == self._block:
             return
-        times = self.times[block * BLOCK : (block + 1) * BLOCK]
-        later = np.minimum(times + self._delay, self.times[-1])
-        now, ahead = (
-            reference(self._trajectory, self._vehicle, times=t, environment=self._environment).setpoint
-            for t in (times, later)
-        )
+        first, ticks = block * BLOCK, min(BLOCK, len(self) - block * BLOCK)
+        times = self.times[first : first + ticks + 1]
+        rows = reference(self._trajectory, self._vehicle, times, environment=self._environment).setpoint
+        following = np.minimum(np.arange(1, ticks + 1), len(times) - 1)
         self._block = block
-        self._setpoint = now
-        self._points = reference_points(now, ahead, self._environment)
+        self._setpoint = setpoint_rows(rows, slice(ticks))
+        self._points = reference_points(
+            self._setpoint,
+            setpoint_rows(rows, following),
+            self._environment,
+            self._vehicle.mass,
+        )
 
 
-def reference_points(setpoint: Setpoint, ahead: Setpoint, environment: Environment) -> ReferencePoint:
-    """Set-points now, and those at the time when commands will have taken effect, as kernels read them."""
-    now = setpoint.flat.acceleration + environment.weight
-    then = ahead.flat.acceleration + environment.weight
+def reference_points(
+    setpoint: Setpoint, following: Setpoint, environment: Environment, mass: float
+) -> ReferencePoint:
+    """Set-points as kernels read them.
+
+    Args:
+        setpoint: at ticks, leading axis (ticks,).
+        following: one tick later.
+        environment: where; its gravity counts.
+        mass: of the vehicle that they are for [kg].
+    """
+    flat, q = setpoint.flat, setpoint.q_world_body
+
+    def in_world(rate_body: Array) -> Tree:
+        return components(so3.rotate(q, rate_body))
+
     return ReferencePoint(
-        components(setpoint.flat.position),
-        components(setpoint.flat.velocity),
-        components(now),
-        components(setpoint.flat.jerk),
-        components(setpoint.q_world_body),
-        components(so3.rotate(setpoint.q_world_body, setpoint.omega_body)),
+        components(flat.position),
+        components(flat.velocity),
+        components(flat.acceleration + environment.weight),
+        components(flat.jerk),
+        components(q),
+        in_world(setpoint.omega_body),
+        in_world(setpoint.omega_dot_body),
         Lookahead(
-            np.linalg.norm(then, axis=-1) - np.linalg.norm(now, axis=-1),
-            components(so3.rotate(ahead.q_world_body, ahead.omega_body)),
-            components(so3.rotate(ahead.q_world_body, ahead.omega_dot_body)),
+            (following.wrench.thrust - setpoint.wrench.thrust) / mass,
+            in_world(following.omega_body),
+            in_world(following.omega_dot_body),
         ),
     )

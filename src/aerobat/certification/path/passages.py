@@ -24,7 +24,7 @@ PLANE_DISTANCE = 1e-3  # [m] from the gate's plane, within which a path is said 
 def passage_findings(
     trajectory: Trajectory, passages: Sequence[PlannedPassage], balance: ForceBalance
 ) -> list[Finding]:
-    """The findings about each passage: in the gate's plane, through it, inside the opening, upright."""
+    """The findings about each passage: in the gate's plane, through it, inside the opening, attitude."""
     return [
         finding for passage in passages for finding in _Instant.of(trajectory, passage, balance).findings()
     ]
@@ -60,17 +60,17 @@ class _Instant:
             self._at_most("upward", "m", abs(up), gate.height / 2),
             self._finding("speed through", "m/s", Side.MIN, speed, self.passage.min_speed),
         ]
-        return [*found, *self._attitude()] if self.passage.upright else found
+        return found if self.passage.attitude_tolerance == np.inf else [*found, self._attitude()]
 
-    def _attitude(self) -> list[Finding]:
-        """The angle between the thrust axis and the gate's upright, undecided where there is no thrust."""
-        gate = self.passage.gate
-        sine, cosine = np.linalg.norm(np.cross(gate.up, self.thrust)), gate.up @ self.thrust
+    def _attitude(self) -> Finding:
+        """The angle between the thrust axis and where it shall point, undecided where there is no thrust."""
+        wanted = self.passage.up
+        sine, cosine = np.linalg.norm(np.cross(wanted, self.thrust)), wanted @ self.thrust
         angle = float(np.arctan2(sine, cosine))
-        found = self._at_most("attitude", "rad", angle, gate.attitude_tolerance)
+        found = self._at_most("attitude", "rad", angle, self.passage.attitude_tolerance)
         if np.linalg.norm(self.thrust) < self.floor:
-            return [replace(found, verdict=Verdict.UNDECIDED)]
-        return [found]
+            return replace(found, verdict=Verdict.UNDECIDED)
+        return found
 
     def _at_most(self, quantity: str, unit: str, value: float, limit: float) -> Finding:
         return self._finding(quantity, unit, Side.MAX, value, limit)

@@ -9,14 +9,16 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import partial
+from itertools import pairwise
 from math import inf
 
 from aerobat.optimization.deadline import out_of_time
 from aerobat.planning.certified_solve import Judged
-from aerobat.planning.flyability import flight_error
+from aerobat.planning.flyability import own_flight
 from aerobat.planning.miqp.attempts import Attempts, Placement
-from aerobat.planning.miqp.refinement import Descent, PathPoint, descent, finished
-from aerobat.planning.result import FLYABLE_ERROR
+from aerobat.planning.miqp.refinement import Descent, PathPoint, PathProgram, descent, finished
+from aerobat.planning.result import OwnFlight
+from aerobat.problem.condition import Condition, Quantity
 
 GROWTH = 1.15  # of dt, from one program to the next
 COARSE_GROWTH = 1.3  # where a path is further off than that
@@ -25,6 +27,7 @@ FAR = 1.3  # of a constraint's range: a path that exceeds it by more is no place
 FALLING = 1.25  # unless the excess falls no faster than by this factor from one program to the next
 STARTS = 2  # that lead to a path
 MAX_STARTS = 6
+FASTER = 1.3  # times as fast through gates, of paths that turn back in them
 RESERVES = (0.02, 0.05, 0.1, 0.2)  # of the rotors' ranges, for paths that leave the controller too little
 
 
@@ -76,20 +79,52 @@ def _descent(start: Placement) -> Descent:
 
 
 def flyable(attempts: Attempts, judged: Judged[Placement]) -> Judged[Placement]:
-    """The same, or with a reserve for the controller where its own flight leaves the path."""
-    vehicle, environment = attempts.vehicle, attempts.formulation.problem.environment
-    for reserve in RESERVES:
-        path, trajectory = judged.solution.source.path, judged.solution.trajectory
-        assert vehicle is not None
-        assert trajectory is not None
-        if path is None or out_of_time() or flight_error(trajectory, vehicle, environment) <= FLYABLE_ERROR:
-            return judged
-        program = replace(path.program, reserve=max(reserve, path.program.reserve))
-        kept = descent(program, path.x).path
-        if kept is not None:
-            reserved = attempts.refined(judged.solution.source, partial(finished, kept))
-            judged = reserved if reserved.feasible else judged
-    return judged
+    """The same, or where its own flight has a defect a slower one without, if there is.
+
+    A path that turns back in its gate gets more speed there, any other a reserve for the controller.
+    """
+    best = last = _own_flight(attempts, judged), judged
+    path = judged.solution.source.path
+    program = path.program if path else None
+    for lesser, reserve in pairwise((0.0, *RESERVES)):
+        if path is None or program is None or last[0].flies or out_of_time():
+            break
+        kept = reserve
+        if last[0].misses:
+            program, kept = _hastened(program), lesser
+        program = replace(program, reserve=max(kept, program.reserve))
+        found = descent(program, path.x).path
+        if found is None:
+            continue
+        slower = attempts.refined(judged.solution.source, partial(finished, found))
+        if slower.feasible:
+            path = found
+            last = _own_flight(attempts, slower), slower
+            best = min(best, last, key=lambda pair: pair[0].rank)
+    return best[1]
+
+
+def _hastened(program: PathProgram) -> PathProgram:
+    """The same with more speed asked of passages."""
+    formulation = program.formulation
+    stages = tuple(
+        stage if stage.gate is None else replace(stage, conditions=tuple(map(_faster, stage.conditions)))
+        for stage in formulation.sequence.stages
+    )
+    sequence = replace(formulation.sequence, stages=stages)
+    return replace(program, formulation=replace(formulation, sequence=sequence))
+
+
+def _faster(condition: Condition) -> Condition:
+    asks_speed = condition.quantity is Quantity.VELOCITY and condition.lower > 0.0 and condition.upper == inf
+    return replace(condition, lower=FASTER * condition.lower) if asks_speed else condition
+
+
+def _own_flight(attempts: Attempts, judged: Judged[Placement]) -> OwnFlight:
+    trajectory, vehicle = judged.solution.trajectory, attempts.vehicle
+    assert vehicle is not None
+    assert trajectory is not None
+    return own_flight(trajectory, vehicle, attempts.formulation.problem, attempts.placed(judged))
 
 
 @dataclass

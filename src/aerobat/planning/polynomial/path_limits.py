@@ -38,13 +38,13 @@ class PathLimits:
 
     rotors: RotorConstraints
     origin: Array  # [m] of the frame of motion, world, (3,)
-    bounds: dict[str, LinearBound]  # by their names
+    bounds: tuple[tuple[str, LinearBound], ...]  # each with its name
 
     def limits(self, reserve: float) -> tuple[Array, Array]:
         """The least and the most of every value, less a reserve, (size,) each."""
         lower, upper = self.rotors.limits
         kept = np.where(self.rotors.has_range, reserve, 0.0)
-        ends = np.array([scaled(bound) for bound in self.bounds.values()]).reshape(-1, 2).T
+        ends = np.array([scaled(bound) for _, bound in self.bounds]).reshape(-1, 2).T
         return (
             np.concatenate([lower + kept, ends[0] + reserve]),
             np.concatenate([upper - kept, ends[1] - reserve]),
@@ -60,7 +60,7 @@ class PathLimits:
     @property
     def names(self) -> tuple[str, ...]:
         """The limits' names, one a value."""
-        return (*self.rotors.names, *self.bounds)
+        return (*self.rotors.names, *(name for name, _ in self.bounds))
 
     def excess(self, trajectory: Trajectory, samples: Samples) -> Array:
         """By how much a trajectory exceeds limits at as many samples of each segment, (S, size, n)."""
@@ -129,7 +129,7 @@ class PathLimits:
     @cached_property
     def _derivatives(self) -> tuple[int, ...]:
         """The derivatives of position that any value depends on."""
-        bounded = {k for bound in self.bounds.values() for k in bound.derivatives}
+        bounded = {k for _, bound in self.bounds for k in bound.derivatives}
         return tuple(sorted({1, 2, 3, 4} | ({5} if self.rotors.lags else set()) | bounded))
 
     @cached_property
@@ -184,33 +184,28 @@ class PathLimits:
         ca, d = import_casadi(), self.dimensions
         rows = {k: motion[i * d : (i + 1) * d] for i, k in enumerate(self._derivatives)}
         values = [self.rotors.values([rows.get(k) for k in range(1, 6)], frame)]
-        for bound in self.bounds.values():
+        for _, bound in self.bounds:
             along = bound.weights @ self.rotors.axes
             value = sum(ca.dot(ca.DM(along[k]), rows[k]) for k in bound.derivatives)
             values.append((value + float(bound.weights[0] @ self.origin)) / bound_scale(bound))
         return ca.vertcat(*values)
 
 
-def path_bounds(problem: Problem, sequence: StageSequence, balance: ForceBalance) -> dict[str, LinearBound]:
-    """Bounds along the whole path by their names: the problem's limits, and what its sequence asks always.
+def path_bounds(
+    problem: Problem, sequence: StageSequence, balance: ForceBalance
+) -> tuple[tuple[str, LinearBound], ...]:
+    """Bounds along the whole path with their names: the problem's limits, what its sequence asks always.
 
     Limits' weights (6, 3) have a row for each derivative, position to crackle.
     """
-    limits = {
-        f"limits on {quantity} {axis}": LinearBound(
-            np.outer(np.eye(len(DERIVATIVES))[k], direction), 0.0, float(low), float(high)
-        )
-        for k, quantity in enumerate(DERIVATIVES)
-        for axis, direction, low, high in zip(AXES, np.eye(3), *problem.path_limits.of(k), strict=True)
-        if low > -inf or high < inf
-    }
-    asked = {
-        f"maneuver's condition on {condition.quantity.value} (number {i} of those along the path)": (
-            condition.bound(balance)
-        )
-        for i, condition in enumerate(sequence.path_constraints, 1)
-    }
-    return limits | asked
+    bounds = []
+    for k, quantity in enumerate(DERIVATIVES):
+        for axis, direction, low, high in zip(AXES, np.eye(3), *problem.path_limits.of(k), strict=True):
+            if low > -inf or high < inf:
+                weights = np.outer(np.eye(len(DERIVATIVES))[k], direction)
+                bounds.append((f"{quantity} {axis}", LinearBound(weights, 0.0, float(low), float(high))))
+    asked = ((condition.name, condition.bound(balance)) for condition in sequence.path_constraints)
+    return (*bounds, *asked)
 
 
 def powers(s: Array, derivative: int) -> Array:

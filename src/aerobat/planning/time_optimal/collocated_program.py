@@ -13,6 +13,7 @@ from aerobat.flatness import force_balance
 from aerobat.optimization.deadline import out_of_time
 from aerobat.optimization.nonlinear import NonlinearResult, solve_nonlinear
 from aerobat.planning.certified_solve import Solution
+from aerobat.planning.result import PlacedStage
 from aerobat.planning.time_optimal.bounds import Backoff
 from aerobat.planning.time_optimal.collocation import CollocatedMotion, Mesh, trajectory_of
 from aerobat.planning.time_optimal.elements import Elements
@@ -43,6 +44,14 @@ class SolvedMotion:
         """The motion's trajectory."""
         elements = self.program.control.elements
         return trajectory_of(elements.body, self.program.mesh, self.motion, elements.problem.heading)
+
+    @property
+    def placed(self) -> tuple[PlacedStage, ...]:
+        """When the motion passes its stages."""
+        ends = np.cumsum(self.program.mesh.intervals).tolist()
+        times = np.cumsum(self.motion.phases).tolist()
+        stages = zip(self.program.control.stages, ends, times, strict=False)
+        return tuple(PlacedStage(s.name, end - 1, time, s.gate) for s, end, time in stages)
 
     @property
     def start(self) -> Start:

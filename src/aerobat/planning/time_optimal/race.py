@@ -7,9 +7,9 @@ from dataclasses import dataclass, field, replace
 
 from aerobat.optimization.deadline import out_of_time, time_left, within_time
 from aerobat.planning.certified_solve import Judged, certified_solve
-from aerobat.planning.flyability import flight_error
+from aerobat.planning.flyability import own_flight
 from aerobat.planning.recorder import Attempt, Recorder
-from aerobat.planning.result import FLYABLE_ERROR
+from aerobat.planning.result import OwnFlight
 from aerobat.planning.time_optimal.collocated_program import CollocatedProgram, SolvedMotion
 from aerobat.planning.time_optimal.elements import Elements
 from aerobat.planning.time_optimal.starts import Start
@@ -66,20 +66,20 @@ class Race:
         return best or next(filter(None, map(self._certified, others)), None)
 
     def flyable(self, found: Judged[SolvedMotion]) -> Judged[SolvedMotion]:
-        """What was found, with so much more reserve that its own flight stays on its path.
+        """What was found, with so much more reserve that its own flight has no defect.
 
         Where no reserve is wanted it stays as it is, and where none is enough the best is returned.
         """
-        best, reserve = (self._flight_error(found), found), self.reserve
+        best, reserve = (self._own_flight(found), found), self.reserve
         for _ in range(RESERVE_RAISES if reserve > 0.0 else 0):
-            if best[0] <= FLYABLE_ERROR or out_of_time():
+            if best[0].flies or out_of_time():
                 break
             reserve = min(MORE_RESERVE * reserve, MAX_RESERVE)
             last = found.solution.source
             again = self._certified(self._fine(last.program.control.elements, last.start, reserve))
             if again is not None:
                 found = again
-                best = min(best, (self._flight_error(found), found), key=lambda pair: pair[0])
+                best = min(best, (self._own_flight(found), found), key=lambda pair: pair[0].rank)
         return best[1]
 
     def _coarse(self, starts: Sequence[Start], body: Vehicle) -> list[CollocatedProgram]:
@@ -116,9 +116,9 @@ class Race:
             self._elements[key] = Elements(self.problem, body, start.plane)
         return self._elements[key]
 
-    def _flight_error(self, found: Judged[SolvedMotion]) -> float:
-        trajectory = found.solution.source.trajectory
-        return flight_error(trajectory, self.vehicle, self.problem.environment)
+    def _own_flight(self, found: Judged[SolvedMotion]) -> OwnFlight:
+        solved = found.solution.source
+        return own_flight(solved.trajectory, self.vehicle, self.problem, solved.placed)
 
     def _certified(self, program: CollocatedProgram) -> Judged[SolvedMotion] | None:
         found = certified_solve(program, self.problem, self.vehicle, self.recorder, ROUNDS)

@@ -24,7 +24,7 @@ from aerobat.planning.certified_solve import Judged
 from aerobat.planning.miqp import Miqp
 from aerobat.planning.planners import Planner, option, planner
 from aerobat.planning.recorder import Progress, Recorder
-from aerobat.planning.result import PlacedStage, Plan
+from aerobat.planning.result import Plan
 from aerobat.planning.time_limit import TIME_LIMIT, stopped, too_short
 from aerobat.planning.time_optimal.collocated_program import SolvedMotion
 from aerobat.planning.time_optimal.collocation import BOUNDED_DERIVATIVES
@@ -98,16 +98,12 @@ class TimeOptimal(Planner):
 
 def _plan(found: Judged[SolvedMotion], race: Race) -> Plan:
     """The plan of what won."""
-    solved = found.solution.source
-    ends = np.cumsum(solved.program.mesh.intervals).tolist()
-    times = np.cumsum(solved.motion.phases).tolist()
-    stages = zip(solved.program.control.stages, ends, times, strict=False)
     return found.plan(
         race.recorder,
         planner="time-optimal",
         order=4,
         status="locally optimal",
         backend="ipopt",
-        stages=tuple(PlacedStage(s.name, end - 1, time, s.gate) for s, end, time in stages),
+        stages=found.solution.source.placed,
         starts=race.durations,
     )

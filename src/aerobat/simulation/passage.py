@@ -8,8 +8,8 @@ gate's plane all the same. One that moves along the plane passes no gate.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, fields, replace
 from math import degrees, inf
 from typing import Any
 
@@ -18,12 +18,12 @@ from numpy.typing import NDArray
 
 from aerobat import so3
 from aerobat.arrays import Array
+from aerobat.certification import PlannedPassage
 from aerobat.declaration import by_value
 from aerobat.kernels.running_metrics import GateProgress, Snapshot
-from aerobat.planning import Plan
 from aerobat.problem.gate import Gate
-from aerobat.problem.problem import Problem
-from aerobat.problem.stage import Stage
+from aerobat.simulation.flight import Flight
+from aerobat.simulation.outcome import Outcome
 from aerobat.vehicle.fleet import Fleet
 
 PASSAGE_WINDOW = 0.25  # [s] around the planned instant in which the crossing is looked for
@@ -45,7 +45,7 @@ class Passage:
     miss: float  # [m] from the centre there
     inside: bool  # true if the centre of mass went through the opening
     speed: float  # [m/s]
-    attitude_error_deg: float  # angle between the thrust axis and the gate's upright, or what a stage asks
+    attitude_error_deg: float  # angle between the thrust axis and where it shall point
     attitude_tolerance_deg: float  # largest that is allowed; infinite where no attitude is asked
     clearance: float  # [m] from the outermost rotor tip to the frame; negative: a collision; NaN: unknown
     planned: float  # [s] when it was to be crossed; NaN where the flight had ended before
@@ -53,57 +53,51 @@ class Passage:
     max_distance: float  # [m] beyond the plane about then, negative: before it
     min_distance: float  # [m] likewise
 
+    def of_flight(self, k: int) -> Passage:
+        """One flight's of many, in plain numbers."""
+        numbers = {field.name: getattr(self, field.name)[k].item() for field in fields(self)[1:]}
+        return replace(self, **numbers)
 
-@dataclass(frozen=True, eq=False)
-class PlannedPassage:
-    """A gate to be passed, when, and with which attitude."""
+    @property
+    def failure(self) -> tuple[Outcome, float, dict[str, object]] | None:
+        """One flight's failure, when [s], and its numbers; None where nothing is wrong, or known."""
+        if np.isnan(self.planned):
+            return None
+        if np.isnan(self.time):
+            return self._instead()
+        if not self.inside:
+            return Outcome.MISSED_GATE, self.time, {"miss": self.miss}
+        if self.clearance < 0.0:
+            return Outcome.HIT_FRAME, self.time, {"excess_cm": -100 * self.clearance}
+        if self.attitude_error_deg > self.attitude_tolerance_deg:
+            angles = {"angle": self.attitude_error_deg, "tolerance": self.attitude_tolerance_deg}
+            return Outcome.WRONG_ATTITUDE, self.time, {**angles}
+        return None
 
-    gate: Gate
-    time: float  # [s]
-    up: Array  # where the thrust axis shall point, world, (3,)
-    attitude_tolerance: float  # [rad] infinite where no attitude is asked
+    def _instead(self) -> tuple[Outcome, float, dict[str, object]]:
+        """What happened in place of a crossing in the gate's direction."""
+        if self.max_distance <= 0.0:
+            return Outcome.SHORT_OF_GATE, self.planned, {"short": -self.max_distance}
+        if self.max_distance >= PASSAGE_DEPTH and np.isfinite(self.backward_time):
+            return Outcome.BACKWARDS, self.backward_time, {}
+        if self.min_distance <= 0.0:
+            return Outcome.STOPPED_IN_GATE, self.planned, {"beyond_cm": 100 * self.max_distance}
+        return Outcome.EARLY, self.planned, {"early": self.min_distance}
 
 
-def planned_passages(goal: Problem | Plan, times: Array, position: Array) -> tuple[PlannedPassage, ...]:
-    """The passages of gates in the order of the stages, of all gates where no stage names one.
-
-    When is said by a plan's stages; otherwise by the set-points' nearest approach to the gate's centre, after
-    the last one of the same gate.
+def flown_passages(flight: Flight, planned: Sequence[PlannedPassage], fleet: Fleet | None) -> list[Passage]:
+    """Passages of one flight, fields (1,).
 
     Args:
-        goal: the problem, or a plan for it.
-        times: of the set-points [s], (T,).
-        position: of the set-points [m], (T, 3).
+        flight: what was flown.
+        planned: what was to be passed.
+        fleet: its vehicle alone, for the clearance.
     """
-    problem = goal.problem if isinstance(goal, Plan) else goal
-    stages = [stage for stage in problem.stages(1.0).stages if stage.gate is not None]
-    if isinstance(goal, Plan):
-        placed = [stage for stage in goal.stages if stage.gate is not None]
-        if placed:
-            by_name = {stage.name: stage for stage in stages}
-            return tuple(
-                _planned(problem.gate(str(stage.gate)), stage.time, by_name.get(stage.name))
-                for stage in placed
-            )
-    asked: list[tuple[Gate, Stage | None]] = [(problem.gate(str(stage.gate)), stage) for stage in stages]
-    asked = asked or [(gate, None) for gate in problem.gates]
-    instants = _nearest_instants([gate for gate, _ in asked], times, position)
-    return tuple(_planned(gate, t, stage) for (gate, stage), t in zip(asked, instants, strict=True))
-
-
-def _planned(gate: Gate, time: float, stage: Stage | None) -> PlannedPassage:
-    if stage is None or stage.attitude is None:
-        return PlannedPassage(gate, time, gate.up, inf)
-    return PlannedPassage(gate, time, stage.attitude.up, gate.attitude_tolerance)
-
-
-def _nearest_instants(gates: Sequence[Gate], times: Array, position: Array) -> Iterator[float]:
-    latest: dict[str, float] = {}
-    for gate in gates:
-        distance = np.linalg.norm(position - gate.position, axis=-1)
-        after = latest.get(gate.name, -np.inf) + PASSAGE_WINDOW
-        latest[gate.name] = float(times[int(np.argmin(np.where(times > after, distance, np.inf)))])
-        yield latest[gate.name]
+    diverged = flight.outcome is not Outcome.COMPLETE
+    stop = np.array([flight.ends if diverged else np.nan])
+    states = flight.states
+    parts = (states.position, states.velocity, states.q_world_body)
+    return [passages(each, gate_progress(each, flight.times, parts), stop, fleet) for each in planned]
 
 
 def passages(planned: PlannedPassage, progress: GateProgress, stop: Array, fleet: Fleet | None) -> Passage:
