@@ -51,6 +51,7 @@ class EllipseBounds:
     regular: NDArray[np.bool_]  # where not, the others mean nothing
     magnitudes: MagnitudeBounds
     twist: Array  # of the angle by which the frame turns about b3 per half length [rad]
+    curl: Array  # of that angle's imaginary part [rad]
 
 
 def regular(norms: Array) -> NDArray[np.bool_]:
@@ -115,7 +116,7 @@ def on_ellipses(norms: Array, half: Array, vehicle: Vehicle) -> EllipseBounds:
     omega_dot = frame * inverse * (snap + 2 * ratio * jerk**2 * inverse)
     axial = abs(axial_drag(vehicle))
     thrust = vehicle.mass * (mean * np.where(RHO > 1, 1 - root, 1 + delta) + axial * ratio * speed)
-    return EllipseBounds(usable, MagnitudeBounds(thrust, ratio, omega, omega_dot), twist)
+    return EllipseBounds(usable, MagnitudeBounds(thrust, ratio, omega, omega_dot), twist, curl)
 
 
 def _off_zero(mean: Array, away: Array) -> NDArray[np.bool_]:
