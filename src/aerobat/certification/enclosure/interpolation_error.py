@@ -6,7 +6,7 @@ about the piece and |q| <= B there, its interpolant p of degree K has |q − p| 
 piece (Trefethen, Approximation Theory and Approximation Practice, theorem 8.2). Such B follow from the
 norms of the terms of v, f, f', f'' alone: with c = |c_0| of f, |f − c_0| <= Δ = δ c on E_ρ and n² = f·f,
 
-    |n² − c²| <= κ c²,  κ = 2δ + δ² < 1   =>   Re n >= c √(1 − κ)
+    δ < 1/2   =>   Re n >= c (1 − δ)
 
 whence the rest, as DERIVATION.md has it; complex vectors have their Hermitian norms. On the piece itself,
 ρ = 1, the same bounds say how large things are there, and what rounding does to them.
@@ -104,7 +104,8 @@ def on_ellipses(norms: Array, half: Array, vehicle: Vehicle) -> EllipseBounds:
     usable = _off_zero(mean, away)
     away, speed, jerk, snap = (np.where(usable, bound, 0.0) for bound in (away, speed, jerk, snap))
     delta = away / mean
-    root = np.sqrt(1 - 2 * delta - delta**2)  # Re n / c, at least
+    root = 1 - delta  # Re n / c, at least
+    grown = delta * (2 + delta) / (1 + root)  # |n − c| / c, at most
     ratio = (1 + delta) / root  # |f|/|n|, at most
     inverse = 1 / (mean * root)  # 1/|n|, at most
     beside = mean * (root + 1 - delta)  # |n + w|, at least
@@ -115,13 +116,13 @@ def on_ellipses(norms: Array, half: Array, vehicle: Vehicle) -> EllipseBounds:
     omega = frame * jerk * inverse
     omega_dot = frame * inverse * (snap + 2 * ratio * jerk**2 * inverse)
     axial = abs(axial_drag(vehicle))
-    thrust = vehicle.mass * (mean * np.where(RHO > 1, 1 - root, 1 + delta) + axial * ratio * speed)
+    thrust = vehicle.mass * (mean * np.where(RHO > 1, grown, 1 + delta) + axial * ratio * speed)
     return EllipseBounds(usable, MagnitudeBounds(thrust, ratio, omega, omega_dot), twist, curl)
 
 
 def _off_zero(mean: Array, away: Array) -> NDArray[np.bool_]:
-    """Tell where κ < 1, with a thousandth to spare."""
-    return np.asarray(2 * away * mean + away**2 < 0.999 * mean**2)
+    """Tell where δ < 1/2, with a thousandth to spare."""
+    return np.asarray(2 * away < 0.999 * mean)
 
 
 def first_order(
