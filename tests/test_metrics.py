@@ -143,3 +143,28 @@ def test_a_flight_below_the_ground_has_hit_it(quad: Vehicle) -> None:
     result = score(flight, problem())
     assert result.outcome is Outcome.HIT_GROUND
     assert result.sentence == "hit the ground at 0.50 s"
+
+
+def test_a_flight_through_its_gates_says_how_fast_and_how_far_off_at_the_worst(cruise: Flight) -> None:
+    off = moved(cruise, (0.0, -0.03, 0.04), (0.0, 0.02, 0.0))
+    near = tilted_gate(np.array([2.0, 0.0, 1.0]), name="near")
+    aside = tilted_gate(np.array([4.0, 0.03, 1.0]), name="aside")
+    path = ", 5.00 cm off its path at most"
+    one = score(off, problem(near))
+    assert one.sentence == f"through the gate at 4.0 m/s, 50.0 mm off its centre{path}"
+    assert str(one) == f"{one.sentence}; attitude error 1.15° RMS, saturated 0.0 % of the time"
+    both = score(off, problem(near, aside))
+    assert both.sentence == f"through all 2 gates, the worst at 4.0 m/s, 72.1 mm off its centre{path}"
+
+
+def test_a_flight_that_went_wrong_says_by_how_much(cruise: Flight, quad: Vehicle) -> None:
+    reach = max(abs(r.position_body[1]) + r.radius for r in quad.rotors)
+    narrow = score(cruise, problem(tilted_gate(np.array([4.0, 0.0, 1.0]), width=0.2, height=1.0)), quad)
+    assert narrow.sentence == f"hit the frame of the gate, {100 * (reach - 0.1):.1f} cm too wide at 1.00 s"
+    error = "position error 5.00 cm at most, attitude error 0.00° RMS, saturated 25.0 % of the time"
+    clipped = np.zeros_like(cruise.series["saturated"])
+    clipped[: len(clipped) // 4] = True
+    off = moved(cruise, (0.0, -0.03, 0.04), (0.0, 0.0, 0.0))
+    off = replace(off, series={**off.series, "saturated": clipped})
+    beside = score(off, problem(tilted_gate(np.array([4.0, 3.97, 1.04]))))
+    assert str(beside) == f"missed the gate, 4.00 m off its centre at 1.00 s; {error}"
