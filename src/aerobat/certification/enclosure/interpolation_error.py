@@ -49,6 +49,7 @@ class EllipseBounds:
     """Bounds on R ellipses about P pieces, all (P, R)."""
 
     regular: NDArray[np.bool_]  # where not, the others mean nothing
+    root: Array  # Re n, the thrust's norm, at least [m/s²]
     magnitudes: MagnitudeBounds
     twist: Array  # of the angle by which the frame turns about b3 per half length [rad]
     curl: Array  # of that angle's imaginary part [rad]
@@ -103,21 +104,18 @@ def on_ellipses(norms: Array, half: Array, vehicle: Vehicle) -> EllipseBounds:
     away = norms[:, 1:, 1] @ larger[1:]
     usable = _off_zero(mean, away)
     away, speed, jerk, snap = (np.where(usable, bound, 0.0) for bound in (away, speed, jerk, snap))
-    delta = away / mean
-    root = 1 - delta  # Re n / c, at least
-    grown = delta * (2 + delta) / (1 + root)  # |n − c| / c, at most
-    ratio = (1 + delta) / root  # |f|/|n|, at most
-    inverse = 1 / (mean * root)  # 1/|n|, at most
-    beside = mean * (root + 1 - delta)  # |n + w|, at least
-    twist = half[:, None] * away * jerk * inverse / beside
+    root = mean - away  # Re n, at least; |n + w| is twice that or more
+    ratio = (mean + away) / root  # |f|/|n|, at most
+    twist = half[:, None] * away * jerk / (2 * root**2)
     curl = twist * (RHO + 1 / RHO) / 2  # the angle's imaginary part, gathered from the real line on
     usable &= curl < MAX_FRAME_ANGLE
-    frame = (1 + away * (1 + ratio) / beside) * np.exp(np.where(usable, curl, 0.0))  # |x|, |y|, at most
-    omega = frame * jerk * inverse
-    omega_dot = frame * inverse * (snap + 2 * ratio * jerk**2 * inverse)
+    frame = (1 + away * mean / root**2) * np.exp(np.where(usable, curl, 0.0))  # |x|, |y|, at most
+    omega = frame * jerk / root
+    omega_dot = frame * (snap + 2 * ratio * jerk**2 / root) / root
+    grown = away * (2 * mean + away) / (mean + root)  # |n − c|, at most
     axial = abs(axial_drag(vehicle))
-    thrust = vehicle.mass * (mean * np.where(RHO > 1, grown, 1 + delta) + axial * ratio * speed)
-    return EllipseBounds(usable, MagnitudeBounds(thrust, ratio, omega, omega_dot), twist, curl)
+    thrust = vehicle.mass * (np.where(RHO > 1, grown, mean + away) + axial * ratio * speed)
+    return EllipseBounds(usable, root, MagnitudeBounds(thrust, ratio, omega, omega_dot), twist, curl)
 
 
 def _off_zero(mean: Array, away: Array) -> NDArray[np.bool_]:
