@@ -8,7 +8,7 @@ import pytest
 from aerobat import so3
 from aerobat.environment import Environment
 from aerobat.errors import SpecError
-from aerobat.evaluation import Passage, score
+from aerobat.evaluation import Passage, score, score_flights
 from aerobat.problem import Gate, Problem, at_rest, tilted_gate
 from aerobat.simulation import Flight, Outcome, fly
 from aerobat.trajectory import Trajectory
@@ -74,6 +74,11 @@ def test_clearance_is_what_the_rotors_leave_of_the_opening(cruise: Flight, quad:
     assert passage(cruise, gate, quad).clearance == pytest.approx(0.5 - reach, abs=1e-3)
     off = moved(cruise, (0.0, 0.1, 0.0), (0.0, 0.0, 0.0))
     assert passage(off, gate, quad).clearance == pytest.approx(0.4 - reach, abs=1e-3)
+    low = tilted_gate(np.array([4.0, 0.0, 1.0]), width=5.0, height=0.4)
+    high = max(abs(r.position_body[2]) for r in quad.rotors)
+    assert passage(cruise, low, quad).clearance == pytest.approx(0.2 - high, abs=1e-3)
+    on_edge = moved(cruise, (0.0, 0.0, 0.0), (np.pi / 2, 0.0, 0.0))
+    assert passage(on_edge, low, quad).clearance == pytest.approx(0.2 - reach, abs=1e-3)
 
 
 def test_a_vehicle_wider_than_the_opening_hits_the_frame(cruise: Flight, quad: Vehicle) -> None:
@@ -168,3 +173,12 @@ def test_a_flight_that_went_wrong_says_by_how_much(cruise: Flight, quad: Vehicle
     off = replace(off, series={**off.series, "saturated": clipped})
     beside = score(off, problem(tilted_gate(np.array([4.0, 3.97, 1.04]))))
     assert str(beside) == f"missed the gate, 4.00 m off its centre at 1.00 s; {error}"
+
+
+def test_scores_of_many_flights_are_a_sequence_of_scores(quad: Vehicle) -> None:
+    straight = Trajectory(np.array([0.2]), np.array([[[0.0, 0, 1], [SPEED / 5, 0, 0]]]))
+    scores = score_flights(straight, [quad, quad], problem=problem())
+    assert list(scores) == [scores[0], scores[1]] == [scores[-2], scores[-1]]
+    for k in (2, -3):
+        with pytest.raises(IndexError, match=f"there are 2 flights, no flight {k}"):
+            scores[k]
