@@ -156,10 +156,10 @@ def test_a_flight_through_its_gates_says_how_fast_and_how_far_off_at_the_worst(c
     aside = tilted_gate(np.array([4.0, 0.03, 1.0]), name="aside")
     path = ", 5.00 cm off its path at most"
     one = score(off, problem(near))
-    assert one.sentence == f"through the gate at 4.0 m/s, 50.0 mm off its centre{path}"
+    assert one.sentence == f"through the gate at 4.0 m/s, 5.00 cm off its centre{path}"
     assert str(one) == f"{one.sentence}; attitude error 1.15° RMS, saturated 0.0 % of the time"
     both = score(off, problem(near, aside))
-    assert both.sentence == f"through all 2 gates, the worst at 4.0 m/s, 72.1 mm off its centre{path}"
+    assert both.sentence == f"through both gates, the worst at 4.0 m/s, 7.21 cm off its centre{path}"
 
 
 def test_a_flight_that_went_wrong_says_by_how_much(cruise: Flight, quad: Vehicle) -> None:
