@@ -125,9 +125,7 @@ def test_collective_thrust_is_lowered_as_far_as_roll_and_pitch_need_and_no_furth
     assert (got.thrust >= highest - tolerance)[can].all()
 
 
-def test_collective_thrust_between_its_ends_needs_no_rotor_beyond_its_limits_and_beyond_them_one_does() -> (
-    None
-):
+def test_the_range_of_collective_thrust_ends_where_a_rotor_does() -> None:
     """Of six rotors that turn either way, one of which pushes down to hold the others up."""
     places = [(1.0, 1.0), (1.0, -1.0), (2.0, 1.0), (2.0, -1.0), (9.0, 0.0), (-1.0, 0.0)]
     rotors = tuple(
