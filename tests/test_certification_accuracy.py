@@ -253,6 +253,18 @@ def test_a_jump_is_told_from_rounding(
     assert all(jump.norm == pytest.approx(factor * tolerance, rel=1e-2) for jump in jumps)
 
 
+@pytest.mark.parametrize("factor", [0.3, 3.0])
+def test_a_jump_of_direction_is_measured_by_the_thrust_at_its_knot(factor: float) -> None:
+    """Which rises to g from a tenth of it, and falls again: 10⁻⁶ rad, not 10⁻⁵."""
+    coefficients = np.zeros((2, 5, 3))
+    coefficients[:, 3, 2] = 0.9 * 9.81 * np.array([1.0, -1.0]) / 6
+    coefficients[0, 2, 2] = -0.9 * 9.81 / 2
+    coefficients[1, :2, 2] = coefficients[0, :, 2].sum(), coefficients[0, :, 2] @ np.arange(5)
+    coefficients[1, 2, 0] = factor * 1e-6 * 9.81 / 2
+    jumps = certify(Trajectory([1.0, 1.0], coefficients), VEHICLE).discontinuities
+    assert [jump.quantity for jump in jumps] == (["thrust direction"] if factor > 1 else [])
+
+
 @pytest.mark.parametrize("factor", [0.5, 2.0])
 def test_a_jump_of_thrust_counts_where_commands_can_tell_it(factor: float) -> None:
     """By a thousandth of the range of a lagging rotor, made by a jump of snap."""
