@@ -4,6 +4,7 @@ Rotors have no lag, or commands that come as near to their limits as the thrusts
 """
 
 from dataclasses import dataclass, field, replace
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -18,7 +19,7 @@ from aerobat.trajectory.polynomial import hermite
 from aerobat.vehicle import Rotor, Vehicle
 
 MARGINS = (-0.2, 0.2)  # of a rotor's range, between which the margin is sought
-HALVINGS = 14
+HALVINGS = 10  # to a hundredth of the flight's time
 STENCIL_STEP = 2e-4  # of a segment, of differences
 
 
@@ -39,6 +40,7 @@ class Sampled:
     determined: bool
 
 
+@lru_cache(maxsize=256)
 def random_flight(seed: int, lags: bool = False) -> Flight:
     """One with its time scaled so that the rotors come as close to their limits as drawn.
 

@@ -1,7 +1,7 @@
 """Rotor thrusts within limits: what is made of a load, and what is given up of one that does not fit."""
 
 import numpy as np
-from hypothesis import example, given
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from aerobat.control import Controller
@@ -15,7 +15,16 @@ from aerobat.kernels import rigid_body
 from aerobat.kernels.allocation import Mixer, desaturate, mix, within_limits
 from aerobat.kernels.motors import Rotors, clamp
 from aerobat.states import Wrench
-from aerobat.vehicle import Vehicle, collective_range, load_vehicle, rotor_thrusts, wrench
+from aerobat.vehicle import (
+    Rotor,
+    Vehicle,
+    collective_range,
+    load_vehicle,
+    mixer,
+    rotor_thrusts,
+    vehicle_names,
+    wrench,
+)
 from aerobat.vehicle.fleet import Fleet
 from random_vehicles import (
     SAMPLES,
@@ -94,6 +103,41 @@ def test_collective_thrust_is_lowered_for_roll_and_pitch_and_never_raised(made: 
     assert (got.thrust <= load.thrust + tolerance).all()
     whole = within(vehicle, rotor_thrusts(vehicle, load))
     np.testing.assert_allclose(got.thrust[whole], load.thrust[whole], rtol=0, atol=tolerance)
+
+
+@settings(max_examples=20)
+@given(st.sampled_from(vehicle_names()), st.integers(0, 2**32 - 1))
+def test_collective_thrust_is_lowered_as_far_as_roll_and_pitch_need_and_no_further(
+    name: str, seed: int
+) -> None:
+    """Of rotors alike, where they fit about some lower thrust they are made whole, about the highest."""
+    vehicle, rng = load_vehicle(name), np.random.default_rng(seed)
+    low, high = collective_range(vehicle)
+    tilted = without_yaw(wrench(vehicle, thrusts_within_limits(vehicle, rng)))
+    demand = Wrench(np.maximum(tilted.thrust, rng.uniform(low, high, SAMPLES)), tilted.moment_body)
+    lower = low + (np.minimum(demand.thrust, high) - low) * np.linspace(0.0, 1.0, 200)[:, None]
+    moment = np.broadcast_to(tilted.moment_body, (200, SAMPLES, 3))
+    fits = within(vehicle, rotor_thrusts(vehicle, Wrench(lower, moment)))
+    can = fits.any(axis=0)
+    got, tolerance = wrench(vehicle, allocate(vehicle, demand)), 1e-8 * span(vehicle)
+    np.testing.assert_allclose(got.moment_body[can], tilted.moment_body[can], rtol=0, atol=tolerance)
+    highest = np.where(fits, lower, -np.inf).max(axis=0)
+    assert (got.thrust >= highest - tolerance)[can].all()
+
+
+def test_the_range_of_collective_thrust_ends_where_a_rotor_does() -> None:
+    """Of six rotors that turn either way, one of which pushes down to hold the others up."""
+    places = [(1.0, 1.0), (1.0, -1.0), (2.0, 1.0), (2.0, -1.0), (9.0, 0.0), (-1.0, 0.0)]
+    rotors = tuple(
+        Rotor(np.array([x, y, 0.0]), spin, -3.0 - k, 8.0 + k, 0.05, 0.0, 0.1)
+        for k, ((x, y), spin) in enumerate(zip(places, (1, -1, -1, 1, 1, -1), strict=True))
+    )
+    vehicle = Vehicle("uneven", 1.0, np.eye(3), rotors)
+    assert mixer(vehicle)[:, 0].min() < -1e-3
+    ends = np.array(collective_range(vehicle))
+    for collective, holds in ((ends, True), (ends + np.array([-1e-3, 1e-3]), False)):
+        thrusts = rotor_thrusts(vehicle, Wrench(collective, np.zeros((2, 3))))
+        assert (within(vehicle, thrusts) == holds).all()
 
 
 @given(vehicles())

@@ -8,7 +8,7 @@ import pytest
 from aerobat import so3
 from aerobat.environment import Environment
 from aerobat.errors import SpecError
-from aerobat.evaluation import Passage, score
+from aerobat.evaluation import Passage, score, score_flights
 from aerobat.problem import Gate, Problem, at_rest, tilted_gate
 from aerobat.simulation import Flight, Outcome, fly
 from aerobat.trajectory import Trajectory
@@ -74,6 +74,11 @@ def test_clearance_is_what_the_rotors_leave_of_the_opening(cruise: Flight, quad:
     assert passage(cruise, gate, quad).clearance == pytest.approx(0.5 - reach, abs=1e-3)
     off = moved(cruise, (0.0, 0.1, 0.0), (0.0, 0.0, 0.0))
     assert passage(off, gate, quad).clearance == pytest.approx(0.4 - reach, abs=1e-3)
+    low = tilted_gate(np.array([4.0, 0.0, 1.0]), width=5.0, height=0.4)
+    high = max(abs(r.position_body[2]) for r in quad.rotors)
+    assert passage(cruise, low, quad).clearance == pytest.approx(0.2 - high, abs=1e-3)
+    on_edge = moved(cruise, (0.0, 0.0, 0.0), (np.pi / 2, 0.0, 0.0))
+    assert passage(on_edge, low, quad).clearance == pytest.approx(0.2 - reach, abs=1e-3)
 
 
 def test_a_vehicle_wider_than_the_opening_hits_the_frame(cruise: Flight, quad: Vehicle) -> None:
@@ -143,3 +148,37 @@ def test_a_flight_below_the_ground_has_hit_it(quad: Vehicle) -> None:
     result = score(flight, problem())
     assert result.outcome is Outcome.HIT_GROUND
     assert result.sentence == "hit the ground at 0.50 s"
+
+
+def test_a_flight_through_its_gates_says_how_fast_and_how_far_off_at_the_worst(cruise: Flight) -> None:
+    off = moved(cruise, (0.0, -0.03, 0.04), (0.0, 0.02, 0.0))
+    near = tilted_gate(np.array([2.0, 0.0, 1.0]), name="near")
+    aside = tilted_gate(np.array([4.0, 0.03, 1.0]), name="aside")
+    path = ", 5.00 cm off its path at most"
+    one = score(off, problem(near))
+    assert one.sentence == f"through the gate at 4.0 m/s, 5.00 cm off its centre{path}"
+    assert str(one) == f"{one.sentence}; attitude error 1.15° RMS, saturated 0.0 % of the time"
+    both = score(off, problem(near, aside))
+    assert both.sentence == f"through both gates, the worst at 4.0 m/s, 7.21 cm off its centre{path}"
+
+
+def test_a_flight_that_went_wrong_says_by_how_much(cruise: Flight, quad: Vehicle) -> None:
+    reach = max(abs(r.position_body[1]) + r.radius for r in quad.rotors)
+    narrow = score(cruise, problem(tilted_gate(np.array([4.0, 0.0, 1.0]), width=0.2, height=1.0)), quad)
+    assert narrow.sentence == f"hit the frame of the gate, {100 * (reach - 0.1):.1f} cm too wide at 1.00 s"
+    error = "position error 5.00 cm at most, attitude error 0.00° RMS, saturated 25.0 % of the time"
+    clipped = np.zeros_like(cruise.series["saturated"])
+    clipped[: len(clipped) // 4] = True
+    off = moved(cruise, (0.0, -0.03, 0.04), (0.0, 0.0, 0.0))
+    off = replace(off, series={**off.series, "saturated": clipped})
+    beside = score(off, problem(tilted_gate(np.array([4.0, 3.97, 1.04]))))
+    assert str(beside) == f"missed the gate, 4.00 m off its centre at 1.00 s; {error}"
+
+
+def test_scores_of_many_flights_are_a_sequence_of_scores(quad: Vehicle) -> None:
+    straight = Trajectory(np.array([0.2]), np.array([[[0.0, 0, 1], [SPEED / 5, 0, 0]]]))
+    scores = score_flights(straight, [quad, quad], problem=problem())
+    assert list(scores) == [scores[0], scores[1]] == [scores[-2], scores[-1]]
+    for k in (2, -3):
+        with pytest.raises(IndexError, match=f"there are 2 flights, no flight {k}"):
+            scores[k]

@@ -318,6 +318,24 @@ def test_a_relaxation_that_cannot_be_solved_leaves_a_gap_and_no_false_claim(
         assert result.status in ("time_limit", "unknown")
 
 
+@pytest.mark.parametrize("noise", [0.0, 1e-8])
+@pytest.mark.parametrize("seed", range(4))
+def test_equalities_that_follow_from_others_change_nothing_and_contradictions_are_found(
+    seed: int, noise: float
+) -> None:
+    """More equalities than variables: the point of least norm on the independent ones, or none."""
+    rng = np.random.default_rng(seed)
+    own = rng.normal(size=(3, 5))
+    rows = np.vstack([own, rng.normal(size=(4, 3)) @ own])
+    rows /= np.linalg.norm(rows, axis=1, keepdims=True)
+    target = rows @ rng.normal(size=5) + noise * rng.normal(size=7)
+    found = LeastDistanceQP(rows).solve(target, target)
+    assert found is not None
+    np.testing.assert_allclose(found.y, np.linalg.lstsq(rows, target)[0], atol=1e-9 + 50 * noise)
+    off = target + 1e-3 * (np.arange(7) == 6)
+    assert LeastDistanceQP(rows).solve(off, off) is None
+
+
 @pytest.mark.parametrize("failures", [1, 2, 3])
 def test_a_relaxation_that_fails_is_tried_cold_and_then_with_care(
     failures: int, monkeypatch: pytest.MonkeyPatch

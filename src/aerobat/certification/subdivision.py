@@ -16,7 +16,6 @@ from aerobat.trajectory.subintervals import Subintervals
 
 MAX_REMAINDER = 1e-8  # of its scale: what interpolation may leave open of a quantity
 MAX_COMMAND_REMAINDER = 1e-7  # and of a command, of a derivative of what is interpolated
-MAX_TWIST_REMAINDER = 1e-9  # [rad] and of the frame's angle on one piece
 MIN_DURATION = 1e-8  # [s], a piece that is not cut further
 MAX_PIECES = 20_000  # at a time, beside four a segment; no flight needs so many
 
@@ -56,7 +55,7 @@ def _accurate(curve: ThrustCurve, pieces: Subintervals, norms: Array) -> NDArray
     seconds = pieces.seconds(curve.trajectory)
     found = interpolation_error.accuracy(norms, seconds, curve.sums[pieces.interval], curve.vehicle)
     allowed = MAX_REMAINDER * np.maximum(quantities.scales(curve.vehicle), found.magnitude)
-    small = (found.remainder <= allowed).all(axis=1) & (found.twist_remainder <= MAX_TWIST_REMAINDER)
+    small = (found.remainder <= allowed).all(axis=1)
     lags = curve.vehicle.lags
     rates = lags * found.rate_remainder[:, : len(lags)]
     small &= (rates <= MAX_COMMAND_REMAINDER / MAX_REMAINDER * allowed[:, : len(lags)]).all(axis=1)

@@ -35,10 +35,8 @@ class TimeInterval:
 
 @dataclass(frozen=True)
 class Frames:
-    """Attitudes along a thrust curve, at its samples and at the nodes put between them."""
+    """Attitudes along a thrust curve, at its samples and at the nodes put between them, M in all."""
 
-    times: Array  # [s], (M,), never falling
-    thrust: Array  # f, f', f'' at every node, (M, 3, 3)
     q_world_body: Array  # (M, 4), sign continuous
     determined: NDArray[np.bool_]  # |f| reaches the floor, so that there is a thrust direction, (M,)
     samples: NDArray[np.intp]  # where among the nodes the samples are, (T,)
@@ -53,15 +51,15 @@ def frames(times: Array, thrust: Array, floor: float, heading: float) -> Frames:
     """
     pieces, control = _subdivided(times, thrust, floor)
     samples = np.append(np.flatnonzero(pieces.start == 0.0), len(pieces))
-    nodes, node_thrust = _nodes(times, thrust, pieces, control, samples)
-    magnitude = _norm(node_thrust[:, 0])
+    starts = times[pieces.interval] + pieces.start * np.diff(times)[pieces.interval]
+    nodes = np.append(starts, times[-1])
+    f = np.concatenate([control[:, 0], thrust[-1:, 0]])
+    magnitude = _norm(f)
     determined = magnitude >= floor
-    directions = _held_directions(node_thrust[:, 0], magnitude, determined)
+    directions = _held_directions(f, magnitude, determined)
     smooth = determined[1:] & determined[:-1]
     q = _carry(directions, np.where(smooth[:, None, None], control, directions[:-1, None]), heading)
-    return Frames(
-        nodes, node_thrust, q, determined, samples, _undetermined(nodes, control, determined, floor)
-    )
+    return Frames(q, determined, samples, _undetermined(nodes, control, determined, floor))
 
 
 def _carry(directions: Array, control: Array, heading: float) -> Array:
@@ -76,16 +74,6 @@ def _carry(directions: Array, control: Array, heading: float) -> Array:
     q = so3.multiply(chart, so3.about_axis(UP, np.cumsum(angles)))
     turned = np.append(np.dot(q[0], first), np.sum(q[1:] * q[:-1], axis=-1)) < 0
     return np.asarray(q * np.cumprod(np.where(turned, -1.0, 1.0))[:, None])
-
-
-def advance(q_world_body: Array, thrust: Array, ahead: Array, step: Array) -> Array:
-    """Carry attitudes (n, 4) over one `step` (n,) [s] each, from f, f', f'' (n, 3, 3) to those ahead.
-
-    For steps inside the cone that `frames` keeps between its nodes, at determined thrust.
-    """
-    start, end = (f[:, 0] / _norm(f[:, 0])[:, None] for f in (thrust, ahead))
-    twist = so3.about_axis(end, _area(start, _hermite(thrust, ahead, step)))
-    return so3.multiply(twist, so3.multiply(so3.smallest_rotation(start, end), q_world_body))
 
 
 def _area(start: Array, control: Array) -> Array:
@@ -150,20 +138,6 @@ def _hermite(thrust: Array, ahead: Array, step: Array) -> Array:
     left, right = f0 + h / 5 * d0, f1 - h / 5 * d1
     inner = (left + h / 5 * d0 + h**2 / 20 * c0, right - h / 5 * d1 + h**2 / 20 * c1)
     return np.stack([f0, left, *inner, right, f1], axis=1)
-
-
-def _nodes(
-    times: Array, thrust: Array, pieces: Subintervals, control: Array, samples: NDArray[np.intp]
-) -> tuple[Array, Array]:
-    """Times (M,) and thrust (M, 3, 3) at the starts of all pieces and at the end; exact at the samples."""
-    steps = np.diff(times)[pieces.interval]
-    nodes = np.append(times[pieces.interval] + pieces.start * steps, times[-1])
-    length = np.where(steps > 0, pieces.length * steps, np.inf)[:, None]
-    b0, b1, b2 = control[:, :3].swapaxes(0, 1)
-    started = np.stack([b0, 5 * (b1 - b0) / length, 20 * (b2 - 2 * b1 + b0) / length**2], axis=1)
-    node_thrust = np.concatenate([started, thrust[-1:]])
-    node_thrust[samples] = thrust
-    return nodes, node_thrust
 
 
 def _held_directions(f: Array, magnitude: Array, determined: NDArray[np.bool_]) -> Array:

@@ -84,8 +84,7 @@ def reference(
     joining = np.concatenate([trajectory.knots[:-1] + s * trajectory.durations for s in parts])
     joining[: trajectory.segments] = trajectory.knots[1:]
     nodes = np.concatenate([joining, times])
-    side = np.repeat([0, *[1] * (len(parts) - 1), 2], [*[trajectory.segments] * len(parts), len(times)])
-    order = np.lexsort((side, nodes))
+    order = np.argsort(nodes, kind="stable")
     path = _frames(nodes[order], thrust[order], environment, trajectory.heading)
     at = path.samples[np.argsort(order)[len(joining) :]]
     return _assembled(times, flat, path, at, vehicle, environment)
@@ -222,7 +221,7 @@ def _assembled(
     vehicle: Vehicle,
     environment: Environment,
 ) -> Reference:
-    thrust, q = path.thrust[nodes], path.q_world_body[nodes]
+    thrust, q = _thrust(flat, vehicle, environment), path.q_world_body[nodes]
     omega, omega_dot = body_rates(thrust, q, path.determined[nodes])
     wrench = wrench_for(thrust, flat.velocity - environment.wind, omega, omega_dot, vehicle)
     setpoint = Setpoint(flat, q, omega, omega_dot, wrench)

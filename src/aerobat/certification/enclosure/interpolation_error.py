@@ -6,7 +6,7 @@ about the piece and |q| <= B there, its interpolant p of degree K has |q − p| 
 piece (Trefethen, Approximation Theory and Approximation Practice, theorem 8.2). Such B follow from the
 norms of the terms of v, f, f', f'' alone: with c = |c_0| of f, |f − c_0| <= Δ = δ c on E_ρ and n² = f·f,
 
-    |n² − c²| <= κ c²,  κ = 2δ + δ² < 1   =>   Re n >= c √(1 − κ)
+    δ < 1/2   =>   Re n >= c (1 − δ)
 
 whence the rest, as DERIVATION.md has it; complex vectors have their Hermitian norms. On the piece itself,
 ρ = 1, the same bounds say how large things are there, and what rounding does to them.
@@ -49,8 +49,10 @@ class EllipseBounds:
     """Bounds on R ellipses about P pieces, all (P, R)."""
 
     regular: NDArray[np.bool_]  # where not, the others mean nothing
+    root: Array  # Re n, the thrust's norm, at least [m/s²]
     magnitudes: MagnitudeBounds
     twist: Array  # of the angle by which the frame turns about b3 per half length [rad]
+    curl: Array  # of that angle's imaginary part [rad]
 
 
 def regular(norms: Array) -> NDArray[np.bool_]:
@@ -102,25 +104,23 @@ def on_ellipses(norms: Array, half: Array, vehicle: Vehicle) -> EllipseBounds:
     away = norms[:, 1:, 1] @ larger[1:]
     usable = _off_zero(mean, away)
     away, speed, jerk, snap = (np.where(usable, bound, 0.0) for bound in (away, speed, jerk, snap))
-    delta = away / mean
-    root = np.sqrt(1 - 2 * delta - delta**2)  # Re n / c, at least
-    ratio = (1 + delta) / root  # |f|/|n|, at most
-    inverse = 1 / (mean * root)  # 1/|n|, at most
-    beside = mean * (root + 1 - delta)  # |n + w|, at least
-    twist = half[:, None] * away * jerk * inverse / beside
+    root = mean - away  # Re n, at least; |n + w| is twice that or more
+    ratio = (mean + away) / root  # |f|/|n|, at most
+    twist = half[:, None] * away * jerk / (2 * root**2)
     curl = twist * (RHO + 1 / RHO) / 2  # the angle's imaginary part, gathered from the real line on
     usable &= curl < MAX_FRAME_ANGLE
-    frame = (1 + away * (1 + ratio) / beside) * np.exp(np.where(usable, curl, 0.0))  # |x|, |y|, at most
-    omega = frame * jerk * inverse
-    omega_dot = frame * inverse * (snap + 2 * ratio * jerk**2 * inverse)
+    frame = (1 + away * mean / root**2) * np.exp(np.where(usable, curl, 0.0))  # |x|, |y|, at most
+    omega = frame * jerk / root
+    omega_dot = frame * (snap + 2 * ratio * jerk**2 / root) / root
+    grown = away * (2 * mean + away) / (mean + root)  # |n − c|, at most
     axial = abs(axial_drag(vehicle))
-    thrust = vehicle.mass * (mean * np.where(RHO > 1, 1 - root, 1 + delta) + axial * ratio * speed)
-    return EllipseBounds(usable, MagnitudeBounds(thrust, ratio, omega, omega_dot), twist)
+    thrust = vehicle.mass * (np.where(RHO > 1, grown, mean + away) + axial * ratio * speed)
+    return EllipseBounds(usable, root, MagnitudeBounds(thrust, ratio, omega, omega_dot), twist, curl)
 
 
 def _off_zero(mean: Array, away: Array) -> NDArray[np.bool_]:
-    """Tell where κ < 1, with a thousandth to spare."""
-    return np.asarray(2 * away * mean + away**2 < 0.999 * mean**2)
+    """Tell where δ < 1/2, with a thousandth to spare."""
+    return np.asarray(2 * away < 0.999 * mean)
 
 
 def first_order(
