@@ -46,7 +46,7 @@ ON_THE_WAY = [
     ("nominal_flight", 1),
     ("score", 1),
     ("report_figure", 1),
-    ("write_csv", 1),
+    ("write_columns", 1),
     ("png", 1),
     ("end_interrupts", 1),
 ]

@@ -13,7 +13,7 @@ from aerobat.cli.options import OutputOptions
 from aerobat.cli.run_record import RECORD, RunRecord, write_record
 from aerobat.cli.terminal import print_json
 from aerobat.evaluation import Score
-from aerobat.interchange.csv import write_csv
+from aerobat.interchange.columns import write_columns
 from aerobat.planning import Plan
 from aerobat.reporting.figures import report_figure
 from aerobat.reporting.page import png
@@ -79,7 +79,7 @@ def finish(plan: Plan, record: RunRecord, options: OutputOptions, flown: Flown |
     replaced = folder.exists()
     with run_folder(folder, record) as staging:
         plan.save(staging / f"{plan.problem.name}.plan")
-        write_csv(plan.trajectory, staging / "plan.csv")
+        write_columns(plan, staging / "plan.csv", record.columns)
         if flight is not None:
             flight.save(staging / FLIGHT)
         (staging / "report.json").write_text(facts + "\n", encoding="utf-8")

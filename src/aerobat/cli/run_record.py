@@ -15,6 +15,7 @@ from pydantic import Field, PlainValidator
 from aerobat.declaration import NonNegative, declared, to_table
 from aerobat.documents import read_document, write_document
 from aerobat.errors import SpecError
+from aerobat.interchange.columns import ALL
 from aerobat.planning import Planner
 from aerobat.planning.planners import PLANNERS
 from aerobat.problem import Problem
@@ -52,6 +53,7 @@ class RunRecord:
     angle: float | None = None  # [deg] that --angle gave, for the folder's name
     source: str | None = None  # the file that the plan came from
     flight: FlightSettings = FlightSettings()
+    columns: tuple[str, ...] = ALL  # of plan.csv
     plugins: tuple[str, ...] = ()  # files that --import named
     versions: Mapping[str, str] = field(default_factory=dict)  # of what made it
     format: Literal["aerobat-run-1"] = "aerobat-run-1"
