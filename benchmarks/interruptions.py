@@ -4,8 +4,8 @@
     uv run python benchmarks/interruptions.py interrupt 60
 
 `kill` sends SIGKILL to a child that replaces an earlier run, and looks at the folder: it must hold the old
-run or the new one, whole, no process may be left, and after the next run nothing else. `interrupt` sends SIGINT
-to children that plan with each planner, compare and repeat, and looks for exit code 130, the word
+run or the new one, whole, no process may be left, and after the next run nothing else. `interrupt` sends
+SIGINT to children that plan with each planner, compare and repeat, and looks for exit code 130, the word
 "interrupted" and nothing written. Children are forked when all is imported, so that instants fall where the
 work is.
 """

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -76,7 +77,7 @@ def finish(plan: Plan, record: RunRecord, options: OutputOptions, flown: Flown |
     flight, score, controller = (flown.flight, flown.score, flown.controller) if flown else (None, None, None)
     facts = to_json(report(plan, score, plan.vehicle.name, controller))
     picture = png(report_figure(plan, plan.vehicle, flight, score))
-    replaced = folder.exists()
+    replaced = os.path.exists(folder)
     with run_folder(folder, record) as staging:
         plan.save(staging / f"{plan.problem.name}.plan")
         write_columns(plan, staging / "plan.csv", record.columns)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 from collections.abc import Mapping
 from dataclasses import field
@@ -95,7 +96,7 @@ def write_record(record: RunRecord, folder: Path) -> None:
 
 def read_record(folder: Path) -> RunRecord:
     """What a folder says of its run. Raises SpecError, one sentence, where it says nothing that is whole."""
-    if not folder.is_dir():
+    if not os.path.isdir(folder):
         raise SpecError(f"{folder} is no folder; give the folder of a run")
     if not (folder / RECORD).exists():
         raise SpecError(f"{folder}/ has no {RECORD}, so that no run can be repeated from it; run anew")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 from dataclasses import replace
 from math import radians
@@ -26,7 +27,7 @@ MADE_BY = "file"  # in the place of a planner's name
 def plan_source(name: str) -> Path | None:
     """The file or folder that holds a plan, where a command names one, and no problem."""
     path = Path(name)
-    is_folder = name not in problem_names() and path.suffix != ".toml" and path.is_dir()
+    is_folder = name not in problem_names() and path.suffix != ".toml" and os.path.isdir(path)
     return path if path.suffix in FILES or is_folder else None
 
 
