@@ -139,7 +139,7 @@ class PlanningOptions(TaskOptions):
 class FlyingOptions:
     """Options of the flight."""
 
-    noise: Annotated[float, Parameter(group=flying, validator=validators.Number(gte=0))] = 0.0
+    noise: Annotated[float, Parameter(group=flying, validator=validators.Number(gte=0, lte=1000))] = 0.0
     """The error of the state that the controller sees: 0 none, 1 that of motion capture and IMU fused."""
 
     controller: Annotated[str, Parameter(group=flying)] = "full"
