@@ -9,13 +9,12 @@ Read back, columns go by their names, in any order; those that nobody knows are 
 
 from __future__ import annotations
 
-import os
 from collections.abc import Sequence
 
 import numpy as np
 
 from aerobat.arrays import Array
-from aerobat.declaration import unknown_name
+from aerobat.declaration import PathName, Positive, door, unknown_name
 from aerobat.errors import SpecError
 from aerobat.flatness import reference
 from aerobat.interchange.csv import write_csv
@@ -40,9 +39,8 @@ def column_groups(text: str) -> tuple[str, ...]:
     return tuple(name for name in NAMES if name in groups)
 
 
-def write_columns(
-    plan: Plan, path: str | os.PathLike[str], columns: Sequence[str] = ALL, rate: float = 100.0
-) -> None:
+@door
+def write_columns(plan: Plan, path: PathName, columns: Sequence[str] = ALL, rate: Positive = 100.0) -> None:
     """Write a plan's columns at `rate` and at the very end, digits enough to read them back exactly.
 
     Without a vehicle, the columns that follow from one are left out. Lost is what lies between rows. Raises
