@@ -29,11 +29,9 @@ LINES = {
     "new": ("fly", "line", "--json"),
     "old": ("fly", "line", "--order", "4", "--json"),
 }
+BEFORE = 99  # the exit code of what was not begun
 COMMANDS = [
-    *(
-        ("plan", "section-v", "--planner", name)
-        for name in ("miqp", "min-snap", "free-knots", "time-optimal")
-    ),
+    *(("plan", "line", "--planner", name) for name in ("miqp", "min-snap", "free-knots", "time-optimal")),
     ("fly", "flip-roll", "--backend", "gurobi"),
     ("fly", "half-flip", "--noise", "1"),
     ("compare", "line"),
@@ -60,6 +58,9 @@ def run(command: tuple[str, ...], after: float | None = None, by: int = 0) -> tu
                 main(command)
             except SystemExit as stop:
                 os._exit(int(stop.code or 0))
+            except BaseException as error:  # a signal before the run has begun, or a defect
+                os.write(2, repr(error).encode())
+                os._exit(BEFORE)
             os._exit(0)
         with suppress(PermissionError):
             os.setpgid(child, child)
@@ -117,9 +118,11 @@ def interrupt(count: int) -> None:
         code = os.waitstatus_to_exitcode(status)
         if code == 130:
             lines = [line for line in said.splitlines() if not line.startswith("aerobat: planning")]
-            assert lines == ["aerobat: interrupted"], said
+            assert lines == ["aerobat: interrupted"], (command, said)
             assert sorted(Path().rglob("*")) == before, "something is written"
             ended["130, nothing written"] += 1
+        elif code == BEFORE and said == "KeyboardInterrupt()":
+            ended["before it began"] += 1
         else:  # it was done before the signal came
             assert code in (0, 1), (command, code, said)
             assert Path("out/run.toml").exists()
