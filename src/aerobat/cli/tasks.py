@@ -78,7 +78,7 @@ def plan_of(record: RunRecord) -> Plan:
             return with_second_opinion(found, progress.record)
         # the paper plans without a vehicle; whether this one can fly it is told all the same
         found = plan(record.problem, record.planner, progress=progress.record)
-        return _told(found, record.vehicle)
+        return with_assessment(with_flyability(with_certificate(found, record.vehicle)))
 
 
 def make_planner(options: PlanningOptions) -> Planner:
