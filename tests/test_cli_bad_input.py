@@ -164,6 +164,7 @@ ARGUMENT_FAULTS = {
         "--paper",
     ),
     "no segments": (["plan", "line", "--planner", "free-knots", "--segments", "0"], "segments"),
+    "segments without end": (["plan", "line", "--planner", "free-knots", "--segments", "1000"], "segments"),
     "closed form of order 6": (["plan", "line", "--planner", "min-snap", "--order", "6"], "order"),
     "stopped before it began": (
         ["plan", "line", "--planner", "min-snap", "--stop-after", "-1"],

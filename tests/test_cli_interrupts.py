@@ -46,7 +46,7 @@ ON_THE_WAY = [
     ("nominal_flight", 1),
     ("score", 1),
     ("report_figure", 1),
-    ("write_csv", 1),
+    ("write_columns", 1),
     ("png", 1),
     ("end_interrupts", 1),
 ]
@@ -123,3 +123,16 @@ def test_a_run_within_another_program_leaves_its_signals_as_they_were(tmp_path: 
     before = signal.getsignal(signal.SIGINT)
     main(["plan", "line", "--order", "5"])
     assert signal.getsignal(signal.SIGINT) is before
+
+
+def test_the_word_is_said_where_standard_error_was_even_if_it_is_led_elsewhere_by_then(
+    tmp_path: Path,
+) -> None:
+    """As where Ctrl-C comes while what a solver printed is being put back."""
+    lead = "import io, signal, sys\nsys.stderr = io.StringIO()\nsignal.raise_signal(signal.SIGINT)\n"
+    (tmp_path / "plugin.py").write_text(lead)
+    ended = subprocess.run(
+        [sys.executable, "-m", "aerobat", "plan", "line", "--import", "plugin.py"],
+        capture_output=True, text=True, cwd=tmp_path,
+    )  # fmt: skip
+    assert (ended.returncode, ended.stdout, ended.stderr) == (130, "", "aerobat: interrupted\n")

@@ -5,6 +5,7 @@ from .environment import Environment
 from .errors import AerobatError, BackendMissing, Infeasible, SpecError
 from .evaluation import Gradient, Passage, Score, Scores, Sensitivity, score, score_flights, sensitivity
 from .flatness import Reference, reference
+from .interchange.columns import write_columns
 from .interchange.csv import read_csv, write_csv
 from .interchange.read import read_plan, read_trajectory
 from .interchange.robots import import_vehicle
@@ -153,6 +154,7 @@ __all__ = [
     "tracking_figure",
     "vehicle_names",
     "with_second_opinion",
+    "write_columns",
     "write_csv",
     "write_problem",
     "write_vehicle",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from typing import Annotated
 
 from cyclopts import Parameter
@@ -57,7 +58,7 @@ def finish_comparison(comparison: Comparison, record: RunRecord, options: Output
     rows = to_json(comparison_rows(comparison))
     picture = png(comparison_figure(comparison))
     folder = options.out or record.folder
-    replaced = folder.exists()
+    replaced = os.path.exists(folder)
     with run_folder(folder, record) as staging:
         (staging / COMPARISON).write_text(rows + "\n", encoding="utf-8")
         (staging / "compare.png").write_bytes(picture)

@@ -30,12 +30,13 @@ def main(arguments: Sequence[str] | None = None) -> None:
 
     Whatever is foreseen ends in one sentence on standard error, and an exit code.
     """
-    code = ExitCode.INTERRUPTED
+    code, errors = ExitCode.INTERRUPTED, sys.stderr
     try:
         with interruptible(afterwards=arguments is not None):
             provide_streams()
             code = _run(sys.argv[1:] if arguments is None else arguments)
     except KeyboardInterrupt:
+        sys.stderr = errors or sys.stderr  # a solver may have been interrupted while it was led elsewhere
         say("interrupted")
     if code is not ExitCode.WELL:
         sys.exit(code)

@@ -10,6 +10,7 @@ from typing import Annotated, Any, TypeVar
 
 from cyclopts import Group, Parameter, validators
 
+from aerobat.interchange.columns import ALL
 from aerobat.planning import PlannerOption, planner_options, registered_planners
 
 planning = Group("Planning", sort_key=1)
@@ -75,6 +76,11 @@ def option_name(flag: str) -> str:
     return flag.removeprefix("--").replace("-", "_")
 
 
+def is_given(value: Any) -> bool:
+    """True for an option that was given, a zero among them."""
+    return value is not None and value is not False
+
+
 def _with_planner_options(cls: Options) -> Options:
     """The class with a field for each option that some planner offers, None where it was not given."""
     fields = [_field(flag, offers) for flag, offers in offered_options().items()]
@@ -113,6 +119,16 @@ class PlanningOptions(TaskOptions):
         None
     )
 
+    rate: Annotated[float | None, Parameter(group=planning, validator=POSITIVE)] = None
+    """Rows a second of a CSV file without times. Default: 100."""
+
+    heading: Annotated[float | None, Parameter(group=planning)] = None
+    """The heading at the start of a CSV file's path in degrees. Default: that of its first attitude, or 0."""
+
+    columns: Annotated[str, Parameter(group=output)] = ",".join(ALL)
+    """What plan.csv holds, with a header: any of time, position, velocity, acceleration, jerk, attitude,
+    rates, thrusts; or paper, the bare layout of the paper's reference code."""
+
     paper: Annotated[bool, Parameter(group=planning, negative="", show_default=False)] = False
     """Exactly the paper's formulation with its reference parameters: miqp of order 3, bounds per axis,
     unsigned and unordered stages, dt the first feasible of 50 steps from 0.1 to 4 s; no vehicle in
@@ -123,7 +139,7 @@ class PlanningOptions(TaskOptions):
 class FlyingOptions:
     """Options of the flight."""
 
-    noise: Annotated[float, Parameter(group=flying, validator=validators.Number(gte=0))] = 0.0
+    noise: Annotated[float, Parameter(group=flying, validator=validators.Number(gte=0, lte=1000))] = 0.0
     """The error of the state that the controller sees: 0 none, 1 that of motion capture and IMU fused."""
 
     controller: Annotated[str, Parameter(group=flying)] = "full"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -13,7 +14,7 @@ from aerobat.cli.options import OutputOptions
 from aerobat.cli.run_record import RECORD, RunRecord, write_record
 from aerobat.cli.terminal import print_json
 from aerobat.evaluation import Score
-from aerobat.interchange.csv import write_csv
+from aerobat.interchange.columns import write_columns
 from aerobat.planning import Plan
 from aerobat.reporting.figures import report_figure
 from aerobat.reporting.page import png
@@ -76,10 +77,10 @@ def finish(plan: Plan, record: RunRecord, options: OutputOptions, flown: Flown |
     flight, score, controller = (flown.flight, flown.score, flown.controller) if flown else (None, None, None)
     facts = to_json(report(plan, score, plan.vehicle.name, controller))
     picture = png(report_figure(plan, plan.vehicle, flight, score))
-    replaced = folder.exists()
+    replaced = os.path.exists(folder)
     with run_folder(folder, record) as staging:
         plan.save(staging / f"{plan.problem.name}.plan")
-        write_csv(plan.trajectory, staging / "plan.csv")
+        write_columns(plan, staging / "plan.csv", record.columns)
         if flight is not None:
             flight.save(staging / FLIGHT)
         (staging / "report.json").write_text(facts + "\n", encoding="utf-8")

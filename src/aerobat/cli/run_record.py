@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 from collections.abc import Mapping
 from dataclasses import field
@@ -15,6 +16,7 @@ from pydantic import Field, PlainValidator
 from aerobat.declaration import NonNegative, declared, to_table
 from aerobat.documents import read_document, write_document
 from aerobat.errors import SpecError
+from aerobat.interchange.columns import ALL
 from aerobat.planning import Planner
 from aerobat.planning.planners import PLANNERS
 from aerobat.problem import Problem
@@ -52,6 +54,7 @@ class RunRecord:
     angle: float | None = None  # [deg] that --angle gave, for the folder's name
     source: str | None = None  # the file that the plan came from
     flight: FlightSettings = FlightSettings()
+    columns: tuple[str, ...] = ALL  # of plan.csv
     plugins: tuple[str, ...] = ()  # files that --import named
     versions: Mapping[str, str] = field(default_factory=dict)  # of what made it
     format: Literal["aerobat-run-1"] = "aerobat-run-1"
@@ -93,7 +96,7 @@ def write_record(record: RunRecord, folder: Path) -> None:
 
 def read_record(folder: Path) -> RunRecord:
     """What a folder says of its run. Raises SpecError, one sentence, where it says nothing that is whole."""
-    if not folder.is_dir():
+    if not os.path.isdir(folder):
         raise SpecError(f"{folder} is no folder; give the folder of a run")
     if not (folder / RECORD).exists():
         raise SpecError(f"{folder}/ has no {RECORD}, so that no run can be repeated from it; run anew")

@@ -4,16 +4,14 @@ from __future__ import annotations
 
 from dataclasses import replace
 from math import isfinite, radians
-from pathlib import Path
 from typing import Any, Literal
 
-from aerobat.cli.options import PlanningOptions, TaskOptions, offered_options, option_name
+from aerobat.cli.options import PlanningOptions, TaskOptions, is_given, offered_options, option_name
 from aerobat.cli.progress import planning_progress
 from aerobat.cli.run_record import RunRecord, default_vehicle
-from aerobat.cli.terminal import say
+from aerobat.cli.saved_plans import named_vehicle, plan_source, read_saved_plan
 from aerobat.errors import SpecError
-from aerobat.interchange import read_plan
-from aerobat.interchange.robots.description import SUFFIXES, import_vehicle
+from aerobat.interchange import column_groups
 from aerobat.planning import (
     Plan,
     Planner,
@@ -25,8 +23,8 @@ from aerobat.planning import (
     with_flyability,
     with_second_opinion,
 )
-from aerobat.problem import Problem, load_problem, problem_names
-from aerobat.vehicle import Vehicle, implausibilities, load_vehicle
+from aerobat.problem import Problem, load_problem
+from aerobat.vehicle import Vehicle
 
 
 def read_task(name: str, options: TaskOptions, paper: bool = False) -> tuple[Problem, Vehicle]:
@@ -38,14 +36,6 @@ def read_task(name: str, options: TaskOptions, paper: bool = False) -> tuple[Pro
     return (problem.as_in_paper() if paper else problem), vehicle
 
 
-def named_vehicle(name: str) -> Vehicle:
-    """The vehicle of that name or file, a robot's among them; what it hardly can be is told, and no more."""
-    vehicle = import_vehicle(name) if name.endswith(SUFFIXES) else load_vehicle(name)
-    for doubt in implausibilities(vehicle):
-        say(f"warning: vehicle '{vehicle.name}': {doubt}")
-    return vehicle
-
-
 def planned(name: str, options: PlanningOptions, command: Literal["fly", "plan"]) -> tuple[Plan, RunRecord]:
     """The plan that a command names, certified for its vehicle, and what it takes to make it again.
 
@@ -54,11 +44,17 @@ def planned(name: str, options: PlanningOptions, command: Literal["fly", "plan"]
         options: As they were given.
         command: That plans.
     """
-    source = plan_source(name)
+    source, columns = plan_source(name), column_groups(options.columns)
     if source is not None:
-        plan = _read_plan(source, options)
+        plan = read_saved_plan(source, options)
         assert plan.vehicle is not None, "a plan that is read is certified for a vehicle"
-        return plan, RunRecord(command=command, problem=plan.problem, vehicle=plan.vehicle, source=name)
+        record = RunRecord(
+            command=command, problem=plan.problem, vehicle=plan.vehicle, source=name, columns=columns
+        )
+        return plan, record
+    for flag, value in (("--rate", options.rate), ("--heading", options.heading)):
+        if value is not None:
+            raise SpecError(f"{flag} is for a CSV file, not for the problem '{name}'; leave it out")
     problem, vehicle = read_task(name, options, options.paper)
     record = RunRecord(
         command=command,
@@ -67,6 +63,7 @@ def planned(name: str, options: PlanningOptions, command: Literal["fly", "plan"]
         planner=make_planner(options),
         paper=options.paper,
         angle=options.angle,
+        columns=columns,
         plugins=tuple(map(str, options.plugins)),
     )
     return plan_of(record), record
@@ -81,14 +78,7 @@ def plan_of(record: RunRecord) -> Plan:
             return with_second_opinion(found, progress.record)
         # the paper plans without a vehicle; whether this one can fly it is told all the same
         found = plan(record.problem, record.planner, progress=progress.record)
-        return _told(found, record.vehicle)
-
-
-def plan_source(name: str) -> Path | None:
-    """The file or folder that holds a plan, where a command names one, and no problem."""
-    path = Path(name)
-    is_folder = name not in problem_names() and path.is_dir() and path.suffix != ".toml"
-    return path if path.suffix == ".plan" or is_folder else None
+        return with_assessment(with_flyability(with_certificate(found, record.vehicle)))
 
 
 def make_planner(options: PlanningOptions) -> Planner:
@@ -118,37 +108,11 @@ def _tilted(problem: Problem, angle: float) -> Problem:
     return replace(problem, gates=gates)
 
 
-def _read_plan(path: Path, options: PlanningOptions) -> Plan:
-    """A saved plan, for its own vehicle or another. Raises SpecError for options that plan anew."""
-    names = ["planner", "paper", "angle", *(option_name(flag) for flag in offered_options())]
-    for name in names:
-        if _is_given(getattr(options, name, None)):
-            flag = "--" + name.replace("_", "-")
-            raise SpecError(f"{flag} plans anew, but {path} is a plan; leave it out, or name a problem")
-    found = read_plan(path)
-    if not isinstance(found, Plan):
-        raise SpecError(f"{path} holds a path alone and no plan; give a .plan file")
-    if options.vehicle is not None or found.vehicle is None:
-        return _told(found, named_vehicle(options.vehicle or default_vehicle()))
-    found = found if found.flyability is not None else with_flyability(found)
-    return found if found.assessment is not None else with_assessment(found)
-
-
-def _told(found: Plan, vehicle: Vehicle) -> Plan:
-    """The plan with all that is told of a vehicle which it was not made for."""
-    return with_assessment(with_flyability(with_certificate(found, vehicle)))
-
-
-def _is_given(value: Any) -> bool:
-    """True for an option that was given, a zero among them."""
-    return value is not None and value is not False
-
-
 def _check_options(options: PlanningOptions, planner: str) -> None:
     """Refuse options that mean nothing to a planner."""
     for flag, offers in offered_options().items():
         # a planner registered after the command's options were made brings some that nobody can have given
-        if planner not in offers and _is_given(getattr(options, option_name(flag), None)):
+        if planner not in offers and is_given(getattr(options, option_name(flag), None)):
             takers = " or ".join(offers)
             raise SpecError(f"{flag} is for --planner {takers}, not {planner}; leave one of them out")
     if options.paper and planner != "miqp":

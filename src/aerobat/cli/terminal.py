@@ -60,9 +60,10 @@ def discard(stream: TextIO) -> None:
 
 
 def say(sentence: str) -> None:
-    """Print a sentence to standard error, if that takes it."""
+    """Print a sentence to standard error, if that takes it; on one line, whatever names it holds."""
+    line = "".join(sign if sign.isprintable() else repr(sign)[1:-1] for sign in sentence)
     try:
-        print(f"aerobat: {sentence}", file=sys.stderr, flush=True)
+        print(f"aerobat: {line}", file=sys.stderr, flush=True)
     except OSError:
         discard(sys.stderr)
 

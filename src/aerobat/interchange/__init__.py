@@ -1,6 +1,15 @@
 """Plans, trajectories and vehicles in other systems' formats, and whichever file holds a plan."""
 
-from aerobat.interchange.csv import read_csv, write_csv
+from aerobat.interchange.columns import column_groups, write_columns
+from aerobat.interchange.csv import read_csv, read_rows, write_csv
 from aerobat.interchange.read import read_plan, read_trajectory
 
-__all__ = ["read_csv", "read_plan", "read_trajectory", "write_csv"]
+__all__ = [
+    "column_groups",
+    "read_csv",
+    "read_plan",
+    "read_rows",
+    "read_trajectory",
+    "write_columns",
+    "write_csv",
+]

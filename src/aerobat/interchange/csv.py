@@ -1,4 +1,4 @@
-"""Trajectories as CSV in the layout of the paper's reference code, and back.
+"""Trajectories as CSV in the layout of the paper's reference code, and back; tables with a header too.
 
 The layout is that of `fliptraj.csv`: no header, comma-separated rows of twelve numbers, position, velocity,
 acceleration and jerk (x, y, z each, SI units, world axes), at a fixed rate, 100 Hz there. That code drops
@@ -17,10 +17,10 @@ import numpy as np
 from aerobat.arrays import Array
 from aerobat.declaration import PathName, Positive, door
 from aerobat.errors import SpecError
+from aerobat.interchange.rows import PathRows, has_header, rows_of_columns
 from aerobat.storage import read_whole, write_whole
 from aerobat.trajectory import Carrier, Trajectory, as_trajectory
 from aerobat.trajectory.piecewise import MAX_DURATION
-from aerobat.trajectory.polynomial import hermite
 
 CSV_COLUMNS = 12
 MAX_CSV = 2**28  # bytes: some hours at 100 Hz
@@ -46,30 +46,41 @@ def write_csv(trajectory: Trajectory | Carrier, path: PathName, rate: Positive =
 def read_csv(path: PathName, rate: Positive = 100.0) -> Trajectory:
     """The trajectory of degree 7 through p, v, a, j of all rows, `rate` [1/s] apart unless times are given.
 
-    Between rows it differs from what was written by the error of that interpolation. Raises SpecError, naming
-    the line, for rows that are not 12 or 13 finite numbers, all as many, with rising times from 0.
+    Between rows it differs from what was written by the error of that interpolation. A file whose first line
+    names its columns, x, y and z among them, is read by those names, see `columns`; where velocity,
+    acceleration or jerk is not there, the path is that of minimum snap through what is. Raises SpecError,
+    naming the line, for rows that are not 12 or 13 finite numbers, all as many, with rising times from 0.
     """
-    rows = _parse(Path(path))
-    if not len(rows) / rate <= MAX_DURATION:
+    return read_rows(path, rate).trajectory
+
+
+@door
+def read_rows(path: PathName, rate: Positive = 100.0) -> PathRows:
+    """The rows that `read_csv` makes a trajectory of. Raises SpecError as it does."""
+    text = _text(Path(path))
+    if not text.count("\n") / rate <= MAX_DURATION:
         raise SpecError(f"rate must make it {MAX_DURATION:g} s at most, got {rate:g} rows a second")
+    try:
+        rows = rows_of_columns(text, rate) if has_header(text) else _bare_rows(text, rate)
+        _ = rows.trajectory
+    except SpecError as error:
+        raise SpecError(f"{path}: {error}") from None
+    return rows
+
+
+def _bare_rows(text: str, rate: float) -> PathRows:
+    rows = _parse(text)
     times = rows[:, CSV_COLUMNS] if rows.shape[1] > CSV_COLUMNS else np.arange(len(rows)) / rate
     steps = np.diff(times)
     if times[0] != 0 or not (steps > 0).all():
         line = 1 if times[0] != 0 else 2 + int(np.argmax(steps <= 0))
-        raise SpecError(f"{path}: line {line}: times, the thirteenth numbers, must start at 0 and rise")
-    scale = steps[:, None, None] ** np.arange(4)[:, None]
-    derivatives = rows[:, :CSV_COLUMNS].reshape(-1, 4, 3)
-    try:
-        with np.errstate(over="ignore", invalid="ignore"):
-            return Trajectory(steps, hermite(scale * derivatives[:-1], scale * derivatives[1:]))
-    except SpecError as error:
-        raise SpecError(f"{path}: {error}") from None
+        raise SpecError(f"line {line}: times, the thirteenth numbers, must start at 0 and rise")
+    return PathRows(rows[:, :CSV_COLUMNS].reshape(-1, 4, 3), steps)
 
 
-def _parse(path: Path) -> Array:
-    """The file's numbers, (rows, 12 or 13)."""
+def _text(path: Path) -> str:
     try:
-        text = read_whole(path, MAX_CSV).decode("utf-8-sig")
+        return read_whole(path, MAX_CSV).decode("utf-8-sig")
     except SpecError as error:
         raise SpecError(f"{path}: {error}") from None
     except UnicodeDecodeError:
@@ -77,15 +88,19 @@ def _parse(path: Path) -> Array:
     except (OSError, ValueError) as error:
         reason = error.strerror if isinstance(error, OSError) else error
         raise SpecError(f"{path}: cannot be read: {reason}") from None
+
+
+def _parse(text: str) -> Array:
+    """The file's numbers, (rows, 12 or 13)."""
     lines = text.splitlines()
-    rows = [_parse_row(line, f"{path}: line {number}") for number, line in enumerate(lines, 1)]
+    rows = [_parse_row(line, f"line {number}") for number, line in enumerate(lines, 1)]
     if len(rows) < 2:
-        raise SpecError(f"{path}: a trajectory needs at least two lines of numbers, got {len(rows)}")
+        raise SpecError(f"a trajectory needs at least two lines of numbers, got {len(rows)}")
     if not text.endswith("\n"):
-        raise SpecError(f"{path}: line {len(rows)} is cut off, it has no line end")
+        raise SpecError(f"line {len(rows)} is cut off, it has no line end")
     for number, row in enumerate(rows, 1):
         if len(row) != len(rows[0]):
-            raise SpecError(f"{path}: line {number} has {len(row)} numbers, line 1 has {len(rows[0])}")
+            raise SpecError(f"line {number} has {len(row)} numbers, line 1 has {len(rows[0])}")
     return np.array(rows)
 
 

@@ -94,6 +94,13 @@ class Miqp(Planner):
                 advised = f"{infeasible}; {advice(self, problem, vehicle)}"
                 raise Infeasible(advised, infeasible.attempts) from None
 
+    @property
+    def _quicker(self) -> str:
+        """What takes less time, in words."""
+        if self.backend == "builtin":
+            return "use fewer intervals"
+        return f"take the backend builtin, which needs a hundredth of the time of {self.backend}"
+
     def _planned(self, problem: Problem, vehicle: Vehicle | None, recorder: Recorder) -> Plan:
         order = default_order(problem, vehicle) if self.order is None else self.order
         formulation = formulate(problem, order, self.intervals, vehicle)
@@ -105,7 +112,7 @@ class Miqp(Planner):
             found = shortest(attempts, first, last=max(4.0, 2.0 * first))
         if found is None:
             if out_of_time():
-                raise too_short(problem, self.time_limit, recorder.attempts, "use fewer intervals")
+                raise too_short(problem, self.time_limit, recorder.attempts, self._quicker)
             raise Infeasible(why_infeasible(formulation, recorder.attempts, vehicle), recorder.attempts)
         return plan_of(attempts, found, self.backend)
 

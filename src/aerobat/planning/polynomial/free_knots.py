@@ -27,6 +27,7 @@ from aerobat.problem.problem import Problem
 from aerobat.problem.stage import StageSequence
 from aerobat.vehicle import Vehicle
 
+MAX_SEGMENTS = 24  # each solve takes more than twice as long with twice as many, and gains next to nothing
 COARSE = 4  # segments to begin with where there shall be more: they are quick and come near the least time
 
 
@@ -43,10 +44,10 @@ class FreeKnots(Planner):
     lag, whose thrusts may jump, 13 cm off the paper's second example; one percent makes that 4 mm.
     """
 
-    segments: Annotated[int, Field(ge=2)] = option(
+    segments: Annotated[int, Field(ge=2, le=MAX_SEGMENTS)] = option(
         COARSE,
         "How many polynomial segments. 2 leaves something to the controller; 8 comes closer to time-optimal "
-        "and takes longer.",
+        f"and takes longer; {MAX_SEGMENTS} at most.",
     )
     start: Annotated[Plan, AS_IT_IS] | None = None
     still_ends: bool = False

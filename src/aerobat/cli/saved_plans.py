@@ -1,0 +1,91 @@
+"""Plans that are read, not made: of a .plan file or a run's folder, or of somebody's path in a CSV file."""
+
+from __future__ import annotations
+
+import os
+import re
+from dataclasses import replace
+from math import radians
+from pathlib import Path
+
+from aerobat.cli.options import PlanningOptions, is_given, offered_options, option_name
+from aerobat.cli.run_record import default_vehicle
+from aerobat.cli.terminal import say
+from aerobat.errors import SpecError
+from aerobat.interchange import read_plan, read_rows
+from aerobat.interchange.robots.description import SUFFIXES, import_vehicle
+from aerobat.planning import Plan, with_assessment, with_certificate, with_flyability
+from aerobat.problem import EndState, Problem, problem_names
+from aerobat.trajectory import Trajectory
+from aerobat.vehicle import Vehicle, implausibilities, load_vehicle
+
+FILES = (".plan", ".csv", ".npz")
+RATE = 100.0  # [1/s] of rows without times
+MADE_BY = "file"  # in the place of a planner's name
+
+
+def plan_source(name: str) -> Path | None:
+    """The file or folder that holds a plan, where a command names one, and no problem."""
+    path = Path(name)
+    is_folder = name not in problem_names() and path.suffix != ".toml" and os.path.isdir(path)
+    return path if path.suffix in FILES or is_folder else None
+
+
+def read_saved_plan(path: Path, options: PlanningOptions) -> Plan:
+    """A saved plan for its own vehicle or another, or a bare path as a plan, certified and flown.
+
+    Raises SpecError for options that plan anew.
+    """
+    for name in ("planner", "paper", "angle", *(option_name(flag) for flag in offered_options())):
+        if is_given(getattr(options, name, None)):
+            flag = "--" + name.replace("_", "-")
+            raise SpecError(f"{flag} plans anew, but {path} is a plan; leave it out, or name a problem")
+    found = read_plan(path, options.rate or RATE)
+    if isinstance(found, Trajectory):
+        return _plan_of_path(path, found, options)
+    for name in ("rate", "heading"):
+        if is_given(getattr(options, name)):
+            raise SpecError(f"--{name} is for a CSV file, but {path} is a whole plan; leave it out")
+    if options.vehicle is not None or found.vehicle is None:
+        return _told(found, named_vehicle(options.vehicle or default_vehicle()))
+    found = found if found.flyability is not None else with_flyability(found)
+    return found if found.assessment is not None else with_assessment(found)
+
+
+def _told(found: Plan, vehicle: Vehicle) -> Plan:
+    """The plan with all that is told of a vehicle which it was not made for."""
+    return with_assessment(with_flyability(with_certificate(found, vehicle)))
+
+
+def named_vehicle(name: str) -> Vehicle:
+    """The vehicle of that name or file, a robot's among them; what it hardly can be is told, and no more."""
+    vehicle = import_vehicle(name) if name.endswith(SUFFIXES) else load_vehicle(name)
+    for doubt in implausibilities(vehicle):
+        say(f"warning: vehicle '{vehicle.name}': {doubt}")
+    return vehicle
+
+
+def _plan_of_path(path: Path, trajectory: Trajectory, options: PlanningOptions) -> Plan:
+    """A bare path as the plan of a line from its first point to its last; what is assumed is told."""
+    vehicle = named_vehicle(options.vehicle or default_vehicle())
+    if options.heading is not None:
+        trajectory = replace(trajectory, heading=radians(options.heading))
+    start, goal = (
+        EndState(*(trajectory.evaluate(end, k) for k in range(3))) for end in (0.0, trajectory.duration)
+    )
+    name = re.sub(r"[^\w .-]|^\W+", "-", path.stem).lstrip(" .-") or MADE_BY
+    problem = Problem(name=name, start=start, goal=goal, heading=trajectory.heading)
+    vehicle.require_hover(problem.environment.gravity)
+    say(f"{path} holds a path alone; assumed: {', '.join(_assumed(path, vehicle, problem, options))}")
+    plan = Plan(problem=problem, trajectory=trajectory, planner=MADE_BY, status="as it is")
+    return _told(plan, vehicle)
+
+
+def _assumed(path: Path, vehicle: Vehicle, problem: Problem, options: PlanningOptions) -> list[str]:
+    facts = [] if options.vehicle else [f"the vehicle {vehicle.name}"]
+    facts += [f"gravity {problem.environment.gravity:g} m/s²", "no wind, limits or gates"]
+    if path.suffix == ".csv":
+        error = read_rows(path, options.rate or RATE).fit_error
+        if error is not None:
+            facts.append(f"a smooth path between rows (without every second row it is off by {error:.1g} m)")
+    return facts

@@ -1,0 +1,74 @@
+"""Plans as tables that other programs read: a header, time first, and whichever columns are wanted.
+
+A header names each column; units are SI, world axes, attitude body to world, rates in body axes:
+
+    t | x y z | vx vy vz | ax ay az | jx jy jz | qw qx qy qz | wx wy wz | f0 f1 ... (thrusts [N])
+
+Read back, columns go by their names, in any order; those that nobody knows are left out.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from aerobat.arrays import Array
+from aerobat.declaration import PathName, Positive, door, unknown_name
+from aerobat.errors import SpecError
+from aerobat.flatness import reference
+from aerobat.interchange.csv import write_csv
+from aerobat.interchange.rows import NAMES, PATH
+from aerobat.planning import Plan
+from aerobat.storage import write_whole
+
+PAPER = ("paper",)  # the bare layout of the paper's reference code, see `csv`
+ALL = tuple(NAMES)
+
+
+def column_groups(text: str) -> tuple[str, ...]:
+    """The groups of columns that a text lists with commas between. Raises SpecError for any that is none."""
+    groups = tuple(name.strip() for name in text.split(","))
+    if groups == PAPER:
+        return PAPER
+    for name in groups:
+        if name not in NAMES:
+            raise unknown_name("group of columns", name, [*NAMES, *PAPER])
+    if len(set(groups)) < len(groups):
+        raise SpecError(f"columns names a group twice: {text}; name each once")
+    return tuple(name for name in NAMES if name in groups)
+
+
+@door
+def write_columns(plan: Plan, path: PathName, columns: Sequence[str] = ALL, rate: Positive = 100.0) -> None:
+    """Write a plan's columns at `rate` and at the very end, digits enough to read them back exactly.
+
+    Without a vehicle, the columns that follow from one are left out. Lost is what lies between rows. Raises
+    SpecError where the file cannot be written.
+
+    Args:
+        plan: What is written.
+        path: The file.
+        columns: Groups of NAMES, or PAPER.
+        rate: Rows a second [1/s].
+    """
+    if tuple(columns) == PAPER:
+        write_csv(plan.trajectory, path, rate)
+        return
+    times = plan.trajectory.sample(rate)
+    groups: dict[str, Array] = {"time": times[:, None]}
+    groups |= {name: plan.trajectory.evaluate(times, k) for k, name in enumerate(PATH)}
+    if plan.vehicle is not None:
+        found = reference(plan.trajectory, plan.vehicle, times, environment=plan.problem.environment)
+        groups["attitude"] = found.setpoint.q_world_body
+        groups["rates"] = found.setpoint.omega_body
+        groups["thrusts"] = found.rotor_thrusts
+    written = [name for name in columns if name in groups]
+    header = [column for name in written for column in _header(name, groups[name].shape[1])]
+    rows = np.concatenate([groups[name] for name in written], axis=1)
+    lines = [",".join(header), *(",".join(map(repr, row)) for row in rows.tolist())]
+    write_whole(path, "\n".join(lines) + "\n")
+
+
+def _header(group: str, count: int) -> Sequence[str]:
+    return NAMES[group] or [f"f{rotor}" for rotor in range(count)]

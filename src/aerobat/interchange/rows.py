@@ -1,0 +1,154 @@
+"""Rows of a path as somebody's file has them, and the trajectory through them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from aerobat import so3
+from aerobat.arrays import Array
+from aerobat.environment import Environment
+from aerobat.errors import SpecError
+from aerobat.trajectory import Trajectory
+from aerobat.trajectory.minimum_effort import minimum_effort
+from aerobat.trajectory.polynomial import hermite
+
+NAMES: Mapping[str, tuple[str, ...]] = {  # of columns, by groups
+    "time": ("t",),
+    "position": ("x", "y", "z"),
+    "velocity": ("vx", "vy", "vz"),
+    "acceleration": ("ax", "ay", "az"),
+    "jerk": ("jx", "jy", "jz"),
+    "attitude": ("qw", "qx", "qy", "qz"),
+    "rates": ("wx", "wy", "wz"),
+    "thrusts": (),  # f0 and as many as there are rotors
+}
+PATH = ("position", "velocity", "acceleration", "jerk")
+SYNONYMS = {"time": "t", "time_s": "t", "px": "x", "py": "y", "pz": "z"}
+UP = np.array([0.0, 0.0, 1.0])
+FEWEST = 5  # rows, of which every second can be left out
+
+
+@dataclass(frozen=True, eq=False)
+class PathRows:
+    """Derivatives of a position at instants."""
+
+    knots: Array  # [m/s^d] position to jerk, world, (rows, 4, 3), NaN where a derivative is not there
+    steps: Array  # [s] from row to row, (rows - 1,)
+    attitude: Array | None = None  # body to world at the first row, (4,)
+
+    @cached_property
+    def trajectory(self) -> Trajectory:
+        """The path with all derivatives of every row; where some are not there, that of minimum snap.
+
+        Its heading is that of the attitude. Raises SpecError for numbers that are too large.
+        """
+        path = self._through(self.knots, self.steps)
+        return Trajectory(path.durations, path.coefficients, self._heading(path))
+
+    @property
+    def fit_error(self) -> float | None:
+        """How far [m] the path through every second row passes by the others; None of fewer than five rows.
+
+        Twice as far from row to row, it errs by more than the path through all rows does between them.
+        """
+        rows = len(self.knots) - (len(self.knots) + 1) % 2
+        if rows < FEWEST:
+            return None
+        times = np.concatenate([[0.0], np.cumsum(self.steps)])[:rows]
+        every_second = self._through(self.knots[:rows:2], np.diff(times[::2]))
+        missed = every_second.evaluate(times[1::2]) - self.knots[1:rows:2, 0]
+        return float(np.linalg.norm(missed, axis=1).max())
+
+    @staticmethod
+    def _through(knots: Array, steps: Array) -> Trajectory:
+        if np.isnan(knots).any():
+            return minimum_effort(knots, steps)
+        scaled = steps[:, None, None] ** np.arange(len(PATH))[:, None]
+        with np.errstate(over="ignore", invalid="ignore"):
+            return Trajectory(steps, hermite(scaled * knots[:-1], scaled * knots[1:]))
+
+    def _heading(self, path: Trajectory) -> float:
+        """The turn about the thrust [rad] in the first attitude, drag left out."""
+        thrust = path.evaluate(0.0, 2) + Environment().gravity * UP
+        if self.attitude is None or not np.linalg.norm(thrust) > 0.0:
+            return 0.0
+        upright = so3.smallest_rotation(UP, thrust / np.linalg.norm(thrust))
+        turn = so3.multiply(so3.conjugate(upright), self.attitude)
+        return float(2.0 * np.arctan2(turn[3], turn[0]))
+
+
+def has_header(text: str) -> bool:
+    """True if a file's first line names columns and holds no numbers."""
+    words = text.partition("\n")[0].strip().lstrip("#").split(",")
+    return all(word.strip().strip('"').isidentifier() and not _is_number(word) for word in words)
+
+
+def rows_of_columns(text: str, rate: float) -> PathRows:
+    """The rows of a table with a header; columns of other names are left out.
+
+    Raises SpecError, naming the line or the column, for what is no such table.
+
+    Args:
+        text: The file's.
+        rate: Rows a second [1/s], where there is no column of time.
+    """
+    first, *lines = text.splitlines()
+    header = [word.strip().strip('"').lower() for word in first.strip().lstrip("#").split(",")]
+    header = [SYNONYMS.get(name, name) for name in header]
+    for name in header:
+        if header.count(name) > 1:
+            raise SpecError(f"line 1: there are two columns {name}; rename one")
+    for name in NAMES["position"]:
+        if name not in header:
+            raise SpecError(f"line 1: there is no column {name}; a path needs x, y and z [m], and t [s]")
+    if len(lines) < 2:
+        raise SpecError(f"a trajectory needs at least two lines of numbers, got {len(lines)}")
+    if not text.endswith("\n"):
+        raise SpecError(f"line {len(lines) + 1} is cut off, it has no line end")
+    table = np.array([_numbers(line, number, len(header)) for number, line in enumerate(lines, 2)])
+    columns = dict(zip(header, table.T, strict=True))
+    times = columns["t"] if "t" in columns else np.arange(len(table)) / rate
+    steps = np.diff(times)
+    if not (steps > 0).all():
+        raise SpecError(f"line {3 + int(np.argmin(steps > 0))}: times, the column t, must rise")
+    knots = np.full((len(table), len(PATH), 3), np.nan)
+    for derivative, group in enumerate(PATH):
+        if all(name in columns for name in NAMES[group]):
+            knots[:, derivative] = np.stack([columns[name] for name in NAMES[group]], axis=1)
+    return PathRows(knots, steps, _first_attitude(columns))
+
+
+def _first_attitude(columns: Mapping[str, Array]) -> Array | None:
+    if not all(name in columns for name in NAMES["attitude"]):
+        return None
+    attitude = np.array([columns[name][0] for name in NAMES["attitude"]])
+    norm = float(np.linalg.norm(attitude))
+    if not 0.5 < norm < 2.0:
+        raise SpecError(f"line 2: qw, qx, qy, qz must be a unit quaternion, got one of norm {norm:.3g}")
+    return np.asarray(attitude / norm)
+
+
+def _numbers(line: str, number: int, count: int) -> list[float]:
+    words = line.split(",")
+    if len(words) != count:
+        raise SpecError(f"line {number} has {len(words)} numbers, line 1 names {count} columns")
+    try:
+        row = [float(word) for word in words]
+    except ValueError:
+        raise SpecError(f"line {number} must be numbers with commas between, got {line[:60]!r}") from None
+    if not all(map(math.isfinite, row)):
+        raise SpecError(f"line {number} must have finite numbers only, got {line[:60]!r}")
+    return row
+
+
+def _is_number(word: str) -> bool:
+    try:
+        float(word)
+    except ValueError:
+        return False
+    return True

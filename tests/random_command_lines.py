@@ -1,0 +1,202 @@
+"""Command lines at random, most of them wrong somewhere: values, files, options of others, odd combinations.
+
+    uv run python tests/random_command_lines.py 800
+
+runs so many and prints what is not as it should be.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import os
+import random
+import sys
+import tempfile
+import time
+import warnings
+from collections.abc import Iterator
+from pathlib import Path
+
+from aerobat import cli
+from aerobat.interchange import write_columns
+from aerobat.planning import Miqp, plan
+from aerobat.problem import load_problem
+from aerobat.vehicle import load_vehicle
+
+SLOW = 20.0  # [s]
+CODES = {0, 1, 2, 3}  # what a run may come to that nobody interrupts
+CHEAP = ("line", "line", "half-flip", "flip-roll", "short.toml")  # quickly planned
+BROKEN = (
+    "lien", "nowhere.toml", "broken.toml", "folder", "empty", "path.csv", "short.csv", "kept",
+    "kept/line.plan", "kept/report.png", "", ".", "..", "/dev/null", "-", "--", "kept/flight.npz",
+    "name\nwith lines", "ü.toml", "x" * 300, "nul\0.toml",
+)  # fmt: skip
+NUMBERS = (
+    "0", "1", "2", "3", "5", "-1", "0.5", "1e-9", "1e9", "1e308", "1e999", "nan", "inf", "-inf", "", "ten",
+    "0x10", "1_000", "٣", "3,5", "99999999999999999999", "--", "True", "None", " 4",
+)  # fmt: skip
+VALUES: dict[str, tuple[str, ...]] = {
+    "--vehicle": (
+        "agile-quad",
+        "crazyflie",
+        "hexarotor",
+        "agile",
+        "broken.toml",
+        "nowhere.toml",
+        "folder",
+        "",
+    ),
+    "--angle": ("30", "-90", *NUMBERS),
+    "--out": (
+        "here",
+        "kept",
+        "kept/deeper",
+        "broken.toml",
+        "mine",
+        "/dev/null/x",
+        "",
+        ".",
+        "x" * 300,
+        "/proc/x",
+    ),
+    "--planner": ("miqp", "min-snap", "free-knot", "", "None"),
+    "--order": ("3", "4", "5", *NUMBERS),
+    "--intervals": ("10", "20", "30", "1001", *(n for n in NUMBERS if n != "1e308")),
+    "--backend": ("builtin", "gurobi", "cplex", ""),
+    "--time-limit": ("0.001", "10", *NUMBERS),
+    "--reserve": ("0.1", "0.499", "0.5", *NUMBERS),
+    "--segments": ("1000", "1", "0", "-3", "many"),
+    "--stop-after": ("1", "3", *NUMBERS),
+    "--starts": ("0", "-1", "few"),
+    "--noise": ("1", "100", *NUMBERS),
+    "--seed": ("7", *NUMBERS),
+    "--controller": ("full", "paper", "none", ""),
+    "--columns": ("time", "paper", "time,position", "time,time", "speed", ",", ""),
+    "--rate": ("50", *NUMBERS),
+    "--heading": ("45", *NUMBERS),
+    "--max-speed": ("3", *NUMBERS),
+    "--max-tilt": ("60", *NUMBERS),
+    "--max-rate": ("400", *NUMBERS),
+    "--max-moment": ("0.1", *NUMBERS),
+    "--import": ("plugin.py", "nowhere.py", "broken.toml", "raises.py", ""),
+    "--paper": (),
+    "--json": (),
+    "--no-rescue": (),
+    "--planar": (),
+    "--help": (),
+    "--fast": (),
+}
+OWN = {
+    "fly": [name for name in VALUES if not name.startswith("--max")],
+    "plan": [name for name in VALUES if not name.startswith("--max") and name not in ("--noise", "--seed")],
+    "check": [
+        name for name in VALUES if name.startswith(("--max", "--veh", "--rate", "--head", "--json", "--imp"))
+    ],
+    "repeat": ["--out", "--json", "--import"],
+    "vehicles": ["--help"],
+    "problems": ["--help"],
+    "compare": ["--out", "--angle", "--json", "--vehicle"],
+}
+
+
+def fill(folder: Path) -> None:
+    """The files that the command lines name."""
+    (folder / "folder").mkdir()
+    (folder / "empty").write_bytes(b"")
+    (folder / "mine").mkdir()
+    (folder / "mine" / "thesis.tex").write_text("years of work")
+    (folder / "broken.toml").write_text("name = 'x'\n[start]\nposition = [0, 0]\n")
+    (folder / "plugin.py").write_text("")
+    (folder / "raises.py").write_text("raise RuntimeError('two\\nlines')")
+    (folder / "short.toml").write_text(
+        "name = 'short'\nstart = { position = [0, 0, 1] }\ngoal = { position = [1, 0, 1] }\n"
+        "maneuver = { kind = 'line' }\n"
+    )
+    (folder / "short.csv").write_text("t,x,y,z\n0,0,0,1\n1,1,0,1\n2,1,0,1\n")
+    made = plan(load_problem("line"), Miqp(order=5), load_vehicle("agile-quad"))
+    write_columns(made, folder / "path.csv", rate=50.0)
+    with contextlib.redirect_stdout(io.StringIO()), contextlib.chdir(folder):
+        cli.main(["fly", "line", "--order", "5", "--out", "kept"])
+
+
+def command_lines(count: int, seed: int) -> Iterator[list[str]]:
+    """So many of them; the same for the same seed."""
+    rng = random.Random(seed)
+    for _ in range(count):
+        yield _command_line(rng)
+
+
+def _command_line(rng: random.Random) -> list[str]:
+    command = rng.choice(
+        [*["fly", "plan", "check", "repeat"] * 4, "compare", "vehicles", "problems", "flyy", ""]
+    )
+    line = [command] if command else []
+    names = OWN.get(command, list(VALUES))
+    if command not in ("vehicles", "problems") and rng.random() < 0.95:
+        right = {"check": ("kept", "path.csv", "kept/line.plan"), "repeat": ("kept",), "compare": ("lien",)}
+        line.append(rng.choice(right.get(command, CHEAP) if rng.random() < 0.6 else BROKEN))
+    if command == "compare" and line[-1] in CHEAP:  # all planners take long
+        line[-1] = "lien"
+    for _ in range(rng.choice((0, 1, 1, 2, 2, 3, 5))):
+        option = rng.choice(names if rng.random() < 0.9 else list(VALUES))
+        line.append(option)
+        if VALUES[option] and rng.random() < 0.97:
+            line.append(rng.choice(VALUES[option]))
+    return line
+
+
+def faults(arguments: list[str]) -> list[str]:
+    """All that is not as it should be about a command line in the working folder."""
+    before = _content()
+    out, err = io.StringIO(), io.StringIO()
+    found = []
+    code: object = 0
+    with warnings.catch_warnings(record=True) as warned, contextlib.redirect_stdout(out):
+        warnings.simplefilter("always")
+        with contextlib.redirect_stderr(err):
+            try:
+                cli.main(arguments)
+            except SystemExit as stop:
+                code = int(stop.code) if isinstance(stop.code, int) else stop.code
+            except BaseException as error:
+                found.append(f"{type(error).__name__}: {error}")
+    if code not in CODES:
+        found.append(f"exit code {code}")
+    found += [f"warning: {each.message}" for each in warned if issubclass(each.category, RuntimeWarning)]
+    lines = err.getvalue().splitlines()
+    found += [f"not one of our sentences: {line}" for line in lines if not line.startswith("aerobat: ")]
+    said = [line for line in lines if not line.startswith("aerobat: warning:")]
+    if code in (2, 3):
+        if len(said) != 1 or out.getvalue():
+            found.append(f"{len(said)} sentences, {len(out.getvalue())} characters of output")
+        if _content() != before:
+            found.append("something is written")
+    if list(Path().rglob("*.aerobat-part*")):
+        found.append("a part is left")
+    return found
+
+
+def _content() -> dict[str, bytes]:
+    return {str(path): path.read_bytes() for path in Path().rglob("*") if path.is_file()}
+
+
+def main(count: int) -> None:
+    """Run so many, and print what is wrong."""
+    wrong = 0
+    os.environ["AEROBAT_PROGRESS"] = "1e6"
+    with tempfile.TemporaryDirectory() as scratch, contextlib.chdir(scratch):
+        fill(Path())
+        for i, line in enumerate(command_lines(count, seed=count)):
+            began = time.process_time()
+            found = faults(line)
+            if time.process_time() - began > SLOW:
+                found.append(f"{time.process_time() - began:.1f} s of the processor")
+            wrong += bool(found)
+            if found:
+                print(i, line, *found, sep="\n    ", flush=True)
+    print(f"{wrong} of {count} are not as they should be")
+
+
+if __name__ == "__main__":
+    main(int(sys.argv[1]))

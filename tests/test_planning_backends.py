@@ -1,0 +1,46 @@
+"""All built-in problems by every back-end and order: the same assignment, or a word that it took too long."""
+
+from __future__ import annotations
+
+import pytest
+
+from aerobat.errors import Infeasible
+from aerobat.optimization import solver
+from aerobat.planning import Miqp, plan
+from aerobat.planning.miqp.miqp import formulate
+from aerobat.problem import load_problem, problem_names
+
+
+@pytest.mark.parametrize("order", [3, 4, 5])
+@pytest.mark.parametrize("name", problem_names())
+def test_gurobi_finds_what_the_built_in_search_finds(name: str, order: int) -> None:
+    pytest.importorskip("gurobipy")
+    problem = load_problem(name)
+    own = plan(problem, Miqp(order=order))
+    program = formulate(problem, order, 20).program(own.dt)
+    exact = solver("builtin").solve(program)
+    found = solver("gurobi").solve(program, time_limit=60.0)
+    assert found.x is not None
+    assert exact.x is not None
+    assert found.cost == pytest.approx(exact.cost, rel=1e-3)
+
+
+@pytest.mark.parametrize("order", [3, 4])
+@pytest.mark.parametrize("name", ["line", "half-flip"])
+def test_scip_finds_what_the_built_in_search_finds(name: str, order: int) -> None:
+    pytest.importorskip("pyscipopt")
+    problem = load_problem(name)
+    program = formulate(problem, order, 8).program(plan(problem, Miqp(order=order, intervals=8)).dt)
+    exact, found = solver("builtin").solve(program), solver("scip").solve(program)
+    assert found.backend == "scip"
+    assert found.cost == pytest.approx(exact.cost, rel=1e-3)
+
+
+@pytest.mark.parametrize(("backend", "remedy"), [("builtin", "fewer intervals"), ("scip", "backend builtin")])
+def test_a_backend_that_is_too_slow_is_not_told_as_a_maneuver_that_cannot_be(
+    backend: str, remedy: str
+) -> None:
+    if backend == "scip":
+        pytest.importorskip("pyscipopt")
+    with pytest.raises(Infeasible, match=f"no plan of 'flip-roll' was found in 0 s.*--time-limit.*{remedy}"):
+        plan(load_problem("flip-roll"), Miqp(backend=backend, time_limit=0.0))
