@@ -223,7 +223,7 @@ def test_a_folder_that_cannot_be_filled_leaves_the_earlier_run_whole(capsys, mon
     def fail(*_: object) -> bytes:
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr("aerobat.cli.run_folder.write_record", fail)
+    monkeypatch.setattr("aerobat.cli.runs.folder.write_record", fail)
     code, _, err = run(capsys, "fly", "line", "--order", "5")
     assert code == 2
     assert err == "aerobat: cannot write out/line: No space left on device\n"

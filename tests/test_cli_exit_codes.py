@@ -49,7 +49,7 @@ def test_a_flight_that_went_wrong_exits_with_1_and_is_written(monkeypatch) -> No
     def missed(*arguments: object):
         return replace(score(*arguments), outcome=Outcome.MISSED_GATE)
 
-    monkeypatch.setattr("aerobat.cli.fly.score", missed)
+    monkeypatch.setattr("aerobat.cli.commands.fly.score", missed)
     assert code("fly", *LINE) == 1
     assert Path("out/line/flight.npz").exists()
 

@@ -11,7 +11,7 @@ import pytest
 import tomli_w
 
 from aerobat import cli
-from aerobat.cli.run_record import RunRecord, read_record
+from aerobat.cli.runs.record import RunRecord, read_record
 from aerobat.interchange import read_trajectory
 from aerobat.planning import Miqp, load_plan
 from aerobat.problem import load_problem

@@ -8,12 +8,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from aerobat.arrays import Array
-from aerobat.declaration import by_value, door
+from aerobat.declaration import by_value, validated
 
 STANDARD_GRAVITY = 9.81  # [m/s²] as the paper has it
 
 
-@door
+@validated
 @by_value
 @dataclass(frozen=True, eq=False)
 class BodyState:
@@ -25,7 +25,7 @@ class BodyState:
     omega_body: Array  # [rad/s] body axes, (..., 3)
 
 
-@door
+@validated
 @by_value
 @dataclass(frozen=True, eq=False)
 class FlatState:
@@ -38,7 +38,7 @@ class FlatState:
     snap: Array  # [m/s⁴]
 
 
-@door
+@validated
 @by_value
 @dataclass(frozen=True, eq=False)
 class Wrench:
@@ -48,7 +48,7 @@ class Wrench:
     moment_body: Array  # [N·m], (..., 3)
 
 
-@door
+@validated
 @by_value
 @dataclass(frozen=True, eq=False)
 class Setpoint:

@@ -7,7 +7,7 @@ from dataclasses import asdict, dataclass, replace
 from enum import StrEnum
 from math import degrees
 
-from aerobat.declaration import by_value, door, in_notebooks, short
+from aerobat.declaration import by_value, in_notebooks, short, validated
 from aerobat.flatness import TimeInterval
 
 
@@ -107,7 +107,7 @@ class Discontinuity:
         return f"{self.quantity} jumps by {jump} at {self.time:.3f} s, which no {means} can do"
 
 
-@door
+@validated
 @in_notebooks
 @short
 @by_value

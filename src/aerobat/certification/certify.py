@@ -31,7 +31,7 @@ from aerobat.certification.path.kinematics import kinematic_findings
 from aerobat.certification.path.passages import passage_findings
 from aerobat.certification.subdivision import subdivide
 from aerobat.certification.thrust_curve import ThrustCurve
-from aerobat.declaration import door
+from aerobat.declaration import validated
 from aerobat.environment import Environment
 from aerobat.flatness import Planned, environment_of, vehicle_of
 from aerobat.flatness.references import UNDETERMINED, force_balance
@@ -43,7 +43,7 @@ INTERPOLATION_DEGREE = 20  # of interpolation
 TIGHTNESS = 1e-7  # of a rotor's range: how near the proven bounds are to what is reached
 
 
-@door
+@validated
 def certify(
     trajectory: Trajectory | Planned,
     vehicle: Vehicle | str | None = None,

@@ -39,7 +39,7 @@ app = App(
     suppress_keyboard_interrupt=False,
 )
 for name, help in COMMANDS.items():
-    app.command(f"aerobat.cli.{name}:{name}", name=name, help=help)
+    app.command(f"aerobat.cli.commands.{name}:{name}", name=name, help=help)
 
 
 def run(arguments: Sequence[str]) -> ExitCode:

@@ -8,8 +8,8 @@ from typing import Any, Literal
 
 from aerobat.cli.options import PlanningOptions, TaskOptions, is_given, offered_options, option_name
 from aerobat.cli.progress import planning_progress
-from aerobat.cli.run_record import RunRecord, default_vehicle
-from aerobat.cli.saved_plans import named_vehicle, plan_source, read_saved_plan
+from aerobat.cli.runs.record import RunRecord, default_vehicle
+from aerobat.cli.runs.saved_plans import named_vehicle, plan_source, read_saved_plan
 from aerobat.errors import SpecError
 from aerobat.interchange import column_groups
 from aerobat.planning import (

@@ -6,7 +6,6 @@ then run through the same checks, and whatever is wrong becomes one sentence tha
 
 from aerobat.declaration.angles import in_degrees, in_radians
 from aerobat.declaration.declared import declared
-from aerobat.declaration.doors import door
 from aerobat.declaration.field_types import (
     AS_IT_IS,
     Angle,
@@ -36,6 +35,7 @@ from aerobat.declaration.notebooks import in_notebooks
 from aerobat.declaration.registry import Registry, import_plugin
 from aerobat.declaration.sentences import FieldError, shown, unknown_key, unknown_name, within_field
 from aerobat.declaration.tables import from_table, to_table
+from aerobat.declaration.validated import validated
 from aerobat.declaration.values import by_value, short
 
 __all__ = [
@@ -63,7 +63,6 @@ __all__ = [
     "VectorLike",
     "by_value",
     "declared",
-    "door",
     "finite",
     "from_table",
     "import_plugin",
@@ -77,5 +76,6 @@ __all__ = [
     "unit",
     "unknown_key",
     "unknown_name",
+    "validated",
     "within_field",
 ]

@@ -11,10 +11,10 @@ from types import MappingProxyType
 from typing import Any, Generic, TypeVar
 
 from aerobat.declaration.declared import declared
-from aerobat.declaration.doors import door
 from aerobat.declaration.field_types import PathName
 from aerobat.declaration.sentences import FieldError, shown, unknown_name
 from aerobat.declaration.tables import from_table
+from aerobat.declaration.validated import validated
 from aerobat.errors import SpecError
 
 T = TypeVar("T")
@@ -105,7 +105,7 @@ class Registry(Generic[T]):
             _import(entry.load, f"{self._group} of the installed package {entry.value}")
 
 
-@door
+@validated
 def import_plugin(path: PathName) -> None:
     """Run a user's Python file, which registers maneuvers and planners of its own, once.
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from aerobat.arrays import Array
 from aerobat.certification import PlannedPassage
-from aerobat.declaration import by_value, door, in_notebooks, short, shown
+from aerobat.declaration import by_value, in_notebooks, short, shown, validated
 from aerobat.errors import OutOfRange, SpecError
 from aerobat.evaluation.passages import passages_asked
 from aerobat.kernels.running_metrics import RunningMetrics
@@ -73,7 +73,7 @@ class Scores:
     def __len__(self) -> int:
         return len(self.stop)
 
-    @door
+    @validated
     def __getitem__(self, k: int) -> Score:
         """The score of one flight."""
         if not -len(self) <= k < len(self):
@@ -126,7 +126,7 @@ class Scores:
         return Outcome.THROUGH_GATES, Outcome.THROUGH_GATES.sentence(**numbers)
 
 
-@door
+@validated
 def score(flight: Flight, goal: Problem | Plan | str, vehicle: Vehicle | str | None = None) -> Score:
     """Score one flight; with the vehicle, by default the plan's, its clearance in the gates too.
 

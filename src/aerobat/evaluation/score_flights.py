@@ -10,7 +10,7 @@ import numpy as np
 
 from aerobat.arrays import Array
 from aerobat.certification import PlannedPassage
-from aerobat.declaration import door
+from aerobat.declaration import validated
 from aerobat.engines.components import components
 from aerobat.engines.pytree import tree_map
 from aerobat.environment import Environment
@@ -73,7 +73,7 @@ class MetricsSource:
         return MetricsInput(self.times[begin:end])
 
 
-@door
+@validated
 def score_flights(
     plan: Plan | Trajectory,
     vehicles: Vehicle | str | Sequence[Vehicle | str] | None = None,

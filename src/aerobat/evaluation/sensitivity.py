@@ -14,7 +14,7 @@ from aerobat import so3
 from aerobat.arrays import Array
 from aerobat.control import Controller
 from aerobat.control.parameters import max_bandwidth
-from aerobat.declaration import by_value, door, short, unknown_name
+from aerobat.declaration import by_value, short, unknown_name, validated
 from aerobat.engines.components import components, matrix_components
 from aerobat.engines.duals import Dual, DualOps, differentiated, dual
 from aerobat.engines.engine import Init, Step, first_row
@@ -89,7 +89,7 @@ class _Sums(NamedTuple):
     flying: Scalar
 
 
-@door
+@validated
 def sensitivity(
     plan: Planned | Trajectory,
     of: str | Sequence[str],

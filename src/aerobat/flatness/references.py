@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from aerobat import so3
 from aerobat.arrays import Array, frozen
-from aerobat.declaration import Angle, Positive, by_value, door, short
+from aerobat.declaration import Angle, Positive, by_value, short, validated
 from aerobat.environment import Environment
 from aerobat.errors import SpecError
 from aerobat.flatness.flyable import Planned, environment_of, vehicle_of
@@ -48,7 +48,7 @@ class Reference:
         return f"{len(self.times)} times to {self.times[-1]:.3f} s, rotors asked for {thrusts}"
 
 
-@door
+@validated
 def reference(
     trajectory: Trajectory | Planned,
     vehicle: Vehicle | str | None = None,
@@ -90,7 +90,7 @@ def reference(
     return _assembled(times, flat, path, at, vehicle, environment)
 
 
-@door
+@validated
 def reference_of(
     times: ArrayLike,
     flat: FlatState,

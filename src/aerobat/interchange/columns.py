@@ -14,7 +14,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from aerobat.arrays import Array
-from aerobat.declaration import PathName, Positive, door, unknown_name
+from aerobat.declaration import PathName, Positive, unknown_name, validated
 from aerobat.errors import SpecError
 from aerobat.flatness import reference
 from aerobat.interchange.csv import write_csv
@@ -39,7 +39,7 @@ def column_groups(text: str) -> tuple[str, ...]:
     return tuple(name for name in NAMES if name in groups)
 
 
-@door
+@validated
 def write_columns(plan: Plan, path: PathName, columns: Sequence[str] = ALL, rate: Positive = 100.0) -> None:
     """Write a plan's columns at `rate` and at the very end, digits enough to read them back exactly.
 

@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 
 from aerobat.arrays import Array
-from aerobat.declaration import PathName, Positive, door
+from aerobat.declaration import PathName, Positive, validated
 from aerobat.errors import SpecError
 from aerobat.interchange.rows import PathRows, has_header, rows_of_columns
 from aerobat.storage import read_whole, write_whole
@@ -27,7 +27,7 @@ MAX_CSV = 2**28  # bytes: some hours at 100 Hz
 SAME_TIME = 1e-12  # [s], a step this near to a period is one
 
 
-@door
+@validated
 def write_csv(trajectory: Trajectory | Carrier, path: PathName, rate: Positive = 100.0) -> None:
     """Write rows of p, v, a, j at `rate` [1/s] and at the very end, digits enough to read them back exactly.
 
@@ -42,7 +42,7 @@ def write_csv(trajectory: Trajectory | Carrier, path: PathName, rate: Positive =
     write_whole(path, "".join(",".join(map(repr, row)) + "\n" for row in rows.tolist()))
 
 
-@door
+@validated
 def read_csv(path: PathName, rate: Positive = 100.0) -> Trajectory:
     """The trajectory of degree 7 through p, v, a, j of all rows, `rate` [1/s] apart unless times are given.
 
@@ -54,7 +54,7 @@ def read_csv(path: PathName, rate: Positive = 100.0) -> Trajectory:
     return read_rows(path, rate).trajectory
 
 
-@door
+@validated
 def read_rows(path: PathName, rate: Positive = 100.0) -> PathRows:
     """The rows that `read_csv` makes a trajectory of. Raises SpecError as it does."""
     text = _text(Path(path))

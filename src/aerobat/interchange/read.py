@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
-from aerobat.declaration import PathName, Positive, door
+from aerobat.declaration import PathName, Positive, validated
 from aerobat.errors import SpecError
 from aerobat.interchange.csv import read_csv
 from aerobat.planning import Plan, load_plan
@@ -14,7 +14,7 @@ from aerobat.trajectory import Trajectory, load_trajectory
 PATTERNS = ("*.plan", "plan.npz", "plan.csv")  # of what a folder may hold, the first that is there counts
 
 
-@door
+@validated
 def read_plan(path: PathName, rate: Positive = 100.0) -> Plan | Trajectory:
     """Read a .plan file as a plan, or the bare trajectory in an .npz or CSV file with `rate` [1/s] rows.
 
@@ -29,7 +29,7 @@ def read_plan(path: PathName, rate: Positive = 100.0) -> Plan | Trajectory:
     return load_trajectory(path) if path.suffix == ".npz" else read_csv(path, rate)
 
 
-@door
+@validated
 def read_trajectory(path: PathName, rate: Positive = 100.0) -> Trajectory:
     """Read the trajectory alone of whatever `read_plan` reads. Raises SpecError as it does."""
     found = read_plan(path, rate)

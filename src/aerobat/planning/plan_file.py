@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from aerobat.certification import Certificate
-from aerobat.declaration import PathName, door, from_table, to_table
+from aerobat.declaration import PathName, from_table, to_table, validated
 from aerobat.errors import SpecError
 from aerobat.planning.assessment.assessment import Assessment
 from aerobat.planning.recorder import Attempt
@@ -73,7 +73,7 @@ def save_plan(plan: Plan, path: PathName) -> None:
         )
 
 
-@door
+@validated
 def load_plan(path: PathName) -> Plan:
     """Read what `Plan.save` wrote, exactly. Raises SpecError, one sentence, for any other file."""
     content = read_arrays(path, "plan")

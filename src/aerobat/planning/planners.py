@@ -15,7 +15,7 @@ from typing import Any, Protocol, TypeVar, cast, dataclass_transform, get_type_h
 
 from pydantic import Field
 
-from aerobat.declaration import Label, Registry, door, shown
+from aerobat.declaration import Label, Registry, shown, validated
 from aerobat.errors import SpecError
 from aerobat.planning.assessment.assess import with_assessment
 from aerobat.planning.certified_solve import with_certificate
@@ -55,7 +55,7 @@ PLANNERS: Registry[Planner] = Registry(
 )
 
 
-@door
+@validated
 def plan(
     problem: Problem | str,
     planner: Planner | str = "miqp",
@@ -101,7 +101,7 @@ def as_planner(planner: Planner | str) -> Planner:
     return planner
 
 
-@door
+@validated
 def option(default: Any, help: str, off: str | None = None, command_default: Any = None) -> Any:
     """A dataclass field with its help, which the command line offers as an option.
 
@@ -115,14 +115,14 @@ def option(default: Any, help: str, off: str | None = None, command_default: Any
     return field(default=default, metadata=metadata)
 
 
-@door
+@validated
 @dataclass_transform(frozen_default=True, field_specifiers=(dataclasses.field, Field))
 def planner(name: Label) -> Callable[[type[P]], type[P]]:
     """Declare the class that follows and register it: by `name`, `plan` and the command line know it."""
 
     def register(cls: type[P]) -> type[P]:
         if "plan" in vars(cls):
-            cls.plan = door(cls.plan)  # type: ignore[method-assign]
+            cls.plan = validated(cls.plan)  # type: ignore[method-assign]
         return cast(type[P], PLANNERS.add(name, cls))
 
     return register

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from aerobat.certification import Certificate
-from aerobat.declaration import PathName, by_value, door, in_notebooks, short
+from aerobat.declaration import PathName, by_value, in_notebooks, short, validated
 from aerobat.planning.assessment.assessment import Assessment
 from aerobat.planning.recorder import Attempt
 from aerobat.planning.rotor_margin import RotorMargin
@@ -96,7 +96,7 @@ class Flyability(OwnFlight):
         )
 
 
-@door
+@validated
 @in_notebooks
 @short
 @by_value
@@ -163,7 +163,7 @@ class Plan:
         """Time in the solver over all attempts [s]."""
         return sum(attempt.solve_time for attempt in self.attempts)
 
-    @door
+    @validated
     def save(self, path: PathName) -> None:
         """Write the whole plan as one file, whole or not at all; `load_plan` reads it back.
 

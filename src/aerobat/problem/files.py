@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from importlib.resources import files
 
-from aerobat.declaration import PathName, door, to_table
+from aerobat.declaration import PathName, to_table, validated
 from aerobat.documents import document_names, read_document, resolve_document, write_document
 from aerobat.problem.problem import Problem
 
@@ -16,7 +16,7 @@ def problem_names() -> tuple[str, ...]:
     return document_names(PRESETS)
 
 
-@door
+@validated
 def load_problem(name: PathName) -> Problem:
     """Return a built-in problem by its name, or the one in a TOML file.
 
@@ -30,7 +30,7 @@ def as_problem(problem: Problem | str) -> Problem:
     return load_problem(problem) if isinstance(problem, str) else problem
 
 
-@door
+@validated
 def write_problem(problem: Problem | str, path: PathName) -> None:
     """Write a problem as TOML, whole or not at all. Raises SpecError when the file cannot be written."""
     write_document(path, to_table(as_problem(problem)), "problem")

@@ -21,13 +21,13 @@ from aerobat.declaration import (
     Vector3,
     VectorLike,
     declared,
-    door,
     from_table,
     in_degrees,
     in_radians,
     number,
     unit,
     unknown_name,
+    validated,
 )
 from aerobat.errors import SpecError
 from aerobat.problem.condition import Condition, ConeAngle, Quantity
@@ -115,7 +115,7 @@ class Gate:
         upright = tilted_gate(self.position, heading, elevation)
         return heading, elevation, float(np.arctan2(-self.up @ upright.lateral, self.up @ upright.up))
 
-    @door
+    @validated
     def tilted(self, tilt: Angle) -> Gate:
         """The same gate with another tilt [rad]."""
         heading, elevation, _ = self.angles
@@ -123,7 +123,7 @@ class Gate:
         return replace(self, normal=normal, up=up)
 
 
-@door
+@validated
 def tilted_gate(
     position: VectorLike,
     heading: Angle = 0.0,

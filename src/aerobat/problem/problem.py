@@ -23,11 +23,11 @@ from aerobat.declaration import (
     Vector3,
     VectorLike,
     declared,
-    door,
     from_table,
     in_degrees,
     in_radians,
     to_table,
+    validated,
     within_field,
 )
 from aerobat.environment import Environment
@@ -50,7 +50,7 @@ class EndState:
     velocity: Vector3 = field(default_factory=lambda: np.zeros(3))  # [m/s] world
     acceleration: Vector3 = field(default_factory=lambda: np.zeros(3))  # [m/s²] world
 
-    @door
+    @validated
     def derivatives(self, order: Annotated[int, Field(ge=1, le=100)]) -> Array:
         """Position and its derivatives below `order`, (order, 3)."""
         known = [self.position, self.velocity, self.acceleration]
@@ -81,7 +81,7 @@ class Limits:
         if not (self.lower < self.upper).all():
             raise FieldError("lower", "must be below upper on every axis")
 
-    @door
+    @validated
     def of(self, derivative: Derivative) -> tuple[Array, Array]:
         """The lower and upper bounds of a derivative of position, each (3,)."""
         if derivative == 0:
@@ -89,7 +89,7 @@ class Limits:
         bound = np.asarray(getattr(self, DERIVATIVES[derivative]))
         return -bound, bound
 
-    @door
+    @validated
     def without(self, derivative: Derivative) -> Limits:
         """The same limits with those on one derivative taken away."""
         if derivative == 0:
@@ -242,7 +242,7 @@ class Problem:
             return self.limits
         return replace(self.limits, lower=np.maximum(self.limits.lower, [-np.inf, -np.inf, ground]))
 
-    @door
+    @validated
     def stages(self, max_specific_thrust: Positive) -> StageSequence:
         """The maneuver's stages through the problem's gates, for a vehicle that has so much thrust [m/s²].
 
@@ -251,7 +251,7 @@ class Problem:
         """
         return _explicit_stages(self.maneuver, self.gates, float(max_specific_thrust))
 
-    @door
+    @validated
     def gate(self, name: str) -> Gate:
         """The gate of that name. Raises SpecError when there is none."""
         return named_gate(self.gates, name)
@@ -271,7 +271,7 @@ def _explicit_stages(
     return replace(sequence, stages=tuple(stages))
 
 
-@door
+@validated
 def at_rest(position: VectorLike) -> EndState:
     """At rest at `position` [m], (3,)."""
     return EndState(cast(Array, position))

@@ -11,7 +11,7 @@ import numpy as np
 from rich.table import Table
 from rich.text import Text
 
-from aerobat.declaration import door
+from aerobat.declaration import validated
 from aerobat.planning import Plan
 from aerobat.reporting.page import (
     AXIS,
@@ -92,7 +92,7 @@ def comparison_table(comparison: Comparison) -> Table:
     return table
 
 
-@door
+@validated
 def comparison_figure(comparison: Comparison) -> Figure:
     """One page: all paths in one picture, then each planner's rotor thrusts on a common time axis.
 

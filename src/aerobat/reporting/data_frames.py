@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from aerobat.arrays import AXES
-from aerobat.declaration import door
+from aerobat.declaration import validated
 from aerobat.errors import BackendMissing
 from aerobat.evaluation.score import Scores
 from aerobat.planning import Attempt, Plan
@@ -31,7 +31,7 @@ METRICS = (
 )
 
 
-@door
+@validated
 def to_dataframe(table: Flight | Plan | Comparison | Scores) -> DataFrame:
     """Return a pandas DataFrame, SI units unless a column says otherwise.
 

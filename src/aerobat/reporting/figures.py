@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from aerobat.declaration import door
+from aerobat.declaration import validated
 from aerobat.errors import SpecError
 from aerobat.evaluation.score import Score
 from aerobat.planning import Plan
@@ -67,7 +67,7 @@ TIMELINES_BELOW = FlightLayout(
 )
 
 
-@door
+@validated
 def draw(flight: Flight | Plan, plan: Plan | None = None, vehicle: Vehicle | str | None = None) -> Figure:
     """Draw a page on a flight, or a batch: path and attitude, errors, rotor thrusts.
 

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from aerobat.declaration import door
+from aerobat.declaration import validated
 from aerobat.errors import SpecError
 from aerobat.evaluation.score import score
 from aerobat.flatness import Reference, reference
@@ -100,7 +100,7 @@ class TrackingPage:
         return [panel(self.figure, left, y, width, pitch - GAP) for y in bottoms]
 
 
-@door
+@validated
 def tracking_figure(plan: Plan, vehicle: Vehicle | str, flight: Flight) -> Figure:
     """Draw a page on what a plan asks and what its flight gave (paper, Figs. 8, 9 and 10).
 

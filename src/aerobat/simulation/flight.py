@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from aerobat import so3
 from aerobat.arrays import Array, frozen
-from aerobat.declaration import PathName, by_value, door, in_notebooks, short, shown
+from aerobat.declaration import PathName, by_value, in_notebooks, short, shown, validated
 from aerobat.environment import Environment
 from aerobat.errors import OutOfRange, SpecError
 from aerobat.simulation.outcome import Outcome, counted
@@ -60,7 +60,7 @@ SERIES = (
 )
 
 
-@door
+@validated
 @in_notebooks
 @short
 @by_value
@@ -147,7 +147,7 @@ class Flight:
             raise SpecError("outcome is asked of one flight; of a batch, ask flight[k].outcome or outcomes")
         return self.outcomes[0]
 
-    @door
+    @validated
     def __getitem__(self, vehicle: int) -> Flight:
         """The flight of one vehicle of a batch, as if it had flown alone. Raises SpecError for one flight."""
         if not self.is_batch:
@@ -170,7 +170,7 @@ class Flight:
             environment=self.environment,
         )
 
-    @door
+    @validated
     def save(self, path: PathName) -> None:
         """Write the flight as a NumPy .npz file, whole or not at all.
 
@@ -187,7 +187,7 @@ class Flight:
             np.savez(file, format=_FORMAT, **arrays)
 
 
-@door
+@validated
 def load_flight(path: PathName) -> Flight:
     """Read a flight that `Flight.save` wrote. Raises SpecError, one sentence, for any other file."""
     content = read_arrays(path, "flight")

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from aerobat.arrays import Array
-from aerobat.declaration import door
+from aerobat.declaration import validated
 from aerobat.engines import logged_ticks
 from aerobat.engines.components import from_components
 from aerobat.engines.pytree import tree_map, tree_stack
@@ -26,7 +26,7 @@ from aerobat.trajectory import Trajectory
 from aerobat.vehicle import Vehicle
 
 
-@door
+@validated
 def fly(
     plan: Planned | Trajectory,
     vehicle: Vehicle | str | Sequence[Vehicle | str] | None = None,

@@ -8,7 +8,7 @@ from dataclasses import fields
 import numpy as np
 
 from aerobat import so3
-from aerobat.declaration import NonNegative, declared, door
+from aerobat.declaration import NonNegative, declared, validated
 from aerobat.engines.components import components, from_components
 from aerobat.kernels.rigid_body import Body
 from aerobat.states import BodyState
@@ -40,7 +40,7 @@ class StateNoise:
         """Errors that a filter leaves of motion capture (1 mm, 100 Hz) and a gyro (1e-3 rad/s/√Hz)."""
         return cls(position=0.001, velocity=0.011, attitude=0.002, omega=0.016)
 
-    @door
+    @validated
     def scaled(self, factor: NonNegative) -> StateNoise:
         """All errors `factor` times as large. Raises SpecError for a negative factor."""
         return StateNoise(*(factor * getattr(self, field.name) for field in fields(self)))

@@ -15,7 +15,7 @@ from aerobat import so3
 from aerobat.arrays import Array, frozen
 from aerobat.control import Controller
 from aerobat.control.parameters import airframe_parameters, controller_parameters, environment_parameters
-from aerobat.declaration import AS_IT_IS, FieldError, declared, door, shown
+from aerobat.declaration import AS_IT_IS, FieldError, declared, shown, validated
 from aerobat.engines import CompiledLoop, Engine, choose
 from aerobat.engines.engine import first_row
 from aerobat.engines.pytree import Tree, tree_map
@@ -153,7 +153,7 @@ class FlightSetup:
         return pairwise(sorted(cuts))
 
 
-@door
+@validated
 def prepare(
     plan: Planned | Trajectory,
     vehicle: Vehicle | str | Sequence[Vehicle | str] | None = None,

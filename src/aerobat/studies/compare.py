@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from time import perf_counter
 from typing import Any
 
-from aerobat.declaration import by_value, door, in_notebooks, short
+from aerobat.declaration import by_value, in_notebooks, short, validated
 from aerobat.errors import BackendMissing, Infeasible, SpecError
 from aerobat.evaluation.score import Score, score
 from aerobat.planning import Attempt, Plan, Planner, as_planner, plan, registered_planners
@@ -37,7 +37,7 @@ class Entry:
         return certificate is not None and certificate.certified
 
 
-@door
+@validated
 @in_notebooks
 @short
 @by_value
@@ -57,14 +57,14 @@ class Comparison:
         )
         return f"{self.problem.name} on {self.vehicle.name}: {', '.join(found)}"
 
-    @door
+    @validated
     def ratio(self, entry: Entry) -> float | None:
         """An entry's duration over the time-optimal plan's, where there are both."""
         optimal = next((e.plan for e in self.entries if e.planner == "time-optimal"), None)
         return None if optimal is None or entry.plan is None else entry.plan.duration / optimal.duration
 
 
-@door
+@validated
 def compare(
     problem: Problem | str,
     vehicle: Vehicle | str,

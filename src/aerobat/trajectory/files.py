@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from aerobat.declaration import PathName, door
+from aerobat.declaration import PathName, validated
 from aerobat.errors import SpecError
 from aerobat.storage import format_of, read_arrays, whole_file
 from aerobat.trajectory.carrier import Carrier, as_trajectory
@@ -14,7 +14,7 @@ _FORMAT = "aerobat-trajectory-2"
 _WITHOUT_HEADING = "aerobat-trajectory-1"  # read with heading 0
 
 
-@door
+@validated
 def save_trajectory(trajectory: Trajectory | Carrier, path: PathName) -> None:
     """Write durations (S,), coefficients (S, degree + 1, 3) and heading as an .npz file, whole or not at all.
 
@@ -31,7 +31,7 @@ def save_trajectory(trajectory: Trajectory | Carrier, path: PathName) -> None:
         )
 
 
-@door
+@validated
 def load_trajectory(path: PathName) -> Trajectory:
     """Read what `save_trajectory` wrote, exactly. Raises SpecError, one sentence, for any other file."""
     content = read_arrays(path, "trajectory")

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from aerobat.arrays import AXES, Array, Mask, frozen
-from aerobat.declaration import Angle, door, shown
+from aerobat.declaration import Angle, shown, validated
 from aerobat.errors import SpecError
 from aerobat.trajectory.knot_conditions import KnotConditions
 from aerobat.trajectory.piecewise import Trajectory
@@ -31,7 +31,7 @@ class ContinuityRule(StrEnum):
     )
 
 
-@door
+@validated
 def minimum_effort(
     fixed: ArrayLike,
     durations: ArrayLike,

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from pydantic import Field
 
 from aerobat.arrays import Array, frozen, numbers
-from aerobat.declaration import Angle, FieldError, Positive, by_value, door, short, shown
+from aerobat.declaration import Angle, FieldError, Positive, by_value, short, shown, validated
 from aerobat.errors import SpecError
 from aerobat.states import FlatState
 from aerobat.trajectory import polynomial
@@ -33,7 +33,7 @@ class Extremum:
     time: float  # [s]
 
 
-@door
+@validated
 @short
 @by_value
 @dataclass(frozen=True, eq=False, repr=False)
@@ -74,7 +74,7 @@ class Trajectory:
         object.__setattr__(self, "heading", float(self.heading))
 
     @classmethod
-    @door
+    @validated
     def from_inputs(
         cls, initial: ArrayLike, inputs: ArrayLike, dt: ArrayLike, heading: Angle = 0.0
     ) -> Trajectory:
@@ -160,7 +160,7 @@ class Trajectory:
         """
         return polynomial.evaluate(self._rates(derivative)[:, None], _normalised(s))
 
-    @door
+    @validated
     def sample(self, rate: Positive) -> Array:
         """Times 0, 1/rate, 2/rate, ... [s], and the end as the last even if its step is shorter."""
         whole_steps = max(math.floor((self.duration - TIME_TOLERANCE) * rate), 0)
@@ -193,7 +193,7 @@ class Trajectory:
             values.append(polynomial.evaluate(component[:, None], s).ravel())
         return np.min(values, axis=1), np.max(values, axis=1)
 
-    @door
+    @validated
     def specific_thrust_range(
         self, gravity: Annotated[float, Field(ge=0, le=1e9)]
     ) -> tuple[Extremum, Extremum]:

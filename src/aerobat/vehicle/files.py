@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from importlib.resources import files
 
-from aerobat.declaration import PathName, door, to_table
+from aerobat.declaration import PathName, to_table, validated
 from aerobat.documents import document_names, read_document, resolve_document, to_toml, write_document
 from aerobat.vehicle.vehicle import Vehicle
 
@@ -16,7 +16,7 @@ def vehicle_names() -> tuple[str, ...]:
     return document_names(PRESETS)
 
 
-@door
+@validated
 def load_vehicle(name_or_path: PathName) -> Vehicle:
     """Return a vehicle that comes with Aerobat, by its name, or the one in a TOML file, by its path.
 
@@ -32,7 +32,7 @@ def as_vehicle(vehicle: Vehicle | str) -> Vehicle:
     return load_vehicle(vehicle) if isinstance(vehicle, str) else vehicle
 
 
-@door
+@validated
 def vehicle_text(name_or_path: PathName) -> str:
     """The text of a vehicle's file: a preset's own, with its sources, or one's own as it was understood.
 
@@ -44,7 +44,7 @@ def vehicle_text(name_or_path: PathName) -> str:
     return to_toml(to_table(vehicle))
 
 
-@door
+@validated
 def write_vehicle(vehicle: Vehicle | str, path: PathName) -> None:
     """Write a vehicle as TOML, whole or not at all. Raises SpecError when the file cannot be written."""
     write_document(path, to_table(as_vehicle(vehicle)), "vehicle")

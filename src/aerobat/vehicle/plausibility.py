@@ -11,7 +11,7 @@ from math import hypot, log, sqrt
 
 import numpy as np
 
-from aerobat.declaration import door
+from aerobat.declaration import validated
 from aerobat.errors import SpecError
 from aerobat.vehicle.rotor import Rotor
 from aerobat.vehicle.vehicle import Vehicle
@@ -49,7 +49,7 @@ class _Check:
     units: Units
 
 
-@door
+@validated
 def implausibilities(vehicle: Vehicle) -> tuple[str, ...]:
     """Return a sentence for each kind of value that hardly any vehicle has, with the unit probably meant."""
     found = (*_of_dead_rotors(vehicle), *_of_rotors(vehicle.rotors), *_of_inertia(vehicle))

@@ -18,10 +18,10 @@ from aerobat.declaration import (
     Positive,
     Vector3,
     declared,
-    door,
     finite,
     from_table,
     unknown_key,
+    validated,
     within_field,
 )
 from aerobat.errors import SpecError
@@ -170,7 +170,7 @@ class Vehicle:
         source = " ".join(self.description.split())  # one line, however it was written
         return f"{facts}; {source}" if source else facts
 
-    @door
+    @validated
     def require_hover(self, gravity: Positive) -> None:
         """Raise SpecError, naming the rotors, unless they can hold a level hover under `gravity` [m/s²]."""
         weight = self.mass * gravity

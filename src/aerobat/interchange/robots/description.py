@@ -19,7 +19,7 @@ from typing import Any
 
 import numpy as np
 
-from aerobat.declaration import PathName, door, from_table
+from aerobat.declaration import PathName, from_table, validated
 from aerobat.documents import in_document, to_toml
 from aerobat.errors import SpecError
 from aerobat.interchange.robots.body import Link, Motor, Robot, merged
@@ -67,7 +67,7 @@ class VehicleDescription:
         return "\n".join([*lines, "", to_toml(self.table)])
 
 
-@door
+@validated
 def import_vehicle(path: PathName) -> Vehicle:
     """Return the vehicle that a URDF or SDF file describes; `aerobat.interchange.robots` says what is lost.
 
@@ -78,7 +78,7 @@ def import_vehicle(path: PathName) -> Vehicle:
         return read_robot_description(path).vehicle()
 
 
-@door
+@validated
 def read_robot_description(path: PathName) -> VehicleDescription:
     """Return what a URDF or SDF file says of a vehicle. Raises SpecError, a sentence, for nonsense."""
     path = Path(path)

@@ -9,7 +9,7 @@ import numpy as np
 
 from aerobat.arrays import Array
 from aerobat.certification import Certificate, Side
-from aerobat.declaration import door
+from aerobat.declaration import validated
 from aerobat.errors import BackendMissing, Infeasible, SpecError
 from aerobat.planning.assessment.assessment import Assessment, Box, Point, SecondOpinion
 from aerobat.planning.assessment.lower_bound import least_duration
@@ -31,7 +31,7 @@ def with_assessment(plan: Plan) -> Plan:
     return replace(plan, assessment=_assessment(plan, plan.vehicle))
 
 
-@door
+@validated
 def with_second_opinion(plan: Plan, progress: Progress | None = None) -> Plan:
     """The plan; where its assessment finds it suspicious, with what free knots make of the same problem.
 

@@ -7,7 +7,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from aerobat.declaration import Angle, Positive, door
+from aerobat.declaration import Angle, Positive, validated
 from aerobat.errors import SpecError
 from aerobat.problem.condition import Condition, Quantity, thrust_in_plane
 from aerobat.problem.gate import Gate, only_gate
@@ -43,7 +43,7 @@ class HalfFlip(Maneuver):
         """Return it with ε_y = 18 m/s²."""
         return HalfFlip(PAPER_LATERAL, PAPER_PASSAGE)
 
-    @door
+    @validated
     def with_gate_tilt(self, gates: Sequence[Gate], tilt: Angle) -> tuple[Gate, ...]:
         """Return the gates at another tilt [rad]."""
         return tuple(gate.tilted(tilt) for gate in gates)

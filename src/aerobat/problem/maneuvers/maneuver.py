@@ -11,7 +11,7 @@ from typing import ClassVar, TypeVar, cast, dataclass_transform
 from pydantic import Field
 
 from aerobat.arrays import Array
-from aerobat.declaration import Angle, Label, Registry, door
+from aerobat.declaration import Angle, Label, Registry, validated
 from aerobat.errors import SpecError
 from aerobat.problem.gate import Gate
 from aerobat.problem.stage import StageSequence
@@ -37,7 +37,7 @@ class Maneuver(ABC):
         """Return the maneuver exactly as the paper prints it; itself when the paper has no such maneuver."""
         return self
 
-    @door
+    @validated
     def with_gate_tilt(self, gates: Sequence[Gate], tilt: Angle) -> tuple[Gate, ...]:
         """Return the gates at another tilt [rad]. Raises SpecError unless a half-flip passes them."""
         raise SpecError(f"only the gate of a half-flip can be tilted, this maneuver is a {self.kind}")
@@ -63,7 +63,7 @@ M = TypeVar("M", bound=Maneuver)
 MANEUVERS: Registry[Maneuver] = Registry(Maneuver, "maneuver", "aerobat.maneuvers")  # type: ignore[type-abstract]
 
 
-@door
+@validated
 @dataclass_transform(frozen_default=True, field_specifiers=(dataclasses.field, Field))
 def maneuver(kind: Label) -> Callable[[type[M]], type[M]]:
     """Declare the class that follows and register it: `kind` is its name in problem files."""

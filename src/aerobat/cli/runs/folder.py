@@ -11,7 +11,7 @@ from pathlib import Path
 from aerobat.cli.entry import ExitCode
 from aerobat.cli.interrupts import end_interrupts
 from aerobat.cli.options import OutputOptions
-from aerobat.cli.run_record import RECORD, RunRecord, write_record
+from aerobat.cli.runs.record import RECORD, RunRecord, write_record
 from aerobat.cli.terminal import print_json
 from aerobat.evaluation import Score
 from aerobat.interchange.columns import write_columns

@@ -10,12 +10,12 @@ from typing import Annotated, Any
 from cyclopts import Parameter
 from numpy.typing import NDArray
 
-from aerobat.cli.compare import COMPARISON, comparison_of, finish_comparison
+from aerobat.cli.commands.compare import COMPARISON, comparison_of, finish_comparison
+from aerobat.cli.commands.fly import flown
 from aerobat.cli.entry import ExitCode
-from aerobat.cli.fly import flown
 from aerobat.cli.options import RepeatOptions
-from aerobat.cli.run_folder import FLIGHT, finish
-from aerobat.cli.run_record import RunRecord, installed_versions, read_record
+from aerobat.cli.runs.folder import FLIGHT, finish
+from aerobat.cli.runs.record import RunRecord, installed_versions, read_record
 from aerobat.cli.tasks import plan_of
 from aerobat.cli.terminal import say
 from aerobat.errors import SpecError

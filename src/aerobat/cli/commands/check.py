@@ -12,8 +12,8 @@ from cyclopts import Parameter
 from aerobat.certification import Envelope, certify
 from aerobat.cli.entry import ExitCode
 from aerobat.cli.options import CheckOptions
-from aerobat.cli.run_record import default_vehicle
-from aerobat.cli.saved_plans import named_vehicle
+from aerobat.cli.runs.record import default_vehicle
+from aerobat.cli.runs.saved_plans import named_vehicle
 from aerobat.cli.terminal import print_json
 from aerobat.environment import Environment
 from aerobat.interchange import read_plan

@@ -8,7 +8,7 @@ from cyclopts import Parameter
 
 from aerobat.cli.entry import ExitCode
 from aerobat.cli.options import PlanningOptions
-from aerobat.cli.run_folder import finish
+from aerobat.cli.runs.folder import finish
 from aerobat.cli.tasks import planned
 
 

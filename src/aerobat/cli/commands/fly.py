@@ -9,8 +9,8 @@ from cyclopts import Parameter
 
 from aerobat.cli.entry import ExitCode
 from aerobat.cli.options import FlyingOptions, PlanningOptions
-from aerobat.cli.run_folder import Flown, finish
-from aerobat.cli.run_record import FlightSettings
+from aerobat.cli.runs.folder import Flown, finish
+from aerobat.cli.runs.record import FlightSettings
 from aerobat.cli.tasks import planned
 from aerobat.control import Controller, named_controller
 from aerobat.evaluation import score

@@ -29,7 +29,7 @@ _NUMBERS = (bool, int, float, complex)  # of which Python takes one for another
 _ARRAYS = frozenset(get_args(ArrayLike))
 
 
-def door(function: F) -> F:
+def validated(function: F) -> F:
     """Make a function, or the making of a class's values, raise SpecError for arguments that do not fit.
 
     Neither the function nor its type changes otherwise.

@@ -8,7 +8,7 @@ from typing import Annotated
 from cyclopts import Parameter
 
 from aerobat.cli.options import output
-from aerobat.cli.saved_plans import named_vehicle
+from aerobat.cli.runs.saved_plans import named_vehicle
 from aerobat.cli.terminal import say
 from aerobat.documents import in_document
 from aerobat.errors import SpecError

@@ -9,8 +9,8 @@ from cyclopts import Parameter
 
 from aerobat.cli.options import OutputOptions, TaskOptions
 from aerobat.cli.progress import planning_progress
-from aerobat.cli.run_folder import run_folder, written_to
-from aerobat.cli.run_record import RunRecord
+from aerobat.cli.runs.folder import run_folder, written_to
+from aerobat.cli.runs.record import RunRecord
 from aerobat.cli.tasks import read_task
 from aerobat.cli.terminal import print_json
 from aerobat.reporting.comparison import comparison_figure, comparison_rows, comparison_table

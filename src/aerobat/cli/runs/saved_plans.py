@@ -9,7 +9,7 @@ from math import radians
 from pathlib import Path
 
 from aerobat.cli.options import PlanningOptions, is_given, offered_options, option_name
-from aerobat.cli.run_record import default_vehicle
+from aerobat.cli.runs.record import default_vehicle
 from aerobat.cli.terminal import say
 from aerobat.errors import SpecError
 from aerobat.interchange import read_plan, read_rows

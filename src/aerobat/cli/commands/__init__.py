@@ -1,0 +1,1 @@
+"""One file a command, with one function of its name, imported when it is asked for."""
