@@ -161,6 +161,12 @@ def _arguments(name: str, folder: Path) -> dict[str, Any]:
         "tracking_figure": {"plan": plan(), "vehicle": agile, "flight": flight()},
         "with_second_opinion": {"plan": plan(), "progress": None},
         "vehicle_names": {},
+        "write_columns": {
+            "plan": plan(),
+            "path": folder / "saved.csv",
+            "columns": ("position",),
+            "rate": 100.0,
+        },
         "write_csv": {"trajectory": plan().trajectory, "path": folder / "saved.csv", "rate": 100.0},
         "write_problem": {"problem": plan().problem, "path": folder / "saved.toml"},
         "write_vehicle": {"vehicle": agile, "path": folder / "saved.toml"},

@@ -157,3 +157,10 @@ def test_options_that_do_not_fit_are_refused(arguments: tuple[str, ...], tmp_pat
     assert code("fly", *arguments) == 2
     assert capsys.readouterr().err.count("\n") == 1
     assert not Path("out").exists()
+
+
+def test_columns_that_need_a_vehicle_are_refused_of_a_plan_without_one(tmp_path: Path) -> None:
+    with pytest.raises(SpecError, match="the plan has none; plan for one"):
+        write_columns(plan("line"), tmp_path / "thrusts.csv", ["thrusts"])
+    with pytest.raises(SpecError, match="no group of columns named 'thrust'"):
+        write_columns(plan("line"), tmp_path / "thrusts.csv", ["thrust"])

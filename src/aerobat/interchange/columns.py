@@ -44,7 +44,7 @@ def write_columns(plan: Plan, path: PathName, columns: Sequence[str] = ALL, rate
     """Write a plan's columns at `rate` and at the very end, digits enough to read them back exactly.
 
     Without a vehicle, the columns that follow from one are left out. Lost is what lies between rows. Raises
-    SpecError where the file cannot be written.
+    SpecError for groups that are none, where nothing is left, and where the file cannot be written.
 
     Args:
         plan: What is written.
@@ -52,7 +52,8 @@ def write_columns(plan: Plan, path: PathName, columns: Sequence[str] = ALL, rate
         columns: Groups of NAMES, or PAPER.
         rate: Rows a second [1/s].
     """
-    if tuple(columns) == PAPER:
+    wanted = column_groups(",".join(columns))
+    if wanted == PAPER:
         write_csv(plan.trajectory, path, rate)
         return
     times = plan.trajectory.sample(rate)
@@ -63,7 +64,9 @@ def write_columns(plan: Plan, path: PathName, columns: Sequence[str] = ALL, rate
         groups["attitude"] = found.setpoint.q_world_body
         groups["rates"] = found.setpoint.omega_body
         groups["thrusts"] = found.rotor_thrusts
-    written = [name for name in columns if name in groups]
+    written = [name for name in wanted if name in groups]
+    if not written:
+        raise SpecError(f"{' and '.join(wanted)} follow from a vehicle, and the plan has none; plan for one")
     header = [column for name in written for column in _header(name, groups[name].shape[1])]
     rows = np.concatenate([groups[name] for name in written], axis=1)
     lines = [",".join(header), *(",".join(map(repr, row)) for row in rows.tolist())]
