@@ -154,6 +154,17 @@ class Condition:
         return f"{self.quantity.replace('_', ' ')} along ({direction})"
 
     @property
+    def range(self) -> str:
+        """The values that it allows, in words."""
+        if self.lower == self.upper:
+            return f"of {self.lower:.4g}"
+        if self.upper == inf:
+            return f"of {self.lower:.4g} or more"
+        if self.lower == -inf:
+            return f"of {self.upper:.4g} or less"
+        return f"between {self.lower:.4g} and {self.upper:.4g}"
+
+    @property
     def min_thrust(self) -> float:
         """The least specific thrust [m/s²] that satisfies the condition; zero when it asks none."""
         if self.quantity is not Quantity.SPECIFIC_THRUST:

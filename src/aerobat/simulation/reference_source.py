@@ -10,7 +10,7 @@ from aerobat.arrays import Array
 from aerobat.engines.components import components
 from aerobat.engines.pytree import Tree, tree_map
 from aerobat.environment import Environment
-from aerobat.flatness import reference
+from aerobat.flatness import axial_drag, force_balance, reference
 from aerobat.kernels.control_loops import Lookahead, ReferencePoint
 from aerobat.simulation.flight import setpoint_rows
 from aerobat.simulation.loop import Clock
@@ -90,20 +90,20 @@ class ReferenceSource:
             self._setpoint,
             setpoint_rows(rows, following),
             self._environment,
-            self._vehicle.mass,
+            self._vehicle,
         )
 
 
 def reference_points(
-    setpoint: Setpoint, following: Setpoint, environment: Environment, mass: float
+    setpoint: Setpoint, following: Setpoint, environment: Environment, vehicle: Vehicle
 ) -> ReferencePoint:
     """Set-points as kernels read them.
 
     Args:
         setpoint: at ticks, leading axis (ticks,).
         following: one tick later.
-        environment: where; its gravity counts.
-        mass: of the vehicle that they are for [kg].
+        environment: where; its gravity and wind count.
+        vehicle: that they are for; its drag counts.
     """
     flat, q = setpoint.flat, setpoint.q_world_body
 
@@ -119,8 +119,18 @@ def reference_points(
         in_world(setpoint.omega_body),
         in_world(setpoint.omega_dot_body),
         Lookahead(
-            (following.wrench.thrust - setpoint.wrench.thrust) / mass,
+            _specific_collective(following, environment, vehicle)
+            - _specific_collective(setpoint, environment, vehicle),
             in_world(following.omega_body),
             in_world(following.omega_dot_body),
         ),
     )
+
+
+def _specific_collective(setpoint: Setpoint, environment: Environment, vehicle: Vehicle) -> Array:
+    """Collective thrust over mass [m/s²], (ticks,): without drag the same for vehicles of any mass."""
+    flat = setpoint.flat
+    thrust = force_balance(environment, vehicle).specific_thrust(flat.velocity, flat.acceleration)
+    airspeed = flat.velocity - environment.wind
+    along = np.sum(so3.thrust_axis(setpoint.q_world_body) * airspeed, axis=-1)
+    return np.asarray(np.linalg.norm(thrust, axis=-1) + axial_drag(vehicle) * along)

@@ -67,8 +67,8 @@ def violated_stage(sequence: StageSequence, trajectory: Trajectory, balance: For
             value = float(bound.value(flat))
             if bound.excess(flat) > STAGE_TOLERANCE:
                 return (
-                    f"the stage '{stage.name}' asks {condition.name} between {condition.lower:.4g} "
-                    f"and {condition.upper:.4g}, the closed form gives {value:.4g}"
+                    f"the stage '{stage.name}' asks {condition.name} {condition.range}, "
+                    f"the closed form gives {value:.4g}"
                 )
         earliest, latest = stage.window
         if not earliest - STAGE_TOLERANCE <= fraction <= latest + STAGE_TOLERANCE:
