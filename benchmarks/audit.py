@@ -20,9 +20,11 @@ os.environ.update(OMP_NUM_THREADS="1", OPENBLAS_NUM_THREADS="1")  # before NumPy
 
 import argparse
 import json
+import time
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import partial
+from itertools import cycle
 from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
@@ -32,11 +34,16 @@ import numpy as np
 from aerobat.planning import FreeKnots, GridSearch, Miqp, plan
 from audit_measures import PLANNERS, YARDSTICK, Attempted, attempted, plan_facts, with_passage
 from audit_tables import TABLES, defect
-from random_problems import KINDS, Case, hard_case, random_case, write_case
+from hard_problems import hard_case
+from random_problems import KINDS, Case, random_case, write_case
 
-RETRIED_INTERVALS = (10, 13, 14, 16, 20, 25, 30, 40)
-FIXED_DURATIONS = 40  # tried, from the shortest conceivable to LONGEST [s]
-LONGEST = 12.0  # [s]
+ASKED_INTERVALS = (10, 13, 16, 20, 20)  # of a MIQP that may refuse
+RETRIED = (  # N and order, None what it takes by itself
+    *((n, None) for n in (10, 13, 16, 20, 25, 30, 40)),
+    *((n, order) for n in (14, 24) for order in (4, 5)),
+)
+FIXED_DURATIONS = np.geomspace(0.8, 10.0, 11)  # [s] tried with the intervals of RETRIED in turn
+RETRY_PATIENCE = 15.0  # [s] of the processor, for one of these
 SHORTER = (0.01, 0.02, 0.03, 0.04, 0.05, 0.07, 0.1, 0.13, 0.16, 0.2, 0.25, 0.3)  # of the duration
 Row = dict[str, Any]
 
@@ -133,21 +140,19 @@ def plans(task: Task, case: Case) -> Row:
 
 def refusals(task: Task, case: Case) -> Row:
     """A refusal by the MIQP of some N, and what plans the problem all the same."""
-    intervals = int(np.random.default_rng([task.seed, task.k, 2]).choice([10, 13, 16, 20]))
-    row = facts(attempted(partial(plan, case.problem, Miqp(intervals=intervals), case.vehicle)))
-    row["intervals"] = intervals
+    intervals = int(np.random.default_rng([task.seed, task.k, 2]).choice(ASKED_INTERVALS))
+    made = attempted(partial(plan, case.problem, Miqp(intervals=intervals), case.vehicle))
+    row = facts(made) | {"intervals": intervals, "hardships": case.problem.description}
     if row["status"] != "infeasible":
-        return row
-    ways = {
-        f"N = {n}, order {r or 'its own'}": Miqp(r, n, rescue=False)
-        for n in RETRIED_INTERVALS
-        for r in (None, 4, 5)
-    }
-    durations = np.geomspace(0.6, LONGEST, FIXED_DURATIONS)
-    ways |= {f"{t:.2f} s, N = {intervals}": at_duration(t, intervals) for t in durations.tolist()}
+        return row | {"rescue": made.plan.rescue if made.plan else None}
+    began = time.process_time()
+    ways = {f"N = {n}, order {r or 'its own'}": Miqp(r, n, rescue=False) for n, r in RETRIED}
+    for duration, n in zip(FIXED_DURATIONS.tolist(), cycle(sorted({n for n, _ in RETRIED})), strict=False):
+        ways[f"{duration:.2f} s, N = {n}"] = at_duration(duration, n)
     planned = next((way for way, made in ways.items() if planned_by_miqp(case, made)), "")
-    free = facts(attempted(partial(plan, case.problem, FreeKnots(), case.vehicle)))
-    return row | {"planned_by": planned, "free_knots": free["status"] == "planned" and free["certified"]}
+    free = facts(attempted(partial(plan, case.problem, FreeKnots(), case.vehicle), RETRY_PATIENCE))
+    free_knots = free["status"] == "planned" and free["certified"]
+    return row | {"planned_by": planned, "free_knots": free_knots, "retried": time.process_time() - began}
 
 
 def at_duration(duration: float, intervals: int) -> Miqp:
@@ -156,7 +161,7 @@ def at_duration(duration: float, intervals: int) -> Miqp:
 
 
 def planned_by_miqp(case: Case, planner: Miqp) -> Row | None:
-    made = attempted(partial(plan, case.problem, planner, case.vehicle))
+    made = attempted(partial(plan, case.problem, planner, case.vehicle), RETRY_PATIENCE)
     mine = made.plan is not None and made.plan.planner == "miqp" and made.plan.certified
     return facts(made) if mine else None
 

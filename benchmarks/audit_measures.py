@@ -40,12 +40,12 @@ class Attempted:
     seconds: float  # of the processor
 
 
-def attempted(call: Callable[[], Plan]) -> Attempted:
-    """The outcome of planning, whatever it is."""
+def attempted(call: Callable[[], Plan], patience: float = PATIENCE) -> Attempted:
+    """The outcome of planning, whatever it is, given up after so much of the processor [s]."""
     began = time.process_time()
     found, status, message = None, "planned", ""
     signal.signal(signal.SIGVTALRM, _give_up)
-    signal.setitimer(signal.ITIMER_VIRTUAL, PATIENCE)
+    signal.setitimer(signal.ITIMER_VIRTUAL, patience)
     try:
         found = call()
     except Infeasible as error:
@@ -60,7 +60,7 @@ def attempted(call: Callable[[], Plan]) -> Attempted:
 
 
 def _give_up(number: int, frame: object) -> None:
-    raise TimeoutError(f"no answer after {PATIENCE:g} s of the processor")
+    raise TimeoutError("no answer in the time of the processor that it was given")
 
 
 def planner_of(name: str, **settings: Any) -> Planner:

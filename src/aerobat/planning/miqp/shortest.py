@@ -28,6 +28,8 @@ FALLING = 1.25  # unless the excess falls no faster than by this factor from one
 STARTS = 2  # that lead to a path
 MAX_STARTS = 6
 FASTER = 1.3  # times as fast through gates, of paths that turn back in them
+SCAN_NODES = 500  # of a program's branch and bound: paths begin at its slots, which need not be the cheapest
+UNSOLVED = 3  # programs without an answer, after others that have one: the longer ones are no better
 RESERVES = (0.02, 0.05, 0.1, 0.2)  # of the rotors' ranges, for paths that leave the controller too little
 
 
@@ -138,9 +140,9 @@ class _Scan:
 
     def starts(self) -> Iterator[Placement]:
         """Answers that are not far from what the vehicle can do, each as a path of its program."""
-        dt, before = self.first, inf
-        while dt <= self.last and not self.attempts.is_over:
-            placement = Placement(self.attempts.solve(dt), dt)
+        dt, before, solved, unsolved = self.first, inf, False, 0
+        while dt <= self.last and unsolved < UNSOLVED and not self.attempts.is_over:
+            placement = Placement(self.attempts.solve(dt, SCAN_NODES), dt)
             violation = inf
             if placement.answer.x is not None:
                 placement = replace(placement, path=self.attempts.start(placement))
@@ -152,6 +154,8 @@ class _Scan:
                 yield placement
             if violation <= 0.0:
                 return
+            solved = solved or violation < inf
+            unsolved = unsolved + 1 if solved and placement.answer.status == "unknown" else 0
             dt, before = dt * (GROWTH if violation < COARSE else COARSE_GROWTH), violation
 
     def certified(self) -> Judged[Placement] | None:
