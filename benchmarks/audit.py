@@ -43,7 +43,9 @@ RETRIED = (  # N and order, None what it takes by itself
     *((n, order) for n in (14, 24) for order in (4, 5)),
 )
 FIXED_DURATIONS = np.geomspace(0.8, 10.0, 11)  # [s] tried with the intervals of RETRIED in turn
-RETRY_PATIENCE = 15.0  # [s] of the processor, for one of these
+REFUSAL_PATIENCE = 30.0  # [s] of the processor, for one refusal
+RETRY_PATIENCE = 8.0  # [s] likewise, for one of these
+RETRIES_PATIENCE = 12.0  # [s] likewise, for all of these, in random order
 SHORTER = (0.01, 0.02, 0.03, 0.04, 0.05, 0.07, 0.1, 0.13, 0.16, 0.2, 0.25, 0.3)  # of the duration
 Row = dict[str, Any]
 
@@ -140,8 +142,10 @@ def plans(task: Task, case: Case) -> Row:
 
 def refusals(task: Task, case: Case) -> Row:
     """A refusal by the MIQP of some N, and what plans the problem all the same."""
-    intervals = int(np.random.default_rng([task.seed, task.k, 2]).choice(ASKED_INTERVALS))
-    made = attempted(partial(plan, case.problem, Miqp(intervals=intervals), case.vehicle))
+    rng = np.random.default_rng([task.seed, task.k, 2])
+    intervals = int(rng.choice(ASKED_INTERVALS))
+    asked = partial(plan, case.problem, Miqp(intervals=intervals), case.vehicle)
+    made = attempted(asked, REFUSAL_PATIENCE)
     row = facts(made) | {"intervals": intervals, "hardships": case.problem.description}
     if row["status"] != "infeasible":
         return row | {"rescue": made.plan.rescue if made.plan else None}
@@ -149,10 +153,15 @@ def refusals(task: Task, case: Case) -> Row:
     ways = {f"N = {n}, order {r or 'its own'}": Miqp(r, n, rescue=False) for n, r in RETRIED}
     for duration, n in zip(FIXED_DURATIONS.tolist(), cycle(sorted({n for n, _ in RETRIED})), strict=False):
         ways[f"{duration:.2f} s, N = {n}"] = at_duration(duration, n)
-    planned = next((way for way, made in ways.items() if planned_by_miqp(case, made)), "")
+    planned, tried = "", 0
+    for way in rng.permutation(list(ways)).tolist():
+        if planned or time.process_time() - began > RETRIES_PATIENCE:
+            break
+        tried += 1
+        planned = way if planned_by_miqp(case, ways[way]) else ""
     free = facts(attempted(partial(plan, case.problem, FreeKnots(), case.vehicle), RETRY_PATIENCE))
     free_knots = free["status"] == "planned" and free["certified"]
-    return row | {"planned_by": planned, "free_knots": free_knots, "retried": time.process_time() - began}
+    return row | {"planned_by": planned, "tried": tried, "free_knots": free_knots}
 
 
 def at_duration(duration: float, intervals: int) -> Miqp:

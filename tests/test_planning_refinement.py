@@ -102,6 +102,15 @@ def test_what_too_few_intervals_miss_is_rescued_and_said(quad: Vehicle) -> None:
     assert "miqp found none with 7 intervals; planned" in str(found)
 
 
+def test_a_narrow_window_at_an_end_is_rescued_by_many_intervals(quad: Vehicle) -> None:
+    """With 13 intervals one is left after the window, with 23 two: too few for three conditions and rest."""
+    aside = Condition(Quantity.POSITION, AXES[1], 0.2, 0.2)
+    still, level = (Condition(q, AXES[1], 0.0, 0.0) for q in (Quantity.VELOCITY, Quantity.SPECIFIC_THRUST))
+    found = plan(passing(aside, still, level, at=(0.9, 0.96)), Miqp(intervals=13), quad)
+    assert found.certified
+    assert "planned with 40" in found.rescue
+
+
 def test_a_stage_that_excludes_itself_is_named(quad: Vehicle) -> None:
     x = Condition(Quantity.POSITION, AXES[0], 3.0, 3.0), Condition(Quantity.POSITION, AXES[0], upper=2.0)
     with pytest.raises(Infeasible, match="conditions of the stage 'mid' exclude each other"):
