@@ -32,7 +32,7 @@ from typing import Any
 import numpy as np
 
 from aerobat.planning import FreeKnots, GridSearch, Miqp, plan
-from audit_measures import PLANNERS, YARDSTICK, Attempted, attempted, plan_facts, with_passage
+from audit_measures import ALL_PLANNERS, Attempted, attempted, plan_facts, with_passage
 from audit_tables import TABLES, defect
 from hard_problems import hard_case
 from random_problems import KINDS, Case, random_case, write_case
@@ -46,7 +46,7 @@ FIXED_DURATIONS = np.geomspace(0.8, 10.0, 11)  # [s] tried with the intervals of
 REFUSAL_PATIENCE = 30.0  # [s] of the processor, for one refusal
 RETRY_PATIENCE = 8.0  # [s] likewise, for one of these
 RETRIES_PATIENCE = 12.0  # [s] likewise, for all of these, in random order
-SHORTER = (0.01, 0.02, 0.03, 0.04, 0.05, 0.07, 0.1, 0.13, 0.16, 0.2, 0.25, 0.3)  # of the duration
+SHORTER = (0.01, 0.02, 0.04, 0.07, 0.12, 0.2)  # of the duration
 Row = dict[str, Any]
 
 
@@ -80,9 +80,7 @@ def main() -> None:
     parser.add_argument("--first", type=int, default=0, help="the first of them (0)")
     parser.add_argument("--seed", type=int, default=0, help="their seed (0)")
     parser.add_argument("--kinds", nargs="*", default=[], choices=list(KINDS), help="of these kinds only")
-    parser.add_argument(
-        "--planners", nargs="*", default=[*PLANNERS, YARDSTICK], choices=[*PLANNERS, YARDSTICK]
-    )
+    parser.add_argument("--planners", nargs="*", default=ALL_PLANNERS, choices=ALL_PLANNERS)
     parser.add_argument("--jobs", type=int, default=2, help="processes (2)")
     parser.add_argument("--results", type=Path, default=Path("out/audit.jsonl"), help="out/audit.jsonl")
     parser.add_argument("--save", type=Path, default=Path("out/audit"), help="where problems go (out/audit)")
