@@ -169,7 +169,7 @@ def at_duration(duration: float, intervals: int) -> Miqp:
 
 def planned_by_miqp(case: Case, planner: Miqp) -> Row | None:
     made = attempted(partial(plan, case.problem, planner, case.vehicle), RETRY_PATIENCE)
-    mine = made.plan is not None and made.plan.planner == "miqp" and made.plan.certified
+    mine = made.plan is not None and made.plan.planner == "miqp" and made.plan.certified and made.plan.flies
     return facts(made) if mine else None
 
 

@@ -77,12 +77,20 @@ def test_more_intervals_are_no_slower(quad: Vehicle) -> None:
     assert many.duration <= 1.01 * few.duration
 
 
-@pytest.mark.parametrize("name", ["half-flip", "line"])
-def test_no_equal_intervals_one_percent_shorter_can_be_flown(name: str, quad: Vehicle) -> None:
-    found = plan(load_problem(name), vehicle=quad)
+@pytest.mark.parametrize(
+    ("name", "vehicle"),
+    [
+        ("half-flip", "agile-quad"),
+        ("line", "agile-quad"),
+        (str(CASES / "slow-start-flip.toml"), "hexarotor"),
+    ],
+)
+def test_no_equal_intervals_one_percent_shorter_can_be_flown(name: str, vehicle: str) -> None:
+    problem, flown_by = load_problem(name), load_vehicle(vehicle)
+    found = plan(problem, vehicle=flown_by)
     dt = 0.99 * found.duration / found.intervals
     with pytest.raises(Infeasible):
-        plan(load_problem(name), Miqp(search=GridSearch(dt, dt, 1), rescue=False), quad)
+        plan(problem, Miqp(search=GridSearch(dt, dt, 1), rescue=False), flown_by)
 
 
 def test_a_fixed_dt_beyond_what_bounds_per_axis_alone_allow_is_refined(quad: Vehicle) -> None:

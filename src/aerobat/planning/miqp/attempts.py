@@ -55,6 +55,11 @@ class Attempts:
         self.slots = answer.slots or self.slots
         return answer
 
+    def placement(self, dt: float, node_limit: int | None = None) -> Placement:
+        """The program's answer at one dt, with the path that begins there, if it has one."""
+        placement = Placement(self.solve(dt, node_limit), dt)
+        return placement if placement.answer.x is None else replace(placement, path=self.start(placement))
+
     @property
     def is_over(self) -> bool:
         """True where no time is left for another; the first is made in any case."""

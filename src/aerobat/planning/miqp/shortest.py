@@ -6,17 +6,24 @@ path has them: from there the descent ends at shorter paths than from those that
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import pairwise
-from math import inf
+from math import exp, inf
 
 from aerobat.optimization.deadline import out_of_time
 from aerobat.planning.certified_solve import Judged
 from aerobat.planning.flyability import own_flight
 from aerobat.planning.miqp.attempts import Attempts, Placement
-from aerobat.planning.miqp.refinement import Descent, PathPoint, PathProgram, descent, finished
+from aerobat.planning.miqp.refinement import (
+    Descent,
+    PathPoint,
+    PathProgram,
+    descent,
+    finished,
+    on_equal_intervals,
+)
 from aerobat.planning.result import OwnFlight
 from aerobat.problem.condition import Condition, Quantity
 
@@ -30,7 +37,11 @@ MAX_STARTS = 6
 FASTER = 1.3  # times as fast through gates, of paths that turn back in them
 SCAN_NODES = 500  # of a program's branch and bound: paths begin at its slots, which need not be the cheapest
 UNSOLVED = 3  # programs without an answer, after others that have one: the longer ones are no better
+SHORTER = (0.99, 0.96)  # of the shortest path's duration: those of programs from which others may start
+MAX_SHORTER = 6  # of such starts that lead to a path
 RESERVES = (0.02, 0.05, 0.1, 0.2)  # of the rotors' ranges, for paths that leave the controller too little
+
+_End = tuple[Placement, PathPoint]  # a start and the path that a descent from it ends at
 
 
 def shortest(attempts: Attempts, first: float, last: float) -> Judged[Placement] | None:
@@ -43,7 +54,7 @@ def shortest(attempts: Attempts, first: float, last: float) -> Judged[Placement]
     """
     scan = _Scan(attempts, first, last)
     starts = scan.starts()
-    ends: list[tuple[Placement, PathPoint]] = []
+    ends: list[_End] = []
     known: set[tuple[int, ...] | None] = set()  # slots whose shortest path is known
     for tried, start in enumerate(starts):
         if start.answer.slots in known:
@@ -54,11 +65,36 @@ def shortest(attempts: Attempts, first: float, last: float) -> Judged[Placement]
             known.add(start.answer.slots)
         if len(ends) == STARTS or tried + 1 == MAX_STARTS or out_of_time():
             break
+    ends += _from_shorter(attempts, ends)
     for start, path in sorted(ends, key=lambda end: float(end[1].x[-1])):
         judged = attempts.refined(start, partial(finished, path))
         if judged.feasible:
             return flyable(attempts, judged)
     return _slower(attempts, scan, starts)
+
+
+def _from_shorter(attempts: Attempts, ends: Sequence[_End]) -> list[_End]:
+    """Ends of descents from programs shorter than the shortest path found, as long as there are any.
+
+    The scan's starts are slower than what they lead to, and have stages where a slower path has them.
+    """
+    found: list[_End] = []
+    best = min((float(path.x[-1]) for _, path in ends), default=-inf)
+    while best > -inf and len(found) < MAX_SHORTER and not out_of_time():
+        starts = (attempts.placement(fraction * exp(best), SCAN_NODES) for fraction in SHORTER)
+        led = ((start, _through_equal(start)) for start in starts)
+        end = next(((start, path) for start, path in led if path and float(path.x[-1]) < best), None)
+        if end is None:
+            break
+        found.append(end)
+        best = float(end[1].x[-1])
+    return found
+
+
+def _through_equal(start: Placement) -> PathPoint | None:
+    """Where a descent ends that begins at a path of equal intervals which the vehicle can fly."""
+    equal = on_equal_intervals(start.path) if start.path else None
+    return descent(equal.program, equal.x).path if equal else None
 
 
 def _slower(attempts: Attempts, scan: _Scan, starts: Iterator[Placement]) -> Judged[Placement] | None:
@@ -142,11 +178,8 @@ class _Scan:
         """Answers that are not far from what the vehicle can do, each as a path of its program."""
         dt, before, solved, unsolved = self.first, inf, False, 0
         while dt <= self.last and unsolved < UNSOLVED and not self.attempts.is_over:
-            placement = Placement(self.attempts.solve(dt, SCAN_NODES), dt)
-            violation = inf
-            if placement.answer.x is not None:
-                placement = replace(placement, path=self.attempts.start(placement))
-                violation = placement.path.violation if placement.path else inf
+            placement = self.attempts.placement(dt, SCAN_NODES)
+            violation = placement.path.violation if placement.path else inf
             self._record(placement, violation)
             if violation <= 0.0:
                 self.flown = replace(placement, path=None)
