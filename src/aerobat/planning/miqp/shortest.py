@@ -41,6 +41,7 @@ SHORTER = (0.99, 0.96)  # of the shortest path's duration: those of programs fro
 MAX_SHORTER = 6  # of such starts that lead to a path
 RESERVES = (0.02, 0.05, 0.1, 0.2)  # of the rotors' ranges, for paths that leave the controller too little
 
+_Slots = tuple[int, ...] | None
 _End = tuple[Placement, PathPoint]  # a start and the path that a descent from it ends at
 
 
@@ -55,7 +56,7 @@ def shortest(attempts: Attempts, first: float, last: float) -> Judged[Placement]
     scan = _Scan(attempts, first, last)
     starts = scan.starts()
     ends: list[_End] = []
-    known: set[tuple[int, ...] | None] = set()  # slots whose shortest path is known
+    known: set[_Slots] = set()  # whose shortest path is known
     for tried, start in enumerate(starts):
         if start.answer.slots in known:
             break
@@ -65,7 +66,7 @@ def shortest(attempts: Attempts, first: float, last: float) -> Judged[Placement]
             known.add(start.answer.slots)
         if len(ends) == STARTS or tried + 1 == MAX_STARTS or out_of_time():
             break
-    ends += _from_shorter(attempts, ends)
+    ends += _from_shorter(attempts, ends, known)
     for start, path in sorted(ends, key=lambda end: float(end[1].x[-1])):
         judged = attempts.refined(start, partial(finished, path))
         if judged.feasible:
@@ -73,7 +74,7 @@ def shortest(attempts: Attempts, first: float, last: float) -> Judged[Placement]
     return _slower(attempts, scan, starts)
 
 
-def _from_shorter(attempts: Attempts, ends: Sequence[_End]) -> list[_End]:
+def _from_shorter(attempts: Attempts, ends: Sequence[_End], known: set[_Slots]) -> list[_End]:
     """Ends of descents from programs shorter than the shortest path found, as long as there are any.
 
     The scan's starts are slower than what they lead to, and have stages where a slower path has them.
@@ -82,7 +83,7 @@ def _from_shorter(attempts: Attempts, ends: Sequence[_End]) -> list[_End]:
     best = min((float(path.x[-1]) for _, path in ends), default=-inf)
     while best > -inf and len(found) < MAX_SHORTER and not out_of_time():
         starts = (attempts.placement(fraction * exp(best), SCAN_NODES) for fraction in SHORTER)
-        led = ((start, _through_equal(start)) for start in starts)
+        led = ((start, _through_equal(start)) for start in starts if start.answer.slots not in known)
         end = next(((start, path) for start, path in led if path and float(path.x[-1]) < best), None)
         if end is None:
             break
