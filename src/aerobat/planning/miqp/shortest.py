@@ -6,11 +6,11 @@ path has them: from there the descent ends at shorter paths than from those that
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import pairwise
-from math import exp, inf
+from math import inf
 
 from aerobat.optimization.deadline import out_of_time
 from aerobat.planning.certified_solve import Judged
@@ -23,6 +23,7 @@ from aerobat.planning.miqp.refinement import (
     descent,
     finished,
     on_equal_intervals,
+    settled,
 )
 from aerobat.planning.result import OwnFlight
 from aerobat.problem.condition import Condition, Quantity
@@ -37,8 +38,8 @@ MAX_STARTS = 6
 FASTER = 1.3  # times as fast through gates, of paths that turn back in them
 SCAN_NODES = 500  # of a program's branch and bound: paths begin at its slots, which need not be the cheapest
 UNSOLVED = 3  # programs without an answer, after others that have one: the longer ones are no better
-SHORTER = (0.99, 0.96)  # of the shortest path's duration: those of programs from which others may start
-MAX_SHORTER = 6  # of such starts that lead to a path
+SHORTER = (0.94, 0.97, 0.99)  # of the shortest path's duration: those of programs from which others may start
+MAX_SHORTER = 8  # of such starts that lead to a path
 RESERVES = (0.02, 0.05, 0.1, 0.2)  # of the rotors' ranges, for paths that leave the controller too little
 
 _Slots = tuple[int, ...] | None
@@ -66,36 +67,47 @@ def shortest(attempts: Attempts, first: float, last: float) -> Judged[Placement]
             known.add(start.answer.slots)
         if len(ends) == STARTS or tried + 1 == MAX_STARTS or out_of_time():
             break
-    ends += _from_shorter(attempts, ends, known)
     for start, path in sorted(ends, key=lambda end: float(end[1].x[-1])):
         judged = attempts.refined(start, partial(finished, path))
         if judged.feasible:
-            return flyable(attempts, judged)
+            return flyable(attempts, _shortened(attempts, judged, known))
     return _slower(attempts, scan, starts)
 
 
-def _from_shorter(attempts: Attempts, ends: Sequence[_End], known: set[_Slots]) -> list[_End]:
-    """Ends of descents from programs shorter than the shortest path found, as long as there are any.
+def _shortened(attempts: Attempts, judged: Judged[Placement], known: set[_Slots]) -> Judged[Placement]:
+    """The same, or a shorter one from programs shorter than it, as long as there are any that lead to one.
 
     The scan's starts are slower than what they lead to, and have stages where a slower path has them.
     """
-    found: list[_End] = []
-    best = min((float(path.x[-1]) for _, path in ends), default=-inf)
-    while best > -inf and len(found) < MAX_SHORTER and not out_of_time():
-        starts = (attempts.placement(fraction * exp(best), SCAN_NODES) for fraction in SHORTER)
-        led = ((start, _through_equal(start)) for start in starts if start.answer.slots not in known)
-        end = next(((start, path) for start, path in led if path and float(path.x[-1]) < best), None)
-        if end is None:
+    for _ in range(MAX_SHORTER):
+        further = None if out_of_time() else _shorter_than(attempts, judged, known)
+        if further is None:
             break
-        found.append(end)
-        best = float(end[1].x[-1])
-    return found
+        judged = further
+    return judged
 
 
-def _through_equal(start: Placement) -> PathPoint | None:
-    """Where a descent ends that begins at a path of equal intervals which the vehicle can fly."""
-    equal = on_equal_intervals(start.path) if start.path else None
-    return descent(equal.program, equal.x).path if equal else None
+def _shorter_than(
+    attempts: Attempts, judged: Judged[Placement], known: set[_Slots]
+) -> Judged[Placement] | None:
+    """A shorter path, certified, from equal intervals that the vehicle can fly; None where none is found.
+
+    Through slots whose shortest path is known only the nearest program is tried.
+    """
+    duration = judged.solution.duration
+    for fraction in SHORTER:
+        start = attempts.placement(fraction * duration / attempts.formulation.chain.intervals, SCAN_NODES)
+        if start.answer.slots in known and fraction != SHORTER[-1]:
+            continue
+        equal = on_equal_intervals(start.path) if start.path else None
+        if equal is None:
+            continue
+        path = descent(equal.program, equal.x).path or equal
+        for find in (partial(finished, path), partial(settled, equal)):
+            found = attempts.refined(start, find)
+            if found.feasible and found.solution.duration < duration:
+                return found
+    return None
 
 
 def _slower(attempts: Attempts, scan: _Scan, starts: Iterator[Placement]) -> Judged[Placement] | None:
@@ -108,7 +120,7 @@ def _slower(attempts: Attempts, scan: _Scan, starts: Iterator[Placement]) -> Jud
             continue
         judged = attempts.refined(start, partial(finished, path))
         if judged.feasible:
-            return flyable(attempts, judged)
+            return flyable(attempts, _shortened(attempts, judged, set()))
     return scan.certified()
 
 
