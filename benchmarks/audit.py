@@ -20,9 +20,11 @@ os.environ.update(OMP_NUM_THREADS="1", OPENBLAS_NUM_THREADS="1")  # before NumPy
 
 import argparse
 import json
+import time
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import partial
+from itertools import cycle
 from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
@@ -30,14 +32,21 @@ from typing import Any
 import numpy as np
 
 from aerobat.planning import FreeKnots, GridSearch, Miqp, plan
-from audit_measures import PLANNERS, YARDSTICK, Attempted, attempted, plan_facts, with_passage
+from audit_measures import ALL_PLANNERS, Attempted, attempted, plan_facts, with_passage
 from audit_tables import TABLES, defect
-from random_problems import KINDS, Case, hard_case, random_case, write_case
+from hard_problems import hard_case
+from random_problems import KINDS, Case, random_case, write_case
 
-RETRIED_INTERVALS = (10, 13, 14, 16, 20, 25, 30, 40)
-FIXED_DURATIONS = 40  # tried, from the shortest conceivable to LONGEST [s]
-LONGEST = 12.0  # [s]
-SHORTER = (0.01, 0.02, 0.03, 0.04, 0.05, 0.07, 0.1, 0.13, 0.16, 0.2, 0.25, 0.3)  # of the duration
+ASKED_INTERVALS = (10, 13, 16, 20, 20)  # of a MIQP that may refuse
+RETRIED = (  # N and order, None what it takes by itself
+    *((n, None) for n in (10, 13, 16, 20, 25, 30, 40)),
+    *((n, order) for n in (14, 24) for order in (4, 5)),
+)
+FIXED_DURATIONS = np.geomspace(0.8, 10.0, 11)  # [s] tried with the intervals of RETRIED in turn
+REFUSAL_PATIENCE = 30.0  # [s] of the processor, for one refusal
+RETRY_PATIENCE = 8.0  # [s] likewise, for one of these
+RETRIES_PATIENCE = 12.0  # [s] likewise, for all of these, in random order
+SHORTER = (0.01, 0.02, 0.04, 0.07, 0.12, 0.2)  # of the duration
 Row = dict[str, Any]
 
 
@@ -71,9 +80,7 @@ def main() -> None:
     parser.add_argument("--first", type=int, default=0, help="the first of them (0)")
     parser.add_argument("--seed", type=int, default=0, help="their seed (0)")
     parser.add_argument("--kinds", nargs="*", default=[], choices=list(KINDS), help="of these kinds only")
-    parser.add_argument(
-        "--planners", nargs="*", default=[*PLANNERS, YARDSTICK], choices=[*PLANNERS, YARDSTICK]
-    )
+    parser.add_argument("--planners", nargs="*", default=ALL_PLANNERS, choices=ALL_PLANNERS)
     parser.add_argument("--jobs", type=int, default=2, help="processes (2)")
     parser.add_argument("--results", type=Path, default=Path("out/audit.jsonl"), help="out/audit.jsonl")
     parser.add_argument("--save", type=Path, default=Path("out/audit"), help="where problems go (out/audit)")
@@ -133,21 +140,26 @@ def plans(task: Task, case: Case) -> Row:
 
 def refusals(task: Task, case: Case) -> Row:
     """A refusal by the MIQP of some N, and what plans the problem all the same."""
-    intervals = int(np.random.default_rng([task.seed, task.k, 2]).choice([10, 13, 16, 20]))
-    row = facts(attempted(partial(plan, case.problem, Miqp(intervals=intervals), case.vehicle)))
-    row["intervals"] = intervals
+    rng = np.random.default_rng([task.seed, task.k, 2])
+    intervals = int(rng.choice(ASKED_INTERVALS))
+    asked = partial(plan, case.problem, Miqp(intervals=intervals), case.vehicle)
+    made = attempted(asked, REFUSAL_PATIENCE)
+    row = facts(made) | {"intervals": intervals, "hardships": case.problem.description}
     if row["status"] != "infeasible":
-        return row
-    ways = {
-        f"N = {n}, order {r or 'its own'}": Miqp(r, n, rescue=False)
-        for n in RETRIED_INTERVALS
-        for r in (None, 4, 5)
-    }
-    durations = np.geomspace(0.6, LONGEST, FIXED_DURATIONS)
-    ways |= {f"{t:.2f} s, N = {intervals}": at_duration(t, intervals) for t in durations.tolist()}
-    planned = next((way for way, made in ways.items() if planned_by_miqp(case, made)), "")
-    free = facts(attempted(partial(plan, case.problem, FreeKnots(), case.vehicle)))
-    return row | {"planned_by": planned, "free_knots": free["status"] == "planned" and free["certified"]}
+        return row | {"rescue": made.plan.rescue if made.plan else None}
+    began = time.process_time()
+    ways = {f"N = {n}, order {r or 'its own'}": Miqp(r, n, rescue=False) for n, r in RETRIED}
+    for duration, n in zip(FIXED_DURATIONS.tolist(), cycle(sorted({n for n, _ in RETRIED})), strict=False):
+        ways[f"{duration:.2f} s, N = {n}"] = at_duration(duration, n)
+    planned, tried = "", 0
+    for way in rng.permutation(list(ways)).tolist():
+        if planned or time.process_time() - began > RETRIES_PATIENCE:
+            break
+        tried += 1
+        planned = way if planned_by_miqp(case, ways[way]) else ""
+    free = facts(attempted(partial(plan, case.problem, FreeKnots(), case.vehicle), RETRY_PATIENCE))
+    free_knots = free["status"] == "planned" and free["certified"]
+    return row | {"planned_by": planned, "tried": tried, "free_knots": free_knots}
 
 
 def at_duration(duration: float, intervals: int) -> Miqp:
@@ -156,8 +168,8 @@ def at_duration(duration: float, intervals: int) -> Miqp:
 
 
 def planned_by_miqp(case: Case, planner: Miqp) -> Row | None:
-    made = attempted(partial(plan, case.problem, planner, case.vehicle))
-    mine = made.plan is not None and made.plan.planner == "miqp" and made.plan.certified
+    made = attempted(partial(plan, case.problem, planner, case.vehicle), RETRY_PATIENCE)
+    mine = made.plan is not None and made.plan.planner == "miqp" and made.plan.certified and made.plan.flies
     return facts(made) if mine else None
 
 

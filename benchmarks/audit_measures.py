@@ -22,7 +22,7 @@ from aerobat.simulation import Flight, fly
 from aerobat.vehicle import Vehicle
 
 PLANNERS = ("miqp", "min-snap", "free-knots", "time-optimal")
-YARDSTICK = "time-optimal at equal reserve"  # without any reserve that others do not keep
+EQUAL_RESERVE = " at equal reserve"  # a planner's name with this: without any that others do not keep
 PATIENCE = 120.0  # [s] of the processor, for one call
 SAMPLES = 100_000
 CHUNK = 10_000
@@ -40,12 +40,12 @@ class Attempted:
     seconds: float  # of the processor
 
 
-def attempted(call: Callable[[], Plan]) -> Attempted:
-    """The outcome of planning, whatever it is."""
+def attempted(call: Callable[[], Plan], patience: float = PATIENCE) -> Attempted:
+    """The outcome of planning, whatever it is, given up after so much of the processor [s]."""
     began = time.process_time()
     found, status, message = None, "planned", ""
     signal.signal(signal.SIGVTALRM, _give_up)
-    signal.setitimer(signal.ITIMER_VIRTUAL, PATIENCE)
+    signal.setitimer(signal.ITIMER_VIRTUAL, patience)
     try:
         found = call()
     except Infeasible as error:
@@ -60,13 +60,22 @@ def attempted(call: Callable[[], Plan]) -> Attempted:
 
 
 def _give_up(number: int, frame: object) -> None:
-    raise TimeoutError(f"no answer after {PATIENCE:g} s of the processor")
+    raise TimeoutError("no answer in the time of the processor that it was given")
+
+
+def at_equal_reserve(name: str) -> str:
+    """The name of a planner that keeps no reserve, as the MIQP by default."""
+    return name + EQUAL_RESERVE
+
+
+YARDSTICK = at_equal_reserve("time-optimal")
+ALL_PLANNERS = (*PLANNERS, at_equal_reserve("free-knots"), YARDSTICK)
 
 
 def planner_of(name: str, **settings: Any) -> Planner:
-    """A planner as the command line makes it, or, the yardstick, as the others' defaults compare with."""
-    if name == YARDSTICK:
-        return planner_class("time-optimal")(**settings)
+    """A planner as the command line makes it, or without any reserve."""
+    if name.endswith(EQUAL_RESERVE):
+        return planner_class(name.removesuffix(EQUAL_RESERVE))(**settings)
     cls: Any = planner_class(name)
     given = {o.name: o.command_default for o in planner_options(cls) if o.command_default is not None}
     return cls(**(given | settings))  # type: ignore[no-any-return]
@@ -84,7 +93,7 @@ def plan_facts(problem: Problem, vehicle: Vehicle, name: str) -> dict[str, Any]:
         "why": str(made.plan.certificate),
         "said": said_of_flight(made.plan),
     }
-    if name == YARDSTICK:
+    if name.endswith(EQUAL_RESERVE):
         return row
     row["violation"], row["violated"] = worst_violation(made.plan, vehicle)
     if made.plan.certified:

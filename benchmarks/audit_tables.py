@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable
 from statistics import median
 from typing import Any
 
-from audit_measures import PLANNERS, YARDSTICK
+from audit_measures import ALL_PLANNERS, PLANNERS, YARDSTICK, at_equal_reserve
 
 Row = dict[str, Any]
 VIOLATION = 1e-6  # [SI]: less is rounding
@@ -14,13 +14,15 @@ ROTOR_EXCESS = 1e-6  # of a rotor's range
 COMMAND_EXCESS = 1e-3  # likewise; they are differences of samples
 MAX_ERROR = 0.05  # [m] flown, of a certified plan
 YARDSTICK_SLACK = 0.995
+AT_SIGHT = 0.05  # [s] of the processor, for a refusal that solves nothing
 SUCCESS = ("COMPLETE", "THROUGH_GATES")
 FORESEEN = ("planned", "infeasible")
+SAID = "refused"  # in words, as input that makes no sense: to be expected of hard problems only
 
 
 def defect(row: Row) -> str:
     """What is wrong with a row, in a few words; nothing otherwise."""
-    if row["status"] not in FORESEEN:
+    if row["status"] not in FORESEEN and (row["status"], row["what"]) != (SAID, "refusals"):
         return f"{row['status']}: {row['message']}"
     if row["what"] == "plans" and row["status"] == "planned":
         if not row["certified"]:
@@ -61,64 +63,55 @@ def _beyond(rows: list[Row]) -> str:
     return f"{counts[0]} planned, {counts[1]} flown (floor: none)"
 
 
-def conditions(rows: list[Row]) -> Iterable[str]:
-    for name in PLANNERS:
-        own = [r for r in _certified(rows, name) if "violation" in r]
-        if own:
-            bad = [r for r in own if r["violation"] > VIOLATION]
-            yield (
-                f"{name:>14} {len(own):4} plans: {len(bad)} violate what holds always (floor: none), by "
-                f"{max(r['violation'] for r in own):.3g} at most"
-            )
-
-
-def rotors(rows: list[Row]) -> Iterable[str]:
-    for name in PLANNERS:
-        own = [r for r in _certified(rows, name) if "thrust_excess" in r]
-        if own:
-            thrusts = sum(r["thrust_excess"] > ROTOR_EXCESS for r in own)
-            commands = sum(r["command_excess"] > COMMAND_EXCESS for r in own)
-            yield (
-                f"{name:>14} {len(own):4} plans: thrusts beyond their limits in {thrusts}, commands in "
-                f"{commands} (floor: none)"
-            )
+def samples(rows: list[Row]) -> Iterable[str]:
+    for name, own in _by_planner(rows, "violation"):
+        beyond = {
+            "what holds always": sum(r["violation"] > VIOLATION for r in own),
+            "rotors' limits": sum(r["thrust_excess"] > ROTOR_EXCESS for r in own),
+            "their commands' limits": sum(r["command_excess"] > COMMAND_EXCESS for r in own),
+        }
+        counts = ", ".join(f"{what} in {n}" for what, n in beyond.items())
+        most = max(r["violation"] for r in own)
+        yield f"{name:>14} {len(own):4} plans violate {counts} (floor: none); the first by {most:.3g} at most"
 
 
 def flyability(rows: list[Row]) -> Iterable[str]:
-    for name in PLANNERS:
-        own = [r for r in _certified(rows, name) if "error" in r]
-        if own:
-            off = [r for r in own if r["error"] > MAX_ERROR or r["outcome"] not in SUCCESS]
-            silent, most = sum(not r["said"] for r in off), max(r["error"] for r in own)
-            yield (
-                f"{name:>14} {len(own):4} plans: {100 * (1 - len(off) / len(own)):.1f} % within 5 cm, "
-                f"through gates (floor: 99 %), {silent} of {len(off)} others in silence, "
-                f"at most {100 * most:.1f} cm"
-            )
+    for name, own in _by_planner(rows, "error"):
+        off = [r for r in own if r["error"] > MAX_ERROR]
+        missed = [r for r in own if r["error"] <= MAX_ERROR and r["outcome"] not in SUCCESS]
+        silent = sum(not r["said"] for r in off)
+        yield (
+            f"{name:>14} {len(own):4} plans: {100 * (1 - len(off) / len(own)):.1f} % within 5 cm "
+            f"(floor: 99 %), {silent} of {len(off)} others in silence (floor: none), at most "
+            f"{100 * max(r['error'] for r in own):.1f} cm; of those within, {len(missed)} miss a gate or "
+            "its attitude"
+        )
 
 
 def durations(rows: list[Row]) -> Iterable[str]:
     best = {r["case"]: r["duration"] for r in _certified(rows, YARDSTICK)}
-    for name, floor in zip(PLANNERS, ("1.25", "-", "1.05", "-"), strict=True):
+    floors = {"miqp": "1.25", "free-knots": "1.05", at_equal_reserve("free-knots"): "1.05"}
+    for name in (*PLANNERS, at_equal_reserve("free-knots")):
         own = [r for r in _certified(rows, name) if r["case"] in best]
         ratios = sorted(r["duration"] / best[r["case"]] for r in own)
         if ratios:
             under = sum(ratio < YARDSTICK_SLACK for ratio in ratios)
             yield (
-                f"{name:>14} {len(ratios):4} plans: median {median(ratios):.3f} (floor: {floor}), "
-                f"{ratios[0]:.3f} to {ratios[-1]:.3f}; {under} under {YARDSTICK_SLACK} (floor: none)"
+                f"{name:>14} {len(ratios):4} plans: median {median(ratios):.3f} (floor: "
+                f"{floors.get(name, '-')}), {ratios[0]:.3f} to {ratios[-1]:.3f}; {under} under "
+                f"{YARDSTICK_SLACK} (floor: none)"
             )
 
 
 def speed(rows: list[Row]) -> Iterable[str]:
-    for name in (*PLANNERS, YARDSTICK):
+    for name in ALL_PLANNERS:
         own = sorted(r["seconds"] for r in rows if r["what"] == "plans" and r["planner"] == name)
         if own:
             yield f"{name:>14} {len(own):4} calls: median {median(own):.2f} s, {own[-1]:.2f} s at most"
 
 
 def outcomes(rows: list[Row]) -> Iterable[str]:
-    for name in (*PLANNERS, YARDSTICK):
+    for name in ALL_PLANNERS:
         own = [r for r in rows if r["what"] == "plans" and r["planner"] == name]
         if own:
             counts = {"certified": len([*_certified(rows, name)])}
@@ -134,12 +127,21 @@ def outcomes(rows: list[Row]) -> Iterable[str]:
 def refusals(rows: list[Row]) -> Iterable[str]:
     tried = [r for r in rows if r["what"] == "refusals"]
     own = [r for r in tried if "planned_by" in r]
-    if tried:
+    rescued = [r["rescue"].rpartition("; ")[2] for r in tried if r.get("rescue")]
+    if own:
         wrong, free = sum(bool(r["planned_by"]) for r in own), sum(r["free_knots"] for r in own)
+        at_sight = sum(r["seconds"] < AT_SIGHT for r in own)
+        seconds = sorted(r["seconds"] for r in own)
+        ways = sum(r["tried"] for r in own) / len(own)
         yield (
-            f"{len(own)} refusals of {len(tried)} problems: {wrong} planned with another N or at a fixed dt "
-            f"(floor: none), {free} by free-knots (floor: none)"
+            f"{len(own)} refusals of {len(tried)} problems, {at_sight} of them at sight: {wrong} planned "
+            f"with another N or at a fixed dt (floor: none), {free} by free-knots (floor: none); "
+            f"{ways:.0f} ways tried on average; {median(seconds):.1f} s a refusal at the median, "
+            f"{seconds[-1]:.1f} at most"
         )
+        counts = ", ".join(f"{rescued.count(how)} {how}" for how in sorted(set(rescued)))
+        patience = sum(r["status"] == "TimeoutError" for r in tried)
+        yield f"{len(rescued)} others rescued: {counts}; {patience} without any answer in time"
 
 
 def smallest_dt(rows: list[Row]) -> Iterable[str]:
@@ -163,6 +165,14 @@ def price(rows: list[Row]) -> Iterable[str]:
             )
 
 
+def _by_planner(rows: list[Row], key: str) -> Iterable[tuple[str, list[Row]]]:
+    """The certified plans of each planner, of those that have any with that measure."""
+    for name in PLANNERS:
+        own = [r for r in _certified(rows, name) if key in r]
+        if own:
+            yield name, own
+
+
 def _certified(rows: list[Row], planner: str) -> list[Row]:
     own = [r for r in rows if r["what"] == "plans" and r["planner"] == planner]
     return [r for r in own if r.get("certified")]
@@ -176,8 +186,7 @@ def _spread(rows: list[Row], key: str, unit: str) -> str:
 TABLES: dict[str, Callable[[list[Row]], Iterable[str]]] = {
     "Outcomes": outcomes,
     "Attitude in the gate, medians": attitude,
-    "Conditions in 10^5 samples of certified plans": conditions,
-    "Rotors in samples of certified plans": rotors,
+    "Samples of certified plans, 10^5 of conditions": samples,
     "Flyability of certified plans": flyability,
     "Durations over time-optimal's": durations,
     "Speed, processor time": speed,

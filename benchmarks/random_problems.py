@@ -73,19 +73,6 @@ def random_case(seed: int, k: int, kinds: tuple[str, ...] = ()) -> Case:
             continue
 
 
-def hard_case(seed: int, k: int) -> Case:
-    """A flip or half-flip, limited, for a vehicle that is as weak as flips allow: many have no plan."""
-    rng = np.random.default_rng([seed, k, 1])
-    easy = random_case(seed, k, ("flip", "half-flip"))
-    weaker = STANDARD_GRAVITY * rng.uniform(1.25, 2.0) / easy.vehicle.max_specific_thrust
-    rotors = tuple(replace(r, max_thrust=weaker * r.max_thrust, min_thrust=0.0) for r in easy.vehicle.rotors)
-    limits = easy.problem.limits
-    if rng.uniform() < 0.5:
-        limits = replace(limits, velocity=rng.uniform(4.0, 8.0))
-    problem = replace(easy.problem, limits=limits, name=f"hard-{seed}-{k}")
-    return Case(problem, replace(easy.vehicle, rotors=rotors), easy.kind)
-
-
 def random_vehicle(rng: np.random.Generator) -> Vehicle:
     """A preset, with drag where it has none, or an irregular quad-, hexa- or octorotor."""
     if rng.uniform() < PRESET_FRACTION:

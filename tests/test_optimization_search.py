@@ -286,6 +286,33 @@ def test_when_time_runs_out_the_optimum_is_between_bound_and_cost(
     assert (result.x is not None) == (ticks > 6)  # one dive down four stages
 
 
+@pytest.mark.parametrize("nodes", [1, 4, 16, 64])
+@pytest.mark.parametrize("seed", range(4))
+def test_a_search_of_so_many_nodes_ends_there_and_the_optimum_is_between_bound_and_cost(
+    nodes: int, seed: int
+) -> None:
+    program = deep_program(seed)
+    exact, limited = solver().solve(program), solver().solve(program, node_limit=nodes)
+    assert limited.nodes <= nodes
+    assert limited.bound <= exact.cost * (1 + 1e-9)
+    assert limited.cost >= exact.cost * (1 - 1e-9)
+    assert limited.status in (("optimal",) if exact.nodes <= nodes else ("time_limit", "unknown", "optimal"))
+
+
+def test_relaxations_that_fail_use_a_limit_up(monkeypatch: pytest.MonkeyPatch) -> None:
+    calls, solve = count(), LeastDistanceQP.solve
+
+    def faulty(*arguments: Any, **options: Any) -> QPSolution | None:
+        if next(calls):
+            raise NotConverged
+        return solve(*arguments, **options)
+
+    monkeypatch.setattr(LeastDistanceQP, "solve", faulty)
+    result = solver().solve(deep_program(8), node_limit=60)
+    assert result.status == "unknown"
+    assert result.nodes < 10
+
+
 @pytest.mark.parametrize("backend", ["builtin", "gurobi"])
 @pytest.mark.parametrize(
     "start", [(5, 6, 10, 13, 7), (1, 2, 10, 3, 4), (5, 5, 10, 5, 5), (99, 99, 99, 99, 99)]

@@ -77,12 +77,20 @@ def test_more_intervals_are_no_slower(quad: Vehicle) -> None:
     assert many.duration <= 1.01 * few.duration
 
 
-@pytest.mark.parametrize("name", ["half-flip", "line"])
-def test_no_equal_intervals_one_percent_shorter_can_be_flown(name: str, quad: Vehicle) -> None:
-    found = plan(load_problem(name), vehicle=quad)
+@pytest.mark.parametrize(
+    ("name", "vehicle"),
+    [
+        ("half-flip", "agile-quad"),
+        ("line", "agile-quad"),
+        (str(CASES / "slow-start-flip.toml"), "hexarotor"),
+    ],
+)
+def test_no_equal_intervals_one_percent_shorter_can_be_flown(name: str, vehicle: str) -> None:
+    problem, flown_by = load_problem(name), load_vehicle(vehicle)
+    found = plan(problem, vehicle=flown_by)
     dt = 0.99 * found.duration / found.intervals
     with pytest.raises(Infeasible):
-        plan(load_problem(name), Miqp(search=GridSearch(dt, dt, 1), rescue=False), quad)
+        plan(problem, Miqp(search=GridSearch(dt, dt, 1), rescue=False), flown_by)
 
 
 def test_a_fixed_dt_beyond_what_bounds_per_axis_alone_allow_is_refined(quad: Vehicle) -> None:
@@ -100,6 +108,15 @@ def test_what_too_few_intervals_miss_is_rescued_and_said(quad: Vehicle) -> None:
     found = plan(problem, Miqp(intervals=7), quad)
     assert found.certified
     assert "miqp found none with 7 intervals; planned" in str(found)
+
+
+def test_a_narrow_window_at_an_end_is_rescued_by_many_intervals(quad: Vehicle) -> None:
+    """With 13 intervals one is left after the window, with 23 two: too few for three conditions and rest."""
+    aside = Condition(Quantity.POSITION, AXES[1], 0.2, 0.2)
+    still, level = (Condition(q, AXES[1], 0.0, 0.0) for q in (Quantity.VELOCITY, Quantity.SPECIFIC_THRUST))
+    found = plan(passing(aside, still, level, at=(0.9, 0.96)), Miqp(intervals=13), quad)
+    assert found.certified
+    assert "planned with 40" in found.rescue
 
 
 def test_a_stage_that_excludes_itself_is_named(quad: Vehicle) -> None:

@@ -30,13 +30,15 @@ class Solver(Protocol):
         program: AssignmentProgram,
         *,
         time_limit: float | None = None,
+        node_limit: int | None = None,
         start: Sequence[int] | None = None,
     ) -> AssignmentResult:
-        """Return the assignment of minimum cost, or the best one found within `time_limit`.
+        """Return the assignment of minimum cost, or the best one found within the limits.
 
         Args:
             program: what to solve.
             time_limit: [s]; None sets no limit.
+            node_limit: relaxations solved, as the solver counts them; None sets no limit.
             start: one slot a stage, an assignment that may be good.
 
         Raises:

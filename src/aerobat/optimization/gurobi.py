@@ -41,6 +41,7 @@ class Gurobi:
         program: AssignmentProgram,
         *,
         time_limit: float | None = None,
+        node_limit: int | None = None,
         start: Sequence[int] | None = None,
     ) -> AssignmentResult:
         """As `Solver.solve`; the result's time is Gurobi's own Runtime.
@@ -60,6 +61,7 @@ class Gurobi:
                 with gurobipy.Model(env=env) as model:
                     limit = shorter(time_limit)
                     model.Params.TimeLimit = inf if limit is None else limit
+                    model.Params.NodeLimit = inf if node_limit is None else node_limit
                     claim = _GurobiModel(gurobipy, model, scaling.program).claim(start)
         except gurobipy.GurobiError as error:
             raise AerobatError(_message(error, program)) from None

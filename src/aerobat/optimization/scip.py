@@ -32,6 +32,7 @@ class Scip:
         program: AssignmentProgram,
         *,
         time_limit: float | None = None,
+        node_limit: int | None = None,
         start: Sequence[int] | None = None,
     ) -> AssignmentResult:
         """As `Solver.solve`; the result's time is SCIP's own.
@@ -45,6 +46,8 @@ class Scip:
         model.hideOutput()
         if (limit := shorter(time_limit)) is not None:
             model.setParam("limits/time", limit)
+        if node_limit is not None:
+            model.setParam("limits/nodes", node_limit)
         scaling = big_m.scaled(program)
         claim = _ScipModel(pyscipopt, model, scaling.program).claim()
         return confirmed(program, verified(program, scaling.unscaled(claim)))

@@ -27,6 +27,7 @@ from aerobat.optimization.result import Status
 _OPTIMALITY_GAP = 1e-10  # relative, at which the search ends
 _MAX_INHERITED = 4  # candidates of the last stage, whose bounds are not computed anew
 _DIVE_GROWTH = 2  # a dive whenever the number of QPs has grown by this factor
+_FAILURE_COST = 20  # of a QP that does not converge, beside one that does, as it is tried three times
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -37,6 +38,14 @@ class _Node:
     chosen: tuple[int, ...]  # candidates
     pending: tuple[int, ...]  # groups without a chosen candidate
     inherited: LowerBounds  # of its parent, for the candidates that may join those chosen
+
+
+@dataclass(frozen=True)
+class SearchLimits:
+    """Where a search ends though nothing is proven."""
+
+    deadline: float = inf  # [s] as `perf_counter` counts
+    nodes: float = inf  # QPs solved, those that fail counted as often as they cost
 
 
 class BestFirstSearch:
@@ -61,6 +70,8 @@ class BestFirstSearch:
         self._unresolved = inf  # the smallest bound of a relaxation that the QP solver could not solve
         self.best: tuple[QPSolution, tuple[int, ...]] | None = None
         self.nodes = 0  # QPs solved
+        self._failures = 0  # QPs that did not converge
+        self._limits = SearchLimits()
 
     @property
     def bound(self) -> float:
@@ -91,23 +102,24 @@ class BestFirstSearch:
         if solution is not None:
             self.best = (solution, tuple(chosen))
 
-    def run(self, deadline: float = inf) -> None:
-        """Search until the best is proven optimal, or nothing is left, or the deadline has passed."""
-        if perf_counter() >= deadline:
+    def run(self, limits: SearchLimits) -> None:
+        """Search until the best is proven optimal, or nothing is left, or a limit is reached."""
+        self._limits = limits
+        if self._is_over:
             self._unresolved = 0.0
             return
         solution = self._solve(self._root.lower, self._root.upper, None, 0.0)
         pending = tuple(range(len(self._candidates.free_stages)))
         inherited = self._dual_bounds.root_bounds(self._bounds)
         if solution is not None and inherited.covers_all_stages(pending):
-            self._dive(_Node(solution, (), pending, inherited), deadline)
+            self._dive(_Node(solution, (), pending, inherited))
         next_dive = _DIVE_GROWTH * self.nodes
-        while self._heap and self._improves(self._heap[0][0]) and perf_counter() < deadline:
+        while self._heap and self._improves(self._heap[0][0]) and not self._is_over:
             node = self._next()
             if node is None:
                 continue
             if self.nodes >= next_dive:
-                self._dive(node, deadline)
+                self._dive(node)
                 next_dive = _DIVE_GROWTH * self.nodes
             elif self._heap and node.solution.value > self._heap[0][0]:
                 self._push(node.solution.value, node)  # others may cost less
@@ -129,17 +141,17 @@ class BestFirstSearch:
         self._push(bound, node, children)
         return None
 
-    def _dive(self, node: _Node | None, deadline: float) -> None:
+    def _dive(self, node: _Node | None) -> None:
         """Go down to some assignment, by the best child at every turn; all others are left in the heap.
 
         What costs more is not searched any more, and should time run out there is something to show.
         """
-        while node is not None and perf_counter() < deadline:
+        while node is not None and not self._is_over:
             children = self._children(node)
             if children is None:
                 return
             child, in_pairs = None, True
-            while child is None and self._improves(children.evaluate_best()) and perf_counter() < deadline:
+            while child is None and self._improves(children.evaluate_best()) and not self._is_over:
                 branch = children.pop(self._cutoff, in_pairs)
                 child = self._child(node, children.lower_bounds, branch)
                 in_pairs = False  # where a pair fails, a candidate alone may: that excludes all its pairs
@@ -213,8 +225,14 @@ class BestFirstSearch:
         try:
             return self._qp.solve(lower, upper, warm_start, self._cutoff)
         except NotConverged:
+            self._failures += 1
             self._unresolved = min(self._unresolved, bound)
             return None
+
+    @property
+    def _is_over(self) -> bool:
+        spent = self.nodes + _FAILURE_COST * self._failures
+        return spent >= self._limits.nodes or perf_counter() >= self._limits.deadline
 
     @property
     def _cutoff(self) -> float:

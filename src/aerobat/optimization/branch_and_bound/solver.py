@@ -16,7 +16,7 @@ from aerobat.optimization.branch_and_bound.candidates import Candidates
 from aerobat.optimization.branch_and_bound.least_distance import LeastDistanceQP, NotConverged
 from aerobat.optimization.branch_and_bound.lower_bounds import DualBounds
 from aerobat.optimization.branch_and_bound.null_space import NullSpace, split_coupled
-from aerobat.optimization.branch_and_bound.search import BestFirstSearch
+from aerobat.optimization.branch_and_bound.search import BestFirstSearch, SearchLimits
 from aerobat.optimization.deadline import shorter
 from aerobat.optimization.result import AssignmentResult, Status, verified
 
@@ -44,6 +44,7 @@ class BranchAndBound:
         program: AssignmentProgram,
         *,
         time_limit: float | None = None,
+        node_limit: int | None = None,
         start: Sequence[int] | None = None,
     ) -> AssignmentResult:
         """As `Solver.solve`; the result's time is that of the whole call."""
@@ -51,11 +52,12 @@ class BranchAndBound:
         began = perf_counter()
         limit = shorter(time_limit)
         deadline = inf if limit is None else began + limit
-        result = verified(program, self._claim(program, deadline, start))
+        limits = SearchLimits(deadline, inf if node_limit is None else node_limit)
+        result = verified(program, self._claim(program, limits, start))
         return replace(result, time=perf_counter() - began)
 
     def _claim(
-        self, program: AssignmentProgram, deadline: float, start: Sequence[int] | None
+        self, program: AssignmentProgram, limits: SearchLimits, start: Sequence[int] | None
     ) -> AssignmentResult:
         lower, upper = program.root_bounds
         larger = np.maximum(np.abs(lower), np.abs(upper))
@@ -68,7 +70,7 @@ class BranchAndBound:
             kept = _Factorization(program, implicit_equalities)
             self._factorization = kept
         try:
-            return kept.claim(program, lower, upper, deadline, start)
+            return kept.claim(program, lower, upper, limits, start)
         except NotConverged:  # of the independent block: the search deals with its own
             return _without_solution("unknown", -inf)
 
@@ -107,7 +109,7 @@ class _Factorization:
         program: AssignmentProgram,
         lower: Array,
         upper: Array,
-        deadline: float,
+        limits: SearchLimits,
         start: Sequence[int] | None,
     ) -> AssignmentResult:
         """Solve the independent block, search the coupled one, and put them together.
@@ -128,7 +130,7 @@ class _Factorization:
         search = BestFirstSearch(self.candidates, self.dual_bounds, self.coupled_qp, bounds, root)
         if start is not None:
             search.try_start({stage: start[stage] for stage in self.candidates.free_stages})
-        search.run(deadline)
+        search.run(limits)
         x = slots = None
         if search.best is not None:
             solution, chosen = search.best

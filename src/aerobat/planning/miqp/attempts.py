@@ -48,12 +48,17 @@ class Attempts:
     reserve: float = 0.0  # of what the vehicle can do, kept for the controller
     slots: tuple[int, ...] | None = None  # of the last solution: where the next solve begins
 
-    def solve(self, dt: float) -> AssignmentResult:
-        """The paper's program at one dt."""
+    def solve(self, dt: float, node_limit: int | None = None) -> AssignmentResult:
+        """The paper's program at one dt; solved exactly where neither time nor nodes are limited."""
         program = self.formulation.program(dt)
-        answer = self.solver.solve(program, start=self.slots)
+        answer = self.solver.solve(program, node_limit=node_limit, start=self.slots)
         self.slots = answer.slots or self.slots
         return answer
+
+    def placement(self, dt: float, node_limit: int | None = None) -> Placement:
+        """The program's answer at one dt, with the path that begins there, if it has one."""
+        placement = Placement(self.solve(dt, node_limit), dt)
+        return placement if placement.answer.x is None else replace(placement, path=self.start(placement))
 
     @property
     def is_over(self) -> bool:

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from aerobat.planning.miqp.miqp import Miqp
 
 MORE_INTERVALS = (1.3, 1.8)  # times as many
+MANY_INTERVALS = 40  # where that is more still: a narrow window at an end needs intervals on either side
 FLYING_RESERVE = 0.03  # of every limit's range, for the controller: rotors without lag leave it none
 
 
@@ -48,8 +49,10 @@ def rescued_plan(asked: Miqp, problem: Problem, vehicle: Vehicle, recorder: Reco
 
 def _alternatives(asked: Miqp, first: int) -> Iterator[tuple[Planner, str]]:
     """Planners, and how they plan in words; `first` is the order that is taken where none is asked for."""
-    for factor in MORE_INTERVALS:
-        intervals = round(factor * asked.intervals)
+    more = {round(factor * asked.intervals) for factor in MORE_INTERVALS}
+    if max(more) * MORE_INTERVALS[0] < MANY_INTERVALS:
+        more.add(MANY_INTERVALS)
+    for intervals in sorted(more):
         yield replace(asked, intervals=intervals, rescue=False), f"with {intervals}"
     for order in range(first, max(INPUT_NAMES) + 1):
         if order != (asked.order or first):

@@ -16,7 +16,15 @@ from aerobat.optimization.deadline import out_of_time
 from aerobat.planning.certified_solve import Judged
 from aerobat.planning.flyability import own_flight
 from aerobat.planning.miqp.attempts import Attempts, Placement
-from aerobat.planning.miqp.refinement import Descent, PathPoint, PathProgram, descent, finished
+from aerobat.planning.miqp.refinement import (
+    Descent,
+    PathPoint,
+    PathProgram,
+    descent,
+    finished,
+    on_equal_intervals,
+    settled,
+)
 from aerobat.planning.result import OwnFlight
 from aerobat.problem.condition import Condition, Quantity
 
@@ -28,7 +36,14 @@ FALLING = 1.25  # unless the excess falls no faster than by this factor from one
 STARTS = 2  # that lead to a path
 MAX_STARTS = 6
 FASTER = 1.3  # times as fast through gates, of paths that turn back in them
+SCAN_NODES = 500  # of a program's branch and bound: paths begin at its slots, which need not be the cheapest
+UNSOLVED = 3  # programs without an answer, after others that have one: the longer ones are no better
+SHORTER = (0.94, 0.97, 0.99)  # of the shortest path's duration: those of programs from which others may start
+MAX_SHORTER = 8  # of such starts that lead to a path
 RESERVES = (0.02, 0.05, 0.1, 0.2)  # of the rotors' ranges, for paths that leave the controller too little
+
+_Slots = tuple[int, ...] | None
+_End = tuple[Placement, PathPoint]  # a start and the path that a descent from it ends at
 
 
 def shortest(attempts: Attempts, first: float, last: float) -> Judged[Placement] | None:
@@ -41,8 +56,8 @@ def shortest(attempts: Attempts, first: float, last: float) -> Judged[Placement]
     """
     scan = _Scan(attempts, first, last)
     starts = scan.starts()
-    ends: list[tuple[Placement, PathPoint]] = []
-    known: set[tuple[int, ...] | None] = set()  # slots whose shortest path is known
+    ends: list[_End] = []
+    known: set[_Slots] = set()  # whose shortest path is known
     for tried, start in enumerate(starts):
         if start.answer.slots in known:
             break
@@ -55,8 +70,44 @@ def shortest(attempts: Attempts, first: float, last: float) -> Judged[Placement]
     for start, path in sorted(ends, key=lambda end: float(end[1].x[-1])):
         judged = attempts.refined(start, partial(finished, path))
         if judged.feasible:
-            return flyable(attempts, judged)
+            return flyable(attempts, _shortened(attempts, judged, known))
     return _slower(attempts, scan, starts)
+
+
+def _shortened(attempts: Attempts, judged: Judged[Placement], known: set[_Slots]) -> Judged[Placement]:
+    """The same, or a shorter one from programs shorter than it, as long as there are any that lead to one.
+
+    The scan's starts are slower than what they lead to, and have stages where a slower path has them.
+    """
+    for _ in range(MAX_SHORTER):
+        further = None if out_of_time() else _shorter_than(attempts, judged, known)
+        if further is None:
+            break
+        judged = further
+    return judged
+
+
+def _shorter_than(
+    attempts: Attempts, judged: Judged[Placement], known: set[_Slots]
+) -> Judged[Placement] | None:
+    """A shorter path, certified, from equal intervals that the vehicle can fly; None where none is found.
+
+    Through slots whose shortest path is known only the nearest program is tried.
+    """
+    duration = judged.solution.duration
+    for fraction in SHORTER:
+        start = attempts.placement(fraction * duration / attempts.formulation.chain.intervals, SCAN_NODES)
+        if start.answer.slots in known and fraction != SHORTER[-1]:
+            continue
+        equal = on_equal_intervals(start.path) if start.path else None
+        if equal is None:
+            continue
+        path = descent(equal.program, equal.x).path or equal
+        for find in (partial(finished, path), partial(settled, equal)):
+            found = attempts.refined(start, find)
+            if found.feasible and found.solution.duration < duration:
+                return found
+    return None
 
 
 def _slower(attempts: Attempts, scan: _Scan, starts: Iterator[Placement]) -> Judged[Placement] | None:
@@ -69,7 +120,7 @@ def _slower(attempts: Attempts, scan: _Scan, starts: Iterator[Placement]) -> Jud
             continue
         judged = attempts.refined(start, partial(finished, path))
         if judged.feasible:
-            return flyable(attempts, judged)
+            return flyable(attempts, _shortened(attempts, judged, set()))
     return scan.certified()
 
 
@@ -138,13 +189,10 @@ class _Scan:
 
     def starts(self) -> Iterator[Placement]:
         """Answers that are not far from what the vehicle can do, each as a path of its program."""
-        dt, before = self.first, inf
-        while dt <= self.last and not self.attempts.is_over:
-            placement = Placement(self.attempts.solve(dt), dt)
-            violation = inf
-            if placement.answer.x is not None:
-                placement = replace(placement, path=self.attempts.start(placement))
-                violation = placement.path.violation if placement.path else inf
+        dt, before, solved, unsolved = self.first, inf, False, 0
+        while dt <= self.last and unsolved < UNSOLVED and not self.attempts.is_over:
+            placement = self.attempts.placement(dt, SCAN_NODES)
+            violation = placement.path.violation if placement.path else inf
             self._record(placement, violation)
             if violation <= 0.0:
                 self.flown = replace(placement, path=None)
@@ -152,6 +200,8 @@ class _Scan:
                 yield placement
             if violation <= 0.0:
                 return
+            solved = solved or violation < inf
+            unsolved = unsolved + 1 if solved and placement.answer.status == "unknown" else 0
             dt, before = dt * (GROWTH if violation < COARSE else COARSE_GROWTH), violation
 
     def certified(self) -> Judged[Placement] | None:

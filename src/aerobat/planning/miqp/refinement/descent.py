@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 from aerobat.arrays import Array
 from aerobat.optimization.prox_linear import prox_linear
 from aerobat.planning.miqp.refinement.path_program import PathPoint, PathProgram
@@ -41,6 +43,16 @@ def descent(program: PathProgram, start: Array, max_steps: int = MAX_STEPS) -> D
     found = prox_linear(program, point, max_steps, TOLERATED, in_time=True)
     path = found.feasible if found.point.violation > MENDABLE else found.point
     return Descent(path, found.converged and found.steps <= FEW_STEPS)
+
+
+def on_equal_intervals(point: PathPoint) -> PathPoint | None:
+    """A path of the same duration and equal intervals, within all constraints; None where that fails."""
+    inputs = 3 * point.program.chain.intervals
+    program = replace(point.program, equal=True, held=True)
+    found = descent(program, np.concatenate([point.x[:inputs], [1.0, point.x[-1]]])).path
+    if found is None:
+        return None
+    return PathPoint(point.program, np.concatenate([found.x[:inputs], point.x[inputs:]]))
 
 
 def finished(point: PathPoint) -> PathPoint | None:
