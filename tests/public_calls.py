@@ -257,6 +257,7 @@ def _files(folder: Path) -> dict[str, Path]:
 def instance(cls: type) -> Any:
     """A value of a public class."""
     made = {
+        ab.Assessment: lambda: ab.plan("line", vehicle="agile-quad").assessment,
         ab.Attitude: lambda: ab.Attitude((0.0, 0.0, 1.0), 5.0, 0.1),
         ab.BodyState: lambda: ab.BodyState(np.zeros(3), np.zeros(3), np.array([1.0, 0, 0, 0]), np.zeros(3)),
         ab.Certificate: lambda: ab.certify(plan()),

@@ -76,7 +76,8 @@ def test_each_vehicle_of_a_batch_flies_as_it_would_alone(engine: str) -> None:
             seed=np.random.SeedSequence(11, spawn_key=(k,)),
             engine="floats",
         )
-        assert_same(batch[k], alone, atol=1e-11)  # XLA rounds by the size of a batch
+        # XLA rounds by the size of a batch
+        assert_same(batch[k], alone, atol=1e-10 if engine == "jax" else 1e-12)
 
 
 def test_bytecode_flies_as_floats_do_to_the_last_bit() -> None:

@@ -260,7 +260,7 @@ def test_a_maneuver_that_cannot_be_is_refused(wrong) -> None:
     ("condition", "sentence"),
     [
         (Condition("velocity", (1.0, 0.0, 0.0), lower=1.0), "start: its velocity along .* lies outside"),
-        (Condition("specific_thrust", (0.0, 0.0, 1.0), lower=11.0), "start: its specific_thrust along"),
+        (Condition("specific_thrust", (0.0, 0.0, 1.0), lower=11.0), "start: its specific thrust along"),
         (Condition("position", (1.0, 0.0, 0.0), upper=2.0), "goal: its position along"),
     ],
 )

@@ -223,7 +223,7 @@ def test_answers_cannot_be_written_to() -> None:
     [
         ((), "of must name at least one quantity, such as 'position_gain' or 'mass'"),
         ("positon_gain", "no differentiable quantity named 'positon_gain'; did you mean 'position_gain'?"),
-        (("mass", 3), "no differentiable quantity named '3'; known: position_gain"),
+        (("mass", 3), "sensitivity: of[1] must be a name, got 3"),
         ("lead_time_constant", "lead_time_constant has no slope"),
         ("prioritize_tilt", "no differentiable quantity named 'prioritize_tilt'"),
     ],

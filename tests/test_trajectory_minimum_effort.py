@@ -389,7 +389,7 @@ GOOD = course([[0, 0, 0], [1, 1, 1], [2, 2, 2]], 4)
         (GOOD[:, :2], [1.0, 1.0], ContinuityRule.VARIATIONAL, "3, 4 or 5 derivatives"),
         (GOOD[..., 0], [1.0, 1.0], ContinuityRule.VARIATIONAL, "shape"),
         (1.0, [1.0], ContinuityRule.VARIATIONAL, "shape"),
-        ("fast", [1.0], ContinuityRule.VARIATIONAL, "array of numbers"),
+        ("fast", [1.0], ContinuityRule.VARIATIONAL, "fixed must be numbers"),
         (with_entry((1, 0, 2), np.inf), [1.0, 1.0], ContinuityRule.VARIATIONAL, "fixed must be finite"),
         (with_entry((0, 0, 2), np.nan), [1.0, 1.0], ContinuityRule.VARIATIONAL, "position at both ends"),
         (with_entry((2, 0, 0), np.nan), [1.0, 1.0], ContinuityRule.VARIATIONAL, "position at both ends"),
