@@ -80,7 +80,7 @@ def test_a_double_flip_that_is_poor_says_so_and_names_what_does_better(drag: flo
     assert assessment.opinion.duration is not None
     assert assessment.poor == (found.duration > 1.4 * assessment.opinion.duration)
     assert not assessment.poor or str(assessment).startswith("poor: ")
-    assert f"{assessment.opinion.duration:.3f} s (--planner free-knots --segments 2)" in str(found)
+    assert f"{assessment.opinion.duration:.3f} s ({assessment.opinion.options})" in str(found)
 
 
 def test_a_plan_that_is_proven_near_the_best_is_given_no_second_opinion() -> None:

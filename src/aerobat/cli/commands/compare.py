@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import os
 from typing import Annotated
 
 from cyclopts import Parameter
 
 from aerobat.cli.options import OutputOptions, TaskOptions
 from aerobat.cli.progress import planning_progress
-from aerobat.cli.runs.folder import run_folder, written_to
+from aerobat.cli.runs.folder import holds_something, run_folder, written_to
 from aerobat.cli.runs.record import RunRecord
 from aerobat.cli.tasks import read_task
 from aerobat.cli.terminal import print_json
@@ -58,7 +57,7 @@ def finish_comparison(comparison: Comparison, record: RunRecord, options: Output
     rows = to_json(comparison_rows(comparison))
     picture = png(comparison_figure(comparison))
     folder = options.out or record.folder
-    replaced = os.path.exists(folder)
+    replaced = holds_something(folder)
     with run_folder(folder, record) as staging:
         (staging / COMPARISON).write_text(rows + "\n", encoding="utf-8")
         (staging / "compare.png").write_bytes(picture)

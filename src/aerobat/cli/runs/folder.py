@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -49,6 +48,11 @@ def run_folder(folder: Path, record: RunRecord) -> Iterator[Path]:
         end_interrupts()
 
 
+def holds_something(folder: Path) -> bool:
+    """True for a folder with anything in it."""
+    return folder.is_dir() and any(folder.iterdir())
+
+
 def written_to(folder: Path, replaced: bool) -> str:
     """Where a run is now, and what is there no longer, in a line."""
     return f"written to {folder}/" + (", in the place of an earlier run" if replaced else "")
@@ -77,7 +81,7 @@ def finish(plan: Plan, record: RunRecord, options: OutputOptions, flown: Flown |
     flight, score, controller = (flown.flight, flown.score, flown.controller) if flown else (None, None, None)
     facts = to_json(report(plan, score, plan.vehicle.name, controller))
     picture = png(report_figure(plan, plan.vehicle, flight, score))
-    replaced = os.path.exists(folder)
+    replaced = holds_something(folder)
     with run_folder(folder, record) as staging:
         plan.save(staging / f"{plan.problem.name}.plan")
         write_columns(plan, staging / "plan.csv", record.columns)

@@ -20,7 +20,7 @@ from aerobat.problem.condition import Quantity
 from aerobat.problem.problem import Problem
 from aerobat.vehicle import Vehicle
 
-OPINION_SEGMENTS = 2  # of free knots, which are quick and enough for a flip's five stages
+OPINION_SEGMENTS = (2, 4)  # of free knots: two are quick and enough for a flip's five stages; else four
 OPINION_RESERVE = 0.03  # as the command line plans them
 
 
@@ -35,7 +35,7 @@ def with_assessment(plan: Plan) -> Plan:
 def with_second_opinion(plan: Plan, progress: Progress | None = None) -> Plan:
     """The plan; where its assessment finds it suspicious, with what free knots make of the same problem.
 
-    They begin from the plan. That takes a second or two of the processor. Time-optimal plans need none, and a
+    They begin from the plan. That takes seconds of the processor. Time-optimal plans need none, and a
     plan whose time was limited gets none.
     Raises SpecError without a vehicle.
 
@@ -52,10 +52,19 @@ def with_second_opinion(plan: Plan, progress: Progress | None = None) -> Plan:
 
 
 def _second_opinion(plan: Plan, progress: Progress | None) -> SecondOpinion:
+    for segments in OPINION_SEGMENTS:
+        opinion = _free_knots(plan, segments, progress)
+        if opinion.duration is not None:
+            break
+    return opinion
+
+
+def _free_knots(plan: Plan, segments: int, progress: Progress | None) -> SecondOpinion:
+    """A shorter plan by free knots that is certified and flies, if there is one."""
     from aerobat.planning.polynomial.free_knots import FreeKnots
 
-    options = f"--planner free-knots --segments {OPINION_SEGMENTS}"
-    planner = FreeKnots(segments=OPINION_SEGMENTS, start=plan, reserve=OPINION_RESERVE)
+    options = f"--planner free-knots --segments {segments}"
+    planner = FreeKnots(segments=segments, start=plan, reserve=OPINION_RESERVE)
     try:
         found = planner.plan(plan.problem, plan.vehicle, progress)
     except BackendMissing as missing:
