@@ -28,7 +28,7 @@ from aerobat.reporting.page import (
 from aerobat.reporting.panels.overlay import NamedPath, draw_overlay
 from aerobat.reporting.panels.poses import is_flat, plan_reference
 from aerobat.reporting.panels.signals import draw_limits, fit_to_limits
-from aerobat.reporting.style import BLUE, FAINT, INK, MUTED, NORMAL, RED, SKY, SMALL, TITLE, YELLOW
+from aerobat.reporting.style import BLUE, INK, MUTED, NORMAL, RED, SKY, SMALL, TITLE, YELLOW
 from aerobat.simulation import Outcome
 from aerobat.simulation.outcome import length
 from aerobat.studies.compare import Comparison, Entry
@@ -39,7 +39,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 NONE = "–"  # in place of a number that there is not
-COLOURS = (INK, YELLOW, SKY, BLUE, FAINT)  # of planners, in their order
+COLOURS = (INK, YELLOW, SKY, BLUE, MUTED)  # of planners, in their order
 PATH_VERTICES = 200  # of a drawn path
 TAIL = 1.02  # where the time axis ends, relative to the longest duration
 
