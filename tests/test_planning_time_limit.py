@@ -39,7 +39,7 @@ def planned(planner: Planner) -> Plan | None:
         (Miqp, (0, 2, 7, 20, 40, 60, 80, 100)),
         (MinSnap, (0, 2, 4, 7, 11, 20)),
         (FreeKnots, (0, 4, 12, 22, 50)),
-        (TimeOptimal, (0, 60, 110, 200)),
+        (TimeOptimal, (0, 60, 200, 300)),
     ],
 )
 def test_a_limit_yields_the_best_so_far_certified_or_says_that_there_is_none(
