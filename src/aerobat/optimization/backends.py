@@ -49,8 +49,8 @@ class Solver(Protocol):
 
 BACKENDS = {  # module:class
     "builtin": "aerobat.optimization.branch_and_bound:BranchAndBound",
-    "gurobi": "aerobat.optimization.gurobi:Gurobi",
-    "scip": "aerobat.optimization.scip:Scip",
+    "gurobi": "aerobat.optimization.adapters.gurobi:Gurobi",
+    "scip": "aerobat.optimization.adapters.scip:Scip",
 }
 
 

@@ -10,8 +10,8 @@ from typing import Any, ClassVar
 import numpy as np
 
 from aerobat.optimization import big_m
+from aerobat.optimization.adapters.confirmation import confirmed
 from aerobat.optimization.assignment import AssignmentProgram
-from aerobat.optimization.confirmation import confirmed
 from aerobat.optimization.deadline import shorter
 from aerobat.optimization.result import AssignmentResult, Status, verified
 

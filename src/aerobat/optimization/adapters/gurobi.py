@@ -11,8 +11,8 @@ import numpy as np
 
 from aerobat.errors import AerobatError
 from aerobat.optimization import big_m
+from aerobat.optimization.adapters.confirmation import confirmed
 from aerobat.optimization.assignment import AssignmentProgram
-from aerobat.optimization.confirmation import confirmed
 from aerobat.optimization.deadline import shorter
 from aerobat.optimization.result import AssignmentResult, Status, verified
 
