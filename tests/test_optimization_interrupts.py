@@ -14,6 +14,14 @@ from aerobat.optimization.nonlinear import NonlinearProgram, import_casadi, solv
 from paper_program import FLIP_ROLL, flip
 
 
+@pytest.fixture(autouse=True)
+def _interruptible():
+    """Ctrl-C as a terminal gives it, also for tests started in the background, which ignores it."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
+
+
 def interrupting(ca):
     """A program whose objective raises SIGINT in its own process when it is evaluated for the tenth time."""
 
