@@ -32,6 +32,7 @@ class Pose(NamedTuple):
         return Pose(self.rotation @ inner.rotation, self.rotation @ inner.origin + self.origin)
 
 
+MOMENTS = ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")  # as both formats name them, in the order of `link_of`
 IDENTITY = Pose(np.eye(3), np.zeros(3))
 
 

@@ -7,7 +7,7 @@ URDF and SDF bring meshes, lxml or a simulator along for what are a few elements
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from math import isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -62,6 +62,21 @@ def numbers(text: str | None, count: int, what: str) -> Array:
 def child_number(element: Element, tag: str, what: str) -> float:
     """The number in a child element, 0 where there is none."""
     return float(numbers(element.findtext(tag), 1, f"{what}: {tag}")[0])
+
+
+def collision_radius(link: Element, name: str, text_of: Callable[[Element, str], str | None]) -> float | None:
+    """The radius [m] of the cylinder that collides, or half the longer side of the box; None without either.
+
+    Args:
+        link: The link's element.
+        name: The link's name.
+        text_of: Gives what an element says under a key: its child's text in SDF, its attribute in URDF.
+    """
+    for cylinder in link.iterfind("collision/geometry/cylinder"):
+        return float(numbers(text_of(cylinder, "radius"), 1, f"link '{name}': cylinder radius")[0])
+    for box in link.iterfind("collision/geometry/box"):
+        return float(numbers(text_of(box, "size"), 3, f"link '{name}': box size")[:2].max()) / 2
+    return None
 
 
 def by_name(elements: Iterable[Element]) -> dict[str, Element]:

@@ -8,14 +8,20 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from aerobat.errors import SpecError
-from aerobat.interchange.robots.body import IDENTITY, Link, Pose, Robot, link_of
-from aerobat.interchange.robots.markup import by_name, child_number, name_of, numbers, parse_xml
+from aerobat.interchange.robots.body import IDENTITY, MOMENTS, Link, Pose, Robot, link_of
+from aerobat.interchange.robots.markup import (
+    by_name,
+    child_number,
+    collision_radius,
+    name_of,
+    numbers,
+    parse_xml,
+)
 from aerobat.interchange.robots.motors import read_motors
 
 if TYPE_CHECKING:
     from xml.etree.ElementTree import Element
 
-MOMENTS = ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")
 FRAMES = ("link", "joint", "frame")  # what a pose may be relative to
 MODEL_FRAME = "__model__"
 
@@ -77,23 +83,15 @@ def _uri(include: Element) -> str:
 
 
 def _link(name: str, element: Element, pose: Pose) -> Link:
+    radius = collision_radius(element, name, lambda each, key: each.findtext(key))
     inertial = element.find("inertial")
     if inertial is None:
-        return link_of(name, pose, IDENTITY, 0.0, np.zeros(6), _radius(element, name))
+        return link_of(name, pose, IDENTITY, 0.0, np.zeros(6), radius)
     inertia = inertial.find("inertia")
     what = f"link '{name}'"
     moments = [0.0 if inertia is None else child_number(inertia, key, what) for key in MOMENTS]
     mass = child_number(inertial, "mass", what)
-    return link_of(name, pose, _pose(inertial, what), mass, np.array(moments), _radius(element, name))
-
-
-def _radius(link: Element, name: str) -> float | None:
-    """The radius [m] of the cylinder that collides, or half the longer side of the box."""
-    for cylinder in link.iterfind("collision/geometry/cylinder"):
-        return child_number(cylinder, "radius", f"link '{name}': cylinder")
-    for box in link.iterfind("collision/geometry/box"):
-        return float(numbers(box.findtext("size"), 3, f"link '{name}': box size")[:2].max()) / 2
-    return None
+    return link_of(name, pose, _pose(inertial, what), mass, np.array(moments), radius)
 
 
 def _pose(element: Element, what: str) -> Pose:

@@ -9,14 +9,12 @@ import numpy as np
 
 from aerobat.arrays import Array
 from aerobat.errors import SpecError
-from aerobat.interchange.robots.body import IDENTITY, Link, Pose, Robot, link_of
-from aerobat.interchange.robots.markup import by_name, name_of, numbers
+from aerobat.interchange.robots.body import IDENTITY, MOMENTS, Link, Pose, Robot, link_of
+from aerobat.interchange.robots.markup import by_name, collision_radius, name_of, numbers
 from aerobat.interchange.robots.motors import read_motors
 
 if TYPE_CHECKING:
     from xml.etree.ElementTree import Element
-
-MOMENTS = ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")
 
 
 def read_urdf(root: Element, path: Path) -> Robot:
@@ -68,9 +66,10 @@ def _follow(name: str, above: dict[str, tuple[str, Pose]], poses: dict[str, Pose
 
 
 def _link(name: str, element: Element, pose: Pose) -> Link:
+    radius = collision_radius(element, name, lambda each, key: each.get(key))
     inertial = element.find("inertial")
     if inertial is None:
-        return link_of(name, pose, IDENTITY, 0.0, np.zeros(6), _radius(element, name))
+        return link_of(name, pose, IDENTITY, 0.0, np.zeros(6), radius)
     mass, inertia = inertial.find("mass"), inertial.find("inertia")
     moments = [_attribute(inertia, key, f"link '{name}': inertia") for key in MOMENTS]
     return link_of(
@@ -79,17 +78,8 @@ def _link(name: str, element: Element, pose: Pose) -> Link:
         _origin(inertial, f"link '{name}': inertial"),
         _attribute(mass, "value", f"link '{name}': mass"),
         np.array(moments),
-        _radius(element, name),
+        radius,
     )
-
-
-def _radius(link: Element, name: str) -> float | None:
-    """The radius [m] of the cylinder that collides, or half the longer side of the box."""
-    for cylinder in link.iterfind("collision/geometry/cylinder"):
-        return _attribute(cylinder, "radius", f"link '{name}': cylinder")
-    for box in link.iterfind("collision/geometry/box"):
-        return float(numbers(box.get("size"), 3, f"link '{name}': box size")[:2].max()) / 2
-    return None
 
 
 def _origin(element: Element, what: str) -> Pose:
