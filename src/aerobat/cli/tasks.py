@@ -18,9 +18,7 @@ from aerobat.planning import (
     plan,
     planner_class,
     planner_options,
-    with_assessment,
-    with_certificate,
-    with_flyability,
+    with_evidence,
     with_second_opinion,
 )
 from aerobat.problem import Problem, load_problem
@@ -78,7 +76,7 @@ def plan_of(record: RunRecord) -> Plan:
             return with_second_opinion(found, progress.record)
         # the paper plans without a vehicle; whether this one can fly it is told all the same
         found = plan(record.problem, record.planner, progress=progress.record)
-        return with_assessment(with_flyability(with_certificate(found, record.vehicle)))
+        return with_evidence(found, record.vehicle)
 
 
 def make_planner(options: PlanningOptions) -> Planner:

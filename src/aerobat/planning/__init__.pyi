@@ -16,6 +16,7 @@ from .planners import (
     planner_class,
     planner_options,
     registered_planners,
+    with_evidence,
 )
 from .polynomial.free_knots import FreeKnots
 from .polynomial.min_snap import MinSnap, TimeScaling
@@ -65,6 +66,7 @@ __all__ = [
     "registered_planners",
     "with_assessment",
     "with_certificate",
+    "with_evidence",
     "with_flyability",
     "with_second_opinion",
 ]

@@ -83,7 +83,17 @@ def plan(
     found = as_planner(planner).plan(problem, vehicle, progress)
     if vehicle is None:
         return found
-    certified = found if found.certificate is not None else with_certificate(found, vehicle)
+    return with_evidence(found, None if found.certificate is not None else vehicle)
+
+
+def with_evidence(plan: Plan, vehicle: Vehicle | None = None) -> Plan:
+    """The plan with all that is told of one: its certificate, its own flight, its assessment.
+
+    Args:
+        plan: What is judged.
+        vehicle: What it shall be certified for anew; None where its certificate stands.
+    """
+    certified = plan if vehicle is None else with_certificate(plan, vehicle)
     return with_assessment(with_flyability(certified))
 
 

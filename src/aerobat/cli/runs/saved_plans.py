@@ -14,7 +14,7 @@ from aerobat.cli.terminal import say
 from aerobat.errors import SpecError
 from aerobat.interchange import read_plan, read_rows
 from aerobat.interchange.robots.description import SUFFIXES, import_vehicle
-from aerobat.planning import Plan, with_assessment, with_certificate, with_flyability
+from aerobat.planning import Plan, with_assessment, with_evidence, with_flyability
 from aerobat.problem import EndState, Problem, problem_names
 from aerobat.trajectory import Trajectory
 from aerobat.vehicle import Vehicle, implausibilities, load_vehicle
@@ -47,14 +47,9 @@ def read_saved_plan(path: Path, options: PlanningOptions) -> Plan:
         if is_given(getattr(options, name)):
             raise SpecError(f"--{name} is for a CSV file, but {path} is a whole plan; leave it out")
     if options.vehicle is not None or found.vehicle is None:
-        return _told(found, named_vehicle(options.vehicle or default_vehicle()))
+        return with_evidence(found, named_vehicle(options.vehicle or default_vehicle()))
     found = found if found.flyability is not None else with_flyability(found)
     return found if found.assessment is not None else with_assessment(found)
-
-
-def _told(found: Plan, vehicle: Vehicle) -> Plan:
-    """The plan with all that is told of a vehicle which it was not made for."""
-    return with_assessment(with_flyability(with_certificate(found, vehicle)))
 
 
 def named_vehicle(name: str) -> Vehicle:
@@ -78,7 +73,7 @@ def _plan_of_path(path: Path, trajectory: Trajectory, options: PlanningOptions) 
     vehicle.require_hover(problem.environment.gravity)
     say(f"{path} holds a path alone; assumed: {', '.join(_assumed(path, vehicle, problem, options))}")
     plan = Plan(problem=problem, trajectory=trajectory, planner=MADE_BY, status="as it is")
-    return _told(plan, vehicle)
+    return with_evidence(plan, vehicle)
 
 
 def _assumed(path: Path, vehicle: Vehicle, problem: Problem, options: PlanningOptions) -> list[str]:
