@@ -25,6 +25,9 @@ class PlacedStage:
     gate: str | None = None  # the name of the gate that is passed there
 
 
+# of every limit's range, kept from either end for the controller by planners that use all of it, where a
+# plan shall be flown: rotors without lag leave it nothing otherwise
+FLYING_RESERVE = 0.03
 FLYABLE_ERROR = 0.05  # [m] that a plan's own flight may leave its path by, a frame's usual clearance
 
 

@@ -15,13 +15,12 @@ from aerobat.planning.assessment.assessment import Assessment, Box, Point, Secon
 from aerobat.planning.assessment.lower_bound import least_duration
 from aerobat.planning.flyability import with_flyability
 from aerobat.planning.recorder import Progress
-from aerobat.planning.result import Plan
+from aerobat.planning.result import FLYING_RESERVE, Plan
 from aerobat.problem.condition import Quantity
 from aerobat.problem.problem import Problem
 from aerobat.vehicle import Vehicle
 
 OPINION_SEGMENTS = (2, 4)  # of free knots: two are quick and enough for a flip's five stages; else four
-OPINION_RESERVE = 0.03  # as the command line plans them
 
 
 def with_assessment(plan: Plan) -> Plan:
@@ -64,7 +63,7 @@ def _free_knots(plan: Plan, segments: int, progress: Progress | None) -> SecondO
     from aerobat.planning.polynomial.free_knots import FreeKnots
 
     options = f"--planner free-knots --segments {segments}"
-    planner = FreeKnots(segments=segments, start=plan, reserve=OPINION_RESERVE)
+    planner = FreeKnots(segments=segments, start=plan, reserve=FLYING_RESERVE)
     try:
         found = planner.plan(plan.problem, plan.vehicle, progress)
     except BackendMissing as missing:

@@ -12,7 +12,7 @@ from aerobat.planning.miqp.attempts import default_order
 from aerobat.planning.miqp.integrator import INPUT_NAMES
 from aerobat.planning.planners import Planner
 from aerobat.planning.recorder import Recorder
-from aerobat.planning.result import Plan
+from aerobat.planning.result import FLYING_RESERVE, Plan
 from aerobat.problem.problem import Problem
 from aerobat.vehicle import Vehicle
 
@@ -21,7 +21,6 @@ if TYPE_CHECKING:
 
 MORE_INTERVALS = (1.3, 1.8)  # times as many
 MANY_INTERVALS = 40  # where that is more still: a narrow window at an end needs intervals on either side
-FLYING_RESERVE = 0.03  # of every limit's range, for the controller: rotors without lag leave it none
 
 
 def rescued_plan(asked: Miqp, problem: Problem, vehicle: Vehicle, recorder: Recorder) -> Plan | None:

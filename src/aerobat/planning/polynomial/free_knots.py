@@ -20,14 +20,14 @@ from aerobat.planning.planners import Planner, option, planner
 from aerobat.planning.polynomial.knot_descent import Course, Descent
 from aerobat.planning.polynomial.min_snap import MinSnap
 from aerobat.planning.recorder import Progress, Recorder
-from aerobat.planning.result import Plan
+from aerobat.planning.result import FLYING_RESERVE, Plan
 from aerobat.planning.time_limit import TIME_LIMIT, stopped, too_short
 from aerobat.planning.warm_start import Reserve, WarmStart, plans_to_begin_from, require_attitudes
 from aerobat.problem.problem import Problem
 from aerobat.problem.stage import StageSequence
 from aerobat.vehicle import Vehicle
 
-MAX_SEGMENTS = 24  # each solve takes more than twice as long with twice as many, and gains next to nothing
+MAX_SEGMENTS = 24  # a judgement: more gain next to nothing, and a solve takes longer with each
 COARSE = 4  # segments to begin with where there shall be more: they are quick and come near the least time
 
 
@@ -55,7 +55,7 @@ class FreeKnots(Planner):
         0.0,
         "The fraction of every limit's range that is kept from either of its ends for the controller; with 0 "
         "a plan of four segments or more leaves it next to nothing.",
-        command_default=0.03,
+        command_default=FLYING_RESERVE,
     )
     iterations: Count = 50  # at most, each solve
     time_limit: NonNegative | None = option(None, TIME_LIMIT)  # [s]

@@ -24,7 +24,7 @@ from aerobat.planning.certified_solve import Judged
 from aerobat.planning.miqp import Miqp
 from aerobat.planning.planners import Planner, option, planner
 from aerobat.planning.recorder import Progress, Recorder
-from aerobat.planning.result import Plan
+from aerobat.planning.result import FLYING_RESERVE, Plan
 from aerobat.planning.time_limit import TIME_LIMIT, stopped, too_short
 from aerobat.planning.time_optimal.collocated_program import SolvedMotion
 from aerobat.planning.time_optimal.collocation import BOUNDED_DERIVATIVES
@@ -54,7 +54,7 @@ class TimeOptimal(Planner):
         0.0,
         "The fraction of each rotor's range of thrust that is kept from either of its ends for the "
         "controller; with 0 a time-optimal plan is a yardstick that no controller follows for sure.",
-        command_default=0.03,
+        command_default=FLYING_RESERVE,
     )
     starts: Annotated[int, Field(ge=1)] = option(
         8, "The number of starts; more find a faster local optimum at times, and take longer."
