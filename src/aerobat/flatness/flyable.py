@@ -9,17 +9,13 @@ from pydantic import Field
 from aerobat.declaration import AS_IT_IS
 from aerobat.environment import Environment
 from aerobat.errors import SpecError
-from aerobat.trajectory import Trajectory
+from aerobat.trajectory import HasTrajectory, Trajectory
 from aerobat.vehicle import Vehicle, as_vehicle
 
 
 @runtime_checkable
-class Flyable(Protocol):
+class Flyable(HasTrajectory, Protocol):
     """A plan as far as flying goes."""
-
-    @property
-    def trajectory(self) -> Trajectory:
-        """The trajectory to fly."""
 
     @property
     def vehicle(self) -> Vehicle | None:

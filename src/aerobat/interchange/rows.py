@@ -29,7 +29,6 @@ NAMES: Mapping[str, tuple[str, ...]] = {  # of columns, by groups
 }
 PATH = ("position", "velocity", "acceleration", "jerk")
 SYNONYMS = {"time": "t", "time_s": "t", "px": "x", "py": "y", "pz": "z"}
-UP = np.array([0.0, 0.0, 1.0])
 FEWEST = 5  # rows, of which every second can be left out
 
 
@@ -74,10 +73,10 @@ class PathRows:
 
     def _heading(self, path: Trajectory) -> float:
         """The turn about the thrust [rad] in the first attitude, drag left out."""
-        thrust = path.evaluate(0.0, 2) + Environment().gravity * UP
+        thrust = path.evaluate(0.0, 2) + Environment().weight
         if self.attitude is None or not np.linalg.norm(thrust) > 0.0:
             return 0.0
-        upright = so3.smallest_rotation(UP, thrust / np.linalg.norm(thrust))
+        upright = so3.smallest_rotation(so3.UP, thrust / np.linalg.norm(thrust))
         turn = so3.multiply(so3.conjugate(upright), self.attitude)
         return float(2.0 * np.arctan2(turn[3], turn[0]))
 

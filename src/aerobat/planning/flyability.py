@@ -45,8 +45,9 @@ def own_flight(
     """
     flight = nominal_flight(trajectory, vehicle, problem.environment)
     flown = flown_passages(flight, planned_passages(stages, problem), None)
-    error = flight_error(trajectory, vehicle, problem.environment)
-    return OwnFlight(error=error, passages=tuple(_flown(passage.of_flight(0)) for passage in flown))
+    return OwnFlight(
+        error=_largest_error(flight), passages=tuple(_flown(passage.of_flight(0)) for passage in flown)
+    )
 
 
 def _flown(passage: Passage) -> FlownPassage:

@@ -71,14 +71,13 @@ TIMELINES_BELOW = FlightLayout(
 def draw(flight: Flight | Plan, plan: Plan | None = None, vehicle: Vehicle | str | None = None) -> Figure:
     """Draw a page on a flight, or a batch: path and attitude, errors, rotor thrusts.
 
-    With the plan, its gates and stages too. Of a plan alone, its path, stages and thrusts.
+    With the plan, its gates and stages too. Of a plan alone, its path, stages and thrusts. Raises SpecError
+    where the vehicle is not known.
 
     Args:
         flight: What is drawn.
         plan: What was flown.
         vehicle: What flew, or its name; by default the plan's, or the preset of the flight's name.
-
-    Raises SpecError where the vehicle is not known.
     """
     if vehicle is None and isinstance(own := plan or flight, Plan):
         vehicle = own.vehicle

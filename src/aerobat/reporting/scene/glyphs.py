@@ -95,10 +95,8 @@ def direction_marks(path: Array, rows: Sequence[int], camera: Camera, size: floa
         ahead = camera.project(path[min(k + 1, len(path) - 1)] - path[max(k - 1, 0)])
         length = float(np.linalg.norm(ahead))
         if length > 0.0:
-            forward, left = (
-                ahead / length @ camera.screen,
-                np.array([-ahead[1], ahead[0]]) / length @ camera.screen,
-            )
+            right, up = ahead / length
+            forward, left = np.array([[right, up], [-up, right]]) @ camera.screen
             corners = path[k] + size * (ARROWHEAD[:, :1] * forward + ARROWHEAD[:, 1:] * left)
             shapes.append(Shape(corners, face=MUTED, edge="white", width=0.5, depth_bias=size))
     return shapes
