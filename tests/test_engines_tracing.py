@@ -8,6 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from aerobat.engines import choose, run_whole
 from aerobat.engines.floats import FloatOps
 from aerobat.engines.traced_loop import trace_loop
 from aerobat.engines.tracing import FUNCTIONS, BranchError, Symbol, Trace, TraceOps
@@ -107,3 +108,69 @@ def test_a_loop_knows_what_it_computes_once_and_carries_only_what_rows_need() ->
     assert str(loop).splitlines()[-1].startswith("output: %")
     assert "exp %" in str(loop)
     assert isinstance(loop.row[0], Symbol)
+
+
+class Turns(NamedTuple):
+    one: Any
+    other: Any
+
+
+def turns_loop(ops: Any, parameters: Any, carry: Any, inputs: Any) -> Any:
+    """Two parts that step at their own ticks, the second seeing the first; each costs many operations."""
+    (a, b), (turns, force) = carry, inputs
+    x = a
+    for k in range(20):
+        x = ops.sqrt(x * x + k + force)
+    a = ops.select(turns.one > 0.5, x, a)
+    y = b + a
+    for k in range(20):
+        y = 1.0 / (y + a / (k + 1.0))
+    b = ops.select(turns.other > 0.5, y, b)
+    return (a, b), (a, b, parameters[0] * a)
+
+
+def traced_turns() -> Any:
+    return trace_loop(lambda ops, parameters, inputs: (1.0, 2.0), turns_loop, (0.0,), (Turns(0.0, 0.0), 0.0))
+
+
+def test_guarded_blocks_hold_every_value_once_after_what_it_is_computed_from() -> None:
+    loop = traced_turns()
+    blocks = loop.guarded_blocks(loop.body, loop.inputs)
+    order = [number for block in blocks for number in block.numbers]
+    assert sorted(order) == loop.body
+    computed = set(loop.prologue)
+    for number in order:
+        assert computed.issuperset(set(loop.trace.operations[number].arguments) - set(loop.prologue))
+        computed.add(number)
+
+
+def test_where_a_guard_does_not_hold_nothing_needs_what_it_guards() -> None:
+    loop = traced_turns()
+    guarded = {n: block.guard for block in loop.guarded_blocks(loop.body, loop.inputs) for n in block.numbers}
+    assert len({guard for guard in guarded.values() if guard is not None}) == 2
+    assert sum(guard is None for guard in guarded.values()) < 20 < len(guarded) - 20
+    users = [(n, i) for n in loop.body for i in loop.trace.operations[n].arguments if i in guarded]
+    for user, used in users:
+        operation, guard = loop.trace.operations[user], guarded[used]
+        chosen = operation.name == "select" and operation.arguments[:2] == (guard, used)
+        assert guard is None or chosen or guarded[user] is not None
+    assert not {*loop.next_carry, *loop.outputs} & {n for n, guard in guarded.items() if guard is not None}
+
+
+def test_conditions_that_vehicles_do_not_share_guard_nothing() -> None:
+    loop = traced_turns()
+    assert [block.guard for block in loop.guarded_blocks(loop.body, loop.inputs[2:])] == [None]
+
+
+@pytest.mark.parametrize("engine", ["bytecode", "compiled", "jax"])
+@pytest.mark.parametrize("vehicles", [1, 9])
+def test_guards_change_no_bit_of_a_loop(engine: str, vehicles: int) -> None:
+    rng = np.random.default_rng(4)
+    turns = Turns(*(rng.integers(0, 2, (2, 60)).astype(float)))
+    inputs = turns, rng.uniform(size=(60, vehicles))
+    functions = (lambda ops, parameters, inputs: (1.0, 2.0)), turns_loop
+    parameters = (rng.uniform(size=vehicles),)
+    expected = run_whole(choose("floats", 1, 1), *functions, parameters, inputs)
+    found = run_whole(choose(engine, 1, 1), *functions, parameters, inputs)
+    for ours, theirs in zip(found, expected, strict=True):
+        np.testing.assert_allclose(ours, theirs, rtol=0.0 if engine != "jax" else 1e-12)

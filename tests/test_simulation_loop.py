@@ -1,7 +1,7 @@
 """A flight is a loop of components: cut, stepped, resumed or branched it is the same flight; periods hold."""
 
 import pickle
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Any
 
@@ -17,7 +17,7 @@ from aerobat.errors import SpecError
 from aerobat.kernels.rigid_body import Body
 from aerobat.simulation import FlightConfig, StateNoise, fly, prepare
 from aerobat.simulation.components import StateObserver
-from aerobat.simulation.loop import Clock, LoopInput, LoopParameters, compose
+from aerobat.simulation.loop import Clock, Due, LoopInput, LoopParameters, compose
 from aerobat.simulation.noise import NoiseSource
 from aerobat.simulation.setup import FlightSetup
 from aerobat.vehicle import load_vehicle
@@ -29,15 +29,22 @@ def flight_of(engine: str, vehicles: Any = QUAD, duration: float = 1.0) -> Fligh
     return prepare(loops(duration), vehicles, config=config)
 
 
+def with_observer_period(setup: FlightSetup, period: int) -> FlightSetup:
+    return replace(setup, components=(StateObserver(period=period), *setup.components[1:]))
+
+
 def assert_equal(a: Any, b: Any) -> None:
     for x, y in zip(tree_leaves(a), tree_leaves(b), strict=True):
         np.testing.assert_array_equal(x, y)
 
 
+@pytest.mark.parametrize("observer_period", [1, 7])
 @pytest.mark.parametrize("vehicles", [QUAD, [QUAD] * 6], ids=["one", "six"])
 @pytest.mark.parametrize("engine", ENGINE_NAMES)
-def test_stepped_cut_and_resumed_a_flight_is_the_same_to_the_last_bit(engine: str, vehicles: Any) -> None:
-    setup = flight_of(engine, vehicles)
+def test_stepped_cut_and_resumed_a_flight_is_the_same_to_the_last_bit(
+    engine: str, vehicles: Any, observer_period: int
+) -> None:
+    setup = with_observer_period(flight_of(engine, vehicles), observer_period)
     loop, ticks = setup.compile(), 40
     whole, rows = loop.scan(loop.init(setup.first_tick), setup.inputs(0, ticks))
     carry = loop.init(setup.first_tick)
@@ -45,7 +52,8 @@ def test_stepped_cut_and_resumed_a_flight_is_the_same_to_the_last_bit(engine: st
         carry, row = loop.step(carry, setup.tick(tick))
         assert_equal(row, tree_map(lambda leaf, k=tick: leaf[:, k], rows))
     kept = pickle.loads(pickle.dumps(carry))
-    carry, row = flight_of(engine, vehicles).compile().scan(kept, setup.inputs(20, 33))
+    again = with_observer_period(flight_of(engine, vehicles), observer_period).compile()
+    carry, row = again.scan(kept, setup.inputs(20, 33))
     assert_equal(row, tree_map(lambda leaf: leaf[:, 20:33], rows))
     carry, _ = loop.scan(carry, setup.inputs(33, ticks))
     assert_equal(carry, whole)
@@ -130,7 +138,8 @@ def test_a_component_steps_at_its_own_period_and_holds_between(engine: str) -> N
     start = Body(*((np.zeros(2),) * n for n in (3, 3, 4, 3)))
     parameters = LoopParameters(start, ((), (), ()))
     times = np.full(11, 0.01)
-    inputs = LoopInput(Clock(times, times), (), ((), (), ()))
+    due = Due((np.arange(11) % 4 == 0).astype(float), Clock(4 * times, 4 * times))
+    inputs = LoopInput(Clock(times, times), (due, (), ()), (), ((), (), ()))
     slow, plant, follower = run_whole(choose(engine, 2, 11), *compose(components, log), parameters, inputs)
     assert slow[0][1].tolist() == [1, 1, 1, 1, 2, 2, 2, 2, 3, 3, 3]
     np.testing.assert_allclose(slow[1][1], 0.04, rtol=1e-15)
@@ -140,17 +149,14 @@ def test_a_component_steps_at_its_own_period_and_holds_between(engine: str) -> N
 
 def test_a_slower_observer_makes_a_worse_flight_and_touches_nothing_else() -> None:
     setup = flight_of("compiled", duration=6.0)
-    every, tenth = (
-        compose((StateObserver(period=period), *setup.components[1:]), lambda signals: signals["plant"].body)
-        for period in (1, 10)
-    )
-    inputs = setup.inputs(0, len(setup.times))
-    best, worse = (
-        run_whole(setup.engine(), *functions, setup.parameters, inputs).position
-        for functions in (every, tenth)
-    )
-    path = np.array(inputs.reference.position)[:, None]
-    errors = [np.linalg.norm(np.array(position) - path, axis=0).max() for position in (best, worse)]
+    errors = []
+    for period in (1, 10):
+        slower = with_observer_period(setup, period)
+        inputs = slower.inputs(0, len(setup.times))
+        functions = compose(slower.components, lambda signals: signals["plant"].body)
+        flown = run_whole(setup.engine(), *functions, setup.parameters, inputs).position
+        path = np.array(inputs.reference.position)[:, None]
+        errors.append(np.linalg.norm(np.array(flown) - path, axis=0).max())
     assert errors[0] < 0.02 < errors[1] < 1.0
 
 

@@ -98,6 +98,14 @@ def source(loop: TracedLoop) -> str:
                 form = _FORMS[operation.name].format(*(value[i] for i in operation.arguments))
                 yield f"{indent}{value[number]} = {form}"
 
+    def guarded_lines(indent: str) -> Iterator[str]:
+        for block in loop.guarded_blocks(loop.body, loop.inputs):
+            if block.guard is None:
+                yield from lines(block.numbers, indent)
+            else:
+                yield f"{indent}if {value[block.guard]}:"
+                yield from lines(block.numbers, indent + " ")
+
     unpack_parameters = f" {listed(loop.parameters)} = parameters"
     return "\n".join(
         [
@@ -112,7 +120,7 @@ def source(loop: TracedLoop) -> str:
             f" {listed(loop.carry)} = carry",
             " rows = []",
             f" for {listed(loop.inputs)}, logged in zip(ticks, is_logged):",
-            *lines(loop.body, "  "),
+            *guarded_lines("  "),
             f"  if logged: rows.append({listed(loop.outputs)})",
             f"  {listed(loop.carry)} = {listed(loop.next_carry)}",
             f" return {listed(loop.carry)}, rows",

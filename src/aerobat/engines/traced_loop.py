@@ -10,6 +10,16 @@ from aerobat.engines.engine import Init, Step
 from aerobat.engines.pytree import Tree, tree_leaves, tree_unflatten
 from aerobat.engines.tracing import Symbol, Trace, TraceOps
 
+MIN_GUARDED = 32  # operations that are worth a branch
+
+
+@dataclass(frozen=True)
+class Block:
+    """Values that are computed together: always, or only where a logical value holds."""
+
+    guard: int | None
+    numbers: tuple[int, ...]  # in order
+
 
 @dataclass(frozen=True, eq=False)
 class TracedLoop:
@@ -70,6 +80,47 @@ class TracedLoop:
                 known.add(number)
                 found.append(number)
         return found
+
+    def guarded_blocks(self, numbers: Sequence[int], shared: Iterable[int]) -> list[Block]:
+        """The values of `numbers` in blocks; what only selections by a shared condition use is guarded.
+
+        Where the condition does not hold, a guarded value is not computed, and no selection takes it.
+
+        Args:
+            numbers: of values, in order.
+            shared: inputs that are one number for all that is computed at once.
+        """
+        guards = self._guards(numbers, {*shared})
+        waiting, blocks = list(numbers), []
+        while waiting:
+            missing = set(waiting)
+            for guard in (None, *dict.fromkeys(guards.values())):
+                block = []
+                for number in waiting:
+                    arguments = self.trace.operations[number].arguments
+                    if guards.get(number) == guard and missing.isdisjoint(arguments):
+                        block.append(number)
+                        missing.discard(number)
+                waiting = [number for number in waiting if number in missing]
+                if block:
+                    blocks.append(Block(guard, tuple(block)))
+        return blocks
+
+    def _guards(self, numbers: Sequence[int], shared: set[int]) -> dict[int, int]:
+        """The condition, by the values' numbers, without which a value is not needed."""
+        operations = self.trace.operations
+        conditions = {operations[n].arguments[0] for n in numbers if operations[n].name == "select"}
+        roots = (*self.next_carry, *self.outputs)
+        guards: dict[int, int] = {}
+        for condition in sorted(conditions):
+            decided_by = {i for i in operations[condition].arguments if operations[i].name != "constant"}
+            if not decided_by or not shared.issuperset(decided_by):
+                continue
+            always = self.trace.needed(roots, unless=condition)
+            only = [n for n in numbers if operations[n].arguments and n not in always and n not in guards]
+            if len(only) >= MIN_GUARDED:
+                guards |= dict.fromkeys(only, condition)
+        return guards
 
     def is_logical(self, number: int) -> bool:
         """True for a value that is true or false, not a number."""

@@ -91,15 +91,22 @@ class Trace:
         logical = name in _LOGICAL or (name == "select" and known[1].logical)
         return Symbol(self, self._number(name, numbers, "", logical))
 
-    def needed(self, roots: Iterable[int]) -> set[int]:
-        """The values that others are computed from, these included."""
+    def needed(self, roots: Iterable[int], unless: int | None = None) -> set[int]:
+        """The values that others are computed from, these included.
+
+        Args:
+            roots: the others.
+            unless: a condition that is taken not to hold, so that selections by it take their second value.
+        """
         found: set[int] = set()
         waiting = list(roots)
         while waiting:
             number = waiting.pop()
             if number not in found:
                 found.add(number)
-                waiting.extend(self.operations[number].arguments)
+                arguments = self.operations[number].arguments
+                selects = self.operations[number].name == "select" and arguments[0] == unless
+                waiting.extend(arguments[::2] if selects else arguments)
         return found
 
     def _number(

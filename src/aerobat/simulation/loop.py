@@ -23,10 +23,10 @@ Log: TypeAlias = Callable[[Signals], Tree]
 
 
 class Clock(NamedTuple):
-    """Time about a tick, which at few ticks differs from the tick before."""
+    """Time about a component's step, which at few of them differs from the step before."""
 
-    elapsed: Scalar  # [s] since the component stepped last
-    period: Scalar  # [s] until the next tick
+    elapsed: Scalar  # [s] since its last step
+    period: Scalar  # [s] until its next
 
     @property
     def piecewise_constant(self) -> bool:
@@ -41,10 +41,18 @@ class LoopParameters(NamedTuple):
     own: tuple[Tree, ...]  # of each component
 
 
+class Due(NamedTuple):
+    """The turn of a component that does not step at every tick."""
+
+    now: Scalar  # 1 at a tick that it steps at, 0 at others
+    clock: Clock  # about the latest of these ticks, from the one before to the next
+
+
 class LoopInput(NamedTuple):
     """Inputs from outside at a tick."""
 
     clock: Clock
+    due: tuple[Due | tuple[()], ...]  # of each component; () where it steps at every tick
     reference: ReferencePoint
     own: tuple[Tree, ...]  # of each component
 
@@ -71,14 +79,6 @@ class Component(Protocol):
         """The next state, from its own parameters and inputs and what others show."""
 
 
-class _Scheduled(NamedTuple):
-    """A component that does not step at every tick."""
-
-    state: Tree
-    countdown: Scalar  # ticks until its next step
-    waited: Scalar  # [s] since its last one
-
-
 @lru_cache(maxsize=64)
 def compose(components: tuple[Component, ...], log: Log) -> tuple[Init, Step]:
     """The loop of some components as two functions for an engine, the same for the same arguments.
@@ -92,27 +92,23 @@ def compose(components: tuple[Component, ...], log: Log) -> tuple[Init, Step]:
         for component, own, given in zip(components, parameters.own, inputs.own, strict=True):
             state = component.init(ops, own, given, signals)
             signals[component.name] = state
-            waited = inputs.clock.elapsed * (component.period - 1)
-            carry.append(state if component.period == 1 else _Scheduled(state, 0.0, waited))
+            carry.append(state)
         return tuple(carry)
 
     def step(
         ops: Ops, parameters: LoopParameters, carry: tuple[Tree, ...], inputs: LoopInput
     ) -> tuple[tuple[Tree, ...], Tree]:
         signals = {"start": parameters.start, "clock": inputs.clock, "reference": inputs.reference}
-        for component, state in zip(components, carry, strict=True):
-            signals[component.name] = state if component.period == 1 else state.state
+        signals |= {component.name: state for component, state in zip(components, carry, strict=True)}
         following = []
-        for i, component in enumerate(components):
-            if component.period == 1:
-                state = component.step(ops, parameters.own[i], carry[i], inputs.own[i], signals)
-                following.append(state)
-            else:
-                scheduled = _scheduled_step(
-                    ops, component, parameters.own[i], carry[i], inputs.own[i], signals
-                )
-                following.append(scheduled)
-                state = scheduled.state
+        for component, own, before, due, given in zip(
+            components, parameters.own, carry, inputs.due, inputs.own, strict=True
+        ):
+            seen = signals if not due else {**signals, "clock": due.clock}
+            state = component.step(ops, own, before, given, seen)
+            if due:
+                state = select_tree(ops, due.now > 0.5, state, before)
+            following.append(state)
             if component.feedthrough:
                 signals[component.name] = state
         return tuple(following), log(signals)
@@ -120,17 +116,7 @@ def compose(components: tuple[Component, ...], log: Log) -> tuple[Init, Step]:
     return init, step
 
 
-def _scheduled_step(
-    ops: Ops, component: Component, parameters: Tree, scheduled: _Scheduled, inputs: Tree, signals: Signals
-) -> _Scheduled:
-    """The component a tick later, stepped if it is due; both ways are computed, as kernels do not branch."""
-    due = scheduled.countdown < 0.5
-    elapsed = scheduled.waited + signals["clock"].elapsed
-    own_signals = {**signals, "clock": signals["clock"]._replace(elapsed=elapsed)}
-    stepped = component.step(ops, parameters, scheduled.state, inputs, own_signals)
-    pairs = zip(tree_leaves(stepped), tree_leaves(scheduled.state), strict=True)
-    return _Scheduled(
-        tree_unflatten(stepped, [ops.select(due, new, old) for new, old in pairs]),
-        ops.select(due, component.period - 1.0, scheduled.countdown - 1.0),
-        ops.select(due, 0.0, elapsed),
-    )
+def select_tree(ops: Ops, condition: Scalar, chosen: Tree, otherwise: Tree) -> Tree:
+    """One tree where a condition holds, the other elsewhere."""
+    pairs = zip(tree_leaves(chosen), tree_leaves(otherwise), strict=True)
+    return tree_unflatten(chosen, [ops.select(condition, x, y) for x, y in pairs])

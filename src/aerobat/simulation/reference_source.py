@@ -13,7 +13,7 @@ from aerobat.environment import Environment
 from aerobat.flatness import axial_drag, force_balance, reference
 from aerobat.kernels.control_loops import Lookahead, ReferencePoint
 from aerobat.simulation.flight import setpoint_rows
-from aerobat.simulation.loop import Clock
+from aerobat.simulation.loop import Clock, Due
 from aerobat.states import Setpoint
 from aerobat.trajectory import Trajectory
 from aerobat.vehicle import Vehicle
@@ -62,19 +62,26 @@ class ReferenceSource:
         points: ReferencePoint = tree_map(lambda leaf: leaf[begin - first : end - first], self._points)
         return points
 
-    def clock(self, begin: int, end: int) -> Clock:
-        """Time about the ticks from `begin` to before `end`.
+    def clock(self, begin: int, end: int, every: int = 1) -> Clock:
+        """Time about the ticks from `begin` to before `end`, of what steps at every so many.
 
         All periods but the last are alike to the last bit, so that an engine may see that they are.
         """
-        ticks = np.arange(begin, end)
-        return Clock(self._period_after(np.maximum(ticks - 1, 0)), self._period_after(ticks))
+        steps = np.arange(begin, end) // every
+        return Clock(self._period_after(np.maximum(steps - 1, 0), every), self._period_after(steps, every))
 
-    def _period_after(self, ticks: NDArray[np.intp]) -> Array:
-        """The period [s] that begins with each tick; the last begins none."""
-        last = len(self.times) - 1
-        periods = np.where(ticks == last, 0.0, self._period)
-        return np.where(ticks == last - 1, self.times[last] - self.times[max(last - 1, 0)], periods)
+    def due(self, every: int, begin: int, end: int) -> Due:
+        """The turns, at these ticks, of a component that steps at every so many."""
+        now = np.arange(begin, end) % every == 0
+        return Due(now.astype(np.float64), self.clock(begin, end, every))
+
+    def _period_after(self, steps: NDArray[np.intp], every: int) -> Array:
+        """The period [s] that begins with each step; the last begins none."""
+        final = len(self.times) - 1
+        begins = np.minimum(steps * every, final)
+        ends = np.minimum(begins + every, final)
+        whole = ends < final
+        return np.where(whole, every * self._period, self.times[ends] - self.times[begins])
 
     def _make(self, tick: int) -> None:
         block = tick // BLOCK

@@ -132,7 +132,11 @@ class FlightSetup:
     def inputs(self, begin: int, end: int) -> LoopInput:
         """The inputs of the ticks from `begin` to before `end`, all of one block, for `scan`."""
         own = tuple(() if source is None else source.chunk(begin, end) for source in self.sources)
-        return LoopInput(self.reference.clock(begin, end), self.reference.chunk(begin, end), own)
+        due = tuple(
+            () if component.period == 1 else self.reference.due(component.period, begin, end)
+            for component in self.components
+        )
+        return LoopInput(self.reference.clock(begin, end), due, self.reference.chunk(begin, end), own)
 
     def chunks(self, log_stride: int = 1, copies: int = 1) -> Iterator[tuple[int, int]]:
         """The flight cut into pieces whose inputs fit into little memory, each of one block.

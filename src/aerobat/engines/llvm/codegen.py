@@ -109,14 +109,14 @@ class _Codegen:
         invariant = loop.loop_invariant(piecewise_constant)
         self._refresh(piecewise_constant, invariant, tick)
         held = set(invariant)
-        self._compute(number for number in loop.body if number not in held)
+        self._compute_guarded([number for number in loop.body if number not in held])
         self._log(tick, lane)
         for value, slot in zip(self._wide(loop.next_carry), carry, strict=True):
             b.store(value, slot)
 
     def _refresh(self, piecewise_constant: Sequence[int], invariant: Sequence[int], tick: Any) -> None:
         """The loop-invariant values, computed anew at the first tick and when a constant input changes."""
-        b, values = self._builder, self._values
+        b = self._builder
         columns = sum(self._layout.shared_inputs)
         shared = compress(self._loop.inputs, self._layout.shared_inputs)
         column = {number: index for index, number in enumerate(shared)}
@@ -126,15 +126,32 @@ class _Codegen:
         for number in piecewise_constant:
             address = self._address("shared inputs", before, columns, column[number], None)
             was = b.load(address, typ=INTEGER, align=8)  # bits: 0.0 and -0.0 are equal
-            changed = b.or_(changed, b.icmp_signed("!=", b.bitcast(values[number], INTEGER), was))
-        widened, slots = dict(self._widened), {}
-        with b.if_then(changed):
-            self._compute(invariant)
-            for number in invariant:
-                slots[number] = self._slot(values[number])
+            changed = b.or_(changed, b.icmp_signed("!=", b.bitcast(self._values[number], INTEGER), was))
+        self._compute_where(changed, invariant, invariant)
+
+    def _compute_guarded(self, numbers: Sequence[int]) -> None:
+        """Values of a tick, those that only shared conditions ask for where these hold."""
+        loop = self._loop
+        blocks = loop.guarded_blocks(numbers, compress(loop.inputs, self._layout.shared_inputs))
+        for i, block in enumerate(blocks):
+            if block.guard is None:
+                self._compute(block.numbers)
+                continue
+            later = (loop.trace.operations[n].arguments for each in blocks[i + 1 :] for n in each.numbers)
+            used = {*loop.next_carry, *loop.outputs}.union(*later)
+            kept = [number for number in block.numbers if number in used]
+            self._compute_where(self._values[block.guard], block.numbers, kept)
+
+    def _compute_where(self, condition: Any, numbers: Sequence[int], kept: Sequence[int]) -> None:
+        """Values computed where a condition holds; some are kept in memory from tick to tick."""
+        b, widened, slots = self._builder, dict(self._widened), {}
+        with b.if_then(condition):
+            self._compute(numbers)
+            for number in kept:
+                slots[number] = self._slot(self._values[number])
         self._widened = widened  # what was widened in there is not known out here
         for number, slot in slots.items():
-            values[number] = b.load(slot, typ=slot.allocated_type)
+            self._values[number] = b.load(slot, typ=slot.allocated_type)
 
     def _log(self, tick: Any, lane: Any) -> None:
         """Store the outputs, if it is time to."""
