@@ -15,6 +15,8 @@ from aerobat.declaration import AS_IT_IS, Count, NonNegative
 from aerobat.errors import Infeasible
 from aerobat.optimization.deadline import out_of_time, within_time
 from aerobat.optimization.nonlinear import import_casadi
+from aerobat.planning.assessment.assessment import SUSPICIOUS
+from aerobat.planning.assessment.lower_bound import least_duration
 from aerobat.planning.miqp import Miqp
 from aerobat.planning.planners import Planner, option, planner
 from aerobat.planning.polynomial.knot_descent import Course, Descent
@@ -89,7 +91,11 @@ class FreeKnots(Planner):
     def _planned(
         self, problem: Problem, vehicle: Vehicle, sequence: StageSequence, recorder: Recorder
     ) -> Plan | None:
-        """The fastest certified plan from the first start that leads to one."""
+        """The fastest certified plan from the first start that leads to one; from further ones if it is slow.
+
+        A poor start leads to a poor optimum; a plan that is not slow beside what is possible is taken.
+        """
+        best: Plan | None = None
         for start in self._starts(problem, vehicle):
             guess = WarmStart.of(start, sequence)
             course = Course.of(problem, vehicle, sequence, guess)
@@ -100,11 +106,12 @@ class FreeKnots(Planner):
                     descent.run(guess, segments)
             if descent.best is None and not out_of_time():
                 descent.run(guess, 2 * self.segments)
-            if (found := descent.plan(self.segments)) is not None:
-                return found
-            if out_of_time():
+            found = descent.plan(self.segments)
+            if found is not None and (best is None or found.duration < best.duration):
+                best = found
+            if out_of_time() or (best is not None and (start is self.start or not _slow(best, vehicle))):
                 break
-        return None
+        return best
 
     def _starts(self, problem: Problem, vehicle: Vehicle) -> Iterator[Plan]:
         """Plans to begin from, the best first; the last knows no rotors."""
@@ -114,3 +121,8 @@ class FreeKnots(Planner):
         yield from plans_to_begin_from([*closed_form, Miqp(rescue=False)], problem, vehicle)
         if not out_of_time():
             yield Miqp().plan(problem)
+
+
+def _slow(plan: Plan, vehicle: Vehicle) -> bool:
+    """True for a plan that takes suspiciously long beside its proven lower bound."""
+    return plan.duration > SUSPICIOUS * least_duration(plan.problem, vehicle)
