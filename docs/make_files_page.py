@@ -18,7 +18,7 @@ from typing import Any, Literal, get_args, get_origin, get_type_hints
 
 import numpy as np
 
-from aerobat.environment import Environment
+from aerobat.environment import Battery, Dispersion, Environment, Gusts, HandOff, Imu, MotionCapture, Outage
 from aerobat.problem import (
     Attitude,
     Condition,
@@ -49,13 +49,20 @@ PLACES = {  # where each class stands in a file
     Condition: "`conditions` and `path_constraints`: lower ≤ direction · quantity ≤ upper",
     Waypoint: "`[[maneuver.waypoints]]`",
     Rotor: "`[[rotors]]`",
+    Imu: "`[imu]`",
+    MotionCapture: "`[motion_capture]`",
+    Outage: "`[motion_capture.outage]`",
+    HandOff: "`[motion_capture.hand_off]`",
+    Gusts: "`[gusts]`",
+    Battery: "`[battery]`",
 }
 INTRODUCTION = """# Files
 
 SI units; the world is ENU (x east, y north, z up), the body FLU (x forward, y left, z up, thrust along +z).
 Keys without a default must be given, themselves or by a shorthand. An unknown key is an error that names it.
-`aerobat.load_problem` and `load_vehicle` read these files, `write_problem` and `write_vehicle` write them,
-exactly. From Python, the classes below take the same fields, without the shorthands.
+`aerobat.load_problem`, `load_vehicle` and `load_dispersion` read these files, `write_problem`,
+`write_vehicle` and `write_dispersion` write them, exactly. From Python, the classes below take the same
+fields, without the shorthands.
 
 This page is written by `docs/make_files_page.py` from the declarations in the code.
 """
@@ -127,6 +134,23 @@ Without motor models rotors are the links named after rotors or propellers, and 
 momentum of turning rotors, `rollingMomentCoefficient`, other plugins, sensors, and models that are included
 but not merged. Rotors that do not push along the body's +z, xacro macros and templates are refused.
 """
+CONDITIONS = """
+What a flight meets that its plan and its controller do not know of. `none`, `lab` (the paper's flight space)
+and `field` come with Aerobat; `lab`, as an example:
+"""
+HAND_OFF = """
+To see what the hand-off alone costs, or to put it where and as bad as one likes:
+
+```python
+from dataclasses import replace
+
+import aerobat as ab
+
+lab = ab.load_dispersion("lab")
+seam = ab.HandOff(point=(4.0, 0.0, 1.0), normal=(1.0, 0.0, 0.0), translation=0.05, rotation=0.035)
+bad_seam = replace(lab, motion_capture=replace(lab.motion_capture, hand_off=seam))
+```
+"""
 
 
 def page() -> str:
@@ -141,6 +165,9 @@ def page() -> str:
     parts += [STAGES, section(Waypoint), WAYPOINTS]
     parts += ["## Vehicle (`--vehicle vehicle.toml`)\n", VEHICLE, fenced(ANNOTATED), table(Vehicle)]
     parts += [section(Rotor), ROTOR, IMPORT]
+    parts += ["## Conditions\n", CONDITIONS, preset("environment", "lab"), table(Dispersion)]
+    parts += [section(cls) for cls in (Imu, MotionCapture, Outage, HandOff)]
+    parts += [HAND_OFF, section(Gusts), section(Battery)]
     return "\n".join(part.strip("\n") + "\n" for part in parts) + "\n" + WRITTEN + by_hand
 
 

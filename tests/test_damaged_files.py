@@ -17,7 +17,7 @@ import pytest
 import tomli_w
 
 from aerobat.certification import certify
-from aerobat.environment import Environment
+from aerobat.environment import Environment, dispersion_names, load_dispersion
 from aerobat.errors import SpecError
 from aerobat.interchange import read_plan
 from aerobat.interchange.csv import write_csv
@@ -172,13 +172,17 @@ def test_two_hundred_damaged_csv_files_end_in_a_sentence_or_are_judged(plan_file
 
 
 @pytest.mark.parametrize(
-    ("load", "names"), [(load_vehicle, vehicle_names()), (load_problem, problem_names())]
+    ("load", "room", "names"),
+    [
+        (load_vehicle, "vehicle", vehicle_names()),
+        (load_problem, "problem", problem_names()),
+        (load_dispersion, "environment", dispersion_names()),
+    ],
 )
-def test_five_hundred_mutated_documents_end_in_a_sentence_or_are_read(load, names, tmp_path) -> None:
+def test_five_hundred_mutated_documents_end_in_a_sentence_or_are_read(load, room, names, tmp_path) -> None:
     import tomllib
     from importlib.resources import files
 
-    room = "vehicle" if load is load_vehicle else "problem"
     presets = [(files(f"aerobat.{room}") / "presets" / f"{name}.toml").read_bytes() for name in names]
     rng = random.Random(4)
     path = tmp_path / "mutated.toml"

@@ -1,7 +1,19 @@
 from .certification import Certificate, Envelope, certify
 from .control import Controller
 from .declaration import import_plugin
-from .environment import Environment
+from .environment import (
+    Battery,
+    Dispersion,
+    Environment,
+    Gusts,
+    HandOff,
+    Imu,
+    MotionCapture,
+    Outage,
+    dispersion_names,
+    load_dispersion,
+    write_dispersion,
+)
 from .errors import AerobatError, BackendMissing, Infeasible, SpecError
 from .evaluation import Gradient, Passage, Score, Scores, Sensitivity, score, score_flights, sensitivity
 from .flatness import Reference, reference
@@ -68,6 +80,7 @@ __all__ = [
     "Assessment",
     "Attitude",
     "BackendMissing",
+    "Battery",
     "BisectionSearch",
     "BodyState",
     "Certificate",
@@ -76,6 +89,7 @@ __all__ = [
     "ContinuityRule",
     "Controller",
     "CustomManeuver",
+    "Dispersion",
     "EndState",
     "Envelope",
     "Environment",
@@ -88,13 +102,18 @@ __all__ = [
     "GatePassage",
     "Gradient",
     "GridSearch",
+    "Gusts",
     "HalfFlip",
+    "HandOff",
+    "Imu",
     "Infeasible",
     "Limits",
     "Line",
     "Maneuver",
     "MinSnap",
     "Miqp",
+    "MotionCapture",
+    "Outage",
     "Outcome",
     "Passage",
     "Plan",
@@ -122,11 +141,13 @@ __all__ = [
     "certify",
     "compare",
     "comparison_figure",
+    "dispersion_names",
     "draw",
     "fly",
     "implausibilities",
     "import_plugin",
     "import_vehicle",
+    "load_dispersion",
     "load_flight",
     "load_plan",
     "load_problem",
@@ -156,6 +177,7 @@ __all__ = [
     "with_second_opinion",
     "write_columns",
     "write_csv",
+    "write_dispersion",
     "write_problem",
     "write_vehicle",
 ]

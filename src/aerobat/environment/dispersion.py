@@ -1,0 +1,100 @@
+"""What differs from flight to flight: the vehicle, its start, the air, its battery, what its sensors say."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Annotated, Any, ClassVar
+
+from pydantic import Field
+
+from aerobat.declaration import (
+    FieldError,
+    Label,
+    NonNegative,
+    Positive,
+    declared,
+    in_degrees,
+    in_radians,
+)
+from aerobat.environment.sensors import AngleSpread, Imu, MotionCapture, SensorRate
+
+RelativeSpread = Annotated[float, Field(ge=0, lt=1, description="number from 0, less than 1")]
+
+
+@declared
+class Gusts:
+    """Wind beyond the environment's: a horizontal mean of each flight's own, and Dryden turbulence.
+
+    The turbulence is that of MIL-F-8785C with one intensity and one length for its three components, frozen
+    and swept past the vehicle at `airspeed`: first-order along the mean wind, second-order across it.
+    """
+
+    mean_wind: NonNegative = 0.0  # [m/s] 1σ of the mean wind's two horizontal components
+    intensity: NonNegative = 0.0  # [m/s] σ of each component of the turbulence
+    length: Positive = 1.0  # [m] scale of the turbulence
+    airspeed: Positive = 5.0  # [m/s] at which the frozen turbulence is swept past
+
+
+@declared
+class Battery:
+    """A battery whose voltage falls with use, and the rotors' thrust ceilings with it.
+
+    The charge used grows by the rotors' induced power, Σ f^1.5, in units of that of a hover.
+    """
+
+    endurance: Positive  # [s] of hover, from full to empty
+    sag: RelativeSpread = 0.0  # [-] by which the thrust ceilings fall from full to empty, linearly in charge
+    charge_spread: RelativeSpread = 0.0  # [-] flights begin with charges drawn evenly from 1 − this to 1
+
+
+@declared
+class Dispersion:
+    """Conditions of a flight as it would really be flown: what varies (1σ), disturbs, and is measured how.
+
+    Factors of mass, inertia, rotors and lags are log-normal with mean 1 and the standard deviation given
+    here. Controller, observer and plan know the nominal vehicle alone. Left as it is, nothing varies, and
+    the controller sees the true state.
+
+    Raises SpecError for one sensor without the other: an observer takes both.
+    """
+
+    name: Label = "conditions"  # left out in a file, the file's
+    mass: RelativeSpread = 0.0  # [-] 1σ, relative
+    inertia: RelativeSpread = 0.0  # [-] 1σ, relative, one factor for the whole matrix
+    rotor: RelativeSpread = 0.0  # [-] 1σ, relative, of each rotor's thrust for a command
+    lag: RelativeSpread = 0.0  # [-] 1σ, relative, of each rotor's time constant
+    drag: NonNegative = 0.0  # [1/s] unmodelled, over the nominal mass, each body axis: the size of a normal
+    start_position: NonNegative = 0.0  # [m] 1σ of the true start, each axis
+    start_velocity: NonNegative = 0.0  # [m/s] 1σ of the true start, each axis
+    start_attitude: AngleSpread = 0.0  # [rad] 1σ of the true start, about each body axis
+    control_rate: SensorRate | None = None  # [1/s] of the controller; left out, the flight's
+    computation_delay: NonNegative = 0.0  # [s] from the state to the commands made of it
+    imu: Imu | None = None  # of the observer, with motion_capture; without, the true state is seen
+    motion_capture: MotionCapture | None = None  # of the observer, with imu
+    gusts: Gusts | None = None  # left out, the environment's wind alone
+    battery: Battery | None = None  # left out, always full
+    description: str = ""  # where its numbers come from
+
+    SHORTHANDS: ClassVar[Mapping[str, str]] = {"start_attitude_deg": "[deg] `start_attitude` in degrees"}
+    _RELATIVE: ClassVar[tuple[str, ...]] = ("mass", "inertia", "rotor", "lag")
+
+    def __post_init__(self) -> None:
+        if (self.imu is None) != (self.motion_capture is None):
+            missing, other = ("imu", "motion_capture") if self.imu is None else ("motion_capture", "imu")
+            raise FieldError(missing, f"is missing; an observer takes it with {other}")
+
+    def __str__(self) -> str:
+        sensors = "true state"
+        if self.imu is not None and self.motion_capture is not None:
+            sensors = f"IMU at {self.imu.rate:g} Hz, poses at {self.motion_capture.rate:g} Hz"
+        spreads = ", ".join(f"{key} {100 * getattr(self, key):.3g} %" for key in self._RELATIVE)
+        return f"{self.name}: {spreads}, {sensors}; {' '.join(self.description.split())}".removesuffix("; ")
+
+    @classmethod
+    def expand(cls, table: dict[str, Any]) -> dict[str, Any]:
+        """Replace the shorthand."""
+        return in_radians(table, "start_attitude")
+
+    def abbreviate(self, table: dict[str, Any]) -> dict[str, Any]:
+        """Write the angle in degrees."""
+        return in_degrees(table, "start_attitude")
