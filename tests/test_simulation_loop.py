@@ -30,7 +30,8 @@ def flight_of(engine: str, vehicles: Any = QUAD, duration: float = 1.0) -> Fligh
 
 
 def with_observer_period(setup: FlightSetup, period: int) -> FlightSetup:
-    return replace(setup, components=(StateObserver(period=period), *setup.components[1:]))
+    observer = replace(setup.parts[0], component=StateObserver(period=period))
+    return replace(setup, parts=(observer, *setup.parts[1:]))
 
 
 def assert_equal(a: Any, b: Any) -> None:

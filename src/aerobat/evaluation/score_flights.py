@@ -22,11 +22,13 @@ from aerobat.kernels.ops import Ops
 from aerobat.kernels.running_metrics import GatePlane, MetricsInput, MetricsParameters, RunningMetrics
 from aerobat.planning import Plan
 from aerobat.problem import Problem, as_problem
+from aerobat.simulation.config import FlightConfig
 from aerobat.simulation.loop import Signals
 from aerobat.simulation.outcome import DIVERGENCE_RADIUS
 from aerobat.simulation.passage import PASSAGE_DEPTH, PASSAGE_WINDOW
+from aerobat.simulation.prepare import prepare
 from aerobat.simulation.reference_source import BLOCK
-from aerobat.simulation.setup import FlightConfig, FlightSetup, prepare
+from aerobat.simulation.setup import FlightSetup, Part
 from aerobat.trajectory import Trajectory
 from aerobat.vehicle import Vehicle
 
@@ -128,12 +130,8 @@ def with_metrics(setup: FlightSetup, planned: tuple[PlannedPassage, ...] = ()) -
     planes = tuple(_plane(passage, vehicles) for passage in planned)
     ground = -np.inf if setup.environment.ground is None else setup.environment.ground
     parameters = MetricsParameters(np.full(vehicles, DIVERGENCE_RADIUS**2), np.full(vehicles, ground), planes)
-    return replace(
-        setup,
-        components=(*setup.components, MetricsMonitor(len(planes))),
-        parameters=setup.parameters._replace(own=(*setup.parameters.own, parameters)),
-        sources=(*setup.sources, MetricsSource(setup.times)),
-    )
+    metrics = Part(MetricsMonitor(len(planes)), parameters, MetricsSource(setup.times))
+    return replace(setup, parts=(*setup.parts, metrics))
 
 
 def _plane(passage: PlannedPassage, vehicles: int) -> GatePlane:

@@ -1,9 +1,10 @@
 """Simulation: the loop of plant, sensors and controller, and the flights that come of it."""
 
+from aerobat.simulation.config import FlightConfig
 from aerobat.simulation.flight import Flight, load_flight
 from aerobat.simulation.fly import fly
 from aerobat.simulation.noise import StateNoise
 from aerobat.simulation.outcome import Outcome
-from aerobat.simulation.setup import FlightConfig, prepare
+from aerobat.simulation.prepare import prepare
 
 __all__ = ["Flight", "FlightConfig", "Outcome", "StateNoise", "fly", "load_flight", "prepare"]

@@ -17,10 +17,12 @@ from aerobat.engines.pytree import tree_map, tree_stack
 from aerobat.environment import Environment
 from aerobat.flatness import Planned
 from aerobat.simulation.components import LogRow
+from aerobat.simulation.config import FlightConfig
 from aerobat.simulation.flight import SERIES, Flight, setpoint_rows, setpoint_series
 from aerobat.simulation.noise import body_states
 from aerobat.simulation.outcome import DIVERGENCE_RADIUS, Outcome, length
-from aerobat.simulation.setup import FlightConfig, FlightSetup, prepare
+from aerobat.simulation.prepare import prepare
+from aerobat.simulation.setup import FlightSetup
 from aerobat.states import Setpoint
 from aerobat.trajectory import Trajectory
 from aerobat.vehicle import Vehicle

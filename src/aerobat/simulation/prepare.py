@@ -1,0 +1,143 @@
+"""prepare(): who flies, from where, with which controller: a flight before it is flown."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from aerobat import so3
+from aerobat.arrays import frozen
+from aerobat.control.parameters import airframe_parameters, controller_parameters, environment_parameters
+from aerobat.declaration import validated
+from aerobat.engines.pytree import tree_map
+from aerobat.environment import Environment
+from aerobat.errors import SpecError
+from aerobat.flatness import Planned, environment_of, lateral_drag, vehicle_of
+from aerobat.kernels.rigid_body import Body
+from aerobat.simulation.components import PlantParameters, RigidBodyPlant, StateObserver, TrackingController
+from aerobat.simulation.config import FlightConfig
+from aerobat.simulation.noise import NoiseSource, bodies
+from aerobat.simulation.reference_source import ReferenceSource
+from aerobat.simulation.setup import FlightSetup, Part
+from aerobat.states import BodyState
+from aerobat.trajectory import Trajectory, as_trajectory
+from aerobat.vehicle import Vehicle, as_vehicle
+from aerobat.vehicle.fleet import Fleet
+
+
+@validated
+def prepare(
+    plan: Planned | Trajectory,
+    vehicle: Vehicle | str | Sequence[Vehicle | str] | None = None,
+    *,
+    environment: Environment | None = None,
+    config: FlightConfig = FlightConfig(),  # noqa: B008 - frozen
+    **changes: Any,
+) -> FlightSetup:
+    """All that a flight takes, to be stepped, cut or branched at will: `loop = prepare(plan).compile()`.
+
+    Then `carry = loop.init(setup.first_tick)` and, for each tick k,
+    `carry, row = loop.step(carry, setup.tick(k))`.
+
+    Args:
+        plan: what is flown; a bare trajectory needs a vehicle.
+        vehicle: what flies it, or its name, by default the plan's.
+        environment: where, by default the problem's; for a bare trajectory a calm day on Earth.
+        config: how.
+        changes: fields of FlightConfig that replace those of `config`, as `seed=3`.
+
+    Raises SpecError for arguments that do not fit together.
+    """
+    config = replace(config, **changes)
+    environment = environment_of(plan, environment)
+    flying, nominal = _broadcast_vehicles(_vehicles(plan, vehicle), config)
+    is_fleet = isinstance(vehicle, Sequence) and not isinstance(vehicle, str)
+    is_batch = is_fleet or _batch_of(config.start) != ()
+    reference = ReferenceSource(as_trajectory(plan), nominal[0], environment, config.rate)
+    fleet = Fleet.of(flying)
+    nominal_fleet = fleet if nominal is flying else Fleet.of(nominal)
+    model = controller_parameters(config.controller, nominal_fleet, environment)
+    for grounded in np.flatnonzero(~np.isfinite(model.gains.stiffness)):
+        nominal[grounded].require_hover(environment.gravity)
+    if nominal_fleet is not fleet:  # one for all
+        model = tree_map(lambda leaf: np.broadcast_to(leaf, len(fleet)), model)
+    plant = PlantParameters(airframe_parameters(fleet), environment_parameters(environment, len(fleet)))
+    errors = None
+    if config.noise is not None:
+        errors = NoiseSource(config.noise, config.seed, len(fleet) if is_batch else None)
+    return FlightSetup(
+        start=_start(config.start, reference, len(fleet)),
+        parts=(
+            Part(StateObserver(), (), errors),
+            Part(TrackingController(config.controller.feature_flags), model),
+            Part(RigidBodyPlant.for_rate(config.rate), plant),
+        ),
+        reference=reference,
+        fleet=fleet,
+        nominal=nominal_fleet,
+        environment=environment,
+        config=config,
+        is_batch=is_batch,
+    )
+
+
+def _vehicles(
+    plan: Planned | Trajectory, vehicle: Vehicle | str | Sequence[Vehicle | str] | None
+) -> list[Vehicle]:
+    """The vehicles that are named, by default the plan's own."""
+    if vehicle is None or isinstance(vehicle, Vehicle | str):
+        return [vehicle_of(plan, vehicle)]
+    return [as_vehicle(each) for each in vehicle]
+
+
+def _batch_of(start: BodyState | None) -> tuple[int, ...]:
+    return () if start is None else np.shape(start.position)[:-1]
+
+
+def _broadcast_vehicles(flying: list[Vehicle], config: FlightConfig) -> tuple[list[Vehicle], list[Vehicle]]:
+    """The vehicles that fly, one for each start, and the nominal ones."""
+    starts = _batch_of(config.start)
+    if starts and len(flying) == 1:
+        flying = flying * starts[0]
+    if not flying:
+        raise SpecError("vehicle must be at least one vehicle")
+    if starts and starts != (len(flying),):
+        raise SpecError(f"start must carry one leading axis of {len(flying)} vehicles or none, got {starts}")
+    nominal = flying if config.nominal is None else [config.nominal]
+    for controlled in nominal:
+        controlled.without_dead_rotors()
+    if len({len(each.rotors) for each in (*flying, nominal[0])}) > 1:
+        raise SpecError(
+            "vehicle: all vehicles of one flight, and the nominal one, need as many rotors; fly others apart"
+        )
+    if config.nominal is None and len({lateral_drag(each) for each in flying}) > 1:
+        raise SpecError(
+            "vehicle: vehicles that differ in drag per mass need different attitudes; fly them apart, "
+            "or give one nominal vehicle for all"
+        )
+    return flying, nominal
+
+
+def _start(start: BodyState | None, reference: ReferenceSource, vehicles: int) -> Body:
+    if start is None:
+        asked = reference.setpoint(0, 1)
+        flat = asked.flat
+        first = BodyState(flat.position[0], flat.velocity[0], asked.q_world_body[0], asked.omega_body[0])
+    else:
+        q = frozen(start.q_world_body, "start.q_world_body", (4,))
+        if (np.abs(np.linalg.norm(q, axis=-1) - 1.0) > 1e-6).any():
+            raise SpecError("start.q_world_body must be unit quaternions; divide by the norm")
+        first = BodyState(
+            frozen(start.position, "start.position", (3,)),
+            frozen(start.velocity, "start.velocity", (3,)),
+            so3.normalize(q),
+            frozen(start.omega_body, "start.omega_body", (3,)),
+        )
+    try:
+        each = {name: np.broadcast_to(part, (vehicles, part.shape[-1])) for name, part in vars(first).items()}
+    except ValueError:
+        raise SpecError(f"start must carry the same leading axis of {vehicles} in all its fields") from None
+    return bodies(BodyState(**each))
