@@ -10,17 +10,20 @@ import numpy as np
 import aerobat as ab
 from aerobat import so3
 from aerobat.arrays import Array
-from aerobat.estimation.filter_loop import NO_SLOT, FilterInput, FilterParameters
-from aerobat.estimation.settings import Ekf
-from aerobat.engines.components import components
+from aerobat.engines import choose
+from aerobat.engines.components import components, from_components
+from aerobat.engines.engine import first_row
 from aerobat.environment import Environment
-from aerobat.kernels.ekf import ImuSample, Pose
+from aerobat.estimation.filter_loop import NO_SLOT, FilterInput, FilterParameters, filter_loop
+from aerobat.estimation.settings import Ekf
+from aerobat.kernels.ekf import EkfState, ImuSample, Pose
+from aerobat.kernels.ekf.covariance import unpack
 from aerobat.simulation import fly
 from aerobat.states import BodyState
 
 RATE = 1000  # [1/s] of the IMU
 STRIDE = 10  # samples from one pose to the next
-GYRO_BIAS, ACCELEROMETER_BIAS = 0.02, 0.1  # [rad/s], [m/s²] 1σ
+SETTINGS = Ekf()
 
 
 @dataclass(frozen=True)
@@ -92,7 +95,7 @@ class Measured:
     q_world_body: Array  # (N, T // STRIDE + 1, 4)
 
 
-def measured(truth: Truth, settings: Ekf = Ekf(), seed: int = 0) -> Measured:
+def measured(truth: Truth, settings: Ekf = SETTINGS, seed: int = 0) -> Measured:
     """The truth with the errors that the settings reckon with."""
     rng = np.random.default_rng(seed)
     shape = truth.omega.shape
@@ -118,19 +121,18 @@ def measured(truth: Truth, settings: Ekf = Ekf(), seed: int = 0) -> Measured:
     )
 
 
-def inputs(measured: Measured, latency: int, slots: int) -> FilterInput:
+def inputs(measured: Measured, latency: int, slots: int, lost: slice = slice(0)) -> FilterInput:
     """The rows of a filter, an instant for each sample; `latency` is in samples."""
-    vehicles, samples = measured.omega.shape[:2]
+    samples = measured.omega.shape[1]
     tick = np.arange(1, samples + 1)
     exposed = np.where(tick % STRIDE == 0, tick // STRIDE % slots, NO_SLOT)
     due = (tick - latency) // STRIDE
     arrives = ((tick - latency) % STRIDE == 0) & (due > 0)
+    arrives &= ~np.isin(due, np.arange(measured.position.shape[1])[lost])
     pose = np.clip(due, 0, None)
     return FilterInput(
         elapsed=np.full(samples, 1.0 / RATE),
-        sample=ImuSample(
-            *(components(x.swapaxes(0, 1)) for x in (measured.omega, measured.specific_force))
-        ),
+        sample=ImuSample(*(components(x.swapaxes(0, 1)) for x in (measured.omega, measured.specific_force))),
         exposed=exposed,
         arrived=np.where(arrives, due % slots, NO_SLOT),
         measured=Pose(
@@ -139,14 +141,16 @@ def inputs(measured: Measured, latency: int, slots: int) -> FilterInput:
     )
 
 
-def parameters(measured: Measured, velocity: Array, settings: Ekf = Ekf()) -> FilterParameters:
+def parameters(measured: Measured, velocity: Array, settings: Ekf = SETTINGS) -> FilterParameters:
     """Those of filters that begin at the first poses; `velocity` (N, 3) is what is taken for it at first."""
     first = Pose(components(measured.position[:, 0]), components(measured.q_world_body[:, 0]))
     numbers = settings.parameters(Environment(), len(velocity))
     return FilterParameters(numbers, first, components(velocity))
 
 
-def random_rows_of_inputs(vehicles: int = 3, rows: int = 60) -> tuple[FilterParameters, FilterInput]:
+def measured_hover(
+    vehicles: int = 3, rows: int = 60, latency: int = 15
+) -> tuple[FilterParameters, FilterInput]:
     """A hover that is measured late, with an outlier and a jump."""
     rng = np.random.default_rng(8)
     still = Truth(
@@ -159,4 +163,60 @@ def random_rows_of_inputs(vehicles: int = 3, rows: int = 60) -> tuple[FilterPara
     seen_by = measured(still)
     seen_by.position[:, 5] += 0.3
     seen_by.position[1:, 20:] += rng.normal(0.0, 0.05, 3)
-    return parameters(seen_by, np.zeros((vehicles, 3))), inputs(seen_by, 15, 2)
+    return parameters(seen_by, np.zeros((vehicles, 3))), inputs(seen_by, latency, 2)
+
+
+@dataclass(frozen=True)
+class Filtered:
+    """What filters say of N vehicles after each sample, and how far it is from the truth."""
+
+    states: EkfState  # leaves (N, T)
+    error: Array  # of 15, (N, T, 15)
+
+    @property
+    def nees(self) -> Array:
+        """Normalized estimation error squared, (N, T)."""
+        rows = np.moveaxis(np.array(unpack(self.states.covariance)), (0, 1), (-2, -1))
+        return np.asarray(
+            np.einsum("nti,nti->nt", self.error, np.linalg.solve(rows, self.error[..., None])[..., 0])
+        )
+
+    def rms(self, part: int, since: int = 0) -> float:
+        """Of the length of one part of the error, from a sample on."""
+        errors = self.error[:, since:, 3 * part : 3 * part + 3]
+        return float(np.sqrt((errors**2).sum(axis=-1).mean()))
+
+
+def filtered(
+    truth: Truth,
+    seen: Measured,
+    latency: int = 10,
+    settings: Ekf = SETTINGS,
+    seed: int = 0,
+    lost: slice = slice(0),
+) -> Filtered:
+    """The filters' states, their first velocities off by what the settings say; some poses are lost."""
+    slots = max(1, -(-latency // STRIDE))
+    rng = np.random.default_rng([seed, 1])
+    velocity = truth.velocity[:, 0]
+    rows = inputs(seen, latency, slots, lost)
+    velocity = velocity + settings.start_velocity * rng.normal(size=velocity.shape)
+    init, step = filter_loop(slots)
+    loop = choose("auto", len(velocity), len(rows.elapsed)).compile(
+        init, step, parameters(seen, velocity, settings), first_row(rows)
+    )
+    states: EkfState = loop.scan(loop.init(first_row(rows)), rows)[1]
+    return Filtered(states, error_of(truth, seen, states))
+
+
+def error_of(truth: Truth, seen: Measured, states: EkfState) -> Array:
+    """True less estimated, (N, T, 15)."""
+    estimate = [from_components(part) for part in states.nominal]
+    parts = (
+        truth.position[:, 1:] - estimate[0],
+        truth.velocity[:, 1:] - estimate[1],
+        so3.box_minus(truth.q_world_body[:, 1:], estimate[2]),
+        seen.gyro_bias - estimate[3],
+        seen.accelerometer_bias - estimate[4],
+    )
+    return np.concatenate(parts, axis=-1)

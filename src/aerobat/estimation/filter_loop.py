@@ -1,4 +1,4 @@
-"""The filter as a loop over time: a row for each instant at which a sample ends, a pose is exposed or arrives."""
+"""The filter as a loop over time, a row for each instant: a sample ends, a pose is exposed, one arrives."""
 
 from __future__ import annotations
 
@@ -59,9 +59,7 @@ def filter_loop(slots: int) -> tuple[Init, Step]:
         predicted = ekf.predict_covariance(ops, parameters.ekf, state)
         exposures = [e._replace(age=e.age + inputs.elapsed) for e in carry[1]]
         past, age = _picked(ops, exposures, inputs.arrived)
-        state = ekf.fuse(
-            ops, parameters.ekf, predicted, inputs.measured, past, age, inputs.arrived > NO_SLOT
-        )
+        state = ekf.fuse(ops, parameters.ekf, predicted, inputs.measured, past, age, inputs.arrived > NO_SLOT)
         fresh = Exposure(ekf.pose_of(state), 0.0)
         kept = []
         for slot, exposure in enumerate(exposures):

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from math import radians
 
-
 import numpy as np
 
 from aerobat.declaration import Count, Fraction, NonNegative, Positive, declared
@@ -16,7 +15,7 @@ POSE_FREEDOMS = 6
 
 @declared
 class Ekf:
-    """Noise, biases and trust of the error-state Kalman filter; 1σ and densities, as data sheets give them."""
+    """Noise, biases and trust of the error-state Kalman filter; 1σ, densities as data sheets have them."""
 
     gyro_noise: NonNegative = 1e-3  # [rad/s/√Hz] density of the white noise
     accelerometer_noise: NonNegative = 0.02  # [m/s²/√Hz] density of the white noise
@@ -26,7 +25,7 @@ class Ekf:
     accelerometer_bias_walk: NonNegative = 1e-3  # [m/s³/√Hz] the bias spreads by this times √t
     position_noise: Positive = 0.001  # [m] 1σ of a pose, each axis
     attitude_noise: Positive = radians(0.3)  # [rad] 1σ of a pose, about each body axis
-    start_velocity: NonNegative = 0.1  # [m/s] 1σ of what is taken for the velocity at first, each axis
+    start_velocity: NonNegative = 0.05  # [m/s] 1σ of what is taken for the velocity at first, each axis
     gate_probability: Fraction = 0.9999  # of a true pose to be believed
     rejections_until_jump: Count = 5  # poses rejected in a row, the last of which is believed to be a jump
 

@@ -1,8 +1,9 @@
-"""Error-state extended Kalman filter: position, velocity, attitude and the biases of an IMU, from it and from poses.
+"""Error-state extended Kalman filter: motion and the biases of an IMU, from its samples and from poses.
 
-Solà, "Quaternion kinematics for the error-state Kalman filter", arXiv:1711.02508, sections 5 and 6, with the
-attitude error in body axes. At every IMU sample `propagate`; at every one or every few `predict_covariance`,
-and always before `fuse`, which takes a pose that may be late. It knows nothing of what it observes.
+Solà, "Quaternion kinematics for the error-state Kalman filter", arXiv:1711.02508, sections 5 and 6. The
+error of 15: position, velocity, attitude in body axes, biases of gyro and accelerometer. At every sample of
+the IMU `propagate`; at every one or every few `predict_covariance`, and always before `fuse`, which takes a
+pose that may be late. It knows nothing of what it observes.
 """
 
 from aerobat.kernels.ekf.fusion import carried_back, fuse

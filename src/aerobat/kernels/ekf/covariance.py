@@ -38,7 +38,11 @@ def error_state(components: Sequence[Scalar]) -> ErrorState:
     """The error of 15 components in its parts."""
     x = components
     return ErrorState(
-        (x[0], x[1], x[2]), (x[3], x[4], x[5]), (x[6], x[7], x[8]), (x[9], x[10], x[11]), (x[12], x[13], x[14])
+        (x[0], x[1], x[2]),
+        (x[3], x[4], x[5]),
+        (x[6], x[7], x[8]),
+        (x[9], x[10], x[11]),
+        (x[12], x[13], x[14]),
     )
 
 
@@ -71,9 +75,7 @@ def add_diagonal(rows: Rows, variances: dict[str, Scalar]) -> Rows:
 def uncorrelated(rows: Rows, part: str, variance: Scalar) -> Rows:
     """The covariance with one part of the error replaced by noise of its own."""
     replaced = _indices(part)
-    new = [
-        [0.0 if i in replaced or j in replaced else rows[i][j] for j in range(SIZE)] for i in range(SIZE)
-    ]
+    new = [[0.0 if i in replaced or j in replaced else rows[i][j] for j in range(SIZE)] for i in range(SIZE)]
     return add_diagonal(new, {part: variance})
 
 

@@ -94,9 +94,7 @@ def carried_back(before: EkfState, after: EkfState, past: Pose, age: Scalar) -> 
         age: [s] from the exposure to the fusion.
     """
     old, new = before.nominal, after.nominal
-    moved = add_scaled(
-        subtract(new.position, old.position), -age, subtract(new.velocity, old.velocity)
-    )
+    moved = add_scaled(subtract(new.position, old.position), -age, subtract(new.velocity, old.velocity))
     turned = multiply(new.q_world_body, conjugate(old.q_world_body))
     return Pose(add(past.position, moved), multiply(turned, past.q_world_body))
 

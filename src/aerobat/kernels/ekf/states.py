@@ -73,7 +73,7 @@ class EkfState(NamedTuple):
 
 
 def init(parameters: EkfParameters, pose: Pose, velocity: Vector = ZERO) -> EkfState:
-    """The state at a first pose, that of its instant; biases are unknown, as is the velocity but for a guess."""
+    """The state at a first pose and its instant; biases are unknown, the velocity is guessed."""
     variances = ErrorState(
         _each_axis(parameters.position_variance),
         _each_axis(parameters.velocity_variance),
