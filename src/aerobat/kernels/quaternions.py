@@ -49,6 +49,15 @@ def quaternion_rate(q: Quaternion, omega_body: Vector) -> Quaternion:
     return -x * a - y * b - z * c, w * a + y * c - z * b, w * b + z * a - x * c, w * c + x * b - y * a
 
 
+def exp_of_small(phi: Vector) -> Quaternion:
+    """The quaternion of a rotation vector [rad], by its series: to rounding up to 0.2, to 1e-9 up to 1."""
+    square = 0.25 * dot(phi, phi)  # of half the angle
+    cosine = 1.0 - square * (1.0 / 2.0 - square * (1.0 / 24.0 - square * (1.0 / 720.0 - square / 40320.0)))
+    sinc = 1.0 - square * (1.0 / 6.0 - square * (1.0 / 120.0 - square * (1.0 / 5040.0 - square / 362880.0)))
+    x, y, z = scale(0.5 * sinc, phi)
+    return cosine, x, y, z
+
+
 def conjugate(q: Quaternion) -> Quaternion:
     """The inverse rotation q*."""
     return q[0], -q[1], -q[2], -q[3]

@@ -1,0 +1,8 @@
+"""State estimation: the error-state Kalman filter's settings, and logs replayed through it.
+
+The public names stand in `__init__.pyi`; each is imported when first used.
+"""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

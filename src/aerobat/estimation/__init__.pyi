@@ -1,0 +1,3 @@
+from .settings import Ekf
+
+__all__ = ["Ekf"]

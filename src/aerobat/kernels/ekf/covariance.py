@@ -1,0 +1,126 @@
+"""Covariance of the error of 15: only its upper triangle is kept, so that it is symmetric by construction.
+
+Linear maps of the error are given as functions of it, which say themselves what is zero: the same function
+maps an error, and from both sides its covariance.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import NamedTuple, TypeAlias
+
+from aerobat.kernels.ops import Scalar, Vector
+
+SIZE = 15
+Covariance: TypeAlias = tuple[Scalar, ...]  # 120: the upper triangle, row by row
+Rows: TypeAlias = Sequence[Sequence[Scalar]]  # 15 x 15
+
+
+class ErrorState(NamedTuple):
+    """True state less the nominal one, of the attitude as a rotation vector: q_true = q ⊗ exp(rotation)."""
+
+    position: Vector  # [m] world
+    velocity: Vector  # [m/s] world
+    rotation: Vector  # [rad] body
+    gyro_bias: Vector  # [rad/s] body
+    accelerometer_bias: Vector  # [m/s²] body
+
+
+class Correction(NamedTuple):
+    """What measurements have said so far."""
+
+    error: ErrorState  # its mean
+    rows: Rows  # its covariance
+    nis: Scalar  # normalized innovation squared, summed
+
+
+def error_state(components: Sequence[Scalar]) -> ErrorState:
+    """The error of 15 components in its parts."""
+    x = components
+    return ErrorState(
+        (x[0], x[1], x[2]),
+        (x[3], x[4], x[5]),
+        (x[6], x[7], x[8]),
+        (x[9], x[10], x[11]),
+        (x[12], x[13], x[14]),
+    )
+
+
+def unpack(covariance: Covariance) -> Rows:
+    """All 15 x 15 components."""
+    start = [row * SIZE - row * (row + 1) // 2 for row in range(SIZE)]
+    return [[covariance[start[min(i, j)] + max(i, j)] for j in range(SIZE)] for i in range(SIZE)]
+
+
+def pack(rows: Rows) -> Covariance:
+    """The upper triangle of all components."""
+    return tuple(rows[i][j] for i in range(SIZE) for j in range(i, SIZE))
+
+
+def diagonal(variances: ErrorState) -> Rows:
+    """The covariance of errors that have nothing to do with each other."""
+    components = [variance for part in variances for variance in part]
+    return [[components[i] if i == j else 0.0 for j in range(SIZE)] for i in range(SIZE)]
+
+
+def add_diagonal(rows: Rows, variances: dict[str, Scalar]) -> Rows:
+    """The covariance with independent noise, of one variance for each axis of the parts that are named."""
+    new = [list(row) for row in rows]
+    for part, variance in variances.items():
+        for i in _indices(part):
+            new[i][i] = new[i][i] + variance
+    return new
+
+
+def uncorrelated(rows: Rows, part: str, variance: Scalar) -> Rows:
+    """The covariance with one part of the error replaced by noise of its own."""
+    replaced = _indices(part)
+    new = [[0.0 if i in replaced or j in replaced else rows[i][j] for j in range(SIZE)] for i in range(SIZE)]
+    return add_diagonal(new, {part: variance})
+
+
+def transform_part(rows: Rows, part: str, change: Callable[[ErrorState], Vector]) -> Rows:
+    """The covariance after one part of the error has become `change(error)`, a linear function."""
+    changed = [change(error_state(row)) for row in rows]  # covariance of the new part with each component
+    new = [list(row) for row in rows]
+    replaced = _indices(part)
+    for axis, i in enumerate(replaced):
+        row = [column[axis] for column in changed]
+        itself = change(error_state(row))
+        for j, value in enumerate(row):
+            if j not in replaced:
+                new[i][j] = new[j][i] = value
+        for other in range(axis, 3):
+            j = replaced[other]
+            new[i][j] = new[j][i] = itself[other]
+    return new
+
+
+def correct(
+    correction: Correction, measured: Callable[[ErrorState], Scalar], innovation: Scalar, variance: Scalar
+) -> Correction:
+    """The correction by one scalar measurement more: P − c cᵀ/s, c = P h, s = h·c + r.
+
+    Args:
+        correction: what is known before it.
+        measured: what it measures of the error, a linear function h·x.
+        innovation: measured less predicted, before any correction.
+        variance: r of its noise.
+    """
+    error, rows, nis = correction
+    c = [measured(error_state(row)) for row in rows]
+    inverse = 1.0 / (measured(error_state(c)) + variance)
+    residual = innovation - measured(error)
+    gain = [component * inverse for component in c]
+    means = [component for part in error for component in part]
+    new = [list(row) for row in rows]
+    for i in range(SIZE):
+        for j in range(i, SIZE):
+            new[i][j] = new[j][i] = rows[i][j] - gain[i] * c[j]
+    shifted = [mean + k * residual for mean, k in zip(means, gain, strict=True)]
+    return Correction(error_state(shifted), new, nis + residual * residual * inverse)
+
+
+def _indices(part: str) -> range:
+    first = 3 * ErrorState._fields.index(part)
+    return range(first, first + 3)

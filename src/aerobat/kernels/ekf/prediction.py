@@ -1,0 +1,110 @@
+"""Prediction from samples of an IMU: the nominal state, and the covariance of its error."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TypeAlias
+
+from aerobat.kernels.ekf.covariance import ErrorState, add_diagonal, pack, transform_part, unpack
+from aerobat.kernels.ekf.states import Anchor, EkfParameters, EkfState, ImuSample
+from aerobat.kernels.ops import Ops, Scalar, Vector
+from aerobat.kernels.quaternions import (
+    axes,
+    conjugate,
+    exp_of_small,
+    multiply,
+    normalize,
+    rotate,
+    to_body,
+    to_world,
+)
+from aerobat.kernels.vectors import add, add_scaled, cross, scale, subtract
+
+_SHORTEST = 1e-9  # [s] stands for no time where one divides by it
+
+Change: TypeAlias = tuple[str, Callable[[ErrorState], Vector]]
+
+
+def propagate(
+    ops: Ops, parameters: EkfParameters, state: EkfState, sample: ImuSample, elapsed: Scalar
+) -> EkfState:
+    """The nominal state after an interval; its covariance is left where it was.
+
+    The sample is a mean over the interval, so that attitude turns by exp(ω T) and the specific force is
+    rotated by the attitude half-way.
+
+    Args:
+        ops: of the arithmetic.
+        parameters: of the filter.
+        state: at the interval's start.
+        sample: of the interval.
+        elapsed: its length T [s].
+    """
+    nominal = state.nominal
+    turn = scale(elapsed, subtract(sample.omega, nominal.gyro_bias))
+    half = exp_of_small(scale(0.5, turn))
+    q_middle = multiply(nominal.q_world_body, half)
+    force = rotate(q_middle, subtract(sample.specific_force, nominal.accelerometer_bias))
+    acceleration = force[0], force[1], force[2] - parameters.gravity
+    middle = add_scaled(nominal.velocity, 0.5 * elapsed, acceleration)
+    moved = nominal._replace(
+        position=add_scaled(nominal.position, elapsed, middle),
+        velocity=add_scaled(nominal.velocity, elapsed, acceleration),
+        q_world_body=normalize(ops, multiply(q_middle, half)),
+    )
+    return state._replace(
+        nominal=moved,
+        anchor=state.anchor._replace(elapsed=state.anchor.elapsed + elapsed),
+        since_pose=state.since_pose + elapsed,
+    )
+
+
+def predict_covariance(ops: Ops, parameters: EkfParameters, state: EkfState) -> EkfState:
+    """The covariance brought from its anchor to now, whatever lies between."""
+    elapsed = state.anchor.elapsed
+    rows = unpack(state.covariance)
+    for part, change in transition(ops, parameters, state):
+        rows = transform_part(rows, part, change)
+    noise = {
+        "velocity": parameters.accelerometer_noise * elapsed,
+        "rotation": parameters.gyro_noise * elapsed,
+        "gyro_bias": parameters.gyro_walk * elapsed,
+        "accelerometer_bias": parameters.accelerometer_walk * elapsed,
+    }
+    return anchored(state._replace(covariance=pack(add_diagonal(rows, noise))))
+
+
+def anchored(state: EkfState) -> EkfState:
+    """The state whose covariance is said to be that of now."""
+    return state._replace(anchor=Anchor(state.nominal.velocity, state.nominal.q_world_body, 0.0))
+
+
+def transition(ops: Ops, parameters: EkfParameters, state: EkfState) -> tuple[Change, Change, Change]:
+    """What becomes of the error's parts from the anchor to now, one after another, to first order in time T.
+
+    δp ← δp + T δv, δv ← δv − T R (f × δθ + δb_a), δθ ← Γ δθ − T δb_g. R is the attitude at the anchor, T f
+    the change of velocity but for gravity's, in its axes, Γ = R_nowᵀ R.
+    """
+    nominal, anchor, elapsed = state.nominal, state.anchor, state.anchor.elapsed
+    body_axes = axes(anchor.q_world_body)
+    x, y, z = subtract(nominal.velocity, anchor.velocity)
+    rate = 1.0 / ops.maximum(elapsed, _SHORTEST)
+    force = to_body(body_axes, scale(rate, (x, y, z + parameters.gravity * elapsed)))
+    turn_back = axes(multiply(conjugate(nominal.q_world_body), anchor.q_world_body))
+    scaled_axes = (
+        scale(elapsed, body_axes[0]),
+        scale(elapsed, body_axes[1]),
+        scale(elapsed, body_axes[2]),
+    )
+
+    def position(error: ErrorState) -> Vector:
+        return add_scaled(error.position, elapsed, error.velocity)
+
+    def velocity(error: ErrorState) -> Vector:
+        lost = add(cross(force, error.rotation), error.accelerometer_bias)
+        return subtract(error.velocity, to_world(scaled_axes, lost))
+
+    def rotation(error: ErrorState) -> Vector:
+        return add_scaled(to_world(turn_back, error.rotation), -elapsed, error.gyro_bias)
+
+    return ("position", position), ("velocity", velocity), ("rotation", rotation)
