@@ -217,16 +217,17 @@ def _sensitivity(
 def _tangent(setup: FlightSetup, name: str, unit: Array) -> LoopParameters:
     """Derivative of the loop's parameters in a quantity, along `unit`; leaves (vehicles,)."""
     still: LoopParameters = tree_map(np.zeros_like, setup.parameters)
-    observer, model, plant, metrics = still.own
+    observer, controller, plant, metrics = still.own
     if name in _GAINS:
-        model = model._replace(gains=_gains(setup, name))
+        model = controller.model._replace(gains=_gains(setup, name))
+        controller = controller._replace(model=model)
     elif name.startswith("start."):
         return still._replace(start=_start(still.start, setup.parameters.start, name, unit))
     elif name.startswith("rotors."):
         plant = plant._replace(airframe=_rotors(plant.airframe, setup, name, unit))
     else:
         plant = plant._replace(airframe=_mass_properties(plant.airframe, setup, name, unit))
-    return still._replace(own=(observer, model, plant, metrics))
+    return still._replace(own=(observer, controller, plant, metrics))
 
 
 def _gains(setup: FlightSetup, name: str) -> Gains:

@@ -107,6 +107,28 @@ def step(
     return ControllerState(outer, integral, thrusts, commands)
 
 
+def predicted(
+    ops: Ops, model: ControllerModel, state: ControllerState, body: Body, elapsed: Scalar, delay: Scalar
+) -> Body:
+    """The body when new commands take effect, `delay` [s] from now, by the nominal model (Smith's predictor).
+
+    Until then the rotors follow the last commands, which took effect `elapsed` less `delay` ago.
+
+    Args:
+        ops: of the arithmetic.
+        model: the nominal vehicle.
+        state: after the last step.
+        body: as it is now.
+        elapsed: since the last step [s], no less than the delay.
+        delay: [s].
+    """
+    rotors = model.airframe.rotors
+    left = motors.decay_factors(ops, rotors, elapsed - delay)
+    now = motors.first_order_response(state.thrusts, state.commands.thrusts, left)
+    motion = motors.Motion(body, now)
+    return motors.advance(ops, model.airframe, model.environment, motion, state.commands.thrusts, delay).body
+
+
 def _collective(ops: Ops, mass: Scalar, b3: Vector, attitude: AttitudeCommand) -> Scalar:
     """The collective thrust [N]: the commanded specific thrust along b3, whichever way the vehicle points.
 

@@ -41,7 +41,7 @@ class Gains(NamedTuple):
 
 
 class Lookahead(NamedTuple):
-    """Reference at the next tick, when this one's commands have taken effect.
+    """Reference at the controller's next step, when this one's commands have taken effect.
 
     Its rates are taken along its own axes and then given in world axes as if those stood as now: the rotors
     turn with the body.

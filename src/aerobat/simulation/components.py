@@ -6,16 +6,26 @@ import math
 from dataclasses import dataclass
 from typing import NamedTuple
 
+import numpy as np
+
+from aerobat.arrays import Array
 from aerobat.kernels import control, motors
 from aerobat.kernels.control import Commands, ControllerModel, ControllerState, FeatureFlags
+from aerobat.kernels.control_loops import ReferencePoint
 from aerobat.kernels.motors import Airframe, Motion
-from aerobat.kernels.ops import Ops
+from aerobat.kernels.ops import Ops, PerRotor, Scalar
 from aerobat.kernels.quaternions import multiply
 from aerobat.kernels.rigid_body import Body, EnvironmentParameters
 from aerobat.kernels.vectors import add
-from aerobat.simulation.loop import Signals
+from aerobat.simulation.loop import Signals, select_tree
 
 MAX_STEP = 0.002  # [s] of RK4: enough for 1e-6 m in the fastest flips
+
+
+class Estimate(NamedTuple):
+    """What an observer knows, of which the controller takes the body."""
+
+    body: Body
 
 
 @dataclass(frozen=True)
@@ -26,15 +36,15 @@ class StateObserver:
     name: str = "observer"
     feedthrough: bool = True
 
-    def init(self, ops: Ops, parameters: tuple[()], error: Body | tuple[()], signals: Signals) -> Body:
+    def init(self, ops: Ops, parameters: tuple[()], error: Body | tuple[()], signals: Signals) -> Estimate:
         """See `Component.init`."""
-        return _observed(signals["start"], error)
+        return Estimate(_observed(signals["start"], error))
 
     def step(
-        self, ops: Ops, parameters: tuple[()], state: Body, error: Body | tuple[()], signals: Signals
-    ) -> Body:
+        self, ops: Ops, parameters: tuple[()], state: Estimate, error: Body | tuple[()], signals: Signals
+    ) -> Estimate:
         """See `Component.step`."""
-        return _observed(signals["plant"].body, error)
+        return Estimate(_observed(signals["plant"].body, error))
 
 
 def _observed(body: Body, error: Body | tuple[()]) -> Body:
@@ -48,25 +58,104 @@ def _observed(body: Body, error: Body | tuple[()]) -> Body:
     )
 
 
+class ControllerParameters(NamedTuple):
+    """A controller, and when its commands take effect."""
+
+    model: ControllerModel
+    delay: Scalar | tuple[()]  # [s] from the state to the commands made of it; () for at once
+
+
 @dataclass(frozen=True)
 class TrackingController:
-    """The tracking controller, told of the body by the observer."""
+    """The tracking controller, told of the body by the observer.
+
+    Its reference is an input of its own where its commands come late, else that of the tick.
+    """
 
     flags: FeatureFlags
     period: int = 1
     name: str = "controller"
     feedthrough: bool = True
 
-    def init(self, ops: Ops, model: ControllerModel, inputs: tuple[()], signals: Signals) -> ControllerState:
+    def init(
+        self,
+        ops: Ops,
+        parameters: ControllerParameters,
+        inputs: ReferencePoint | tuple[()],
+        signals: Signals,
+    ) -> ControllerState:
         """See `Component.init`."""
-        return control.init(ops, model, signals["observer"], signals["reference"])
+        reference = inputs or signals["reference"]
+        return control.init(ops, parameters.model, signals["observer"].body, reference)
 
     def step(
-        self, ops: Ops, model: ControllerModel, state: ControllerState, inputs: tuple[()], signals: Signals
+        self,
+        ops: Ops,
+        parameters: ControllerParameters,
+        state: ControllerState,
+        inputs: ReferencePoint | tuple[()],
+        signals: Signals,
     ) -> ControllerState:
         """See `Component.step`."""
-        elapsed = signals["clock"].elapsed
-        return control.step(ops, self.flags, model, state, signals["observer"], signals["reference"], elapsed)
+        model, delay = parameters
+        body, elapsed = signals["observer"].body, signals["clock"].elapsed
+        if delay != ():
+            body = control.predicted(ops, model, state, body, elapsed, delay)
+        return control.step(ops, self.flags, model, state, body, inputs or signals["reference"], elapsed)
+
+
+class CommandsOnTheirWay(NamedTuple):
+    """Rotor commands [N] of a controller whose computation takes time."""
+
+    in_effect: PerRotor
+    latest: PerRotor  # of the last tick, which take effect next
+
+
+@dataclass(frozen=True)
+class ComputationDelay:
+    """The controller's commands, which take effect a while after they are asked for.
+
+    Its input is 1 at the ticks at which the latest ones do, which may be those of the controller's next.
+    """
+
+    period: int = 1
+    name: str = "computation_delay"
+    feedthrough: bool = True
+
+    def init(
+        self, ops: Ops, parameters: tuple[()], takes_effect: Scalar, signals: Signals
+    ) -> CommandsOnTheirWay:
+        """See `Component.init`."""
+        thrusts = signals["controller"].commands.thrusts
+        return CommandsOnTheirWay(thrusts, thrusts)
+
+    def step(
+        self,
+        ops: Ops,
+        parameters: tuple[()],
+        state: CommandsOnTheirWay,
+        takes_effect: Scalar,
+        signals: Signals,
+    ) -> CommandsOnTheirWay:
+        """See `Component.step`."""
+        return CommandsOnTheirWay(
+            select_tree(ops, takes_effect > 0.5, state.latest, state.in_effect),
+            signals["controller"].commands.thrusts,
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class DelayTicks:
+    """The ticks at which delayed commands take effect."""
+
+    period: int  # ticks from one step of the controller to the next
+    delay: int  # ticks from a step to its commands' effect, no more than a period
+    per_vehicle: bool = False
+
+    def chunk(self, begin: int, end: int) -> Array:
+        """See `Source.chunk`."""
+        since = np.arange(begin, end) - self.delay
+        return np.asarray((since >= 0) & (since % self.period == 0), dtype=np.float64)
 
 
 class PlantParameters(NamedTuple):
@@ -99,7 +188,10 @@ class RigidBodyPlant:
     ) -> Motion:
         """See `Component.step`."""
         airframe, environment = parameters
-        commands = signals["controller"].commands.thrusts
+        if "computation_delay" in signals:
+            commands = signals["computation_delay"].in_effect
+        else:
+            commands = signals["controller"].commands.thrusts
         dt = signals["clock"].period / self.substeps
         for _ in range(self.substeps):
             motion = motors.advance(ops, airframe, environment, motion, commands, dt)

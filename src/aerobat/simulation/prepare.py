@@ -17,7 +17,13 @@ from aerobat.environment import Environment
 from aerobat.errors import SpecError
 from aerobat.flatness import Planned, environment_of, lateral_drag, vehicle_of
 from aerobat.kernels.rigid_body import Body
-from aerobat.simulation.components import PlantParameters, RigidBodyPlant, StateObserver, TrackingController
+from aerobat.simulation.components import (
+    ControllerParameters,
+    PlantParameters,
+    RigidBodyPlant,
+    StateObserver,
+    TrackingController,
+)
 from aerobat.simulation.config import FlightConfig
 from aerobat.simulation.noise import NoiseSource, bodies
 from aerobat.simulation.reference_source import ReferenceSource
@@ -72,7 +78,7 @@ def prepare(
         start=_start(config.start, reference, len(fleet)),
         parts=(
             Part(StateObserver(), (), errors),
-            Part(TrackingController(config.controller.feature_flags), model),
+            Part(TrackingController(config.controller.feature_flags), ControllerParameters(model, ())),
             Part(RigidBodyPlant.for_rate(config.rate), plant),
         ),
         reference=reference,

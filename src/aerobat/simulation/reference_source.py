@@ -22,7 +22,9 @@ BLOCK = 4096  # ticks; blocks begin at its multiples, so that no chunk's size ch
 
 
 class ReferenceSource:
-    """Set-points of a trajectory for a nominal vehicle, at the ticks of a controller."""
+    """Set-points of a trajectory for a nominal vehicle, at the ticks of a loop."""
+
+    per_vehicle = False
 
     def __init__(
         self,
@@ -30,6 +32,9 @@ class ReferenceSource:
         vehicle: Vehicle,
         environment: Environment,
         rate: float,
+        *,
+        every: int = 1,
+        delay: float = 0.0,
     ) -> None:
         """Prepare to make set-points.
 
@@ -38,12 +43,16 @@ class ReferenceSource:
             vehicle: the nominal one.
             environment: where it flies.
             rate: of the ticks [1/s].
+            every: ticks from one step of the controller to the next.
+            delay: of its commands [s], by which set-points are those of later.
         """
         self.times = trajectory.sample(rate)
         self._trajectory = trajectory
         self._vehicle = vehicle
         self._environment = environment
         self._period = 1.0 / rate
+        self._every = every
+        self._delay = delay
         self._block = -1
 
     def __len__(self) -> int:
@@ -88,9 +97,11 @@ class ReferenceSource:
         if block == self._block:
             return
         first, ticks = block * BLOCK, min(BLOCK, len(self) - block * BLOCK)
-        times = self.times[first : first + ticks + 1]
+        last = len(self) - 1
+        known = self.times[np.minimum(np.arange(first, first + ticks + self._every), last)]
+        times = np.minimum(known + self._delay, self.times[last])
         rows = reference(self._trajectory, self._vehicle, times, environment=self._environment).setpoint
-        following = np.minimum(np.arange(1, ticks + 1), len(times) - 1)
+        following = np.arange(self._every, self._every + ticks)
         self._block = block
         self._setpoint = setpoint_rows(rows, slice(ticks))
         self._points = reference_points(
@@ -108,7 +119,7 @@ def reference_points(
 
     Args:
         setpoint: at ticks, leading axis (ticks,).
-        following: one tick later.
+        following: one step of the controller later.
         environment: where; its gravity and wind count.
         vehicle: that they are for; its drag counts.
     """
