@@ -98,12 +98,28 @@ class RigidBodyPlant:
         self, ops: Ops, parameters: PlantParameters, motion: Motion, inputs: tuple[()], signals: Signals
     ) -> Motion:
         """See `Component.step`."""
-        airframe, environment = parameters
+        airframe = with_ceiling(ops, parameters.airframe, signals)
+        environment = with_wind(parameters.environment, signals)
         commands = signals["controller"].commands.thrusts
         dt = signals["clock"].period / self.substeps
         for _ in range(self.substeps):
             motion = motors.advance(ops, airframe, environment, motion, commands, dt)
         return motion
+
+
+def with_wind(environment: EnvironmentParameters, signals: Signals) -> EnvironmentParameters:
+    """The environment with the wind of this tick, where the loop has a component of that name."""
+    return environment._replace(wind=signals["wind"].velocity) if "wind" in signals else environment
+
+
+def with_ceiling(ops: Ops, airframe: Airframe, signals: Signals) -> Airframe:
+    """The airframe with what the battery leaves of its rotors' limits, where the loop has one."""
+    if "battery" not in signals:
+        return airframe
+    rotors, ceiling = airframe.rotors, signals["battery"].ceiling
+    limits = zip(rotors.min_thrust, rotors.max_thrust, strict=True)
+    lowered = tuple(ops.maximum(ceiling * high, low) for low, high in limits)
+    return airframe._replace(rotors=rotors._replace(max_thrust=lowered))
 
 
 class LogRow(NamedTuple):
