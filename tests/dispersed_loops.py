@@ -35,16 +35,10 @@ def dispersed_setup(
     setup = prepare(plan, [vehicle] * len(draws), config=config)
     fleet = dispersed_fleet(vehicle, draws)
     flights = DispersedFlights(draws, fleet, vehicle, setup.environment, RATE, problem)
-    parts = condition_parts(dispersion, flights)
-    *others, plant = setup.parameters.own
-    plant = plant._replace(airframe=airframe_parameters(fleet, flights.effectiveness))
-    return replace(
-        setup,
-        components=(*(part.component for part in parts), *setup.components),
-        parameters=setup.parameters._replace(own=(*(part.parameters for part in parts), *others, plant)),
-        sources=(*(part.source for part in parts), *setup.sources),
-        fleet=fleet,
-    )
+    observer, controller, plant = setup.parts
+    actual = plant.parameters._replace(airframe=airframe_parameters(fleet, flights.effectiveness))
+    parts = (*condition_parts(dispersion, flights), observer, controller, replace(plant, parameters=actual))
+    return replace(setup, parts=parts, fleet=fleet)
 
 
 def rows_of(setup: FlightSetup, log: Any, ticks: int | None = None) -> Tree:

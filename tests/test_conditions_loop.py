@@ -16,6 +16,7 @@ from aerobat.kernels.motors import Motion
 from aerobat.simulation.components import log_row
 from aerobat.simulation.conditions.draw import draw_flights
 from aerobat.simulation.conditions.random_source import RandomSource
+from aerobat.simulation.setup import Part
 from dispersed_loops import dispersed_setup, drawn, rows_of
 from test_flying_batches import HEXA, loops
 
@@ -58,14 +59,8 @@ class HeldPlant:
 @cache
 def held_rows(engine: str) -> list[np.ndarray]:
     setup = dispersed_setup(loops(1.0), HEXA, ALL, drawn(ALL, HEXA, 3), engine=engine)
-    parts = len(setup.components) - 3
     thrusts = tuple(np.linspace(1.0, 2.0, 3) for _ in range(6))
-    setup = replace(
-        setup,
-        components=(*setup.components[:parts], HeldPlant()),
-        parameters=setup.parameters._replace(own=(*setup.parameters.own[:parts], thrusts)),
-        sources=(*setup.sources[:parts], None),
-    )
+    setup = replace(setup, parts=(*setup.parts[:-3], Part(HeldPlant(), thrusts)))
     return tree_leaves(rows_of(setup, everything, TICKS))
 
 

@@ -42,8 +42,8 @@ def with_capture(**errors: Any) -> Dispersion:
 def sensor_of(dispersion: Dispersion, flights: int = 1) -> Any:
     """The sensor and its parameters."""
     setup = dispersed_setup(loops(1.0), QUAD, dispersion, drawn(dispersion, QUAD, flights))
-    k = [component.name for component in setup.components].index("motion_capture")
-    return setup.components[k], setup.parameters.own[k]
+    [part] = (part for part in setup.parts if part.component.name == "motion_capture")
+    return part.component, part.parameters
 
 
 def seen_by(dispersion: Dispersion, flights: int = FLIGHTS) -> tuple[np.ndarray, ...]:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -39,6 +38,7 @@ from aerobat.simulation.conditions.sensors import (
     MocapSource,
     MotionCaptureSensor,
 )
+from aerobat.simulation.setup import Part
 from aerobat.vehicle import Vehicle
 from aerobat.vehicle.fleet import Fleet
 
@@ -46,14 +46,6 @@ SLOW = 100.0  # [1/s] at which what changes slowly steps: biases, charge, and wi
 GUSTY = 20.0  # [-] steps of the wind in the time in which its gusts change
 MAX_QUEUE = 8  # poses on their way at once
 _WHOLE = 1e-6  # [-] of a tick
-
-
-class LoopPart(NamedTuple):
-    """A component, its parameters with leaves (vehicles,), and the source of its inputs or None."""
-
-    component: Any
-    parameters: Tree
-    source: Any
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,7 +82,7 @@ class DispersedFlights:
         return max(1, int(self.rate / rate + _WHOLE))
 
 
-def condition_parts(dispersion: Dispersion, flights: DispersedFlights) -> tuple[LoopPart, ...]:
+def condition_parts(dispersion: Dispersion, flights: DispersedFlights) -> tuple[Part, ...]:
     """The parts of some conditions, in their order in the loop, before observer, controller and plant.
 
     Raises SpecError for sensors whose rates do not fit the ticks, and for a hand-off that lies nowhere.
@@ -107,7 +99,7 @@ def condition_parts(dispersion: Dispersion, flights: DispersedFlights) -> tuple[
     return tuple(parts)
 
 
-def wind_part(gusts: Gusts, flights: DispersedFlights) -> LoopPart:
+def wind_part(gusts: Gusts, flights: DispersedFlights) -> Part:
     """Mean wind and gusts."""
     time_constant = gusts.length / gusts.airspeed
     period = flights.slow_period(max(SLOW, GUSTY / time_constant))
@@ -127,7 +119,7 @@ def wind_part(gusts: Gusts, flights: DispersedFlights) -> LoopPart:
         gust_filter(period / flights.rate / time_constant, len(flights.draws)),
         GustState(along, (first, second), (third, fourth)),
     )
-    return LoopPart(Wind(period), parameters, WindSource(flights.draws, period))
+    return Part(Wind(period), parameters, WindSource(flights.draws, period))
 
 
 def gust_filter(step: float, vehicles: int) -> GustFilter:
@@ -148,17 +140,17 @@ def gust_filter(step: float, vehicles: int) -> GustFilter:
     return GustFilter(a, b, c, (d, e, f))
 
 
-def battery_part(battery: Battery, flights: DispersedFlights) -> LoopPart:
+def battery_part(battery: Battery, flights: DispersedFlights) -> Part:
     """A battery that the nominal vehicle's hover empties within its endurance."""
     nominal = Fleet.of([flights.nominal])
     hover = flights.nominal.mass * flights.environment.gravity * np.abs(nominal.mixer[0, :, 0])
     hover_power = np.sum(hover**1.5 / nominal.radii[0])
     usage = flights.effectiveness**1.5 / nominal.radii[0] / hover_power / battery.endurance
     parameters = BatteryParameters(flights.each("charge"), components(usage), flights.all(battery.sag))
-    return LoopPart(BatterySag(flights.slow_period()), parameters, None)
+    return Part(BatterySag(flights.slow_period()), parameters)
 
 
-def imu_parts(imu: Imu, flights: DispersedFlights) -> tuple[LoopPart, LoopPart]:
+def imu_parts(imu: Imu, flights: DispersedFlights) -> tuple[Part, Part]:
     """An IMU's biases, and the IMU."""
     slow = flights.slow_period()
     walk = np.sqrt(slow / flights.rate)
@@ -181,12 +173,12 @@ def imu_parts(imu: Imu, flights: DispersedFlights) -> tuple[LoopPart, LoopPart]:
         ImuParameters(*map(flights.all, numbers)),
     )
     return (
-        LoopPart(ImuBias(slow), biases, ImuSource(flights.draws, "imu_bias", slow, block=8)),
-        LoopPart(ImuSensor(period), felt, ImuSource(flights.draws, "imu", period)),
+        Part(ImuBias(slow), biases, ImuSource(flights.draws, "imu_bias", slow, block=8)),
+        Part(ImuSensor(period), felt, ImuSource(flights.draws, "imu", period)),
     )
 
 
-def motion_capture_part(capture: MotionCapture, flights: DispersedFlights) -> LoopPart:
+def motion_capture_part(capture: MotionCapture, flights: DispersedFlights) -> Part:
     """Motion capture."""
     period = whole_ticks(flights.rate, capture.rate, "motion_capture.rate")
     latency = round(capture.latency * flights.rate)
@@ -209,7 +201,7 @@ def motion_capture_part(capture: MotionCapture, flights: DispersedFlights) -> Lo
         first_error=(flights.each("first_position_error"), flights.each("first_attitude_error")),
     )
     source = MocapSource(flights.draws, period, flights.rate)
-    return LoopPart(MotionCaptureSensor(period, latency), parameters, source)
+    return Part(MotionCaptureSensor(period, latency), parameters, source)
 
 
 def _seam(hand_off: HandOff | None, flights: DispersedFlights) -> Seam:
