@@ -69,7 +69,7 @@ from .reporting.comparison import comparison_figure
 from .reporting.data_frames import to_dataframe
 from .reporting.figures import draw
 from .reporting.tracking import tracking_figure
-from .simulation import Flight, FlightConfig, Outcome, StateNoise, fly, load_flight, prepare
+from .simulation import Flight, FlightConfig, Outcome, fly, load_flight, prepare
 from .states import BodyState, FlatState, Setpoint, Wrench
 from .studies.compare import Comparison, compare
 from .trajectory import ContinuityRule, Trajectory, load_trajectory, minimum_effort, save_trajectory
@@ -129,7 +129,6 @@ __all__ = [
     "SpecError",
     "Stage",
     "StageSequence",
-    "StateNoise",
     "TimeOptimal",
     "TimeScaling",
     "Trajectory",

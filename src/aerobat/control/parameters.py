@@ -21,8 +21,12 @@ _SLACK = 1e-12  # [-] of a rotor's range, for rounding
 _MIN_TIME_CONSTANT = 1e-9  # [s] a rotor without lag follows within it
 
 
-def airframe_parameters(fleet: Fleet) -> Airframe:
-    """Airframes with leaves (vehicles,)."""
+def airframe_parameters(fleet: Fleet, effectiveness: Array | None = None) -> Airframe:
+    """Airframes with leaves (vehicles,).
+
+    Thrusts of rotors with an `effectiveness` (vehicles, n) are those that nominal ones would give, and what
+    they do to the body is so many times as much.
+    """
     mass_properties = MassProperties(
         fleet.mass,
         matrix_components(fleet.inertia),
@@ -31,12 +35,13 @@ def airframe_parameters(fleet: Fleet) -> Airframe:
     )
     ranges = fleet.max_thrusts - fleet.min_thrusts
     ranges = np.where(ranges > 0.0, ranges, ranges.max(axis=-1, keepdims=True))  # dead rotors have none
+    allocation = fleet.allocation if effectiveness is None else fleet.allocation * effectiveness[:, None]
     rotors = Rotors(
         components(fleet.min_thrusts),
         components(fleet.max_thrusts),
         components(_SLACK * ranges),
         components(1.0 / np.maximum(fleet.lags, _MIN_TIME_CONSTANT)),
-        matrix_components(fleet.allocation),
+        matrix_components(allocation),
     )
     return Airframe(mass_properties, rotors)
 

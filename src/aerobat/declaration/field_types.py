@@ -182,6 +182,7 @@ NonNegative = Annotated[float, Field(ge=0, description="number ≥ 0")]
 Fraction = Annotated[float, Field(gt=0, lt=1, description="number between 0 and 1")]
 Limit = Annotated[float, Field(gt=0, allow_inf_nan=True, description="positive number, `inf` for no limit")]
 Count = Annotated[int, Field(ge=1, description="whole number, 1 or more")]
+Seed = Annotated[int, Field(ge=0, description="whole number, 0 or more")]
 AS_IT_IS = _Instance()  # Annotated[BodyState, AS_IT_IS]: an instance of a class that is not declared
 Number = Annotated[
     float,

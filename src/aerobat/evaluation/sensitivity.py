@@ -29,9 +29,9 @@ from aerobat.kernels.motors import Airframe
 from aerobat.kernels.ops import Ops, Scalar
 from aerobat.kernels.rigid_body import Body
 from aerobat.kernels.vectors import dot, subtract
+from aerobat.simulation.bodies import body_states
 from aerobat.simulation.config import FlightConfig
 from aerobat.simulation.loop import LoopInput, LoopParameters, compose
-from aerobat.simulation.noise import body_states
 from aerobat.simulation.prepare import prepare
 from aerobat.simulation.setup import FlightSetup
 from aerobat.trajectory import Trajectory

@@ -45,6 +45,11 @@ def first_order_response(thrusts: PerRotor, commands: PerRotor, decay_factors: P
     return tuple(u + (f - u) * left for f, u, left in zip(thrusts, commands, decay_factors, strict=True))
 
 
+def collective_thrust(rotors: Rotors, thrusts: PerRotor) -> Scalar:
+    """The collective thrust [N] that rotor thrusts [N] make."""
+    return _weighted_sum(rotors.allocation[0], thrusts)
+
+
 def wrench(rotors: Rotors, thrusts: PerRotor) -> Wrench:
     """The collective thrust and the moments that rotor thrusts [N] make."""
     collective, mx, my, mz = (_weighted_sum(row, thrusts) for row in rotors.allocation)

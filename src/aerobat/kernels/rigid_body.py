@@ -4,9 +4,16 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from aerobat.kernels.ops import Matrix, Ops, Quaternion, Scalar, Vector
+from aerobat.kernels.ops import Axes, Matrix, Ops, Quaternion, Scalar, Vector
 from aerobat.kernels.quaternions import axes, normalize, quaternion_rate, to_body, to_world
-from aerobat.kernels.vectors import add_scaled, cross, subtract, transform
+from aerobat.kernels.vectors import add_scaled, cross, scale, subtract, transform
+
+
+class Pose(NamedTuple):
+    """Position and attitude at one instant."""
+
+    position: Vector  # [m] world
+    q_world_body: Quaternion
 
 
 class Body(NamedTuple):
@@ -51,9 +58,8 @@ def derivative(
     Eq. (4): ω' = J⁻¹ (M − ω × Jω). Attitude: q' = ½ q ⊗ (0, ω).
     """
     body_axes = axes(body.q_world_body)
-    u, v, w = to_body(body_axes, subtract(body.velocity, environment.wind))
-    dx, dy, dz = mass_properties.drag_body
-    ax, ay, az = to_world(body_axes, (-dx * u, -dy * v, load.thrust - dz * w))
+    force_body = _force_body(mass_properties, environment, body_axes, body.velocity, load.thrust)
+    ax, ay, az = to_world(body_axes, force_body)
     lightness = 1.0 / mass_properties.mass
     gyroscopic = cross(body.omega_body, transform(mass_properties.inertia, body.omega_body))
     return Body(
@@ -62,6 +68,28 @@ def derivative(
         quaternion_rate(body.q_world_body, body.omega_body),
         transform(mass_properties.inverse_inertia, subtract(load.moment_body, gyroscopic)),
     )
+
+
+def specific_force(
+    mass_properties: MassProperties, environment: EnvironmentParameters, body: Body, thrust: Scalar
+) -> Vector:
+    """All forces but gravity over mass [m/s²], body axes: what an accelerometer feels at an instant."""
+    body_axes = axes(body.q_world_body)
+    force_body = _force_body(mass_properties, environment, body_axes, body.velocity, thrust)
+    return scale(1.0 / mass_properties.mass, force_body)
+
+
+def _force_body(
+    mass_properties: MassProperties,
+    environment: EnvironmentParameters,
+    body_axes: Axes,
+    velocity: Vector,
+    thrust: Scalar,
+) -> Vector:
+    """Thrust and drag [N], body axes."""
+    u, v, w = to_body(body_axes, subtract(velocity, environment.wind))
+    dx, dy, dz = mass_properties.drag_body
+    return -dx * u, -dy * v, thrust - dz * w
 
 
 def step(

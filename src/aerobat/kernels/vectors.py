@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from aerobat.kernels.ops import Matrix, Ops, Scalar, Vector
+from aerobat.kernels.ops import Matrix, Ops, Scalar, Vector, clip
 
 ZERO: Vector = (0.0, 0.0, 0.0)
 _TINY = 1e-300  # keeps 0/0 away and changes no other quotient
@@ -46,6 +46,20 @@ def cross(a: Vector, b: Vector) -> Vector:
 def transform(m: Matrix, a: Vector) -> Vector:
     """The matrix-vector product m·a."""
     return dot(m[0], a), dot(m[1], a), dot(m[2], a)
+
+
+def clip_components(ops: Ops, a: Vector, limit: Scalar) -> Vector:
+    """`a` with each component held within [−limit, limit]."""
+    return clip(ops, a[0], -limit, limit), clip(ops, a[1], -limit, limit), clip(ops, a[2], -limit, limit)
+
+
+def select(ops: Ops, condition: Scalar, a: Vector, b: Vector) -> Vector:
+    """`a` where the condition holds, `b` elsewhere."""
+    return (
+        ops.select(condition, a[0], b[0]),
+        ops.select(condition, a[1], b[1]),
+        ops.select(condition, a[2], b[2]),
+    )
 
 
 def clamp_norm(ops: Ops, a: Vector, longest: Scalar) -> Vector:

@@ -3,8 +3,7 @@
 from aerobat.simulation.config import FlightConfig
 from aerobat.simulation.flight import Flight, load_flight
 from aerobat.simulation.fly import fly
-from aerobat.simulation.noise import StateNoise
 from aerobat.simulation.outcome import Outcome
 from aerobat.simulation.prepare import prepare
 
-__all__ = ["Flight", "FlightConfig", "Outcome", "StateNoise", "fly", "load_flight", "prepare"]
+__all__ = ["Flight", "FlightConfig", "Outcome", "fly", "load_flight", "prepare"]

@@ -14,9 +14,7 @@ from aerobat.kernels.control import Commands, ControllerModel, ControllerState, 
 from aerobat.kernels.control_loops import ReferencePoint
 from aerobat.kernels.motors import Airframe, Motion
 from aerobat.kernels.ops import Ops, PerRotor, Scalar
-from aerobat.kernels.quaternions import multiply
 from aerobat.kernels.rigid_body import Body, EnvironmentParameters
-from aerobat.kernels.vectors import add
 from aerobat.simulation.loop import Signals, select_tree
 
 MAX_STEP = 0.002  # [s] of RK4: enough for 1e-6 m in the fastest flips
@@ -30,32 +28,21 @@ class Estimate(NamedTuple):
 
 @dataclass(frozen=True)
 class StateObserver:
-    """The true state with the errors that come as its inputs, a body, or () for none."""
+    """The true state, as if it were known."""
 
     period: int = 1
     name: str = "observer"
     feedthrough: bool = True
 
-    def init(self, ops: Ops, parameters: tuple[()], error: Body | tuple[()], signals: Signals) -> Estimate:
+    def init(self, ops: Ops, parameters: tuple[()], inputs: tuple[()], signals: Signals) -> Estimate:
         """See `Component.init`."""
-        return Estimate(_observed(signals["start"], error))
+        return Estimate(signals["start"])
 
     def step(
-        self, ops: Ops, parameters: tuple[()], state: Estimate, error: Body | tuple[()], signals: Signals
+        self, ops: Ops, parameters: tuple[()], state: Estimate, inputs: tuple[()], signals: Signals
     ) -> Estimate:
         """See `Component.step`."""
-        return Estimate(_observed(signals["plant"].body, error))
-
-
-def _observed(body: Body, error: Body | tuple[()]) -> Body:
-    if not error:
-        return body
-    return Body(
-        add(body.position, error.position),
-        add(body.velocity, error.velocity),
-        multiply(body.q_world_body, error.q_world_body),
-        add(body.omega_body, error.omega_body),
-    )
+        return Estimate(signals["plant"].body)
 
 
 class ControllerParameters(NamedTuple):
@@ -187,7 +174,8 @@ class RigidBodyPlant:
         self, ops: Ops, parameters: PlantParameters, motion: Motion, inputs: tuple[()], signals: Signals
     ) -> Motion:
         """See `Component.step`."""
-        airframe, environment = parameters
+        airframe = with_ceiling(ops, parameters.airframe, signals)
+        environment = with_wind(parameters.environment, signals)
         if "computation_delay" in signals:
             commands = signals["computation_delay"].in_effect
         else:
@@ -196,6 +184,21 @@ class RigidBodyPlant:
         for _ in range(self.substeps):
             motion = motors.advance(ops, airframe, environment, motion, commands, dt)
         return motion
+
+
+def with_wind(environment: EnvironmentParameters, signals: Signals) -> EnvironmentParameters:
+    """The environment with the wind of this tick, where the loop has a component of that name."""
+    return environment._replace(wind=signals["wind"].velocity) if "wind" in signals else environment
+
+
+def with_ceiling(ops: Ops, airframe: Airframe, signals: Signals) -> Airframe:
+    """The airframe with what the battery leaves of its rotors' limits, where the loop has one."""
+    if "battery" not in signals:
+        return airframe
+    rotors, ceiling = airframe.rotors, signals["battery"].ceiling
+    limits = zip(rotors.min_thrust, rotors.max_thrust, strict=True)
+    lowered = tuple(ops.maximum(ceiling * high, low) for low, high in limits)
+    return airframe._replace(rotors=rotors._replace(max_thrust=lowered))
 
 
 class LogRow(NamedTuple):

@@ -5,12 +5,11 @@ from __future__ import annotations
 from dataclasses import field
 from typing import Annotated, Any
 
-import numpy as np
 from pydantic import Field, PlainValidator
 
 from aerobat.control import Controller
-from aerobat.declaration import AS_IT_IS, FieldError, declared, shown
-from aerobat.simulation.noise import StateNoise
+from aerobat.declaration import AS_IT_IS, FieldError, Seed, declared, shown
+from aerobat.environment import Dispersion, as_dispersion
 from aerobat.states import BodyState
 from aerobat.vehicle import Vehicle
 
@@ -18,22 +17,37 @@ ControlRate = Annotated[float, Field(ge=1, le=1e6, description="number from 1 to
 LogRate = Annotated[float, Field(ge=1e-3, le=1e6, description="number from 0.001 to 1e6")]
 
 
-def _seed(value: Any) -> int | np.random.SeedSequence:
-    if isinstance(value, np.random.SeedSequence):
+def _conditions(value: Any) -> Dispersion | None:
+    if value is None or isinstance(value, Dispersion):
         return value
-    if not isinstance(value, int) or isinstance(value, bool) or value < 0:
-        raise FieldError("", f"must be a whole number, zero or more, or a SeedSequence, got {shown(value)}")
-    return value
+    if isinstance(value, str):
+        return as_dispersion(value)
+    raise FieldError("", f"must be a Dispersion or the name of one, got {shown(value)}")
+
+
+def _flights(value: Any) -> range | None:
+    if isinstance(value, int) and not isinstance(value, bool) and value > 0:
+        return range(value)
+    if value is None or (isinstance(value, range) and value and min(value) >= 0):
+        return value
+    raise FieldError("", f"must be a whole number of flights, or a range of theirs, got {shown(value)}")
 
 
 @declared
 class FlightConfig:
-    """Settings of a flight, whatever plan is flown."""
+    """Settings of a flight, whatever plan is flown.
+
+    Raises SpecError for flights without conditions, and for conditions beside a start or a nominal vehicle,
+    which they draw, and say, themselves.
+    """
 
     controller: Controller = field(default_factory=Controller)
-    rate: ControlRate = 500.0  # [1/s] of the controller
-    noise: StateNoise | None = None  # errors of the state that the controller sees
-    seed: Annotated[int | np.random.SeedSequence, PlainValidator(_seed)] = 0  # of the noise
+    rate: ControlRate = 500.0  # [1/s] of the controller, unless conditions say it
+    # as it would really be flown: what varies, disturbs, and is measured how; left out, as planned
+    conditions: Annotated[Dispersion | None, PlainValidator(_conditions)] = None
+    seed: Seed = 0  # of conditions
+    # of a batch under conditions, so many, or which; left out, one flight, number 0
+    flights: Annotated[range | None, PlainValidator(_flights)] = None
     start: Annotated[BodyState, AS_IT_IS] | None = None  # true, by default the trajectory's; or a batch's
     nominal: Vehicle | None = None  # that controller and set-points are made for; by default what flies
     # floats, bytecode, numpy, compiled, jax, jax-float32, or the fastest that is installed
@@ -41,12 +55,24 @@ class FlightConfig:
     log_rate: LogRate | None = None  # [1/s] of the flight's rows, rate over a whole number; by default rate
 
     def __post_init__(self) -> None:
-        stride = self.rate / (self.log_rate or self.rate)
+        if self.conditions is None:
+            if self.flights is not None:
+                raise FieldError("flights", "are drawn from conditions; give conditions too")
+        elif self.start is not None or self.nominal is not None:
+            name = "start" if self.start is not None else "nominal"
+            raise FieldError(name, "comes of the conditions; leave it out, or leave out conditions")
+        stride = self.control_rate / self.rows_rate
         if stride < 1.0 or abs(stride - round(stride)) > 1e-6 * stride:
-            complaint = f"must be rate ({self.rate:g}) over a whole number, got {self.log_rate}"
+            complaint = f"must be {self.control_rate:g} 1/s over a whole number, got {self.log_rate}"
             raise FieldError("log_rate", complaint)
 
     @property
-    def log_stride(self) -> int:
-        """The ticks from one row of the log to the next."""
-        return round(self.rate / (self.log_rate or self.rate))
+    def control_rate(self) -> float:
+        """Of the controller [1/s]."""
+        asked = None if self.conditions is None else self.conditions.control_rate
+        return asked or self.rate
+
+    @property
+    def rows_rate(self) -> float:
+        """Of the flight's rows [1/s]."""
+        return self.log_rate or self.control_rate

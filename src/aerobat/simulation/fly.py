@@ -16,10 +16,10 @@ from aerobat.engines.components import from_components
 from aerobat.engines.pytree import tree_map, tree_stack
 from aerobat.environment import Environment
 from aerobat.flatness import Planned
+from aerobat.simulation.bodies import body_states
 from aerobat.simulation.components import LogRow
 from aerobat.simulation.config import FlightConfig
 from aerobat.simulation.flight import SERIES, Flight, setpoint_rows, setpoint_series
-from aerobat.simulation.noise import body_states
 from aerobat.simulation.outcome import DIVERGENCE_RADIUS, Outcome, length
 from aerobat.simulation.prepare import prepare
 from aerobat.simulation.setup import FlightSetup
@@ -39,9 +39,9 @@ def fly(
 ) -> Flight:
     """Fly a plan in the nonlinear simulation (paper, Sections III and IV-A).
 
-    One vehicle, or a batch: a sequence of vehicles with as many rotors each, or a `start` with a leading
-    axis. Vehicle k of a batch flies as it would alone with the seed `SeedSequence(seed, spawn_key=(k,))`.
-    Divergence (5 m off, or no longer a number) ends a flight and is its outcome, not an error.
+    One vehicle, or a batch: a sequence of vehicles with as many rotors each, a `start` with a leading axis,
+    or `flights` under `conditions`. Each flies as it would alone: flight k of a seed is the same in any
+    batch. Divergence (5 m off, or no longer a number) ends a flight and is its outcome, not an error.
 
     Args:
         plan: what is flown; a bare trajectory needs a vehicle.
@@ -54,7 +54,7 @@ def fly(
     installed.
     """
     setup = prepare(plan, vehicle, environment=environment, config=config, **changes)
-    stride = setup.config.log_stride
+    stride = setup.log_stride
     engine = setup.engine()
     loop = setup.compile(engine)
     logged = logged_ticks(len(setup.times), stride)

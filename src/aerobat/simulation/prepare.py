@@ -17,6 +17,7 @@ from aerobat.environment import Environment
 from aerobat.errors import SpecError
 from aerobat.flatness import Planned, environment_of, lateral_drag, vehicle_of
 from aerobat.kernels.rigid_body import Body
+from aerobat.simulation.bodies import bodies
 from aerobat.simulation.components import (
     ControllerParameters,
     PlantParameters,
@@ -24,8 +25,8 @@ from aerobat.simulation.components import (
     StateObserver,
     TrackingController,
 )
+from aerobat.simulation.conditions.setup import dispersed_setup
 from aerobat.simulation.config import FlightConfig
-from aerobat.simulation.noise import NoiseSource, bodies
 from aerobat.simulation.reference_source import ReferenceSource
 from aerobat.simulation.setup import FlightSetup, Part
 from aerobat.states import BodyState
@@ -59,6 +60,8 @@ def prepare(
     """
     config = replace(config, **changes)
     environment = environment_of(plan, environment)
+    if config.conditions is not None:
+        return dispersed_setup(plan, _one_vehicle(plan, vehicle), environment, config, config.conditions)
     flying, nominal = _broadcast_vehicles(_vehicles(plan, vehicle), config)
     is_fleet = isinstance(vehicle, Sequence) and not isinstance(vehicle, str)
     is_batch = is_fleet or _batch_of(config.start) != ()
@@ -71,13 +74,10 @@ def prepare(
     if nominal_fleet is not fleet:  # one for all
         model = tree_map(lambda leaf: np.broadcast_to(leaf, len(fleet)), model)
     plant = PlantParameters(airframe_parameters(fleet), environment_parameters(environment, len(fleet)))
-    errors = None
-    if config.noise is not None:
-        errors = NoiseSource(config.noise, config.seed, len(fleet) if is_batch else None)
     return FlightSetup(
         start=_start(config.start, reference, len(fleet)),
         parts=(
-            Part(StateObserver(), (), errors),
+            Part(StateObserver()),
             Part(TrackingController(config.controller.feature_flags), ControllerParameters(model, ())),
             Part(RigidBodyPlant.for_rate(config.rate), plant),
         ),
@@ -87,7 +87,17 @@ def prepare(
         environment=environment,
         config=config,
         is_batch=is_batch,
+        rate=config.rate,
     )
+
+
+def _one_vehicle(
+    plan: Planned | Trajectory, vehicle: Vehicle | str | Sequence[Vehicle | str] | None
+) -> Vehicle:
+    """The nominal vehicle of flights under conditions, which draw what really flies."""
+    if vehicle is None or isinstance(vehicle, Vehicle | str):
+        return vehicle_of(plan, vehicle)
+    raise SpecError("vehicle must be one where there are conditions, which draw what really flies from it")
 
 
 def _vehicles(

@@ -56,6 +56,7 @@ class FlightSetup:
     environment: Environment
     config: FlightConfig
     is_batch: bool
+    rate: float  # [1/s] of the ticks
 
     @property
     def components(self) -> tuple[Component, ...]:
@@ -71,6 +72,11 @@ class FlightSetup:
     def times(self) -> Array:
         """Of the ticks [s]."""
         return self.reference.times
+
+    @property
+    def log_stride(self) -> int:
+        """The ticks from one row of the log to the next."""
+        return round(self.rate / self.config.rows_rate)
 
     def engine(self, copies: int = 1) -> Engine:
         """The engine asked for, or the fastest for so many copies of the vehicles."""

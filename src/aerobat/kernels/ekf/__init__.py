@@ -11,13 +11,13 @@ from aerobat.kernels.ekf.prediction import predict_covariance, propagate
 from aerobat.kernels.ekf.states import (
     EkfParameters,
     EkfState,
-    ImuSample,
     NominalState,
-    Pose,
     estimated_body,
     init,
     pose_of,
 )
+from aerobat.kernels.imu import ImuSample
+from aerobat.kernels.rigid_body import Pose
 
 __all__ = [
     "EkfParameters",

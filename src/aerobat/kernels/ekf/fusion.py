@@ -17,7 +17,7 @@ from aerobat.kernels.ekf.covariance import (
     unpack,
 )
 from aerobat.kernels.ekf.prediction import anchored
-from aerobat.kernels.ekf.states import EkfParameters, EkfState, NominalState, Pose
+from aerobat.kernels.ekf.states import EkfParameters, EkfState, NominalState
 from aerobat.kernels.ops import Ops, Scalar, Vector
 from aerobat.kernels.quaternions import (
     axes,
@@ -28,6 +28,7 @@ from aerobat.kernels.quaternions import (
     to_body,
     to_world,
 )
+from aerobat.kernels.rigid_body import Pose
 from aerobat.kernels.vectors import ZERO, add, add_scaled, dot, scale, subtract
 
 _NONE = ErrorState(ZERO, ZERO, ZERO, ZERO, ZERO)

@@ -6,7 +6,8 @@ from collections.abc import Callable
 from typing import TypeAlias
 
 from aerobat.kernels.ekf.covariance import ErrorState, add_diagonal, pack, transform_part, unpack
-from aerobat.kernels.ekf.states import Anchor, EkfParameters, EkfState, ImuSample
+from aerobat.kernels.ekf.states import Anchor, EkfParameters, EkfState
+from aerobat.kernels.imu import ImuSample
 from aerobat.kernels.ops import Ops, Scalar, Vector
 from aerobat.kernels.quaternions import (
     axes,

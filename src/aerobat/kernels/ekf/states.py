@@ -5,8 +5,9 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from aerobat.kernels.ekf.covariance import Covariance, ErrorState, diagonal, pack
+from aerobat.kernels.imu import ImuSample
 from aerobat.kernels.ops import Quaternion, Scalar, Vector
-from aerobat.kernels.rigid_body import Body
+from aerobat.kernels.rigid_body import Body, Pose
 from aerobat.kernels.vectors import ZERO, subtract
 
 
@@ -25,20 +26,6 @@ class EkfParameters(NamedTuple):
     attitude_variance: Scalar  # [rad²] of poses, about each axis
     max_nis: Scalar  # [-] of a pose that is believed
     max_rejections: Scalar  # [-] in a row, the last of which is believed to be a jump and taken
-
-
-class ImuSample(NamedTuple):
-    """Means over the time since the sample before, biases included; body axes."""
-
-    omega: Vector  # [rad/s]
-    specific_force: Vector  # [m/s²]
-
-
-class Pose(NamedTuple):
-    """Position and attitude at one instant."""
-
-    position: Vector  # [m] world
-    q_world_body: Quaternion
 
 
 class NominalState(NamedTuple):

@@ -1,0 +1,90 @@
+"""Motion capture of two camera systems: poses with noise, a misfit beyond a plane, outliers and gaps."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from aerobat.kernels.ops import Ops, Scalar, Vector
+from aerobat.kernels.quaternions import multiply, normalize, rotate
+from aerobat.kernels.rigid_body import Body, Pose
+from aerobat.kernels.vectors import add, add_scaled, dot, scale, select, subtract
+
+
+class PoseSample(NamedTuple):
+    """A pose as it was measured, if it was."""
+
+    pose: Pose
+    is_valid: Scalar  # 1, or 0 for a gap
+
+
+class Seam(NamedTuple):
+    """The plane where the second system takes over, and its misfit."""
+
+    point: Vector  # [m] of the plane
+    normal: Vector  # to the second system
+    offset: Pose  # of the second system's axes, turned about the point
+    warp: Vector  # [m] displacement at the plane, of either system
+    inverse_depth: Scalar  # [1/m] over which the warp fades
+
+
+class MocapParameters(NamedTuple):
+    """Errors of a motion capture."""
+
+    position_noise: Scalar  # [m]
+    attitude_noise: Scalar  # [rad]
+    dropout: Scalar  # [-]
+    outlier: Scalar  # [-]
+    outlier_size: Scalar  # [m]
+    outage: tuple[Scalar, Scalar]  # [s] from, to before
+    seam: Seam
+    first_error: tuple[Vector, Vector]  # [m], [rad] of the pose before the flight
+
+
+class MocapInput(NamedTuple):
+    """Time and chance at a sample."""
+
+    time: Scalar  # [s] since the flight's start
+    position: Vector  # standard normals
+    attitude: Vector  # standard normals
+    outlier: Vector  # standard normals
+    chances: tuple[Scalar, Scalar]  # uniform in [0, 1), of a dropout and of an outlier
+
+
+def first_pose(ops: Ops, parameters: MocapParameters, body: Body) -> Pose:
+    """The pose known before the flight, with an error of its own."""
+    seen = as_seen(ops, parameters.seam, Pose(body.position, body.q_world_body))
+    return _with_errors(ops, seen, *parameters.first_error)
+
+
+def sample(ops: Ops, parameters: MocapParameters, body: Body, inputs: MocapInput) -> PoseSample:
+    """The pose that is taken of a body."""
+    seen = as_seen(ops, parameters.seam, Pose(body.position, body.q_world_body))
+    dropout, outlier = inputs.chances
+    mistaken = ops.select(outlier < parameters.outlier, parameters.outlier_size, 0.0)
+    error = add_scaled(scale(parameters.position_noise, inputs.position), mistaken, inputs.outlier)
+    pose = _with_errors(ops, seen, error, scale(parameters.attitude_noise, inputs.attitude))
+    begin, end = parameters.outage
+    is_out = (begin <= inputs.time) & (inputs.time < end)
+    is_taken = ops.select(parameters.dropout <= dropout, 1.0, 0.0)
+    return PoseSample(pose, ops.select(is_out, 0.0, is_taken))
+
+
+def as_seen(ops: Ops, seam: Seam, pose: Pose) -> Pose:
+    """The pose that a system without noise shows: of the second one beyond the plane, warped near it."""
+    from_point = subtract(pose.position, seam.point)
+    distance = dot(seam.normal, from_point)
+    moved = add(add(seam.point, rotate(seam.offset.q_world_body, from_point)), seam.offset.position)
+    turned = multiply(seam.offset.q_world_body, pose.q_world_body)
+    is_beyond = distance > 0.0
+    depths = distance * seam.inverse_depth
+    position = add_scaled(
+        select(ops, is_beyond, moved, pose.position), ops.exp(-0.5 * depths * depths), seam.warp
+    )
+    w, x, y, z = (ops.select(is_beyond, a, b) for a, b in zip(turned, pose.q_world_body, strict=True))
+    return Pose(position, (w, x, y, z))
+
+
+def _with_errors(ops: Ops, pose: Pose, position: Vector, attitude: Vector) -> Pose:
+    """The pose with small errors [m] world and [rad] about body axes."""
+    small_rotation = normalize(ops, (1.0, *scale(0.5, attitude)))
+    return Pose(add(pose.position, position), multiply(pose.q_world_body, small_rotation))

@@ -1,0 +1,1 @@
+"""Flights as they would really be flown: what each draws, and the components that bring it about."""

@@ -1,0 +1,251 @@
+"""Conditions as parts of the loop: components, what they are made of, and where their inputs come from."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from aerobat import so3
+from aerobat.arrays import Array
+from aerobat.control.parameters import airframe_parameters, environment_parameters
+from aerobat.declaration import unit
+from aerobat.engines.components import components
+from aerobat.engines.pytree import Tree
+from aerobat.environment import (
+    Battery,
+    Dispersion,
+    Environment,
+    Gusts,
+    HandOff,
+    Imu,
+    MotionCapture,
+)
+from aerobat.errors import SpecError
+from aerobat.kernels.battery import BatteryParameters
+from aerobat.kernels.imu import BiasParameters, ImuParameters, ImuSample
+from aerobat.kernels.mocap import MocapParameters, Seam
+from aerobat.kernels.rigid_body import Pose
+from aerobat.kernels.wind import GustFilter, GustState, WindParameters
+from aerobat.problem import Problem
+from aerobat.simulation.conditions.disturbances import BatterySag, Wind, WindSource
+from aerobat.simulation.conditions.draw import Draw
+from aerobat.simulation.conditions.sensors import (
+    FeltParameters,
+    ImuBias,
+    ImuSensor,
+    ImuSource,
+    MocapSource,
+    MotionCaptureSensor,
+)
+from aerobat.simulation.setup import Part
+from aerobat.vehicle import Vehicle
+from aerobat.vehicle.fleet import Fleet
+
+SLOW = 100.0  # [1/s] at which what changes slowly steps: biases, charge, and wind that is not gustier
+GUSTY = 20.0  # [-] steps of the wind in the time in which its gusts change
+MAX_QUEUE = 8  # poses on their way at once
+_WHOLE = 1e-6  # [-] of a tick
+
+
+@dataclass(frozen=True, eq=False)
+class DispersedFlights:
+    """What conditions are made for."""
+
+    draws: Sequence[Draw]
+    fleet: Fleet  # that really flies
+    nominal: Vehicle
+    environment: Environment
+    rate: float  # [1/s] of the ticks
+    problem: Problem | None = None  # whose gates, start and goal say where a hand-off lies that does not
+
+    def each(self, name: str) -> Tree:
+        """A field of the draws: a leaf (vehicles,), or for an array a tuple of them."""
+        values = np.array([getattr(draw, name) for draw in self.draws])
+        return values if values.ndim == 1 else components(values)
+
+    def all(self, value: float) -> Array:
+        """A number for every vehicle."""
+        return np.full(len(self.draws), value)
+
+    def vector(self, value: Array) -> Tree:
+        """A vector (3,) for every vehicle."""
+        return tuple(map(self.all, value))
+
+    @property
+    def effectiveness(self) -> Array:
+        """Of the rotors [-], (vehicles, n)."""
+        return np.array([draw.effectiveness for draw in self.draws])
+
+    def slow_period(self, rate: float = SLOW) -> int:
+        """The ticks of a step at so many a second, or of the next faster one."""
+        return max(1, int(self.rate / rate + _WHOLE))
+
+
+def condition_parts(dispersion: Dispersion, flights: DispersedFlights) -> tuple[Part, ...]:
+    """The parts of some conditions, in their order in the loop, before observer, controller and plant.
+
+    Raises SpecError for sensors whose rates do not fit the ticks, and for a hand-off that lies nowhere.
+    """
+    parts = []
+    if dispersion.gusts is not None:
+        parts.append(wind_part(dispersion.gusts, flights))
+    if dispersion.battery is not None:
+        parts.append(battery_part(dispersion.battery, flights))
+    if dispersion.imu is not None:
+        parts += imu_parts(dispersion.imu, flights)
+    if dispersion.motion_capture is not None:
+        parts.append(motion_capture_part(dispersion.motion_capture, flights))
+    return tuple(parts)
+
+
+def wind_part(gusts: Gusts, flights: DispersedFlights) -> Part:
+    """Mean wind and gusts."""
+    time_constant = gusts.length / gusts.airspeed
+    period = flights.slow_period(max(SLOW, GUSTY / time_constant))
+    mean = flights.environment.wind + np.array([draw.mean_wind for draw in flights.draws])
+    speed = np.hypot(mean[:, 0], mean[:, 1])
+    heading = np.array([draw.gust_heading for draw in flights.draws])
+    is_calm = speed == 0.0
+    divisor = np.where(is_calm, 1.0, speed)
+    along, first, second, third, fourth = flights.each("gust")
+    parameters = WindParameters(
+        components(mean),
+        (
+            np.where(is_calm, np.cos(heading), mean[:, 0] / divisor),
+            np.where(is_calm, np.sin(heading), mean[:, 1] / divisor),
+        ),
+        flights.all(gusts.intensity),
+        gust_filter(period / flights.rate / time_constant, len(flights.draws)),
+        GustState(along, (first, second), (third, fourth)),
+    )
+    return Part(Wind(period), parameters, WindSource(flights.draws, period))
+
+
+def gust_filter(step: float, vehicles: int) -> GustFilter:
+    """The exact discretisation of the gusts' filters over `step` of their time constants [-].
+
+    The two filters of a component across have the stationary covariance P = (1/2, 1/4; 1/4, 1/4) and the
+    transition Φ = e^(−h) (1, 0; h, 1); their inputs have the covariance P − Φ P Φᵀ.
+    """
+    decay = np.exp(-step)
+    lost = -np.expm1(-2.0 * step)  # 1 − e^(−2h)
+    kept = decay**2
+    first = np.sqrt(0.5 * lost)
+    both = 0.25 * lost - 0.5 * kept * step
+    second = 0.25 * lost - 0.5 * kept * (step + step**2)
+    cross = both / first
+    numbers = (decay, step * decay, np.sqrt(lost), first, cross, np.sqrt(max(second - cross**2, 0.0)))
+    a, b, c, d, e, f = (np.full(vehicles, x) for x in numbers)
+    return GustFilter(a, b, c, (d, e, f))
+
+
+def battery_part(battery: Battery, flights: DispersedFlights) -> Part:
+    """A battery that the nominal vehicle's hover empties within its endurance."""
+    nominal = Fleet.of([flights.nominal])
+    hover = flights.nominal.mass * flights.environment.gravity * np.abs(nominal.mixer[0, :, 0])
+    hover_power = np.sum(hover**1.5 / nominal.radii[0])
+    usage = flights.effectiveness**1.5 / nominal.radii[0] / hover_power / battery.endurance
+    parameters = BatteryParameters(flights.each("charge"), components(usage), flights.all(battery.sag))
+    return Part(BatterySag(flights.slow_period()), parameters)
+
+
+def imu_parts(imu: Imu, flights: DispersedFlights) -> tuple[Part, Part]:
+    """An IMU's biases, and the IMU."""
+    slow = flights.slow_period()
+    walk = np.sqrt(slow / flights.rate)
+    biases = BiasParameters(
+        ImuSample(flights.each("gyro_bias"), flights.each("accelerometer_bias")),
+        flights.all(imu.gyro_bias_walk * walk),
+        flights.all(imu.accelerometer_bias_walk * walk),
+    )
+    period = whole_ticks(flights.rate, imu.rate, "imu.rate")
+    noise = np.sqrt(imu.rate)
+    numbers = (
+        imu.gyro_noise * noise,
+        imu.accelerometer_noise * noise,
+        imu.gyro_range,
+        imu.accelerometer_range,
+    )
+    felt = FeltParameters(
+        airframe_parameters(flights.fleet, flights.effectiveness),
+        environment_parameters(flights.environment, len(flights.draws)),
+        ImuParameters(*map(flights.all, numbers)),
+    )
+    return (
+        Part(ImuBias(slow), biases, ImuSource(flights.draws, "imu_bias", slow, block=8)),
+        Part(ImuSensor(period), felt, ImuSource(flights.draws, "imu", period)),
+    )
+
+
+def motion_capture_part(capture: MotionCapture, flights: DispersedFlights) -> Part:
+    """Motion capture."""
+    period = whole_ticks(flights.rate, capture.rate, "motion_capture.rate")
+    latency = round(capture.latency * flights.rate)
+    if latency >= MAX_QUEUE * period:
+        raise SpecError(
+            f"motion_capture.latency must be below {MAX_QUEUE} periods of its rate, "
+            f"{MAX_QUEUE / capture.rate:g} s, got {capture.latency:g} s"
+        )
+    begin = end = np.inf
+    if capture.outage is not None:
+        begin, end = capture.outage.start, capture.outage.start + capture.outage.duration
+    parameters = MocapParameters(
+        position_noise=flights.all(capture.position_noise),
+        attitude_noise=flights.all(capture.attitude_noise),
+        dropout=flights.all(capture.dropout),
+        outlier=flights.all(capture.outlier),
+        outlier_size=flights.all(capture.outlier_size),
+        outage=(flights.all(begin), flights.all(end)),
+        seam=_seam(capture.hand_off, flights),
+        first_error=(flights.each("first_position_error"), flights.each("first_attitude_error")),
+    )
+    source = MocapSource(flights.draws, period, flights.rate)
+    return Part(MotionCaptureSensor(period, latency), parameters, source)
+
+
+def _seam(hand_off: HandOff | None, flights: DispersedFlights) -> Seam:
+    """The plane of hand-off; without one, any plane, and no misfit."""
+    point, normal = (np.zeros(3), so3.UP) if hand_off is None else hand_off_plane(hand_off, flights.problem)
+    rotation = so3.exp(np.array([draw.hand_off_rotation for draw in flights.draws]))
+    return Seam(
+        flights.vector(point),
+        flights.vector(normal),
+        Pose(flights.each("hand_off_translation"), components(rotation)),
+        flights.each("warp"),
+        flights.all(1.0 / (hand_off or HandOff()).warp_depth),
+    )
+
+
+def hand_off_plane(hand_off: HandOff, problem: Problem | None) -> tuple[Array, Array]:
+    """Point [m] and unit normal of the plane of hand-off, (3,) each, in a problem if it does not say itself.
+
+    Raises SpecError where neither it, nor gates, nor start and goal tell.
+    """
+    point, normal = hand_off.point, hand_off.normal
+    gate = problem.gates[0] if problem is not None and problem.gates else None
+    if gate is not None:
+        point = gate.position if point is None else point
+        normal = gate.normal if normal is None else normal
+    if point is not None and normal is not None:
+        return point, normal
+    way = np.zeros(3) if problem is None else problem.goal.position - problem.start.position
+    if problem is None or not way.any():
+        missing = "point" if point is None else "normal"
+        raise SpecError(
+            f"motion_capture.hand_off.{missing} is missing: without a gate, and a goal elsewhere, "
+            "nothing else says where the second system begins"
+        )
+    middle = problem.start.position + 0.5 * way
+    return middle if point is None else point, unit(way) if normal is None else normal
+
+
+def whole_ticks(rate: float, sensor_rate: float, field: str) -> int:
+    """The ticks, at `rate` [1/s], of a sensor's period. Raises SpecError, naming its field, for fractions."""
+    ticks = rate / sensor_rate
+    if ticks < 1.0 - _WHOLE or abs(ticks - round(ticks)) > _WHOLE * ticks:
+        raise SpecError(
+            f"{field} must be the simulation's rate ({rate:g} 1/s) over a whole number, got {sensor_rate:g}"
+        )
+    return round(ticks)

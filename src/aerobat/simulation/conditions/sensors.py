@@ -1,0 +1,167 @@
+"""The loop's components that measure: an IMU with its walking biases, and motion capture with its latency."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from aerobat.arrays import Mask
+from aerobat.kernels import imu, mocap, motors, rigid_body
+from aerobat.kernels.imu import BiasParameters, ImuParameters, ImuSample, ImuState
+from aerobat.kernels.mocap import MocapInput, MocapParameters, PoseSample
+from aerobat.kernels.motors import Airframe
+from aerobat.kernels.ops import Ops
+from aerobat.kernels.rigid_body import EnvironmentParameters
+from aerobat.simulation.components import with_wind
+from aerobat.simulation.conditions.draw import Draw
+from aerobat.simulation.conditions.random_source import RandomSource
+from aerobat.simulation.loop import Signals
+
+
+@dataclass(frozen=True)
+class ImuBias:
+    """The biases of an IMU, held from one step to the next."""
+
+    period: int = 1
+    name: str = "imu_bias"
+    feedthrough: bool = True
+
+    def init(self, ops: Ops, parameters: BiasParameters, noise: ImuSample, signals: Signals) -> ImuSample:
+        """See `Component.init`."""
+        return parameters.start
+
+    def step(
+        self, ops: Ops, parameters: BiasParameters, bias: ImuSample, noise: ImuSample, signals: Signals
+    ) -> ImuSample:
+        """See `Component.step`."""
+        return imu.walk(parameters, bias, noise)
+
+
+class FeltParameters(NamedTuple):
+    """An IMU, and what it is carried by."""
+
+    airframe: Airframe
+    environment: EnvironmentParameters
+    errors: ImuParameters
+
+
+@dataclass(frozen=True)
+class ImuSensor:
+    """An IMU at the centre of mass, biased as `imu_bias` says; its sample ends at the tick of its step."""
+
+    period: int = 1
+    name: str = "imu"
+    feedthrough: bool = True
+
+    def init(self, ops: Ops, parameters: FeltParameters, noise: ImuSample, signals: Signals) -> ImuState:
+        """See `Component.init`."""
+        return imu.init()
+
+    def step(
+        self, ops: Ops, parameters: FeltParameters, state: ImuState, noise: ImuSample, signals: Signals
+    ) -> ImuState:
+        """See `Component.step`."""
+        body, thrusts = signals["plant"]
+        thrust = motors.collective_thrust(parameters.airframe.rotors, thrusts)
+        environment = with_wind(parameters.environment, signals)
+        force = rigid_body.specific_force(parameters.airframe.mass_properties, environment, body, thrust)
+        felt = ImuSample(body.omega_body, force)
+        return imu.step(ops, parameters.errors, state, felt, signals["imu_bias"], noise)
+
+
+class ImuSource:
+    """Random numbers of an IMU's white noise, or of the walk of its biases."""
+
+    per_vehicle = True
+
+    def __init__(self, draws: Sequence[Draw], stream: str, period: int, block: int = 64) -> None:
+        """Prepare to draw.
+
+        Args:
+            draws: of each vehicle.
+            stream: "imu" or "imu_bias".
+            period: ticks from one sample to the next.
+            block: samples drawn at once.
+        """
+        seeds = [each.stream(stream) for each in draws]
+        self._numbers = RandomSource(seeds, normals=6, period=period, block=block)
+
+    def chunk(self, begin: int, end: int) -> ImuSample:
+        """See `Source.chunk`."""
+        a, b, c, d, e, f = self._numbers.rows(begin, end)
+        return ImuSample((a, b, c), (d, e, f))
+
+
+class MocapState(NamedTuple):
+    """Poses on their way, the latest first."""
+
+    queue: tuple[PoseSample, ...]
+
+    @property
+    def delivered(self) -> PoseSample:
+        """The one that arrives or has arrived last, at ticks from its arrival to its successor's exposure."""
+        return self.queue[-1]
+
+
+@dataclass(frozen=True)
+class MotionCaptureSensor:
+    """Motion capture: a pose is taken at every step, and arrives `latency` ticks later.
+
+    It steps at exposures alone. Of tick t with `arrives([t])`, `signals["motion_capture"].delivered` is the
+    pose of tick t − latency. Before the first arrival it is a pose from before the flight, not valid as a
+    measurement, with an error of its own.
+    """
+
+    period: int = 1
+    latency: int = 0  # ticks
+    name: str = "motion_capture"
+    feedthrough: bool = True
+
+    def init(self, ops: Ops, parameters: MocapParameters, inputs: MocapInput, signals: Signals) -> MocapState:
+        """See `Component.init`."""
+        known = PoseSample(mocap.first_pose(ops, parameters, signals["start"]), 0.0)
+        return MocapState((known,) * (self.latency // self.period + 1))
+
+    def step(
+        self,
+        ops: Ops,
+        parameters: MocapParameters,
+        state: MocapState,
+        inputs: MocapInput,
+        signals: Signals,
+    ) -> MocapState:
+        """See `Component.step`."""
+        taken = mocap.sample(ops, parameters, signals["plant"].body, inputs)
+        return MocapState((taken, *state.queue[:-1]))
+
+    def arrives(self, ticks: np.ndarray) -> Mask:
+        """True for ticks at which a pose of this flight arrives."""
+        since = np.asarray(ticks) - self.latency
+        return np.asarray((since >= 0) & (since % self.period == 0))
+
+
+class MocapSource:
+    """Time, and random numbers of motion capture."""
+
+    per_vehicle = True
+
+    def __init__(self, draws: Sequence[Draw], period: int, rate: float) -> None:
+        """Prepare to draw.
+
+        Args:
+            draws: of each vehicle.
+            period: ticks from one sample to the next.
+            rate: of the ticks [1/s].
+        """
+        seeds = [each.stream("motion_capture") for each in draws]
+        self._numbers = RandomSource(seeds, normals=9, uniforms=2, period=period, block=8)
+        self._rate = rate
+
+    def chunk(self, begin: int, end: int) -> MocapInput:
+        """See `Source.chunk`."""
+        x = self._numbers.rows(begin, end)
+        time = np.arange(begin, end) / self._rate
+        return MocapInput(time, (x[0], x[1], x[2]), (x[3], x[4], x[5]), (x[6], x[7], x[8]), (x[9], x[10]))

@@ -1,0 +1,145 @@
+"""Flights under conditions before they are flown: who really flies, from where, seen by which sensors."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from aerobat import so3
+from aerobat.control.parameters import airframe_parameters, controller_parameters, environment_parameters
+from aerobat.engines.pytree import tree_map
+from aerobat.environment import Dispersion, Environment
+from aerobat.errors import SpecError
+from aerobat.estimation import Ekf, ekf_parameters
+from aerobat.flatness import Planned
+from aerobat.kernels.rigid_body import Body
+from aerobat.simulation.bodies import bodies
+from aerobat.simulation.components import (
+    ComputationDelay,
+    ControllerParameters,
+    DelayTicks,
+    PlantParameters,
+    RigidBodyPlant,
+    StateObserver,
+    TrackingController,
+)
+from aerobat.simulation.conditions.draw import dispersed_fleet, draw_flights
+from aerobat.simulation.conditions.observer import EkfObserver, ObserverParameters, ObserverSource
+from aerobat.simulation.conditions.parts import DispersedFlights, condition_parts, whole_ticks
+from aerobat.simulation.conditions.sensors import MotionCaptureSensor
+from aerobat.simulation.config import FlightConfig
+from aerobat.simulation.reference_source import ReferenceSource
+from aerobat.simulation.setup import FlightSetup, Part
+from aerobat.states import BodyState
+from aerobat.trajectory import Trajectory, as_trajectory
+from aerobat.vehicle import Vehicle
+from aerobat.vehicle.fleet import Fleet
+
+_LEAST_START_VELOCITY = 0.01  # [m/s] 1σ that the filter reckons with at least
+
+
+def dispersed_setup(
+    plan: Planned | Trajectory,
+    nominal: Vehicle,
+    environment: Environment,
+    config: FlightConfig,
+    conditions: Dispersion,
+) -> FlightSetup:
+    """The flights of a config under its conditions.
+
+    Args:
+        plan: what is flown.
+        nominal: the vehicle that the controller knows.
+        environment: where, without gusts.
+        config: whose seed and flights are drawn.
+        conditions: what they are drawn from.
+
+    Raises SpecError for a vehicle that cannot hover, for rates that do not fit each other, a delay of more
+    than a period of the controller, and a hand-off that lies nowhere.
+    """
+    nominal.without_dead_rotors()
+    rate = config.control_rate if conditions.imu is None else conditions.imu.rate
+    numbers = config.flights or range(1)
+    draws = draw_flights(conditions, len(nominal.rotors), config.seed, numbers)
+    flights = DispersedFlights(
+        draws=draws,
+        fleet=dispersed_fleet(nominal, draws),
+        nominal=nominal,
+        environment=environment,
+        rate=rate,
+        problem=None if isinstance(plan, Trajectory) else plan.problem,
+    )
+    reference = ReferenceSource(as_trajectory(plan), nominal, environment, rate)
+    disturbed = condition_parts(conditions, flights)
+    airframe = airframe_parameters(flights.fleet, flights.effectiveness)
+    plant = PlantParameters(airframe, environment_parameters(environment, len(draws)))
+    return FlightSetup(
+        start=_start(reference, flights),
+        parts=(
+            *disturbed,
+            _observer(conditions, flights, disturbed),
+            *_controller(conditions, flights, config, as_trajectory(plan)),
+            Part(RigidBodyPlant.for_rate(rate), plant),
+        ),
+        reference=reference,
+        fleet=flights.fleet,
+        nominal=Fleet.of([nominal]),
+        environment=environment,
+        config=config,
+        is_batch=config.flights is not None,
+        rate=rate,
+    )
+
+
+def _start(reference: ReferenceSource, flights: DispersedFlights) -> Body:
+    asked = reference.setpoint(0, 1)
+    flat = asked.flat
+    planned = BodyState(flat.position[0], flat.velocity[0], asked.q_world_body[0], asked.omega_body[0])
+    drawn = [vars(draw.start(planned)) for draw in flights.draws]
+    stacked = {name: np.array([each[name] for each in drawn]) for name in drawn[0]}
+    stacked["q_world_body"] = so3.normalize(stacked["q_world_body"])
+    return bodies(BodyState(**stacked))
+
+
+def _observer(conditions: Dispersion, flights: DispersedFlights, disturbed: Sequence[Part]) -> Part:
+    """The filter behind the sensors, where there are any, or the true state."""
+    imu, capture = conditions.imu, conditions.motion_capture
+    if imu is None or capture is None:
+        return Part(StateObserver())
+    sensor = next(p.component for p in disturbed if isinstance(p.component, MotionCaptureSensor))
+    settings = Ekf.of_sensors(imu, capture, max(conditions.start_velocity, _LEAST_START_VELOCITY))
+    parameters = ekf_parameters(settings, flights.environment.gravity, len(flights.draws))
+    return Part(
+        EkfObserver(sensor.period, sensor.latency),
+        ObserverParameters(parameters, flights.all(1.0 / flights.rate)),
+        ObserverSource(sensor, flights.rate),
+    )
+
+
+def _controller(
+    conditions: Dispersion, flights: DispersedFlights, config: FlightConfig, trajectory: Trajectory
+) -> tuple[Part, ...]:
+    """The controller at its own period, its reference that of its commands' effect, and its delay."""
+    nominal, environment, rate = flights.nominal, flights.environment, flights.rate
+    model = controller_parameters(config.controller, Fleet.of([nominal]), environment)
+    if not np.isfinite(model.gains.stiffness).all():
+        nominal.require_hover(environment.gravity)
+    model = tree_map(lambda leaf: np.broadcast_to(leaf, len(flights.draws)), model)
+    period = whole_ticks(rate, config.control_rate, "control_rate")
+    delay = round(conditions.computation_delay * rate)
+    if delay > period:
+        raise SpecError(
+            f"computation_delay must be at most a period of the controller, {period / rate:g} s, "
+            f"got {conditions.computation_delay:g} s; lower control_rate"
+        )
+    controller = TrackingController(config.controller.feature_flags, period)
+    if period == 1 and delay == 0:
+        return (Part(controller, ControllerParameters(model, ())),)
+    source = ReferenceSource(trajectory, nominal, environment, rate, every=period, delay=delay / rate)
+    if delay == 0:
+        return (Part(controller, ControllerParameters(model, ()), source),)
+    return (
+        Part(controller, ControllerParameters(model, flights.all(delay / rate)), source),
+        Part(ComputationDelay(), (), DelayTicks(period, delay)),
+    )

@@ -1,0 +1,158 @@
+"""Draws: each flight's own, whatever flies beside it; means and spreads as the conditions state them."""
+
+from dataclasses import fields, replace
+
+import numpy as np
+import pytest
+from scipy import stats
+
+from aerobat.environment import Battery, Dispersion, Gusts, load_dispersion
+from aerobat.simulation.conditions.draw import STREAMS, Draw, dispersed_fleet, draw_flights
+from aerobat.states import BodyState
+from aerobat.vehicle import load_vehicle, vehicle_names
+from aerobat.vehicle.fleet import Fleet
+
+FLIGHTS = 3000
+ALPHA = 1e-3  # of each test by which a right spread would be refused; seeds are fixed
+LAB = load_dispersion("lab")
+ROTORS = 6
+
+
+@pytest.fixture(scope="module")
+def draws() -> tuple[Draw, ...]:
+    return draw_flights(LAB, ROTORS, 11, range(FLIGHTS))
+
+
+def column(draws: tuple[Draw, ...], name: str) -> np.ndarray:
+    return np.array([getattr(draw, name) for draw in draws])
+
+
+def differing(one: Draw, other: Draw) -> set[str]:
+    names = (field.name for field in fields(Draw))
+    return {name for name in names if not np.array_equal(getattr(one, name), getattr(other, name))}
+
+
+def test_a_flight_draws_the_same_whatever_flies_beside_it(draws: tuple[Draw, ...]) -> None:
+    assert draw_flights(LAB, ROTORS, 11, [2, 40, 7]) == (draws[2], draws[40], draws[7])
+    assert draw_flights(LAB, ROTORS, 12, [2]) != (draws[2],)
+    assert len({draw.mass for draw in draws}) == FLIGHTS
+
+
+@pytest.mark.parametrize(
+    ("name", "spread"),
+    [
+        ("start_position", 0.02),
+        ("start_velocity", 0.05),
+        ("start_attitude", np.radians(1.0)),
+        ("gyro_bias", 0.02),
+        ("accelerometer_bias", 0.1),
+        ("first_position_error", 0.001),
+        ("first_attitude_error", np.radians(0.3)),
+    ],
+)
+def test_offsets_are_normal_with_the_spread_stated(draws: tuple[Draw, ...], name: str, spread: float) -> None:
+    for axis in column(draws, name).T:
+        assert stats.kstest(axis / spread, "norm").pvalue > ALPHA
+
+
+@pytest.mark.parametrize(
+    ("name", "spread"), [("mass", 0.03), ("inertia", 0.1), ("effectiveness", 0.03), ("lags", 0.25)]
+)
+def test_factors_have_mean_one_and_the_spread_stated(
+    draws: tuple[Draw, ...], name: str, spread: float
+) -> None:
+    factors = column(draws, name).ravel()
+    standard_error = spread / np.sqrt(len(factors))
+    assert abs(factors.mean() - 1.0) < 3.3 * standard_error
+    assert factors.std() == pytest.approx(spread, rel=5.0 * (1.0 + 4.0 * spread) / np.sqrt(len(factors)))
+    shape = np.sqrt(np.log1p(spread**2))
+    assert stats.kstest(factors, "lognorm", (shape, 0.0, np.exp(-0.5 * shape**2))).pvalue > ALPHA
+
+
+def test_drag_charge_and_wind_are_drawn_as_stated(draws: tuple[Draw, ...]) -> None:
+    assert stats.kstest(column(draws, "drag") / 0.1, "halfnorm").pvalue > ALPHA
+    assert stats.kstest((1.0 - column(draws, "charge")) / 0.1, "uniform").pvalue > ALPHA
+    assert stats.kstest(column(draws, "gust_heading") / (2 * np.pi), "uniform").pvalue > ALPHA
+    wind = column(draws, "mean_wind")
+    for axis in wind.T[:2]:
+        assert stats.kstest(axis / 0.1, "norm").pvalue > ALPHA
+    assert not wind[:, 2].any()
+
+
+@pytest.mark.parametrize(
+    ("name", "length"),
+    [("hand_off_translation", 0.005), ("hand_off_rotation", np.radians(0.2)), ("warp", 0.003)],
+)
+def test_misfits_have_the_length_stated_in_any_direction(
+    draws: tuple[Draw, ...], name: str, length: float
+) -> None:
+    """On a sphere each component of a unit vector is uniform (Archimedes)."""
+    vectors = column(draws, name) / length
+    np.testing.assert_allclose(np.linalg.norm(vectors, axis=1), 1.0, rtol=1e-12)
+    for component in vectors.T:
+        assert stats.kstest(component, "uniform", (-1.0, 2.0)).pvalue > ALPHA
+
+
+def test_a_cause_that_is_switched_off_leaves_the_draws_of_others_alone() -> None:
+    causes: dict[str, tuple[dict[str, object], set[str]]] = {
+        "mass": ({"mass": 0.0}, {"mass"}),
+        "gusts": ({"gusts": None}, {"mean_wind"}),
+        "battery": ({"battery": None}, {"charge"}),
+        "start": ({"start_position": 0.0, "start_velocity": 0.0}, {"start_position", "start_velocity"}),
+        "hand-off": (
+            {"motion_capture": replace(LAB.motion_capture, hand_off=None)},
+            {"hand_off_translation", "hand_off_rotation", "warp"},
+        ),
+    }
+    [whole] = draw_flights(LAB, ROTORS, 3, [5])
+    for changes, own in causes.values():
+        [other] = draw_flights(replace(LAB, **changes), ROTORS, 3, [5])
+        assert differing(whole, other) == own
+
+
+def test_a_vehicle_with_other_rotors_draws_all_else_alike() -> None:
+    [six], [four] = (draw_flights(LAB, rotors, 3, [5]) for rotors in (6, 4))
+    assert differing(six, four) == {"effectiveness", "lags"}
+
+
+@pytest.mark.parametrize("name", vehicle_names())
+def test_vehicles_drawn_one_by_one_and_all_at_once_are_the_same(name: str) -> None:
+    nominal = load_vehicle(name)
+    draws = draw_flights(LAB, len(nominal.rotors), 3, range(20))
+    at_once, one_by_one = dispersed_fleet(nominal, draws), Fleet.of([d.vehicle(nominal) for d in draws])
+    for field, value in vars(one_by_one).items():
+        np.testing.assert_array_equal(getattr(at_once, field), value)
+
+
+def test_where_nothing_varies_the_nominal_vehicle_starts_at_the_reference() -> None:
+    nominal = load_vehicle("hexarotor")
+    reference = BodyState(np.ones(3), np.zeros(3), np.array([0.6, 0.0, 0.8, 0.0]), np.zeros(3))
+    [draw] = draw_flights(Dispersion(), ROTORS, 3, [4])
+    assert draw.vehicle(nominal) == nominal
+    assert draw.start(reference) == reference
+    assert draw.charge == 1.0
+    np.testing.assert_array_equal(draw.effectiveness, 1.0)
+
+
+def test_streams_of_random_numbers_are_each_their_own() -> None:
+    draws = draw_flights(LAB, ROTORS, 3, range(20))
+    first = {tuple(draw.stream(name).generate_state(2).tolist()) for draw in draws for name in STREAMS}
+    assert len(first) == len(draws) * len(STREAMS)
+
+
+def test_a_row_of_a_table_holds_every_number_of_a_draw() -> None:
+    [draw] = draw_flights(LAB, ROTORS, 3, [5])
+    row = draw.row()
+    assert (row["flight"], row["lags_5"], row["warp_2"]) == (5, draw.lags[5], draw.warp[2])
+    assert all(isinstance(value, int | float) for value in row.values())
+    assert len(row) == 7 + 2 * ROTORS + 11 * 3 + 5
+
+
+def test_turbulence_starts_as_it_goes_on() -> None:
+    """Stationary covariance of the filters: 1 along; (1/2, 1/4; 1/4, 1/4) across."""
+    gusty = Dispersion(gusts=Gusts(intensity=1.0), battery=Battery(endurance=1.0))
+    states = column(draw_flights(gusty, ROTORS, 5, range(FLIGHTS)), "gust")
+    expected = np.zeros((5, 5))
+    expected[0, 0] = 1.0
+    expected[1:3, 1:3] = expected[3:, 3:] = [[0.5, 0.25], [0.25, 0.25]]
+    np.testing.assert_allclose(np.cov(states.T), expected, atol=5.0 / np.sqrt(FLIGHTS))
