@@ -14,8 +14,8 @@ from aerobat.engines import choose
 from aerobat.engines.components import components, from_components
 from aerobat.engines.engine import first_row
 from aerobat.environment import Environment
-from aerobat.estimation.filter_loop import NO_SLOT, FilterInput, FilterParameters, filter_loop
-from aerobat.estimation.settings import Ekf
+from aerobat.estimation import Ekf, FilterInput, FilterParameters, ekf_parameters, filter_loop
+from aerobat.estimation.filter_loop import NO_SLOT
 from aerobat.kernels.ekf import EkfState, ImuSample, Pose
 from aerobat.kernels.ekf.covariance import unpack
 from aerobat.simulation import fly
@@ -144,7 +144,7 @@ def inputs(measured: Measured, latency: int, slots: int, lost: slice = slice(0))
 def parameters(measured: Measured, velocity: Array, settings: Ekf = SETTINGS) -> FilterParameters:
     """Those of filters that begin at the first poses; `velocity` (N, 3) is what is taken for it at first."""
     first = Pose(components(measured.position[:, 0]), components(measured.q_world_body[:, 0]))
-    numbers = settings.parameters(Environment(), len(velocity))
+    numbers = ekf_parameters(settings, Environment().gravity, len(velocity))
     return FilterParameters(numbers, first, components(velocity))
 
 

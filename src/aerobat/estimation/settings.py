@@ -1,4 +1,4 @@
-"""Settings of the filter: what it reckons with."""
+"""Settings of the filter: the errors that it reckons with, and what it believes."""
 
 from __future__ import annotations
 
@@ -6,45 +6,75 @@ from math import radians
 
 import numpy as np
 
-from aerobat.declaration import Count, Fraction, NonNegative, Positive, declared
-from aerobat.environment import Environment
+from aerobat.declaration import Count, Fraction, NonNegative, Positive, declared, validated
+from aerobat.environment import Imu, MotionCapture
 from aerobat.kernels.ekf import EkfParameters
 
 POSE_FREEDOMS = 6
+_MIN_POSITION_NOISE = 1e-4  # [m] what the filter's own rounding and first order are safely below
+_MIN_ATTITUDE_NOISE = 1e-3  # [rad] the same
 
 
 @declared
 class Ekf:
-    """Noise, biases and trust of the error-state Kalman filter; 1σ, densities as data sheets have them."""
+    """Errors that the error-state Kalman filter reckons with, as data sheets have them, and its trust."""
 
     gyro_noise: NonNegative = 1e-3  # [rad/s/√Hz] density of the white noise
     accelerometer_noise: NonNegative = 0.02  # [m/s²/√Hz] density of the white noise
     gyro_bias: NonNegative = 0.02  # [rad/s] 1σ at the start, each axis
     accelerometer_bias: NonNegative = 0.1  # [m/s²] 1σ at the start, each axis
-    gyro_bias_walk: NonNegative = 1e-4  # [rad/s²/√Hz] the bias spreads by this times √t
-    accelerometer_bias_walk: NonNegative = 1e-3  # [m/s³/√Hz] the bias spreads by this times √t
+    gyro_bias_walk: NonNegative = 1.9e-5  # [rad/s²/√Hz] the bias spreads by this times √t
+    accelerometer_bias_walk: NonNegative = 3e-3  # [m/s³/√Hz] the bias spreads by this times √t
     position_noise: Positive = 0.001  # [m] 1σ of a pose, each axis
     attitude_noise: Positive = radians(0.3)  # [rad] 1σ of a pose, about each body axis
     start_velocity: NonNegative = 0.05  # [m/s] 1σ of what is taken for the velocity at first, each axis
     gate_probability: Fraction = 0.9999  # of a true pose to be believed
     rejections_until_jump: Count = 5  # poses rejected in a row, the last of which is believed to be a jump
 
-    def parameters(self, environment: Environment, vehicles: int) -> EkfParameters:
-        """The numbers that the kernel reads, leaves (vehicles,)."""
-        from scipy.special import chdtri
+    @classmethod
+    @validated
+    def of_sensors(cls, imu: Imu, motion_capture: MotionCapture, start_velocity: NonNegative = 0.05) -> Ekf:
+        """The filter that knows the noise of its sensors, poses without any taken for next to exact.
 
-        numbers = EkfParameters(
-            gravity=environment.gravity,
-            gyro_noise=self.gyro_noise**2,
-            accelerometer_noise=self.accelerometer_noise**2,
-            gyro_walk=self.gyro_bias_walk**2,
-            accelerometer_walk=self.accelerometer_bias_walk**2,
-            velocity_variance=self.start_velocity**2,
-            gyro_bias_variance=self.gyro_bias**2,
-            accelerometer_bias_variance=self.accelerometer_bias**2,
-            position_variance=self.position_noise**2,
-            attitude_variance=self.attitude_noise**2,
-            max_nis=float(chdtri(POSE_FREEDOMS, 1.0 - self.gate_probability)),
-            max_rejections=float(self.rejections_until_jump),
+        Args:
+            imu: its IMU.
+            motion_capture: where its poses come from.
+            start_velocity: 1σ of the velocity at first [m/s], each axis.
+        """
+        return cls(
+            gyro_noise=imu.gyro_noise,
+            accelerometer_noise=imu.accelerometer_noise,
+            gyro_bias=imu.gyro_bias,
+            accelerometer_bias=imu.accelerometer_bias,
+            gyro_bias_walk=imu.gyro_bias_walk,
+            accelerometer_bias_walk=imu.accelerometer_bias_walk,
+            position_noise=max(motion_capture.position_noise, _MIN_POSITION_NOISE),
+            attitude_noise=max(motion_capture.attitude_noise, _MIN_ATTITUDE_NOISE),
+            start_velocity=start_velocity,
         )
-        return EkfParameters(*(np.full(vehicles, number) for number in numbers))
+
+    @property
+    def max_nis(self) -> float:
+        """The normalized innovation squared that poses may have: chi² of 6 at `gate_probability`."""
+        from scipy.special import chdtri  # imported when needed: it takes longer than the filter's settings
+
+        return float(chdtri(POSE_FREEDOMS, 1.0 - self.gate_probability))
+
+
+def ekf_parameters(settings: Ekf, gravity: float, vehicles: int) -> EkfParameters:
+    """The numbers that the kernel reads, leaves (vehicles,); gravity in m/s²."""
+    numbers = EkfParameters(
+        gravity=gravity,
+        gyro_noise=settings.gyro_noise**2,
+        accelerometer_noise=settings.accelerometer_noise**2,
+        gyro_walk=settings.gyro_bias_walk**2,
+        accelerometer_walk=settings.accelerometer_bias_walk**2,
+        velocity_variance=settings.start_velocity**2,
+        gyro_bias_variance=settings.gyro_bias**2,
+        accelerometer_bias_variance=settings.accelerometer_bias**2,
+        position_variance=settings.position_noise**2,
+        attitude_variance=settings.attitude_noise**2,
+        max_nis=settings.max_nis,
+        max_rejections=float(settings.rejections_until_jump),
+    )
+    return EkfParameters(*(np.full(vehicles, number) for number in numbers))

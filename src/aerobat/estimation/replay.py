@@ -1,0 +1,137 @@
+"""A recorded log through the filter: estimates, how far they may be off, and what became of each pose."""
+
+from __future__ import annotations
+
+import operator
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from aerobat.arrays import Array, Mask
+from aerobat.declaration import Positive, VectorLike, by_value, short, validated
+from aerobat.engines import choose
+from aerobat.engines.components import components, from_components
+from aerobat.engines.engine import first_row
+from aerobat.engines.pytree import tree_map
+from aerobat.environment import Environment
+from aerobat.estimation.filter_loop import FilterParameters, filter_loop
+from aerobat.estimation.schedule import Schedule, schedule
+from aerobat.estimation.sensor_log import SensorLog
+from aerobat.estimation.settings import Ekf, ekf_parameters
+from aerobat.flatness import TimeInterval
+from aerobat.kernels.ekf import EkfState, Pose
+from aerobat.kernels.ekf.covariance import SIZE
+
+_ROWS = 10_000  # of the loop at once: their covariances take 10 MB
+_DIAGONAL = [row * SIZE - row * (row - 1) // 2 for row in range(SIZE)]  # in the upper triangle, row by row
+
+
+@short
+@by_value
+@dataclass(frozen=True, eq=False, repr=False)
+class Estimates:
+    """What the filter made of a log: the state at the end of each sample, and what became of each pose."""
+
+    times: Array  # [s], (T,), from the first sample that ends after the first pose
+    position: Array  # [m] world, (T, 3)
+    velocity: Array  # [m/s] world, (T, 3)
+    q_world_body: Array  # (T, 4)
+    omega_body: Array  # [rad/s] mean over the sample, its bias taken off, (T, 3)
+    gyro_bias: Array  # [rad/s], (T, 3)
+    accelerometer_bias: Array  # [m/s²], (T, 3)
+    sigma: Array  # 1σ of errors of position, velocity, attitude (body axes) and both biases, (T, 15)
+    nis: Array  # normalized innovation squared of each pose, NaN for those that were not fused, (P,)
+    accepted: Mask  # poses that were taken; the first is where the filter begins, (P,)
+    jumps: Array  # [s] arrivals of poses that were taken as a jump, (J,)
+    coasting: tuple[TimeInterval, ...]  # from a pose's exposure to the next that was taken, or to the end
+
+    def __str__(self) -> str:
+        """One line for people."""
+        fused = np.isfinite(self.nis)
+        parts = [f"{self.times[-1] - self.times[0]:.3f} s with {fused.sum()} poses"]
+        if (fused & ~self.accepted).any():
+            parts.append(f"{(fused & ~self.accepted).sum()} rejected")
+        if self.jumps.size:
+            parts.append("jumps at " + ", ".join(f"{time:.3f} s" for time in self.jumps))
+        parts += [f"without poses from {gap.start:.3f} to {gap.end:.3f} s" for gap in self.coasting]
+        return ", ".join(parts)
+
+
+@validated
+def estimate(
+    log: SensorLog,
+    ekf: Ekf = Ekf(),  # noqa: B008 - frozen
+    environment: Environment | None = None,
+    start_velocity: VectorLike = (0.0, 0.0, 0.0),
+    max_gap: Positive = 0.1,
+) -> Estimates:
+    """Replay a log through the error-state Kalman filter, as it would have run on board.
+
+    Each pose is fused when it arrived, at the time of its exposure; what arrived after the last sample is
+    not. Between poses, and in outages, the state is carried on by the IMU alone. Raises SpecError where the
+    log has no pose within the IMU's samples.
+
+    Args:
+        log: What was recorded.
+        ekf: What the filter reckons with.
+        environment: Whose gravity acts, by default that of a calm day on Earth.
+        start_velocity: Velocity at the first pose [m/s], world, (3,).
+        max_gap: Time without poses [s] from which on the estimate is said to coast.
+    """
+    plan = schedule(log)
+    gravity = (environment or Environment()).gravity
+    rows = _run(log, ekf, gravity, np.asarray(start_velocity), plan)
+    at_samples = {name: values[plan.sample_rows] for name, values in rows.items()}
+    arrived = plan.arrival_rows >= 0
+    nis, accepted = np.full(len(arrived), np.nan), np.zeros(len(arrived), dtype=bool)
+    nis[arrived] = rows["nis"][plan.arrival_rows[arrived]]
+    accepted[arrived] = rows["accepted"][plan.arrival_rows[arrived]] == 1.0
+    accepted[plan.first_pose] = True
+    during = np.searchsorted(log.imu_times, plan.sample_times)
+    return Estimates(
+        times=plan.sample_times,
+        omega_body=log.omega[during] - at_samples["gyro_bias"],
+        nis=nis,
+        accepted=accepted,
+        jumps=np.cumsum(plan.inputs.elapsed)[np.diff(rows["jumps"], prepend=0.0) > 0.0]
+        + log.pose_times[plan.first_pose],
+        coasting=tuple(_coasting(plan.sample_times, at_samples["since_pose"], max_gap)),
+        **{name: at_samples[name] for name in (*_NOMINAL, "sigma")},
+    )
+
+
+_NOMINAL = ("position", "velocity", "q_world_body", "gyro_bias", "accelerometer_bias")
+
+
+def _run(log: SensorLog, ekf: Ekf, gravity: float, velocity: Array, plan: Schedule) -> dict[str, Array]:
+    """What is kept of the state after every row."""
+    init, step = filter_loop(plan.slots)
+    first = Pose(
+        components(log.position[plan.first_pose, None]), components(log.q_world_body[plan.first_pose, None])
+    )
+    parameters = FilterParameters(ekf_parameters(ekf, gravity, 1), first, components(velocity[None]))
+    count = len(plan.inputs.elapsed)
+    loop = choose("auto", 1, count).compile(init, step, parameters, first_row(plan.inputs))
+    carry, parts = loop.init(first_row(plan.inputs)), []
+    for begin, end in pairwise([*range(0, count, _ROWS), count]):
+        cut = operator.itemgetter(slice(begin, end))
+        carry, states = loop.scan(carry, tree_map(cut, plan.inputs))
+        parts.append(_kept(states))
+    return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
+
+
+def _kept(states: EkfState) -> dict[str, Array]:
+    """States with leaves (1, rows) as arrays (rows, ...)."""
+    kept = {name: from_components(getattr(states.nominal, name))[0] for name in _NOMINAL}
+    kept["sigma"] = np.sqrt(from_components([states.covariance[i] for i in _DIAGONAL])[0])
+    return kept | {name: getattr(states, name)[0] for name in ("since_pose", "jumps", "nis", "accepted")}
+
+
+def _coasting(times: Array, since_pose: Array, max_gap: float) -> Iterator[TimeInterval]:
+    """The times between poses that were longer apart than that."""
+    coasts = since_pose > max_gap
+    edges = np.flatnonzero(np.diff(coasts, prepend=False, append=False))
+    for begin, end in zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True):
+        yield TimeInterval(float(times[begin] - since_pose[begin]), float(times[min(end, len(times) - 1)]))

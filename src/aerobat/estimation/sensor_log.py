@@ -1,0 +1,101 @@
+"""What an IMU and motion capture have recorded of one vehicle, checked once."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from aerobat import so3
+from aerobat.arrays import Array, frozen
+from aerobat.declaration import by_value, short
+from aerobat.errors import SpecError
+
+MAX_GAP = 0.05  # [s] between samples of an IMU: longer ones say too little of a turning vehicle
+MAX_AGE = 0.2  # [s] of a pose as it arrives: errors then and now are related to first order in it
+_UNIT = 1e-2  # [-] by which the norm of a quaternion may be off: what few decimals leave
+
+
+@short
+@by_value
+@dataclass(frozen=True, eq=False, repr=False)
+class SensorLog:
+    """Record of an IMU and of poses, on one clock; SI units, ENU world, FLU body.
+
+    A sample of the IMU is the mean since the sample before (of the first, over as long as of the second).
+    Poses have the times of their exposure, and those at which they arrived. Raises SpecError, one sentence
+    that names the array, for shapes that differ, NaN, times that do not rise, and gaps.
+    """
+
+    imu_times: Array  # [s] of the ends of the samples' intervals, (T,)
+    omega: Array  # [rad/s] body, (T, 3)
+    specific_force: Array  # [m/s²] body, (T, 3)
+    pose_times: Array  # [s] of their exposure, (P,)
+    position: Array  # [m] world, (P, 3)
+    q_world_body: Array  # (P, 4)
+    arrival_times: Array | None = None  # [s], (P,), by default those of exposure
+
+    def __post_init__(self) -> None:
+        imu = self._series("imu_times", ("omega", 3), ("specific_force", 3))
+        poses = self._series("pose_times", ("position", 3), ("q_world_body", 4))
+        if imu < 2 or poses < 1:
+            raise SpecError(f"a log needs two samples of the IMU and a pose, got {imu} and {poses}")
+        steps = np.diff(self.imu_times)
+        if steps.max() > MAX_GAP:
+            where = self.imu_times[steps.argmax()]
+            raise SpecError(
+                f"imu_times has a gap of {steps.max():.3g} s at {where:.6g} s; above {MAX_GAP} s cut the log"
+            )
+        self._check_attitudes()
+        self._check_arrivals()
+
+    def _series(self, clock: str, *columns: tuple[str, int]) -> int:
+        """The number of rows of arrays that go together, each made read-only."""
+        times = frozen(getattr(self, clock), clock, (None,))
+        if times.ndim != 1 or not (np.diff(times) > 0.0).all():
+            raise SpecError(f"{clock} must be one series of rising times; sort it and drop repetitions")
+        object.__setattr__(self, clock, times)
+        for name, width in columns:
+            values = frozen(getattr(self, name), name)
+            if values.shape != (len(times), width):
+                raise SpecError(
+                    f"{name} must have the shape ({len(times)}, {width}), a row for each of {clock}, "
+                    f"got {values.shape}"
+                )
+            object.__setattr__(self, name, values)
+        return len(times)
+
+    def _check_attitudes(self) -> None:
+        norms = np.linalg.norm(self.q_world_body, axis=-1)
+        wrong = np.flatnonzero(np.abs(norms - 1.0) > _UNIT)
+        if wrong.size:
+            raise SpecError(
+                f"q_world_body must be unit quaternions (w, x, y, z); that of pose {wrong[0]} is of the norm "
+                f"{norms[wrong[0]]:.3g}"
+            )
+        object.__setattr__(self, "q_world_body", frozen(so3.normalize(self.q_world_body), "q_world_body"))
+
+    def _check_arrivals(self) -> None:
+        arrivals = frozen(self.arrivals, "arrival_times")
+        if arrivals.shape != self.pose_times.shape:
+            raise SpecError(
+                f"arrival_times must have the shape {self.pose_times.shape}, got {arrivals.shape}"
+            )
+        ages = arrivals - self.pose_times
+        wrong = np.flatnonzero((ages < 0.0) | (ages > MAX_AGE))
+        if wrong.size:
+            raise SpecError(
+                f"arrival_times must be 0 to {MAX_AGE} s after pose_times, got {ages[wrong[0]]:.3g} s "
+                f"for pose {wrong[0]}; set both to one clock"
+            )
+        object.__setattr__(self, "arrival_times", arrivals)
+
+    @property
+    def arrivals(self) -> Array:
+        """When poses arrived [s], (P,)."""
+        return self.pose_times if self.arrival_times is None else self.arrival_times
+
+    def __str__(self) -> str:
+        """One line for people."""
+        duration = self.imu_times[-1] - self.imu_times[0]
+        return f"{duration:.3f} s of {len(self.imu_times)} samples and {len(self.pose_times)} poses"
