@@ -33,7 +33,7 @@ BEFORE = 99  # the exit code of what was not begun
 COMMANDS = [
     *(("plan", "line", "--planner", name) for name in ("miqp", "min-snap", "free-knots", "time-optimal")),
     ("fly", "flip-roll", "--backend", "gurobi"),
-    ("fly", "half-flip", "--noise", "1"),
+    ("fly", "half-flip", "--conditions", "lab"),
     ("compare", "line"),
     ("repeat", "kept"),
 ]

@@ -69,7 +69,7 @@ VALUES: dict[str, tuple[str, ...]] = {
     "--segments": ("1000", "1", "0", "-3", "many"),
     "--stop-after": ("1", "3", *NUMBERS),
     "--starts": ("0", "-1", "few"),
-    "--noise": ("1", "100", *NUMBERS),
+    "--conditions": ("none", "lab", "field", "lap", "../lab.toml"),
     "--seed": ("7", *NUMBERS),
     "--controller": ("full", "paper", "none", ""),
     "--columns": ("time", "paper", "time,position", "time,time", "speed", ",", ""),
@@ -89,7 +89,9 @@ VALUES: dict[str, tuple[str, ...]] = {
 }
 OWN = {
     "fly": [name for name in VALUES if not name.startswith("--max")],
-    "plan": [name for name in VALUES if not name.startswith("--max") and name not in ("--noise", "--seed")],
+    "plan": [
+        name for name in VALUES if not name.startswith("--max") and name not in ("--conditions", "--seed")
+    ],
     "check": [
         name for name in VALUES if name.startswith(("--max", "--veh", "--rate", "--head", "--json", "--imp"))
     ],

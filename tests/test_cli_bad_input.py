@@ -148,7 +148,7 @@ ARGUMENT_FAULTS = {
     "unknown option": (["plan", "line", "--fast"], "--fast"),
     "unknown command": (["loop", "line"], "loop"),
     "no problem": (["fly"], "problem"),
-    "negative noise": (["fly", "line", "--noise", "-1"], "noise"),
+    "unknown conditions": (["fly", "line", "--conditions", "lap"], "conditions"),
     "unknown controller": (["fly", "line", "--controller", "papr"], "did you mean 'paper'?"),
     "negative seed": (["fly", "line", "--seed", "-1"], "seed"),
     "negative time": (["plan", "line", "--time-limit", "-1"], "time_limit"),

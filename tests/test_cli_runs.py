@@ -19,7 +19,7 @@ from aerobat.simulation import load_flight
 from aerobat.vehicle import load_vehicle
 
 RUNS = {
-    "a flight with noise": ("fly", "line", "--noise", "1", "--seed", "7", "--order", "5"),
+    "a flight under conditions": ("fly", "line", "--conditions", "lab", "--seed", "7", "--order", "5"),
     "an angle and another vehicle": ("fly", "half-flip", "--angle", "-30", "--vehicle", "crazyflie"),
     "the paper's program and law": ("fly", "flip-roll", "--paper", "--controller", "paper"),
     "another planner, no flight": ("plan", "section-v", "--planner", "min-snap", "--stop-after", "3"),
@@ -79,7 +79,7 @@ def test_a_run_repeated_from_its_folder_alone_gives_the_same_bits(run: str, caps
 
 def test_a_saved_plan_that_was_flown_is_flown_again_not_planned(capsys) -> None:
     code("plan", "line", "--order", "5")
-    assert code("fly", "out/line", "--noise", "1") == 0
+    assert code("fly", "out/line", "--conditions", "lab") == 0
     assert code("repeat", "out/line-flown") == 0
     assert "the same as" in capsys.readouterr().err
 

@@ -139,15 +139,16 @@ class PlanningOptions(TaskOptions):
 class FlyingOptions:
     """Options of the flight."""
 
-    noise: Annotated[float, Parameter(group=flying, validator=validators.Number(gte=0, lte=1000))] = 0.0
-    """The error of the state that the controller sees: 0 none, 1 that of motion capture and IMU fused."""
+    conditions: Annotated[str | None, Parameter(group=flying)] = None
+    """What varies, disturbs and is measured how: none, lab, field, or a TOML file. Default: flown as planned,
+    from a state that is known."""
 
     controller: Annotated[str, Parameter(group=flying)] = "full"
     """The control law: full, or paper, the paper's own without moment feed-forward, motor-lag compensation
     and tilt before yaw."""
 
     seed: Annotated[int, Parameter(group=flying, validator=validators.Number(gte=0))] = 0
-    """The seed of that noise: the same seed, the same flight."""
+    """The seed of the conditions: the same seed, the same flight."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -13,9 +13,9 @@ from aerobat.cli.runs.folder import Flown, finish
 from aerobat.cli.runs.record import FlightSettings
 from aerobat.cli.tasks import planned
 from aerobat.control import Controller, named_controller
+from aerobat.environment import load_dispersion
 from aerobat.evaluation import score
 from aerobat.planning import Plan, nominal_flight
-from aerobat.simulation import StateNoise
 from aerobat.simulation.fly import fly as simulate
 
 
@@ -38,18 +38,18 @@ def fly(
         plan is flown as it is.
     """
     named_controller(flying.controller)  # refused before anything is planned
+    conditions = None if flying.conditions is None else load_dispersion(flying.conditions)
     plan, record = planned(problem, options, "fly")
-    settings = FlightSettings(flying.controller, flying.noise, flying.seed)
+    settings = FlightSettings(flying.controller, conditions, flying.seed)
     return finish(plan, replace(record, flight=settings), options, flown(plan, settings))
 
 
 def flown(plan: Plan, settings: FlightSettings) -> Flown:
     """The flight of a plan, and its score."""
     assert plan.vehicle is not None, "a command plans for a vehicle"
-    noise = StateNoise.fused().scaled(settings.noise) if settings.noise else None
     controller = named_controller(settings.controller)
-    if noise is None and controller == Controller():  # the flight that the plan was judged by
+    if settings.conditions is None and controller == Controller():  # the flight that the plan was judged by
         flight = nominal_flight(plan.trajectory, plan.vehicle, plan.problem.environment)
     else:
-        flight = simulate(plan, controller=controller, noise=noise, seed=settings.seed)
+        flight = simulate(plan, controller=controller, conditions=settings.conditions, seed=settings.seed)
     return Flown(flight, score(flight, plan, plan.vehicle), settings.controller)

@@ -11,10 +11,11 @@ from pathlib import Path
 from platform import python_version
 from typing import Annotated, Any, Literal
 
-from pydantic import Field, PlainValidator
+from pydantic import PlainValidator
 
-from aerobat.declaration import NonNegative, declared, to_table
+from aerobat.declaration import Seed, declared, to_table
 from aerobat.documents import read_document, write_document
+from aerobat.environment import Dispersion
 from aerobat.errors import SpecError
 from aerobat.interchange.columns import ALL
 from aerobat.planning import Planner
@@ -35,8 +36,8 @@ class FlightSettings:
     """How a plan was flown."""
 
     controller: str = "full"
-    noise: NonNegative = 0.0  # times that of motion capture and IMU fused
-    seed: Annotated[int, Field(ge=0)] = 0  # of that noise
+    conditions: Dispersion | None = None  # left out, as planned
+    seed: Seed = 0  # of the conditions
 
 
 @declared
