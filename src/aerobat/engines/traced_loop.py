@@ -122,6 +122,33 @@ class TracedLoop:
                 guards |= dict.fromkeys(only, condition)
         return guards
 
+    def stored_early(self, blocks: Sequence[Block]) -> list[dict[int, int]]:
+        """For each block, the parts of the carry that may take their next values in it, and these values.
+
+        They are those that otherwise stay as they are, and that nothing asks for after the block.
+        """
+        place = {number: i for i, block in enumerate(blocks) for number in block.numbers}
+        users: dict[int, set[int]] = {}
+        for number in place:
+            for argument in self.trace.operations[number].arguments:
+                users.setdefault(argument, set()).add(number)
+        asked_at_the_end = {*self.outputs, *self.next_carry}
+        found: list[dict[int, int]] = [{} for _ in blocks]
+        for now, then in zip(self.carry, self.next_carry, strict=True):
+            operation = self.trace.operations[then]
+            if operation.name != "select" or operation.arguments[2] != now:
+                continue
+            guard, chosen, _ = operation.arguments
+            block = place.get(chosen, -1)
+            if block < 0 or blocks[block].guard != guard:
+                continue
+            is_seen_later = any(place[user] > block for user in users[now] - {then})
+            is_asked = then in users or then in self.outputs or now in asked_at_the_end
+            is_asked = is_asked or self.next_carry.count(then) > 1
+            if not is_seen_later and not is_asked:
+                found[block][now] = chosen
+        return found
+
     def is_logical(self, number: int) -> bool:
         """True for a value that is true or false, not a number."""
         return self.trace.operations[number].logical

@@ -9,9 +9,9 @@ the machine, nor the width, nor the size of a batch changes a bit of what comes 
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import compress
 from typing import Any
 
@@ -68,6 +68,7 @@ class _Codegen:
         self._arguments = dict(zip((*ARRAYS, *COUNTS), function.args, strict=True))
         self._builder = ir.IRBuilder(function.append_basic_block())
         self._values: dict[int, Any] = {}  # by their numbers in the trace
+        self._unloaded: dict[int, tuple[Any, Any, int | None]] = {}  # address, type and alignment of others
         self._widened: dict[Any, Any] = {}
 
     def emit_init(self) -> None:
@@ -86,33 +87,34 @@ class _Codegen:
         with self._blocks() as lane:
             self._load("parameters", loop.parameters, layout.shared_parameters, INTEGER(0), lane)
             self._compute(loop.prologue)
-            carry = []
+            carry = {}
             for index, number in enumerate(loop.carry):
                 address = self._address("carry", INTEGER(0), len(loop.carry), index, lane)
                 value = b.load(address, typ=self._wide_type(NUMBER), align=8)
-                carry.append(self._slot(self._as_logical(value) if loop.is_logical(number) else value))
+                carry[number] = self._slot(self._as_logical(value) if loop.is_logical(number) else value)
             with self._counting(INTEGER(0), self._arguments["ticks"], 1) as tick:
                 self._tick(carry, tick, lane)
-            after = [b.load(slot, typ=slot.allocated_type) for slot in carry]
+            after = [b.load(slot, typ=slot.allocated_type) for slot in carry.values()]
             self._store("next carry", INTEGER(0), after, lane)
         b.ret_void()
 
     def _blocks(self) -> AbstractContextManager[Any]:
         return self._counting(self._arguments["begin"], self._arguments["end"], self._layout.width)
 
-    def _tick(self, carry: Sequence[Any], tick: Any, lane: Any) -> None:
-        b, loop = self._builder, self._loop
-        for number, slot in zip(loop.carry, carry, strict=True):
-            self._values[number] = b.load(slot, typ=slot.allocated_type)
+    def _tick(self, carry: Mapping[int, Any], tick: Any, lane: Any) -> None:
+        loop = self._loop
+        self._unloaded |= {number: (slot, slot.allocated_type, None) for number, slot in carry.items()}
         self._load("inputs", loop.inputs, self._layout.shared_inputs, tick, lane)
         piecewise_constant = list(compress(loop.inputs, self._layout.piecewise_constant))
         invariant = loop.loop_invariant(piecewise_constant)
         self._refresh(piecewise_constant, invariant, tick)
         held = set(invariant)
-        self._compute_guarded([number for number in loop.body if number not in held])
+        stored = self._compute_guarded([number for number in loop.body if number not in held], carry)
         self._log(tick, lane)
-        for value, slot in zip(self._wide(loop.next_carry), carry, strict=True):
-            b.store(value, slot)
+        following = [pair for pair in zip(loop.carry, loop.next_carry, strict=True) if pair[0] not in stored]
+        values = self._wide(then for _, then in following)
+        for (now, _), value in zip(following, values, strict=True):
+            self._builder.store(value, carry[now])
 
     def _refresh(self, piecewise_constant: Sequence[int], invariant: Sequence[int], tick: Any) -> None:
         """The loop-invariant values, computed anew at the first tick and when a constant input changes."""
@@ -126,32 +128,45 @@ class _Codegen:
         for number in piecewise_constant:
             address = self._address("shared inputs", before, columns, column[number], None)
             was = b.load(address, typ=INTEGER, align=8)  # bits: 0.0 and -0.0 are equal
-            changed = b.or_(changed, b.icmp_signed("!=", b.bitcast(self._values[number], INTEGER), was))
-        self._compute_where(changed, invariant, invariant)
+            changed = b.or_(changed, b.icmp_signed("!=", b.bitcast(self._value(number), INTEGER), was))
+        with self._where(changed, invariant):
+            self._compute(invariant)
 
-    def _compute_guarded(self, numbers: Sequence[int]) -> None:
-        """Values of a tick, those that only shared conditions ask for where these hold."""
+    def _compute_guarded(self, numbers: Sequence[int], carry: Mapping[int, Any]) -> set[int]:
+        """Values of a tick, those that only shared conditions ask for where these hold.
+
+        Returns the parts of the carry that are stored there already.
+        """
         loop = self._loop
         blocks = loop.guarded_blocks(numbers, compress(loop.inputs, self._layout.shared_inputs))
+        stored = loop.stored_early(blocks)
+        early = {now for parts in stored for now in parts}
+        merged = {then for now, then in zip(loop.carry, loop.next_carry, strict=True) if now in early}
+        blocks = [replace(each, numbers=tuple(n for n in each.numbers if n not in merged)) for each in blocks]
+        at_the_end = {*loop.next_carry, *loop.outputs} - merged
         for i, block in enumerate(blocks):
             if block.guard is None:
                 self._compute(block.numbers)
                 continue
             later = (loop.trace.operations[n].arguments for each in blocks[i + 1 :] for n in each.numbers)
-            used = {*loop.next_carry, *loop.outputs}.union(*later)
+            used = at_the_end.union(*later)
             kept = [number for number in block.numbers if number in used]
-            self._compute_where(self._values[block.guard], block.numbers, kept)
+            with self._where(self._value(block.guard), kept):
+                self._compute(block.numbers)
+                for now, value in zip(stored[i], self._wide(stored[i].values()), strict=True):
+                    self._builder.store(value, carry[now])
+        return early
 
-    def _compute_where(self, condition: Any, numbers: Sequence[int], kept: Sequence[int]) -> None:
-        """Values computed where a condition holds; some are kept in memory from tick to tick."""
-        b, widened, slots = self._builder, dict(self._widened), {}
+    @contextmanager
+    def _where(self, condition: Any, kept: Sequence[int]) -> Iterator[None]:
+        """Context of code that runs where a condition holds; some values are kept from tick to tick."""
+        b, widened, values, slots = self._builder, dict(self._widened), dict(self._values), {}
         with b.if_then(condition):
-            self._compute(numbers)
+            yield
             for number in kept:
                 slots[number] = self._slot(self._values[number])
-        self._widened = widened  # what was widened in there is not known out here
-        for number, slot in slots.items():
-            self._values[number] = b.load(slot, typ=slot.allocated_type)
+        self._widened, self._values = widened, values  # what was made in there is not known out here
+        self._unloaded |= {number: (slot, slot.allocated_type, None) for number, slot in slots.items()}
 
     def _log(self, tick: Any, lane: Any) -> None:
         """Store the outputs, if it is time to."""
@@ -176,7 +191,7 @@ class _Codegen:
             if operation.name == "constant":
                 self._values[number] = _constant(operation.content)
             elif operation.name != "input":
-                arguments = [self._values[i] for i in operation.arguments]
+                arguments = [self._value(i) for i in operation.arguments]
                 if any(map(_is_wide, arguments)):
                     arguments = [self._widen(argument) for argument in arguments]
                 self._values[number] = self._apply(operation, arguments)
@@ -219,14 +234,14 @@ class _Codegen:
         return self._builder.module.declare_intrinsic(f"llvm.sqrt.{suffix}", (), signature)
 
     def _load(self, name: str, numbers: Sequence[int], shared: Sequence[bool], tick: Any, lane: Any) -> None:
-        """The parameters, or one tick's inputs."""
+        """The parameters, or one tick's inputs, to be loaded where they are needed first."""
         counts = {True: sum(shared), False: len(shared) - sum(shared)}
         indices = {True: 0, False: 0}
         for number, same in zip(numbers, shared, strict=True):
             array = f"shared {name}" if same else name
             address = self._address(array, tick, counts[same], indices[same], None if same else lane)
             type_ = NUMBER if same else self._wide_type(NUMBER)
-            self._values[number] = self._builder.load(address, typ=type_, align=8)
+            self._unloaded[number] = (address, type_, 8)
             indices[same] += 1
 
     def _address(self, array: str, row: Any, columns: int, column: int, lane: Any | None) -> Any:
@@ -261,7 +276,14 @@ class _Codegen:
         return slot
 
     def _wide(self, numbers: Iterable[int]) -> list[Any]:
-        return [self._widen(self._values[number]) for number in numbers]
+        return [self._widen(self._value(number)) for number in numbers]
+
+    def _value(self, number: int) -> Any:
+        """A value that is known, or loaded now."""
+        if number not in self._values:
+            address, type_, alignment = self._unloaded[number]
+            self._values[number] = self._builder.load(address, typ=type_, align=alignment)
+        return self._values[number]
 
     def _widen(self, value: Any) -> Any:
         """A value with a lane for each vehicle."""
