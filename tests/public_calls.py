@@ -224,7 +224,6 @@ def _methods(folder: Path) -> Iterator[Door]:
         ("Flight.save", flight().save, {"path": folder / "saved.npz"}),
         ("Flight[]", ab.fly(plan(), [agile, agile], rate=100.0).__getitem__, {"vehicle": 1}),
         ("Scores[]", ab.score_flights(plan(), [agile, agile], rate=100.0).__getitem__, {"k": 1}),
-        ("StateNoise.scaled", ab.StateNoise.fused().scaled, {"factor": 2.0}),
         (
             "Miqp.plan",
             ab.Miqp(rescue=False).plan,

@@ -15,7 +15,7 @@ from aerobat.engines.llvm import ENGINE
 from aerobat.engines.llvm.codegen import Layout, module
 from aerobat.engines.llvm.engine import MachineLoop, available_cores, machine_code, target_machine
 from aerobat.engines.traced_loop import trace_loop
-from aerobat.simulation import StateNoise, fly
+from aerobat.simulation import fly
 from aerobat.trajectory import Trajectory
 from aerobat.vehicle import load_vehicle
 from test_flying_batches import loops, near
@@ -54,15 +54,12 @@ def batch() -> Any:
 def test_a_flight_is_the_same_to_the_last_bit_in_any_batch(batch: Any) -> None:
     """Alone in plain registers, or in a lane of a vector; parameters shared or each vehicle's own."""
     vehicles, starts = batch
-    noise = StateNoise.fused()
-    together = fly(loops(2.0), vehicles, start=starts, noise=noise, seed=3, engine="compiled")
+    together = fly(loops(2.0), vehicles, start=starts, engine="compiled")
     for k in (0, 7, 8, 20):
         alone = fly(
             loops(2.0),
             vehicles[k],
             start=replace(starts, **{name: values[k] for name, values in vars(starts).items()}),
-            noise=noise,
-            seed=np.random.SeedSequence(3, spawn_key=(k,)),
             engine="compiled",
         )
         np.testing.assert_array_equal(together[k].states.position, alone.states.position)

@@ -8,8 +8,9 @@ import pytest
 from aerobat import so3
 from aerobat.control import Controller
 from aerobat.engines import BYTECODE, FLOATS, NUMPY, choose
+from aerobat.environment import Dispersion
 from aerobat.errors import BackendMissing, SpecError
-from aerobat.simulation import Flight, Outcome, StateNoise, fly
+from aerobat.simulation import Flight, Outcome, fly
 from aerobat.states import BodyState
 from aerobat.trajectory import Trajectory
 from aerobat.vehicle import load_vehicle
@@ -52,8 +53,7 @@ def assert_same(a: Flight, b: Flight, atol: float = 0.0) -> None:
 @pytest.mark.parametrize("vehicle", [QUAD, HEXA], ids=["4 rotors", "6 rotors"])
 @pytest.mark.parametrize("engine", ["bytecode", "numpy", "compiled", "jax"])
 def test_engines_agree_with_floats_to_rounding_over_3000_steps(engine: str, vehicle) -> None:
-    noise = StateNoise.fused()
-    flights = [fly(loops(6.0), vehicle, engine=name, noise=noise, seed=4) for name in ("floats", engine)]
+    flights = [fly(loops(6.0), vehicle, engine=name) for name in ("floats", engine)]
     assert len(flights[0].times) == 3001
     assert [flight.engine for flight in flights] == ["floats", engine]
     assert_same(*flights, atol=1e-12)
@@ -61,30 +61,20 @@ def test_engines_agree_with_floats_to_rounding_over_3000_steps(engine: str, vehi
 
 @pytest.mark.parametrize("engine", EXACT)
 def test_each_vehicle_of_a_batch_flies_as_it_would_alone(engine: str) -> None:
-    """Different vehicles, starts and noise, all in one call."""
+    """Different vehicles and starts, all in one call."""
     rng = np.random.default_rng(3)
     vehicles = [replace(HEXA, name=f"no. {k}", mass=HEXA.mass * rng.uniform(0.9, 1.1)) for k in range(4)]
-    starts, noise = near(4), StateNoise.fused()
-    batch = fly(loops(4.0), vehicles, start=starts, noise=noise, seed=11, engine=engine)
+    starts = near(4)
+    batch = fly(loops(4.0), vehicles, start=starts, engine=engine)
     assert batch.states.position.shape == (4, 2001, 3)
     for k, vehicle in enumerate(vehicles):
-        alone = fly(
-            loops(4.0),
-            vehicle,
-            start=one(starts, k),
-            noise=noise,
-            seed=np.random.SeedSequence(11, spawn_key=(k,)),
-            engine="floats",
-        )
+        alone = fly(loops(4.0), vehicle, start=one(starts, k), engine="floats")
         # XLA rounds by the size of a batch
         assert_same(batch[k], alone, atol=1e-10 if engine == "jax" else 1e-12)
 
 
 def test_bytecode_flies_as_floats_do_to_the_last_bit() -> None:
-    starts, noise = near(3), StateNoise.fused()
-    plain, traced = (
-        fly(loops(1.0), HEXA, start=starts, noise=noise, engine=name) for name in ("floats", "bytecode")
-    )
+    plain, traced = (fly(loops(1.0), HEXA, start=near(3), engine=name) for name in ("floats", "bytecode"))
     assert_same(plain, traced, atol=0.0)
 
 
@@ -116,23 +106,6 @@ def test_flights_are_flown_by_what_is_fastest_for_so_many_ticks(monkeypatch) -> 
     for engine, extra in (("compiled", "fast"), ("jax", "jax")):
         with pytest.raises(BackendMissing, match=rf'pip install "aerobat\[{extra}\]"'):
             choose(engine, 1, 1000)
-
-
-def test_observed_errors_have_the_stated_spread() -> None:
-    """On each axis, of each quantity; and no vehicle's errors are another's."""
-    noise = StateNoise(position=0.01, velocity=0.1, attitude=0.02, omega=0.3)
-    errors = noise.drawn([np.random.default_rng(k) for k in range(4)], 5000)
-    assert errors.position.std() == pytest.approx(0.01, rel=0.02)
-    assert errors.velocity.std() == pytest.approx(0.1, rel=0.02)
-    assert so3.log(errors.q_world_body).std() == pytest.approx(0.02, rel=0.02)
-    assert errors.omega_body.std() == pytest.approx(0.3, rel=0.02)
-    assert abs(np.corrcoef(errors.position[:, 0, 0], errors.position[:, 1, 0])[0, 1]) < 0.05
-
-
-def test_noise_as_of_a_good_observer_costs_millimetres() -> None:
-    clean, noisy = (fly(loops(8.0), HEXA, noise=noise, seed=2) for noise in (None, StateNoise.fused()))
-    gap = np.linalg.norm(noisy.states.position - clean.states.position, axis=-1)
-    assert 1e-5 < gap.max() < 0.005
 
 
 @pytest.mark.parametrize("engine", EXACT)
@@ -198,7 +171,16 @@ def test_a_slow_controller_does_not_coarsen_the_physics() -> None:
         ),
         ({"rate": 0.0}, r"^FlightConfig\.rate must be 1 or more, got "),
         ({"rate": np.nan}, r"^FlightConfig\.rate must be a finite number"),
-        ({"seed": -1, "noise": StateNoise.fused()}, "seed must be a whole number"),
+        ({"seed": -1}, "seed must be"),
+        ({"conditions": "lap"}, "conditions"),
+        ({"conditions": 3}, "conditions must be a Dispersion or the name of one"),
+        ({"conditions": "lab", "flights": 0}, "flights must be a whole number"),
+        ({"conditions": "lab", "flights": range(-2, 1)}, "flights must be a whole number"),
+        ({"flights": 3}, "flights are drawn from conditions"),
+        ({"conditions": "lab", "start": near(1)}, "start comes of the conditions"),
+        ({"conditions": "lab", "nominal": QUAD}, "nominal comes of the conditions"),
+        ({"conditions": "lab", "vehicle": [QUAD] * 2}, "vehicle must be one where there are conditions"),
+        ({"conditions": Dispersion(computation_delay=0.003)}, "computation_delay must be at most a period"),
         ({"vehicle": [QUAD] * 2, "start": near(3)}, "start must carry one leading axis of 2"),
         ({"start": replace(near(3), velocity=np.zeros((2, 3)))}, "same leading axis of 3"),
         ({"start": one(replace(near(1), q_world_body=np.array([[2.0, 0, 0, 0]])), 0)}, "unit quaternion"),
@@ -212,13 +194,6 @@ def test_arguments_that_do_not_fit_are_refused_in_one_sentence(arguments: dict, 
     with pytest.raises(SpecError, match=sentence) as caught:
         fly(**{"plan": AT_REST, "vehicle": QUAD, **arguments})
     assert "\n" not in str(caught.value)
-
-
-@pytest.mark.parametrize("field", ["position", "velocity", "attitude", "omega"])
-@pytest.mark.parametrize("value", [-1.0, np.nan, "much"])
-def test_noise_that_is_no_spread_is_refused_by_name(field: str, value: object) -> None:
-    with pytest.raises(SpecError, match=rf"^StateNoise\.{field} must be"):
-        StateNoise(**{field: value})
 
 
 def test_a_controller_of_its_own_is_flown() -> None:

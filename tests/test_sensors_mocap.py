@@ -167,14 +167,15 @@ def test_the_warp_is_largest_at_the_plane_and_gone_far_from_it() -> None:
     np.testing.assert_allclose(sizes, 0.02 * np.exp([-50.0, -0.5, 0.0, -0.5, -50.0]), atol=1e-12)
 
 
-def test_a_hand_off_lies_in_the_gate_unless_it_says_where() -> None:
-    problem, flip = ab.load_problem("half-flip"), ab.load_problem("line")
-    point, normal = hand_off_plane(HandOff(), problem)
-    np.testing.assert_array_equal(point, problem.gates[0].position)
-    np.testing.assert_array_equal(normal, problem.gates[0].normal)
-    point, normal = hand_off_plane(HandOff(normal=(0.0, 0.0, 2.0)), problem)
+def test_a_hand_off_lies_in_the_gate_or_half_way_unless_it_says_where() -> None:
+    gates = ab.load_problem("half-flip").gates
+    line = ab.plan("line", vehicle="agile-quad").trajectory
+    point, normal = hand_off_plane(HandOff(), line, gates)
+    np.testing.assert_array_equal(point, gates[0].position)
+    np.testing.assert_array_equal(normal, gates[0].normal)
+    _, normal = hand_off_plane(HandOff(normal=(0.0, 0.0, 2.0)), line, gates)
     np.testing.assert_array_equal(normal, [0.0, 0.0, 1.0])
-    point, normal = hand_off_plane(HandOff(), flip)
-    np.testing.assert_allclose(point, 0.5 * (flip.start.position + flip.goal.position))
-    with pytest.raises(SpecError, match=r"^motion_capture.hand_off.point is missing: without a gate"):
-        hand_off_plane(HandOff(), None)
+    point, normal = hand_off_plane(HandOff(), line, ())
+    np.testing.assert_array_equal(point, line.evaluate(0.5 * line.duration, 0))
+    velocity = line.evaluate(0.5 * line.duration, 1)
+    np.testing.assert_allclose(normal, velocity / np.linalg.norm(velocity), atol=1e-12)

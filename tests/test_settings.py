@@ -15,7 +15,8 @@ import aerobat as ab
 from refusals import complaint
 
 SETTINGS = (
-    ab.StateNoise,
+    ab.Dispersion,
+    ab.MotionCapture,
     ab.Envelope,
     ab.GridSearch,
     ab.BisectionSearch,

@@ -15,8 +15,8 @@ from aerobat.engines.pytree import tree_map
 from aerobat.kernels import motors, rigid_body
 from aerobat.kernels.motors import Airframe, Motion, advance
 from aerobat.kernels.rigid_body import Body, EnvironmentParameters, MassProperties, Wrench
+from aerobat.simulation.bodies import bodies, body_states
 from aerobat.simulation.components import RigidBodyPlant
-from aerobat.simulation.noise import bodies, body_states
 from aerobat.states import BodyState
 from aerobat.vehicle import Vehicle, load_vehicle
 from aerobat.vehicle.fleet import Fleet

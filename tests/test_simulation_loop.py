@@ -2,31 +2,26 @@
 
 import pickle
 from dataclasses import dataclass, replace
-from itertools import pairwise
 from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 from aerobat.engines import ENGINE_NAMES, choose, run_whole
 from aerobat.engines.pytree import tree_leaves, tree_map
 from aerobat.environment import Environment
 from aerobat.errors import SpecError
 from aerobat.kernels.rigid_body import Body
-from aerobat.simulation import FlightConfig, StateNoise, fly, prepare
+from aerobat.simulation import FlightConfig, fly, prepare
 from aerobat.simulation.components import StateObserver
 from aerobat.simulation.loop import Clock, Due, LoopInput, LoopParameters, compose
-from aerobat.simulation.noise import NoiseSource
 from aerobat.simulation.setup import FlightSetup
 from aerobat.vehicle import load_vehicle
 from test_flying_batches import HEXA, QUAD, assert_same, loops, near
 
 
 def flight_of(engine: str, vehicles: Any = QUAD, duration: float = 1.0) -> FlightSetup:
-    config = FlightConfig(engine=engine, noise=StateNoise.fused(), seed=5)
-    return prepare(loops(duration), vehicles, config=config)
+    return prepare(loops(duration), vehicles, config=FlightConfig(engine=engine))
 
 
 def with_observer_period(setup: FlightSetup, period: int) -> FlightSetup:
@@ -75,26 +70,15 @@ def test_a_flight_branched_in_the_air_goes_both_ways() -> None:
     assert_equal(calm, loop.scan(carry, rest)[1])
 
 
-@settings(max_examples=20)
-@given(st.lists(st.integers(0, 60), min_size=2, max_size=8))
-def test_noise_is_the_same_however_it_is_asked_for(cuts: list[int]) -> None:
-    """Forward in chunks of any size, over gaps, and back again."""
-    whole = NoiseSource(StateNoise.fused(), 7, 3).chunk(0, 61)
-    source = NoiseSource(StateNoise.fused(), 7, 3)
-    for begin, end in pairwise(cuts):
-        begin, end = min(begin, end), max(begin, end) + 1
-        assert_equal(source.chunk(begin, end), tree_map(lambda leaf, b=begin, e=end: leaf[b:e], whole))
-
-
 @pytest.mark.parametrize("log_rate", [None, 100.0, 3.125])
 def test_neither_blocks_of_references_nor_chunks_of_noise_change_a_flight(monkeypatch, log_rate) -> None:
-    options = {"noise": StateNoise.fused(), "seed": 3, "log_rate": log_rate, "engine": "compiled"}
-    whole = fly(loops(2.0), [HEXA] * 3, **options)
+    options = {"conditions": "lab", "flights": 3, "seed": 3, "log_rate": log_rate, "engine": "compiled"}
+    whole = fly(loops(2.0), HEXA, **options)
     monkeypatch.setattr("aerobat.simulation.setup._VEHICLE_TICKS", 3 * 37)
-    assert_same(fly(loops(2.0), [HEXA] * 3, **options), whole)
+    assert_same(fly(loops(2.0), HEXA, **options), whole)
     for module in ("setup", "reference_source"):
         monkeypatch.setattr(f"aerobat.simulation.{module}.BLOCK", 130)
-    assert_same(fly(loops(2.0), [HEXA] * 3, **options), whole, atol=1e-12)
+    assert_same(fly(loops(2.0), HEXA, **options), whole, atol=1e-12)
 
 
 @dataclass(frozen=True)

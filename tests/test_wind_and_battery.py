@@ -28,7 +28,7 @@ def gusts_of(rate: float, steps: int, **changes: float) -> np.ndarray:
     """Gusts at so many ticks a second, along, across and vertical, (3, steps, flights)."""
     dispersion = Dispersion(gusts=Gusts(intensity=INTENSITY, length=LENGTH, airspeed=AIRSPEED, **changes))
     draws = draw_flights(dispersion, 6, 3, range(FLIGHTS))
-    flights = DispersedFlights(draws, dispersed_fleet(HEXA, draws), HEXA, Environment(), rate)
+    flights = DispersedFlights(draws, dispersed_fleet(HEXA, draws), HEXA, Environment(), rate, hover(1.0))
     part = wind_part(dispersion.gusts, flights)
     state = wind.init(part.parameters)
     noise = WindSource(draws, 1).chunk(0, steps)
@@ -86,7 +86,7 @@ def test_the_mean_wind_is_that_of_the_place_and_the_flight_s_own() -> None:
     dispersion = Dispersion(gusts=Gusts(mean_wind=1.0))
     draws = draw_flights(dispersion, 6, 3, range(3))
     windy = Environment(wind=(0.0, 2.0, 0.5))
-    flights = DispersedFlights(draws, dispersed_fleet(HEXA, draws), HEXA, windy, 1000.0)
+    flights = DispersedFlights(draws, dispersed_fleet(HEXA, draws), HEXA, windy, 1000.0, hover(1.0))
     state = wind.init(wind_part(dispersion.gusts, flights).parameters)
     expected = np.array([windy.wind + draw.mean_wind for draw in draws])
     np.testing.assert_allclose(np.transpose(state.velocity), expected, atol=1e-15)

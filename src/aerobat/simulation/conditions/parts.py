@@ -10,7 +10,6 @@ import numpy as np
 from aerobat import so3
 from aerobat.arrays import Array
 from aerobat.control.parameters import airframe_parameters, environment_parameters
-from aerobat.declaration import unit
 from aerobat.engines.components import components
 from aerobat.engines.pytree import Tree
 from aerobat.environment import (
@@ -28,7 +27,7 @@ from aerobat.kernels.imu import BiasParameters, ImuParameters, ImuSample
 from aerobat.kernels.mocap import MocapParameters, Seam
 from aerobat.kernels.rigid_body import Pose
 from aerobat.kernels.wind import GustFilter, GustState, WindParameters
-from aerobat.problem import Problem
+from aerobat.problem import Gate
 from aerobat.simulation.conditions.disturbances import BatterySag, Wind, WindSource
 from aerobat.simulation.conditions.draw import Draw
 from aerobat.simulation.conditions.sensors import (
@@ -40,6 +39,7 @@ from aerobat.simulation.conditions.sensors import (
     MotionCaptureSensor,
 )
 from aerobat.simulation.setup import Part
+from aerobat.trajectory import Trajectory
 from aerobat.vehicle import Vehicle
 from aerobat.vehicle.fleet import Fleet
 
@@ -47,6 +47,7 @@ SLOW = 100.0  # [1/s] at which what changes slowly steps: biases, charge, and wi
 GUSTY = 20.0  # [-] steps of the wind in the time in which its gusts change
 MAX_QUEUE = 8  # poses on their way at once
 _WHOLE = 1e-6  # [-] of a tick
+_MOVING = 1e-3  # [m/s] a path that is slower has no direction
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,7 +59,8 @@ class DispersedFlights:
     nominal: Vehicle
     environment: Environment
     rate: float  # [1/s] of the ticks
-    problem: Problem | None = None  # whose gates, start and goal say where a hand-off lies that does not
+    trajectory: Trajectory  # that is flown
+    gates: tuple[Gate, ...] = ()  # on its way; they or the trajectory say where a hand-off is that does not
 
     def each(self, name: str) -> Tree:
         """A field of the draws: a leaf (vehicles,), or for an array a tuple of them."""
@@ -86,7 +88,7 @@ class DispersedFlights:
 def condition_parts(dispersion: Dispersion, flights: DispersedFlights) -> tuple[Part, ...]:
     """The parts of some conditions, in their order in the loop, before observer, controller and plant.
 
-    Raises SpecError for sensors whose rates do not fit the ticks, and for a hand-off that lies nowhere.
+    Raises SpecError for sensors whose rates do not fit the ticks.
     """
     parts = []
     if dispersion.gusts is not None:
@@ -206,8 +208,8 @@ def motion_capture_part(capture: MotionCapture, flights: DispersedFlights) -> Pa
 
 
 def _seam(hand_off: HandOff | None, flights: DispersedFlights) -> Seam:
-    """The plane of hand-off; without one, any plane, and no misfit."""
-    point, normal = (np.zeros(3), so3.UP) if hand_off is None else hand_off_plane(hand_off, flights.problem)
+    """The plane of hand-off; without one, some plane, and no misfit."""
+    point, normal = hand_off_plane(hand_off or HandOff(), flights.trajectory, flights.gates)
     rotation = so3.exp(np.array([draw.hand_off_rotation for draw in flights.draws]))
     return Seam(
         flights.vector(point),
@@ -218,27 +220,21 @@ def _seam(hand_off: HandOff | None, flights: DispersedFlights) -> Seam:
     )
 
 
-def hand_off_plane(hand_off: HandOff, problem: Problem | None) -> tuple[Array, Array]:
-    """Point [m] and unit normal of the plane of hand-off, (3,) each, in a problem if it does not say itself.
+def hand_off_plane(hand_off: HandOff, path: Trajectory, gates: Sequence[Gate]) -> tuple[Array, Array]:
+    """Point [m] and unit normal of the plane of hand-off, (3,) each, by itself or by what is flown.
 
-    Raises SpecError where neither it, nor gates, nor start and goal tell.
+    That is the first gate's, or where there is none the plane across the trajectory half-way.
     """
-    point, normal = hand_off.point, hand_off.normal
-    gate = problem.gates[0] if problem is not None and problem.gates else None
-    if gate is not None:
-        point = gate.position if point is None else point
-        normal = gate.normal if normal is None else normal
-    if point is not None and normal is not None:
-        return point, normal
-    way = np.zeros(3) if problem is None else problem.goal.position - problem.start.position
-    if problem is None or not way.any():
-        missing = "point" if point is None else "normal"
-        raise SpecError(
-            f"motion_capture.hand_off.{missing} is missing: without a gate, and a goal elsewhere, "
-            "nothing else says where the second system begins"
-        )
-    middle = problem.start.position + 0.5 * way
-    return middle if point is None else point, unit(way) if normal is None else normal
+    half = 0.5 * path.duration
+    point = gates[0].position if gates else path.evaluate(half, 0)
+    velocity = path.evaluate(half, 1)
+    speed = float(np.linalg.norm(velocity))
+    ahead = velocity / speed if speed > _MOVING else np.array([1.0, 0.0, 0.0])
+    normal = gates[0].normal if gates else ahead
+    return (
+        point if hand_off.point is None else hand_off.point,
+        normal if hand_off.normal is None else hand_off.normal,
+    )
 
 
 def whole_ticks(rate: float, sensor_rate: float, field: str) -> int:

@@ -55,8 +55,8 @@ def dispersed_setup(
         config: whose seed and flights are drawn.
         conditions: what they are drawn from.
 
-    Raises SpecError for a vehicle that cannot hover, for rates that do not fit each other, a delay of more
-    than a period of the controller, and a hand-off that lies nowhere.
+    Raises SpecError for a vehicle that cannot hover, for rates that do not fit each other, and for a delay of
+    more than a period of the controller.
     """
     nominal.without_dead_rotors()
     rate = config.control_rate if conditions.imu is None else conditions.imu.rate
@@ -68,7 +68,8 @@ def dispersed_setup(
         nominal=nominal,
         environment=environment,
         rate=rate,
-        problem=None if isinstance(plan, Trajectory) else plan.problem,
+        trajectory=as_trajectory(plan),
+        gates=() if isinstance(plan, Trajectory) else plan.problem.gates,
     )
     reference = ReferenceSource(as_trajectory(plan), nominal, environment, rate)
     disturbed = condition_parts(conditions, flights)
