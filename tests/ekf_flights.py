@@ -149,16 +149,16 @@ def parameters(measured: Measured, velocity: Array, settings: Ekf = SETTINGS) ->
 
 
 def measured_hover(
-    vehicles: int = 3, rows: int = 60, latency: int = 15
+    vehicles: int = 3, poses: int = 27, latency: int = 15
 ) -> tuple[FilterParameters, FilterInput]:
     """A hover that is measured late, with an outlier and a jump."""
     rng = np.random.default_rng(8)
     still = Truth(
-        np.zeros((vehicles, 10 * rows + 1, 3)),
-        np.zeros((vehicles, 10 * rows + 1, 3)),
-        np.tile(so3.IDENTITY, (vehicles, 10 * rows + 1, 1)),
-        np.zeros((vehicles, 10 * rows, 3)),
-        np.tile([0.0, 0.0, 9.81], (vehicles, 10 * rows, 1)),
+        np.zeros((vehicles, STRIDE * poses + 1, 3)),
+        np.zeros((vehicles, STRIDE * poses + 1, 3)),
+        np.tile(so3.IDENTITY, (vehicles, STRIDE * poses + 1, 1)),
+        np.zeros((vehicles, STRIDE * poses, 3)),
+        np.tile([0.0, 0.0, 9.81], (vehicles, STRIDE * poses, 1)),
     )
     seen_by = measured(still)
     seen_by.position[:, 5] += 0.3
