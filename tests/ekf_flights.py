@@ -23,6 +23,7 @@ from aerobat.states import BodyState
 
 RATE = 1000  # [1/s] of the IMU
 STRIDE = 10  # samples from one pose to the next
+CONVERGED = 200  # samples after which the start is forgotten
 SETTINGS = Ekf()
 
 
@@ -38,13 +39,19 @@ class Truth:
 
 
 @lru_cache
+def plans() -> tuple[ab.Plan, ...]:
+    """Two maneuvers of the hexarotor, quickly planned."""
+    names = ("half-flip", "flip-pitch")
+    return tuple(ab.plan(ab.load_problem(name), ab.FreeKnots(), "hexarotor") for name in names)
+
+
+@lru_cache
 def flips(count: int = 50, seed: int = 0) -> tuple[Truth, ...]:
     """Flights of two plans by many vehicles, none like another, each from a start of its own."""
     hexarotor = ab.load_vehicle("hexarotor")
     rng = np.random.default_rng(seed)
     truths = []
-    for name in ("half-flip", "flip-pitch"):
-        plan = ab.plan(ab.load_problem(name), ab.FreeKnots(), hexarotor)
+    for plan in plans():
         factors = rng.uniform(0.95, 1.05, count)
         vehicles = [replace(hexarotor, name=f"{k}", mass=hexarotor.mass * f) for k, f in enumerate(factors)]
         scatter = [s * rng.normal(size=(count, 3)) for s in (0.02, 0.05, 0.03, 0.1)]

@@ -10,9 +10,7 @@ from scipy.stats import chi2
 
 from aerobat import so3
 from aerobat.arrays import Array
-from ekf_flights import RATE, STRIDE, Filtered, Measured, Truth, filtered, flips, measured
-
-CONVERGED = 200  # samples after which the start is forgotten
+from ekf_flights import CONVERGED, RATE, STRIDE, Filtered, Measured, Truth, filtered, flips, measured
 
 
 def poses_of(filter_: Filtered, latency: int = 10) -> slice:
