@@ -101,7 +101,7 @@ def skew(a: Array) -> Array:
 
 
 def dense_transition(before: EkfState, after: EkfState, elapsed: float) -> Array:
-    """Solà's (270), with the mean specific force that the nominal states moved by."""
+    """Solà's, section 5.4, with the mean specific force that the nominal states moved by."""
     R = so3.axes(before.nominal.q_world_body)
     R_after = so3.axes(after.nominal.q_world_body)
     gained = np.subtract(after.nominal.velocity, before.nominal.velocity) + elapsed * GRAVITY
