@@ -23,6 +23,7 @@ from aerobat.states import BodyState
 
 RATE = 1000  # [1/s] of the IMU
 STRIDE = 10  # samples from one pose to the next
+CONVERGED = 200  # samples after which the start is forgotten
 SETTINGS = Ekf()
 
 
@@ -38,13 +39,19 @@ class Truth:
 
 
 @lru_cache
+def plans() -> tuple[ab.Plan, ...]:
+    """Two maneuvers of the hexarotor, quickly planned."""
+    names = ("half-flip", "flip-pitch")
+    return tuple(ab.plan(ab.load_problem(name), ab.FreeKnots(), "hexarotor") for name in names)
+
+
+@lru_cache
 def flips(count: int = 50, seed: int = 0) -> tuple[Truth, ...]:
     """Flights of two plans by many vehicles, none like another, each from a start of its own."""
     hexarotor = ab.load_vehicle("hexarotor")
     rng = np.random.default_rng(seed)
     truths = []
-    for name in ("half-flip", "flip-pitch"):
-        plan = ab.plan(ab.load_problem(name), ab.FreeKnots(), hexarotor)
+    for plan in plans():
         factors = rng.uniform(0.95, 1.05, count)
         vehicles = [replace(hexarotor, name=f"{k}", mass=hexarotor.mass * f) for k, f in enumerate(factors)]
         scatter = [s * rng.normal(size=(count, 3)) for s in (0.02, 0.05, 0.03, 0.1)]
@@ -149,16 +156,16 @@ def parameters(measured: Measured, velocity: Array, settings: Ekf = SETTINGS) ->
 
 
 def measured_hover(
-    vehicles: int = 3, rows: int = 60, latency: int = 15
+    vehicles: int = 3, poses: int = 27, latency: int = 15
 ) -> tuple[FilterParameters, FilterInput]:
     """A hover that is measured late, with an outlier and a jump."""
     rng = np.random.default_rng(8)
     still = Truth(
-        np.zeros((vehicles, 10 * rows + 1, 3)),
-        np.zeros((vehicles, 10 * rows + 1, 3)),
-        np.tile(so3.IDENTITY, (vehicles, 10 * rows + 1, 1)),
-        np.zeros((vehicles, 10 * rows, 3)),
-        np.tile([0.0, 0.0, 9.81], (vehicles, 10 * rows, 1)),
+        np.zeros((vehicles, STRIDE * poses + 1, 3)),
+        np.zeros((vehicles, STRIDE * poses + 1, 3)),
+        np.tile(so3.IDENTITY, (vehicles, STRIDE * poses + 1, 1)),
+        np.zeros((vehicles, STRIDE * poses, 3)),
+        np.tile([0.0, 0.0, 9.81], (vehicles, STRIDE * poses, 1)),
     )
     seen_by = measured(still)
     seen_by.position[:, 5] += 0.3

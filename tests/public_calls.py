@@ -53,6 +53,7 @@ def ignored(attempt: object) -> None:
 
 RESULTS = (
     "Assessment",
+    "Estimates",
     "Gradient",
     "Passage",
     "Score",
@@ -95,6 +96,13 @@ def _arguments(name: str, folder: Path) -> dict[str, Any]:
         "comparison_figure": {"comparison": instance(ab.Comparison)},
         "dispersion_names": {},
         "draw": {"flight": flight(), "plan": plan(), "vehicle": agile},
+        "estimate": {
+            "log": instance(ab.SensorLog),
+            "ekf": ab.Ekf(),
+            **here,
+            "start_velocity": (0.0, 0.0, 0.1),
+            "max_gap": 0.2,
+        },
         "fly": {
             "plan": plan(),
             "vehicle": agile,
@@ -269,6 +277,7 @@ def instance(cls: type) -> Any:
         ab.CustomManeuver: lambda: ab.CustomManeuver((ab.Stage("a"),)),
         ab.Dispersion: lambda: ab.load_dispersion("lab"),
         ab.EndState: lambda: ab.at_rest((0.0, 0.0, 1.0)),
+        ab.Estimates: lambda: ab.estimate(_log()),
         ab.FlatState: lambda: plan().trajectory.flat(0.1),
         ab.Flight: flight,
         ab.Gate: lambda: ab.tilted_gate((0.0, 0.0, 1.0)),
@@ -276,6 +285,7 @@ def instance(cls: type) -> Any:
         ab.Plan: plan,
         ab.Problem: lambda: ab.load_problem("half-flip"),
         ab.Rotor: lambda: ab.load_vehicle("agile-quad").rotors[0],
+        ab.SensorLog: _log,
         ab.Setpoint: lambda: flight().setpoint,
         ab.Stage: lambda: ab.Stage("a"),
         ab.Trajectory: lambda: plan().trajectory,
@@ -291,6 +301,14 @@ def instance(cls: type) -> Any:
         ab.Passage: _passage,
     }
     return made.get(cls, cls)()
+
+
+@cache
+def _log() -> ab.SensorLog:
+    """A tenth of a second at rest."""
+    times, force = np.arange(1.0, 11.0) / 100.0, np.tile([0.0, 0.0, 9.81], (10, 1))
+    upright = np.tile([1.0, 0.0, 0.0, 0.0], (2, 1))
+    return ab.SensorLog(times, np.zeros((10, 3)), force, np.array([0.0, 0.05]), np.zeros((2, 3)), upright)
 
 
 def _passage() -> ab.Passage:

@@ -10,9 +10,7 @@ from scipy.stats import chi2
 
 from aerobat import so3
 from aerobat.arrays import Array
-from ekf_flights import RATE, STRIDE, Filtered, Measured, Truth, filtered, flips, measured
-
-CONVERGED = 200  # samples after which the start is forgotten
+from ekf_flights import CONVERGED, RATE, STRIDE, Filtered, Measured, Truth, filtered, flips, measured
 
 
 def poses_of(filter_: Filtered, latency: int = 10) -> slice:
@@ -107,6 +105,20 @@ def test_after_a_hand_off_the_filter_is_back_within_three_tenths_of_a_second() -
         assert run.states.since_pose[:, back:].max() < 0.05
         assert np.linalg.norm(run.error[:, back:, :3], axis=-1).max() < 0.006
         assert np.degrees(np.linalg.norm(run.error[:, back:, 6:9], axis=-1).max()) < 0.5
+
+
+def test_a_second_system_that_takes_the_body_itself_for_turned_does_not_lock_the_filter_out() -> None:
+    """By 2° and 5 cm: its attitudes contradict every specific force, so that it jumps more than once."""
+    truth = flips()[0]
+    seen, pose = measured(truth), truth.omega.shape[1] // STRIDE // 2
+    wrong = so3.multiply(seen.q_world_body[:, pose:], so3.exp([0.0, np.radians(2.0), 0.0]))
+    moved = np.concatenate([seen.position[:, :pose], seen.position[:, pose:] + [0.0, 0.0, 0.05]], axis=1)
+    turned = np.concatenate([seen.q_world_body[:, :pose], wrong], axis=1)
+    run = filtered(truth, replace(seen, position=moved, q_world_body=turned))
+    back = STRIDE * pose + 3 * RATE // 10
+    assert run.states.since_pose[:, back:].max() < 0.1
+    off = np.linalg.norm(run.error[:, back:, :3] + [0.0, 0.0, 0.05], axis=-1)
+    assert off.max() < 0.015
 
 
 def test_in_an_outage_the_filter_coasts_as_well_as_it_says_and_is_back_with_the_next_pose() -> None:

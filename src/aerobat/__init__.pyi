@@ -15,6 +15,7 @@ from .environment import (
     write_dispersion,
 )
 from .errors import AerobatError, BackendMissing, Infeasible, SpecError
+from .estimation import Ekf, Estimates, SensorLog, estimate
 from .evaluation import Gradient, Passage, Score, Scores, Sensitivity, score, score_flights, sensitivity
 from .flatness import Reference, reference
 from .interchange.columns import write_columns
@@ -90,9 +91,11 @@ __all__ = [
     "Controller",
     "CustomManeuver",
     "Dispersion",
+    "Ekf",
     "EndState",
     "Envelope",
     "Environment",
+    "Estimates",
     "FlatState",
     "Flight",
     "FlightConfig",
@@ -125,6 +128,7 @@ __all__ = [
     "Score",
     "Scores",
     "Sensitivity",
+    "SensorLog",
     "Setpoint",
     "SpecError",
     "Stage",
@@ -142,6 +146,7 @@ __all__ = [
     "comparison_figure",
     "dispersion_names",
     "draw",
+    "estimate",
     "fly",
     "implausibilities",
     "import_plugin",

@@ -8,7 +8,7 @@ import numpy as np
 
 from aerobat import so3
 from aerobat.arrays import Array, frozen
-from aerobat.declaration import by_value, short
+from aerobat.declaration import by_value, short, validated
 from aerobat.errors import SpecError
 
 MAX_GAP = 0.05  # [s] between samples of an IMU: longer ones say too little of a turning vehicle
@@ -16,6 +16,7 @@ MAX_AGE = 0.2  # [s] of a pose as it arrives: errors then and now are related to
 _UNIT = 1e-2  # [-] by which the norm of a quaternion may be off: what few decimals leave
 
 
+@validated
 @short
 @by_value
 @dataclass(frozen=True, eq=False, repr=False)
