@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
+from aerobat import so3
 from aerobat.environment import Battery, Dispersion, Gusts, load_dispersion
 from aerobat.simulation.conditions.draw import STREAMS, Draw, dispersed_fleet, draw_flights
 from aerobat.states import BodyState
@@ -132,6 +133,17 @@ def test_where_nothing_varies_the_nominal_vehicle_starts_at_the_reference() -> N
     assert draw.start(reference) == reference
     assert draw.charge == 1.0
     np.testing.assert_array_equal(draw.effectiveness, 1.0)
+
+
+def test_a_flight_starts_off_the_reference_by_what_it_draws() -> None:
+    reference = BodyState(np.ones(3), np.zeros(3), np.array([0.6, 0.0, 0.8, 0.0]), np.ones(3))
+    [draw] = draw_flights(LAB, ROTORS, 3, [2])
+    start = draw.start(reference)
+    np.testing.assert_array_equal(start.position, 1.0 + draw.start_position)
+    np.testing.assert_array_equal(start.velocity, draw.start_velocity)
+    turned = so3.box_minus(start.q_world_body, reference.q_world_body)
+    np.testing.assert_allclose(turned, draw.start_attitude, atol=1e-14)
+    np.testing.assert_array_equal(start.omega_body, 1.0)
 
 
 def test_streams_of_random_numbers_are_each_their_own() -> None:
