@@ -3,6 +3,6 @@
 from aerobat.evaluation.score import Score, Scores, score
 from aerobat.evaluation.score_flights import score_flights
 from aerobat.evaluation.sensitivity import Gradient, Sensitivity, sensitivity
-from aerobat.simulation.passage import Passage
+from aerobat.simulation.passages import Passage
 
 __all__ = ["Gradient", "Passage", "Score", "Scores", "Sensitivity", "score", "score_flights", "sensitivity"]
