@@ -32,7 +32,7 @@ from aerobat.problem import (
     Waypoint,
     registered_maneuvers,
 )
-from aerobat.vehicle import Rotor, Vehicle
+from aerobat.vehicle import Ellipsoid, Rotor, Vehicle
 
 PAGE = Path(__file__).parent / "files.md"
 ANNOTATED = PAGE.parent.parent / "examples" / "vehicles" / "annotated.toml"
@@ -49,6 +49,7 @@ PLACES = {  # where each class stands in a file
     Condition: "`conditions` and `path_constraints`: lower ≤ direction · quantity ≤ upper",
     Waypoint: "`[[maneuver.waypoints]]`",
     Rotor: "`[[rotors]]`",
+    Ellipsoid: "`body`: what passes gates, propellers included",
 }
 INTRODUCTION = """# Files
 
@@ -105,6 +106,11 @@ flights are theirs, counted without it; where they do not, one sentence says whi
 stop, and what remains. A hexarotor whose spins alternate keeps no control of yaw without any of its rotors,
 one with spins 1, 1, -1, -1, 1, -1 does without any of the first four; an octorotor does without any.
 """
+BODY = """
+Left out, it is a flat ellipsoid in the middle between the rotors that encloses all propellers, its half height
+0.2 of its half width. Gates are judged by it: all that it sweeps of a gate's plane is to lie within the
+opening. A vehicle that does not fit at all is refused before anything is planned.
+"""
 IMPORT = """
 ### From URDF and SDF
 
@@ -140,7 +146,7 @@ def page() -> str:
     parts += [section(GatePassage), section(Stage), section(Attitude), section(Condition)]
     parts += [STAGES, section(Waypoint), WAYPOINTS]
     parts += ["## Vehicle (`--vehicle vehicle.toml`)\n", VEHICLE, fenced(ANNOTATED), table(Vehicle)]
-    parts += [section(Rotor), ROTOR, IMPORT]
+    parts += [section(Rotor), ROTOR, section(Ellipsoid), BODY, IMPORT]
     return "\n".join(part.strip("\n") + "\n" for part in parts) + "\n" + WRITTEN + by_hand
 
 

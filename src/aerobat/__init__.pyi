@@ -3,7 +3,18 @@ from .control import Controller
 from .declaration import import_plugin
 from .environment import Environment
 from .errors import AerobatError, BackendMissing, Infeasible, SpecError
-from .evaluation import Gradient, Passage, Score, Scores, Sensitivity, score, score_flights, sensitivity
+from .evaluation import (
+    Gradient,
+    Opening,
+    Passage,
+    Score,
+    Scores,
+    Sensitivity,
+    score,
+    score_flights,
+    sensitivity,
+    smallest_opening,
+)
 from .flatness import Reference, reference
 from .interchange.columns import write_columns
 from .interchange.csv import read_csv, write_csv
@@ -61,7 +72,7 @@ from .simulation import Flight, FlightConfig, Outcome, StateNoise, fly, load_fli
 from .states import BodyState, FlatState, Setpoint, Wrench
 from .studies.compare import Comparison, compare
 from .trajectory import ContinuityRule, Trajectory, load_trajectory, minimum_effort, save_trajectory
-from .vehicle import Rotor, Vehicle, implausibilities, load_vehicle, vehicle_names, write_vehicle
+from .vehicle import Ellipsoid, Rotor, Vehicle, implausibilities, load_vehicle, vehicle_names, write_vehicle
 
 __all__ = [
     "AerobatError",
@@ -76,6 +87,7 @@ __all__ = [
     "ContinuityRule",
     "Controller",
     "CustomManeuver",
+    "Ellipsoid",
     "EndState",
     "Envelope",
     "Environment",
@@ -95,6 +107,7 @@ __all__ = [
     "Maneuver",
     "MinSnap",
     "Miqp",
+    "Opening",
     "Outcome",
     "Passage",
     "Plan",
@@ -149,6 +162,7 @@ __all__ = [
     "score",
     "score_flights",
     "sensitivity",
+    "smallest_opening",
     "tilted_gate",
     "to_dataframe",
     "tracking_figure",

@@ -61,6 +61,7 @@ def _flown(passage: Passage) -> FlownPassage:
         attitude_error=None if isnan(error) else error,
         attitude_tolerance=None if isinf(tolerance) else tolerance,
         failure=failure,
+        clearance=None if isnan(passage.clearance) else passage.clearance,
     )
 
 
