@@ -107,9 +107,9 @@ stop, and what remains. A hexarotor whose spins alternate keeps no control of ya
 one with spins 1, 1, -1, -1, 1, -1 does without any of the first four; an octorotor does without any.
 """
 BODY = """
-Left out, it is a flat ellipsoid in the middle between the rotors that encloses all propellers, its half height
-0.2 of its half width. Gates are judged by it: all that it sweeps of a gate's plane is to lie within the
-opening. A vehicle that does not fit at all is refused before anything is planned.
+Left out, it is a flat ellipsoid in the middle between the rotors that encloses all propellers, its half
+height a fifth of its half width. Gates are judged by it: all that it sweeps of a gate's plane is to lie
+within the opening. A vehicle that does not fit at all is refused before anything is planned.
 """
 IMPORT = """
 ### From URDF and SDF

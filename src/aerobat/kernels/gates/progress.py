@@ -88,7 +88,7 @@ def step(
             (plane.frame, plane.depth, ellipsoid),
             snapshots,
             counted,
-            (crosses, fraction),
+            crosses,
             passed,
         ),
     )

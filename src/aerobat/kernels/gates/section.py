@@ -1,22 +1,22 @@
-"""The section of an ellipsoid by a gate's plane: how far it reaches across the opening and up in it.
+"""The section of an ellipsoid by a gate's plane: how far it reaches along a direction in that.
 
 The ellipsoid is x = c + R A w, |w| ≤ 1, with attitude R and A = diag(semi-axes). For a unit vector d of the
 world d' = A Rᵀ d; then σ = |n'| is how far it reaches from its centre along the plane's normal n, and with
-the centre at a height s = n·c above the plane the section is the ellipse of points w with n'·w = −s, |w| ≤ 1:
-its centre is at d·c − s (d'·n')/σ² along any d in the plane, and from there it reaches
-√(1 − s²/σ²) √(d'·d' − (d'·n')²/σ²).
+the centre at a height h = n·c above the plane the section is the ellipse of points w with n'·w = −h, |w| ≤ 1:
+its centre is at d·c − h (d'·n')/σ² along any d in the plane, and from there it reaches
+H √(1 − h²/σ²) with H² = d'·d' − (d'·n')²/σ².
 """
 
 from __future__ import annotations
 
 from typing import NamedTuple
 
-from aerobat.kernels.ops import Ops, Quaternion, Scalar, Vector
+from aerobat.kernels.ops import Ops, Quaternion, Scalar, Vector, clip
 from aerobat.kernels.quaternions import axes, normalize, to_body
-from aerobat.kernels.vectors import dot, norm
+from aerobat.kernels.vectors import dot
 
 _TINY = 1e-300  # keeps 0/0 away and changes no other quotient
-_ROUNDING = 1e-9  # [m] from the middle, where neither side is the nearer
+_ROUNDING = 1e-9  # [m] from the middle, where neither side is the nearer; of a rise that is none
 
 
 class BoundingEllipsoid(NamedTuple):
@@ -34,66 +34,102 @@ class GateFrame(NamedTuple):
     up: Vector
 
 
+class Section(NamedTuple):
+    """An ellipsoid above a plane, its section, and a direction in that plane with the one beside it."""
+
+    height: Scalar  # [m] of the centre above the plane
+    reach: Scalar  # [m] of the ellipsoid along the normal
+    along: Scalar  # [m] of the centre
+    beside: Scalar  # [m] likewise
+    shear_along: Scalar  # by which the section's centre moves with the height
+    shear_beside: Scalar  # likewise
+    half: Scalar  # [m] that the section reaches along the direction, through the centre
+    covariance: Scalar  # [m²] of along and beside there
+
+
 class PlanePoint(NamedTuple):
     """A point in a gate's plane, from the centre of the opening."""
 
-    lateral: Scalar  # [m]
-    up: Scalar  # [m]
+    along: Scalar  # [m]
+    beside: Scalar  # [m]
 
 
-def plane_gap(
-    ops: Ops, ellipsoid: BoundingEllipsoid, frame: GateFrame, offset: Vector, q_world_body: Quaternion
-) -> Scalar:
-    """The distance between an ellipsoid and a gate's plane [m]; negative where they meet.
-
-    Args:
-        ops: of the arithmetic.
-        ellipsoid: what encloses the vehicle.
-        frame: the gate's.
-        offset: of the centre of mass from the opening's centre [m], world.
-        q_world_body: the attitude.
-    """
-    normal = to_body(axes(q_world_body), frame.normal)
-    height = dot(offset, frame.normal) + dot(ellipsoid.centre, normal)
-    return ops.maximum(height, -height) - norm(ops, _stretched(ellipsoid, normal))
-
-
-def section_extremes(
-    ops: Ops, ellipsoid: BoundingEllipsoid, frame: GateFrame, offset: Vector, q_world_body: Quaternion
-) -> tuple[PlanePoint, PlanePoint]:
-    """The points of an ellipsoid's section farthest from the opening's middle: across it, and up or down.
-
-    Where the plane is not met, those of the section's nearest point to it.
+def section(
+    ops: Ops,
+    ellipsoid: BoundingEllipsoid,
+    directions: tuple[Vector, Vector, Vector],
+    offset: Vector,
+    q_world_body: Quaternion,
+) -> Section:
+    """The section of an ellipsoid by a plane.
 
     Args:
         ops: of the arithmetic.
         ellipsoid: what encloses the vehicle.
-        frame: the gate's.
+        directions: the plane's normal, a direction in it, and the one beside that, unit vectors, world.
         offset: of the centre of mass from the opening's centre [m], world.
         q_world_body: the attitude, of any length but zero.
     """
     body_axes = axes(normalize(ops, q_world_body))
-    normal, lateral, up = (to_body(body_axes, axis) for axis in frame)
-    height, across, above = (
-        dot(offset, axis) + dot(ellipsoid.centre, in_body)
-        for axis, in_body in zip(frame, (normal, lateral, up), strict=True)
+    in_body = [to_body(body_axes, direction) for direction in directions]
+    height, along, beside = (
+        dot(offset, direction) + dot(ellipsoid.centre, turned)
+        for direction, turned in zip(directions, in_body, strict=True)
     )
-    normal, lateral, up = (_stretched(ellipsoid, axis) for axis in (normal, lateral, up))
-    reach_sq = dot(normal, normal)
-    shear_lateral, shear_up = dot(lateral, normal) / reach_sq, dot(up, normal) / reach_sq
-    size = ops.sqrt(ops.maximum(1.0 - height * height / reach_sq, 0.0))
-    across, above = across - height * shear_lateral, above - height * shear_up
-    half_width, half_height = (
-        ops.sqrt(ops.maximum(dot(axis, axis) - reach_sq * shear * shear, _TINY))
-        for axis, shear in ((lateral, shear_lateral), (up, shear_up))
+    n, a, b = (_stretched(ellipsoid, direction) for direction in in_body)
+    reach_sq = dot(n, n)
+    shear_along, shear_beside = dot(a, n) / reach_sq, dot(b, n) / reach_sq
+    return Section(
+        height,
+        ops.sqrt(reach_sq),
+        along,
+        beside,
+        shear_along,
+        shear_beside,
+        ops.sqrt(ops.maximum(dot(a, a) - reach_sq * shear_along * shear_along, _TINY)),
+        dot(a, b) - reach_sq * shear_along * shear_beside,
     )
-    covariance = dot(lateral, up) - reach_sq * shear_lateral * shear_up
-    to_side = ops.select(across < -_ROUNDING, -size, size)
-    upward = ops.select(above < -_ROUNDING, -size, size)
-    return (
-        PlanePoint(across + to_side * half_width, above + to_side * covariance / half_width),
-        PlanePoint(across + upward * covariance / half_height, above + upward * half_height),
-    )
+
+
+def gap(ops: Ops, at: Section) -> Scalar:
+    """The distance between ellipsoid and plane [m]; negative where they meet."""
+    return ops.maximum(at.height, -at.height) - at.reach
+
+
+def farthest(ops: Ops, at: Section) -> PlanePoint:
+    """The section's point farthest along the direction, to the side where the section's centre is.
+
+    Where the plane is not met, of the point of the ellipsoid next to it.
+    """
+    relative = at.height / at.reach
+    size = ops.sqrt(ops.maximum(1.0 - relative * relative, 0.0))
+    along, beside = at.along - at.height * at.shear_along, at.beside - at.height * at.shear_beside
+    sided = ops.select(along < -_ROUNDING, -size, size)
+    return PlanePoint(along + sided * at.half, beside + sided * at.covariance / at.half)
+
+
+def fraction_of_farthest(
+    ops: Ops, at: Section, change: tuple[Scalar, Scalar], within: tuple[Scalar, Scalar]
+) -> Scalar:
+    """The fraction of a straight way, its end at `at`, at which a section reaches the farthest.
+
+    With the attitude as at the end the section reaches a linear function of the height h more or less
+    H √(1 − h²/σ²): a concave function, with its maximum in closed form.
+
+    Args:
+        ops: of the arithmetic.
+        at: at the end of the way.
+        change: of the centre on the way, along the normal and along the direction [m].
+        within: the least and the greatest fraction to choose from.
+    """
+    rise, drift = change
+    rise = ops.select(ops.maximum(rise, -rise) < _ROUNDING, _ROUNDING, rise)
+    sheared = drift - rise * at.shear_along
+    middle = 1.0 - 0.5 * (within[0] + within[1])
+    along = at.along - at.height * at.shear_along - middle * sheared
+    slope = ops.select(along < -_ROUNDING, -sheared, sheared) * at.reach / (at.half * rise)
+    height = at.reach * slope / ops.sqrt(1.0 + slope * slope)
+    return clip(ops, 1.0 + (height - at.height) / rise, *within)
 
 
 def _stretched(ellipsoid: BoundingEllipsoid, direction: Vector) -> Vector:

@@ -14,16 +14,18 @@ from aerobat.kernels.gates.section import (
     BoundingEllipsoid,
     GateFrame,
     PlanePoint,
-    plane_gap,
-    section_extremes,
+    farthest,
+    fraction_of_farthest,
+    gap,
+    section,
 )
 from aerobat.kernels.gates.snapshot import Snapshot, between
-from aerobat.kernels.ops import Ops, Scalar
-from aerobat.kernels.vectors import dot
+from aerobat.kernels.ops import Ops, Scalar, Vector
+from aerobat.kernels.vectors import dot, subtract
 
 
-class TimedPoint(NamedTuple):
-    """A point of the body in a gate's plane, and when."""
+class Extreme(NamedTuple):
+    """A point of the body in a gate's plane, from the centre of the opening, and when."""
 
     time: Scalar  # [s] infinite where there is none
     point: PlanePoint
@@ -32,8 +34,8 @@ class TimedPoint(NamedTuple):
 class Sweep(NamedTuple):
     """The farthest that a body reached in a gate's plane."""
 
-    widest: TimedPoint  # from the middle across the opening, on either side
-    highest: TimedPoint  # up or down
+    widest: Extreme  # along the lateral, to either side
+    highest: Extreme  # along the upright, up or down
 
 
 class SweepProgress(NamedTuple):
@@ -46,8 +48,8 @@ class SweepProgress(NamedTuple):
     crossing: Sweep  # of the one in which the gate is crossed
 
 
-NO_POINT = TimedPoint(inf, PlanePoint(0.0, 0.0))
-NO_SWEEP = Sweep(NO_POINT, NO_POINT)
+NOWHERE = Extreme(inf, PlanePoint(0.0, 0.0))
+NO_SWEEP = Sweep(NOWHERE, NOWHERE)
 
 
 def init() -> SweepProgress:
@@ -61,7 +63,7 @@ def step(
     parameters: tuple[GateFrame, Scalar, BoundingEllipsoid],
     snapshots: tuple[Snapshot, Snapshot],
     counted: tuple[Scalar, Scalar],
-    crossing: tuple[Scalar, Scalar],
+    crosses: Scalar,
     passed: Scalar,
 ) -> SweepProgress:
     """Progress a tick later.
@@ -72,20 +74,20 @@ def step(
         parameters: the gate's axes, the depth [m] about its plane, and what encloses the vehicle.
         snapshots: the last tick's and this one's, positions from the opening's centre.
         counted: true where there was a last tick, and where this one counts.
-        crossing: 1 where the centre crosses the plane between them, and at which fraction of the way.
+        crosses: 1 where the centre crosses the plane between them.
         passed: true where with this tick the stay, this or the last, has become the one that counts.
     """
     frame, depth, ellipsoid = parameters
     now = snapshots[1]
-    gap = plane_gap(ops, ellipsoid, frame, now.position, now.q_world_body)
+    gap_now = gap(ops, section(ops, ellipsoid, frame, now.position, now.q_world_body))
     distance = magnitude(ops, dot(now.position, frame.normal))
-    is_about = counted[1] & (ops.minimum(gap, distance - depth) <= 0.0)
-    met, here = swept_between(ops, frame, ellipsoid, snapshots, (progress.gap, gap), crossing)
+    is_about = counted[1] & (ops.minimum(gap_now, distance - depth) <= 0.0)
+    met, here = swept_between(ops, frame, ellipsoid, snapshots, (progress.gap, gap_now), crosses)
     before = _either(ops, progress.is_about > 0.5, progress.stay, NO_SWEEP)
     stay = _wider(ops, counted[0] & counted[1] & met, here, before)
     is_crossing = ops.select(passed, 1.0, progress.is_crossing) > 0.5
     return SweepProgress(
-        gap,
+        gap_now,
         ops.select(is_about, 1.0, 0.0),
         ops.select(is_crossing & is_about, 1.0, 0.0),
         stay,
@@ -99,12 +101,11 @@ def swept_between(
     ellipsoid: BoundingEllipsoid,
     snapshots: tuple[Snapshot, Snapshot],
     gaps: tuple[Scalar, Scalar],
-    crossing: tuple[Scalar, Scalar],
+    crosses: Scalar,
 ) -> tuple[Scalar, Sweep]:
     """True where the body meets the plane between two ticks, and the farthest that it reaches there.
 
-    It is looked at where it comes into the plane or leaves it, else at the second tick; where it flies
-    through from one tick to the next, as its centre crosses.
+    Where it reaches the farthest is said by the attitude at the second tick, how far by the one there.
 
     Args:
         ops: of the arithmetic.
@@ -112,18 +113,37 @@ def swept_between(
         ellipsoid: what encloses the vehicle.
         snapshots: at both ticks, positions from the opening's centre.
         gaps: between body and plane at both [m].
-        crossing: 1 where the centre crosses the plane between them, and at which fraction of the way.
+        crosses: 1 where the centre crosses the plane between them.
     """
     before, behind = gaps
-    crosses, fraction = crossing
-    met, stays = ops.minimum(before, behind) <= 0.0, ops.maximum(before, behind) <= 0.0
-    change = ops.select(met, ops.select(stays, 1.0, before - behind), 1.0)
-    fraction = ops.select(met, ops.select(stays, 1.0, before / change), fraction)
-    here = between(*snapshots, fraction)
-    widest, highest = section_extremes(ops, ellipsoid, frame, here.position, here.q_world_body)
-    return ops.select(met, 1.0, crosses) > 0.5, Sweep(
-        TimedPoint(here.time, widest), TimedPoint(here.time, highest)
+    meets = ops.minimum(before, behind) <= 0.0
+    changes = meets & (ops.maximum(before, behind) > 0.0)
+    edge = before / ops.select(changes, before - behind, 1.0)
+    comes, leaves = changes & (before > 0.0), changes & (behind > 0.0)
+    within = ops.select(comes, edge, 0.0), ops.select(leaves, edge, 1.0)
+    normal, lateral, up = frame
+    extremes = (
+        _extreme(ops, (normal, along, beside), ellipsoid, snapshots, within)
+        for along, beside in ((lateral, up), (up, lateral))
     )
+    return ops.select(meets, 1.0, crosses) > 0.5, Sweep(*extremes)
+
+
+def _extreme(
+    ops: Ops,
+    directions: tuple[Vector, Vector, Vector],
+    ellipsoid: BoundingEllipsoid,
+    snapshots: tuple[Snapshot, Snapshot],
+    within: tuple[Scalar, Scalar],
+) -> Extreme:
+    """The farthest along the second of the directions, within fractions of the way between two ticks."""
+    last, now = snapshots
+    way = subtract(now.position, last.position)
+    there = section(ops, ellipsoid, directions, now.position, now.q_world_body)
+    change = dot(way, directions[0]), dot(way, directions[1])
+    at = between(last, now, fraction_of_farthest(ops, there, change, within))
+    here = section(ops, ellipsoid, directions, at.position, at.q_world_body)
+    return Extreme(at.time, farthest(ops, here))
 
 
 def magnitude(ops: Ops, x: Scalar) -> Scalar:
@@ -133,19 +153,19 @@ def magnitude(ops: Ops, x: Scalar) -> Scalar:
 
 def _wider(ops: Ops, condition: Scalar, a: Sweep, b: Sweep) -> Sweep:
     """Of both extremes the farther, `a`'s only where the condition holds."""
-    wider = magnitude(ops, a.widest.point.lateral) > magnitude(ops, b.widest.point.lateral)
-    higher = magnitude(ops, a.highest.point.up) > magnitude(ops, b.highest.point.up)
-    return Sweep(
-        _either_point(ops, condition & wider, a.widest, b.widest),
-        _either_point(ops, condition & higher, a.highest, b.highest),
-    )
+    return Sweep(*(_farther(ops, condition, p, q) for p, q in zip(a, b, strict=True)))
+
+
+def _farther(ops: Ops, condition: Scalar, a: Extreme, b: Extreme) -> Extreme:
+    is_farther = magnitude(ops, a.point.along) > magnitude(ops, b.point.along)
+    return _either_extreme(ops, condition & is_farther, a, b)
 
 
 def _either(ops: Ops, condition: Scalar, a: Sweep, b: Sweep) -> Sweep:
     """`a` where the condition holds, else `b`."""
-    return Sweep(*(_either_point(ops, condition, p, q) for p, q in zip(a, b, strict=True)))
+    return Sweep(*(_either_extreme(ops, condition, p, q) for p, q in zip(a, b, strict=True)))
 
 
-def _either_point(ops: Ops, condition: Scalar, a: TimedPoint, b: TimedPoint) -> TimedPoint:
-    lateral, up = (ops.select(condition, x, y) for x, y in zip(a.point, b.point, strict=True))
-    return TimedPoint(ops.select(condition, a.time, b.time), PlanePoint(lateral, up))
+def _either_extreme(ops: Ops, condition: Scalar, a: Extreme, b: Extreme) -> Extreme:
+    along, beside = (ops.select(condition, x, y) for x, y in zip(a.point, b.point, strict=True))
+    return Extreme(ops.select(condition, a.time, b.time), PlanePoint(along, beside))

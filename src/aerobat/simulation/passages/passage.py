@@ -136,11 +136,11 @@ def _closest(gate: Gate, sweep: Sweep, crossed: NDArray[np.bool_]) -> dict[str, 
         crossed: true where it is crossed.
     """
     known = crossed & np.isfinite(sweep.widest.time)
-    (across, up), (_, above) = sweep.widest.point, sweep.highest.point
+    (across, up), (above, beside) = sweep.widest.point, sweep.highest.point
     needed = 2 * np.abs(across), 2 * np.abs(above)
     at_side = gate.width - needed[0] <= gate.height - needed[1]
     half_width, half_height = gate.width / 2, gate.height / 2
-    lateral = np.where(at_side, np.copysign(half_width, across), sweep.highest.point.lateral)
+    lateral = np.where(at_side, np.copysign(half_width, across), beside)
     upward = np.where(at_side, up, np.copysign(half_height, above))
     edges = np.where(
         at_side,

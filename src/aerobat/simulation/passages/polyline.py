@@ -17,9 +17,9 @@ from aerobat.engines.numpy import ArrayOps
 from aerobat.engines.pytree import tree_map
 from aerobat.kernels.gates import progress
 from aerobat.kernels.gates.progress import GateProgress
-from aerobat.kernels.gates.section import BoundingEllipsoid, GateFrame, plane_gap
+from aerobat.kernels.gates.section import BoundingEllipsoid, GateFrame, gap, section
 from aerobat.kernels.gates.snapshot import Snapshot, between
-from aerobat.kernels.gates.sweep import Sweep, TimedPoint, swept_between
+from aerobat.kernels.gates.sweep import Extreme, Sweep, swept_between
 from aerobat.simulation.flight import Flight
 from aerobat.simulation.outcome import Outcome
 from aerobat.simulation.passages.passage import PASSAGE_DEPTH, PASSAGE_WINDOW, Passage, passages
@@ -124,24 +124,23 @@ class _Track:
         frame = GateFrame(*(tuple(axis.tolist()) for axis in (gate.normal, gate.lateral, gate.up)))
         ellipsoid = BoundingEllipsoid(tuple(body.centre.tolist()), tuple(body.semi_axes.tolist()))
         rows = self.rows
-        gaps = plane_gap(ArrayOps, ellipsoid, frame, rows.position, rows.q_world_body)
+        gaps = gap(ArrayOps, section(ArrayOps, ellipsoid, frame, rows.position, rows.q_world_body))
         away = np.flatnonzero((gaps > 0.0) & (np.abs(self.distance) > PASSAGE_DEPTH))
         first, end = away[away <= crossing], away[away > crossing]
         stay = slice(first[-1] if first.size else 0, end[0] + 1 if end.size else len(gaps))
         rows, gaps = _part(rows, stay), gaps[stay]
         snapshots = _part(rows, slice(-1)), _part(rows, slice(1, None))
         crosses = np.arange(len(gaps) - 1) == crossing - stay.start
-        fraction = (self.crossing(crossing).time - snapshots[0].time) / np.diff(rows.time)
         met, swept = swept_between(
-            ArrayOps, frame, ellipsoid, snapshots, (gaps[:-1], gaps[1:]), (crosses.astype(float), fraction)
+            ArrayOps, frame, ellipsoid, snapshots, (gaps[:-1], gaps[1:]), crosses.astype(float)
         )
         return Sweep(
-            _farthest(swept.widest, np.where(met, np.abs(swept.widest.point.lateral), 0.0)),
-            _farthest(swept.highest, np.where(met, np.abs(swept.highest.point.up), 0.0)),
+            _farthest(swept.widest, np.where(met, np.abs(swept.widest.point.along), 0.0)),
+            _farthest(swept.highest, np.where(met, np.abs(swept.highest.point.along), 0.0)),
         )
 
 
-def _farthest(points: TimedPoint, distance: Array) -> TimedPoint:
+def _farthest(points: Extreme, distance: Array) -> Extreme:
     """Of points, leaves (intervals,), the first of the farthest."""
     k = int(np.argmax(distance))
     return _part(points, slice(k, k + 1))
