@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import sys
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 import mujoco
 import numpy as np
@@ -14,11 +16,15 @@ import aerobat as ab
 from aerobat import so3
 from aerobat.arrays import Array
 from aerobat.certification import PlannedPassage
+from aerobat.planning import PlacedStage, with_flyability
 from aerobat.reporting.report_json import report
 from aerobat.simulation import Outcome
 from aerobat.simulation.passages import passages
 from aerobat.simulation.passages.polyline import gate_progress
 from test_flying_scores import QUAD
+
+sys.path.append(str(Path(__file__).parents[1] / "benchmarks"))
+from random_problems import random_case
 
 RATE = 500.0  # [1/s] as flights are logged
 CROSSING = 0.5  # [s]
@@ -259,3 +265,35 @@ def test_in_a_batch_each_vehicle_has_its_own_body() -> None:
             assert np.isnan(alone.clearance)
             alone = ab.score(ab.fly(path, vehicle), problem, vehicle).passages[0]
             assert scores[k].passages[0].clearance == pytest.approx(alone.clearance, abs=1e-12)
+
+
+@given(seeds)
+@settings(max_examples=30, deadline=None)
+def test_a_coarse_log_finds_what_a_fine_one_finds(seed: int) -> None:
+    """Within a millimetre, turning by up to 14 rad/s at up to 10 m/s."""
+    one = motion(seed)
+    assert one.passage().clearance == pytest.approx(one.passage(40 * RATE).clearance, abs=1e-3)
+
+
+def test_a_plan_whose_own_flight_touches_the_frame_does_not_fly_and_says_where() -> None:
+    path, problem = cruise(1.12)
+    stages = (ab.Stage("gate", gate="gate"),)
+    problem = replace(problem, maneuver=ab.CustomManeuver(stages))
+    placed = (PlacedStage("gate", 0, 0.5, "gate"),)
+    plan = with_flyability(ab.Plan(problem, path, "by hand", stages=placed, vehicle=QUAD))
+    assert plan.flyability is not None
+    assert not plan.flies
+    assert plan.flyability.lingers
+    assert not plan.flyability.wants_reserve
+    assert "1.3 cm into its lower edge at 0.50 s" in str(plan.flyability)
+    clearance = ab.score(ab.fly(plan), plan).passages[0].clearance
+    assert plan.flyability.passages[0].clearance == pytest.approx(clearance, abs=1e-12)
+    assert report(plan)["plan"]["flyability"]["passages"][0]["clearance_m"] == pytest.approx(clearance)
+
+
+def test_a_flip_that_would_slide_along_its_gate_s_plane_is_planned_faster_through_it() -> None:
+    """It would be half in the plane for 0.4 s, 1.6 m below the opening at first."""
+    case = random_case(0, 42, ("flip", "half-flip"))
+    plan = ab.plan(case.problem, vehicle=case.vehicle)
+    assert plan.flies
+    assert ab.score(ab.fly(plan), plan).passages[0].clearance > 0.0
