@@ -32,7 +32,7 @@ from aerobat.problem import (
     Waypoint,
     registered_maneuvers,
 )
-from aerobat.vehicle import Rotor, Vehicle
+from aerobat.vehicle import Ellipsoid, Rotor, Vehicle
 
 PAGE = Path(__file__).parent / "files.md"
 ANNOTATED = PAGE.parent.parent / "examples" / "vehicles" / "annotated.toml"
@@ -55,6 +55,7 @@ PLACES = {  # where each class stands in a file
     HandOff: "`[motion_capture.hand_off]`",
     Gusts: "`[gusts]`",
     Battery: "`[battery]`",
+    Ellipsoid: "`body`: what passes gates, propellers included",
 }
 INTRODUCTION = """# Files
 
@@ -112,6 +113,11 @@ flights are theirs, counted without it; where they do not, one sentence says whi
 stop, and what remains. A hexarotor whose spins alternate keeps no control of yaw without any of its rotors,
 one with spins 1, 1, -1, -1, 1, -1 does without any of the first four; an octorotor does without any.
 """
+BODY = """
+Left out, it is a flat ellipsoid in the middle between the rotors that encloses all propellers, its half
+height a fifth of its half width. Gates are judged by it: all that it sweeps of a gate's plane is to lie
+within the opening. A vehicle that does not fit at all is refused before anything is planned.
+"""
 IMPORT = """
 ### From URDF and SDF
 
@@ -164,7 +170,7 @@ def page() -> str:
     parts += [section(GatePassage), section(Stage), section(Attitude), section(Condition)]
     parts += [STAGES, section(Waypoint), WAYPOINTS]
     parts += ["## Vehicle (`--vehicle vehicle.toml`)\n", VEHICLE, fenced(ANNOTATED), table(Vehicle)]
-    parts += [section(Rotor), ROTOR, IMPORT]
+    parts += [section(Rotor), ROTOR, section(Ellipsoid), BODY, IMPORT]
     parts += ["## Conditions\n", CONDITIONS, preset("environment", "lab"), table(Dispersion)]
     parts += [section(cls) for cls in (Imu, MotionCapture, Outage, HandOff)]
     parts += [HAND_OFF, section(Gusts), section(Battery)]

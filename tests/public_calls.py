@@ -42,6 +42,15 @@ def plan() -> ab.Plan:
 
 
 @cache
+def cruise() -> ab.Plan:
+    """Half a second along x through a gate."""
+    trajectory = ab.Trajectory([0.5], [[[0.0, 0.0, 1.0], [4.0, 0.0, 0.0]]])
+    ends = ab.at_rest((0.0, 0.0, 1.0)), ab.at_rest((2.0, 0.0, 1.0))
+    problem = ab.Problem("cruise", *ends, gates=(ab.tilted_gate((1.0, 0.0, 1.0)),))
+    return ab.Plan(problem, trajectory, "none", vehicle=ab.load_vehicle("agile-quad"))
+
+
+@cache
 def flight() -> ab.Flight:
     """Its flight."""
     return ab.fly(plan(), rate=100.0, engine="floats")
@@ -55,6 +64,7 @@ RESULTS = (
     "Assessment",
     "Estimates",
     "Gradient",
+    "Opening",
     "Passage",
     "Score",
     "Scores",
@@ -167,6 +177,7 @@ def _arguments(name: str, folder: Path) -> dict[str, Any]:
             "height": 1.0,
             "name": "a gate",
         },
+        "smallest_opening": _wide_enough(),
         "to_dataframe": {"table": plan()},
         "tracking_figure": {"plan": plan(), "vehicle": agile, "flight": flight()},
         "with_second_opinion": {"plan": plan(), "progress": None},
@@ -276,12 +287,14 @@ def instance(cls: type) -> Any:
         ab.Condition: lambda: ab.Condition("velocity", (1.0, 0.0, 0.0), upper=1.0),
         ab.CustomManeuver: lambda: ab.CustomManeuver((ab.Stage("a"),)),
         ab.Dispersion: lambda: ab.load_dispersion("lab"),
+        ab.Ellipsoid: lambda: ab.Ellipsoid((0.2, 0.2, 0.05), (0.0, 0.0, 0.01)),
         ab.EndState: lambda: ab.at_rest((0.0, 0.0, 1.0)),
         ab.Estimates: lambda: ab.estimate(_log()),
         ab.FlatState: lambda: plan().trajectory.flat(0.1),
         ab.Flight: flight,
         ab.Gate: lambda: ab.tilted_gate((0.0, 0.0, 1.0)),
         ab.Outage: lambda: ab.Outage(0.1, 0.5),
+        ab.Opening: lambda: ab.smallest_opening(**_wide_enough()),
         ab.Plan: plan,
         ab.Problem: lambda: ab.load_problem("half-flip"),
         ab.Rotor: lambda: ab.load_vehicle("agile-quad").rotors[0],
@@ -309,6 +322,13 @@ def _log() -> ab.SensorLog:
     times, force = np.arange(1.0, 11.0) / 100.0, np.tile([0.0, 0.0, 9.81], (10, 1))
     upright = np.tile([1.0, 0.0, 0.0, 0.0], (2, 1))
     return ab.SensorLog(times, np.zeros((10, 3)), force, np.array([0.0, 0.05]), np.zeros((2, 3)), upright)
+
+
+def _wide_enough() -> dict[str, Any]:
+    """The arguments of smallest_opening."""
+    flights = ab.score_flights(cruise(), ["agile-quad"] * 2)
+    odds = {"probability": 0.5, "confidence": 0.5, "side": "width"}
+    return {"scores": flights, "gate": cruise().problem.gates[0], **odds}
 
 
 def _passage() -> ab.Passage:

@@ -48,12 +48,18 @@ def numbers(score: Score) -> dict[str, float]:
     """All numbers of a score, by name."""
     found = {name: value for name, value in asdict(score).items() if isinstance(value, float)}
     for passage in score.passages:
-        found |= {f"{passage.gate} {key}": value for key, value in asdict(passage).items() if key != "gate"}
+        found |= {
+            f"{passage.gate} {key}": value
+            for key, value in asdict(passage).items()
+            if not isinstance(value, str)
+        }
     return found
 
 
 def assert_same(a: Score, b: Score, tolerance: float) -> None:
     assert (a.outcome, a.sentence) == (b.outcome, b.sentence)
+    edges = ([passage.closest_edge for passage in score.passages] for score in (a, b))
+    assert next(edges) == next(edges)
     assert numbers(a) == pytest.approx(numbers(b), abs=tolerance, rel=tolerance, nan_ok=True)
 
 

@@ -67,15 +67,16 @@ def test_the_gate_is_missed_by_the_distance_between_path_and_centre_wherever_sam
         assert passed.attitude_error_deg == pytest.approx(np.rad2deg(0.1), abs=0.01)
 
 
-def test_clearance_is_what_the_rotors_leave_of_the_opening(cruise: Flight, quad: Vehicle) -> None:
-    """Level flight: half the width less the outermost hub and its propeller."""
-    reach = max(abs(r.position_body[1]) + r.radius for r in quad.rotors)
+def test_clearance_is_what_the_body_leaves_of_the_opening(cruise: Flight, quad: Vehicle) -> None:
+    """Level flight: half the width less the farthest propeller tip from the centre."""
+    reach, _, high = quad.bounding_ellipsoid.semi_axes
+    tips = max(np.hypot(*r.position_body[:2]) + r.radius for r in quad.rotors)
+    assert reach == pytest.approx(tips, rel=1e-3)
     gate = tilted_gate(np.array([4.0, 0.0, 1.0]), width=1.0, height=1.0)
     assert passage(cruise, gate, quad).clearance == pytest.approx(0.5 - reach, abs=1e-3)
     off = moved(cruise, (0.0, 0.1, 0.0), (0.0, 0.0, 0.0))
     assert passage(off, gate, quad).clearance == pytest.approx(0.4 - reach, abs=1e-3)
     low = tilted_gate(np.array([4.0, 0.0, 1.0]), width=5.0, height=0.4)
-    high = max(abs(r.position_body[2]) for r in quad.rotors)
     assert passage(cruise, low, quad).clearance == pytest.approx(0.2 - high, abs=1e-3)
     on_edge = moved(cruise, (0.0, 0.0, 0.0), (np.pi / 2, 0.0, 0.0))
     assert passage(on_edge, low, quad).clearance == pytest.approx(0.2 - reach, abs=1e-3)
@@ -163,9 +164,10 @@ def test_a_flight_through_its_gates_says_how_fast_and_how_far_off_at_the_worst(c
 
 
 def test_a_flight_that_went_wrong_says_by_how_much(cruise: Flight, quad: Vehicle) -> None:
-    reach = max(abs(r.position_body[1]) + r.radius for r in quad.rotors)
+    reach = quad.bounding_ellipsoid.semi_axes[1]
     narrow = score(cruise, problem(tilted_gate(np.array([4.0, 0.0, 1.0]), width=0.2, height=1.0)), quad)
-    assert narrow.sentence == f"hit the frame of the gate, {100 * (reach - 0.1):.1f} cm too wide at 1.00 s"
+    depth = f"{100 * (reach - 0.1):.1f} cm"
+    assert narrow.sentence == f"hit the frame of the gate, {depth} into its left edge at 1.00 s"
     error = "position error 5.00 cm at most, attitude error 0.00° RMS, saturated 25.0 % of the time"
     clipped = np.zeros_like(cruise.series["saturated"])
     clipped[: len(clipped) // 4] = True

@@ -13,7 +13,7 @@ from aerobat import so3
 from aerobat.arrays import Array
 from aerobat.problem.condition import Attitude
 from aerobat.simulation import Outcome
-from aerobat.simulation.passage import PASSAGE_DEPTH
+from aerobat.simulation.passages import PASSAGE_DEPTH
 from test_flying_scores import EXACT, QUAD, assert_same
 from test_flying_scores import near as starts_near
 

@@ -16,7 +16,18 @@ from .environment import (
 )
 from .errors import AerobatError, BackendMissing, Infeasible, SpecError
 from .estimation import Ekf, Estimates, SensorLog, estimate
-from .evaluation import Gradient, Passage, Score, Scores, Sensitivity, score, score_flights, sensitivity
+from .evaluation import (
+    Gradient,
+    Opening,
+    Passage,
+    Score,
+    Scores,
+    Sensitivity,
+    score,
+    score_flights,
+    sensitivity,
+    smallest_opening,
+)
 from .flatness import Reference, reference
 from .interchange.columns import write_columns
 from .interchange.csv import read_csv, write_csv
@@ -74,7 +85,7 @@ from .simulation import Flight, FlightConfig, Outcome, fly, load_flight, prepare
 from .states import BodyState, FlatState, Setpoint, Wrench
 from .studies.compare import Comparison, compare
 from .trajectory import ContinuityRule, Trajectory, load_trajectory, minimum_effort, save_trajectory
-from .vehicle import Rotor, Vehicle, implausibilities, load_vehicle, vehicle_names, write_vehicle
+from .vehicle import Ellipsoid, Rotor, Vehicle, implausibilities, load_vehicle, vehicle_names, write_vehicle
 
 __all__ = [
     "AerobatError",
@@ -92,6 +103,7 @@ __all__ = [
     "CustomManeuver",
     "Dispersion",
     "Ekf",
+    "Ellipsoid",
     "EndState",
     "Envelope",
     "Environment",
@@ -116,6 +128,7 @@ __all__ = [
     "MinSnap",
     "Miqp",
     "MotionCapture",
+    "Opening",
     "Outage",
     "Outcome",
     "Passage",
@@ -174,6 +187,7 @@ __all__ = [
     "score",
     "score_flights",
     "sensitivity",
+    "smallest_opening",
     "tilted_gate",
     "to_dataframe",
     "tracking_figure",

@@ -1,8 +1,20 @@
 """Evaluation: how well flights went, and what that depends on."""
 
+from aerobat.evaluation.opening import Opening, smallest_opening
 from aerobat.evaluation.score import Score, Scores, score
 from aerobat.evaluation.score_flights import score_flights
 from aerobat.evaluation.sensitivity import Gradient, Sensitivity, sensitivity
-from aerobat.simulation.passage import Passage
+from aerobat.simulation.passages import Passage
 
-__all__ = ["Gradient", "Passage", "Score", "Scores", "Sensitivity", "score", "score_flights", "sensitivity"]
+__all__ = [
+    "Gradient",
+    "Opening",
+    "Passage",
+    "Score",
+    "Scores",
+    "Sensitivity",
+    "score",
+    "score_flights",
+    "sensitivity",
+    "smallest_opening",
+]

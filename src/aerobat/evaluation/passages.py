@@ -12,7 +12,7 @@ from aerobat.planning import Plan, planned_passages
 from aerobat.problem.gate import Gate
 from aerobat.problem.problem import Problem
 from aerobat.problem.stage import Stage
-from aerobat.simulation.passage import PASSAGE_WINDOW
+from aerobat.simulation.passages import PASSAGE_WINDOW
 
 
 def passages_asked(goal: Problem | Plan, times: Array, position: Array) -> tuple[PlannedPassage, ...]:

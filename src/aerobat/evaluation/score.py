@@ -17,9 +17,8 @@ from aerobat.planning import Plan
 from aerobat.problem import Problem, as_problem
 from aerobat.simulation.flight import Flight
 from aerobat.simulation.outcome import Outcome, counted, length
-from aerobat.simulation.passage import Passage, flown_passages, passages
+from aerobat.simulation.passages import Passage, flown_passages, passages
 from aerobat.vehicle import Vehicle, as_vehicle
-from aerobat.vehicle.fleet import Fleet
 
 
 @in_notebooks
@@ -143,7 +142,7 @@ def score(flight: Flight, goal: Problem | Plan | str, vehicle: Vehicle | str | N
     square, angle = flight.position_error**2, flight.attitude_error
     diverged = flight.outcome is not Outcome.COMPLETE
     stop = np.array([flight.ends if diverged else np.nan])
-    fleet = None if vehicle is None else Fleet.of([as_vehicle(vehicle)])
+    body = None if vehicle is None else as_vehicle(vehicle).bounding_ellipsoid
     planned = passages_asked(goal, flight.times, flight.setpoint.flat.position)
     ground = flight.environment.ground
     below = np.zeros(1, bool) if ground is None else states.position[:, 2] < ground
@@ -153,14 +152,14 @@ def score(flight: Flight, goal: Problem | Plan | str, vehicle: Vehicle | str | N
         max_attitude_error_deg=np.rad2deg([angle.max()]),
         rms_attitude_error_deg=np.rad2deg(np.sqrt([np.mean(angle**2)])),
         saturated_fraction=np.array([flight.saturated.mean()]),
-        passages=tuple(flown_passages(flight, planned, fleet)),
+        passages=tuple(flown_passages(flight, planned, body)),
         stop=stop,
         is_finite=np.array([flight.outcome is not Outcome.STATE_NOT_FINITE]),
         ground_time=np.array([flight.times[int(np.argmax(below))] if below.any() else np.nan]),
     )[0]
 
 
-def scores_of(metrics: RunningMetrics, planned: tuple[PlannedPassage, ...], fleet: Fleet) -> Scores:
+def scores_of(metrics: RunningMetrics, planned: tuple[PlannedPassage, ...]) -> Scores:
     """Scores of flights that were added up as they were flown, from their last metrics, leaves (flights,)."""
     ticks = np.maximum(metrics.ticks, 1.0)
     stop = np.where(metrics.flying < 0.5, metrics.stop, np.nan)
@@ -172,8 +171,7 @@ def scores_of(metrics: RunningMetrics, planned: tuple[PlannedPassage, ...], flee
         rms_attitude_error_deg=np.rad2deg(np.sqrt(metrics.sum_square_angle / ticks)),
         saturated_fraction=metrics.saturated / ticks,
         passages=tuple(
-            passages(each, progress, stop, fleet)
-            for each, progress in zip(planned, metrics.gates, strict=True)
+            passages(each, progress, stop) for each, progress in zip(planned, metrics.gates, strict=True)
         ),
         stop=stop,
         is_finite=metrics.is_finite > 0.5,

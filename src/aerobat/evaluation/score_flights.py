@@ -18,14 +18,16 @@ from aerobat.errors import SpecError
 from aerobat.evaluation.passages import passages_asked
 from aerobat.evaluation.score import Scores, scores_of
 from aerobat.kernels import running_metrics
+from aerobat.kernels.gates.progress import GatePlane
+from aerobat.kernels.gates.section import BoundingEllipsoid, GateFrame
 from aerobat.kernels.ops import Ops
-from aerobat.kernels.running_metrics import GatePlane, MetricsInput, MetricsParameters, RunningMetrics
+from aerobat.kernels.running_metrics import MetricsInput, MetricsParameters, RunningMetrics
 from aerobat.planning import Plan
 from aerobat.problem import Problem, as_problem
 from aerobat.simulation.config import FlightConfig
 from aerobat.simulation.loop import Signals
 from aerobat.simulation.outcome import DIVERGENCE_RADIUS
-from aerobat.simulation.passage import PASSAGE_DEPTH, PASSAGE_WINDOW
+from aerobat.simulation.passages import PASSAGE_DEPTH, PASSAGE_WINDOW
 from aerobat.simulation.prepare import prepare
 from aerobat.simulation.reference_source import BLOCK
 from aerobat.simulation.setup import FlightSetup, Part
@@ -115,7 +117,7 @@ def score_flights(
     carry = loop.init(setup.first_tick)
     for begin, end in setup.chunks():
         carry, rows = loop.scan(carry, setup.inputs(begin, end), end)
-    return scores_of(tree_map(lambda leaf: leaf[:, -1], rows), planned, setup.fleet)
+    return scores_of(tree_map(lambda leaf: leaf[:, -1], rows), planned)
 
 
 def metrics_row(signals: Signals) -> RunningMetrics:
@@ -129,7 +131,9 @@ def with_metrics(setup: FlightSetup, planned: tuple[PlannedPassage, ...] = ()) -
     vehicles = len(setup.fleet)
     planes = tuple(_plane(passage, vehicles) for passage in planned)
     ground = -np.inf if setup.environment.ground is None else setup.environment.ground
-    parameters = MetricsParameters(np.full(vehicles, DIVERGENCE_RADIUS**2), np.full(vehicles, ground), planes)
+    body = BoundingEllipsoid(*map(components, (setup.fleet.body_centres, setup.fleet.semi_axes)))
+    limits = np.full(vehicles, DIVERGENCE_RADIUS**2), np.full(vehicles, ground)
+    parameters = MetricsParameters(*limits, body, planes)
     metrics = Part(MetricsMonitor(len(planes)), parameters, MetricsSource(setup.times))
     return replace(setup, parts=(*setup.parts, metrics))
 
@@ -137,6 +141,9 @@ def with_metrics(setup: FlightSetup, planned: tuple[PlannedPassage, ...] = ()) -
 def _plane(passage: PlannedPassage, vehicles: int) -> GatePlane:
     """A planned passage as kernels read it, leaves (vehicles,)."""
     gate = passage.gate
-    centre, normal = (components(np.broadcast_to(v, (vehicles, 3))) for v in (gate.position, gate.normal))
+    centre, *frame = (
+        components(np.broadcast_to(v, (vehicles, 3)))
+        for v in (gate.position, gate.normal, gate.lateral, gate.up)
+    )
     numbers = (np.full(vehicles, x) for x in (passage.time, PASSAGE_WINDOW, PASSAGE_DEPTH))
-    return GatePlane(centre, normal, *numbers)
+    return GatePlane(centre, GateFrame(*frame), *numbers)

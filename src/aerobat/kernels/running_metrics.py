@@ -7,10 +7,14 @@ from math import inf
 from operator import add as plus
 from typing import NamedTuple
 
+from aerobat.kernels.gates import progress
+from aerobat.kernels.gates.progress import GatePlane, GateProgress
+from aerobat.kernels.gates.section import BoundingEllipsoid
+from aerobat.kernels.gates.snapshot import Snapshot
 from aerobat.kernels.ops import Ops, PerRotor, Quaternion, Scalar, Vector
 from aerobat.kernels.quaternions import angle_between
 from aerobat.kernels.rigid_body import Body
-from aerobat.kernels.vectors import ZERO, add_scaled, dot, subtract
+from aerobat.kernels.vectors import ZERO, dot, subtract
 
 
 class MetricsInput(NamedTuple):
@@ -19,42 +23,13 @@ class MetricsInput(NamedTuple):
     time: Scalar  # [s]
 
 
-class GatePlane(NamedTuple):
-    """A gate as a plane to be crossed at a time."""
-
-    centre: Vector  # [m]
-    normal: Vector  # direction of passage, a unit vector
-    planned: Scalar  # [s] when it is to be crossed
-    window: Scalar  # [s] by which the crossing may be earlier or later
-    depth: Scalar  # [m] beyond the plane that makes a crossing a passage
-
-
 class MetricsParameters(NamedTuple):
     """Criteria by which a flight is judged."""
 
     divergence_radius_sq: Scalar  # [m²] of squared position error, beyond which a vehicle has diverged
     ground: Scalar  # [m] height, −infinity where there is none
+    ellipsoid: BoundingEllipsoid  # of the vehicle
     gates: tuple[GatePlane, ...]
-
-
-class Snapshot(NamedTuple):
-    """A vehicle at an instant."""
-
-    time: Scalar  # [s]
-    position: Vector  # [m]
-    velocity: Vector  # [m/s]
-    q_world_body: Quaternion  # between two ticks not quite of unit length
-
-
-class GateProgress(NamedTuple):
-    """A flight before and behind a gate's plane so far, straight between ticks; offsets as positions."""
-
-    latest: Snapshot  # the last crossing in the direction of passage
-    beyond: Scalar  # 1 since that crossing, until it comes back
-    crossing: Snapshot  # of those after which it got far enough beyond, the nearest to the planned instant
-    backward: Scalar  # [s] the crossing against the direction next to that instant, infinite if there is none
-    max_distance: Scalar  # [m] beyond the plane, of ticks in the window; −infinite before it
-    min_distance: Scalar  # [m] likewise
 
 
 class RunningMetrics(NamedTuple):
@@ -77,9 +52,8 @@ class RunningMetrics(NamedTuple):
 def init(gates: int) -> RunningMetrics:
     """Metrics before the first tick of a flight through so many gates."""
     nowhere = Snapshot(0.0, ZERO, ZERO, (1.0, 0.0, 0.0, 0.0))
-    never = nowhere._replace(time=inf)
-    progress = GateProgress(never, 0.0, never, inf, -inf, inf)
-    return RunningMetrics(1.0, 1.0, 0.0, inf, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, nowhere, gates * (progress,))
+    passages = gates * (progress.init(),)
+    return RunningMetrics(1.0, 1.0, 0.0, inf, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, nowhere, passages)
 
 
 def step(
@@ -126,76 +100,22 @@ def step(
         saturated=metrics.saturated + ops.select(saturated, counts, 0.0),
         last=now,
         gates=tuple(
-            _progress(ops, progress, plane, (metrics.last, now), (metrics.ticks > 0.5, counted))
-            for progress, plane in zip(metrics.gates, parameters.gates, strict=True)
+            progress.step(
+                ops,
+                gate,
+                plane,
+                parameters.ellipsoid,
+                (_relative(metrics.last, plane), _relative(now, plane)),
+                (metrics.ticks > 0.5, counted),
+            )
+            for gate, plane in zip(metrics.gates, parameters.gates, strict=True)
         ),
     )
 
 
-def _progress(
-    ops: Ops,
-    progress: GateProgress,
-    plane: GatePlane,
-    snapshots: tuple[Snapshot, Snapshot],
-    counted: tuple[Scalar, Scalar],
-) -> GateProgress:
-    """Progress a tick later.
-
-    Args:
-        ops: of the arithmetic.
-        progress: before the tick.
-        plane: the gate's.
-        snapshots: the last tick's and this one's.
-        counted: true where there was a last tick, and where this one counts.
-    """
-    last, now = (one._replace(position=subtract(one.position, plane.centre)) for one in snapshots)
-    before, behind = dot(last.position, plane.normal), dot(now.position, plane.normal)
-    both = counted[0] & counted[1]
-    forward = both & (before <= 0.0) & (behind > 0.0)
-    back = both & (before > 0.0) & (behind <= 0.0)
-    change = ops.select(forward, behind - before, ops.select(back, behind - before, 1.0))
-    here = _between(last, now, -before / change)
-    latest = _either(ops, forward, here, progress.latest)
-    beyond = ops.select(forward, 1.0, ops.select(back, 0.0, progress.beyond))
-    off_time = _magnitude(ops, latest.time - plane.planned)
-    nearer = off_time < _magnitude(ops, progress.crossing.time - plane.planned)
-    passed = counted[1] & (beyond > 0.5) & (behind >= plane.depth) & (off_time <= plane.window) & nearer
-    back_off_time = _magnitude(ops, here.time - plane.planned)
-    nearer_back = back_off_time < _magnitude(ops, progress.backward - plane.planned)
-    in_window = counted[1] & (_magnitude(ops, now.time - plane.planned) <= plane.window)
-    return GateProgress(
-        latest,
-        beyond,
-        _either(ops, passed, latest, progress.crossing),
-        ops.select(back & (back_off_time <= plane.window) & nearer_back, here.time, progress.backward),
-        ops.select(in_window, ops.maximum(progress.max_distance, behind), progress.max_distance),
-        ops.select(in_window, ops.minimum(progress.min_distance, behind), progress.min_distance),
-    )
-
-
-def _magnitude(ops: Ops, x: Scalar) -> Scalar:
-    return ops.maximum(x, -x)
-
-
-def _between(a: Snapshot, b: Snapshot, fraction: Scalar) -> Snapshot:
-    w, x, y, z = (p + fraction * (q - p) for p, q in zip(a.q_world_body, b.q_world_body, strict=True))
-    return Snapshot(
-        a.time + fraction * (b.time - a.time),
-        add_scaled(a.position, fraction, subtract(b.position, a.position)),
-        add_scaled(a.velocity, fraction, subtract(b.velocity, a.velocity)),
-        (w, x, y, z),
-    )
-
-
-def _either(ops: Ops, condition: Scalar, a: Snapshot, b: Snapshot) -> Snapshot:
-    """`a` where the condition holds, else `b`."""
-    return Snapshot(
-        ops.select(condition, a.time, b.time),
-        *(
-            tuple(ops.select(condition, x, y) for x, y in zip(p, q, strict=True))
-            for p, q in zip(a[1:], b[1:], strict=True)
-        ),
-    )
+def _relative(snapshot: Snapshot, plane: GatePlane) -> Snapshot:
+    """The snapshot with its position from the centre of a gate's opening."""
+    return snapshot._replace(position=subtract(snapshot.position, plane.centre))
 
 
 def _is_finite(body: Body, thrusts: PerRotor, commands: PerRotor) -> Scalar:

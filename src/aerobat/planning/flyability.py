@@ -5,7 +5,7 @@ included, only a flight shows. What is flown is the plan's trajectory by its veh
 the default controller and nothing unknown; then once more with the reserve that the certificate leaves used
 up, all rotors giving less than commanded by the same fraction δ. As rotors that give (1 − δ) f move a body
 as f moves one of 1/(1 − δ) times the mass, inertia and drag, that is what flies then, told otherwise. The
-nominal flight is judged at the gates as scores judge flights, but for their frames: planners know no sizes.
+nominal flight is judged at the gates as scores judge flights, their frames included.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from aerobat.planning.result import FlownPassage, Flyability, OwnFlight, PlacedS
 from aerobat.problem.problem import Problem
 from aerobat.simulation import Flight, FlightConfig, Outcome, fly
 from aerobat.simulation.outcome import DIVERGENCE_RADIUS
-from aerobat.simulation.passage import Passage, flown_passages
+from aerobat.simulation.passages import Passage, flown_passages
 from aerobat.trajectory import Trajectory
 from aerobat.vehicle import Vehicle
 
@@ -44,7 +44,7 @@ def own_flight(
         stages: Where they are placed.
     """
     flight = nominal_flight(trajectory, vehicle, problem.environment)
-    flown = flown_passages(flight, planned_passages(stages, problem), None)
+    flown = flown_passages(flight, planned_passages(stages, problem), vehicle.bounding_ellipsoid)
     return OwnFlight(
         error=_largest_error(flight), passages=tuple(_flown(passage.of_flight(0)) for passage in flown)
     )
@@ -61,6 +61,7 @@ def _flown(passage: Passage) -> FlownPassage:
         attitude_error=None if isnan(error) else error,
         attitude_tolerance=None if isinf(tolerance) else tolerance,
         failure=failure,
+        clearance=None if isnan(passage.clearance) else passage.clearance,
     )
 
 

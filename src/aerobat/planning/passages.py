@@ -1,13 +1,23 @@
-"""Passages through gates that a plan intends: its placed stages, with what the problem's stages ask."""
+"""Passages through gates that a plan intends: its placed stages, with what the problem's stages ask.
+
+And, before anything is searched, the openings of gates beside the vehicle that shall pass them.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 
+import numpy as np
+
+from aerobat.arrays import Array
 from aerobat.certification import PlannedPassage
+from aerobat.errors import SpecError
 from aerobat.planning.result import PlacedStage
+from aerobat.problem.gate import Gate
 from aerobat.problem.problem import Problem
 from aerobat.problem.stage import Stage
+from aerobat.simulation.outcome import length
+from aerobat.vehicle import Vehicle
 
 
 def planned_passages(stages: Sequence[PlacedStage], problem: Problem) -> tuple[PlannedPassage, ...]:
@@ -20,3 +30,46 @@ def planned_passages(stages: Sequence[PlacedStage], problem: Problem) -> tuple[P
             asked = [other for other in asked if other is not stage]
             found.append(PlannedPassage.of(stage, problem.gate(place.gate), place.time))
     return tuple(found)
+
+
+def require_openings(problem: Problem, vehicle: Vehicle) -> None:
+    """Refuse a vehicle whose body fits through the opening of a gate in no way that is asked.
+
+    Where the thrust's direction is asked, the body turned about it as it fits best, and flying as it does;
+    else in any attitude. Raises SpecError, which names the gate and the least opening.
+    """
+    for stage in problem.stages(vehicle.max_specific_thrust).stages:
+        if stage.gate is not None:
+            _require(problem.gate(stage.gate), stage, vehicle)
+
+
+def _require(gate: Gate, stage: Stage, vehicle: Vehicle) -> None:
+    semi_axes = np.sort(vehicle.bounding_ellipsoid.semi_axes)
+    if stage.attitude is None:
+        small, large = 2 * semi_axes[:2]
+        fits = min(gate.width, gate.height) >= small
+        fits = fits and np.hypot(gate.width, gate.height) >= np.hypot(small, large)
+        need, how = (large, small), "even edgewise, in whichever attitude is the best"
+    else:
+        need = tuple(2 * _least_section(gate, stage.attitude.up, vehicle.bounding_ellipsoid.semi_axes))
+        fits = gate.width >= need[0] and gate.height >= need[1]
+        how = "in the attitude that is asked there"
+    if not fits:
+        raise SpecError(
+            f"gate '{gate.name}' is {length(gate.width)} wide and {length(gate.height)} high, but the body "
+            f"of {vehicle.name} takes {length(need[0])} by {length(need[1])}, {how}; widen the opening, or "
+            "take a smaller vehicle"
+        )
+
+
+def _least_section(gate: Gate, thrust_axis: Array, semi_axes: Array) -> Array:
+    """Half the width and height [m] of a body's section in the gate, its centre there, at the least, (2,).
+
+    The section of an ellipsoid grows with it: the one about the thrust axis with the lesser of both other
+    semi-axes lies within it, however it is turned about that.
+    """
+    lesser = min(semi_axes[:2]) ** 2
+    shape = lesser * np.eye(3) + (semi_axes[2] ** 2 - lesser) * np.outer(thrust_axis, thrust_axis)
+    along = shape @ gate.normal
+    inside = shape - np.outer(along, along) / (gate.normal @ along)
+    return np.sqrt([gate.lateral @ inside @ gate.lateral, gate.up @ inside @ gate.up])

@@ -20,6 +20,7 @@ from aerobat.errors import SpecError
 from aerobat.planning.assessment.assess import with_assessment
 from aerobat.planning.certified_solve import with_certificate
 from aerobat.planning.flyability import with_flyability
+from aerobat.planning.passages import require_openings
 from aerobat.planning.recorder import Progress
 from aerobat.planning.result import Plan
 from aerobat.problem import Problem, as_problem
@@ -66,7 +67,7 @@ def plan(
 
     A plan is for the rotors that give thrust, and counts them without the dead ones. Raises Infeasible, whose
     message names the bound that binds and whose `attempts` hold the evidence, and SpecError for input that
-    makes no sense.
+    makes no sense, a gate whose opening the vehicle does not fit into among it.
 
     Args:
         problem: What is planned, or its name.
@@ -80,6 +81,7 @@ def plan(
     if vehicle is not None:
         vehicle = vehicle.without_dead_rotors()
         vehicle.require_hover(problem.environment.gravity)
+        require_openings(problem, vehicle)
     found = as_planner(planner).plan(problem, vehicle, progress)
     if vehicle is None:
         return found

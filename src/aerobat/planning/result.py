@@ -39,6 +39,7 @@ class FlownPassage:
     attitude_error: float | None  # [rad] between the thrust axis and where it shall point; None: not crossed
     attitude_tolerance: float | None  # [rad] that is allowed; None where no attitude is asked
     failure: str = ""  # what went wrong, in words; empty where it was passed as asked
+    clearance: float | None = None  # [m] the least between body and frame; None: not crossed
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -46,7 +47,7 @@ class OwnFlight:
     """A plan's own nominal flight: the simulated closed loop, nothing unknown."""
 
     error: float  # [m] the largest position error, 5 m or more where it diverges
-    passages: tuple[FlownPassage, ...] = ()  # the planned ones, in their order; frames are not looked at
+    passages: tuple[FlownPassage, ...] = ()  # the planned ones, in their order
 
     @property
     def flies(self) -> bool:
@@ -54,9 +55,18 @@ class OwnFlight:
         return not self.defects
 
     @property
-    def misses(self) -> bool:
-        """True if it does not pass through the plane of a gate that is asked, or not as far as counts."""
-        return any(passage.failure and passage.attitude_error is None for passage in self.passages)
+    def lingers(self) -> bool:
+        """True if it does not pass the plane of a gate, or not as far as counts, or touches the frame."""
+        return any(
+            passage.failure and (passage.clearance is None or passage.clearance < 0.0)
+            for passage in self.passages
+        )
+
+    @property
+    def wants_reserve(self) -> bool:
+        """True if it has a defect that more reserve for the controller may mend: any but touching a frame."""
+        touching = sum((passage.clearance or 0.0) < 0.0 for passage in self.passages if passage.failure)
+        return len(self.defects) > touching
 
     @property
     def rank(self) -> tuple[int, float]:

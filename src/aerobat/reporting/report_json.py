@@ -43,7 +43,7 @@ def _flight(score: Score) -> dict[str, Any]:
     """A score; what is not known or not limited is None, as JSON has neither NaN nor infinity."""
     facts = asdict(score) | {"outcome": score.outcome.name.lower()}
     facts["passages"] = [
-        {name: None if value != value or value == inf else value for name, value in passage.items()}
+        {name: None if value in ("", inf) or value != value else value for name, value in passage.items()}
         for passage in facts["passages"]
     ]
     return facts
@@ -61,6 +61,7 @@ def _flyability(found: Flyability) -> dict[str, Any]:
                 "gate": passage.gate,
                 "attitude_error_deg": _in_degrees(passage.attitude_error),
                 "attitude_tolerance_deg": _in_degrees(passage.attitude_tolerance),
+                "clearance_m": passage.clearance,
                 "failure": passage.failure or None,
             }
             for passage in found.passages

@@ -12,7 +12,7 @@ from rich.table import Table
 from rich.text import Text
 
 from aerobat.certification import Certificate, Finding, Side, Verdict
-from aerobat.evaluation.score import Score
+from aerobat.evaluation import Passage, Score
 from aerobat.planning import Assessment, Plan
 from aerobat.problem import Problem
 from aerobat.simulation.outcome import length
@@ -181,7 +181,7 @@ def flight_facts(score: Score, controller: str | None = None) -> Iterable[Fact]:
     yield "position error", _pair(100 * score.max_position_error_m, 100 * score.rms_position_error_m, "cm")
     yield "attitude error", _pair(score.max_attitude_error_deg, score.rms_attitude_error_deg, "°")
     for passage in score.passages:
-        clearance = "" if isnan(passage.clearance) else f", {100 * passage.clearance:.0f} cm clear"
+        clearance = "" if isnan(passage.clearance) else f", {_clearance(passage)}"
         allowed = (
             ""
             if isinf(passage.attitude_tolerance_deg)
@@ -193,6 +193,13 @@ def flight_facts(score: Score, controller: str | None = None) -> Iterable[Fact]:
         )
         yield passage.gate, "not passed" if isnan(passage.time) else passed
     yield "saturated", f"{100 * score.saturated_fraction:.1f} % of the time"
+
+
+def _clearance(passage: Passage) -> str:
+    """The least clearance in words, with its edge and its instant."""
+    centimetres = 100 * passage.clearance
+    found = f"{-centimetres:.1f} cm into" if centimetres < 0.0 else f"{centimetres:.1f} cm clear of"
+    return f"{found} the {passage.closest_edge} edge at {passage.closest_time:.2f} s"
 
 
 def _pair(largest: float, rms: float, unit: str) -> str:

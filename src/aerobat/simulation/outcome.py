@@ -40,7 +40,7 @@ class Outcome(Enum):
     EARLY = (
         "missed {gate}, {early:.2f} m or more beyond its plane about {time:.2f} s, when it was to be crossed"
     )
-    HIT_FRAME = "hit the frame of {gate}, {excess_cm:.1f} cm too wide at {time:.2f} s"
+    HIT_FRAME = "hit the frame of {gate}, {excess_cm:.1f} cm into its {edge} edge at {time:.2f} s"
     WRONG_ATTITUDE = (
         "passed {gate} {angle:.1f}° off the attitude asked at {time:.2f} s, {tolerance:.3g}° allowed"
     )

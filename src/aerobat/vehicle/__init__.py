@@ -6,12 +6,14 @@ from aerobat.vehicle.allocation import (
     rotor_thrusts,
     wrench,
 )
+from aerobat.vehicle.ellipsoid import Ellipsoid
 from aerobat.vehicle.files import as_vehicle, load_vehicle, vehicle_names, vehicle_text, write_vehicle
 from aerobat.vehicle.plausibility import implausibilities
 from aerobat.vehicle.rotor import Rotor
 from aerobat.vehicle.vehicle import Vehicle
 
 __all__ = [
+    "Ellipsoid",
     "Rotor",
     "Vehicle",
     "as_vehicle",

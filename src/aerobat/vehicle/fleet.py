@@ -29,7 +29,8 @@ class Fleet:
     max_thrusts: Array  # [N], (vehicles, n)
     torque_coefficients: Array  # [m], (vehicles, n)
     lags: Array  # [s], (vehicles, n)
-    radii: Array  # [m], (vehicles, n)
+    body_centres: Array  # [m] of what encloses the vehicle, (vehicles, 3)
+    semi_axes: Array  # [m] likewise, (vehicles, 3)
 
     def __post_init__(self) -> None:
         """Write-protect."""
@@ -43,9 +44,9 @@ class Fleet:
         rotors = [rotor for vehicle in vehicles for rotor in vehicle.rotors]
         shape = (len(vehicles), -1)
         numbers = np.array(
-            [(r.spin, r.min_thrust, r.max_thrust, r.torque_coefficient, r.lag, r.radius) for r in rotors]
+            [(r.spin, r.min_thrust, r.max_thrust, r.torque_coefficient, r.lag) for r in rotors]
         )
-        spin, low, high, torque, lag, radius = numbers.T.copy()
+        spin, low, high, torque, lag = numbers.T.copy()
         return cls(
             names=tuple(vehicle.name for vehicle in vehicles),
             mass=np.array([vehicle.mass for vehicle in vehicles]),
@@ -57,7 +58,8 @@ class Fleet:
             max_thrusts=high.reshape(shape),
             torque_coefficients=torque.reshape(shape),
             lags=lag.reshape(shape),
-            radii=radius.reshape(shape),
+            body_centres=np.array([vehicle.bounding_ellipsoid.centre for vehicle in vehicles]),
+            semi_axes=np.array([vehicle.bounding_ellipsoid.semi_axes for vehicle in vehicles]),
         )
 
     def __len__(self) -> int:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import field, fields, replace
 from functools import cached_property
 from typing import Annotated, Any, ClassVar
@@ -26,6 +26,7 @@ from aerobat.declaration import (
 )
 from aerobat.errors import SpecError
 from aerobat.states import STANDARD_GRAVITY
+from aerobat.vehicle.ellipsoid import ENCLOSING, Ellipsoid, about_rotors
 from aerobat.vehicle.hover import mixing_matrix, overloaded, why_no_hover
 from aerobat.vehicle.rotor import Rotor, rotor_table
 
@@ -54,12 +55,14 @@ class Vehicle:
     rotors: tuple[Rotor, ...]  # four or more
     drag_body: Vector3 = field(default_factory=lambda: np.zeros(3))  # [kg/s] force_body = -drag_body·v_body
     max_body_rate: Limit = np.inf  # [rad/s] the largest norm of ω
+    # what encloses it, propellers included, and passes gates; a flat one about the rotors unless given
+    body: Ellipsoid | None = None
     description: str = ""  # where its numbers come from
 
     SHORTHANDS: ClassVar[Mapping[str, str]] = {
         "rotor_defaults": "any keys of rotors, for all of them",
         "centre_of_mass": "[m] where the centre of mass lies, in the axes and from the origin from which "
-        "position_body is then counted ([0, 0, 0])",
+        "position_body and the body's centre are then counted ([0, 0, 0])",
     }
 
     def __post_init__(self) -> None:
@@ -70,6 +73,8 @@ class Vehicle:
             raise FieldError("rotors", f"must be 4 or more, got {len(self.rotors)}")
         if not self.dead_rotors:  # with some, see `without_dead_rotors`
             self._check_control()
+        if self.body is not None:
+            _check_enclosed(self.body, self.rotors)
 
     @classmethod
     def expand(cls, table: dict[str, Any]) -> dict[str, Any]:
@@ -87,6 +92,10 @@ class Vehicle:
             with within_field("centre_of_mass"):
                 centre = finite(table.pop("centre_of_mass"), 3)
             table["rotors"] = tuple(_about(centre, rotor) for rotor in table.get("rotors", ()))
+            if isinstance(body := table.get("body"), Mapping):
+                with within_field("body"):
+                    body = from_table(Ellipsoid, body)
+                table["body"] = replace(body, centre=body.centre - centre)
         return table
 
     def abbreviate(self, table: dict[str, Any]) -> dict[str, Any]:
@@ -134,6 +143,11 @@ class Vehicle:
         return frozen(mixing_matrix(self.allocation, self.min_thrusts, self.max_thrusts), "mixer")
 
     @cached_property
+    def bounding_ellipsoid(self) -> Ellipsoid:
+        """What encloses it with its propellers: `body`, or a flat ellipsoid about the rotors."""
+        return about_rotors(self.rotors) if self.body is None else self.body
+
+    @cached_property
     def dead_rotors(self) -> tuple[int, ...]:
         """Which rotors give no thrust, counted from 0."""
         return tuple(i for i, rotor in enumerate(self.rotors) if rotor.is_dead)
@@ -149,7 +163,8 @@ class Vehicle:
             self._check_control()
         except FieldError as error:
             raise SpecError(f"vehicle '{self.name}': {error}") from None
-        return replace(self, rotors=tuple(rotor for rotor in self.rotors if not rotor.is_dead))
+        rotors = tuple(rotor for rotor in self.rotors if not rotor.is_dead)
+        return replace(self, rotors=rotors, body=self.bounding_ellipsoid)
 
     @property
     def max_specific_thrust(self) -> float:
@@ -232,6 +247,18 @@ def _rotor(table: Any, defaults: Mapping[str, Any], place: str) -> Any:
 def _about(centre: Array, rotor: Any) -> Any:
     """A rotor placed about the centre of mass."""
     return replace(rotor, position_body=rotor.position_body - centre) if isinstance(rotor, Rotor) else rotor
+
+
+def _check_enclosed(body: Ellipsoid, rotors: Sequence[Rotor]) -> None:
+    """Refuse a body that a propeller sticks out of."""
+    for i, rotor in enumerate(rotors):
+        scale = body.sticking_out(rotor)
+        if scale > 1.0 + ENCLOSING:
+            raise FieldError(
+                "body",
+                f"must enclose rotors[{i}] with its propeller; {scale:.3g} times its semi_axes would, or "
+                "another centre",
+            )
 
 
 def _check_inertia(inertia: Array) -> None:

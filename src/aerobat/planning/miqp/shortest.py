@@ -132,7 +132,8 @@ def _descent(start: Placement) -> Descent:
 def flyable(attempts: Attempts, judged: Judged[Placement]) -> Judged[Placement]:
     """The same, or where its own flight has a defect a slower one without, if there is.
 
-    A path that turns back in its gate gets more speed there, any other a reserve for the controller.
+    A path that lingers in its gate, or turns back there, gets more speed there, any other a reserve for the
+    controller.
     """
     best = last = _own_flight(attempts, judged), judged
     path = judged.solution.source.path
@@ -141,7 +142,7 @@ def flyable(attempts: Attempts, judged: Judged[Placement]) -> Judged[Placement]:
         if path is None or program is None or last[0].flies or out_of_time():
             break
         kept = reserve
-        if last[0].misses:
+        if last[0].lingers:
             program, kept = _hastened(program), lesser
         program = replace(program, reserve=max(kept, program.reserve))
         found = descent(program, path.x).path

@@ -72,7 +72,7 @@ class Race:
         """
         best, reserve = (self._own_flight(found), found), self.reserve
         for _ in range(RESERVE_RAISES if reserve > 0.0 else 0):
-            if best[0].flies or out_of_time():
+            if not best[0].wants_reserve or out_of_time():
                 break
             reserve = min(MORE_RESERVE * reserve, MAX_RESERVE)
             last = found.solution.source

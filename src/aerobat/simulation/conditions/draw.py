@@ -211,5 +211,6 @@ def dispersed_fleet(nominal: Vehicle, draws: Sequence[Draw]) -> Fleet:
         max_thrusts=alike(one.max_thrusts),
         torque_coefficients=alike(one.torque_coefficients),
         lags=np.array([d.lags for d in draws]) * one.lags,
-        radii=alike(one.radii),
+        body_centres=alike(one.body_centres),
+        semi_axes=alike(one.semi_axes),
     )

@@ -147,8 +147,9 @@ def battery_part(battery: Battery, flights: DispersedFlights) -> Part:
     """A battery that the nominal vehicle's hover empties within its endurance."""
     nominal = Fleet.of([flights.nominal])
     hover = flights.nominal.mass * flights.environment.gravity * np.abs(nominal.mixer[0, :, 0])
-    hover_power = np.sum(hover**1.5 / nominal.radii[0])
-    usage = flights.effectiveness**1.5 / nominal.radii[0] / hover_power / battery.endurance
+    radii = np.array([rotor.radius for rotor in flights.nominal.rotors])
+    hover_power = np.sum(hover**1.5 / radii)
+    usage = flights.effectiveness**1.5 / radii / hover_power / battery.endurance
     parameters = BatteryParameters(flights.each("charge"), components(usage), flights.all(battery.sag))
     return Part(BatterySag(flights.slow_period()), parameters)
 

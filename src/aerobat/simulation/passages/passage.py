@@ -4,13 +4,15 @@ A crossing counts once the vehicle's centre gets PASSAGE_DEPTH beyond the plane 
 one that stops in the gate, turns back, or comes from the other side has not passed. A path may cross
 obliquely, as the paper's do, whose gates leave the velocity free: it is judged where it crosses, by the
 gate's plane all the same. One that moves along the plane passes no gate.
+
+The frame is judged by the body, an ellipsoid with its propellers inside: all that it sweeps of the gate's
+plane, from when it comes into the plane until it has left it, is to lie within the opening.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
-from math import degrees, inf
+from math import degrees
 from typing import Any
 
 import numpy as np
@@ -20,16 +22,13 @@ from aerobat import so3
 from aerobat.arrays import Array
 from aerobat.certification import PlannedPassage
 from aerobat.declaration import by_value
-from aerobat.kernels.running_metrics import GateProgress, Snapshot
+from aerobat.kernels.gates.progress import GateProgress
+from aerobat.kernels.gates.sweep import Sweep
 from aerobat.problem.gate import Gate
-from aerobat.simulation.flight import Flight
 from aerobat.simulation.outcome import Outcome
-from aerobat.vehicle.fleet import Fleet
 
 PASSAGE_WINDOW = 0.25  # [s] around the planned instant in which the crossing is looked for
 PASSAGE_DEPTH = 0.05  # [m] beyond the plane, where who crosses it has not merely stopped in it
-ZEROS = (np.zeros(1),) * 3
-NEVER = Snapshot(np.full(1, inf), ZEROS, ZEROS, (np.ones(1), *ZEROS))
 
 
 @by_value
@@ -47,7 +46,13 @@ class Passage:
     speed: float  # [m/s]
     attitude_error_deg: float  # angle between the thrust axis and where it shall point
     attitude_tolerance_deg: float  # largest that is allowed; infinite where no attitude is asked
-    clearance: float  # [m] from the outermost rotor tip to the frame; negative: a collision; NaN: unknown
+    clearance: float  # [m] the least between body and frame; negative: so far into it; NaN: unknown
+    closest_time: float  # [s] when that was
+    closest_edge: str  # left, right, upper or lower, as who passes upright sees it; empty: unknown
+    closest_lateral: float  # [m] where on that edge: from the opening's centre to the left
+    closest_up: float  # [m] likewise along the gate's upright
+    needed_width: float  # [m] of the least opening about the same centre that it would have passed
+    needed_height: float  # [m] likewise
     planned: float  # [s] when it was to be crossed; NaN where the flight had ended before
     backward_time: float  # [s] of a crossing against the direction about then; infinite where there is none
     max_distance: float  # [m] beyond the plane about then, negative: before it
@@ -68,7 +73,8 @@ class Passage:
         if not self.inside:
             return Outcome.MISSED_GATE, self.time, {"miss": self.miss}
         if self.clearance < 0.0:
-            return Outcome.HIT_FRAME, self.time, {"excess_cm": -100 * self.clearance}
+            numbers = {"excess_cm": -100 * self.clearance, "edge": self.closest_edge}
+            return Outcome.HIT_FRAME, self.closest_time, {**numbers}
         if self.attitude_error_deg > self.attitude_tolerance_deg:
             angles = {"angle": self.attitude_error_deg, "tolerance": self.attitude_tolerance_deg}
             return Outcome.WRONG_ATTITUDE, self.time, {**angles}
@@ -85,29 +91,13 @@ class Passage:
         return Outcome.EARLY, self.planned, {"early": self.min_distance}
 
 
-def flown_passages(flight: Flight, planned: Sequence[PlannedPassage], fleet: Fleet | None) -> list[Passage]:
-    """Passages of one flight, fields (1,).
-
-    Args:
-        flight: what was flown.
-        planned: what was to be passed.
-        fleet: its vehicle alone, for the clearance.
-    """
-    diverged = flight.outcome is not Outcome.COMPLETE
-    stop = np.array([flight.ends if diverged else np.nan])
-    states = flight.states
-    parts = (states.position, states.velocity, states.q_world_body)
-    return [passages(each, gate_progress(each, flight.times, parts), stop, fleet) for each in planned]
-
-
-def passages(planned: PlannedPassage, progress: GateProgress, stop: Array, fleet: Fleet | None) -> Passage:
+def passages(planned: PlannedPassage, progress: GateProgress, stop: Array) -> Passage:
     """Passages of many flights through one gate.
 
     Args:
         planned: what was to be passed.
         progress: of the vehicles, offsets from the gate's centre as positions; leaves (flights,).
         stop: when flights diverged [s], NaN for those that did not, (flights,).
-        fleet: the vehicles, for the clearance.
     """
     gate = planned.gate
     time = progress.crossing.time
@@ -121,7 +111,6 @@ def passages(planned: PlannedPassage, progress: GateProgress, stop: Array, fleet
 
     across, up = np.abs(offset @ gate.lateral), np.abs(offset @ gate.up)
     tilt = np.arccos(np.clip(so3.thrust_axis(q) @ planned.up, -1, 1))
-    clearance = np.full(len(q), np.nan) if fleet is None else _clearance(gate, fleet, offset, q)
     fields: dict[str, Any] = {
         "time": known(time),
         "miss": known(np.linalg.norm(offset, axis=-1)),
@@ -129,7 +118,7 @@ def passages(planned: PlannedPassage, progress: GateProgress, stop: Array, fleet
         "speed": known(np.linalg.norm(velocity, axis=-1)),
         "attitude_error_deg": known(np.rad2deg(tilt)),
         "attitude_tolerance_deg": np.full(len(q), degrees(planned.attitude_tolerance)),
-        "clearance": known(clearance),
+        **_closest(gate, progress.sweep.crossing, crossed),
         "planned": known(planned.time, ~ended_before),
         "backward_time": progress.backward,
         "max_distance": known(progress.max_distance, ~ended_before),
@@ -138,60 +127,33 @@ def passages(planned: PlannedPassage, progress: GateProgress, stop: Array, fleet
     return Passage(gate.name, **fields)
 
 
-def gate_progress(planned: PlannedPassage, times: Array, states: Sequence[Array]) -> GateProgress:
-    """Progress at the end of a flight along a polyline of states; leaves (1,).
+def _closest(gate: Gate, sweep: Sweep, crossed: NDArray[np.bool_]) -> dict[str, Any]:
+    """What a sweep leaves of the opening, and where it is least, each (flights,).
 
     Args:
-        planned: what was to be passed.
-        times: of the states [s], (T,).
-        states: positions, velocities and attitudes, (T, ·).
+        gate: what is passed.
+        sweep: through its plane, leaves (flights,).
+        crossed: true where it is crossed.
     """
-    offset = states[0] - planned.gate.position
-    distance = offset @ planned.gate.normal
-    is_beyond = distance > 0.0
-    change = np.diff(is_beyond.astype(int))
-    parts = (offset, *states[1:])
-    found = []
-    for k in np.flatnonzero(change > 0):
-        ahead = is_beyond[k + 1 :]
-        until = len(ahead) if ahead.all() else int(np.argmin(ahead))
-        if distance[k + 1 : k + 1 + until].max() >= PASSAGE_DEPTH:
-            found.append(_crossing(k, distance, times, parts))
-    crossing = _nearest(planned.time, found)
-    backward = _nearest(
-        planned.time, [_crossing(k, distance, times, parts) for k in np.flatnonzero(change < 0)]
+    known = crossed & np.isfinite(sweep.widest.time)
+    (across, up), (above, beside) = sweep.widest.point, sweep.highest.point
+    needed = 2 * np.abs(across), 2 * np.abs(above)
+    at_side = gate.width - needed[0] <= gate.height - needed[1]
+    half_width, half_height = gate.width / 2, gate.height / 2
+    lateral = np.where(at_side, np.copysign(half_width, across), beside)
+    upward = np.where(at_side, up, np.copysign(half_height, above))
+    edges = np.where(
+        at_side,
+        np.where(across > 0.0, "left", "right"),
+        np.where(above > 0.0, "upper", "lower"),
     )
-    in_window = np.abs(times - planned.time) <= PASSAGE_WINDOW
-    about = distance[in_window] if in_window.any() else distance[-1:]
-    return GateProgress(
-        NEVER,
-        np.zeros(1),
-        NEVER if crossing is None else crossing,
-        np.full(1, np.inf) if backward is None else backward.time,
-        np.array([about.max()]),
-        np.array([about.min()]),
-    )
-
-
-def _crossing(k: np.intp, distance: Array, times: Array, parts: Sequence[Array]) -> Snapshot:
-    """The state where the plane is crossed between two rows, leaves (1,)."""
-    fraction = -distance[k] / (distance[k + 1] - distance[k])
-    time, *rest = (part[k] + fraction * (part[k + 1] - part[k]) for part in (times, *parts))
-    return Snapshot(np.array([time]), *(tuple(part[:, None]) for part in rest))
-
-
-def _nearest(planned: float, crossings: Sequence[Snapshot]) -> Snapshot | None:
-    """The crossing next to an instant [s], the first of several; None where none is in the window."""
-    near = [each for each in crossings if abs(each.time[0] - planned) <= PASSAGE_WINDOW]
-    return min(near, key=lambda each: abs(each.time[0] - planned), default=None)
-
-
-def _clearance(gate: Gate, fleet: Fleet, offset: Array, q: Array) -> Array:
-    """From the frame to the nearest edge of a rotor's disc [m], in the plane of the gate, (flights,)."""
-    hubs = offset[:, None] + so3.rotate(q[:, None], fleet.rotor_positions)
-    spin_axis = so3.thrust_axis(q)
-    sides = []
-    for axis, half in ((gate.lateral, gate.width / 2), (gate.up, gate.height / 2)):
-        edge = np.sqrt(np.maximum(0.0, 1.0 - (spin_axis @ axis) ** 2))
-        sides.append(half - np.max(np.abs(hubs @ axis) + fleet.radii * edge[:, None], axis=-1))
-    return np.asarray(np.minimum(*sides))
+    numbers = {
+        "clearance": np.minimum(gate.width - needed[0], gate.height - needed[1]) / 2,
+        "closest_time": np.where(at_side, sweep.widest.time, sweep.highest.time),
+        "closest_lateral": np.clip(lateral, -half_width, half_width),
+        "closest_up": np.clip(upward, -half_height, half_height),
+        "needed_width": needed[0],
+        "needed_height": needed[1],
+    }
+    places = {name: np.where(known, values, np.nan) for name, values in numbers.items()}
+    return places | {"closest_edge": np.where(known, edges, "")}

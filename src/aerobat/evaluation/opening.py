@@ -1,0 +1,117 @@
+"""smallest_opening(): which opening of a gate flights pass with a wanted probability, from many of them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import ceil, isinf, log
+from typing import Annotated, Literal
+
+import numpy as np
+from pydantic import Field
+
+from aerobat.arrays import Array
+from aerobat.declaration import by_value, unknown_name, validated
+from aerobat.errors import SpecError
+from aerobat.evaluation.score import Scores
+from aerobat.problem import Gate
+from aerobat.simulation.outcome import length
+
+Probability = Annotated[float, Field(gt=0.0, lt=1.0)]
+Side = Literal["both", "width", "height"]
+
+
+@by_value
+@dataclass(frozen=True, eq=False)
+class Opening:
+    """An opening about a gate's centre, and how far the flights at hand vouch for it."""
+
+    width: float  # [m] infinite where more flights fail to cross the gate's plane than may
+    height: float  # [m] likewise
+    scale: float  # [-] of the gate's own opening, or of the side that was sought
+    sample_scale: float  # [-] that the wanted fraction of the flights at hand has passed: an estimate
+    probability: float  # with which a flight passes it
+    confidence: float  # with which that is so, whatever the flights' distribution
+    flights: int
+
+    def __str__(self) -> str:
+        """One line for people."""
+        vouched = (
+            f"passed with {100 * self.probability:.3g} % probability, says {100 * self.confidence:.3g} % "
+            f"confidence from {self.flights} flights"
+        )
+        if isinf(self.scale):
+            return f"no opening is {vouched}: too many do not get there as planned"
+        size = f"{length(self.width)} by {length(self.height)}"
+        return f"an opening of {size}, {self.scale:.3g} times the gate's, is {vouched}"
+
+
+@validated
+def smallest_opening(
+    scores: Scores,
+    gate: Gate,
+    probability: Probability = 0.99,
+    confidence: Probability = 0.95,
+    side: Side = "both",
+) -> Opening:
+    """Return the smallest opening about a gate's centre that a flight passes with a probability.
+
+    Each flight needs some scale of the gate's opening: what its body swept over what the gate has; one that
+    did not cross the plane as planned needs an infinite one. The r-th smallest of the scales of n flights
+    bounds from above what a fraction p of all flights needs, with the confidence P(B(n, p) < r), B binomial,
+    whatever their distribution (an order statistic as the bound of a quantile: David and Nagaraja, Order
+    Statistics, 2003, section 7.1). The least r that reaches the confidence is taken.
+
+    Args:
+        scores: of flights drawn independently of each other.
+        gate: which one; where it is passed several times, each time counts.
+        probability: with which a flight shall pass.
+        confidence: with which the opening is large enough.
+        side: `both` for an opening of the gate's proportions; `width` or `height` for that alone, the other
+            as it is.
+
+    Raises:
+        SpecError: no passage is through such a gate, or the flights are too few for such a probability.
+    """
+    scales = np.sort(_needed(scores, gate, side))
+    least = ceil(log(1.0 - confidence) / log(probability))
+    if len(scales) < least:
+        raise SpecError(
+            f"scores of {len(scales)} flights cannot vouch for {100 * probability:g} % with "
+            f"{100 * confidence:g} % confidence; score {least} flights or more"
+        )
+    scale = float(scales[_rank(len(scales), probability, confidence) - 1])
+    return Opening(
+        width=gate.width * (1.0 if side == "height" else scale),
+        height=gate.height * (1.0 if side == "width" else scale),
+        scale=scale,
+        sample_scale=float(scales[ceil(probability * len(scales)) - 1]),
+        probability=probability,
+        confidence=confidence,
+        flights=len(scales),
+    )
+
+
+def _rank(count: int, probability: float, confidence: float) -> int:
+    """The rank of the order statistic that bounds a quantile from above, counted from 1."""
+    from scipy.stats import binom  # takes a quarter of a second
+
+    return min(int(binom.ppf(confidence, count, probability)) + 1, count)
+
+
+def _needed(scores: Scores, gate: Gate, side: Side) -> Array:
+    """The scale of the opening that each flight needs, infinite where none will do, (flights,)."""
+    passages = [passage for passage in scores.passages if passage.gate == gate.name]
+    if not passages:
+        raise unknown_name("gate", gate.name, [passage.gate for passage in scores.passages])
+    width, height = (
+        np.max([np.nan_to_num(sizes, nan=np.inf) for sizes in each], axis=0)
+        for each in (
+            [passage.needed_width for passage in passages],
+            [passage.needed_height for passage in passages],
+        )
+    )
+    if side == "width":
+        return np.where(height <= gate.height, width / gate.width, np.inf)
+    if side == "height":
+        return np.where(width <= gate.width, height / gate.height, np.inf)
+    return np.asarray(np.maximum(width / gate.width, height / gate.height))

@@ -1,0 +1,1 @@
+"""Gates as flights meet them, tick by tick: the crossing of their plane, and the body's section there."""

@@ -1,0 +1,94 @@
+"""A flight before, in and behind a gate's plane, tick by tick, straight between ticks."""
+
+from __future__ import annotations
+
+from math import inf
+from typing import NamedTuple
+
+from aerobat.kernels.gates import sweep
+from aerobat.kernels.gates.section import BoundingEllipsoid, GateFrame
+from aerobat.kernels.gates.snapshot import Snapshot, between, either
+from aerobat.kernels.gates.sweep import SweepProgress, magnitude
+from aerobat.kernels.ops import Ops, Scalar, Vector
+from aerobat.kernels.vectors import ZERO, dot
+
+
+class GatePlane(NamedTuple):
+    """A gate as a plane to be crossed at a time."""
+
+    centre: Vector  # [m]
+    frame: GateFrame
+    planned: Scalar  # [s] when it is to be crossed
+    window: Scalar  # [s] by which the crossing may be earlier or later
+    depth: Scalar  # [m] beyond the plane that makes a crossing a passage
+
+
+class GateProgress(NamedTuple):
+    """A flight about a gate's plane so far; offsets from the opening's centre as positions."""
+
+    latest: Snapshot  # the last crossing in the direction of passage
+    beyond: Scalar  # 1 since that crossing, until it comes back
+    crossing: Snapshot  # of those after which it got far enough beyond, the nearest to the planned instant
+    backward: Scalar  # [s] the crossing against the direction next to that instant, infinite if there is none
+    max_distance: Scalar  # [m] beyond the plane, of ticks in the window; −infinite before it
+    min_distance: Scalar  # [m] likewise
+    sweep: SweepProgress  # of the body through the plane
+
+
+def init() -> GateProgress:
+    """Progress before the first tick."""
+    never = Snapshot(inf, ZERO, ZERO, (1.0, 0.0, 0.0, 0.0))
+    return GateProgress(never, 0.0, never, inf, -inf, inf, sweep.init())
+
+
+def step(
+    ops: Ops,
+    progress: GateProgress,
+    plane: GatePlane,
+    ellipsoid: BoundingEllipsoid,
+    snapshots: tuple[Snapshot, Snapshot],
+    counted: tuple[Scalar, Scalar],
+) -> GateProgress:
+    """Progress a tick later.
+
+    Args:
+        ops: of the arithmetic.
+        progress: before the tick.
+        plane: the gate's.
+        ellipsoid: what encloses the vehicle.
+        snapshots: the last tick's and this one's, positions from the opening's centre.
+        counted: true where there was a last tick, and where this one counts.
+    """
+    last, now = snapshots
+    before, behind = dot(last.position, plane.frame.normal), dot(now.position, plane.frame.normal)
+    both = counted[0] & counted[1]
+    forward = both & (before <= 0.0) & (behind > 0.0)
+    back = both & (before > 0.0) & (behind <= 0.0)
+    crosses = ops.select(forward, 1.0, ops.select(back, 1.0, 0.0))
+    fraction = -before / ops.select(crosses > 0.5, behind - before, 1.0)
+    here = between(last, now, fraction)
+    latest = either(ops, forward, here, progress.latest)
+    beyond = ops.select(forward, 1.0, ops.select(back, 0.0, progress.beyond))
+    off_time = magnitude(ops, latest.time - plane.planned)
+    nearer = off_time < magnitude(ops, progress.crossing.time - plane.planned)
+    passed = counted[1] & (beyond > 0.5) & (behind >= plane.depth) & (off_time <= plane.window) & nearer
+    back_off_time = magnitude(ops, here.time - plane.planned)
+    nearer_back = back_off_time < magnitude(ops, progress.backward - plane.planned)
+    in_window = counted[1] & (magnitude(ops, now.time - plane.planned) <= plane.window)
+    return GateProgress(
+        latest,
+        beyond,
+        either(ops, passed, latest, progress.crossing),
+        ops.select(back & (back_off_time <= plane.window) & nearer_back, here.time, progress.backward),
+        ops.select(in_window, ops.maximum(progress.max_distance, behind), progress.max_distance),
+        ops.select(in_window, ops.minimum(progress.min_distance, behind), progress.min_distance),
+        sweep.step(
+            ops,
+            progress.sweep,
+            (plane.frame, plane.depth, ellipsoid),
+            snapshots,
+            counted,
+            crosses,
+            passed,
+        ),
+    )

@@ -1,0 +1,152 @@
+"""Passages of a flight that was logged, straight between its rows."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from aerobat.arrays import Array
+from aerobat.certification import PlannedPassage
+from aerobat.engines.components import components
+from aerobat.engines.numpy import ArrayOps
+from aerobat.engines.pytree import tree_map
+from aerobat.kernels.gates import progress
+from aerobat.kernels.gates.progress import GateProgress
+from aerobat.kernels.gates.section import BoundingEllipsoid, GateFrame, gap, section
+from aerobat.kernels.gates.snapshot import Snapshot, between
+from aerobat.kernels.gates.sweep import Extreme, Sweep, swept_between
+from aerobat.simulation.flight import Flight
+from aerobat.simulation.outcome import Outcome
+from aerobat.simulation.passages.passage import PASSAGE_DEPTH, PASSAGE_WINDOW, Passage, passages
+from aerobat.vehicle import Ellipsoid
+
+T = TypeVar("T")
+
+
+def flown_passages(
+    flight: Flight, planned: Sequence[PlannedPassage], body: Ellipsoid | None
+) -> list[Passage]:
+    """Passages of one flight, fields (1,).
+
+    Args:
+        flight: what was flown.
+        planned: what was to be passed.
+        body: what encloses its vehicle, for the clearance.
+    """
+    diverged = flight.outcome is not Outcome.COMPLETE
+    stop = np.array([flight.ends if diverged else np.nan])
+    states = flight.states
+    parts = (states.position, states.velocity, states.q_world_body)
+    return [passages(each, gate_progress(each, flight.times, parts, body), stop) for each in planned]
+
+
+def gate_progress(
+    planned: PlannedPassage, times: Array, states: Sequence[Array], body: Ellipsoid | None = None
+) -> GateProgress:
+    """Progress at the end of a flight along a polyline of states; leaves (1,).
+
+    Args:
+        planned: what was to be passed.
+        times: of the states [s], (T,).
+        states: positions, velocities and attitudes, (T, ·).
+        body: what encloses the vehicle, for what it sweeps of the plane.
+    """
+    track = _Track(planned, times, states[0] - planned.gate.position, *states[1:])
+    forward, backward = track.nearest(track.passages), track.nearest(track.crossings(-1))
+    in_window = np.abs(times - planned.time) <= PASSAGE_WINDOW
+    about = track.distance[in_window] if in_window.any() else track.distance[-1:]
+    before: GateProgress = tree_map(lambda leaf: np.full(1, leaf), progress.init())
+    found = before._replace(max_distance=np.array([about.max()]), min_distance=np.array([about.min()]))
+    if backward is not None:
+        found = found._replace(backward=track.crossing(backward).time)
+    if forward is None:
+        return found
+    found = found._replace(crossing=track.crossing(forward))
+    if body is None:
+        return found
+    return found._replace(sweep=found.sweep._replace(crossing=track.swept(forward, body)))
+
+
+@dataclass(frozen=True)
+class _Track:
+    """A polyline of states about a gate; interval k leads from row k to the next."""
+
+    planned: PlannedPassage
+    times: Array  # [s], (T,)
+    offset: Array  # [m] from the centre of the opening, (T, 3)
+    velocity: Array  # [m/s], (T, 3)
+    q_world_body: Array  # (T, 4)
+
+    @cached_property
+    def distance(self) -> Array:
+        """How far beyond the gate's plane [m], (T,)."""
+        return np.asarray(self.offset @ self.planned.gate.normal)
+
+    @cached_property
+    def rows(self) -> Snapshot:
+        """The rows as kernels take them, leaves (T,)."""
+        return Snapshot(self.times, *map(components, (self.offset, self.velocity, self.q_world_body)))
+
+    def crossings(self, direction: int) -> NDArray[np.intp]:
+        """The intervals in which the plane is crossed, in its direction (1) or against it (−1)."""
+        return np.flatnonzero(np.diff((self.distance > 0.0).astype(int)) == direction)
+
+    @property
+    def passages(self) -> list[np.intp]:
+        """Those of the crossings after which it gets far enough beyond before it comes back."""
+        back = np.append(self.crossings(-1), len(self.times))
+        return [
+            k
+            for k in self.crossings(1)
+            if self.distance[k + 1 : back[np.searchsorted(back, k)] + 1].max() >= PASSAGE_DEPTH
+        ]
+
+    def crossing(self, k: np.intp) -> Snapshot:
+        """The state where the plane is crossed in an interval, leaves (1,)."""
+        fraction = -self.distance[k] / (self.distance[k + 1] - self.distance[k])
+        last, now = (_part(self.rows, slice(j, j + 1)) for j in (k, k + 1))
+        return between(last, now, fraction)
+
+    def nearest(self, intervals: Sequence[np.intp] | NDArray[np.intp]) -> np.intp | None:
+        """Of the intervals the one that crosses next to the planned instant, None of none in the window."""
+        off_times = [abs(self.crossing(k).time[0] - self.planned.time) for k in intervals]
+        k = int(np.argmin(off_times)) if off_times else 0
+        return intervals[k] if off_times and off_times[k] <= PASSAGE_WINDOW else None
+
+    def swept(self, crossing: np.intp, body: Ellipsoid) -> Sweep:
+        """What the body sweeps of the plane in the stay in which it is crossed, leaves (1,)."""
+        gate = self.planned.gate
+        frame = GateFrame(*(tuple(axis.tolist()) for axis in (gate.normal, gate.lateral, gate.up)))
+        ellipsoid = BoundingEllipsoid(tuple(body.centre.tolist()), tuple(body.semi_axes.tolist()))
+        rows = self.rows
+        gaps = gap(ArrayOps, section(ArrayOps, ellipsoid, frame, rows.position, rows.q_world_body))
+        away = np.flatnonzero((gaps > 0.0) & (np.abs(self.distance) > PASSAGE_DEPTH))
+        first, end = away[away <= crossing], away[away > crossing]
+        stay = slice(first[-1] if first.size else 0, end[0] + 1 if end.size else len(gaps))
+        rows, gaps = _part(rows, stay), gaps[stay]
+        snapshots = _part(rows, slice(-1)), _part(rows, slice(1, None))
+        crosses = np.arange(len(gaps) - 1) == crossing - stay.start
+        met, swept = swept_between(
+            ArrayOps, frame, ellipsoid, snapshots, (gaps[:-1], gaps[1:]), crosses.astype(float)
+        )
+        return Sweep(
+            _farthest(swept.widest, np.where(met, np.abs(swept.widest.point.along), 0.0)),
+            _farthest(swept.highest, np.where(met, np.abs(swept.highest.point.along), 0.0)),
+        )
+
+
+def _farthest(points: Extreme, distance: Array) -> Extreme:
+    """Of points, leaves (intervals,), the first of the farthest."""
+    k = int(np.argmax(distance))
+    return _part(points, slice(k, k + 1))
+
+
+def _part(tree: T, part: slice) -> T:
+    """A part of the leaves."""
+    cut: T = tree_map(lambda leaf: leaf[part], tree)
+    return cut

@@ -1,0 +1,69 @@
+"""What encloses a vehicle, its propellers included: the body that passes through a gate.
+
+An ellipsoid, not a box: its section by a plane, and how far that reaches, are known in closed form, it has no
+corners where nothing is (a flip turns the body about its thrust axis by as much as its path asks, and a box
+drawn about round frames would touch with its corners), and it costs a flight little at every tick.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import field
+from math import cos, pi
+from typing import Annotated
+
+import numpy as np
+from pydantic import AfterValidator
+
+from aerobat.arrays import Array
+from aerobat.declaration import FieldError, Vector3, declared
+from aerobat.vehicle.rotor import Rotor
+
+# [-] half the height over half the width: Bitcraze's Crazyflie 2.x 29 mm of 139 mm, the Iris of PX4's models
+# 11 cm of 77 cm
+FLATNESS = 0.2
+ENCLOSING = 1e-3  # [-] of the semi-axes, by which a propeller may stick out: what files are rounded to
+_CORNERS = 96  # of the polygon about a propeller's disc: 0.05 % of its radius too large
+
+
+def _positive(value: Array) -> Array:
+    if (value <= 0.0).any():
+        raise FieldError("", f"must be positive, got {value.tolist()}")
+    return value
+
+
+@declared
+class Ellipsoid:
+    """An ellipsoid along the body's axes that encloses a vehicle with its propellers.
+
+    Raises SpecError, naming the field, for semi-axes that are not positive.
+    """
+
+    semi_axes: Annotated[Vector3, AfterValidator(_positive)]  # [m] half its length, width and height
+    # [m] from the centre of mass; in a file, from where `centre_of_mass` is counted
+    centre: Vector3 = field(default_factory=lambda: np.zeros(3))
+
+    def sticking_out(self, rotor: Rotor) -> float:
+        """The scale [-] by which it would enclose a rotor with its propeller, about its centre."""
+        return float(np.linalg.norm((_rim(rotor) - self.centre) / self.semi_axes, axis=-1).max())
+
+
+def about_rotors(rotors: Sequence[Rotor]) -> Ellipsoid:
+    """The flat ellipsoid that encloses rotors with their propellers, in the middle between them.
+
+    As long to as wide as they are together; its half height is FLATNESS of the larger half width, more by
+    what it lies above or below the centre of mass, where the body is.
+    """
+    rims = np.concatenate([_rim(rotor) for rotor in rotors])
+    low, high = rims.min(axis=0), rims.max(axis=0)
+    centre, half = (low + high) / 2, (high - low) / 2
+    half[2] += FLATNESS * half[:2].max() + abs(centre[2])
+    scale = np.linalg.norm((rims - centre) / half, axis=-1).max()
+    return Ellipsoid(semi_axes=scale * half, centre=centre)
+
+
+def _rim(rotor: Rotor) -> Array:
+    """Corners of a polygon about a propeller's disc [m], body axes, (corners, 3)."""
+    angle = np.linspace(0.0, 2 * pi, _CORNERS, endpoint=False)
+    circle = np.column_stack([np.cos(angle), np.sin(angle), np.zeros(_CORNERS)])
+    return np.asarray(rotor.position_body + rotor.radius / cos(pi / _CORNERS) * circle)
