@@ -86,6 +86,8 @@ from .states import BodyState, FlatState, Setpoint, Wrench
 from .studies.compare import Comparison, compare
 from .trajectory import ContinuityRule, Trajectory, load_trajectory, minimum_effort, save_trajectory
 from .vehicle import Ellipsoid, Rotor, Vehicle, implausibilities, load_vehicle, vehicle_names, write_vehicle
+from .vehicle import Rotor, Vehicle, implausibilities, load_vehicle, vehicle_names, write_vehicle
+from .viewer.replay import Replay, view, write_replay
 
 __all__ = [
     "AerobatError",
@@ -137,6 +139,7 @@ __all__ = [
     "Problem",
     "Quantity",
     "Reference",
+    "Replay",
     "Rotor",
     "Score",
     "Scores",
@@ -192,10 +195,12 @@ __all__ = [
     "to_dataframe",
     "tracking_figure",
     "vehicle_names",
+    "view",
     "with_second_opinion",
     "write_columns",
     "write_csv",
     "write_dispersion",
     "write_problem",
+    "write_replay",
     "write_vehicle",
 ]

@@ -1,0 +1,129 @@
+"""The HTML of a replay page: a scene as numbers, and what draws them, in one file."""
+
+from __future__ import annotations
+
+import json
+import re
+from base64 import b64encode
+from dataclasses import dataclass, field
+from html import escape
+from importlib.resources import files
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from aerobat.arrays import Array
+from aerobat.problem.gate import Gate
+from aerobat.viewer.scene import Scene, Track
+
+PAGE = files("aerobat.viewer") / "page"
+SCRIPTS = ("arrays.js", "models.js", "world.js", "cameras.js", "plots.js", "player.js")  # in this order
+MARK = '<meta name="generator" content="aerobat replay">'  # by which such a page is known
+PLACE = re.compile("@@([a-z]+)@@")
+DIGITS = 32767.0  # of 16-bit integers: attitudes to 0.004°
+
+
+@dataclass
+class Blob:
+    """Arrays of a page one after the other, each beginning at a multiple of four bytes."""
+
+    parts: list[bytes] = field(default_factory=list)
+    size: int = 0
+
+    def add(self, values: NDArray[Any], kind: str, scale: float = 1.0) -> dict[str, Any]:
+        """Append values / scale as little-endian numbers of a NumPy kind, and return where they are."""
+        numbers = values / scale
+        packed = (np.rint(numbers) if kind != "f4" else numbers).astype(f"<{kind}").tobytes()
+        place = {"kind": kind, "offset": self.size, "length": values.size, "scale": scale}
+        packed += bytes(-len(packed) % 4)
+        self.parts.append(packed)
+        self.size += len(packed)
+        return place
+
+    def __str__(self) -> str:
+        """All of it as Base64."""
+        return b64encode(b"".join(self.parts)).decode()
+
+
+def document(scene: Scene) -> str:
+    """The page that replays a scene."""
+    blob = Blob()
+    header = _header(scene, blob)
+    parts = {
+        "title": escape(scene.title),
+        "style": _text("replay.css"),
+        "header": json.dumps(header, ensure_ascii=False, allow_nan=False).replace("<", "\\u003c"),
+        "arrays": str(blob),
+        "three": _text("three.min.js"),
+        "script": "\n".join(map(_text, SCRIPTS)),
+    }
+    return PLACE.sub(lambda place: parts[place[1]], _text("replay.html"))
+
+
+def _text(name: str) -> str:
+    return (PAGE / name).read_text(encoding="utf-8")
+
+
+def _header(scene: Scene, blob: Blob) -> dict[str, Any]:
+    """All of a scene but its arrays, which go to the blob."""
+    vehicle = scene.vehicle
+    top = float(max(np.abs([track.thrusts for track in scene.tracks]).max(), 1e-9))
+    return {
+        "title": scene.title,
+        "facts": scene.facts,
+        "isWell": scene.is_well,
+        "weight": vehicle.mass * scene.gravity,
+        "ground": scene.ground,
+        "rotors": [
+            {
+                "position": rotor.position_body.tolist(),
+                "radius": rotor.radius,
+                "spin": rotor.spin,
+                "min": rotor.min_thrust,
+                "max": rotor.max_thrust,
+            }
+            for rotor in vehicle.rotors
+        ],
+        "gates": [_gate(gate) for gate in scene.gates],
+        "stages": [{"name": s.name, "time": s.time, "gate": s.gate} for s in scene.stages],
+        "ghosts": [
+            {"name": g.name, "position": _rounded(g.position), "attitude": _rounded(g.q_world_body)}
+            for g in scene.ghosts
+        ],
+        "times": blob.add(scene.times, "f4"),
+        "planned": blob.add(scene.planned, "f4"),
+        "tracks": [_track(track, blob, top) for track in scene.tracks],
+        "curves": [
+            {"name": curve.name, "unit": curve.unit, "values": blob.add(curve.values, "f4")}
+            for curve in scene.curves
+        ],
+    }
+
+
+def _gate(gate: Gate) -> dict[str, Any]:
+    return {
+        "name": gate.name,
+        "position": gate.position.tolist(),
+        "normal": gate.normal.tolist(),
+        "up": gate.up.tolist(),
+        "width": gate.width,
+        "height": gate.height,
+    }
+
+
+def _track(track: Track, blob: Blob, top: float) -> dict[str, Any]:
+    """A track; its thrusts [N] are at most `top` in size."""
+    return {
+        "name": track.name,
+        "end": track.end,
+        "failed": track.failed,
+        "sentence": track.sentence,
+        "position": blob.add(track.position, "f4"),
+        "attitude": blob.add(track.q_world_body, "i2", 1.0 / DIGITS),
+        "thrusts": blob.add(track.thrusts, "i2", top / DIGITS),
+    }
+
+
+def _rounded(values: Array) -> list[float]:
+    return [round(value, 6) for value in values.tolist()]

@@ -1,0 +1,121 @@
+// Three cameras: around the whole scene, with the vehicle, and through a gate. Each can be turned and zoomed.
+
+const FIELD = 38; // [deg] of view, up and down
+const FILLED = [0.84, 0.76]; // of the picture across and up, by the whole scene
+const RAISED = 0.05; // of half the picture, to have the buttons below it
+
+class Cameras {
+  constructor(world, canvas) {
+    this.world = world;
+    this.camera = new THREE.PerspectiveCamera(FIELD, 1, 0.01 * SPAN, 100 * world.bounds.size);
+    this.camera.up.set(0, 0, 1);
+    this.controls = new THREE.OrbitControls(this.camera, canvas);
+    this.controls.minDistance = 0.6 * SPAN;
+    this.controls.maxDistance = 8 * world.bounds.size;
+    this.view = "orbit";
+    this.gate = 0;
+    this.touched = false;
+    this.controls.addEventListener("start", () => (this.touched = true));
+  }
+
+  // Take a view; the gate's again, that of the next gate.
+  take(view) {
+    if (view === "gate" && !HEADER.gates.length) return;
+    if (view === "gate" && this.view === "gate") this.gate = (this.gate + 1) % HEADER.gates.length;
+    this.view = view;
+    this.touched = false;
+    this.frame();
+  }
+
+  // Stand where the view is best, unless somebody has moved the camera since.
+  frame() {
+    if (this.touched) return;
+    const [target, offset] = { orbit: () => this.whole(), follow: () => this.chase(), gate: () => this.through() }[this.view]();
+    this.controls.target.copy(target);
+    this.camera.position.copy(target).add(offset);
+    this.controls.update();
+  }
+
+  // Move along with the vehicle, if it is followed.
+  follow() {
+    if (this.view !== "follow") return;
+    const step = this.world.vehicle.position.clone().sub(this.controls.target);
+    this.controls.target.add(step);
+    this.camera.position.add(step);
+    this.camera.lookAt(this.controls.target);
+  }
+
+  resize(width, height) {
+    this.camera.aspect = width / height;
+    this.camera.updateProjectionMatrix();
+    this.frame();
+  }
+
+  whole() {
+    const direction = bestDirection(this.world.bounds, this.camera.aspect);
+    return fitted(this.world.bounds.points, direction, this.camera.aspect);
+  }
+
+  chase() {
+    const offset = bestDirection(this.world.bounds, 1).multiplyScalar(4.8 * SPAN);
+    return [this.world.vehicle.position.clone(), offset];
+  }
+
+  // From behind the gate, a little to the side, toward the vehicle that comes through.
+  through() {
+    const gate = HEADER.gates[this.gate];
+    const [normal, across] = [vector(gate.normal), vector(crossOf(gate))];
+    const distance = 3.2 * Math.max(gate.width, gate.height, 1.5 * SPAN) / Math.min(this.camera.aspect, 1);
+    const offset = normal.multiplyScalar(distance).addScaledVector(across, 0.28 * distance);
+    offset.z += 0.22 * distance;
+    return [vector(gate.position), offset];
+  }
+}
+
+// The direction from which the path spreads widest and gates are seen open, x to the right among equals.
+function bestDirection({ lower, upper }, aspect) {
+  const planned = values(HEADER.planned);
+  let [best, found] = [-1, null];
+  for (let degrees = -180; degrees < 180; degrees += 5) {
+    const azimuth = (degrees * Math.PI) / 180;
+    const direction = new THREE.Vector3(Math.cos(azimuth), Math.sin(azimuth), 0);
+    const right = new THREE.Vector3(-direction.y, direction.x, 0);
+    let [low, high] = [Infinity, -Infinity];
+    for (let k = 0; k < planned.length; k += 3) {
+      const x = planned[k] * right.x + planned[k + 1] * right.y;
+      [low, high] = [Math.min(low, x), Math.max(high, x)];
+    }
+    const openness = HEADER.gates.map((gate) => Math.abs(vector(gate.normal).dot(direction)));
+    const depth = Math.min(1, Math.min(Math.abs(direction.x), Math.abs(direction.y)) / 0.3);
+    const travel = vector(planned.slice(-3)).sub(vector(planned.slice(0, 3)));
+    const onward = travel.dot(right) / Math.max(travel.length(), 1);
+    const spread = (high - low + 0.1 * (upper.z - lower.z)) * Math.sqrt(Math.min(1, ...openness) + 0.02);
+    const score = spread * Math.sqrt(depth + 0.05) * (1 + 0.15 * onward + 0.02 * Math.cos(azimuth + Math.PI / 3));
+    if (score > best) [best, found] = [score, direction];
+  }
+  return found.setZ(aspect < 1 ? 0.25 : 0.3).normalize();
+}
+
+// Where to look, and from how far in a direction, to have all points in the picture and its middle.
+function fitted(points, direction, aspect) {
+  const probe = new THREE.PerspectiveCamera(FIELD, aspect, 1e-3, 1e6);
+  probe.up.set(0, 0, 1);
+  const target = points.reduce((sum, point) => sum.add(point), new THREE.Vector3()).divideScalar(points.length);
+  let distance = 4 * Math.max(...points.map((point) => point.distanceTo(target)));
+  for (let round = 0; round < 12; round++) {
+    probe.position.copy(target).addScaledVector(direction, distance);
+    probe.lookAt(target);
+    probe.updateMatrixWorld();
+    const seen = points.map((point) => point.clone().project(probe));
+    const [left, right, low, high] = [
+      Math.min(...seen.map((p) => p.x)), Math.max(...seen.map((p) => p.x)),
+      Math.min(...seen.map((p) => p.y)), Math.max(...seen.map((p) => p.y)),
+    ];
+    const half = distance * Math.tan((FIELD * Math.PI) / 360); // [m] half the picture's height at the target
+    const [across, up] = [0, 1].map((k) => new THREE.Vector3().setFromMatrixColumn(probe.matrixWorld, k));
+    target.addScaledVector(across, (half * aspect * (left + right)) / 2).addScaledVector(up, (half * (low + high)) / 2);
+    distance *= Math.max((right - left) / 2 / FILLED[0], (high - low) / 2 / FILLED[1]);
+  }
+  target.addScaledVector(probe.up, -RAISED * distance * Math.tan((FIELD * Math.PI) / 360));
+  return [target, direction.clone().multiplyScalar(distance)];
+}

@@ -1,0 +1,92 @@
+"""Replays: pages that show plans and flights, each one file that asks nothing of any other place."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from html import escape
+from pathlib import Path
+
+from aerobat.declaration import PathName, validated
+from aerobat.errors import SpecError
+from aerobat.planning import Plan
+from aerobat.simulation import Flight
+from aerobat.storage import write_whole
+from aerobat.vehicle import Vehicle
+from aerobat.viewer.document import MARK, document
+from aerobat.viewer.scene import Scene, scene_of
+
+INLINE_HEIGHT = 640  # [px] of a page in a notebook
+HEAD = 1000  # characters of a page in which it says what it is
+
+
+@dataclass(frozen=True, repr=False, eq=False)
+class Replay:
+    """A page that replays a scene; a notebook shows it where it stands."""
+
+    scene: Scene
+    html: str
+
+    def __repr__(self) -> str:
+        """The scene's title and the page's size."""
+        return f"Replay({self.scene.title}, {len(self.html) / 1e6:.2f} MB)"
+
+    def _repr_html_(self) -> str:
+        """The page in a frame of its own, in which it disturbs nothing."""
+        frame = "width:100%;border:1px solid #dfe6ec;border-radius:8px"
+        page = escape(self.html, quote=True)
+        return f'<iframe style="{frame}" height="{INLINE_HEIGHT}" srcdoc="{page}"></iframe>'
+
+
+@validated
+def view(shown: Flight | Plan, plan: Plan | None = None, vehicle: Vehicle | str | None = None) -> Replay:
+    """Return the page that replays a flight, a batch of flights, or a plan; a notebook shows it inline.
+
+    With the plan of a flight its gates and stages are shown, and whether it passed them. Raises SpecError
+    where there is nothing to show or the vehicle is not known.
+
+    Args:
+        shown: What is looked at.
+        plan: What was flown.
+        vehicle: What flew, or its name; by default the plan's, or the preset of the flight's name.
+    """
+    scene = scene_of(shown, plan, vehicle)
+    return Replay(scene, document(scene))
+
+
+@validated
+def write_replay(
+    shown: Flight | Plan,
+    path: PathName,
+    plan: Plan | None = None,
+    vehicle: Vehicle | str | None = None,
+) -> None:
+    """Write the page of `view` as one HTML file, whole or not at all; it opens from the disk.
+
+    An earlier replay is replaced. Raises SpecError as `view` does, for a file that is something else, and
+    where it cannot be written.
+
+    Args:
+        shown: What is looked at.
+        path: Of the file.
+        plan: What was flown.
+        vehicle: What flew, or its name; by default the plan's, or the preset of the flight's name.
+    """
+    save_replay(view(shown, plan, vehicle), path)
+
+
+def save_replay(replay: Replay, path: PathName) -> None:
+    """Write a page as `write_replay` does."""
+    if not is_replaceable(Path(path)):
+        raise SpecError(f"{path} is there already and no replay; name another file")
+    write_whole(path, replay.html)
+
+
+def is_replaceable(path: Path) -> bool:
+    """True where nothing is, or an earlier replay."""
+    try:
+        with path.open(encoding="utf-8") as file:
+            return MARK in file.read(HEAD)
+    except FileNotFoundError:
+        return True
+    except (OSError, ValueError):
+        return False

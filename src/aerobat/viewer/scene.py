@@ -1,0 +1,251 @@
+"""Scenes: what there is to see of a plan or of flights, whichever way it is shown."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from math import ceil
+
+import numpy as np
+from numpy.typing import NDArray
+
+from aerobat.arrays import Array
+from aerobat.errors import SpecError
+from aerobat.evaluation.score import score
+from aerobat.flatness import reference
+from aerobat.planning import PlacedStage, Plan
+from aerobat.problem.gate import Gate
+from aerobat.simulation import Flight
+from aerobat.simulation.outcome import length
+from aerobat.vehicle import Vehicle, as_vehicle
+
+Rows = NDArray[np.intp]
+
+PLAN_RATE = 250.0  # [1/s] rows of a plan that nobody flew
+MAX_ROWS = 4000  # of a flight: 60 s are then shown at 67 rows a second
+MAX_POSES = 36_000  # of all flights together, so that a page of many stays under 2 MB
+MAX_FLIGHTS = 100
+FEW_STAGES = 4  # fewer are joined by ghosts between them,
+GHOSTS = 8  # at equal steps of time
+SAME_PATH = 1e-6  # [m] by which set-points may miss the path that they are of
+
+
+@dataclass(frozen=True, eq=False)
+class Ghost:
+    """The vehicle as it is planned at one instant."""
+
+    name: str  # of the stage, empty where there is none
+    time: float  # [s]
+    position: Array  # [m], (3,)
+    q_world_body: Array  # (4,)
+
+
+@dataclass(frozen=True, eq=False)
+class Track:
+    """One vehicle over time, at the instants of its scene."""
+
+    name: str
+    position: Array  # [m], (T, 3)
+    q_world_body: Array  # (T, 4)
+    thrusts: Array  # [N], (T, n)
+    end: float  # [s] when it ends, before the others do where it diverges
+    failed: bool  # true where something went wrong
+    sentence: str  # how it went
+
+
+@dataclass(frozen=True, eq=False)
+class Curve:
+    """A quantity over time, of each track."""
+
+    name: str
+    unit: str
+    values: Array  # (tracks, T)
+
+
+@dataclass(frozen=True, eq=False)
+class Scene:
+    """What there is to see: a vehicle, gates, the planned path and the tracks of those who flew it."""
+
+    title: str
+    facts: tuple[str, ...]  # a line each
+    is_well: bool  # false where the first fact says that something went wrong
+    vehicle: Vehicle
+    gravity: float  # [m/s²]
+    ground: float | None  # [m]
+    gates: tuple[Gate, ...]
+    stages: tuple[PlacedStage, ...]
+    ghosts: tuple[Ghost, ...]
+    times: Array  # [s], (T,)
+    planned: Array  # [m] the reference path, (T, 3)
+    tracks: tuple[Track, ...]
+    curves: tuple[Curve, ...]
+
+
+def scene_of(shown: Plan | Flight, plan: Plan | None = None, vehicle: Vehicle | str | None = None) -> Scene:
+    """The scene of a plan, of a flight, or of a batch. Raises SpecError where there is nothing to see.
+
+    Args:
+        shown: What is looked at.
+        plan: What was flown, for its gates and stages.
+        vehicle: What flew, or its name; by default the plan's, or the preset of the flight's name.
+    """
+    if isinstance(shown, Plan):
+        own = shown.vehicle if vehicle is None else as_vehicle(vehicle)
+        if own is None:
+            raise SpecError("vehicle is missing: a plan without one says not what to show; give vehicle=...")
+        return _plan_scene(shown, own)
+    if not shown.vehicles:
+        raise SpecError(
+            "the batch holds no flights, so that there is nothing to show; fly one vehicle or more"
+        )
+    if len(shown.times) < 2:
+        raise SpecError("the flight has one row, so that nothing moves; show one of two rows or more")
+    if vehicle is None and plan is not None:
+        vehicle = plan.vehicle
+    own = as_vehicle(shown.vehicles[0] if vehicle is None else vehicle)
+    if shown.thrusts.shape[-1] != len(own.rotors):
+        rotors = f"{shown.thrusts.shape[-1]} rotors, {own.name} has {len(own.rotors)}"
+        raise SpecError(f"vehicle: the flight is one of {rotors}; name the vehicle that flew")
+    return _flight_scene(shown, plan, own)
+
+
+def plan_fits(plan: Plan, flight: Flight) -> bool:
+    """True if a flight is one along a plan's path."""
+    times = flight.times
+    if times[-1] > plan.duration + SAME_PATH:
+        return False
+    off = plan.trajectory.evaluate(times) - flight.setpoint.flat.position
+    return bool(np.abs(off).max() <= SAME_PATH)
+
+
+def _plan_scene(plan: Plan, vehicle: Vehicle) -> Scene:
+    rate = min(PLAN_RATE, MAX_ROWS / plan.duration)
+    asked = reference(plan.trajectory, vehicle, rate=rate, environment=plan.problem.environment)
+    setpoint = asked.setpoint
+    track = Track(
+        name=vehicle.name,
+        position=setpoint.flat.position,
+        q_world_body=setpoint.q_world_body,
+        thrusts=asked.rotor_thrusts,
+        end=plan.duration,
+        failed=not plan.certified,
+        sentence="as planned",
+    )
+    speed = np.linalg.norm(setpoint.flat.velocity, axis=-1)
+    rates = np.rad2deg(np.linalg.norm(setpoint.omega_body, axis=-1))
+    proof = "not certified" if plan.certificate is None else plan.certificate.why
+    return Scene(
+        title=f"{plan.problem.name} · {vehicle.name}",
+        facts=(f"planned by {plan.planner}: {plan.duration:.3f} s", proof),
+        is_well=plan.certified,
+        vehicle=vehicle,
+        gravity=plan.problem.environment.gravity,
+        ground=plan.problem.environment.ground,
+        gates=plan.problem.gates,
+        stages=plan.stages,
+        ghosts=_ghosts(plan.stages, asked.times, track.position, track.q_world_body),
+        times=asked.times,
+        planned=track.position,
+        tracks=(track,),
+        curves=(Curve("speed", "m/s", speed[None]), Curve("body rate", "°/s", rates[None])),
+    )
+
+
+def _flight_scene(flight: Flight, plan: Plan | None, vehicle: Vehicle) -> Scene:
+    flights = (
+        [flight[k] for k in range(min(len(flight.vehicles), MAX_FLIGHTS))] if flight.is_batch else [flight]
+    )
+    rows = shown_rows(len(flight.times), len(flights))
+    tracks = tuple(
+        _track(each, plan, vehicle, rows, k if flight.is_batch else None) for k, each in enumerate(flights)
+    )
+    setpoint = flight.setpoint
+    stages = () if plan is None else plan.stages
+    name = "flight" if plan is None else plan.problem.name
+    batch = f"{len(flights)} flights of " if flight.is_batch else ""
+    return Scene(
+        title=f"{name} · {batch}{vehicle.name}",
+        facts=(*_facts(tracks, flight, plan), *_left_out(flight, rows, len(flights))),
+        is_well=not any(track.failed for track in tracks),
+        vehicle=vehicle,
+        gravity=flight.environment.gravity,
+        ground=flight.environment.ground,
+        gates=() if plan is None else plan.problem.gates,
+        stages=stages,
+        ghosts=_ghosts(stages, flight.times, setpoint.flat.position, setpoint.q_world_body),
+        times=flight.times[rows],
+        planned=setpoint.flat.position[rows],
+        tracks=tracks,
+        curves=_errors(flight, len(flights), rows),
+    )
+
+
+def shown_rows(rows: int, flights: int) -> Rows:
+    """Which of so many rows of each flight are shown: every k-th and the last."""
+    stride = ceil(rows / min(MAX_ROWS, MAX_POSES // flights))
+    return np.unique(np.append(np.arange(0, rows, stride), rows - 1))
+
+
+def _track(flight: Flight, plan: Plan | None, vehicle: Vehicle, rows: Rows, number: int | None) -> Track:
+    """A flight as it was judged; of a batch, by its number."""
+    outcome, sentence = flight.outcome, flight.sentences[0]
+    if plan is not None:
+        judged = score(flight, plan, vehicle)
+        outcome, sentence = judged.outcome, judged.sentence
+    kept = np.minimum(rows, len(flight.times) - 1)  # one that diverged stays where it ended
+    return Track(
+        name=flight.vehicles[0] if number is None else f"{number} · {flight.vehicles[0]}",
+        position=flight.position[kept],
+        q_world_body=flight.q_world_body[kept],
+        thrusts=flight.thrusts[kept],
+        end=float(flight.ends),
+        failed=not outcome.is_success,
+        sentence=sentence,
+    )
+
+
+def _facts(tracks: Sequence[Track], flight: Flight, plan: Plan | None) -> tuple[str, ...]:
+    planned = [] if plan is None else [f"planned by {plan.planner}: {plan.duration:.3f} s"]
+    if plan is not None and plan.certificate is not None:
+        planned.append("certified" if plan.certified else plan.certificate.why)
+    failed = [track for track in tracks if track.failed]
+    if len(tracks) > 1:
+        went = f"{len(tracks) - len(failed)} of {len(tracks)} flights went well"
+        worst = f"position error at most {length(float(flight.position_error[: len(tracks)].max()))}"
+        return (f"{went}, {worst}", ", ".join(planned)) if planned else (f"{went}, {worst}",)
+    return (tracks[0].sentence, ", ".join(planned)) if planned else (tracks[0].sentence,)
+
+
+def _left_out(flight: Flight, rows: Rows, flights: int) -> Iterator[str]:
+    """What a scene does not show of its flights, a line each."""
+    stride = int(rows[1] - rows[0])
+    rate = 1.0 / float(np.median(np.diff(flight.times)))
+    if stride > 1:
+        yield f"shown at {rate / stride:.4g} rows a second of {rate:.4g}, errors the largest between them"
+    if flights < len(flight.vehicles):
+        yield f"the first {flights} of {len(flight.vehicles)} flights"
+
+
+def _errors(flight: Flight, flights: int, rows: Rows) -> tuple[Curve, ...]:
+    """Tracking errors; where rows are left out, the largest until the next that is shown."""
+    position, attitude = (
+        np.maximum.reduceat(np.atleast_2d(error)[:flights], rows, axis=-1)
+        for error in (flight.position_error, flight.attitude_error)
+    )
+    return (Curve("position error", "m", position), Curve("attitude error", "°", np.rad2deg(attitude)))
+
+
+def _ghosts(
+    stages: Sequence[PlacedStage], times: Array, position: Array, q_world_body: Array
+) -> tuple[Ghost, ...]:
+    """The planned vehicle at its stages, and where those are few, at equal steps of time."""
+    instants = [(stage.name, stage.time) for stage in stages if stage.time <= times[-1]]
+    if len(instants) < FEW_STAGES:
+        steps = np.linspace(times[0], times[-1], GHOSTS + 1).tolist()[1:-1]
+        apart = 0.5 * (steps[1] - steps[0])
+        instants += [("", t) for t in steps if all(abs(t - known) > apart for _, known in instants)]
+    rows = np.searchsorted(times, [time - 1e-9 for _, time in instants]).clip(0, len(times) - 1)
+    return tuple(
+        Ghost(name, time, position[k], q_world_body[k])
+        for (name, time), k in zip(instants, rows.tolist(), strict=True)
+    )
