@@ -70,6 +70,7 @@ RESULTS = (
     "Scores",
     "Sensitivity",
     "Reference",
+    "Replay",
 )  # made by no user
 NOT_CALLED = ("AerobatError", "BackendMissing", "Infeasible", "SpecError", "Maneuver", "Planner")
 ENUMS = ("ContinuityRule", "Outcome", "Quantity", "TimeScaling")
@@ -180,6 +181,7 @@ def _arguments(name: str, folder: Path) -> dict[str, Any]:
         "smallest_opening": _wide_enough(),
         "to_dataframe": {"table": plan()},
         "tracking_figure": {"plan": plan(), "vehicle": agile, "flight": flight()},
+        "view": {"shown": flight(), "plan": plan(), "vehicle": agile},
         "with_second_opinion": {"plan": plan(), "progress": None},
         "vehicle_names": {},
         "write_columns": {
@@ -190,6 +192,12 @@ def _arguments(name: str, folder: Path) -> dict[str, Any]:
         },
         "write_csv": {"trajectory": plan().trajectory, "path": folder / "saved.csv", "rate": 100.0},
         "write_dispersion": {"dispersion": ab.load_dispersion("lab"), "path": folder / "saved.toml"},
+        "write_replay": {
+            "shown": flight(),
+            "path": folder / "saved.html",
+            "plan": plan(),
+            "vehicle": agile,
+        },
         "write_problem": {"problem": plan().problem, "path": folder / "saved.toml"},
         "write_vehicle": {"vehicle": agile, "path": folder / "saved.toml"},
     }

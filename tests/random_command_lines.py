@@ -60,6 +60,7 @@ VALUES: dict[str, tuple[str, ...]] = {
         "x" * 300,
         "/proc/x",
     ),
+    "--html": ("page.html", "kept/replay.html", "kept/plan.csv", "folder", "", "/dev/null/x", "x" * 300),
     "--planner": ("miqp", "min-snap", "free-knot", "", "None"),
     "--order": ("3", "4", "5", *NUMBERS),
     "--intervals": ("10", "20", "30", "1001", *(n for n in NUMBERS if n != "1e308")),
@@ -96,6 +97,7 @@ OWN = {
         name for name in VALUES if name.startswith(("--max", "--veh", "--rate", "--head", "--json", "--imp"))
     ],
     "repeat": ["--out", "--json", "--import"],
+    "view": ["--html", "--json", "--import", "--vehicle"],
     "vehicles": ["--help"],
     "problems": ["--help"],
     "compare": ["--out", "--angle", "--json", "--vehicle"],
@@ -131,12 +133,17 @@ def command_lines(count: int, seed: int) -> Iterator[list[str]]:
 
 def _command_line(rng: random.Random) -> list[str]:
     command = rng.choice(
-        [*["fly", "plan", "check", "repeat"] * 4, "compare", "vehicles", "problems", "flyy", ""]
+        [*["fly", "plan", "check", "repeat", "view"] * 4, "compare", "vehicles", "problems", "flyy", ""]
     )
     line = [command] if command else []
     names = OWN.get(command, list(VALUES))
     if command not in ("vehicles", "problems") and rng.random() < 0.95:
-        right = {"check": ("kept", "path.csv", "kept/line.plan"), "repeat": ("kept",), "compare": ("lien",)}
+        right = {
+            "check": ("kept", "path.csv", "kept/line.plan"),
+            "repeat": ("kept",),
+            "view": ("kept", "kept/line.plan", "kept/flight.npz"),
+            "compare": ("lien",),
+        }
         line.append(rng.choice(right.get(command, CHEAP) if rng.random() < 0.6 else BROKEN))
     if command == "compare" and line[-1] in CHEAP:  # all planners take long
         line[-1] = "lien"

@@ -65,6 +65,7 @@ def whole_folder(path: str | os.PathLike[str], is_ours: Callable[[str], bool]) -
     """
     target = Path(os.path.abspath(path))
     try:
+        _remove_abandoned(target)  # of files that were being written into it
         foreign = sorted(name for name in _entries(target) if not is_ours(name))
         if foreign:
             raise SpecError(f"{path}/ holds {foreign[0]}, which no run wrote; give a folder of its own")

@@ -19,6 +19,7 @@ COMMANDS = {
     "plan": "Plan a maneuver and stop there.",
     "check": "Prove that a vehicle can fly a trajectory, or say when and why it cannot.",
     "compare": "Plan a maneuver with every planner and put the plans side by side.",
+    "view": "Write a page that replays a run, a plan or a flight in a browser.",
     "repeat": "Do a run again from its folder, and say if it came to the same.",
     "vehicles": "List the built-in vehicles, or print one as a file to begin one's own with.",
     "problems": "List the built-in problems.",

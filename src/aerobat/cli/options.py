@@ -182,3 +182,24 @@ class CheckOptions:
 
     json: Annotated[bool, Parameter(group=output, negative="", show_default=False)] = False
     """Print the certificate as JSON on standard output, and nothing else."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class ViewOptions:
+    """What a replay shows, and where it goes."""
+
+    html: Annotated[Path | None, Parameter(group=output)] = None
+    """The file to write; an earlier replay is replaced. Default: replay.html in the folder of a run, or
+    beside another file, named after it."""
+
+    vehicle: Annotated[str | None, Parameter(group=output)] = None
+    """The vehicle: a name that `aerobat vehicles` lists, or a TOML file. Default: the plan's, else the preset
+    of the flight's name."""
+
+    plugins: Annotated[tuple[Path, ...], Plugins(group=output)] = ()
+
+    open: Annotated[bool, Parameter(group=output, negative="", show_default=False)] = False
+    """Open the page in the browser."""
+
+    json: Annotated[bool, Parameter(group=output, negative="", show_default=False)] = False
+    """Print what was written as JSON on standard output, and nothing else."""

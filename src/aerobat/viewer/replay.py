@@ -82,11 +82,11 @@ def save_replay(replay: Replay, path: PathName) -> None:
 
 
 def is_replaceable(path: Path) -> bool:
-    """True where nothing is, or an earlier replay."""
+    """True where nothing can be read, or an earlier replay."""
     try:
         with path.open(encoding="utf-8") as file:
             return MARK in file.read(HEAD)
-    except FileNotFoundError:
-        return True
-    except (OSError, ValueError):
+    except (IsADirectoryError, ValueError):  # a folder, bytes that are no text
         return False
+    except OSError:
+        return True

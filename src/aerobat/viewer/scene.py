@@ -210,7 +210,11 @@ def _facts(tracks: Sequence[Track], flight: Flight, plan: Plan | None) -> tuple[
         planned.append("certified" if plan.certified else plan.certificate.why)
     failed = [track for track in tracks if track.failed]
     if len(tracks) > 1:
-        went = f"{len(tracks) - len(failed)} of {len(tracks)} flights went well"
+        went = (
+            f"{len(failed)} of {len(tracks)} flights failed"
+            if failed
+            else f"all {len(tracks)} flights went well"
+        )
         worst = f"position error at most {length(float(flight.position_error[: len(tracks)].max()))}"
         return (f"{went}, {worst}", ", ".join(planned)) if planned else (f"{went}, {worst}",)
     return (tracks[0].sentence, ", ".join(planned)) if planned else (tracks[0].sentence,)

@@ -23,9 +23,11 @@ from aerobat.simulation import Flight
 from aerobat.storage import whole_folder
 
 FLIGHT = "flight.npz"
+REPLAY = "replay.html"  # joins the run later, by `aerobat view`
 FILES = (
     RECORD,
     FLIGHT,
+    REPLAY,
     "plan.npz",
     "plan.csv",
     "report.json",

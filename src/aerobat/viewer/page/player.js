@@ -1,6 +1,7 @@
 // The page: its controls, its clock, and what is drawn when.
 
 const SPEEDS = [0.05, 0.1, 0.25, 0.5, 1, 2, 4];
+const LONGEST = 0.25; // [s] that a frame counts for: whoever looks elsewhere meanwhile misses nothing
 const STEPS = 100; // presses of an arrow key from start to end
 const ICONS = { play: "M5 2l14 9-14 9z", pause: "M4 2h5v18H4zM13 2h5v18h-5z", again: "M11 3a8 8 0 1 0 8 8h-3a5 5 0 1 1-5-5v4l7-5.500-7-5.500z" };
 const element = (id) => document.getElementById(id);
@@ -10,6 +11,7 @@ class Player {
     this.time = 0;
     this.playing = false;
     this.frames = 0;
+    this.trueSize = TRACKS.length > 1; // of many, how far they spread is the point
     this.stale = true;
     this.fill();
     this.plots = new Plots((time) => this.seek(time));
@@ -208,7 +210,7 @@ class Player {
   tick(now) {
     requestAnimationFrame(this.tick);
     if (this.playing) {
-      this.time += this.last === null ? 0 : (this.speed * (now - this.last)) / 1000;
+      this.time += this.last === null ? 0 : this.speed * Math.min((now - this.last) / 1000, LONGEST);
       this.last = now;
       this.stale = true;
       if (this.time >= DURATION) [this.time, this.playing] = [DURATION, false];

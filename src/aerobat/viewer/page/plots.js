@@ -92,10 +92,10 @@ class Plot {
       dot.setAttribute("cx", this.x(Math.min(time, lines[k].end)));
       dot.setAttribute("cy", this.y(now[k]));
     });
-    const digits = this.high >= 100 ? 0 : this.high >= 10 ? 1 : this.high >= 1 ? 2 : 4;
+    const digits = this.high >= 100 ? 0 : this.high >= 10 || (this.legend && this.high > 1) ? 1 : this.high >= 1 ? 2 : this.legend ? 3 : 4;
     if (!this.legend) this.readout.textContent = `${now[0].toFixed(digits)} ${this.unit}`;
-    else if (lines.length > 4) this.readout.textContent = `${Math.min(...now).toFixed(1)} to ${Math.max(...now).toFixed(1)} N`;
-    else this.readout.innerHTML = lines.map((line, k) => `<i style="background:${line.colour}"></i>${now[k].toFixed(1)}`).join("");
+    else if (lines.length > 4) this.readout.textContent = `${Math.min(...now).toFixed(digits)} to ${Math.max(...now).toFixed(digits)} N`;
+    else this.readout.innerHTML = lines.map((line, k) => `<i style="background:${line.colour}"></i>${now[k].toFixed(digits)}`).join("");
   }
 }
 
@@ -182,7 +182,8 @@ function greatest(series) {
 
 // Round numbers in a range, about so many.
 function ticks(low, high, count) {
-  const step = roundStep(((high - low) / count) * 1.5);
+  const least = (high - low) / count;
+  const step = [1, 2, 2.5, 5].map((m) => m * roundStep(least)).find((length) => length >= least);
   const found = [];
   for (let k = Math.ceil(low / step - 1e-9); k * step <= high + 1e-9 * step; k++) found.push(k * step);
   return found;

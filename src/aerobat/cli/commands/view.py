@@ -1,0 +1,108 @@
+"""`aerobat view`: a page that replays what lies in a folder or a file."""
+
+from __future__ import annotations
+
+import os
+import webbrowser
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated
+
+from cyclopts import Parameter
+
+from aerobat.cli.options import ViewOptions
+from aerobat.cli.runs.folder import FLIGHT, REPLAY
+from aerobat.cli.runs.record import RECORD
+from aerobat.cli.runs.saved_plans import named_vehicle
+from aerobat.cli.terminal import print_json, say
+from aerobat.errors import SpecError
+from aerobat.interchange import read_plan
+from aerobat.planning import Plan
+from aerobat.reporting.report_json import to_json
+from aerobat.simulation import Flight, load_flight
+from aerobat.storage import format_of, read_arrays
+from aerobat.viewer.replay import Replay, save_replay
+from aerobat.viewer.replay import view as replay_of
+from aerobat.viewer.scene import plan_fits
+
+
+def view(source: Path, options: Annotated[ViewOptions, Parameter(name="*")] = ViewOptions()) -> None:
+    """Write a page that replays a run, a plan or a flight: one HTML file that a browser opens from the disk.
+
+    It shows the vehicle on its path, gates, stages and thrusts, and beside them errors and rotor thrusts.
+    Space plays, the arrow keys step, 1, 2 and 3 are its cameras. Of a batch all flights are shown, and which
+    of them failed. It is written to replay.html in a run's folder, which the next run there replaces with all
+    else, or beside another file, unless --html says otherwise.
+
+    Parameters
+    ----------
+    source
+        A folder that `aerobat plan` or `aerobat fly` wrote, a .plan file, or a flight's .npz file.
+    """
+    run = _read(source)
+    vehicle = None if options.vehicle is None else named_vehicle(options.vehicle)
+    replay = replay_of(run.shown, run.plan, vehicle)
+    page = options.html or _default_page(source)
+    save_replay(replay, page)
+    if options.json:
+        print_json(to_json(_facts(replay, page)))
+    else:
+        print(f"{replay.scene.title}: {'; '.join(replay.scene.facts)}\nwritten to {page}")
+    if options.open and not webbrowser.open(page.resolve().as_uri()):
+        say(f"no browser could be started; open {page} in one")
+
+
+@dataclass(frozen=True)
+class _Source:
+    """What is looked at, and the plan of a flight."""
+
+    shown: Plan | Flight
+    plan: Plan | None = None
+
+
+def _read(source: Path) -> _Source:
+    """The flight of a folder with its plan, the plan where there is no flight, or what one file holds."""
+    if source.suffix == ".npz" and _holds_flight(source):
+        flight = load_flight(source)
+        return _Source(flight, _plan_beside(source, flight))
+    if not os.path.exists(source):  # of a name that is too long, Path raises
+        raise SpecError(f"{source}: there is no such file or folder; `aerobat fly PROBLEM` writes one")
+    found = read_plan(source)
+    if not isinstance(found, Plan):
+        raise SpecError(f"{source} holds a path alone; give it to `aerobat fly`, and view what that writes")
+    if os.path.isdir(source) and (source / FLIGHT).exists():
+        return _Source(load_flight(source / FLIGHT), found)
+    return _Source(found)
+
+
+def _holds_flight(file: Path) -> bool:
+    return format_of(read_arrays(file, "flight")).startswith("aerobat-flight")
+
+
+def _plan_beside(file: Path, flight: Flight) -> Plan | None:
+    """The one plan in a flight's folder, if it is what was flown."""
+    plans = list(file.parent.glob("*.plan"))
+    if len(plans) != 1:
+        return None
+    plan = read_plan(plans[0])
+    return plan if isinstance(plan, Plan) and plan_fits(plan, flight) else None
+
+
+def _default_page(source: Path) -> Path:
+    """In a run's folder, its replay; of another file, a page beside it."""
+    if os.path.isdir(source):
+        return source / REPLAY
+    return source.parent / REPLAY if (source.parent / RECORD).exists() else source.with_suffix(".html")
+
+
+def _facts(replay: Replay, page: Path) -> dict[str, object]:
+    scene = replay.scene
+    return {
+        "page": str(page),
+        "bytes": len(replay.html.encode()),
+        "title": scene.title,
+        "facts": list(scene.facts),
+        "flights": [{"sentence": track.sentence, "failed": track.failed} for track in scene.tracks],
+        "duration_s": float(scene.times[-1]),
+        "rows": len(scene.times),
+    }
