@@ -173,7 +173,7 @@ def test_the_time_bar_seeks_and_cursors_of_all_plots_follow(laptop: Seen) -> Non
         laptop.until("!replay.stale")
         assert laptop.time == pytest.approx(part * duration, rel=1e-3)
         places = laptop.page.evaluate(
-            "[...document.querySelectorAll('.cursor')].map((line) => +/M([^ ]*)/.exec(line.getAttribute('d'))[1])"
+            "[...document.querySelectorAll('.cursor')].map((c) => +/M([^ ]*)/.exec(c.getAttribute('d'))[1])"
         )
         left, right = laptop.page.evaluate("[0, DURATION].map((t) => replay.plots.plots[0].x(t))")
         np.testing.assert_allclose(places, left + part * (right - left), atol=0.5)

@@ -1,8 +1,8 @@
 // Three cameras: around the whole scene, with the vehicle, and through a gate. Each can be turned and zoomed.
 
 const FIELD = 38; // [deg] of view, up and down
-const FILLED = [0.84, 0.76]; // of the picture across and up, by the whole scene
-const RAISED = 0.05; // of half the picture, to have the buttons below it
+const WIDTH_FILLED = 0.84; // of the picture by the whole scene
+const EDGES = [0.09, 0.13]; // of its height that stay free above and below it, where there are no buttons
 
 class Cameras {
   constructor(world, canvas) {
@@ -53,7 +53,7 @@ class Cameras {
 
   whole() {
     const direction = bestDirection(this.world.bounds, this.camera.aspect);
-    return fitted(this.world.bounds.points, direction, this.camera.aspect);
+    return fitted(this.world.bounds.points, direction, this.camera.aspect, edges(this.camera.aspect));
   }
 
   chase() {
@@ -96,8 +96,16 @@ function bestDirection({ lower, upper }, aspect) {
   return found.setZ(aspect < 1 ? 0.25 : 0.3).normalize();
 }
 
+// Parts of the picture's height that buttons take above and below, where they take its whole width.
+function edges(aspect) {
+  if (aspect > 1.2) return EDGES;
+  const [stage, views, choice, corner] = ["stage", "views", "choice", "corner"].map((id) => document.getElementById(id).getBoundingClientRect());
+  const top = Math.max(views.bottom, choice.bottom) - stage.top;
+  return [(top + 8) / stage.height, (stage.bottom - corner.top + 8) / stage.height];
+}
+
 // Where to look, and from how far in a direction, to have all points in the picture and its middle.
-function fitted(points, direction, aspect) {
+function fitted(points, direction, aspect, [above, below]) {
   const probe = new THREE.PerspectiveCamera(FIELD, aspect, 1e-3, 1e6);
   probe.up.set(0, 0, 1);
   const target = points.reduce((sum, point) => sum.add(point), new THREE.Vector3()).divideScalar(points.length);
@@ -113,9 +121,8 @@ function fitted(points, direction, aspect) {
     ];
     const half = distance * Math.tan((FIELD * Math.PI) / 360); // [m] half the picture's height at the target
     const [across, up] = [0, 1].map((k) => new THREE.Vector3().setFromMatrixColumn(probe.matrixWorld, k));
-    target.addScaledVector(across, (half * aspect * (left + right)) / 2).addScaledVector(up, (half * (low + high)) / 2);
-    distance *= Math.max((right - left) / 2 / FILLED[0], (high - low) / 2 / FILLED[1]);
+    target.addScaledVector(across, (half * aspect * (left + right)) / 2).addScaledVector(up, half * ((low + high) / 2 - (below - above)));
+    distance *= Math.max((right - left) / 2 / WIDTH_FILLED, (high - low) / 2 / (1 - above - below));
   }
-  target.addScaledVector(probe.up, -RAISED * distance * Math.tan((FIELD * Math.PI) / 360));
   return [target, direction.clone().multiplyScalar(distance)];
 }

@@ -44,7 +44,7 @@ class Plot {
       parts.push(`<path d="M${left} ${y}H${right}" stroke="#e6ecf1"/>`);
       parts.push(`<text x="${left - 6}" y="${y + 4}" text-anchor="end">${label(value)}</text>`);
     }
-    for (const time of ticks(0, DURATION, Math.max(3, Math.round(this.width / 90))))
+    for (const time of ticks(0, DURATION, Math.max(3, Math.round(this.width / 60))))
       parts.push(`<text x="${this.x(time)}" y="${this.height - 4}" text-anchor="middle">${label(time)}${time ? "" : " s"}</text>`);
     for (const stage of HEADER.stages) {
       const [colour, width] = stage.gate === null ? [COLOUR.faint, 0.8] : [COLOUR.yellow, 2];
