@@ -199,6 +199,14 @@ def _arguments(name: str, folder: Path) -> dict[str, Any]:
             "vehicle": agile,
         },
         "write_problem": {"problem": plan().problem, "path": folder / "saved.toml"},
+        "write_video": {
+            "shown": flight(),
+            "path": folder / "saved.gif",
+            "plan": plan(),
+            "vehicle": agile,
+            "speed": 5.0,
+            "progress": None,
+        },
         "write_vehicle": {"vehicle": agile, "path": folder / "saved.toml"},
     }
     return calls[name]

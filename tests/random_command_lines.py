@@ -61,6 +61,8 @@ VALUES: dict[str, tuple[str, ...]] = {
         "/proc/x",
     ),
     "--html": ("page.html", "kept/replay.html", "kept/plan.csv", "folder", "", "/dev/null/x", "x" * 300),
+    "--video": ("video.gif", "video.avi", "folder", "", "/dev/null/x.gif", "x" * 300 + ".mp4"),
+    "--speed": ("5", *(n for n in NUMBERS if n not in ("1", "0.5"))),
     "--planner": ("miqp", "min-snap", "free-knot", "", "None"),
     "--order": ("3", "4", "5", *NUMBERS),
     "--intervals": ("10", "20", "30", "1001", *(n for n in NUMBERS if n != "1e308")),
@@ -97,7 +99,7 @@ OWN = {
         name for name in VALUES if name.startswith(("--max", "--veh", "--rate", "--head", "--json", "--imp"))
     ],
     "repeat": ["--out", "--json", "--import"],
-    "view": ["--html", "--json", "--import", "--vehicle"],
+    "view": ["--html", "--video", "--speed", "--json", "--import", "--vehicle"],
     "vehicles": ["--help"],
     "problems": ["--help"],
     "compare": ["--out", "--angle", "--json", "--vehicle"],

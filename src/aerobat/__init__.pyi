@@ -80,6 +80,7 @@ from .problem import (
 from .reporting.comparison import comparison_figure
 from .reporting.data_frames import to_dataframe
 from .reporting.figures import draw
+from .reporting.motion.video import write_video
 from .reporting.tracking import tracking_figure
 from .simulation import Flight, FlightConfig, Outcome, fly, load_flight, prepare
 from .states import BodyState, FlatState, Setpoint, Wrench
@@ -203,4 +204,5 @@ __all__ = [
     "write_problem",
     "write_replay",
     "write_vehicle",
+    "write_video",
 ]

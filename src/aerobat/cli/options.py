@@ -192,6 +192,13 @@ class ViewOptions:
     """The file to write; an earlier replay is replaced. Default: replay.html in the folder of a run, or
     beside another file, named after it."""
 
+    video: Annotated[Path | None, Parameter(group=output)] = None
+    """A video instead, to FILE.mp4 or FILE.gif, 30 frames a second; beside the page if --html is given too.
+    Needs aerobat[viewer]."""
+
+    speed: Annotated[float, Parameter(group=output, validator=POSITIVE)] = 0.5
+    """How fast time goes in the video, 1 as it was flown."""
+
     vehicle: Annotated[str | None, Parameter(group=output)] = None
     """The vehicle: a name that `aerobat vehicles` lists, or a TOML file. Default: the plan's, else the preset
     of the flight's name."""

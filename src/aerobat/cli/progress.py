@@ -6,9 +6,10 @@ import os
 import sys
 import threading
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from math import inf, isfinite
 from time import perf_counter
+from typing import TypeVar
 
 from aerobat.cli.terminal import say
 from aerobat.errors import SpecError
@@ -18,7 +19,20 @@ PERIOD = 5.0  # [s] between lines in a pipe, unless the environment says otherwi
 VARIABLE = "AEROBAT_PROGRESS"
 
 
-class PlanningProgress:
+class Progress:
+    """What long work has come to by now, as a line."""
+
+    def __rich__(self) -> str:
+        """The line, drawn anew whenever a terminal shows it, and none of its brackets taken for markup."""
+        from rich.markup import escape
+
+        return escape(str(self))
+
+
+P = TypeVar("P", bound=Progress)
+
+
+class PlanningProgress(Progress):
     """What planning has come to by now.
 
     Args:
@@ -51,17 +65,32 @@ class PlanningProgress:
         last = f"; attempt {self._tried}: {self._last}" if self._tried else ""
         return f"planning with {self._planner} for {self._clock() - self._began:.0f} s: {best}{last}"
 
-    def __rich__(self) -> str:
-        """The line, drawn anew whenever a terminal shows it, and none of its brackets taken for markup."""
-        from rich.markup import escape
 
-        return escape(str(self))
+class DrawingProgress(Progress):
+    """How many pictures of a video are drawn by now."""
+
+    def __init__(self) -> None:
+        self._drawn = self._all = 0
+
+    def record(self, drawn: int, all: int) -> None:
+        """Take note of a picture that is drawn."""
+        self._drawn, self._all = drawn, all
+
+    def __str__(self) -> str:
+        """How many, and of how many."""
+        return (
+            f"drawing the video: {self._drawn} of {self._all} pictures" if self._all else "drawing the video"
+        )
+
+
+def planning_progress(planner: str = "") -> AbstractContextManager[PlanningProgress]:
+    """Show what planning is at in the block."""
+    return showing(PlanningProgress(planner))
 
 
 @contextmanager
-def planning_progress(planner: str = "") -> Iterator[PlanningProgress]:
+def showing(progress: P) -> Iterator[P]:
     """Show what is recorded in the block, by whichever way standard error has."""
-    progress = PlanningProgress(planner)
     if sys.stderr.isatty():
         from rich.console import Console
 
@@ -78,12 +107,12 @@ def planning_progress(planner: str = "") -> Iterator[PlanningProgress]:
         teller.join()
 
 
-def tell(progress: PlanningProgress, wait: Callable[[float], bool], seconds: float) -> None:
-    """Say where planning is, again and again.
+def tell(progress: Progress, wait: Callable[[float], bool], seconds: float) -> None:
+    """Say where work is, again and again.
 
     Args:
         progress: Where it is.
-        wait: Waits for so many seconds [s], less where planning ends: then it returns true.
+        wait: Waits for so many seconds [s], less where the work ends: then it returns true.
         seconds: From one line to the next [s].
     """
     while not wait(seconds):

@@ -76,17 +76,18 @@ def write_replay(
 
 def save_replay(replay: Replay, path: PathName) -> None:
     """Write a page as `write_replay` does."""
-    if not is_replaceable(Path(path)):
-        raise SpecError(f"{path} is there already and no replay; name another file")
+    require_replaceable(path)
     write_whole(path, replay.html)
 
 
-def is_replaceable(path: Path) -> bool:
-    """True where nothing can be read, or an earlier replay."""
+def require_replaceable(path: PathName) -> None:
+    """Raise SpecError where something is that is no replay."""
     try:
-        with path.open(encoding="utf-8") as file:
-            return MARK in file.read(HEAD)
+        with Path(path).open(encoding="utf-8") as file:
+            found = MARK in file.read(HEAD)
     except (IsADirectoryError, ValueError):  # a folder, bytes that are no text
-        return False
-    except OSError:
-        return True
+        found = False
+    except OSError:  # nothing is there, or writing says why not
+        return
+    if not found:
+        raise SpecError(f"{path} is there already and no replay; name another file")

@@ -1,4 +1,4 @@
-"""`aerobat view`: a page that replays what lies in a folder or a file."""
+"""`aerobat view`: a page that replays what lies in a folder or a file, or a video of it."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from typing import Annotated
 from cyclopts import Parameter
 
 from aerobat.cli.options import ViewOptions
+from aerobat.cli.progress import DrawingProgress, showing
 from aerobat.cli.runs.folder import FLIGHT, REPLAY
 from aerobat.cli.runs.record import RECORD
 from aerobat.cli.runs.saved_plans import named_vehicle
@@ -18,10 +19,11 @@ from aerobat.cli.terminal import print_json, say
 from aerobat.errors import SpecError
 from aerobat.interchange import read_plan
 from aerobat.planning import Plan
+from aerobat.reporting.motion.video import write_video
 from aerobat.reporting.report_json import to_json
 from aerobat.simulation import Flight, load_flight
 from aerobat.storage import format_of, read_arrays
-from aerobat.viewer.replay import Replay, save_replay
+from aerobat.viewer.replay import Replay, require_replaceable, save_replay
 from aerobat.viewer.replay import view as replay_of
 from aerobat.viewer.scene import plan_fits
 
@@ -32,7 +34,7 @@ def view(source: Path, options: Annotated[ViewOptions, Parameter(name="*")] = Vi
     It shows the vehicle on its path, gates, stages and thrusts, and beside them errors and rotor thrusts.
     Space plays, the arrow keys step, 1, 2 and 3 are its cameras. Of a batch all flights are shown, and which
     of them failed. It is written to replay.html in a run's folder, which the next run there replaces with all
-    else, or beside another file, unless --html says otherwise.
+    else, or beside another file, unless --html says otherwise. --video FILE.mp4 or FILE.gif writes a video.
 
     Parameters
     ----------
@@ -42,14 +44,28 @@ def view(source: Path, options: Annotated[ViewOptions, Parameter(name="*")] = Vi
     run = _read(source)
     vehicle = None if options.vehicle is None else named_vehicle(options.vehicle)
     replay = replay_of(run.shown, run.plan, vehicle)
-    page = options.html or _default_page(source)
-    save_replay(replay, page)
+    page = options.html or (None if options.video else _default_page(source))
+    if page is not None:
+        require_replaceable(page)
+    if options.video is not None:
+        with showing(DrawingProgress()) as progress:
+            write_video(run.shown, options.video, run.plan, vehicle, options.speed, progress.record)
+    if page is not None:
+        save_replay(replay, page)
     if options.json:
-        print_json(to_json(_facts(replay, page)))
+        print_json(to_json(_facts(replay, page, options.video)))
     else:
-        print(f"{replay.scene.title}: {'; '.join(replay.scene.facts)}\nwritten to {page}")
-    if options.open and not webbrowser.open(page.resolve().as_uri()):
-        say(f"no browser could be started; open {page} in one")
+        print(f"{replay.scene.title}: {'; '.join(replay.scene.facts)}")
+        for written in filter(None, (options.video, page)):
+            print(f"written to {written}")
+    if options.open:
+        _open(page or options.video)
+
+
+def _open(file: Path | None) -> None:
+    """Open what was written, or say that nothing does."""
+    if file is not None and not webbrowser.open(file.resolve().as_uri()):
+        say(f"no browser could be started; open {file} in one")
 
 
 @dataclass(frozen=True)
@@ -95,11 +111,12 @@ def _default_page(source: Path) -> Path:
     return source.parent / REPLAY if (source.parent / RECORD).exists() else source.with_suffix(".html")
 
 
-def _facts(replay: Replay, page: Path) -> dict[str, object]:
+def _facts(replay: Replay, page: Path | None, video: Path | None) -> dict[str, object]:
     scene = replay.scene
     return {
-        "page": str(page),
-        "bytes": len(replay.html.encode()),
+        "page": None if page is None else str(page),
+        "video": None if video is None else str(video),
+        "bytes": sum(os.path.getsize(file) for file in (page, video) if file is not None),
         "title": scene.title,
         "facts": list(scene.facts),
         "flights": [{"sentence": track.sentence, "failed": track.failed} for track in scene.tracks],

@@ -1,0 +1,233 @@
+"""A page on a flight at any instant: the vehicle on its path, and timelines with a cursor."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from aerobat.arrays import Array
+from aerobat.errors import SpecError
+from aerobat.planning import PlacedStage, Plan
+from aerobat.problem.gate import Gate
+from aerobat.reporting.page import AXIS, Place, house_style, panel, write
+from aerobat.reporting.panels import timelines
+from aerobat.reporting.panels.poses import PoseHistory, actual_poses, plan_reference, reference_poses
+from aerobat.reporting.scene.axes_box import box_around, draw_axes_box
+from aerobat.reporting.scene.camera import Camera, best_view
+from aerobat.reporting.scene.glyphs import (
+    enlargement,
+    gate_corners,
+    gate_shapes,
+    shadow,
+    side_face,
+    span,
+    thrust_axis_shape,
+    vehicle_shapes,
+)
+from aerobat.reporting.scene.shapes import Shape, draw_depth_sorted, polyline
+from aerobat.reporting.style import BAND, BLUE, FAINT, HAIR, INK, MUTED, NORMAL, TITLE
+from aerobat.simulation import Flight
+from aerobat.vehicle import Vehicle, as_vehicle
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+SIZE = (7.2, 4.8)  # [in] of a picture
+SCENE: Place = (0.0, 0.0, 4.0, 4.5)
+LINES: tuple[Place, ...] = tuple((4.78, AXIS + 1.38 * k, 2.28, 1.0) for k in (2, 1, 0))
+CLOCK = (3.9, SIZE[1] - 0.3)  # [in] where the time stands
+GLYPH = 0.18  # of the vehicle as drawn, relative to the path's extent
+BELOW = 0.06  # by which the reference path is drawn under the actual one, likewise
+PASSED = 0.35  # opacity of the vehicle at stages that are behind it
+NAMED = 6  # stages up to which their names stand above the timelines
+
+
+@dataclass(frozen=True, eq=False)
+class Subject:
+    """What a picture is of: a plan, or a flight or many."""
+
+    title: str
+    vehicle: Vehicle
+    gates: tuple[Gate, ...]
+    stages: tuple[PlacedStage, ...]
+    reference: PoseHistory
+    actual: Sequence[PoseHistory]
+    thrusts: Array  # [N], (..., T, n)
+    flight: Flight | None
+
+    @property
+    def shown(self) -> Sequence[PoseHistory]:
+        """The vehicles that move."""
+        return self.actual or [self.reference]
+
+    @property
+    def duration(self) -> float:
+        """From start to end [s]."""
+        return float(self.reference.times[-1])
+
+
+def subject_of(shown: Flight | Plan, plan: Plan | None, vehicle: Vehicle | str | None) -> Subject:
+    """The subject of a flight with its plan, or of a plan alone.
+
+    Raises SpecError where the vehicle is not known, and where nothing moves.
+    """
+    given = plan if isinstance(shown, Flight) else shown
+    if vehicle is None and given is not None:
+        vehicle = given.vehicle
+    if isinstance(shown, Plan):
+        if vehicle is None:
+            raise SpecError("vehicle is missing: a plan without one says not what to draw; give vehicle=...")
+        own = as_vehicle(vehicle)
+        asked = plan_reference(shown, own)
+        poses, thrusts, actual = reference_poses(asked), asked.rotor_thrusts, []
+    else:
+        if not shown.vehicles or len(shown.times) < 2:
+            raise SpecError(
+                "the flight holds nothing that moves; show one vehicle or more, of two rows or more"
+            )
+        own = as_vehicle(shown.vehicles[0] if vehicle is None else vehicle)
+        poses, thrusts, actual = reference_poses(shown), shown.thrusts, actual_poses(shown)
+    return Subject(
+        title=f"{'flight' if given is None else given.problem.name} · {own.name}",
+        vehicle=own,
+        gates=() if given is None else given.problem.gates,
+        stages=() if given is None else given.stages,
+        reference=poses,
+        actual=actual,
+        thrusts=thrusts,
+        flight=shown if isinstance(shown, Flight) else None,
+    )
+
+
+class MovingPicture:
+    """The picture of a subject; whatever stands still in it is drawn once.
+
+    Args:
+        subject: What it is of.
+        dpi: Pixels to the inch.
+    """
+
+    def __init__(self, subject: Subject, dpi: int) -> None:
+        from matplotlib.backends.backend_agg import FigureCanvasAgg
+        from matplotlib.figure import Figure
+
+        self.subject = subject
+        with house_style():
+            self._figure = Figure(figsize=SIZE, dpi=dpi)
+            self._canvas = cast(Any, FigureCanvasAgg(self._figure))  # parts of it have no types
+            write(self._figure, 0.2, SIZE[1] - 0.3, subject.title, size=TITLE + 2, weight="bold", va="center")
+            self._scene = panel(self._figure, *SCENE)
+            self._camera = self._draw_scene()
+            self._timelines = self._draw_timelines()
+            self._cursors = [axes.axvline(0.0, color=INK, linewidth=1.0) for axes in self._timelines]
+            place: dict[str, Any] = {
+                "x": 3.9 / SIZE[0],
+                "y": 1.0 - 0.3 / SIZE[1],
+                "ha": "right",
+                "va": "center",
+            }
+            self._clock = self._figure.text(s="", size=NORMAL + 1, color=MUTED, **place)
+            for artist in (*self._cursors, self._clock):
+                artist.set_animated(True)
+            self._canvas.draw()
+            self._still = self._canvas.copy_from_bbox(self._figure.bbox)
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """Width and height in pixels."""
+        width, height = self._canvas.get_width_height()
+        return width, height
+
+    def at(self, time: float) -> NDArray[np.uint8]:
+        """The pixels at an instant [s], (height, width, 3)."""
+        with house_style():
+            self._canvas.restore_region(self._still)
+            moving = draw_depth_sorted(self._scene, [*self._standing, *self._moving(time)], self._camera)
+            self._scene.draw_artist(moving)
+            moving.remove()
+            self._clock.set_text(f"{time:.2f} s")
+            self._figure.draw_artist(self._clock)
+            for axes, cursor in zip(self._timelines, self._cursors, strict=True):
+                cursor.set_xdata([time, time])
+                axes.draw_artist(cursor)
+        return np.array(self._canvas.buffer_rgba())[..., :3]
+
+    def _draw_scene(self) -> Camera:
+        """The box around the scene, and from where it is seen."""
+        subject = self.subject
+        points = [poses.path for poses in (subject.reference, *subject.actual)]
+        reach = self._scale * span(subject.vehicle)
+        box = box_around(np.concatenate([*points, gate_corners(subject.gates)]), 0.6 * reach)
+        self._floor = float(box.lower[2])
+        size = np.array(SCENE[2:])
+        camera = best_view(subject.reference.path, subject.gates, box.corners, size)
+        draw_axes_box(self._scene, box, camera)
+        return camera
+
+    def _draw_timelines(self) -> list[Axes]:
+        """Errors and rotor thrusts over time; of a plan its rotor thrusts."""
+        subject = self.subject
+        places = LINES if subject.flight is not None else LINES[-1:]
+        column = [panel(self._figure, *place) for place in places]
+        if subject.flight is not None:
+            timelines.draw_position_error(column[0], subject.flight)
+            timelines.draw_attitude_error(column[1], subject.flight)
+        times = subject.reference.times
+        timelines.draw_rotor_thrusts(column[-1], times, subject.thrusts, subject.vehicle)
+        stages = subject.stages if len(subject.stages) <= NAMED else ()
+        timelines.finish_column(column, "", stages, subject.duration)
+        for axes in column:
+            if (legend := axes.get_legend()) is not None:
+                legend.remove()
+        return column
+
+    @cached_property
+    def _scale(self) -> float:
+        return enlargement(self.subject.vehicle, GLYPH * self.subject.reference.extent)
+
+    @cached_property
+    def _standing(self) -> list[Shape]:
+        """The shapes that stand still: gates, and the path that is to be flown."""
+        path = self.subject.reference.path
+        shapes = [Shape(shadow(path, self._floor), edge=HAIR, width=2.5, depth_bias=-1e3)]
+        shapes += polyline(path, BAND, 3.2, depth_bias=-BELOW * self.subject.reference.extent)
+        return shapes + [shape for gate in self.subject.gates for shape in gate_shapes(gate)]
+
+    def _moving(self, time: float) -> list[Shape]:
+        """Vehicles at an instant, the paths that they have flown by then, and the stages that are behind."""
+        shapes = self._passed(time)
+        many = len(self.subject.shown) > 1
+        line: Any = (BLUE, 0.3) if many else BLUE
+        for poses in self.subject.shown:
+            k = poses.rows([time])[0]
+            position, q = poses.position[k], poses.q_world_body[k]
+            flown = poses.position[: k + 1 : max(1, k // 80)]
+            if len(flown) > 1:
+                shapes += polyline(np.concatenate([flown, position[None]]), line, 1.0 if many else 1.8)
+            shapes.append(thrust_axis_shape(self.subject.vehicle, position, q, self._scale))
+            shapes += self._vehicle(position, q)
+            foot = shadow(position, self._floor)
+            shapes.append(Shape(np.array([position, foot]), edge=FAINT, width=0.6, depth_bias=-1e3))
+        return shapes
+
+    def _passed(self, time: float) -> list[Shape]:
+        """The first vehicle at the stages until an instant, as a breath."""
+        poses = self.subject.shown[0]
+        rows = poses.rows([stage.time for stage in self.subject.stages if stage.time <= time])
+        shapes = [self._vehicle(poses.position[k], poses.q_world_body[k], PASSED) for k in rows]
+        return [shape for shapes_of_one in shapes for shape in shapes_of_one]
+
+    def _vehicle(self, position: Array, q_world_body: Array, opacity: float = 1.0) -> list[Shape]:
+        """The vehicle's glyph."""
+        face = side_face(q_world_body, self._camera)
+        if not isinstance(face, str):
+            face = face[0], opacity * face[1]
+        shapes = vehicle_shapes(self.subject.vehicle, position, q_world_body, self._scale, face)
+        if opacity == 1.0:
+            return shapes
+        return [replace(shape, edge=(INK, opacity), width=0.7 * shape.width) for shape in shapes]
