@@ -25,6 +25,15 @@ FLAGS = (
 )  # fmt: skip
 
 
+def wait(page: Page, condition: str) -> None:
+    """Wait for a condition; a replay's own policy forbids the browser's way of waiting for one."""
+    for _ in range(PATIENCE // STEP):
+        if page.evaluate(condition):
+            return
+        page.wait_for_timeout(STEP)
+    raise AssertionError(f"never {condition}")
+
+
 @dataclass
 class Seen:
     """A page that is open, and what went wrong since it was opened."""
@@ -40,12 +49,8 @@ class Seen:
         return value
 
     def until(self, condition: str) -> None:
-        """Wait for a condition; the page's own policy forbids the browser's way of waiting for one."""
-        for _ in range(PATIENCE // STEP):
-            if self.page.evaluate(condition):
-                return
-            self.page.wait_for_timeout(STEP)
-        raise AssertionError(f"never {condition}")
+        """Wait for a condition."""
+        wait(self.page, condition)
 
     def press(self, *keys: str) -> None:
         """Press keys, and wait until their effect is drawn."""
@@ -240,6 +245,23 @@ def test_of_many_flights_the_failed_ones_are_marked_and_each_can_be_chosen(show)
     seen.press("[")
     assert seen.page.evaluate("replay.plots.focus") == failed.index(True) - 1
     assert "wrong" not in (seen.page.get_attribute("#flight", "class") or "")
+
+
+def test_without_webgl_a_sentence_says_so_and_the_plots_still_show_the_flight(browser: Browser) -> None:
+    page = browser.new_page()
+    faults: list[str] = []
+    page.on("pageerror", lambda error: faults.append(str(error)))
+    page.add_init_script("HTMLCanvasElement.prototype.getContext = () => null")
+    page.goto("about:blank")
+    page.set_content(ab.view(*flip()).html)
+    assert "no WebGL" in page.inner_text("#sorry")
+    page.keyboard.press("End")
+    wait(page, "!replay.stale")
+    flight = flip()[0]
+    last = float(page.locator(".plot h2 b").first.inner_text().removesuffix(" cm"))
+    assert last == pytest.approx(100 * flight.position_error[-1], abs=1e-4)
+    assert not faults
+    page.close()
 
 
 def test_a_notebook_frame_holds_the_page(browser: Browser) -> None:

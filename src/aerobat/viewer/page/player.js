@@ -20,7 +20,9 @@ class Player {
     } catch (error) {
       this.world = null;
       element("sorry").hidden = false;
-      element("sorry").textContent = `This browser draws nothing in space (${error.message}); the plots show the flight.`;
+      element("sorry").textContent = "This browser has no WebGL, so that nothing is drawn in space; the plots show the flight.";
+      for (const id of ["views", "corner"]) element(id).hidden = true;
+      console.warn(error);
     }
     this.speed = DURATION < 1.5 ? 0.25 : DURATION < 5 ? 0.5 : 1; // what is short is shown slowly
     element("speed").value = this.speed;
@@ -189,7 +191,7 @@ class Player {
   }
 
   legend() {
-    if (!this.world) return element("legend").remove();
+    if (!this.world) return;
     const [name, top] = this.world.colourBy === "speed" ? ["speed", `${label(+this.world.top.toPrecision(3))} m/s`] : ["time", `${DURATION.toFixed(2)} s`];
     const ramp = RAMP.map((colour) => `#${colour.getHexString()}`).join(",");
     element("legend").innerHTML = `${name} 0<i style="background:linear-gradient(90deg,${ramp})"></i>${top}`;

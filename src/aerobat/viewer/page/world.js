@@ -105,9 +105,12 @@ class World {
     this.scene.add(...this.others);
   }
 
-  // The round factor by which vehicles are drawn larger than they are, to be seen beside the whole scene.
+  // The round factor by which vehicles are drawn larger than they are, to be seen beside the whole scene; no
+  // larger than the gates, though.
   get enlargement() {
-    return ENLARGEMENTS.find((step) => step * SPAN >= 0.85 * DRAWN * this.bounds.size) ?? ENLARGEMENTS.at(-1);
+    const widest = Math.min(...HEADER.gates.map((gate) => Math.max(gate.width, gate.height)));
+    const fitting = ENLARGEMENTS.filter((step) => step === 1 || step * SPAN <= widest);
+    return fitting.find((step) => step * SPAN >= 0.85 * DRAWN * this.bounds.size) ?? fitting.at(-1);
   }
 
   // Draw all vehicles so many times their size.
