@@ -87,7 +87,6 @@ from .states import BodyState, FlatState, Setpoint, Wrench
 from .studies.compare import Comparison, compare
 from .trajectory import ContinuityRule, Trajectory, load_trajectory, minimum_effort, save_trajectory
 from .vehicle import Ellipsoid, Rotor, Vehicle, implausibilities, load_vehicle, vehicle_names, write_vehicle
-from .vehicle import Rotor, Vehicle, implausibilities, load_vehicle, vehicle_names, write_vehicle
 from .viewer.replay import Replay, view, write_replay
 
 __all__ = [
