@@ -345,21 +345,26 @@ def test_a_relaxation_that_cannot_be_solved_leaves_a_gap_and_no_false_claim(
         assert result.status in ("time_limit", "unknown")
 
 
-@pytest.mark.parametrize("noise", [0.0, 1e-8])
-@pytest.mark.parametrize("seed", range(4))
+@given(st.integers(0, 2**32 - 1), st.floats(-2.0, 4.0), st.floats(-16.0, -8.0))
 def test_equalities_that_follow_from_others_change_nothing_and_contradictions_are_found(
-    seed: int, noise: float
+    seed: int, magnitude: float, rounding: float
 ) -> None:
-    """More equalities than variables: the point of least norm on the independent ones, or none."""
+    """More equalities than variables: the point of least norm on the independent ones, or none.
+
+    By however much rounding has them differ, and in whatever units.
+    """
     rng = np.random.default_rng(seed)
-    own = rng.normal(size=(3, 5))
+    own = np.linalg.qr(rng.normal(size=(5, 3)))[0].T
     rows = np.vstack([own, rng.normal(size=(4, 3)) @ own])
     rows /= np.linalg.norm(rows, axis=1, keepdims=True)
-    target = rows @ rng.normal(size=5) + noise * rng.normal(size=7)
-    found = LeastDistanceQP(rows).solve(target, target)
+    target = rows @ rng.normal(size=5)
+    scale = 10.0**magnitude / np.abs(target).max()
+    noise = 10.0**rounding * rng.uniform(-1.0, 1.0, size=7) * np.abs(target).max()
+    seen = scale * (target + noise)
+    found = LeastDistanceQP(rows).solve(seen, seen)
     assert found is not None
-    np.testing.assert_allclose(found.y, np.linalg.lstsq(rows, target)[0], atol=1e-9 + 50 * noise)
-    off = target + 1e-3 * (np.arange(7) == 6)
+    np.testing.assert_allclose(found.y, np.linalg.lstsq(rows, seen)[0], atol=1e-6 * 10.0**magnitude)
+    off = seen + 1e-4 * 10.0**magnitude * (np.arange(7) == 6)
     assert LeastDistanceQP(rows).solve(off, off) is None
 
 
