@@ -14,6 +14,7 @@ from rich.text import Text
 from aerobat.certification import Certificate, Finding, Side, Verdict
 from aerobat.evaluation.score import Score
 from aerobat.planning import Assessment, Plan
+from aerobat.planning.time_limit import best_by_limit
 from aerobat.problem import Problem
 from aerobat.simulation.outcome import length
 from aerobat.vehicle import Vehicle
@@ -167,7 +168,7 @@ def _assessment_facts(found: Assessment) -> Iterable[Fact]:
 
 def _optimality(plan: Plan) -> str:
     if plan.status == "time_limit" and plan.gap is None:
-        return "the best found by the time limit"
+        return best_by_limit(plan)
     if plan.gap is None or plan.gap < 1e-6:
         return plan.status
     return f"within {100 * plan.gap:.2g} % of the optimum"

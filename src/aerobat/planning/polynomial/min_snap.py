@@ -236,7 +236,7 @@ class _ClosedForm:
         return self._with_drag_of(sequence, np.asarray(own).reshape(stages, 3))
 
     def _with_drag_of(self, sequence: StageSequence, velocities: Array) -> Trajectory:
-        """The closed form through stages, with the drag of some velocities at the stages [m/s], (K - 2, 3)."""
+        """The closed form through stages, with the drag of velocities there [m/s], (K - 2, 3)."""
         planning = self.planning
         durations = planning.scaled(self.duration)
         fixed = planning.fixed(sequence, velocities)
