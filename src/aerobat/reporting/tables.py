@@ -16,7 +16,7 @@ from aerobat.evaluation.score import Score
 from aerobat.planning import Assessment, Plan
 from aerobat.planning.time_limit import best_by_limit
 from aerobat.problem import Problem
-from aerobat.simulation.outcome import length
+from aerobat.simulation.outcome import digits, length
 from aerobat.vehicle import Vehicle
 
 Fact = tuple[str, str | Text]  # a name, and what is to be said
@@ -197,5 +197,4 @@ def flight_facts(score: Score, controller: str | None = None) -> Iterable[Fact]:
 
 
 def _pair(largest: float, rms: float, unit: str) -> str:
-    most, mean = (f"{x:.2f}" if x >= 0.1 else f"{x:.2g}" for x in (largest, rms))
-    return f"{most} {unit} at most, {mean} {unit} RMS"
+    return f"{digits(largest)} {unit} at most, {digits(rms)} {unit} RMS"
