@@ -16,6 +16,7 @@ from aerobat.optimization import AssignmentProgram, AssignmentResult, SlottedSta
 from aerobat.optimization.branch_and_bound import search
 from aerobat.optimization.branch_and_bound import solver as branch_and_bound
 from aerobat.optimization.branch_and_bound.candidates import Candidates
+from aerobat.optimization.branch_and_bound.dual_ascent import DualDirections, dual_ascent
 from aerobat.optimization.branch_and_bound.least_distance import LeastDistanceQP, NotConverged, QPSolution
 from aerobat.optimization.branch_and_bound.lower_bounds import DualBounds
 from aerobat.optimization.branch_and_bound.null_space import NullSpace, split_coupled
@@ -216,6 +217,20 @@ def test_no_completion_costs_less_than_the_lower_bounds_of_its_candidates(seed: 
                 assert both is None or pairs[q, other] <= both.value * (1 + 1e-9)
         assert np.isinf(pairs[~candidates.compatible]).all()
         lower, upper = tightened(lower, upper, candidates.rows[:, p], bounds.lower[:, p], bounds.upper[:, p])
+
+
+@given(st.lists(st.floats(0.1, 10.0), min_size=2, max_size=6), st.floats(0.1, 1e3))
+def test_multipliers_that_vanish_together_end_no_ascent_and_none_changes_its_sign(
+    multipliers: list[float], slope: float
+) -> None:
+    """Orthonormal active rows, and a candidate along whose direction all of them vanish at a step of 1."""
+    equalities = np.zeros(len(multipliers), dtype=bool)
+    for sign in (1.0, -1.0):
+        start = sign * np.array(multipliers)
+        directions = DualDirections(start[:, None], np.array([slope + 1.0]), np.array([1.0]))
+        result, steps, _ = dual_ascent(np.eye(len(start)), start, equalities, directions)
+        assert (sign * result >= 0.0).all()
+        assert steps[0] > 1.0  # beyond the tie
 
 
 def tightened(
