@@ -13,7 +13,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import PlainValidator
 
-from aerobat.declaration import Seed, declared, to_table
+from aerobat.declaration import NonNegative, Seed, declared, to_table
 from aerobat.documents import read_document, write_document
 from aerobat.environment import Dispersion
 from aerobat.errors import SpecError
