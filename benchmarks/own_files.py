@@ -252,7 +252,8 @@ def _stage(pen: Pen, i: int, gates: list[Table]) -> Table:
     )
     if gates and pen.chance(0.5):
         stage["gate"] = gates[0].get("name", "gate")
-        return stage | pen.some({"min_upright_thrust": lambda p: p.number(1.0, 6.0)}, 0.5)
+        keys = {"min_upright_thrust": lambda p: p.number(1.0, 6.0), "min_speed": lambda p: p.number(0.0, 3.0)}
+        return stage | pen.some(keys, 0.5)
     if pen.chance(0.5):
         attitude = {
             "up": [pen.number(-1, 1), pen.number(-1, 1), pen.number(0, 1)],

@@ -157,10 +157,15 @@ def _command_line(rng: random.Random) -> list[str]:
     return line
 
 
-def faults(arguments: list[str]) -> list[str]:
-    """All that is not as it should be about a command line in the working folder."""
+def faults(arguments: list[str], err: io.StringIO | None = None) -> list[str]:
+    """All that is not as it should be about a command line in the working folder.
+
+    Args:
+        arguments: The command line's.
+        err: What stands for standard error.
+    """
     before = _content()
-    out, err = io.StringIO(), io.StringIO()
+    out, err = io.StringIO(), io.StringIO() if err is None else err
     found = []
     code: object = 0
     with warnings.catch_warnings(record=True) as warned, contextlib.redirect_stdout(out):
@@ -177,7 +182,8 @@ def faults(arguments: list[str]) -> list[str]:
     found += [f"warning: {each.message}" for each in warned if issubclass(each.category, RuntimeWarning)]
     lines = err.getvalue().splitlines()
     found += [f"not one of our sentences: {line}" for line in lines if not line.startswith("aerobat: ")]
-    said = [line for line in lines if not line.startswith("aerobat: warning:")]
+    asides = ("aerobat: warning:", "aerobat: planning with")
+    said = [line for line in lines if not line.startswith(asides)]
     if code in (2, 3):
         if len(said) != 1 or out.getvalue():
             found.append(f"{len(said)} sentences, {len(out.getvalue())} characters of output")

@@ -58,6 +58,17 @@ def test_of_equal_greatest_values_the_earliest_is_told(value, count):
 
 
 @settings(max_examples=25)
+@given(seed=seeds, degree=st.integers(3, 24))
+def test_halving_shrinks_all_but_a_parabola_by_eight_however_large_that_is(seed, degree):
+    rng = np.random.default_rng(seed)
+    coefficients = rng.normal(size=degree + 1)
+    coefficients[:3] *= 1e15  # rounding of which would never shrink, and enclosing would not end
+    for _ in range(40):
+        coefficients = rng.choice(chebyshev.basis(degree).halves) @ coefficients
+    assert np.abs(coefficients[3:]).sum() <= degree**7 * 8.0**-40
+
+
+@settings(max_examples=25)
 @given(seed=seeds, degree=st.integers(2, 24))
 def test_halves_and_integrals_are_those_of_the_polynomial(seed, degree):
     basis = chebyshev.basis(degree)

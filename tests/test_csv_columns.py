@@ -148,12 +148,16 @@ def test_the_papers_bare_layout_is_written_on_demand(tmp_path: Path, monkeypatch
         ("line", "--columns", "sped"),
         ("path.csv", "--order", "5"),
         ("path.csv", "--rate", "0"),
+        ("wild.csv",),
         ("nowhere.csv",),
     ],
 )
-def test_options_that_do_not_fit_are_refused(arguments: tuple[str, ...], tmp_path: Path, monkeypatch, capsys):
+def test_options_and_paths_that_do_not_fit_are_refused(
+    arguments: tuple[str, ...], tmp_path: Path, monkeypatch, capsys
+):
     monkeypatch.chdir(tmp_path)
     Path("path.csv").write_text("t,x,y,z\n0,0,0,1\n1,1,0,1\n2,1,0,1\n3,1,0,1\n")
+    Path("wild.csv").write_text("t,x,y,z\n0,0,0,1\n1,1,0,1e30\n2,1,0,1\n3,1,0,1\n4,1,0,1\n")
     assert code("fly", *arguments) == 2
     assert capsys.readouterr().err.count("\n") == 1
     assert not Path("out").exists()

@@ -16,6 +16,7 @@ from aerobat.optimization import AssignmentProgram, AssignmentResult, SlottedSta
 from aerobat.optimization.branch_and_bound import search
 from aerobat.optimization.branch_and_bound import solver as branch_and_bound
 from aerobat.optimization.branch_and_bound.candidates import Candidates
+from aerobat.optimization.branch_and_bound.dual_ascent import DualDirections, dual_ascent
 from aerobat.optimization.branch_and_bound.least_distance import LeastDistanceQP, NotConverged, QPSolution
 from aerobat.optimization.branch_and_bound.lower_bounds import DualBounds
 from aerobat.optimization.branch_and_bound.null_space import NullSpace, split_coupled
@@ -218,6 +219,20 @@ def test_no_completion_costs_less_than_the_lower_bounds_of_its_candidates(seed: 
         lower, upper = tightened(lower, upper, candidates.rows[:, p], bounds.lower[:, p], bounds.upper[:, p])
 
 
+@given(st.lists(st.floats(0.1, 10.0), min_size=2, max_size=6), st.floats(0.1, 1e3))
+def test_multipliers_that_vanish_together_end_no_ascent_and_none_changes_its_sign(
+    multipliers: list[float], slope: float
+) -> None:
+    """Orthonormal active rows, and a candidate along whose direction all of them vanish at a step of 1."""
+    equalities = np.zeros(len(multipliers), dtype=bool)
+    for sign in (1.0, -1.0):
+        start = sign * np.array(multipliers)
+        directions = DualDirections(start[:, None], np.array([slope + 1.0]), np.array([1.0]))
+        result, steps, _ = dual_ascent(np.eye(len(start)), start, equalities, directions)
+        assert (sign * result >= 0.0).all()
+        assert steps[0] > 1.0  # beyond the tie
+
+
 def tightened(
     lower: np.ndarray, upper: np.ndarray, rows: np.ndarray, low: np.ndarray, high: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
@@ -345,21 +360,26 @@ def test_a_relaxation_that_cannot_be_solved_leaves_a_gap_and_no_false_claim(
         assert result.status in ("time_limit", "unknown")
 
 
-@pytest.mark.parametrize("noise", [0.0, 1e-8])
-@pytest.mark.parametrize("seed", range(4))
+@given(st.integers(0, 2**32 - 1), st.floats(-2.0, 4.0), st.floats(-16.0, -8.0))
 def test_equalities_that_follow_from_others_change_nothing_and_contradictions_are_found(
-    seed: int, noise: float
+    seed: int, magnitude: float, rounding: float
 ) -> None:
-    """More equalities than variables: the point of least norm on the independent ones, or none."""
+    """More equalities than variables: the point of least norm on the independent ones, or none.
+
+    By however much rounding has them differ, and in whatever units.
+    """
     rng = np.random.default_rng(seed)
-    own = rng.normal(size=(3, 5))
+    own = np.linalg.qr(rng.normal(size=(5, 3)))[0].T
     rows = np.vstack([own, rng.normal(size=(4, 3)) @ own])
     rows /= np.linalg.norm(rows, axis=1, keepdims=True)
-    target = rows @ rng.normal(size=5) + noise * rng.normal(size=7)
-    found = LeastDistanceQP(rows).solve(target, target)
+    target = rows @ rng.normal(size=5)
+    scale = 10.0**magnitude / np.abs(target).max()
+    noise = 10.0**rounding * rng.uniform(-1.0, 1.0, size=7) * np.abs(target).max()
+    seen = scale * (target + noise)
+    found = LeastDistanceQP(rows).solve(seen, seen)
     assert found is not None
-    np.testing.assert_allclose(found.y, np.linalg.lstsq(rows, target)[0], atol=1e-9 + 50 * noise)
-    off = target + 1e-3 * (np.arange(7) == 6)
+    np.testing.assert_allclose(found.y, np.linalg.lstsq(rows, seen)[0], atol=1e-6 * 10.0**magnitude)
+    off = seen + 1e-4 * 10.0**magnitude * (np.arange(7) == 6)
     assert LeastDistanceQP(rows).solve(off, off) is None
 
 

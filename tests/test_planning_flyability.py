@@ -15,7 +15,7 @@ from aerobat.planning import (
     FLYABLE_ERROR,
     Flyability,
     PlacedStage,
-    flight_error,
+    own_flight,
     with_certificate,
     with_flyability,
 )
@@ -57,7 +57,9 @@ def test_flyability_is_the_score_of_the_plan_s_own_flight(plan: ab.Plan) -> None
     error = ab.score(ab.fly(plan), plan).max_position_error_m
     assert flyability(plan).error == pytest.approx(error, rel=1e-9)
     assert plan.vehicle is not None
-    assert flight_error(plan.trajectory, plan.vehicle, plan.problem.environment) == flyability(plan).error
+    assert (
+        own_flight(plan.trajectory, plan.vehicle, plan.problem, plan.stages).error == flyability(plan).error
+    )
     assert 0.0 < error < FLYABLE_ERROR
     assert plan.flies
 
@@ -159,7 +161,7 @@ def test_the_miqp_passes_faster_through_a_gate_that_its_path_would_turn_back_in(
 def test_a_flight_that_diverges_is_no_small_error() -> None:
     """It is lost, wherever it was last."""
     away = Trajectory([1.0], [[[0.0, 0.0, 0.0], [0.0, 0.0, 0.0], [90.0, 0.0, 0.0]]])
-    assert flight_error(away, QUAD, ab.Environment()) >= 5.0
+    assert own_flight(away, QUAD, ab.load_problem("line"), ()).error >= 5.0
 
 
 def test_flyability_survives_the_plan_s_file(plan: ab.Plan, tmp_path: Path) -> None:

@@ -206,3 +206,19 @@ def test_the_command_lines_options_follow_from_the_fields() -> None:
         "free-knots": ["--segments", "--reserve", "--time-limit"],
         "time-optimal": ["--reserve", "--starts", "--planar", "--time-limit"],
     }
+
+
+@pytest.mark.parametrize("name", PLANNERS)
+def test_a_gate_that_a_stage_names_is_crossed_in_its_direction(name: str) -> None:
+    """Also where the way on leads back, and standing still in it would be shortest."""
+    if name in ("free-knots", "time-optimal"):
+        pytest.importorskip("casadi")
+    gate = ab.tilted_gate((2.0, 0.0, 1.0), name="far")
+    maneuver = ab.CustomManeuver((ab.Stage("turn", gate="far"),))
+    problem = Problem("there and back", at_rest((0, 0, 1)), at_rest((0, 0, 1.5)), maneuver, (gate,))
+    found = plan(problem, PLANNERS[name], QUAD)
+    assert found.certified
+    (stage,) = found.stages
+    assert found.trajectory.evaluate(stage.time, 1) @ gate.normal >= 1.0 - 1e-6
+    if name == "miqp":  # which plans anew where its own flight turns back in the gate
+        assert found.flies

@@ -2,14 +2,28 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import count
 
 import pytest
 
+from aerobat import cli
 from aerobat.errors import Infeasible
 from aerobat.optimization import deadline
-from aerobat.planning import FreeKnots, MinSnap, Miqp, Plan, Planner, TimeOptimal, plan
+from aerobat.planning import (
+    FreeKnots,
+    MinSnap,
+    Miqp,
+    Plan,
+    Planner,
+    TimeOptimal,
+    plan,
+    with_second_opinion,
+)
+from aerobat.planning.recorder import Progress
 from aerobat.problem import load_problem
+from aerobat.reporting.tables import plan_facts
+from aerobat.studies.compare import compare
 from aerobat.vehicle import load_vehicle
 
 SECTION_V, QUAD = load_problem("section-v"), load_vehicle("section-v")
@@ -64,6 +78,50 @@ def test_a_plan_that_a_limit_ended_says_so_and_one_in_time_is_the_same_as_withou
     unlimited, in_time = (plan(SECTION_V, Miqp(time_limit=limit), QUAD) for limit in (None, 1e9))
     assert in_time.status == unlimited.status == "locally optimal"
     assert in_time.trajectory.coefficients.tobytes() == unlimited.trajectory.coefficients.tobytes()
+
+
+def test_time_optimal_without_time_for_a_path_of_its_own_returns_that_which_it_began_from() -> None:
+    pytest.importorskip("casadi")
+    found = planned(TimeOptimal(time_limit=60_000.0))
+    assert found is not None
+    assert found.certified
+    assert (found.planner, found.status) == ("time-optimal", "time_limit")
+    assert found.rescue.endswith("than the path that it began from, miqp's")
+
+
+@pytest.mark.parametrize(("planner", "ticks"), [("miqp", 60), ("min-snap", 12)])
+def test_what_a_limit_left_of_a_comparison_says_how_far_from_the_shortest_possible_it_is(
+    planner: str, ticks: int
+) -> None:
+    (entry,) = compare(SECTION_V, QUAD, [planner], time_limit=1000.0 * ticks).entries
+    found = entry.plan
+    assert found is not None
+    assert found.assessment is not None
+    ratio = found.duration / found.assessment.least_duration
+    told = f"the best found by the time limit, at most {ratio:.2f} times the shortest possible"
+    assert entry.note.startswith(told)
+    assert dict(plan_facts(found))["cost"].endswith(told)
+
+
+def test_what_is_left_of_a_limit_is_all_that_a_second_opinion_has(tmp_path, monkeypatch, capsys) -> None:
+    monkeypatch.chdir(tmp_path)
+    left: list[float | None] = []
+
+    def opinion(plan: Plan, progress: Progress | None = None) -> Plan:
+        left.append(deadline.time_left())
+        return plan
+
+    monkeypatch.setattr("aerobat.cli.tasks.with_second_opinion", opinion)
+    cli.main(["plan", "line", "--planner", "min-snap", "--time-limit", "1e9", "--json"])
+    assert left[0] is not None
+    assert left[0] < 1e9
+    found = plan(load_problem("line"), MinSnap(), "agile-quad")
+    assert found.assessment is not None
+    poor = replace(found, assessment=replace(found.assessment, least_duration=0.1))
+    with deadline.within_time(0.0):
+        told = with_second_opinion(poor).assessment
+    assert told is not None
+    assert told.sentence.endswith("no second opinion: the time was over")
 
 
 def test_an_inner_limit_never_outlasts_an_outer_one() -> None:

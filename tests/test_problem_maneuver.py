@@ -133,6 +133,28 @@ def test_a_spelled_out_maneuver_may_pass_the_problems_gate() -> None:
     assert (course.stages[1].gate, course.stages[1].at) == (gate.name, 0.4)
 
 
+GATE = tilted_gate(np.ones(3), heading=0.5, elevation=0.2)
+
+
+@given(st.lists(st.floats(-9, 9), min_size=3, max_size=3))
+def test_a_stage_that_names_a_gate_moves_through_it_unless_it_says_how(velocity: list[float]) -> None:
+    """At 1 m/s or more in its direction: whatever is asked across it changes nothing."""
+
+    def slowest(*conditions: Condition, **keys: float) -> float:
+        asked = Stage("gate", conditions, gate="gate", **keys).explicit(GATE).conditions
+        return max((c.lower for c in asked if c.quantity is Quantity.VELOCITY), default=-np.inf)
+
+    across = Condition("velocity", GATE.lateral, 0.0, 0.0), Condition("velocity", GATE.up, 0.0, 0.0)
+    along = Condition("velocity", GATE.normal, -3.0, 0.5)
+    thrust = Condition("specific_thrust", GATE.normal, lower=1.0)
+    assert slowest() == slowest(*across) == slowest(thrust) == 1.0
+    assert slowest(along) == -3.0
+    assert slowest(min_speed=2.5) == slowest(along, min_speed=2.5) == 2.5
+    assert slowest(min_speed=0.0) == -np.inf
+    moving = [c for c in Stage("gate", gate="gate").explicit(GATE).conditions if "vel" in c.quantity.value]
+    assert all((c.direction @ velocity >= 1.0) == (GATE.normal @ velocity >= 1.0) for c in moving)
+
+
 angles = st.floats(0.0, 6.28)
 
 
@@ -235,6 +257,8 @@ def test_a_window_holds_the_interval_ends_within_it(first: float, length: float,
         lambda: Stage("s", at=True),
         lambda: Stage("s", at=(0.2, 0.4, 0.6)),
         lambda: Stage("s", min_upright_thrust=5.0),
+        lambda: Stage("s", min_speed=1.0),
+        lambda: Stage("s", gate="gate", min_speed=-1.0),
         lambda: Stage("s", gate="gate", min_upright_thrust=5.0, attitude=Attitude((0.0, 0.0, 1.0), 5.0)),
         lambda: Attitude((0.0, 0.0, 1.0), 5.0, tolerance=1.6),
         lambda: Attitude((0.0, 0.0, 1.0), min_thrust=-1.0),

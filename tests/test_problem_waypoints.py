@@ -55,7 +55,7 @@ def test_waypoints_are_passed_in_order_and_the_gate_at_its_centre() -> None:
     assert passed.ordered
     assert [s.name for s in passed.stages] == ["waypoint 1", "gate"]
     assert [s.at for s in passed.stages] == ["free", "free"]
-    assert [c.lower for c in passed.stages[1].conditions] == [1.0, 2.0, 3.0]
+    assert [c.lower for c in passed.stages[1].conditions] == [1.0, 2.0, 3.0, 1.0]
     with pytest.raises(SpecError, match="no gate named 'gate'"):
         problem()
 

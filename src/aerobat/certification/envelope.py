@@ -6,9 +6,9 @@ import numpy as np
 
 from aerobat.declaration import Limit, NonNegative, Number, TiltLimit, UnitVector, declared
 from aerobat.problem import Condition, Gate, Limits, Quantity, Stage
+from aerobat.problem.stage import PARALLEL
 
 CROSSING_SPEED = 1e-3  # [m/s] a path that is slower in the gate's plane does not cross it
-PARALLEL = 1e-6  # [-] a direction with less of the gate's normal lies in its plane
 NO_LIMITS = Limits()
 
 

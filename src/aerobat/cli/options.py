@@ -62,6 +62,14 @@ class TaskOptions(OutputOptions):
     plugins: Annotated[tuple[Path, ...], Plugins(group=planning)] = ()
 
 
+@dataclass(frozen=True, kw_only=True)
+class CompareOptions(TaskOptions):
+    """Options of a comparison."""
+
+    time_limit: Annotated[float | None, Parameter(group=planning, validator=validators.Number(gte=0))] = None
+    """Seconds for each planner; the best plan that it finds by then is taken, and said to be that."""
+
+
 def offered_options() -> dict[str, dict[str, PlannerOption]]:
     """The options of all registered planners: by flag, then by planner."""
     offered: dict[str, dict[str, PlannerOption]] = {}

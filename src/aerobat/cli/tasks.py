@@ -12,6 +12,7 @@ from aerobat.cli.runs.record import RunRecord, default_vehicle
 from aerobat.cli.runs.saved_plans import named_vehicle, plan_source, read_saved_plan
 from aerobat.errors import SpecError
 from aerobat.interchange import column_groups
+from aerobat.optimization.deadline import within_time
 from aerobat.planning import (
     Plan,
     Planner,
@@ -70,7 +71,8 @@ def planned(name: str, options: PlanningOptions, command: Literal["fly", "plan"]
 def plan_of(record: RunRecord) -> Plan:
     """The plan of a run, made anew."""
     assert record.planner is not None, "a plan that came from a file is not made"
-    with planning_progress(record.planner_name) as progress:
+    limit = getattr(record.planner, "time_limit", None)
+    with planning_progress(record.planner_name) as progress, within_time(limit):
         if not record.paper:
             found = plan(record.problem, record.planner, record.vehicle, progress.record)
             return with_second_opinion(found, progress.record)

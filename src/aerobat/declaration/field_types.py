@@ -20,6 +20,7 @@ from aerobat.declaration.sentences import FieldError, shown, unknown_key, within
 _ROUND_OFF = 1e-12  # [-] components of a unit vector that are zero but for it
 _UNIT = 1e-15  # [-] how far from one a norm may be by round-off
 _CONTROL = {*map(chr, range(32)), "\x7f"}  # letters that no path needs and no terminal shows
+_MAX_MAGNITUDE = 1e15  # in SI units, and one over it the least: powers of more overflow
 _TWO_TURNS = 2.0 * tau * (1.0 + _ROUND_OFF)  # [rad] sums of angles stay within; more is hardly in radians
 
 
@@ -126,7 +127,17 @@ def _per_axis(value: Any) -> Array:
     bounds = array([value] * 3 if one else value, 3)
     if not (bounds > 0.0).all():
         raise FieldError("", f"must be positive, one number or one per axis, got {shown(value)}")
+    for bound in bounds.tolist():
+        _reasonable(bound)
     return bounds
+
+
+def _reasonable(value: float) -> float:
+    if 0.0 < value < inf and not 1.0 / _MAX_MAGNITUDE <= value <= _MAX_MAGNITUDE:
+        raise FieldError(
+            "", f"must be from {1.0 / _MAX_MAGNITUDE:g} to {_MAX_MAGNITUDE:g}, got {value:g}; check its unit"
+        )
+    return value
 
 
 def _not_nan(value: float) -> float:
@@ -176,11 +187,17 @@ def _one_line(text: str) -> str:
     return text
 
 
-Positive = Annotated[float, Field(gt=0, description="positive number")]
+_REASONABLE = AfterValidator(_reasonable)
+Positive = Annotated[float, Field(gt=0), _REASONABLE, Field(description="positive number")]
 Gravity = Annotated[float, Field(gt=0, le=1e9, description="positive number")]
-NonNegative = Annotated[float, Field(ge=0, description="number ≥ 0")]
+NonNegative = Annotated[float, Field(ge=0, le=_MAX_MAGNITUDE, description="number ≥ 0")]
 Fraction = Annotated[float, Field(gt=0, lt=1, description="number between 0 and 1")]
-Limit = Annotated[float, Field(gt=0, allow_inf_nan=True, description="positive number, `inf` for no limit")]
+Limit = Annotated[
+    float,
+    Field(gt=0, allow_inf_nan=True),
+    _REASONABLE,
+    Field(description="positive number, `inf` for no limit"),
+]
 Count = Annotated[int, Field(ge=1, description="whole number, 1 or more")]
 Seed = Annotated[int, Field(ge=0, description="whole number, 0 or more")]
 AS_IT_IS = _Instance()  # Annotated[BodyState, AS_IT_IS]: an instance of a class that is not declared

@@ -9,15 +9,13 @@ the first twelve columns, as the reference code does, reads both.
 
 from __future__ import annotations
 
-import math
 from pathlib import Path
 
 import numpy as np
 
-from aerobat.arrays import Array
 from aerobat.declaration import PathName, Positive, validated
 from aerobat.errors import SpecError
-from aerobat.interchange.rows import PathRows, has_header, rows_of_columns
+from aerobat.interchange.rows import PathRows, has_header, number_table, rows_of_columns
 from aerobat.storage import read_whole, write_whole
 from aerobat.trajectory import Carrier, Trajectory, as_trajectory
 from aerobat.trajectory.piecewise import MAX_DURATION
@@ -69,7 +67,8 @@ def read_rows(path: PathName, rate: Positive = 100.0) -> PathRows:
 
 
 def _bare_rows(text: str, rate: float) -> PathRows:
-    rows = _parse(text)
+    asked = f"a path's have {CSV_COLUMNS}, or {CSV_COLUMNS + 1} with a time"
+    rows = number_table(text, 1, (CSV_COLUMNS, CSV_COLUMNS + 1), asked)
     times = rows[:, CSV_COLUMNS] if rows.shape[1] > CSV_COLUMNS else np.arange(len(rows)) / rate
     steps = np.diff(times)
     if times[0] != 0 or not (steps > 0).all():
@@ -88,29 +87,3 @@ def _text(path: Path) -> str:
     except (OSError, ValueError) as error:
         reason = error.strerror if isinstance(error, OSError) else error
         raise SpecError(f"{path}: cannot be read: {reason}") from None
-
-
-def _parse(text: str) -> Array:
-    """The file's numbers, (rows, 12 or 13)."""
-    lines = text.splitlines()
-    rows = [_parse_row(line, f"line {number}") for number, line in enumerate(lines, 1)]
-    if len(rows) < 2:
-        raise SpecError(f"a trajectory needs at least two lines of numbers, got {len(rows)}")
-    if not text.endswith("\n"):
-        raise SpecError(f"line {len(rows)} is cut off, it has no line end")
-    for number, row in enumerate(rows, 1):
-        if len(row) != len(rows[0]):
-            raise SpecError(f"line {number} has {len(row)} numbers, line 1 has {len(rows[0])}")
-    return np.array(rows)
-
-
-def _parse_row(line: str, where: str) -> list[float]:
-    try:
-        row = [float(word) for word in line.split(",")]
-    except ValueError:
-        raise SpecError(f"{where} must be numbers with commas between, got {line[:60]!r}") from None
-    if len(row) not in (CSV_COLUMNS, CSV_COLUMNS + 1):
-        raise SpecError(f"{where} must have 12 numbers, or 13 with a time, got {len(row)}")
-    if not all(map(math.isfinite, row)):
-        raise SpecError(f"{where} must have finite numbers only, got {line[:60]!r}")
-    return row

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -96,7 +96,7 @@ def rows_of_columns(text: str, rate: float) -> PathRows:
         text: The file's.
         rate: Rows a second [1/s], where there is no column of time.
     """
-    first, *lines = text.splitlines()
+    first = text.partition("\n")[0]
     header = [word.strip().strip('"').lower() for word in first.strip().lstrip("#").split(",")]
     header = [SYNONYMS.get(name, name) for name in header]
     for name in header:
@@ -105,11 +105,7 @@ def rows_of_columns(text: str, rate: float) -> PathRows:
     for name in NAMES["position"]:
         if name not in header:
             raise SpecError(f"line 1: there is no column {name}; a path needs x, y and z [m], and t [s]")
-    if len(lines) < 2:
-        raise SpecError(f"a trajectory needs at least two lines of numbers, got {len(lines)}")
-    if not text.endswith("\n"):
-        raise SpecError(f"line {len(lines) + 1} is cut off, it has no line end")
-    table = np.array([_numbers(line, number, len(header)) for number, line in enumerate(lines, 2)])
+    table = number_table(text, 2, (len(header),), f"line 1 names {len(header)} columns")
     columns = dict(zip(header, table.T, strict=True))
     times = columns["t"] if "t" in columns else np.arange(len(table)) / rate
     steps = np.diff(times)
@@ -132,12 +128,36 @@ def _first_attitude(columns: Mapping[str, Array]) -> Array | None:
     return np.asarray(attitude / norm)
 
 
-def _numbers(line: str, number: int, count: int) -> list[float]:
-    words = line.split(",")
-    if len(words) != count:
-        raise SpecError(f"line {number} has {len(words)} numbers, line 1 names {count} columns")
+def number_table(text: str, first: int, counts: Sequence[int], asked: str) -> Array:
+    """The numbers of a file's lines, (rows, columns), two rows or more, in each as many as in the first.
+
+    Raises SpecError, naming the line, for what is no such table.
+
+    Args:
+        text: The file's.
+        first: The number of the first line that counts, from 1.
+        counts: The numbers of columns that may be.
+        asked: A sentence without its full stop that says so.
+    """
+    lines = text.splitlines()[first - 1 :]
+    if len(lines) > 1 and not text.endswith("\n"):
+        raise SpecError(f"line {first - 1 + len(lines)} is cut off, it has no line end")
+    rows: list[list[float]] = []
+    for number, line in enumerate(lines, first):
+        row = _numbers(line, number)
+        if len(row) not in counts:
+            raise SpecError(f"line {number} has {len(row)} numbers, {asked}")
+        if rows and len(row) != len(rows[0]):
+            raise SpecError(f"line {number} has {len(row)} numbers, line {first} has {len(rows[0])}")
+        rows.append(row)
+    if len(rows) < 2:
+        raise SpecError(f"a trajectory needs at least two lines of numbers, got {len(rows)}")
+    return np.array(rows)
+
+
+def _numbers(line: str, number: int) -> list[float]:
     try:
-        row = [float(word) for word in words]
+        row = [float(word) for word in line.split(",")]
     except ValueError:
         raise SpecError(f"line {number} must be numbers with commas between, got {line[:60]!r}") from None
     if not all(map(math.isfinite, row)):

@@ -2,7 +2,7 @@ from .assessment.assess import with_assessment, with_second_opinion
 from .assessment.assessment import Assessment, Box, SecondOpinion
 from .assessment.lower_bound import least_duration
 from .certified_solve import Judged, Solution, certified_solve, with_certificate
-from .flyability import flight_error, nominal_flight, own_flight, with_flyability
+from .flyability import nominal_flight, own_flight, with_flyability
 from .miqp import Miqp
 from .passages import planned_passages
 from .plan_file import load_plan
@@ -52,7 +52,6 @@ __all__ = [
     "TimeScaling",
     "as_planner",
     "certified_solve",
-    "flight_error",
     "least_duration",
     "load_plan",
     "nominal_flight",

@@ -27,11 +27,6 @@ from aerobat.trajectory import Trajectory
 from aerobat.vehicle import Vehicle
 
 
-def flight_error(trajectory: Trajectory, vehicle: Vehicle, environment: Environment) -> float:
-    """The largest position error [m] of a vehicle's nominal flight; 5 m or more where it diverges."""
-    return _largest_error(nominal_flight(trajectory, vehicle, environment))
-
-
 def own_flight(
     trajectory: Trajectory, vehicle: Vehicle, problem: Problem, stages: Sequence[PlacedStage]
 ) -> OwnFlight:

@@ -10,6 +10,7 @@ import numpy as np
 from aerobat.certification import Certificate, Finding, Side
 from aerobat.environment import Environment
 from aerobat.flatness import reference
+from aerobat.simulation.outcome import digits
 from aerobat.trajectory import Trajectory
 from aerobat.vehicle import Vehicle
 
@@ -58,8 +59,8 @@ class RotorMargin:
 
     def __str__(self) -> str:
         """The outcome in a few words."""
-        words = f"{_newtons(self.min_thrust)} to {_newtons(self.max_thrust)} N, "
-        off = f"{_newtons(abs(self.margin))} N"
+        words = f"{digits(self.min_thrust)} to {digits(self.max_thrust)} N, "
+        off = f"{digits(abs(self.margin))} N"
         if self.margin >= 0:
             return words + f"within limits by {off}"
         if self.low_margin < self.high_margin:
@@ -93,11 +94,6 @@ def sampled_margin(trajectory: Trajectory, vehicle: Vehicle, environment: Enviro
 def rotor_findings(certificate: Certificate, side: Side) -> list[Finding]:
     """Findings of a certificate about each rotor's thrust, and its command if it lags, on one side."""
     return [f for f in certificate.findings if f.quantity.startswith("rotor ") and f.side is side]
-
-
-def _newtons(thrust: float) -> str:
-    """A thrust with two decimals, or two digits where those would show too little of it."""
-    return f"{thrust:.2f}" if abs(thrust) >= 0.095 or thrust == 0.0 else f"{thrust:.2g}"
 
 
 def _closest(certificate: Certificate, side: Side) -> Finding:

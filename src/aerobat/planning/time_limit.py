@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from math import inf
 
 from aerobat.errors import Infeasible
 from aerobat.optimization.deadline import out_of_time
@@ -17,6 +18,17 @@ TIME_LIMIT = "Seconds for planning; the best plan found by then is taken, and sa
 def stopped(plan: Plan) -> Plan:
     """The plan; where no time is left, as the best that was found by then."""
     return replace(plan, status="time_limit") if out_of_time() else plan
+
+
+def best_by_limit(plan: Plan) -> str:
+    """What is to be said of a plan that a limit ended, with its gap where one is known; else nothing."""
+    if plan.status != "time_limit":
+        return ""
+    if plan.assessment is None or plan.assessment.ratio == inf:
+        return "the best found by the time limit"
+    return (
+        f"the best found by the time limit, at most {plan.assessment.ratio:.2f} times the shortest possible"
+    )
 
 
 def too_short(

@@ -8,8 +8,8 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field, PlainValidator
 
-from aerobat.declaration import FieldError, Label, Positive, declared, shown
-from aerobat.problem.condition import Attitude, Condition
+from aerobat.declaration import FieldError, Label, NonNegative, Positive, declared, shown
+from aerobat.problem.condition import Attitude, Condition, Quantity
 from aerobat.problem.gate import Gate, at_centre
 
 
@@ -32,6 +32,8 @@ CrossingTime = Annotated[
     PlainValidator(_crossing_time),
     Field(description='`"free"`, a fraction of the duration between 0 and 1, or two that rise, a window'),
 ]
+MIN_CROSSING_SPEED = 1.0  # [m/s] through a gate, where nothing else is asked: who stands still may turn back
+PARALLEL = 1e-6  # [-] a direction with less of a gate's normal lies in the gate's plane
 PLANNED_SHARE = 0.5  # of a gate's tolerance of attitude: the plan's
 ROUNDING = 1e-9  # [-] of an interval
 
@@ -41,9 +43,9 @@ class Stage:
     """Conditions that hold together at one instant, which the search chooses where `at` leaves it a choice.
 
     A fraction fixes it to the last interval that ends by then, or `interval_offset` intervals after that
-    one. `gate` names the gate that it passes, whose centre it meets, with the thrust axis along its upright
-    where `min_upright_thrust` is given, or as `attitude` says: within half the gate's tolerance, at most, the
-    rest is left to the flight.
+    one. `gate` names the gate that it passes, whose centre it meets in its direction of passage, at
+    `min_speed` or faster, with the thrust axis along its upright where `min_upright_thrust` is given, or as
+    `attitude` says: within half the gate's tolerance, at most, the rest is left to the flight.
     """
 
     name: Label  # shown in reports and pictures
@@ -54,9 +56,13 @@ class Stage:
     # specific thrust along the gate's upright, at least; left out, no attitude is asked of the gate
     min_upright_thrust: Positive | None = None  # [m/s²]
     attitude: Attitude | None = None  # where the thrust points, instead
+    # through the gate; left out, 1 unless `conditions` say how fast, and 0 leaves it free
+    min_speed: NonNegative | None = None  # [m/s]
 
     def __post_init__(self) -> None:
         """Check."""
+        if self.min_speed is not None and self.gate is None:
+            raise FieldError("min_speed", "needs gate, whose direction of passage is meant; name it")
         if self.min_upright_thrust is not None:
             if self.gate is None:
                 raise FieldError("min_upright_thrust", "needs gate, whose upright is meant; name it")
@@ -91,10 +97,17 @@ class Stage:
                 attitude = Attitude(gate.up, self.min_upright_thrust, tolerance)
             elif attitude is not None:
                 attitude = replace(attitude, tolerance=min(attitude.tolerance, tolerance))
-        there = () if gate is None else at_centre(gate)
+        there = () if gate is None else (*at_centre(gate), *self._moving_through(gate))
         pointing = () if attitude is None else attitude.conditions
         conditions = (*there, *self.conditions, *pointing)
         return replace(self, conditions=conditions, min_upright_thrust=None, attitude=attitude)
+
+    def _moving_through(self, gate: Gate) -> tuple[Condition, ...]:
+        """The speed in the gate's direction that is asked beside the stage's own conditions."""
+        along = (abs(c.direction @ gate.normal) for c in self.conditions if c.quantity is Quantity.VELOCITY)
+        default = 0.0 if any(part > PARALLEL for part in along) else MIN_CROSSING_SPEED
+        speed = default if self.min_speed is None else self.min_speed
+        return (Condition(Quantity.VELOCITY, gate.normal, lower=speed),) if speed > 0.0 else ()
 
 
 @declared

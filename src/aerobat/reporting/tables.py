@@ -14,8 +14,9 @@ from rich.text import Text
 from aerobat.certification import Certificate, Finding, Side, Verdict
 from aerobat.evaluation import Passage, Score
 from aerobat.planning import Assessment, Plan
+from aerobat.planning.time_limit import best_by_limit
 from aerobat.problem import Problem
-from aerobat.simulation.outcome import length
+from aerobat.simulation.outcome import digits, length
 from aerobat.vehicle import Vehicle
 
 Fact = tuple[str, str | Text]  # a name, and what is to be said
@@ -167,7 +168,7 @@ def _assessment_facts(found: Assessment) -> Iterable[Fact]:
 
 def _optimality(plan: Plan) -> str:
     if plan.status == "time_limit" and plan.gap is None:
-        return "the best found by the time limit"
+        return best_by_limit(plan)
     if plan.gap is None or plan.gap < 1e-6:
         return plan.status
     return f"within {100 * plan.gap:.2g} % of the optimum"
@@ -203,5 +204,4 @@ def _clearance(passage: Passage) -> str:
 
 
 def _pair(largest: float, rms: float, unit: str) -> str:
-    most, mean = (f"{x:.2f}" if x >= 0.1 else f"{x:.2g}" for x in (largest, rms))
-    return f"{most} {unit} at most, {mean} {unit} RMS"
+    return f"{digits(largest)} {unit} at most, {digits(rms)} {unit} RMS"

@@ -8,14 +8,22 @@ from enum import Enum
 
 DIVERGENCE_RADIUS = 5.0  # [m] of position error: no controller is expected back from there
 NO_LENGTH = 1e-6  # [m] less is rounding
+FEW_DECIMALS = 0.095  # what rounds to less than 0.10 has no two digits in two decimals
 
 
 def length(metres: float) -> str:
     """A length with the unit that suits it."""
-    if metres >= 1.0:
-        return f"{metres:.2f} m"
-    digits = ".2g" if NO_LENGTH < metres < 1e-3 else ".2f"
-    return f"{100 * metres:{digits}} cm"
+    return f"{digits(metres)} m" if metres >= 1.0 else f"{digits(100.0 * metres, NO_LENGTH * 100.0)} cm"
+
+
+def digits(value: float, nothing: float = 0.0) -> str:
+    """A number with two decimals, or two digits where those would show too little of it.
+
+    Args:
+        value: In the unit that it is told in.
+        nothing: Up to so much is rounding, 0.00.
+    """
+    return f"{value:.2g}" if nothing < abs(value) < FEW_DECIMALS else f"{value:.2f}"
 
 
 def counted(outcomes: Iterable[Outcome]) -> str:

@@ -7,10 +7,12 @@ from dataclasses import dataclass, replace
 from time import perf_counter
 from typing import Any
 
-from aerobat.declaration import by_value, in_notebooks, short, validated
+from aerobat.declaration import NonNegative, by_value, in_notebooks, short, validated
 from aerobat.errors import BackendMissing, Infeasible, SpecError
 from aerobat.evaluation.score import Score, score
+from aerobat.optimization.deadline import out_of_time, within_time
 from aerobat.planning import Attempt, Plan, Planner, as_planner, plan, registered_planners
+from aerobat.planning.time_limit import best_by_limit
 from aerobat.planning.time_optimal import TimeOptimal
 from aerobat.problem import Problem, as_problem
 from aerobat.simulation import Flight, fly
@@ -71,6 +73,7 @@ def compare(
     planners: Sequence[tuple[str, Planner] | str] | None = None,
     progress: Callable[[Attempt], None] | None = None,
     begin: Callable[[str], None] | None = None,
+    time_limit: NonNegative | None = None,
 ) -> Comparison:
     """Plan a problem with each planner and fly each plan.
 
@@ -85,6 +88,7 @@ def compare(
         planners: Each with a name, or the name of a registered one; by default all that are registered.
         progress: Called with every attempt as it ends.
         begin: Called with each planner's name when its turn comes.
+        time_limit: For each planner [s]; the best plan that it finds by then counts.
     """
     problem, vehicle = as_problem(problem), as_vehicle(vehicle)
     compared = all_planners() if planners is None else [_named(each) for each in planners]
@@ -94,11 +98,14 @@ def compare(
     found = []
     for name, planner in compared:
         begin(name)
-        found.append(_entry(name, planner, problem, vehicle, progress))
+        with within_time(time_limit):
+            found.append(_entry(name, planner, problem, vehicle, progress))
     for i, (name, planner) in enumerate(compared):
         if isinstance(planner, TimeOptimal):
             begin(f"{name} again")
-            found[i] = _improved(found[i], planner, found, progress)
+            left = None if time_limit is None else max(time_limit - found[i].planning_time, 0.0)
+            with within_time(left):
+                found[i] = _improved(found[i], planner, found, progress)
     entries = tuple(_with_twin(entry, found[:i]) for i, entry in enumerate(found))
     if all(entry.plan is None for entry in entries):
         raise Infeasible(
@@ -135,6 +142,8 @@ def _improved(
     alone = None if entry.plan is None or not entry.certified else entry.plan.duration
     if best is None or best.vehicle is None or (alone is not None and best.duration >= alone):
         return entry
+    if out_of_time():
+        return entry
     from_best = replace(planner, start=best, starts=2)
     again = _entry(entry.planner, from_best, best.problem, best.vehicle, progress)
     found = "no plan" if alone is None else f"{alone:.3f} s"
@@ -170,5 +179,5 @@ def _entry(
     flight = fly(found, vehicle)
     flown = score(flight, found, vehicle)
     warnings = () if found.assessment is None else found.assessment.warnings
-    note = "; ".join(filter(None, (found.rescue, *warnings)))
+    note = "; ".join(filter(None, (best_by_limit(found), found.rescue, *warnings)))
     return Entry(name, found, flight, flown, spent, flown.sentence, note)

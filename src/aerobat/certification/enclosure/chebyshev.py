@@ -44,7 +44,8 @@ def basis(degree: int) -> Basis:
     """The basis of a degree >= 1."""
     nodes = np.asarray(-np.cos(np.pi * np.arange(degree + 1) / degree))
     analysis = np.linalg.inv(chebyshev.chebvander(nodes, degree))
-    halves = [analysis @ chebyshev.chebvander((nodes + side) / 2, degree) for side in (-1, 1)]
+    # a half's term is made of terms of no lower degree: rounding of large ones would be left in all others
+    halves = [np.triu(analysis @ chebyshev.chebvander((nodes + side) / 2, degree)) for side in (-1, 1)]
     derivative = np.zeros((degree + 1, degree + 1))
     derivative[:-1] = chebyshev.chebder(np.eye(degree + 1))
     return Basis(nodes, np.asarray(analysis), np.array(halves), derivative)

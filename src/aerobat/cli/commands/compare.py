@@ -2,27 +2,26 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Annotated
 
 from cyclopts import Parameter
 
-from aerobat.cli.options import OutputOptions, TaskOptions
+from aerobat.cli.options import CompareOptions, OutputOptions
 from aerobat.cli.progress import planning_progress
-from aerobat.cli.runs.folder import holds_something, run_folder, written_to
+from aerobat.cli.runs.folder import written
 from aerobat.cli.runs.record import RunRecord
 from aerobat.cli.tasks import read_task
-from aerobat.cli.terminal import print_json
 from aerobat.reporting.comparison import comparison_figure, comparison_rows, comparison_table
 from aerobat.reporting.page import png
 from aerobat.reporting.report_json import to_json
-from aerobat.reporting.tables import show
 from aerobat.studies.compare import Comparison
 from aerobat.studies.compare import compare as compare_planners
 
 COMPARISON = "compare.json"
 
 
-def compare(problem: str, options: Annotated[TaskOptions, Parameter(name="*")] = TaskOptions()) -> None:
+def compare(problem: str, options: Annotated[CompareOptions, Parameter(name="*")] = CompareOptions()) -> None:
     """Plan a maneuver with every planner and put the plans side by side.
 
     Prints a table of durations, ratios to the time-optimal plan, margins, proofs and tracking errors, and
@@ -39,6 +38,7 @@ def compare(problem: str, options: Annotated[TaskOptions, Parameter(name="*")] =
         problem=task,
         vehicle=vehicle,
         angle=options.angle,
+        time_limit=options.time_limit,
         plugins=tuple(map(str, options.plugins)),
     )
     finish_comparison(comparison_of(record), record, options)
@@ -48,7 +48,11 @@ def comparison_of(record: RunRecord) -> Comparison:
     """All planners on a run's problem."""
     with planning_progress() as progress:
         return compare_planners(
-            record.problem, record.vehicle, progress=progress.record, begin=progress.begin
+            record.problem,
+            record.vehicle,
+            progress=progress.record,
+            begin=progress.begin,
+            time_limit=record.time_limit,
         )
 
 
@@ -56,13 +60,9 @@ def finish_comparison(comparison: Comparison, record: RunRecord, options: Output
     """Write a comparison, then show it."""
     rows = to_json(comparison_rows(comparison))
     picture = png(comparison_figure(comparison))
-    folder = options.out or record.folder
-    replaced = holds_something(folder)
-    with run_folder(folder, record) as staging:
+
+    def write(staging: Path) -> None:
         (staging / COMPARISON).write_text(rows + "\n", encoding="utf-8")
         (staging / "compare.png").write_bytes(picture)
-    if options.json:
-        print_json(rows)
-        return
-    show(comparison_table(comparison))
-    print(f"\n{written_to(folder, replaced)}")
+
+    written(record, options, write, rows, comparison_table(comparison))

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
+
+from rich.table import Table
 
 from aerobat.cli.entry import ExitCode
 from aerobat.cli.interrupts import end_interrupts
@@ -50,14 +52,27 @@ def run_folder(folder: Path, record: RunRecord) -> Iterator[Path]:
         end_interrupts()
 
 
-def holds_something(folder: Path) -> bool:
-    """True for a folder with anything in it."""
-    return folder.is_dir() and any(folder.iterdir())
+def written(
+    record: RunRecord, options: OutputOptions, write: Callable[[Path], None], facts: str, table: Table
+) -> None:
+    """Put a run in its place as one, then say what it is.
 
-
-def written_to(folder: Path, replaced: bool) -> str:
-    """Where a run is now, and what is there no longer, in a line."""
-    return f"written to {folder}/" + (", in the place of an earlier run" if replaced else "")
+    Args:
+        record: What it takes to do it again.
+        options: Where to write, and in what form to say it.
+        write: Writes all but the record to a folder.
+        facts: What it is, as JSON.
+        table: The same for people.
+    """
+    folder = options.out or record.folder
+    replaced = folder.is_dir() and any(folder.iterdir())
+    with run_folder(folder, record) as staging:
+        write(staging)
+    if options.json:
+        print_json(facts)
+        return
+    show(table)
+    print(f"\nwritten to {folder}/" + (", in the place of an earlier run" if replaced else ""))
 
 
 @dataclass(frozen=True)
@@ -79,23 +94,19 @@ def finish(plan: Plan, record: RunRecord, options: OutputOptions, flown: Flown |
         flown: The plan's flight, if it was flown.
     """
     assert plan.vehicle is not None, "a command plans for a vehicle"
-    folder = options.out or record.folder
     flight, score, controller = (flown.flight, flown.score, flown.controller) if flown else (None, None, None)
     facts = to_json(report(plan, score, plan.vehicle.name, controller))
     picture = png(report_figure(plan, plan.vehicle, flight, score))
-    replaced = holds_something(folder)
-    with run_folder(folder, record) as staging:
+
+    def write(staging: Path) -> None:
         plan.save(staging / f"{plan.problem.name}.plan")
         write_columns(plan, staging / "plan.csv", record.columns)
         if flight is not None:
             flight.save(staging / FLIGHT)
         (staging / "report.json").write_text(facts + "\n", encoding="utf-8")
         (staging / "report.png").write_bytes(picture)
-    if options.json:
-        print_json(facts)
-    else:
-        show(summary_table(plan, score, plan.vehicle.name, controller))
-        print(f"\n{written_to(folder, replaced)}")
+
+    written(record, options, write, facts, summary_table(plan, score, plan.vehicle.name, controller))
     return ExitCode.WELL if _is_well(plan, score) else ExitCode.NOT_WELL
 
 

@@ -13,7 +13,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import PlainValidator
 
-from aerobat.declaration import Seed, declared, to_table
+from aerobat.declaration import NonNegative, Seed, declared, to_table
 from aerobat.documents import read_document, write_document
 from aerobat.environment import Dispersion
 from aerobat.errors import SpecError
@@ -55,6 +55,7 @@ class RunRecord:
     angle: float | None = None  # [deg] that --angle gave, for the folder's name
     source: str | None = None  # the file that the plan came from
     flight: FlightSettings = FlightSettings()
+    time_limit: NonNegative | None = None  # [s] of each planner that is compared
     columns: tuple[str, ...] = ALL  # of plan.csv
     plugins: tuple[str, ...] = ()  # files that --import named
     versions: Mapping[str, str] = field(default_factory=dict)  # of what made it

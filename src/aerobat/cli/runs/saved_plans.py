@@ -71,9 +71,10 @@ def _plan_of_path(path: Path, trajectory: Trajectory, options: PlanningOptions) 
     name = re.sub(r"[^\w .-]|^\W+", "-", path.stem).lstrip(" .-") or MADE_BY
     problem = Problem(name=name, start=start, goal=goal, heading=trajectory.heading)
     vehicle.require_hover(problem.environment.gravity)
-    say(f"{path} holds a path alone; assumed: {', '.join(_assumed(path, vehicle, problem, options))}")
     plan = Plan(problem=problem, trajectory=trajectory, planner=MADE_BY, status="as it is")
-    return with_evidence(plan, vehicle)
+    plan = with_evidence(plan, vehicle)  # whatever is wrong with the path is the one thing to be said then
+    say(f"{path} holds a path alone; assumed: {', '.join(_assumed(path, vehicle, problem, options))}")
+    return plan
 
 
 def _assumed(path: Path, vehicle: Vehicle, problem: Problem, options: PlanningOptions) -> list[str]:

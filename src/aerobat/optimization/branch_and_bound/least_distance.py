@@ -16,11 +16,10 @@ from aerobat.optimization.branch_and_bound.null_space import UNBOUNDED
 _AT_UPPER, _AT_LOWER, _IGNORED = 1, 3, 4
 _SOLVED, _INFEASIBLE, _OVERDETERMINED = 1, -1, -6
 _EQUAL = 1e-11  # bounds as near as that make an equality, in units of the larger
-_CONTRADICTION = (
-    1e-7  # on rows of unit norm, beside the larger bound: by which equalities contradict each other
-)
+_CONTRADICTION = 1e-7  # beside the largest of all equalities' bounds: by which they contradict each other
 _INDEPENDENT = 1e-8  # of a row of unit norm: what is left of it where it is no combination of others
-_SETTINGS = {"primal_tol": 1e-9}  # on rows of unit norm
+_TOLERANCE = 1e-9  # on rows of unit norm
+_SETTINGS = {"primal_tol": _TOLERANCE}
 _CAREFUL_SETTINGS = {"pivot_tol": 1e-4, "sing_tol": 1e-13, "dual_tol": 1e-10}  # where the usual ones fail
 
 
@@ -84,12 +83,13 @@ class LeastDistanceQP:
         y, flag, multipliers = self._run(lower, upper, warm, cutoff)
         if flag not in (_SOLVED, _INFEASIBLE):
             y, flag, multipliers = self._run(lower, upper, cold, cutoff)
-        if flag == _OVERDETERMINED:  # equalities depend on each other
+        if flag in (_INFEASIBLE, _OVERDETERMINED):  # it may be that equalities depend on each other
             redundant = self._redundant(lower, upper)
             if redundant is None:
                 return None
-            cold[redundant] = _IGNORED
-            y, flag, multipliers = self._run(lower, upper, cold, cutoff)
+            if len(redundant):
+                cold[redundant] = _IGNORED
+                y, flag, multipliers = self._run(lower, upper, cold, cutoff)
         if flag not in (_SOLVED, _INFEASIBLE):
             usual_settings = self._model.settings
             self._model.settings = _CAREFUL_SETTINGS
@@ -103,12 +103,20 @@ class LeastDistanceQP:
         return QPSolution(y, 0.5 * float(y @ y), lower, upper, active, multipliers[active])
 
     def _redundant(self, lower: Array, upper: Array) -> Indices | None:
-        """Equalities that follow from others; None where no y satisfies all."""
+        """Equalities that follow from others; None where no y satisfies all.
+
+        DAQP overlooks less than `_TOLERANCE` and sees dependence where more is missed, but what is missed by
+        about as much it takes for infeasible, however large the bounds are.
+        """
         larger = np.maximum(np.abs(lower), np.abs(upper))
         equal = np.flatnonzero(upper - lower <= _EQUAL * np.maximum(larger, 1.0))
         rows, target = self._rows[equal], upper[equal]
+        if not len(rows) or (
+            len(rows) <= rows.shape[1] and np.linalg.svd(rows, compute_uv=False)[-1] > _INDEPENDENT
+        ):
+            return np.zeros(0, dtype=np.intp)
         missed = rows @ np.linalg.lstsq(rows, target, rcond=_INDEPENDENT)[0] - target
-        if (np.abs(missed) > _CONTRADICTION * np.maximum(larger[equal], 1.0)).any():
+        if np.abs(missed).max() > max(_CONTRADICTION * np.abs(target).max(), _TOLERANCE):
             return None
         basis = np.zeros((0, rows.shape[1]))
         redundant = []

@@ -11,6 +11,7 @@ from aerobat.arrays import Array
 from aerobat.certification import Certificate, Side
 from aerobat.declaration import validated
 from aerobat.errors import BackendMissing, Infeasible, SpecError
+from aerobat.optimization.deadline import out_of_time
 from aerobat.planning.assessment.assessment import Assessment, Box, Point, SecondOpinion
 from aerobat.planning.assessment.lower_bound import least_duration
 from aerobat.planning.flyability import with_flyability
@@ -34,8 +35,9 @@ def with_assessment(plan: Plan) -> Plan:
 def with_second_opinion(plan: Plan, progress: Progress | None = None) -> Plan:
     """The plan; where its assessment finds it suspicious, with what free knots make of the same problem.
 
-    They begin from the plan. That takes seconds of the processor. Time-optimal plans need none, and a
-    plan whose time was limited gets none.
+    They begin from the plan. That takes seconds of the processor, and no more than is left of a limit
+    (`optimization.deadline.within_time`). Time-optimal plans need none, and a plan that a limit ended gets
+    none.
     Raises SpecError without a vehicle.
 
     Args:
@@ -54,8 +56,8 @@ def _second_opinion(plan: Plan, progress: Progress | None) -> SecondOpinion:
     for segments in OPINION_SEGMENTS:
         opinion = _free_knots(plan, segments, progress)
         if opinion.duration is not None:
-            break
-    return opinion
+            return opinion
+    return replace(opinion, missing="the time was over") if out_of_time() else opinion
 
 
 def _free_knots(plan: Plan, segments: int, progress: Progress | None) -> SecondOpinion:

@@ -99,7 +99,7 @@ class Miqp(Planner):
         """What takes less time, in words."""
         if self.backend == "builtin":
             return "use fewer intervals"
-        return f"take the backend builtin, which needs a hundredth of the time of {self.backend}"
+        return "take the backend builtin, which is quicker"
 
     def _planned(self, problem: Problem, vehicle: Vehicle | None, recorder: Recorder) -> Plan:
         order = default_order(problem, vehicle) if self.order is None else self.order

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import StrEnum
+from itertools import filterfalse
 from time import perf_counter
 from typing import Annotated
 
@@ -23,6 +24,7 @@ from aerobat.planning.recorder import Progress, Recorder
 from aerobat.planning.result import PlacedStage, Plan
 from aerobat.planning.search import BisectionSearch, GridSearch, Search
 from aerobat.planning.time_limit import TIME_LIMIT, stopped, too_short
+from aerobat.problem.condition import Condition, Quantity
 from aerobat.problem.problem import Problem
 from aerobat.problem.stage import StageSequence
 from aerobat.trajectory import Trajectory
@@ -107,13 +109,24 @@ class _Planning:
         self.sequence: StageSequence = problem.stages(thrust)
         self.balance = force_balance(problem.environment, vehicle)
         still = np.zeros((len(self.sequence.stages), 3))
-        self.durations = first_times(problem, self.fixed(still), thrust)
+        self.durations = first_times(problem, self.fixed(self.sequence, still), thrust)
         timed = TimeScaling.ALL if problem.maneuver.first_times is None else TimeScaling.FIRST
         self.scaling = config.time_scaling or timed
 
-    def fixed(self, velocities: Array) -> Array:
-        """All that is fixed at the knots, given the velocities at the stages [m/s], (K - 2, 3)."""
-        return fixed_at_knots(self.problem, self.sequence, self.config.order, self.balance, velocities)
+    def fixed(self, sequence: StageSequence, velocities: Array) -> Array:
+        """All that a sequence fixes at the knots, given the velocities at its stages [m/s], (K - 2, 3)."""
+        return fixed_at_knots(self.problem, sequence, self.config.order, self.balance, velocities)
+
+    @property
+    def unhurried(self) -> StageSequence:
+        """The stages without the least speeds of those that ask no attitude."""
+        stages = (
+            stage
+            if stage.attitude
+            else replace(stage, conditions=tuple(filterfalse(_hurries, stage.conditions)))
+            for stage in self.sequence.stages
+        )
+        return replace(self.sequence, stages=tuple(stages))
 
     def attempt(self, duration: float) -> Judged[None] | None:
         """Outcome of one duration; None unless it meets its stages and the vehicle can fly it.
@@ -179,11 +192,17 @@ class _ClosedForm:
     duration: float
 
     def solve(self) -> Solution[None]:
-        """The path; a failure where it misses a stage or samples refute it."""
+        """The path; a failure where it misses a stage or samples refute it.
+
+        Speeds at least as high as asked are left free where they come out so, and held at that elsewhere.
+        """
         started = perf_counter()
         planning, problem, order = self.planning, self.planning.problem, self.planning.config.order
-        trajectory = self._trajectory()
-        failure = violated_stage(planning.sequence, trajectory, planning.balance)
+        for sequence in (planning.unhurried, planning.sequence):
+            trajectory = self._trajectory(sequence)
+            failure = violated_stage(planning.sequence, trajectory, planning.balance)
+            if failure is None:
+                break
         solution = Solution(
             source=None,
             duration=self.duration,
@@ -196,33 +215,38 @@ class _ClosedForm:
         )
         return refuted_by_samples(solution, problem, planning.vehicle)
 
-    def _trajectory(self) -> Trajectory:
-        """The closed form whose drag at the stages is that of its own velocities there.
+    def _trajectory(self, sequence: StageSequence) -> Trajectory:
+        """The closed form through stages whose drag at the stages is that of its own velocities there.
 
         Those are an affine function of the velocities of which the drag is taken, v ↦ M v + c, found column
         by column; what is wanted is v = M v + c.
         """
-        stages = len(self.planning.sequence.stages)
+        stages = len(sequence.stages)
         still = np.zeros((stages, 3))
-        trajectory = self._with_drag_of(still)
+        trajectory = self._with_drag_of(sequence, still)
         if self.planning.balance.drag == 0.0 or not stages:
             return trajectory
         there = trajectory.knots[1:-1]
         constant = trajectory.evaluate(there, 1).ravel()
         columns = [
-            self._with_drag_of(unit.reshape(stages, 3)).evaluate(there, 1).ravel() - constant
+            self._with_drag_of(sequence, unit.reshape(stages, 3)).evaluate(there, 1).ravel() - constant
             for unit in np.eye(still.size)
         ]
         own = np.linalg.solve(np.eye(still.size) - np.array(columns).T, constant)
-        return self._with_drag_of(np.asarray(own).reshape(stages, 3))
+        return self._with_drag_of(sequence, np.asarray(own).reshape(stages, 3))
 
-    def _with_drag_of(self, velocities: Array) -> Trajectory:
-        """The closed form, with the drag of some velocities at the stages [m/s], (K - 2, 3)."""
+    def _with_drag_of(self, sequence: StageSequence, velocities: Array) -> Trajectory:
+        """The closed form through stages, with the drag of velocities there [m/s], (K - 2, 3)."""
         planning = self.planning
         durations = planning.scaled(self.duration)
-        fixed = planning.fixed(velocities)
+        fixed = planning.fixed(sequence, velocities)
         return minimum_effort(fixed, durations, planning.config.rule, planning.problem.heading)
 
     def tighten(self, solution: Solution[None], certificate: Certificate | None) -> bool:
         """A longer duration is all that helps."""
         return False
+
+
+def _hurries(condition: Condition) -> bool:
+    """True of a least speed."""
+    return condition.quantity is Quantity.VELOCITY and 0.0 < condition.lower < condition.upper

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import islice
 
@@ -18,6 +18,7 @@ from aerobat.planning.result import Plan
 from aerobat.planning.time_optimal.collocation import CollocatedMotion, Mesh
 from aerobat.planning.warm_start import WarmStart
 from aerobat.problem.problem import Problem
+from aerobat.problem.stage import StageSequence
 from aerobat.vehicle import Vehicle
 
 SLOWER = 1.5  # times the duration of a plan that knows no rotors
@@ -37,10 +38,18 @@ class Start:
     origin: str
 
 
+@dataclass(frozen=True, eq=False)
+class Starts:
+    """Motions to begin from, the likeliest first, and the plans among them that will do as they are."""
+
+    motions: tuple[Start, ...]
+    plans: tuple[Plan, ...]  # certified for the vehicle
+
+
 def starts(
     problem: Problem, vehicle: Vehicle, guess: Miqp, planar: bool, count: int, first: Plan | None
-) -> tuple[Start, ...]:
-    """So many starts, the likeliest first; all in the maneuver's vertical plane where that is asked.
+) -> Starts:
+    """So many motions to begin from; all in the maneuver's vertical plane where that is asked.
 
     Args:
         problem: What is planned.
@@ -53,27 +62,31 @@ def starts(
     Raises:
         Infeasible: A stage asks more thrust than the vehicle has.
     """
-    sources = list(_sources(problem, vehicle, guess, first))
-    return tuple(islice(_variations(sources, planar), count))
+    plans = list(_plans(problem, vehicle, guess, first))
+    sources = list(_sources(plans, problem.stages(vehicle.max_specific_thrust)))
+    own = tuple(plan for plan, _ in plans if plan.certified and plan.vehicle == vehicle)
+    return Starts(tuple(islice(_variations(sources, planar), count)), own)
 
 
-def _sources(
-    problem: Problem, vehicle: Vehicle, guess: Miqp, first: Plan | None
-) -> Iterator[tuple[WarmStart, str]]:
-    sequence = problem.stages(vehicle.max_specific_thrust)
+def _sources(plans: Sequence[tuple[Plan, str]], sequence: StageSequence) -> Iterator[tuple[WarmStart, str]]:
+    """Plans as starts; those that know no rotors also slower."""
+    for plan, origin in plans:
+        start = WarmStart.of(plan, sequence)
+        yield start, origin
+        if plan.vehicle is None:
+            yield start.time_scaled(SLOWER), f"{origin}, slower"
+
+
+def _plans(problem: Problem, vehicle: Vehicle, guess: Miqp, first: Plan | None) -> Iterator[tuple[Plan, str]]:
+    """Plans with their origins, the likeliest first."""
     if first is not None:
-        yield WarmStart.of(first, sequence), f"{first.planner}'s plan"
+        yield first, f"{first.planner}'s plan"
     for planner, rotors, origin in _planners(problem, guess):
         try:
-            plan = planner.plan(problem, vehicle if rotors else None)
+            yield planner.plan(problem, vehicle if rotors else None), origin
         except Infeasible as infeasible:
             if not infeasible.attempts:  # refused at once, and whatever the planner
                 raise
-            continue
-        start = WarmStart.of(plan, sequence)
-        yield start, origin
-        if not rotors:
-            yield start.time_scaled(SLOWER), f"{origin}, slower"
 
 
 def _planners(problem: Problem, guess: Miqp) -> Iterator[tuple[Planner, bool, str]]:

@@ -10,7 +10,7 @@ fine one, and the fastest that is certified is kept.
 
 from __future__ import annotations
 
-from dataclasses import field
+from dataclasses import field, replace
 from typing import Annotated
 
 import numpy as np
@@ -29,7 +29,7 @@ from aerobat.planning.time_limit import TIME_LIMIT, stopped, too_short
 from aerobat.planning.time_optimal.collocated_program import SolvedMotion
 from aerobat.planning.time_optimal.collocation import BOUNDED_DERIVATIVES
 from aerobat.planning.time_optimal.race import MIN_INTERVALS, Race, with_smoother
-from aerobat.planning.time_optimal.starts import starts
+from aerobat.planning.time_optimal.starts import Starts, starts
 from aerobat.planning.warm_start import Reserve, require_attitudes
 from aerobat.problem.problem import Problem
 from aerobat.vehicle import Vehicle
@@ -84,16 +84,32 @@ class TimeOptimal(Planner):
         with within_time(self.time_limit):
             begun = starts(problem, vehicle, self.guess, self.planar, self.starts, self.start)
             for body in with_smoother(vehicle, SMOOTHING_LAG):
-                found = race.winner(begun, body)
-                if found is not None:
-                    return stopped(_plan(race.flyable(found), race))
+                found = race.winner(begun.motions, body)
+                own = None if found is None else _plan(race.flyable(found), race)
                 if out_of_time():
-                    raise too_short(problem, self.time_limit, attempts)
+                    return stopped(_best_so_far(own, begun, race, self.time_limit))
+                if own is not None:
+                    return own
         raise Infeasible(
             f"no motion of '{problem.name}' was found that {vehicle.name} can do: at the last attempt "
             f"{attempts[-1].outcome}; ask less of its stages and limits, or give more intervals",
             attempts,
         )
+
+
+def _best_so_far(own: Plan | None, begun: Starts, race: Race, limit: float | None) -> Plan:
+    """The planner's own plan, or that it began from where there is none or it is slower.
+
+    Raises Infeasible where there is neither.
+    """
+    attempts = tuple(race.recorder.attempts)
+    start = min(begun.plans, key=lambda plan: plan.duration, default=None)
+    if own is not None and (start is None or own.duration <= start.duration):
+        return own
+    if start is None:
+        raise too_short(race.problem, limit, attempts)
+    instead = f"time-optimal found none faster in time than the path that it began from, {start.planner}'s"
+    return replace(start, planner="time-optimal", attempts=attempts, rescue=instead)
 
 
 def _plan(found: Judged[SolvedMotion], race: Race) -> Plan:

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from aerobat.declaration import NonNegative, declared
 from aerobat.problem.condition import Condition, Quantity
 from aerobat.problem.gate import Gate
-from aerobat.problem.stage import CrossingTime, Stage
+from aerobat.problem.stage import MIN_CROSSING_SPEED, CrossingTime, Stage
 
 
 @declared
@@ -23,7 +23,7 @@ class GatePassage:
     """
 
     perpendicular: bool = True  # move along the gate's direction of passage and not across it
-    speed: NonNegative = 1.0  # [m/s] at least, along the direction of passage
+    speed: NonNegative = MIN_CROSSING_SPEED  # [m/s] at least, along the direction of passage
     at: CrossingTime = "free"  # when, as a part of the duration
     centred: bool = True  # at `at`; false: one interval later, as in the paper's code
     upright: bool = True  # the thrust axis along the gate's upright, not only in the plane of the turn
@@ -46,7 +46,8 @@ class GatePassage:
             asked += conditions
             min_thrust = None
         offset = 0 if self.centred else 1
-        return Stage(gate.name, tuple(asked), self.at, offset, gate.name, min_thrust)
+        # how fast is among the conditions, or left free
+        return Stage(gate.name, tuple(asked), self.at, offset, gate.name, min_thrust, min_speed=0.0)
 
 
 PAPER_PASSAGE = GatePassage(perpendicular=False, at=0.5, centred=False, upright=False)

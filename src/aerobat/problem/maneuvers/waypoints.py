@@ -11,7 +11,14 @@ import numpy as np
 from pydantic import Field
 
 from aerobat.arrays import Array
-from aerobat.declaration import FieldError, PartialVector, Positive, UnitVector, declared
+from aerobat.declaration import (
+    FieldError,
+    NonNegative,
+    PartialVector,
+    Positive,
+    UnitVector,
+    declared,
+)
 from aerobat.errors import SpecError
 from aerobat.problem.condition import Attitude, Condition, Quantity
 from aerobat.problem.gate import Gate
@@ -43,9 +50,13 @@ class Waypoint:
     thrust: Positive | None = None  # [m/s²]
     time: Positive | None = None  # [s] when to pass by, where a search on times begins
     gate: str | None = None  # name of the gate whose centre is passed
+    # through the gate; left out, 1 unless `velocity` says how fast, and 0 leaves it free
+    min_speed: NonNegative | None = None  # [m/s]
 
     def __post_init__(self) -> None:
         """Check."""
+        if self.min_speed is not None and self.gate is None:
+            raise FieldError("min_speed", "needs gate, whose direction of passage is meant; name it")
         if self.thrust is not None and self.up is None:
             raise FieldError("thrust", "needs up, its direction; add it")
         if self.up is not None and not np.isnan(self.acceleration).all():
@@ -98,6 +109,7 @@ class Waypoints(Maneuver):
                     conditions=tuple(waypoint.conditions()),
                     gate=waypoint.gate,
                     attitude=waypoint.attitude(max_specific_thrust),
+                    min_speed=waypoint.min_speed,
                 )
                 for number, waypoint in enumerate(self.waypoints, 1)
             )
