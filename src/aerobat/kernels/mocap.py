@@ -47,7 +47,7 @@ class MocapInput(NamedTuple):
     position: Vector  # standard normals
     attitude: Vector  # standard normals
     outlier: Vector  # standard normals
-    chances: tuple[Scalar, Scalar]  # uniform in [0, 1), of a dropout and of an outlier
+    chance: Scalar  # uniform in [0, 1)
 
 
 def first_pose(ops: Ops, parameters: MocapParameters, body: Body) -> Pose:
@@ -59,13 +59,13 @@ def first_pose(ops: Ops, parameters: MocapParameters, body: Body) -> Pose:
 def sample(ops: Ops, parameters: MocapParameters, body: Body, inputs: MocapInput) -> PoseSample:
     """The pose that is taken of a body."""
     seen = as_seen(ops, parameters.seam, Pose(body.position, body.q_world_body))
-    dropout, outlier = inputs.chances
-    mistaken = ops.select(outlier < parameters.outlier, parameters.outlier_size, 0.0)
+    is_outlier = 1.0 - parameters.outlier <= inputs.chance  # and a gap at the other end
+    mistaken = ops.select(is_outlier, parameters.outlier_size, 0.0)
     error = add_scaled(scale(parameters.position_noise, inputs.position), mistaken, inputs.outlier)
     pose = _with_errors(ops, seen, error, scale(parameters.attitude_noise, inputs.attitude))
     begin, end = parameters.outage
     is_out = (begin <= inputs.time) & (inputs.time < end)
-    is_taken = ops.select(parameters.dropout <= dropout, 1.0, 0.0)
+    is_taken = ops.select(parameters.dropout <= inputs.chance, 1.0, 0.0)
     return PoseSample(pose, ops.select(is_out, 0.0, is_taken))
 
 

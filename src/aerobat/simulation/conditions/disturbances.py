@@ -40,7 +40,7 @@ class WindSource:
 
     def __init__(self, draws: Sequence[Draw], period: int) -> None:
         """Prepare to draw, for a component that steps at every so many ticks."""
-        self._numbers = RandomSource([d.stream("wind") for d in draws], normals=5, period=period, block=8)
+        self._numbers = RandomSource([d.stream("wind") for d in draws], normals=5, period=period, block=32)
 
     def chunk(self, begin: int, end: int) -> GustNoise:
         """See `Source.chunk`."""

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
+from math import hypot, tau
+from typing import Any
 
 import numpy as np
 
@@ -33,6 +35,7 @@ _NORMALS = (  # standard normals of a draw, in this order, whatever the conditio
     ("mean_wind", 2),
     ("gust", 5),
 )
+_ENDS = np.cumsum([count for _, count in _NORMALS]).tolist()
 # of a second-order gust's two filters [-]: the Cholesky factor of their covariance (1/2, 1/4; 1/4, 1/4)
 _GUST_ROOT = np.array([[np.sqrt(0.5), 0.0], [np.sqrt(0.125), np.sqrt(0.125)]])
 
@@ -121,17 +124,23 @@ def draw_flights(dispersion: Dispersion, rotors: int, seed: int, flights: Iterab
 
 def _draw(conditions: Dispersion, rotors: int, seed: int, flight: int) -> Draw:
     rng = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(flight,)))
-    ends = np.cumsum([count for _, count in _NORMALS])
-    normals = np.split(rng.standard_normal(ends[-1]), ends[:-1])
-    normal = {name: part for (name, _), part in zip(_NORMALS, normals, strict=True)}
-    used, heading = rng.random(2).tolist()
+    normals = rng.standard_normal(_ENDS[-1])
+    normal = {name: normals[end - count : end] for (name, count), end in zip(_NORMALS, _ENDS, strict=True)}
+    uniform = rng.random(2).tolist()
     each_rotor = rng.standard_normal((2, rotors))  # last: other vehicles draw the rest alike
-    imu = conditions.imu or Imu()
-    capture = conditions.motion_capture or MotionCapture()
-    hand_off = capture.hand_off or HandOff()
-    gusts = conditions.gusts or Gusts()
-    along, *across = normal["gust"]
     values = {
+        **_of_vehicle(conditions, normal, each_rotor),
+        **_of_sensors(conditions, normal),
+        **_of_surroundings(conditions, normal, uniform),
+    }
+    for value in values.values():
+        if isinstance(value, np.ndarray):
+            value.flags.writeable = False
+    return Draw(seed, flight, **values)
+
+
+def _of_vehicle(conditions: Dispersion, normal: Mapping[str, Array], each_rotor: Array) -> dict[str, Any]:
+    return {
         "mass": float(_factors(conditions.mass, normal["mass"])[0]),
         "inertia": float(_factors(conditions.inertia, normal["inertia"])[0]),
         "drag": conditions.drag * abs(float(normal["drag"][0])),
@@ -140,6 +149,14 @@ def _draw(conditions: Dispersion, rotors: int, seed: int, flight: int) -> Draw:
         "start_position": conditions.start_position * normal["start_position"],
         "start_velocity": conditions.start_velocity * normal["start_velocity"],
         "start_attitude": conditions.start_attitude * normal["start_attitude"],
+    }
+
+
+def _of_sensors(conditions: Dispersion, normal: Mapping[str, Array]) -> dict[str, Any]:
+    imu = conditions.imu or Imu()
+    capture = conditions.motion_capture or MotionCapture()
+    hand_off = capture.hand_off or HandOff()
+    return {
         "gyro_bias": imu.gyro_bias * normal["gyro_bias"],
         "accelerometer_bias": imu.accelerometer_bias * normal["accelerometer_bias"],
         "first_position_error": capture.position_noise * normal["first_position_error"],
@@ -147,15 +164,21 @@ def _draw(conditions: Dispersion, rotors: int, seed: int, flight: int) -> Draw:
         "hand_off_translation": hand_off.translation * _direction(normal["hand_off_translation"]),
         "hand_off_rotation": hand_off.rotation * _direction(normal["hand_off_rotation"]),
         "warp": hand_off.warp * _direction(normal["warp"]),
+    }
+
+
+def _of_surroundings(
+    conditions: Dispersion, normal: Mapping[str, Array], uniform: Sequence[float]
+) -> dict[str, Any]:
+    gusts = conditions.gusts or Gusts()
+    used, turn = uniform
+    along, *across = normal["gust"]
+    return {
         "charge": 1.0 - used * (conditions.battery.charge_spread if conditions.battery else 0.0),
         "mean_wind": gusts.mean_wind * np.append(normal["mean_wind"], 0.0),
         "gust": np.append(along, (np.reshape(across, (2, 2)) @ _GUST_ROOT.T).ravel()),
-        "gust_heading": 2.0 * np.pi * heading,
+        "gust_heading": tau * turn,
     }
-    for value in values.values():
-        if isinstance(value, np.ndarray):
-            value.flags.writeable = False
-    return Draw(seed, flight, **values)
 
 
 def _factors(spread: float, normals: Array) -> Array:
@@ -165,7 +188,7 @@ def _factors(spread: float, normals: Array) -> Array:
 
 
 def _direction(normals: Array) -> Array:
-    return normals / np.linalg.norm(normals)
+    return normals / hypot(*normals.tolist())
 
 
 def dispersed_fleet(nominal: Vehicle, draws: Sequence[Draw]) -> Fleet:
@@ -190,3 +213,9 @@ def dispersed_fleet(nominal: Vehicle, draws: Sequence[Draw]) -> Fleet:
         lags=np.array([d.lags for d in draws]) * one.lags,
         radii=alike(one.radii),
     )
+
+
+def dispersed_starts(reference: BodyState, draws: Sequence[Draw]) -> BodyState:
+    """The true starts of flights whose reference starts so, leading axis (vehicles,)."""
+    starts = [vars(draw.start(reference)) for draw in draws]
+    return BodyState(*(np.array([start[field.name] for start in starts]) for field in fields(BodyState)))

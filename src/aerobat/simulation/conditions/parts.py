@@ -176,7 +176,7 @@ def imu_parts(imu: Imu, flights: DispersedFlights) -> tuple[Part, Part]:
         ImuParameters(*map(flights.all, numbers)),
     )
     return (
-        Part(ImuBias(slow), biases, ImuSource(flights.draws, "imu_bias", slow, block=8)),
+        Part(ImuBias(slow), biases, ImuSource(flights.draws, "imu_bias", slow, block=32)),
         Part(ImuSensor(period), felt, ImuSource(flights.draws, "imu", period)),
     )
 

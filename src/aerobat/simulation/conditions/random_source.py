@@ -70,7 +70,8 @@ class RandomSource:
             own = np.empty((len(generators), self._numbers, self._size))
             for numbers, generator in zip(own, generators, strict=True):
                 generator.standard_normal(out=numbers[: self._normals])
-                generator.random(out=numbers[self._normals :])
+                if self._normals < self._numbers:
+                    generator.random(out=numbers[self._normals :])
             drawn[..., first : first + _TOGETHER] = own.transpose(1, 2, 0)
         self._drawn = drawn
         self._latest += 1

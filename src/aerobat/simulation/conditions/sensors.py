@@ -157,11 +157,11 @@ class MocapSource:
             rate: of the ticks [1/s].
         """
         seeds = [each.stream("motion_capture") for each in draws]
-        self._numbers = RandomSource(seeds, normals=9, uniforms=2, period=period, block=8)
+        self._numbers = RandomSource(seeds, normals=9, uniforms=1, period=period, block=32)
         self._rate = rate
 
     def chunk(self, begin: int, end: int) -> MocapInput:
         """See `Source.chunk`."""
         x = self._numbers.rows(begin, end)
         time = np.arange(begin, end) / self._rate
-        return MocapInput(time, (x[0], x[1], x[2]), (x[3], x[4], x[5]), (x[6], x[7], x[8]), (x[9], x[10]))
+        return MocapInput(time, (x[0], x[1], x[2]), (x[3], x[4], x[5]), (x[6], x[7], x[8]), x[9])
