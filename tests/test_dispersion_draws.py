@@ -8,7 +8,7 @@ from scipy import stats
 
 from aerobat import so3
 from aerobat.environment import Battery, Dispersion, Gusts, load_dispersion
-from aerobat.simulation.conditions.draw import STREAMS, Draw, dispersed_fleet, dispersed_starts, draw_flights
+from aerobat.simulation.conditions.draw import STREAMS, Draw, dispersed_fleet, draw_flights
 from aerobat.states import BodyState
 from aerobat.vehicle import load_vehicle, vehicle_names
 from aerobat.vehicle.fleet import Fleet
@@ -135,15 +135,15 @@ def test_where_nothing_varies_the_nominal_vehicle_starts_at_the_reference() -> N
     np.testing.assert_array_equal(draw.effectiveness, 1.0)
 
 
-def test_starts_are_those_of_the_draws() -> None:
+def test_a_flight_starts_off_the_reference_by_what_it_draws() -> None:
     reference = BodyState(np.ones(3), np.zeros(3), np.array([0.6, 0.0, 0.8, 0.0]), np.ones(3))
-    draws = draw_flights(LAB, ROTORS, 3, range(4))
-    starts = dispersed_starts(reference, draws)
-    np.testing.assert_array_equal(starts.position, 1.0 + column(draws, "start_position"))
-    np.testing.assert_array_equal(starts.velocity, column(draws, "start_velocity"))
-    turned = so3.box_minus(starts.q_world_body, reference.q_world_body)
-    np.testing.assert_allclose(turned, column(draws, "start_attitude"), atol=1e-14)
-    np.testing.assert_array_equal(starts.omega_body, 1.0)
+    [draw] = draw_flights(LAB, ROTORS, 3, [2])
+    start = draw.start(reference)
+    np.testing.assert_array_equal(start.position, 1.0 + draw.start_position)
+    np.testing.assert_array_equal(start.velocity, draw.start_velocity)
+    turned = so3.box_minus(start.q_world_body, reference.q_world_body)
+    np.testing.assert_allclose(turned, draw.start_attitude, atol=1e-14)
+    np.testing.assert_array_equal(start.omega_body, 1.0)
 
 
 def test_streams_of_random_numbers_are_each_their_own() -> None:

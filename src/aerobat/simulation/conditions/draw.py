@@ -213,9 +213,3 @@ def dispersed_fleet(nominal: Vehicle, draws: Sequence[Draw]) -> Fleet:
         lags=np.array([d.lags for d in draws]) * one.lags,
         radii=alike(one.radii),
     )
-
-
-def dispersed_starts(reference: BodyState, draws: Sequence[Draw]) -> BodyState:
-    """The true starts of flights whose reference starts so, leading axis (vehicles,)."""
-    starts = [vars(draw.start(reference)) for draw in draws]
-    return BodyState(*(np.array([start[field.name] for start in starts]) for field in fields(BodyState)))
