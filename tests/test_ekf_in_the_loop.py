@@ -23,9 +23,9 @@ def filter_row(signals: Any) -> Any:
     return signals["plant"].body, signals["observer"].filter, signals["imu_bias"]
 
 
-def fused_errors(plan: ab.Plan, conditions: ab.Dispersion) -> tuple[Array, Array, Array]:
+def fused_errors(plan: ab.Plan, conditions: ab.Dispersion, flights: range) -> tuple[Array, Array, Array]:
     """Errors of 15 after each pose, (flights, poses, 15), their covariances, and the poses' NIS."""
-    setup = prepare(plan, config=ab.FlightConfig(conditions=conditions, flights=range(50)))
+    setup = prepare(plan, config=ab.FlightConfig(conditions=conditions, flights=flights))
     loop = setup.compile(log=filter_row)
     carry, parts = loop.init(setup.first_tick), []
     for begin, end in setup.chunks():
@@ -53,7 +53,8 @@ def test_in_a_hundred_flips_errors_are_as_large_as_the_filter_says_and_small() -
     lab = ab.load_dispersion("lab")
     assert lab.motion_capture is not None
     capture = replace(lab.motion_capture, dropout=0.0, outlier=0.0, hand_off=None)
-    runs = [fused_errors(plan, replace(lab, motion_capture=capture)) for plan in plans()]
+    conditions, halves = replace(lab, motion_capture=capture), (range(50), range(50, 100))
+    runs = [fused_errors(plan, conditions, half) for plan, half in zip(plans(), halves, strict=True)]
     poses = min(run[0].shape[1] for run in runs)
     error, covariance, nis = (np.concatenate([run[k][:, :poses] for run in runs]) for k in range(3))
     nees = np.einsum("nti,nti->nt", error, np.linalg.solve(covariance, error[..., None])[..., 0])
