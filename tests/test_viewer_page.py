@@ -32,6 +32,7 @@ def test_a_page_holds_what_was_flown() -> None:
     np.testing.assert_allclose(errors["position error"], flight.position_error, rtol=1e-6)
     np.testing.assert_allclose(errors["attitude error"], np.rad2deg(flight.attitude_error), rtol=1e-6)
     assert [rotor["max"] for rotor in told["rotors"]] == plan.vehicle.max_thrusts.tolist()
+    assert told["body"]["semiAxes"] == plan.vehicle.bounding_ellipsoid.semi_axes.tolist()
     assert told["gates"][0]["position"] == plan.problem.gates[0].position.tolist()
 
 

@@ -68,6 +68,7 @@ def _text(name: str) -> str:
 def _header(scene: Scene, blob: Blob) -> dict[str, Any]:
     """All of a scene but its arrays, which go to the blob."""
     vehicle = scene.vehicle
+    body = vehicle.bounding_ellipsoid
     top = float(max(np.abs([track.thrusts for track in scene.tracks]).max(), 1e-9))
     return {
         "title": scene.title,
@@ -75,6 +76,7 @@ def _header(scene: Scene, blob: Blob) -> dict[str, Any]:
         "isWell": scene.is_well,
         "weight": vehicle.mass * scene.gravity,
         "ground": scene.ground,
+        "body": {"semiAxes": body.semi_axes.tolist(), "centre": body.centre.tolist()},
         "rotors": [
             {
                 "position": rotor.position_body.tolist(),

@@ -65,7 +65,7 @@ class Cameras {
   through() {
     const gate = HEADER.gates[this.gate];
     const [normal, across] = [vector(gate.normal), vector(crossOf(gate))];
-    const distance = 3.2 * Math.max(gate.width, gate.height, 1.5 * SPAN) / Math.min(this.camera.aspect, 1);
+    const distance = 2.5 * Math.max(gate.width, gate.height, 1.5 * SPAN) / Math.min(this.camera.aspect, 1);
     const offset = normal.multiplyScalar(distance).addScaledVector(across, 0.28 * distance);
     offset.z += 0.22 * distance;
     return [vector(gate.position), offset];

@@ -71,7 +71,8 @@ function disc(rotor) {
   return shape.translate(rotor.position[0], rotor.position[1], rotor.position[2] + MAST * rotor.radius);
 }
 
-// A vehicle whose discs show the thrusts of their rotors, with an arrow of them all.
+// A vehicle whose discs show the thrusts of their rotors, with an arrow of them all and the ellipsoid by which its
+// clearance is judged.
 function vehicleModel() {
   const model = new THREE.Group();
   model.add(new THREE.Mesh(airframe(COLOUR.sky), new THREE.MeshLambertMaterial({ vertexColors: true })));
@@ -89,6 +90,11 @@ function vehicleModel() {
   model.head = new THREE.Mesh(head, paint);
   model.arrow.add(model.shaft, model.head);
   model.add(model.arrow);
+  const glass = new THREE.MeshBasicMaterial({ color: COLOUR.sky, transparent: true, opacity: 0.13, depthWrite: false });
+  model.shell = new THREE.Mesh(new THREE.SphereGeometry(1, 32, 20), glass);
+  model.shell.scale.set(...HEADER.body.semiAxes);
+  model.shell.position.set(...HEADER.body.centre);
+  model.add(model.shell);
   return model;
 }
 

@@ -161,6 +161,7 @@ class Player {
     const { enlargement } = this.world;
     const scale = this.trueSize || this.cameras.view !== "orbit" ? 1 : enlargement;
     this.world.enlarge(scale);
+    this.world.vehicle.shell.visible = this.cameras.view === "gate"; // whether it fits is asked there
     element("size").hidden = enlargement === 1 || this.cameras.view !== "orbit";
     element("size").textContent = `vehicle ×${scale}`;
     this.stale = true;
