@@ -213,3 +213,12 @@ def test_all_numbers_of_a_certificate_are_finite(duration, coefficient):
     numbers = [(f.value, f.bound, f.time) for f in certificate.findings]
     assert np.isfinite(numbers).all()
     assert certificate.certified == (certificate.margin > 0)
+
+
+@given(value=st.floats(-2.0, 2.0), off=st.floats(0.0, 2.0), limit=st.floats(-2.0, 2.0))
+def test_a_finding_is_nearer_than_can_be_told_only_where_its_bound_is_beyond_the_limit(value, off, limit):
+    """Undecided it may be elsewhere, too: where no attitude is determined."""
+    bound = value + off
+    said = str(Finding("thrust", "N", Side.MAX, value, bound, 1.0, limit, Verdict.UNDECIDED))
+    assert ("nearer to its limit than can be told" in said) == (bound > limit)
+    assert ("within its limit" in said) == (bound <= limit)

@@ -153,6 +153,7 @@ ARGUMENT_FAULTS = {
     "negative seed": (["fly", "line", "--seed", "-1"], "seed"),
     "negative time": (["plan", "line", "--time-limit", "-1"], "time_limit"),
     "output over a file": (["plan", "line", "--out", "taken"], "taken"),
+    "output to a name too long": (["plan", "line", "--planner", "min-snap", "--out", "x" * 300], "x" * 300),
     "unknown planner": (["plan", "line", "--planner", "magic"], "planner"),
     "segments of another planner": (["plan", "line", "--segments", "4"], "--segments"),
     "a solver for the closed form": (

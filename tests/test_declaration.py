@@ -68,6 +68,7 @@ WRONG = [
     ({"shape": BOX, "scale": 1e-300}, "scale must be from 1e-15 to 1e+15, got 1e-300; check its unit"),
     ({"shape": BOX, "scale": 1e29}, "scale must be from 1e-15 to 1e+15, got 1e+29; check its unit"),
     ({"shape": {"sides": [1.0, 2.0]}}, "shape.sides must be 3 numbers, got a list of 2"),
+    ({"shape": {"sides": [1.0, 1e300, 1.0]}}, "shape.sides[1] must be from -1e+15 to 1e+15, got 1e+300"),
     ({"shape": {"sides": [1.0, "x", 1.0]}}, "shape.sides[1] must be a number, got 'x'"),
     ({"shape": {"sides": [1.0, True, 1.0]}}, "shape.sides[1] must be a number, got True"),
     ({"shape": BOX | {"hollow": "very"}}, "shape.hollow must be true or false, got 'very'"),

@@ -85,7 +85,20 @@ def _numbers(value: Any, place: str, infinite: bool) -> Any:
 
 
 def _vector(value: Any) -> Array:
-    return finite(value, 3)
+    return _small(finite(value, 3))
+
+
+def _small(vector: Array) -> Array:
+    """The vector. Raises FieldError where a finite component is beyond all reason."""
+    for i, x in enumerate(vector.tolist()):
+        _bounded(x, f"[{i}]")
+    return vector
+
+
+def _bounded(value: float, place: str = "") -> float:
+    if _MAX_MAGNITUDE < abs(value) < inf:
+        raise FieldError(place, f"must be from {-_MAX_MAGNITUDE:g} to {_MAX_MAGNITUDE:g}, got {value:g}")
+    return value
 
 
 def _direction(value: Any) -> Array:
@@ -113,13 +126,13 @@ def _partial(value: Any) -> Array:
         0.0 if left_free else _numbers(x, place, infinite=False)
         for x, place, left_free in zip(given, places, free, strict=True)
     ]
-    vector = np.where(free, nan, finite(numbers, 3))
+    vector = np.where(free, nan, _vector(numbers))
     vector.flags.writeable = False
     return vector
 
 
 def _corner(value: Any) -> Array:
-    return array(value, 3)
+    return _small(array(value, 3))
 
 
 def _per_axis(value: Any) -> Array:
@@ -205,6 +218,7 @@ Number = Annotated[
     float,
     Field(allow_inf_nan=True),
     AfterValidator(_not_nan),
+    AfterValidator(lambda number: _bounded(number)),
     Field(description="number, `inf` and `-inf` too"),
 ]
 Angle = Annotated[float, AfterValidator(_radians), Field(description="number of radians, from −4π to 4π")]

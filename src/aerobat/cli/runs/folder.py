@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -65,7 +66,7 @@ def written(
         table: The same for people.
     """
     folder = options.out or record.folder
-    replaced = folder.is_dir() and any(folder.iterdir())
+    replaced = os.path.isdir(folder) and any(folder.iterdir())  # False for names that no folder can have
     with run_folder(folder, record) as staging:
         write(staging)
     if options.json:
