@@ -11,6 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import stats
 
+from aerobat.engines.engine import expanded
 from aerobat.engines.pytree import tree_leaves
 from aerobat.environment import Battery, Dispersion, Gusts, HandOff, Imu, MotionCapture, load_dispersion
 from aerobat.kernels.motors import Motion
@@ -113,6 +114,11 @@ def test_wind_weak_rotors_and_an_empty_battery_each_change_a_flight() -> None:
         assert np.abs(np.subtract(other, still)).max() > 1e-3
 
 
+def numbers(source: RandomSource, begin: int, end: int) -> np.ndarray:
+    """Those of every tick, (numbers, ticks, vehicles)."""
+    return np.array(expanded(source.inputs(begin, end, tuple)))
+
+
 @settings(max_examples=30)
 @given(st.lists(st.integers(0, 300), min_size=2, max_size=6), st.sampled_from([1, 3, 10]))
 def test_random_numbers_are_the_same_however_they_are_asked_for(cuts: list[int], period: int) -> None:
@@ -122,11 +128,11 @@ def test_random_numbers_are_the_same_however_they_are_asked_for(cuts: list[int],
     def source() -> RandomSource:
         return RandomSource(seeds, normals=2, uniforms=1, period=period, block=8)
 
-    whole, cut = source().rows(0, 302), source()
+    whole, cut = numbers(source(), 0, 302), source()
     for begin, end in pairwise(cuts):
         begin, end = min(begin, end), max(begin, end) + 1
-        np.testing.assert_array_equal(cut.rows(begin, end), whole[:, begin:end])
-    alone = RandomSource(seeds[1:2], normals=2, uniforms=1, period=period, block=8).rows(0, 302)
+        np.testing.assert_array_equal(numbers(cut, begin, end), whole[:, begin:end])
+    alone = numbers(RandomSource(seeds[1:2], normals=2, uniforms=1, period=period, block=8), 0, 302)
     np.testing.assert_array_equal(alone[..., 0], whole[..., 1])
     samples = whole[:, ::period]
     np.testing.assert_array_equal(whole, np.repeat(samples, period, axis=1)[:, :302])
@@ -135,7 +141,7 @@ def test_random_numbers_are_the_same_however_they_are_asked_for(cuts: list[int],
 
 def test_random_numbers_are_normal_and_uniform() -> None:
     seeds = [np.random.SeedSequence(5, spawn_key=(k,)) for k in range(70)]
-    normal, other, uniform = RandomSource(seeds, normals=2, uniforms=1).rows(0, 500)
+    normal, other, uniform = numbers(RandomSource(seeds, normals=2, uniforms=1), 0, 500)
     for values, law in ((normal, "norm"), (other, "norm"), (uniform, "uniform")):
         assert stats.kstest(values.ravel(), law).pvalue > 1e-3
     assert abs(np.corrcoef(normal.ravel(), other.ravel())[0, 1]) < 0.02

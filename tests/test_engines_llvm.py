@@ -103,7 +103,7 @@ def test_no_multiplication_is_fused_with_an_addition(width: int) -> None:
     """Fusing rounds once where the kernel rounds twice, and not on all machines."""
     loop = trace_loop(begin, random_walk, np.ones(3), np.ones(3))
     text = module(
-        loop, Layout(width, shared_parameters=(False,), shared_inputs=(False,), piecewise_constant=(False,))
+        loop, Layout(width, shared_parameters=(False,), shared_inputs=(False,), held=(None,), piecewise_constant=(False,))
     )
     assembly = target_machine().emit_assembly(llvm.parse_assembly(text))
     assert "mul" in assembly

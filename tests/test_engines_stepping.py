@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from aerobat.engines import ENGINE_NAMES, CompiledLoop, choose, logged_ticks
-from aerobat.engines.engine import first_row
+from aerobat.engines.engine import Held, expanded, first_row
 from aerobat.engines.pytree import tree_leaves, tree_map
 
 FAST = ("floats", "bytecode", "numpy", "compiled")  # to be ready
@@ -103,6 +103,39 @@ def test_any_cuts_give_the_same_bits(cuts: list[int], engine: str) -> None:
     inputs = drawn(200, 5)
     loop = loop_of(engine, inputs)
     assert_same(in_chunks(loop, inputs, [0, *sorted(set(cuts)), 200]), in_chunks(loop, inputs, [0, 200]))
+
+
+@pytest.mark.parametrize("vehicles", [1, VEHICLES])
+@pytest.mark.parametrize("engine", ENGINE_NAMES)
+def test_held_inputs_give_the_bits_of_inputs_told_at_every_tick(engine: str, vehicles: int) -> None:
+    """Where they change, how often, in which order, and how the ticks are cut: all the same."""
+    rng = np.random.default_rng(2)
+    common = Held(np.arange(200) // 7, 9.0 * rng.normal(size=29))
+    own = Held(rng.integers(0, 17, 200), 9.0 * rng.normal(size=(17, vehicles)))
+    inputs = Inputs(drawn(200).clock, common, own)
+    plain = expanded(inputs)
+    assert plain.own.shape == (200, vehicles)
+    expected = in_chunks(loop_of(engine, plain), plain, [0, 200])
+    stiffness = np.random.default_rng(1).uniform(0.5, 2.0, vehicles)
+    loop = choose(engine, vehicles, TICKS).compile(init, step, stiffness, first_row(inputs))
+    for cuts in ([0, 200], [0, 1, 60, 67, 200]):
+        carry, rows = loop.init(first_row(inputs)), []
+        for begin, end in pairwise(cuts):
+            carry, row = loop.scan(carry, shown(inputs, begin, end))
+            rows.append(row)
+        together = Row(*(np.concatenate(series, axis=-1) for series in zip(*rows, strict=True)))
+        assert_same((carry, together), expected)
+    carry = loop.init(first_row(inputs))
+    for tick in range(30):
+        carry, row = loop.step(carry, first_row(shown(inputs, tick, tick + 1)))
+        assert_same(row, tree_map(lambda leaf, k=tick: leaf[:, k], expected[1]))
+
+
+def shown(inputs: Inputs, begin: int, end: int) -> Inputs:
+    """Inputs of some ticks, all that was held before and will be after among the values."""
+    clock, common, own = inputs
+    held = (Held(each.row[begin:end], each.values) for each in (common, own))
+    return Inputs(Clock(clock.elapsed[begin:end]), *held)
 
 
 @pytest.mark.parametrize("engine", ENGINE_NAMES)

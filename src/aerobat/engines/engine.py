@@ -5,16 +5,29 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, Protocol, TypeAlias
+from typing import Any, NamedTuple, Protocol, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
-from aerobat.engines.pytree import Tree, tree_leaves, tree_map
+from aerobat.engines.pytree import Tree, tree_leaves, tree_map, tree_replace
 from aerobat.kernels.ops import Ops
 
 Init: TypeAlias = Callable[[Ops, Tree, Tree], Tree]
 Step: TypeAlias = Callable[[Ops, Tree, Tree, Tree], tuple[Tree, Tree]]
+
+
+class Held(NamedTuple):
+    """Inputs that stay for several ticks, of which each is told once; kernels see the tree of its values."""
+
+    row: Any  # of `values` at each tick, (ticks,), whole numbers; () for one tick, whose values are its own
+    values: Tree  # leaves (samples,) or (samples, vehicles)
+
+    def expanded(self) -> Tree:
+        """The values of each tick."""
+        if isinstance(self.row, tuple):
+            return self.values
+        return tree_map(lambda leaf: leaf[self.row], self.values)
 
 
 class CompiledLoop(ABC):
@@ -26,7 +39,10 @@ class CompiledLoop(ABC):
 
     @abstractmethod
     def init(self, inputs: Tree) -> Tree:
-        """The carry before the first tick; leaves of its `inputs` are numbers or arrays (vehicles,)."""
+        """The carry before the first tick; leaves of its `inputs` are numbers or arrays (vehicles,).
+
+        As for `scan`, what is `Held` in them is so at compilation too.
+        """
 
     @abstractmethod
     def scan(self, carry: Tree, inputs: Tree, log_stride: int = 1) -> tuple[Tree, Tree]:
@@ -34,7 +50,8 @@ class CompiledLoop(ABC):
 
         Args:
             carry: from `init`, or from an earlier scan or step; stays as it is.
-            inputs: leaves (ticks,), the same for all vehicles, or (ticks, vehicles), as at compilation.
+            inputs: leaves (ticks,), the same for all vehicles, or (ticks, vehicles), as at compilation; those
+                of a `Held` have as many rows as it has samples.
             log_stride: ticks from one logged row to the next.
 
         The rows' leaves are (vehicles, logged ticks).
@@ -84,7 +101,13 @@ def run_whole(engine: Engine, init: Init, step: Step, parameters: Tree, inputs: 
 
 def first_row(inputs: Tree) -> Tree:
     """Inputs of the first tick."""
-    return tree_map(lambda leaf: np.asarray(leaf)[0], inputs)
+    of_first = tree_replace(inputs, Held, lambda held: Held((), held._replace(row=held.row[:1]).expanded()))
+    return tree_map(lambda leaf: np.asarray(leaf)[0], of_first)
+
+
+def expanded(inputs: Tree) -> Tree:
+    """Inputs as kernels see them: what is `Held` stands at every tick."""
+    return tree_replace(inputs, Held, Held.expanded)
 
 
 def tick_count(inputs: Tree) -> int:

@@ -13,6 +13,7 @@ from aerobat.engines.engine import (
     Engine,
     Init,
     Step,
+    expanded,
     logged_ticks,
     read_only,
     tick_count,
@@ -53,7 +54,7 @@ class FloatLoop(CompiledLoop):
 
     def init(self, inputs: Tree) -> Tree:
         """See `CompiledLoop.init`."""
-        chunk = tree_map(lambda leaf: np.asarray(leaf)[None], inputs)
+        chunk = tree_map(lambda leaf: np.asarray(leaf)[None], expanded(inputs))
         carries = [
             self._init(FloatOps, parameters, next(_ticks(chunk, vehicle)))
             for vehicle, parameters in enumerate(self._parameters)
@@ -63,6 +64,7 @@ class FloatLoop(CompiledLoop):
     def scan(self, carry: Tree, inputs: Tree, log_stride: int = 1) -> tuple[Tree, Tree]:
         """See `CompiledLoop.scan`."""
         logged = set(logged_ticks(tick_count(inputs), log_stride).tolist())
+        inputs = expanded(inputs)
         carries, series = [], []
         for vehicle, state in enumerate(tree_rows(carry, _floats)):
             parameters, rows = self._parameters[vehicle], []

@@ -12,7 +12,16 @@ import jax.numpy as jnp
 import numpy as np
 
 from aerobat.arrays import Array
-from aerobat.engines.engine import CompiledLoop, Engine, Init, Step, logged_ticks, read_only, tick_count
+from aerobat.engines.engine import (
+    CompiledLoop,
+    Engine,
+    Init,
+    Step,
+    expanded,
+    logged_ticks,
+    read_only,
+    tick_count,
+)
 from aerobat.engines.pytree import Tree, tree_leaves, tree_unflatten
 from aerobat.engines.traced_loop import TracedLoop, trace_loop
 from aerobat.engines.tracing import FUNCTIONS
@@ -42,7 +51,7 @@ class JaxLoop(CompiledLoop):
         inputs: Tree,
         precision: Literal["float64", "float32"] = "float64",
     ) -> None:
-        self._loop = trace_loop(init, step, parameters, inputs)
+        self._loop = trace_loop(init, step, parameters, expanded(inputs))
         self._program = _Program(str(self._loop), self._loop)
         self._precision = precision
         with jax.enable_x64(precision == "float64"):
@@ -51,7 +60,7 @@ class JaxLoop(CompiledLoop):
     def init(self, inputs: Tree) -> Tree:
         """See `CompiledLoop.init`."""
         with jax.enable_x64(self._precision == "float64"):
-            row = tuple(jnp.asarray(leaf, self._precision) for leaf in tree_leaves(inputs))
+            row = tuple(jnp.asarray(leaf, self._precision) for leaf in tree_leaves(expanded(inputs)))
             return self._carry(_initialized(self._program, self._parameters, row))
 
     def scan(self, carry: Tree, inputs: Tree, log_stride: int = 1) -> tuple[Tree, Tree]:
@@ -59,7 +68,7 @@ class JaxLoop(CompiledLoop):
         logged = logged_ticks(tick_count(inputs), log_stride)
         with jax.enable_x64(self._precision == "float64"):
             state = tuple(map(jnp.asarray, tree_leaves(carry)))
-            series = tuple(jnp.asarray(_padded(x), self._precision) for x in tree_leaves(inputs))
+            series = tuple(jnp.asarray(_padded(x), self._precision) for x in tree_leaves(expanded(inputs)))
             state, outputs = _scanned(self._program, self._parameters, state, series, _padded(logged))
             rows = [_row(output, len(logged)) for output in outputs]
             return self._carry(state), tree_unflatten(self._loop.row, rows)

@@ -13,6 +13,7 @@ from aerobat.engines.engine import (
     Engine,
     Init,
     Step,
+    expanded,
     logged_ticks,
     read_only,
     tick_count,
@@ -42,7 +43,7 @@ class ArrayLoop(CompiledLoop):
 
     def init(self, inputs: Tree) -> Tree:
         """See `CompiledLoop.init`."""
-        row = tree_map(lambda leaf: leaf if np.ndim(leaf) else float(leaf), inputs)
+        row = tree_map(lambda leaf: leaf if np.ndim(leaf) else float(leaf), expanded(inputs))
         with np.errstate(all="ignore"):
             return self._carry(self._init(ArrayOps, self._parameters, row))
 
@@ -51,7 +52,7 @@ class ArrayLoop(CompiledLoop):
         logged = set(logged_ticks(tick_count(inputs), log_stride).tolist())
         rows = []
         with np.errstate(all="ignore"):  # a vehicle that diverges may overflow; the others fly on
-            for tick, row in enumerate(tree_rows(inputs, _ticks)):
+            for tick, row in enumerate(tree_rows(expanded(inputs), _ticks)):
                 carry, output = self._step(ArrayOps, self._parameters, carry, row)
                 if tick in logged:
                     rows.append(output)

@@ -26,6 +26,15 @@ def tree_map(function: Callable[[Any], Any], tree: Tree) -> Tree:
     return tree_unflatten(tree, map(function, tree_leaves(tree)))
 
 
+def tree_replace(tree: Tree, kind: type, function: Callable[[Any], Tree]) -> Tree:
+    """The tree with `function` applied to each tuple of a kind."""
+    if isinstance(tree, kind):
+        return function(tree)
+    if not isinstance(tree, tuple):
+        return tree
+    return _like(tree, [tree_replace(child, kind, function) for child in tree])
+
+
 def tree_stack(trees: Sequence[Tree], join: Callable[[Sequence[Any]], Any]) -> Tree:
     """The tree whose leaves are `join` of the leaves of alike trees."""
     first = trees[0]

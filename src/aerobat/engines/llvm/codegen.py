@@ -9,10 +9,11 @@ the machine, nor the width, nor the size of a batch changes a bit of what comes 
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass, replace
-from itertools import compress
+from itertools import compress, count
 from typing import Any
 
 from llvmlite import ir
@@ -26,11 +27,12 @@ ARRAYS = (
     "parameters",
     "shared inputs",
     "inputs",
+    "held inputs",
     "carry",
     "next carry",
     "outputs",
 )
-COUNTS = ("lanes", "ticks", "log_stride", "begin", "end")
+COUNTS = ("lanes", "ticks", "held rows", "log_stride", "begin", "end")
 
 
 @dataclass(frozen=True)
@@ -38,7 +40,9 @@ class Layout:
     """Vehicles side by side, and which parameters and inputs are one number for all.
 
     Both functions take arrays of float64: shared parameters (s,), parameters (p, lanes), shared inputs
-    (ticks, r), inputs (ticks, i, lanes), carry and next carry (c, lanes), outputs (logged ticks, o, lanes).
+    (ticks, r + h), inputs (blocks, ticks, i, width), held inputs (blocks, held rows, width), carry and next
+    carry (c, lanes), outputs (logged ticks, o, lanes). The last h columns of the shared inputs say where in a
+    block of the held inputs the values of each `Held` begin at a tick.
     `scan` logs the first tick, each `log_stride` ticks after it, and the last; `init` reads the inputs of one
     tick and writes the next carry. The lanes `begin` to `end` are run, multiples of the width.
     """
@@ -46,7 +50,23 @@ class Layout:
     width: int
     shared_parameters: tuple[bool, ...]
     shared_inputs: tuple[bool, ...]
+    held: tuple[int | None, ...]  # of each input, the `Held` that it stands in
     piecewise_constant: tuple[bool, ...]  # inputs that are shared, and at most ticks the same as before
+
+    @property
+    def own_inputs(self) -> int:
+        """Inputs of each vehicle that are told at every tick."""
+        return sum(not one and held is None for one, held in zip(self.shared_inputs, self.held, strict=True))
+
+    @property
+    def helds(self) -> int:
+        """The number of `Held`s."""
+        return len({*self.held} - {None})
+
+    @property
+    def shared_columns(self) -> int:
+        """Of the shared inputs."""
+        return sum(self.shared_inputs) + self.helds
 
 
 def module(loop: TracedLoop, layout: Layout) -> str:
@@ -73,19 +93,19 @@ class _Codegen:
 
     def emit_init(self) -> None:
         """The first carry of each block of lanes, one after another."""
-        loop, layout = self._loop, self._layout
+        loop = self._loop
         with self._blocks() as lane:
-            self._load("parameters", loop.parameters, layout.shared_parameters, INTEGER(0), lane)
-            self._load("inputs", loop.inputs, layout.shared_inputs, INTEGER(0), lane)
+            self._load_parameters(lane)
+            self._load_inputs(INTEGER(0), lane)
             self._compute(loop.initialization)
             self._store("next carry", INTEGER(0), self._wide(loop.first_carry), lane)
         self._builder.ret_void()
 
     def emit_scan(self) -> None:
         """Blocks of lanes, one after another, each through all ticks."""
-        b, loop, layout = self._builder, self._loop, self._layout
+        b, loop = self._builder, self._loop
         with self._blocks() as lane:
-            self._load("parameters", loop.parameters, layout.shared_parameters, INTEGER(0), lane)
+            self._load_parameters(lane)
             self._compute(loop.prologue)
             carry = {}
             for index, number in enumerate(loop.carry):
@@ -104,7 +124,7 @@ class _Codegen:
     def _tick(self, carry: Mapping[int, Any], tick: Any, lane: Any) -> None:
         loop = self._loop
         self._unloaded |= {number: (slot, slot.allocated_type, None) for number, slot in carry.items()}
-        self._load("inputs", loop.inputs, self._layout.shared_inputs, tick, lane)
+        self._load_inputs(tick, lane)
         piecewise_constant = list(compress(loop.inputs, self._layout.piecewise_constant))
         invariant = loop.loop_invariant(piecewise_constant)
         self._refresh(piecewise_constant, invariant, tick)
@@ -119,7 +139,7 @@ class _Codegen:
     def _refresh(self, piecewise_constant: Sequence[int], invariant: Sequence[int], tick: Any) -> None:
         """The loop-invariant values, computed anew at the first tick and when a constant input changes."""
         b = self._builder
-        columns = sum(self._layout.shared_inputs)
+        columns = self._layout.shared_columns
         shared = compress(self._loop.inputs, self._layout.shared_inputs)
         column = {number: index for index, number in enumerate(shared)}
         begins = b.icmp_signed("==", tick, INTEGER(0))
@@ -233,16 +253,50 @@ class _Codegen:
         signature = ir.FunctionType(type_, [type_])
         return self._builder.module.declare_intrinsic(f"llvm.sqrt.{suffix}", (), signature)
 
-    def _load(self, name: str, numbers: Sequence[int], shared: Sequence[bool], tick: Any, lane: Any) -> None:
-        """The parameters, or one tick's inputs, to be loaded where they are needed first."""
-        counts = {True: sum(shared), False: len(shared) - sum(shared)}
-        indices = {True: 0, False: 0}
-        for number, same in zip(numbers, shared, strict=True):
-            array = f"shared {name}" if same else name
-            address = self._address(array, tick, counts[same], indices[same], None if same else lane)
-            type_ = NUMBER if same else self._wide_type(NUMBER)
-            self._unloaded[number] = (address, type_, 8)
-            indices[same] += 1
+    def _load_parameters(self, lane: Any) -> None:
+        """The parameters, to be loaded where they are needed first."""
+        flags = self._layout.shared_parameters
+        counts = {True: sum(flags), False: len(flags) - sum(flags)}
+        columns = {True: count(), False: count()}
+        for number, shared in zip(self._loop.parameters, flags, strict=True):
+            array = "shared parameters" if shared else "parameters"
+            place = (INTEGER(0), counts[shared], next(columns[shared]), None if shared else lane)
+            self._unloaded[number] = (self._address(array, *place), self._type(shared), 8)
+
+    def _load_inputs(self, tick: Any, lane: Any) -> None:
+        """One tick's inputs, to be loaded where they are needed first."""
+        layout = self._layout
+        rows = {None: ("inputs", self._own_inputs_row(tick, lane))}
+        for held in range(layout.helds):
+            rows[held] = ("held inputs", self._held_inputs_row(held, tick, lane))
+        columns: dict[Any, Iterator[int]] = defaultdict(count)
+        for number, shared, held in zip(self._loop.inputs, layout.shared_inputs, layout.held, strict=True):
+            column = next(columns["shared" if shared else held])
+            if shared:
+                address = self._address("shared inputs", tick, layout.shared_columns, column, None)
+            else:
+                array, row = rows[held]
+                place = self._builder.add(row, INTEGER(column * layout.width))
+                address = self._builder.gep(self._arguments[array], [place], source_etype=NUMBER)
+            self._unloaded[number] = (address, self._type(shared), 8)
+
+    def _own_inputs_row(self, tick: Any, lane: Any) -> Any:
+        """The place of a tick's first input in a block of lanes."""
+        b, columns = self._builder, INTEGER(self._layout.own_inputs)
+        before = b.mul(b.mul(lane, self._arguments["ticks"]), columns)
+        return b.add(before, b.mul(b.mul(tick, columns), INTEGER(self._layout.width)))
+
+    def _held_inputs_row(self, held: int, tick: Any, lane: Any) -> Any:
+        """The place of the first of a Held's values at a tick, in a block of lanes."""
+        b, layout = self._builder, self._layout
+        column = layout.shared_columns - layout.helds + held
+        address = self._address("shared inputs", tick, layout.shared_columns, column, None)
+        row = b.fptosi(b.load(address, typ=NUMBER, align=8), INTEGER)
+        before = b.mul(lane, self._arguments["held rows"])
+        return b.add(before, b.mul(row, INTEGER(layout.width)))
+
+    def _type(self, shared: bool) -> Any:
+        return NUMBER if shared else self._wide_type(NUMBER)
 
     def _address(self, array: str, row: Any, columns: int, column: int, lane: Any | None) -> Any:
         """Of array[row, column], or of array[row, column, lane]."""

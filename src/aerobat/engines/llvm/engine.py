@@ -14,8 +14,18 @@ import llvmlite.binding as llvm
 import numpy as np
 
 from aerobat.arrays import Array
-from aerobat.engines.engine import CompiledLoop, Engine, Init, Step, logged_ticks, read_only, tick_count
+from aerobat.engines.engine import (
+    CompiledLoop,
+    Engine,
+    Init,
+    Step,
+    expanded,
+    logged_ticks,
+    read_only,
+    tick_count,
+)
 from aerobat.engines.llvm.codegen import ARRAYS, COUNTS, Layout, module
+from aerobat.engines.llvm.packing import PackedInputs, Packing
 from aerobat.engines.pytree import Tree, piecewise_constant_leaves, tree_leaves, tree_map, tree_unflatten
 from aerobat.engines.traced_loop import TracedLoop, trace_loop
 
@@ -33,53 +43,58 @@ class MachineLoop(CompiledLoop):
         self, init: Init, step: Step, parameters: Tree, inputs: Tree, threads: int | None = None
     ) -> None:
         leaves = [np.asarray(leaf, dtype=np.float64) for leaf in tree_leaves(parameters)]
-        self._vehicles = len(leaves[0])
-        width = 1 if self._vehicles <= MAX_SCALAR_VEHICLES else REGISTERS * _lanes()
-        self._lanes = -(-self._vehicles // width) * width
+        vehicles = len(leaves[0])
+        width = 1 if vehicles <= MAX_SCALAR_VEHICLES else REGISTERS * _lanes()
+        self._packing = Packing.of(inputs, vehicles, width)
         equal = [bool((leaf == leaf[0]).all()) for leaf in leaves]
-        self._shared = [np.ndim(leaf) == 0 for leaf in tree_leaves(inputs)]
-        self._own = [not shared for shared in self._shared]
-        constant = zip(piecewise_constant_leaves(inputs), self._shared, strict=True)
-        layout = Layout(width, tuple(equal), tuple(self._shared), tuple(a and b for a, b in constant))
-        self._loop, self._init, self._scan = _program(init, step, _bare(parameters), _bare(inputs), layout)
+        constant = zip(piecewise_constant_leaves(inputs), self._packing.shared, strict=True)
+        layout = Layout(
+            width,
+            shared_parameters=tuple(equal),
+            shared_inputs=self._packing.shared,
+            held=self._packing.held,
+            piecewise_constant=tuple(a and b for a, b in constant),
+        )
+        bare_inputs = _bare(expanded(inputs))
+        self._loop, self._init, self._scan = _program(init, step, _bare(parameters), bare_inputs, layout)
         self._parameters = (
             np.array([leaf[0] for leaf in compress(leaves, equal)]),
-            self._pad_lanes([leaf for leaf, one in zip(leaves, equal, strict=True) if not one], ()),
+            self._packing.pad_lanes([leaf for leaf, one in zip(leaves, equal, strict=True) if not one]),
         )
         self._latest: tuple[Tree, Array] = (None, _UNUSED)
         self._addresses = [array.ctypes.data for array in self._parameters]
-        self._cuts = _thread_cuts(self._lanes // width, threads or available_cores(), width)
+        self._cuts = _thread_cuts(self._packing.blocks, threads or available_cores(), width)
         self._logical = [i for i, n in enumerate(self._loop.carry) if self._loop.is_logical(n)]
         self._logical_outputs = [i for i, n in enumerate(self._loop.outputs) if self._loop.is_logical(n)]
 
     def init(self, inputs: Tree) -> Tree:
         """See `CompiledLoop.init`."""
-        after = np.empty((len(self._loop.carry), self._lanes))
-        self._run(self._init, (*self._packed(inputs, ()), _UNUSED, after, _UNUSED), 1, 1)
+        after = np.empty((len(self._loop.carry), self._packing.lanes))
+        self._run(self._init, self._packing.inputs(inputs, 1), (_UNUSED, after, _UNUSED), 1, 1)
         return self._unpacked(after)
 
     def scan(self, carry: Tree, inputs: Tree, log_stride: int = 1) -> tuple[Tree, Tree]:
         """See `CompiledLoop.scan`."""
         ticks = tick_count(inputs)
         rows = len(logged_ticks(ticks, log_stride))
-        after, outputs = self._advanced(carry, self._packed(inputs, (ticks,)), rows, ticks, log_stride)
+        after, outputs = self._advanced(carry, self._packing.inputs(inputs, ticks), rows, ticks, log_stride)
         return after, self._row(outputs.transpose(1, 2, 0))
 
     def step(self, carry: Tree, inputs: Tree) -> tuple[Tree, Tree]:
         """See `CompiledLoop.step`."""
-        after, outputs = self._advanced(carry, self._packed(inputs, ()), 1, 1, 1)
+        after, outputs = self._advanced(carry, self._packing.inputs(inputs, 1), 1, 1, 1)
         return after, self._row(outputs[0])
 
     def _advanced(
-        self, carry: Tree, inputs: tuple[Array, Array], rows: int, ticks: int, log_stride: int
+        self, carry: Tree, inputs: PackedInputs, rows: int, ticks: int, log_stride: int
     ) -> tuple[Tree, Array]:
         """The next carry, and the outputs (rows, o, vehicles)."""
         latest, packed = self._latest  # most scans go on from where the last one ended
-        before = packed if carry is latest else self._pad_lanes(tree_leaves(carry), ())
-        after = np.empty((len(self._loop.carry), self._lanes))
-        outputs = np.empty((rows, len(self._loop.outputs), self._lanes))
-        self._run(self._scan, (*inputs, before, after, outputs), ticks, log_stride)
-        return self._unpacked(after), outputs[..., : self._vehicles]
+        before = packed if carry is latest else self._packing.pad_lanes(tree_leaves(carry))
+        after = np.empty((len(self._loop.carry), self._packing.lanes))
+        outputs = np.empty((rows, len(self._loop.outputs), self._packing.lanes))
+        self._run(self._scan, inputs, (before, after, outputs), ticks, log_stride)
+        return self._unpacked(after), outputs[..., : self._packing.vehicles]
 
     def _row(self, series: Array) -> Tree:
         """Outputs (o, vehicles, ...) as a row's tree."""
@@ -88,36 +103,23 @@ class MachineLoop(CompiledLoop):
             leaves[index] = leaves[index] != 0.0
         return tree_unflatten(self._loop.row, leaves)
 
-    def _packed(self, inputs: Tree, ticks: tuple[int, ...]) -> tuple[Array, Array]:
-        """Shared inputs (*ticks, r) and inputs (*ticks, i, lanes)."""
-        leaves = tree_leaves(inputs)
-        shared = np.array(list(compress(leaves, self._shared)), dtype=np.float64).T
-        own = list(compress(leaves, self._own))
-        return np.ascontiguousarray(shared), self._pad_lanes(own, ticks)
-
-    def _pad_lanes(self, leaves: Sequence[Array], ticks: tuple[int, ...]) -> Array:
-        """Leaves (*ticks, vehicles) as (*ticks, leaf, lanes); lanes too many repeat the last vehicle."""
-        if not leaves:
-            return _UNUSED
-        packed = np.empty((*ticks, len(leaves), self._lanes))
-        np.stack(leaves, axis=-2, out=packed[..., : self._vehicles], casting="unsafe")
-        packed[..., self._vehicles :] = packed[..., self._vehicles - 1, None]
-        return packed
-
     def _unpacked(self, carry: Array) -> Tree:
         """(c, lanes) -> a tree of read-only leaves (vehicles,)."""
         carry.flags.writeable = False
-        leaves = list(carry[:, : self._vehicles])
+        leaves = list(carry[:, : self._packing.vehicles])
         for index in self._logical:
             leaves[index] = read_only(leaves[index] != 0.0)
         tree = tree_unflatten(self._loop.carry_tree, leaves)
         self._latest = (tree, carry)
         return tree
 
-    def _run(self, function: Function, arrays: Sequence[Array], ticks: int, log_stride: int) -> None:
+    def _run(
+        self, function: Function, inputs: PackedInputs, arrays: Sequence[Array], ticks: int, log_stride: int
+    ) -> None:
         """All lanes, divided among threads in whole blocks; a thread holds no lock of Python's meanwhile."""
-        arguments = [*self._addresses, *(array.ctypes.data for array in arrays)]
-        arguments += [self._lanes, ticks, log_stride]
+        packed = (inputs.shared, inputs.own, inputs.held, *arrays)
+        arguments = [*self._addresses, *(array.ctypes.data for array in packed)]
+        arguments += [self._packing.lanes, ticks, inputs.held_rows, log_stride]
         if len(self._cuts) == 2:
             function(*arguments, *self._cuts)
             return

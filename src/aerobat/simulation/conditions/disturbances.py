@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from aerobat.arrays import Array
+from aerobat.engines.pytree import Tree
 from aerobat.kernels import battery, wind
 from aerobat.kernels.battery import BatteryParameters, BatteryState
 from aerobat.kernels.ops import Ops
@@ -42,10 +44,13 @@ class WindSource:
         """Prepare to draw, for a component that steps at every so many ticks."""
         self._numbers = RandomSource([d.stream("wind") for d in draws], normals=5, period=period, block=32)
 
-    def chunk(self, begin: int, end: int) -> GustNoise:
-        """See `Source.chunk`."""
-        along, *rest = self._numbers.rows(begin, end)
-        return GustNoise(along, (rest[0], rest[1]), (rest[2], rest[3]))
+    def chunk(self, begin: int, end: int) -> Tree:
+        """See `Source.chunk`; a GustNoise."""
+
+        def noise(x: Array) -> GustNoise:
+            return GustNoise(x[0], (x[1], x[2]), (x[3], x[4]))
+
+        return self._numbers.inputs(begin, end, noise)
 
 
 @dataclass(frozen=True)

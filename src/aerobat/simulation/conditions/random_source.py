@@ -6,33 +6,40 @@ NumPy's own, of which a flight with an IMU takes ten thousand, and the same with
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import cache
+from typing import TypeAlias
 
 import numpy as np
+from numpy.random.bit_generator import ISeedSequence
+from numpy.typing import NDArray
 
 from aerobat.arrays import Array, frozen
+from aerobat.engines.engine import Held
+from aerobat.engines.pytree import Tree
+
+Words: TypeAlias = NDArray[np.uint16]
 
 _LEVELS = 2**16
 _WORDS_AT_ONCE = 4  # 16-bit words in a number of the generator
+_TOGETHER = 64  # vehicles whose words are turned at once, so that they stay in a cache
 
 
 class RandomSource:
     """Standard normals and uniform numbers of a component that steps at every so many ticks.
 
     They are drawn in blocks of samples that begin at multiples of their size, so that any cuts of the ticks
-    into chunks, in any order, give the same bits, and only for ticks at which the component steps: between
-    them stand those of its last step.
+    into chunks, in any order, give the same bits, and only for ticks at which the component steps.
     """
 
     def __init__(
         self,
-        seeds: Sequence[np.random.SeedSequence],
+        seeds: Sequence[ISeedSequence],
         *,
         normals: int,
         uniforms: int = 0,
         period: int = 1,
-        block: int = 64,
+        block: int = 256,
     ) -> None:
         """Prepare to draw.
 
@@ -50,19 +57,28 @@ class RandomSource:
         self._size = block
         self._restart()
 
-    def rows(self, begin: int, end: int) -> Array:
-        """Numbers of the ticks from `begin` to before `end`, normals first, (numbers, ticks, vehicles)."""
-        first, last = begin // self._period, (end - 1) // self._period
-        blocks = [self._block(k) for k in range(first // self._size, last // self._size + 1)]
-        samples = blocks[0] if len(blocks) == 1 else np.concatenate(blocks, axis=1)
-        offset = first // self._size * self._size
-        samples = samples[:, first - offset : last + 1 - offset]
-        if self._period == 1:
-            return samples
-        ticks = np.repeat(samples, self._period, axis=1)
-        return ticks[:, begin - first * self._period : end - first * self._period]
+    def inputs(self, begin: int, end: int, arrange: Callable[[Array], Tree]) -> Tree:
+        """Inputs of the ticks from `begin` to before `end`, held from one sample to the next.
 
-    def _block(self, number: int) -> Array:
+        `arrange` makes a tree of numbers (numbers, samples, vehicles), normals first.
+        """
+        first = begin // self._period
+        numbers = arrange(self._samples(first, (end - 1) // self._period + 1))
+        return numbers if self._period == 1 else Held(np.arange(begin, end) // self._period - first, numbers)
+
+    def _samples(self, begin: int, end: int) -> Array:
+        blocks = [self._block(k) for k in range(begin // self._size, (end - 1) // self._size + 1)]
+        words = blocks[0] if len(blocks) == 1 else np.concatenate(blocks, axis=1)
+        offset = begin // self._size * self._size
+        words = words[:, begin - offset : end - offset]
+        normals = _quantiles().take(words[: self._normals])
+        if self._words == self._normals:
+            return normals
+        high, low = words[self._normals :: 2], words[self._normals + 1 :: 2]
+        return np.concatenate([normals, (high + (low + 0.5) / _LEVELS) / _LEVELS])
+
+    def _block(self, number: int) -> Words:
+        """Random words (words, samples, vehicles) of a block."""
         if number < self._latest:
             self._restart()
         while self._latest < number:
@@ -70,16 +86,14 @@ class RandomSource:
         return self._drawn
 
     def _draw(self) -> None:
-        count = self._words * self._size // _WORDS_AT_ONCE
-        drawn = np.empty((len(self._generators), count), dtype="<u8")
+        count = self._words * self._size
+        drawn = np.empty((len(self._generators), count // _WORDS_AT_ONCE), dtype="<u8")
         for own, generator in zip(drawn, self._generators, strict=True):
-            own[:] = generator.random_raw(count)
-        words = np.ascontiguousarray(drawn.view("<u2").T).reshape(self._words, self._size, -1)
-        normals = _quantiles()[words[: self._normals]]
-        if self._words > self._normals:
-            high, low = words[self._normals :: 2], words[self._normals + 1 :: 2]
-            normals = np.concatenate([normals, (high + (low + 0.5) / _LEVELS) / _LEVELS])
-        self._drawn: Array = normals
+            own[:] = generator.random_raw(len(own))
+        turned = np.empty((count, len(drawn)), dtype=np.uint16)
+        for first in range(0, len(drawn), _TOGETHER):
+            turned[:, first : first + _TOGETHER] = drawn[first : first + _TOGETHER].view("<u2").T
+        self._drawn: Words = turned.reshape(self._words, self._size, -1)
         self._latest += 1
 
     def _restart(self) -> None:

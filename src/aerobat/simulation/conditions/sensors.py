@@ -8,7 +8,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from aerobat.arrays import Mask
+from aerobat.arrays import Array, Mask
+from aerobat.engines.pytree import Tree
 from aerobat.kernels import imu, mocap, motors, rigid_body
 from aerobat.kernels.imu import BiasParameters, ImuParameters, ImuSample, ImuState
 from aerobat.kernels.mocap import MocapInput, MocapParameters, PoseSample
@@ -77,7 +78,7 @@ class ImuSource:
 
     per_vehicle = True
 
-    def __init__(self, draws: Sequence[Draw], stream: str, period: int, block: int = 64) -> None:
+    def __init__(self, draws: Sequence[Draw], stream: str, period: int, block: int = 256) -> None:
         """Prepare to draw.
 
         Args:
@@ -89,10 +90,13 @@ class ImuSource:
         seeds = [each.stream(stream) for each in draws]
         self._numbers = RandomSource(seeds, normals=6, period=period, block=block)
 
-    def chunk(self, begin: int, end: int) -> ImuSample:
-        """See `Source.chunk`."""
-        a, b, c, d, e, f = self._numbers.rows(begin, end)
-        return ImuSample((a, b, c), (d, e, f))
+    def chunk(self, begin: int, end: int) -> Tree:
+        """See `Source.chunk`; an ImuSample."""
+
+        def noise(x: Array) -> ImuSample:
+            return ImuSample((x[0], x[1], x[2]), (x[3], x[4], x[5]))
+
+        return self._numbers.inputs(begin, end, noise)
 
 
 class MocapState(NamedTuple):
@@ -158,10 +162,14 @@ class MocapSource:
         """
         seeds = [each.stream("motion_capture") for each in draws]
         self._numbers = RandomSource(seeds, normals=9, uniforms=1, period=period, block=32)
+        self._period = period
         self._rate = rate
 
-    def chunk(self, begin: int, end: int) -> MocapInput:
-        """See `Source.chunk`."""
-        x = self._numbers.rows(begin, end)
-        time = np.arange(begin, end) / self._rate
-        return MocapInput(time, (x[0], x[1], x[2]), (x[3], x[4], x[5]), (x[6], x[7], x[8]), x[9])
+    def chunk(self, begin: int, end: int) -> Tree:
+        """See `Source.chunk`; a MocapInput."""
+
+        def sampled(x: Array) -> MocapInput:
+            times = (begin // self._period + np.arange(x.shape[1])) * self._period / self._rate
+            return MocapInput(times, (x[0], x[1], x[2]), (x[3], x[4], x[5]), (x[6], x[7], x[8]), x[9])
+
+        return self._numbers.inputs(begin, end, sampled)

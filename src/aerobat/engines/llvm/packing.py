@@ -1,0 +1,116 @@
+"""Arrays as machine code reads them: vehicles in blocks of lanes, side by side."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import compress
+from typing import NamedTuple
+
+import numpy as np
+
+from aerobat.arrays import Array
+from aerobat.engines.engine import Held
+from aerobat.engines.pytree import Tree, tree_leaves, tree_map, tree_replace
+
+_NONE = np.zeros(0)
+
+
+class PackedInputs(NamedTuple):
+    """Inputs of some ticks; see `codegen.Layout`."""
+
+    shared: Array
+    own: Array
+    held: Array
+    held_rows: int  # of a block of lanes
+
+
+@dataclass(frozen=True)
+class Packing:
+    """Where the leaves of a loop's inputs go."""
+
+    vehicles: int
+    width: int
+    shared: tuple[bool, ...]  # of each input: one number for all vehicles
+    held: tuple[int | None, ...]  # of each input: the `Held` that it stands in
+
+    @classmethod
+    def of(cls, inputs: Tree, vehicles: int, width: int) -> Packing:
+        """The packing of inputs like those of one tick."""
+        nodes: list[Held] = []
+
+        def numbered(held: Held) -> Tree:
+            nodes.append(held)
+            return tree_map(lambda _: _Number(len(nodes) - 1), held.values)
+
+        numbers = tree_leaves(tree_replace(inputs, Held, numbered))
+        held = (leaf.value if isinstance(leaf, _Number) else None for leaf in numbers)
+        return cls(vehicles, width, tuple(np.ndim(leaf) == 0 for leaf in tree_leaves(inputs)), tuple(held))
+
+    @property
+    def blocks(self) -> int:
+        """Blocks of lanes, the last one of them filled up with copies of the last vehicle."""
+        return -(-self.vehicles // self.width)
+
+    @property
+    def lanes(self) -> int:
+        """Of all blocks."""
+        return self.blocks * self.width
+
+    def inputs(self, inputs: Tree, ticks: int) -> PackedInputs:
+        """Inputs of so many ticks, or without an axis of ticks those of one."""
+        nodes: list[Held] = []
+
+        def noted(held: Held) -> Tree:
+            nodes.append(held)
+            return held.values
+
+        leaves = tree_leaves(tree_replace(inputs, Held, noted))
+        rows = [np.zeros(ticks, dtype=np.intp) if isinstance(node.row, tuple) else node.row for node in nodes]
+        of_all = [
+            np.asarray(leaf)[rows[number]] if number is not None and np.ndim(leaf) else leaf
+            for leaf, number in compress(zip(leaves, self.held, strict=True), self.shared)
+        ]
+        places = list(zip(leaves, self.shared, self.held, strict=True))
+        own = [leaf for leaf, shared, number in places if not shared and number is None]
+        groups = [
+            [leaf.reshape(-1, self.vehicles) for leaf, shared, number in places if not shared and number == k]
+            for k in range(len(nodes))
+        ]
+        sizes = [len(group) * len(group[0]) if group else 0 for group in groups]
+        begins = np.cumsum([0, *sizes])
+        held = np.empty((self.blocks, begins[-1], self.width))
+        for group, begin, size in zip(groups, begins, sizes, strict=False):
+            if group:
+                part = held[:, begin : begin + size]
+                self._fill(part.reshape(self.blocks, -1, len(group), self.width), group)
+        starts = [begin + len(group) * row for begin, group, row in zip(begins, groups, rows, strict=False)]
+        columns = [np.broadcast_to(np.asarray(x, dtype=np.float64), ticks) for x in (*of_all, *starts)]
+        packed = np.empty((self.blocks, ticks, len(own), self.width)) if own else _NONE
+        self._fill(packed, [np.reshape(leaf, (-1, self.vehicles)) for leaf in own])
+        shared = np.stack(columns, axis=1) if columns else _NONE
+        return PackedInputs(shared, packed, held, int(begins[-1]))
+
+    def pad_lanes(self, leaves: Sequence[Array]) -> Array:
+        """Leaves (vehicles,) as (leaf, lanes)."""
+        packed = np.empty((len(leaves), self.lanes))
+        for row, leaf in zip(packed, leaves, strict=True):
+            row[: self.vehicles] = leaf
+        packed[:, self.vehicles :] = packed[:, self.vehicles - 1, None]
+        return packed
+
+    def _fill(self, packed: Array, leaves: Sequence[Array]) -> None:
+        """Leaves (rows, vehicles) into an array (blocks, rows, leaf, lane)."""
+        whole = self.vehicles // self.width
+        full = whole * self.width
+        for index, leaf in enumerate(leaves):
+            blocks = leaf[:, :full].reshape(len(leaf), whole, self.width)
+            packed[:whole, :, index] = blocks.swapaxes(0, 1)
+            if full < self.vehicles:
+                packed[whole, :, index, : self.vehicles - full] = leaf[:, full:]
+                packed[whole, :, index, self.vehicles - full :] = leaf[:, -1:]
+
+
+@dataclass(frozen=True)
+class _Number:
+    value: int
