@@ -143,6 +143,7 @@ def _arguments(name: str, folder: Path) -> dict[str, Any]:
         "problem_names": {},
         "read_csv": {"path": saved["csv"], "rate": 100.0},
         "read_plan": {"path": saved["plan"], "rate": 100.0},
+        "read_table": {"path": saved["table"]},
         "read_trajectory": {"path": saved["trajectory"], "rate": 100.0},
         "reference": {
             "trajectory": plan().trajectory,
@@ -207,6 +208,7 @@ def _arguments(name: str, folder: Path) -> dict[str, Any]:
             "speed": 5.0,
             "progress": None,
         },
+        "write_table": {"table": {"a": [1.0]}, "path": folder / "saved-table.csv"},
         "write_vehicle": {"vehicle": agile, "path": folder / "saved.toml"},
     }
     return calls[name]
@@ -282,6 +284,8 @@ def _files(folder: Path) -> dict[str, Path]:
     """A file of each kind."""
     files = {name: folder / f"a.{name}" for name in ("plan", "csv")}
     files |= {name: folder / f"{name}.npz" for name in ("flight", "trajectory")}
+    files["table"] = folder / "table.csv"
+    ab.write_table({"a": [1.0]}, files["table"])
     files["plugin"] = folder / "plugin.py"
     files["plugin"].write_text("")
     plan().save(files["plan"])

@@ -33,6 +33,7 @@ from .interchange.columns import write_columns
 from .interchange.csv import read_csv, write_csv
 from .interchange.read import read_plan, read_trajectory
 from .interchange.robots import import_vehicle
+from .interchange.tables import read_table, write_table
 from .planning import (
     Assessment,
     BisectionSearch,
@@ -182,6 +183,7 @@ __all__ = [
     "problem_names",
     "read_csv",
     "read_plan",
+    "read_table",
     "read_trajectory",
     "reference",
     "registered_maneuvers",
@@ -202,6 +204,7 @@ __all__ = [
     "write_dispersion",
     "write_problem",
     "write_replay",
+    "write_table",
     "write_vehicle",
     "write_video",
 ]
