@@ -1,0 +1,186 @@
+"""Some flights of a sweep: what each draws, what it comes to, and the errors of the first ones over time."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, fields
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from aerobat.arrays import Array
+from aerobat.control import Controller
+from aerobat.engines import choose
+from aerobat.environment import Dispersion
+from aerobat.evaluation import Passage, Scores, score_flights
+from aerobat.planning import Plan
+from aerobat.simulation import Flight, FlightConfig, fly
+from aerobat.simulation.conditions.draw import Draw, draw_flights
+from aerobat.vehicle import Vehicle
+
+CHUNK = 50  # flights that are flown, kept and resumed as one, whatever the batches and the cores
+SAMPLED = 200  # flights, the first ones, whose errors are kept over time
+SAMPLE_RATE = 100.0  # [1/s] of their rows
+PASSED, NOT_REACHED = "passed", "not_reached"  # ends of a passage, beside the outcomes that are failures
+AGAIN = "#"  # between a gate's name and the number of its passage, from the second on
+
+Columns = dict[str, NDArray[Any]]
+
+_ERRORS = tuple(field.name for field in fields(Scores)[:5])
+_PASSAGE = (  # numbers of a passage, each with the name of its column after the gate's
+    ("time", "time_s"),
+    ("lateral", "lateral_m"),
+    ("up", "up_m"),
+    ("miss", "miss_m"),
+    ("speed", "speed_m_s"),
+    ("attitude_error_deg", "attitude_error_deg"),
+    ("clearance", "clearance_m"),
+)
+
+
+@dataclass(frozen=True)
+class SweepTask:
+    """What is flown, and how."""
+
+    plan: Plan
+    vehicle: Vehicle  # that plan and controller know
+    conditions: Dispersion
+    seed: int
+    controller: Controller
+    engine: str
+    batch: int  # flights that are flown side by side
+
+
+@dataclass(frozen=True, eq=False)
+class Chunk:
+    """Flights that were flown: columns of the table, and errors over time of those that are sampled."""
+
+    columns: Columns  # (flights,)
+    times: Array  # [s], (T,); none where no flight is sampled
+    position_error: Array  # [m], (sampled flights, T)
+    attitude_error: Array  # [rad], (sampled flights, T)
+
+
+def fly_chunk(task: SweepTask, begin: int, end: int) -> Chunk:
+    """The flights from number `begin` to before `end`; how they are cut into batches changes no bit."""
+    engine = _engine(task)
+    cuts = [*range(begin, end, task.batch), end]
+    parts = [
+        _flown(task, engine, range(first, last)) for first, last in zip(cuts, cuts[1:], strict=False)
+    ]
+    columns = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
+    return Chunk(columns, *_sampled(task, engine, range(begin, min(end, SAMPLED))))
+
+
+def _engine(task: SweepTask) -> str:
+    """The engine for whole chunks: each has its own rounding, so that one flies all of them."""
+    ticks = round(task.plan.duration * FlightConfig().rate)
+    return choose(task.engine, CHUNK, ticks).name
+
+
+def _flown(task: SweepTask, engine: str, numbers: range) -> Columns:
+    """Columns of the table for some flights."""
+    draws = draw_flights(task.conditions, len(task.vehicle.rotors), task.seed, numbers)
+    return _drawn(draws) | _scored(_scores(task, engine, draws))
+
+
+def _scores(task: SweepTask, engine: str, draws: Sequence[Draw]) -> Scores:
+    return score_flights(
+        task.plan,
+        [draw.vehicle(task.vehicle) for draw in draws],
+        nominal=task.vehicle,
+        controller=task.controller,
+        engine=engine,
+        start=_starts(task, draws),
+    )
+
+
+def _starts(task: SweepTask, draws: Sequence[Draw]) -> Any:
+    from aerobat import so3
+    from aerobat.states import BodyState
+
+    n = len(draws)
+    q = np.tile([1.0, 0, 0, 0], (n, 1))
+    return BodyState(
+        np.array([task.plan.problem.start.position + d.start_position for d in draws]),
+        np.array([d.start_velocity for d in draws]),
+        so3.multiply(q, so3.exp(np.array([d.start_attitude for d in draws]))),
+        np.zeros((n, 3)),
+    )
+
+
+def _drawn(draws: Sequence[Draw]) -> Columns:
+    """What flights draw, in few numbers."""
+    effectiveness = np.array([draw.effectiveness for draw in draws])
+    numbers = {
+        "mass": [draw.mass for draw in draws],
+        "inertia": [draw.inertia for draw in draws],
+        "lag_mean": [draw.lags.mean() for draw in draws],
+        "thrust_mean": effectiveness.mean(axis=1),
+        "thrust_min": effectiveness.min(axis=1),
+        "drag_1_s": [draw.drag for draw in draws],
+        "start_offset_m": [_norm(draw.start_position) for draw in draws],
+        "start_speed_m_s": [_norm(draw.start_velocity) for draw in draws],
+        "start_tilt_deg": [np.rad2deg(_norm(draw.start_attitude)) for draw in draws],
+        "mean_wind_m_s": [_norm(draw.mean_wind) for draw in draws],
+        "charge": [draw.charge for draw in draws],
+    }
+    columns: Columns = {"flight": np.array([draw.flight for draw in draws])}
+    return columns | {name: np.array(values, dtype=float) for name, values in numbers.items()}
+
+
+def _norm(vector: Array) -> float:
+    return float(np.linalg.norm(vector))
+
+
+def _scored(scores: Scores) -> Columns:
+    """What flights came to."""
+    columns: Columns = {"outcome": np.array([outcome.name.lower() for outcome in scores.outcomes])}
+    columns |= {name: np.array(getattr(scores, name)) for name in _ERRORS}
+    for name, passage in zip(passage_names(scores.passages), scores.passages, strict=True):
+        columns |= {f"{name}_{column}": np.array(getattr(passage, field)) for field, column in _PASSAGE}
+        ends = [_passage_outcome(passage.of_flight(k)) for k in range(len(scores))]
+        columns[f"{name}_outcome"] = np.array(ends)
+    return columns
+
+
+def _passage_outcome(passage: Passage) -> str:
+    """One passage's end, as the outcome of a flight that has no other would be."""
+    if passage.failure is not None:
+        return passage.failure[0].name.lower()
+    return NOT_REACHED if np.isnan(passage.time) else PASSED
+
+
+def passage_names(passages: Sequence[Passage]) -> Iterator[str]:
+    """The gates' names in the order of passage; behind that of one that is passed again, which time it is."""
+    turns: Counter[str] = Counter()
+    for passage in passages:
+        turns[passage.gate] += 1
+        yield passage.gate + (f"{AGAIN}{turns[passage.gate]}" if turns[passage.gate] > 1 else "")
+
+
+def _sampled(task: SweepTask, engine: str, numbers: range) -> tuple[Array, Array, Array]:
+    """Times of rows, and errors of position and attitude of some flights, held after a divergence."""
+    if not numbers:
+        return np.zeros(0), np.zeros((0, 0)), np.zeros((0, 0))
+    rate = FlightConfig().rate
+    draws = draw_flights(task.conditions, len(task.vehicle.rotors), task.seed, numbers)
+    flight = fly(
+        task.plan,
+        [draw.vehicle(task.vehicle) for draw in draws],
+        nominal=task.vehicle,
+        controller=task.controller,
+        engine=engine,
+        start=_starts(task, draws),
+        log_rate=rate / max(round(rate / SAMPLE_RATE), 1),
+    )
+    return flight.times, _held(flight, flight.position_error), _held(flight, flight.attitude_error)
+
+
+def _held(flight: Flight, errors: Array) -> Array:
+    """Errors over time (flights, T), those of a flight's end from there on."""
+    last = np.searchsorted(flight.times, flight.ends, side="right") - 1
+    shown = np.minimum(np.arange(errors.shape[1]), last[:, None])
+    return np.take_along_axis(errors, shown, axis=1)
