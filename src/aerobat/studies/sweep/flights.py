@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from typing import Any
 
 import numpy as np
@@ -65,50 +65,25 @@ class Chunk:
 
 def fly_chunk(task: SweepTask, begin: int, end: int) -> Chunk:
     """The flights from number `begin` to before `end`; how they are cut into batches changes no bit."""
-    engine = _engine(task)
-    cuts = [*range(begin, end, task.batch), end]
-    parts = [
-        _flown(task, engine, range(first, last)) for first, last in zip(cuts, cuts[1:], strict=False)
-    ]
+    config = _config(task)
+    numbers = [range(first, min(first + task.batch, end)) for first in range(begin, end, task.batch)]
+    parts = [_flown(task, replace(config, flights=each)) for each in numbers]
     columns = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
-    return Chunk(columns, *_sampled(task, engine, range(begin, min(end, SAMPLED))))
+    return Chunk(columns, *_sampled(task, config, range(begin, min(end, SAMPLED))))
 
 
-def _engine(task: SweepTask) -> str:
-    """The engine for whole chunks: each has its own rounding, so that one flies all of them."""
-    ticks = round(task.plan.duration * FlightConfig().rate)
-    return choose(task.engine, CHUNK, ticks).name
+def _config(task: SweepTask) -> FlightConfig:
+    """Settings of all flights. An engine has its own rounding, so that one flies all chunks, small or not."""
+    config = FlightConfig(controller=task.controller, conditions=task.conditions, seed=task.seed)
+    ticks = round(task.plan.duration * config.control_rate)
+    return replace(config, engine=choose(task.engine, CHUNK, ticks).name)
 
 
-def _flown(task: SweepTask, engine: str, numbers: range) -> Columns:
-    """Columns of the table for some flights."""
-    draws = draw_flights(task.conditions, len(task.vehicle.rotors), task.seed, numbers)
-    return _drawn(draws) | _scored(_scores(task, engine, draws))
-
-
-def _scores(task: SweepTask, engine: str, draws: Sequence[Draw]) -> Scores:
-    return score_flights(
-        task.plan,
-        [draw.vehicle(task.vehicle) for draw in draws],
-        nominal=task.vehicle,
-        controller=task.controller,
-        engine=engine,
-        start=_starts(task, draws),
-    )
-
-
-def _starts(task: SweepTask, draws: Sequence[Draw]) -> Any:
-    from aerobat import so3
-    from aerobat.states import BodyState
-
-    n = len(draws)
-    q = np.tile([1.0, 0, 0, 0], (n, 1))
-    return BodyState(
-        np.array([task.plan.problem.start.position + d.start_position for d in draws]),
-        np.array([d.start_velocity for d in draws]),
-        so3.multiply(q, so3.exp(np.array([d.start_attitude for d in draws]))),
-        np.zeros((n, 3)),
-    )
+def _flown(task: SweepTask, config: FlightConfig) -> Columns:
+    """Columns of the table for the flights of a config."""
+    assert config.flights is not None
+    draws = draw_flights(task.conditions, len(task.vehicle.rotors), task.seed, config.flights)
+    return _drawn(draws) | _scored(score_flights(task.plan, task.vehicle, config=config))
 
 
 def _drawn(draws: Sequence[Draw]) -> Columns:
@@ -161,21 +136,13 @@ def passage_names(passages: Sequence[Passage]) -> Iterator[str]:
         yield passage.gate + (f"{AGAIN}{turns[passage.gate]}" if turns[passage.gate] > 1 else "")
 
 
-def _sampled(task: SweepTask, engine: str, numbers: range) -> tuple[Array, Array, Array]:
+def _sampled(task: SweepTask, config: FlightConfig, numbers: range) -> tuple[Array, Array, Array]:
     """Times of rows, and errors of position and attitude of some flights, held after a divergence."""
     if not numbers:
         return np.zeros(0), np.zeros((0, 0)), np.zeros((0, 0))
-    rate = FlightConfig().rate
-    draws = draw_flights(task.conditions, len(task.vehicle.rotors), task.seed, numbers)
-    flight = fly(
-        task.plan,
-        [draw.vehicle(task.vehicle) for draw in draws],
-        nominal=task.vehicle,
-        controller=task.controller,
-        engine=engine,
-        start=_starts(task, draws),
-        log_rate=rate / max(round(rate / SAMPLE_RATE), 1),
-    )
+    stride = max(round(config.control_rate / SAMPLE_RATE), 1)
+    config = replace(config, flights=numbers, log_rate=config.control_rate / stride)
+    flight = fly(task.plan, task.vehicle, config=config)
     return flight.times, _held(flight, flight.position_error), _held(flight, flight.attitude_error)
 
 
