@@ -188,21 +188,6 @@ def test_a_sweep_that_is_killed_leaves_no_process_and_goes_on_where_it_stopped(
     assert sweep(hop(), "lab", RUNS, SEED, workers=1, keep=tmp_path / "kept") == whole()
 
 
-def test_a_script_without_its_guard_is_told_to_have_one(tmp_path: Path) -> None:
-    (tmp_path / "script.py").write_text(
-        "from test_sweep import hop, sweep\nsweep(hop(), 'none', 101, workers=2)\n"
-    )
-    done = subprocess.run(
-        [sys.executable, "script.py"],
-        cwd=tmp_path,
-        env=os.environ | {"PYTHONPATH": str(Path(__file__).parent)},
-        capture_output=True,
-        text=True,
-    )
-    assert done.returncode == 1
-    assert 'below `if __name__ == "__main__":`' in done.stderr.splitlines()[-1]
-
-
 def test_an_executor_can_be_handed_in() -> None:
     with ThreadPoolExecutor(2) as executor:
         assert sweep(hop(), "lab", RUNS, SEED, executor=executor) == whole()

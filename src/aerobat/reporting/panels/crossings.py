@@ -102,8 +102,9 @@ def _draw_crossings(axes: Axes, crossings: Crossings, half: Array, scale: float)
         (inside & ~crossings.wrong, BLUE, "o", 8.0),
         (inside & crossings.wrong, RED, "X", 22.0),
     ):
+        across, up = points[where].T
         axes.scatter(
-            *points[where].T, s=size, marker=marker, color=colour, linewidths=0.0, zorder=2.0,
+            across, up, s=size, marker=marker, color=colour, linewidths=0.0, zorder=2.0,
             alpha=opacity if colour == BLUE else 1.0,
         )  # fmt: skip
     beyond = int((crossings.crossed & ~inside).sum())

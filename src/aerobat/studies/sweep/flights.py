@@ -14,15 +14,16 @@ from aerobat.arrays import Array
 from aerobat.control import Controller
 from aerobat.engines import choose
 from aerobat.environment import Dispersion
-from aerobat.evaluation import Passage, Scores, score_flights
+from aerobat.evaluation import Passage, Scores
+from aerobat.evaluation.score_flights import ErrorsOverTime, score_over_time
 from aerobat.planning import Plan
-from aerobat.simulation import Flight, FlightConfig, fly
+from aerobat.simulation import FlightConfig
 from aerobat.simulation.conditions.draw import Draw, draw_flights
 from aerobat.vehicle import Vehicle
 
 CHUNK = 50  # flights that are flown, kept and resumed as one, whatever the batches and the cores
-SAMPLED = 200  # flights, the first ones, whose errors are kept over time
-SAMPLE_RATE = 100.0  # [1/s] of their rows
+SAMPLED = 4 * CHUNK  # flights, the first ones, whose errors are kept over time
+STRIDE = 10  # ticks from one instant of theirs to the next
 PASSED, NOT_REACHED = "passed", "not_reached"  # ends of a passage, beside the outcomes that are failures
 AGAIN = "#"  # between a gate's name and the number of its passage, from the second on
 
@@ -65,11 +66,19 @@ class Chunk:
 
 def fly_chunk(task: SweepTask, begin: int, end: int) -> Chunk:
     """The flights from number `begin` to before `end`; how they are cut into batches changes no bit."""
-    config = _config(task)
-    numbers = [range(first, min(first + task.batch, end)) for first in range(begin, end, task.batch)]
-    parts = [_flown(task, replace(config, flights=each)) for each in numbers]
-    columns = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
-    return Chunk(columns, *_sampled(task, config, range(begin, min(end, SAMPLED))))
+    config, is_sampled = _config(task), begin < SAMPLED
+    batches = [range(first, min(first + task.batch, end)) for first in range(begin, end, task.batch)]
+    parts = [_flown(task, replace(config, flights=numbers), is_sampled) for numbers in batches]
+    columns = {name: np.concatenate([part[name] for part, _ in parts]) for name in parts[0][0]}
+    if not is_sampled:
+        return Chunk(columns, np.zeros(0), *np.zeros((2, 0, 0)))
+    errors = [each for _, each in parts]
+    return Chunk(
+        columns,
+        errors[0].times,
+        np.concatenate([each.position for each in errors]),
+        np.concatenate([each.attitude for each in errors]),
+    )
 
 
 def _config(task: SweepTask) -> FlightConfig:
@@ -79,11 +88,13 @@ def _config(task: SweepTask) -> FlightConfig:
     return replace(config, engine=choose(task.engine, CHUNK, ticks).name)
 
 
-def _flown(task: SweepTask, config: FlightConfig) -> Columns:
-    """Columns of the table for the flights of a config."""
+def _flown(task: SweepTask, config: FlightConfig, is_sampled: bool) -> tuple[Columns, ErrorsOverTime]:
+    """Columns of the table for the flights of a config, and their errors over time if they are sampled."""
     assert config.flights is not None
     draws = draw_flights(task.conditions, len(task.vehicle.rotors), task.seed, config.flights)
-    return _drawn(draws) | _scored(score_flights(task.plan, task.vehicle, config=config))
+    stride = STRIDE if is_sampled else None
+    scores, errors = score_over_time(task.plan, task.vehicle, None, None, config, stride)
+    return _drawn(draws) | _scored(scores), errors
 
 
 def _drawn(draws: Sequence[Draw]) -> Columns:
@@ -134,20 +145,3 @@ def passage_names(passages: Sequence[Passage]) -> Iterator[str]:
     for passage in passages:
         turns[passage.gate] += 1
         yield passage.gate + (f"{AGAIN}{turns[passage.gate]}" if turns[passage.gate] > 1 else "")
-
-
-def _sampled(task: SweepTask, config: FlightConfig, numbers: range) -> tuple[Array, Array, Array]:
-    """Times of rows, and errors of position and attitude of some flights, held after a divergence."""
-    if not numbers:
-        return np.zeros(0), np.zeros((0, 0)), np.zeros((0, 0))
-    stride = max(round(config.control_rate / SAMPLE_RATE), 1)
-    config = replace(config, flights=numbers, log_rate=config.control_rate / stride)
-    flight = fly(task.plan, task.vehicle, config=config)
-    return flight.times, _held(flight, flight.position_error), _held(flight, flight.attitude_error)
-
-
-def _held(flight: Flight, errors: Array) -> Array:
-    """Errors over time (flights, T), those of a flight's end from there on."""
-    last = np.searchsorted(flight.times, flight.ends, side="right") - 1
-    shown = np.minimum(np.arange(errors.shape[1]), last[:, None])
-    return np.take_along_axis(errors, shown, axis=1)

@@ -17,7 +17,7 @@ from aerobat.documents import read_text
 from aerobat.errors import SpecError
 from aerobat.planning import Plan
 from aerobat.storage import read_arrays, whole_file, write_whole
-from aerobat.studies.sweep.flights import CHUNK, SAMPLE_RATE, SAMPLED, Chunk, SweepTask
+from aerobat.studies.sweep.flights import CHUNK, SAMPLED, STRIDE, Chunk, SweepTask
 
 FINGERPRINT = "fingerprint.json"
 LIBRARIES = ("aerobat", "numpy", "llvmlite", "jax")  # that the numbers of flights come from
@@ -83,7 +83,7 @@ def fingerprint(task: SweepTask) -> dict[str, Any]:
         "seed": task.seed,
         "controller": _digest(to_table(task.controller)),
         "engine": task.engine,
-        "chunks": [CHUNK, SAMPLED, SAMPLE_RATE],
+        "chunks": [CHUNK, SAMPLED, STRIDE],
         "versions": installed_versions(),
     }
 

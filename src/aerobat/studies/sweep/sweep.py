@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Executor, Future, wait
-from contextlib import nullcontext
 from itertools import islice
 from pathlib import Path
 from typing import Annotated
@@ -12,7 +11,6 @@ from typing import Annotated
 import numpy as np
 from pydantic import Field
 
-from aerobat.arrays import Array
 from aerobat.control import Controller
 from aerobat.declaration import PathName, validated
 from aerobat.engines.cores import available_cores
@@ -23,6 +21,7 @@ from aerobat.simulation import Outcome
 from aerobat.studies.sweep.flights import CHUNK, Chunk, SweepTask, fly_chunk
 from aerobat.studies.sweep.kept import KeptChunks
 from aerobat.studies.sweep.result import Sweep
+from aerobat.studies.sweep.workers import InProcess
 from aerobat.studies.sweep.workers import workers as processes
 from aerobat.vehicle import Vehicle
 
@@ -89,12 +88,19 @@ def sweep(
             chunks[span] = tally.counted(found)
     missing = [span for span in spans if span not in chunks]
     cores = workers or available_cores()
-    own = processes(min(cores, max(len(missing), 1)))
-    with own if executor is None else nullcontext(executor) as flying:
-        for span, chunk in _in_parallel(flying, task, missing, _AHEAD * cores, executor is not None):
+
+    def finish(executor: Executor, spans: Sequence[Span], cancels: bool = False) -> None:
+        for span, chunk in _in_parallel(executor, task, spans, _AHEAD * cores, cancels):
             if kept is not None:
                 kept.write(*span, chunk)
             chunks[span] = tally.counted(chunk)
+
+    if executor is not None:
+        finish(executor, missing, cancels=True)
+    else:
+        finish(InProcess(), missing[:1])  # compiles what all processes share
+        with processes(min(cores, max(len(missing) - 1, 1)), not engine.startswith("jax")) as pool:
+            finish(pool, missing[1:])
     return _joined(task, [chunks[span] for span in spans])
 
 
@@ -144,22 +150,14 @@ def _in_parallel(
 
 def _joined(task: SweepTask, chunks: Sequence[Chunk]) -> Sweep:
     """All flights as one."""
-    columns = {name: np.concatenate([chunk.columns[name] for chunk in chunks]) for name in chunks[0].columns}
     sampled = [chunk for chunk in chunks if len(chunk.times)]
-    times = max((chunk.times for chunk in sampled), key=len)
-    # where all of a chunk's flights ended early its rows are fewer, and go on as the last
-    rows = [np.minimum(np.arange(len(times)), len(chunk.times) - 1) for chunk in sampled]
-
-    def over_time(name: str) -> Array:
-        return np.concatenate([getattr(chunk, name)[:, k] for k, chunk in zip(rows, sampled, strict=True)])
-
     return Sweep(
         plan=task.plan,
         vehicle=task.vehicle,
         conditions=task.conditions,
         seed=task.seed,
-        table=columns,
-        times=times,
-        position_error=over_time("position_error"),
-        attitude_error=over_time("attitude_error"),
+        table={n: np.concatenate([chunk.columns[n] for chunk in chunks]) for n in chunks[0].columns},
+        times=sampled[0].times,
+        position_error=np.concatenate([chunk.position_error for chunk in sampled]),
+        attitude_error=np.concatenate([chunk.attitude_error for chunk in sampled]),
     )

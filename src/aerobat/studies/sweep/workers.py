@@ -5,7 +5,9 @@ from __future__ import annotations
 import multiprocessing
 import os
 import signal
+import sys
 import threading
+import warnings
 from collections.abc import Iterator
 from concurrent.futures import Executor, Future, ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
@@ -15,8 +17,6 @@ from typing import Any
 
 from aerobat.declaration.registry import import_plugin, imported_plugins
 from aerobat.errors import SpecError
-
-_PRELOADED = "aerobat.studies.sweep.flights"
 
 
 class InProcess(Executor):
@@ -30,28 +30,34 @@ class InProcess(Executor):
 
 
 @contextmanager
-def workers(count: int) -> Iterator[Executor]:
-    """So many processes, in which nothing is left of this one's threads and locks; one is this process.
+def workers(count: int, forked: bool) -> Iterator[Executor]:
+    """So many processes; one is this process.
 
     An exception in the block, Ctrl-C among them, ends them at once, as does the death of this process: each
     watches one end of a pipe. Raises SpecError where they end by themselves.
+
+    Args:
+        count: how many.
+        forked: True for copies of this process, where the system has such, that share its memory and its
+            compiled code; else each imports and compiles its own.
     """
     if count == 1:
         yield InProcess()
         return
-    methods = multiprocessing.get_all_start_methods()
-    context: Any = multiprocessing.get_context("forkserver" if "forkserver" in methods else "spawn")
-    if "forkserver" in methods:
-        context.set_forkserver_preload([_PRELOADED])  # imported once for all of them
+    # macOS has forks that its own libraries do not survive
+    context: Any = multiprocessing.get_context("fork" if forked and sys.platform == "linux" else "spawn")
     watched, held = context.Pipe(duplex=False)
-    pool = ProcessPoolExecutor(count, context, _begin, (watched, imported_plugins()))
+    pool = ProcessPoolExecutor(count, context, _begin, (watched, held, imported_plugins()))
     try:
-        yield pool
+        with warnings.catch_warnings():
+            # forked beside threads: those of engines and BLAS know of forks, and no other is waited for
+            warnings.filterwarnings("ignore", ".*fork", DeprecationWarning)
+            yield pool
         pool.shutdown()
     except BrokenProcessPool:
         raise SpecError(
-            "a process that flies has ended by itself: its memory may be short, then take a smaller batch; "
-            'and a script that sweeps does so below `if __name__ == "__main__":`, or with workers=1'
+            "a process that flies has ended by itself: where memory is short, take fewer workers; a script "
+            'on Windows or macOS sweeps below `if __name__ == "__main__":`, or with workers=1'
         ) from None
     finally:
         held.close()
@@ -59,9 +65,10 @@ def workers(count: int) -> Iterator[Executor]:
         watched.close()
 
 
-def _begin(watched: Connection, plugins: tuple[str, ...]) -> None:
+def _begin(watched: Connection, held: Connection, plugins: tuple[str, ...]) -> None:
     """Begin a worker: interrupts are for the process that sweeps, whose end is the worker's."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    held.close()
     threading.Thread(target=_end_with, args=(watched,), daemon=True).start()
     for path in plugins:
         import_plugin(path)
