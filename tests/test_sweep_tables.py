@@ -57,15 +57,17 @@ def test_a_file_that_is_no_table_is_refused_in_a_sentence(
             read_table(path)
         assert "\n" not in str(refused.value)
         path.write_bytes(content)
-    with pytest.raises(SpecError, match="ends in .csv or .parquet"):
+    with pytest.raises(SpecError, match=r"ends in \.csv or \.parquet"):
         write_table({"a": [1.0]}, tmp_path / "table.txt")
     assert not (tmp_path / "table.txt").exists()
 
 
-@pytest.mark.parametrize("table", [{}, {"a": [1.0], "b": [1.0, 2.0]}, {"a": [[1.0]]}, {"a": 1.0}, {"a": [None]}])
+@pytest.mark.parametrize(
+    "table", [{}, {"a": [1.0], "b": [1.0, 2.0]}, {"a": [[1.0]]}, {"a": 1.0}, {"a": [None]}]
+)
 def test_what_is_no_table_is_refused(tmp_path: Path, table: dict[str, Any]) -> None:
     for suffix in ("csv", "parquet"):
-        with pytest.raises(SpecError, match="^table must hold columns"):
+        with pytest.raises(SpecError, match=r"^table must hold columns"):
             write_table(table, tmp_path / f"table.{suffix}")
     assert not list(tmp_path.iterdir())
 

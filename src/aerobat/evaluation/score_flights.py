@@ -108,7 +108,7 @@ def score_flights(
 
 @dataclass(frozen=True, eq=False)
 class ErrorsOverTime:
-    """Errors of flights, RMS over the intervals that end at some times; after a divergence, those of its end."""
+    """Errors of flights, RMS over the intervals that end at some times, held after a divergence."""
 
     times: Array  # [s], (T,)
     position: Array  # [m], (flights, T)

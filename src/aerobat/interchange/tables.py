@@ -24,8 +24,8 @@ CSV, PARQUET = ".csv", ".parquet"
 def write_table(table: Mapping[str, Any], path: PathName) -> None:
     """Write columns by their names, as a sweep's table, to a CSV or Parquet file, by the path's suffix.
 
-    Whole numbers, numbers or text; digits enough to read all numbers back exactly. Raises SpecError for another suffix, and
-    where the file cannot be written, BackendMissing for Parquet without pyarrow.
+    Whole numbers, numbers or text; digits enough to read all numbers back exactly. Raises SpecError for
+    another suffix, and where the file cannot be written, BackendMissing for Parquet without pyarrow.
     """
     columns = _columns(table)
     if _suffix(path) == CSV:

@@ -57,9 +57,7 @@ def draw_opening(axes: Axes, crossings: Crossings) -> None:
     corner = (-gate.width / 2, -gate.height / 2)
     axes.add_patch(Rectangle(corner, gate.width, gate.height, facecolor=PAPER, edgecolor="none", zorder=0.2))
     axes.add_patch(
-        Rectangle(
-            corner, gate.width, gate.height, fill=False, edgecolor=YELLOW, linewidth=3.0, zorder=1.5
-        )
+        Rectangle(corner, gate.width, gate.height, fill=False, edgecolor=YELLOW, linewidth=3.0, zorder=1.5)
     )
     half = np.array([gate.width, gate.height]) * (0.5 + MARGIN)
     off = np.nanmax(np.abs([crossings.right, crossings.up]), axis=1) if crossings.crossed.any() else half

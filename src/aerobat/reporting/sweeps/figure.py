@@ -53,7 +53,8 @@ def sweep_figure(sweep: Sweep) -> Figure:
     gates = crossings(sweep)
     bars = BAR * len(sweep.outcomes)
     stacked = bars + AXIS + TITLES + CURVES
-    foot = TITLES + AXIS + (max(GATE_PITCH * len(gates) - AXIS - TITLES, stacked) if gates else max(bars, CURVES))
+    beside = max(bars, CURVES)  # where no gate is in the way
+    foot = max(GATE_PITCH * len(gates), AXIS + TITLES + (stacked if gates else beside))
     with house_style():
         title = f"{sweep.plan.problem.name} · {len(sweep)} flights of {sweep.vehicle.name}"
         facts = [f"conditions {sweep.conditions}".partition(";")[0], success_sentence(sweep)]

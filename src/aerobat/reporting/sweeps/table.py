@@ -64,9 +64,7 @@ def _passage_facts(sweep: Sweep, name: str) -> Iterable[Fact]:
 
 def _levels(sweep: Sweep, column: str) -> str:
     """Quantiles of a column in its unit."""
-    shown = (
-        f"{_shown(sweep.quantile(column, level), column)} at {100 * level:g} %" for level in LEVELS[:-1]
-    )
+    shown = (f"{_shown(sweep.quantile(column, level), column)} at {100 * level:g} %" for level in LEVELS[:-1])
     return f"{', '.join(shown)}, {_shown(sweep.quantile(column, 1.0), column)} at most"
 
 

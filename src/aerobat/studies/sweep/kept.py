@@ -35,6 +35,8 @@ class KeptChunks:
         """The folder, new or of the same sweep. Raises SpecError, one sentence, for any other's."""
         own = fingerprint(task)
         path = folder / FINGERPRINT
+        if folder.exists() and not folder.is_dir():
+            raise SpecError(f"{folder} is no folder; name one to keep flights in")
         if not folder.exists() or not any(folder.iterdir()):
             write_whole(path, json.dumps(own, indent=2) + "\n")
             return cls(folder)
@@ -71,6 +73,12 @@ class KeptChunks:
 
     def _path(self, begin: int, end: int) -> Path:
         return self.folder / f"flights-{begin}-{end}.npz"
+
+
+def finished_flights(folder: Path) -> int:
+    """How many flights a folder keeps."""
+    spans = (path.stem.split("-")[1:] for path in folder.glob("flights-*-*.npz"))
+    return sum(int(end) - int(begin) for begin, end in spans)
 
 
 def fingerprint(task: SweepTask) -> dict[str, Any]:

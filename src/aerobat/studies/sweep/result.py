@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Annotated, Any
@@ -83,8 +83,8 @@ class Sweep:
         """One line for people."""
         errors = [length(self.quantile("max_position_error_m", level)) for level in LEVELS[1:]]
         return (
-            f"{len(self)} flights of {self.plan.problem.name}, {self.conditions.name}: {self.success} went well; "
-            f"position error {errors[0]} at 95 %, {errors[1]} at most"
+            f"{len(self)} flights of {self.plan.problem.name}, {self.conditions.name}: {self.success} "
+            f"went well; position error {errors[0]} at 95 %, {errors[1]} at most"
         )
 
     @property

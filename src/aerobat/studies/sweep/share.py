@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 CONFIDENCE = 0.95  # of the intervals
+MAX_DIGITS = 6  # of a percentage, behind the point
 
 
 @dataclass(frozen=True)
@@ -43,9 +44,5 @@ class Share:
 def percent(fraction: float) -> str:
     """A fraction in percent, with the digits that tell it from none and from all."""
     value = 100.0 * fraction
-    rounded = f"{value:.1f}"
-    if value in (0.0, 100.0):
-        return f"{value:.0f}"
-    if rounded in ("0.0", "100.0"):
-        return f"{value:.2g}" if value < 1.0 else f"{value:.4f}".rstrip("0")
-    return rounded
+    texts = (f"{value:.{digits}f}" for digits in range(1, MAX_DIGITS + 1))
+    return next((text for text in texts if float(text) not in (0.0, 100.0)), f"{value:.0f}")
