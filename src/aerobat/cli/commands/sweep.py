@@ -97,7 +97,8 @@ def sweep_of(plan: Plan, record: RunRecord, options: OutputOptions, workers: int
         if not unfinished.finished:
             unfinished.remove()
         elif isinstance(error, KeyboardInterrupt):
-            say(f"{unfinished.finished} of {flight.runs} flights are kept: the same command goes on from there")
+            kept = f"{unfinished.finished} of {flight.runs} flights are kept"
+            say(f"{kept}: the same command goes on from there")
         raise
 
 
