@@ -60,6 +60,10 @@ def ignored(attempt: object) -> None:
     pass
 
 
+def ignored_counts(done: int, well: int) -> None:
+    pass
+
+
 RESULTS = (
     "Assessment",
     "Estimates",
@@ -170,6 +174,21 @@ def _arguments(name: str, folder: Path) -> dict[str, Any]:
             **here,
             "config": ab.FlightConfig(rate=100.0, engine="floats"),
         },
+        "sweep": {
+            "plan": plan(),
+            "conditions": ab.load_dispersion("none"),
+            "runs": 1,
+            "seed": 1,
+            "vehicle": agile,
+            "controller": ab.Controller(),
+            "engine": "floats",
+            "batch": 1,
+            "workers": 1,
+            "executor": None,
+            "keep": folder / "kept",
+            "progress": ignored_counts,
+        },
+        "sweep_figure": {"sweep": instance(ab.Sweep)},
         "tilted_gate": {
             "position": (0.0, 0.0, 1.0),
             "heading": 0.1,
@@ -260,6 +279,8 @@ def _methods(folder: Path) -> Iterator[Door]:
         ("Plan.save", plan().save, {"path": folder / "saved.plan"}),
         ("Flight.save", flight().save, {"path": folder / "saved.npz"}),
         ("Flight[]", ab.fly(plan(), [agile, agile], rate=100.0).__getitem__, {"vehicle": 1}),
+        ("Sweep.quantile", instance(ab.Sweep).quantile, {"column": "max_position_error_m", "level": 0.5}),
+        ("Sweep.within", instance(ab.Sweep).within, {"column": "max_position_error_m", "limit": 0.1}),
         ("Scores[]", ab.score_flights(plan(), [agile, agile], rate=100.0).__getitem__, {"k": 1}),
         (
             "Miqp.plan",
@@ -327,6 +348,8 @@ def instance(cls: type) -> Any:
         ab.Waypoints: lambda: ab.Waypoints((ab.Waypoint((0.0, 0.0, 1.0)),)),
         ab.Wrench: lambda: flight().setpoint.wrench,
         ab.Reference: lambda: ab.reference(plan(), times=[0.0, 0.1]),
+        ab.Share: lambda: instance(ab.Sweep).success,
+        ab.Sweep: lambda: ab.sweep(plan(), "none", 1, engine="floats", workers=1),
         ab.Score: lambda: ab.score(flight(), plan()),
         ab.Scores: lambda: ab.score_flights(plan(), ["agile-quad"] * 2, rate=100.0),
         ab.Sensitivity: lambda: ab.sensitivity(plan(), "mass", rate=100.0),

@@ -82,10 +82,12 @@ from .reporting.comparison import comparison_figure
 from .reporting.data_frames import to_dataframe
 from .reporting.figures import draw
 from .reporting.motion.video import write_video
+from .reporting.sweeps.figure import sweep_figure
 from .reporting.tracking import tracking_figure
 from .simulation import Flight, FlightConfig, Outcome, fly, load_flight, prepare
 from .states import BodyState, FlatState, Setpoint, Wrench
 from .studies.compare import Comparison, compare
+from .studies.sweep import Share, Sweep, sweep
 from .trajectory import ContinuityRule, Trajectory, load_trajectory, minimum_effort, save_trajectory
 from .vehicle import Ellipsoid, Rotor, Vehicle, implausibilities, load_vehicle, vehicle_names, write_vehicle
 from .viewer.replay import Replay, view, write_replay
@@ -147,9 +149,11 @@ __all__ = [
     "Sensitivity",
     "SensorLog",
     "Setpoint",
+    "Share",
     "SpecError",
     "Stage",
     "StageSequence",
+    "Sweep",
     "TimeOptimal",
     "TimeScaling",
     "Trajectory",
@@ -193,6 +197,8 @@ __all__ = [
     "score_flights",
     "sensitivity",
     "smallest_opening",
+    "sweep",
+    "sweep_figure",
     "tilted_gate",
     "to_dataframe",
     "tracking_figure",

@@ -29,6 +29,7 @@ class Crossings:
     right: Array  # [m] of the opening's centre, NaN where a flight did not cross, (flights,)
     up: Array  # [m] likewise, (flights,)
     wrong: Mask  # true for those that did not pass as they should, (flights,)
+    smallest: tuple[float, float] | None  # [m] width and height of the opening that 99 % pass, if known
 
     @property
     def crossed(self) -> Mask:
@@ -59,6 +60,11 @@ def draw_opening(axes: Axes, crossings: Crossings) -> None:
     axes.add_patch(
         Rectangle(corner, gate.width, gate.height, fill=False, edgecolor=YELLOW, linewidth=3.0, zorder=1.5)
     )
+    if crossings.smallest is not None:
+        width, height = crossings.smallest
+        needed = Rectangle((-width / 2, -height / 2), width, height, fill=False, edgecolor=INK, linewidth=0.9)
+        needed.set_linestyle((0, (4, 2)))
+        axes.add_patch(needed)
     half = np.array([gate.width, gate.height]) * (0.5 + MARGIN)
     off = np.nanmax(np.abs([crossings.right, crossings.up]), axis=1) if crossings.crossed.any() else half
     half = np.clip(1.05 * off, half, 2.0 * half)

@@ -23,7 +23,7 @@ from aerobat.reporting.page import (
 from aerobat.reporting.panels import timelines
 from aerobat.reporting.panels.crossings import Crossings, draw_opening, draw_scatter
 from aerobat.reporting.style import BAND, BLUE, INK, MUTED, RED, SKY, SMALL
-from aerobat.reporting.sweeps.table import outcome_name, success_sentence
+from aerobat.reporting.sweeps.table import known_opening, outcome_name, success_sentence
 from aerobat.simulation.outcome import length
 from aerobat.studies.sweep import Sweep
 from aerobat.studies.sweep.flights import PASSED
@@ -76,7 +76,10 @@ def crossings(sweep: Sweep) -> dict[str, Crossings]:
     found = {}
     for name, gate in sweep.passages.items():
         left, up = (np.asarray(sweep.table[f"{name}_{axis}_m"]) for axis in ("lateral", "up"))
-        found[name] = Crossings(gate, -left, up, sweep.table[f"{name}_outcome"] != PASSED)
+        wrong = sweep.table[f"{name}_outcome"] != PASSED
+        smallest = known_opening(sweep, name)
+        sides = None if smallest is None else (smallest.width, smallest.height)
+        found[name] = Crossings(gate, -left, up, wrong, sides)
     return found
 
 
@@ -108,7 +111,8 @@ def _draw_gate(figure: Figure, name: str, crossed: Crossings, bottom: float) -> 
     opening, scatter = (panel(figure, x, bottom, THIRD, GATE) for x in THIRDS[:2])
     draw_opening(opening, crossed)
     draw_scatter(scatter, crossed)
-    heading(opening, f"Plane of {name}", f"as who passes upright sees it; {crossed.note}")
+    dashed = "" if crossed.smallest is None else "; dashed: 99 % pass"
+    heading(opening, f"Plane of {name}", f"as who passes upright sees it; {crossed.note}{dashed}")
     half, most = map(length, crossed.rings)
     heading(scatter, "Centres there", f"half within {half}, 95 % within {most}")
 

@@ -9,6 +9,8 @@ from typing import Any
 from rich.table import Table
 from rich.text import Text
 
+from aerobat.errors import SpecError
+from aerobat.evaluation import Opening
 from aerobat.reporting.tables import Fact, facts_table
 from aerobat.simulation import Outcome
 from aerobat.simulation.outcome import length
@@ -41,6 +43,15 @@ def success_sentence(sweep: Sweep) -> str:
     return f"{sweep.success} of the flights went well, at 95 % confidence; seed {sweep.seed}"
 
 
+def known_opening(sweep: Sweep, passage: str) -> Opening | None:
+    """The smallest opening that 99 % pass; None where the flights are too few to say, or too many miss."""
+    try:
+        found = sweep.smallest_opening(passage)
+    except SpecError:
+        return None
+    return found if isfinite(found.scale) else None
+
+
 def outcome_name(outcome: Outcome) -> str:
     """An outcome in two or three words."""
     return outcome.name.lower().replace("_", " ")
@@ -60,6 +71,9 @@ def _passage_facts(sweep: Sweep, name: str) -> Iterable[Fact]:
         yield fact, _levels(sweep, f"{name}_{column}")
     within = ", ".join(f"{length(w)} {sweep.within(f'{name}_miss_m', w)}" for w in WIDTHS[1:3])
     yield "within", within
+    opening = known_opening(sweep, name)
+    if opening is not None:
+        yield "99 % pass", str(opening)
 
 
 def _levels(sweep: Sweep, column: str) -> str:
@@ -88,10 +102,17 @@ def sweep_report(sweep: Sweep) -> dict[str, Any]:
         "passages": {
             name: {"passed": _share(sweep.passed(name))}
             | {column: _quantiles(sweep, f"{name}_{column}") for column, _ in PASSAGE}
-            | {"within": [{"miss_m": w, **_share(sweep.within(f"{name}_miss_m", w))} for w in WIDTHS]}
+            | {
+                "smallest_opening_m": _sides(known_opening(sweep, name)),
+                "within": [{"miss_m": w, **_share(sweep.within(f"{name}_miss_m", w))} for w in WIDTHS],
+            }
             for name in sweep.passages
         },
     }
+
+
+def _sides(opening: Opening | None) -> list[float] | None:
+    return None if opening is None else [opening.width, opening.height]
 
 
 def _share(share: Share) -> dict[str, float]:

@@ -38,6 +38,8 @@ _PASSAGE = (  # numbers of a passage, each with the name of its column after the
     ("speed", "speed_m_s"),
     ("attitude_error_deg", "attitude_error_deg"),
     ("clearance", "clearance_m"),
+    ("needed_width", "needed_width_m"),
+    ("needed_height", "needed_height_m"),
 )
 
 

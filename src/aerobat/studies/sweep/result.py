@@ -15,6 +15,7 @@ from pydantic import Field
 from aerobat.arrays import Array
 from aerobat.declaration import Label, Number, by_value, in_notebooks, short, unknown_name, validated
 from aerobat.environment import Dispersion
+from aerobat.evaluation.opening import Opening, Probability, opening_of
 from aerobat.planning import Plan
 from aerobat.problem import Gate
 from aerobat.simulation import Outcome
@@ -56,8 +57,8 @@ class Sweep:
     `lag_mean`, `thrust_mean` and `thrust_min` over the nominal vehicle's, `drag_1_s` over its mass,
     `start_offset_m`, `start_speed_m_s`, `start_tilt_deg`, `mean_wind_m_s`, `charge`; `outcome`, as text; the
     fields of a Score; and of each gate, after its name, `_time_s`, `_lateral_m`, `_up_m`, `_miss_m`,
-    `_speed_m_s`, `_attitude_error_deg`, `_clearance_m`, NaN where its plane was not crossed, and `_outcome`:
-    passed, not_reached, or what went wrong there.
+    `_speed_m_s`, `_attitude_error_deg`, `_clearance_m`, `_needed_width_m` and `_needed_height_m`, NaN where
+    its plane was not crossed, and `_outcome`: passed, not_reached, or what went wrong there.
     """
 
     plan: Plan
@@ -107,9 +108,31 @@ class Sweep:
     @validated
     def passed(self, passage: Label) -> Share:
         """The share of flights that passed a gate as they should. Raises SpecError for an unknown name."""
+        self._gate(passage)
+        return Share(int((self.table[f"{passage}_outcome"] == PASSED).sum()), len(self))
+
+    @validated
+    def smallest_opening(
+        self, passage: Label, probability: Probability = 0.99, confidence: Probability = 0.95
+    ) -> Opening:
+        """The smallest opening about a gate's centre that flights pass, as `ab.smallest_opening` says it.
+
+        Args:
+            passage: the name that the gate's columns begin with.
+            probability: with which a flight shall pass [-].
+            confidence: with which the opening is large enough [-].
+
+        Raises SpecError for an unknown name, and where the flights are too few for such a probability.
+        """
+        gate = self._gate(passage)
+        sides = ((f"{passage}_needed_width_m", gate.width), (f"{passage}_needed_height_m", gate.height))
+        scales = np.maximum(*(self._errors(column) / side for column, side in sides))
+        return opening_of(scales, gate, probability, confidence)
+
+    def _gate(self, passage: str) -> Gate:
         if passage not in self.passages:
             raise unknown_name("passage", passage, self.passages)
-        return Share(int((self.table[f"{passage}_outcome"] == PASSED).sum()), len(self))
+        return self.passages[passage]
 
     @validated
     def quantile(self, column: Label, level: Level) -> float:
