@@ -73,6 +73,8 @@ RESULTS = (
     "Score",
     "Scores",
     "Sensitivity",
+    "Share",
+    "Sweep",
     "Reference",
     "Replay",
 )  # made by no user

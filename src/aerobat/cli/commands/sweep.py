@@ -9,11 +9,11 @@ from cyclopts import Parameter
 
 from aerobat.cli.options import OutputOptions, PlanningOptions, SweepingOptions
 from aerobat.cli.progress import SweepProgress, showing
-from aerobat.cli.runs.folder import holds_something, run_folder, written_to
+from aerobat.cli.runs.folder import written
 from aerobat.cli.runs.record import FlightSettings, RunRecord
 from aerobat.cli.runs.unfinished import Unfinished
 from aerobat.cli.tasks import plan_of, planned
-from aerobat.cli.terminal import print_json, say
+from aerobat.cli.terminal import say
 from aerobat.control import named_controller
 from aerobat.environment import load_dispersion
 from aerobat.interchange.tables import require_writable, write_table
@@ -22,7 +22,6 @@ from aerobat.reporting.page import png
 from aerobat.reporting.report_json import to_json
 from aerobat.reporting.sweeps.figure import sweep_figure
 from aerobat.reporting.sweeps.table import sweep_report, sweep_table
-from aerobat.reporting.tables import show
 from aerobat.studies.sweep import Sweep
 from aerobat.studies.sweep import sweep as sweep_plan
 
@@ -106,16 +105,12 @@ def finish_sweep(sweep: Sweep, record: RunRecord, options: OutputOptions) -> Non
     """Write a sweep, then show it."""
     facts = to_json(sweep_report(sweep))
     picture = png(sweep_figure(sweep))
-    folder: Path = options.out or record.folder
-    replaced = holds_something(folder)
-    with run_folder(folder, record) as staging:
+
+    def write(staging: Path) -> None:
         sweep.plan.save(staging / f"{sweep.plan.problem.name}.plan")
         write_table(sweep.table, staging / table_name(record.flight))
         (staging / "sweep.json").write_text(facts + "\n", encoding="utf-8")
         (staging / "sweep.png").write_bytes(picture)
-    Unfinished.beside(folder).remove()
-    if options.json:
-        print_json(facts)
-        return
-    show(sweep_table(sweep))
-    print(f"\n{written_to(folder, replaced)}")
+
+    written(record, options, write, facts, sweep_table(sweep))
+    Unfinished.beside(options.out or record.folder).remove()

@@ -45,7 +45,6 @@ class ErrorBand:
         return cls(*np.quantile(errors, (0.05, 0.5, 0.95, 1.0), axis=0))
 
 
-@validated
 @in_notebooks
 @short
 @by_value
