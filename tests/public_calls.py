@@ -60,6 +60,10 @@ def ignored(attempt: object) -> None:
     pass
 
 
+def ignored_counts(done: int, well: int) -> None:
+    pass
+
+
 RESULTS = (
     "Assessment",
     "Estimates",
@@ -69,6 +73,8 @@ RESULTS = (
     "Score",
     "Scores",
     "Sensitivity",
+    "Share",
+    "Sweep",
     "Reference",
     "Replay",
 )  # made by no user
@@ -143,6 +149,7 @@ def _arguments(name: str, folder: Path) -> dict[str, Any]:
         "problem_names": {},
         "read_csv": {"path": saved["csv"], "rate": 100.0},
         "read_plan": {"path": saved["plan"], "rate": 100.0},
+        "read_table": {"path": saved["table"]},
         "read_trajectory": {"path": saved["trajectory"], "rate": 100.0},
         "reference": {
             "trajectory": plan().trajectory,
@@ -169,6 +176,21 @@ def _arguments(name: str, folder: Path) -> dict[str, Any]:
             **here,
             "config": ab.FlightConfig(rate=100.0, engine="floats"),
         },
+        "sweep": {
+            "plan": plan(),
+            "conditions": ab.load_dispersion("none"),
+            "runs": 1,
+            "seed": 1,
+            "vehicle": agile,
+            "controller": ab.Controller(),
+            "engine": "floats",
+            "batch": 1,
+            "workers": 1,
+            "executor": None,
+            "keep": folder / "kept",
+            "progress": ignored_counts,
+        },
+        "sweep_figure": {"sweep": instance(ab.Sweep)},
         "tilted_gate": {
             "position": (0.0, 0.0, 1.0),
             "heading": 0.1,
@@ -207,6 +229,7 @@ def _arguments(name: str, folder: Path) -> dict[str, Any]:
             "speed": 5.0,
             "progress": None,
         },
+        "write_table": {"table": {"a": [1.0]}, "path": folder / "saved-table.csv"},
         "write_vehicle": {"vehicle": agile, "path": folder / "saved.toml"},
     }
     return calls[name]
@@ -258,6 +281,8 @@ def _methods(folder: Path) -> Iterator[Door]:
         ("Plan.save", plan().save, {"path": folder / "saved.plan"}),
         ("Flight.save", flight().save, {"path": folder / "saved.npz"}),
         ("Flight[]", ab.fly(plan(), [agile, agile], rate=100.0).__getitem__, {"vehicle": 1}),
+        ("Sweep.quantile", instance(ab.Sweep).quantile, {"column": "max_position_error_m", "level": 0.5}),
+        ("Sweep.within", instance(ab.Sweep).within, {"column": "max_position_error_m", "limit": 0.1}),
         ("Scores[]", ab.score_flights(plan(), [agile, agile], rate=100.0).__getitem__, {"k": 1}),
         (
             "Miqp.plan",
@@ -282,6 +307,8 @@ def _files(folder: Path) -> dict[str, Path]:
     """A file of each kind."""
     files = {name: folder / f"a.{name}" for name in ("plan", "csv")}
     files |= {name: folder / f"{name}.npz" for name in ("flight", "trajectory")}
+    files["table"] = folder / "table.csv"
+    ab.write_table({"a": [1.0]}, files["table"])
     files["plugin"] = folder / "plugin.py"
     files["plugin"].write_text("")
     plan().save(files["plan"])
@@ -323,6 +350,8 @@ def instance(cls: type) -> Any:
         ab.Waypoints: lambda: ab.Waypoints((ab.Waypoint((0.0, 0.0, 1.0)),)),
         ab.Wrench: lambda: flight().setpoint.wrench,
         ab.Reference: lambda: ab.reference(plan(), times=[0.0, 0.1]),
+        ab.Share: lambda: instance(ab.Sweep).success,
+        ab.Sweep: lambda: ab.sweep(plan(), "none", 1, engine="floats", workers=1),
         ab.Score: lambda: ab.score(flight(), plan()),
         ab.Scores: lambda: ab.score_flights(plan(), ["agile-quad"] * 2, rate=100.0),
         ab.Sensitivity: lambda: ab.sensitivity(plan(), "mass", rate=100.0),

@@ -11,9 +11,10 @@ import numpy as np
 import pytest
 
 from aerobat.engines import FLOATS, Engine, run_whole
+from aerobat.engines.cores import available_cores
 from aerobat.engines.llvm import ENGINE
 from aerobat.engines.llvm.codegen import Layout, module
-from aerobat.engines.llvm.engine import MachineLoop, available_cores, machine_code, target_machine
+from aerobat.engines.llvm.engine import MachineLoop, machine_code, target_machine
 from aerobat.engines.traced_loop import trace_loop
 from aerobat.simulation import fly
 from aerobat.trajectory import Trajectory
@@ -103,7 +104,14 @@ def test_no_multiplication_is_fused_with_an_addition(width: int) -> None:
     """Fusing rounds once where the kernel rounds twice, and not on all machines."""
     loop = trace_loop(begin, random_walk, np.ones(3), np.ones(3))
     text = module(
-        loop, Layout(width, shared_parameters=(False,), shared_inputs=(False,), held=(None,), piecewise_constant=(False,))
+        loop,
+        Layout(
+            width,
+            shared_parameters=(False,),
+            shared_inputs=(False,),
+            held=(None,),
+            piecewise_constant=(False,),
+        ),
     )
     assembly = target_machine().emit_assembly(llvm.parse_assembly(text))
     assert "mul" in assembly

@@ -62,6 +62,15 @@ def test_a_flight_early_or_late_crosses_where_it_crosses(cruise: ab.Flight, ahea
     assert passage.planned == pytest.approx(1.0, abs=2e-3)
 
 
+@pytest.mark.parametrize("tilt_deg", [0.0, 40.0, 90.0, 180.0])
+def test_where_a_gate_is_crossed_is_told_in_its_own_axes(cruise: ab.Flight, tilt_deg: float) -> None:
+    turned = gate().tilted(np.deg2rad(tilt_deg))
+    shifted = moved(cruise, lambda p: p + 0.3 * turned.lateral - 0.1 * turned.up)
+    (passage,) = ab.score(shifted, through(turned), QUAD).passages
+    assert (passage.lateral, passage.up) == pytest.approx((0.3, -0.1), abs=1e-4)
+    assert passage.miss == pytest.approx(np.hypot(passage.lateral, passage.up), rel=1e-9)
+
+
 @pytest.mark.parametrize(
     ("x", "outcome", "sentence"),
     [

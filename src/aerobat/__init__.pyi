@@ -33,6 +33,7 @@ from .interchange.columns import write_columns
 from .interchange.csv import read_csv, write_csv
 from .interchange.read import read_plan, read_trajectory
 from .interchange.robots import import_vehicle
+from .interchange.tables import read_table, write_table
 from .planning import (
     Assessment,
     BisectionSearch,
@@ -81,10 +82,12 @@ from .reporting.comparison import comparison_figure
 from .reporting.data_frames import to_dataframe
 from .reporting.figures import draw
 from .reporting.motion.video import write_video
+from .reporting.sweeps.figure import sweep_figure
 from .reporting.tracking import tracking_figure
 from .simulation import Flight, FlightConfig, Outcome, fly, load_flight, prepare
 from .states import BodyState, FlatState, Setpoint, Wrench
 from .studies.compare import Comparison, compare
+from .studies.sweep import Share, Sweep, sweep
 from .trajectory import ContinuityRule, Trajectory, load_trajectory, minimum_effort, save_trajectory
 from .vehicle import Ellipsoid, Rotor, Vehicle, implausibilities, load_vehicle, vehicle_names, write_vehicle
 from .viewer.replay import Replay, view, write_replay
@@ -146,9 +149,11 @@ __all__ = [
     "Sensitivity",
     "SensorLog",
     "Setpoint",
+    "Share",
     "SpecError",
     "Stage",
     "StageSequence",
+    "Sweep",
     "TimeOptimal",
     "TimeScaling",
     "Trajectory",
@@ -182,6 +187,7 @@ __all__ = [
     "problem_names",
     "read_csv",
     "read_plan",
+    "read_table",
     "read_trajectory",
     "reference",
     "registered_maneuvers",
@@ -191,6 +197,8 @@ __all__ = [
     "score_flights",
     "sensitivity",
     "smallest_opening",
+    "sweep",
+    "sweep_figure",
     "tilted_gate",
     "to_dataframe",
     "tracking_figure",
@@ -202,6 +210,7 @@ __all__ = [
     "write_dispersion",
     "write_problem",
     "write_replay",
+    "write_table",
     "write_vehicle",
     "write_video",
 ]

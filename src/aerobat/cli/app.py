@@ -19,6 +19,7 @@ COMMANDS = {
     "plan": "Plan a maneuver and stop there.",
     "check": "Prove that a vehicle can fly a trajectory, or say when and why it cannot.",
     "compare": "Plan a maneuver with every planner and put the plans side by side.",
+    "sweep": "Fly a maneuver many times as it would really be flown, and count what becomes of it.",
     "view": "Write a page that replays a run, a plan or a flight in a browser.",
     "repeat": "Do a run again from its folder, and say if it came to the same.",
     "vehicles": "List the built-in vehicles, or print one as a file to begin one's own with.",
@@ -35,7 +36,9 @@ app = App(
     help_epilogue="""Exit codes: 0 all is well; 1 not certified, or not flown as it should be (off its path,
     past a gate, into its frame or the ground): all is written, and the report says why; 2 the input is wrong
     or the output cannot be written (one sentence says where); 3 no plan was found (one sentence says which
-    bound binds and what would free it); 130 interrupted, with nothing written.
+    bound binds and what would free it); 130 interrupted, with nothing written. A sweep that was flown ends
+    with 0, whatever became of its flights; an interrupted one keeps those that are finished, and the same
+    command goes on from there.
     """,
     suppress_keyboard_interrupt=False,
 )

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field, make_dataclass
 from functools import partial
 from inspect import getdoc
 from pathlib import Path
-from typing import Annotated, Any, TypeVar
+from typing import Annotated, Any, Literal, TypeVar
 
 from cyclopts import Group, Parameter, validators
 
@@ -157,6 +157,31 @@ class FlyingOptions:
 
     seed: Annotated[int, Parameter(group=flying, validator=validators.Number(gte=0))] = 0
     """The seed of the conditions: the same seed, the same flight."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class SweepingOptions:
+    """Options of many flights."""
+
+    runs: Annotated[int, Parameter(group=flying, validator=validators.Number(gte=1, lte=10**7))] = 1000
+    """How many flights."""
+
+    conditions: Annotated[str, Parameter(group=flying)] = "lab"
+    """What varies from flight to flight, disturbs and is measured how: none, lab, field, or a TOML file."""
+
+    controller: Annotated[str, Parameter(group=flying)] = "full"
+    """The control law: full, or paper."""
+
+    seed: Annotated[int, Parameter(group=flying, validator=validators.Number(gte=0))] = 0
+    """The seed of all flights: the same seed, the same flights."""
+
+    workers: Annotated[int | None, Parameter(group=flying, validator=validators.Number(gte=1, lte=4096))] = (
+        None
+    )
+    """How many processes fly; the flights are the same for any number. Default: one a core."""
+
+    table: Annotated[Literal["csv", "parquet"], Parameter(group=output)] = "csv"
+    """The form of the table, flights.csv or flights.parquet; the latter needs aerobat[parquet]."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -1,4 +1,4 @@
-"""What long planning is at: on a terminal always, in a pipe a line on standard error every few seconds."""
+"""What long work is at: on a terminal always, in a pipe a line on standard error every few seconds."""
 
 from __future__ import annotations
 
@@ -81,6 +81,35 @@ class DrawingProgress(Progress):
         return (
             f"drawing the video: {self._drawn} of {self._all} pictures" if self._all else "drawing the video"
         )
+
+
+class SweepProgress(Progress):
+    """What a sweep has come to by now.
+
+    Args:
+        runs: How many flights there shall be.
+        clock: Seconds that rise.
+    """
+
+    def __init__(self, runs: int, clock: Callable[[], float] = perf_counter) -> None:
+        self._clock = clock
+        self._began = clock()
+        self._runs = runs
+        self._done = self._well = 0
+
+    def record(self, done: int, well: int) -> None:
+        """Take note of the flights done, and of those that went well."""
+        self._done, self._well = done, well
+
+    def __str__(self) -> str:
+        """How many flights, how well, for how long, how long still."""
+        spent = self._clock() - self._began
+        text = f"flown {self._done} of {self._runs} in {spent:.0f} s"
+        if not self._done:
+            return text
+        well = f"{100 * self._well / self._done:.1f} % went well"
+        left = (self._runs - self._done) * spent / self._done
+        return f"{text}: {well}; {left:.0f} s to go"
 
 
 def planning_progress(planner: str = "") -> AbstractContextManager[PlanningProgress]:

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from math import isfinite, radians
 from typing import Any, Literal
 
 from aerobat.cli.options import PlanningOptions, TaskOptions, is_given, offered_options, option_name
 from aerobat.cli.progress import planning_progress
-from aerobat.cli.runs.record import RunRecord, default_vehicle
+from aerobat.cli.runs.record import FlightSettings, RunRecord, default_vehicle
 from aerobat.cli.runs.saved_plans import named_vehicle, plan_source, read_saved_plan
 from aerobat.errors import SpecError
 from aerobat.interchange import column_groups
@@ -35,20 +36,33 @@ def read_task(name: str, options: TaskOptions, paper: bool = False) -> tuple[Pro
     return (problem.as_in_paper() if paper else problem), vehicle
 
 
-def planned(name: str, options: PlanningOptions, command: Literal["fly", "plan"]) -> tuple[Plan, RunRecord]:
+def planned(
+    name: str,
+    options: PlanningOptions,
+    command: Literal["fly", "plan", "sweep"],
+    flight: FlightSettings = FlightSettings(),
+    make: Callable[[RunRecord], Plan] | None = None,
+) -> tuple[Plan, RunRecord]:
     """The plan that a command names, certified for its vehicle, and what it takes to make it again.
 
     Args:
         name: Of a problem, or a plan's file or folder.
         options: As they were given.
         command: That plans.
+        flight: How the plan is flown.
+        make: The way from a record to a plan, by default planning.
     """
     source, columns = plan_source(name), column_groups(options.columns)
     if source is not None:
         plan = read_saved_plan(source, options)
         assert plan.vehicle is not None, "a plan that is read is certified for a vehicle"
         record = RunRecord(
-            command=command, problem=plan.problem, vehicle=plan.vehicle, source=name, columns=columns
+            command=command,
+            problem=plan.problem,
+            vehicle=plan.vehicle,
+            source=name,
+            flight=flight,
+            columns=columns,
         )
         return plan, record
     for flag, value in (("--rate", options.rate), ("--heading", options.heading)):
@@ -62,10 +76,11 @@ def planned(name: str, options: PlanningOptions, command: Literal["fly", "plan"]
         planner=make_planner(options),
         paper=options.paper,
         angle=options.angle,
+        flight=flight,
         columns=columns,
         plugins=tuple(map(str, options.plugins)),
     )
-    return plan_of(record), record
+    return (make or plan_of)(record), record
 
 
 def plan_of(record: RunRecord) -> Plan:

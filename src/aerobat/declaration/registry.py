@@ -105,6 +105,15 @@ class Registry(Generic[T]):
             _import(entry.load, f"{self._group} of the installed package {entry.value}")
 
 
+_PLUGIN = "aerobat_plugin_"  # begins the names of the modules that users' files are
+
+
+def imported_plugins() -> tuple[str, ...]:
+    """The paths of the files that `import_plugin` has run, for another process to do the same."""
+    found = ((name, module.__file__) for name, module in sys.modules.items() if name.startswith(_PLUGIN))
+    return tuple(path for _, path in found if path is not None)
+
+
 @validated
 def import_plugin(path: PathName) -> None:
     """Run a user's Python file, which registers maneuvers and planners of its own, once.
@@ -115,7 +124,7 @@ def import_plugin(path: PathName) -> None:
     import importlib.util
 
     file = Path(path).resolve()
-    name = "aerobat_plugin_" + hashlib.sha256(os.fsencode(file)).hexdigest()[:16]
+    name = _PLUGIN + hashlib.sha256(os.fsencode(file)).hexdigest()[:16]
     if name in sys.modules:
         return
     spec = importlib.util.spec_from_file_location(name, file) if file.suffix == ".py" else None

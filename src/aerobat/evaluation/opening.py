@@ -72,7 +72,24 @@ def smallest_opening(
     Raises:
         SpecError: no passage is through such a gate, or the flights are too few for such a probability.
     """
-    scales = np.sort(_needed(scores, gate, side))
+    return opening_of(_needed(scores, gate, side), gate, probability, confidence, side)
+
+
+def opening_of(
+    needed: Array, gate: Gate, probability: float, confidence: float, side: Side = "both"
+) -> Opening:
+    """Return the smallest opening of flights whose needs are known, as `smallest_opening` does.
+
+    Args:
+        needed: the scale of the gate that each flight needs, infinite where none will do, (flights,).
+        gate: which one.
+        probability: with which a flight shall pass.
+        confidence: with which the opening is large enough.
+        side: what is scaled.
+
+    Raises SpecError where the flights are too few for such a probability.
+    """
+    scales = np.sort(needed)
     least = ceil(log(1.0 - confidence) / log(probability))
     if len(scales) < least:
         raise SpecError(

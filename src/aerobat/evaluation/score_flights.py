@@ -4,15 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from aerobat.arrays import Array
 from aerobat.certification import PlannedPassage
 from aerobat.declaration import validated
+from aerobat.engines import logged_ticks
 from aerobat.engines.components import components
-from aerobat.engines.pytree import tree_map
+from aerobat.engines.pytree import tree_map, tree_stack
 from aerobat.environment import Environment
 from aerobat.errors import SpecError
 from aerobat.evaluation.passages import passages_asked
@@ -100,24 +103,78 @@ def score_flights(
     Raises SpecError for arguments that do not fit together, BackendMissing for an engine that is not
     installed.
     """
+    return score_over_time(plan, vehicles, problem, environment, replace(config, **changes))[0]
+
+
+@dataclass(frozen=True, eq=False)
+class ErrorsOverTime:
+    """Errors of flights, RMS over the intervals that end at some times, held after a divergence."""
+
+    times: Array  # [s], (T,)
+    position: Array  # [m], (flights, T)
+    attitude: Array  # [rad], (flights, T)
+
+    @classmethod
+    def of(cls, times: Array, metrics: RunningMetrics) -> ErrorsOverTime:
+        """The errors behind metrics as they stood at those times [s], leaves (flights, T)."""
+        ticks = np.diff(metrics.ticks, axis=1, prepend=0.0)
+        latest = np.maximum.accumulate(np.where(ticks > 0.0, np.arange(len(times)), 0), axis=1)
+
+        def errors(sums: Array) -> Array:
+            mean_square = np.diff(sums, axis=1, prepend=0.0) / np.maximum(ticks, 1.0)
+            return np.asarray(np.sqrt(np.take_along_axis(np.maximum(mean_square, 0.0), latest, axis=1)))
+
+        return cls(times, errors(metrics.sum_square), errors(metrics.sum_square_angle))
+
+
+def score_over_time(
+    plan: Plan | Trajectory,
+    vehicles: Vehicle | str | Sequence[Vehicle | str] | None,
+    problem: Problem | str | None,
+    environment: Environment | None,
+    config: FlightConfig,
+    stride: int | None = None,
+) -> tuple[Scores, ErrorsOverTime]:
+    """Score flights as `score_flights` does, and return their errors over time too.
+
+    Args:
+        plan: what is flown.
+        vehicles: what flies it.
+        problem: what is judged by.
+        environment: where.
+        config: how.
+        stride: ticks from one of the times to the next; None for the last one alone.
+    """
     goal = plan if problem is None else as_problem(problem)
     if isinstance(goal, Trajectory):
         raise SpecError("problem is missing: a trajectory says not what it is judged by")
-    settings = replace(config, **changes)
-    if settings.log_rate is not None:
+    if config.log_rate is not None:
         raise SpecError("log_rate: a scored flight keeps no rows; leave it out")
     if environment is None:
         environment = (goal.problem if isinstance(goal, Plan) else goal).environment
-    setup = prepare(plan, vehicles, environment=environment, config=settings)
-    blocks = range(0, len(setup.times), BLOCK)
-    parts = [setup.reference.setpoint(k, min(k + BLOCK, len(setup.times))).flat.position for k in blocks]
+    setup = prepare(plan, vehicles, environment=environment, config=config)
+    ticks = len(setup.times)
+    blocks = range(0, ticks, BLOCK)
+    parts = [setup.reference.setpoint(k, min(k + BLOCK, ticks)).flat.position for k in blocks]
     planned = passages_asked(goal, setup.times, np.concatenate(parts))
-    setup = with_metrics(setup, planned)
+    rows, logged = _metrics_over_time(with_metrics(setup, planned), stride or ticks)
+    scores = scores_of(tree_map(lambda leaf: leaf[:, -1], rows), planned)
+    return scores, ErrorsOverTime.of(setup.times[logged], rows)
+
+
+def _metrics_over_time(setup: FlightSetup, stride: int) -> tuple[RunningMetrics, NDArray[np.intp]]:
+    """Metrics as they stand at ticks, multiples of a stride and the last, leaves (vehicles, T), and those."""
+    logged = logged_ticks(len(setup.times), stride)
     loop = setup.compile(log=metrics_row)
     carry = loop.init(setup.first_tick)
-    for begin, end in setup.chunks():
-        carry, rows = loop.scan(carry, setup.inputs(begin, end), end)
-    return scores_of(tree_map(lambda leaf: leaf[:, -1], rows), planned)
+    parts = []
+    for begin, end in setup.chunks(stride):
+        chunk_stride = end if begin % stride else stride
+        carry, rows = loop.scan(carry, setup.inputs(begin, end), chunk_stride)
+        kept = np.isin(begin + logged_ticks(end - begin, chunk_stride), logged)
+        parts.append(tree_map(partial(np.compress, kept, axis=1), rows))
+    metrics: RunningMetrics = tree_stack(parts, lambda leaves: np.concatenate(leaves, axis=-1))
+    return metrics, logged
 
 
 def metrics_row(signals: Signals) -> RunningMetrics:

@@ -17,6 +17,7 @@ from aerobat.reporting.comparison import comparison_rows
 from aerobat.simulation import Flight
 from aerobat.simulation.flight import SERIES
 from aerobat.studies.compare import Comparison
+from aerobat.studies.sweep import Sweep
 
 if TYPE_CHECKING:
     from pandas import DataFrame
@@ -32,12 +33,13 @@ METRICS = (
 
 
 @validated
-def to_dataframe(table: Flight | Plan | Comparison | Scores) -> DataFrame:
+def to_dataframe(table: Flight | Plan | Comparison | Scores | Sweep) -> DataFrame:
     """Return a pandas DataFrame, SI units unless a column says otherwise.
 
     Of a flight its rows: time, then each series of SERIES by its components, as `position_x` and `thrusts_0`;
     of a batch all flights' rows, one flight below the other, with the number of the vehicle first. Of a plan
-    its attempts, of a comparison its planners, of scores the flights with their passages through each gate.
+    its attempts, of a comparison its planners, of scores the flights with their passages through each gate,
+    of a sweep its table.
     Raises BackendMissing without pandas.
     """
     try:
@@ -47,6 +49,8 @@ def to_dataframe(table: Flight | Plan | Comparison | Scores) -> DataFrame:
         raise BackendMissing(f"to_dataframe needs pandas; install it with {remedy}") from None
     if isinstance(table, Plan):
         return DataFrame([asdict(attempt) for attempt in table.attempts], columns=_names(Attempt))
+    if isinstance(table, Sweep):
+        return DataFrame(dict(table.table))
     if isinstance(table, Comparison):
         return DataFrame(comparison_rows(table))
     return DataFrame(_of_scores(table) if isinstance(table, Scores) else _of_flight(table))

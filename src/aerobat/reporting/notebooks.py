@@ -17,9 +17,12 @@ from aerobat.planning import Plan
 from aerobat.reporting.comparison import comparison_figure, comparison_table
 from aerobat.reporting.figures import draw
 from aerobat.reporting.page import png as png_of
+from aerobat.reporting.sweeps.figure import sweep_figure
+from aerobat.reporting.sweeps.table import sweep_table
 from aerobat.reporting.tables import certificate_table, facts_table, flight_facts, plan_facts
 from aerobat.simulation import Flight
 from aerobat.studies.compare import Comparison
+from aerobat.studies.sweep import Sweep
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -30,7 +33,7 @@ KEPT = 8  # pictures: a notebook asks for one twice
 
 
 def html(value: Any) -> str:
-    """HTML of a plan, a flight, a score, a certificate or a comparison."""
+    """HTML of a plan, a flight, a score, a certificate, a comparison or a sweep."""
     console = Console(record=True, file=StringIO(), width=COLUMNS, force_jupyter=False)
     console.print(_table(value))
     text = console.export_html(inline_styles=True, code_format=PRE)
@@ -62,6 +65,8 @@ def _table(value: Any) -> Table:
         return certificate_table(value, "certificate")
     if isinstance(value, Comparison):
         return comparison_table(value)
+    if isinstance(value, Sweep):
+        return sweep_table(value)
     return facts_table(str(value), {})
 
 
@@ -69,4 +74,6 @@ def _figure(value: Any) -> Figure | None:
     """The picture; None of what has none."""
     if isinstance(value, Comparison):
         return comparison_figure(value)
+    if isinstance(value, Sweep):
+        return sweep_figure(value)
     return draw(value) if isinstance(value, Plan | Flight) else None

@@ -86,7 +86,7 @@ class TrackingController:
         """See `Component.step`."""
         model, delay = parameters
         body, elapsed = signals["observer"].body, signals["clock"].elapsed
-        if delay != ():
+        if not isinstance(delay, tuple):
             body = control.predicted(ops, model, state, body, elapsed, delay)
         return control.step(ops, self.flags, model, state, body, inputs or signals["reference"], elapsed)
 

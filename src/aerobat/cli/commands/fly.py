@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import Annotated
 
 from cyclopts import Parameter
@@ -39,9 +38,9 @@ def fly(
     """
     named_controller(flying.controller)  # refused before anything is planned
     conditions = None if flying.conditions is None else load_dispersion(flying.conditions)
-    plan, record = planned(problem, options, "fly")
     settings = FlightSettings(flying.controller, conditions, flying.seed)
-    return finish(plan, replace(record, flight=settings), options, flown(plan, settings))
+    plan, record = planned(problem, options, "fly", settings)
+    return finish(plan, record, options, flown(plan, settings))
 
 
 def flown(plan: Plan, settings: FlightSettings) -> Flown:

@@ -7,11 +7,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any
 
+import numpy as np
 from cyclopts import Parameter
 from numpy.typing import NDArray
 
 from aerobat.cli.commands.compare import COMPARISON, comparison_of, finish_comparison
 from aerobat.cli.commands.fly import flown
+from aerobat.cli.commands.sweep import finish_sweep, sweep_of, table_name
 from aerobat.cli.entry import ExitCode
 from aerobat.cli.options import RepeatOptions
 from aerobat.cli.runs.folder import FLIGHT, finish
@@ -19,7 +21,7 @@ from aerobat.cli.runs.record import RunRecord, installed_versions, read_record
 from aerobat.cli.tasks import plan_of
 from aerobat.cli.terminal import say
 from aerobat.errors import SpecError
-from aerobat.interchange import read_plan
+from aerobat.interchange import read_plan, read_table
 from aerobat.planning import Plan
 from aerobat.reporting.comparison import comparison_rows
 from aerobat.simulation import Flight, load_flight
@@ -40,13 +42,15 @@ def repeat(
     Parameters
     ----------
     folder
-        A folder that `aerobat plan`, `fly` or `compare` wrote.
+        A folder that `aerobat plan`, `fly`, `sweep` or `compare` wrote.
     """
     record = read_record(folder)
     out = options.out or folder.with_name(f"{folder.resolve().name}-repeated")
     options = RepeatOptions(out=out, json=options.json)
     if record.command == "compare":
         return _repeat_comparison(folder, record, options)
+    if record.command == "sweep":
+        return _repeat_sweep(folder, record, options)
     old = _Run.read(folder, record)
     plan = old.plan if record.planner is None else plan_of(record)
     again = flown(plan, record.flight) if record.command == "fly" else None
@@ -63,6 +67,15 @@ def _repeat_comparison(folder: Path, record: RunRecord, options: RepeatOptions) 
     rows = [[row[name] for name in SAME] for row in comparison_rows(comparison)]
     finish_comparison(comparison, record, options)
     return _told(folder, record, "" if rows == old else "durations are others", ExitCode.WELL)
+
+
+def _repeat_sweep(folder: Path, record: RunRecord, options: RepeatOptions) -> ExitCode:
+    old = read_table(folder / table_name(record.flight))
+    plan = _Run.read(folder, record).plan if record.planner is None else plan_of(record)
+    swept = sweep_of(plan, record, options)
+    names = [name for name, column in swept.table.items() if not _same(column, old.get(name, np.zeros(0)))]
+    finish_sweep(swept, record, options)
+    return _told(folder, record, f"flights differ in {', '.join(names)}" if names else "", ExitCode.WELL)
 
 
 def _told(folder: Path, record: RunRecord, difference: str, code: ExitCode) -> ExitCode:

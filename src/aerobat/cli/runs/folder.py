@@ -37,6 +37,10 @@ FILES = (
     "report.png",
     "compare.json",
     "compare.png",
+    "flights.csv",
+    "flights.parquet",
+    "sweep.json",
+    "sweep.png",
 )
 
 

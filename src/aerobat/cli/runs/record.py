@@ -13,7 +13,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import PlainValidator
 
-from aerobat.declaration import NonNegative, Seed, declared, to_table
+from aerobat.declaration import Count, NonNegative, Seed, declared, to_table
 from aerobat.documents import read_document, write_document
 from aerobat.environment import Dispersion
 from aerobat.errors import SpecError
@@ -24,7 +24,7 @@ from aerobat.problem import Problem
 from aerobat.vehicle import Vehicle
 
 RECORD = "run.toml"
-LIBRARIES = ("numpy", "scipy", "daqp", "casadi", "gurobipy", "pyscipopt", "llvmlite", "jax")
+LIBRARIES = ("numpy", "scipy", "daqp", "casadi", "gurobipy", "pyscipopt", "llvmlite", "jax", "pyarrow")
 
 
 def _planner(value: Any) -> Planner | None:
@@ -38,6 +38,8 @@ class FlightSettings:
     controller: str = "full"
     conditions: Dispersion | None = None  # left out, as planned
     seed: Seed = 0  # of the conditions
+    runs: Count = 1  # flights of a sweep
+    table: Literal["csv", "parquet"] = "csv"  # the form of a sweep's table
 
 
 @declared
@@ -47,7 +49,7 @@ class RunRecord:
     Without a planner, the plan came from a file and lies in the folder; `compare` takes all planners.
     """
 
-    command: Literal["fly", "plan", "compare"]
+    command: Literal["fly", "plan", "compare", "sweep"]
     problem: Problem  # as it was planned, with --angle and --paper
     vehicle: Vehicle
     planner: Annotated[Planner | None, PlainValidator(_planner)] = None
@@ -72,11 +74,15 @@ class RunRecord:
         if self.command == "compare":
             parts.append("compare")
         elif self.planner is None:
-            parts.append("flown" if self.command == "fly" else "judged")
+            parts += {"fly": ["flown"], "plan": ["judged"]}.get(self.command, [])
         elif self.planner_name != "miqp":
             parts.append(self.planner_name)
         if self.paper:
             parts.append("paper")
+        if self.command == "sweep":
+            parts.append("sweep")
+        if self.flight.conditions is not None:
+            parts.append(self.flight.conditions.name)
         return Path("out") / "-".join(re.sub(r"[^\w.-]+", "-", part) for part in parts)
 
     @property

@@ -14,6 +14,7 @@ import llvmlite.binding as llvm
 import numpy as np
 
 from aerobat.arrays import Array
+from aerobat.engines.cores import available_cores
 from aerobat.engines.engine import (
     CompiledLoop,
     Engine,
@@ -169,13 +170,6 @@ def target_machine() -> llvm.TargetMachine:
     return llvm.Target.from_default_triple().create_target_machine(
         cpu=llvm.get_host_cpu_name(), features=llvm.get_host_cpu_features().flatten(), opt=2, jit=True
     )
-
-
-def available_cores() -> int:
-    """The processors that this process may use; where the system does not say, all there are."""
-    if hasattr(os, "sched_getaffinity"):
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1
 
 
 def _lanes() -> int:

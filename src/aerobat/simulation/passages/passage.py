@@ -42,6 +42,8 @@ class Passage:
     gate: str
     time: float  # [s] of the crossing
     miss: float  # [m] from the centre there
+    lateral: float  # [m] from the centre there along the gate's lateral axis, to the left
+    up: float  # [m] likewise along its upright
     inside: bool  # true if the centre of mass went through the opening
     speed: float  # [m/s]
     attitude_error_deg: float  # angle between the thrust axis and where it shall point
@@ -114,6 +116,8 @@ def passages(planned: PlannedPassage, progress: GateProgress, stop: Array) -> Pa
     fields: dict[str, Any] = {
         "time": known(time),
         "miss": known(np.linalg.norm(offset, axis=-1)),
+        "lateral": known(offset @ gate.lateral),
+        "up": known(offset @ gate.up),
         "inside": crossed & (across < gate.width / 2) & (up < gate.height / 2),
         "speed": known(np.linalg.norm(velocity, axis=-1)),
         "attitude_error_deg": known(np.rad2deg(tilt)),

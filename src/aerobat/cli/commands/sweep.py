@@ -1,0 +1,116 @@
+"""`aerobat sweep`: many flights of one plan, as it would really be flown."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+from cyclopts import Parameter
+
+from aerobat.cli.options import OutputOptions, PlanningOptions, SweepingOptions
+from aerobat.cli.progress import SweepProgress, showing
+from aerobat.cli.runs.folder import written
+from aerobat.cli.runs.record import FlightSettings, RunRecord
+from aerobat.cli.runs.unfinished import Unfinished
+from aerobat.cli.tasks import plan_of, planned
+from aerobat.cli.terminal import say
+from aerobat.control import named_controller
+from aerobat.environment import load_dispersion
+from aerobat.interchange.tables import require_writable, write_table
+from aerobat.planning import Plan
+from aerobat.reporting.page import png
+from aerobat.reporting.report_json import to_json
+from aerobat.reporting.sweeps.figure import sweep_figure
+from aerobat.reporting.sweeps.table import sweep_report, sweep_table
+from aerobat.studies.sweep import Sweep
+from aerobat.studies.sweep import sweep as sweep_plan
+
+
+def sweep(
+    problem: str,
+    options: Annotated[PlanningOptions, Parameter(name="*")] = PlanningOptions(),
+    sweeping: Annotated[SweepingOptions, Parameter(name="*")] = SweepingOptions(),
+) -> None:
+    """Fly a maneuver many times as it would really be flown, and count what becomes of it.
+
+    Each flight draws its own vehicle, start, sensor errors, wind and battery. Prints shares of outcomes with
+    95 % confidence and quantiles of errors, and writes to the output folder, by default
+    out/PROBLEM-sweep-CONDITIONS: flights.csv (a row a flight), sweep.json, sweep.png, PROBLEM.plan and
+    run.toml. A sweep that was interrupted or killed goes on where it stopped when the same command is given.
+    Exits with 0 once all is flown, whatever became of the flights.
+
+    Parameters
+    ----------
+    problem
+        A name that `aerobat problems` lists, a problem's TOML file, or a .plan file or a run's folder, whose
+        plan is flown as it is.
+    """
+    named_controller(sweeping.controller)  # refused before anything is planned
+    settings = FlightSettings(
+        controller=sweeping.controller,
+        conditions=load_dispersion(sweeping.conditions),
+        seed=sweeping.seed,
+        runs=sweeping.runs,
+        table=sweeping.table,
+    )
+    require_writable(table_name(settings))
+
+    def kept_or_new(record: RunRecord) -> Plan:
+        return Unfinished.beside(options.out or record.folder).plan(record, plan_of)
+
+    plan, record = planned(problem, options, "sweep", settings, kept_or_new)
+    finish_sweep(sweep_of(plan, record, options, sweeping.workers), record, options)
+
+
+def table_name(settings: FlightSettings) -> str:
+    """The name of a sweep's table."""
+    return f"flights.{settings.table}"
+
+
+def sweep_of(plan: Plan, record: RunRecord, options: OutputOptions, workers: int | None = None) -> Sweep:
+    """The flights of a run; what is finished is kept beside the run's folder until that is written.
+
+    Args:
+        plan: What is flown.
+        record: How.
+        options: Where to.
+        workers: How many processes fly.
+    """
+    flight = record.flight
+    assert flight.conditions is not None, "a sweep has conditions"
+    unfinished = Unfinished.beside(options.out or record.folder)
+    try:
+        with showing(SweepProgress(flight.runs)) as progress:
+            return sweep_plan(
+                plan,
+                flight.conditions,
+                flight.runs,
+                flight.seed,
+                vehicle=record.vehicle,
+                controller=named_controller(flight.controller),
+                workers=workers,
+                keep=unfinished.flights,
+                progress=progress.record,
+            )
+    except BaseException as error:
+        if not unfinished.finished:
+            unfinished.remove()
+        elif isinstance(error, KeyboardInterrupt):
+            kept = f"{unfinished.finished} of {flight.runs} flights are kept"
+            say(f"{kept}: the same command goes on from there")
+        raise
+
+
+def finish_sweep(sweep: Sweep, record: RunRecord, options: OutputOptions) -> None:
+    """Write a sweep, then show it."""
+    facts = to_json(sweep_report(sweep))
+    picture = png(sweep_figure(sweep))
+
+    def write(staging: Path) -> None:
+        sweep.plan.save(staging / f"{sweep.plan.problem.name}.plan")
+        write_table(sweep.table, staging / table_name(record.flight))
+        (staging / "sweep.json").write_text(facts + "\n", encoding="utf-8")
+        (staging / "sweep.png").write_bytes(picture)
+
+    written(record, options, write, facts, sweep_table(sweep))
+    Unfinished.beside(options.out or record.folder).remove()

@@ -1,0 +1,121 @@
+"""Tables as files: CSV, or Parquet for what reads columns with their types; both are read back equal."""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from aerobat.declaration import PathName, validated
+from aerobat.documents import in_document, read_text
+from aerobat.errors import BackendMissing, SpecError
+from aerobat.storage import whole_file, write_whole
+
+CSV, PARQUET = ".csv", ".parquet"
+
+
+@validated
+def write_table(table: Mapping[str, Any], path: PathName) -> None:
+    """Write columns by their names, as a sweep's table, to a CSV or Parquet file, by the path's suffix.
+
+    Whole numbers, numbers or text; digits enough to read all numbers back exactly. Raises SpecError for
+    another suffix, and where the file cannot be written, BackendMissing for Parquet without pyarrow.
+    """
+    columns = _columns(table)
+    if _suffix(path) == CSV:
+        rows = zip(*(column.tolist() for column in columns.values()), strict=True)
+        text = io.StringIO()
+        csv.writer(text, lineterminator="\n").writerows([list(columns), *rows])
+        write_whole(path, text.getvalue())
+        return
+    parquet = _parquet()
+    from pyarrow import table as arrow_table
+
+    made = arrow_table({name: _storable(column) for name, column in columns.items()})
+    with whole_file(path) as temporary:
+        parquet.write_table(made, temporary)
+
+
+@validated
+def read_table(path: PathName) -> dict[str, NDArray[Any]]:
+    """Return the columns that `write_table` wrote, by their names: whole numbers, numbers, or text.
+
+    Raises SpecError, one sentence, for any other file, BackendMissing for Parquet without pyarrow.
+    """
+    with in_document(Path(path), "table"):
+        if _suffix(path) == CSV:
+            return _from_csv(read_text(Path(path)))
+        parquet = _parquet()
+        try:
+            columns = parquet.read_table(path)
+            return {name: np.array(columns.column(name).to_pylist()) for name in columns.column_names}
+        except FileNotFoundError:
+            raise SpecError("there is no such file; check the path") from None
+        except (OSError, ValueError):  # Arrow's own errors are ValueErrors
+            raise SpecError("it is not a whole Parquet file; write it again") from None
+
+
+def require_writable(path: PathName) -> None:
+    """Refuse, before anything is flown, what `write_table` cannot write. Raises as that does."""
+    if _suffix(path) == PARQUET:
+        _parquet()
+
+
+def _suffix(path: PathName) -> str:
+    suffix = Path(path).suffix
+    if suffix not in (CSV, PARQUET):
+        raise SpecError(f"a table's file ends in {CSV} or {PARQUET}, got {path}")
+    return suffix
+
+
+def _columns(table: Mapping[str, Any]) -> dict[str, NDArray[Any]]:
+    """The columns as arrays. Raises SpecError for what are none."""
+    try:
+        columns = {str(name): np.asarray(column) for name, column in table.items()}
+    except ValueError:  # ragged
+        columns = {}
+    shapes = {column.shape for column in columns.values()}
+    kinds = {column.dtype.kind for column in columns.values()}
+    if len(shapes) != 1 or len(shapes.pop()) != 1 or not kinds <= set("iufU"):
+        raise SpecError("table must hold columns by their names: lists of numbers or text, all as long")
+    return columns
+
+
+def _parquet() -> ModuleType:
+    try:
+        import pyarrow.parquet
+    except ImportError:
+        remedy = 'pip install "aerobat[parquet]"'
+        raise BackendMissing(f"Parquet files need pyarrow; install it with {remedy}, or write CSV") from None
+    module: ModuleType = pyarrow.parquet
+    return module
+
+
+def _storable(column: NDArray[Any]) -> Any:
+    return column.tolist() if column.dtype.kind == "U" else column
+
+
+def _from_csv(text: str) -> dict[str, NDArray[Any]]:
+    try:
+        header, *rows = csv.reader(io.StringIO(text, newline=""))
+    except (ValueError, csv.Error):  # nothing at all, or no text
+        header, rows = [], []
+    if not rows or len(set(header)) < len(header) or any(len(row) != len(header) for row in rows):
+        raise SpecError("it is no table with a header and rows as long; write it again")
+    return {name: _parsed(column) for name, column in zip(header, zip(*rows, strict=True), strict=True)}
+
+
+def _parsed(column: Sequence[str]) -> NDArray[Any]:
+    """Whole numbers where all are, else numbers where all are, else text."""
+    for kind in (int, float):
+        try:
+            return np.array([kind(text) for text in column])
+        except ValueError:
+            continue
+    return np.array(column)

@@ -1,0 +1,128 @@
+"""A gate's plane as who passes it upright sees it: its opening, and where flights crossed."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from aerobat.arrays import Array, Mask
+from aerobat.problem.gate import Gate
+from aerobat.reporting.page import size_of
+from aerobat.reporting.style import BLUE, FAINT, INK, MUTED, PAPER, RED, SMALL, YELLOW
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+MARGIN = 0.15  # around an opening, of its size
+RINGS = (0.5, 0.95)  # fractions of the crossings that circles hold
+REACH = 1.35  # of the larger circle, to where its picture extends
+PALE, FEW = 0.18, 64  # the least opacity of a dot, and the crossings up to which dots are opaque
+
+
+@dataclass(frozen=True, eq=False)
+class Crossings:
+    """Where flights crossed a gate's plane."""
+
+    gate: Gate
+    right: Array  # [m] of the opening's centre, NaN where a flight did not cross, (flights,)
+    up: Array  # [m] likewise, (flights,)
+    wrong: Mask  # true for those that did not pass as they should, (flights,)
+    smallest: tuple[float, float] | None  # [m] width and height of the opening that 99 % pass, if known
+
+    @property
+    def crossed(self) -> Mask:
+        """True for flights that crossed the plane."""
+        return np.asarray(np.isfinite(self.right))
+
+    @property
+    def rings(self) -> list[float]:
+        """Radii [m] of circles about the opening's centre that hold RINGS of the crossings."""
+        distance = np.hypot(self.right, self.up)[self.crossed]
+        return [float(np.quantile(distance, part)) if len(distance) else 0.0 for part in RINGS]
+
+    @property
+    def note(self) -> str:
+        """The crossings in a few words."""
+        missing = int((~self.crossed).sum())
+        text = f"{int(self.crossed.sum())} crossings"
+        return text + (f", {missing} without one" if missing else "")
+
+
+def draw_opening(axes: Axes, crossings: Crossings) -> None:
+    """Draw a gate's frame with all crossings, to one scale along both axes [m]."""
+    from matplotlib.patches import Rectangle
+
+    gate = crossings.gate
+    corner = (-gate.width / 2, -gate.height / 2)
+    axes.add_patch(Rectangle(corner, gate.width, gate.height, facecolor=PAPER, edgecolor="none", zorder=0.2))
+    axes.add_patch(
+        Rectangle(corner, gate.width, gate.height, fill=False, edgecolor=YELLOW, linewidth=3.0, zorder=1.5)
+    )
+    if crossings.smallest is not None:
+        width, height = crossings.smallest
+        needed = Rectangle((-width / 2, -height / 2), width, height, fill=False, edgecolor=INK, linewidth=0.9)
+        needed.set_linestyle((0, (4, 2)))
+        axes.add_patch(needed)
+    half = np.array([gate.width, gate.height]) * (0.5 + MARGIN)
+    off = np.nanmax(np.abs([crossings.right, crossings.up]), axis=1) if crossings.crossed.any() else half
+    half = np.clip(1.05 * off, half, 2.0 * half)
+    _draw_crossings(axes, crossings, half, 1.0)
+    axes.grid(False)
+    _fit(axes, half)
+    axes.set(xlabel="to the right [m]", ylabel="up [m]")
+
+
+def draw_scatter(axes: Axes, crossings: Crossings) -> None:
+    """Draw the crossings by themselves, with circles that hold half and 95 % of them [cm]."""
+    from matplotlib.patches import Circle
+
+    radii = [100.0 * radius for radius in crossings.rings]
+    half = np.full(2, REACH * max(radii[-1], 1e-2))
+    axes.axhline(0.0, color=FAINT, linewidth=0.8)
+    axes.axvline(0.0, color=FAINT, linewidth=0.8)
+    for radius, style in zip(radii, ("-", (0, (4, 2))), strict=True):
+        ring = Circle((0.0, 0.0), radius, fill=False, edgecolor=INK, linewidth=0.9, linestyle=style)
+        axes.add_patch(ring)
+    _draw_crossings(axes, crossings, half, 100.0)
+    _fit(axes, half)
+    axes.set(xlabel="to the right [cm]", ylabel="up [cm]")
+
+
+def _draw_crossings(axes: Axes, crossings: Crossings, half: Array, scale: float) -> None:
+    """Dots, blue and red; those beyond the picture are counted in its corner.
+
+    Args:
+        axes: Where to draw.
+        crossings: What to draw.
+        half: Width and height of the picture, half of them, in its unit, (2,).
+        scale: Of its unit to the metre.
+    """
+    points = scale * np.column_stack([crossings.right, crossings.up])
+    inside = crossings.crossed & (np.abs(np.nan_to_num(points)) <= half).all(axis=1)
+    opacity = max(PALE, min(1.0, np.sqrt(FEW / max(inside.sum(), 1))))
+    for where, colour, marker, size in (
+        (inside & ~crossings.wrong, BLUE, "o", 8.0),
+        (inside & crossings.wrong, RED, "X", 22.0),
+    ):
+        across, up = points[where].T
+        axes.scatter(
+            across, up, s=size, marker=marker, color=colour, linewidths=0.0, zorder=2.0,
+            alpha=opacity if colour == BLUE else 1.0,
+        )  # fmt: skip
+    beyond = int((crossings.crossed & ~inside).sum())
+    if beyond:
+        wrong = bool((crossings.crossed & ~inside & crossings.wrong).any())
+        x, y = 0.08 / size_of(axes)
+        axes.text(
+            x, y, f"{beyond} beyond", size=SMALL, color=RED if wrong else MUTED, transform=axes.transAxes,
+            zorder=4,
+        )  # fmt: skip
+
+
+def _fit(axes: Axes, half: Array) -> None:
+    """Fit half a width and height (2,) about the centre, the same scale along both."""
+    size = size_of(axes)
+    across, up = size * float((half / size).max())
+    axes.set(xlim=(-across, across), ylim=(-up, up))

@@ -1,0 +1,1 @@
+"""Sweeps as figures, tables for people and plain data."""

@@ -1,0 +1,149 @@
+"""Some flights of a sweep: what each draws, what it comes to, and the errors of the first ones over time."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, fields, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from aerobat.arrays import Array
+from aerobat.control import Controller
+from aerobat.engines import choose
+from aerobat.environment import Dispersion
+from aerobat.evaluation import Passage, Scores
+from aerobat.evaluation.score_flights import ErrorsOverTime, score_over_time
+from aerobat.planning import Plan
+from aerobat.simulation import FlightConfig
+from aerobat.simulation.conditions.draw import Draw, draw_flights
+from aerobat.vehicle import Vehicle
+
+CHUNK = 50  # flights that are flown, kept and resumed as one, whatever the batches and the cores
+SAMPLED = 4 * CHUNK  # flights, the first ones, whose errors are kept over time
+STRIDE = 10  # ticks from one instant of theirs to the next
+PASSED, NOT_REACHED = "passed", "not_reached"  # ends of a passage, beside the outcomes that are failures
+AGAIN = "#"  # between a gate's name and the number of its passage, from the second on
+
+Columns = dict[str, NDArray[Any]]
+
+_ERRORS = tuple(field.name for field in fields(Scores)[:5])
+_PASSAGE = (  # numbers of a passage, each with the name of its column after the gate's
+    ("time", "time_s"),
+    ("lateral", "lateral_m"),
+    ("up", "up_m"),
+    ("miss", "miss_m"),
+    ("speed", "speed_m_s"),
+    ("attitude_error_deg", "attitude_error_deg"),
+    ("clearance", "clearance_m"),
+    ("needed_width", "needed_width_m"),
+    ("needed_height", "needed_height_m"),
+)
+
+
+@dataclass(frozen=True)
+class SweepTask:
+    """What is flown, and how."""
+
+    plan: Plan
+    vehicle: Vehicle  # that plan and controller know
+    conditions: Dispersion
+    seed: int
+    controller: Controller
+    engine: str
+    batch: int  # flights that are flown side by side
+
+
+@dataclass(frozen=True, eq=False)
+class Chunk:
+    """Flights that were flown: columns of the table, and errors over time of those that are sampled."""
+
+    columns: Columns  # (flights,)
+    times: Array  # [s], (T,); none where no flight is sampled
+    position_error: Array  # [m], (sampled flights, T)
+    attitude_error: Array  # [rad], (sampled flights, T)
+
+
+def fly_chunk(task: SweepTask, begin: int, end: int) -> Chunk:
+    """The flights from number `begin` to before `end`; how they are cut into batches changes no bit."""
+    config, is_sampled = _config(task), begin < SAMPLED
+    batches = [range(first, min(first + task.batch, end)) for first in range(begin, end, task.batch)]
+    parts = [_flown(task, replace(config, flights=numbers), is_sampled) for numbers in batches]
+    columns = {name: np.concatenate([part[name] for part, _ in parts]) for name in parts[0][0]}
+    if not is_sampled:
+        return Chunk(columns, np.zeros(0), *np.zeros((2, 0, 0)))
+    errors = [each for _, each in parts]
+    return Chunk(
+        columns,
+        errors[0].times,
+        np.concatenate([each.position for each in errors]),
+        np.concatenate([each.attitude for each in errors]),
+    )
+
+
+def _config(task: SweepTask) -> FlightConfig:
+    """Settings of all flights. An engine has its own rounding, so that one flies all chunks, small or not."""
+    config = FlightConfig(controller=task.controller, conditions=task.conditions, seed=task.seed)
+    ticks = round(task.plan.duration * config.control_rate)
+    return replace(config, engine=choose(task.engine, CHUNK, ticks).name)
+
+
+def _flown(task: SweepTask, config: FlightConfig, is_sampled: bool) -> tuple[Columns, ErrorsOverTime]:
+    """Columns of the table for the flights of a config, and their errors over time if they are sampled."""
+    assert config.flights is not None
+    draws = draw_flights(task.conditions, len(task.vehicle.rotors), task.seed, config.flights)
+    stride = STRIDE if is_sampled else None
+    scores, errors = score_over_time(task.plan, task.vehicle, None, None, config, stride)
+    return _drawn(draws) | _scored(scores), errors
+
+
+def _drawn(draws: Sequence[Draw]) -> Columns:
+    """What flights draw, in few numbers."""
+    effectiveness = np.array([draw.effectiveness for draw in draws])
+    numbers = {
+        "mass": [draw.mass for draw in draws],
+        "inertia": [draw.inertia for draw in draws],
+        "lag_mean": [draw.lags.mean() for draw in draws],
+        "thrust_mean": effectiveness.mean(axis=1),
+        "thrust_min": effectiveness.min(axis=1),
+        "drag_1_s": [draw.drag for draw in draws],
+        "start_offset_m": [_norm(draw.start_position) for draw in draws],
+        "start_speed_m_s": [_norm(draw.start_velocity) for draw in draws],
+        "start_tilt_deg": [np.rad2deg(_norm(draw.start_attitude)) for draw in draws],
+        "mean_wind_m_s": [_norm(draw.mean_wind) for draw in draws],
+        "charge": [draw.charge for draw in draws],
+    }
+    columns: Columns = {"flight": np.array([draw.flight for draw in draws])}
+    return columns | {name: np.array(values, dtype=float) for name, values in numbers.items()}
+
+
+def _norm(vector: Array) -> float:
+    return float(np.linalg.norm(vector))
+
+
+def _scored(scores: Scores) -> Columns:
+    """What flights came to."""
+    columns: Columns = {"outcome": np.array([outcome.name.lower() for outcome in scores.outcomes])}
+    columns |= {name: np.array(getattr(scores, name)) for name in _ERRORS}
+    for name, passage in zip(passage_names(scores.passages), scores.passages, strict=True):
+        columns |= {f"{name}_{column}": np.array(getattr(passage, field)) for field, column in _PASSAGE}
+        ends = [_passage_outcome(passage.of_flight(k)) for k in range(len(scores))]
+        columns[f"{name}_outcome"] = np.array(ends)
+    return columns
+
+
+def _passage_outcome(passage: Passage) -> str:
+    """One passage's end, as the outcome of a flight that has no other would be."""
+    if passage.failure is not None:
+        return passage.failure[0].name.lower()
+    return NOT_REACHED if np.isnan(passage.time) else PASSED
+
+
+def passage_names(passages: Sequence[Passage]) -> Iterator[str]:
+    """The gates' names in the order of passage; behind that of one that is passed again, which time it is."""
+    turns: Counter[str] = Counter()
+    for passage in passages:
+        turns[passage.gate] += 1
+        yield passage.gate + (f"{AGAIN}{turns[passage.gate]}" if turns[passage.gate] > 1 else "")

@@ -1,0 +1,123 @@
+"""Finished flights of a sweep in a folder, from which one that was ended goes on."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import shutil
+from dataclasses import asdict, dataclass
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from aerobat.declaration import to_table
+from aerobat.documents import read_text
+from aerobat.errors import SpecError
+from aerobat.planning import Plan
+from aerobat.storage import read_arrays, whole_file, write_whole
+from aerobat.studies.sweep.flights import CHUNK, SAMPLED, STRIDE, Chunk, SweepTask
+
+FINGERPRINT = "fingerprint.json"
+LIBRARIES = ("aerobat", "numpy", "llvmlite", "jax")  # that the numbers of flights come from
+_OVER_TIME = ("times", "position_error", "attitude_error")
+
+
+@dataclass(frozen=True)
+class KeptChunks:
+    """The folder of a sweep's finished chunks, each a file that is whole or absent."""
+
+    folder: Path
+
+    @classmethod
+    def of(cls, folder: Path, task: SweepTask) -> KeptChunks:
+        """The folder, new or of the same sweep. Raises SpecError, one sentence, for any other's."""
+        own = fingerprint(task)
+        path = folder / FINGERPRINT
+        if folder.exists() and not folder.is_dir():
+            raise SpecError(f"{folder} is no folder; name one to keep flights in")
+        if not folder.exists() or not any(folder.iterdir()):
+            write_whole(path, json.dumps(own, indent=2) + "\n")
+            return cls(folder)
+        try:
+            found = json.loads(read_text(path))
+            differing = [key for key in own if found[key] != own[key]]
+        except (SpecError, ValueError, KeyError, TypeError):
+            raise SpecError(f"{folder}/ keeps no flights of a sweep; name a folder of its own") from None
+        if differing:
+            others = " and ".join(differing)
+            raise SpecError(f"{folder}/ keeps flights of another sweep ({others}); remove it to begin anew")
+        return cls(folder)
+
+    def read(self, begin: int, end: int) -> Chunk | None:
+        """Finished flights; None where there are none, or none that can be read."""
+        try:
+            arrays = read_arrays(self._path(begin, end), "sweep")
+            names = arrays["names"].tolist()
+            columns = {name: arrays[f"column_{k}"] for k, name in enumerate(names)}
+            return Chunk(columns, *(arrays[name] for name in _OVER_TIME))
+        except (SpecError, KeyError):
+            return None
+
+    def write(self, begin: int, end: int, chunk: Chunk) -> None:
+        """Keep finished flights."""
+        arrays: dict[str, Any] = {name: getattr(chunk, name) for name in _OVER_TIME}
+        arrays |= {f"column_{k}": column for k, column in enumerate(chunk.columns.values())}
+        with whole_file(self._path(begin, end)) as temporary, temporary.open("wb") as file:
+            np.savez(file, names=list(chunk.columns), **arrays)
+
+    def remove(self) -> None:
+        """Remove the folder, as its flights are kept elsewhere by now."""
+        shutil.rmtree(self.folder, ignore_errors=True)
+
+    def _path(self, begin: int, end: int) -> Path:
+        return self.folder / f"flights-{begin}-{end}.npz"
+
+
+def finished_flights(folder: Path) -> int:
+    """How many flights a folder keeps."""
+    spans = (path.stem.split("-")[1:] for path in folder.glob("flights-*-*.npz"))
+    return sum(int(end) - int(begin) for begin, end in spans)
+
+
+def fingerprint(task: SweepTask) -> dict[str, Any]:
+    """All that the numbers of flights depend on, in few words; batches and cores are not among it."""
+    return {
+        "format": "aerobat-sweep-1",
+        "plan": _digest(_plan_table(task.plan)),
+        "vehicle": _digest(to_table(task.vehicle)),
+        "conditions": _digest(to_table(task.conditions)),
+        "seed": task.seed,
+        "controller": _digest(to_table(task.controller)),
+        "engine": task.engine,
+        "chunks": [CHUNK, SAMPLED, STRIDE],
+        "versions": installed_versions(),
+    }
+
+
+def _plan_table(plan: Plan) -> dict[str, Any]:
+    """What of a plan is flown and judged."""
+    trajectory = plan.trajectory
+    return {
+        "problem": to_table(plan.problem),
+        "stages": [asdict(stage) for stage in plan.stages],
+        "durations": trajectory.durations.tolist(),
+        "coefficients": trajectory.coefficients.tolist(),
+        "heading": trajectory.heading,
+    }
+
+
+def _digest(table: Any) -> str:
+    return hashlib.sha256(json.dumps(table, sort_keys=True).encode()).hexdigest()[:16]
+
+
+def installed_versions() -> dict[str, str]:
+    """The versions of what the numbers come from."""
+    found = {}
+    for library in LIBRARIES:
+        try:
+            found[library] = version(library)
+        except PackageNotFoundError:
+            continue
+    return found

@@ -1,0 +1,157 @@
+"""What a sweep comes to: a table with a row a flight, its shares and quantiles, and errors over time."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import Annotated, Any
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field
+
+from aerobat.arrays import Array
+from aerobat.declaration import Label, Number, by_value, in_notebooks, short, unknown_name, validated
+from aerobat.environment import Dispersion
+from aerobat.evaluation.opening import Opening, Probability, opening_of
+from aerobat.planning import Plan
+from aerobat.problem import Gate
+from aerobat.simulation import Outcome
+from aerobat.simulation.outcome import length
+from aerobat.studies.sweep.flights import AGAIN, PASSED
+from aerobat.studies.sweep.share import Share
+from aerobat.vehicle import Vehicle
+
+Level = Annotated[float, Field(ge=0, le=1, description="number from 0 to 1")]
+
+_LATERAL = "_lateral_m"
+LEVELS = (0.5, 0.95, 1.0)  # of quantiles that tables show
+
+
+@dataclass(frozen=True, eq=False)
+class ErrorBand:
+    """Quantiles of an error over time, each (T,)."""
+
+    low: Array  # 5 %
+    median: Array
+    high: Array  # 95 %
+    max: Array
+
+    @classmethod
+    def of(cls, errors: Array) -> ErrorBand:
+        """The band of errors (flights, T)."""
+        return cls(*np.quantile(errors, (0.05, 0.5, 0.95, 1.0), axis=0))
+
+
+@in_notebooks
+@short
+@by_value
+@dataclass(frozen=True, eq=False, repr=False)
+class Sweep:
+    """Many flights of one plan, a row each in the table; of the first ones, errors over time too.
+
+    Columns of the table, arrays (flights,): `flight`, its number; what it drew, factors of `mass`, `inertia`,
+    `lag_mean`, `thrust_mean` and `thrust_min` over the nominal vehicle's, `drag_1_s` over its mass,
+    `start_offset_m`, `start_speed_m_s`, `start_tilt_deg`, `mean_wind_m_s`, `charge`; `outcome`, as text; the
+    fields of a Score; and of each gate, after its name, `_time_s`, `_lateral_m`, `_up_m`, `_miss_m`,
+    `_speed_m_s`, `_attitude_error_deg`, `_clearance_m`, `_needed_width_m` and `_needed_height_m`, NaN where
+    its plane was not crossed, and `_outcome`: passed, not_reached, or what went wrong there.
+    """
+
+    plan: Plan
+    vehicle: Vehicle  # the nominal one
+    conditions: Dispersion
+    seed: int
+    table: Mapping[str, NDArray[Any]]
+    times: Array  # [s] of the errors over time, (T,)
+    position_error: Array  # [m], (sampled flights, T)
+    attitude_error: Array  # [rad], (sampled flights, T)
+
+    def __post_init__(self) -> None:
+        """Write-protect."""
+        columns = {name: np.asarray(column) for name, column in self.table.items()}
+        for array in (*columns.values(), self.times, self.position_error, self.attitude_error):
+            array.flags.writeable = False
+        object.__setattr__(self, "table", MappingProxyType(columns))
+
+    def __len__(self) -> int:
+        return len(self.table["flight"])
+
+    def __str__(self) -> str:
+        """One line for people."""
+        errors = [length(self.quantile("max_position_error_m", level)) for level in LEVELS[1:]]
+        return (
+            f"{len(self)} flights of {self.plan.problem.name}, {self.conditions.name}: {self.success} "
+            f"went well; position error {errors[0]} at 95 %, {errors[1]} at most"
+        )
+
+    @property
+    def outcomes(self) -> Mapping[Outcome, Share]:
+        """The share of each outcome that came, the most frequent first."""
+        counts = Counter(self.table["outcome"].tolist())
+        return {Outcome[name.upper()]: Share(n, len(self)) for name, n in counts.most_common()}
+
+    @property
+    def success(self) -> Share:
+        """The share of flights in which nothing went wrong."""
+        return Share(sum(s.count for outcome, s in self.outcomes.items() if outcome.is_success), len(self))
+
+    @property
+    def passages(self) -> Mapping[str, Gate]:
+        """The gates in the order of passage, by the names that their columns begin with."""
+        names = [name.removesuffix(_LATERAL) for name in self.table if name.endswith(_LATERAL)]
+        return {name: self.plan.problem.gate(name.partition(AGAIN)[0]) for name in names}
+
+    @validated
+    def passed(self, passage: Label) -> Share:
+        """The share of flights that passed a gate as they should. Raises SpecError for an unknown name."""
+        self._gate(passage)
+        return Share(int((self.table[f"{passage}_outcome"] == PASSED).sum()), len(self))
+
+    @validated
+    def smallest_opening(
+        self, passage: Label, probability: Probability = 0.99, confidence: Probability = 0.95
+    ) -> Opening:
+        """The smallest opening about a gate's centre that flights pass, as `ab.smallest_opening` says it.
+
+        Args:
+            passage: the name that the gate's columns begin with.
+            probability: with which a flight shall pass [-].
+            confidence: with which the opening is large enough [-].
+
+        Raises SpecError for an unknown name, and where the flights are too few for such a probability.
+        """
+        gate = self._gate(passage)
+        sides = ((f"{passage}_needed_width_m", gate.width), (f"{passage}_needed_height_m", gate.height))
+        scales = np.maximum(*(self._errors(column) / side for column, side in sides))
+        return opening_of(scales, gate, probability, confidence)
+
+    def _gate(self, passage: str) -> Gate:
+        if passage not in self.passages:
+            raise unknown_name("passage", passage, self.passages)
+        return self.passages[passage]
+
+    @validated
+    def quantile(self, column: Label, level: Level) -> float:
+        """The value that this fraction of the flights keeps to, one of theirs.
+
+        Args:
+            column: of the table; a passage that there was not counts as worse than any.
+            level: the fraction of the flights [-].
+        """
+        values = self._errors(column)
+        return float(np.quantile(values, level, method="higher"))
+
+    @validated
+    def within(self, column: Label, limit: Number) -> Share:
+        """The share of flights in which a number of the table is at most `limit`."""
+        return Share(int((self._errors(column) <= limit).sum()), len(self))
+
+    def _errors(self, column: str) -> Array:
+        """A column of numbers, infinite where there was no passage."""
+        if column not in self.table or self.table[column].dtype.kind not in "fi":
+            raise unknown_name("column of numbers", column, [n for n in self.table if n != "outcome"])
+        values = np.asarray(self.table[column], dtype=float)
+        return np.where(np.isnan(values), np.inf, values)

@@ -1,0 +1,82 @@
+"""Processes that fly, one a core: they end when the sweep does, however it ends."""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+import signal
+import sys
+import threading
+import warnings
+from collections.abc import Iterator
+from concurrent.futures import Executor, Future, ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
+from contextlib import contextmanager
+from multiprocessing.connection import Connection
+from typing import Any
+
+from aerobat.declaration.registry import import_plugin, imported_plugins
+from aerobat.errors import SpecError
+
+
+class InProcess(Executor):
+    """Does what is submitted at once, in this process."""
+
+    def submit(self, function: Any, /, *args: Any, **kwargs: Any) -> Future[Any]:
+        """The result, done."""
+        future: Future[Any] = Future()
+        future.set_result(function(*args, **kwargs))
+        return future
+
+
+@contextmanager
+def workers(count: int, forked: bool) -> Iterator[Executor]:
+    """So many processes; one is this process.
+
+    An exception in the block, Ctrl-C among them, ends them at once, as does the death of this process: each
+    watches one end of a pipe. Raises SpecError where they end by themselves.
+
+    Args:
+        count: how many.
+        forked: True for copies of this process, where the system has such, that share its memory and its
+            compiled code; else each imports and compiles its own.
+    """
+    if count == 1:
+        yield InProcess()
+        return
+    # macOS has forks that its own libraries do not survive
+    context: Any = multiprocessing.get_context("fork" if forked and sys.platform == "linux" else "spawn")
+    watched, held = context.Pipe(duplex=False)
+    pool = ProcessPoolExecutor(count, context, _begin, (watched, held, imported_plugins()))
+    try:
+        with warnings.catch_warnings():
+            # forked beside threads: those of engines and BLAS know of forks, and no other is waited for
+            warnings.filterwarnings("ignore", ".*fork", DeprecationWarning)
+            yield pool
+        pool.shutdown()
+    except BrokenProcessPool:
+        raise SpecError(
+            "a process that flies has ended by itself: where memory is short, take fewer workers; a script "
+            'on Windows or macOS sweeps below `if __name__ == "__main__":`, or with workers=1'
+        ) from None
+    finally:
+        held.close()
+        pool.shutdown()
+        watched.close()
+
+
+def _begin(watched: Connection, held: Connection, plugins: tuple[str, ...]) -> None:
+    """Begin a worker: interrupts are for the process that sweeps, whose end is the worker's."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    held.close()
+    threading.Thread(target=_end_with, args=(watched,), daemon=True).start()
+    for path in plugins:
+        import_plugin(path)
+
+
+def _end_with(watched: Connection) -> None:
+    """End this process when nobody holds the other end of a pipe any more."""
+    try:
+        watched.recv()
+    except (EOFError, OSError):
+        os._exit(1)

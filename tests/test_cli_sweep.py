@@ -1,0 +1,153 @@
+"""`aerobat sweep` and its folder: what is there, what goes on, what is repeated."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import aerobat as ab
+from aerobat import cli
+from aerobat.cli.progress import SweepProgress
+from aerobat.interchange import read_table
+
+SPREAD = "mass = 0.03\nlag = 0.2\nstart_position = 0.02\n"  # quick to compile
+RUNS = 60  # a chunk and a part of another
+
+
+@pytest.fixture(autouse=True)
+def _elsewhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("spread.toml").write_text(SPREAD)
+
+
+def code(*arguments: str) -> int:
+    try:
+        cli.main(arguments)
+    except SystemExit as stop:
+        return int(stop.code or 0)
+    return 0
+
+
+def swept(*more: str) -> int:
+    options = ("--runs", str(RUNS), "--conditions", "spread.toml", "--seed", "7", "--workers", "1")
+    return code("sweep", "half-flip", *options, *more)
+
+
+def test_a_sweep_writes_a_row_a_flight_and_counts_what_became_of_them(capsys) -> None:
+    assert swept("--json") == 0
+    facts = json.loads(capsys.readouterr().out)
+    folder = Path("out/half-flip-sweep-spread")
+    assert {path.name for path in folder.iterdir()} == {
+        "flights.csv", "half-flip.plan", "run.toml", "sweep.json", "sweep.png",
+    }  # fmt: skip
+    assert [path.name for path in Path("out").iterdir()] == [folder.name]  # nothing unfinished is left
+    table = read_table(folder / "flights.csv")
+    np.testing.assert_array_equal(table["flight"], np.arange(RUNS))
+    assert facts == json.loads((folder / "sweep.json").read_bytes())
+    assert sum(share["count"] for share in facts["outcomes"].values()) == facts["flights"] == RUNS
+    passed = int((table["gate_outcome"] == "passed").sum())
+    assert facts["passages"]["gate"]["passed"]["count"] == passed
+    worst = facts["errors"]["max_position_error_m"]["100%"]
+    assert worst == table["max_position_error_m"].max()
+    low = facts["went_well"]["low"]
+    assert low < facts["went_well"]["fraction"] <= facts["went_well"]["high"]
+
+
+def test_a_repeated_sweep_comes_to_the_same_bits(capsys) -> None:
+    assert swept("--table", "parquet") == 0
+    shown = capsys.readouterr().out
+    assert "went well" in shown
+    assert shown.endswith("written to out/half-flip-sweep-spread/\n")
+    Path("spread.toml").unlink()  # the folder holds its contents
+    assert code("repeat", "out/half-flip-sweep-spread") == 0
+    assert "the same as in out/half-flip-sweep-spread/, bit for bit" in capsys.readouterr().err
+    plan = "out/half-flip-sweep-spread"  # whose plan is swept again as it is
+    Path("spread.toml").write_text(SPREAD)
+    assert (
+        code("sweep", plan, "--runs", "3", "--conditions", "spread.toml", "--seed", "7", "--out", "few") == 0
+    )
+    few, many = (read_table(path) for path in ("few/flights.csv", f"{plan}/flights.parquet"))
+    for name, column in few.items():
+        np.testing.assert_array_equal(column, many[name][:3])
+
+
+# is interrupted when the first flights are kept
+INTERRUPTED = """
+import os, signal, sys
+from aerobat.cli import main
+from aerobat.studies.sweep.kept import KeptChunks
+
+write = KeptChunks.write
+def write_and_interrupt(self, *chunk):
+    write(self, *chunk)
+    os.kill(os.getpid(), getattr(signal, sys.argv[1]))
+KeptChunks.write = write_and_interrupt
+main(sys.argv[2:])
+"""
+
+
+@pytest.mark.parametrize("ended_by", ["SIGINT", "SIGKILL"])
+def test_the_same_command_goes_on_with_the_flights_that_are_kept(ended_by: str, capsys) -> None:
+    assert swept("--out", "whole") == 0
+    command = ("sweep", "half-flip", "--conditions", "spread.toml", "--seed", "7", "--out", "there/broken")
+    ended = subprocess.run(
+        [sys.executable, "-c", INTERRUPTED, ended_by, *command, "--runs", str(RUNS)],
+        capture_output=True,
+        text=True,
+        env=os.environ,
+    )
+    if ended_by == "SIGINT":
+        assert ended.returncode == 130
+        told = [line for line in ended.stderr.splitlines() if "flown" not in line]
+        assert told == [
+            "aerobat: 50 of 60 flights are kept: the same command goes on from there",
+            "aerobat: interrupted",
+        ]
+    assert [path.name for path in Path("there").iterdir()] == ["broken-unfinished"]
+    kept = ab.load_plan("there/broken-unfinished/sweep.plan")
+    assert code(*command[:-1], "there/broken", "--runs", "60", "--order", "4") == 2  # another plan
+    assert "an unfinished sweep with other settings" in capsys.readouterr().err
+    assert code(*command, "--runs", str(RUNS)) == 0
+    assert [path.name for path in Path("there").iterdir()] == ["broken"]
+    assert Path("there/broken/flights.csv").read_bytes() == Path("whole/flights.csv").read_bytes()
+    assert ab.load_plan("there/broken/half-flip.plan") == kept
+
+
+@pytest.mark.parametrize(
+    ("arguments", "named"),
+    [
+        (["--conditions", "lap"], "did you mean 'lab'?"),
+        (["--runs", "0"], "runs"),
+        (["--controller", "papr"], "did you mean 'paper'?"),
+        (["--table", "xls"], "table"),
+        (["--workers", "0"], "workers"),
+    ],
+)
+def test_what_makes_no_sense_is_refused_before_anything_is_planned(arguments, named: str, capsys) -> None:
+    assert code("sweep", "half-flip", *arguments) == 2
+    err = capsys.readouterr().err
+    assert named in err
+    assert err.count("\n") == 1
+    assert not Path("out").exists()
+
+
+def test_a_sweep_that_cannot_be_flown_leaves_nothing(capsys) -> None:
+    Path("nowhere.toml").write_text("computation_delay = 1.0\n")
+    assert code("sweep", "line", "--conditions", "nowhere.toml", "--runs", "3") == 2
+    assert "computation_delay" in capsys.readouterr().err
+    assert not [path for path in Path().rglob("*") if path.suffix != ".toml" and path.name != "out"]
+
+
+def test_progress_tells_how_many_how_well_and_how_long_still() -> None:
+    now = [0.0]
+    progress = SweepProgress(200, lambda: now[0])
+    assert str(progress) == "flown 0 of 200 in 0 s"
+    now[0] = 5.0
+    progress.record(50, 49)
+    assert str(progress) == "flown 50 of 200 in 5 s: 98.0 % went well; 15 s to go"

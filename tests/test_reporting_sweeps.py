@@ -1,0 +1,110 @@
+"""A sweep's page and table say what its rows are, and red is what went wrong."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+from matplotlib.colors import to_hex
+
+import aerobat as ab
+from aerobat.reporting.notebooks import html, png
+from aerobat.reporting.style import RED
+from aerobat.reporting.sweeps.figure import crossings
+from aerobat.reporting.sweeps.table import sweep_report
+from aerobat.studies.sweep.result import ErrorBand
+from reporting_cases import require_legible
+
+pytestmark = pytest.mark.filterwarnings("error")  # drawing warns of nothing
+RUNS = 60
+ROUGH = ab.Dispersion(mass=0.1, rotor=0.08, start_position=0.3, start_velocity=0.4, start_attitude=0.4)
+
+
+@cache
+def rough() -> ab.Sweep:
+    """Flights of which some fail."""
+    return ab.sweep(ab.plan("half-flip", vehicle="agile-quad"), ROUGH, RUNS, 3, workers=1)
+
+
+@cache
+def without_a_gate() -> ab.Sweep:
+    return ab.sweep(ab.plan("line", vehicle="agile-quad"), ROUGH, 5, 3, workers=1)
+
+
+def lost(sweep: ab.Sweep) -> ab.Sweep:
+    """The sweep as if none of its flights had come to the gate."""
+    columns = dict(sweep.table)
+    for name in [name for name in columns if name.startswith("gate_") and name != "gate_outcome"]:
+        columns[name] = np.full(len(sweep), np.nan)
+    columns["gate_outcome"] = np.full(len(sweep), "not_reached")
+    columns["outcome"] = np.full(len(sweep), "diverged")
+    return replace(sweep, table=columns)
+
+
+@pytest.mark.parametrize("make", [rough, without_a_gate, lambda: lost(rough())])
+def test_a_page_is_legible_whatever_becomes_of_the_flights(make, monkeypatch) -> None:
+    require_legible(ab.sweep_figure(make()), monkeypatch)
+
+
+def test_red_crossings_are_those_that_did_not_pass() -> None:
+    wrong = int((rough().table["gate_outcome"] != "passed").sum())
+    assert 0 < wrong < RUNS  # some of either kind
+    assert crossings(rough())["gate"].wrong.sum() == wrong
+    opening = ab.sweep_figure(rough()).axes[2]
+    drawn = {to_hex(dots.get_facecolor()[0]): len(dots.get_offsets()) for dots in opening.collections}
+    beyond = [text for text in opening.texts if text.get_text().endswith("beyond")]
+    assert not beyond
+    crossed = np.isfinite(rough().table["gate_miss_m"])
+    assert drawn[RED] == (crossed & (rough().table["gate_outcome"] != "passed")).sum()
+    assert sum(drawn.values()) == crossed.sum()
+
+
+def test_flights_that_do_not_come_to_a_gate_are_worse_than_any_that_miss_it() -> None:
+    none = lost(rough())
+    assert none.quantile("gate_miss_m", 0.0) == np.inf
+    assert none.within("gate_miss_m", 1e9).count == 0
+    assert none.passed("gate").count == 0
+    facts = sweep_report(none)["passages"]["gate"]
+    assert facts["miss_m"] == {"50%": None, "95%": None, "100%": None}
+    with pytest.raises(ab.SpecError, match="no passage named 'gat'; did you mean 'gate'"):
+        none.passed("gat")
+    with pytest.raises(ab.SpecError, match="no column of numbers named 'outcome'"):
+        none.quantile("outcome", 0.5)
+
+
+def test_quantiles_and_shares_are_those_of_the_rows() -> None:
+    errors = np.sort(rough().table["max_position_error_m"])
+    assert rough().quantile("max_position_error_m", 0.5) == errors[RUNS // 2]
+    assert rough().quantile("max_position_error_m", 1.0) == errors[-1]
+    assert rough().within("max_position_error_m", errors[9]).count == 10
+    assert sum(share.count for share in rough().outcomes.values()) == RUNS
+    assert rough().success.count == sum(
+        share.count for outcome, share in rough().outcomes.items() if outcome.is_success
+    )
+
+
+def test_errors_over_time_are_those_of_the_logged_flights() -> None:
+    """RMS over ten ticks lies between the least and the largest of them, and ends with the flight."""
+    swept = rough()
+    logged = ab.fly(swept.plan, conditions=ROUGH, seed=3, flights=20, engine="compiled")
+    ends = np.searchsorted(logged.times, swept.times)
+    for errors, exact in (
+        (swept.position_error, logged.position_error),
+        (swept.attitude_error, logged.attitude_error),
+    ):
+        for begin, end, column in zip(ends, ends[1:], errors[:20, 1:].T, strict=False):
+            within = exact[:, begin + 1 : end + 1]
+            np.testing.assert_allclose(column, np.sqrt(np.mean(within**2, axis=1)), rtol=1e-5, atol=1e-7)
+    band = ErrorBand.of(swept.position_error)
+    assert (band.low <= band.median).all()
+    assert (band.high <= band.max).all()
+
+
+def test_a_sweep_is_a_data_frame_and_shows_itself_in_notebooks() -> None:
+    table = ab.to_dataframe(rough())
+    assert list(table.columns) == list(rough().table)
+    assert len(table) == RUNS
+    assert "went well" in html(rough())
+    assert png(rough()) is not None
