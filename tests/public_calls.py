@@ -357,6 +357,7 @@ def instance(cls: type) -> Any:
         ab.Sensitivity: lambda: ab.sensitivity(plan(), "mass", rate=100.0),
         ab.Gradient: lambda: instance(ab.Sensitivity).mean_square_position_error,
         ab.Passage: _passage,
+        ab.Replay: lambda: ab.view(plan()),
     }
     return made.get(cls, cls)()
 

@@ -148,8 +148,8 @@ def test_help_tells_every_command_and_option(capsys) -> None:
     _, out, _ = run(capsys, "--help")
     assert all(command in out for command in ("fly", "plan", "check", "compare", "vehicles", "Exit codes"))
     _, out, _ = run(capsys, "fly", "--help")
-    options = "vehicle planner order intervals segments stop-after backend paper angle out json seed noise"
-    assert "--controller" in out
+    options = "vehicle planner order intervals segments stop-after backend paper angle out json seed"
+    assert "--controller" in out and "--conditions" in out
     assert all(f"--{option}" in out for option in options.split())
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from html import escape
 from pathlib import Path
 
@@ -19,11 +19,11 @@ INLINE_HEIGHT = 640  # [px] of a page in a notebook
 HEAD = 1000  # characters of a page in which it says what it is
 
 
-@dataclass(frozen=True, repr=False, eq=False)
+@dataclass(frozen=True, repr=False)
 class Replay:
     """A page that replays a scene; a notebook shows it where it stands."""
 
-    scene: Scene
+    scene: Scene = field(compare=False)  # all of it is in the page
     html: str
 
     def __repr__(self) -> str:
