@@ -35,9 +35,11 @@ class KeptChunks:
         """The folder, new or of the same sweep. Raises SpecError, one sentence, for any other's."""
         own = fingerprint(task)
         path = folder / FINGERPRINT
-        if folder.exists() and not folder.is_dir():
-            raise SpecError(f"{folder} is no folder; name one to keep flights in")
-        if not folder.exists() or not any(folder.iterdir()):
+        try:
+            is_new = not folder.exists() or not any(folder.iterdir())
+        except OSError as error:
+            raise SpecError(f"cannot keep flights in {folder}: {error.strerror or error}") from None
+        if is_new:
             write_whole(path, json.dumps(own, indent=2) + "\n")
             return cls(folder)
         try:
