@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
+from aerobat import so3
 from aerobat.arrays import Array
 from aerobat.certification import PlannedPassage
 from aerobat.declaration import by_value, in_notebooks, short, shown, validated
@@ -19,6 +20,25 @@ from aerobat.simulation.flight import Flight
 from aerobat.simulation.outcome import Outcome, counted, length
 from aerobat.simulation.passages import Passage, flown_passages, passages
 from aerobat.vehicle import Vehicle, as_vehicle
+
+COASTING = 0.1  # [s] without a pose: several periods of any motion capture
+
+
+@dataclass(frozen=True)
+class ObserverScore:
+    """A filter in numbers: its errors, and the longest time that it had to do without poses."""
+
+    max_position_error_m: float
+    rms_position_error_m: float
+    max_attitude_error_deg: float
+    rms_attitude_error_deg: float
+    longest_without_pose_s: float
+    until_s: float  # when that was over
+
+    @property
+    def coasted(self) -> bool:
+        """True if it had to go by the IMU alone for long."""
+        return self.longest_without_pose_s > COASTING
 
 
 @in_notebooks
@@ -35,6 +55,7 @@ class Score:
     passages: tuple[Passage, ...]  # one for each gate, in the order of the stages
     outcome: Outcome  # the first thing that went wrong, if anything did
     sentence: str  # the outcome with its numbers
+    observer: ObserverScore | None = None  # of a filter, where a logged flight had one
 
     def __str__(self) -> str:
         """One line for people."""
@@ -146,7 +167,7 @@ def score(flight: Flight, goal: Problem | Plan | str, vehicle: Vehicle | str | N
     planned = passages_asked(goal, flight.times, flight.setpoint.flat.position)
     ground = flight.environment.ground
     below = np.zeros(1, bool) if ground is None else states.position[:, 2] < ground
-    return Scores(
+    scored = Scores(
         max_position_error_m=np.sqrt([square.max()]),
         rms_position_error_m=np.sqrt([square.mean()]),
         max_attitude_error_deg=np.rad2deg([angle.max()]),
@@ -157,6 +178,24 @@ def score(flight: Flight, goal: Problem | Plan | str, vehicle: Vehicle | str | N
         is_finite=np.array([flight.outcome is not Outcome.STATE_NOT_FINITE]),
         ground_time=np.array([flight.times[int(np.argmax(below))] if below.any() else np.nan]),
     )[0]
+    return replace(scored, observer=_observer(flight))
+
+
+def _observer(flight: Flight) -> ObserverScore | None:
+    """How well the filter knew the flight, if there was one."""
+    if "since_pose" not in flight.series:
+        return None
+    off = np.linalg.norm(flight.observed_position - flight.states.position, axis=-1)
+    angle = so3.angle_between(flight.observed_q_world_body, flight.states.q_world_body)
+    latest = int(np.argmax(flight.since_pose))
+    return ObserverScore(
+        max_position_error_m=float(off.max()),
+        rms_position_error_m=float(np.sqrt(np.mean(off**2))),
+        max_attitude_error_deg=float(np.rad2deg(angle.max())),
+        rms_attitude_error_deg=float(np.rad2deg(np.sqrt(np.mean(angle**2)))),
+        longest_without_pose_s=float(flight.since_pose[latest]),
+        until_s=float(flight.times[latest]),
+    )
 
 
 def scores_of(metrics: RunningMetrics, planned: tuple[PlannedPassage, ...]) -> Scores:

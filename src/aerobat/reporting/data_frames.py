@@ -15,7 +15,6 @@ from aerobat.evaluation.score import Scores
 from aerobat.planning import Attempt, Plan
 from aerobat.reporting.comparison import comparison_rows
 from aerobat.simulation import Flight
-from aerobat.simulation.flight import SERIES
 from aerobat.studies.compare import Comparison
 from aerobat.studies.sweep import Sweep
 
@@ -72,7 +71,7 @@ def _of_flight(flight: Flight) -> dict[str, Any]:
 
 def _columns(flight: Flight) -> Iterator[tuple[str, Any]]:
     yield "time", flight.times
-    for one in SERIES:
+    for one in flight.kinds:
         values = flight.series[one.name]
         if not one.over_time:
             continue

@@ -13,6 +13,7 @@ from rich.text import Text
 
 from aerobat.certification import Certificate, Finding, Side, Verdict
 from aerobat.evaluation import Passage, Score
+from aerobat.evaluation.score import ObserverScore
 from aerobat.planning import Assessment, Plan
 from aerobat.planning.time_limit import best_by_limit
 from aerobat.problem import Problem
@@ -181,6 +182,8 @@ def flight_facts(score: Score, controller: str | None = None) -> Iterable[Fact]:
         yield "controller", controller
     yield "position error", _pair(100 * score.max_position_error_m, 100 * score.rms_position_error_m, "cm")
     yield "attitude error", _pair(score.max_attitude_error_deg, score.rms_attitude_error_deg, "°")
+    if score.observer is not None:
+        yield "observer", _observer(score.observer)
     for passage in score.passages:
         clearance = "" if isnan(passage.clearance) else f", {_clearance(passage)}"
         allowed = (
@@ -194,6 +197,15 @@ def flight_facts(score: Score, controller: str | None = None) -> Iterable[Fact]:
         )
         yield passage.gate, "not passed" if isnan(passage.time) else passed
     yield "saturated", f"{100 * score.saturated_fraction:.1f} % of the time"
+
+
+def _observer(found: ObserverScore) -> str:
+    """The filter's errors, and where it had to do without poses."""
+    errors = f"{length(found.rms_position_error_m)} and {digits(found.rms_attitude_error_deg)}° RMS off the truth"
+    if not found.coasted:
+        return errors
+    begin = found.until_s - found.longest_without_pose_s
+    return f"{errors}; no poses from {begin:.2f} to {found.until_s:.2f} s, the IMU alone"
 
 
 def _clearance(passage: Passage) -> str:

@@ -201,13 +201,24 @@ def with_ceiling(ops: Ops, airframe: Airframe, signals: Signals) -> Airframe:
     return airframe._replace(rotors=rotors._replace(max_thrust=lowered))
 
 
+class Observed(NamedTuple):
+    """What a filter made of its sensors."""
+
+    body: Body
+    since_pose: Scalar  # [s] since the exposure of the last pose that it took
+
+
 class LogRow(NamedTuple):
     """Row of the log, kept of each tick."""
 
     motion: Motion
     commands: Commands
+    observed: Observed | tuple[()]  # () where the true state is known
 
 
 def log_row(signals: Signals) -> LogRow:
     """The row of a flight's log."""
-    return LogRow(signals["plant"], signals["controller"].commands)
+    observer = signals["observer"]
+    known = isinstance(observer, Estimate)
+    observed = () if known else Observed(observer.body, observer.filter.since_pose)
+    return LogRow(signals["plant"], signals["controller"].commands, observed)

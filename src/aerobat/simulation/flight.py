@@ -34,6 +34,7 @@ class Series:
     per_vehicle: bool = True
     over_time: bool = True
     logical: bool = False
+    observed: bool = False  # there only where a filter saw the flight
 
 
 SERIES = (
@@ -44,6 +45,10 @@ SERIES = (
     Series("commands", "N", (_ROTORS,)),
     Series("thrusts", "N", (_ROTORS,)),
     Series("saturated", "", logical=True),
+    Series("observed_position", "m", (3,), observed=True),
+    Series("observed_velocity", "m/s", (3,), observed=True),
+    Series("observed_q_world_body", "", (4,), observed=True),
+    Series("since_pose", "s", observed=True),  # [s] since the exposure of the last pose that was taken
     Series("setpoint_position", "m", (3,), per_vehicle=False),
     Series("setpoint_velocity", "m/s", (3,), per_vehicle=False),
     Series("setpoint_acceleration", "m/s²", (3,), per_vehicle=False),
@@ -71,7 +76,7 @@ class Flight:
     Row k of every series is the situation at `times[k]`: the true state, the thrusts that the rotors give,
     and the commands that the controller sends then and holds until the next row. Each series of SERIES is an
     attribute too, as `flight.thrusts`. A vehicle that diverges ends at its `ends`; in a batch its later rows
-    repeat that one. Raises SpecError for shapes that do not match and numbers that are not finite.
+    repeat that one. What a filter made of its sensors is there where one flew. Raises SpecError for shapes that do not match and numbers that are not finite.
     """
 
     times: Array  # [s], (T,), rising
@@ -87,7 +92,9 @@ class Flight:
         times = frozen(self.times, "times", (None,))
         if times.ndim != 1 or (np.diff(times) <= 0).any():
             raise SpecError("times must be one list of rising numbers of seconds")
-        missing = [one.name for one in SERIES if one.name not in self.series]
+        is_observed = "since_pose" in self.series
+        kept = [one for one in SERIES if is_observed or not one.observed]
+        missing = [one.name for one in kept if one.name not in self.series]
         if missing:
             raise SpecError(f"a flight needs the series {missing[0]!r}; its names are those of SERIES")
         many, rotors = np.shape(self.series["ends"]), np.shape(self.series["max_thrusts"])[-1:]
@@ -95,7 +102,7 @@ class Flight:
         if not rotors or not alike or many not in ((), (len(self.vehicles),)):
             raise SpecError("a flight needs rotors, and one end, name and outcome for each vehicle")
         checked = {}
-        for one in SERIES:
+        for one in kept:
             shape = tuple(rotors[0] if size == _ROTORS else size for size in one.shape)
             leading = (many if one.per_vehicle else ()) + (times.shape if one.over_time else ())
             checked[one.name] = _checked(one, self.series[one.name], leading + shape)
@@ -106,6 +113,11 @@ class Flight:
         if not name.startswith("_") and name in self.__dict__.get("series", ()):
             return self.series[name]
         raise AttributeError(f"a flight has no {name!r}; its series are {', '.join(s.name for s in SERIES)}")
+
+    @property
+    def kinds(self) -> tuple[Series, ...]:
+        """Those of SERIES that there are."""
+        return tuple(one for one in SERIES if one.name in self.series)
 
     @cached_property
     def states(self) -> BodyState:
@@ -157,7 +169,7 @@ class Flight:
             raise OutOfRange(f"there are {count} flights, no flight {shown(vehicle)}; count from 0")
         rows = slice(0, int(np.searchsorted(self.times, self.series["ends"][vehicle], side="right")))
         picked = {}
-        for one in SERIES:
+        for one in self.kinds:
             values = self.series[one.name][vehicle] if one.per_vehicle else self.series[one.name]
             picked[one.name] = values[rows] if one.over_time else values
         return Flight(
@@ -197,7 +209,9 @@ def load_flight(path: PathName) -> Flight:
         ground = float(content["ground"])
         return Flight(
             times=content["times"],
-            series={one.name: content[one.name] for one in SERIES},
+            series={
+                one.name: content[one.name] for one in SERIES if one.name in content or not one.observed
+            },
             vehicles=_texts(content["vehicles"]),
             outcomes=tuple(Outcome[name] for name in _texts(content["outcomes"])),
             sentences=_texts(content["sentences"]),

@@ -82,6 +82,14 @@ def _flight(
         "commands": from_components(log.commands.thrusts),
         "saturated": log.commands.saturated,
     }
+    if log.observed:
+        body = body_states(log.observed.body)
+        series |= {
+            "observed_position": body.position,
+            "observed_velocity": body.velocity,
+            "observed_q_world_body": body.q_world_body,
+            "since_pose": log.observed.since_pose,
+        }
     for name in setpoint_series(setpoints[0]):
         series[name] = np.concatenate([setpoint_series(part)[name] for part in setpoints])
     ends, outcomes, sentences = _endings(series, times)
@@ -94,6 +102,8 @@ def _flight(
         "ends": times[ends],
     }
     for one in SERIES:
+        if one.name not in series:
+            continue
         values = series[one.name]
         if one.per_vehicle and one.over_time:
             values = values[:, :length] if (ends == ends.max()).all() else _taken(values, shown)
