@@ -64,6 +64,7 @@ VEHICLE_FAULTS = {
         "rotors",
     ),
     "thrust range upside down": (setting("rotor_defaults.min_thrust", 50.0), "thrust"),
+    "a thrust beyond all reason": (setting("rotor_defaults.min_thrust", -1e300), "min_thrust"),
     "negative lag": (setting("rotor_defaults.lag", -0.01), "lag"),
     "position of two numbers": (setting("rotors.1.position_body", [0.1, 0.1]), "position_body"),
 }
@@ -87,6 +88,7 @@ PROBLEM_FAULTS = {
         "limits",
     ),
     "start too fast": (setting("start.velocity", [11.0, 0.0, 0.0]), "start.velocity"),
+    "ground beyond all reason": (setting("environment", {"ground": -1e300}), "environment.ground"),
     "weightless": (setting("environment", {"gravity": 0.0}), "environment.gravity"),
     "name with a slash": (setting("name", "a/b"), "name"),
     "infinite yaw": (setting("heading_deg", INF), "heading_deg"),

@@ -214,6 +214,7 @@ Limit = Annotated[
 Count = Annotated[int, Field(ge=1, description="whole number, 1 or more")]
 Seed = Annotated[int, Field(ge=0, description="whole number, 0 or more")]
 AS_IT_IS = _Instance()  # Annotated[BodyState, AS_IT_IS]: an instance of a class that is not declared
+Finite = Annotated[float, AfterValidator(lambda number: _bounded(number)), Field(description="number")]
 Number = Annotated[
     float,
     Field(allow_inf_nan=True),

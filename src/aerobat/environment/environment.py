@@ -7,7 +7,7 @@ from dataclasses import field
 import numpy as np
 
 from aerobat.arrays import Array
-from aerobat.declaration import Gravity, Vector3, declared
+from aerobat.declaration import Finite, Gravity, Vector3, declared
 from aerobat.so3 import UP
 from aerobat.states import STANDARD_GRAVITY
 
@@ -22,7 +22,7 @@ class Environment:
 
     gravity: Gravity = STANDARD_GRAVITY  # [m/s²] along -z
     wind: Vector3 = field(default_factory=lambda: np.zeros(3))  # [m/s] velocity of the air
-    ground: float | None = None  # [m] height z that no path goes below; left out, no ground
+    ground: Finite | None = None  # [m] height z that no path goes below; left out, no ground
 
     @property
     def weight(self) -> Array:

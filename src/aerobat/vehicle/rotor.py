@@ -12,6 +12,7 @@ from pydantic import BeforeValidator
 from aerobat.arrays import Array
 from aerobat.declaration import (
     FieldError,
+    Finite,
     NonNegative,
     Positive,
     Vector3,
@@ -45,7 +46,7 @@ class Rotor:
     spin: Annotated[
         Literal[1, -1], BeforeValidator(_no_truth)
     ]  # 1 counter-clockwise seen from above, -1 clockwise; the body feels -spin·c·f about +z
-    min_thrust: float  # [N] negative for a variable pitch
+    min_thrust: Finite  # [N] negative for a variable pitch
     max_thrust: NonNegative  # [N] at full throttle; 0 for a rotor that has failed
     torque_coefficient: NonNegative  # [m] c: N·m of drag torque per N of thrust
     lag: NonNegative  # [s] time constant; zero for a thrust that follows its command at once
