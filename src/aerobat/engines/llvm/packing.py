@@ -93,12 +93,14 @@ class Packing:
         return PackedInputs(shared, packed, held, int(begins[-1]))
 
     def pad_lanes(self, leaves: Sequence[Array]) -> Array:
-        """Leaves (vehicles,) as (leaf, lanes)."""
-        packed = np.empty((len(leaves), self.lanes))
-        for row, leaf in zip(packed, leaves, strict=True):
-            row[: self.vehicles] = leaf
-        packed[:, self.vehicles :] = packed[:, self.vehicles - 1, None]
-        return packed
+        """Leaves (vehicles,) as (blocks, leaf, width)."""
+        packed = np.empty((self.blocks, 1, len(leaves), self.width))
+        self._fill(packed, [leaf[None] for leaf in leaves])
+        return packed[:, 0]
+
+    def unpad_lanes(self, packed: Array) -> list[Array]:
+        """The leaves (vehicles,) of (blocks, leaf, width)."""
+        return list(packed.swapaxes(0, 1).reshape(-1, self.lanes)[:, : self.vehicles])
 
     def _fill(self, packed: Array, leaves: Sequence[Array]) -> None:
         """Leaves (rows, vehicles) into an array (blocks, rows, leaf, lane)."""
