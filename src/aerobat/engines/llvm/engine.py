@@ -71,7 +71,7 @@ class MachineLoop(CompiledLoop):
 
     def init(self, inputs: Tree) -> Tree:
         """See `CompiledLoop.init`."""
-        after = np.empty((self._packing.blocks, len(self._loop.carry), self._packing.width))
+        after = self._scratch.empty((self._packing.blocks, len(self._loop.carry), self._packing.width))
         self._run(self._init, self._packing.inputs(inputs, 1, self._scratch), (_UNUSED, after, _UNUSED), 1, 1)
         return self._unpacked(after)
 
@@ -93,8 +93,8 @@ class MachineLoop(CompiledLoop):
         """The next carry, and the outputs (rows, o, vehicles)."""
         latest, packed = self._latest  # most scans go on from where the last one ended
         before = packed if carry is latest else self._packing.pad_lanes(tree_leaves(carry))
-        after = np.empty((self._packing.blocks, len(self._loop.carry), self._packing.width))
-        outputs = np.empty((rows, len(self._loop.outputs), self._packing.lanes))
+        after = self._scratch.empty((self._packing.blocks, len(self._loop.carry), self._packing.width))
+        outputs = self._scratch.empty((rows, len(self._loop.outputs), self._packing.lanes))
         self._run(self._scan, inputs, (before, after, outputs), ticks, log_stride)
         return self._unpacked(after), outputs[..., : self._packing.vehicles]
 
@@ -108,7 +108,7 @@ class MachineLoop(CompiledLoop):
     def _unpacked(self, carry: Array) -> Tree:
         """(blocks, c, width) -> a tree of read-only leaves (vehicles,)."""
         carry.flags.writeable = False
-        leaves = [read_only(leaf) for leaf in self._packing.unpad_lanes(carry)]
+        leaves = [read_only(leaf) for leaf in self._packing.unpad_lanes(carry, self._scratch)]
         for index in self._logical:
             leaves[index] = read_only(leaves[index] != 0.0)
         tree = tree_unflatten(self._loop.carry_tree, leaves)

@@ -98,9 +98,11 @@ class Packing:
         self._fill(packed, [leaf[None] for leaf in leaves])
         return packed[:, 0]
 
-    def unpad_lanes(self, packed: Array) -> list[Array]:
-        """The leaves (vehicles,) of (blocks, leaf, width)."""
-        return list(packed.swapaxes(0, 1).reshape(-1, self.lanes)[:, : self.vehicles])
+    def unpad_lanes(self, packed: Array, scratch: Scratch) -> list[Array]:
+        """The leaves (vehicles,) of (blocks, leaf, width), in memory of a scratch."""
+        leaves = scratch.empty((packed.shape[1], self.lanes))
+        leaves.reshape(-1, self.blocks, self.width)[:] = packed.swapaxes(0, 1)
+        return list(leaves[:, : self.vehicles])
 
     def _fill(self, packed: Array, leaves: Sequence[Array]) -> None:
         """Leaves (rows, vehicles) into an array (blocks, rows, leaf, lane)."""
