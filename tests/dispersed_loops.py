@@ -1,6 +1,5 @@
 """Flights under conditions, put together by hand: the controller sees the truth, sensors look on."""
 
-from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -9,7 +8,7 @@ from aerobat.engines.pytree import Tree
 from aerobat.environment import Dispersion
 from aerobat.problem import Problem
 from aerobat.simulation import FlightConfig, prepare
-from aerobat.simulation.conditions.draw import Draw, dispersed_fleet, draw_flights
+from aerobat.simulation.conditions.draw import Draws, dispersed_fleet, draw_flights
 from aerobat.simulation.conditions.parts import DispersedFlights, condition_parts
 from aerobat.simulation.setup import FlightSetup
 from aerobat.trajectory import as_trajectory
@@ -18,7 +17,7 @@ from aerobat.vehicle import Vehicle
 RATE = 1000.0  # [1/s]
 
 
-def drawn(dispersion: Dispersion, vehicle: Vehicle, flights: int, seed: int = 7) -> tuple[Draw, ...]:
+def drawn(dispersion: Dispersion, vehicle: Vehicle, flights: int, seed: int = 7) -> Draws:
     return draw_flights(dispersion, len(vehicle.rotors), seed, range(flights))
 
 
@@ -26,7 +25,7 @@ def dispersed_setup(
     plan: Any,
     vehicle: Vehicle,
     dispersion: Dispersion,
-    draws: Sequence[Draw],
+    draws: Draws,
     *,
     problem: Problem | None = None,
     engine: str = "compiled",

@@ -79,8 +79,8 @@ def test_engines_agree_with_floats_on_flights_under_conditions(engine: str) -> N
 
 
 def test_a_flight_of_a_batch_is_the_flight_alone() -> None:
-    batch, [draw] = rows("floats", 5), draw_flights(ALL, 6, 7, [3])
-    setup = dispersed_setup(loops(1.0), HEXA, ALL, [draw], engine="floats")
+    batch, draws = rows("floats", 5), draw_flights(ALL, 6, 7, [3])
+    setup = dispersed_setup(loops(1.0), HEXA, ALL, draws, engine="floats")
     alone = tree_leaves(rows_of(setup, everything, TICKS))
     for one, other in zip(batch, alone, strict=True):
         np.testing.assert_array_equal(one[3], other[0])

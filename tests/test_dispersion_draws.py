@@ -8,7 +8,7 @@ from scipy import stats
 
 from aerobat import so3
 from aerobat.environment import Battery, Dispersion, Gusts, load_dispersion
-from aerobat.simulation.conditions.draw import STREAMS, Draw, dispersed_fleet, draw_flights
+from aerobat.simulation.conditions.draw import STREAMS, Draw, Draws, dispersed_fleet, draw_flights
 from aerobat.states import BodyState
 from aerobat.vehicle import load_vehicle, vehicle_names
 from aerobat.vehicle.fleet import Fleet
@@ -20,12 +20,12 @@ ROTORS = 6
 
 
 @pytest.fixture(scope="module")
-def draws() -> tuple[Draw, ...]:
+def draws() -> Draws:
     return draw_flights(LAB, ROTORS, 11, range(FLIGHTS))
 
 
-def column(draws: tuple[Draw, ...], name: str) -> np.ndarray:
-    return np.array([getattr(draw, name) for draw in draws])
+def column(draws: Draws, name: str) -> np.ndarray:
+    return draws.column(name)
 
 
 def differing(one: Draw, other: Draw) -> set[str]:
@@ -33,9 +33,9 @@ def differing(one: Draw, other: Draw) -> set[str]:
     return {name for name in names if not np.array_equal(getattr(one, name), getattr(other, name))}
 
 
-def test_a_flight_draws_the_same_whatever_flies_beside_it(draws: tuple[Draw, ...]) -> None:
-    assert draw_flights(LAB, ROTORS, 11, [2, 40, 7]) == (draws[2], draws[40], draws[7])
-    assert draw_flights(LAB, ROTORS, 12, [2]) != (draws[2],)
+def test_a_flight_draws_the_same_whatever_flies_beside_it(draws: Draws) -> None:
+    assert tuple(draw_flights(LAB, ROTORS, 11, [2, 40, 7])) == (draws[2], draws[40], draws[7])
+    assert draw_flights(LAB, ROTORS, 12, [2])[0] != draws[2]
     assert len({draw.mass for draw in draws}) == FLIGHTS
 
 
@@ -51,7 +51,7 @@ def test_a_flight_draws_the_same_whatever_flies_beside_it(draws: tuple[Draw, ...
         ("first_attitude_error", np.radians(0.3)),
     ],
 )
-def test_offsets_are_normal_with_the_spread_stated(draws: tuple[Draw, ...], name: str, spread: float) -> None:
+def test_offsets_are_normal_with_the_spread_stated(draws: Draws, name: str, spread: float) -> None:
     for axis in column(draws, name).T:
         assert stats.kstest(axis / spread, "norm").pvalue > ALPHA
 
@@ -60,7 +60,7 @@ def test_offsets_are_normal_with_the_spread_stated(draws: tuple[Draw, ...], name
     ("name", "spread"), [("mass", 0.03), ("inertia", 0.1), ("effectiveness", 0.03), ("lags", 0.25)]
 )
 def test_factors_have_mean_one_and_the_spread_stated(
-    draws: tuple[Draw, ...], name: str, spread: float
+    draws: Draws, name: str, spread: float
 ) -> None:
     factors = column(draws, name).ravel()
     standard_error = spread / np.sqrt(len(factors))
@@ -70,7 +70,7 @@ def test_factors_have_mean_one_and_the_spread_stated(
     assert stats.kstest(factors, "lognorm", (shape, 0.0, np.exp(-0.5 * shape**2))).pvalue > ALPHA
 
 
-def test_drag_charge_and_wind_are_drawn_as_stated(draws: tuple[Draw, ...]) -> None:
+def test_drag_charge_and_wind_are_drawn_as_stated(draws: Draws) -> None:
     assert stats.kstest(column(draws, "drag") / 0.1, "halfnorm").pvalue > ALPHA
     assert stats.kstest((1.0 - column(draws, "charge")) / 0.1, "uniform").pvalue > ALPHA
     assert stats.kstest(column(draws, "gust_heading") / (2 * np.pi), "uniform").pvalue > ALPHA
@@ -85,7 +85,7 @@ def test_drag_charge_and_wind_are_drawn_as_stated(draws: tuple[Draw, ...]) -> No
     [("hand_off_translation", 0.005), ("hand_off_rotation", np.radians(0.2)), ("warp", 0.003)],
 )
 def test_misfits_have_the_length_stated_in_any_direction(
-    draws: tuple[Draw, ...], name: str, length: float
+    draws: Draws, name: str, length: float
 ) -> None:
     """On a sphere each component of a unit vector is uniform (Archimedes)."""
     vectors = column(draws, name) / length
@@ -148,7 +148,7 @@ def test_a_flight_starts_off_the_reference_by_what_it_draws() -> None:
 
 def test_streams_of_random_numbers_are_each_their_own() -> None:
     draws = draw_flights(LAB, ROTORS, 3, range(20))
-    first = {tuple(draw.stream(name).generate_state(2).tolist()) for draw in draws for name in STREAMS}
+    first = {tuple(seed.generate_state(2).tolist()) for name in STREAMS for seed in draws.stream(name)}
     assert len(first) == len(draws) * len(STREAMS)
 
 

@@ -39,9 +39,9 @@ COUNTS = ("lanes", "ticks", "held rows", "log_stride", "begin", "end")
 class Layout:
     """Vehicles side by side, and which parameters and inputs are one number for all.
 
-    Both functions take arrays of float64: shared parameters (s,), parameters (p, lanes), shared inputs
+    Both functions take arrays of float64: shared parameters (s,), parameters (blocks, p, width), shared inputs
     (ticks, r + h), inputs (blocks, ticks, i, width), held inputs (blocks, held rows, width), carry and next
-    carry (c, lanes), outputs (logged ticks, o, lanes). The last h columns of the shared inputs say where in a
+    carry (blocks, c, width), outputs (logged ticks, o, lanes). The last h columns of the shared inputs say where in a
     block of the held inputs the values of each `Held` begin at a tick.
     `scan` logs the first tick, each `log_stride` ticks after it, and the last; `init` reads the inputs of one
     tick and writes the next carry. The lanes `begin` to `end` are run, multiples of the width.
@@ -98,7 +98,7 @@ class _Codegen:
             self._load_parameters(lane)
             self._load_inputs(INTEGER(0), lane)
             self._compute(loop.initialization)
-            self._store("next carry", INTEGER(0), self._wide(loop.first_carry), lane)
+            self._store_block("next carry", self._wide(loop.first_carry), lane)
         self._builder.ret_void()
 
     def emit_scan(self) -> None:
@@ -109,13 +109,13 @@ class _Codegen:
             self._compute(loop.prologue)
             carry = {}
             for index, number in enumerate(loop.carry):
-                address = self._address("carry", INTEGER(0), len(loop.carry), index, lane)
+                address = self._block_address("carry", len(loop.carry), index, lane)
                 value = b.load(address, typ=self._wide_type(NUMBER), align=8)
                 carry[number] = self._slot(self._as_logical(value) if loop.is_logical(number) else value)
             with self._counting(INTEGER(0), self._arguments["ticks"], 1) as tick:
                 self._tick(carry, tick, lane)
             after = [b.load(slot, typ=slot.allocated_type) for slot in carry.values()]
-            self._store("next carry", INTEGER(0), after, lane)
+            self._store_block("next carry", after, lane)
         b.ret_void()
 
     def _blocks(self) -> AbstractContextManager[Any]:
@@ -189,19 +189,21 @@ class _Codegen:
         self._unloaded |= {number: (slot, slot.allocated_type, None) for number, slot in slots.items()}
 
     def _log(self, tick: Any, lane: Any) -> None:
-        """Store the outputs, if it is time to."""
+        """Store the outputs, if it is time to, true and false as 1 and 0."""
         b, stride = self._builder, self._arguments["log_stride"]
         outputs = self._wide(self._loop.outputs)
         last = b.icmp_signed("==", b.add(tick, INTEGER(1)), self._arguments["ticks"])
         due = b.icmp_signed("==", b.srem(tick, stride), INTEGER(0))
         with b.if_then(b.or_(due, last)):
             row = b.sdiv(b.add(tick, b.sub(stride, INTEGER(1))), stride)
-            self._store("outputs", row, outputs, lane)
+            for column, value in enumerate(outputs):
+                address = self._address("outputs", row, len(outputs), column, lane)
+                b.store(self._as_number(value), address, align=8)
 
-    def _store(self, array: str, row: Any, values: Sequence[Any], lane: Any) -> None:
-        """Wide values into a row of an array, true and false as 1 and 0."""
+    def _store_block(self, array: str, values: Sequence[Any], lane: Any) -> None:
+        """Wide values into an array (blocks, values, width), true and false as 1 and 0."""
         for column, value in enumerate(values):
-            address = self._address(array, row, len(values), column, lane)
+            address = self._block_address(array, len(values), column, lane)
             self._builder.store(self._as_number(value), address, align=8)
 
     def _compute(self, numbers: Iterable[int]) -> None:
@@ -259,9 +261,12 @@ class _Codegen:
         counts = {True: sum(flags), False: len(flags) - sum(flags)}
         columns = {True: count(), False: count()}
         for number, shared in zip(self._loop.parameters, flags, strict=True):
-            array = "shared parameters" if shared else "parameters"
-            place = (INTEGER(0), counts[shared], next(columns[shared]), None if shared else lane)
-            self._unloaded[number] = (self._address(array, *place), self._type(shared), 8)
+            column = next(columns[shared])
+            if shared:
+                address = self._address("shared parameters", INTEGER(0), counts[shared], column, None)
+            else:
+                address = self._block_address("parameters", counts[shared], column, lane)
+            self._unloaded[number] = (address, self._type(shared), 8)
 
     def _load_inputs(self, tick: Any, lane: Any) -> None:
         """One tick's inputs, to be loaded where they are needed first."""
@@ -304,6 +309,12 @@ class _Codegen:
         place = b.add(b.mul(row, INTEGER(columns)), INTEGER(column))
         if lane is not None:
             place = b.add(b.mul(place, self._arguments["lanes"]), lane)
+        return b.gep(self._arguments[array], [place], source_etype=NUMBER)
+
+    def _block_address(self, array: str, columns: int, column: int, lane: Any) -> Any:
+        """Of array[block, column], its shape (blocks, columns, width)."""
+        b = self._builder
+        place = b.add(b.mul(lane, INTEGER(columns)), INTEGER(column * self._layout.width))
         return b.gep(self._arguments[array], [place], source_etype=NUMBER)
 
     @contextmanager

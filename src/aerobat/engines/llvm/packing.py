@@ -12,6 +12,7 @@ import numpy as np
 from aerobat.arrays import Array
 from aerobat.engines.engine import Held
 from aerobat.engines.pytree import Tree, tree_leaves, tree_map, tree_replace
+from aerobat.engines.scratch import Scratch
 
 _NONE = np.zeros(0)
 
@@ -57,8 +58,8 @@ class Packing:
         """Of all blocks."""
         return self.blocks * self.width
 
-    def inputs(self, inputs: Tree, ticks: int) -> PackedInputs:
-        """Inputs of so many ticks, or without an axis of ticks those of one."""
+    def inputs(self, inputs: Tree, ticks: int, scratch: Scratch) -> PackedInputs:
+        """Inputs of so many ticks, or without an axis of ticks those of one, in memory of a scratch."""
         nodes: list[Held] = []
 
         def noted(held: Held) -> Tree:
@@ -79,25 +80,29 @@ class Packing:
         ]
         sizes = [len(group) * len(group[0]) if group else 0 for group in groups]
         begins = np.cumsum([0, *sizes])
-        held = np.empty((self.blocks, begins[-1], self.width))
+        held = scratch.empty((self.blocks, int(begins[-1]), self.width))
         for group, begin, size in zip(groups, begins, sizes, strict=False):
             if group:
                 part = held[:, begin : begin + size]
                 self._fill(part.reshape(self.blocks, -1, len(group), self.width), group)
         starts = [begin + len(group) * row for begin, group, row in zip(begins, groups, rows, strict=False)]
         columns = [np.broadcast_to(np.asarray(x, dtype=np.float64), ticks) for x in (*of_all, *starts)]
-        packed = np.empty((self.blocks, ticks, len(own), self.width)) if own else _NONE
+        packed = scratch.empty((self.blocks, ticks, len(own), self.width))
         self._fill(packed, [np.reshape(leaf, (-1, self.vehicles)) for leaf in own])
         shared = np.stack(columns, axis=1) if columns else _NONE
         return PackedInputs(shared, packed, held, int(begins[-1]))
 
     def pad_lanes(self, leaves: Sequence[Array]) -> Array:
-        """Leaves (vehicles,) as (leaf, lanes)."""
-        packed = np.empty((len(leaves), self.lanes))
-        for row, leaf in zip(packed, leaves, strict=True):
-            row[: self.vehicles] = leaf
-        packed[:, self.vehicles :] = packed[:, self.vehicles - 1, None]
-        return packed
+        """Leaves (vehicles,) as (blocks, leaf, width)."""
+        packed = np.empty((self.blocks, 1, len(leaves), self.width))
+        self._fill(packed, [leaf[None] for leaf in leaves])
+        return packed[:, 0]
+
+    def unpad_lanes(self, packed: Array, scratch: Scratch) -> list[Array]:
+        """The leaves (vehicles,) of (blocks, leaf, width), in memory of a scratch."""
+        leaves = scratch.empty((packed.shape[1], self.lanes))
+        leaves.reshape(-1, self.blocks, self.width)[:] = packed.swapaxes(0, 1)
+        return list(leaves[:, : self.vehicles])
 
     def _fill(self, packed: Array, leaves: Sequence[Array]) -> None:
         """Leaves (rows, vehicles) into an array (blocks, rows, leaf, lane)."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 from aerobat.arrays import Array
@@ -11,7 +10,7 @@ from aerobat.kernels import battery, wind
 from aerobat.kernels.battery import BatteryParameters, BatteryState
 from aerobat.kernels.ops import Ops
 from aerobat.kernels.wind import GustNoise, WindParameters, WindState
-from aerobat.simulation.conditions.draw import Draw
+from aerobat.simulation.conditions.draw import Draws
 from aerobat.simulation.conditions.random_source import RandomSource
 from aerobat.simulation.loop import Signals
 
@@ -40,9 +39,9 @@ class WindSource:
 
     per_vehicle = True
 
-    def __init__(self, draws: Sequence[Draw], period: int) -> None:
+    def __init__(self, draws: Draws, period: int) -> None:
         """Prepare to draw, for a component that steps at every so many ticks."""
-        self._numbers = RandomSource([d.stream("wind") for d in draws], normals=5, period=period, block=32)
+        self._numbers = RandomSource(draws.stream("wind"), normals=5, period=period, block=32)
 
     def chunk(self, begin: int, end: int) -> Tree:
         """See `Source.chunk`; a GustNoise."""

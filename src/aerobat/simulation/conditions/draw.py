@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
-from math import hypot, tau
-from typing import Any
+from math import sqrt, tau
+from typing import Any, overload
 
 import numpy as np
+from numpy.random.bit_generator import ISeedSequence
+from numpy.typing import NDArray
 
 from aerobat import so3
 from aerobat.arrays import Array
@@ -37,7 +39,8 @@ _NORMALS = (  # standard normals of a draw, in this order, whatever the conditio
 )
 _ENDS = np.cumsum([count for _, count in _NORMALS]).tolist()
 # of a second-order gust's two filters [-]: the Cholesky factor of their covariance (1/2, 1/4; 1/4, 1/4)
-_GUST_ROOT = np.array([[np.sqrt(0.5), 0.0], [np.sqrt(0.125), np.sqrt(0.125)]])
+_GUST_FIRST, _GUST_SECOND = sqrt(0.5), sqrt(0.125)
+_SEED_WORDS = 3  # of 64 bits, in the state of a generator
 
 
 @by_value
@@ -87,16 +90,7 @@ class Draw:
 
     def start(self, reference: BodyState) -> BodyState:
         """The true state at the start of a flight whose reference starts so."""
-        return BodyState(
-            reference.position + self.start_position,
-            reference.velocity + self.start_velocity,
-            so3.multiply(reference.q_world_body, so3.exp(self.start_attitude)),
-            np.asarray(reference.omega_body),
-        )
-
-    def stream(self, name: str) -> np.random.SeedSequence:
-        """The seed of the random numbers of one of STREAMS along the flight."""
-        return np.random.SeedSequence(self.seed, spawn_key=(self.flight, STREAMS.index(name)))
+        return _start(reference, self.start_position, self.start_velocity, self.start_attitude)
 
     def row(self) -> dict[str, float]:
         """All of it as numbers by name, those of arrays by an index behind: a row of a table."""
@@ -110,7 +104,74 @@ class Draw:
         return columns
 
 
-def draw_flights(dispersion: Dispersion, rotors: int, seed: int, flights: Iterable[int]) -> tuple[Draw, ...]:
+class Draws(Sequence[Draw]):
+    """Draws of some flights: arrays of all of them, and each by itself where it is asked for."""
+
+    def __init__(self, dispersion: Dispersion, rotors: int, seed: int, flights: Sequence[int]) -> None:
+        """Draw, for a vehicle of so many rotors; see `draw_flights`."""
+        self._seed = seed
+        self._flights = flights
+        count = sum(count for _, count in _NORMALS)
+        normals, uniforms = np.empty((len(flights), count + 2 * rotors)), np.empty((len(flights), 2))
+        words = np.empty((len(flights), 1 + len(STREAMS), _SEED_WORDS), dtype=np.uint64)
+        for k, flight in enumerate(flights):
+            own = np.random.SeedSequence(seed, spawn_key=(flight,))
+            words[k] = own.generate_state(words[k].size, np.uint64).reshape(words[k].shape)
+            generator = np.random.Generator(np.random.SFC64(_Seed(words[k, 0])))
+            generator.random(out=uniforms[k])
+            generator.standard_normal(out=normals[k])  # of rotors last: other vehicles draw the rest alike
+        normal = {name: normals[:, end - count : end] for (name, count), end in zip(_NORMALS, _ENDS, strict=True)}
+        each_rotor = normals[:, count:].reshape(-1, 2, rotors).swapaxes(0, 1)
+        self._columns = {
+            **_of_vehicle(dispersion, normal, each_rotor),
+            **_of_sensors(dispersion, normal),
+            **_of_surroundings(dispersion, normal, uniforms),
+        }
+        self._words = words
+        for values in self._columns.values():
+            values.flags.writeable = False
+
+    def __len__(self) -> int:
+        return len(self._flights)
+
+    @overload
+    def __getitem__(self, index: int) -> Draw: ...
+
+    @overload
+    def __getitem__(self, index: slice) -> tuple[Draw, ...]: ...
+
+    def __getitem__(self, index: int | slice) -> Draw | tuple[Draw, ...]:
+        if isinstance(index, slice):
+            return tuple(self[k] for k in range(*index.indices(len(self))))
+        values = {name: column[index] for name, column in self._columns.items()}
+        numbers = {name: float(value) for name, value in values.items() if value.ndim == 0}
+        return Draw(self._seed, self._flights[index], **{**values, **numbers})
+
+    def column(self, name: str) -> Array:
+        """A field of all draws, (flights,) or (flights, n)."""
+        return self._columns[name]
+
+    def starts(self, reference: BodyState) -> BodyState:
+        """The true states at the start of flights whose reference starts so."""
+        return _start(reference, *(self.column(f"start_{name}") for name in ("position", "velocity", "attitude")))
+
+    def stream(self, name: str) -> list[ISeedSequence]:
+        """The seeds of the random numbers of one of STREAMS along each flight."""
+        return [_Seed(words) for words in self._words[:, 1 + STREAMS.index(name)]]
+
+
+class _Seed(ISeedSequence):
+    """Seed of a generator whose words are known: a flight's are made at once for all its generators."""
+
+    def __init__(self, words: NDArray[np.uint64]) -> None:
+        self._words = words
+
+    def generate_state(self, n_words: int, dtype: Any = np.uint64) -> NDArray[np.uint64]:
+        """The words."""
+        return self._words[:n_words]
+
+
+def draw_flights(dispersion: Dispersion, rotors: int, seed: int, flights: Iterable[int]) -> Draws:
     """The draws of some flights, each the same whichever others are asked for.
 
     Args:
@@ -119,31 +180,14 @@ def draw_flights(dispersion: Dispersion, rotors: int, seed: int, flights: Iterab
         seed: of all flights.
         flights: their numbers, from 0.
     """
-    return tuple(_draw(dispersion, rotors, seed, flight) for flight in flights)
+    return Draws(dispersion, rotors, seed, tuple(flights))
 
 
-def _draw(conditions: Dispersion, rotors: int, seed: int, flight: int) -> Draw:
-    rng = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(flight,)))
-    normals = rng.standard_normal(_ENDS[-1])
-    normal = {name: normals[end - count : end] for (name, count), end in zip(_NORMALS, _ENDS, strict=True)}
-    uniform = rng.random(2).tolist()
-    each_rotor = rng.standard_normal((2, rotors))  # last: other vehicles draw the rest alike
-    values = {
-        **_of_vehicle(conditions, normal, each_rotor),
-        **_of_sensors(conditions, normal),
-        **_of_surroundings(conditions, normal, uniform),
-    }
-    for value in values.values():
-        if isinstance(value, np.ndarray):
-            value.flags.writeable = False
-    return Draw(seed, flight, **values)
-
-
-def _of_vehicle(conditions: Dispersion, normal: Mapping[str, Array], each_rotor: Array) -> dict[str, Any]:
+def _of_vehicle(conditions: Dispersion, normal: Mapping[str, Array], each_rotor: Array) -> dict[str, Array]:
     return {
-        "mass": float(_factors(conditions.mass, normal["mass"])[0]),
-        "inertia": float(_factors(conditions.inertia, normal["inertia"])[0]),
-        "drag": conditions.drag * abs(float(normal["drag"][0])),
+        "mass": _factors(conditions.mass, normal["mass"][:, 0]),
+        "inertia": _factors(conditions.inertia, normal["inertia"][:, 0]),
+        "drag": conditions.drag * np.abs(normal["drag"][:, 0]),
         "effectiveness": _factors(conditions.rotor, each_rotor[0]),
         "lags": _factors(conditions.lag, each_rotor[1]),
         "start_position": conditions.start_position * normal["start_position"],
@@ -152,7 +196,7 @@ def _of_vehicle(conditions: Dispersion, normal: Mapping[str, Array], each_rotor:
     }
 
 
-def _of_sensors(conditions: Dispersion, normal: Mapping[str, Array]) -> dict[str, Any]:
+def _of_sensors(conditions: Dispersion, normal: Mapping[str, Array]) -> dict[str, Array]:
     imu = conditions.imu or Imu()
     capture = conditions.motion_capture or MotionCapture()
     hand_off = capture.hand_off or HandOff()
@@ -161,24 +205,33 @@ def _of_sensors(conditions: Dispersion, normal: Mapping[str, Array]) -> dict[str
         "accelerometer_bias": imu.accelerometer_bias * normal["accelerometer_bias"],
         "first_position_error": capture.position_noise * normal["first_position_error"],
         "first_attitude_error": capture.attitude_noise * normal["first_attitude_error"],
-        "hand_off_translation": hand_off.translation * _direction(normal["hand_off_translation"]),
-        "hand_off_rotation": hand_off.rotation * _direction(normal["hand_off_rotation"]),
-        "warp": hand_off.warp * _direction(normal["warp"]),
+        "hand_off_translation": hand_off.translation * _directions(normal["hand_off_translation"]),
+        "hand_off_rotation": hand_off.rotation * _directions(normal["hand_off_rotation"]),
+        "warp": hand_off.warp * _directions(normal["warp"]),
     }
 
 
 def _of_surroundings(
-    conditions: Dispersion, normal: Mapping[str, Array], uniform: Sequence[float]
-) -> dict[str, Any]:
+    conditions: Dispersion, normal: Mapping[str, Array], uniforms: Array
+) -> dict[str, Array]:
     gusts = conditions.gusts or Gusts()
-    used, turn = uniform
-    along, *across = normal["gust"]
+    used, turn = uniforms.T
+    along, *across = normal["gust"].T
+    filters = ((_GUST_FIRST * a, _GUST_SECOND * (a + b)) for a, b in (across[:2], across[2:]))
+    x, y = normal["mean_wind"].T
     return {
         "charge": 1.0 - used * (conditions.battery.charge_spread if conditions.battery else 0.0),
-        "mean_wind": gusts.mean_wind * np.append(normal["mean_wind"], 0.0),
-        "gust": np.append(along, (np.reshape(across, (2, 2)) @ _GUST_ROOT.T).ravel()),
+        "mean_wind": gusts.mean_wind * np.stack([x, y, np.zeros_like(x)], axis=-1),
+        "gust": np.stack([along, *(state for both in filters for state in both)], axis=-1),
         "gust_heading": tau * turn,
     }
+
+
+def _start(reference: BodyState, position: Array, velocity: Array, attitude: Array) -> BodyState:
+    """A state by its offsets, (3,) or (flights, 3); a rotation vector in body axes."""
+    q = so3.normalize(so3.multiply(reference.q_world_body, so3.exp(attitude)))
+    omega = np.broadcast_to(reference.omega_body, position.shape)
+    return BodyState(reference.position + position, reference.velocity + velocity, q, omega)
 
 
 def _factors(spread: float, normals: Array) -> Array:
@@ -187,30 +240,30 @@ def _factors(spread: float, normals: Array) -> Array:
     return np.asarray(np.exp(np.sqrt(variance) * normals - 0.5 * variance))
 
 
-def _direction(normals: Array) -> Array:
-    return normals / hypot(*normals.tolist())
+def _directions(normals: Array) -> Array:
+    x, y, z = normals.T
+    return np.asarray(normals / np.sqrt(x * x + y * y + z * z)[:, None])
 
 
-def dispersed_fleet(nominal: Vehicle, draws: Sequence[Draw]) -> Fleet:
+def dispersed_fleet(nominal: Vehicle, draws: Draws) -> Fleet:
     """The vehicles that really fly, as arrays: `Fleet.of` of each draw's vehicle, without making those."""
     one, shape = Fleet.of([nominal]), (len(draws),)
-    mass, inertia = np.array([(d.mass, d.inertia) for d in draws]).T
-    drag = np.array([d.drag for d in draws]) * nominal.mass
+    drag = draws.column("drag") * nominal.mass
 
     def alike(array: Array) -> Array:
         return np.broadcast_to(array[0], shape + array.shape[1:]).copy()
 
     return Fleet(
         names=one.names * len(draws),
-        mass=mass * nominal.mass,
-        inertia=inertia[:, None, None] * nominal.inertia,
+        mass=draws.column("mass") * nominal.mass,
+        inertia=draws.column("inertia")[:, None, None] * nominal.inertia,
         drag_body=nominal.drag_body + drag[:, None],
         rotor_positions=alike(one.rotor_positions),
         spins=alike(one.spins),
         min_thrusts=alike(one.min_thrusts),
         max_thrusts=alike(one.max_thrusts),
         torque_coefficients=alike(one.torque_coefficients),
-        lags=np.array([d.lags for d in draws]) * one.lags,
+        lags=draws.column("lags") * one.lags,
         body_centres=alike(one.body_centres),
         semi_axes=alike(one.semi_axes),
     )

@@ -29,7 +29,7 @@ from aerobat.kernels.rigid_body import Pose
 from aerobat.kernels.wind import GustFilter, GustState, WindParameters
 from aerobat.problem import Gate
 from aerobat.simulation.conditions.disturbances import BatterySag, Wind, WindSource
-from aerobat.simulation.conditions.draw import Draw
+from aerobat.simulation.conditions.draw import Draws
 from aerobat.simulation.conditions.sensors import (
     FeltParameters,
     ImuBias,
@@ -54,7 +54,7 @@ _MOVING = 1e-3  # [m/s] a path that is slower has no direction
 class DispersedFlights:
     """What conditions are made for."""
 
-    draws: Sequence[Draw]
+    draws: Draws
     fleet: Fleet  # that really flies
     nominal: Vehicle
     environment: Environment
@@ -64,7 +64,7 @@ class DispersedFlights:
 
     def each(self, name: str) -> Tree:
         """A field of the draws: a leaf (vehicles,), or for an array a tuple of them."""
-        values = np.array([getattr(draw, name) for draw in self.draws])
+        values = self.draws.column(name)
         return values if values.ndim == 1 else components(values)
 
     def all(self, value: float) -> Array:
@@ -78,7 +78,7 @@ class DispersedFlights:
     @property
     def effectiveness(self) -> Array:
         """Of the rotors [-], (vehicles, n)."""
-        return np.array([draw.effectiveness for draw in self.draws])
+        return self.draws.column("effectiveness")
 
     def slow_period(self, rate: float = SLOW) -> int:
         """The ticks of a step at so many a second, or of the next faster one."""
@@ -106,9 +106,9 @@ def wind_part(gusts: Gusts, flights: DispersedFlights) -> Part:
     """Mean wind and gusts."""
     time_constant = gusts.length / gusts.airspeed
     period = flights.slow_period(max(SLOW, GUSTY / time_constant))
-    mean = flights.environment.wind + np.array([draw.mean_wind for draw in flights.draws])
+    mean = flights.environment.wind + flights.draws.column("mean_wind")
     speed = np.hypot(mean[:, 0], mean[:, 1])
-    heading = np.array([draw.gust_heading for draw in flights.draws])
+    heading = flights.draws.column("gust_heading")
     is_calm = speed == 0.0
     divisor = np.where(is_calm, 1.0, speed)
     along, first, second, third, fourth = flights.each("gust")
@@ -211,7 +211,7 @@ def motion_capture_part(capture: MotionCapture, flights: DispersedFlights) -> Pa
 def _seam(hand_off: HandOff | None, flights: DispersedFlights) -> Seam:
     """The plane of hand-off; without one, some plane, and no misfit."""
     point, normal = hand_off_plane(hand_off or HandOff(), flights.trajectory, flights.gates)
-    rotation = so3.exp(np.array([draw.hand_off_rotation for draw in flights.draws]))
+    rotation = so3.exp(flights.draws.column("hand_off_rotation"))
     return Seam(
         flights.vector(point),
         flights.vector(normal),

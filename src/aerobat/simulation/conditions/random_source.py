@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from aerobat.arrays import Array, frozen
 from aerobat.engines.engine import Held
 from aerobat.engines.pytree import Tree
+from aerobat.engines.scratch import Scratch
 
 Words: TypeAlias = NDArray[np.uint16]
 
@@ -55,6 +56,7 @@ class RandomSource:
         self._words = normals + 2 * uniforms
         self._period = period
         self._size = block
+        self._scratch = Scratch()
         self._restart()
 
     def inputs(self, begin: int, end: int, arrange: Callable[[Array], Tree]) -> Tree:
@@ -71,11 +73,11 @@ class RandomSource:
         words = blocks[0] if len(blocks) == 1 else np.concatenate(blocks, axis=1)
         offset = begin // self._size * self._size
         words = words[:, begin - offset : end - offset]
-        normals = _quantiles().take(words[: self._normals])
-        if self._words == self._normals:
-            return normals
         high, low = words[self._normals :: 2], words[self._normals + 1 :: 2]
-        return np.concatenate([normals, (high + (low + 0.5) / _LEVELS) / _LEVELS])
+        numbers = self._scratch.empty((self._normals + len(high), *words.shape[1:]))
+        _quantiles().take(words[: self._normals], out=numbers[: self._normals], mode="clip")  # quicker, checks less
+        numbers[self._normals :] = (high + (low + 0.5) / _LEVELS) / _LEVELS
+        return numbers
 
     def _block(self, number: int) -> Words:
         """Random words (words, samples, vehicles) of a block."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -17,7 +16,7 @@ from aerobat.kernels.motors import Airframe
 from aerobat.kernels.ops import Ops
 from aerobat.kernels.rigid_body import EnvironmentParameters
 from aerobat.simulation.components import with_wind
-from aerobat.simulation.conditions.draw import Draw
+from aerobat.simulation.conditions.draw import Draws
 from aerobat.simulation.conditions.random_source import RandomSource
 from aerobat.simulation.loop import Signals
 
@@ -78,7 +77,7 @@ class ImuSource:
 
     per_vehicle = True
 
-    def __init__(self, draws: Sequence[Draw], stream: str, period: int, block: int = 256) -> None:
+    def __init__(self, draws: Draws, stream: str, period: int, block: int = 256) -> None:
         """Prepare to draw.
 
         Args:
@@ -87,7 +86,7 @@ class ImuSource:
             period: ticks from one sample to the next.
             block: samples drawn at once.
         """
-        seeds = [each.stream(stream) for each in draws]
+        seeds = draws.stream(stream)
         self._numbers = RandomSource(seeds, normals=6, period=period, block=block)
 
     def chunk(self, begin: int, end: int) -> Tree:
@@ -152,7 +151,7 @@ class MocapSource:
 
     per_vehicle = True
 
-    def __init__(self, draws: Sequence[Draw], period: int, rate: float) -> None:
+    def __init__(self, draws: Draws, period: int, rate: float) -> None:
         """Prepare to draw.
 
         Args:
@@ -160,7 +159,7 @@ class MocapSource:
             period: ticks from one sample to the next.
             rate: of the ticks [1/s].
         """
-        seeds = [each.stream("motion_capture") for each in draws]
+        seeds = draws.stream("motion_capture")
         self._numbers = RandomSource(seeds, normals=9, uniforms=1, period=period, block=32)
         self._period = period
         self._rate = rate

@@ -6,7 +6,6 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from aerobat import so3
 from aerobat.control.parameters import airframe_parameters, controller_parameters, environment_parameters
 from aerobat.engines.pytree import tree_map
 from aerobat.environment import Dispersion, Environment
@@ -97,10 +96,7 @@ def _start(reference: ReferenceSource, flights: DispersedFlights) -> Body:
     asked = reference.setpoint(0, 1)
     flat = asked.flat
     planned = BodyState(flat.position[0], flat.velocity[0], asked.q_world_body[0], asked.omega_body[0])
-    drawn = [vars(draw.start(planned)) for draw in flights.draws]
-    stacked = {name: np.array([each[name] for each in drawn]) for name in drawn[0]}
-    stacked["q_world_body"] = so3.normalize(stacked["q_world_body"])
-    return bodies(BodyState(**stacked))
+    return bodies(flights.draws.starts(planned))
 
 
 def _observer(conditions: Dispersion, flights: DispersedFlights, disturbed: Sequence[Part]) -> Part:
