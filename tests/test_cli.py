@@ -149,7 +149,8 @@ def test_help_tells_every_command_and_option(capsys) -> None:
     assert all(command in out for command in ("fly", "plan", "check", "compare", "vehicles", "Exit codes"))
     _, out, _ = run(capsys, "fly", "--help")
     options = "vehicle planner order intervals segments stop-after backend paper angle out json seed"
-    assert "--controller" in out and "--conditions" in out
+    assert "--controller" in out
+    assert "--conditions" in out
     assert all(f"--{option}" in out for option in options.split())
 
 

@@ -59,9 +59,7 @@ def test_offsets_are_normal_with_the_spread_stated(draws: Draws, name: str, spre
 @pytest.mark.parametrize(
     ("name", "spread"), [("mass", 0.03), ("inertia", 0.1), ("effectiveness", 0.03), ("lags", 0.25)]
 )
-def test_factors_have_mean_one_and_the_spread_stated(
-    draws: Draws, name: str, spread: float
-) -> None:
+def test_factors_have_mean_one_and_the_spread_stated(draws: Draws, name: str, spread: float) -> None:
     factors = column(draws, name).ravel()
     standard_error = spread / np.sqrt(len(factors))
     assert abs(factors.mean() - 1.0) < 3.3 * standard_error
@@ -84,9 +82,7 @@ def test_drag_charge_and_wind_are_drawn_as_stated(draws: Draws) -> None:
     ("name", "length"),
     [("hand_off_translation", 0.005), ("hand_off_rotation", np.radians(0.2)), ("warp", 0.003)],
 )
-def test_misfits_have_the_length_stated_in_any_direction(
-    draws: Draws, name: str, length: float
-) -> None:
+def test_misfits_have_the_length_stated_in_any_direction(draws: Draws, name: str, length: float) -> None:
     """On a sphere each component of a unit vector is uniform (Archimedes)."""
     vectors = column(draws, name) / length
     np.testing.assert_allclose(np.linalg.norm(vectors, axis=1), 1.0, rtol=1e-12)

@@ -11,7 +11,6 @@ import pytest
 from aerobat.environment import Environment
 from aerobat.errors import SpecError
 from aerobat.simulation import Flight, fly, load_flight
-from aerobat.simulation.flight import SERIES
 from aerobat.trajectory import Trajectory
 from aerobat.vehicle import load_vehicle
 
@@ -119,7 +118,7 @@ def test_one_flight_is_no_batch_and_a_batch_no_flight() -> None:
 
 def test_each_series_of_the_table_is_an_attribute_and_nothing_else_is() -> None:
     flight = fly(RISE, QUAD)
-    for series in SERIES:
+    for series in flight.kinds:
         assert getattr(flight, series.name) is flight.series[series.name]
     np.testing.assert_array_equal(flight.states.velocity, flight.velocity)
     np.testing.assert_array_equal(flight.setpoint.wrench.thrust, flight.setpoint_thrust)

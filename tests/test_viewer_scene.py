@@ -11,7 +11,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import aerobat as ab
-from aerobat.simulation.flight import SERIES
 from aerobat.viewer.scene import MAX_FLIGHTS, MAX_POSES, MAX_ROWS, plan_fits, scene_of, shown_rows
 from reporting_cases import planned, simulated
 from viewer_cases import dispersed, flip
@@ -29,7 +28,8 @@ def minute() -> ab.Flight:
 def first(flight: ab.Flight, count: int) -> ab.Flight:
     """The first vehicles of a batch, be it none."""
     series = {
-        s.name: flight.series[s.name][:count] if s.per_vehicle else flight.series[s.name] for s in SERIES
+        s.name: flight.series[s.name][:count] if s.per_vehicle else flight.series[s.name]
+        for s in flight.kinds
     }
     names, outcomes, sentences = flight.vehicles[:count], flight.outcomes[:count], flight.sentences[:count]
     return replace(flight, series=series, vehicles=names, outcomes=outcomes, sentences=sentences)

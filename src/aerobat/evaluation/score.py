@@ -105,6 +105,7 @@ class Scores:
             passages=passed,
             outcome=outcome,
             sentence=sentence,
+            observer=None,
         )
 
     def __iter__(self) -> Iterator[Score]:

@@ -201,7 +201,9 @@ def flight_facts(score: Score, controller: str | None = None) -> Iterable[Fact]:
 
 def _observer(found: ObserverScore) -> str:
     """The filter's errors, and where it had to do without poses."""
-    errors = f"{length(found.rms_position_error_m)} and {digits(found.rms_attitude_error_deg)}° RMS off the truth"
+    errors = (
+        f"{length(found.rms_position_error_m)} and {digits(found.rms_attitude_error_deg)}° RMS off the truth"
+    )
     if not found.coasted:
         return errors
     begin = found.until_s - found.longest_without_pose_s

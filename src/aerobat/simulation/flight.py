@@ -75,8 +75,9 @@ class Flight:
 
     Row k of every series is the situation at `times[k]`: the true state, the thrusts that the rotors give,
     and the commands that the controller sends then and holds until the next row. Each series of SERIES is an
-    attribute too, as `flight.thrusts`. A vehicle that diverges ends at its `ends`; in a batch its later rows
-    repeat that one. What a filter made of its sensors is there where one flew. Raises SpecError for shapes that do not match and numbers that are not finite.
+    attribute too, as `flight.thrusts`; what a filter made of its sensors is there where one flew. A vehicle
+    that diverges ends at its `ends`; in a batch its later rows repeat that one. Raises SpecError for shapes
+    that do not match and numbers that are not finite.
     """
 
     times: Array  # [s], (T,), rising
@@ -209,9 +210,7 @@ def load_flight(path: PathName) -> Flight:
         ground = float(content["ground"])
         return Flight(
             times=content["times"],
-            series={
-                one.name: content[one.name] for one in SERIES if one.name in content or not one.observed
-            },
+            series={one.name: content[one.name] for one in SERIES if one.name in content or not one.observed},
             vehicles=_texts(content["vehicles"]),
             outcomes=tuple(Outcome[name] for name in _texts(content["outcomes"])),
             sentences=_texts(content["sentences"]),

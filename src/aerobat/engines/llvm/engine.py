@@ -80,7 +80,9 @@ class MachineLoop(CompiledLoop):
         """See `CompiledLoop.scan`."""
         ticks = tick_count(inputs)
         rows = len(logged_ticks(ticks, log_stride))
-        after, outputs = self._advanced(carry, self._packing.inputs(inputs, ticks, self._scratch), rows, ticks, log_stride)
+        after, outputs = self._advanced(
+            carry, self._packing.inputs(inputs, ticks, self._scratch), rows, ticks, log_stride
+        )
         return after, self._row(outputs.transpose(1, 2, 0))
 
     def step(self, carry: Tree, inputs: Tree) -> tuple[Tree, Tree]:

@@ -120,7 +120,9 @@ class Draws(Sequence[Draw]):
             generator = np.random.Generator(np.random.SFC64(_Seed(words[k, 0])))
             generator.random(out=uniforms[k])
             generator.standard_normal(out=normals[k])  # of rotors last: other vehicles draw the rest alike
-        normal = {name: normals[:, end - count : end] for (name, count), end in zip(_NORMALS, _ENDS, strict=True)}
+        normal = {
+            name: normals[:, end - count : end] for (name, count), end in zip(_NORMALS, _ENDS, strict=True)
+        }
         each_rotor = normals[:, count:].reshape(-1, 2, rotors).swapaxes(0, 1)
         self._columns = {
             **_of_vehicle(dispersion, normal, each_rotor),
@@ -153,7 +155,9 @@ class Draws(Sequence[Draw]):
 
     def starts(self, reference: BodyState) -> BodyState:
         """The true states at the start of flights whose reference starts so."""
-        return _start(reference, *(self.column(f"start_{name}") for name in ("position", "velocity", "attitude")))
+        return _start(
+            reference, *(self.column(f"start_{name}") for name in ("position", "velocity", "attitude"))
+        )
 
     def stream(self, name: str) -> list[ISeedSequence]:
         """The seeds of the random numbers of one of STREAMS along each flight."""

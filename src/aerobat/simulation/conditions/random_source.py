@@ -75,7 +75,9 @@ class RandomSource:
         words = words[:, begin - offset : end - offset]
         high, low = words[self._normals :: 2], words[self._normals + 1 :: 2]
         numbers = self._scratch.empty((self._normals + len(high), *words.shape[1:]))
-        _quantiles().take(words[: self._normals], out=numbers[: self._normals], mode="clip")  # quicker, checks less
+        _quantiles().take(
+            words[: self._normals], out=numbers[: self._normals], mode="clip"
+        )  # quicker, checks less
         numbers[self._normals :] = (high + (low + 0.5) / _LEVELS) / _LEVELS
         return numbers
 
