@@ -127,14 +127,19 @@ def test_the_same_command_goes_on_with_the_flights_that_are_kept(ended_by: str, 
         (["--controller", "papr"], "did you mean 'paper'?"),
         (["--table", "xls"], "table"),
         (["--workers", "0"], "workers"),
+        (["--out", "mine"], "mine/ holds thesis.tex, which no run wrote"),
+        (["--out", "spread.toml"], "Not a directory"),
+        (["--out", "x" * 300], "too long"),
     ],
 )
 def test_what_makes_no_sense_is_refused_before_anything_is_planned(arguments, named: str, capsys) -> None:
+    Path("mine").mkdir()
+    Path("mine/thesis.tex").write_text("years of work")
     assert code("sweep", "half-flip", *arguments) == 2
     err = capsys.readouterr().err
     assert named in err
     assert err.count("\n") == 1
-    assert not Path("out").exists()
+    assert sorted(path.name for path in Path().iterdir()) == ["mine", "spread.toml"]
 
 
 def test_a_sweep_that_cannot_be_flown_leaves_nothing(capsys) -> None:

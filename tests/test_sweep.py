@@ -130,7 +130,7 @@ def test_finished_flights_of_another_sweep_are_not_taken(tmp_path: Path) -> None
     with pytest.raises(ab.SpecError, match="keeps no flights of a sweep"):
         sweep(hop(), "none", 2, SEED, workers=1, keep=kept)
     (tmp_path / "file").write_text("")
-    with pytest.raises(ab.SpecError, match="cannot keep flights in .*: Not a directory"):
+    with pytest.raises(ab.SpecError, match=r"cannot keep flights in .*: Not a directory"):
         sweep(hop(), "none", 2, SEED, workers=1, keep=tmp_path / "file")
 
 

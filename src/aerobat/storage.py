@@ -65,10 +65,7 @@ def whole_folder(path: str | os.PathLike[str], is_ours: Callable[[str], bool]) -
     """
     target = Path(os.path.abspath(path))
     try:
-        _remove_abandoned(target)  # of files that were being written into it
-        foreign = sorted(name for name in _entries(target) if not is_ours(name))
-        if foreign:
-            raise SpecError(f"{path}/ holds {foreign[0]}, which no run wrote; give a folder of its own")
+        require_replaceable(path, is_ours)
         made = [parent for parent in target.parents if not parent.exists()]
         target.parent.mkdir(parents=True, exist_ok=True)
         _remove_abandoned(target.parent)
@@ -93,6 +90,21 @@ def whole_folder(path: str | os.PathLike[str], is_ours: Callable[[str], bool]) -
             with suppress(OSError):  # somebody else's by now
                 for parent in made:
                     parent.rmdir()
+
+
+def require_replaceable(path: str | os.PathLike[str], is_ours: Callable[[str], bool]) -> None:
+    """Refuse a folder that holds anything whose name is not ours: that is somebody's work. Raises SpecError.
+
+    What killed processes have left in it is removed.
+    """
+    target = Path(os.path.abspath(path))
+    try:
+        _remove_abandoned(target)  # of files that were being written into it
+        foreign = sorted(name for name in _entries(target) if not is_ours(name))
+    except OSError as error:
+        raise SpecError(f"cannot write {path}: {error.strerror or error}") from None
+    if foreign:
+        raise SpecError(f"{path}/ holds {foreign[0]}, which no run wrote; give a folder of its own")
 
 
 def write_whole(path: str | os.PathLike[str], content: str | bytes) -> None:

@@ -9,7 +9,7 @@ from cyclopts import Parameter
 
 from aerobat.cli.options import OutputOptions, PlanningOptions, SweepingOptions
 from aerobat.cli.progress import SweepProgress, showing
-from aerobat.cli.runs.folder import written
+from aerobat.cli.runs.folder import is_of_a_run, written
 from aerobat.cli.runs.record import FlightSettings, RunRecord
 from aerobat.cli.runs.unfinished import Unfinished
 from aerobat.cli.tasks import plan_of, planned
@@ -22,6 +22,7 @@ from aerobat.reporting.page import png
 from aerobat.reporting.report_json import to_json
 from aerobat.reporting.sweeps.figure import sweep_figure
 from aerobat.reporting.sweeps.table import sweep_report, sweep_table
+from aerobat.storage import require_replaceable
 from aerobat.studies.sweep import Sweep
 from aerobat.studies.sweep import sweep as sweep_plan
 
@@ -56,7 +57,9 @@ def sweep(
     require_writable(table_name(settings))
 
     def kept_or_new(record: RunRecord) -> Plan:
-        return Unfinished.beside(options.out or record.folder).plan(record, plan_of)
+        folder = options.out or record.folder
+        require_replaceable(folder, is_of_a_run)  # before hours of flying
+        return Unfinished.beside(folder).plan(record, plan_of)
 
     plan, record = planned(problem, options, "sweep", settings, kept_or_new)
     finish_sweep(sweep_of(plan, record, options, sweeping.workers), record, options)

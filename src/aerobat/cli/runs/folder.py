@@ -44,6 +44,11 @@ FILES = (
 )
 
 
+def is_of_a_run(name: str) -> bool:
+    """True for the name of a file that runs write."""
+    return name in FILES or name.endswith(".plan")
+
+
 @contextmanager
 def run_folder(folder: Path, record: RunRecord) -> Iterator[Path]:
     """Yield an empty folder that replaces that of an earlier run as one; see `whole_folder`.
@@ -51,7 +56,7 @@ def run_folder(folder: Path, record: RunRecord) -> Iterator[Path]:
     The record comes with it. Ctrl-C comes in time until that happens, and means nothing afterwards: a run is
     interrupted or done.
     """
-    with whole_folder(folder, lambda name: name in FILES or name.endswith(".plan")) as staging:
+    with whole_folder(folder, is_of_a_run) as staging:
         yield staging
         write_record(record, staging)
         end_interrupts()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import shutil
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -45,7 +46,7 @@ class Unfinished:
 
         Raises SpecError where the flights are those of another sweep.
         """
-        if (self.folder / RECORD).exists() and (self.folder / PLAN).exists():
+        if all(os.path.exists(self.folder / name) for name in (RECORD, PLAN)):
             if _without_runs(read_record(self.folder)) != _without_runs(record):
                 raise SpecError(
                     f"{self.folder}/ keeps the flights of an unfinished sweep with other settings; repeat "
