@@ -66,6 +66,7 @@ def ignored_counts(done: int, well: int) -> None:
 
 RESULTS = (
     "Assessment",
+    "ErrorCauses",
     "Estimates",
     "Gradient",
     "Opening",
@@ -113,6 +114,17 @@ def _arguments(name: str, folder: Path) -> dict[str, Any]:
         "comparison_figure": {"comparison": instance(ab.Comparison)},
         "dispersion_names": {},
         "draw": {"flight": flight(), "plan": plan(), "vehicle": agile},
+        "error_causes": {
+            "problem": cruise().problem,
+            "vehicle": agile,
+            "causes": [ab.Cause("late", {"conditions.control_rate": 200.0})],
+            "planner": ab.MinSnap(),
+            "conditions": ab.Dispersion(mass=0.01, control_rate=100.0),
+            "controller": ab.Controller(),
+            "flights": 2,
+            "seed": 1,
+            "begin": ignored,
+        },
         "estimate": {
             "log": instance(ab.SensorLog),
             "ekf": ab.Ekf(),
@@ -325,6 +337,7 @@ def instance(cls: type) -> Any:
         ab.Attitude: lambda: ab.Attitude((0.0, 0.0, 1.0), 5.0, 0.1),
         ab.Battery: lambda: ab.load_dispersion("lab").battery,
         ab.BodyState: lambda: ab.BodyState(np.zeros(3), np.zeros(3), np.array([1.0, 0, 0, 0]), np.zeros(3)),
+        ab.Cause: lambda: ab.Cause("jerk", {"planner.order": 3}),
         ab.Certificate: lambda: ab.certify(plan()),
         ab.Comparison: _comparison,
         ab.Condition: lambda: ab.Condition("velocity", (1.0, 0.0, 0.0), upper=1.0),

@@ -87,6 +87,7 @@ from .reporting.tracking import tracking_figure
 from .simulation import Flight, FlightConfig, Outcome, fly, load_flight, prepare
 from .states import BodyState, FlatState, Setpoint, Wrench
 from .studies.compare import Comparison, compare
+from .studies.error_causes import Cause, ErrorCauses, error_causes
 from .studies.sweep import Share, Sweep, sweep
 from .trajectory import ContinuityRule, Trajectory, load_trajectory, minimum_effort, save_trajectory
 from .vehicle import Ellipsoid, Rotor, Vehicle, implausibilities, load_vehicle, vehicle_names, write_vehicle
@@ -100,6 +101,7 @@ __all__ = [
     "Battery",
     "BisectionSearch",
     "BodyState",
+    "Cause",
     "Certificate",
     "Comparison",
     "Condition",
@@ -112,6 +114,7 @@ __all__ = [
     "EndState",
     "Envelope",
     "Environment",
+    "ErrorCauses",
     "Estimates",
     "FlatState",
     "Flight",
@@ -167,6 +170,7 @@ __all__ = [
     "comparison_figure",
     "dispersion_names",
     "draw",
+    "error_causes",
     "estimate",
     "fly",
     "implausibilities",

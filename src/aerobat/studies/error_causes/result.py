@@ -1,0 +1,142 @@
+"""What causes of error come to: flights with each alone, with all, with none, and what each costs."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Annotated
+
+import numpy as np
+from pydantic import Field
+
+from aerobat.arrays import Array
+from aerobat.declaration import Label, Positive, by_value, short, unknown_name, validated
+from aerobat.evaluation import Scores
+from aerobat.planning import Plan
+from aerobat.simulation.outcome import length
+from aerobat.studies.error_causes.cause import Trial
+
+NONE, ALL = "none", "all together"
+Level = Annotated[float, Field(ge=0.0, le=1.0)]
+Confidence = Annotated[float, Field(gt=0.0, lt=1.0)]
+
+
+@by_value
+@dataclass(frozen=True)
+class Cost:
+    """How much larger an error is with a cause than without: the median over pairs of flights.
+
+    The interval holds the median of all such differences at the confidence, whatever their distribution: its
+    ends are order statistics, by the sign test. Of too few pairs for that it is infinite.
+    """
+
+    median: float
+    low: float
+    high: float
+
+    @classmethod
+    def of(cls, without: Array, with_cause: Array, confidence: float) -> Cost:
+        """The cost between errors of the same flights, (flights,); two infinite ones differ by nothing."""
+        from scipy.stats import binom  # takes a quarter of a second
+
+        with np.errstate(invalid="ignore"):
+            differences = np.sort(np.nan_to_num(with_cause - without, nan=0.0, posinf=np.inf, neginf=-np.inf))
+        rank = int(binom.ppf(0.5 * (1.0 - confidence), len(differences), 0.5))  # of the ends, from 1
+        ends = (differences[rank - 1], differences[-rank]) if rank else (-np.inf, np.inf)
+        return cls(float(np.quantile(differences, 0.5, method="higher")), float(ends[0]), float(ends[1]))
+
+
+@short
+@by_value
+@dataclass(frozen=True, eq=False, repr=False)
+class TrialResult:
+    """Flights of one trial. Errors are arrays (flights,), infinite where a gate was not crossed."""
+
+    cause: str  # its name, NONE or ALL
+    trial: Trial
+    plan: Plan
+    scores: Scores
+
+    def __str__(self) -> str:
+        """One line for people."""
+        return f"{self.cause}: {self.scores}"
+
+    @property
+    def position_error(self) -> Array:
+        """The largest of each flight [m]."""
+        return np.nan_to_num(self.scores.max_position_error_m, nan=np.inf)
+
+    @property
+    def gate_error(self) -> Array:
+        """The distance from the gate's centre as its plane is crossed [m], the largest of several gates."""
+        return self._worst("miss")
+
+    @property
+    def gate_attitude_error(self) -> Array:
+        """The angle of the thrust axis off the attitude asked there [deg], the largest of several gates."""
+        return self._worst("attitude_error_deg")
+
+    @property
+    def clearance(self) -> Array:
+        """The least between body and frame [m], negative: so far into it; −∞ where a gate was not crossed."""
+        return -self._worst("clearance", -1.0)
+
+    @property
+    def passed(self) -> float:
+        """The fraction of flights whose body passed all gates and touched no frame."""
+        return float(np.mean(self.clearance >= 0.0))
+
+    @validated
+    def passed_opening(self, width: Positive, height: Positive) -> float:
+        """The fraction of flights whose body would have passed gates of that opening [m]."""
+        fits = (self._worst("needed_width") <= width) & (self._worst("needed_height") <= height)
+        return float(np.mean(fits))
+
+    def _worst(self, field: str, sign: float = 1.0) -> Array:
+        """The largest of a field of the passages, times a sign; infinite where it is not known."""
+        values = [sign * getattr(passage, field) for passage in self.scores.passages]
+        return np.asarray(np.max(np.nan_to_num(values, nan=np.inf), axis=0))
+
+
+@short
+@by_value
+@dataclass(frozen=True, eq=False, repr=False)
+class ErrorCauses:
+    """The same flights with no cause of error, with each alone, and with all together."""
+
+    results: tuple[TrialResult, ...]  # NONE first, then the causes in their order, ALL last
+    seed: int
+
+    def __len__(self) -> int:
+        return len(self.results[0].scores)
+
+    def __str__(self) -> str:
+        """One line for people."""
+        costs = ", ".join(f"{r.cause} {length(self.cost(r.cause).median)}" for r in self.results[1:])
+        median = float(np.median(self.none.position_error))
+        return f"{len(self)} flights, position error {length(median)} at the median; more with {costs}"
+
+    @property
+    def none(self) -> TrialResult:
+        """With no cause."""
+        return self.results[0]
+
+    @property
+    def together(self) -> TrialResult:
+        """With all causes."""
+        return self.results[-1]
+
+    @validated
+    def of(self, cause: Label) -> TrialResult:
+        """With one cause, by its name. Raises SpecError where there is no such cause."""
+        for result in self.results:
+            if result.cause == cause:
+                return result
+        raise unknown_name("cause", cause, [result.cause for result in self.results])
+
+    @validated
+    def cost(self, cause: Label, confidence: Confidence = 0.95) -> Cost:
+        """The cost of a cause in position error [m], flight by flight against none.
+
+        Raises SpecError where there is no such cause.
+        """
+        return Cost.of(self.none.position_error, self.of(cause).position_error, confidence)
