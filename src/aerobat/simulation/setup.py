@@ -20,7 +20,7 @@ from aerobat.simulation.loop import Component, Log, LoopInput, LoopParameters, c
 from aerobat.simulation.reference_source import BLOCK, ReferenceSource
 from aerobat.vehicle.fleet import Fleet
 
-_VEHICLE_TICKS = 20_000
+_VEHICLE_TICKS = 160_000  # whose own inputs are made at once, so that they take little memory (50 MB)
 _MIN_CHUNK = 16  # ticks
 
 

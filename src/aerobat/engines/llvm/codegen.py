@@ -12,61 +12,16 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import compress, count
 from typing import Any
 
 from llvmlite import ir
 
 from aerobat.engines.llvm.arithmetic import INTEGER, LOGICAL, NUMBER, exponential, filled, shaped
+from aerobat.engines.llvm.layout import ARRAYS, COUNTS, Layout
 from aerobat.engines.traced_loop import TracedLoop
 from aerobat.engines.tracing import Operation
-
-ARRAYS = (
-    "shared parameters",
-    "parameters",
-    "shared inputs",
-    "inputs",
-    "held inputs",
-    "carry",
-    "next carry",
-    "outputs",
-)
-COUNTS = ("lanes", "ticks", "held rows", "log_stride", "begin", "end")
-
-
-@dataclass(frozen=True)
-class Layout:
-    """Vehicles side by side, and which parameters and inputs are one number for all.
-
-    Both functions take arrays of float64: shared parameters (s,), parameters (blocks, p, width), shared inputs
-    (ticks, r + h), inputs (blocks, ticks, i, width), held inputs (blocks, held rows, width), carry and next
-    carry (blocks, c, width), outputs (logged ticks, o, lanes). The last h columns of the shared inputs say where in a
-    block of the held inputs the values of each `Held` begin at a tick.
-    `scan` logs the first tick, each `log_stride` ticks after it, and the last; `init` reads the inputs of one
-    tick and writes the next carry. The lanes `begin` to `end` are run, multiples of the width.
-    """
-
-    width: int
-    shared_parameters: tuple[bool, ...]
-    shared_inputs: tuple[bool, ...]
-    held: tuple[int | None, ...]  # of each input, the `Held` that it stands in
-    piecewise_constant: tuple[bool, ...]  # inputs that are shared, and at most ticks the same as before
-
-    @property
-    def own_inputs(self) -> int:
-        """Inputs of each vehicle that are told at every tick."""
-        return sum(not one and held is None for one, held in zip(self.shared_inputs, self.held, strict=True))
-
-    @property
-    def helds(self) -> int:
-        """The number of `Held`s."""
-        return len({*self.held} - {None})
-
-    @property
-    def shared_columns(self) -> int:
-        """Of the shared inputs."""
-        return sum(self.shared_inputs) + self.helds
 
 
 def module(loop: TracedLoop, layout: Layout) -> str:
@@ -271,9 +226,9 @@ class _Codegen:
     def _load_inputs(self, tick: Any, lane: Any) -> None:
         """One tick's inputs, to be loaded where they are needed first."""
         layout = self._layout
-        rows = {None: ("inputs", self._own_inputs_row(tick, lane))}
-        for held in range(layout.helds):
-            rows[held] = ("held inputs", self._held_inputs_row(held, tick, lane))
+        rows: dict[int | None, tuple[str, Any]] = {None: ("inputs", self._own_inputs_row(tick, lane))}
+        for index in range(layout.helds):
+            rows[index] = ("held inputs", self._held_inputs_row(index, tick, lane))
         columns: dict[Any, Iterator[int]] = defaultdict(count)
         for number, shared, held in zip(self._loop.inputs, layout.shared_inputs, layout.held, strict=True):
             column = next(columns["shared" if shared else held])

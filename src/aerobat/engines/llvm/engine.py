@@ -13,7 +13,7 @@ from typing import Any
 import llvmlite.binding as llvm
 import numpy as np
 
-from aerobat.arrays import Array
+from aerobat.arrays import Array, Scratch
 from aerobat.engines.cores import available_cores
 from aerobat.engines.engine import (
     CompiledLoop,
@@ -25,10 +25,10 @@ from aerobat.engines.engine import (
     read_only,
     tick_count,
 )
-from aerobat.engines.llvm.codegen import ARRAYS, COUNTS, Layout, module
+from aerobat.engines.llvm.codegen import module
+from aerobat.engines.llvm.layout import ARRAYS, COUNTS, Layout
 from aerobat.engines.llvm.packing import PackedInputs, Packing
 from aerobat.engines.pytree import Tree, piecewise_constant_leaves, tree_leaves, tree_map, tree_unflatten
-from aerobat.engines.scratch import Scratch
 from aerobat.engines.traced_loop import TracedLoop, trace_loop
 
 REGISTERS = 2  # of vehicles side by side, so that one need not wait for another's result

@@ -9,16 +9,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from aerobat.arrays import Array
+from aerobat.arrays import Array, Scratch
 from aerobat.engines.engine import Held
 from aerobat.engines.pytree import Tree, tree_leaves, tree_map, tree_replace
-from aerobat.engines.scratch import Scratch
-
-_NONE = np.zeros(0)
 
 
 class PackedInputs(NamedTuple):
-    """Inputs of some ticks; see `codegen.Layout`."""
+    """Inputs of some ticks; see `layout.Layout`."""
 
     shared: Array
     own: Array
@@ -68,29 +65,30 @@ class Packing:
 
         leaves = tree_leaves(tree_replace(inputs, Held, noted))
         rows = [np.zeros(ticks, dtype=np.intp) if isinstance(node.row, tuple) else node.row for node in nodes]
-        of_all = [
+        columns = [
             np.asarray(leaf)[rows[number]] if number is not None and np.ndim(leaf) else leaf
             for leaf, number in compress(zip(leaves, self.held, strict=True), self.shared)
         ]
-        places = list(zip(leaves, self.shared, self.held, strict=True))
-        own = [leaf for leaf, shared, number in places if not shared and number is None]
-        groups = [
-            [leaf.reshape(-1, self.vehicles) for leaf, shared, number in places if not shared and number == k]
-            for k in range(len(nodes))
-        ]
-        sizes = [len(group) * len(group[0]) if group else 0 for group in groups]
-        begins = np.cumsum([0, *sizes])
-        held = scratch.empty((self.blocks, int(begins[-1]), self.width))
-        for group, begin, size in zip(groups, begins, sizes, strict=False):
+        groups = [self._of_vehicles(leaves, number) for number in range(len(nodes))]
+        begins = np.cumsum([0, *(len(group) * len(group[0]) if group else 0 for group in groups)]).tolist()
+        held = scratch.empty((self.blocks, begins[-1], self.width))
+        for group, row, begin, end in zip(groups, rows, begins, begins[1:], strict=False):
+            columns.append(begin + len(group) * row)
             if group:
-                part = held[:, begin : begin + size]
-                self._fill(part.reshape(self.blocks, -1, len(group), self.width), group)
-        starts = [begin + len(group) * row for begin, group, row in zip(begins, groups, rows, strict=False)]
-        columns = [np.broadcast_to(np.asarray(x, dtype=np.float64), ticks) for x in (*of_all, *starts)]
+                self._fill(held[:, begin:end].reshape(self.blocks, -1, len(group), self.width), group)
+        own = self._of_vehicles(leaves, None)
         packed = scratch.empty((self.blocks, ticks, len(own), self.width))
-        self._fill(packed, [np.reshape(leaf, (-1, self.vehicles)) for leaf in own])
-        shared = np.stack(columns, axis=1) if columns else _NONE
-        return PackedInputs(shared, packed, held, int(begins[-1]))
+        self._fill(packed, own)
+        shared = np.empty((ticks, len(columns)))
+        for index, column in enumerate(columns):
+            shared[:, index] = column
+        return PackedInputs(shared, packed, held, begins[-1])
+
+    def _of_vehicles(self, leaves: Sequence[Array], number: int | None) -> list[Array]:
+        """The leaves (rows, vehicles) that stand in a certain Held, or in none."""
+        places = zip(leaves, self.shared, self.held, strict=True)
+        chosen = (leaf for leaf, shared, held in places if not shared and held == number)
+        return [np.reshape(leaf, (-1, self.vehicles)) for leaf in chosen]
 
     def pad_lanes(self, leaves: Sequence[Array]) -> Array:
         """Leaves (vehicles,) as (blocks, leaf, width)."""

@@ -117,7 +117,7 @@ class Draws(Sequence[Draw]):
         for k, flight in enumerate(flights):
             own = np.random.SeedSequence(seed, spawn_key=(flight,))
             words[k] = own.generate_state(words[k].size, np.uint64).reshape(words[k].shape)
-            generator = np.random.Generator(np.random.SFC64(_Seed(words[k, 0])))
+            generator = np.random.Generator(np.random.SFC64(_Seed(words[k, 0])))  # type: ignore[arg-type]
             generator.random(out=uniforms[k])
             generator.standard_normal(out=normals[k])  # of rotors last: other vehicles draw the rest alike
         normal = {

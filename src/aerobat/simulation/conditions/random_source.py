@@ -14,10 +14,9 @@ import numpy as np
 from numpy.random.bit_generator import ISeedSequence
 from numpy.typing import NDArray
 
-from aerobat.arrays import Array, frozen
+from aerobat.arrays import Array, Scratch, frozen
 from aerobat.engines.engine import Held
 from aerobat.engines.pytree import Tree
-from aerobat.engines.scratch import Scratch
 
 Words: TypeAlias = NDArray[np.uint16]
 
@@ -101,7 +100,7 @@ class RandomSource:
         self._latest += 1
 
     def _restart(self) -> None:
-        self._generators = [np.random.SFC64(seed) for seed in self._seeds]  # NumPy's fastest
+        self._generators = [np.random.SFC64(seed) for seed in self._seeds]  # type: ignore[arg-type]  # NumPy's fastest
         self._latest = -1
 
 
