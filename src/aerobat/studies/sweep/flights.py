@@ -93,7 +93,7 @@ def _config(task: SweepTask) -> FlightConfig:
 def _flown(task: SweepTask, config: FlightConfig, is_sampled: bool) -> tuple[Columns, ErrorsOverTime]:
     """Columns of the table for the flights of a config, and their errors over time if they are sampled."""
     assert config.flights is not None
-    draws = draw_flights(task.conditions, len(task.vehicle.rotors), task.seed, config.flights)
+    draws = tuple(draw_flights(task.conditions, len(task.vehicle.rotors), task.seed, config.flights))
     stride = STRIDE if is_sampled else None
     scores, errors = score_over_time(task.plan, task.vehicle, None, None, config, stride)
     return _drawn(draws) | _scored(scores), errors
