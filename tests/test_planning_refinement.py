@@ -223,3 +223,9 @@ def test_a_reserve_is_kept_for_the_controller_and_costs_time(quad: Vehicle) -> N
     assert plain.certificate is not None
     assert plain.certificate.margin < 0.01 * quad.max_thrusts.max()
     assert plain.duration < kept.duration < 1.1 * plain.duration
+
+
+def test_a_hop_straight_up_is_planned_without_a_word_of_arithmetic() -> None:
+    """Trials of it point their thrust straight down, against the frame that they are seen in."""
+    hop = replace(load_problem("line"), start=at_rest((0.0, 0.0, 0.0)), goal=at_rest((0.0, 0.0, 1.0)))
+    assert Miqp(order=4).plan(hop, load_vehicle("agile-quad")).certified

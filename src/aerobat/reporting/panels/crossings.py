@@ -40,7 +40,9 @@ class Crossings:
     def rings(self) -> list[float]:
         """Radii [m] of circles about the opening's centre that hold RINGS of the crossings."""
         distance = np.hypot(self.right, self.up)[self.crossed]
-        return [float(np.quantile(distance, part, method="higher")) if len(distance) else 0.0 for part in RINGS]
+        if not len(distance):
+            return [0.0] * len(RINGS)
+        return [float(np.quantile(distance, part, method="higher")) for part in RINGS]
 
     @property
     def note(self) -> str:

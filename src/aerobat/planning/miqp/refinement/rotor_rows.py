@@ -55,10 +55,11 @@ class RotorRows:
         return so3.axes(path.q_world_body[path.samples])
 
     def values(self, derivatives: Array, frames: Array) -> Array:
-        """The constraints at derivatives (m, 6, 3), (m, c)."""
+        """The constraints at derivatives (m, 6, 3), (m, c), infinite where thrust is against its frame."""
         weights, offsets = self._linear
-        values: Array = self._demands(self._moving(derivatives) @ frames, frames) @ weights.T + offsets
-        return values
+        with np.errstate(divide="ignore", invalid="ignore"):
+            values = self._demands(self._moving(derivatives) @ frames, frames) @ weights.T + offsets
+        return np.where(np.isnan(values), np.inf, values)
 
     def slopes(self, derivatives: Array, frames: Array, place: Indices, column: Indices) -> Array:
         """Slopes of some constraints by the derivatives at their places, (q, 6, 3).
