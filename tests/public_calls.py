@@ -114,17 +114,7 @@ def _arguments(name: str, folder: Path) -> dict[str, Any]:
         "comparison_figure": {"comparison": instance(ab.Comparison)},
         "dispersion_names": {},
         "draw": {"flight": flight(), "plan": plan(), "vehicle": agile},
-        "error_causes": {
-            "problem": cruise().problem,
-            "vehicle": agile,
-            "causes": [ab.Cause("late", {"conditions.control_rate": 200.0})],
-            "planner": ab.MinSnap(),
-            "conditions": ab.Dispersion(mass=0.01, control_rate=100.0),
-            "controller": ab.Controller(),
-            "flights": 2,
-            "seed": 1,
-            "begin": ignored,
-        },
+        "error_causes": _causes(),
         "estimate": {
             "log": instance(ab.SensorLog),
             "ekf": ab.Ekf(),
@@ -307,6 +297,21 @@ def _methods(folder: Path) -> Iterator[Door]:
         yield Door(name, method, right)
 
 
+def _causes() -> dict[str, Any]:
+    """A study of two flights a trial."""
+    return {
+        "problem": cruise().problem,
+        "vehicle": "agile-quad",
+        "causes": [ab.Cause("late", {"conditions.control_rate": 200.0})],
+        "planner": ab.MinSnap(),
+        "conditions": ab.Dispersion(mass=0.01, control_rate=100.0),
+        "controller": ab.Controller(),
+        "flights": 2,
+        "seed": 1,
+        "begin": ignored,
+    }
+
+
 @cache
 def _hopeless() -> ab.Problem:
     """A problem that every planner refuses at once."""
@@ -345,6 +350,7 @@ def instance(cls: type) -> Any:
         ab.Dispersion: lambda: ab.load_dispersion("lab"),
         ab.Ellipsoid: lambda: ab.Ellipsoid((0.2, 0.2, 0.05), (0.0, 0.0, 0.01)),
         ab.EndState: lambda: ab.at_rest((0.0, 0.0, 1.0)),
+        ab.ErrorCauses: lambda: ab.error_causes(**_causes()),
         ab.Estimates: lambda: ab.estimate(_log()),
         ab.FlatState: lambda: plan().trajectory.flat(0.1),
         ab.Flight: flight,
