@@ -87,6 +87,7 @@ from .reporting.tracking import tracking_figure
 from .simulation import Flight, FlightConfig, Outcome, fly, load_flight, prepare
 from .states import BodyState, FlatState, Setpoint, Wrench
 from .studies.compare import Comparison, compare
+from .studies.passing import Passing, plan_to_pass
 from .studies.sweep import Share, Sweep, sweep
 from .trajectory import ContinuityRule, Trajectory, load_trajectory, minimum_effort, save_trajectory
 from .vehicle import Ellipsoid, Rotor, Vehicle, implausibilities, load_vehicle, vehicle_names, write_vehicle
@@ -137,6 +138,7 @@ __all__ = [
     "Outage",
     "Outcome",
     "Passage",
+    "Passing",
     "Plan",
     "Planner",
     "Problem",
@@ -182,6 +184,7 @@ __all__ = [
     "minimum_effort",
     "option",
     "plan",
+    "plan_to_pass",
     "planner",
     "prepare",
     "problem_names",
