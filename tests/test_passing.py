@@ -11,7 +11,7 @@ import aerobat as ab
 from aerobat.studies.passing import Passing, Trial
 
 WEAK = ab.Dispersion(name="weak", mass=0.05, rotor=0.04, start_position=0.02)
-HARSH = ab.Dispersion(name="harsh", start_attitude=radians(40.0), mass=0.02)
+HARSH = ab.Dispersion(name="harsh", start_attitude=radians(40.0), mass=1e-4)
 FEW = {"flights": 60, "fresh": 80, "seed": 3}
 
 
