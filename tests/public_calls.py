@@ -64,6 +64,15 @@ def ignored_counts(done: int, well: int) -> None:
     pass
 
 
+PASSING: dict[str, Any] = {
+    "problem": "line",
+    "planner": ab.Miqp(order=4),
+    "vehicle": "agile-quad",
+    "probability": 0.1,
+    "conditions": ab.Dispersion(mass=0.01),
+    "seed": 1,
+    "flights": 2,
+}
 RESULTS = (
     "Assessment",
     "ErrorCauses",
@@ -71,6 +80,7 @@ RESULTS = (
     "Gradient",
     "Opening",
     "Passage",
+    "Passing",
     "Score",
     "Scores",
     "Sensitivity",
@@ -146,6 +156,7 @@ def _arguments(name: str, folder: Path) -> dict[str, Any]:
         },
         "option": {"default": 1, "help": "x", "off": "no-x", "command_default": 2},
         "plan": {"problem": plan().problem, "planner": NoPlan(), "vehicle": agile, "progress": ignored},
+        "plan_to_pass": {**PASSING, "fresh": 2, "progress": ignored, "tried": ignored},
         "planner": {"name": "x"},
         "prepare": {"plan": plan(), "vehicle": agile, **here, "config": ab.FlightConfig()},
         "problem_names": {},
@@ -357,6 +368,7 @@ def instance(cls: type) -> Any:
         ab.Gate: lambda: ab.tilted_gate((0.0, 0.0, 1.0)),
         ab.Outage: lambda: ab.Outage(0.1, 0.5),
         ab.Opening: lambda: ab.smallest_opening(**_wide_enough()),
+        ab.Passing: lambda: ab.plan_to_pass(**PASSING),
         ab.Plan: plan,
         ab.Problem: lambda: ab.load_problem("half-flip"),
         ab.Rotor: lambda: ab.load_vehicle("agile-quad").rotors[0],

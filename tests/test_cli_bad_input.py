@@ -179,6 +179,21 @@ ARGUMENT_FAULTS = {
     "a vehicle to check with that is none": (["check", "taken", "--vehicle", "agile-qad"], "agile-quad"),
     "a limit below zero": (["check", "taken", "--max-speed", "-1"], "max-speed"),
     "rows at no rate": (["check", "taken", "--rate", "0"], "rate"),
+    "conditions of a plan that need not pass": (["plan", "line", "--conditions", "lab"], "--pass"),
+    "to pass under nothing": (["plan", "line", "--pass", "0.9"], "--conditions"),
+    "to pass for certain": (["fly", "line", "--pass", "1", "--conditions", "lab"], "--pass"),
+    "to pass as in the paper": (
+        ["plan", "line", "--paper", "--pass", "0.9", "--conditions", "lab"],
+        "--paper",
+    ),
+    "to pass by another law": (
+        ["fly", "line", "--pass", "0.9", "--conditions", "lab", "--controller", "paper"],
+        "--controller",
+    ),
+    "to pass without a reserve": (
+        ["plan", "line", "--pass", "0.9", "--conditions", "lab", "--planner", "min-snap"],
+        "miqp",
+    ),
     "a comparison of nothing": (["compare", "flip-rol"], "flip-roll"),
 }
 

@@ -88,6 +88,7 @@ from .simulation import Flight, FlightConfig, Outcome, fly, load_flight, prepare
 from .states import BodyState, FlatState, Setpoint, Wrench
 from .studies.compare import Comparison, compare
 from .studies.error_causes import Cause, ErrorCauses, error_causes
+from .studies.passing import Passing, plan_to_pass
 from .studies.sweep import Share, Sweep, sweep
 from .trajectory import ContinuityRule, Trajectory, load_trajectory, minimum_effort, save_trajectory
 from .vehicle import Ellipsoid, Rotor, Vehicle, implausibilities, load_vehicle, vehicle_names, write_vehicle
@@ -140,6 +141,7 @@ __all__ = [
     "Outage",
     "Outcome",
     "Passage",
+    "Passing",
     "Plan",
     "Planner",
     "Problem",
@@ -186,6 +188,7 @@ __all__ = [
     "minimum_effort",
     "option",
     "plan",
+    "plan_to_pass",
     "planner",
     "prepare",
     "problem_names",

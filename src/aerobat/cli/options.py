@@ -144,19 +144,31 @@ class PlanningOptions(TaskOptions):
 
 
 @dataclass(frozen=True, kw_only=True)
-class FlyingOptions:
-    """Options of the flight."""
+class ConditionsOptions:
+    """Options of the conditions, and of planning for them."""
+
+    probability: Annotated[
+        float | None,
+        Parameter(name="--pass", group=planning, validator=validators.Number(gt=0, lt=1)),
+    ] = None
+    """Plan until flights under --conditions pass with this probability, with a reserve of thrust and narrower
+    gates as their spread asks for, and prove it on fresh flights."""
 
     conditions: Annotated[str | None, Parameter(group=flying)] = None
     """What varies, disturbs and is measured how: none, lab, field, or a TOML file. Default: flown as planned,
     from a state that is known."""
 
+    seed: Annotated[int, Parameter(group=flying, validator=validators.Number(gte=0))] = 0
+    """The seed of the conditions: the same seed, the same flight."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class FlyingOptions(ConditionsOptions):
+    """Options of the flight."""
+
     controller: Annotated[str, Parameter(group=flying)] = "full"
     """The control law: full, or paper, the paper's own without moment feed-forward, motor-lag compensation
     and tilt before yaw."""
-
-    seed: Annotated[int, Parameter(group=flying, validator=validators.Number(gte=0))] = 0
-    """The seed of the conditions: the same seed, the same flight."""
 
 
 @dataclass(frozen=True, kw_only=True)

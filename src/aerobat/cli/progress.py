@@ -14,6 +14,7 @@ from typing import TypeVar
 from aerobat.cli.terminal import say
 from aerobat.errors import SpecError
 from aerobat.planning import Attempt
+from aerobat.studies.passing import Trial
 
 PERIOD = 5.0  # [s] between lines in a pipe, unless the environment says otherwise
 VARIABLE = "AEROBAT_PROGRESS"
@@ -64,6 +65,26 @@ class PlanningProgress(Progress):
         best = "no plan so far" if self._best == inf else f"{self._best:.3f} s so far"
         last = f"; attempt {self._tried}: {self._last}" if self._tried else ""
         return f"planning with {self._planner} for {self._clock() - self._began:.0f} s: {best}{last}"
+
+
+class PassingProgress(PlanningProgress):
+    """What planning until flights pass has come to by now."""
+
+    def begin(self, planner: str) -> None:
+        """Another planner's turn, no round flown."""
+        super().begin(planner)
+        self._rounds = 0
+        self._trial = ""
+
+    def tried(self, trial: Trial) -> None:
+        """Take note of a round that ended; the next one is planned anew."""
+        self._best = inf
+        self._rounds += 1
+        self._trial = str(trial)
+
+    def __str__(self) -> str:
+        """What planning is at, and what the last round came to."""
+        return super().__str__() + (f"; round {self._rounds}, {self._trial}" if self._rounds else "")
 
 
 class DrawingProgress(Progress):

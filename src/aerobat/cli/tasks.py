@@ -7,10 +7,18 @@ from dataclasses import replace
 from math import isfinite, radians
 from typing import Any, Literal
 
-from aerobat.cli.options import PlanningOptions, TaskOptions, is_given, offered_options, option_name
-from aerobat.cli.progress import planning_progress
+from aerobat.cli.options import (
+    ConditionsOptions,
+    PlanningOptions,
+    TaskOptions,
+    is_given,
+    offered_options,
+    option_name,
+)
+from aerobat.cli.progress import PassingProgress, planning_progress, showing
 from aerobat.cli.runs.record import FlightSettings, RunRecord, default_vehicle
 from aerobat.cli.runs.saved_plans import named_vehicle, plan_source, read_saved_plan
+from aerobat.environment import load_dispersion
 from aerobat.errors import SpecError
 from aerobat.interchange import column_groups
 from aerobat.optimization.deadline import within_time
@@ -24,6 +32,7 @@ from aerobat.planning import (
     with_second_opinion,
 )
 from aerobat.problem import Problem, load_problem
+from aerobat.studies.passing import plan_to_pass
 from aerobat.vehicle import Vehicle
 
 
@@ -54,6 +63,8 @@ def planned(
     """
     source, columns = plan_source(name), column_groups(options.columns)
     if source is not None:
+        if flight.probability is not None:
+            raise SpecError(f"--pass plans anew, and '{name}' is a plan; give a problem, or leave --pass out")
         plan = read_saved_plan(source, options)
         assert plan.vehicle is not None, "a plan that is read is certified for a vehicle"
         record = RunRecord(
@@ -83,10 +94,25 @@ def planned(
     return (make or plan_of)(record), record
 
 
+def flight_settings(options: ConditionsOptions, controller: str = "full") -> FlightSettings:
+    """How a plan is flown.
+
+    Args:
+        options: As they were given.
+        controller: The name of what flies it.
+    """
+    conditions = None if options.conditions is None else load_dispersion(options.conditions)
+    if options.probability is not None and conditions is None:
+        raise SpecError("--pass needs --conditions, under which flights shall pass; give lab, say")
+    return FlightSettings(controller, conditions, options.seed, probability=options.probability)
+
+
 def plan_of(record: RunRecord) -> Plan:
     """The plan of a run, made anew."""
     assert record.planner is not None, "a plan that came from a file is not made"
     limit = getattr(record.planner, "time_limit", None)
+    if record.flight.probability is not None:
+        return _plan_that_passes(record)
     with planning_progress(record.planner_name) as progress, within_time(limit):
         if not record.paper:
             found = plan(record.problem, record.planner, record.vehicle, progress.record)
@@ -94,6 +120,29 @@ def plan_of(record: RunRecord) -> Plan:
         # the paper plans without a vehicle; whether this one can fly it is told all the same
         found = plan(record.problem, record.planner, progress=progress.record)
         return with_evidence(found, record.vehicle)
+
+
+def _plan_that_passes(record: RunRecord) -> Plan:
+    """The plan of a run that is tightened until flights pass."""
+    flight = record.flight
+    assert record.planner is not None, "a plan that came from a file is not made"
+    assert flight.probability is not None, "a probability is asked"
+    assert flight.conditions is not None, "with conditions"
+    if record.paper:
+        raise SpecError("--pass keeps a reserve, the paper none; leave out --pass or --paper")
+    if flight.controller != "full":
+        raise SpecError(f"--pass plans for --controller full, not {flight.controller}; leave one of them out")
+    with showing(PassingProgress(record.planner_name)) as progress:
+        return plan_to_pass(
+            record.problem,
+            record.planner,
+            record.vehicle,
+            probability=flight.probability,
+            conditions=flight.conditions,
+            seed=flight.seed,
+            progress=progress.record,
+            tried=progress.tried,
+        ).plan
 
 
 def make_planner(options: PlanningOptions) -> Planner:

@@ -25,6 +25,7 @@ from .result import FLYABLE_ERROR, FlownPassage, Flyability, OwnFlight, PlacedSt
 from .rotor_margin import RotorMargin
 from .search import BisectionSearch, GridSearch
 from .time_optimal.time_optimal import TimeOptimal
+from .tube import Tube
 
 __all__ = [
     "FLYABLE_ERROR",
@@ -50,6 +51,7 @@ __all__ = [
     "Solution",
     "TimeOptimal",
     "TimeScaling",
+    "Tube",
     "as_planner",
     "certified_solve",
     "least_duration",

@@ -3,7 +3,7 @@
 A .plan file is a NumPy .npz archive without pickles. Its arrays `durations` (S,), `coefficients`
 (S, degree + 1, 3) and `heading` are the trajectory's, bit for bit; `document` holds, as UTF-8 JSON, the rest:
 the problem and the vehicle as the tables of their files, how the plan was made, its stages, attempts,
-certificate, flyability and assessment, and the version of Aerobat that wrote it.
+certificate, flyability, assessment and tube, and the version of Aerobat that wrote it.
 """
 
 from __future__ import annotations
@@ -21,6 +21,7 @@ from aerobat.errors import SpecError
 from aerobat.planning.assessment.assessment import Assessment
 from aerobat.planning.recorder import Attempt
 from aerobat.planning.result import Flyability, PlacedStage, Plan
+from aerobat.planning.tube import Tube
 from aerobat.problem.problem import Problem
 from aerobat.storage import format_of, read_arrays, whole_file
 from aerobat.trajectory import Trajectory
@@ -48,6 +49,7 @@ class _Evidence:
     assessment: Assessment | None = None
     rescue: str = ""
     starts: tuple[float, ...] = ()
+    tube: Tube | None = None
 
 
 def save_plan(plan: Plan, path: PathName) -> None:

@@ -9,6 +9,7 @@ from aerobat.declaration import PathName, by_value, in_notebooks, short, validat
 from aerobat.planning.assessment.assessment import Assessment
 from aerobat.planning.recorder import Attempt
 from aerobat.planning.rotor_margin import RotorMargin
+from aerobat.planning.tube import Tube
 from aerobat.problem.problem import Problem
 from aerobat.simulation.outcome import length
 from aerobat.trajectory import Trajectory
@@ -135,6 +136,7 @@ class Plan:
     assessment: Assessment | None = None  # beside what is possible and usual, for the vehicle
     rescue: str = ""  # what found it, where what was asked for found nothing
     starts: tuple[float, ...] = ()  # [s] that first, coarse solves from several starts came to, rising
+    tube: Tube | None = None  # of its flights, where it was tightened until they pass
 
     @property
     def duration(self) -> float:
@@ -194,9 +196,10 @@ class Plan:
         flown = "" if self.flyability is None else f"; {self.flyability}"
         assessed = "" if self.assessment is None else f"; {self.assessment}"
         rescue = f"; {self.rescue}" if self.rescue else ""
+        tube = "" if self.tube is None else f"; {self.tube}"
         dt = "" if self.dt is None else f" of {self.dt:.4f} s"
         backend = f" ({self.backend})" if self.backend else ""
         return (
             f"{self.problem.name}: {self.duration:.3f} s in {self.intervals} intervals{dt}, {self.status} by "
-            f"{self.planner}{backend}; {stages}{margin}{proof}{flown}{assessed}{rescue}"
+            f"{self.planner}{backend}; {stages}{margin}{proof}{flown}{assessed}{rescue}{tube}"
         )

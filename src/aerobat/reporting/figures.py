@@ -128,8 +128,8 @@ def _flight_page(plan: Plan, vehicle: Vehicle, flight: Flight, score: Score | No
     reference = reference_poses(plan_reference(plan, vehicle))
     figure, rows = _pictures(plan, vehicle, reference, actual_poses(flight), 2, facts)
     errors, thrusts = ([panel(figure, x, y, WIDTH, ROW) for y in rows] for x in COLUMNS)
-    timelines.draw_position_error(errors[0], flight)
-    timelines.draw_attitude_error(errors[1], flight)
+    timelines.draw_position_error(errors[0], flight, plan.tube)
+    timelines.draw_attitude_error(errors[1], flight, plan.tube)
     timelines.draw_specific_thrust(thrusts[0], plan, vehicle)
     timelines.draw_rotor_thrusts(thrusts[1], flight.times, flight.thrusts, vehicle)
     timelines.finish_column(errors, "Tracking error", plan.stages, plan.duration)
@@ -140,6 +140,7 @@ def _flight_page(plan: Plan, vehicle: Vehicle, flight: Flight, score: Score | No
 def _plan_page(plan: Plan, vehicle: Vehicle) -> Figure:
     reference = plan_reference(plan, vehicle)
     facts = [plan_caption(plan), *([] if plan.margin is None else [f"rotors {plan.margin}"])]
+    facts += [] if plan.tube is None else [str(plan.tube)]
     figure, rows = _pictures(plan, vehicle, reference_poses(reference), [], 1, facts)
     specific, rotors = (panel(figure, x, rows[0], WIDTH, ROW) for x in COLUMNS)
     timelines.draw_specific_thrust(specific, plan, vehicle)

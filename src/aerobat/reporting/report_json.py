@@ -8,7 +8,7 @@ from math import degrees, inf
 from typing import Any
 
 from aerobat.evaluation.score import Score
-from aerobat.planning import Assessment, Flyability, Plan
+from aerobat.planning import Assessment, Flyability, Plan, Tube
 from aerobat.vehicle import implausibilities
 
 
@@ -86,6 +86,27 @@ def _assessment(found: Assessment) -> dict[str, Any]:
     }
 
 
+def _tube(tube: Tube, duration: float) -> dict[str, Any]:
+    """A tube, its series over time at `times_s`, and its price beside a plan of that duration [s]."""
+    return {
+        "conditions": tube.conditions,
+        "seed": tube.seed,
+        "probability": tube.probability,
+        "passed": tube.passed,
+        "flights": tube.flights,
+        "lower_bound": tube.lower_bound,
+        "reserve": tube.reserve,
+        "plain_duration_s": tube.plain_duration,
+        "price_s": tube.price(duration),
+        "level": tube.level,
+        "times_s": list(tube.times),
+        "position_error_m": list(tube.position_error),
+        "attitude_error_deg": [degrees(angle) for angle in tube.attitude_error],
+        "rotor_margin": list(tube.rotor_margin),
+        "sentence": str(tube),
+    }
+
+
 def _in_degrees(angle: float | None) -> float | None:
     return None if angle is None else degrees(angle)
 
@@ -130,4 +151,5 @@ def _plan(plan: Plan) -> dict[str, Any]:
         "certificate": plan.certificate and plan.certificate.record(),
         "flyability": plan.flyability and _flyability(plan.flyability),
         "assessment": plan.assessment and _assessment(plan.assessment),
+        "tube": plan.tube and _tube(plan.tube, plan.duration),
     }

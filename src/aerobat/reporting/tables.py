@@ -14,7 +14,7 @@ from rich.text import Text
 from aerobat.certification import Certificate, Finding, Side, Verdict
 from aerobat.evaluation import Passage, Score
 from aerobat.evaluation.score import ObserverScore
-from aerobat.planning import Assessment, Plan
+from aerobat.planning import Assessment, Plan, Tube
 from aerobat.planning.time_limit import best_by_limit
 from aerobat.problem import Problem
 from aerobat.simulation.outcome import digits, length
@@ -152,8 +152,31 @@ def plan_facts(plan: Plan) -> Iterable[Fact]:
         yield "proof", ("" if plan.certificate.certified else "not certified: ") + plan.certificate.why
     if plan.flyability is not None:
         yield "flyability", str(plan.flyability)
+    if plan.tube is not None:
+        yield from _tube_facts(plan.tube, plan.duration)
     if plan.assessment is not None:
         yield from _assessment_facts(plan.assessment)
+
+
+def _tube_facts(tube: Tube, duration: float) -> Iterable[Fact]:
+    """The proof that flights pass, what it costs a plan of that duration [s], and their tube."""
+    yield (
+        "passes",
+        f"{tube.passed} of {tube.flights} fresh flights under {tube.conditions}: "
+        f"{100 * tube.lower_bound:.2f} % or more with 95 % confidence, {100 * tube.probability:g} % asked",
+    )
+    price = tube.price(duration)
+    yield (
+        "price",
+        f"{price:.3f} s or {100 * price / tube.plain_duration:.1f} %, beside {tube.plain_duration:.3f} s; "
+        f"reserve {tube.reserve:g}",
+    )
+    yield (
+        "tube",
+        f"{100 * tube.level:g} % within {length(tube.max_position_error)} and "
+        f"{degrees(tube.max_attitude_error):.1f}°, commands {100 * tube.min_rotor_margin:.1f} % of the "
+        "rotors' range from their limits",
+    )
 
 
 def _assessment_facts(found: Assessment) -> Iterable[Fact]:

@@ -10,9 +10,8 @@ from aerobat.cli.entry import ExitCode
 from aerobat.cli.options import FlyingOptions, PlanningOptions
 from aerobat.cli.runs.folder import Flown, finish
 from aerobat.cli.runs.record import FlightSettings
-from aerobat.cli.tasks import planned
+from aerobat.cli.tasks import flight_settings, planned
 from aerobat.control import Controller, named_controller
-from aerobat.environment import load_dispersion
 from aerobat.evaluation import score
 from aerobat.planning import Plan, nominal_flight
 from aerobat.simulation.fly import fly as simulate
@@ -37,8 +36,7 @@ def fly(
         plan is flown as it is.
     """
     named_controller(flying.controller)  # refused before anything is planned
-    conditions = None if flying.conditions is None else load_dispersion(flying.conditions)
-    settings = FlightSettings(flying.controller, conditions, flying.seed)
+    settings = flight_settings(flying, flying.controller)
     plan, record = planned(problem, options, "fly", settings)
     return finish(plan, record, options, flown(plan, settings))
 

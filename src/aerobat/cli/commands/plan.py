@@ -7,13 +7,17 @@ from typing import Annotated
 from cyclopts import Parameter
 
 from aerobat.cli.entry import ExitCode
-from aerobat.cli.options import PlanningOptions
+from aerobat.cli.options import ConditionsOptions, PlanningOptions
 from aerobat.cli.runs.folder import finish
-from aerobat.cli.tasks import planned
+from aerobat.cli.runs.record import FlightSettings
+from aerobat.cli.tasks import flight_settings, planned
+from aerobat.errors import SpecError
 
 
 def plan(
-    problem: str, options: Annotated[PlanningOptions, Parameter(name="*")] = PlanningOptions()
+    problem: str,
+    options: Annotated[PlanningOptions, Parameter(name="*")] = PlanningOptions(),
+    passing: Annotated[ConditionsOptions, Parameter(name="*")] = ConditionsOptions(),
 ) -> ExitCode:
     """Plan a maneuver and stop there.
 
@@ -25,5 +29,10 @@ def plan(
     problem
         A name that `aerobat problems` lists, or a problem's TOML file.
     """
-    found, record = planned(problem, options, "plan")
+    settings = FlightSettings()
+    if passing.probability is not None:
+        settings = flight_settings(passing)
+    elif passing.conditions is not None or passing.seed:
+        raise SpecError("--conditions and --seed are for --pass, or for `aerobat fly`; leave them out")
+    found, record = planned(problem, options, "plan", settings)
     return finish(found, record, options)

@@ -17,6 +17,7 @@ from aerobat.declaration import Count, NonNegative, Seed, declared, to_table
 from aerobat.documents import read_document, write_document
 from aerobat.environment import Dispersion
 from aerobat.errors import SpecError
+from aerobat.evaluation.opening import Probability
 from aerobat.interchange.columns import ALL
 from aerobat.planning import Planner
 from aerobat.planning.planners import PLANNERS
@@ -40,6 +41,7 @@ class FlightSettings:
     seed: Seed = 0  # of the conditions
     runs: Count = 1  # flights of a sweep
     table: Literal["csv", "parquet"] = "csv"  # the form of a sweep's table
+    probability: Probability | None = None  # of passing under the conditions, that it was planned for
 
 
 @declared
@@ -81,6 +83,8 @@ class RunRecord:
             parts.append("paper")
         if self.command == "sweep":
             parts.append("sweep")
+        if self.flight.probability is not None:
+            parts.append(f"pass-{self.flight.probability:g}")
         if self.flight.conditions is not None:
             parts.append(self.flight.conditions.name)
         return Path("out") / "-".join(re.sub(r"[^\w.-]+", "-", part) for part in parts)

@@ -9,7 +9,7 @@ import numpy as np
 
 from aerobat.arrays import Array
 from aerobat.flatness import force_balance
-from aerobat.planning import PlacedStage, Plan
+from aerobat.planning import PlacedStage, Plan, Tube
 from aerobat.reporting.page import HEADING, heading, legend, size_of
 from aerobat.reporting.panels.keyframes import maneuver_plane, plan_keyframes
 from aerobat.reporting.panels.labels import spread_out
@@ -25,19 +25,35 @@ LENGTHS = (("m", 1.0), ("cm", 1e-2))
 NAME_WIDTH, LETTER = 0.36, 0.065  # [in] that a stage's name takes at least, and by the letter
 
 
-def draw_position_error(axes: Axes, flight: Flight) -> None:
-    """Draw the distance between actual and reference position, in the unit that suits its largest value."""
+def draw_position_error(axes: Axes, flight: Flight, tube: Tube | None = None) -> None:
+    """Draw the distance between actual and reference position, in the unit that suits its largest value.
+
+    With a plan's tube, what is within it is shaded.
+    """
     error = flight.position_error
-    unit, size = next((u for u in LENGTHS if error.max() >= u[1]), LENGTHS[-1])
+    bound = np.zeros(1) if tube is None else np.array(tube.position_error)
+    largest = max(error.max(), bound.max())
+    unit, size = next((u for u in LENGTHS if largest >= u[1]), LENGTHS[-1])
     draw_series(axes, flight.times, error / size, INK)
-    axes.set(ylabel=f"position error [{unit}]", ylim=(0.0, _top(error / size, 0.01)))
+    if tube is not None:
+        _shade_tube(axes, tube, bound / size)
+    axes.set(ylabel=f"position error [{unit}]", ylim=(0.0, _top(largest / size, 0.01)))
 
 
-def draw_attitude_error(axes: Axes, flight: Flight) -> None:
-    """Draw the angle between actual and reference attitude."""
+def draw_attitude_error(axes: Axes, flight: Flight, tube: Tube | None = None) -> None:
+    """Draw the angle between actual and reference attitude; with a plan's tube, that is shaded."""
     error = np.rad2deg(flight.attitude_error)
+    bound = np.zeros(1) if tube is None else np.rad2deg(tube.attitude_error)
     draw_series(axes, flight.times, error, INK)
-    axes.set(ylabel="attitude error [°]", ylim=(0.0, _top(error, 0.01)))
+    if tube is not None:
+        _shade_tube(axes, tube, bound)
+    axes.set(ylabel="attitude error [°]", ylim=(0.0, _top(max(error.max(), bound.max()), 0.01)))
+
+
+def _shade_tube(axes: Axes, tube: Tube, bound: Array) -> None:
+    """Shade what a tube's fraction of the flights keeps within, (T,)."""
+    label = f"{100 * tube.level:g} % of flights under {tube.conditions}"
+    axes.fill_between(tube.times, 0.0, bound, color=SKY, alpha=0.35, linewidth=0.0, label=label)
 
 
 def draw_rotor_thrusts(axes: Axes, times: Array, thrusts: Array, vehicle: Vehicle) -> None:
@@ -151,6 +167,6 @@ def finish_column(column: Sequence[Axes], title: str, stages: Sequence[PlacedSta
     heading(column[0], title)
 
 
-def _top(values: Array, floor: float) -> float:
+def _top(largest: float, floor: float) -> float:
     """The upper end of an axis that starts at zero; what is smaller than `floor` is noise."""
-    return max(1.12 * float(values.max()), floor)
+    return max(1.12 * float(largest), floor)

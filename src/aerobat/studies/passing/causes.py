@@ -1,0 +1,57 @@
+"""Which cause stands in the way of passing: each is switched off alone, for the same flights."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from types import MappingProxyType
+from typing import Any
+
+from aerobat.environment import Dispersion
+from aerobat.studies.sweep import Share
+
+CAUSES: Mapping[str, Mapping[str, Any]] = MappingProxyType(  # each with what is there without it
+    {
+        "the spread of mass": {"mass": 0.0},
+        "the spread of inertia": {"inertia": 0.0},
+        "the spread of the rotors' thrust": {"rotor": 0.0},
+        "the spread of the rotors' lag": {"lag": 0.0},
+        "unmodelled drag": {"drag": 0.0},
+        "the start": {"start_position": 0.0, "start_velocity": 0.0, "start_attitude": 0.0},
+        "the control rate": {"control_rate": None},
+        "the computation delay": {"computation_delay": 0.0},
+        "what the sensors say": {"imu": None, "motion_capture": None},
+        "gusts": {"gusts": None},
+        "the battery": {"battery": None},
+    }
+)
+
+
+@dataclass(frozen=True)
+class Freed:
+    """The share of flights that pass without one cause."""
+
+    cause: str
+    share: Share
+
+    def sentence(self, probability: float) -> str:
+        """What stands in the way, in words."""
+        without = f"without it {self.share} pass"
+        if self.share.fraction >= probability:
+            return f"{self.cause} stands in the way: {without}"
+        return f"no single cause stands in the way, {self.cause} the most: {without}"
+
+
+def standing_in_the_way(conditions: Dispersion, share: Callable[[Dispersion], Share]) -> Freed | None:
+    """The cause without which most flights pass; None where nothing varies.
+
+    Args:
+        conditions: What varies.
+        share: Flies the same flights under other conditions.
+    """
+    freed = []
+    for cause, off in CAUSES.items():
+        without = replace(conditions, **off)
+        if without != conditions:
+            freed.append(Freed(cause, share(without)))
+    return max(freed, key=lambda each: each.share.count, default=None)

@@ -1,0 +1,261 @@
+"""plan_to_pass(): plan, fly, tighten, until flights pass with the probability asked."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from math import ceil, log
+from typing import Any
+
+from aerobat.declaration import Count, Seed, validated
+from aerobat.environment import Dispersion, as_dispersion
+from aerobat.errors import Infeasible, SpecError
+from aerobat.evaluation import Scores, score_flights
+from aerobat.evaluation.opening import Probability
+from aerobat.planning import Attempt, Plan, Planner, as_planner, plan, with_evidence
+from aerobat.planning.tube import Tube
+from aerobat.problem import Problem, as_problem
+from aerobat.studies.passing.causes import standing_in_the_way
+from aerobat.studies.passing.result import Passing, Trial
+from aerobat.studies.passing.spread import LEVEL, narrowed, spread_of
+from aerobat.studies.sweep import Share
+from aerobat.studies.sweep.share import CONFIDENCE, percent
+from aerobat.vehicle import Vehicle, as_vehicle
+
+STEP = 0.02  # of every limit's range, between reserves that are tried
+STRIDE = 4  # steps from one round to the next until flights pass
+# steps in the first round: flights that are lost ask for all the range, and less is enough to keep them
+MAX_FIRST = 5
+MAX_STEPS = 20  # a reserve of two fifths at either end leaves a fifth of the range to fly with
+# fresh flights that are expected to fail at the probability asked: half as many failures are then a proof
+PROVING_FAILURES = 20
+# proofs are attempted on flights of their own: each errs with 2.5 % at most, both together with 5 %
+PROOFS = 2
+
+
+@validated
+def plan_to_pass(
+    problem: Problem | str,
+    planner: Planner | str = "miqp",
+    vehicle: Vehicle | str = "agile-quad",
+    *,
+    probability: Probability = 0.99,
+    conditions: Dispersion | str = "lab",
+    seed: Seed = 0,
+    flights: Count = 1000,
+    fresh: Count | None = None,
+    progress: Callable[[Attempt], None] | None = None,
+    tried: Callable[[Trial], None] | None = None,
+) -> Passing:
+    """Plan a problem so that flights under conditions pass with a probability, proven on fresh flights.
+
+    The plain plan is flown many times. Where too few flights pass, their spread says which reserve of the
+    rotors' limits to begin with, and by how much to narrow the gates for planning; the smallest reserve of a
+    ladder is sought with which enough of the same flights pass. The plan found is then flown on flights that
+    nothing was learned from: it is returned if the lower end of Clopper and Pearson's interval reaches the
+    probability. A flight passes where nothing goes wrong, as its `Outcome` says.
+
+    Args:
+        problem: What is planned, or its name.
+        planner: How, one with a `reserve`, or its registered name.
+        vehicle: What flies it, or its name.
+        probability: With which a flight shall pass [-].
+        conditions: What varies from flight to flight, or the name of a preset or a file.
+        seed: Of the flights.
+        flights: How many tell how to tighten, numbered from 0.
+        fresh: How many prove it, numbered behind those; by default 20 over the probability of failing.
+        progress: Called with every attempt at a plan as it ends.
+        tried: Called with every round as it ends.
+
+    Raises:
+        Infeasible: there is no plan, or none that passes so often; the message names the cause in the way.
+        SpecError: the planner keeps no reserve, or so few flights cannot prove such a probability.
+    """
+    method, conditions = as_planner(planner), as_dispersion(conditions)
+    if not hasattr(method, "reserve"):
+        raise SpecError(
+            "planner keeps no reserve, by which plans are tightened; take miqp, free-knots or time-optimal"
+        )
+    proving = fresh or max(round(PROVING_FAILURES / (1.0 - probability)), _least_flights(probability))
+    _require_enough("flights", flights, probability)
+    _require_enough("fresh", proving, probability)
+    task = _Task(as_problem(problem), method, as_vehicle(vehicle), conditions, seed, probability, progress)
+    return _Tightening(task, range(flights), proving, tried or (lambda trial: None)).passing()
+
+
+def _least_flights(probability: float) -> int:
+    """The number of flights that prove a probability if all of them pass."""
+    return ceil(log(0.5 * (1.0 - CONFIDENCE)) / log(probability))
+
+
+def _require_enough(name: str, flights: int, probability: float) -> None:
+    """Refuse a number of flights that proves nothing even where all of them pass."""
+    least = _least_flights(probability)
+    if flights < least:
+        raise SpecError(
+            f"{name}: {flights} flights cannot prove {100 * probability:g} %; take {least} or more, or a "
+            "smaller probability"
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class _Task:
+    """What is planned, flown and asked."""
+
+    problem: Problem
+    planner: Any  # a planner with a reserve
+    vehicle: Vehicle
+    conditions: Dispersion
+    seed: int
+    probability: float
+    progress: Callable[[Attempt], None] | None
+
+    def plan(self, reserve: float, problem: Problem) -> Plan:
+        """The plan with a reserve, and through gates as `problem` has them, judged by the task's own."""
+        found = plan(problem, replace(self.planner, reserve=reserve), self.vehicle, self.progress)
+        if problem == self.problem:
+            return found
+        return with_evidence(replace(found, problem=self.problem), found.vehicle)
+
+    def scores(self, found: Plan, flights: range, conditions: Dispersion | None = None) -> Scores:
+        """Scores of flights of a plan, by default under the task's conditions."""
+        return score_flights(found, conditions=conditions or self.conditions, seed=self.seed, flights=flights)
+
+    def share(self, found: Plan, flights: range, conditions: Dispersion | None = None) -> Share:
+        """The share of flights of a plan that pass."""
+        return _passed(self.scores(found, flights, conditions))
+
+    def is_enough(self, share: Share) -> bool:
+        """True where so many flights prove the probability."""
+        return share.interval[0] >= self.probability
+
+
+@dataclass
+class _Tightening:
+    """The search for the smallest reserve that is enough."""
+
+    task: _Task
+    training: range
+    proving: int
+    tried: Callable[[Trial], None]
+    trials: list[Trial] = field(default_factory=list)
+
+    def passing(self) -> Passing:
+        """The plan that passes, proven. Raises Infeasible where there is none."""
+        plain, scores = self._plain()
+        self._narrowed = self.task.problem
+        steps, trial = 0, plain
+        if not self.task.is_enough(plain.share):
+            self._narrowed = narrowed(self.task.problem, self.task.vehicle, scores)
+            steps, trial = self._smallest(self._first_steps(plain.plan))
+        for attempt in range(PROOFS):
+            fresh = self._fresh(attempt)
+            share = self.task.share(trial.plan, fresh)
+            if self.task.is_enough(share):
+                return self._proven(trial, share, fresh)
+            following = self._trial(steps + 1) if attempt + 1 < PROOFS else None
+            if following is None:
+                raise self._unreachable(trial, fresh)
+            steps, trial = steps + 1, following
+        raise AssertionError("a proof ends one way or the other")
+
+    def _plain(self) -> tuple[Trial, Scores]:
+        found = self.task.plan(self.task.planner.reserve, self.task.problem)
+        scores = self.task.scores(found, self.training)
+        return self._noted(Trial(self.task.planner.reserve, found, _passed(scores))), scores
+
+    def _first_steps(self, plain: Plan) -> int:
+        """The steps of reserve that the spread of the plain plan's commands asks for."""
+        task = self.task
+        spread = spread_of(plain, task.vehicle, task.conditions, task.seed, self.training)
+        return min(max(ceil(spread.reserve / STEP), 1), MAX_FIRST)
+
+    def _smallest(self, first: int) -> tuple[int, Trial]:
+        """The fewest steps of reserve with which enough training flights pass, or nearly, and that round.
+
+        Args:
+            first: Steps to begin with.
+        """
+        low, steps = 0, first
+        while steps <= MAX_STEPS and (trial := self._trial(steps)) is not None:
+            if self.task.is_enough(trial.share):
+                return self._refined(low, steps, trial)
+            low, steps = steps, steps + STRIDE
+        best = max(self.trials, key=lambda each: each.share.count)
+        if best.share.fraction < self.task.probability:
+            raise self._unreachable(best, self.training)
+        return round((best.reserve - self.task.planner.reserve) / STEP), best
+
+    def _refined(self, low: int, high: int, best: Trial) -> tuple[int, Trial]:
+        """The fewest steps between too few and enough, by bisection."""
+        while high - low > 1:
+            middle = (low + high) // 2
+            trial = self._trial(middle)
+            if trial is not None and self.task.is_enough(trial.share):
+                high, best = middle, trial
+            else:
+                low = middle
+        return high, best
+
+    def _trial(self, steps: int) -> Trial | None:
+        """A round with so many steps of reserve; None where there is no such plan."""
+        reserve = round(self.task.planner.reserve + steps * STEP, 9)
+        try:
+            found = self.task.plan(reserve, self._narrowed)
+        except (Infeasible, SpecError):  # no plan, or no such reserve
+            return None
+        return self._noted(Trial(reserve, found, self.task.share(found, self.training)))
+
+    def _noted(self, trial: Trial) -> Trial:
+        self.trials.append(trial)
+        self.tried(trial)
+        return trial
+
+    def _fresh(self, attempt: int) -> range:
+        """Numbers of flights that nothing was learned from."""
+        first = len(self.training) + attempt * self.proving
+        return range(first, first + self.proving)
+
+    def _proven(self, trial: Trial, share: Share, fresh: range) -> Passing:
+        task, plain = self.task, self.trials[0]
+        spread = spread_of(trial.plan, task.vehicle, task.conditions, task.seed, fresh)
+        tube = Tube(
+            conditions=task.conditions.name,
+            seed=task.seed,
+            level=LEVEL,
+            times=tuple(spread.times.tolist()),
+            position_error=tuple(spread.position_error.tolist()),
+            attitude_error=tuple(spread.attitude_error.tolist()),
+            rotor_margin=tuple(spread.rotor_margin.tolist()),
+            reserve=trial.reserve,
+            plain_duration=plain.plan.duration,
+            probability=task.probability,
+            passed=share.count,
+            flights=share.of,
+            lower_bound=share.interval[0],
+        )
+        return Passing(
+            plan=replace(trial.plan, tube=tube),
+            plain=plain.plan,
+            before=share if trial is plain else task.share(plain.plan, fresh),
+            after=share,
+            probability=task.probability,
+            fresh=fresh,
+            trials=tuple(self.trials),
+        )
+
+    def _unreachable(self, best: Trial, flights: range) -> Infeasible:
+        """The error that says how often flights pass at most, and which cause stands in the way."""
+        task, share = self.task, self.task.share(best.plan, flights)
+        cause = standing_in_the_way(task.conditions, lambda without: task.share(best.plan, flights, without))
+        why = "" if cause is None else f"; {cause.sentence(task.probability)}"
+        return Infeasible(
+            f"'{task.problem.name}' on {task.vehicle.name} is not proven to pass as often as asked, "
+            f"{percent(task.probability)} %: under {task.conditions.name} {share} pass at best, with a "
+            f"reserve of {best.reserve:g}{why}; ask for less, or better that",
+            [attempt for trial in self.trials for attempt in trial.plan.attempts],
+        )
+
+
+def _passed(scores: Scores) -> Share:
+    return Share(sum(outcome.is_success for outcome in scores.outcomes), len(scores))

@@ -1,0 +1,61 @@
+"""What tightening a plan comes to: its rounds, its proof and its price."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from aerobat.declaration import by_value, in_notebooks, short
+from aerobat.planning import Plan
+from aerobat.planning.tube import Tube
+from aerobat.studies.sweep import Share
+
+
+@by_value
+@dataclass(frozen=True, eq=False)
+class Trial:
+    """One round: a plan with a reserve, and how many of the training flights pass."""
+
+    reserve: float  # [-] of every limit's range
+    plan: Plan
+    share: Share
+
+    def __str__(self) -> str:
+        """One line for people."""
+        return f"reserve {self.reserve:.2f}: {self.plan.duration:.3f} s, {self.share} pass"
+
+
+@in_notebooks
+@short
+@by_value
+@dataclass(frozen=True, eq=False, repr=False)
+class Passing:
+    """A plan whose flights pass with the probability asked, and the proof.
+
+    The flights of `before` and `after` are the same fresh ones, of which none told how to tighten.
+    """
+
+    plan: Plan  # carries its tube
+    plain: Plan  # as planned without tightening
+    before: Share  # of the fresh flights, those of the plain plan that pass
+    after: Share  # likewise of the plan
+    probability: float  # [-] asked
+    fresh: range  # numbers of the flights of the proof
+    trials: tuple[Trial, ...]  # in the order in which they were tried, the plain plan first
+
+    @property
+    def tube(self) -> Tube:
+        """The plan's tube."""
+        assert self.plan.tube is not None, "a plan that passes carries its tube"
+        return self.plan.tube
+
+    @property
+    def price(self) -> float:
+        """By how much longer the plan is than the plain one [s]."""
+        return self.plan.duration - self.plain.duration
+
+    def __str__(self) -> str:
+        """One line for people."""
+        return (
+            f"{self.plan.problem.name}: {self.after} of {self.after.of} fresh flights pass in "
+            f"{self.plan.duration:.3f} s, {self.before} in {self.plain.duration:.3f} s without tightening"
+        )

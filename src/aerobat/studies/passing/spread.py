@@ -1,0 +1,108 @@
+"""The spread of flights, and what it asks of the next plan: a reserve of thrust, and narrower gates."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from math import radians
+
+import numpy as np
+
+from aerobat.arrays import Array
+from aerobat.environment import Dispersion
+from aerobat.errors import SpecError
+from aerobat.evaluation import Scores
+from aerobat.planning import Plan
+from aerobat.planning.passages import require_openings
+from aerobat.problem import Gate, Problem
+from aerobat.simulation import fly
+from aerobat.vehicle import Vehicle
+
+LEVEL = 0.95  # of the flights, that keep within a tube
+ROWS_RATE = 100.0  # [1/s] of a tube's rows, at most
+SAMPLED = 200  # flights whose every row is looked at: 50 MB
+MIN_TOLERANCE = 0.1  # of a gate's tolerance, that is left to the plan however far flights stray
+MIN_OPENING = 0.8  # likewise of a gate's opening
+
+
+@dataclass(frozen=True, eq=False)
+class Spread:
+    """Quantiles over flights along time."""
+
+    times: Array  # [s], (T,)
+    position_error: Array  # [m], (T,)
+    attitude_error: Array  # [rad], (T,)
+    rotor_margin: Array  # [-] of a rotor's range, (T,)
+    departure: Array  # [-] of a rotor's range, of the commands from their median, (T,)
+
+    @property
+    def reserve(self) -> float:
+        """The part of the rotors' range that flights ask for beyond the plan, on average along time [-]."""
+        return float(self.departure.mean())
+
+
+def spread_of(plan: Plan, vehicle: Vehicle, conditions: Dispersion, seed: int, flights: range) -> Spread:
+    """The spread of flights, the first ones of `flights`.
+
+    Args:
+        plan: What is flown.
+        vehicle: The nominal one.
+        conditions: What varies.
+        seed: Of the flights.
+        flights: Their numbers.
+    """
+    batch = fly(plan, vehicle, conditions=conditions, seed=seed, flights=flights[:SAMPLED])
+    spacing = float(batch.times[1] - batch.times[0]) if len(batch.times) > 1 else 1.0
+    rows = slice(None, None, max(1, round(1.0 / (ROWS_RATE * spacing))))
+    span = vehicle.max_thrusts - vehicle.min_thrusts
+    commands = batch.commands[:, rows]
+    margins = np.minimum(commands - vehicle.min_thrusts, vehicle.max_thrusts - commands) / span
+    departures = np.abs(commands - np.median(commands, axis=0)) / span
+    return Spread(
+        times=batch.times[rows],
+        position_error=np.quantile(batch.position_error[:, rows], LEVEL, axis=0),
+        attitude_error=np.quantile(batch.attitude_error[:, rows], LEVEL, axis=0),
+        rotor_margin=np.quantile(margins.min(axis=-1), 1.0 - LEVEL, axis=0),
+        departure=np.quantile(departures.max(axis=-1), LEVEL, axis=0),
+    )
+
+
+def narrowed(problem: Problem, vehicle: Vehicle, scores: Scores) -> Problem:
+    """The problem with openings and tolerances less by what flights stray in the gates.
+
+    An opening stays as it is where the vehicle would not fit into a smaller one.
+
+    Args:
+        problem: What is planned.
+        vehicle: What flies it.
+        scores: Of the flights of its plan.
+    """
+    pointed = replace(problem, gates=tuple(_pointed(gate, scores) for gate in problem.gates))
+    smaller = replace(pointed, gates=tuple(_smaller(gate, scores) for gate in pointed.gates))
+    try:
+        require_openings(smaller, vehicle)
+    except SpecError:
+        return pointed
+    return smaller
+
+
+def _pointed(gate: Gate, scores: Scores) -> Gate:
+    """The gate with the rest of its tolerance of attitude."""
+    strays = radians(_quantile(gate, scores, "attitude_error_deg"))
+    left = max(gate.attitude_tolerance - strays, MIN_TOLERANCE * gate.attitude_tolerance)
+    return replace(gate, attitude_tolerance=left)
+
+
+def _smaller(gate: Gate, scores: Scores) -> Gate:
+    """The gate with the rest of its opening."""
+    width, height = (
+        max(side - 2.0 * _quantile(gate, scores, offset), MIN_OPENING * side)
+        for side, offset in ((gate.width, "lateral"), (gate.height, "up"))
+    )
+    return replace(gate, width=width, height=height)
+
+
+def _quantile(gate: Gate, scores: Scores, field: str) -> float:
+    """The largest size of a field over the passages of a gate, in LEVEL of the flights that crossed it."""
+    sizes = [np.abs(getattr(each, field)) for each in scores.passages if each.gate == gate.name]
+    known = [each[np.isfinite(each)] for each in sizes]
+    return max((float(np.quantile(each, LEVEL)) for each in known if len(each)), default=0.0)

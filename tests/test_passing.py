@@ -1,0 +1,100 @@
+"""Plan, fly, tighten: what is proven, on which flights, and what it costs."""
+
+from __future__ import annotations
+
+from functools import cache
+from math import radians
+
+import pytest
+
+import aerobat as ab
+from aerobat.studies.passing import Passing, Trial
+
+WEAK = ab.Dispersion(name="weak", mass=0.05, rotor=0.04, start_position=0.02)
+HARSH = ab.Dispersion(name="harsh", start_attitude=radians(40.0), mass=1e-4)
+FEW = {"flights": 60, "fresh": 80, "seed": 3}
+
+
+@cache
+def passing(probability: float) -> Passing:
+    return ab.plan_to_pass(
+        "flip-roll", ab.Miqp(order=4), "agile-quad", probability=probability, conditions=WEAK, **FEW
+    )
+
+
+def test_what_is_proven_was_learned_from_other_flights_and_holds_when_flown_again():
+    found = passing(0.9)
+    assert found.fresh.start >= FEW["flights"]
+    assert all(trial.share.of == FEW["flights"] for trial in found.trials)
+    again = ab.score_flights(found.plan, conditions=WEAK, seed=3, flights=found.fresh)
+    assert sum(outcome.is_success for outcome in again.outcomes) == found.after.count
+    assert found.after.interval[0] >= 0.9
+    assert (found.tube.passed, found.tube.flights) == (found.after.count, found.after.of)
+    assert found.before.fraction < 0.9 < found.after.fraction
+    assert found.price == found.tube.price(found.plan.duration) > 0.0
+
+
+def test_more_probability_never_gives_a_shorter_plan():
+    durations = [passing(probability).plan.duration for probability in (0.01, 0.5, 0.9)]
+    assert durations == sorted(durations)
+
+
+def test_a_probability_that_is_met_already_costs_nothing():
+    found = passing(0.01)
+    assert (
+        found.plan.trajectory
+        == found.plain.trajectory
+        == ab.plan("flip-roll", ab.Miqp(order=4), "agile-quad").trajectory
+    )
+    assert found.price == 0.0
+    assert len(found.trials) == 1
+
+
+def test_the_same_seed_gives_the_same_plan_and_tube():
+    again = ab.plan_to_pass(
+        "flip-roll", ab.Miqp(order=4), "agile-quad", probability=0.5, conditions=WEAK, **FEW
+    )
+    assert again.plan.trajectory == passing(0.5).plan.trajectory
+    assert again.tube == passing(0.5).tube
+
+
+def test_the_plan_that_passes_is_judged_by_the_gates_of_its_problem():
+    found = passing(0.9)
+    assert found.plan.problem == ab.load_problem("flip-roll")
+    assert found.plan.certified == found.plain.certified
+
+
+def test_a_saved_plan_carries_its_tube(tmp_path):
+    found = passing(0.5).plan
+    found.save(tmp_path / "flip.plan")
+    assert ab.load_plan(tmp_path / "flip.plan").tube == found.tube
+
+
+def test_what_cannot_be_reached_names_the_cause_in_the_way():
+    trials: list[Trial] = []
+    with pytest.raises(ab.Infeasible, match=r"the start stands in the way: without it .* pass") as refused:
+        ab.plan_to_pass(
+            "half-flip",
+            ab.Miqp(order=4, reserve=0.45),
+            "hexarotor",
+            probability=0.9,
+            conditions=HARSH,
+            tried=trials.append,
+            **FEW,
+        )
+    assert "harsh" in str(refused.value)
+    assert trials[0].reserve == 0.45
+    assert all(0.45 < trial.reserve < 0.5 for trial in trials[1:])
+
+
+@pytest.mark.parametrize(
+    ("settings", "named"),
+    [
+        ({"planner": "min-snap"}, "planner keeps no reserve"),
+        ({"probability": 0.99, "flights": 300}, "flights: 300 flights cannot prove 99 %; take 368"),
+        ({"probability": 0.99, "fresh": 300}, "fresh: 300 flights cannot prove 99 %; take 368"),
+    ],
+)
+def test_what_can_prove_nothing_is_refused(settings, named):
+    with pytest.raises(ab.SpecError, match=named):
+        ab.plan_to_pass("line", **settings)
