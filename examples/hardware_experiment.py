@@ -88,7 +88,7 @@ def table(causes: ab.ErrorCauses) -> list[tuple[str, ...]]:
                 f"{np.median(result.gate_attitude_error):.1f}",
                 f"{100 * np.median(result.clearance):.1f}",
                 f"{100 * result.scores.saturated_fraction.mean():.0f}",
-                *(f"{100 * result.passed_opening(*opening):.1f}" for opening in OPENINGS),
+                *(f"{100 * result.cleared_opening(*opening).fraction:.1f}" for opening in OPENINGS),
             )
         )
     return rows
@@ -179,7 +179,7 @@ def draw_gate(axes: Axes, result: TrialResult, flight: ab.Flight, opening: tuple
     )
     axes.grid(color=PALE, linewidth=0.6)
     axes.set_axisbelow(True)
-    axes.set_title(f"{100 * result.passed_opening(*opening):.0f} % pass", size=10)
+    axes.set_title(f"{100 * result.cleared_opening(*opening).fraction:.0f} % pass", size=10)
 
 
 def silhouette(attitude: Array, view: Array) -> Array:

@@ -58,8 +58,10 @@ def test_shares_are_those_of_the_flights_that_pass_and_grow_with_the_opening() -
     study = measured(*CAUSES)
     gate = half_flip().gates[0]
     for result in study.results:
-        assert result.passed == result.passed_opening(gate.width, gate.height)
-        shares = [result.passed_opening(scale, 0.6 * scale) for scale in (0.01, 0.5, 0.7, 1.0, 100.0)]
+        assert result.cleared == result.cleared_opening(gate.width, gate.height)
+        shares = [
+            result.cleared_opening(scale, 0.6 * scale).fraction for scale in (0.01, 0.5, 0.7, 1.0, 100.0)
+        ]
         assert shares == sorted(shares)
         assert shares[0] == 0.0
         assert shares[-1] == np.isfinite(result.gate_error).mean()

@@ -14,6 +14,7 @@ from aerobat.evaluation import Scores
 from aerobat.planning import Plan
 from aerobat.simulation.outcome import length
 from aerobat.studies.error_causes.cause import Trial
+from aerobat.studies.sweep.share import Share
 
 NONE, ALL = "none", "all together"
 Level = Annotated[float, Field(ge=0.0, le=1.0)]
@@ -81,15 +82,15 @@ class TrialResult:
         return -self._worst("clearance", -1.0)
 
     @property
-    def passed(self) -> float:
-        """The fraction of flights whose body passed all gates and touched no frame."""
-        return float(np.mean(self.clearance >= 0.0))
+    def cleared(self) -> Share:
+        """The share of flights whose body went through all gates and touched no frame, whatever its tilt."""
+        return Share(int((self.clearance >= 0.0).sum()), len(self.scores))
 
     @validated
-    def passed_opening(self, width: Positive, height: Positive) -> float:
-        """The fraction of flights whose body would have passed gates of that opening [m]."""
+    def cleared_opening(self, width: Positive, height: Positive) -> Share:
+        """The share of flights whose body would have cleared gates of that opening [m]."""
         fits = (self._worst("needed_width") <= width) & (self._worst("needed_height") <= height)
-        return float(np.mean(fits))
+        return Share(int(fits.sum()), len(self.scores))
 
     def _worst(self, field: str, sign: float = 1.0) -> Array:
         """The largest of a field of the passages, times a sign; infinite where it is not known."""
