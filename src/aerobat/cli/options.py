@@ -167,8 +167,8 @@ class FlyingOptions(ConditionsOptions):
     """Options of the flight."""
 
     controller: Annotated[str, Parameter(group=flying)] = "full"
-    """The control law: full, or paper, the paper's own without moment feed-forward, motor-lag compensation
-    and tilt before yaw."""
+    """The control law, at the gains of the vehicle's file: full, or paper, the paper's own without moment
+    feed-forward, motor-lag compensation and tilt before yaw."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -182,7 +182,7 @@ class SweepingOptions:
     """What varies from flight to flight, disturbs and is measured how: none, lab, field, or a TOML file."""
 
     controller: Annotated[str, Parameter(group=flying)] = "full"
-    """The control law: full, or paper."""
+    """The control law, at the gains of the vehicle's file: full, or paper."""
 
     seed: Annotated[int, Parameter(group=flying, validator=validators.Number(gte=0))] = 0
     """The seed of all flights: the same seed, the same flights."""
