@@ -18,6 +18,7 @@ from typing import Any, Literal, get_args, get_origin, get_type_hints
 
 import numpy as np
 
+from aerobat.control import Controller
 from aerobat.environment import Battery, Dispersion, Environment, Gusts, HandOff, Imu, MotionCapture, Outage
 from aerobat.problem import (
     Attitude,
@@ -56,6 +57,7 @@ PLACES = {  # where each class stands in a file
     Gusts: "`[gusts]`",
     Battery: "`[battery]`",
     Ellipsoid: "`body`: what passes gates, propellers included",
+    Controller: "`[controller]` of a vehicle: what tracks its paths",
 }
 INTRODUCTION = """# Files
 
@@ -118,6 +120,10 @@ Left out, it is a flat ellipsoid in the middle between the rotors that encloses 
 height a fifth of its half width. Gates are judged by it: all that it sweeps of a gate's plane is to lie
 within the opening. A vehicle that does not fit at all is refused before anything is planned.
 """
+CONTROLLER = """
+Left out, every field has its default; a flight that names another controller is flown by that one.
+`aerobat tune flip-roll --vehicle mine.toml --conditions lab --out tuned.toml` finds gains and writes them.
+"""
 IMPORT = """
 ### From URDF and SDF
 
@@ -170,7 +176,7 @@ def page() -> str:
     parts += [section(GatePassage), section(Stage), section(Attitude), section(Condition)]
     parts += [STAGES, section(Waypoint), WAYPOINTS]
     parts += ["## Vehicle (`--vehicle vehicle.toml`)\n", VEHICLE, fenced(ANNOTATED), table(Vehicle)]
-    parts += [section(Rotor), ROTOR, section(Ellipsoid), BODY, IMPORT]
+    parts += [section(Rotor), ROTOR, section(Ellipsoid), BODY, section(Controller), CONTROLLER, IMPORT]
     parts += ["## Conditions\n", CONDITIONS, preset("environment", "lab"), table(Dispersion)]
     parts += [section(cls) for cls in (Imu, MotionCapture, Outage, HandOff)]
     parts += [HAND_OFF, section(Gusts), section(Battery)]

@@ -88,6 +88,7 @@ RESULTS = (
     "Sweep",
     "Reference",
     "Replay",
+    "Tuning",
 )  # made by no user
 NOT_CALLED = ("AerobatError", "BackendMissing", "Infeasible", "SpecError", "Maneuver", "Planner")
 ENUMS = ("ContinuityRule", "Outcome", "Quantity", "TimeScaling")
@@ -218,6 +219,7 @@ def _arguments(name: str, folder: Path) -> dict[str, Any]:
         "tracking_figure": {"plan": plan(), "vehicle": agile, "flight": flight()},
         "view": {"shown": flight(), "plan": plan(), "vehicle": agile},
         "with_second_opinion": {"plan": plan(), "progress": None},
+        "tune": _tuned(),
         "vehicle_names": {},
         "write_columns": {
             "plan": plan(),
@@ -246,6 +248,22 @@ def _arguments(name: str, folder: Path) -> dict[str, Any]:
         "write_vehicle": {"vehicle": agile, "path": folder / "saved.toml"},
     }
     return calls[name]
+
+
+@cache
+def _tuned() -> dict[str, Any]:
+    """The arguments of a search that tries the vehicle's own gains alone."""
+    return {
+        "plan": plan(),
+        "conditions": ab.Dispersion(),
+        "flights": 2,
+        "seed": 0,
+        "vehicle": ab.load_vehicle("agile-quad"),
+        "gains": ["position_gain"],
+        "evaluations": 1,
+        "time_limit": None,
+        "progress": None,
+    }
 
 
 def _flights() -> Iterator[Door]:
@@ -376,6 +394,7 @@ def instance(cls: type) -> Any:
         ab.Setpoint: lambda: flight().setpoint,
         ab.Stage: lambda: ab.Stage("a"),
         ab.Trajectory: lambda: plan().trajectory,
+        ab.Tuning: lambda: ab.tune(**_tuned()),
         ab.Vehicle: lambda: ab.load_vehicle("agile-quad"),
         ab.Waypoint: lambda: ab.Waypoint((0.0, 0.0, 1.0)),
         ab.Waypoints: lambda: ab.Waypoints((ab.Waypoint((0.0, 0.0, 1.0)),)),

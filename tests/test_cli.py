@@ -147,7 +147,8 @@ def test_an_infeasible_problem_ends_with_its_sentence_and_nothing_written(capsys
 def test_help_tells_every_command_and_option(capsys) -> None:
     _, out, _ = run(capsys, "--help")
     assert all(
-        command in out for command in ("fly", "plan", "check", "compare", "sweep", "vehicles", "Exit codes")
+        command in out
+        for command in ("fly", "plan", "check", "compare", "sweep", "tune", "vehicles", "Exit codes")
     )
     _, out, _ = run(capsys, "fly", "--help")
     options = "vehicle planner order intervals segments stop-after backend paper angle out json seed"

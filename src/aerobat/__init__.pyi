@@ -90,6 +90,7 @@ from .studies.compare import Comparison, compare
 from .studies.error_causes import Cause, ErrorCauses, error_causes
 from .studies.passing import Passing, plan_to_pass
 from .studies.sweep import Share, Sweep, sweep
+from .studies.tune import Tuning, tune
 from .trajectory import ContinuityRule, Trajectory, load_trajectory, minimum_effort, save_trajectory
 from .vehicle import Ellipsoid, Rotor, Vehicle, implausibilities, load_vehicle, vehicle_names, write_vehicle
 from .viewer.replay import Replay, view, write_replay
@@ -162,6 +163,7 @@ __all__ = [
     "TimeOptimal",
     "TimeScaling",
     "Trajectory",
+    "Tuning",
     "Vehicle",
     "Waypoint",
     "Waypoints",
@@ -209,6 +211,7 @@ __all__ = [
     "tilted_gate",
     "to_dataframe",
     "tracking_figure",
+    "tune",
     "vehicle_names",
     "view",
     "with_second_opinion",

@@ -167,8 +167,8 @@ class FlyingOptions(ConditionsOptions):
     """Options of the flight."""
 
     controller: Annotated[str, Parameter(group=flying)] = "full"
-    """The control law: full, or paper, the paper's own without moment feed-forward, motor-lag compensation
-    and tilt before yaw."""
+    """The control law, at the gains of the vehicle's file: full, or paper, the paper's own without moment
+    feed-forward, motor-lag compensation and tilt before yaw."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -182,7 +182,7 @@ class SweepingOptions:
     """What varies from flight to flight, disturbs and is measured how: none, lab, field, or a TOML file."""
 
     controller: Annotated[str, Parameter(group=flying)] = "full"
-    """The control law: full, or paper."""
+    """The control law, at the gains of the vehicle's file: full, or paper."""
 
     seed: Annotated[int, Parameter(group=flying, validator=validators.Number(gte=0))] = 0
     """The seed of all flights: the same seed, the same flights."""
@@ -194,6 +194,43 @@ class SweepingOptions:
 
     table: Annotated[Literal["csv", "parquet"], Parameter(group=output)] = "csv"
     """The form of the table, flights.csv or flights.parquet; the latter needs aerobat[parquet]."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class TuningOptions:
+    """Options of a search for gains."""
+
+    vehicle: Annotated[str | None, Parameter(group=planning)] = None
+    """The vehicle whose gains are sought: a name that `aerobat vehicles` lists, or a TOML file. Default: that
+    of a .plan file, else agile-quad."""
+
+    angle: Annotated[float | None, Parameter(group=planning)] = None
+    """The tilt of a half-flip's gate in degrees, -90 to 90, to the right when positive."""
+
+    plugins: Annotated[tuple[Path, ...], Plugins(group=planning)] = ()
+
+    conditions: Annotated[str, Parameter(group=flying)] = "lab"
+    """What varies from flight to flight, disturbs and is measured how: none, lab, field, or a TOML file."""
+
+    flights: Annotated[int, Parameter(group=flying, validator=validators.Number(gte=2, lte=100_000))] = 200
+    """How many flights of each maneuver each set of gains is tried on, and how many others judge the best."""
+
+    seed: Annotated[int, Parameter(group=flying, validator=validators.Number(gte=0))] = 0
+    """The seed of all flights: the same seed, the same gains, unless --time-limit ends the search."""
+
+    evaluations: Annotated[
+        int, Parameter(group=limiting, validator=validators.Number(gte=1, lte=100_000))
+    ] = 150
+    """How many sets of gains may be tried."""
+
+    time_limit: Annotated[float | None, Parameter(group=limiting, validator=validators.Number(gte=0))] = None
+    """Seconds of the search; the best gains by then are judged."""
+
+    out: Annotated[Path | None, Parameter(group=output)] = None
+    """The vehicle's file to write; an earlier one is replaced. Default: out/VEHICLE-tuned.toml."""
+
+    json: Annotated[bool, Parameter(group=output, negative="", show_default=False)] = False
+    """Print before and after as JSON on standard output, and nothing else."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -104,6 +104,27 @@ class DrawingProgress(Progress):
         )
 
 
+class TuningProgress(Progress):
+    """What a search for gains has come to by now.
+
+    Args:
+        evaluations: How many sets of gains may be tried.
+    """
+
+    def __init__(self, evaluations: int) -> None:
+        self._evaluations = evaluations
+        self._tried, self._cost = 0, inf
+
+    def record(self, tried: int, cost: float) -> None:
+        """Take note of how many sets of gains were tried, and of the lowest cost [m]."""
+        self._tried, self._cost = tried, cost
+
+    def __str__(self) -> str:
+        """How many sets of gains, and how good the best of them is."""
+        best = f", cost {100 * self._cost:.2f} cm so far" if self._tried else ""
+        return f"tuning: {self._tried} of at most {self._evaluations} sets of gains{best}"
+
+
 class SweepProgress(Progress):
     """What a sweep has come to by now.
 

@@ -7,13 +7,13 @@ from typing import Any
 import numpy as np
 
 from aerobat.arrays import Array
-from aerobat.control.controller import Controller
 from aerobat.engines.components import components, matrix_components
 from aerobat.environment import Environment
 from aerobat.kernels.allocation import Mixer
 from aerobat.kernels.control import ControllerModel
 from aerobat.kernels.motors import Airframe, Rotors
 from aerobat.kernels.rigid_body import EnvironmentParameters, MassProperties
+from aerobat.vehicle.controller import Controller
 from aerobat.vehicle.fleet import Fleet
 
 _FREE_ERROR = 0.06  # [rad] of attitude that must not saturate a hovering vehicle's rotors

@@ -231,7 +231,7 @@ def _tangent(setup: FlightSetup, name: str, unit: Array) -> LoopParameters:
 
 
 def _gains(setup: FlightSetup, name: str) -> Gains:
-    controller = setup.config.controller
+    controller = setup.controller
     number: Any = Dual(getattr(controller, name), 1.0)
     bandwidth = max_bandwidth(setup.nominal, setup.environment)
     gains = controller.gains(bandwidth, DualOps(ArrayOps), **{name: number})

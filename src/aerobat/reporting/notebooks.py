@@ -19,10 +19,12 @@ from aerobat.reporting.figures import draw
 from aerobat.reporting.page import png as png_of
 from aerobat.reporting.sweeps.figure import sweep_figure
 from aerobat.reporting.sweeps.table import sweep_table
+from aerobat.reporting.sweeps.tuning import tuning_table
 from aerobat.reporting.tables import certificate_table, facts_table, flight_facts, plan_facts
 from aerobat.simulation import Flight
 from aerobat.studies.compare import Comparison
 from aerobat.studies.sweep import Sweep
+from aerobat.studies.tune import Tuning
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -33,7 +35,7 @@ KEPT = 8  # pictures: a notebook asks for one twice
 
 
 def html(value: Any) -> str:
-    """HTML of a plan, a flight, a score, a certificate, a comparison or a sweep."""
+    """HTML of a plan, a flight, a score, a certificate, a comparison, a sweep or a tuning."""
     console = Console(record=True, file=StringIO(), width=COLUMNS, force_jupyter=False)
     console.print(_table(value))
     text = console.export_html(inline_styles=True, code_format=PRE)
@@ -67,6 +69,8 @@ def _table(value: Any) -> Table:
         return comparison_table(value)
     if isinstance(value, Sweep):
         return sweep_table(value)
+    if isinstance(value, Tuning):
+        return tuning_table(value)
     return facts_table(str(value), {})
 
 

@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import field
+from collections.abc import Sequence
 from typing import Annotated, Any
 
 from pydantic import Field, PlainValidator
 
-from aerobat.control import Controller
 from aerobat.declaration import AS_IT_IS, FieldError, Seed, declared, shown
 from aerobat.environment import Dispersion, as_dispersion
+from aerobat.errors import SpecError
 from aerobat.states import BodyState
 from aerobat.vehicle import Vehicle
+from aerobat.vehicle.controller import Controller
 
 ControlRate = Annotated[float, Field(ge=1, le=1e6, description="number from 1 to 1e6")]
 LogRate = Annotated[float, Field(ge=1e-3, le=1e6, description="number from 0.001 to 1e6")]
@@ -41,7 +42,7 @@ class FlightConfig:
     which they draw, and say, themselves.
     """
 
-    controller: Controller = field(default_factory=Controller)
+    controller: Controller | None = None  # by default the nominal vehicle's
     rate: ControlRate = 500.0  # [1/s] of the controller, unless conditions say it
     # as it would really be flown: what varies, disturbs, and is measured how; left out, as planned
     conditions: Annotated[Dispersion | None, PlainValidator(_conditions)] = None
@@ -71,6 +72,19 @@ class FlightConfig:
         """Of the controller [1/s]."""
         asked = None if self.conditions is None else self.conditions.control_rate
         return asked or self.rate
+
+    def controller_of(self, nominal: Sequence[Vehicle]) -> Controller:
+        """The controller asked for, or that of the nominal vehicles.
+
+        Raises SpecError for vehicles with more than one.
+        """
+        if self.controller is not None:
+            return self.controller
+        if any(vehicle.controller != nominal[0].controller for vehicle in nominal[1:]):
+            raise SpecError(
+                "controller: these vehicles have different ones; give one for all, or fly them apart"
+            )
+        return nominal[0].controller
 
     @property
     def rows_rate(self) -> float:

@@ -68,7 +68,8 @@ def prepare(
     reference = ReferenceSource(as_trajectory(plan), nominal[0], environment, config.rate)
     fleet = Fleet.of(flying)
     nominal_fleet = fleet if nominal is flying else Fleet.of(nominal)
-    model = controller_parameters(config.controller, nominal_fleet, environment)
+    controller = config.controller_of(nominal)
+    model = controller_parameters(controller, nominal_fleet, environment)
     for grounded in np.flatnonzero(~np.isfinite(model.gains.stiffness)):
         nominal[grounded].require_hover(environment.gravity)
     if nominal_fleet is not fleet:  # one for all
@@ -78,7 +79,7 @@ def prepare(
         start=_start(config.start, reference, len(fleet)),
         parts=(
             Part(StateObserver()),
-            Part(TrackingController(config.controller.feature_flags), ControllerParameters(model, ())),
+            Part(TrackingController(controller.feature_flags), ControllerParameters(model, ())),
             Part(RigidBodyPlant.for_rate(config.rate), plant),
         ),
         reference=reference,
@@ -86,6 +87,7 @@ def prepare(
         nominal=nominal_fleet,
         environment=environment,
         config=config,
+        controller=controller,
         is_batch=is_batch,
         rate=config.rate,
     )

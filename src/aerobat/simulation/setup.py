@@ -18,6 +18,7 @@ from aerobat.simulation.components import log_row
 from aerobat.simulation.config import FlightConfig
 from aerobat.simulation.loop import Component, Log, LoopInput, LoopParameters, compose
 from aerobat.simulation.reference_source import BLOCK, ReferenceSource
+from aerobat.vehicle.controller import Controller
 from aerobat.vehicle.fleet import Fleet
 
 _VEHICLE_TICKS = 160_000  # whose own inputs are made at once, so that they take little memory (50 MB)
@@ -55,6 +56,7 @@ class FlightSetup:
     nominal: Fleet
     environment: Environment
     config: FlightConfig
+    controller: Controller  # whose gains the loop has
     is_batch: bool
     rate: float  # [1/s] of the ticks
 

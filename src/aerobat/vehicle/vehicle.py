@@ -26,6 +26,7 @@ from aerobat.declaration import (
 )
 from aerobat.errors import SpecError
 from aerobat.states import STANDARD_GRAVITY
+from aerobat.vehicle.controller import Controller
 from aerobat.vehicle.ellipsoid import ENCLOSING, Ellipsoid, about_rotors
 from aerobat.vehicle.hover import mixing_matrix, overloaded, why_no_hover
 from aerobat.vehicle.rotor import Rotor, rotor_table
@@ -57,6 +58,8 @@ class Vehicle:
     max_body_rate: Limit = np.inf  # [rad/s] the largest norm of ω
     # what encloses it, propellers included, and passes gates; a flat one about the rotors unless given
     body: Ellipsoid | None = None
+    # what tracks its paths, where a flight names no other
+    controller: Controller = Controller()
     description: str = ""  # where its numbers come from
 
     SHORTHANDS: ClassVar[Mapping[str, str]] = {

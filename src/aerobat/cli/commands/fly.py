@@ -11,7 +11,7 @@ from aerobat.cli.options import FlyingOptions, PlanningOptions
 from aerobat.cli.runs.folder import Flown, finish
 from aerobat.cli.runs.record import FlightSettings
 from aerobat.cli.tasks import flight_settings, planned
-from aerobat.control import Controller, named_controller
+from aerobat.control import named_controller
 from aerobat.evaluation import score
 from aerobat.planning import Plan, nominal_flight
 from aerobat.simulation.fly import fly as simulate
@@ -44,8 +44,9 @@ def fly(
 def flown(plan: Plan, settings: FlightSettings) -> Flown:
     """The flight of a plan, and its score."""
     assert plan.vehicle is not None, "a command plans for a vehicle"
-    controller = named_controller(settings.controller)
-    if settings.conditions is None and controller == Controller():  # the flight that the plan was judged by
+    controller = named_controller(settings.controller, plan.vehicle.controller)
+    is_nominal = settings.conditions is None and controller == plan.vehicle.controller
+    if is_nominal:  # the flight that the plan was judged by
         flight = nominal_flight(plan.trajectory, plan.vehicle, plan.problem.environment)
     else:
         flight = simulate(plan, controller=controller, conditions=settings.conditions, seed=settings.seed)

@@ -90,7 +90,7 @@ def sweep_of(plan: Plan, record: RunRecord, options: OutputOptions, workers: int
                 flight.runs,
                 flight.seed,
                 vehicle=record.vehicle,
-                controller=named_controller(flight.controller),
+                controller=named_controller(flight.controller, record.vehicle.controller),
                 workers=workers,
                 keep=unfinished.flights,
                 progress=progress.record,

@@ -33,6 +33,7 @@ from aerobat.simulation.setup import FlightSetup, Part
 from aerobat.states import BodyState
 from aerobat.trajectory import Trajectory, as_trajectory
 from aerobat.vehicle import Vehicle
+from aerobat.vehicle.controller import Controller
 from aerobat.vehicle.fleet import Fleet
 
 _LEAST_START_VELOCITY = 0.01  # [m/s] 1σ that the filter reckons with at least
@@ -61,6 +62,7 @@ def dispersed_setup(
     rate = config.control_rate if conditions.imu is None else conditions.imu.rate
     numbers = config.flights or range(1)
     draws = draw_flights(conditions, len(nominal.rotors), config.seed, numbers)
+    controller = config.controller_of([nominal])
     flights = DispersedFlights(
         draws=draws,
         fleet=dispersed_fleet(nominal, draws),
@@ -79,7 +81,7 @@ def dispersed_setup(
         parts=(
             *disturbed,
             _observer(conditions, flights, disturbed),
-            *_controller(conditions, flights, config, as_trajectory(plan)),
+            *_controller(conditions, flights, config, controller),
             Part(RigidBodyPlant.for_rate(rate), plant),
         ),
         reference=reference,
@@ -87,6 +89,7 @@ def dispersed_setup(
         nominal=Fleet.of([nominal]),
         environment=environment,
         config=config,
+        controller=controller,
         is_batch=config.flights is not None,
         rate=rate,
     )
@@ -115,11 +118,11 @@ def _observer(conditions: Dispersion, flights: DispersedFlights, disturbed: Sequ
 
 
 def _controller(
-    conditions: Dispersion, flights: DispersedFlights, config: FlightConfig, trajectory: Trajectory
+    conditions: Dispersion, flights: DispersedFlights, config: FlightConfig, settings: Controller
 ) -> tuple[Part, ...]:
     """The controller at its own period, its reference that of its commands' effect, and its delay."""
     nominal, environment, rate = flights.nominal, flights.environment, flights.rate
-    model = controller_parameters(config.controller, Fleet.of([nominal]), environment)
+    model = controller_parameters(settings, Fleet.of([nominal]), environment)
     if not np.isfinite(model.gains.stiffness).all():
         nominal.require_hover(environment.gravity)
     model = tree_map(lambda leaf: np.broadcast_to(leaf, len(flights.draws)), model)
@@ -130,10 +133,10 @@ def _controller(
             f"computation_delay must be at most a period of the controller, {period / rate:g} s, "
             f"got {conditions.computation_delay:g} s; lower control_rate"
         )
-    controller = TrackingController(config.controller.feature_flags, period)
+    controller = TrackingController(settings.feature_flags, period)
     if period == 1 and delay == 0:
         return (Part(controller, ControllerParameters(model, ())),)
-    source = ReferenceSource(trajectory, nominal, environment, rate, every=period, delay=delay / rate)
+    source = ReferenceSource(flights.trajectory, nominal, environment, rate, every=period, delay=delay / rate)
     if delay == 0:
         return (Part(controller, ControllerParameters(model, ()), source),)
     return (

@@ -29,7 +29,7 @@ def error_causes(
     *,
     planner: Planner | str = "miqp",
     conditions: Dispersion | str = "lab",
-    controller: Controller = Controller(),  # noqa: B008 - frozen
+    controller: Controller | None = None,
     flights: Flights = 1000,
     seed: Seed = 0,
     begin: Callable[[str], None] | None = None,
@@ -45,7 +45,7 @@ def error_causes(
         causes: each with a name of its own; no two change the same.
         planner: how it is planned without them, or a registered planner's name.
         conditions: under which it is flown without them, or their name.
-        controller: how it is controlled without them.
+        controller: how it is controlled without them, by default the vehicle's own.
         flights: how many, of each trial.
         seed: of all flights.
         begin: called with each trial's name when its turn comes.
@@ -61,7 +61,7 @@ def error_causes(
     repeated = next((name for k, name in enumerate(names) if name in names[:k]), None)
     if repeated is not None:
         raise SpecError(f"causes: there are two named '{repeated}'; rename one")
-    none = Trial(as_planner(planner), as_dispersion(conditions), controller)
+    none = Trial(as_planner(planner), as_dispersion(conditions), controller or vehicle.controller)
     trials = [each.applied(none) for each in (Cause(NONE, {}), *causes, together(causes, ALL))]
     plans: dict[tuple[Planner, bool], Plan] = {}
     results = []

@@ -45,7 +45,7 @@ def sweep(
     seed: Seed = 0,
     *,
     vehicle: Vehicle | str | None = None,
-    controller: Controller = Controller(),  # noqa: B008 - frozen
+    controller: Controller | None = None,
     engine: str = "auto",
     batch: Batch = CHUNK,
     workers: Workers | None = None,
@@ -65,7 +65,7 @@ def sweep(
         runs: how many flights.
         seed: of their draws.
         vehicle: the nominal one, or its name, by default the plan's.
-        controller: how it is controlled.
+        controller: how it is controlled, by default the vehicle's own.
         engine: as for FlightConfig.
         batch: flights that are flown side by side in one process: fewer take less memory.
         workers: processes, by default one a core; 1 flies in this process.
@@ -77,7 +77,7 @@ def sweep(
     """
     conditions = as_dispersion(conditions)
     vehicle = vehicle_of(plan, vehicle)
-    task = SweepTask(plan, vehicle, conditions, seed, controller, engine, batch)
+    task = SweepTask(plan, vehicle, conditions, seed, controller or vehicle.controller, engine, batch)
     kept = None if keep is None else KeptChunks.of(Path(keep), task)
     spans = [(begin, min(begin + CHUNK, runs)) for begin in range(0, runs, CHUNK)]
     tally = _Tally(progress)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from types import MappingProxyType, SimpleNamespace
 from typing import Any
 
@@ -78,8 +79,11 @@ class Controller:
 CONTROLLERS: Mapping[str, Controller] = MappingProxyType({"full": Controller(), "paper": Controller.paper()})
 
 
-def named_controller(name: str) -> Controller:
-    """The controller of CONTROLLERS by its name. Raises SpecError when there is none."""
+def named_controller(name: str, own: Controller = CONTROLLERS["full"]) -> Controller:
+    """A vehicle's `own` controller, by the name full; by paper, the paper's law at its gains.
+
+    Raises SpecError for a name that CONTROLLERS has not.
+    """
     if name not in CONTROLLERS:
         raise unknown_name("controller", name, CONTROLLERS)
-    return CONTROLLERS[name]
+    return own if name == "full" else replace(own, **CONTROLLERS[name].feature_flags._asdict())

@@ -1,0 +1,294 @@
+"""tune(): controller gains for one vehicle, found over many flights as it would really be flown.
+
+The search is Nelder and Mead's, by SciPy, over the logarithms of the gains. It compares costs and takes no
+slopes of them, so that a quantile's kinks and the price of a lost flight do it no harm; six gains take it one
+or two hundred costs; and it draws nothing, so that all chance is in the flights. All costs of a search are of
+the same flights, each with its own draws (common random numbers): two sets of gains differ by what they do,
+not by their luck. The luck of the best is told by other flights, which the search has not seen.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, replace
+from math import inf
+from typing import Annotated
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field
+
+from aerobat.arrays import Array, frozen
+from aerobat.control import Controller
+from aerobat.declaration import NonNegative, Seed, by_value, in_notebooks, short, unknown_name, validated
+from aerobat.environment import Dispersion, as_dispersion
+from aerobat.errors import SpecError
+from aerobat.evaluation import Scores, score_flights
+from aerobat.flatness import vehicle_of
+from aerobat.optimization.deadline import out_of_time, within_time
+from aerobat.planning import Plan
+from aerobat.simulation.outcome import DIVERGENCE_RADIUS, length
+from aerobat.vehicle import Vehicle
+
+TUNED = (
+    "position_gain",
+    "velocity_gain",
+    "integral_gain",
+    "attitude_frequency",
+    "attitude_damping",
+    "attitude_integral_gain",
+)
+TUNABLE = (*TUNED, "jerk_filter", "lead_time_constant")
+MAX_FACTOR = 4.0  # [-] by which a gain may be raised or lowered
+QUANTILE = 0.95  # of flights, whose largest position error is lowered
+FAILURE = DIVERGENCE_RADIUS  # [m] of cost if all flights failed: one in a hundred weighs 5 cm
+_FIRST_FACTOR = 1.4  # [-] of each gain in turn, when the search begins
+_RESOLUTION = 0.01  # [-] of a gain, finer than which no search goes
+_RESAMPLES = 1000  # of the fresh flights
+
+Flights = Annotated[int, Field(ge=2, le=100_000, description="whole number from 2 to 100000")]
+Evaluations = Annotated[int, Field(ge=1, le=100_000, description="whole number from 1 to 100000")]
+
+
+@by_value
+@dataclass(frozen=True, eq=False)
+class FlightCosts:
+    """Many flights of some plans under one set of gains; arrays (plans, flights)."""
+
+    max_position_error_m: Array  # of a flight that diverged, the radius from which none comes back
+    failed: Array  # 1 where a flight was lost, missed a gate or hit its frame, else 0
+
+    @property
+    def error_quantile_m(self) -> float:
+        """The largest position error that 95 % of flights stay within, the mean over plans [m]."""
+        return float(np.quantile(self.max_position_error_m, QUANTILE, axis=-1).mean())
+
+    @property
+    def failed_fraction(self) -> float:
+        """Of all flights."""
+        return float(self.failed.mean())
+
+    @property
+    def cost(self) -> float:
+        """The measure that is lowered [m]: `error_quantile_m`, and 5 cm for each hundredth that failed."""
+        return self.error_quantile_m + FAILURE * self.failed_fraction
+
+    def resampled(self, flights: NDArray[np.int64]) -> FlightCosts:
+        """The flights of these numbers, some of them perhaps many times."""
+        return FlightCosts(self.max_position_error_m[:, flights], self.failed[:, flights])
+
+    def __str__(self) -> str:
+        """One line for people."""
+        error = f"95 % of flights within {length(self.error_quantile_m)} of their path"
+        return f"{error}, {100 * self.failed_fraction:.3g} % failed"
+
+
+@in_notebooks
+@short
+@by_value
+@dataclass(frozen=True, eq=False, repr=False)
+class Tuning:
+    """The gains that a search found for a vehicle, and what they are worth on other flights."""
+
+    vehicle: Vehicle  # as it was
+    controller: Controller  # the best on the flights of the search
+    gains: tuple[str, ...]  # those of its settings that were sought
+    evaluations: int  # sets of gains that were flown
+    training: tuple[FlightCosts, FlightCosts]  # before and after, flights 0 to n − 1
+    fresh: tuple[FlightCosts, FlightCosts]  # before and after, flights n to 2n − 1
+    interval: tuple[float, float]  # [m] 95 % confidence of the cost after less before, on fresh flights
+
+    @property
+    def is_better(self) -> bool:
+        """True if the gains lower the cost of fresh flights, with 95 % confidence."""
+        return self.interval[1] < 0.0
+
+    @property
+    def tuned_vehicle(self) -> Vehicle:
+        """The vehicle with the gains that were found. Raises SpecError where they are no better."""
+        if not self.is_better:
+            raise SpecError(f"the gains of '{self.vehicle.name}' stay as they are: {self.verdict}")
+        return replace(self.vehicle, controller=self.controller)
+
+    @property
+    def verdict(self) -> str:
+        """In words, what the gains are worth."""
+        low, high = (f"{100 * bound:+.2f}" for bound in self.interval)
+        found = "better" if self.is_better else "no better"
+        return f"the gains found are {found} on fresh flights, cost {low} to {high} cm (95 % confidence)"
+
+    def __str__(self) -> str:
+        """One line for people."""
+        before, after = self.fresh
+        return f"{self.vehicle.name}: {self.verdict}; before, {before}; after, {after}"
+
+
+@validated
+def tune(
+    plan: Plan | Sequence[Plan],
+    conditions: Dispersion | str = "lab",
+    flights: Flights = 200,
+    seed: Seed = 0,
+    *,
+    vehicle: Vehicle | str | None = None,
+    gains: Sequence[str] = TUNED,
+    evaluations: Evaluations = 150,
+    time_limit: NonNegative | None = None,
+    progress: Callable[[int, float], None] | None = None,
+) -> Tuning:
+    """Search the controller gains with which a vehicle flies plans best under conditions.
+
+    Each gain may be changed by a factor of up to 4 from the vehicle's own. What is lowered is the largest
+    position error that 95 % of flights stay within, and 5 cm more for each flight in 100 that is lost, misses
+    a gate or hits its frame. The best gains are flown once more beside the vehicle's own, on as many flights
+    with other numbers; whether they are better there, the result says.
+
+    Args:
+        plan: What is flown, one or several for one vehicle.
+        conditions: What flights draw from, or the name of a preset or a file.
+        flights: How many of each plan each set of gains flies.
+        seed: Of their draws.
+        vehicle: Whose gains are sought, or its name, by default the plans' own.
+        gains: The settings of its controller that may change: any of TUNABLE.
+        evaluations: How many sets of gains may be tried.
+        time_limit: Of the search [s]; the best gains until then are judged.
+        progress: Called after each set of gains with how many there were, and the lowest cost so far [m].
+
+    Raises SpecError for plans of several vehicles, and for gains that are unknown or zero.
+    """
+    plans = (plan,) if isinstance(plan, Plan) else tuple(plan)
+    flown = _vehicle_of(plans, vehicle)
+    names = _checked(gains, flown.controller)
+    objective = _Objective(plans, flown, as_dispersion(conditions), seed)
+    search = _Search(objective, names, range(flights), evaluations, progress)
+    with within_time(time_limit):
+        search.run()
+    training = objective.fly(flown.controller, range(flights)), search.best
+    others = range(flights, 2 * flights)
+    fresh = objective.fly(flown.controller, others), objective.fly(search.controller, others)
+    interval = _confidence(*fresh, seed)
+    return Tuning(flown, search.controller, names, search.tried, training, fresh, interval)
+
+
+def _vehicle_of(plans: Sequence[Plan], vehicle: Vehicle | str | None) -> Vehicle:
+    """The one vehicle that flies some plans."""
+    if not plans:
+        raise SpecError("plan must be one plan or more")
+    first = vehicle_of(plans[0], vehicle)
+    if any(vehicle_of(plan, vehicle) != first for plan in plans[1:]):
+        raise SpecError("plan: the plans are of several vehicles; give vehicle, or tune for each by itself")
+    return first
+
+
+def _checked(gains: Sequence[str], controller: Controller) -> tuple[str, ...]:
+    """The names of gains that a factor can change."""
+    if not gains or isinstance(gains, str):
+        raise SpecError(f"gains must be one or more of {', '.join(TUNABLE)}")
+    for name in gains:
+        if name not in TUNABLE:
+            raise unknown_name("gain", name, TUNABLE)
+        if getattr(controller, name) == 0.0:
+            raise SpecError(f"gains: {name} is 0, which no factor changes; leave it out")
+    return tuple(dict.fromkeys(gains))
+
+
+@dataclass(frozen=True)
+class _Objective:
+    """What every set of gains is tried on."""
+
+    plans: tuple[Plan, ...]
+    vehicle: Vehicle
+    conditions: Dispersion
+    seed: int
+
+    def fly(self, controller: Controller, flights: range) -> FlightCosts:
+        """The flights of these numbers, of each plan."""
+        scores = [
+            score_flights(
+                plan,
+                self.vehicle,
+                conditions=self.conditions,
+                seed=self.seed,
+                flights=flights,
+                controller=controller,
+            )
+            for plan in self.plans
+        ]
+        errors, failed = [_errors(each) for each in scores], [_failed(each) for each in scores]
+        return FlightCosts(frozen(errors, "max_position_error_m"), frozen(failed, "failed"))
+
+
+def _errors(scores: Scores) -> Array:
+    lost = np.isfinite(scores.stop)
+    return np.where(lost, DIVERGENCE_RADIUS, np.minimum(scores.max_position_error_m, DIVERGENCE_RADIUS))
+
+
+def _failed(scores: Scores) -> Array:
+    return np.array([0.0 if outcome.is_success else 1.0 for outcome in scores.outcomes])
+
+
+class _Ended(Exception):
+    """The search has had its time, or its share of tries."""
+
+
+class _Search:
+    """Gains that are tried, and the best of them."""
+
+    def __init__(
+        self,
+        objective: _Objective,
+        names: tuple[str, ...],
+        flights: range,
+        evaluations: int,
+        progress: Callable[[int, float], None] | None,
+    ) -> None:
+        self._objective, self._names, self._flights = objective, names, flights
+        self._evaluations = evaluations
+        self._progress = progress
+        self._lowest = inf
+        self.tried = 0
+        self.controller = objective.vehicle.controller
+
+    def run(self) -> None:
+        """Try the vehicle's own gains, then others, until none are better or time or tries are over."""
+        from scipy.optimize import minimize
+
+        size = len(self._names)
+        first = np.vstack([np.zeros(size), np.log(_FIRST_FACTOR) * np.eye(size)])
+        reach = np.log(MAX_FACTOR)
+        options = {
+            "initial_simplex": first,
+            "adaptive": True,
+            "xatol": _RESOLUTION,
+            "fatol": inf,
+            "maxiter": self._evaluations,
+        }
+        bounds = [(-reach, reach)] * size
+        with suppress(_Ended):
+            minimize(self._cost, first[0], method="Nelder-Mead", bounds=bounds, options=options)
+
+    def _cost(self, logarithms: Array) -> float:
+        if self.tried and (self.tried >= self._evaluations or out_of_time()):
+            raise _Ended
+        own = self._objective.vehicle.controller
+        factors = dict(zip(self._names, np.exp(logarithms).tolist(), strict=True))
+        changed = {name: getattr(own, name) * factor for name, factor in factors.items()}
+        controller = replace(own, **changed)
+        costs = self._objective.fly(controller, self._flights)
+        self.tried += 1
+        if costs.cost < self._lowest:
+            self._lowest, self.best, self.controller = costs.cost, costs, controller
+        if self._progress is not None:
+            self._progress(self.tried, self._lowest)
+        return costs.cost
+
+
+def _confidence(before: FlightCosts, after: FlightCosts, seed: int) -> tuple[float, float]:
+    """The 95 % interval of the cost after less before, by resampling flights, each with both its gains."""
+    rng = np.random.default_rng(seed)
+    count: int = before.failed.shape[-1]
+    picks = (rng.integers(count, size=(count,)) for _ in range(_RESAMPLES))
+    differences = [after.resampled(pick).cost - before.resampled(pick).cost for pick in picks]
+    low, high = np.quantile(differences, [0.025, 0.975])
+    return float(low), float(high)
