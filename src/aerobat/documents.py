@@ -63,9 +63,9 @@ def read_document(path: str | Document, cls: type[T], kind: str, **defaults: Any
         return from_table(cls, defaults | _parse(read_text(document)))
 
 
-def write_document(path: str | os.PathLike[str], table: Mapping[str, Any], kind: str) -> None:
+def write_document(path: str | os.PathLike[str], table: Mapping[str, Any]) -> None:
     """Write `table` as a TOML file, whole or not at all. Raises SpecError when the file cannot be written."""
-    with in_document(Path(path), kind), whole_file(Path(path)) as temporary:
+    with whole_file(Path(path)) as temporary:
         temporary.write_text(to_toml(table), encoding="utf-8")
 
 

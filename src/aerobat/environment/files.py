@@ -35,4 +35,4 @@ def as_dispersion(dispersion: Dispersion | str) -> Dispersion:
 @validated
 def write_dispersion(dispersion: Dispersion | str, path: PathName) -> None:
     """Write conditions as TOML, whole or not at all. Raises SpecError when the file cannot be written."""
-    write_document(path, to_table(as_dispersion(dispersion)), "conditions")
+    write_document(path, to_table(as_dispersion(dispersion)))

@@ -33,4 +33,4 @@ def as_problem(problem: Problem | str) -> Problem:
 @validated
 def write_problem(problem: Problem | str, path: PathName) -> None:
     """Write a problem as TOML, whole or not at all. Raises SpecError when the file cannot be written."""
-    write_document(path, to_table(as_problem(problem)), "problem")
+    write_document(path, to_table(as_problem(problem)))

@@ -47,4 +47,4 @@ def vehicle_text(name_or_path: PathName) -> str:
 @validated
 def write_vehicle(vehicle: Vehicle | str, path: PathName) -> None:
     """Write a vehicle as TOML, whole or not at all. Raises SpecError when the file cannot be written."""
-    write_document(path, to_table(as_vehicle(vehicle)), "vehicle")
+    write_document(path, to_table(as_vehicle(vehicle)))

@@ -103,7 +103,7 @@ def default_vehicle(paper: bool = False) -> str:
 def write_record(record: RunRecord, folder: Path) -> None:
     """Write a run's record to its folder, with the versions of all that may change its numbers."""
     facts = {"format": record.format, "versions": installed_versions()}
-    write_document(folder / RECORD, to_table(record) | facts, "run")
+    write_document(folder / RECORD, to_table(record) | facts)
 
 
 def read_record(folder: Path) -> RunRecord:
