@@ -126,7 +126,7 @@ def test_too_many_values_and_values_given_twice_are_refused() -> None:
 def test_a_document_is_read_as_it_was_written(tmp_path: Path) -> None:
     path = tmp_path / "scene.toml"
     scene = Scene(Box((1, 2, 3), True), 2.0, extras=[Box((4, 5, 6))])
-    write_document(path, to_table(scene), "scene")
+    write_document(path, to_table(scene))
     assert read_document(str(path), Scene, "scene") == scene
     assert [entry.name for entry in tmp_path.iterdir()] == ["scene.toml"]
 
@@ -198,7 +198,7 @@ def test_any_value_in_python_makes_a_value_or_one_sentence(toward: Any, length: 
 def test_a_document_that_cannot_be_written_is_a_sentence_and_leaves_nothing(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
     with pytest.raises(SpecError, match=r"^scene file .*scene\.toml: "):
-        write_document(tmp_path / "file" / "scene.toml", {"shape": BOX}, "scene")
+        write_document(tmp_path / "file" / "scene.toml", {"shape": BOX})
     assert [entry.name for entry in tmp_path.iterdir()] == ["file"]
 
 
