@@ -197,7 +197,7 @@ def test_any_value_in_python_makes_a_value_or_one_sentence(toward: Any, length: 
 
 def test_a_document_that_cannot_be_written_is_a_sentence_and_leaves_nothing(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
-    with pytest.raises(SpecError, match=r"^scene file .*scene\.toml: "):
+    with pytest.raises(SpecError, match=r"^cannot write .*scene\.toml: "):
         write_document(tmp_path / "file" / "scene.toml", {"shape": BOX})
     assert [entry.name for entry in tmp_path.iterdir()] == ["file"]
 
