@@ -140,6 +140,8 @@ def _arguments(name: str, folder: Path) -> dict[str, Any]:
             "config": ab.FlightConfig(rate=100.0, engine="floats"),
         },
         "implausibilities": {"vehicle": agile},
+        "inspect_flight": _inspected(),
+        "inspection_figure": {"inspection": instance(ab.Inspection)},
         "import_plugin": {"path": saved["plugin"]},
         "load_dispersion": {"name_or_path": "lab"},
         "load_flight": {"path": saved["flight"]},
@@ -341,6 +343,16 @@ def _causes() -> dict[str, Any]:
     }
 
 
+def _inspected() -> dict[str, Any]:
+    """A flight and its plan."""
+    return {
+        "flight": flight(),
+        "plan": plan(),
+        "vehicle": ab.load_vehicle("agile-quad"),
+        "controller": ab.Controller(),
+    }
+
+
 @cache
 def _hopeless() -> ab.Problem:
     """A problem that every planner refuses at once."""
@@ -380,10 +392,12 @@ def instance(cls: type) -> Any:
         ab.Ellipsoid: lambda: ab.Ellipsoid((0.2, 0.2, 0.05), (0.0, 0.0, 0.01)),
         ab.EndState: lambda: ab.at_rest((0.0, 0.0, 1.0)),
         ab.ErrorCauses: lambda: ab.error_causes(**_causes()),
+        ab.ErrorShare: lambda: ab.inspect_flight(**_inspected()).shares[0],
         ab.Estimates: lambda: ab.estimate(_log()),
         ab.FlatState: lambda: plan().trajectory.flat(0.1),
         ab.Flight: flight,
         ab.Gate: lambda: ab.tilted_gate((0.0, 0.0, 1.0)),
+        ab.Inspection: lambda: ab.inspect_flight(**_inspected()),
         ab.Outage: lambda: ab.Outage(0.1, 0.5),
         ab.Opening: lambda: ab.smallest_opening(**_wide_enough()),
         ab.Passing: lambda: ab.plan_to_pass(**PASSING),

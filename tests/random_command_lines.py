@@ -100,6 +100,7 @@ OWN = {
     ],
     "repeat": ["--out", "--json", "--import"],
     "view": ["--html", "--video", "--speed", "--json", "--import", "--vehicle"],
+    "inspect": ["--plan", "--figure", "--json", "--import", "--vehicle"],
     "vehicles": ["--help"],
     "problems": ["--help"],
     "compare": ["--out", "--angle", "--json", "--vehicle"],
@@ -135,7 +136,14 @@ def command_lines(count: int, seed: int) -> Iterator[list[str]]:
 
 def _command_line(rng: random.Random) -> list[str]:
     command = rng.choice(
-        [*["fly", "plan", "check", "repeat", "view"] * 4, "compare", "vehicles", "problems", "flyy", ""]
+        [
+            *["fly", "plan", "check", "repeat", "view", "inspect"] * 4,
+            "compare",
+            "vehicles",
+            "problems",
+            "flyy",
+            "",
+        ]
     )
     line = [command] if command else []
     names = OWN.get(command, list(VALUES))
@@ -144,6 +152,7 @@ def _command_line(rng: random.Random) -> list[str]:
             "check": ("kept", "path.csv", "kept/line.plan"),
             "repeat": ("kept",),
             "view": ("kept", "kept/line.plan", "kept/flight.npz"),
+            "inspect": ("kept", "kept/flight.npz"),
             "compare": ("lien",),
         }
         line.append(rng.choice(right.get(command, CHEAP) if rng.random() < 0.6 else BROKEN))

@@ -148,7 +148,17 @@ def test_help_tells_every_command_and_option(capsys) -> None:
     _, out, _ = run(capsys, "--help")
     assert all(
         command in out
-        for command in ("fly", "plan", "check", "compare", "sweep", "tune", "vehicles", "Exit codes")
+        for command in (
+            "fly",
+            "plan",
+            "check",
+            "compare",
+            "sweep",
+            "tune",
+            "inspect",
+            "vehicles",
+            "Exit codes",
+        )
     )
     _, out, _ = run(capsys, "fly", "--help")
     options = "vehicle planner order intervals segments stop-after backend paper angle out json seed"

@@ -81,6 +81,7 @@ from .problem import (
 from .reporting.comparison import comparison_figure
 from .reporting.data_frames import to_dataframe
 from .reporting.figures import draw
+from .reporting.inspection import inspection_figure
 from .reporting.motion.video import write_video
 from .reporting.sweeps.figure import sweep_figure
 from .reporting.tracking import tracking_figure
@@ -88,6 +89,7 @@ from .simulation import Flight, FlightConfig, Outcome, fly, load_flight, prepare
 from .states import BodyState, FlatState, Setpoint, Wrench
 from .studies.compare import Comparison, compare
 from .studies.error_causes import Cause, ErrorCauses, error_causes
+from .studies.inspection import ErrorShare, Inspection, inspect_flight
 from .studies.passing import Passing, plan_to_pass
 from .studies.sweep import Share, Sweep, sweep
 from .studies.tune import Tuning, tune
@@ -117,6 +119,7 @@ __all__ = [
     "Envelope",
     "Environment",
     "ErrorCauses",
+    "ErrorShare",
     "Estimates",
     "FlatState",
     "Flight",
@@ -132,6 +135,7 @@ __all__ = [
     "HandOff",
     "Imu",
     "Infeasible",
+    "Inspection",
     "Limits",
     "Line",
     "Maneuver",
@@ -180,6 +184,8 @@ __all__ = [
     "implausibilities",
     "import_plugin",
     "import_vehicle",
+    "inspect_flight",
+    "inspection_figure",
     "load_dispersion",
     "load_flight",
     "load_plan",

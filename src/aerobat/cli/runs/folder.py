@@ -26,11 +26,13 @@ from aerobat.simulation import Flight
 from aerobat.storage import whole_folder
 
 FLIGHT = "flight.npz"
+INSPECTION = "inspect.png"  # so does its inspection, by `aerobat inspect`
 REPLAY = "replay.html"  # joins the run later, by `aerobat view`
 FILES = (
     RECORD,
     FLIGHT,
     REPLAY,
+    INSPECTION,
     "plan.npz",
     "plan.csv",
     "report.json",

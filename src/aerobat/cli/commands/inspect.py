@@ -1,0 +1,58 @@
+"""`aerobat inspect`: what caused a recorded flight's error."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import Annotated
+
+from cyclopts import Parameter
+
+from aerobat.cli.options import InspectOptions
+from aerobat.cli.runs.folder import FLIGHT, INSPECTION
+from aerobat.cli.runs.saved_plans import named_vehicle
+from aerobat.cli.terminal import print_json
+from aerobat.errors import SpecError
+from aerobat.interchange import read_plan
+from aerobat.planning import Plan
+from aerobat.reporting.inspection import inspection_figure
+from aerobat.reporting.page import png
+from aerobat.reporting.report_json import to_json
+from aerobat.simulation import load_flight
+from aerobat.storage import whole_file
+from aerobat.studies.inspection import inspect_flight
+
+
+def inspect(log: Path, options: Annotated[InspectOptions, Parameter(name="*")] = InspectOptions()) -> None:
+    """Say what caused a recorded flight's error: start, saturation, delay, hand-off, gains or the vehicle.
+
+    Prints each cause's part of the largest position error and what would mend the main one, and writes a
+    picture of them to inspect.png in the log's folder.
+
+    Parameters
+    ----------
+    log
+        A folder that `aerobat fly` wrote, or a flight's .npz file.
+    """
+    file = log / FLIGHT if os.path.isdir(log) else log
+    flight = load_flight(file)
+    plan = read_plan(options.plan or file.parent)
+    if not isinstance(plan, Plan):
+        raise SpecError(
+            f"{options.plan or file.parent} holds a path alone; give the flight's .plan file as --plan"
+        )
+    vehicle = None if options.vehicle is None else named_vehicle(options.vehicle)
+    found = inspect_flight(flight, plan, vehicle)
+    picture = options.figure or file.parent / INSPECTION
+    image = png(inspection_figure(found))
+    with whole_file(picture) as temporary:
+        temporary.write_bytes(image)
+    if options.json:
+        print_json(to_json(found.record()))
+        return
+    print(found.verdict)
+    for share in found.shares:
+        print(f"  {share}")
+    for remark in found.remarks:
+        print(remark)
+    print(f"written to {picture}")

@@ -1,0 +1,55 @@
+"""A picture of an inspection: a flight's position error, and what each cause put into it."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from aerobat.arrays import Array
+from aerobat.declaration import validated
+from aerobat.reporting.page import AXIS, TITLES, blank_page, heading, house_style, panel
+from aerobat.reporting.style import BLUE, FAINT, INK, RED
+from aerobat.studies.inspection import CAUSES, Inspection
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+ERROR = 1.7  # [in] the height of the whole error's timeline
+CAUSE = 0.75  # [in] of one cause's
+GAP = 0.5  # [in] between causes, for a name
+LEFT = 0.9  # [in]
+WIDTH = 10.4  # [in]
+
+
+@validated
+def inspection_figure(inspection: Inspection) -> Figure:
+    """Draw a flight's position error, and below it each cause's part along the largest error.
+
+    The main cause is red; a line marks the time of the largest error.
+    """
+    with house_style():
+        height = AXIS + len(CAUSES) * (CAUSE + GAP) + ERROR + TITLES
+        figure = blank_page(height, "What caused the error", [inspection.verdict])
+        top = height - TITLES - ERROR
+        whole = panel(figure, LEFT, top, WIDTH, ERROR)
+        heading(whole, "Position error", "[cm] distance from the set-point")
+        _draw(whole, inspection, np.linalg.norm(inspection.error, axis=1), INK)
+        direction = inspection.direction
+        parts = {name: errors @ direction for name, errors in inspection.errors.items()}
+        limit = 110.0 * max(float(np.abs(part).max()) for part in parts.values()) + 1e-3
+        for k, share in enumerate(inspection.shares, 1):
+            axes = panel(figure, LEFT, top - k * (CAUSE + GAP), WIDTH, CAUSE)
+            colour = RED if share.cause == inspection.cause else BLUE
+            heading(axes, "", str(share))
+            _draw(axes, inspection, parts[share.cause], colour)
+            axes.set_ylim(-limit, limit)
+        axes.set_xlabel("time [s]")
+    return figure
+
+
+def _draw(axes: Axes, inspection: Inspection, error: Array, colour: str) -> None:
+    axes.plot(inspection.times, 100.0 * error, color=colour)
+    axes.axvline(inspection.time, color=FAINT, linewidth=0.9)
+    axes.set_xlim(inspection.times[0], inspection.times[-1])

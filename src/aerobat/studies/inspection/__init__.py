@@ -1,0 +1,6 @@
+"""A recorded flight's error, told apart by what caused it."""
+
+from aerobat.studies.inspection.inspect_flight import inspect_flight
+from aerobat.studies.inspection.result import CAUSES, ErrorShare, Inspection
+
+__all__ = ["CAUSES", "ErrorShare", "Inspection", "inspect_flight"]

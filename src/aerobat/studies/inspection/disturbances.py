@@ -1,0 +1,161 @@
+"""Accelerations by which a logged vehicle left what its controller would have had it do, each of one cause.
+
+With the error e = p − p_ref and the position loop's own answer to it, F(e) = −(k_p e + k_v e' + k_i ∫e),
+
+    e'' = F(e) + [F(ê) − F(e)] + [a_thrust − a_ref − F(ê)] + [a − a_thrust]
+
+where ê is the error as the observer had it, and a_thrust what the nominal vehicle does under the thrusts
+that were logged: the observer's part, what was not delivered, and what the vehicle's model leaves out.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import IntEnum
+
+import numpy as np
+
+from aerobat import so3
+from aerobat.arrays import Array
+from aerobat.control.parameters import controller_parameters
+from aerobat.kernels.control_loops import Gains
+from aerobat.simulation import Flight
+from aerobat.vehicle import Vehicle
+from aerobat.vehicle.allocation import rotor_thrusts
+from aerobat.vehicle.controller import Controller
+from aerobat.vehicle.fleet import Fleet
+
+_RECOVERY = 3.0  # time constants 1/ω_n of the attitude loop, after a saturation that is still felt
+_SLACK = 0.02  # of a rotor's range, by which derivatives taken between rows may err
+_LONGEST_DELAY = 0.2  # [s] that is looked for
+
+
+@dataclass(frozen=True)
+class PositionLoop:
+    """Gains of the position loop, and how long the attitude loop takes to forget."""
+
+    position: float  # [1/s²]
+    velocity: float  # [1/s]
+    integral: float  # [1/s³]
+    recovery: float  # [s]
+
+    @classmethod
+    def of(cls, controller: Controller, vehicle: Vehicle, flight: Flight) -> PositionLoop:
+        """Gains that a controller has for a vehicle."""
+        gains: Gains = controller_parameters(controller, Fleet.of([vehicle]), flight.environment).gains
+        p, v, i, stiffness = (
+            float(np.ravel(gain)[0])
+            for gain in (gains.position, gains.velocity, gains.integral, gains.stiffness)
+        )
+        return cls(p, v, i, _RECOVERY / np.sqrt(max(stiffness, 1e-9) / 2.0))
+
+    def feedback(self, times: Array, error: Array, rate: Array) -> Array:
+        """The answer [m/s²] to errors [m] and their rates [m/s], (T, 3)."""
+        steps = np.diff(times)[:, None] * _between(error)
+        integral = np.concatenate([np.zeros((1, 3)), np.cumsum(steps, axis=0)])
+        return -(self.position * error + self.velocity * rate + self.integral * integral)
+
+
+class Kind(IntEnum):
+    """How what was not delivered between two rows came about."""
+
+    UNSATURATED = 0
+    ASKED_BY_PLAN = 1  # the set-points themselves ask rotors for more than they can
+    LED_TO = 2  # they do not: an error that was there before does
+
+
+@dataclass(frozen=True)
+class Disturbances:
+    """Mean accelerations [m/s²] between rows, world, (T − 1, 3) each."""
+
+    observer: Array  # by what the observer saw wrongly
+    vehicle: Array  # by what the vehicle's model leaves out
+    missing: Array  # not delivered
+    kinds: Array  # Kind of what is missing, (T − 1,)
+
+
+def disturbances(flight: Flight, vehicle: Vehicle, loop: PositionLoop) -> Disturbances:
+    """All that moved a flight's vehicle, nominally `vehicle`, other than its position loop would have."""
+    true = loop.feedback(
+        flight.times,
+        flight.position - flight.setpoint_position,
+        flight.velocity - flight.setpoint_velocity,
+    )
+    seen = true
+    if "since_pose" in flight.series:
+        seen = loop.feedback(
+            flight.times,
+            flight.observed_position - flight.setpoint_position,
+            flight.observed_velocity - flight.setpoint_velocity,
+        )
+    lift = _lift(flight, vehicle) - flight.setpoint_acceleration
+    off = flight.velocity - flight.setpoint_velocity
+    moved = np.diff(off, axis=0) / np.diff(flight.times)[:, None]
+    return Disturbances(
+        observer=_between(seen - true),
+        vehicle=moved - _between(lift),
+        missing=_between(lift - seen),
+        kinds=_kinds(flight, vehicle, loop.recovery),
+    )
+
+
+def command_delay(flight: Flight, vehicle: Vehicle) -> float:
+    """The time [s] from commands to the rotors that obey them, by the rotors' nominal lags; 0 to 0.2 s.
+
+    Rotors with lag τ that take up commands d late, d within one row, miss what they would give at once by
+    (u' − u) (e^(−(h − d)/τ) − e^(−h/τ)), where u follows u': of which d is told by regression.
+    """
+    steps = np.diff(flight.times)
+    h = float(np.median(steps))
+    lags = np.maximum(Fleet.of([vehicle]).lags.ravel(), 1e-9)
+    left = np.exp(-h / lags)
+    thrusts, commands = flight.thrusts, flight.commands
+    best, delay = np.inf, 0.0
+    for rows in range(min(int(_LONGEST_DELAY / h), len(steps) // 2)):
+        now = commands[1 : len(commands) - 1 - rows]
+        before = commands[: len(commands) - 2 - rows]
+        start = thrusts[1 + rows : -1]
+        rest = thrusts[2 + rows :] - now - (start - now) * left
+        change = before - now
+        power = float(np.sum(change**2))
+        slope = float(np.clip(np.sum(rest * change) / power, 0.0, 1.0 - left.mean())) if power > 0.0 else 0.0
+        remains = float(np.mean((rest - slope * change) ** 2))
+        if remains < best * (1.0 - 1e-6):
+            lag = float(lags.mean())
+            best, delay = remains, rows * h + h + lag * float(np.log(slope + np.exp(-h / lag)))
+    return delay
+
+
+def _lift(flight: Flight, vehicle: Vehicle) -> Array:
+    """The acceleration [m/s²] of the nominal vehicle under the logged thrusts, (T, 3)."""
+    q, air = flight.q_world_body, flight.environment
+    drag = so3.rotate(q, vehicle.drag_body * so3.unrotate(q, flight.velocity - air.wind))
+    collective = flight.thrusts.sum(axis=-1)[:, None] * so3.rotate(q, np.array([0.0, 0.0, 1.0]))
+    return np.asarray((collective - drag) / vehicle.mass - np.array([0.0, 0.0, air.gravity]))
+
+
+def _kinds(flight: Flight, vehicle: Vehicle, recovery: float) -> Array:
+    """Kind of what is missing between rows, until the `recovery` [s] after a saturation, (T − 1,)."""
+    begin = flight.times[:-1]
+    beyond = flight.saturated & _asked_too_much(flight, vehicle)
+    saturated, asked = (
+        begin - np.maximum.accumulate(np.where(rows[:-1], begin, -np.inf)) <= recovery
+        for rows in (flight.saturated, beyond)
+    )
+    return np.where(asked, Kind.ASKED_BY_PLAN, np.where(saturated, Kind.LED_TO, Kind.UNSATURATED))
+
+
+def _asked_too_much(flight: Flight, vehicle: Vehicle) -> Array:
+    """True where the set-points ask any rotor for thrust, or a lead of its lag, beyond its limits, (T,)."""
+    asked = rotor_thrusts(vehicle, flight.setpoint.wrench)
+    lags = Fleet.of([vehicle]).lags.ravel()
+    slack = _SLACK * (flight.max_thrusts - flight.min_thrusts)
+    led = asked + lags * np.gradient(asked, flight.times, axis=0)
+    outside = (np.minimum(asked, led) < flight.min_thrusts - slack) | (
+        np.maximum(asked, led) > flight.max_thrusts + slack
+    )
+    return np.asarray(outside.any(axis=-1))
+
+
+def _between(values: Array) -> Array:
+    return np.asarray(0.5 * (values[1:] + values[:-1]))

@@ -1,0 +1,69 @@
+"""The error that each cause leaves in the closed position loop; being linear, they add up to the whole."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.linalg import expm
+
+from aerobat.arrays import Array
+from aerobat.studies.inspection.disturbances import Disturbances, Kind, PositionLoop
+
+_ANSWERED = 1e-3  # [m/s²] of feedback, below which it answers nothing but rounding
+NAMES = ("start", "hand-off", "vehicle", "saturation", "delay", "gains")
+
+
+def responses(
+    times: Array, start: tuple[Array, Array], found: Disturbances, loop: PositionLoop, unsaturated: str
+) -> dict[str, Array]:
+    """Errors [m] by their causes, (T, 3) each.
+
+    What is missing in a saturation that the plan did not ask for goes to the cause whose error was the
+    largest when it began: that error is what the controller was answering.
+
+    Args:
+        times: Of the rows [s], (T,).
+        start: The error of position [m] and of velocity [m/s] in the first row, (3,) each.
+        found: Accelerations held between rows.
+        loop: The position loop.
+        unsaturated: The cause of what is missing without a saturation, of NAMES.
+    """
+    state = np.zeros((3, len(NAMES), 3))  # position, velocity, integral
+    state[0, 0], state[1, 0] = start
+    errors = [state[0]]
+    steps = {float(h): _step(float(h), loop) for h in np.unique(np.diff(times))}
+    answered, before = NAMES.index(unsaturated), Kind.UNSATURATED
+    for row, h in enumerate(np.diff(times)):
+        kind = Kind(found.kinds[row])
+        if kind is not before:
+            answered = _cause(kind, state, loop, NAMES.index(unsaturated))
+        before = kind
+        push = np.zeros((len(NAMES), 3))
+        push[NAMES.index("hand-off")] = found.observer[row]
+        push[NAMES.index("vehicle")] = found.vehicle[row]
+        push[answered] += found.missing[row]
+        forward, gain = steps[float(h)]
+        state = np.einsum("ij,jck->ick", forward, state) + gain[:, None, None] * push
+        errors.append(state[0])
+    series = np.stack(errors)
+    return {name: series[:, k] for k, name in enumerate(NAMES)}
+
+
+def _cause(kind: Kind, state: Array, loop: PositionLoop, unsaturated: int) -> int:
+    """The number of the cause of what is missing from now on."""
+    if kind is Kind.ASKED_BY_PLAN:
+        return NAMES.index("saturation")
+    if kind is Kind.UNSATURATED:
+        return unsaturated
+    sizes = loop.position * np.linalg.norm(state[0], axis=-1) + loop.velocity * np.linalg.norm(
+        state[1], axis=-1
+    )
+    return int(np.argmax(sizes)) if sizes.max() > _ANSWERED else unsaturated
+
+
+def _step(h: float, loop: PositionLoop) -> tuple[Array, Array]:
+    """The closed loop over one row: x → A x + b d."""
+    rates = np.zeros((4, 4))
+    rates[0, 1] = rates[1, 3] = rates[2, 0] = 1.0
+    rates[1, :3] = -loop.position, -loop.velocity, -loop.integral
+    whole = expm(h * rates)
+    return whole[:3, :3], whole[:3, 3]

@@ -1,0 +1,145 @@
+"""An inspection's result: how many centimetres of a flight's error each cause accounts for."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+
+import numpy as np
+
+from aerobat.arrays import Array
+from aerobat.declaration import by_value, short
+from aerobat.simulation.outcome import length
+from aerobat.studies.inspection.alignment import Alignment
+
+NEGLIGIBLE = 0.005  # [m] of error at most that calls for no cause: millimetres remain in the best flights
+_RISE = 1e-9  # [m] below which an error has no direction
+CAUSES: Mapping[str, tuple[str, str]] = MappingProxyType(
+    {
+        "start": ("the start offset", "hold the vehicle at the plan's start for longer before it begins"),
+        "saturation": ("saturation", "plan with a larger `reserve`, or with limits the rotors can keep"),
+        "delay": ("delay", "shorten `computation_delay`"),
+        "hand-off": (
+            "what the observer saw, as at a hand-off of cameras",
+            "align the camera systems, see `motion_capture.hand_off`",
+        ),
+        "gains": (
+            "thrust and attitude that fell short of their commands unsaturated",
+            "find gains with `aerobat tune`",
+        ),
+        "vehicle": (
+            "a vehicle or air other than planned for",
+            "weigh the vehicle and measure its thrusts: `mass`, `max_thrust`, `drag`, wind",
+        ),
+    }
+)
+
+
+@dataclass(frozen=True)
+class ErrorShare:
+    """One cause's part of the largest position error."""
+
+    cause: str  # of CAUSES
+    error: float  # [m] along the largest error, below 0 where it made that smaller
+    begin: float  # [s] when its own error first exceeded half of its largest
+    end: float  # [s] when it last did
+
+    def __str__(self) -> str:
+        """One line for people."""
+        felt = f"felt from {self.begin:.2f} to {self.end:.2f} s"
+        return f"{CAUSES[self.cause][0]}: {100 * self.error:+.1f} cm, {felt}"
+
+
+@short
+@by_value
+@dataclass(frozen=True, eq=False, repr=False)
+class Inspection:
+    """What caused a flight's position error."""
+
+    times: Array  # [s] of the log, (T,)
+    error: Array  # [m] position less set-point, world, (T, 3)
+    errors: Mapping[str, Array]  # [m] of each of CAUSES, (T, 3), which add up to it
+    shares: tuple[ErrorShare, ...]  # of the largest error, the largest first
+    largest: float  # [m] position error
+    time: float  # [s] when it was
+    delay: float  # [s] from commands to rotors, by the log
+    saturated: float  # [-] part of the rows
+    observed: bool  # false where the log does not tell what an observer saw
+    alignment: Alignment
+
+    @property
+    def cause(self) -> str | None:
+        """The largest error's main cause, None where the error is too small for one."""
+        return None if self.largest < NEGLIGIBLE else self.shares[0].cause
+
+    @property
+    def direction(self) -> Array:
+        """The largest error's, a unit vector in world axes, (3,); zero where there is no error."""
+        worst = self.error[np.searchsorted(self.times, self.time)]
+        return np.asarray(worst / max(self.largest, _RISE))
+
+    @property
+    def remarks(self) -> tuple[str, ...]:
+        """All that bears on how far the result goes, a line each."""
+        place = self.alignment
+        shift = f"the log's clock reads {place.time_shift:.3f} s when the plan begins"
+        moved = f"its axes are turned by {np.rad2deg(place.yaw):.2f}° and moved by {length(place.moved)}"
+        blind = (
+            "the log does not hold what an observer saw: hand-offs and other errors of sensors do not show"
+        )
+        asked = {f"{shift}; {moved}": not place.is_none, blind: not self.observed}
+        return tuple(remark for remark, is_said in asked.items() if is_said)
+
+    @property
+    def verdict(self) -> str:
+        """The main cause and what would mend it, in one sentence."""
+        if self.cause is None:
+            return f"nothing stands out: the error is {length(self.largest)} at most"
+        first = self.shares[0]
+        name, remedy = CAUSES[first.cause]
+        of = f"{length(first.error)} of the largest error, {length(self.largest)} at {self.time:.2f} s"
+        return f"{name} explains {of}; {remedy}"
+
+    def __str__(self) -> str:
+        """One line for people."""
+        return self.verdict
+
+    def record(self) -> dict[str, object]:
+        """All but the series, for a file."""
+        shares = [
+            {"cause": one.cause, "error_m": one.error, "begin_s": one.begin, "end_s": one.end}
+            for one in self.shares
+        ]
+        place = self.alignment
+        return {
+            "verdict": self.verdict,
+            "cause": self.cause,
+            "max_position_error_m": self.largest,
+            "time_s": self.time,
+            "shares": shares,
+            "command_delay_s": self.delay,
+            "saturated_fraction": self.saturated,
+            "has_observer": self.observed,
+            "alignment": {
+                "time_shift_s": place.time_shift,
+                "yaw_deg": float(np.rad2deg(place.yaw)),
+                "translation_m": place.translation.tolist(),
+                "misfit_m": place.misfit,
+            },
+        }
+
+
+def share_of(cause: str, errors: Array, times: Array, worst: int, direction: Array) -> ErrorShare:
+    """One cause's share of the error in a row.
+
+    Args:
+        cause: Of CAUSES.
+        errors: Its own [m], (T, 3).
+        times: [s], (T,).
+        worst: The row.
+        direction: Of the whole error there, a unit vector, (3,).
+    """
+    size = np.linalg.norm(errors, axis=1)
+    felt = times[size >= 0.5 * size.max()]
+    return ErrorShare(cause, float(errors[worst] @ direction), float(felt[0]), float(felt[-1]))
