@@ -60,6 +60,8 @@ VALUES: dict[str, tuple[str, ...]] = {
         "x" * 300,
         "/proc/x",
     ),
+    "--plan": ("kept", "kept/line.plan", "path.csv", "empty", "missing", "x" * 300),
+    "--figure": ("picture.png", "folder", "", "/dev/null/x", "x" * 300),
     "--html": ("page.html", "kept/replay.html", "kept/plan.csv", "folder", "", "/dev/null/x", "x" * 300),
     "--video": ("video.gif", "video.avi", "folder", "", "/dev/null/x.gif", "x" * 300 + ".mp4"),
     "--speed": ("5", *(n for n in NUMBERS if n not in ("1", "0.5"))),
@@ -135,16 +137,8 @@ def command_lines(count: int, seed: int) -> Iterator[list[str]]:
 
 
 def _command_line(rng: random.Random) -> list[str]:
-    command = rng.choice(
-        [
-            *["fly", "plan", "check", "repeat", "view", "inspect"] * 4,
-            "compare",
-            "vehicles",
-            "problems",
-            "flyy",
-            "",
-        ]
-    )
+    often = ["fly", "plan", "check", "repeat", "view", "inspect"]
+    command = rng.choice([*often * 4, "compare", "vehicles", "problems", "flyy", ""])
     line = [command] if command else []
     names = OWN.get(command, list(VALUES))
     if command not in ("vehicles", "problems") and rng.random() < 0.95:

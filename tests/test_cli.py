@@ -146,19 +146,10 @@ def test_an_infeasible_problem_ends_with_its_sentence_and_nothing_written(capsys
 
 def test_help_tells_every_command_and_option(capsys) -> None:
     _, out, _ = run(capsys, "--help")
+    assert "Exit codes" in out
     assert all(
         command in out
-        for command in (
-            "fly",
-            "plan",
-            "check",
-            "compare",
-            "sweep",
-            "tune",
-            "inspect",
-            "vehicles",
-            "Exit codes",
-        )
+        for command in ["fly", "plan", "check", "compare", "sweep", "tune", "inspect", "vehicles"]
     )
     _, out, _ = run(capsys, "fly", "--help")
     options = "vehicle planner order intervals segments stop-after backend paper angle out json seed"

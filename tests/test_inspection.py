@@ -1,4 +1,4 @@
-"""Inspection: a planted cause is named first, parts add up to the error, and axes and clocks do not matter."""
+"""Inspection: a planted cause is named first, parts add up to the error, axes and clocks do not matter."""
 
 from __future__ import annotations
 
@@ -15,13 +15,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import aerobat as ab
-from aerobat import so3
-from aerobat.cli.entry import main
+from aerobat import cli, so3
 from aerobat.simulation.flight import SERIES
 
 PLANS = (("flip-roll", "agile-quad"), ("half-flip", "hexarotor"))
 SEEDS = (1, 2, 3)
-OFF = ab.BodyState((0.1, 0.0, 0.0), (0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
 
 
 @cache
@@ -91,7 +89,9 @@ def test_a_flight_without_causes_is_told_to_be_without(number: int) -> None:
 
 @pytest.mark.parametrize(("rate", "delay"), [(500.0, 0.002), (100.0, 0.004), (100.0, 0.01), (50.0, 0.02)])
 def test_the_delay_of_commands_is_read_off_the_rotors(rate: float, delay: float) -> None:
-    flight = under(planned(0), 1, computation_delay=delay, control_rate=rate)
+    lab = ab.load_dispersion("lab")
+    sensors: dict[str, Any] = {"imu": lab.imu, "motion_capture": lab.motion_capture}
+    flight = under(planned(0), 1, computation_delay=delay, control_rate=rate, **sensors)
     assert ab.inspect_flight(flight, planned(0)).delay == pytest.approx(delay, abs=1e-4)
 
 
@@ -138,7 +138,7 @@ def test_other_axes_and_another_clock_change_no_share(
 def test_what_cannot_be_inspected_is_refused_in_a_sentence() -> None:
     plan = planned(0)
     flight = ab.fly(plan)
-    with pytest.raises(ab.SpecError, match="its path lies .* give the flight's own plan"):
+    with pytest.raises(ab.SpecError, match=r"its path lies .* give the flight's own plan"):
         ab.inspect_flight(flight, planned(1), plan.vehicle)
     with pytest.raises(ab.SpecError, match="hexarotor has 6 rotors and the flight 4"):
         ab.inspect_flight(flight, plan, "hexarotor")
@@ -164,11 +164,11 @@ def test_the_command_says_draws_and_prints_what_the_function_finds(tmp_path: Pat
     plan.save(tmp_path / "flip.plan")
     flight.save(tmp_path / "flight.npz")
     found = ab.inspect_flight(flight, plan)
-    assert main(["inspect", str(tmp_path)]) == 0
+    cli.main(["inspect", str(tmp_path)])
     assert found.verdict in capsys.readouterr().out
     assert (tmp_path / "inspect.png").read_bytes().startswith(b"\x89PNG")
     file, figure = str(tmp_path / "flight.npz"), str(tmp_path / "other.png")
-    assert main(["inspect", file, "--plan", str(tmp_path / "flip.plan"), "--figure", figure, "--json"]) == 0
+    cli.main(["inspect", file, "--plan", str(tmp_path / "flip.plan"), "--figure", figure, "--json"])
     record = json.loads(capsys.readouterr().out)
     assert record["verdict"] == found.verdict
     assert [share["cause"] for share in record["shares"]] == [share.cause for share in found.shares]

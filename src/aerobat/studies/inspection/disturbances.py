@@ -27,6 +27,7 @@ from aerobat.vehicle.fleet import Fleet
 
 _RECOVERY = 3.0  # time constants 1/ω_n of the attitude loop, after a saturation that is still felt
 _SLACK = 0.02  # of a rotor's range, by which derivatives taken between rows may err
+_CLOCK = 1e-6  # [s] to which clocks are read
 _LONGEST_DELAY = 0.2  # [s] that is looked for
 
 
@@ -139,7 +140,7 @@ def _kinds(flight: Flight, vehicle: Vehicle, recovery: float) -> Array:
     begin = flight.times[:-1]
     beyond = flight.saturated & _asked_too_much(flight, vehicle)
     saturated, asked = (
-        begin - np.maximum.accumulate(np.where(rows[:-1], begin, -np.inf)) <= recovery
+        begin - np.maximum.accumulate(np.where(rows[:-1], begin, -np.inf)) <= recovery + _CLOCK
         for rows in (flight.saturated, beyond)
     )
     return np.where(asked, Kind.ASKED_BY_PLAN, np.where(saturated, Kind.LED_TO, Kind.UNSATURATED))

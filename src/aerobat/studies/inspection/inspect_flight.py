@@ -61,9 +61,8 @@ def inspect_flight(
     causes = disturbances(flight, nominal, loop)
     error = flight.position - flight.setpoint_position
     rate = flight.velocity - flight.setpoint_velocity
-    errors = responses(
-        flight.times, (error[0], rate[0]), causes, loop, "delay" if delay > NOTICED else "gains"
-    )
+    unsaturated = "delay" if delay > NOTICED else "gains"
+    errors = responses(flight.times, (error[0], rate[0]), causes, loop, unsaturated)
     worst = int(np.argmax(flight.position_error))
     largest = float(flight.position_error[worst])
     direction = error[worst] / max(largest, RISE)

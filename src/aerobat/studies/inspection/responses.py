@@ -8,6 +8,7 @@ from scipy.linalg import expm
 from aerobat.arrays import Array
 from aerobat.studies.inspection.disturbances import Disturbances, Kind, PositionLoop
 
+_DIGITS = 9  # of a row's duration [s], so that rows alike are stepped alike
 _ANSWERED = 1e-3  # [m/s²] of feedback, below which it answers nothing but rounding
 NAMES = ("start", "hand-off", "vehicle", "saturation", "delay", "gains")
 
@@ -30,9 +31,10 @@ def responses(
     state = np.zeros((3, len(NAMES), 3))  # position, velocity, integral
     state[0, 0], state[1, 0] = start
     errors = [state[0]]
-    steps = {float(h): _step(float(h), loop) for h in np.unique(np.diff(times))}
+    durations = np.round(np.diff(times), _DIGITS)
+    steps = {float(h): _step(float(h), loop) for h in np.unique(durations)}
     answered, before = NAMES.index(unsaturated), Kind.UNSATURATED
-    for row, h in enumerate(np.diff(times)):
+    for row, h in enumerate(durations):
         kind = Kind(found.kinds[row])
         if kind is not before:
             answered = _cause(kind, state, loop, NAMES.index(unsaturated))
@@ -54,9 +56,8 @@ def _cause(kind: Kind, state: Array, loop: PositionLoop, unsaturated: int) -> in
         return NAMES.index("saturation")
     if kind is Kind.UNSATURATED:
         return unsaturated
-    sizes = loop.position * np.linalg.norm(state[0], axis=-1) + loop.velocity * np.linalg.norm(
-        state[1], axis=-1
-    )
+    off, rate = np.linalg.norm(state[:2], axis=-1)
+    sizes = loop.position * off + loop.velocity * rate
     return int(np.argmax(sizes)) if sizes.max() > _ANSWERED else unsaturated
 
 
