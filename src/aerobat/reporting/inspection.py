@@ -45,6 +45,7 @@ def inspection_figure(inspection: Inspection) -> Figure:
             heading(axes, "", str(share))
             _draw(axes, inspection, parts[share.cause], colour)
             axes.set_ylim(-limit, limit)
+            axes.tick_params(labelbottom=k == len(CAUSES))
         axes.set_xlabel("time [s]")
     return figure
 

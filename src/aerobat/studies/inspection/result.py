@@ -14,6 +14,7 @@ from aerobat.simulation.outcome import length
 from aerobat.studies.inspection.alignment import Alignment
 
 NEGLIGIBLE = 0.005  # [m] of error at most that calls for no cause: millimetres remain in the best flights
+_SHOWN = 5e-4  # [m] that is more than nothing in a line
 _RISE = 1e-9  # [m] below which an error has no direction
 CAUSES: Mapping[str, tuple[str, str]] = MappingProxyType(
     {
@@ -48,7 +49,8 @@ class ErrorShare:
     def __str__(self) -> str:
         """One line for people."""
         felt = f"felt from {self.begin:.2f} to {self.end:.2f} s"
-        return f"{CAUSES[self.cause][0]}: {100 * self.error:+.1f} cm, {felt}"
+        part = f"{CAUSES[self.cause][0]}: {100 * self.error:+.1f} cm"
+        return f"{part}, {felt}" if abs(self.error) >= _SHOWN else part
 
 
 @short
