@@ -76,6 +76,8 @@ PASSING: dict[str, Any] = {
 RESULTS = (
     "Assessment",
     "ErrorCauses",
+    "ErrorShare",
+    "Inspection",
     "Estimates",
     "Gradient",
     "Opening",

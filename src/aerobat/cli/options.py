@@ -292,22 +292,3 @@ class ViewOptions:
 
     json: Annotated[bool, Parameter(group=output, negative="", show_default=False)] = False
     """Print what was written as JSON on standard output, and nothing else."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class InspectOptions:
-    """What a log is held against, and where its picture goes."""
-
-    plan: Annotated[Path | None, Parameter(group=output)] = None
-    """The flight's plan, a .plan file or its folder. Default: the one beside the log."""
-
-    vehicle: Annotated[str | None, Parameter(group=output)] = None
-    """The vehicle: a name that `aerobat vehicles` lists, or a TOML file. Default: the plan's."""
-
-    figure: Annotated[Path | None, Parameter(group=output)] = None
-    """The picture's file. Default: inspect.png in the log's folder."""
-
-    plugins: Annotated[tuple[Path, ...], Plugins(group=output)] = ()
-
-    json: Annotated[bool, Parameter(group=output, negative="", show_default=False)] = False
-    """Print the inspection as JSON on standard output, and nothing else."""

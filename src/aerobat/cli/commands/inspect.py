@@ -8,7 +8,7 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from aerobat.cli.options import InspectOptions
+from aerobat.cli.inspect_options import InspectOptions
 from aerobat.cli.runs.folder import FLIGHT, INSPECTION
 from aerobat.cli.runs.saved_plans import named_vehicle
 from aerobat.cli.terminal import print_json

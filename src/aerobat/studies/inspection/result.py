@@ -70,6 +70,11 @@ class Inspection:
     observed: bool  # false where the log does not tell what an observer saw
     alignment: Alignment
 
+    def __post_init__(self) -> None:
+        """Write-protect."""
+        for series in (self.error, *self.errors.values()):
+            series.flags.writeable = False
+
     @property
     def cause(self) -> str | None:
         """The largest error's main cause, None where the error is too small for one."""
