@@ -97,7 +97,7 @@ def test_a_comparison_that_is_interrupted_has_no_rows(tmp_path: Path) -> None:
 
 
 def test_an_interrupt_comes_too_late_once_all_is_written(tmp_path: Path) -> None:
-    ended = interrupted("summary_table", 1, "fly", "line", "--order", "5", folder=tmp_path)
+    ended = interrupted("print_table", 1, "fly", "line", "--order", "5", folder=tmp_path)
     assert (ended.returncode, ended.stderr) == (0, "")
     assert json.loads((tmp_path / "out/line/report.json").read_text())["problem"] == "line"
 

@@ -81,7 +81,7 @@ def test_a_run_repeated_from_its_folder_alone_gives_the_same_bits(run: str, caps
 def test_a_saved_plan_that_was_flown_is_flown_again_not_planned(capsys) -> None:
     code("plan", "line", "--order", "5")
     assert code("fly", "out/line", "--conditions", "lab") == 0
-    assert code("repeat", "out/line-flown") == 0
+    assert code("repeat", "out/line-flown-lab") == 0
     assert "the same as" in capsys.readouterr().err
 
 

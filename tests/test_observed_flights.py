@@ -70,3 +70,8 @@ def test_commands_that_come_a_period_late_cost_nothing_where_the_model_is_right(
     late = replace(ab.load_dispersion("none"), control_rate=500.0, computation_delay=0.002)
     errors = [ab.score(ab.fly(line, conditions=c), line).max_position_error_m for c in ("none", late)]
     assert errors[1] < errors[0] + 2e-4
+
+
+@pytest.mark.parametrize("name", ab.dispersion_names())
+def test_all_conditions_that_come_along_can_be_flown_in(name: str, line: ab.Plan) -> None:
+    assert ab.score_flights(line, conditions=name, flights=3).is_finite.all()

@@ -67,7 +67,7 @@ def problems_table(problems: Iterable[Problem]) -> Table:
     return table
 
 
-def show(table: Table) -> None:
+def print_table(table: Table) -> None:
     """Print a table to standard output, full width in a pipe."""
     console = Console()
     (console if console.is_terminal else Console(width=120)).print(table)

@@ -20,7 +20,7 @@ from aerobat.interchange import read_plan
 from aerobat.planning import Plan
 from aerobat.planning.certified_solve import envelope_for
 from aerobat.reporting.report_json import to_json
-from aerobat.reporting.tables import certificate_table, show
+from aerobat.reporting.tables import certificate_table, print_table
 from aerobat.vehicle import Vehicle, load_vehicle
 
 
@@ -58,7 +58,7 @@ def check(plan: Path, options: Annotated[CheckOptions, Parameter(name="*")] = Ch
     if options.json:
         print_json(to_json(certificate.record()))
     else:
-        show(certificate_table(certificate, f"{plan} · {vehicle.name}"))
+        print_table(certificate_table(certificate, f"{plan} · {vehicle.name}"))
         if not isinstance(found, Plan):
             print(_assumed(options, vehicle, environment))
     return ExitCode.WELL if certificate.certified else ExitCode.NOT_WELL

@@ -17,7 +17,7 @@ from aerobat.environment import load_dispersion
 from aerobat.errors import SpecError
 from aerobat.reporting.report_json import to_json
 from aerobat.reporting.sweeps.tuning import tuning_report, tuning_table
-from aerobat.reporting.tables import show
+from aerobat.reporting.tables import print_table
 from aerobat.studies.tune import tune as tune_gains
 from aerobat.vehicle import write_vehicle
 
@@ -64,6 +64,6 @@ def tune(
     if options.json:
         print_json(to_json(tuning_report(tuning) | {"file": str(out) if tuning.is_better else None}))
     else:
-        show(tuning_table(tuning))
+        print_table(tuning_table(tuning))
     say(f"written to {out}" if tuning.is_better else "nothing is written")
     return ExitCode.WELL if tuning.is_better else ExitCode.NOT_WELL

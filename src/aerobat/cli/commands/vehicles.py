@@ -13,7 +13,7 @@ from aerobat.cli.terminal import say
 from aerobat.documents import in_document
 from aerobat.errors import SpecError
 from aerobat.interchange.robots.description import SUFFIXES, read_robot_description
-from aerobat.reporting.tables import show, vehicles_table
+from aerobat.reporting.tables import print_table, vehicles_table
 from aerobat.storage import write_whole
 from aerobat.vehicle import load_vehicle, vehicle_names, vehicle_text
 
@@ -39,7 +39,7 @@ def vehicles(
     elif out is not None:
         raise SpecError("--out writes one vehicle; name it")
     else:
-        show(vehicles_table(load_vehicle(name) for name in vehicle_names()))
+        print_table(vehicles_table(load_vehicle(name) for name in vehicle_names()))
 
 
 def _text(name: str) -> str:

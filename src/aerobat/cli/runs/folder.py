@@ -21,7 +21,7 @@ from aerobat.planning import Plan
 from aerobat.reporting.figures import report_figure
 from aerobat.reporting.page import png
 from aerobat.reporting.report_json import report, to_json
-from aerobat.reporting.tables import show, summary_table
+from aerobat.reporting.tables import print_table, summary_table
 from aerobat.simulation import Flight
 from aerobat.storage import whole_folder
 
@@ -81,7 +81,7 @@ def written(
     if options.json:
         print_json(facts)
         return
-    show(table)
+    print_table(table)
     print(f"\nwritten to {folder}/" + (", in the place of an earlier run" if replaced else ""))
 
 
