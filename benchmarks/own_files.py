@@ -21,6 +21,7 @@ from typing import Any
 import numpy as np
 import tomli_w
 
+from aerobat.control import Controller
 from aerobat.errors import AerobatError, Infeasible, SpecError
 from aerobat.evaluation import score
 from aerobat.planning import plan
@@ -101,6 +102,7 @@ def _vehicle(pen: Pen) -> Table:
         },
         0.5,
     )
+    table |= pen.some({"controller": _controller, "body": lambda p: _body(p, arm)}, 0.15)
     strength = pen.number(1.3, 6.0) * mass * 9.81 / count
     defaults = _thrusts(pen, strength, arm) | {"lag": pen.one_of(0.0, pen.size(0.01, 0.08))}
     defaults["radius"] = float(f"{0.5 * arm:.3g}")
@@ -110,6 +112,22 @@ def _vehicle(pen: Pen) -> Table:
     if pen.chance(0.2):
         return table | {"rotors": [defaults | rotor for rotor in rotors]}
     return table | {"rotor_defaults": defaults, "rotors": rotors}
+
+
+def _controller(pen: Pen) -> Table:
+    """Gains about those that suit every vehicle."""
+    usual = vars(Controller())
+    table: Table = {key: round(value * pen.number(0.8, 1.3), 4) for key, value in usual.items() if value > 1}
+    small = {key: value for key, value in usual.items() if isinstance(value, float) and value <= 1}
+    switches = dict.fromkeys((key for key, value in usual.items() if isinstance(value, bool)), True)
+    return table | pen.some({key: lambda _, x=value: x for key, value in (small | switches).items()}, 0.5)
+
+
+def _body(pen: Pen, arm: float) -> Table:
+    """An ellipsoid that encloses the rotors, at whatever height they are."""
+    height = float(f"{arm * pen.number(0.5, 0.9):.3g}")
+    across = float(f"{3.0 * arm:.3g}")
+    return {"semi_axes": [across, across, height], "centre": [0.0, 0.0, 0.0]}
 
 
 def _rotor(pen: Pen, angle: float, arm: float, spin: int) -> Table:

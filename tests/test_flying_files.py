@@ -75,7 +75,7 @@ def changed(**arrays: object) -> Callable[[Path], None]:
             changed(format="aerobat-flight-1"),
             "holds aerobat-flight-1, not aerobat-flight-2; fly it again",
         ),
-        (changed(outcomes=["LANDED"]), "no array 'LANDED'"),
+        (changed(outcomes=["LANDED"]), "outcomes must be names of outcomes, got 'LANDED'"),
         (changed(thrusts=None), "no array 'thrusts'"),
         (changed(setpoint_jerk=None), "no array 'setpoint_jerk'"),
         (changed(position=np.zeros((3, 3))), "position must have the shape"),

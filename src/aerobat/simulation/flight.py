@@ -212,7 +212,7 @@ def load_flight(path: PathName) -> Flight:
             times=content["times"],
             series={one.name: content[one.name] for one in SERIES if one.name in content or not one.observed},
             vehicles=_texts(content["vehicles"]),
-            outcomes=tuple(Outcome[name] for name in _texts(content["outcomes"])),
+            outcomes=tuple(_outcome(name) for name in _texts(content["outcomes"])),
             sentences=_texts(content["sentences"]),
             engine=str(content["engine"]),
             environment=Environment(
@@ -225,6 +225,12 @@ def load_flight(path: PathName) -> Flight:
         raise SpecError(f"flight file {path}: {error}") from None
     except (TypeError, ValueError):  # arrays of other kinds and shapes
         raise SpecError(f"flight file {path}: it is damaged; save it again") from None
+
+
+def _outcome(name: str) -> Outcome:
+    if name not in Outcome.__members__:
+        raise SpecError(f"outcomes must be names of outcomes, got {shown(name)}; save it again")
+    return Outcome[name]
 
 
 def setpoint_series(setpoint: Setpoint) -> dict[str, Array]:
