@@ -75,3 +75,15 @@ def test_commands_that_come_a_period_late_cost_nothing_where_the_model_is_right(
 @pytest.mark.parametrize("name", ab.dispersion_names())
 def test_all_conditions_that_come_along_can_be_flown_in(name: str, line: ab.Plan) -> None:
     assert ab.score_flights(line, conditions=name, flights=3).is_finite.all()
+
+
+def test_a_delay_of_part_of_a_period_is_flown_as_long_as_it_is(line: ab.Plan) -> None:
+    """Without sensors too, whose ticks would tell; what fits no ticks is refused."""
+    none = ab.load_dispersion("none")
+    delays = (0.0, 0.003, 0.01)
+    slow = [ab.fly(line, conditions=replace(none, control_rate=100.0, computation_delay=d)) for d in delays]
+    assert len({flight.thrusts.tobytes() for flight in slow}) == len(delays)
+    with pytest.raises(ab.SpecError, match=r"^computation_delay must be a whole number of ticks"):
+        ab.fly(line, conditions=replace(LAB, computation_delay=0.0015))
+    with pytest.raises(ab.SpecError, match=r"^computation_delay must be at most a period"):
+        ab.fly(line, conditions=replace(LAB, computation_delay=0.003))

@@ -36,6 +36,8 @@ from aerobat.vehicle import Vehicle
 from aerobat.vehicle.controller import Controller
 from aerobat.vehicle.fleet import Fleet
 
+MAX_TICKS = 20  # in a period of the controller, where no IMU says how many
+WHOLE = 1e-6  # [-] of a tick
 _LEAST_START_VELOCITY = 0.01  # [m/s] 1σ that the filter reckons with at least
 
 
@@ -59,7 +61,7 @@ def dispersed_setup(
     more than a period of the controller.
     """
     nominal.without_dead_rotors()
-    rate = config.control_rate if conditions.imu is None else conditions.imu.rate
+    rate = _tick_rate(conditions, config.control_rate)
     numbers = config.flights or range(1)
     draws = draw_flights(conditions, len(nominal.rotors), config.seed, numbers)
     controller = config.controller_of([nominal])
@@ -92,6 +94,19 @@ def dispersed_setup(
         controller=controller,
         is_batch=config.flights is not None,
         rate=rate,
+    )
+
+
+def _tick_rate(conditions: Dispersion, control_rate: float) -> float:
+    """Ticks a second: the IMU's, or so many that a period and the delay of the controller are whole ticks."""
+    delay = conditions.computation_delay
+    own = range(1, MAX_TICKS + 1) if conditions.imu is None else (conditions.imu.rate / control_rate,)
+    for ticks in own:
+        if abs(delay * control_rate * ticks - round(delay * control_rate * ticks)) < WHOLE:
+            return control_rate * ticks
+    tick = f"{1.0 / (control_rate * own[-1]):g} s"
+    raise SpecError(
+        f"computation_delay must be a whole number of ticks, which last {tick} or longer, got {delay:g} s"
     )
 
 

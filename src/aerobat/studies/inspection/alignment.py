@@ -8,6 +8,7 @@ import numpy as np
 from scipy.optimize import minimize_scalar
 
 from aerobat.arrays import Array
+from aerobat.declaration import by_value
 from aerobat.errors import SpecError
 from aerobat.simulation import Flight
 from aerobat.trajectory import Trajectory
@@ -17,7 +18,8 @@ _ROWS = 60  # of the log that are compared while the shift is sought
 _SHIFTS = 201  # that are tried at first
 
 
-@dataclass(frozen=True)
+@by_value
+@dataclass(frozen=True, eq=False)
 class Alignment:
     """The move that brings a plan onto a log: turned about the vertical, moved, and begun later."""
 

@@ -153,10 +153,10 @@ class _Tightening:
             share = self.task.share(trial.plan, fresh)
             if self.task.is_enough(share):
                 return self._proven(trial, share, fresh)
-            following = self._trial(steps + 1) if attempt + 1 < PROOFS else None
+            following = self._trial(steps + STRIDE) if attempt + 1 < PROOFS else None
             if following is None:
                 raise self._unreachable(trial, fresh)
-            steps, trial = steps + 1, following
+            steps, trial = steps + STRIDE, following
         raise AssertionError("a proof ends one way or the other")
 
     def _plain(self) -> tuple[Trial, Scores]:
