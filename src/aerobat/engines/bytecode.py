@@ -19,10 +19,10 @@ from aerobat.engines.engine import (
     Engine,
     Init,
     Step,
-    expanded,
     logged_ticks,
     read_only,
     tick_count,
+    told_at_every_tick,
 )
 from aerobat.engines.pytree import Tree, tree_leaves, tree_map, tree_unflatten
 from aerobat.engines.traced_loop import TracedLoop, trace_loop
@@ -52,12 +52,12 @@ class BytecodeLoop(CompiledLoop):
     """A loop as two Python functions, for its vehicles' parameters."""
 
     def __init__(self, init: Init, step: Step, parameters: Tree, inputs: Tree) -> None:
-        self._loop, self._init, self._scan = _program(init, step, _bare(parameters), _bare(expanded(inputs)))
+        self._loop, self._init, self._scan = _program(init, step, _bare(parameters), _bare(inputs))
         self._parameters = list(zip(*map(_floats, tree_leaves(parameters)), strict=True))
 
     def init(self, inputs: Tree) -> Tree:
         """See `CompiledLoop.init`."""
-        rows = [np.asarray(leaf)[None] for leaf in tree_leaves(expanded(inputs))]
+        rows = [np.asarray(leaf)[None] for leaf in tree_leaves(inputs)]
         carries = [
             self._init(parameters, next(_ticks(rows, vehicle)))
             for vehicle, parameters in enumerate(self._parameters)
@@ -69,7 +69,7 @@ class BytecodeLoop(CompiledLoop):
         ticks = tick_count(inputs)
         is_logged = np.zeros(ticks, dtype=bool)
         is_logged[logged_ticks(ticks, log_stride)] = True
-        leaves = tree_leaves(expanded(inputs))
+        leaves = tree_leaves(inputs)
         before = zip(*map(_floats, tree_leaves(carry)), strict=True) if self._loop.carry else repeat(())
         carries, columns = [], []
         for vehicle, (parameters, state) in enumerate(zip(self._parameters, before, strict=False)):
@@ -159,4 +159,4 @@ def _ticks(leaves: list[Any], vehicle: int) -> Iterator[Row]:
     return zip(*columns, strict=True)
 
 
-BYTECODE = Engine("bytecode", BytecodeLoop)
+BYTECODE = Engine("bytecode", told_at_every_tick(BytecodeLoop))

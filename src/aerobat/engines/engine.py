@@ -79,6 +79,30 @@ class Compile(Protocol):
         """
 
 
+class _ToldAtEveryTick(CompiledLoop):
+    """A loop that knows nothing of what is `Held`: it is told at every tick."""
+
+    def __init__(self, loop: CompiledLoop) -> None:
+        self._loop = loop
+
+    def init(self, inputs: Tree) -> Tree:
+        """See `CompiledLoop.init`."""
+        return self._loop.init(expanded(inputs))
+
+    def scan(self, carry: Tree, inputs: Tree, log_stride: int = 1) -> tuple[Tree, Tree]:
+        """See `CompiledLoop.scan`."""
+        return self._loop.scan(carry, expanded(inputs), log_stride)
+
+
+def told_at_every_tick(compile_loop: Compile) -> Compile:
+    """The way to a loop whose inputs may be `Held`, of one to a loop whose inputs may not."""
+
+    def compiled(init: Init, step: Step, parameters: Tree, inputs: Tree) -> CompiledLoop:
+        return _ToldAtEveryTick(compile_loop(init, step, parameters, expanded(inputs)))
+
+    return compiled
+
+
 @dataclass(frozen=True)
 class Engine:
     """One way to run kernels. All give the same numbers to rounding."""

@@ -17,10 +17,10 @@ from aerobat.engines.engine import (
     Engine,
     Init,
     Step,
-    expanded,
     logged_ticks,
     read_only,
     tick_count,
+    told_at_every_tick,
 )
 from aerobat.engines.pytree import Tree, tree_leaves, tree_unflatten
 from aerobat.engines.traced_loop import TracedLoop, trace_loop
@@ -51,7 +51,7 @@ class JaxLoop(CompiledLoop):
         inputs: Tree,
         precision: Literal["float64", "float32"] = "float64",
     ) -> None:
-        self._loop = trace_loop(init, step, parameters, expanded(inputs))
+        self._loop = trace_loop(init, step, parameters, inputs)
         self._program = _Program(str(self._loop), self._loop)
         self._precision = precision
         with jax.enable_x64(precision == "float64"):
@@ -60,7 +60,7 @@ class JaxLoop(CompiledLoop):
     def init(self, inputs: Tree) -> Tree:
         """See `CompiledLoop.init`."""
         with jax.enable_x64(self._precision == "float64"):
-            row = tuple(jnp.asarray(leaf, self._precision) for leaf in tree_leaves(expanded(inputs)))
+            row = tuple(jnp.asarray(leaf, self._precision) for leaf in tree_leaves(inputs))
             return self._carry(_initialized(self._program, self._parameters, row))
 
     def scan(self, carry: Tree, inputs: Tree, log_stride: int = 1) -> tuple[Tree, Tree]:
@@ -68,7 +68,7 @@ class JaxLoop(CompiledLoop):
         logged = logged_ticks(tick_count(inputs), log_stride)
         with jax.enable_x64(self._precision == "float64"):
             state = tuple(map(jnp.asarray, tree_leaves(carry)))
-            series = tuple(jnp.asarray(_padded(x), self._precision) for x in tree_leaves(expanded(inputs)))
+            series = tuple(jnp.asarray(_padded(x), self._precision) for x in tree_leaves(inputs))
             state, outputs = _scanned(self._program, self._parameters, state, series, _padded(logged))
             rows = [_row(output, len(logged)) for output in outputs]
             return self._carry(state), tree_unflatten(self._loop.row, rows)
@@ -152,5 +152,5 @@ def _row(output: Any, rows: int) -> Array:
     return series if series.dtype == bool else series.astype(np.float64)
 
 
-ENGINE = Engine("jax", JaxLoop)
-SINGLE = Engine("jax-float32", partial(JaxLoop, precision="float32"))
+ENGINE = Engine("jax", told_at_every_tick(JaxLoop))
+SINGLE = Engine("jax-float32", told_at_every_tick(partial(JaxLoop, precision="float32")))

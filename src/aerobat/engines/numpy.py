@@ -13,10 +13,10 @@ from aerobat.engines.engine import (
     Engine,
     Init,
     Step,
-    expanded,
     logged_ticks,
     read_only,
     tick_count,
+    told_at_every_tick,
 )
 from aerobat.engines.pytree import Tree, tree_leaves, tree_map, tree_rows, tree_stack
 
@@ -43,7 +43,7 @@ class ArrayLoop(CompiledLoop):
 
     def init(self, inputs: Tree) -> Tree:
         """See `CompiledLoop.init`."""
-        row = tree_map(lambda leaf: leaf if np.ndim(leaf) else float(leaf), expanded(inputs))
+        row = tree_map(lambda leaf: leaf if np.ndim(leaf) else float(leaf), inputs)
         with np.errstate(all="ignore"):
             return self._carry(self._init(ArrayOps, self._parameters, row))
 
@@ -52,7 +52,7 @@ class ArrayLoop(CompiledLoop):
         logged = set(logged_ticks(tick_count(inputs), log_stride).tolist())
         rows = []
         with np.errstate(all="ignore"):  # a vehicle that diverges may overflow; the others fly on
-            for tick, row in enumerate(tree_rows(expanded(inputs), _ticks)):
+            for tick, row in enumerate(tree_rows(inputs, _ticks)):
                 carry, output = self._step(ArrayOps, self._parameters, carry, row)
                 if tick in logged:
                     rows.append(output)
@@ -71,4 +71,4 @@ def _ticks(leaf: Array) -> Iterator[Any]:
     return iter(leaf.tolist() if leaf.ndim == 1 else leaf)
 
 
-NUMPY = Engine("numpy", ArrayLoop)
+NUMPY = Engine("numpy", told_at_every_tick(ArrayLoop))
