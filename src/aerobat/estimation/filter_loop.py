@@ -6,10 +6,9 @@ from functools import lru_cache
 from typing import NamedTuple
 
 from aerobat.engines.engine import Init, Step
-from aerobat.engines.pytree import tree_leaves, tree_unflatten
 from aerobat.kernels import ekf
 from aerobat.kernels.ekf import EkfParameters, EkfState, ImuSample, Pose
-from aerobat.kernels.ops import Ops, Scalar, Vector
+from aerobat.kernels.ops import Ops, Scalar, Vector, select_tree
 
 NO_SLOT = -1.0
 
@@ -64,7 +63,7 @@ def filter_loop(slots: int) -> tuple[Init, Step]:
         kept = []
         for slot, exposure in enumerate(exposures):
             back = ekf.carried_back(predicted, state, exposure.past, exposure.age)
-            kept.append(_chosen(ops, inputs.exposed, slot, fresh, exposure._replace(past=back)))
+            kept.append(select_tree(ops, _is_slot(inputs.exposed, slot), fresh, exposure._replace(past=back)))
         return (state, tuple(kept)), state
 
     return init, step
@@ -73,13 +72,10 @@ def filter_loop(slots: int) -> tuple[Init, Step]:
 def _picked(ops: Ops, exposures: list[Exposure], wanted: Scalar) -> Exposure:
     picked = exposures[0]
     for slot, exposure in enumerate(exposures[1:], start=1):
-        picked = _chosen(ops, wanted, slot, exposure, picked)
+        picked = select_tree(ops, _is_slot(wanted, slot), exposure, picked)
     return picked
 
 
-def _chosen(ops: Ops, wanted: Scalar, slot: int, one: Exposure, other: Exposure) -> Exposure:
-    """One exposure if its slot is wanted, else the other."""
-    same = (wanted > slot - 0.5) & (wanted < slot + 0.5)
-    leaves = zip(tree_leaves(one), tree_leaves(other), strict=True)
-    chosen: Exposure = tree_unflatten(one, [ops.select(same, a, b) for a, b in leaves])
-    return chosen
+def _is_slot(wanted: Scalar, slot: int) -> Scalar:
+    """True where a slot is the one that is wanted."""
+    return (wanted > slot - 0.5) & (wanted < slot + 0.5)

@@ -184,7 +184,7 @@ def score(flight: Flight, goal: Problem | Plan | str, vehicle: Vehicle | str | N
 
 def _observer(flight: Flight) -> ObserverScore | None:
     """How well the filter knew the flight, if there was one."""
-    if "since_pose" not in flight.series:
+    if not flight.is_observed:
         return None
     off = np.linalg.norm(flight.observed_position - flight.states.position, axis=-1)
     angle = so3.angle_between(flight.observed_q_world_body, flight.states.q_world_body)

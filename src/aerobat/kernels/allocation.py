@@ -6,7 +6,7 @@ from functools import reduce
 from typing import NamedTuple
 
 from aerobat.kernels.motors import Rotors, clamp
-from aerobat.kernels.ops import Ops, PerRotor, Scalar, clip
+from aerobat.kernels.ops import Ops, PerRotor, Scalar, clip, magnitude
 from aerobat.kernels.rigid_body import Wrench
 
 _BEARING = 1e-9  # [-] a rotor with a smaller fraction of the collective thrust bears nothing
@@ -78,6 +78,6 @@ def _as_far_as_fits(ops: Ops, rotors: Rotors, base: PerRotor, change: PerRotor) 
     fraction: Scalar = 1.0
     for f, df, (low, high, slack) in zip(base, change, limits, strict=True):
         room = ops.maximum(ops.select(df > 0.0, high - f, f - low), 0.0)
-        size = ops.maximum(df, -df)
+        size = magnitude(ops, df)
         fraction = ops.minimum(fraction, ops.select(size > slack, room / ops.maximum(size, slack), 1.0))
     return tuple(f + fraction * df for f, df in zip(base, change, strict=True))

@@ -6,7 +6,7 @@ from functools import reduce
 from operator import add
 from typing import NamedTuple
 
-from aerobat.kernels.ops import Ops, PerRotor, Scalar
+from aerobat.kernels.ops import Ops, PerRotor, Scalar, magnitude
 
 
 class BatteryParameters(NamedTuple):
@@ -34,7 +34,7 @@ def step(
 ) -> BatteryState:
     """The battery after `dt` [s] at these rotor thrusts [N]."""
     used = (
-        usage * ops.maximum(f, -f) * ops.sqrt(ops.maximum(f, -f))
+        usage * magnitude(ops, f) * ops.sqrt(magnitude(ops, f))
         for usage, f in zip(parameters.usage, thrusts, strict=True)
     )
     return _shown(parameters, ops.maximum(state.charge - dt * reduce(add, used), 0.0))

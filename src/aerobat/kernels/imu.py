@@ -8,8 +8,8 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from aerobat.kernels.ops import Ops, Scalar, Vector
-from aerobat.kernels.vectors import ZERO, add, add_scaled, clip_components, scale, select
+from aerobat.kernels.ops import Ops, Scalar, Vector, select_tree
+from aerobat.kernels.vectors import ZERO, add, add_scaled, clip_components, scale
 
 
 class ImuSample(NamedTuple):
@@ -63,27 +63,17 @@ def step(
         bias: that is added.
         noise: independent standard normals.
     """
-    has_before = state.has_felt > 0.5
-    return ImuState(
-        ImuSample(
-            _measured(
-                ops,
-                _middle(ops, has_before, state.felt.omega, felt.omega),
-                bias.omega,
-                (parameters.gyro_noise, noise.omega),
-                parameters.gyro_range,
-            ),
-            _measured(
-                ops,
-                _middle(ops, has_before, state.felt.specific_force, felt.specific_force),
-                bias.specific_force,
-                (parameters.accelerometer_noise, noise.specific_force),
-                parameters.accelerometer_range,
-            ),
-        ),
-        felt,
-        1.0,
+    before = select_tree(ops, state.has_felt > 0.5, state.felt, felt)
+    gyro = parameters.gyro_noise, parameters.gyro_range
+    accelerometer = parameters.accelerometer_noise, parameters.accelerometer_range
+    means = (scale(0.5, add(a, b)) for a, b in zip(before, felt, strict=True))
+    measured = (
+        clip_components(ops, add(add_scaled(mean, spread, drawn), offset), limit)
+        for mean, (spread, limit), drawn, offset in zip(
+            means, (gyro, accelerometer), noise, bias, strict=True
+        )
     )
+    return ImuState(ImuSample(*measured), felt, 1.0)
 
 
 def walk(parameters: BiasParameters, bias: ImuSample, noise: ImuSample) -> ImuSample:
@@ -92,11 +82,3 @@ def walk(parameters: BiasParameters, bias: ImuSample, noise: ImuSample) -> ImuSa
         add_scaled(bias.omega, parameters.gyro_walk, noise.omega),
         add_scaled(bias.specific_force, parameters.accelerometer_walk, noise.specific_force),
     )
-
-
-def _middle(ops: Ops, has_before: Scalar, before: Vector, now: Vector) -> Vector:
-    return scale(0.5, add(select(ops, has_before, before, now), now))
-
-
-def _measured(ops: Ops, mean: Vector, bias: Vector, noise: tuple[Scalar, Vector], limit: Scalar) -> Vector:
-    return clip_components(ops, add(add_scaled(mean, *noise), bias), limit)

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from aerobat.kernels.ops import Ops, Scalar, Vector
+from aerobat.kernels.ops import Ops, Scalar, Vector, select_tree
 from aerobat.kernels.quaternions import multiply, normalize, rotate
 from aerobat.kernels.rigid_body import Body, Pose
-from aerobat.kernels.vectors import add, add_scaled, dot, scale, select, subtract
+from aerobat.kernels.vectors import add, add_scaled, dot, scale, subtract
 
 
 class PoseSample(NamedTuple):
@@ -75,13 +75,10 @@ def as_seen(ops: Ops, seam: Seam, pose: Pose) -> Pose:
     distance = dot(seam.normal, from_point)
     moved = add(add(seam.point, rotate(seam.offset.q_world_body, from_point)), seam.offset.position)
     turned = multiply(seam.offset.q_world_body, pose.q_world_body)
-    is_beyond = distance > 0.0
+    seen = select_tree(ops, distance > 0.0, Pose(moved, turned), pose)
     depths = distance * seam.inverse_depth
-    position = add_scaled(
-        select(ops, is_beyond, moved, pose.position), ops.exp(-0.5 * depths * depths), seam.warp
-    )
-    w, x, y, z = (ops.select(is_beyond, a, b) for a, b in zip(turned, pose.q_world_body, strict=True))
-    return Pose(position, (w, x, y, z))
+    position = add_scaled(seen.position, ops.exp(-0.5 * depths * depths), seam.warp)
+    return seen._replace(position=position)
 
 
 def _with_errors(ops: Ops, pose: Pose, position: Vector, attitude: Vector) -> Pose:

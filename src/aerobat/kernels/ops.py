@@ -6,7 +6,7 @@ of a compiler, dual numbers. An engine hands it the matching `Ops`.
 
 from __future__ import annotations
 
-from typing import Any, Protocol, TypeAlias
+from typing import Any, Protocol, TypeAlias, TypeVar
 
 Scalar: TypeAlias = Any  # whatever an engine computes with; every operation is element by element
 Vector: TypeAlias = tuple[Scalar, Scalar, Scalar]
@@ -14,6 +14,7 @@ Quaternion: TypeAlias = tuple[Scalar, Scalar, Scalar, Scalar]  # Hamilton, (w, x
 Matrix: TypeAlias = tuple[Vector, Vector, Vector]  # rows
 Axes: TypeAlias = tuple[Vector, Vector, Vector]  # b1, b2, b3 in the world
 PerRotor: TypeAlias = tuple[Scalar, ...]
+T = TypeVar("T")
 
 
 class Ops(Protocol):
@@ -38,3 +39,17 @@ class Ops(Protocol):
 def clip(ops: Ops, x: Scalar, low: Scalar, high: Scalar) -> Scalar:
     """`x` held within [low, high]."""
     return ops.minimum(ops.maximum(x, low), high)
+
+
+def magnitude(ops: Ops, x: Scalar) -> Scalar:
+    """|x|."""
+    return ops.maximum(x, -x)
+
+
+def select_tree(ops: Ops, condition: Scalar, x: T, y: T) -> T:
+    """`x` where the condition holds, `y` elsewhere: numbers, or tuples of such of any depth."""
+    if not isinstance(x, tuple) or not isinstance(y, tuple):
+        chosen: T = ops.select(condition, x, y)
+        return chosen
+    children = [select_tree(ops, condition, a, b) for a, b in zip(x, y, strict=True)]
+    return tuple.__new__(type(x), children)  # named tuples too

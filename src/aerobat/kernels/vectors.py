@@ -53,15 +53,6 @@ def clip_components(ops: Ops, a: Vector, limit: Scalar) -> Vector:
     return clip(ops, a[0], -limit, limit), clip(ops, a[1], -limit, limit), clip(ops, a[2], -limit, limit)
 
 
-def select(ops: Ops, condition: Scalar, a: Vector, b: Vector) -> Vector:
-    """`a` where the condition holds, `b` elsewhere."""
-    return (
-        ops.select(condition, a[0], b[0]),
-        ops.select(condition, a[1], b[1]),
-        ops.select(condition, a[2], b[2]),
-    )
-
-
 def clamp_norm(ops: Ops, a: Vector, longest: Scalar) -> Vector:
     """`a`, shortened to the length `longest` where it is longer; its direction is kept."""
     return scale(longest / (ops.maximum(norm(ops, a), longest) + _TINY), a)

@@ -13,9 +13,9 @@ from aerobat.kernels import control, motors
 from aerobat.kernels.control import Commands, ControllerModel, ControllerState, FeatureFlags
 from aerobat.kernels.control_loops import ReferencePoint
 from aerobat.kernels.motors import Airframe, Motion
-from aerobat.kernels.ops import Ops, PerRotor, Scalar
+from aerobat.kernels.ops import Ops, PerRotor, Scalar, select_tree
 from aerobat.kernels.rigid_body import Body, EnvironmentParameters
-from aerobat.simulation.loop import Signals, select_tree
+from aerobat.simulation.loop import Signals
 
 MAX_STEP = 0.002  # [s] of RK4: enough for 1e-6 m in the fastest flips
 

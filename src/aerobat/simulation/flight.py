@@ -93,8 +93,7 @@ class Flight:
         times = frozen(self.times, "times", (None,))
         if times.ndim != 1 or (np.diff(times) <= 0).any():
             raise SpecError("times must be one list of rising numbers of seconds")
-        is_observed = "since_pose" in self.series
-        kept = [one for one in SERIES if is_observed or not one.observed]
+        kept = [one for one in SERIES if self.is_observed or not one.observed]
         missing = [one.name for one in kept if one.name not in self.series]
         if missing:
             raise SpecError(f"a flight needs the series {missing[0]!r}; its names are those of SERIES")
@@ -119,6 +118,11 @@ class Flight:
     def kinds(self) -> tuple[Series, ...]:
         """Those of SERIES that there are."""
         return tuple(one for one in SERIES if one.name in self.series)
+
+    @property
+    def is_observed(self) -> bool:
+        """True where a filter saw the flight."""
+        return "since_pose" in self.series
 
     @cached_property
     def states(self) -> BodyState:

@@ -13,9 +13,9 @@ from functools import lru_cache
 from typing import Any, NamedTuple, Protocol, TypeAlias
 
 from aerobat.engines.engine import Init, Step
-from aerobat.engines.pytree import Tree, tree_leaves, tree_unflatten
+from aerobat.engines.pytree import Tree
 from aerobat.kernels.control_loops import ReferencePoint
-from aerobat.kernels.ops import Ops, Scalar
+from aerobat.kernels.ops import Ops, Scalar, select_tree
 from aerobat.kernels.rigid_body import Body
 
 Signals: TypeAlias = Mapping[str, Any]  # "clock", "reference", "start", and by name the components' states
@@ -114,9 +114,3 @@ def compose(components: tuple[Component, ...], log: Log) -> tuple[Init, Step]:
         return tuple(following), log(signals)
 
     return init, step
-
-
-def select_tree(ops: Ops, condition: Scalar, chosen: Tree, otherwise: Tree) -> Tree:
-    """One tree where a condition holds, the other elsewhere."""
-    pairs = zip(tree_leaves(chosen), tree_leaves(otherwise), strict=True)
-    return tree_unflatten(chosen, [ops.select(condition, x, y) for x, y in pairs])

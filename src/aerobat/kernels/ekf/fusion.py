@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
 
 from aerobat.kernels.ekf.covariance import (
     Correction,
@@ -18,7 +17,7 @@ from aerobat.kernels.ekf.covariance import (
 )
 from aerobat.kernels.ekf.prediction import anchored
 from aerobat.kernels.ekf.states import EkfParameters, EkfState, NominalState
-from aerobat.kernels.ops import Ops, Scalar, Vector
+from aerobat.kernels.ops import Ops, Scalar, Vector, select_tree
 from aerobat.kernels.quaternions import (
     axes,
     conjugate,
@@ -68,7 +67,7 @@ def fuse(
     believed = correction.nis <= parameters.max_nis
     count = ops.select(believed, 0.0, state.rejections + 1.0)
     taken = ops.select(believed, True, count >= parameters.max_rejections)
-    chosen = _select(ops, believed, accepted, jumped)
+    chosen = select_tree(ops, believed, accepted, jumped)
     after = anchored(
         chosen._replace(
             since_pose=age,
@@ -79,8 +78,7 @@ def fuse(
         )
     )
     rejected = anchored(state._replace(rejections=count, nis=correction.nis, accepted=0.0))
-    new: EkfState = _select(ops, arrived, _select(ops, taken, after, rejected), anchored(state))
-    return new
+    return select_tree(ops, arrived, select_tree(ops, taken, after, rejected), anchored(state))
 
 
 def carried_back(before: EkfState, after: EkfState, past: Pose, age: Scalar) -> Pose:
@@ -178,11 +176,3 @@ def _jumped(
     rows = transform_part(rows, "position", lambda e: add_scaled(e.position, age, e.velocity))
     rows = transform_part(rows, "rotation", lambda e: add_scaled(e.rotation, -age, e.gyro_bias))
     return state._replace(nominal=new, covariance=pack(rows))
-
-
-def _select(ops: Ops, condition: Scalar, x: Any, y: Any) -> Any:
-    """One of two trees, leaf by leaf."""
-    if not isinstance(x, tuple):
-        return ops.select(condition, x, y)
-    children = [_select(ops, condition, a, b) for a, b in zip(x, y, strict=True)]
-    return tuple.__new__(type(x), children)

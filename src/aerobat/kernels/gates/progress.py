@@ -7,9 +7,9 @@ from typing import NamedTuple
 
 from aerobat.kernels.gates import sweep
 from aerobat.kernels.gates.section import BoundingEllipsoid, GateFrame
-from aerobat.kernels.gates.snapshot import Snapshot, between, either
-from aerobat.kernels.gates.sweep import SweepProgress, magnitude
-from aerobat.kernels.ops import Ops, Scalar, Vector
+from aerobat.kernels.gates.snapshot import Snapshot, between
+from aerobat.kernels.gates.sweep import SweepProgress
+from aerobat.kernels.ops import Ops, Scalar, Vector, magnitude, select_tree
 from aerobat.kernels.vectors import ZERO, dot
 
 
@@ -67,7 +67,7 @@ def step(
     crosses = ops.select(forward, 1.0, ops.select(back, 1.0, 0.0))
     fraction = -before / ops.select(crosses > 0.5, behind - before, 1.0)
     here = between(last, now, fraction)
-    latest = either(ops, forward, here, progress.latest)
+    latest = select_tree(ops, forward, here, progress.latest)
     beyond = ops.select(forward, 1.0, ops.select(back, 0.0, progress.beyond))
     off_time = magnitude(ops, latest.time - plane.planned)
     nearer = off_time < magnitude(ops, progress.crossing.time - plane.planned)
@@ -78,7 +78,7 @@ def step(
     return GateProgress(
         latest,
         beyond,
-        either(ops, passed, latest, progress.crossing),
+        select_tree(ops, passed, latest, progress.crossing),
         ops.select(back & (back_off_time <= plane.window) & nearer_back, here.time, progress.backward),
         ops.select(in_window, ops.maximum(progress.max_distance, behind), progress.max_distance),
         ops.select(in_window, ops.minimum(progress.min_distance, behind), progress.min_distance),

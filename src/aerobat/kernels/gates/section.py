@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from aerobat.kernels.ops import Ops, Quaternion, Scalar, Vector, clip
+from aerobat.kernels.ops import Ops, Quaternion, Scalar, Vector, clip, magnitude
 from aerobat.kernels.quaternions import axes, normalize, to_body
 from aerobat.kernels.vectors import dot
 
@@ -93,7 +93,7 @@ def section(
 
 def gap(ops: Ops, at: Section) -> Scalar:
     """The distance between ellipsoid and plane [m]; negative where they meet."""
-    return ops.maximum(at.height, -at.height) - at.reach
+    return magnitude(ops, at.height) - at.reach
 
 
 def farthest(ops: Ops, at: Section) -> PlanePoint:
@@ -123,7 +123,7 @@ def fraction_of_farthest(
         within: the least and the greatest fraction to choose from.
     """
     rise, drift = change
-    rise = ops.select(ops.maximum(rise, -rise) < _ROUNDING, _ROUNDING, rise)
+    rise = ops.select(magnitude(ops, rise) < _ROUNDING, _ROUNDING, rise)
     sheared = drift - rise * at.shear_along
     middle = 1.0 - 0.5 * (within[0] + within[1])
     along = at.along - at.height * at.shear_along - middle * sheared

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from aerobat.kernels.ops import Ops, Quaternion, Scalar, Vector
+from aerobat.kernels.ops import Quaternion, Scalar, Vector
 from aerobat.kernels.vectors import add_scaled, subtract
 
 
@@ -25,15 +25,4 @@ def between(a: Snapshot, b: Snapshot, fraction: Scalar) -> Snapshot:
         add_scaled(a.position, fraction, subtract(b.position, a.position)),
         add_scaled(a.velocity, fraction, subtract(b.velocity, a.velocity)),
         (w, x, y, z),
-    )
-
-
-def either(ops: Ops, condition: Scalar, a: Snapshot, b: Snapshot) -> Snapshot:
-    """`a` where the condition holds, else `b`."""
-    return Snapshot(
-        ops.select(condition, a.time, b.time),
-        *(
-            tuple(ops.select(condition, x, y) for x, y in zip(p, q, strict=True))
-            for p, q in zip(a[1:], b[1:], strict=True)
-        ),
     )

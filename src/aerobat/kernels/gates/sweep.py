@@ -20,7 +20,7 @@ from aerobat.kernels.gates.section import (
     section,
 )
 from aerobat.kernels.gates.snapshot import Snapshot, between
-from aerobat.kernels.ops import Ops, Scalar, Vector
+from aerobat.kernels.ops import Ops, Scalar, Vector, magnitude, select_tree
 from aerobat.kernels.vectors import dot, subtract
 
 
@@ -83,7 +83,7 @@ def step(
     distance = magnitude(ops, dot(now.position, frame.normal))
     is_about = counted[1] & (ops.minimum(gap_now, distance - depth) <= 0.0)
     met, here = swept_between(ops, frame, ellipsoid, snapshots, (progress.gap, gap_now), crosses)
-    before = _either(ops, progress.is_about > 0.5, progress.stay, NO_SWEEP)
+    before = select_tree(ops, progress.is_about > 0.5, progress.stay, NO_SWEEP)
     stay = _wider(ops, counted[0] & counted[1] & met, here, before)
     is_crossing = ops.select(passed, 1.0, progress.is_crossing) > 0.5
     return SweepProgress(
@@ -91,7 +91,7 @@ def step(
         ops.select(is_about, 1.0, 0.0),
         ops.select(is_crossing & is_about, 1.0, 0.0),
         stay,
-        _either(ops, is_crossing, stay, progress.crossing),
+        select_tree(ops, is_crossing, stay, progress.crossing),
     )
 
 
@@ -146,11 +146,6 @@ def _extreme(
     return Extreme(at.time, farthest(ops, here))
 
 
-def magnitude(ops: Ops, x: Scalar) -> Scalar:
-    """|x|."""
-    return ops.maximum(x, -x)
-
-
 def _wider(ops: Ops, condition: Scalar, a: Sweep, b: Sweep) -> Sweep:
     """Of both extremes the farther, `a`'s only where the condition holds."""
     return Sweep(*(_farther(ops, condition, p, q) for p, q in zip(a, b, strict=True)))
@@ -158,14 +153,4 @@ def _wider(ops: Ops, condition: Scalar, a: Sweep, b: Sweep) -> Sweep:
 
 def _farther(ops: Ops, condition: Scalar, a: Extreme, b: Extreme) -> Extreme:
     is_farther = magnitude(ops, a.point.along) > magnitude(ops, b.point.along)
-    return _either_extreme(ops, condition & is_farther, a, b)
-
-
-def _either(ops: Ops, condition: Scalar, a: Sweep, b: Sweep) -> Sweep:
-    """`a` where the condition holds, else `b`."""
-    return Sweep(*(_either_extreme(ops, condition, p, q) for p, q in zip(a, b, strict=True)))
-
-
-def _either_extreme(ops: Ops, condition: Scalar, a: Extreme, b: Extreme) -> Extreme:
-    along, beside = (ops.select(condition, x, y) for x, y in zip(a.point, b.point, strict=True))
-    return Extreme(ops.select(condition, a.time, b.time), PlanePoint(along, beside))
+    return select_tree(ops, condition & is_farther, a, b)

@@ -10,10 +10,10 @@ import numpy as np
 from aerobat.arrays import Array
 from aerobat.kernels import ekf
 from aerobat.kernels.ekf import EkfParameters, EkfState
-from aerobat.kernels.ops import Ops, Scalar
+from aerobat.kernels.ops import Ops, Scalar, select_tree
 from aerobat.kernels.rigid_body import Body, Pose
 from aerobat.simulation.conditions.sensors import MotionCaptureSensor
-from aerobat.simulation.loop import Signals, select_tree
+from aerobat.simulation.loop import Signals
 
 
 class ObserverParameters(NamedTuple):

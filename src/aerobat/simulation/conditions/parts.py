@@ -46,7 +46,7 @@ from aerobat.vehicle.fleet import Fleet
 SLOW = 100.0  # [1/s] at which what changes slowly steps: biases, charge, and wind that is not gustier
 GUSTY = 20.0  # [-] steps of the wind in the time in which its gusts change
 MAX_QUEUE = 8  # poses on their way at once
-_WHOLE = 1e-6  # [-] of a tick
+WHOLE = 1e-6  # [-] of a tick
 _MOVING = 1e-3  # [m/s] a path that is slower has no direction
 
 
@@ -82,7 +82,7 @@ class DispersedFlights:
 
     def slow_period(self, rate: float = SLOW) -> int:
         """The ticks of a step at so many a second, or of the next faster one."""
-        return max(1, int(self.rate / rate + _WHOLE))
+        return max(1, int(self.rate / rate + WHOLE))
 
 
 def condition_parts(dispersion: Dispersion, flights: DispersedFlights) -> tuple[Part, ...]:
@@ -241,7 +241,7 @@ def hand_off_plane(hand_off: HandOff, path: Trajectory, gates: Sequence[Gate]) -
 def whole_ticks(rate: float, sensor_rate: float, field: str) -> int:
     """The ticks, at `rate` [1/s], of a sensor's period. Raises SpecError, naming its field, for fractions."""
     ticks = rate / sensor_rate
-    if ticks < 1.0 - _WHOLE or abs(ticks - round(ticks)) > _WHOLE * ticks:
+    if ticks < 1.0 - WHOLE or abs(ticks - round(ticks)) > WHOLE * ticks:
         raise SpecError(
             f"{field} must be the simulation's rate ({rate:g} 1/s) over a whole number, got {sensor_rate:g}"
         )

@@ -25,7 +25,7 @@ from aerobat.simulation.components import (
 )
 from aerobat.simulation.conditions.draw import dispersed_fleet, draw_flights
 from aerobat.simulation.conditions.observer import EkfObserver, ObserverParameters, ObserverSource
-from aerobat.simulation.conditions.parts import DispersedFlights, condition_parts, whole_ticks
+from aerobat.simulation.conditions.parts import WHOLE, DispersedFlights, condition_parts, whole_ticks
 from aerobat.simulation.conditions.sensors import MotionCaptureSensor
 from aerobat.simulation.config import FlightConfig
 from aerobat.simulation.reference_source import ReferenceSource
@@ -37,7 +37,6 @@ from aerobat.vehicle.controller import Controller
 from aerobat.vehicle.fleet import Fleet
 
 MAX_TICKS = 20  # in a period of the controller, where no IMU says how many
-WHOLE = 1e-6  # [-] of a tick
 _LEAST_START_VELOCITY = 0.01  # [m/s] 1σ that the filter reckons with at least
 
 
@@ -99,14 +98,14 @@ def dispersed_setup(
 
 def _tick_rate(conditions: Dispersion, control_rate: float) -> float:
     """Ticks a second: the IMU's, or so many that a period and the delay of the controller are whole ticks."""
-    delay = conditions.computation_delay
-    own = range(1, MAX_TICKS + 1) if conditions.imu is None else (conditions.imu.rate / control_rate,)
-    for ticks in own:
-        if abs(delay * control_rate * ticks - round(delay * control_rate * ticks)) < WHOLE:
-            return control_rate * ticks
-    tick = f"{1.0 / (control_rate * own[-1]):g} s"
+    delay, imu = conditions.computation_delay, conditions.imu
+    rates = [control_rate * k for k in range(1, MAX_TICKS + 1)] if imu is None else [imu.rate]
+    for rate in rates:
+        if abs(delay * rate - round(delay * rate)) < WHOLE:
+            return rate
     raise SpecError(
-        f"computation_delay must be a whole number of ticks, which last {tick} or longer, got {delay:g} s"
+        f"computation_delay must be a whole number of ticks, which last {1.0 / rates[-1]:g} s or longer, "
+        f"got {delay:g} s"
     )
 
 

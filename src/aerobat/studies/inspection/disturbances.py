@@ -83,7 +83,7 @@ def disturbances(flight: Flight, vehicle: Vehicle, loop: PositionLoop) -> Distur
         flight.velocity - flight.setpoint_velocity,
     )
     seen = true
-    if "since_pose" in flight.series:
+    if flight.is_observed:
         seen = loop.feedback(
             flight.times,
             flight.observed_position - flight.setpoint_position,
@@ -108,7 +108,7 @@ def command_delay(flight: Flight, vehicle: Vehicle) -> float:
     """
     steps = np.diff(flight.times)
     h = float(np.median(steps))
-    lags = np.maximum(Fleet.of([vehicle]).lags.ravel(), 1e-9)
+    lags = np.maximum(vehicle.lags, 1e-9)
     left = np.exp(-h / lags)
     thrusts, commands = flight.thrusts, flight.commands
     best, delay = np.inf, 0.0
@@ -131,8 +131,8 @@ def _lift(flight: Flight, vehicle: Vehicle) -> Array:
     """The acceleration [m/s²] of the nominal vehicle under the logged thrusts, (T, 3)."""
     q, air = flight.q_world_body, flight.environment
     drag = so3.rotate(q, vehicle.drag_body * so3.unrotate(q, flight.velocity - air.wind))
-    collective = flight.thrusts.sum(axis=-1)[:, None] * so3.rotate(q, np.array([0.0, 0.0, 1.0]))
-    return np.asarray((collective - drag) / vehicle.mass - np.array([0.0, 0.0, air.gravity]))
+    collective = flight.thrusts.sum(axis=-1)[:, None] * so3.thrust_axis(q)
+    return np.asarray((collective - drag) / vehicle.mass - air.weight)
 
 
 def _kinds(flight: Flight, vehicle: Vehicle, recovery: float) -> Array:
@@ -149,9 +149,8 @@ def _kinds(flight: Flight, vehicle: Vehicle, recovery: float) -> Array:
 def _asked_too_much(flight: Flight, vehicle: Vehicle) -> Array:
     """True where the set-points ask any rotor for thrust, or a lead of its lag, beyond its limits, (T,)."""
     asked = rotor_thrusts(vehicle, flight.setpoint.wrench)
-    lags = Fleet.of([vehicle]).lags.ravel()
     slack = _SLACK * (flight.max_thrusts - flight.min_thrusts)
-    led = asked + lags * np.gradient(asked, flight.times, axis=0)
+    led = asked + vehicle.lags * np.gradient(asked, flight.times, axis=0)
     outside = (np.minimum(asked, led) < flight.min_thrusts - slack) | (
         np.maximum(asked, led) > flight.max_thrusts + slack
     )

@@ -76,6 +76,6 @@ def inspect_flight(
         time=float(flight.times[worst]),
         delay=delay,
         saturated=float(flight.saturated.mean()),
-        observed="since_pose" in flight.series,
+        observed=flight.is_observed,
         alignment=alignment,
     )

@@ -12,7 +12,7 @@ import numpy as np
 from pydantic import Field
 
 from aerobat.control import Controller
-from aerobat.declaration import PathName, validated
+from aerobat.declaration import PathName, Seed, validated
 from aerobat.engines.cores import available_cores
 from aerobat.environment import Dispersion, as_dispersion
 from aerobat.flatness import vehicle_of
@@ -28,7 +28,6 @@ from aerobat.vehicle import Vehicle
 Runs = Annotated[int, Field(ge=1, le=10**7, description="whole number from 1 to ten million")]
 Batch = Annotated[int, Field(ge=1, le=CHUNK, description=f"whole number from 1 to {CHUNK}")]
 Workers = Annotated[int, Field(ge=1, le=4096, description="whole number from 1 to 4096")]
-Seed = Annotated[int, Field(ge=0, description="whole number, zero or more")]
 
 _AHEAD = 2  # chunks for each worker that wait to be flown
 _WELL = tuple(outcome.name.lower() for outcome in Outcome if outcome.is_success)
