@@ -17,7 +17,7 @@ from aerobat.cli.commands.sweep import finish_sweep, sweep_of, table_name
 from aerobat.cli.entry import ExitCode
 from aerobat.cli.options import RepeatOptions
 from aerobat.cli.runs.folder import FLIGHT, finish
-from aerobat.cli.runs.record import RunRecord, installed_versions, read_record
+from aerobat.cli.runs.record import RunRecord, read_record, versions_now
 from aerobat.cli.tasks import plan_of
 from aerobat.cli.terminal import say
 from aerobat.errors import SpecError
@@ -83,7 +83,7 @@ def _told(folder: Path, record: RunRecord, difference: str, code: ExitCode) -> E
     if not difference:
         say(f"the same as in {folder}/, bit for bit")
         return code
-    now = installed_versions()
+    now = versions_now()
     changed = [name for name in {*now, *record.versions} if now.get(name) != record.versions.get(name)]
     versions = f" (other versions of {', '.join(sorted(changed))})" if changed else ""
     say(f"not the same as in {folder}/: {difference}{versions}")

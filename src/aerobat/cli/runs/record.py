@@ -6,7 +6,6 @@ import os
 import re
 from collections.abc import Mapping
 from dataclasses import field
-from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from platform import python_version
 from typing import Annotated, Any, Literal
@@ -22,10 +21,22 @@ from aerobat.interchange.columns import ALL
 from aerobat.planning import Planner
 from aerobat.planning.planners import PLANNERS
 from aerobat.problem import Problem
+from aerobat.provenance import installed_versions
 from aerobat.vehicle import Vehicle
 
 RECORD = "run.toml"
-LIBRARIES = ("numpy", "scipy", "daqp", "casadi", "gurobipy", "pyscipopt", "llvmlite", "jax", "pyarrow")
+LIBRARIES = (
+    "aerobat",
+    "numpy",
+    "scipy",
+    "daqp",
+    "casadi",
+    "gurobipy",
+    "pyscipopt",
+    "llvmlite",
+    "jax",
+    "pyarrow",
+)
 
 
 def _planner(value: Any) -> Planner | None:
@@ -102,7 +113,7 @@ def default_vehicle(paper: bool = False) -> str:
 
 def write_record(record: RunRecord, folder: Path) -> None:
     """Write a run's record to its folder, with the versions of all that may change its numbers."""
-    facts = {"format": record.format, "versions": installed_versions()}
+    facts = {"format": record.format, "versions": versions_now()}
     write_document(folder / RECORD, to_table(record) | facts)
 
 
@@ -115,12 +126,6 @@ def read_record(folder: Path) -> RunRecord:
     return read_document(folder / RECORD, RunRecord, "run")
 
 
-def installed_versions() -> dict[str, str]:
+def versions_now() -> dict[str, str]:
     """The versions of Python, Aerobat and the libraries that its numbers come from."""
-    found = {"aerobat": version("aerobat"), "python": python_version()}
-    for library in LIBRARIES:
-        try:
-            found[library] = version(library)
-        except PackageNotFoundError:
-            continue
-    return found
+    return {"python": python_version()} | installed_versions(LIBRARIES)

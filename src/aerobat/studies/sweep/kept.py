@@ -6,7 +6,6 @@ import hashlib
 import json
 import shutil
 from dataclasses import asdict, dataclass
-from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +15,7 @@ from aerobat.declaration import to_table
 from aerobat.documents import read_text
 from aerobat.errors import SpecError
 from aerobat.planning import Plan
+from aerobat.provenance import installed_versions
 from aerobat.storage import read_arrays, whole_file, write_whole
 from aerobat.studies.sweep.flights import CHUNK, SAMPLED, STRIDE, Chunk, SweepTask
 
@@ -94,7 +94,7 @@ def fingerprint(task: SweepTask) -> dict[str, Any]:
         "controller": _digest(to_table(task.controller)),
         "engine": task.engine,
         "chunks": [CHUNK, SAMPLED, STRIDE],
-        "versions": installed_versions(),
+        "versions": installed_versions(LIBRARIES),
     }
 
 
@@ -112,14 +112,3 @@ def _plan_table(plan: Plan) -> dict[str, Any]:
 
 def _digest(table: Any) -> str:
     return hashlib.sha256(json.dumps(table, sort_keys=True).encode()).hexdigest()[:16]
-
-
-def installed_versions() -> dict[str, str]:
-    """The versions of what the numbers come from."""
-    found = {}
-    for library in LIBRARIES:
-        try:
-            found[library] = version(library)
-        except PackageNotFoundError:
-            continue
-    return found
