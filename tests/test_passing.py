@@ -7,7 +7,7 @@ from functools import cache
 import pytest
 
 import aerobat as ab
-from aerobat.studies.passing import Passing, Trial
+from aerobat.studies.passing import Passing, Round
 
 WEAK = ab.Dispersion(name="weak", mass=0.05, rotor=0.04, start_position=0.02)
 HARSH = ab.Dispersion(name="harsh", start_velocity=30.0, mass=1e-4)
@@ -24,7 +24,7 @@ def passing(probability: float) -> Passing:
 def test_what_is_proven_was_learned_from_other_flights_and_holds_when_flown_again():
     found = passing(0.9)
     assert found.fresh.start >= FEW["flights"]
-    assert all(trial.share.of == FEW["flights"] for trial in found.trials)
+    assert all(trial.share.of == FEW["flights"] for trial in found.rounds)
     again = ab.score_flights(found.plan, conditions=WEAK, seed=3, flights=found.fresh)
     assert sum(outcome.is_success for outcome in again.outcomes) == found.after.count
     assert found.after.interval[0] >= 0.9
@@ -46,7 +46,7 @@ def test_a_probability_that_is_met_already_costs_nothing():
         == ab.plan("flip-roll", ab.Miqp(order=4), "agile-quad").trajectory
     )
     assert found.price == 0.0
-    assert len(found.trials) == 1
+    assert len(found.rounds) == 1
 
 
 def test_the_same_seed_gives_the_same_plan_and_tube():
@@ -70,7 +70,7 @@ def test_a_saved_plan_carries_its_tube(tmp_path):
 
 
 def test_what_cannot_be_reached_names_the_cause_in_the_way():
-    trials: list[Trial] = []
+    rounds: list[Round] = []
     with pytest.raises(ab.Infeasible, match=r"the start stands in the way: without it .* pass") as refused:
         ab.plan_to_pass(
             "flip-roll",
@@ -78,12 +78,12 @@ def test_what_cannot_be_reached_names_the_cause_in_the_way():
             "agile-quad",
             probability=0.9,
             conditions=HARSH,
-            tried=trials.append,
+            tried=rounds.append,
             **FEW,
         )
     assert "harsh" in str(refused.value)
-    assert trials[0].reserve == 0.3
-    assert all(0.3 < trial.reserve < 0.5 for trial in trials[1:])
+    assert rounds[0].reserve == 0.3
+    assert all(0.3 < trial.reserve < 0.5 for trial in rounds[1:])
 
 
 @pytest.mark.parametrize(

@@ -14,7 +14,7 @@ from typing import TypeVar
 from aerobat.cli.terminal import say
 from aerobat.errors import SpecError
 from aerobat.planning import Attempt
-from aerobat.studies.passing import Trial
+from aerobat.studies.passing import Round
 
 PERIOD = 5.0  # [s] between lines in a pipe, unless the environment says otherwise
 VARIABLE = "AEROBAT_PROGRESS"
@@ -76,7 +76,7 @@ class PassingProgress(PlanningProgress):
         self._rounds = 0
         self._trial = ""
 
-    def tried(self, trial: Trial) -> None:
+    def tried(self, trial: Round) -> None:
         """Take note of a round that ended; the next one is planned anew."""
         self._best = inf
         self._rounds += 1

@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, fields, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from aerobat import so3
 from aerobat.arrays import Array
@@ -115,6 +116,11 @@ class Scores:
         """One line for people."""
         error = f"position error {length(float(self.max_position_error_m.max()))} at most"
         return f"{len(self)} flights: {counted(self.outcomes)}; {error}"
+
+    @property
+    def succeeded(self) -> NDArray[np.bool_]:
+        """True of flights that did all that was asked, (flights,)."""
+        return np.array([outcome.is_success for outcome in self.outcomes])
 
     @property
     def outcomes(self) -> tuple[Outcome, ...]:

@@ -141,9 +141,7 @@ def _broadcast_vehicles(flying: list[Vehicle], config: FlightConfig) -> tuple[li
 
 def _start(start: BodyState | None, reference: ReferenceSource, vehicles: int) -> Body:
     if start is None:
-        asked = reference.setpoint(0, 1)
-        flat = asked.flat
-        first = BodyState(flat.position[0], flat.velocity[0], asked.q_world_body[0], asked.omega_body[0])
+        first = reference.start
     else:
         q = frozen(start.q_world_body, "start.q_world_body", (4,))
         if (np.abs(np.linalg.norm(q, axis=-1) - 1.0) > 1e-6).any():

@@ -14,7 +14,7 @@ from aerobat.flatness import axial_drag, force_balance, reference
 from aerobat.kernels.control_loops import Lookahead, ReferencePoint
 from aerobat.simulation.flight import setpoint_rows
 from aerobat.simulation.loop import Clock, Due
-from aerobat.states import Setpoint
+from aerobat.states import BodyState, Setpoint
 from aerobat.trajectory import Trajectory
 from aerobat.vehicle import Vehicle
 
@@ -57,6 +57,14 @@ class ReferenceSource:
 
     def __len__(self) -> int:
         return len(self.times)
+
+    @property
+    def start(self) -> BodyState:
+        """The state of a vehicle that begins without any error, no leading axis."""
+        first = self.setpoint(0, 1)
+        return BodyState(
+            first.flat.position[0], first.flat.velocity[0], first.q_world_body[0], first.omega_body[0]
+        )
 
     def setpoint(self, begin: int, end: int) -> Setpoint:
         """Set-points of the ticks from `begin` to before `end`, all of one block."""

@@ -215,17 +215,13 @@ class _Objective:
             )
             for plan in self.plans
         ]
-        errors, failed = [_errors(each) for each in scores], [_failed(each) for each in scores]
+        errors, failed = [_errors(each) for each in scores], [1.0 - each.succeeded for each in scores]
         return FlightCosts(frozen(errors, "max_position_error_m"), frozen(failed, "failed"))
 
 
 def _errors(scores: Scores) -> Array:
     lost = np.isfinite(scores.stop)
     return np.where(lost, DIVERGENCE_RADIUS, np.minimum(scores.max_position_error_m, DIVERGENCE_RADIUS))
-
-
-def _failed(scores: Scores) -> Array:
-    return np.array([0.0 if outcome.is_success else 1.0 for outcome in scores.outcomes])
 
 
 class _Ended(Exception):

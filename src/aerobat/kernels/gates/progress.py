@@ -5,10 +5,10 @@ from __future__ import annotations
 from math import inf
 from typing import NamedTuple
 
-from aerobat.kernels.gates import sweep
+from aerobat.kernels.gates import swath
 from aerobat.kernels.gates.section import BoundingEllipsoid, GateFrame
 from aerobat.kernels.gates.snapshot import Snapshot, between
-from aerobat.kernels.gates.sweep import SweepProgress
+from aerobat.kernels.gates.swath import SwathProgress
 from aerobat.kernels.ops import Ops, Scalar, Vector, magnitude, select_tree
 from aerobat.kernels.vectors import ZERO, dot
 
@@ -32,13 +32,13 @@ class GateProgress(NamedTuple):
     backward: Scalar  # [s] the crossing against the direction next to that instant, infinite if there is none
     max_distance: Scalar  # [m] beyond the plane, of ticks in the window; −infinite before it
     min_distance: Scalar  # [m] likewise
-    sweep: SweepProgress  # of the body through the plane
+    swath: SwathProgress  # of the body through the plane
 
 
 def init() -> GateProgress:
     """Progress before the first tick."""
     never = Snapshot(inf, ZERO, ZERO, (1.0, 0.0, 0.0, 0.0))
-    return GateProgress(never, 0.0, never, inf, -inf, inf, sweep.init())
+    return GateProgress(never, 0.0, never, inf, -inf, inf, swath.init())
 
 
 def step(
@@ -82,9 +82,9 @@ def step(
         ops.select(back & (back_off_time <= plane.window) & nearer_back, here.time, progress.backward),
         ops.select(in_window, ops.maximum(progress.max_distance, behind), progress.max_distance),
         ops.select(in_window, ops.minimum(progress.min_distance, behind), progress.min_distance),
-        sweep.step(
+        swath.step(
             ops,
-            progress.sweep,
+            progress.swath,
             (plane.frame, plane.depth, ellipsoid),
             snapshots,
             counted,

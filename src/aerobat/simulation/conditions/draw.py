@@ -110,7 +110,7 @@ class Draws(Sequence[Draw]):
     def __init__(self, dispersion: Dispersion, rotors: int, seed: int, flights: Sequence[int]) -> None:
         """Draw, for a vehicle of so many rotors; see `draw_flights`."""
         self._seed = seed
-        self._flights = flights
+        self.flights = flights
         count = sum(count for _, count in _NORMALS)
         normals, uniforms = np.empty((len(flights), count + 2 * rotors)), np.empty((len(flights), 2))
         words = np.empty((len(flights), 1 + len(STREAMS), _SEED_WORDS), dtype=np.uint64)
@@ -134,7 +134,7 @@ class Draws(Sequence[Draw]):
             values.flags.writeable = False
 
     def __len__(self) -> int:
-        return len(self._flights)
+        return len(self.flights)
 
     @overload
     def __getitem__(self, index: int) -> Draw: ...
@@ -147,7 +147,7 @@ class Draws(Sequence[Draw]):
             return tuple(self[k] for k in range(*index.indices(len(self))))
         values = {name: column[index] for name, column in self._columns.items()}
         numbers = {name: float(value) for name, value in values.items() if value.ndim == 0}
-        return Draw(self._seed, self._flights[index], **{**values, **numbers})
+        return Draw(self._seed, self.flights[index], **{**values, **numbers})
 
     def column(self, name: str) -> Array:
         """A field of all draws, (flights,) or (flights, n)."""

@@ -12,7 +12,6 @@ from aerobat.environment import Dispersion, Environment
 from aerobat.errors import SpecError
 from aerobat.estimation import Ekf, ekf_parameters
 from aerobat.flatness import Planned
-from aerobat.kernels.rigid_body import Body
 from aerobat.simulation.bodies import bodies
 from aerobat.simulation.components import (
     ComputationDelay,
@@ -30,7 +29,6 @@ from aerobat.simulation.conditions.sensors import MotionCaptureSensor
 from aerobat.simulation.config import FlightConfig
 from aerobat.simulation.reference_source import ReferenceSource
 from aerobat.simulation.setup import FlightSetup, Part
-from aerobat.states import BodyState
 from aerobat.trajectory import Trajectory, as_trajectory
 from aerobat.vehicle import Vehicle
 from aerobat.vehicle.controller import Controller
@@ -78,7 +76,7 @@ def dispersed_setup(
     airframe = airframe_parameters(flights.fleet, flights.effectiveness)
     plant = PlantParameters(airframe, environment_parameters(environment, len(draws)))
     return FlightSetup(
-        start=_start(reference, flights),
+        start=bodies(flights.draws.starts(reference.start)),
         parts=(
             *disturbed,
             _observer(conditions, flights, disturbed),
@@ -107,13 +105,6 @@ def _tick_rate(conditions: Dispersion, control_rate: float) -> float:
         f"computation_delay must be a whole number of ticks, which last {1.0 / rates[-1]:g} s or longer, "
         f"got {delay:g} s"
     )
-
-
-def _start(reference: ReferenceSource, flights: DispersedFlights) -> Body:
-    asked = reference.setpoint(0, 1)
-    flat = asked.flat
-    planned = BodyState(flat.position[0], flat.velocity[0], asked.q_world_body[0], asked.omega_body[0])
-    return bodies(flights.draws.starts(planned))
 
 
 def _observer(conditions: Dispersion, flights: DispersedFlights, disturbed: Sequence[Part]) -> Part:

@@ -23,7 +23,7 @@ from aerobat.arrays import Array
 from aerobat.certification import PlannedPassage
 from aerobat.declaration import by_value
 from aerobat.kernels.gates.progress import GateProgress
-from aerobat.kernels.gates.sweep import Sweep
+from aerobat.kernels.gates.swath import Swath
 from aerobat.problem.gate import Gate
 from aerobat.simulation.outcome import Outcome
 
@@ -122,7 +122,7 @@ def passages(planned: PlannedPassage, progress: GateProgress, stop: Array) -> Pa
         "speed": known(np.linalg.norm(velocity, axis=-1)),
         "attitude_error_deg": known(np.rad2deg(tilt)),
         "attitude_tolerance_deg": np.full(len(q), degrees(planned.attitude_tolerance)),
-        **_closest(gate, progress.sweep.crossing, crossed),
+        **_closest(gate, progress.swath.crossing, crossed),
         "planned": known(planned.time, ~ended_before),
         "backward_time": progress.backward,
         "max_distance": known(progress.max_distance, ~ended_before),
@@ -131,16 +131,16 @@ def passages(planned: PlannedPassage, progress: GateProgress, stop: Array) -> Pa
     return Passage(gate.name, **fields)
 
 
-def _closest(gate: Gate, sweep: Sweep, crossed: NDArray[np.bool_]) -> dict[str, Any]:
-    """What a sweep leaves of the opening, and where it is least, each (flights,).
+def _closest(gate: Gate, swath: Swath, crossed: NDArray[np.bool_]) -> dict[str, Any]:
+    """What a swath leaves of the opening, and where it is least, each (flights,).
 
     Args:
         gate: what is passed.
-        sweep: through its plane, leaves (flights,).
+        swath: through its plane, leaves (flights,).
         crossed: true where it is crossed.
     """
-    known = crossed & np.isfinite(sweep.widest.time)
-    (across, up), (above, beside) = sweep.widest.point, sweep.highest.point
+    known = crossed & np.isfinite(swath.widest.time)
+    (across, up), (above, beside) = swath.widest.point, swath.highest.point
     needed = 2 * np.abs(across), 2 * np.abs(above)
     at_side = gate.width - needed[0] <= gate.height - needed[1]
     half_width, half_height = gate.width / 2, gate.height / 2
@@ -153,7 +153,7 @@ def _closest(gate: Gate, sweep: Sweep, crossed: NDArray[np.bool_]) -> dict[str, 
     )
     numbers = {
         "clearance": np.minimum(gate.width - needed[0], gate.height - needed[1]) / 2,
-        "closest_time": np.where(at_side, sweep.widest.time, sweep.highest.time),
+        "closest_time": np.where(at_side, swath.widest.time, swath.highest.time),
         "closest_lateral": np.clip(lateral, -half_width, half_width),
         "closest_up": np.clip(upward, -half_height, half_height),
         "needed_width": needed[0],

@@ -19,7 +19,7 @@ from aerobat.kernels.gates import progress
 from aerobat.kernels.gates.progress import GateProgress
 from aerobat.kernels.gates.section import BoundingEllipsoid, GateFrame, gap, section
 from aerobat.kernels.gates.snapshot import Snapshot, between
-from aerobat.kernels.gates.sweep import Extreme, Sweep, swept_between
+from aerobat.kernels.gates.swath import Extreme, Swath, swept_between
 from aerobat.simulation.flight import Flight
 from aerobat.simulation.outcome import Outcome
 from aerobat.simulation.passages.passage import PASSAGE_DEPTH, PASSAGE_WINDOW, Passage, passages
@@ -69,7 +69,7 @@ def gate_progress(
     found = found._replace(crossing=track.crossing(forward))
     if body is None:
         return found
-    return found._replace(sweep=found.sweep._replace(crossing=track.swept(forward, body)))
+    return found._replace(swath=found.swath._replace(crossing=track.swept(forward, body)))
 
 
 @dataclass(frozen=True)
@@ -118,7 +118,7 @@ class _Track:
         k = int(np.argmin(off_times)) if off_times else 0
         return intervals[k] if off_times and off_times[k] <= PASSAGE_WINDOW else None
 
-    def swept(self, crossing: np.intp, body: Ellipsoid) -> Sweep:
+    def swept(self, crossing: np.intp, body: Ellipsoid) -> Swath:
         """What the body sweeps of the plane in the stay in which it is crossed, leaves (1,)."""
         gate = self.planned.gate
         frame = GateFrame(*(tuple(axis.tolist()) for axis in (gate.normal, gate.lateral, gate.up)))
@@ -134,7 +134,7 @@ class _Track:
         met, swept = swept_between(
             ArrayOps, frame, ellipsoid, snapshots, (gaps[:-1], gaps[1:]), crosses.astype(float)
         )
-        return Sweep(
+        return Swath(
             _farthest(swept.widest, np.where(met, np.abs(swept.widest.point.along), 0.0)),
             _farthest(swept.highest, np.where(met, np.abs(swept.highest.point.along), 0.0)),
         )

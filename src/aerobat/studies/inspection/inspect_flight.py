@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from types import MappingProxyType
 
-import numpy as np
-
 from aerobat.declaration import validated
 from aerobat.errors import SpecError
 from aerobat.flatness import vehicle_of
@@ -14,13 +12,12 @@ from aerobat.simulation import Flight
 from aerobat.studies.inspection.alignment import aligned
 from aerobat.studies.inspection.disturbances import PositionLoop, command_delay, disturbances
 from aerobat.studies.inspection.responses import responses
-from aerobat.studies.inspection.result import Inspection, share_of
+from aerobat.studies.inspection.result import Inspection
 from aerobat.vehicle import Vehicle
 from aerobat.vehicle.controller import Controller
 
 FEWEST = 10  # rows of a log in which anything can be seen
 NOTICED = 0.002  # [s] of delay that is more than the rotors' lags leave uncertain
-RISE = 1e-9  # [m] below which there is no direction of an error
 
 
 @validated
@@ -63,17 +60,10 @@ def inspect_flight(
     rate = flight.velocity - flight.setpoint_velocity
     unsaturated = "delay" if delay > NOTICED else "gains"
     errors = responses(flight.times, (error[0], rate[0]), causes, loop, unsaturated)
-    worst = int(np.argmax(flight.position_error))
-    largest = float(flight.position_error[worst])
-    direction = error[worst] / max(largest, RISE)
-    shares = [share_of(cause, one, flight.times, worst, direction) for cause, one in errors.items()]
     return Inspection(
         times=flight.times,
         error=error,
         errors=MappingProxyType(errors),
-        shares=tuple(sorted(shares, key=lambda share: -share.error)),
-        largest=largest,
-        time=float(flight.times[worst]),
         delay=delay,
         saturated=float(flight.saturated.mean()),
         observed=flight.is_observed,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from types import MappingProxyType
 
 import numpy as np
@@ -62,9 +63,6 @@ class Inspection:
     times: Array  # [s] of the log, (T,)
     error: Array  # [m] position less set-point, world, (T, 3)
     errors: Mapping[str, Array]  # [m] of each of CAUSES, (T, 3), which add up to it
-    shares: tuple[ErrorShare, ...]  # of the largest error, the largest first
-    largest: float  # [m] position error
-    time: float  # [s] when it was
     delay: float  # [s] from commands to rotors, by the log
     saturated: float  # [-] part of the rows
     observed: bool  # false where the log does not tell what an observer saw
@@ -81,10 +79,36 @@ class Inspection:
         return None if self.largest < NEGLIGIBLE else self.shares[0].cause
 
     @property
+    def largest(self) -> float:
+        """The largest position error [m]."""
+        return float(np.linalg.norm(self.error[self._worst]))
+
+    @property
+    def time(self) -> float:
+        """When the error was largest [s]."""
+        return float(self.times[self._worst])
+
+    @property
     def direction(self) -> Array:
         """The largest error's, a unit vector in world axes, (3,); zero where there is no error."""
-        worst = self.error[np.searchsorted(self.times, self.time)]
-        return np.asarray(worst / max(self.largest, _RISE))
+        return np.asarray(self.error[self._worst] / max(self.largest, _RISE))
+
+    @cached_property
+    def shares(self) -> tuple[ErrorShare, ...]:
+        """Each cause's part of the largest error, the largest first."""
+        shares = (self._share(cause, series) for cause, series in self.errors.items())
+        return tuple(sorted(shares, key=lambda share: -share.error))
+
+    @cached_property
+    def _worst(self) -> int:
+        """The row of the largest error."""
+        return int(np.argmax(np.linalg.norm(self.error, axis=1)))
+
+    def _share(self, cause: str, series: Array) -> ErrorShare:
+        size = np.linalg.norm(series, axis=1)
+        felt = self.times[size >= 0.5 * size.max()]
+        error = float(series[self._worst] @ self.direction)
+        return ErrorShare(cause, error, float(felt[0]), float(felt[-1]))
 
     @property
     def remarks(self) -> tuple[str, ...]:
@@ -135,18 +159,3 @@ class Inspection:
                 "misfit_m": place.misfit,
             },
         }
-
-
-def share_of(cause: str, errors: Array, times: Array, worst: int, direction: Array) -> ErrorShare:
-    """One cause's share of the error in a row.
-
-    Args:
-        cause: Of CAUSES.
-        errors: Its own [m], (T, 3).
-        times: [s], (T,).
-        worst: The row.
-        direction: Of the whole error there, a unit vector, (3,).
-    """
-    size = np.linalg.norm(errors, axis=1)
-    felt = times[size >= 0.5 * size.max()]
-    return ErrorShare(cause, float(errors[worst] @ direction), float(felt[0]), float(felt[-1]))

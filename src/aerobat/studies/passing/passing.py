@@ -16,7 +16,7 @@ from aerobat.planning import Attempt, Plan, Planner, as_planner, plan, with_evid
 from aerobat.planning.tube import Tube
 from aerobat.problem import Problem, as_problem
 from aerobat.studies.passing.causes import standing_in_the_way
-from aerobat.studies.passing.result import Passing, Trial
+from aerobat.studies.passing.result import Passing, Round
 from aerobat.studies.passing.spread import LEVEL, narrowed, spread_of
 from aerobat.studies.sweep import Share
 from aerobat.studies.sweep.share import CONFIDENCE, percent
@@ -45,7 +45,7 @@ def plan_to_pass(
     flights: Count = 1000,
     fresh: Count | None = None,
     progress: Callable[[Attempt], None] | None = None,
-    tried: Callable[[Trial], None] | None = None,
+    tried: Callable[[Round], None] | None = None,
 ) -> Passing:
     """Plan a problem so that flights under conditions pass with a probability, proven on fresh flights.
 
@@ -80,7 +80,7 @@ def plan_to_pass(
     _require_enough("flights", flights, probability)
     _require_enough("fresh", proving, probability)
     task = _Task(as_problem(problem), method, as_vehicle(vehicle), conditions, seed, probability, progress)
-    return _Tightening(task, range(flights), proving, tried or (lambda trial: None)).passing()
+    return _Tightening(task, range(flights), proving, tried or (lambda done: None)).passing()
 
 
 def _least_flights(probability: float) -> int:
@@ -137,32 +137,32 @@ class _Tightening:
     task: _Task
     training: range
     proving: int
-    tried: Callable[[Trial], None]
-    trials: list[Trial] = field(default_factory=list)
+    tried: Callable[[Round], None]
+    rounds: list[Round] = field(default_factory=list)
 
     def passing(self) -> Passing:
         """The plan that passes, proven. Raises Infeasible where there is none."""
         plain, scores = self._plain()
         self._narrowed = self.task.problem
-        steps, trial = 0, plain
+        steps, done = 0, plain
         if not self.task.is_enough(plain.share):
             self._narrowed = narrowed(self.task.problem, self.task.vehicle, scores)
-            steps, trial = self._smallest(self._first_steps(plain.plan))
+            steps, done = self._smallest(self._first_steps(plain.plan))
         for attempt in range(PROOFS):
             fresh = self._fresh(attempt)
-            share = self.task.share(trial.plan, fresh)
+            share = self.task.share(done.plan, fresh)
             if self.task.is_enough(share):
-                return self._proven(trial, share, fresh)
-            following = self._trial(steps + STRIDE) if attempt + 1 < PROOFS else None
+                return self._proven(done, share, fresh)
+            following = self._round(steps + STRIDE) if attempt + 1 < PROOFS else None
             if following is None:
-                raise self._unreachable(trial, fresh)
-            steps, trial = steps + STRIDE, following
+                raise self._unreachable(done, fresh)
+            steps, done = steps + STRIDE, following
         raise AssertionError("a proof ends one way or the other")
 
-    def _plain(self) -> tuple[Trial, Scores]:
+    def _plain(self) -> tuple[Round, Scores]:
         found = self.task.plan(self.task.planner.reserve, self.task.problem)
         scores = self.task.scores(found, self.training)
-        return self._noted(Trial(self.task.planner.reserve, found, _passed(scores))), scores
+        return self._noted(Round(self.task.planner.reserve, found, _passed(scores))), scores
 
     def _first_steps(self, plain: Plan) -> int:
         """The steps of reserve that the spread of the plain plan's commands asks for."""
@@ -170,55 +170,55 @@ class _Tightening:
         spread = spread_of(plain, task.vehicle, task.conditions, task.seed, self.training)
         return min(max(ceil(spread.reserve / STEP), 1), MAX_FIRST)
 
-    def _smallest(self, first: int) -> tuple[int, Trial]:
+    def _smallest(self, first: int) -> tuple[int, Round]:
         """The fewest steps of reserve with which enough training flights pass, or nearly, and that round.
 
         Args:
             first: Steps to begin with.
         """
         low, steps = 0, first
-        while steps <= MAX_STEPS and (trial := self._trial(steps)) is not None:
-            if self.task.is_enough(trial.share):
-                return self._refined(low, steps, trial)
+        while steps <= MAX_STEPS and (done := self._round(steps)) is not None:
+            if self.task.is_enough(done.share):
+                return self._refined(low, steps, done)
             low, steps = steps, steps + STRIDE
-        best = max(self.trials, key=lambda each: each.share.count)
+        best = max(self.rounds, key=lambda each: each.share.count)
         if best.share.fraction < self.task.probability:
             raise self._unreachable(best, self.training)
         return round((best.reserve - self.task.planner.reserve) / STEP), best
 
-    def _refined(self, low: int, high: int, best: Trial) -> tuple[int, Trial]:
+    def _refined(self, low: int, high: int, best: Round) -> tuple[int, Round]:
         """The fewest steps between too few and enough, by bisection."""
         while high - low > 1:
             middle = (low + high) // 2
-            trial = self._trial(middle)
-            if trial is not None and self.task.is_enough(trial.share):
-                high, best = middle, trial
+            done = self._round(middle)
+            if done is not None and self.task.is_enough(done.share):
+                high, best = middle, done
             else:
                 low = middle
         return high, best
 
-    def _trial(self, steps: int) -> Trial | None:
+    def _round(self, steps: int) -> Round | None:
         """A round with so many steps of reserve; None where there is no such plan."""
         reserve = round(self.task.planner.reserve + steps * STEP, 9)
         try:
             found = self.task.plan(reserve, self._narrowed)
         except (Infeasible, SpecError):  # no plan, or no such reserve
             return None
-        return self._noted(Trial(reserve, found, self.task.share(found, self.training)))
+        return self._noted(Round(reserve, found, self.task.share(found, self.training)))
 
-    def _noted(self, trial: Trial) -> Trial:
-        self.trials.append(trial)
-        self.tried(trial)
-        return trial
+    def _noted(self, done: Round) -> Round:
+        self.rounds.append(done)
+        self.tried(done)
+        return done
 
     def _fresh(self, attempt: int) -> range:
         """Numbers of flights that nothing was learned from."""
         first = len(self.training) + attempt * self.proving
         return range(first, first + self.proving)
 
-    def _proven(self, trial: Trial, share: Share, fresh: range) -> Passing:
-        task, plain = self.task, self.trials[0]
-        spread = spread_of(trial.plan, task.vehicle, task.conditions, task.seed, fresh)
+    def _proven(self, done: Round, share: Share, fresh: range) -> Passing:
+        task, plain = self.task, self.rounds[0]
+        spread = spread_of(done.plan, task.vehicle, task.conditions, task.seed, fresh)
         tube = Tube(
             conditions=task.conditions.name,
             seed=task.seed,
@@ -227,7 +227,7 @@ class _Tightening:
             position_error=tuple(spread.position_error.tolist()),
             attitude_error=tuple(spread.attitude_error.tolist()),
             rotor_margin=tuple(spread.rotor_margin.tolist()),
-            reserve=trial.reserve,
+            reserve=done.reserve,
             plain_duration=plain.plan.duration,
             probability=task.probability,
             passed=share.count,
@@ -235,16 +235,16 @@ class _Tightening:
             lower_bound=share.interval[0],
         )
         return Passing(
-            plan=replace(trial.plan, tube=tube),
+            plan=replace(done.plan, tube=tube),
             plain=plain.plan,
-            before=share if trial is plain else task.share(plain.plan, fresh),
+            before=share if done is plain else task.share(plain.plan, fresh),
             after=share,
             probability=task.probability,
             fresh=fresh,
-            trials=tuple(self.trials),
+            rounds=tuple(self.rounds),
         )
 
-    def _unreachable(self, best: Trial, flights: range) -> Infeasible:
+    def _unreachable(self, best: Round, flights: range) -> Infeasible:
         """The error that says how often flights pass at most, and which cause stands in the way."""
         task, share = self.task, self.task.share(best.plan, flights)
         cause = standing_in_the_way(task.conditions, lambda without: task.share(best.plan, flights, without))
@@ -253,9 +253,9 @@ class _Tightening:
             f"'{task.problem.name}' on {task.vehicle.name} is not proven to pass as often as asked, "
             f"{percent(task.probability)} %: under {task.conditions.name} {share} pass at best, with a "
             f"reserve of {best.reserve:g}{why}; ask for less, or better that",
-            [attempt for trial in self.trials for attempt in trial.plan.attempts],
+            [attempt for done in self.rounds for attempt in done.plan.attempts],
         )
 
 
 def _passed(scores: Scores) -> Share:
-    return Share(sum(outcome.is_success for outcome in scores.outcomes), len(scores))
+    return Share(int(scores.succeeded.sum()), len(scores))

@@ -12,7 +12,7 @@ from aerobat.studies.sweep import Share
 
 @by_value
 @dataclass(frozen=True, eq=False)
-class Trial:
+class Round:
     """One round: a plan with a reserve, and how many of the training flights pass."""
 
     reserve: float  # [-] of every limit's range
@@ -40,7 +40,7 @@ class Passing:
     after: Share  # likewise of the plan
     probability: float  # [-] asked
     fresh: range  # numbers of the flights of the proof
-    trials: tuple[Trial, ...]  # in the order in which they were tried, the plain plan first
+    rounds: tuple[Round, ...]  # in the order in which they were tried, the plain plan first
 
     @property
     def tube(self) -> Tube:

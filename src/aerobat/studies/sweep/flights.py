@@ -18,7 +18,7 @@ from aerobat.evaluation import Passage, Scores
 from aerobat.evaluation.score_flights import ErrorsOverTime, score_over_time
 from aerobat.planning import Plan
 from aerobat.simulation import FlightConfig
-from aerobat.simulation.conditions.draw import Draw, draw_flights
+from aerobat.simulation.conditions.draw import Draws, draw_flights
 from aerobat.vehicle import Vehicle
 
 CHUNK = 50  # flights that are flown, kept and resumed as one, whatever the batches and the cores
@@ -93,34 +93,33 @@ def _config(task: SweepTask) -> FlightConfig:
 def _flown(task: SweepTask, config: FlightConfig, is_sampled: bool) -> tuple[Columns, ErrorsOverTime]:
     """Columns of the table for the flights of a config, and their errors over time if they are sampled."""
     assert config.flights is not None
-    draws = tuple(draw_flights(task.conditions, len(task.vehicle.rotors), task.seed, config.flights))
+    draws = draw_flights(task.conditions, len(task.vehicle.rotors), task.seed, config.flights)
     stride = STRIDE if is_sampled else None
     scores, errors = score_over_time(task.plan, task.vehicle, None, None, config, stride)
     return _drawn(draws) | _scored(scores), errors
 
 
-def _drawn(draws: Sequence[Draw]) -> Columns:
+def _drawn(draws: Draws) -> Columns:
     """What flights draw, in few numbers."""
-    effectiveness = np.array([draw.effectiveness for draw in draws])
-    numbers = {
-        "mass": [draw.mass for draw in draws],
-        "inertia": [draw.inertia for draw in draws],
-        "lag_mean": [draw.lags.mean() for draw in draws],
+    effectiveness = draws.column("effectiveness")
+    return {
+        "flight": np.array(draws.flights),
+        "mass": draws.column("mass"),
+        "inertia": draws.column("inertia"),
+        "lag_mean": draws.column("lags").mean(axis=1),
         "thrust_mean": effectiveness.mean(axis=1),
         "thrust_min": effectiveness.min(axis=1),
-        "drag_1_s": [draw.drag for draw in draws],
-        "start_offset_m": [_norm(draw.start_position) for draw in draws],
-        "start_speed_m_s": [_norm(draw.start_velocity) for draw in draws],
-        "start_tilt_deg": [np.rad2deg(_norm(draw.start_attitude)) for draw in draws],
-        "mean_wind_m_s": [_norm(draw.mean_wind) for draw in draws],
-        "charge": [draw.charge for draw in draws],
+        "drag_1_s": draws.column("drag"),
+        "start_offset_m": _norms(draws.column("start_position")),
+        "start_speed_m_s": _norms(draws.column("start_velocity")),
+        "start_tilt_deg": np.rad2deg(_norms(draws.column("start_attitude"))),
+        "mean_wind_m_s": _norms(draws.column("mean_wind")),
+        "charge": draws.column("charge"),
     }
-    columns: Columns = {"flight": np.array([draw.flight for draw in draws])}
-    return columns | {name: np.array(values, dtype=float) for name, values in numbers.items()}
 
 
-def _norm(vector: Array) -> float:
-    return float(np.linalg.norm(vector))
+def _norms(vectors: Array) -> Array:
+    return np.asarray(np.linalg.norm(vectors, axis=1))
 
 
 def _scored(scores: Scores) -> Columns:

@@ -1,4 +1,4 @@
-"""The body swept through a gate's plane, tick by tick: how far it reached across the opening and up in it.
+"""The swath of a body through a gate's plane, tick by tick: how far it reached across and up.
 
 What counts is the stay about the plane in which the gate is crossed: from when the body, or the centre within
 the gate's depth, comes to the plane until both have left it. A body that comes into the plane beside the
@@ -31,41 +31,41 @@ class Extreme(NamedTuple):
     point: PlanePoint
 
 
-class Sweep(NamedTuple):
+class Swath(NamedTuple):
     """The farthest that a body reached in a gate's plane."""
 
     widest: Extreme  # along the lateral, to either side
     highest: Extreme  # along the upright, up or down
 
 
-class SweepProgress(NamedTuple):
+class SwathProgress(NamedTuple):
     """A body about a gate's plane so far."""
 
     gap: Scalar  # [m] between body and plane, negative where they meet
     is_about: Scalar  # 1 while the vehicle is about the plane
     is_crossing: Scalar  # 1 while that stay is the one in which the gate is crossed
-    stay: Sweep  # of this stay, none where there is none
-    crossing: Sweep  # of the one in which the gate is crossed
+    stay: Swath  # of this stay, none where there is none
+    crossing: Swath  # of the one in which the gate is crossed
 
 
 NOWHERE = Extreme(inf, PlanePoint(0.0, 0.0))
-NO_SWEEP = Sweep(NOWHERE, NOWHERE)
+NO_SWATH = Swath(NOWHERE, NOWHERE)
 
 
-def init() -> SweepProgress:
+def init() -> SwathProgress:
     """Progress before the first tick."""
-    return SweepProgress(inf, 0.0, 0.0, NO_SWEEP, NO_SWEEP)
+    return SwathProgress(inf, 0.0, 0.0, NO_SWATH, NO_SWATH)
 
 
 def step(
     ops: Ops,
-    progress: SweepProgress,
+    progress: SwathProgress,
     parameters: tuple[GateFrame, Scalar, BoundingEllipsoid],
     snapshots: tuple[Snapshot, Snapshot],
     counted: tuple[Scalar, Scalar],
     crosses: Scalar,
     passed: Scalar,
-) -> SweepProgress:
+) -> SwathProgress:
     """Progress a tick later.
 
     Args:
@@ -83,10 +83,10 @@ def step(
     distance = magnitude(ops, dot(now.position, frame.normal))
     is_about = counted[1] & (ops.minimum(gap_now, distance - depth) <= 0.0)
     met, here = swept_between(ops, frame, ellipsoid, snapshots, (progress.gap, gap_now), crosses)
-    before = select_tree(ops, progress.is_about > 0.5, progress.stay, NO_SWEEP)
+    before = select_tree(ops, progress.is_about > 0.5, progress.stay, NO_SWATH)
     stay = _wider(ops, counted[0] & counted[1] & met, here, before)
     is_crossing = ops.select(passed, 1.0, progress.is_crossing) > 0.5
-    return SweepProgress(
+    return SwathProgress(
         gap_now,
         ops.select(is_about, 1.0, 0.0),
         ops.select(is_crossing & is_about, 1.0, 0.0),
@@ -102,7 +102,7 @@ def swept_between(
     snapshots: tuple[Snapshot, Snapshot],
     gaps: tuple[Scalar, Scalar],
     crosses: Scalar,
-) -> tuple[Scalar, Sweep]:
+) -> tuple[Scalar, Swath]:
     """True where the body meets the plane between two ticks, and the farthest that it reaches there.
 
     Where it reaches the farthest is said by the attitude at the second tick, how far by the one there.
@@ -126,7 +126,7 @@ def swept_between(
         _extreme(ops, (normal, along, beside), ellipsoid, snapshots, within)
         for along, beside in ((lateral, up), (up, lateral))
     )
-    return ops.select(meets, 1.0, crosses) > 0.5, Sweep(*extremes)
+    return ops.select(meets, 1.0, crosses) > 0.5, Swath(*extremes)
 
 
 def _extreme(
@@ -146,9 +146,9 @@ def _extreme(
     return Extreme(at.time, farthest(ops, here))
 
 
-def _wider(ops: Ops, condition: Scalar, a: Sweep, b: Sweep) -> Sweep:
+def _wider(ops: Ops, condition: Scalar, a: Swath, b: Swath) -> Swath:
     """Of both extremes the farther, `a`'s only where the condition holds."""
-    return Sweep(*(_farther(ops, condition, p, q) for p, q in zip(a, b, strict=True)))
+    return Swath(*(_farther(ops, condition, p, q) for p, q in zip(a, b, strict=True)))
 
 
 def _farther(ops: Ops, condition: Scalar, a: Extreme, b: Extreme) -> Extreme:
