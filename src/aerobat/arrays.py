@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Sequence
-from math import prod
-from threading import Lock
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -15,7 +12,6 @@ from aerobat.errors import SpecError
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 Indices = NDArray[np.intp]
-_ONLY_HERE = 3  # references to a buffer that no array looks at: the list's, the loop's, the question's
 AXES = "xyz"  # the names of a vector's components
 
 
@@ -65,26 +61,3 @@ def _fits(shape: tuple[int, ...], wanted: Sequence[int | None]) -> bool:
     return len(shape) >= len(wanted) and all(
         w is None or s == w for s, w in zip(trailing, wanted, strict=True)
     )
-
-
-class Scratch:
-    """Memory of arrays that come and go, used again once no array looks at it any more.
-
-    Fresh pages of memory cost more than what is written to them.
-    """
-
-    def __init__(self) -> None:
-        self._buffers: list[Array] = []
-        self._lock = Lock()
-
-    def empty(self, shape: tuple[int, ...]) -> Array:
-        """An array of any content that shares memory with no other one that is still in use."""
-        size = prod(shape)
-        with self._lock:
-            for buffer in self._buffers:
-                if len(buffer) >= size and sys.getrefcount(buffer) == _ONLY_HERE:
-                    return buffer[:size].reshape(shape)
-            self._buffers = [kept for kept in self._buffers if sys.getrefcount(kept) > _ONLY_HERE]
-            fresh: Array = np.empty(size)
-            self._buffers.append(fresh)
-            return fresh[:size].reshape(shape)

@@ -13,7 +13,7 @@ from typing import Any
 import llvmlite.binding as llvm
 import numpy as np
 
-from aerobat.arrays import Array, Scratch
+from aerobat.arrays import Array
 from aerobat.engines.cores import available_cores
 from aerobat.engines.engine import (
     CompiledLoop,
@@ -48,7 +48,6 @@ class MachineLoop(CompiledLoop):
         vehicles = len(leaves[0])
         width = 1 if vehicles <= MAX_SCALAR_VEHICLES else REGISTERS * _lanes()
         self._packing = Packing.of(inputs, vehicles, width)
-        self._scratch = Scratch()
         equal = [bool((leaf == leaf[0]).all()) for leaf in leaves]
         constant = zip(piecewise_constant_leaves(inputs), self._packing.shared, strict=True)
         layout = Layout(
@@ -72,22 +71,20 @@ class MachineLoop(CompiledLoop):
 
     def init(self, inputs: Tree) -> Tree:
         """See `CompiledLoop.init`."""
-        after = self._scratch.empty((self._packing.blocks, len(self._loop.carry), self._packing.width))
-        self._run(self._init, self._packing.inputs(inputs, 1, self._scratch), (_UNUSED, after, _UNUSED), 1, 1)
+        after = np.empty((self._packing.blocks, len(self._loop.carry), self._packing.width))
+        self._run(self._init, self._packing.inputs(inputs, 1), (_UNUSED, after, _UNUSED), 1, 1)
         return self._unpacked(after)
 
     def scan(self, carry: Tree, inputs: Tree, log_stride: int = 1) -> tuple[Tree, Tree]:
         """See `CompiledLoop.scan`."""
         ticks = tick_count(inputs)
         rows = len(logged_ticks(ticks, log_stride))
-        after, outputs = self._advanced(
-            carry, self._packing.inputs(inputs, ticks, self._scratch), rows, ticks, log_stride
-        )
+        after, outputs = self._advanced(carry, self._packing.inputs(inputs, ticks), rows, ticks, log_stride)
         return after, self._row(outputs.transpose(1, 2, 0))
 
     def step(self, carry: Tree, inputs: Tree) -> tuple[Tree, Tree]:
         """See `CompiledLoop.step`."""
-        after, outputs = self._advanced(carry, self._packing.inputs(inputs, 1, self._scratch), 1, 1, 1)
+        after, outputs = self._advanced(carry, self._packing.inputs(inputs, 1), 1, 1, 1)
         return after, self._row(outputs[0])
 
     def _advanced(
@@ -96,8 +93,8 @@ class MachineLoop(CompiledLoop):
         """The next carry, and the outputs (rows, o, vehicles)."""
         latest, packed = self._latest  # most scans go on from where the last one ended
         before = packed if carry is latest else self._packing.pad_lanes(tree_leaves(carry))
-        after = self._scratch.empty((self._packing.blocks, len(self._loop.carry), self._packing.width))
-        outputs = self._scratch.empty((rows, len(self._loop.outputs), self._packing.lanes))
+        after = np.empty((self._packing.blocks, len(self._loop.carry), self._packing.width))
+        outputs = np.empty((rows, len(self._loop.outputs), self._packing.lanes))
         self._run(self._scan, inputs, (before, after, outputs), ticks, log_stride)
         return self._unpacked(after), outputs[..., : self._packing.vehicles]
 
@@ -111,7 +108,7 @@ class MachineLoop(CompiledLoop):
     def _unpacked(self, carry: Array) -> Tree:
         """(blocks, c, width) -> a tree of read-only leaves (vehicles,)."""
         carry.flags.writeable = False
-        leaves = [read_only(leaf) for leaf in self._packing.unpad_lanes(carry, self._scratch)]
+        leaves = [read_only(leaf) for leaf in self._packing.unpad_lanes(carry)]
         for index in self._logical:
             leaves[index] = read_only(leaves[index] != 0.0)
         tree = tree_unflatten(self._loop.carry_tree, leaves)

@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from aerobat.arrays import Array, Scratch
+from aerobat.arrays import Array
 from aerobat.engines.engine import Held
 from aerobat.engines.pytree import Tree, tree_leaves, tree_map, tree_replace
 
@@ -55,8 +55,8 @@ class Packing:
         """Of all blocks."""
         return self.blocks * self.width
 
-    def inputs(self, inputs: Tree, ticks: int, scratch: Scratch) -> PackedInputs:
-        """Inputs of so many ticks, or without an axis of ticks those of one, in memory of a scratch."""
+    def inputs(self, inputs: Tree, ticks: int) -> PackedInputs:
+        """Inputs of so many ticks, or without an axis of ticks those of one."""
         nodes: list[Held] = []
 
         def noted(held: Held) -> Tree:
@@ -71,13 +71,13 @@ class Packing:
         ]
         groups = [self._of_vehicles(leaves, number) for number in range(len(nodes))]
         begins = np.cumsum([0, *(len(group) * len(group[0]) if group else 0 for group in groups)]).tolist()
-        held = scratch.empty((self.blocks, begins[-1], self.width))
+        held = np.empty((self.blocks, begins[-1], self.width))
         for group, row, begin, end in zip(groups, rows, begins, begins[1:], strict=False):
             columns.append(begin + len(group) * row)
             if group:
                 self._fill(held[:, begin:end].reshape(self.blocks, -1, len(group), self.width), group)
         own = self._of_vehicles(leaves, None)
-        packed = scratch.empty((self.blocks, ticks, len(own), self.width))
+        packed = np.empty((self.blocks, ticks, len(own), self.width))
         self._fill(packed, own)
         shared = np.empty((ticks, len(columns)))
         for index, column in enumerate(columns):
@@ -96,9 +96,9 @@ class Packing:
         self._fill(packed, [leaf[None] for leaf in leaves])
         return packed[:, 0]
 
-    def unpad_lanes(self, packed: Array, scratch: Scratch) -> list[Array]:
-        """The leaves (vehicles,) of (blocks, leaf, width), in memory of a scratch."""
-        leaves = scratch.empty((packed.shape[1], self.lanes))
+    def unpad_lanes(self, packed: Array) -> list[Array]:
+        """The leaves (vehicles,) of (blocks, leaf, width)."""
+        leaves = np.empty((packed.shape[1], self.lanes))
         leaves.reshape(-1, self.blocks, self.width)[:] = packed.swapaxes(0, 1)
         return list(leaves[:, : self.vehicles])
 

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.random.bit_generator import ISeedSequence
 from numpy.typing import NDArray
 
-from aerobat.arrays import Array, Scratch, frozen
+from aerobat.arrays import Array, frozen
 from aerobat.engines.engine import Held
 from aerobat.engines.pytree import Tree
 
@@ -55,7 +55,6 @@ class RandomSource:
         self._words = normals + 2 * uniforms
         self._period = period
         self._size = block
-        self._scratch = Scratch()
         self._restart()
 
     def inputs(self, begin: int, end: int, arrange: Callable[[Array], Tree]) -> Tree:
@@ -73,7 +72,7 @@ class RandomSource:
         offset = begin // self._size * self._size
         words = words[:, begin - offset : end - offset]
         high, low = words[self._normals :: 2], words[self._normals + 1 :: 2]
-        numbers = self._scratch.empty((self._normals + len(high), *words.shape[1:]))
+        numbers = np.empty((self._normals + len(high), *words.shape[1:]))
         _quantiles().take(
             words[: self._normals], out=numbers[: self._normals], mode="clip"
         )  # quicker, checks less
