@@ -74,7 +74,7 @@ def test_what_cannot_be_reached_names_the_cause_in_the_way():
     with pytest.raises(ab.Infeasible, match=r"the start stands in the way: without it .* pass") as refused:
         ab.plan_to_pass(
             "flip-roll",
-            ab.Miqp(order=4, reserve=0.3, rescue=False),
+            ab.Miqp(order=4, reserve=0.26, rescue=False),
             "agile-quad",
             probability=0.9,
             conditions=HARSH,
@@ -82,8 +82,8 @@ def test_what_cannot_be_reached_names_the_cause_in_the_way():
             **FEW,
         )
     assert "harsh" in str(refused.value)
-    assert rounds[0].reserve == 0.3
-    assert all(0.3 < trial.reserve < 0.5 for trial in rounds[1:])
+    assert rounds[0].reserve == 0.26
+    assert all(0.26 < trial.reserve < 0.5 for trial in rounds[1:])
 
 
 @pytest.mark.parametrize(

@@ -118,7 +118,7 @@ def test_derivatives_given_to_the_solver_are_those_of_differentiation() -> None:
     start = MinSnap(stop_after=5).plan(problem, vehicle)
     sequence = problem.stages(vehicle.max_specific_thrust)
     guess = WarmStart.of(start, sequence)
-    course = Course.of(problem, vehicle, sequence, guess)
+    course = Course.of(problem, vehicle, sequence, guess, 0.0)
     guess = replace(guess, trajectory=refit(guess.trajectory, 3))
     place = int(np.searchsorted(guess.trajectory.knots[1:-1], guess.times[0], side="right"))
     variables = KnotVariables(problem, vehicle, guess, (place,), course.frame, 1.0, still_ends=False)

@@ -20,7 +20,7 @@ from aerobat.flatness.references import force_balance
 from aerobat.planning.passages import planned_passages, planned_waypoints
 from aerobat.planning.recorder import Attempt, Recorder
 from aerobat.planning.result import PlacedStage, Plan
-from aerobat.planning.rotor_margin import sampled_margin
+from aerobat.planning.rotor_margin import reserve_shortfalls, sampled_margin
 from aerobat.problem.problem import Limits, Problem
 from aerobat.trajectory import Trajectory
 from aerobat.vehicle import Vehicle
@@ -105,8 +105,9 @@ def certified_solve(
     recorder: Recorder,
     rounds: int = 1,
     jumps: bool = False,
+    reserve: float = 0.0,
 ) -> Judged[Detail]:
-    """The first solution that is certified, or the last one that was tried.
+    """The first solution that is certified and keeps the reserve, or the last one that was tried.
 
     Args:
         program: What is solved and tightened.
@@ -116,9 +117,10 @@ def certified_solve(
         rounds: Solves, at most.
         jumps: Whether body rates, or thrusts of rotors with lag, may jump between segments, which no moment
             and no rotor can do, as the certificate says.
+        reserve: Of each rotor's range, that it must be proven to keep from either of its limits.
     """
     for left in reversed(range(rounds)):
-        judged = _judged(program.solve(), problem, vehicle, recorder, jumps)
+        judged = _judged(program.solve(), problem, vehicle, recorder, jumps, reserve)
         if judged.feasible or not left or not program.tighten(judged.solution, judged.certificate):
             break
     return judged
@@ -199,7 +201,12 @@ def _backoff(excess: Array, bound: Array) -> Array:
 
 
 def _judged(
-    solution: Solution[Detail], problem: Problem, vehicle: Vehicle | None, recorder: Recorder, jumps: bool
+    solution: Solution[Detail],
+    problem: Problem,
+    vehicle: Vehicle | None,
+    recorder: Recorder,
+    jumps: bool,
+    reserve: float,
 ) -> Judged[Detail]:
     certificate = None
     if solution.trajectory is not None and solution.failure is None and vehicle is not None:
@@ -208,6 +215,9 @@ def _judged(
     if certificate is not None:
         within = replace(certificate, discontinuities=()) if jumps else certificate
         outcome = None if within.certified else certificate.why
+        shortfalls = reserve_shortfalls(certificate, reserve)
+        if outcome is None and shortfalls:
+            outcome = str(shortfalls[0])
     feasible = outcome is None
     margin = solution.margin if certificate is None else certificate.margin
     recorder.record(

@@ -1,4 +1,4 @@
-"""The rotors' margin, read from a certificate; samples of it, which can refute but not prove."""
+"""The rotors' margin and reserve, read from a certificate; samples, which can refute but not prove."""
 
 from __future__ import annotations
 
@@ -89,6 +89,46 @@ def sampled_margin(trajectory: Trajectory, vehicle: Vehicle, environment: Enviro
         low_margin=float(low[at_low]),
         high_margin=float(high[at_high]),
     )
+
+
+@dataclass(frozen=True)
+class ReserveShortfall:
+    """A rotor's thrust or command that is not proven to keep as much from its limit as was asked."""
+
+    finding: Finding
+    reserve: float  # of the rotor's range, asked
+    kept: float  # of it, proven
+
+    @property
+    def size(self) -> float:
+        """What is missing, of the rotor's range."""
+        return self.reserve - self.kept
+
+    def __str__(self) -> str:
+        """One sentence without its full stop."""
+        return (
+            f"{self.finding.quantity} keeps {100.0 * self.kept:.3g} % of its range at "
+            f"{self.finding.time:.3f} s, {100.0 * self.reserve:.3g} % are asked in reserve"
+        )
+
+
+def reserve_shortfalls(certificate: Certificate, reserve: float) -> list[ReserveShortfall]:
+    """Where rotors are not proven to keep a reserve, a fraction of their range, the worst first.
+
+    Empty without a reserve: then their limits are all that counts.
+    """
+    if reserve <= 0.0:
+        return []
+    pairs = zip(*(rotor_findings(certificate, side) for side in (Side.MIN, Side.MAX)), strict=True)
+    found = []
+    for low, high in pairs:
+        assert low.limit is not None
+        assert high.limit is not None
+        for finding in (low, high):
+            kept = _margin(finding) / (high.limit - low.limit)
+            if kept < reserve:
+                found.append(ReserveShortfall(finding, reserve, kept))
+    return sorted(found, key=lambda shortfall: shortfall.kept)
 
 
 def rotor_findings(certificate: Certificate, side: Side) -> list[Finding]:

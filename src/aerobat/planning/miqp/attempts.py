@@ -18,6 +18,7 @@ from aerobat.planning.miqp.integrator import INPUT_NAMES
 from aerobat.planning.miqp.refinement import PathPoint, PathProgram, settled
 from aerobat.planning.recorder import Recorder
 from aerobat.planning.result import PlacedStage, Plan
+from aerobat.planning.rotor_margin import reserve_shortfalls
 from aerobat.problem.problem import Problem
 from aerobat.trajectory import Trajectory
 from aerobat.vehicle import Vehicle
@@ -121,7 +122,9 @@ class Attempts:
 
     def _certified(self, program: _Answered | _Refined, rounds: int) -> Judged[Placement]:
         problem = self.formulation.problem
-        return certified_solve(program, problem, self.vehicle, self.recorder, rounds, self.jumps)
+        return certified_solve(
+            program, problem, self.vehicle, self.recorder, rounds, self.jumps, self.reserve
+        )
 
 
 @dataclass
@@ -212,15 +215,14 @@ class _Refined:
         return True
 
     def _excess(self, certificate: Certificate) -> float:
-        """The largest that a certificate refutes, as a fraction of its limit's range."""
+        """The largest that a certificate refutes, or misses of the reserve, as a fraction of its range."""
         vehicle = self.attempts.vehicle
         assert vehicle is not None
         spans = {"N": float((vehicle.max_thrusts - vehicle.min_thrusts).min())}
         refuted = (f for f in certificate.findings if f.verdict is Verdict.VIOLATED and f.limit is not None)
-        return max(
-            (-(f.margin or 0.0) / spans.get(f.unit, max(abs(f.limit or 0.0), 1.0)) for f in refuted),
-            default=0.0,
-        )
+        beyond = [-(f.margin or 0.0) / spans.get(f.unit, max(abs(f.limit or 0.0), 1.0)) for f in refuted]
+        missed = [shortfall.size for shortfall in reserve_shortfalls(certificate, self.attempts.reserve)]
+        return max([*beyond, *missed], default=0.0)
 
 
 def flyable_order(vehicle: Vehicle | None) -> int:

@@ -60,4 +60,4 @@ def _alternatives(asked: Miqp, first: int) -> Iterator[tuple[Planner, str]]:
         yield replace(asked, search=None, rescue=False), "with intervals that differ"
     from aerobat.planning.polynomial.free_knots import FreeKnots
 
-    yield FreeKnots(reserve=FLYING_RESERVE), "by free-knots"
+    yield FreeKnots(reserve=max(FLYING_RESERVE, asked.reserve)), "by free-knots"

@@ -42,7 +42,7 @@ class FreeKnots(Planner):
     two segments have room for a flip's five. Rotors that lag are held to their limits by their commands,
     their thrusts continuous. At the ends the body does not turn, but its thrust may be changing, so that
     there is jerk along it, unless `still_ends` asks for none. A `reserve`, a fraction of every limit's range,
-    is kept at samples from either end, for the controller: without one, four segments leave rotors without
+    is kept from either end for the controller, proven of rotors, at samples of the path's limits: without one, four segments leave rotors without
     lag, whose thrusts may jump, 13 cm off the paper's second example; one percent makes that 4 mm.
     """
 
@@ -98,8 +98,8 @@ class FreeKnots(Planner):
         best: Plan | None = None
         for start in self._starts(problem, vehicle):
             guess = WarmStart.of(start, sequence)
-            course = Course.of(problem, vehicle, sequence, guess)
-            descent = Descent(course, recorder, self.reserve, self.still_ends, self.iterations)
+            course = Course.of(problem, vehicle, sequence, guess, self.reserve)
+            descent = Descent(course, recorder, self.still_ends, self.iterations)
             descent.consider(start, guess)
             for segments in sorted({min(COARSE, self.segments), self.segments}):
                 if not out_of_time():
@@ -118,7 +118,12 @@ class FreeKnots(Planner):
         if self.start is not None:
             yield self.start
         closed_form: list[Planner] = [MinSnap()] if problem.maneuver.through_points else []
-        yield from plans_to_begin_from([*closed_form, Miqp(rescue=False)], problem, vehicle)
+        yield from plans_to_begin_from(closed_form, problem, vehicle)
+        for reserve in sorted({self.reserve, 0.0}, reverse=True):
+            kept = list(plans_to_begin_from([Miqp(reserve=reserve, rescue=False)], problem, vehicle))
+            yield from kept
+            if kept:
+                break
         if not out_of_time():
             yield Miqp().plan(problem)
 

@@ -23,6 +23,7 @@ from aerobat.planning.polynomial.path_limits import PathLimits, bound_scale, pat
 from aerobat.planning.polynomial.rotor_constraints import RotorConstraints
 from aerobat.planning.recorder import Recorder
 from aerobat.planning.result import PlacedStage, Plan
+from aerobat.planning.rotor_margin import reserve_shortfalls
 from aerobat.planning.warm_start import WarmStart
 from aerobat.problem.condition import ForceBalance
 from aerobat.problem.problem import Problem
@@ -65,20 +66,31 @@ class Course:
     frame: Frame
     limits: PathLimits
     balance: ForceBalance
+    reserve: float  # of every limit's range, proven of rotors
 
     @classmethod
-    def of(cls, problem: Problem, vehicle: Vehicle, sequence: StageSequence, guess: WarmStart) -> Course:
-        """Of a guess, in whose vertical plane all stays if it has one."""
+    def of(
+        cls, problem: Problem, vehicle: Vehicle, sequence: StageSequence, guess: WarmStart, reserve: float
+    ) -> Course:
+        """Of a guess, in whose vertical plane all stays if it has one.
+
+        Args:
+            problem: What is planned.
+            vehicle: What flies it.
+            sequence: The problem's stages for it.
+            guess: Where to begin.
+            reserve: Of every limit's range, kept from either of its ends.
+        """
         environment = problem.environment
         frame = Frame.around(guess, environment.wind)
         balance = force_balance(environment, vehicle)
         rotors = RotorConstraints(vehicle, frame.axes, environment, problem.heading)
         limits = PathLimits(rotors, frame.origin, path_bounds(problem, sequence, balance))
-        return cls(problem, vehicle, frame, limits, balance)
+        return cls(problem, vehicle, frame, limits, balance, reserve)
 
     def path(self, guess: WarmStart, start: Plan | None = None) -> Path:
         """A guess, looked at densely."""
-        return Path(guess, ConstraintViolation.of(guess.trajectory, self.limits), start)
+        return Path(guess, ConstraintViolation.of(guess.trajectory, self.limits, self.reserve), start)
 
     def solution(self, path: Path, status: str, nodes: int = 0, solve_time: float = 0.0) -> Solution[Path]:
         """A path as a solution; a failure where it misses a stage, or exceeds limits."""
@@ -127,7 +139,6 @@ class Descent:
 
     course: Course
     recorder: Recorder
-    reserve: float  # of every limit's range
     still_ends: bool
     iterations: int  # of each solve, at most
     best: Judged[Path] | None = None
@@ -170,7 +181,9 @@ class Descent:
     def _certified(self, program: _Start | _Exchange, rounds: int) -> Judged[Path] | None:
         """Outcome of a program, if it is certified; the best is kept."""
         course = self.course
-        found = certified_solve(program, course.problem, course.vehicle, self.recorder, rounds)
+        found = certified_solve(
+            program, course.problem, course.vehicle, self.recorder, rounds, reserve=course.reserve
+        )
         if not found.feasible:
             return None
         if self.best is None or found.solution.duration < self.best.solution.duration:
@@ -213,7 +226,7 @@ class _Exchange:
         self._begun = guess.trajectory.duration
         self._samples = chebyshev_samples(guess.trajectory.segments)
         self._radius = TRUST_RADIUS
-        self._backoff = FIRST_BACKOFF + descent.reserve
+        self._backoff = FIRST_BACKOFF + descent.course.reserve
         self._relaxed: float | None = None  # [s] the duration of the first solution near the guess
 
     def solve(self) -> Solution[Path]:
@@ -249,14 +262,14 @@ class _Exchange:
         self.guess = certified
         self._relaxed = None
         self._radius = TRUST_RADIUS
-        self._backoff = FIRST_BACKOFF + self._descent.reserve
+        self._backoff = FIRST_BACKOFF + self._descent.course.reserve
 
     def tighten(self, solution: Solution[Path], certificate: Certificate | None) -> bool:
         """Sample where limits are exceeded, and go on from there in a smaller region.
 
         A path slower than the best that is certified is given up: tightening only slows it further.
         """
-        best, path = self._descent.best, solution.source
+        best, course, path = self._descent.best, self._descent.course, solution.source
         if out_of_time():
             return False
         solved = path.unsolved <= SOLVED
@@ -267,6 +280,8 @@ class _Exchange:
         for finding in () if certificate is None else certificate.findings:
             if finding.verdict is not Verdict.HOLDS:
                 violation = violation.add_counterexample(path.guess.trajectory, finding.time)
+        for shortfall in () if certificate is None else reserve_shortfalls(certificate, course.reserve):
+            violation = violation.add_counterexample(path.guess.trajectory, shortfall.finding.time)
         self._samples = violation.joined(self._samples)
         if not solved and self._radius <= MIN_RADIUS:
             return False

@@ -28,11 +28,11 @@ class ConstraintViolation:
     peaks: Samples  # normalised times in each segment at which a limit is exceeded more than beside them
 
     @classmethod
-    def of(cls, trajectory: Trajectory, limits: PathLimits) -> ConstraintViolation:
-        """Of limits along a trajectory, at a dense look."""
+    def of(cls, trajectory: Trajectory, limits: PathLimits, reserve: float = 0.0) -> ConstraintViolation:
+        """Of limits along a trajectory, the vehicle's less a reserve, at a dense look."""
         s = np.linspace(0.0, 1.0, DENSE)
         inside = np.clip(s, JUST_INSIDE, 1.0 - JUST_INSIDE)
-        values = limits.excess(trajectory, (inside,) * trajectory.segments)
+        values = limits.excess(trajectory, (inside,) * trajectory.segments, reserve)
         neighbours = np.pad(values, ((0, 0), (0, 0), (1, 1)), constant_values=-np.inf)
         peaks = (values > 0.0) & (values >= neighbours[..., :-2]) & (values >= neighbours[..., 2:])
         segment, row, place = np.unravel_index(np.argmax(values), values.shape)

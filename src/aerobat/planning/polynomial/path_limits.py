@@ -62,9 +62,15 @@ class PathLimits:
         """The limits' names, one a value."""
         return (*self.rotors.names, *(name for name, _ in self.bounds))
 
-    def excess(self, trajectory: Trajectory, samples: Samples) -> Array:
-        """By how much a trajectory exceeds limits at as many samples of each segment, (S, size, n)."""
+    def excess(self, trajectory: Trajectory, samples: Samples, reserve: float = 0.0) -> Array:
+        """By how much a trajectory exceeds limits at as many samples of each segment, (S, size, n).
+
+        Of the vehicle's limits, less a reserve.
+        """
+        kept = np.zeros((len(self.names), 1))
+        kept[: len(self.rotors.names), 0] = np.where(self.rotors.has_range, reserve, 0.0)
         lower, upper = (limits[:, None] for limits in self.limits(0.0))
+        lower, upper = lower + kept, upper - kept
         frames = self.frames(trajectory, samples)
         found = []
         for i, (s, frame) in enumerate(zip(samples, frames, strict=True)):

@@ -194,16 +194,16 @@ class PathPoint:
     @cached_property
     def violation(self) -> float:
         """The largest excess, as a fraction of its constraint's range, a trifle of what rows aim at aside."""
-        rotor_columns = self._values.shape[1] - len(self.program.path.bounds)
-        rotors = self._values[:, :rotor_columns].max(initial=-1.0) - ROTOR_SLACK
-        others = max(self._values[:, rotor_columns:].max(initial=-1.0), self._stage_values.max(initial=-1.0))
+        count = self.program.rotors.count
+        rotors = self._values[:, :count].max(initial=-1.0) - ROTOR_SLACK
+        others = max(self._values[:, count:].max(initial=-1.0), self._stage_values.max(initial=-1.0))
         return float(max(rotors, others - NEGLIGIBLE))
 
     @property
     def excess_sentence(self) -> str:
         """Which constraint is exceeded most, by how much and when."""
         place, column = np.unravel_index(int(self._values.argmax()), self._values.shape)
-        names = self.program.rotors.names[: self._values.shape[1] - len(self.program.path.bounds)]
+        names = self.program.rotors.names[: self.program.rotors.count]
         name = names[column] if column < len(names) else "a limit or condition on the path is"
         excess, time = 100.0 * float(self._values[place, column]), float(self._samples.times[place])
         return f"{name} beyond its limit by {excess:.3g} % of its range at {time:.2f} s"
@@ -226,12 +226,16 @@ class PathPoint:
         )
 
     def excess(self, parts: int) -> Array:
-        """By how much constraints are exceeded in each interval, (N, c), at places this dense."""
+        """By how much constraints are exceeded in each interval, (N, c), at places this dense.
+
+        Of what the vehicle can do, less what shall be kept of it.
+        """
         chain = self.program.chain
         samples = chain.samples(self.x, Places.even(chain.intervals, parts))
         frames = self.program.rotors.frames(samples.times, samples.derivatives)
-        values = self._constraints(samples, frames).reshape(chain.intervals, parts + 1, -1)
-        worst = values.max(axis=1)
+        values = self._constraints(samples, frames)
+        values[:, : self.program.rotors.count] += self.program.reserve - ROTOR_BACKOFF
+        worst = values.reshape(chain.intervals, parts + 1, -1).max(axis=1)
         return np.where(worst > NEGLIGIBLE, worst, 0.0)
 
     def near(self, margin: float) -> Array:
@@ -263,7 +267,7 @@ class PathPoint:
         """The constraints at places, backed off, (m, c)."""
         program = self.program
         values = self._constraints(self._samples, self._frames)
-        values[:, : -len(program.path.bounds) or None] += program.reserve
+        values[:, : program.rotors.count] += program.reserve
         return values + program.backoff[program.places.interval] if program.backoff.size else values
 
     @cached_property
@@ -280,10 +284,9 @@ class PathPoint:
     def _slopes(self, place: Indices, column: Indices) -> Array:
         """Of constraints by the derivatives at their places, (q, 6, 3)."""
         path = self.program.path.weights
-        rotor_columns = self._values.shape[1] - len(path)
-        of_path = column >= rotor_columns
+        of_path = column >= self.program.rotors.count
         slopes = np.empty((len(place), DERIVATIVES, 3))
-        slopes[of_path] = path[column[of_path] - rotor_columns]
+        slopes[of_path] = path[column[of_path] - self.program.rotors.count]
         at, columns = place[~of_path], column[~of_path]
         slopes[~of_path] = self.program.rotors.slopes(self._samples.derivatives, self._frames, at, columns)
         return slopes

@@ -46,6 +46,11 @@ class RotorRows:
         sides = (f"the {kind} of rotor {i} is" for kind in kinds for _ in ("low", "high") for i in rotors)
         return (*sides, "the collective thrust is next to nothing,", "the body rate is")
 
+    @property
+    def count(self) -> int:
+        """The number of constraints."""
+        return len(self._linear[1])
+
     def frames(self, times: Array, derivatives: Array) -> Array:
         """Body axes in the world, as columns, (m, 3, 3), along a path's derivatives (m, 6, 3)."""
         velocity, acceleration, jerk, snap = np.moveaxis(derivatives[:, 1:5], 1, 0)

@@ -1,0 +1,74 @@
+"""A reserve that is asked for is proven of the plan that is returned, whoever planned it in the end."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+from aerobat.certification import Certificate
+from aerobat.errors import Infeasible
+from aerobat.planning import FreeKnots, Miqp, Planner, TimeOptimal
+from aerobat.planning.miqp.rescue import rescued_plan
+from aerobat.planning.recorder import Recorder
+from aerobat.planning.rotor_margin import reserve_shortfalls
+from aerobat.problem import load_problem
+from aerobat.vehicle import load_vehicle
+
+
+def kept(certificate: Certificate | None) -> float:
+    """The smallest fraction of its range that a rotor's thrust or command is proven to keep from a limit."""
+    assert certificate is not None
+    limits: dict[str, list[float]] = {}
+    margins: dict[str, float] = {}
+    for finding in certificate.findings:
+        if finding.quantity.startswith("rotor "):
+            assert finding.limit is not None
+            assert finding.margin is not None
+            limits.setdefault(finding.quantity, []).append(finding.limit)
+            margins[finding.quantity] = min(finding.margin, margins.get(finding.quantity, finding.margin))
+    return min(margins[name] / (max(ends) - min(ends)) for name, ends in limits.items())
+
+
+@pytest.mark.parametrize(
+    ("planner", "reserve"),
+    [
+        (Miqp(reserve=0.03), 0.03),
+        (Miqp(reserve=0.1), 0.1),
+        (Miqp(reserve=0.34), 0.34),
+        (FreeKnots(reserve=0.03), 0.03),
+        (TimeOptimal(20, 0.1, starts=1, planar=True), 0.1),
+    ],
+    ids=str,
+)
+def test_every_plan_is_proven_to_keep_the_reserve_that_was_asked(planner: Planner, reserve: float) -> None:
+    """Free-knots returned the path that it began from, which kept none, and so did rescues."""
+    plan = planner.plan(load_problem("flip-roll"), load_vehicle("crazyflie"))
+    assert plan.certified
+    assert kept(plan.certificate) >= reserve
+
+
+def test_every_rescue_is_asked_to_keep_what_was_asked(monkeypatch: pytest.MonkeyPatch) -> None:
+    asked: list[float] = []
+
+    def refuse(self: Any, *_: Any) -> None:
+        asked.append(self.reserve)
+        raise Infeasible("refused")
+
+    for planner in (Miqp, FreeKnots):
+        monkeypatch.setattr(planner, "plan", refuse)
+    problem, vehicle = load_problem("flip-roll"), load_vehicle("crazyflie")
+    assert rescued_plan(Miqp(reserve=0.34), problem, vehicle, Recorder(None)) is None
+    assert asked
+    assert min(asked) == 0.34
+
+
+def test_what_is_missing_of_a_reserve_is_told_of_the_rotor_that_keeps_least() -> None:
+    certificate = Miqp().plan(load_problem("half-flip"), load_vehicle("agile-quad")).certificate
+    assert certificate is not None
+    least = kept(certificate)
+    assert reserve_shortfalls(certificate, least) == []
+    worst = reserve_shortfalls(certificate, least + 0.01)[0]
+    assert worst.kept == least
+    assert worst.size == pytest.approx(0.01)
+    assert "in reserve" in str(worst)
