@@ -122,11 +122,16 @@ class Backoff:
         nothing = np.zeros((intervals, len(bounds.lower)))
         return cls(nothing, nothing)
 
-    def grown(self, bounds: Bounds, trajectory: Trajectory) -> Backoff | None:
-        """The same with what a trajectory exceeds added; None where that leaves nothing, or nothing is."""
-        values = bounds.along(trajectory)
-        low = self.low + _more(bounds.lower + _largest(-values), bounds.sizes)
-        high = self.high + _more(_largest(values) - bounds.upper, bounds.sizes)
+    def grown(self, bounds: Bounds, trajectory: Trajectory, reserve: float = 0.0) -> Backoff | None:
+        """The same with what a trajectory exceeds added; None where that leaves nothing, or nothing is.
+
+        Of rotors, whose `reserve`, a fraction of their range, shall be kept, what it misses of that.
+        """
+        values, kept = bounds.along(trajectory), np.zeros_like(bounds.sizes)
+        rotors = slice(len(bounds.path), -1)
+        kept[rotors] = reserve * bounds.sizes[rotors]
+        low = self.low + _more(bounds.lower + kept + _largest(-values), bounds.sizes)
+        high = self.high + _more(_largest(values) - (bounds.upper - kept), bounds.sizes)
         unchanged = (low == self.low).all() and (high == self.high).all()
         if unchanged or (low + high > MAX_BACKOFF * (bounds.upper - bounds.lower)).any():
             return None

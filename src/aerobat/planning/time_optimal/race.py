@@ -121,7 +121,9 @@ class Race:
         return own_flight(solved.trajectory, self.vehicle, self.problem, solved.placed)
 
     def _certified(self, program: CollocatedProgram) -> Judged[SolvedMotion] | None:
-        found = certified_solve(program, self.problem, self.vehicle, self.recorder, ROUNDS)
+        found = certified_solve(
+            program, self.problem, self.vehicle, self.recorder, ROUNDS, reserve=self.reserve
+        )
         return found if found.feasible else None
 
     def _record(self, solved: SolvedMotion, usable: bool) -> None:

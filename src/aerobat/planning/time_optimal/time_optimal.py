@@ -25,6 +25,7 @@ from aerobat.planning.miqp import Miqp
 from aerobat.planning.planners import Planner, option, planner
 from aerobat.planning.recorder import Progress, Recorder
 from aerobat.planning.result import FLYING_RESERVE, Plan
+from aerobat.planning.rotor_margin import reserve_shortfalls
 from aerobat.planning.time_limit import TIME_LIMIT, stopped, too_short
 from aerobat.planning.time_optimal.collocated_program import SolvedMotion
 from aerobat.planning.time_optimal.collocation import BOUNDED_DERIVATIVES
@@ -109,6 +110,9 @@ def _best_so_far(own: Plan | None, begun: Starts, race: Race, limit: float | Non
     if start is None:
         raise too_short(race.problem, limit, attempts)
     instead = f"time-optimal found none faster in time than the path that it began from, {start.planner}'s"
+    shortfalls = [] if start.certificate is None else reserve_shortfalls(start.certificate, race.reserve)
+    if shortfalls:
+        instead += f", whose {shortfalls[0]}"
     return replace(start, planner="time-optimal", attempts=attempts, rescue=instead)
 
 
