@@ -38,12 +38,13 @@ class FreeKnots(Planner):
     """Such polynomials at the rotors' limits, derivatives and times at knots free; needs the extra casadi.
 
     It begins from `start`, a plan of the same problem, certified or not; without one from the closed form
-    through waypoints, or else from the MIQP's plan. Stages hold anywhere in their order and their windows;
-    two segments have room for a flip's five. Rotors that lag are held to their limits by their commands,
-    their thrusts continuous. At the ends the body does not turn, but its thrust may be changing, so that
-    there is jerk along it, unless `still_ends` asks for none. A `reserve`, a fraction of every limit's range,
-    is kept from either end for the controller, proven of rotors, at samples of the path's limits: without one, four segments leave rotors without
-    lag, whose thrusts may jump, 13 cm off the paper's second example; one percent makes that 4 mm.
+    through waypoints, or else from the MIQP's plan. Stages hold anywhere in their order and their
+    windows; two segments have room for a flip's five. Rotors that lag are held to their limits by their
+    commands, their thrusts continuous. At the ends the body does not turn, but its thrust may be
+    changing, so that there is jerk along it, unless `still_ends` asks for none. A `reserve`, a fraction
+    of every limit's range, is kept from either end for the controller, proven of rotors, at samples of
+    the path's limits: without one, four segments leave rotors without lag, whose thrusts may jump, 13 cm
+    off the paper's second example; one percent makes that 4 mm.
     """
 
     segments: Annotated[int, Field(ge=2, le=MAX_SEGMENTS)] = option(

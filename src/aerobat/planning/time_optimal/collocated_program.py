@@ -134,9 +134,7 @@ class CollocatedProgram:
         """Tighten what is held at nodes by what is exceeded between them, and go on from the solution."""
         if solution.trajectory is None or certificate is None or out_of_time():
             return False
-        backoff = self._backoff.grown(
-            self.control.elements.bounds, solution.trajectory, self.control.reserve
-        )
+        backoff = self._backoff.grown(self.control.elements.bounds, solution.trajectory, self.control.reserve)
         if backoff is None:
             return False
         answer = solution.source.answer
