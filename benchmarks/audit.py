@@ -3,13 +3,13 @@
     uv run python benchmarks/audit.py [--what plans refusals smallest-dt price] [--count N] [--seed S]
         [--planners miqp ...] [--kinds flip ...] [--jobs 2] [--results FILE] [--save FOLDER]
 
-`plans` plans each problem with each planner as the command line does, flies it, and tells what is left of its
-certificate: attitude in gates, `always` conditions and limits in 10^5 samples, errors flown, durations over
-those of time-optimal plans, times. `refusals` tries again what the MIQP refuses, with other N, orders and
-durations and with free knots. `smallest-dt` looks for shorter plans than the MIQP's, 1 % at a time. `price`
-compares durations with those of an attitude in the gate that is asked only in the plane of the turn, and of a
-passage at half the duration. Rows are appended to the results' file; those that it holds are not measured
-again. Problems whose result is a defect are saved as files.
+`plans` plans each problem with each planner as the command line does, flies it, and tells what is left of
+its certificate: attitude in gates, `always` conditions and limits in 10^5 samples, errors flown, durations
+over those of time-optimal plans, times. `refusals` tries again what the MIQP refuses, with other N, orders
+and durations and with free knots, and follows what each advises. `smallest-dt` looks for shorter plans than
+the MIQP's, 1 % at a time. `price` compares durations with those of an attitude in the gate that is asked
+only in the plane of the turn, and of a passage at half the duration. Rows are appended to the results'
+file; those that it holds are not measured again. Problems whose result is a defect are saved as files.
 """
 
 from __future__ import annotations
@@ -32,6 +32,7 @@ from typing import Any
 import numpy as np
 
 from aerobat.planning import FreeKnots, GridSearch, Miqp, plan
+from audit_advice import followed
 from audit_measures import ALL_PLANNERS, Attempted, attempted, plan_facts, with_passage
 from audit_tables import TABLES, defect
 from hard_problems import hard_case
@@ -145,6 +146,8 @@ def refusals(task: Task, case: Case) -> Row:
     asked = partial(plan, case.problem, Miqp(intervals=intervals), case.vehicle)
     made = attempted(asked, REFUSAL_PATIENCE)
     row = facts(made) | {"intervals": intervals, "hardships": case.problem.description}
+    if made.plan is None and made.status in ("infeasible", "refused"):
+        row["advice"] = followed(case, Miqp(intervals=intervals), made.message)
     if row["status"] != "infeasible":
         return row | {"rescue": made.plan.rescue if made.plan else None}
     began = time.process_time()

@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterable
 from statistics import median
 from typing import Any
 
+from audit_advice import WRONG
 from audit_measures import ALL_PLANNERS, PLANNERS, YARDSTICK, at_equal_reserve
 
 Row = dict[str, Any]
@@ -40,6 +41,8 @@ def defect(row: Row) -> str:
             > row.get("tolerance_deg", 180.0) + 0.5
         ):
             return f"attitude in the gate {row['planned_deg']:.1f}° off, flown {row['flown_deg']:.1f}°"
+    if row.get("advice", "").startswith(WRONG):
+        return f"refused, {row['advice']}: {row['message']}"
     if row.get("planned_by") or row.get("free_knots"):
         return f"refused, planned by {row['planned_by'] or 'free knots'}"
     if row.get("shorter"):
@@ -139,6 +142,9 @@ def refusals(rows: list[Row]) -> Iterable[str]:
             f"{ways:.0f} ways tried on average; {median(seconds):.1f} s a refusal at the median, "
             f"{seconds[-1]:.1f} at most"
         )
+        told = [r["advice"] for r in tried if "advice" in r]
+        words = ", ".join(f"{told.count(what)} {what}" for what in sorted(set(told)))
+        yield f"what {len(told)} refusals advise, followed (floor: none that does not help): {words}"
         counts = ", ".join(f"{rescued.count(how)} {how}" for how in sorted(set(rescued)))
         patience = sum(r["status"] == "TimeoutError" for r in tried)
         yield f"{len(rescued)} others rescued: {counts}; {patience} without any answer in time"

@@ -34,9 +34,9 @@ def why_infeasible(formulation: Formulation, attempts: Sequence[Attempt], vehicl
     if not binding:
         return (
             f"{said}: its stages, goal and limits exclude each other, and dropping any one of them does not "
-            "help; use more intervals or ask less"
+            "help"
         )
-    return f"{said}: {' or '.join(binding)} binds; widen or drop it, or use more intervals"
+    return f"{said}: {' or '.join(binding)} binds; without it the program has a solution"
 
 
 def _binding(formulation: Formulation, dts: Sequence[float]) -> Iterator[str]:

@@ -89,7 +89,7 @@ class Miqp(Planner):
                 rescued = rescued_plan(self, problem, vehicle, recorder)
                 if rescued is not None:
                     return rescued
-                if out_of_time() or not any(attempt.cost is not None for attempt in infeasible.attempts):
+                if out_of_time():
                     raise
                 advised = f"{infeasible}; {advice(self, problem, vehicle)}"
                 raise Infeasible(advised, infeasible.attempts) from None

@@ -203,8 +203,8 @@ class PathPoint:
     def excess_sentence(self) -> str:
         """Which constraint is exceeded most, by how much and when."""
         place, column = np.unravel_index(int(self._values.argmax()), self._values.shape)
-        names = self.program.rotors.names[: self.program.rotors.count]
-        name = names[column] if column < len(names) else "a limit or condition on the path is"
+        rotors = self.program.rotors
+        name = [*rotors.names[: rotors.count], *self.program.path.names][column]
         excess, time = 100.0 * float(self._values[place, column]), float(self._samples.times[place])
         return f"{name} beyond its limit by {excess:.3g} % of its range at {time:.2f} s"
 

@@ -8,9 +8,10 @@ from math import isfinite
 
 import numpy as np
 
-from aerobat.arrays import Array
+from aerobat.arrays import AXES, Array
 from aerobat.planning.miqp.refinement.phases import DERIVATIVES
 from aerobat.problem.condition import Condition, ForceBalance
+from aerobat.problem.problem import DERIVATIVES as QUANTITIES
 from aerobat.problem.problem import Limits
 
 
@@ -20,6 +21,7 @@ class PathRows:
 
     weights: Array  # (c, 6, 3)
     bounds: Array  # (c,)
+    names: tuple[str, ...]  # of each, with its verb
 
     @classmethod
     def of(
@@ -33,9 +35,11 @@ class PathRows:
             conditions: what holds throughout.
             balance: what thrust works against.
         """
-        rows = [*_of_limits(limits, order), *of_conditions(conditions, balance)]
-        weights = np.array([row[0] for row in rows]).reshape(-1, DERIVATIVES, 3)
-        return cls(weights, np.array([row[1] for row in rows]))
+        rows = list(_of_limits(limits, order))
+        for condition in conditions:
+            rows += [(f"{condition.name} is", *side) for side in of_conditions((condition,), balance)]
+        weights = np.array([row[1] for row in rows]).reshape(-1, DERIVATIVES, 3)
+        return cls(weights, np.array([row[2] for row in rows]), tuple(row[0] for row in rows))
 
     def values(self, derivatives: Array) -> Array:
         """The constraints at derivatives (m, 6, 3), (m, c), at most zero where they hold."""
@@ -64,11 +68,12 @@ def of_conditions(
                 yield sign * weights / size, sign * limit / size
 
 
-def _of_limits(limits: Limits, order: int) -> Iterator[tuple[Array, float]]:
+def _of_limits(limits: Limits, order: int) -> Iterator[tuple[str, Array, float]]:
     for derivative in range(order + 1):
         for sign, bounds in zip((-1.0, 1.0), limits.of(derivative), strict=True):
             for axis in np.flatnonzero(np.isfinite(bounds)).tolist():
                 size = max(abs(float(bounds[axis])), 1.0)
                 weights = np.zeros((DERIVATIVES, 3))
                 weights[derivative, axis] = sign / size
-                yield weights, sign * float(bounds[axis]) / size
+                name = f"the {QUANTITIES[derivative]} {AXES[axis]} is"
+                yield name, weights, sign * float(bounds[axis]) / size
