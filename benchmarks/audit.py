@@ -1,15 +1,16 @@
 """Everything that a certificate, a refusal and a yardstick promise, tried on random problems.
 
-    uv run python benchmarks/audit.py [--what plans refusals smallest-dt price] [--count N] [--seed S]
+    uv run python benchmarks/audit.py [--what plans refusals advice smallest-dt price] [--count N] [--seed S]
         [--planners miqp ...] [--kinds flip ...] [--jobs 2] [--results FILE] [--save FOLDER]
 
 `plans` plans each problem with each planner as the command line does, flies it, and tells what is left of
 its certificate: attitude in gates, `always` conditions and limits in 10^5 samples, errors flown, durations
 over those of time-optimal plans, times. `refusals` tries again what the MIQP refuses, with other N, orders
-and durations and with free knots, and follows what each advises. `smallest-dt` looks for shorter plans than
-the MIQP's, 1 % at a time. `price` compares durations with those of an attitude in the gate that is asked
-only in the plane of the turn, and of a passage at half the duration. Rows are appended to the results'
-file; those that it holds are not measured again. Problems whose result is a defect are saved as files.
+and durations and with free knots. `advice` follows what refusals advise. `smallest-dt` looks for shorter
+plans than the MIQP's, 1 % at a time. `price` compares durations with those of an attitude in the gate that
+is asked only in the plane of the turn, and of a passage at half the duration. Rows are appended to the
+results' file; those that it holds are not measured again. Problems whose result is a defect are saved as
+files.
 """
 
 from __future__ import annotations
@@ -34,7 +35,7 @@ import numpy as np
 from aerobat.planning import FreeKnots, GridSearch, Miqp, plan
 from audit_advice import followed
 from audit_measures import ALL_PLANNERS, Attempted, attempted, plan_facts, with_passage
-from audit_tables import TABLES, defect
+from audit_tables import HARD, TABLES, defect
 from hard_problems import hard_case
 from random_problems import KINDS, Case, random_case, write_case
 
@@ -69,7 +70,7 @@ class Task:
     @property
     def case(self) -> Case:
         """The problem and the vehicle."""
-        if self.what == "refusals":
+        if self.what in HARD:
             return hard_case(self.seed, self.k)
         return random_case(self.seed, self.k, self.kinds)
 
@@ -141,13 +142,7 @@ def plans(task: Task, case: Case) -> Row:
 
 def refusals(task: Task, case: Case) -> Row:
     """A refusal by the MIQP of some N, and what plans the problem all the same."""
-    rng = np.random.default_rng([task.seed, task.k, 2])
-    intervals = int(rng.choice(ASKED_INTERVALS))
-    asked = partial(plan, case.problem, Miqp(intervals=intervals), case.vehicle)
-    made = attempted(asked, REFUSAL_PATIENCE)
-    row = facts(made) | {"intervals": intervals, "hardships": case.problem.description}
-    if made.plan is None and made.status in ("infeasible", "refused"):
-        row["advice"] = followed(case, Miqp(intervals=intervals), made.message)
+    row, made, _, rng = refused_perhaps(task, case)
     if row["status"] != "infeasible":
         return row | {"rescue": made.plan.rescue if made.plan else None}
     began = time.process_time()
@@ -163,6 +158,23 @@ def refusals(task: Task, case: Case) -> Row:
     free = facts(attempted(partial(plan, case.problem, FreeKnots(), case.vehicle), RETRY_PATIENCE))
     free_knots = free["status"] == "planned" and free["certified"]
     return row | {"planned_by": planned, "tried": tried, "free_knots": free_knots}
+
+
+def advice(task: Task, case: Case) -> Row:
+    """A refusal by the MIQP of some N, and what comes of following its advice."""
+    row, made, asked, _ = refused_perhaps(task, case)
+    if made.plan is None and made.status in ("infeasible", "refused"):
+        row["advice"] = followed(case, asked, made.message)
+    return row
+
+
+def refused_perhaps(task: Task, case: Case) -> tuple[Row, Attempted, Miqp, np.random.Generator]:
+    """What the MIQP of some N makes of a hard problem; the N and the generator that drew it."""
+    rng = np.random.default_rng([task.seed, task.k, 2])
+    asked = Miqp(intervals=int(rng.choice(ASKED_INTERVALS)))
+    made = attempted(partial(plan, case.problem, asked, case.vehicle), REFUSAL_PATIENCE)
+    hardships = {"intervals": asked.intervals, "hardships": case.problem.description}
+    return facts(made) | hardships, made, asked, rng
 
 
 def at_duration(duration: float, intervals: int) -> Miqp:
@@ -207,7 +219,13 @@ def facts(made: Attempted) -> Row:
     return row
 
 
-MEASURES = {"plans": plans, "refusals": refusals, "smallest-dt": smallest_dt, "price": price}
+MEASURES = {
+    "plans": plans,
+    "refusals": refusals,
+    "advice": advice,
+    "smallest-dt": smallest_dt,
+    "price": price,
+}
 
 if __name__ == "__main__":
     main()

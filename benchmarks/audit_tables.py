@@ -18,12 +18,13 @@ YARDSTICK_SLACK = 0.995
 AT_SIGHT = 0.05  # [s] of the processor, for a refusal that solves nothing
 SUCCESS = ("COMPLETE", "THROUGH_GATES")
 FORESEEN = ("planned", "infeasible")
+HARD = ("refusals", "advice")  # measures on hard problems
 SAID = "refused"  # in words, as input that makes no sense: to be expected of hard problems only
 
 
 def defect(row: Row) -> str:
     """What is wrong with a row, in a few words; nothing otherwise."""
-    if row["status"] not in FORESEEN and (row["status"], row["what"]) != (SAID, "refusals"):
+    if row["status"] not in FORESEEN and not (row["status"] == SAID and row["what"] in HARD):
         return f"{row['status']}: {row['message']}"
     if row["what"] == "plans" and row["status"] == "planned":
         if not row["certified"]:
@@ -142,12 +143,21 @@ def refusals(rows: list[Row]) -> Iterable[str]:
             f"{ways:.0f} ways tried on average; {median(seconds):.1f} s a refusal at the median, "
             f"{seconds[-1]:.1f} at most"
         )
-        told = [r["advice"] for r in tried if "advice" in r]
-        words = ", ".join(f"{told.count(what)} {what}" for what in sorted(set(told)))
-        yield f"what {len(told)} refusals advise, followed (floor: none that does not help): {words}"
         counts = ", ".join(f"{rescued.count(how)} {how}" for how in sorted(set(rescued)))
         patience = sum(r["status"] == "TimeoutError" for r in tried)
         yield f"{len(rescued)} others rescued: {counts}; {patience} without any answer in time"
+
+
+def advice(rows: list[Row]) -> Iterable[str]:
+    own = [r for r in rows if r["what"] == "advice"]
+    told = [r["advice"] for r in own if "advice" in r]
+    if told:
+        seconds = sorted(r["seconds"] for r in own if r["status"] == "infeasible")
+        words = ", ".join(f"{told.count(what)} {what}" for what in sorted(set(told)))
+        yield (
+            f"{len(told)} refusals of {len(own)} problems: {words} (floor: none in vain); "
+            f"{median(seconds):.1f} s at the median, {seconds[-1]:.1f} at most"
+        )
 
 
 def smallest_dt(rows: list[Row]) -> Iterable[str]:
@@ -197,6 +207,7 @@ TABLES: dict[str, Callable[[list[Row]], Iterable[str]]] = {
     "Durations over time-optimal's": durations,
     "Speed, processor time": speed,
     "Refusals by MIQP": refusals,
+    "What refusals advise, followed": advice,
     "Smallest dt of MIQP": smallest_dt,
     "Price in duration of the attitude in the gate, and what its free time gains": price,
 }
