@@ -116,6 +116,19 @@ def test_the_gate_goes_with_its_sliders_before_anything_is_planned(show) -> None
     np.testing.assert_allclose(shown[:3, 0], gate.normal, atol=1e-9)
 
 
+def test_the_next_plan_is_drawn_by_the_programs_of_the_last(show) -> None:
+    """Software compiles them for seconds."""
+    seen = show()
+    slide(seen, "gates[0].z", 3.0)
+    seen.page.evaluate(
+        "window.linked = 0; const gl = replay.renderer.getContext(); const link = gl.linkProgram.bind(gl);"
+        "gl.linkProgram = (program) => ((window.linked += 1), link(program))"
+    )
+    for height in (3.2, 4.0):
+        slide(seen, "gates[0].z", height)
+        assert seen.page.evaluate("window.linked") == 0
+
+
 def test_of_many_values_in_quick_succession_the_last_one_is_shown(show) -> None:
     seen = show()
     seen.page.evaluate("for (const z of [3, 3.2, 4.1, 4.6, 4.8, 3.7]) live.move('gates[0].z', z)")

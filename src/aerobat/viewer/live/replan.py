@@ -17,6 +17,7 @@ from aerobat.viewer.scene import Scene, scene_of
 
 PATIENCE = 30.0  # [s] of planning: whoever moves a slider waits no longer
 FLIGHTS = 20  # under conditions: enough to see how they spread, few enough to be drawn quickly
+POSES = 6000  # that are shown of all flights together, each some 7 ms of a flip: many would be drawn late
 KEPT = 32  # plans: sliders are moved to and fro
 
 
@@ -94,7 +95,7 @@ def flown(plan: Plan, setting: Setting) -> Flight:
 
 def judged(plan: Plan, flight: Flight) -> Answer:
     """The answer where there is a plan: certified and well flown, or why not."""
-    scene = scene_of(flight, plan)
+    scene = scene_of(flight, plan, poses=POSES)
     proof = "" if plan.certificate is None else plan.certificate.why
     failed = [track.sentence for track in scene.tracks if track.failed]
     many = len(scene.tracks) > 1
