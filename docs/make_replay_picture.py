@@ -1,4 +1,7 @@
-"""The README's picture of a replay page, drawn anew: `uv run --dev python docs/make_replay_picture.py`."""
+"""The README's pictures of a replay and of a live page, drawn anew.
+
+uv run --dev python docs/make_replay_picture.py
+"""
 
 import shutil
 import tempfile
@@ -21,4 +24,13 @@ with tempfile.TemporaryDirectory() as folder, sync_playwright() as tools:
     window.evaluate(f"(replay.view('follow'), replay.seek({INSTANT}))")
     window.wait_for_timeout(3000)
     window.screenshot(path=Path(__file__).with_name("replay.png"))
+    with ab.view_live("half-flip", browser=False) as live:
+        window.goto(live.address)
+        for key, value in {"gates[0].z": 4.2, "gates[0].tilt": -60.0}.items():
+            window.evaluate("([key, value]) => live.move(key, value)", [key, value])
+        while window.locator("#verdict.busy").count():
+            window.wait_for_timeout(100)
+        window.evaluate(f"(replay.toggle(), replay.seek({INSTANT}))")
+        window.wait_for_timeout(3000)
+        window.screenshot(path=Path(__file__).with_name("live.png"))
     browser.close()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 import inspect
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -80,6 +81,7 @@ RESULTS = (
     "Inspection",
     "Estimates",
     "Gradient",
+    "LiveView",
     "Opening",
     "Passage",
     "Passing",
@@ -105,9 +107,16 @@ def doors(folder: Path) -> Iterator[Door]:
         if inspect.isclass(public):
             yield Door(name, public, _content(instance(public)))
         else:
-            yield Door(name, public, _arguments(name, folder))
+            call = _closed if name == "view_live" else public
+            yield Door(name, call, _arguments(name, folder))
     yield from _flights()
     yield from _methods(folder)
+
+
+@functools.wraps(ab.view_live)
+def _closed(*args: Any, **kwargs: Any) -> None:
+    """Serve a page, and no longer."""
+    ab.view_live(*args, **kwargs).close()
 
 
 def _arguments(name: str, folder: Path) -> dict[str, Any]:
@@ -222,6 +231,14 @@ def _arguments(name: str, folder: Path) -> dict[str, Any]:
         "to_dataframe": {"table": plan()},
         "tracking_figure": {"plan": plan(), "vehicle": agile, "flight": flight()},
         "view": {"shown": flight(), "plan": plan(), "vehicle": agile},
+        "view_live": {
+            "shown": plan(),
+            "planner": ab.Miqp(),
+            "vehicle": agile,
+            "conditions": ab.Dispersion(),
+            "port": 0,
+            "browser": False,
+        },
         "with_second_opinion": {"plan": plan(), "progress": None},
         "tune": _tuned(),
         "vehicle_names": {},

@@ -2,81 +2,22 @@
 
 from __future__ import annotations
 
-import io
-import shutil
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
 
 import numpy as np
 import pytest
-from PIL import Image
-from playwright.sync_api import Browser, Page, sync_playwright
+from playwright.sync_api import Browser
 
 import aerobat as ab
+from browsers import LAPTOP, PATIENCE, PHONE, Seen, open_browser, wait
 from reporting_cases import planned
 from viewer_cases import dispersed, flip
-
-LAPTOP, PHONE = (1280, 720), (390, 844)
-PATIENCE = 120_000  # [ms] on a busy machine; nothing waits longer than it takes
-STEP = 20  # [ms] from one look to the next
-FLAGS = (
-    "--no-sandbox", "--disable-background-networking", "--disable-component-update", "--disable-sync",
-    "--use-angle=swiftshader", "--enable-unsafe-swiftshader",
-)  # fmt: skip
-
-
-def wait(page: Page, condition: str) -> None:
-    """Wait for a condition; a replay's own policy forbids the browser's way of waiting for one."""
-    for _ in range(PATIENCE // STEP):
-        if page.evaluate(condition):
-            return
-        page.wait_for_timeout(STEP)
-    raise AssertionError(f"never {condition}")
-
-
-@dataclass
-class Seen:
-    """A page that is open, and what went wrong since it was opened."""
-
-    page: Page
-    faults: list[str] = field(default_factory=list)
-    asked: list[str] = field(default_factory=list)
-
-    def do(self, script: str) -> object:
-        """The value of a script in the page, after what it changes is drawn."""
-        value = self.page.evaluate(script)
-        self.until("!replay.stale")
-        return value
-
-    def until(self, condition: str) -> None:
-        """Wait for a condition."""
-        wait(self.page, condition)
-
-    def press(self, *keys: str) -> None:
-        """Press keys, and wait until their effect is drawn."""
-        for key in keys:
-            self.page.keyboard.press(key)
-        self.until("!replay.stale")
-
-    @property
-    def time(self) -> float:
-        """Where the replay is [s]."""
-        return float(self.page.evaluate("replay.time"))
-
-    def picture(self) -> np.ndarray:
-        """The scene in space as pixels."""
-        return np.asarray(Image.open(io.BytesIO(self.page.locator("#stage").screenshot())).convert("RGB"))
 
 
 @pytest.fixture(scope="module")
 def browser() -> Iterator[Browser]:
-    """The system's Chromium, else Chrome or Edge."""
-    path = shutil.which("chromium") or shutil.which("google-chrome") or shutil.which("msedge")
-    with sync_playwright() as tools:
-        launch = tools.chromium.launch
-        found = launch(executable_path=path, args=FLAGS) if path else launch(channel="chrome", args=FLAGS)
+    with open_browser() as found:
         yield found
-        found.close()
 
 
 @pytest.fixture(scope="module")
@@ -89,12 +30,8 @@ def show(browser: Browser, tmp_path_factory: pytest.TempPathFactory) -> Iterator
         file = folder / f"{len(opened)}.html"
         file.write_text(replay.html, encoding="utf-8")
         page = browser.new_page(viewport={"width": size[0], "height": size[1]})
-        page.set_default_timeout(PATIENCE)
-        seen = Seen(page)
+        seen = Seen.watching(page)
         opened.append(seen)
-        page.on("pageerror", lambda error: seen.faults.append(str(error)))
-        page.on("console", lambda line: seen.faults.append(line.text) if line.type == "error" else None)
-        page.on("request", lambda request: seen.asked.append(request.url))
         page.goto(file.as_uri())
         seen.until("window.replay && replay.frames > 0")
         return seen

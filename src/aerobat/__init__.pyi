@@ -96,6 +96,7 @@ from .studies.sweep import Share, Sweep, sweep
 from .studies.tune import Tuning, tune
 from .trajectory import ContinuityRule, Trajectory, load_trajectory, minimum_effort, save_trajectory
 from .vehicle import Ellipsoid, Rotor, Vehicle, implausibilities, load_vehicle, vehicle_names, write_vehicle
+from .viewer.live.view_live import LiveView, view_live
 from .viewer.replay import Replay, view, write_replay
 
 __all__ = [
@@ -140,6 +141,7 @@ __all__ = [
     "Inspection",
     "Limits",
     "Line",
+    "LiveView",
     "Maneuver",
     "MinSnap",
     "Miqp",
@@ -222,6 +224,7 @@ __all__ = [
     "tune",
     "vehicle_names",
     "view",
+    "view_live",
     "with_second_opinion",
     "write_columns",
     "write_csv",

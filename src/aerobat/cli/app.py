@@ -22,7 +22,7 @@ COMMANDS = {
     "sweep": "Fly a maneuver many times as it would really be flown, and count what becomes of it.",
     "tune": "Find controller gains for a vehicle over many flights, and write them to its file.",
     "inspect": "Say what caused a recorded flight's error, by its log and its plan.",
-    "view": "Write a page that replays a run, a plan or a flight in a browser.",
+    "view": "Write a page that replays a run, a plan or a flight in a browser, or serve one to try plans on.",
     "repeat": "Do a run again from its folder, and say if it came to the same.",
     "vehicles": "List the built-in vehicles, or print one as a file to begin one's own with.",
     "problems": "List the built-in problems.",

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Annotated, Any, ClassVar
+from dataclasses import replace
+from typing import Annotated, Any, ClassVar, TypeVar
 
 from pydantic import Field
 
@@ -15,10 +16,23 @@ from aerobat.declaration import (
     declared,
     in_degrees,
     in_radians,
+    validated,
 )
 from aerobat.environment.sensors import AngleSpread, Imu, MotionCapture, SensorRate
 
+T = TypeVar("T")
+
 RelativeSpread = Annotated[float, Field(ge=0, lt=1, description="number from 0, less than 1")]
+
+
+INERTIAL_ERRORS = (
+    "gyro_noise",
+    "accelerometer_noise",
+    "gyro_bias",
+    "accelerometer_bias",
+    "gyro_bias_walk",
+    "accelerometer_bias_walk",
+)
 
 
 @declared
@@ -77,11 +91,37 @@ class Dispersion:
 
     SHORTHANDS: ClassVar[Mapping[str, str]] = {"start_attitude_deg": "[deg] `start_attitude` in degrees"}
     _RELATIVE: ClassVar[tuple[str, ...]] = ("mass", "inertia", "rotor", "lag")
+    _SPREADS: ClassVar[tuple[str, ...]] = (
+        *_RELATIVE,
+        "drag",
+        "start_position",
+        "start_velocity",
+        "start_attitude",
+    )
 
     def __post_init__(self) -> None:
         if (self.imu is None) != (self.motion_capture is None):
             missing, other = ("imu", "motion_capture") if self.imu is None else ("motion_capture", "imu")
             raise FieldError(missing, f"is missing; an observer takes it with {other}")
+
+    @validated
+    def scaled(self, factor: NonNegative) -> Dispersion:
+        """The same conditions, `factor` times as bad.
+
+        Spreads, unmodelled drag, wind, gusts and the noises, biases and misfits of sensors are multiplied;
+        rates, delays, ranges, gaps, outliers and the battery stay as they are. Raises SpecError where a
+        relative spread comes to 1 or more.
+        """
+        capture = _scaled(self.motion_capture, factor, ("position_noise", "attitude_noise"))
+        if capture is not None and capture.hand_off is not None:
+            misfit = _scaled(capture.hand_off, factor, ("translation", "rotation", "warp"))
+            capture = replace(capture, hand_off=misfit)
+        return replace(
+            _scaled(self, factor, self._SPREADS),
+            imu=_scaled(self.imu, factor, INERTIAL_ERRORS),
+            motion_capture=capture,
+            gusts=_scaled(self.gusts, factor, ("mean_wind", "intensity")),
+        )
 
     def __str__(self) -> str:
         sensors = "true state"
@@ -98,3 +138,10 @@ class Dispersion:
     def abbreviate(self, table: dict[str, Any]) -> dict[str, Any]:
         """Write the angle in degrees."""
         return in_degrees(table, "start_attitude")
+
+
+def _scaled(value: T, factor: float, names: tuple[str, ...]) -> T:
+    """The value with some of its numbers multiplied; None as it is."""
+    if value is None:
+        return value
+    return replace(value, **{name: factor * getattr(value, name) for name in names})  # type: ignore[type-var]

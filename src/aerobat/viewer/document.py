@@ -19,6 +19,9 @@ from aerobat.viewer.scene import Scene, Track
 
 PAGE = files("aerobat.viewer") / "page"
 SCRIPTS = ("arrays.js", "models.js", "world.js", "cameras.js", "plots.js", "player.js")  # in this order
+OWN_ORIGIN = (
+    "; connect-src 'self'; img-src 'self' data:"  # what a live page may ask beyond one that is a file
+)
 MARK = '<meta name="generator" content="aerobat replay">'  # by which such a page is known
 PLACE = re.compile("@@([a-z]+)@@")
 DIGITS = 32767.0  # of 16-bit integers: attitudes to 0.004°
@@ -46,19 +49,39 @@ class Blob:
         return b64encode(b"".join(self.parts)).decode()
 
 
-def document(scene: Scene) -> str:
-    """The page that replays a scene."""
+@dataclass(frozen=True)
+class PackedScene:
+    """A scene as its page reads it."""
+
+    header: dict[str, Any]  # all but the arrays, and where they are
+    arrays: str  # Base64
+
+
+def packed(scene: Scene) -> PackedScene:
+    """The scene as its page reads it."""
     blob = Blob()
-    header = _header(scene, blob)
+    return PackedScene(_header(scene, blob), str(blob))
+
+
+def document(scene: Scene, controls: Any = None) -> str:
+    """The page that replays a scene; with controls, a live page, whose server answers when they change."""
+    content, is_live = packed(scene), controls is not None
     parts = {
         "title": escape(scene.title),
-        "style": _text("replay.css"),
-        "header": json.dumps(header, ensure_ascii=False, allow_nan=False).replace("<", "\\u003c"),
-        "arrays": str(blob),
+        "policy": OWN_ORIGIN if is_live else "; img-src data:",
+        "style": _text("replay.css") + (_text("live.css") if is_live else ""),
+        "panel": _text("live.html").replace("@@controls@@", _embedded(controls)) if is_live else "",
+        "header": _embedded(content.header),
+        "arrays": content.arrays,
         "three": _text("three.min.js"),
-        "script": "\n".join(map(_text, SCRIPTS)),
+        "script": "\n".join(map(_text, (*SCRIPTS, "live.js") if is_live else SCRIPTS)),
     }
     return PLACE.sub(lambda place: parts[place[1]], _text("replay.html"))
+
+
+def _embedded(value: Any) -> str:
+    """The value as JSON that ends no script in which it stands."""
+    return json.dumps(value, ensure_ascii=False, allow_nan=False).replace("<", "\\u003c")
 
 
 def _text(name: str) -> str:

@@ -81,13 +81,19 @@ class Scene:
     curves: tuple[Curve, ...]
 
 
-def scene_of(shown: Plan | Flight, plan: Plan | None = None, vehicle: Vehicle | str | None = None) -> Scene:
+def scene_of(
+    shown: Plan | Flight,
+    plan: Plan | None = None,
+    vehicle: Vehicle | str | None = None,
+    poses: int = MAX_POSES,
+) -> Scene:
     """The scene of a plan, of a flight, or of a batch. Raises SpecError where there is nothing to see.
 
     Args:
         shown: What is looked at.
         plan: What was flown, for its gates and stages.
         vehicle: What flew, or its name; by default the plan's, or the preset of the flight's name.
+        poses: How many are shown at most, of all flights together.
     """
     if isinstance(shown, Plan):
         own = shown.vehicle if vehicle is None else as_vehicle(vehicle)
@@ -106,7 +112,7 @@ def scene_of(shown: Plan | Flight, plan: Plan | None = None, vehicle: Vehicle | 
     if shown.thrusts.shape[-1] != len(own.rotors):
         rotors = f"{shown.thrusts.shape[-1]} rotors, {own.name} has {len(own.rotors)}"
         raise SpecError(f"vehicle: the flight is one of {rotors}; name the vehicle that flew")
-    return _flight_scene(shown, plan, own)
+    return _flight_scene(shown, plan, own, poses)
 
 
 def plan_fits(plan: Plan, flight: Flight) -> bool:
@@ -151,11 +157,11 @@ def _plan_scene(plan: Plan, vehicle: Vehicle) -> Scene:
     )
 
 
-def _flight_scene(flight: Flight, plan: Plan | None, vehicle: Vehicle) -> Scene:
+def _flight_scene(flight: Flight, plan: Plan | None, vehicle: Vehicle, poses: int) -> Scene:
     flights = (
         [flight[k] for k in range(min(len(flight.vehicles), MAX_FLIGHTS))] if flight.is_batch else [flight]
     )
-    rows = shown_rows(len(flight.times), len(flights))
+    rows = shown_rows(len(flight.times), len(flights), poses)
     tracks = tuple(
         _track(each, plan, vehicle, rows, k if flight.is_batch else None) for k, each in enumerate(flights)
     )
@@ -180,9 +186,9 @@ def _flight_scene(flight: Flight, plan: Plan | None, vehicle: Vehicle) -> Scene:
     )
 
 
-def shown_rows(rows: int, flights: int) -> Rows:
+def shown_rows(rows: int, flights: int, poses: int = MAX_POSES) -> Rows:
     """Which of so many rows of each flight are shown: every k-th and the last."""
-    stride = ceil(rows / min(MAX_ROWS, MAX_POSES // flights))
+    stride = ceil(rows / min(MAX_ROWS, poses // flights))
     return np.unique(np.append(np.arange(0, rows, stride), rows - 1))
 
 

@@ -10,6 +10,7 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
+from aerobat.cli.live import LiveOptions, serve
 from aerobat.cli.options import ViewOptions
 from aerobat.cli.progress import DrawingProgress, showing
 from aerobat.cli.runs.folder import FLIGHT, REPLAY
@@ -28,7 +29,11 @@ from aerobat.viewer.replay import view as replay_of
 from aerobat.viewer.scene import plan_fits
 
 
-def view(source: Path, options: Annotated[ViewOptions, Parameter(name="*")] = ViewOptions()) -> None:
+def view(
+    source: Path | None = None,
+    options: Annotated[ViewOptions, Parameter(name="*")] = ViewOptions(),
+    serving: Annotated[LiveOptions, Parameter(name="*")] = LiveOptions(),
+) -> None:
     """Write a page that replays a run, a plan or a flight: one HTML file that a browser opens from the disk.
 
     It shows the vehicle on its path, gates, stages and thrusts, and beside them errors and rotor thrusts.
@@ -36,11 +41,24 @@ def view(source: Path, options: Annotated[ViewOptions, Parameter(name="*")] = Vi
     of them failed. It is written to replay.html in a run's folder, which the next run there replaces with all
     else, or beside another file, unless --html says otherwise. --video FILE.mp4 or FILE.gif writes a video.
 
+    --live serves a page with sliders instead, until Ctrl-C: they move and tilt gates, say how much thrust
+    the maneuver asks at least, the order, the thrust-to-weight and how much flights are dispersed, and
+    whatever they say is planned and flown at once, with the verdict in words.
+
     Parameters
     ----------
     source
-        A folder that `aerobat plan` or `aerobat fly` wrote, a .plan file, or a flight's .npz file.
+        A folder that `aerobat plan` or `aerobat fly` wrote, a .plan file, or a flight's .npz file; with
+        --live a problem's name or file too, by default flip-roll.
     """
+    if serving.live:
+        serve(source, options, serving)
+        return
+    serving.require_live()
+    if source is None:
+        raise SpecError(
+            "what shall be shown is missing; name a run's folder, a plan or a flight, or give --live"
+        )
     run = _read(source)
     vehicle = None if options.vehicle is None else named_vehicle(options.vehicle)
     replay = replay_of(run.shown, run.plan, vehicle)

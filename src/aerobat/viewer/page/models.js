@@ -116,7 +116,8 @@ function showThrusts(model, track, time) {
 // Vehicles that stand still in pictures, or are many: one shape each.
 function plainModel(accent, opacity, rims = true) {
   const discs = HEADER.rotors.map((rotor) => [disc(rotor), accent]);
-  const paint = { vertexColors: true, transparent: true, opacity, side: THREE.DoubleSide };
+  // in one pass: which side of what is so faint comes first is not seen
+  const paint = { vertexColors: true, transparent: true, opacity, side: THREE.DoubleSide, forceSinglePass: true };
   const model = new THREE.Group();
   model.add(new THREE.Mesh(airframe(accent, rims), new THREE.MeshLambertMaterial(paint)));
   const pale = { ...paint, opacity: 0.45 * opacity, depthWrite: false };

@@ -144,12 +144,10 @@ class World {
     this.scene.add(this.ahead, this.flown);
   }
 
-  // Take a thing out of the scene, and what it holds of the graphics card's memory.
+  // Take a thing out of the scene, and its shapes out of the graphics card's memory. Materials stay: what they
+  // hold are programs, which the next thing of the kind needs again, and software compiles for seconds.
   remove(thing) {
-    thing.traverse(({ geometry, material }) => {
-      geometry?.dispose();
-      material?.dispose();
-    });
+    thing.traverse(({ geometry }) => geometry?.dispose());
     thing.removeFromParent();
   }
 

@@ -1,0 +1,207 @@
+"""The sliders of a live page: what of a problem, its planner and its vehicle they change, and how far."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, fields, replace
+from functools import partial
+from itertools import chain
+from math import degrees, floor, log10, radians
+from typing import Any, get_type_hints
+
+import numpy as np
+
+from aerobat import so3
+from aerobat.arrays import Array
+from aerobat.environment import Dispersion
+from aerobat.errors import SpecError
+from aerobat.planning import Plan, Planner
+from aerobat.problem import Gate, Problem
+from aerobat.so3 import UP
+from aerobat.vehicle import Vehicle
+
+LEAST_REACH = 0.5  # [m] to either side, by which a gate can be moved
+STEPS = 40  # of a slider's range, or more: its step is round
+THRUST_FRACTION = 0.2  # of what the vehicle has: the least thrusts of maneuvers that name none
+ORDERS = range(3, 6)  # jerk, snap, crackle
+THRUST_TO_WEIGHT = (1.2, 8.0)  # from what hardly climbs to racing quadrotors
+MAX_DISPERSION = 3.0  # times the conditions: most maneuvers fail well before
+
+
+@dataclass(frozen=True)
+class Setting:
+    """All that sliders change: what is planned, how, for which vehicle, and how it is flown."""
+
+    problem: Problem
+    planner: Planner
+    vehicle: Vehicle
+    conditions: Dispersion
+    dispersion: float = 0.0  # times the conditions; at 0 it is flown as planned
+
+
+Change = Callable[[Setting, float], Setting]
+
+
+@dataclass(frozen=True)
+class Slider:
+    """One number of a setting, and its range."""
+
+    key: str
+    group: str
+    name: str
+    unit: str
+    low: float
+    high: float
+    step: float
+    value: float
+    change: Change  # raises SpecError for a value that makes no sense
+    axis: tuple[float, ...] | None = None  # of a gate's turn, (3,)
+
+    def record(self) -> dict[str, Any]:
+        """Plain data for the page."""
+        return {field.name: getattr(self, field.name) for field in fields(self) if field.name != "change"}
+
+
+def sliders_of(setting: Setting, plan: Plan) -> tuple[Slider, ...]:
+    """The sliders of a setting, as they stand for its plan."""
+    gates = range(len(setting.problem.gates))
+    return (
+        *chain.from_iterable(_gate_sliders(setting.problem, k) for k in gates),
+        *_thrust_sliders(setting),
+        *_order_slider(setting, plan),
+        _vehicle_slider(setting),
+        _dispersion_slider(setting),
+    )
+
+
+def moved(setting: Setting, sliders: Sequence[Slider], values: Mapping[str, float]) -> Setting:
+    """The setting with some of its sliders elsewhere, by their keys.
+
+    Raises SpecError for one that is not there or goes not as far, and for what makes no sense together.
+    """
+    known = {slider.key: slider for slider in sliders}
+    for key, value in values.items():
+        slider = known.get(key)
+        if slider is None or not slider.low <= value <= slider.high:
+            raise SpecError(f"{key}: there is no slider that stands at {value}; load the page anew")
+        setting = slider.change(setting, value)
+    return setting
+
+
+def _gate_sliders(problem: Problem, k: int) -> Iterator[Slider]:
+    """Position and tilt of a gate."""
+    gate, (lower, upper) = problem.gates[k], problem.path_limits.of(0)
+    reach = _reach(problem)
+    step = _round_step(2 * reach / STEPS)
+    reach = step * round(reach / step)
+    for i, axis in enumerate("xyz"):
+        value = float(gate.position[i])
+        low, high = max(value - reach, float(lower[i])), min(value + reach, float(upper[i]))
+        change = partial(_with_gate, k, partial(_at, i))
+        yield Slider(f"gates[{k}].{axis}", gate.name, axis, "m", low, high, step, value, change)
+    yield _tilt_slider(problem, k)
+
+
+def _tilt_slider(problem: Problem, k: int) -> Slider:
+    """The turn of a gate about its passage; about the axis of the maneuver's turn, whose part the gate is."""
+    gate, turn_axis = problem.gates[k], problem.maneuver.turn_axis
+    tilt = degrees(gate.angles[2])
+    axis = gate.normal
+    if turn_axis is not None:
+        axis = turn_axis
+        tilt = degrees(np.arctan2(gate.up @ np.cross(axis, UP), gate.up @ UP)) % 360.0
+    tilt = round(tilt, 6)
+    change = partial(_with_gate, k, lambda gate, value: _turned(gate, axis, radians(value - tilt)))
+    low, high = (-180.0, 180.0) if turn_axis is None else (0.0, 360.0)
+    return Slider(
+        f"gates[{k}].tilt", gate.name, "tilt", "°", low, high, 1.0, tilt, change, tuple(axis.tolist())
+    )
+
+
+def _turned(gate: Gate, axis: Array, angle: float) -> Gate:
+    """The gate turned about an axis through its centre [rad]."""
+    turn = so3.about_axis(axis, np.asarray(angle))
+    return replace(gate, normal=so3.rotate(turn, gate.normal), up=so3.rotate(turn, gate.up))
+
+
+def _reach(problem: Problem) -> float:
+    """Half the size of what is flown through [m]."""
+    places = [problem.start.position, problem.goal.position, *(gate.position for gate in problem.gates)]
+    return max(0.5 * float(np.ptp(places, axis=0).max()), LEAST_REACH)
+
+
+def _round_step(length: float) -> float:
+    """The largest of 1, 2 or 5 times a power of ten that is no longer."""
+    decade = 10.0 ** floor(log10(length))
+    return max(factor * decade for factor in (1.0, 2.0, 5.0) if factor * decade <= length * (1 + 1e-9))
+
+
+def _at(axis: int, gate: Gate, value: float) -> Gate:
+    """The gate elsewhere along an axis."""
+    position = gate.position.copy()
+    position[axis] = value
+    return replace(gate, position=position)
+
+
+def _with_gate(k: int, change: Callable[[Gate, float], Gate], setting: Setting, value: float) -> Setting:
+    """The setting with gate k changed."""
+    gates = list(setting.problem.gates)
+    gates[k] = change(gates[k], value)
+    return replace(setting, problem=replace(setting.problem, gates=tuple(gates)))
+
+
+def _thrust_sliders(setting: Setting) -> Iterator[Slider]:
+    """The paper's ε: the maneuver's least specific thrusts, whichever it has."""
+    maneuver, top = setting.problem.maneuver, setting.vehicle.max_specific_thrust
+    for name in get_type_hints(type(maneuver)):
+        if name.startswith("min_") and name.endswith("_thrust"):
+            asked = getattr(maneuver, name)
+            value = round(THRUST_FRACTION * top if asked is None else float(asked), 2)
+            words = name.removeprefix("min_").removesuffix("thrust").replace("_", " ").strip()
+            shown = f"ε {words}".strip()
+            change = partial(_with_min_thrust, name)
+            high = float(np.ceil(1.2 * max(top, value)))
+            yield Slider(f"maneuver.{name}", "maneuver", shown, "m/s²", 0.5, high, 0.5, value, change)
+
+
+def _with_min_thrust(name: str, setting: Setting, value: float) -> Setting:
+    maneuver: Any = setting.problem.maneuver
+    changed = replace(maneuver, **{name: value})
+    return replace(setting, problem=replace(setting.problem, maneuver=changed))
+
+
+def _order_slider(setting: Setting, plan: Plan) -> Iterator[Slider]:
+    """The derivative that is the input, of planners that have one."""
+    if plan.order is not None and hasattr(setting.planner, "order"):
+        low, high = min(ORDERS[0], plan.order), max(ORDERS[-1], plan.order)
+        yield Slider("planner.order", "maneuver", "order", "", low, high, 1, plan.order, _with_order)
+
+
+def _with_order(setting: Setting, value: float) -> Setting:
+    planner: Any = setting.planner
+    return replace(setting, planner=replace(planner, order=round(value)))
+
+
+def _vehicle_slider(setting: Setting) -> Slider:
+    value = round(setting.vehicle.thrust_to_weight, 2)
+    low, high = min(THRUST_TO_WEIGHT[0], value), max(THRUST_TO_WEIGHT[1], float(np.ceil(1.5 * value)))
+    return Slider(
+        "vehicle.thrust_to_weight", "vehicle", "thrust-to-weight", "", low, high, 0.05, value, _with_thrust
+    )
+
+
+def _with_thrust(setting: Setting, value: float) -> Setting:
+    """The setting whose rotors give so many weights together, each its part of them as before."""
+    vehicle = setting.vehicle
+    factor = value / vehicle.thrust_to_weight
+    rotors = tuple(replace(rotor, max_thrust=factor * rotor.max_thrust) for rotor in vehicle.rotors)
+    return replace(setting, vehicle=replace(vehicle, rotors=rotors))
+
+
+def _dispersion_slider(setting: Setting) -> Slider:
+    unit = f"× {setting.conditions.name}"
+    return Slider("dispersion", "flight", "dispersion", unit, 0.0, MAX_DISPERSION, 0.1, 0.0, _with_dispersion)
+
+
+def _with_dispersion(setting: Setting, value: float) -> Setting:
+    return replace(setting, dispersion=value)

@@ -1,0 +1,205 @@
+"""Answers of live pages: which plan, in which words, and of many questions the last."""
+
+from __future__ import annotations
+
+import http.client
+import json
+import socket
+import threading
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import closing
+from dataclasses import replace
+
+import pytest
+
+import aerobat as ab
+from aerobat.viewer.live.desk import Desk
+from aerobat.viewer.live.replan import FLIGHTS, Answer, Overtaken, Replanner, Verdict
+from aerobat.viewer.live.sliders import Setting, sliders_of
+from aerobat.viewer.live.view_live import LiveView
+from reporting_cases import planned
+
+JSON = {"Content-Type": "application/json"}
+FINE = Answer(Verdict("Feasible", "fine", True))
+
+
+@pytest.fixture(scope="module")
+def replanner() -> Replanner:
+    """The half-flip's."""
+    plan = planned("half-flip")
+    assert plan.vehicle is not None
+    begun = Setting(plan.problem, ab.Miqp(), plan.vehicle, ab.load_dispersion("lab"))
+    return Replanner(begun, sliders_of(begun, plan))
+
+
+@pytest.fixture(scope="module")
+def live() -> Iterator[LiveView]:
+    with ab.view_live(planned("line"), browser=False) as view:
+        yield view
+
+
+def never() -> bool:
+    return False
+
+
+def ask(
+    live: LiveView, body: object, path: str = "/plan", headers: Mapping[str, str] = JSON
+) -> tuple[int, bytes]:
+    """Status and content of an answer."""
+    with closing(http.client.HTTPConnection(live.address.removeprefix("http://").strip("/"))) as connection:
+        content = body if isinstance(body, bytes) else json.dumps(body).encode()
+        connection.request("POST", path, content, dict(headers))
+        answer = connection.getresponse()
+        return answer.status, answer.read()
+
+
+def test_a_plan_for_where_the_sliders_stand_is_the_plan_of_that_problem(replanner: Replanner) -> None:
+    answer = replanner.answer({"gates[0].z": 4.0}, never)
+    again = ab.plan(moved_gate(4.0), ab.Miqp(), "agile-quad")
+    assert answer.scene is not None
+    assert answer.scene.times[-1] == pytest.approx(again.duration)
+    assert answer.scene.gates[0].position[2] == 4.0
+    assert again.certificate is not None
+    assert answer.verdict == Verdict(
+        "Feasible" if again.certified else "Not proven",
+        f"{again.duration:.2f} s, {again.certificate.why}",
+        again.certified,
+    )
+
+
+def moved_gate(height: float) -> ab.Problem:
+    problem = ab.load_problem("half-flip")
+    return replace(problem, gates=(replace(problem.gates[0], position=(2.5, 2.0, height)),))
+
+
+@pytest.mark.parametrize(
+    ("values", "word", "sentence"),
+    [
+        ({"maneuver.min_lateral_thrust": 38.0}, "Infeasible", "agile-quad gives 32"),
+        ({"gates[0].tilt": 120.0}, "Refused", "must be from -90 to 90 for a half-flip"),
+        ({"planner.order": 3.0}, "Not proven", "jumps"),
+    ],
+)
+def test_what_cannot_be_is_said_in_a_sentence(
+    replanner: Replanner, values: dict[str, float], word: str, sentence: str
+) -> None:
+    answer = replanner.answer(values, never)
+    assert answer.verdict.word == word
+    assert sentence in answer.verdict.sentence
+    assert not answer.verdict.is_well
+    assert (answer.scene is None) == (word != "Not proven")
+
+
+def test_dispersed_flights_are_of_the_same_plan_and_counted(replanner: Replanner) -> None:
+    one = replanner.answer({}, never).scene
+    plans = len(replanner.plans)
+    many = replanner.answer({"dispersion": 2.0}, never)
+    assert len(replanner.plans) == plans, "nothing was planned anew"
+    assert one is not None
+    assert many.scene is not None
+    assert len(many.scene.tracks) == FLIGHTS
+    failed = sum(track.failed for track in many.scene.tracks)
+    assert many.verdict.word == f"{failed} of {FLIGHTS} flights fail"
+    assert (many.scene.planned[-1] == one.planned[-1]).all()
+
+
+def test_planning_that_is_overtaken_is_given_up(replanner: Replanner) -> None:
+    plans = len(replanner.plans)
+    with pytest.raises(Overtaken):
+        replanner.answer({"gates[0].z": 2.7}, lambda: True)
+    assert len(replanner.plans) == plans
+
+
+def test_the_last_question_of_each_page_is_answered_in_whichever_order_they_come() -> None:
+    """Requests of a browser are sent in one order and heard in another."""
+    begun, go_on, pause = threading.Event(), threading.Event(), threading.Event()
+    seen: list[tuple[str, float]] = []
+
+    def answering(values: Mapping[str, float], is_overtaken: Callable[[], bool]) -> Answer:
+        begun.set()
+        go_on.wait()
+        if is_overtaken():
+            raise Overtaken
+        seen.append((values["page"], values["number"]))
+        return FINE
+
+    desk = Desk(answering)
+    answers: dict[tuple[str, int], Answer | None] = {}
+
+    def put(page: str, number: int) -> threading.Thread:
+        def asking() -> None:
+            answers[page, number] = desk.ask(page, number, {"page": ord(page), "number": number})
+
+        asked = threading.Thread(target=asking)
+        asked.start()
+        while desk._last.get(page, 0) < number:  # until it is heard
+            pause.wait(0.001)
+        return asked
+
+    threads = [put("a", 1)]
+    begun.wait()
+    threads += [put("b", 1), put("a", 4), put("a", 3)]
+    go_on.set()
+    for thread in threads:
+        thread.join()
+    assert answers == {("a", 1): None, ("b", 1): FINE, ("a", 3): None, ("a", 4): FINE}
+    assert seen == [(ord("b"), 1), (ord("a"), 4)]
+    desk.close()
+    assert desk.ask("a", 5, {}) is None
+
+
+def test_the_page_is_served_to_this_machine_alone_and_to_pages_of_no_other_place(live: LiveView) -> None:
+    host, port = live._server.server_address[:2]
+    assert host == "127.0.0.1"
+    question = {"page": "a", "number": 1, "values": {}}
+    assert ask(live, question)[0] == 200
+    assert ask(live, question, headers={**JSON, "Host": f"example.org:{port}"})[0] == 403
+    assert ask(live, question, headers={"Content-Type": "text/plain"})[0] == 400
+    for body in (
+        b"",
+        b"[",
+        [],
+        {},
+        {"page": "a", "number": 1},
+        {"page": "a", "values": {}},
+        {"page": 1, "number": 1, "values": {}},
+        {"page": "a", "number": 1, "values": {"x": True}},
+    ):
+        assert ask(live, body)[0] == 400
+    assert ask(live, b'{"page": "a", "number": 1, "values": {"x": NaN}}')[0] == 400
+    assert ask(live, b"", headers={**JSON, "Content-Length": "999999999"})[0] == 411
+
+
+def test_a_failure_of_our_own_is_told_and_the_page_lives_on(live: LiveView, monkeypatch, capsys) -> None:
+    def fail(*question: object) -> None:
+        raise ZeroDivisionError("planted")
+
+    with monkeypatch.context() as planted:
+        planted.setattr(live._server.desk, "ask", fail)
+        status, content = ask(live, {"page": "a", "number": 1, "values": {}})
+    assert status == 200
+    assert json.loads(content)["verdict"]["word"] == "Broken"
+    assert "planted" in capsys.readouterr().err
+    assert json.loads(ask(live, {"page": "a", "number": 1, "values": {}})[1])["verdict"]["is_well"]
+
+
+def test_a_port_that_is_taken_is_named(live: LiveView) -> None:
+    with socket.create_server(("127.0.0.1", 0)) as taken:
+        port = taken.getsockname()[1]
+        with pytest.raises(ab.SpecError, match=f"port {port} cannot be served"):
+            ab.view_live(planned("line"), port=port, browser=False)
+
+
+def test_a_plan_is_begun_with_as_it_is_and_an_infeasible_problem_with_its_sentence() -> None:
+    with pytest.raises(ab.Infeasible, match="agile-quad gives"):
+        ab.view_live(demanding(ab.load_problem("half-flip")), browser=False)
+    with ab.view_live(planned("line"), browser=False) as view:
+        assert view._repr_html_().count(view.address) == 1
+        assert repr(view) == f"LiveView({view.address})"
+    with pytest.raises(ConnectionRefusedError, match="refused"):
+        ask(view, {"page": "a", "number": 1, "values": {}})
+
+
+def demanding(problem: ab.Problem) -> ab.Problem:
+    """Asks for more thrust than agile-quad has."""
+    return replace(problem, maneuver=ab.HalfFlip(min_lateral_thrust=50.0))
