@@ -22,6 +22,7 @@ from aerobat.control import Controller
 from aerobat.environment import Battery, Dispersion, Environment, Gusts, HandOff, Imu, MotionCapture, Outage
 from aerobat.problem import (
     Attitude,
+    Ball,
     Condition,
     EndState,
     Gate,
@@ -47,6 +48,7 @@ PLACES = {  # where each class stands in a file
     GatePassage: "`[maneuver.passage]`",
     Stage: "`[[maneuver.stages]]`",
     Attitude: "`attitude` of a stage: where the thrust points, its drag counted",
+    Ball: "`ball` of a stage: where it is, within a radius",
     Condition: "`conditions` and `path_constraints`: lower ≤ direction · quantity ≤ upper",
     Waypoint: "`[[maneuver.waypoints]]`",
     Rotor: "`[[rotors]]`",
@@ -173,7 +175,7 @@ def page() -> str:
     parts += [section(cls) for cls in (EndState, Gate, Limits, Environment)]
     parts += ["### Maneuvers\n", "`[maneuver]` has a `kind`, and what that kind takes:\n"]
     parts += [kind(name, cls) for name, cls in registered_maneuvers().items() if of_package(cls)]
-    parts += [section(GatePassage), section(Stage), section(Attitude), section(Condition)]
+    parts += [section(GatePassage), section(Stage), section(Ball), section(Attitude), section(Condition)]
     parts += [STAGES, section(Waypoint), WAYPOINTS]
     parts += ["## Vehicle (`--vehicle vehicle.toml`)\n", VEHICLE, fenced(ANNOTATED), table(Vehicle)]
     parts += [section(Rotor), ROTOR, section(Ellipsoid), BODY, section(Controller), CONTROLLER, IMPORT]

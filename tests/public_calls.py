@@ -383,6 +383,7 @@ def instance(cls: type) -> Any:
     made = {
         ab.Assessment: lambda: ab.plan("line", vehicle="agile-quad").assessment,
         ab.Attitude: lambda: ab.Attitude((0.0, 0.0, 1.0), 5.0, 0.1),
+        ab.Ball: lambda: ab.Ball((0.0, 0.0, 1.0), 0.3),
         ab.Battery: lambda: ab.load_dispersion("lab").battery,
         ab.BodyState: lambda: ab.BodyState(np.zeros(3), np.zeros(3), np.array([1.0, 0, 0, 0]), np.zeros(3)),
         ab.Cause: lambda: ab.Cause("jerk", {"planner.order": 3}),

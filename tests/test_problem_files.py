@@ -9,6 +9,7 @@ import pytest
 from aerobat.environment import Environment
 from aerobat.errors import SpecError
 from aerobat.problem import (
+    Ball,
     Condition,
     CustomManeuver,
     EndState,
@@ -33,12 +34,15 @@ SPELLED_OUT = Problem(
     maneuver=CustomManeuver(
         (
             Stage("kick", (Condition("specific_thrust", (1, 0, -1), 0.0, 0.0),)),
+            Stage("near", ball=Ball((1.0, 1.0, 2.0), 0.5)),
             Stage(
                 "gate",
                 (Condition("velocity", (1, 0, 0), lower=2.0),),
                 at=0.25,
                 interval_offset=1,
                 gate="gate",
+                crossing_point="free",
+                margin=0.05,
             ),
         ),
         path_constraints=(Condition("position", (0, 0, 1), lower=0.0),),
@@ -64,6 +68,8 @@ THROUGH_WAYPOINTS = replace(
             Waypoint(gate="second", up=(0.0, 1.0, -1.0), time=0.75),
             Waypoint(position=(1.0, 2.0, 3.0), up=(0.0, 0.0, -2.0), thrust=12.0, time=1.5),
             Waypoint(acceleration=(0.0, np.nan, -9.0), time=2.0),
+            Waypoint(position=(2.0, 2.0, 3.0), radius=0.3),
+            Waypoint(gate="gate", crossing_point="free", margin=0.1),
         ),
         duration=3.0,
     ),

@@ -187,6 +187,31 @@ def test_the_time_bar_seeks_and_cursors_of_all_plots_follow(laptop: Seen) -> Non
         assert float(told.removesuffix(" cm")) == pytest.approx(error, abs=1e-4)
 
 
+def test_what_stands_in_a_plot_is_left_alone_while_time_goes_on(laptop: Seen) -> None:
+    """Software renders it slowly: painted anew in every frame it took half of their time."""
+    laptop.do(
+        "window.changes = 0; for (const plot of document.querySelectorAll('.plot svg:not(.moving)'))"
+        " new MutationObserver((list) => (window.changes += list.length))"
+        ".observe(plot, { subtree: true, childList: true, attributes: true })"
+    )
+    layers = "[...document.querySelectorAll('.plot svg, .plot b')].map((e) => getComputedStyle(e).willChange)"
+    assert set(laptop.page.evaluate(layers)) == {"transform"}
+    laptop.press("Home", "ArrowRight", "End")
+    assert laptop.page.evaluate("window.changes") == 0
+
+
+def test_what_is_drawn_slowly_is_drawn_coarser_while_it_plays_and_finely_when_it_stands(laptop: Seen) -> None:
+    laptop.press("Home")
+    width = "replay.renderer.domElement.width"
+    fine = laptop.page.evaluate(width)
+    slow = f"(replay.toggle(), [1, 2, 3, 4].map(() => (replay.seek(0), replay.advance(1), {width})))"
+    coarser = laptop.page.evaluate(f"[{slow}, replay.toggle()][0]")
+    assert coarser[0] == pytest.approx(0.7 * fine, abs=1)
+    assert coarser[1:] == [pytest.approx(0.5 * fine, abs=1)] * 3, "and no coarser than that"
+    laptop.until("replay.fineness === 1 && !replay.stale")
+    assert laptop.page.evaluate(width) == fine
+
+
 def test_a_press_on_a_plot_seeks(laptop: Seen) -> None:
     box = laptop.page.locator(".plot svg").nth(1).bounding_box()
     assert box is not None

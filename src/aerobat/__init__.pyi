@@ -54,6 +54,7 @@ from .planning import (
 )
 from .problem import (
     Attitude,
+    Ball,
     Condition,
     CustomManeuver,
     EndState,
@@ -102,6 +103,7 @@ __all__ = [
     "Assessment",
     "Attitude",
     "BackendMissing",
+    "Ball",
     "Battery",
     "BisectionSearch",
     "BodyState",

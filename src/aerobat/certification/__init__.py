@@ -2,7 +2,7 @@
 
 from aerobat.certification.certificate import Certificate, Discontinuity, Finding, Side, Verdict
 from aerobat.certification.certify import certify
-from aerobat.certification.envelope import Envelope, PlannedPassage
+from aerobat.certification.envelope import Envelope, PlannedPassage, PlannedWaypoint
 
 __all__ = [
     "Certificate",
@@ -10,6 +10,7 @@ __all__ = [
     "Envelope",
     "Finding",
     "PlannedPassage",
+    "PlannedWaypoint",
     "Side",
     "Verdict",
     "certify",

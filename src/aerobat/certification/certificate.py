@@ -30,7 +30,8 @@ class Side(StrEnum):
 class Finding:
     """The minimum or the maximum of one quantity, enclosed between `value` and `bound`.
 
-    Where it names a `gate`, it is about the passage there alone, and `value` and `bound` are the same.
+    Where it names a `gate` or a `waypoint`, it is about that instant alone, and `value` and `bound` are the
+    same.
     """
 
     # "speed", "tilt", "thrust", "body rate", "moment", "rotor 0", "rotor 0 command", "velocity x", ...
@@ -43,6 +44,14 @@ class Finding:
     limit: float | None
     verdict: Verdict
     gate: str | None = None  # passed at that time
+    waypoint: str | None = None  # met at that time
+
+    @property
+    def place(self) -> str | None:
+        """The gate or waypoint that it is about, in words; None where it is about the whole path."""
+        if self.gate is not None:
+            return f"gate '{self.gate}'"
+        return None if self.waypoint is None else f"'{self.waypoint}'"
 
     @property
     def margin(self) -> float | None:
@@ -57,15 +66,15 @@ class Finding:
         """One sentence without its full stop."""
         change = "rises" if self.side is Side.MAX else "falls"
         reached = f"{self.quantity} {change} to {self.shown(self.value)} at {self.time:.3f} s"
-        if self.gate is not None:
-            reached = f"gate '{self.gate}' {self.quantity} {self._of_limit} at {self.time:.3f} s"
+        if self.place is not None:
+            reached = f"{self.place} {self.quantity} {self._of_limit} at {self.time:.3f} s"
         margin = self.margin
         if self.limit is None or margin is None:
             return reached
         if self.verdict is Verdict.VIOLATED:
             where = "above" if self.side is Side.MAX else "below"
             return f"{reached}, {self.shown(-margin, 2)} {where} its limit"
-        if self.gate is not None:
+        if self.place is not None:
             return reached
         if self.verdict is Verdict.UNDECIDED and margin < 0:
             return f"{reached}, nearer to its limit than can be told"
@@ -164,8 +173,8 @@ class Certificate:
         return f"certified: {self.worst}"
 
     def with_passages(self, passages: Sequence[Finding]) -> Certificate:
-        """The same with the findings about passages through gates."""
-        others = tuple(finding for finding in self.findings if finding.gate is None)
+        """The same with the findings about passages through gates and about waypoints."""
+        others = tuple(finding for finding in self.findings if finding.place is None)
         return replace(self, findings=(*others, *passages))
 
     def record(self) -> dict[str, object]:

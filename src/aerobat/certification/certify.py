@@ -28,7 +28,7 @@ from aerobat.certification.enclosure.queries import (
 )
 from aerobat.certification.envelope import Envelope
 from aerobat.certification.path.kinematics import kinematic_findings
-from aerobat.certification.path.passages import passage_findings
+from aerobat.certification.path.passages import passage_findings, waypoint_findings
 from aerobat.certification.subdivision import subdivide
 from aerobat.certification.thrust_curve import ThrustCurve
 from aerobat.declaration import validated
@@ -86,6 +86,7 @@ def certify(
     balance = force_balance(environment, vehicle)
     findings += kinematic_findings(trajectory, envelope, balance)
     findings += passage_findings(trajectory, envelope.passages, balance)
+    findings += waypoint_findings(trajectory, envelope.waypoints)
     return Certificate(tuple(findings), found.vanishing, discontinuities(curve, floor, series))
 
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from aerobat.declaration import Limit, NonNegative, Number, TiltLimit, UnitVector, declared
-from aerobat.problem import Condition, Gate, Limits, Quantity, Stage
+from aerobat.declaration import Label, Limit, NonNegative, Number, TiltLimit, UnitVector, declared
+from aerobat.problem import Ball, Condition, Gate, Limits, Quantity, Stage
 from aerobat.problem.stage import PARALLEL
 
 CROSSING_SPEED = 1e-3  # [m/s] a path that is slower in the gate's plane does not cross it
@@ -21,14 +21,24 @@ class PlannedPassage:
     up: UnitVector  # where the thrust axis shall point
     attitude_tolerance: Number = np.inf  # [rad] between them, at most; infinite where no attitude is asked
     min_speed: NonNegative = CROSSING_SPEED  # [m/s] in the gate's direction; 0 where it may be met along it
+    margin: NonNegative = 0.0  # [m] from the edges of its opening
 
     @classmethod
     def of(cls, stage: Stage, gate: Gate, time: float) -> PlannedPassage:
         """The passage that a stage of `Problem.stages` asks for, placed at a time [s]."""
         min_speed = 0.0 if any(_keeps_from(gate, each) for each in stage.conditions) else CROSSING_SPEED
         if stage.attitude is None:
-            return cls(gate, time, gate.up, min_speed=min_speed)
-        return cls(gate, time, stage.attitude.up, gate.attitude_tolerance, min_speed)
+            return cls(gate, time, gate.up, min_speed=min_speed, margin=stage.margin)
+        return cls(gate, time, stage.attitude.up, gate.attitude_tolerance, min_speed, stage.margin)
+
+
+@declared
+class PlannedWaypoint:
+    """A ball to be met at an instant."""
+
+    name: Label
+    ball: Ball
+    time: NonNegative  # [s]
 
 
 def _keeps_from(gate: Gate, condition: Condition) -> bool:
@@ -43,7 +53,7 @@ class Envelope:
     """Limits over continuous time; infinite where there is none.
 
     `limits` bounds position and its derivatives per axis, as a problem does; `conditions` hold throughout,
-    and `passages` at their instants.
+    and `passages` and `waypoints` at their instants.
     """
 
     speed: Limit = np.inf  # [m/s] |v|
@@ -53,3 +63,4 @@ class Envelope:
     limits: Limits = NO_LIMITS
     conditions: tuple[Condition, ...] = ()
     passages: tuple[PlannedPassage, ...] = ()
+    waypoints: tuple[PlannedWaypoint, ...] = ()

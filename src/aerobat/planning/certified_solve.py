@@ -14,10 +14,10 @@ import numpy as np
 
 from aerobat.arrays import Array
 from aerobat.certification import Certificate, Envelope, certify
-from aerobat.certification.path.passages import passage_findings
+from aerobat.certification.path.passages import passage_findings, waypoint_findings
 from aerobat.errors import SpecError
 from aerobat.flatness.references import force_balance
-from aerobat.planning.passages import planned_passages
+from aerobat.planning.passages import planned_passages, planned_waypoints
 from aerobat.planning.recorder import Attempt, Recorder
 from aerobat.planning.result import PlacedStage, Plan
 from aerobat.planning.rotor_margin import sampled_margin
@@ -94,6 +94,7 @@ class Judged(Generic[Detail]):
         findings = passage_findings(
             trajectory, passages, force_balance(self.problem.environment, self.vehicle)
         )
+        findings += waypoint_findings(trajectory, planned_waypoints(plan.stages, self.problem))
         return replace(plan, certificate=self.certificate.with_passages(findings))
 
 
@@ -153,7 +154,8 @@ def envelope_for(problem: Problem, vehicle: Vehicle, stages: Sequence[PlacedStag
     """The limits of a problem for a vehicle, with the gates that are passed at placed stages."""
     throughout = problem.stages(vehicle.max_specific_thrust).path_constraints
     passages = planned_passages(stages, problem)
-    return Envelope(limits=problem.path_limits, conditions=throughout, passages=passages)
+    waypoints = planned_waypoints(stages, problem)
+    return Envelope(limits=problem.path_limits, conditions=throughout, passages=passages, waypoints=waypoints)
 
 
 def with_certificate(plan: Plan, vehicle: Vehicle) -> Plan:

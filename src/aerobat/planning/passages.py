@@ -1,4 +1,4 @@
-"""Passages through gates that a plan intends: its placed stages, with what the problem's stages ask.
+"""Passages that a plan intends, through gates and balls: its placed stages, with what the problem's ask.
 
 And, before anything is searched, the openings of gates beside the vehicle that shall pass them.
 """
@@ -10,7 +10,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from aerobat.arrays import Array
-from aerobat.certification import PlannedPassage
+from aerobat.certification import PlannedPassage, PlannedWaypoint
 from aerobat.errors import SpecError
 from aerobat.planning.result import PlacedStage
 from aerobat.problem.gate import Gate
@@ -29,6 +29,18 @@ def planned_passages(stages: Sequence[PlacedStage], problem: Problem) -> tuple[P
             stage = next((stage for stage in asked if stage.gate == place.gate), Stage(place.name))
             asked = [other for other in asked if other is not stage]
             found.append(PlannedPassage.of(stage, problem.gate(place.gate), place.time))
+    return tuple(found)
+
+
+def planned_waypoints(stages: Sequence[PlacedStage], problem: Problem) -> tuple[PlannedWaypoint, ...]:
+    """The balls that are met at placed stages, in their order."""
+    asked = [stage for stage in problem.stages(1.0).stages if stage.ball is not None]
+    found = []
+    for place in stages:
+        stage = next((stage for stage in asked if stage.name == place.name), None)
+        if stage is not None and stage.ball is not None:
+            asked = [other for other in asked if other is not stage]
+            found.append(PlannedWaypoint(stage.name, stage.ball, place.time))
     return tuple(found)
 
 

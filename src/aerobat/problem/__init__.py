@@ -1,5 +1,6 @@
 """What is wanted: gates, maneuvers as lists of stages, problems. No optimization happens here."""
 
+from aerobat.problem.ball import Ball
 from aerobat.problem.condition import Attitude, Condition, ForceBalance, LinearBound, Quantity
 from aerobat.problem.files import as_problem, load_problem, problem_names, write_problem
 from aerobat.problem.gate import Gate, tilted_gate
@@ -21,6 +22,7 @@ from aerobat.problem.stage import Stage, StageSequence
 __all__ = [
     "PAPER_LIMITS",
     "Attitude",
+    "Ball",
     "Condition",
     "CustomManeuver",
     "EndState",

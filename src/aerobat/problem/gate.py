@@ -160,6 +160,19 @@ def at_centre(gate: Gate) -> tuple[Condition, ...]:
     )
 
 
+def in_opening(gate: Gate, clearance: float) -> tuple[Condition, ...]:
+    """Meeting a gate's opening anywhere at a clearance [m] from its edges.
+
+    Where the opening is too narrow for that, in the middle between the edges that are too near.
+    """
+    in_plane = float(gate.normal @ gate.position)
+    found = [Condition(Quantity.POSITION, gate.normal, in_plane, in_plane)]
+    for axis, side in ((gate.lateral, gate.width), (gate.up, gate.height)):
+        middle, reach = float(axis @ gate.position), max(side / 2.0 - clearance, 0.0)
+        found.append(Condition(Quantity.POSITION, axis, middle - reach, middle + reach))
+    return tuple(found)
+
+
 def only_gate(gates: Sequence[Gate], maneuver: str) -> Gate:
     """The one gate of a maneuver that passes one. Raises SpecError when there are none or several."""
     if len(gates) != 1:

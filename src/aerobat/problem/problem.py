@@ -18,6 +18,7 @@ from aerobat.declaration import (
     Derivative,
     FieldError,
     Label,
+    NonNegative,
     PerAxis,
     Positive,
     Vector3,
@@ -180,7 +181,8 @@ class Problem:
     def _check_stages(self, sequence: StageSequence) -> None:
         """Refuse stages at places outside the limits or under ground."""
         for stage in sequence.stages:
-            for condition in stage.conditions:
+            enclosing = () if stage.ball is None else stage.ball.circumscribed
+            for condition in (*stage.conditions, *enclosing):
                 if condition.quantity is Quantity.POSITION:
                     self._check_place(stage.name, condition)
 
@@ -243,13 +245,26 @@ class Problem:
         return replace(self.limits, lower=np.maximum(self.limits.lower, [-np.inf, -np.inf, ground]))
 
     @validated
-    def stages(self, max_specific_thrust: Positive) -> StageSequence:
-        """The maneuver's stages through the problem's gates, for a vehicle that has so much thrust [m/s²].
+    def stages(
+        self, max_specific_thrust: Positive, body_radius: NonNegative = 0.0, polytopes: bool = True
+    ) -> StageSequence:
+        """The maneuver's stages through the problem's gates, for a vehicle of such thrust and size.
 
-        All that a stage asks is among its conditions, its gate's centre and its attitude too.
-        Raises SpecError for gates that do not suit the maneuver.
+        All that a stage asks is among its conditions, where it is and its attitude too.
+
+        Args:
+            max_specific_thrust: That the vehicle has [m/s²].
+            body_radius: Of the vehicle's body about its centre of mass [m], which is kept from the edges of
+                openings that are crossed anywhere.
+            polytopes: Whether those of stages within a ball are of a polytope in it, which are linear; false
+                for who holds the ball itself.
+
+        Raises:
+            SpecError: Gates do not suit the maneuver.
         """
-        return _explicit_stages(self.maneuver, self.gates, float(max_specific_thrust))
+        return _explicit_stages(
+            self.maneuver, self.gates, float(max_specific_thrust), float(body_radius), polytopes
+        )
 
     @validated
     def gate(self, name: str) -> Gate:
@@ -263,11 +278,18 @@ class Problem:
 
 @lru_cache(maxsize=64)
 def _explicit_stages(
-    maneuver: Maneuver, gates: tuple[Gate, ...], max_specific_thrust: float
+    maneuver: Maneuver,
+    gates: tuple[Gate, ...],
+    max_specific_thrust: float,
+    body_radius: float,
+    polytopes: bool,
 ) -> StageSequence:
     """As `Problem.stages`, kept: planner, certificate and score each ask for the same."""
     sequence = maneuver.stage_sequence(gates, max_specific_thrust)
-    stages = (s.explicit(None if s.gate is None else named_gate(gates, s.gate)) for s in sequence.stages)
+    stages = (
+        s.explicit(None if s.gate is None else named_gate(gates, s.gate), body_radius, polytopes)
+        for s in sequence.stages
+    )
     return replace(sequence, stages=tuple(stages))
 
 

@@ -9,8 +9,9 @@ from typing import Annotated, Any, Literal
 from pydantic import Field, PlainValidator
 
 from aerobat.declaration import FieldError, Label, NonNegative, Positive, declared, shown
+from aerobat.problem.ball import Ball
 from aerobat.problem.condition import Attitude, Condition, Quantity
-from aerobat.problem.gate import Gate, at_centre
+from aerobat.problem.gate import Gate, at_centre, in_opening
 
 
 def _crossing_time(value: Any) -> Any:
@@ -32,6 +33,8 @@ CrossingTime = Annotated[
     PlainValidator(_crossing_time),
     Field(description='`"free"`, a fraction of the duration between 0 and 1, or two that rise, a window'),
 ]
+# where in a gate's opening it is crossed: at its centre, or anywhere
+CrossingPoint = Literal["centre", "free"]
 MIN_CROSSING_SPEED = 1.0  # [m/s] through a gate, where nothing else is asked: who stands still may turn back
 PARALLEL = 1e-6  # [-] a direction with less of a gate's normal lies in the gate's plane
 PLANNED_SHARE = 0.5  # of a gate's tolerance of attitude: the plan's
@@ -45,7 +48,9 @@ class Stage:
     A fraction fixes it to the last interval that ends by then, or `interval_offset` intervals after that
     one. `gate` names the gate that it passes, whose centre it meets in its direction of passage, at
     `min_speed` or faster, with the thrust axis along its upright where `min_upright_thrust` is given, or as
-    `attitude` says: within half the gate's tolerance, at most, the rest is left to the flight.
+    `attitude` says: within half the gate's tolerance, at most, the rest is left to the flight. With a free
+    `crossing_point` it meets the opening anywhere, the vehicle's body and a `margin` away from its edges. A
+    `ball` is a place beside any gate that it meets within a radius.
     """
 
     name: Label  # shown in reports and pictures
@@ -58,9 +63,15 @@ class Stage:
     attitude: Attitude | None = None  # where the thrust points, instead
     # through the gate; left out, 1 unless `conditions` say how fast, and 0 leaves it free
     min_speed: NonNegative | None = None  # [m/s]
+    crossing_point: CrossingPoint = "centre"  # of the gate's opening: its centre, or free
+    margin: NonNegative = 0.0  # [m] from the edges to the body, where the crossing point is free
+    ball: Ball | None = None  # where it is, within a radius
 
     def __post_init__(self) -> None:
         """Check."""
+        check_crossing(self.gate, self.crossing_point, self.margin)
+        if self.ball is not None and self.gate is not None:
+            raise FieldError("ball", "stands beside gate, which says where; give one of them")
         if self.min_speed is not None and self.gate is None:
             raise FieldError("min_speed", "needs gate, whose direction of passage is meant; name it")
         if self.min_upright_thrust is not None:
@@ -88,8 +99,14 @@ class Stage:
         earliest = max(ceil(first * intervals - ROUNDING) - 1, 0)
         return range(earliest, min(floor(last * intervals + ROUNDING), intervals - 1))
 
-    def explicit(self, gate: Gate | None = None) -> Stage:
-        """The same at its gate, with all that it asks among its conditions: also where, and its attitude."""
+    def explicit(self, gate: Gate | None = None, body_radius: float = 0.0, polytopes: bool = True) -> Stage:
+        """The same at its gate, with all that it asks among its conditions: also where, and its attitude.
+
+        Args:
+            gate: Its gate.
+            body_radius: Of the vehicle's body [m], kept from the edges of an opening.
+            polytopes: Whether a polytope in its ball is among the conditions.
+        """
         attitude = self.attitude
         if gate is not None:
             tolerance = PLANNED_SHARE * gate.attitude_tolerance
@@ -97,7 +114,15 @@ class Stage:
                 attitude = Attitude(gate.up, self.min_upright_thrust, tolerance)
             elif attitude is not None:
                 attitude = replace(attitude, tolerance=min(attitude.tolerance, tolerance))
-        there = () if gate is None else (*at_centre(gate), *self._moving_through(gate))
+        there: tuple[Condition, ...] = ()
+        if gate is not None and self.crossing_point == "free":
+            there = in_opening(gate, body_radius + self.margin)
+        elif gate is not None:
+            there = at_centre(gate)
+        elif self.ball is not None and polytopes:
+            there = self.ball.inscribed
+        if gate is not None:
+            there += self._moving_through(gate)
         pointing = () if attitude is None else attitude.conditions
         conditions = (*there, *self.conditions, *pointing)
         return replace(self, conditions=conditions, min_upright_thrust=None, attitude=attitude)
@@ -108,6 +133,19 @@ class Stage:
         default = 0.0 if any(part > PARALLEL for part in along) else MIN_CROSSING_SPEED
         speed = default if self.min_speed is None else self.min_speed
         return (Condition(Quantity.VELOCITY, gate.normal, lower=speed),) if speed > 0.0 else ()
+
+
+def check_crossing(gate: str | None, crossing_point: CrossingPoint, margin: float) -> None:
+    """Refuse a free crossing point of no gate, and a margin where it is not free. Raises FieldError."""
+    if crossing_point == "free" and gate is None:
+        raise FieldError("crossing_point", "needs gate, whose opening is meant; name it")
+    check_margin(crossing_point, margin)
+
+
+def check_margin(crossing_point: CrossingPoint, margin: float) -> None:
+    """Refuse a margin where the crossing point is not free. Raises FieldError."""
+    if margin > 0.0 and crossing_point != "free":
+        raise FieldError("margin", 'needs crossing_point = "free": a centre has no margin; give both')
 
 
 @declared

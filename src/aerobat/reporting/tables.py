@@ -88,11 +88,11 @@ def certificate_table(certificate: Certificate, title: str) -> Table:
     """
     headings = ("quantity", "reaches", "at", "limit", "margin", "verdict")
     table = Table(*headings, title=title, title_justify="left", box=None, pad_edge=False)
-    along = [finding for finding in certificate.findings if finding.gate is None]
+    along = [finding for finding in certificate.findings if finding.place is None]
     for finding in _nearest_rotors(along):
         if finding.limit is not None or finding.side is Side.MAX:
             table.add_row(*_finding_row(finding))
-    for row in _passage_rows(finding for finding in certificate.findings if finding.gate is not None):
+    for row in _passage_rows(finding for finding in certificate.findings if finding.place is not None):
         table.add_row(*row)
     table.caption = ("" if certificate.certified else "not certified: ") + certificate.why
     table.caption_justify = "left"
@@ -111,20 +111,20 @@ def _nearest_rotors(findings: Iterable[Finding]) -> Iterable[Finding]:
 
 
 def _passage_rows(findings: Iterable[Finding]) -> Iterable[tuple[str, ...]]:
-    """A row a passage through a gate; where it is not as asked, a row for all that is not."""
-    for (gate, time), group in groupby(findings, lambda finding: (finding.gate, finding.time)):
+    """A row a passage through a gate or waypoint; where it is not as asked, a row for all that is not."""
+    for (place, time), group in groupby(findings, lambda finding: (finding.place, finding.time)):
         passage = list(group)
         wrong = [finding for finding in passage if finding.verdict is not Verdict.HOLDS]
         if wrong:
             yield from map(_finding_row, wrong)
         else:
             reached = ", ".join(f"{each.quantity} {each.shown(each.value, 2)}" for each in passage)
-            yield f"gate '{gate}'", reached, f"{time:.3f} s", "", "", Verdict.HOLDS.value
+            yield str(place), reached, f"{time:.3f} s", "", "", Verdict.HOLDS.value
 
 
 def _finding_row(finding: Finding) -> tuple[str, ...]:
     return (
-        finding.quantity if finding.gate is None else f"gate '{finding.gate}' {finding.quantity}",
+        finding.quantity if finding.place is None else f"{finding.place} {finding.quantity}",
         f"{finding.side.value} {finding.shown(finding.value)}",
         f"{finding.time:.3f} s",
         "–" if finding.limit is None else finding.shown(finding.limit),

@@ -150,6 +150,12 @@ class Vehicle:
         """What encloses it with its propellers: `body`, or a flat ellipsoid about the rotors."""
         return about_rotors(self.rotors) if self.body is None else self.body
 
+    @property
+    def body_radius(self) -> float:
+        """The radius [m] of a ball about the centre of mass that encloses the body in any attitude."""
+        body = self.bounding_ellipsoid
+        return float(np.linalg.norm(body.centre) + body.semi_axes.max())
+
     @cached_property
     def dead_rotors(self) -> tuple[int, ...]:
         """Which rotors give no thrust, counted from 0."""

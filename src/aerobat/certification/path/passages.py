@@ -1,4 +1,4 @@
-"""Passages through gates, at the instants at which they are planned.
+"""Passages through gates and waypoints, at the instants at which they are planned.
 
 Path and thrust at one instant are known but for rounding; solvers meet their equations to PASSAGE_TOLERANCE.
 """
@@ -12,7 +12,7 @@ import numpy as np
 
 from aerobat.arrays import Array
 from aerobat.certification.certificate import Finding, Side, Verdict
-from aerobat.certification.envelope import PlannedPassage
+from aerobat.certification.envelope import PlannedPassage, PlannedWaypoint
 from aerobat.flatness.references import UNDETERMINED
 from aerobat.problem.condition import ForceBalance
 from aerobat.trajectory import Trajectory
@@ -28,6 +28,29 @@ def passage_findings(
     return [
         finding for passage in passages for finding in _Instant.of(trajectory, passage, balance).findings()
     ]
+
+
+def waypoint_findings(trajectory: Trajectory, waypoints: Sequence[PlannedWaypoint]) -> list[Finding]:
+    """The findings about each waypoint: how far from its centre it is met."""
+    return [_met(trajectory, waypoint) for waypoint in waypoints]
+
+
+def _met(trajectory: Trajectory, waypoint: PlannedWaypoint) -> Finding:
+    time = min(waypoint.time, trajectory.duration)
+    ball = waypoint.ball
+    distance = float(np.linalg.norm(trajectory.evaluate(time) - ball.centre))
+    verdict = Verdict.HOLDS if distance <= ball.radius + PASSAGE_TOLERANCE else Verdict.VIOLATED
+    return Finding(
+        "distance",
+        "m",
+        Side.MAX,
+        distance,
+        distance,
+        waypoint.time,
+        ball.radius,
+        verdict,
+        waypoint=waypoint.name,
+    )
 
 
 @dataclass(frozen=True)
@@ -56,8 +79,8 @@ class _Instant:
         speed = float(self.velocity @ gate.normal)
         found = [
             self._at_most("off plane", "m", abs(along), PLANE_DISTANCE),
-            self._at_most("sideways", "m", abs(across), gate.width / 2),
-            self._at_most("upward", "m", abs(up), gate.height / 2),
+            self._at_most("sideways", "m", abs(across), max(gate.width / 2 - self.passage.margin, 0.0)),
+            self._at_most("upward", "m", abs(up), max(gate.height / 2 - self.passage.margin, 0.0)),
             self._finding("speed through", "m/s", Side.MIN, speed, self.passage.min_speed),
         ]
         return found if self.passage.attitude_tolerance == np.inf else [*found, self._attitude()]

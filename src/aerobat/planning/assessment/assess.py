@@ -96,7 +96,8 @@ def _asked(problem: Problem, vehicle: Vehicle) -> Box:
     points = np.array([problem.start.position, problem.goal.position, *(g.position for g in problem.gates)])
     lower, upper = points.min(axis=0), points.max(axis=0)
     for stage in problem.stages(vehicle.max_specific_thrust).stages:
-        for condition in stage.conditions:
+        enclosing = () if stage.ball is None else stage.ball.circumscribed
+        for condition in (*stage.conditions, *enclosing):
             axes = np.flatnonzero(condition.direction)
             if condition.quantity is Quantity.POSITION and len(axes) == 1:
                 for bound in (condition.lower, condition.upper):
@@ -110,7 +111,7 @@ def _asked(problem: Problem, vehicle: Vehicle) -> Box:
 def _largest(certificate: Certificate | None, quantity: str) -> float | None:
     """The largest value of a quantity along the path."""
     findings = () if certificate is None else certificate.findings
-    asked = (f.value for f in findings if (f.quantity, f.side, f.gate) == (quantity, Side.MAX, None))
+    asked = (f.value for f in findings if (f.quantity, f.side, f.place) == (quantity, Side.MAX, None))
     return max(asked, default=None)
 
 

@@ -21,7 +21,7 @@ from aerobat.flatness.references import axial_drag
 from aerobat.planning.assessment.damped_point import DampedPoint
 from aerobat.problem.condition import Condition, ForceBalance, Quantity
 from aerobat.problem.problem import EndState, Problem
-from aerobat.problem.stage import StageSequence
+from aerobat.problem.stage import Stage, StageSequence
 from aerobat.so3 import UP
 from aerobat.vehicle import Vehicle
 
@@ -35,7 +35,7 @@ def least_duration(problem: Problem, vehicle: Vehicle) -> float:
 
     Raises SpecError for gates that do not suit the maneuver.
     """
-    sequence = problem.stages(vehicle.max_specific_thrust)
+    sequence = problem.stages(vehicle.max_specific_thrust, vehicle.body_radius, polytopes=False)
     lines = [_Line.of(problem, vehicle, sequence, n) for n in _directions(problem, sequence)]
 
     def moving(duration: float) -> float:
@@ -78,7 +78,8 @@ def _directions(problem: Problem, sequence: StageSequence) -> Iterator[Array]:
     """The axes, those of conditions on the position, and those between points that are met."""
     found = [*np.eye(3)]
     found += [c.direction for s in sequence.stages for c in s.conditions if c.quantity is Quantity.POSITION]
-    points = [problem.start.position, *(g.position for g in problem.gates), problem.goal.position]
+    balls = (stage.ball.centre for stage in sequence.stages if stage.ball is not None)
+    points = [problem.start.position, *(g.position for g in problem.gates), *balls, problem.goal.position]
     found += [b - a for a, b in pairwise(points)]
     seen: list[Array] = []
     for vector in found:
@@ -136,7 +137,7 @@ class _Line:
         )
         start, goal = ends
         return cls(
-            groups=(start, *(_places(stage.conditions, direction) for stage in sequence.stages), goal),
+            groups=(start, *(_places(stage, direction) for stage in sequence.stages), goal),
             ordered=sequence.ordered,
             lower=lower,
             upper=upper,
@@ -183,10 +184,13 @@ def _leg(a: _Place, b: _Place, up: DampedPoint, down: DampedPoint) -> float:
     return -inf if blocked else down.least_time(-distance, -a.velocity, -b.velocity)
 
 
-def _places(conditions: Sequence[Condition], direction: Array) -> tuple[_Place, ...]:
-    """The places along a direction that a stage asks to be met."""
-    lower, upper = _range(Quantity.POSITION, conditions, direction)
-    slow, fast = _range(Quantity.VELOCITY, conditions, direction)
+def _places(stage: Stage, direction: Array) -> tuple[_Place, ...]:
+    """The places along a direction that a stage asks to be met, of a ball its ends."""
+    lower, upper = _range(Quantity.POSITION, stage.conditions, direction)
+    slow, fast = _range(Quantity.VELOCITY, stage.conditions, direction)
+    if stage.ball is not None:
+        middle = float(stage.ball.centre @ direction)
+        lower, upper = max(lower, middle - stage.ball.radius), min(upper, middle + stage.ball.radius)
     found = [_Place(_Turn.ABOVE, lower), _Place(_Turn.BELOW, upper)]
     if lower == upper and slow == fast:
         found.append(_Place(_Turn.AT, lower, slow))

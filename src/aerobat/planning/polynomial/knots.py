@@ -25,9 +25,10 @@ def fixed_at_knots(
     """Position and its derivatives below `order` at start, stages and goal, (K, order, 3); NaN: free.
 
     The closed form takes each axis alone and equalities only. So conditions in oblique directions fix, by
-    least norm, every component that they touch. An attitude fixes the thrust to exactly its direction, and a
-    lower bound on thrust to itself or to the hover's if that is more, one on speed to itself or to the
-    velocity given; other inequalities are left free, to be checked afterwards.
+    least norm, every component that they touch. Balls and gates are met at their centres. An attitude fixes
+    the thrust to exactly its direction, and a lower bound on thrust to itself or to the hover's if that is
+    more, one on speed to itself or to the velocity given; other inequalities are left free, to be checked
+    afterwards.
 
     Args:
         problem: Its ends are fixed.
@@ -41,6 +42,10 @@ def fixed_at_knots(
     for knot, (stage, velocity) in enumerate(zip(sequence.stages, velocities, strict=True), 1):
         for derivative in range(3):
             fixed[knot, derivative] = _fixed(stage, derivative, balance, velocity)
+        if stage.ball is not None:
+            fixed[knot, 0] = stage.ball.centre
+        elif stage.gate is not None:
+            fixed[knot, 0] = problem.gate(stage.gate).position
     return fixed
 
 

@@ -126,6 +126,14 @@ class Elements:
         return node.function(ca.vertcat(*values)), lower, upper
 
     @cached_property
+    def squared_distance(self) -> ElementFunction:
+        """The squared distance from a centre (3,) in radii of a ball, the parameters, of scaled positions."""
+        ca = import_casadi()
+        z, ball = ca.SX.sym("z", 3), ca.SX.sym("ball", 4)
+        distance = (z * STATE_SCALE[POSITION] - ball[:3]) / ball[3]
+        return ElementFunction(ca.Function("distance", [z, ball], [ca.sumsqr(distance)]))
+
+    @cached_property
     def goal_thrust(self) -> ElementFunction:
         """A thrust (3,), the parameter, in body axes."""
         ca = import_casadi()

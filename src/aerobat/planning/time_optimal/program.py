@@ -129,6 +129,10 @@ class OptimalControl:
             for side in (1, 0) if jumping and not mesh.continuous else (1,):
                 u = mesh.inputs[side, node - side]
                 rows.hold(function, np.hstack([mesh.states[node], u])[None], lower, upper)
+        if stage.ball is not None:
+            there = mesh.states[None, node, POSITION]
+            ball = (*stage.ball.centre, stage.ball.radius)
+            rows.hold(self.elements.squared_distance, there, -inf, 1.0, ball)
         phases = np.arange(len(mesh.intervals))
         earliest, latest = stage.window
         before = (phases <= index).astype(float)

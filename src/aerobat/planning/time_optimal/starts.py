@@ -63,7 +63,9 @@ def starts(
         Infeasible: A stage asks more thrust than the vehicle has.
     """
     plans = list(_plans(problem, vehicle, guess, first))
-    sources = list(_sources(plans, problem.stages(vehicle.max_specific_thrust)))
+    sources = list(
+        _sources(plans, problem.stages(vehicle.max_specific_thrust, vehicle.body_radius, polytopes=False))
+    )
     own = tuple(plan for plan, _ in plans if plan.certified and plan.vehicle == vehicle)
     return Starts(tuple(islice(_variations(sources, planar), count)), own)
 

@@ -7,19 +7,26 @@ from collections.abc import Sequence
 from aerobat.declaration import NonNegative, declared
 from aerobat.problem.condition import Condition, Quantity
 from aerobat.problem.gate import Gate
-from aerobat.problem.stage import MIN_CROSSING_SPEED, CrossingTime, Stage
+from aerobat.problem.stage import (
+    MIN_CROSSING_SPEED,
+    CrossingPoint,
+    CrossingTime,
+    Stage,
+    check_margin,
+)
 
 
 @declared
 class GatePassage:
-    """The manner in which a gate is passed, beyond meeting its centre.
+    """The manner in which a gate is passed, beyond meeting its opening.
 
     A `perpendicular` passage moves along the gate's direction of passage, at `speed` or faster, and not
     across it, so that a vehicle of some size fits through; one that stood still there could turn back. It is
     `upright` with the thrust axis along the gate's upright, within half its tolerance, where the maneuver
     asks for an attitude at all; otherwise only in the plane of the maneuver's turn, as in the paper.
     `centred` means that the gate is met by the fraction `at`, and otherwise one interval later, at the end of
-    interval N/2, as in the authors' reference code; there the velocity is free.
+    interval N/2, as in the authors' reference code; there the velocity is free. With a free `crossing_point`
+    the opening is met anywhere, the vehicle's body and a `margin` away from its edges.
     """
 
     perpendicular: bool = True  # move along the gate's direction of passage and not across it
@@ -27,6 +34,12 @@ class GatePassage:
     at: CrossingTime = "free"  # when, as a part of the duration
     centred: bool = True  # at `at`; false: one interval later, as in the paper's code
     upright: bool = True  # the thrust axis along the gate's upright, not only in the plane of the turn
+    crossing_point: CrossingPoint = "centre"  # of the opening: its centre, or free
+    margin: NonNegative = 0.0  # [m] from the edges to the body, where the crossing point is free
+
+    def __post_init__(self) -> None:
+        """Check."""
+        check_margin(self.crossing_point, self.margin)
 
     def stage(
         self, gate: Gate, conditions: Sequence[Condition] = (), min_thrust: float | None = None
@@ -34,7 +47,7 @@ class GatePassage:
         """The stage of passing `gate`.
 
         Args:
-            gate: the gate, whose centre is met.
+            gate: the gate that is met.
             conditions: what holds there in place of the gate's attitude, where the passage is not upright.
             min_thrust: least specific thrust [m/s²] along the gate's upright; None: no attitude is asked.
         """
@@ -47,7 +60,17 @@ class GatePassage:
             min_thrust = None
         offset = 0 if self.centred else 1
         # how fast is among the conditions, or left free
-        return Stage(gate.name, tuple(asked), self.at, offset, gate.name, min_thrust, min_speed=0.0)
+        return Stage(
+            gate.name,
+            tuple(asked),
+            self.at,
+            offset,
+            gate.name,
+            min_thrust,
+            min_speed=0.0,
+            crossing_point=self.crossing_point,
+            margin=self.margin,
+        )
 
 
 PAPER_PASSAGE = GatePassage(perpendicular=False, at=0.5, centred=False, upright=False)

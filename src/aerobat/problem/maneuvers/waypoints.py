@@ -20,10 +20,11 @@ from aerobat.declaration import (
     declared,
 )
 from aerobat.errors import SpecError
+from aerobat.problem.ball import Ball
 from aerobat.problem.condition import Attitude, Condition, Quantity
 from aerobat.problem.gate import Gate
 from aerobat.problem.maneuvers.maneuver import Maneuver, maneuver
-from aerobat.problem.stage import Stage, StageSequence
+from aerobat.problem.stage import CrossingPoint, Stage, StageSequence, check_crossing
 
 THRUST_FRACTION = 0.2  # of the greatest specific thrust: the least along an attitude that names no thrust
 FIXABLE = (Quantity.POSITION, Quantity.VELOCITY, Quantity.ACCELERATION)
@@ -37,9 +38,9 @@ def _free() -> Array:
 class Waypoint:
     """Components fixed at one point of the path, world frame; components that are NaN are free.
 
-    `up` asks that the thrust points there, with exactly `thrust` per mass, or, without it, with at least a
-    fraction of what the vehicle has. Raises SpecError when nothing is given, or acceleration and attitude
-    both are.
+    With a `radius` the position is met within so much. `up` asks that the thrust points there, with exactly
+    `thrust` per mass, or, without it, with at least a fraction of what the vehicle has. Raises SpecError when
+    nothing is given, or acceleration and attitude both are.
     """
 
     position: PartialVector = field(default_factory=_free)  # [m] world
@@ -52,9 +53,17 @@ class Waypoint:
     gate: str | None = None  # name of the gate whose centre is passed
     # through the gate; left out, 1 unless `velocity` says how fast, and 0 leaves it free
     min_speed: NonNegative | None = None  # [m/s]
+    crossing_point: CrossingPoint = "centre"  # of the gate's opening: its centre, or free
+    margin: NonNegative = 0.0  # [m] from the edges to the body, where the crossing point is free
+    radius: Positive | None = None  # [m] about the position, within which it is met
 
     def __post_init__(self) -> None:
         """Check."""
+        check_crossing(self.gate, self.crossing_point, self.margin)
+        if self.radius is not None and np.isnan(self.position).any():
+            raise FieldError("radius", "needs all components of position, the centre; give them")
+        if self.radius is not None and self.gate is not None:
+            raise FieldError("radius", "stands beside gate, which says where; give one of them")
         if self.min_speed is not None and self.gate is None:
             raise FieldError("min_speed", "needs gate, whose direction of passage is meant; name it")
         if self.thrust is not None and self.up is None:
@@ -66,8 +75,8 @@ class Waypoint:
             raise SpecError("nothing is given; give at least one component of the position")
 
     def conditions(self) -> Iterable[Condition]:
-        """The given components and a given thrust, as conditions of a stage."""
-        for quantity in FIXABLE:
+        """The given components and a given thrust, as conditions of a stage; of a ball none."""
+        for quantity in FIXABLE if self.radius is None else FIXABLE[1:]:
             for direction, value in zip(np.eye(3), getattr(self, quantity.value).tolist(), strict=True):
                 if not np.isnan(value):
                     yield Condition(quantity, direction, value, value)
@@ -75,6 +84,11 @@ class Waypoint:
             return
         for direction, value in zip(np.eye(3), (self.thrust * self.up).tolist(), strict=True):
             yield Condition(Quantity.SPECIFIC_THRUST, direction, value, value)
+
+    @property
+    def ball(self) -> Ball | None:
+        """The ball that its radius makes of its position."""
+        return None if self.radius is None else Ball(self.position, self.radius)
 
     def attitude(self, max_specific_thrust: float) -> Attitude | None:
         """The attitude that `up` asks for with no thrust given."""
@@ -110,6 +124,9 @@ class Waypoints(Maneuver):
                     gate=waypoint.gate,
                     attitude=waypoint.attitude(max_specific_thrust),
                     min_speed=waypoint.min_speed,
+                    crossing_point=waypoint.crossing_point,
+                    margin=waypoint.margin,
+                    ball=waypoint.ball,
                 )
                 for number, waypoint in enumerate(self.waypoints, 1)
             )

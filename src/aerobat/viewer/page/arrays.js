@@ -1,24 +1,37 @@
 "use strict";
-// The page's numbers, and a vehicle's pose between its rows.
+// The numbers of the scene that is shown, and a vehicle's pose between its rows.
 
-const HEADER = JSON.parse(document.getElementById("header").textContent);
 const KINDS = { f4: Float32Array, i2: Int16Array };
+const VERTICES = 220; // of a drawn path: what software renders is slow by the piece
 
-const BYTES = (() => {
-  const text = atob(document.getElementById("arrays").textContent);
+// Of the scene that `load` took last.
+let HEADER, BYTES, TIMES, DURATION, TRACKS;
+let DRAWN_ROWS; // of all rows, those that paths are drawn of
+let SPAN; // [m] of the vehicle, over its rotors
+
+// Take a scene: its header, and its arrays as Base64.
+function load(header, arrays) {
+  HEADER = header;
+  BYTES = decoded(arrays);
+  TIMES = values(header.times);
+  DURATION = TIMES[TIMES.length - 1];
+  DRAWN_ROWS = [...new Set(Array.from({ length: VERTICES + 1 }, (_, k) => Math.round((k / VERTICES) * (TIMES.length - 1))))];
+  SPAN = 2 * Math.max(...header.rotors.map((r) => Math.hypot(r.position[0], r.position[1]) + r.radius));
+  TRACKS = header.tracks.map((track, index) => new Track(track, index));
+}
+
+function decoded(base64) {
+  const text = atob(base64);
   const bytes = new Uint8Array(text.length);
   for (let k = 0; k < text.length; k++) bytes[k] = text.charCodeAt(k);
   return bytes.buffer;
-})();
+}
 
 // The values of an array of the header.
 function values({ kind, offset, length, scale }) {
   const raw = new KINDS[kind](BYTES, offset, length);
   return kind === "f4" ? raw : Float32Array.from(raw, (x) => x * scale);
 }
-
-const TIMES = values(HEADER.times);
-const DURATION = TIMES[TIMES.length - 1];
 
 // The row at or before a time, and how far it is to the next, 0 to 1.
 function place(time) {
@@ -75,5 +88,3 @@ class Track {
     return between(this.thrusts, HEADER.rotors.length, rotor, place(Math.min(time, this.end)));
   }
 }
-
-const TRACKS = HEADER.tracks.map((header, index) => new Track(header, index));

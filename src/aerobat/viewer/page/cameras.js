@@ -5,17 +5,23 @@ const WIDTH_FILLED = 0.84; // of the picture by the whole scene
 const EDGES = [0.09, 0.13]; // of its height that stay free above and below it, where there are no buttons
 
 class Cameras {
-  constructor(world, canvas) {
-    this.world = world;
-    this.camera = new THREE.PerspectiveCamera(FIELD, 1, 0.01 * SPAN, 100 * world.bounds.size);
+  constructor(canvas) {
+    this.camera = new THREE.PerspectiveCamera(FIELD, 1);
     this.camera.up.set(0, 0, 1);
     this.controls = new THREE.OrbitControls(this.camera, canvas);
-    this.controls.minDistance = 0.6 * SPAN;
-    this.controls.maxDistance = 8 * world.bounds.size;
     this.view = "orbit";
     this.gate = 0;
     this.touched = false;
     this.controls.addEventListener("start", () => (this.touched = true));
+  }
+
+  // Look at a world; at another than before in the same way.
+  look(world) {
+    this.world = world;
+    [this.camera.near, this.camera.far] = [0.01 * SPAN, 100 * world.bounds.size];
+    [this.controls.minDistance, this.controls.maxDistance] = [0.6 * SPAN, 8 * world.bounds.size];
+    this.camera.updateProjectionMatrix();
+    this.frame();
   }
 
   // Take a view; the gate's again, that of the next gate.
@@ -24,6 +30,7 @@ class Cameras {
     if (view === "gate" && this.view === "gate") this.gate = (this.gate + 1) % HEADER.gates.length;
     this.view = view;
     this.touched = false;
+    this.widest = null;
     this.frame();
   }
 
@@ -48,11 +55,12 @@ class Cameras {
   resize(width, height) {
     this.camera.aspect = width / height;
     this.camera.updateProjectionMatrix();
+    this.widest = null;
     this.frame();
   }
 
   whole() {
-    const direction = bestDirection(this.world.bounds, this.camera.aspect);
+    const direction = (this.widest ??= bestDirection(this.world.bounds, this.camera.aspect)).clone();
     return fitted(this.world.bounds.points, direction, this.camera.aspect, edges(this.camera.aspect));
   }
 

@@ -7,10 +7,7 @@ const COLOUR = {
 const RAMP = ["#3b2a78", "#2c5fa8", "#1f8f9a", "#35b779", "#9ad13c"].map((c) => new THREE.Color(c)); // slow to fast
 const DISC = ["#e3edf7", "#8db7e0", "#004488"].map((c) => new THREE.Color(c)); // least to greatest thrust
 const BAR = 0.12; // a gate's bars, of the opening's shorter side
-const SPAN = 2 * Math.max(...HEADER.rotors.map((r) => Math.hypot(r.position[0], r.position[1]) + r.radius));
 const MAST = 0.35; // of a rotor's radius
-const VERTICES = 220; // of a drawn path: what software renders is slow by the piece
-const DRAWN_ROWS = [...new Set(Array.from({ length: VERTICES + 1 }, (_, k) => Math.round((k / VERTICES) * (TIMES.length - 1))))];
 
 function mixed(ramp, fraction) {
   const x = Math.min(Math.max(fraction, 0), 1) * (ramp.length - 1);

@@ -3,6 +3,10 @@
 const SPEEDS = [0.05, 0.1, 0.25, 0.5, 1, 2, 4];
 const LONGEST = 0.25; // [s] that a frame counts for: whoever looks elsewhere meanwhile misses nothing
 const STEPS = 100; // presses of an arrow key from start to end
+const SLOW = 0.05; // [s] a frame: what is drawn slower than that is drawn coarser while it plays,
+const COARSER = 0.7; // of the pixels across, each time,
+const COARSEST = 0.5; // down to this part of them
+const PACE = 0.3; // of the mean time of a frame, the weight of the last
 const ICONS = { play: "M5 2l14 9-14 9z", pause: "M4 2h5v18H4zM13 2h5v18h-5z", again: "M11 3a8 8 0 1 0 8 8h-3a5 5 0 1 1-5-5v4l7-5.500-7-5.500z" };
 const element = (id) => document.getElementById(id);
 
@@ -10,24 +14,16 @@ class Player {
   constructor() {
     this.time = 0;
     this.playing = false;
+    this.repeats = false; // from the start when it has come to the end
     this.frames = 0;
-    this.trueSize = TRACKS.length > 1; // of many, how far they spread is the point
     this.stale = true;
-    this.fill();
-    this.plots = new Plots((time) => this.seek(time));
-    try {
-      this.open();
-    } catch (error) {
-      this.world = null;
-      element("sorry").hidden = false;
-      element("sorry").textContent = "This browser has no WebGL, so that nothing is drawn in space; the plots show the flight.";
-      for (const id of ["views", "corner"]) element(id).hidden = true;
-      console.warn(error);
-    }
+    this.fineness = 1; // of pixels across, the part that is drawn
+    this.open();
+    for (const speed of SPEEDS) element("speed").add(new Option(`${speed}×`, speed));
     this.speed = DURATION < 1.5 ? 0.25 : DURATION < 5 ? 0.5 : 1; // what is short is shown slowly
     element("speed").value = this.speed;
     this.listen();
-    this.choose(this.world?.focus ?? 0);
+    this.show();
     this.view("orbit");
     this.resize();
     this.tick = this.tick.bind(this);
@@ -36,21 +32,46 @@ class Player {
 
   open() {
     const canvas = element("canvas");
-    this.renderer = new THREE.WebGLRenderer({ canvas, antialias: true, alpha: true });
-    this.world = new World();
-    this.cameras = new Cameras(this.world, canvas);
-    this.cameras.controls.addEventListener("change", () => (this.stale = true));
+    try {
+      this.renderer = new THREE.WebGLRenderer({ canvas, antialias: true, alpha: true });
+      this.cameras = new Cameras(canvas);
+      this.cameras.controls.addEventListener("change", () => (this.stale = true));
+    } catch (error) {
+      element("sorry").hidden = false;
+      element("sorry").textContent = "This browser has no WebGL, so that nothing is drawn in space; the plots show the flight.";
+      for (const id of ["views", "corner"]) element(id).hidden = true;
+      console.warn(error);
+    }
+  }
+
+  // The scene that is loaded, at the same part of its time as the one before it.
+  show() {
+    this.time = this.duration ? (this.time / this.duration) * DURATION : 0;
+    this.duration = DURATION;
+    this.trueSize = TRACKS.length > 1; // of many, how far they spread is the point
+    this.fill();
+    this.plots = new Plots((time) => this.seek(time));
+    if (this.renderer) {
+      const colourBy = this.world?.colourBy ?? "speed";
+      this.world?.close();
+      this.world = new World(colourBy);
+      this.world.show(this.time);
+      this.cameras.look(this.world);
+      this.enlarge();
+    }
+    this.choose(this.world?.focus ?? 0);
+    this.mark();
   }
 
   fill() {
     element("title").textContent = HEADER.title;
+    element("facts").textContent = element("flight").textContent = "";
     HEADER.facts.forEach((fact, k) => {
       const span = document.createElement("span");
       span.textContent = fact;
       if (k === 0 && !HEADER.isWell) span.className = "wrong";
       element("facts").append(span);
     });
-    for (const speed of SPEEDS) element("speed").add(new Option(`${speed}×`, speed));
     element("choice").hidden = TRACKS.length === 1;
     for (const track of TRACKS) element("flight").add(new Option(`${track.failed ? "✗ " : ""}${track.name}: ${track.sentence}`, track.index));
     document.querySelector("[data-view=gate]").hidden = !HEADER.gates.length;
@@ -122,7 +143,7 @@ class Player {
   toggle() {
     if (!this.playing && this.time >= DURATION) this.seek(0);
     this.playing = !this.playing;
-    this.last = null;
+    [this.last, this.pace] = [null, 0];
     this.icon();
   }
 
@@ -201,7 +222,7 @@ class Player {
   resize() {
     const { clientWidth: width, clientHeight: height } = element("stage");
     if (this.world && width && height) {
-      this.renderer.setPixelRatio(Math.min(devicePixelRatio, 2));
+      this.renderer.setPixelRatio(this.fineness * Math.min(devicePixelRatio, 2));
       this.renderer.setSize(width, height, false);
       this.cameras.resize(width, height);
     }
@@ -212,15 +233,31 @@ class Player {
 
   tick(now) {
     requestAnimationFrame(this.tick);
-    if (this.playing) {
-      this.time += this.last === null ? 0 : this.speed * Math.min((now - this.last) / 1000, LONGEST);
-      this.last = now;
-      this.stale = true;
-      if (this.time >= DURATION) [this.time, this.playing] = [DURATION, false];
-    }
+    if (this.playing) this.advance(this.last === null ? 0 : (now - this.last) / 1000);
+    this.last = this.playing ? now : null;
+    this.refine(this.playing ? this.fineness : 1);
     if (!this.stale) return;
     this.stale = false;
     this.draw();
+  }
+
+  // Play on by so much of the viewer's time [s].
+  advance(elapsed) {
+    this.time += this.speed * Math.min(elapsed, LONGEST);
+    this.stale = true;
+    if (this.time >= DURATION) [this.time, this.playing] = this.repeats ? [0, true] : [DURATION, false];
+    this.pace = (1 - PACE) * this.pace + PACE * elapsed;
+    if (this.pace < SLOW || this.fineness <= COARSEST) return;
+    this.pace = 0; // of what is drawn coarser nothing is known yet
+    this.refine(Math.max(COARSER * this.fineness, COARSEST));
+  }
+
+  // Draw this part of all pixels across.
+  refine(fineness) {
+    if (fineness === this.fineness) return;
+    this.fineness = fineness;
+    this.renderer?.setPixelRatio(fineness * Math.min(devicePixelRatio, 2));
+    this.stale = true;
   }
 
   draw() {
@@ -238,4 +275,5 @@ class Player {
   }
 }
 
+load(JSON.parse(element("header").textContent), element("arrays").textContent);
 window.replay = new Player(); // for whoever embeds the page: seek(), toggle(), view(), time

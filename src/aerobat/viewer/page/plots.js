@@ -11,10 +11,10 @@ class Plot {
     Object.assign(this, { name, unit, lines, limits, legend });
     this.root = document.createElement("div");
     this.root.className = "plot";
-    this.root.innerHTML = "<h2><span></span><b></b></h2><div><svg></svg></div>";
+    this.root.innerHTML = "<h2><span></span><b></b></h2><div><svg></svg><svg class='moving'></svg></div>";
     this.root.querySelector("span").textContent = `${name} [${unit}]`;
     this.readout = this.root.querySelector("b");
-    this.svg = this.root.querySelector("svg");
+    [this.svg, this.moving] = this.root.querySelectorAll("svg");
     document.getElementById("plots").append(this.root);
     const every = lines.flatMap((line) => [least(line.values), greatest(line.values)]);
     this.low = Math.min(0, ...every, ...limits);
@@ -58,14 +58,15 @@ class Plot {
       parts.push(this.path(line, behind ? 0.25 : 1, this.legend ? 1.4 : 1));
     });
     if (behind || this.lines.length === 1) parts.push(this.path(this.lines[Math.min(focus, this.lines.length - 1)], 1, 1.7));
-    this.svg.innerHTML = `${parts.join("")}<path class="cursor" stroke="${COLOUR.ink}" stroke-width="1.2"/>`;
-    this.cursor = this.svg.querySelector(".cursor");
+    this.svg.innerHTML = parts.join("");
+    this.moving.innerHTML = `<path class="cursor" stroke="${COLOUR.ink}" stroke-width="1.2"/>`;
+    this.cursor = this.moving.querySelector(".cursor");
     this.dots = this.shown(focus).map((line) => {
       const dot = document.createElementNS(NS, "circle");
       dot.setAttribute("r", 3.4);
       dot.setAttribute("fill", line.colour);
       dot.setAttribute("stroke", "white");
-      this.svg.append(dot);
+      this.moving.append(dot);
       return dot;
     });
   }
@@ -103,9 +104,10 @@ class Plot {
 class Plots {
   constructor(seek) {
     this.focus = 0;
+    this.root = document.getElementById("plots");
+    this.root.textContent = "";
     this.plots = HEADER.curves.map((curve) => curvePlot(curve));
     this.rotors = null;
-    this.root = document.getElementById("plots");
     const press = (event) => {
       const plot = this.all().find((one) => one.root.contains(event.target));
       if (!plot || (event.type === "pointermove" && event.buttons !== 1)) return;
@@ -113,8 +115,7 @@ class Plots {
       const part = (event.clientX - box.left - EDGE.left) / (box.width - EDGE.left - EDGE.right);
       seek(Math.min(Math.max(part, 0), 1) * DURATION);
     };
-    this.root.addEventListener("pointerdown", press);
-    this.root.addEventListener("pointermove", press);
+    this.root.onpointerdown = this.root.onpointermove = press;
     this.choose(0);
   }
 

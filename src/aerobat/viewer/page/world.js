@@ -4,10 +4,10 @@ const DRAWN = 0.14; // of the scene's size, that vehicles are drawn with where t
 const ENLARGEMENTS = [1, 1.5, 2, 3, 4, 5, 6, 8, 10, 15, 20, 30, 50, 100];
 
 class World {
-  constructor() {
+  constructor(colourBy) {
     this.scene = new THREE.Scene();
     this.bounds = bounds();
-    this.colourBy = "speed";
+    this.colourBy = colourBy;
     this.focus = 0;
     this.labels = [];
     this.scene.add(new THREE.HemisphereLight("#ffffff", "#b9c6d3", 2.1));
@@ -15,7 +15,7 @@ class World {
     sun.position.set(0.5, -0.8, 1.6);
     this.scene.add(sun);
     this.addGround();
-    HEADER.gates.forEach((gate) => this.addGate(gate));
+    this.placeGates(HEADER.gates);
     this.addPlan();
     this.addTracks();
     this.choose(TRACKS.findIndex((track) => track.failed) > -1 && TRACKS.length > 1 ? TRACKS.findIndex((t) => t.failed) : 0);
@@ -49,12 +49,16 @@ class World {
     this.gridStep = step;
   }
 
-  addGate(gate) {
-    this.scene.add(gateModel(gate));
-    const foot = vector(gate.position);
-    const reach = Math.abs(vector(gate.up).z) * gate.height / 2 + Math.hypot(...crossOf(gate).slice(2)) * gate.width / 2;
-    foot.z -= reach;
-    this.scene.add(dropLine(foot, this.bounds.floor));
+  // Draw gates, in place of those that are drawn.
+  placeGates(gates) {
+    if (this.gates) this.remove(this.gates);
+    this.gates = new THREE.Group();
+    for (const gate of gates) {
+      const foot = vector(gate.position);
+      foot.z -= Math.abs(vector(gate.up).z) * gate.height / 2 + Math.hypot(...crossOf(gate).slice(2)) * gate.width / 2;
+      this.gates.add(gateModel(gate), dropLine(foot, this.bounds.floor));
+    }
+    this.scene.add(this.gates);
   }
 
   addPlan() {
@@ -127,12 +131,7 @@ class World {
 
   // Draw the chosen flight's path in colours: faint in all, strong as far as it was flown.
   paint() {
-    for (const line of [this.ahead, this.flown]) {
-      if (!line) continue;
-      this.scene.remove(line);
-      line.geometry.dispose();
-      line.material.dispose();
-    }
+    for (const line of [this.ahead, this.flown]) if (line) this.remove(line);
     const { position, speeds } = this.track;
     this.top = Math.max(...TRACKS.map((track) => track.speeds.reduce((a, b) => Math.max(a, b), 0)), 1e-9);
     const colours = [];
@@ -143,6 +142,21 @@ class World {
     this.ahead = pathLine(drawn(position), 2, colours, 0.4, 3);
     this.flown = pathLine(drawn(position), 4, colours, 1, 4);
     this.scene.add(this.ahead, this.flown);
+  }
+
+  // Take a thing out of the scene, and what it holds of the graphics card's memory.
+  remove(thing) {
+    thing.traverse(({ geometry, material }) => {
+      geometry?.dispose();
+      material?.dispose();
+    });
+    thing.removeFromParent();
+  }
+
+  // Leave the page to another scene.
+  close() {
+    this.remove(this.scene);
+    document.getElementById("labels").textContent = "";
   }
 
   // Everything as it is at a time.

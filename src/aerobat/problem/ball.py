@@ -1,0 +1,47 @@
+"""A ball: a place that is met within a radius."""
+
+from __future__ import annotations
+
+from math import sqrt
+
+import numpy as np
+
+from aerobat.declaration import Positive, Vector3, declared
+from aerobat.problem.condition import Condition, Quantity
+
+GOLDEN_RATIO = (1.0 + sqrt(5.0)) / 2.0
+# normals of a regular dodecahedron's six pairs of faces: the corners of an icosahedron, (6, 3)
+FACES = np.array(
+    [
+        np.roll([0.0, 1.0, sign * GOLDEN_RATIO], turn) / sqrt(1.0 + GOLDEN_RATIO**2)
+        for turn in range(3)
+        for sign in (1.0, -1.0)
+    ]
+)
+INRADIUS = sqrt((5.0 + 2.0 * sqrt(5.0)) / 15.0)  # [-] of a regular dodecahedron, of its circumradius: 0.795
+
+
+@declared
+class Ball:
+    """A place that is met within a radius of its centre."""
+
+    centre: Vector3  # [m] world
+    radius: Positive  # [m] from it, at most
+
+    @property
+    def inscribed(self) -> tuple[Condition, ...]:
+        """The linear conditions of being in the regular dodecahedron whose corners lie on the ball."""
+        reach = INRADIUS * self.radius
+        middles = (FACES @ self.centre).tolist()
+        return tuple(
+            Condition(Quantity.POSITION, face, middle - reach, middle + reach)
+            for face, middle in zip(FACES, middles, strict=True)
+        )
+
+    @property
+    def circumscribed(self) -> tuple[Condition, ...]:
+        """The linear conditions of being in the cube along the world's axes that encloses it."""
+        return tuple(
+            Condition(Quantity.POSITION, axis, x - self.radius, x + self.radius)
+            for axis, x in zip(np.eye(3), self.centre.tolist(), strict=True)
+        )
