@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import aerobat as ab
+from aerobat.interchange.flat_outputs import FlatOutputs
 from aerobat.simulation.contact import Contact
 from aerobat.simulation.outcome import Outcome
 from aerobat.simulation.plants import PLANTS
@@ -40,9 +41,7 @@ def test_drag_wind_and_full_inertia_are_the_same_in_mujoco() -> None:
     )
     windy = ab.Environment(wind=(1.0, -2.0, 0.5))
     plan = through_the_gate()
-    flights = [
-        ab.fly(plan.trajectory, vehicle, environment=windy, plant=plant) for plant in (None, "mujoco")
-    ]
+    flights = [ab.fly(plan.trajectory, vehicle, environment=windy, plant=plant) for plant in (None, "mujoco")]
     assert flights[0].position_error.max() > 1e-3
     np.testing.assert_allclose(flights[1].position, flights[0].position, rtol=0, atol=1e-4)
 
@@ -96,6 +95,29 @@ def test_rotorpy_flies_our_plan_on_its_model_of_our_vehicle() -> None:
     flight = ab.fly(plan, plant="rotorpy")
     assert flight.position_error.max() < 0.005
     assert ab.score(flight, plan).outcome is Outcome.THROUGH_GATES
+
+
+def test_rotorpys_own_controller_follows_our_plan_in_rotorpys_own_simulation() -> None:
+    """Its `simulate` takes the plan as one of its trajectories; a slow line, upright."""
+    from rotorpy.controllers.quadrotor_control import SE3Control
+    from rotorpy.environments import Environment
+    from rotorpy.vehicles.hummingbird_params import quad_params
+    from rotorpy.vehicles.multirotor import Multirotor
+
+    limits = ab.Limits(velocity=1.0, acceleration=1.0, jerk=3.0)
+    line = ab.Problem("line", ab.at_rest((0.0, 0.0, 1.0)), ab.at_rest((1.0, 0.5, 1.5)), limits=limits)
+    plan = ab.plan(line, ab.Miqp(order=4))
+    wanted = FlatOutputs(plan)
+    hover = np.full(4, np.sqrt(quad_params["mass"] * 9.81 / (4 * quad_params["k_eta"])))
+    rest = {"v": np.zeros(3), "q": np.array([0.0, 0.0, 0.0, 1.0]), "w": np.zeros(3), "wind": np.zeros(3)}
+    start = rest | {"x": wanted.update(0.0)["x"], "rotor_speeds": hover}
+    world = Environment(Multirotor(quad_params, start), SE3Control(quad_params), wanted, sim_rate=200)
+    logged = world.run(t_final=plan.duration, plot=False, animate_bool=False, verbose=False)
+    times = np.minimum(logged["time"], plan.duration)
+    np.testing.assert_allclose(logged["flat"]["x"], plan.trajectory.evaluate(times), atol=1e-9)
+    np.testing.assert_allclose(logged["state"]["x"], logged["flat"]["x"], atol=0.1)
+    np.testing.assert_array_equal(wanted.update(-1.0)["x_ddot"], np.zeros(3))
+    np.testing.assert_array_equal(wanted.target(99.0)["target_pos"], wanted.update(plan.duration)["x"])
 
 
 def test_rotorpys_hummingbird_flips_with_its_own_aerodynamics() -> None:
