@@ -11,7 +11,7 @@ from aerobat.reporting.tables import flight_facts
 from aerobat.simulation.flight import SERIES
 
 LAB = ab.load_dispersion("lab")
-OBSERVED = {one.name for one in SERIES if one.observed}
+OBSERVED = {one.name for one in SERIES if one.part == "observer"}
 
 
 @pytest.fixture(scope="module")

@@ -170,6 +170,10 @@ class FlyingOptions(ConditionsOptions):
     """The control law, at the gains of the vehicle's file: full, or paper, the paper's own without moment
     feed-forward, motor-lag compensation and tilt before yaw."""
 
+    plant: Annotated[str | None, Parameter(group=flying)] = None
+    """Another simulator's physics in place of the built-in: mujoco, in which a gate that is touched is felt,
+    or rotorpy."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class SweepingOptions:

@@ -94,17 +94,20 @@ def planned(
     return (make or plan_of)(record), record
 
 
-def flight_settings(options: ConditionsOptions, controller: str = "full") -> FlightSettings:
+def flight_settings(
+    options: ConditionsOptions, controller: str = "full", plant: str | None = None
+) -> FlightSettings:
     """How a plan is flown.
 
     Args:
         options: As they were given.
         controller: The name of what flies it.
+        plant: The name of the physics, None for the built-in.
     """
     conditions = None if options.conditions is None else load_dispersion(options.conditions)
     if options.probability is not None and conditions is None:
         raise SpecError("--pass needs --conditions, under which flights shall pass; give lab, say")
-    return FlightSettings(controller, conditions, options.seed, probability=options.probability)
+    return FlightSettings(controller, conditions, options.seed, plant=plant, probability=options.probability)
 
 
 def plan_of(record: RunRecord) -> Plan:

@@ -17,6 +17,7 @@ from aerobat.evaluation.passages import passages_asked
 from aerobat.kernels.running_metrics import RunningMetrics
 from aerobat.planning import Plan
 from aerobat.problem import Problem, as_problem
+from aerobat.simulation.contact import Contact
 from aerobat.simulation.flight import Flight
 from aerobat.simulation.outcome import Outcome, counted, length
 from aerobat.simulation.passages import Passage, flown_passages, passages
@@ -84,6 +85,8 @@ class Scores:
     stop: Array  # [s] when a flight diverged, NaN if it did not
     is_finite: Array  # false where a flight diverged by what is not a number
     ground_time: Array  # [s] when a vehicle was below ground first, NaN if never
+    contact: Array  # what it came to touch first, by the codes of Contact, where its plant felt that
+    contact_time: Array  # [s] when, NaN if never
 
     def __post_init__(self) -> None:
         """Write-protect."""
@@ -135,6 +138,10 @@ class Scores:
             found.append((float(self.stop[k]), outcome, {}))
         if np.isfinite(self.ground_time[k]):
             found.append((float(self.ground_time[k]), Outcome.HIT_GROUND, {}))
+        if np.isfinite(self.contact_time[k]):
+            at_gate = self.contact[k] == Contact.GATE
+            outcome = Outcome.TOUCHED_GATE if at_gate else Outcome.TOUCHED_GROUND
+            found.append((float(self.contact_time[k]), outcome, {}))
         for passage in passed:
             label = "the gate" if len(passed) == 1 else f"gate '{passage.gate}'"
             if passage.failure is not None:
@@ -173,6 +180,7 @@ def score(flight: Flight, goal: Problem | Plan | str, vehicle: Vehicle | str | N
     body = None if vehicle is None else as_vehicle(vehicle).bounding_ellipsoid
     planned = passages_asked(goal, flight.times, flight.setpoint.flat.position)
     ground = flight.environment.ground
+    contact, touched = flight.first_contact
     below = np.zeros(1, bool) if ground is None else states.position[:, 2] < ground
     scored = Scores(
         max_position_error_m=np.sqrt([square.max()]),
@@ -184,6 +192,8 @@ def score(flight: Flight, goal: Problem | Plan | str, vehicle: Vehicle | str | N
         stop=stop,
         is_finite=np.array([flight.outcome is not Outcome.STATE_NOT_FINITE]),
         ground_time=np.array([flight.times[int(np.argmax(below))] if below.any() else np.nan]),
+        contact=np.array([contact]),
+        contact_time=np.array([touched]),
     )[0]
     return replace(scored, observer=_observer(flight))
 
@@ -222,4 +232,6 @@ def scores_of(metrics: RunningMetrics, planned: tuple[PlannedPassage, ...]) -> S
         stop=stop,
         is_finite=metrics.is_finite > 0.5,
         ground_time=np.where(never, np.nan, metrics.ground_time),
+        contact=np.zeros(stop.shape),
+        contact_time=np.full(stop.shape, np.nan),
     )

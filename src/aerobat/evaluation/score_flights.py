@@ -152,6 +152,8 @@ def score_over_time(
         raise SpecError("log_rate: a scored flight keeps no rows; leave it out")
     if environment is None:
         environment = (goal.problem if isinstance(goal, Plan) else goal).environment
+    if config.plant is not None:
+        raise SpecError("plant: other simulators fly one vehicle at a time; take fly and score")
     setup = prepare(plan, vehicles, environment=environment, config=config)
     ticks = len(setup.times)
     blocks = range(0, ticks, BLOCK)

@@ -13,7 +13,11 @@ from aerobat.vehicle import implausibilities
 
 
 def report(
-    plan: Plan, score: Score | None = None, vehicle: str | None = None, controller: str | None = None
+    plan: Plan,
+    score: Score | None = None,
+    vehicle: str | None = None,
+    controller: str | None = None,
+    plant: str | None = None,
 ) -> dict[str, Any]:
     """The content of report.json; units are in the keys. `flight` is missing when nothing was flown.
 
@@ -22,6 +26,7 @@ def report(
         score: of its flight.
         vehicle: the name of what flew it, by default the plan's.
         controller: the name of the controller that did.
+        plant: the name of the other simulator whose physics it flew in, if it was one.
     """
     facts: dict[str, Any] = {
         "problem": plan.problem.name,
@@ -30,7 +35,9 @@ def report(
         "plan": _plan(plan),
     }
     if score is not None:
-        facts["flight"] = _flight(score) | ({} if controller is None else {"controller": controller})
+        flown_by = {"controller": controller, "plant": plant}
+        known = {name: value for name, value in flown_by.items() if value is not None}
+        facts["flight"] = _flight(score) | known
     return facts
 
 

@@ -23,7 +23,13 @@ from aerobat.vehicle import Vehicle
 Fact = tuple[str, str | Text]  # a name, and what is to be said
 
 
-def summary_table(plan: Plan, score: Score | None, vehicle: str, controller: str | None = None) -> Table:
+def summary_table(
+    plan: Plan,
+    score: Score | None,
+    vehicle: str,
+    controller: str | None = None,
+    plant: str | None = None,
+) -> Table:
     """The plan and its flight, a fact a row.
 
     Args:
@@ -31,10 +37,11 @@ def summary_table(plan: Plan, score: Score | None, vehicle: str, controller: str
         score: of its flight, where there is one.
         vehicle: the name of what flew it.
         controller: the name of the controller that did.
+        plant: the name of the other simulator whose physics it flew in, if it was one.
     """
     facts: dict[str, Iterable[Fact]] = {"plan": plan_facts(plan)}
     if score is not None:
-        facts["flight"] = flight_facts(score, controller)
+        facts["flight"] = flight_facts(score, controller, plant)
     return facts_table(f"{plan.problem.name} · {vehicle}", facts)
 
 
@@ -198,11 +205,13 @@ def _optimality(plan: Plan) -> str:
     return f"within {100 * plan.gap:.2g} % of the optimum"
 
 
-def flight_facts(score: Score, controller: str | None = None) -> Iterable[Fact]:
+def flight_facts(score: Score, controller: str | None = None, plant: str | None = None) -> Iterable[Fact]:
     """Facts of a flight, each with its name."""
     yield "outcome", score.sentence
     if controller is not None:
         yield "controller", controller
+    if plant is not None:
+        yield "plant", plant
     yield "position error", _pair(100 * score.max_position_error_m, 100 * score.rms_position_error_m, "cm")
     yield "attitude error", _pair(score.max_attitude_error_deg, score.rms_attitude_error_deg, "°")
     if score.observer is not None:

@@ -176,14 +176,20 @@ class RigidBodyPlant:
         """See `Component.step`."""
         airframe = with_ceiling(ops, parameters.airframe, signals)
         environment = with_wind(parameters.environment, signals)
-        if "computation_delay" in signals:
-            commands = signals["computation_delay"].in_effect
-        else:
-            commands = signals["controller"].commands.thrusts
+        commands = commands_in_effect(signals)
         dt = signals["clock"].period / self.substeps
         for _ in range(self.substeps):
             motion = motors.advance(ops, airframe, environment, motion, commands, dt)
         return motion
+
+
+def commands_in_effect(signals: Signals) -> PerRotor:
+    """The rotors' commands [N] of this tick, which may be some while old."""
+    if "computation_delay" in signals:
+        commands: PerRotor = signals["computation_delay"].in_effect
+    else:
+        commands = signals["controller"].commands.thrusts
+    return commands
 
 
 def with_wind(environment: EnvironmentParameters, signals: Signals) -> EnvironmentParameters:

@@ -10,6 +10,7 @@ from pydantic import Field, PlainValidator
 from aerobat.declaration import AS_IT_IS, FieldError, Seed, declared, shown
 from aerobat.environment import Dispersion, as_dispersion
 from aerobat.errors import SpecError
+from aerobat.simulation.plants import Plant, as_plant
 from aerobat.states import BodyState
 from aerobat.vehicle import Vehicle
 from aerobat.vehicle.controller import Controller
@@ -53,6 +54,8 @@ class FlightConfig:
     nominal: Vehicle | None = None  # that controller and set-points are made for; by default what flies
     # floats, bytecode, numpy, compiled, jax, jax-float32, or the fastest that is installed
     engine: str = "auto"
+    # physics that others wrote in place of ours, or its name, mujoco or rotorpy: one vehicle a flight
+    plant: Annotated[Plant | None, PlainValidator(as_plant)] = None
     log_rate: LogRate | None = None  # [1/s] of the flight's rows, rate over a whole number; by default rate
 
     def __post_init__(self) -> None:

@@ -16,6 +16,7 @@ from aerobat.arrays import Array, frozen
 from aerobat.declaration import PathName, by_value, in_notebooks, short, shown, validated
 from aerobat.environment import Environment
 from aerobat.errors import OutOfRange, SpecError
+from aerobat.simulation.contact import Contact
 from aerobat.simulation.outcome import Outcome, counted
 from aerobat.states import BodyState, FlatState, Setpoint, Wrench
 from aerobat.storage import format_of, read_arrays, whole_file
@@ -34,7 +35,7 @@ class Series:
     per_vehicle: bool = True
     over_time: bool = True
     logical: bool = False
-    observed: bool = False  # there only where a filter saw the flight
+    part: str | None = None  # of a flight that only some have: what a filter saw, what the plant felt
 
 
 SERIES = (
@@ -45,10 +46,11 @@ SERIES = (
     Series("commands", "N", (_ROTORS,)),
     Series("thrusts", "N", (_ROTORS,)),
     Series("saturated", "", logical=True),
-    Series("observed_position", "m", (3,), observed=True),
-    Series("observed_velocity", "m/s", (3,), observed=True),
-    Series("observed_q_world_body", "", (4,), observed=True),
-    Series("since_pose", "s", observed=True),  # [s] since the exposure of the last pose that was taken
+    Series("observed_position", "m", (3,), part="observer"),
+    Series("observed_velocity", "m/s", (3,), part="observer"),
+    Series("observed_q_world_body", "", (4,), part="observer"),
+    Series("since_pose", "s", part="observer"),  # [s] since the exposure of the last pose that was taken
+    Series("contact", "", part="plant"),  # what the vehicle touched, by the codes of Contact
     Series("setpoint_position", "m", (3,), per_vehicle=False),
     Series("setpoint_velocity", "m/s", (3,), per_vehicle=False),
     Series("setpoint_acceleration", "m/s²", (3,), per_vehicle=False),
@@ -75,9 +77,9 @@ class Flight:
 
     Row k of every series is the situation at `times[k]`: the true state, the thrusts that the rotors give,
     and the commands that the controller sends then and holds until the next row. Each series of SERIES is an
-    attribute too, as `flight.thrusts`; what a filter made of its sensors is there where one flew. A vehicle
-    that diverges ends at its `ends`; in a batch its later rows repeat that one. Raises SpecError for shapes
-    that do not match and numbers that are not finite.
+    attribute too, as `flight.thrusts`; what a filter made of its sensors is there where one flew, what the
+    vehicle touched where its plant felt that. A vehicle that diverges ends at its `ends`; in a batch its
+    later rows repeat that one. Raises SpecError for shapes that do not match and numbers that are not finite.
     """
 
     times: Array  # [s], (T,), rising
@@ -85,7 +87,7 @@ class Flight:
     vehicles: tuple[str, ...]  # their names
     outcomes: tuple[Outcome, ...]  # of each vehicle
     sentences: tuple[str, ...]  # the outcomes with their numbers
-    engine: str  # which engine flew them
+    engine: str  # which engine flew them, or which plant
     environment: Environment
 
     def __post_init__(self) -> None:
@@ -93,7 +95,8 @@ class Flight:
         times = frozen(self.times, "times", (None,))
         if times.ndim != 1 or (np.diff(times) <= 0).any():
             raise SpecError("times must be one list of rising numbers of seconds")
-        kept = [one for one in SERIES if self.is_observed or not one.observed]
+        parts = {one.part for one in SERIES if one.name in self.series}
+        kept = [one for one in SERIES if one.part is None or one.part in parts]
         missing = [one.name for one in kept if one.name not in self.series]
         if missing:
             raise SpecError(f"a flight needs the series {missing[0]!r}; its names are those of SERIES")
@@ -123,6 +126,19 @@ class Flight:
     def is_observed(self) -> bool:
         """True where a filter saw the flight."""
         return "since_pose" in self.series
+
+    @property
+    def first_contact(self) -> tuple[Contact, float]:
+        """What one vehicle first came to touch, and when [s]; NaN where nothing, or where nobody felt it.
+
+        One that stands on the ground at first comes to it only if it leaves it.
+        """
+        contact = self.series.get("contact", np.zeros(1))
+        came = (contact > 0) & ~np.logical_and.accumulate(contact > 0)
+        if not came.any():
+            return Contact.NOTHING, np.nan
+        first = int(np.argmax(came))
+        return Contact(int(contact[first])), float(self.times[first])
 
     @cached_property
     def states(self) -> BodyState:
@@ -214,7 +230,7 @@ def load_flight(path: PathName) -> Flight:
         ground = float(content["ground"])
         return Flight(
             times=content["times"],
-            series={one.name: content[one.name] for one in SERIES if one.name in content or not one.observed},
+            series={one.name: content[one.name] for one in SERIES if one.name in content or one.part is None},
             vehicles=_texts(content["vehicles"]),
             outcomes=tuple(_outcome(name) for name in _texts(content["outcomes"])),
             sentences=_texts(content["sentences"]),

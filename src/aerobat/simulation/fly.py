@@ -16,11 +16,14 @@ from aerobat.engines.components import from_components
 from aerobat.engines.pytree import tree_map, tree_stack
 from aerobat.environment import Environment
 from aerobat.flatness import Planned
+from aerobat.problem.gate import Gate
 from aerobat.simulation.bodies import body_states
 from aerobat.simulation.components import LogRow
 from aerobat.simulation.config import FlightConfig
 from aerobat.simulation.flight import SERIES, Flight, setpoint_rows, setpoint_series
 from aerobat.simulation.outcome import DIVERGENCE_RADIUS, Outcome, length
+from aerobat.simulation.plants import Plant
+from aerobat.simulation.plants.outside import fly_outside
 from aerobat.simulation.prepare import prepare
 from aerobat.simulation.setup import FlightSetup
 from aerobat.states import Setpoint
@@ -54,6 +57,9 @@ def fly(
     installed.
     """
     setup = prepare(plan, vehicle, environment=environment, config=config, **changes)
+    if setup.config.plant is not None:
+        gates = () if isinstance(plan, Trajectory) else plan.problem.gates
+        return _flown_outside(setup, setup.config.plant, gates)
     stride = setup.log_stride
     engine = setup.engine()
     loop = setup.compile(engine)
@@ -73,8 +79,25 @@ def fly(
     return _flight(setup, log, setup.times[logged], setpoints, engine.name)
 
 
+def _flown_outside(setup: FlightSetup, plant: Plant, gates: tuple[Gate, ...]) -> Flight:
+    rows, contact = fly_outside(setup, plant, gates)
+    logged = logged_ticks(len(setup.times), setup.log_stride)
+    setpoints = []
+    for begin, end in setup.chunks():
+        kept = logged[(logged >= begin) & (logged < end)]
+        setpoints.append(setpoint_rows(setup.reference.setpoint(begin, end), kept - begin))
+    log = tree_map(lambda leaf: leaf[..., logged], rows)
+    touched = np.maximum.reduceat(contact, logged).astype(np.float64)
+    return _flight(setup, log, setup.times[logged], setpoints, plant.kind, touched[None])
+
+
 def _flight(
-    setup: FlightSetup, log: LogRow, times: Array, setpoints: Sequence[Setpoint], engine: str
+    setup: FlightSetup,
+    log: LogRow,
+    times: Array,
+    setpoints: Sequence[Setpoint],
+    engine: str,
+    contact: Array | None = None,
 ) -> Flight:
     series: dict[str, Any] = {
         **vars(body_states(log.motion.body)),
@@ -90,6 +113,8 @@ def _flight(
             "observed_q_world_body": body.q_world_body,
             "since_pose": log.observed.since_pose,
         }
+    if contact is not None:
+        series["contact"] = contact
     for name in setpoint_series(setpoints[0]):
         series[name] = np.concatenate([setpoint_series(part)[name] for part in setpoints])
     ends, outcomes, sentences = _endings(series, times)

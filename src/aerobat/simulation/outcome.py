@@ -52,6 +52,8 @@ class Outcome(Enum):
     WRONG_ATTITUDE = (
         "passed {gate} {angle:.1f}° off the attitude asked at {time:.2f} s, {tolerance:.3g}° allowed"
     )
+    TOUCHED_GATE = "touched the frame of a gate at {time:.2f} s, as its plant felt"
+    TOUCHED_GROUND = "touched the ground at {time:.2f} s, as its plant felt"
     HIT_GROUND = "hit the ground at {time:.2f} s"
     DIVERGED = "diverged at {time:.2f} s: position error above {radius:g} m"
     STATE_NOT_FINITE = "diverged at {time:.2f} s: its state is no longer a number"

@@ -15,6 +15,7 @@ from aerobat.control import named_controller
 from aerobat.evaluation import score
 from aerobat.planning import Plan, nominal_flight
 from aerobat.simulation.fly import fly as simulate
+from aerobat.simulation.plants import as_plant
 
 
 def fly(
@@ -36,7 +37,8 @@ def fly(
         plan is flown as it is.
     """
     named_controller(flying.controller)  # refused before anything is planned
-    settings = flight_settings(flying, flying.controller)
+    as_plant(flying.plant)
+    settings = flight_settings(flying, flying.controller, flying.plant)
     plan, record = planned(problem, options, "fly", settings)
     return finish(plan, record, options, flown(plan, settings))
 
@@ -45,9 +47,16 @@ def flown(plan: Plan, settings: FlightSettings) -> Flown:
     """The flight of a plan, and its score."""
     assert plan.vehicle is not None, "a command plans for a vehicle"
     controller = named_controller(settings.controller, plan.vehicle.controller)
-    is_nominal = settings.conditions is None and controller == plan.vehicle.controller
+    given = settings.conditions, settings.plant
+    is_nominal = given == (None, None) and controller == plan.vehicle.controller
     if is_nominal:  # the flight that the plan was judged by
         flight = nominal_flight(plan.trajectory, plan.vehicle, plan.problem.environment)
     else:
-        flight = simulate(plan, controller=controller, conditions=settings.conditions, seed=settings.seed)
-    return Flown(flight, score(flight, plan, plan.vehicle), settings.controller)
+        flight = simulate(
+            plan,
+            controller=controller,
+            conditions=settings.conditions,
+            seed=settings.seed,
+            plant=settings.plant,
+        )
+    return Flown(flight, score(flight, plan, plan.vehicle), settings.controller, settings.plant)

@@ -89,11 +89,12 @@ def written(
 
 @dataclass(frozen=True)
 class Flown:
-    """A plan's flight, its score, and the name of the controller that flew it."""
+    """A plan's flight, its score, and the names of what flew it."""
 
     flight: Flight
     score: Score
     controller: str
+    plant: str | None  # the name of another simulator
 
 
 def finish(plan: Plan, record: RunRecord, options: OutputOptions, flown: Flown | None = None) -> ExitCode:
@@ -106,8 +107,9 @@ def finish(plan: Plan, record: RunRecord, options: OutputOptions, flown: Flown |
         flown: The plan's flight, if it was flown.
     """
     assert plan.vehicle is not None, "a command plans for a vehicle"
-    flight, score, controller = (flown.flight, flown.score, flown.controller) if flown else (None, None, None)
-    facts = to_json(report(plan, score, plan.vehicle.name, controller))
+    flight, score = (flown.flight, flown.score) if flown else (None, None)
+    by = (flown.controller, flown.plant) if flown else ()
+    facts = to_json(report(plan, score, plan.vehicle.name, *by))
     picture = png(report_figure(plan, plan.vehicle, flight, score))
 
     def write(staging: Path) -> None:
@@ -118,7 +120,7 @@ def finish(plan: Plan, record: RunRecord, options: OutputOptions, flown: Flown |
         (staging / "report.json").write_text(facts + "\n", encoding="utf-8")
         (staging / "report.png").write_bytes(picture)
 
-    written(record, options, write, facts, summary_table(plan, score, plan.vehicle.name, controller))
+    written(record, options, write, facts, summary_table(plan, score, plan.vehicle.name, *by))
     return ExitCode.WELL if _is_well(plan, score) else ExitCode.NOT_WELL
 
 

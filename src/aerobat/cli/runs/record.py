@@ -50,6 +50,7 @@ class FlightSettings:
     controller: str = "full"
     conditions: Dispersion | None = None  # left out, as planned
     seed: Seed = 0  # of the conditions
+    plant: str | None = None  # whose physics, left out the built-in
     runs: Count = 1  # flights of a sweep
     table: Literal["csv", "parquet"] = "csv"  # the form of a sweep's table
     probability: Probability | None = None  # of passing under the conditions, that it was planned for

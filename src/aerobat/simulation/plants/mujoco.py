@@ -1,0 +1,200 @@
+"""MuJoCo as a plant: contacts and rigid-body physics that others wrote, of a model made from ours.
+
+The vehicle is a free body with an ellipsoid as its hull. Each rotor is an actuator at a site in its centre of
+mass: thrust along +z and the moments of its column of the allocation, a first-order lag. Drag is a force of
+its own, held for a step. Gates are frames of four bars, the ground a plane.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from math import ceil
+from typing import TYPE_CHECKING, Annotated, Any
+from xml.etree.ElementTree import Element, SubElement, tostring
+
+import numpy as np
+from pydantic import Field
+
+from aerobat import so3
+from aerobat.arrays import Array
+from aerobat.errors import BackendMissing
+from aerobat.kernels.motors import Airframe, Motion
+from aerobat.kernels.rigid_body import Body
+from aerobat.problem.gate import Gate
+from aerobat.simulation.contact import Contact
+from aerobat.simulation.plants.plant import PLANTS, Actuation, Plant, PlantScene
+
+if TYPE_CHECKING:
+    import mujoco
+
+FRAME_WIDTH = 0.05  # [m] of a gate's bars
+FRAME_DEPTH = 0.02  # [m] along the direction of passage
+_VEHICLE, _GROUND, _GATE = "vehicle", "ground", "gate"
+_KINDS = {_VEHICLE: Contact.NOTHING, _GROUND: Contact.GROUND, _GATE: Contact.GATE}
+_AT_ONCE = 1e4  # [1/s] a rotor that is as fast has no lag here
+_ROUNDING = 1e-9  # of a step
+
+
+class Mujoco(Plant):
+    """MuJoCo's rigid bodies and contacts; needs the extra mujoco."""
+
+    contacts: bool = True  # with gates and ground; false: the vehicle passes through them
+    max_step: Annotated[float, Field(gt=0, le=0.01)] = 0.001  # [s] of its Runge-Kutta steps
+
+    def begin(self, scene: PlantScene, motion: Motion) -> MujocoRun:
+        """Return the vehicle of a scene at its start. Raises BackendMissing without MuJoCo."""
+        return MujocoRun(scene, motion, self.contacts, self.max_step)
+
+
+PLANTS.add("mujoco", Mujoco)
+
+
+class MujocoRun:
+    """A vehicle in MuJoCo, on its way; see `PlantRun`."""
+
+    def __init__(self, scene: PlantScene, motion: Motion, contacts: bool, max_step: float) -> None:
+        self._mujoco = _import_mujoco()
+        self._airframe = scene.airframe
+        rates = [rate for rate in scene.airframe.rotors.inverse_time_constant if rate < _AT_ONCE]
+        self._max_step = min([max_step, *(1.0 / rate for rate in rates)])  # Runge-Kutta bears 2.8 times that
+        self._model: mujoco.MjModel = self._mujoco.MjModel.from_xml_string(mujoco_model(scene, contacts))
+        self._data: mujoco.MjData = self._mujoco.MjData(self._model)
+        self._lagging = np.flatnonzero(self._model.actuator_dyntype != self._mujoco.mjtDyn.mjDYN_NONE)
+        names = [self._model.geom(k).name for k in range(self._model.ngeom)]
+        self._kinds = [_KINDS[name.partition(" ")[0]] for name in names]
+        self._contact = Contact.NOTHING
+        self._begin(motion)
+
+    def _begin(self, motion: Motion) -> None:
+        data, body = self._data, motion.body
+        data.qpos[:] = [*body.position, *body.q_world_body]
+        data.qvel[:] = [*body.velocity, *body.omega_body]
+        data.ctrl[:] = motion.thrusts
+        data.act[:] = np.array(motion.thrusts)[self._lagging]
+        self._mujoco.mj_forward(self._model, data)
+        self._feel()
+
+    @property
+    def motion(self) -> Motion:
+        """See `PlantRun.motion`."""
+        position, q = self._data.qpos[:3].tolist(), self._data.qpos[3:7].tolist()
+        velocity, omega = self._data.qvel[:3].tolist(), self._data.qvel[3:6].tolist()
+        thrusts = np.clip(self._data.ctrl, *self._model.actuator_ctrlrange.T)
+        thrusts[self._lagging] = self._data.act
+        body = Body(tuple(position), tuple(velocity), tuple(q), tuple(omega))
+        return Motion(body, tuple(thrusts.tolist()))
+
+    @property
+    def contact(self) -> Contact:
+        """See `PlantRun.contact`."""
+        seen, self._contact = self._contact, Contact.NOTHING
+        return seen
+
+    def advance(self, actuation: Actuation, duration: float) -> None:
+        """See `PlantRun.advance`."""
+        steps = ceil(duration / self._max_step - _ROUNDING)
+        self._model.opt.timestep = duration / max(steps, 1)
+        self._data.ctrl[:] = np.clip(actuation.commands, self._airframe.rotors.min_thrust, actuation.ceilings)
+        drag = np.array(self._airframe.mass_properties.drag_body)
+        for _ in range(steps):
+            q = self._data.qpos[3:7]
+            airspeed = self._data.qvel[:3] - np.array(actuation.wind)
+            self._data.xfrc_applied[1, :3] = -so3.rotate(q, drag * so3.unrotate(q, airspeed))
+            self._mujoco.mj_step(self._model, self._data)
+            self._feel()
+
+    def _feel(self) -> None:
+        touched = self._data.contact.geom[: self._data.ncon].ravel().tolist()
+        self._contact = max((self._contact, *(self._kinds[geom] for geom in touched)))
+
+
+def mujoco_model(scene: PlantScene, contacts: bool = True) -> str:
+    """The MuJoCo model (MJCF) of a vehicle, gates and ground.
+
+    Args:
+        scene: what there is.
+        contacts: with gates and ground.
+    """
+    root = Element("mujoco", model="aerobat")
+    SubElement(root, "option", integrator="RK4", gravity=f"0 0 {-scene.gravity!r}", density="0")
+    world = SubElement(root, "worldbody")
+    SubElement(world, "light", pos="0 0 20", dir="0 0 -1", directional="true")
+    meets = "1" if contacts else "0"
+    if scene.ground is not None:
+        SubElement(
+            world, "geom", name=_GROUND, type="plane", size="50 50 1", pos=f"0 0 {scene.ground!r}",
+            rgba="0.9 0.9 0.9 1", contype="0", conaffinity=meets,
+        )  # fmt: skip
+    for number, gate in enumerate(scene.gates):
+        axes = _text((*gate.normal, *gate.lateral))
+        for side, (centre, half_size) in enumerate(_frame_bars(gate)):
+            SubElement(
+                world, "geom", name=f"{_GATE} {number} {side}", type="box", pos=_text(centre),
+                size=_text(half_size), xyaxes=axes, rgba="0.85 0.4 0.1 1", contype="0", conaffinity=meets,
+            )  # fmt: skip
+    _add_vehicle(world, scene)
+    actuators = SubElement(root, "actuator")
+    for actuator in _actuators(scene.airframe):
+        SubElement(actuators, "general", actuator)
+    return tostring(root, encoding="unicode")
+
+
+def _frame_bars(gate: Gate) -> Iterator[tuple[Array, tuple[float, float, float]]]:
+    """The bars about a gate's opening: centres [m] and half sizes [m] along its normal, lateral and upright.
+
+    Those above and below reach over the corners.
+    """
+    depth, half = FRAME_DEPTH / 2, FRAME_WIDTH / 2
+    beside = (gate.width / 2 + half) * gate.lateral
+    above = (gate.height / 2 + half) * gate.up
+    for sign in (1.0, -1.0):
+        yield gate.position + sign * beside, (depth, half, gate.height / 2)
+        yield gate.position + sign * above, (depth, gate.width / 2 + FRAME_WIDTH, half)
+
+
+def _add_vehicle(world: Element, scene: PlantScene) -> None:
+    properties = scene.airframe.mass_properties
+    (xx, xy, xz), (_, yy, yz), (_, _, zz) = properties.inertia
+    body = SubElement(world, "body", name=_VEHICLE)
+    SubElement(body, "freejoint")
+    SubElement(
+        body, "inertial", pos="0 0 0", mass=repr(float(properties.mass)),
+        fullinertia=_text((xx, yy, zz, xy, xz, yz)),
+    )  # fmt: skip
+    SubElement(
+        body, "geom", name=_VEHICLE, type="ellipsoid", pos=_text(scene.body.centre),
+        size=_text(scene.body.semi_axes), rgba="0.2 0.4 0.7 1", contype="1", conaffinity="0",
+    )  # fmt: skip
+    SubElement(body, "site", name="centre of mass")
+
+
+def _actuators(airframe: Airframe) -> Iterator[dict[str, str]]:
+    """A rotor each: what a newton of its thrust does to the body, its limits and its lag."""
+    rotors = airframe.rotors
+    for low, high, rate, *column in zip(
+        rotors.min_thrust, rotors.max_thrust, rotors.inverse_time_constant, *rotors.allocation, strict=True
+    ):
+        collective, *moments = column
+        actuator = {
+            "site": "centre of mass",
+            "gear": _text((0.0, 0.0, collective, *moments)),
+            "ctrllimited": "true",
+            "ctrlrange": _text((low, max(high, low + 1e-9))),  # MuJoCo knows no dead actuators
+        }
+        if rate < _AT_ONCE:
+            actuator |= {"dyntype": "filter", "dynprm": repr(1.0 / float(rate))}
+        yield actuator
+
+
+def _text(numbers: Any) -> str:
+    return " ".join(repr(float(number)) for number in numbers)
+
+
+def _import_mujoco() -> Any:
+    try:
+        import mujoco
+    except ImportError:
+        raise BackendMissing(
+            'the plant mujoco needs MuJoCo; install it with pip install "aerobat[mujoco]"'
+        ) from None
+    return mujoco

@@ -1,0 +1,86 @@
+"""What a plant of another simulator is told, and what it answers, tick by tick."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+from typing import Any, ClassVar, NamedTuple, Protocol
+
+from aerobat.declaration import FieldError, Registry, shown
+from aerobat.errors import SpecError
+from aerobat.kernels.motors import Airframe, Motion
+from aerobat.kernels.ops import PerRotor, Vector
+from aerobat.problem.gate import Gate
+from aerobat.simulation.contact import Contact
+from aerobat.vehicle.ellipsoid import Ellipsoid
+
+
+@dataclass(frozen=True, eq=False)
+class PlantScene:
+    """One vehicle and what it may touch, in the numbers of the kernels."""
+
+    airframe: Airframe  # what really flies
+    gravity: float  # [m/s²]
+    ground: float | None  # [m] its height; None for no ground
+    body: Ellipsoid  # that encloses the vehicle
+    gates: tuple[Gate, ...]
+
+
+class Actuation(NamedTuple):
+    """What acts on a plant from one tick to the next."""
+
+    commands: PerRotor  # [N] of the rotors, that are in effect
+    wind: Vector  # [m/s] velocity of the air, world
+    ceilings: PerRotor  # [N] the most that each rotor can give now
+
+
+class PlantRun(Protocol):
+    """A vehicle in another simulator, on its way."""
+
+    @property
+    def motion(self) -> Motion:
+        """Its state and the thrusts [N] of its rotors, as they are now."""
+
+    @property
+    def contact(self) -> Contact:
+        """What it has touched since the last look; a gate's frame comes before the ground."""
+
+    def advance(self, actuation: Actuation, duration: float) -> None:
+        """Let some time [s] pass under what is held meanwhile."""
+
+
+class Plant(ABC):
+    """Another simulator's physics, in place of ours.
+
+    A plant of one's own inherits from this class and is registered by `PLANTS.add("its-name", cls)`.
+    """
+
+    kind: ClassVar[str] = ""  # its name in settings, set when it is registered
+
+    @abstractmethod
+    def begin(self, scene: PlantScene, motion: Motion) -> PlantRun:
+        """Return the vehicle of a scene at its start.
+
+        Raises BackendMissing where the simulator is not installed, SpecError for what it has not.
+        """
+
+
+_ROOM = "aerobat.simulation.plants"
+PLANTS: Registry[Plant] = Registry(
+    Plant,  # type: ignore[type-abstract]
+    "plant",
+    "aerobat.plants",
+    {"mujoco": f"{_ROOM}.mujoco", "rotorpy": f"{_ROOM}.rotorpy"},
+)
+
+
+def as_plant(value: Any) -> Plant | None:
+    """The plant itself, or the one of that name; None for our own. Raises FieldError for anything else."""
+    if value is None or isinstance(value, Plant):
+        return value
+    if not isinstance(value, str):
+        raise FieldError("", f"must be a plant or the name of one, got {shown(value)}")
+    try:
+        return PLANTS[value]()
+    except SpecError as error:
+        raise FieldError("", f": {error}") from None

@@ -1,0 +1,167 @@
+"""Plants: the same controller in physics that others wrote, which agree with ours, and feel gates."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import aerobat as ab
+from aerobat.interchange.flat_outputs import FlatOutputs
+from aerobat.simulation.contact import Contact
+from aerobat.simulation.outcome import Outcome
+from aerobat.simulation.plants import PLANTS
+from aerobat.simulation.plants.mujoco import Mujoco
+from aerobat.simulation.plants.rotorpy import RotorPy, rotorpy_vehicle
+
+ORDER_4 = ab.Miqp(order=4)
+
+
+@pytest.mark.parametrize("vehicle", ["agile-quad", "hexarotor"])
+@pytest.mark.parametrize("name", ["line", "flip-roll", "flip-pitch", "flip-roll-translation", "half-flip"])
+def test_mujoco_flies_every_maneuver_as_our_simulation_does(name: str, vehicle: str) -> None:
+    """To a tenth of a micrometre: a free body, four or six rotors with a lag, no contact with the gate."""
+    plan = ab.plan(name, ORDER_4, vehicle)
+    own, other = ab.fly(plan), ab.fly(plan, plant="mujoco")
+    np.testing.assert_allclose(other.position, own.position, rtol=0, atol=1e-7)
+    np.testing.assert_allclose(other.thrusts, own.thrusts, rtol=0, atol=1e-5)
+    assert other.first_contact[0] is Contact.NOTHING
+    assert ab.score(other, plan).outcome is ab.score(own, plan).outcome
+
+
+def through_the_gate() -> ab.Plan:
+    return ab.plan("half-flip", ORDER_4, "agile-quad")
+
+
+def test_drag_wind_and_full_inertia_are_the_same_in_mujoco() -> None:
+    """Its drag is held for a step of a millisecond, hence a tenth of a millimetre."""
+    vehicle = replace(
+        ab.load_vehicle("agile-quad"),
+        drag_body=np.array([0.2, 0.25, 0.1]),
+        inertia=[[0.0025, 2e-4, -1e-4], [2e-4, 0.0021, 1e-4], [-1e-4, 1e-4, 0.0043]],
+    )
+    windy = ab.Environment(wind=(1.0, -2.0, 0.5))
+    plan = through_the_gate()
+    flights = [ab.fly(plan.trajectory, vehicle, environment=windy, plant=plant) for plant in (None, "mujoco")]
+    assert flights[0].position_error.max() > 1e-3
+    np.testing.assert_allclose(flights[1].position, flights[0].position, rtol=0, atol=1e-4)
+
+
+@pytest.mark.parametrize("aside", [(0.3, 0.0), (0.0, 0.3)], ids=["lateral", "up"])
+def test_a_gate_that_was_moved_is_touched_where_geometry_says(aside: tuple[float, float]) -> None:
+    """By 0.3 m to a side the ellipsoid meets a bar: felt by MuJoCo, told of our own flight by its score."""
+    plan = through_the_gate()
+    gate = plan.problem.gates[0]
+    moved = replace(gate, position=gate.position + aside[0] * gate.lateral + aside[1] * gate.up)
+    elsewhere = replace(plan, problem=replace(plan.problem, gates=(moved,)))
+    own, felt = ab.fly(elsewhere), ab.fly(elsewhere, plant="mujoco")
+    judged = ab.score(own, elsewhere)
+    assert judged.outcome in (Outcome.HIT_FRAME, Outcome.MISSED_GATE)
+    contact, time = felt.first_contact
+    assert contact is Contact.GATE
+    assert time == pytest.approx(judged.passages[0].time, abs=0.05)
+    assert ab.score(felt, elsewhere).outcome is Outcome.TOUCHED_GATE
+    assert ab.fly(elsewhere, plant=Mujoco(contacts=False)).first_contact[0] is Contact.NOTHING
+
+
+def test_a_vehicle_that_comes_down_touches_the_ground_and_one_that_takes_off_does_not() -> None:
+    """What stands there at first has come to none."""
+    vehicle, flat = ab.load_vehicle("agile-quad"), ab.Environment(ground=0.0)
+    height = float(vehicle.bounding_ellipsoid.semi_axes[2])
+    rise = ab.Trajectory([1.0], [[[0.0, 0.0, 0.99 * height], [0.0, 0.0, 0.0], [0.0, 0.0, 3.0]]])
+    rising = ab.fly(rise, vehicle, environment=flat, plant="mujoco")
+    assert rising.contact[0] == Contact.GROUND
+    assert rising.first_contact[0] is Contact.NOTHING
+    descent = ab.Trajectory([1.0], [[[0.0, 0.0, 0.5], [0.0, 0.0, -1.0]]])
+    contact, time = ab.fly(descent, vehicle, environment=flat, plant="mujoco").first_contact
+    assert contact is Contact.GROUND
+    assert time == pytest.approx(0.5 - height, abs=0.02)
+
+
+def test_conditions_are_the_same_in_mujoco() -> None:
+    """Sensors, filter, delays, gusts, battery and the vehicle that was drawn: flight 3 of seed 1."""
+    plan = through_the_gate()
+    own, other = (
+        ab.fly(plan, conditions="lab", seed=1, flights=range(3, 4), plant=plant)[0]
+        for plant in (None, "mujoco")
+    )
+    np.testing.assert_allclose(other.position, own.position, rtol=0, atol=2e-3)
+    np.testing.assert_allclose(other.observed_position, own.observed_position, rtol=0, atol=2e-3)
+    assert own.position_error.max() > 0.01
+
+
+def test_rotorpy_flies_our_plan_on_its_model_of_our_vehicle() -> None:
+    """The speeds of its rotors lag, not their thrusts: millimetres."""
+    plan = ab.plan("flip-roll", ORDER_4, "agile-quad")
+    flight = ab.fly(plan, plant="rotorpy")
+    assert flight.position_error.max() < 0.005
+    assert ab.score(flight, plan).outcome is Outcome.THROUGH_GATES
+
+
+def test_rotorpys_own_controller_follows_our_plan_in_rotorpys_own_simulation() -> None:
+    """Its `simulate` takes the plan as one of its trajectories; a slow line, upright."""
+    from rotorpy.controllers.quadrotor_control import SE3Control
+    from rotorpy.environments import Environment
+    from rotorpy.vehicles.hummingbird_params import quad_params
+    from rotorpy.vehicles.multirotor import Multirotor
+
+    limits = ab.Limits(velocity=1.0, acceleration=1.0, jerk=3.0)
+    line = ab.Problem("line", ab.at_rest((0.0, 0.0, 1.0)), ab.at_rest((1.0, 0.5, 1.5)), limits=limits)
+    plan = ab.plan(line, ab.Miqp(order=4))
+    wanted = FlatOutputs(plan)
+    hover = np.full(4, np.sqrt(quad_params["mass"] * 9.81 / (4 * quad_params["k_eta"])))
+    rest = {"v": np.zeros(3), "q": np.array([0.0, 0.0, 0.0, 1.0]), "w": np.zeros(3), "wind": np.zeros(3)}
+    start = rest | {"x": wanted.update(0.0)["x"], "rotor_speeds": hover}
+    world = Environment(Multirotor(quad_params, start), SE3Control(quad_params), wanted, sim_rate=200)
+    logged = world.run(t_final=plan.duration, plot=False, animate_bool=False, verbose=False)
+    times = np.minimum(logged["time"], plan.duration)
+    np.testing.assert_allclose(logged["flat"]["x"], plan.trajectory.evaluate(times), atol=1e-9)
+    np.testing.assert_allclose(logged["state"]["x"], logged["flat"]["x"], atol=0.1)
+    np.testing.assert_array_equal(wanted.update(-1.0)["x_ddot"], np.zeros(3))
+    np.testing.assert_array_equal(wanted.target(99.0)["target_pos"], wanted.update(plan.duration)["x"])
+
+
+def test_rotorpys_hummingbird_flips_with_its_own_aerodynamics() -> None:
+    """Lift that its airspeed brings, which no model of ours knows: further off, through the gate yet."""
+    vehicle = rotorpy_vehicle("hummingbird")
+    plan = ab.plan("flip-roll", ab.Miqp(order=4, reserve=0.15), vehicle)
+    flight = ab.fly(plan, plant=RotorPy(vehicle="hummingbird"))
+    assert 0.01 < flight.position_error.max() < 0.3
+    assert ab.score(flight, plan).passages[0].failure is None
+
+
+@pytest.mark.parametrize(
+    ("wrong", "sentence"),
+    [
+        ({"plant": "mujco"}, "did you mean 'mujoco'"),
+        ({"plant": 3}, "plant must be a plant or the name of one"),
+        ({"plant": "mujoco", "conditions": "lab", "flights": 2}, "one vehicle at a time"),
+        ({"plant": "rotorpy", "vehicle": "hexarotor"}, "4 rotors"),
+        ({"plant": "rotorpy", "conditions": "lab"}, "one kind"),
+    ],
+)
+def test_plants_that_cannot_fly_are_refused_in_a_sentence(wrong: dict, sentence: str) -> None:
+    with pytest.raises(ab.SpecError, match=sentence):
+        ab.fly(through_the_gate(), **wrong)
+
+
+def test_scores_of_many_flights_refuse_a_plant() -> None:
+    with pytest.raises(ab.SpecError, match="one vehicle at a time"):
+        ab.score_flights(through_the_gate(), plant="mujoco")
+
+
+def test_unknown_vehicles_of_rotorpy_are_refused() -> None:
+    with pytest.raises(ab.SpecError, match="hummingbird"):
+        rotorpy_vehicle("humingbird")
+    with pytest.raises(ab.SpecError, match="RotorPy's vehicles"):
+        RotorPy(vehicle="a/b")
+
+
+def test_plants_are_known_by_name() -> None:
+    assert set(PLANTS) >= {"mujoco", "rotorpy"}
+
+
+def test_a_flight_that_felt_contact_is_saved_and_loaded_whole(tmp_path) -> None:
+    flight = ab.fly(through_the_gate(), plant="mujoco")
+    flight.save(tmp_path / "flight.npz")
+    assert ab.load_flight(tmp_path / "flight.npz") == flight
+    assert flight.engine == "mujoco"
