@@ -122,13 +122,21 @@ class Backoff:
         nothing = np.zeros((intervals, len(bounds.lower)))
         return cls(nothing, nothing)
 
-    def grown(self, bounds: Bounds, trajectory: Trajectory) -> Backoff | None:
-        """The same with what a trajectory exceeds added; None where that leaves nothing, or nothing is."""
+    def grown(self, bounds: Bounds, trajectory: Trajectory, reserve: float = 0.0) -> Backoff | None:
+        """The same with what a trajectory exceeds added; None where that leaves nothing, or nothing is.
+
+        Args:
+            bounds: What holds all along.
+            trajectory: The motion's.
+            reserve: Of each rotor's range, that is kept from either of its ends beside.
+        """
         values = bounds.along(trajectory)
         low = self.low + _more(bounds.lower + _largest(-values), bounds.sizes)
         high = self.high + _more(_largest(values) - bounds.upper, bounds.sizes)
         unchanged = (low == self.low).all() and (high == self.high).all()
-        if unchanged or (low + high > MAX_BACKOFF * (bounds.upper - bounds.lower)).any():
+        kept = np.zeros(len(bounds.sizes))
+        kept[len(bounds.path) : -1] = 2.0 * reserve
+        if unchanged or (low + high > (MAX_BACKOFF - kept) * (bounds.upper - bounds.lower)).any():
             return None
         return replace(self, low=low, high=high)
 
