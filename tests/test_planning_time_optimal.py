@@ -184,7 +184,9 @@ def test_options_that_make_no_sense_are_refused(options, sentence):
 
 def test_a_search_that_ends_with_nothing_says_where_and_what_to_change():
     seen = []
-    with pytest.raises(Infeasible, match=r"limit of iterations; ask less .* or give more") as raised:
+    with pytest.raises(
+        Infeasible, match=r"limit of iterations, worst on the leg from .*; ask less .* or give"
+    ) as raised:
         TimeOptimal(iterations=2, starts=2).plan(load_problem("line"), QUAD, seen.append)
     assert list(raised.value.attempts) == seen
     assert all(not attempt.feasible for attempt in seen)

@@ -45,11 +45,16 @@ ROUNDING = 1e-9  # of a bound's size
 
 @declared
 class EndState:
-    """Where a trajectory begins or ends; derivatives above acceleration are zero there. World frame."""
+    """Where a trajectory begins or ends; derivatives above acceleration are zero there. World frame.
+
+    A goal of `free_attitude` may be reached in any attitude, at whatever body rate and thrust, as races end;
+    planners that cannot leave it free take the acceleration.
+    """
 
     position: Vector3  # [m] world
     velocity: Vector3 = field(default_factory=lambda: np.zeros(3))  # [m/s] world
     acceleration: Vector3 = field(default_factory=lambda: np.zeros(3))  # [m/s²] world
+    free_attitude: bool = False  # of a goal: any attitude will do, whatever the acceleration
 
     @validated
     def derivatives(self, order: Annotated[int, Field(ge=1, le=100)]) -> Array:
@@ -148,6 +153,8 @@ class Problem:
         for i, name in enumerate(names):
             if name in names[:i]:
                 raise FieldError(f"gates[{i}].name", f": there are two gates named '{name}'; rename one")
+        if self.start.free_attitude:
+            raise FieldError("start.free_attitude", "is for goals, a start has its attitude; drop it")
         self._check_within_limits()
         sequence = self.stages(1.0)
         self._check_stages(sequence)

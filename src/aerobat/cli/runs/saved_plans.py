@@ -66,7 +66,8 @@ def _plan_of_path(path: Path, trajectory: Trajectory, options: PlanningOptions) 
     if options.heading is not None:
         trajectory = replace(trajectory, heading=radians(options.heading))
     start, goal = (
-        EndState(*(trajectory.evaluate(end, k) for k in range(3))) for end in (0.0, trajectory.duration)
+        EndState(trajectory.evaluate(end), trajectory.evaluate(end, 1), trajectory.evaluate(end, 2))
+        for end in (0.0, trajectory.duration)
     )
     name = re.sub(r"[^\w .-]|^\W+", "-", path.stem).lstrip(" .-") or MADE_BY
     problem = Problem(name=name, start=start, goal=goal, heading=trajectory.heading)

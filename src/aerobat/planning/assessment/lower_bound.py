@@ -241,7 +241,7 @@ class _Cone:
         """The direction at an end, where jerk is zero and only drag may turn the thrust."""
         thrust = balance.specific_thrust(end.velocity, end.acceleration)
         norm = float(np.linalg.norm(thrust))
-        if norm == 0.0:
+        if norm == 0.0 or end.free_attitude:
             return cls(UP, half_angle=pi)
         rate = balance.drag * float(np.linalg.norm(np.cross(thrust, end.acceleration))) / norm**2
         return cls(thrust / norm, rate=rate)

@@ -3,19 +3,27 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from itertools import pairwise
+from dataclasses import replace
+from itertools import filterfalse, pairwise
 from math import sqrt
 
 import numpy as np
 
 from aerobat.arrays import Array
-from aerobat.problem.condition import ForceBalance, Quantity
+from aerobat.flatness import force_balance
+from aerobat.planning.rotor_margin import sampled_margin
+from aerobat.problem.condition import Condition, ForceBalance, Quantity
 from aerobat.problem.problem import Problem
 from aerobat.problem.stage import Stage, StageSequence
 from aerobat.trajectory import Trajectory
+from aerobat.trajectory.minimum_effort import minimum_effort
+from aerobat.vehicle import Vehicle
 
 LEG_THRUST_FRACTION = 0.3  # of the specific thrust, that accelerates along a leg when times are guessed
 SHORTEST_LEG = 0.2  # [s] that a leg is given at first
+EXCEEDED = 0.3  # of the rotors' range, by which a stretched path may exceed it
+PACE = 1.05  # times the duration, in one step of stretching
+PACES = 80  # steps at most: 50 times the duration
 STAGE_TOLERANCE = 1e-6  # in SI units: by how much a condition may be missed through rounding
 
 
@@ -62,6 +70,45 @@ def first_times(problem: Problem, fixed: Array, max_specific_thrust: float) -> A
     return durations
 
 
+def unhurried(sequence: StageSequence) -> StageSequence:
+    """The same without the least speeds of stages that ask no attitude."""
+    stages = (
+        stage if stage.attitude else replace(stage, conditions=tuple(filterfalse(_hurries, stage.conditions)))
+        for stage in sequence.stages
+    )
+    return replace(sequence, stages=tuple(stages))
+
+
+def stretched_path(problem: Problem, vehicle: Vehicle, sequence: StageSequence, order: int) -> Trajectory:
+    """The closed form through ordered stages, legs as long as the roots of their distances, for a warm start.
+
+    So slow as a whole that rotors exceed their limits by EXCEEDED at most: a motion that is a little too fast
+    is nearer to the fastest than one that is too slow.
+
+    Args:
+        problem: Its ends are met.
+        vehicle: What flies it.
+        sequence: The stages.
+        order: The derivative of position whose square is minimized.
+    """
+    balance = force_balance(problem.environment, vehicle)
+    still = np.zeros((len(sequence.stages), 3))
+    fixed = fixed_at_knots(problem, unhurried(sequence), order, balance, still)
+    durations = first_times(problem, fixed, vehicle.max_specific_thrust)
+    allowed = -EXCEEDED * float((vehicle.max_thrusts - vehicle.min_thrusts).max())
+
+    def path(steps: int) -> Trajectory:
+        return minimum_effort(fixed, durations * PACE**steps, heading=problem.heading)
+
+    def too_fast(steps: int) -> bool:
+        return sampled_margin(path(steps), vehicle, problem.environment).margin < allowed
+
+    slower = next((steps for steps in range(PACES) if not too_fast(steps)), PACES)
+    if slower > 0:
+        return path(slower)
+    return path(1 - next((steps for steps in range(1, PACES) if too_fast(-steps)), PACES))
+
+
 def violated_stage(sequence: StageSequence, trajectory: Trajectory, balance: ForceBalance) -> str | None:
     """The first stage that a trajectory with a knot a stage misses, in a sentence; or None."""
     values = [trajectory.evaluate(trajectory.knots[1:-1], k) for k in range(3)]
@@ -82,6 +129,11 @@ def violated_stage(sequence: StageSequence, trajectory: Trajectory, balance: For
                 f"duration, the closed form passes it at {fraction:.4g}"
             )
     return None
+
+
+def _hurries(condition: Condition) -> bool:
+    """True of a least speed."""
+    return condition.quantity is Quantity.VELOCITY and 0.0 < condition.lower < condition.upper
 
 
 def _fixed(stage: Stage, derivative: int, balance: ForceBalance, velocity: Array) -> Array:

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from enum import StrEnum
-from itertools import filterfalse
 from time import perf_counter
 from typing import Annotated
 
@@ -19,12 +18,11 @@ from aerobat.flatness import force_balance
 from aerobat.optimization.deadline import out_of_time, within_time
 from aerobat.planning.certified_solve import Judged, Solution, certified_solve, refuted_by_samples
 from aerobat.planning.planners import Planner, option, planner
-from aerobat.planning.polynomial.knots import first_times, fixed_at_knots, violated_stage
+from aerobat.planning.polynomial.knots import first_times, fixed_at_knots, unhurried, violated_stage
 from aerobat.planning.recorder import Progress, Recorder
 from aerobat.planning.result import PlacedStage, Plan
 from aerobat.planning.search import BisectionSearch, GridSearch, Search
 from aerobat.planning.time_limit import TIME_LIMIT, stopped, too_short
-from aerobat.problem.condition import Condition, Quantity
 from aerobat.problem.problem import Problem
 from aerobat.problem.stage import StageSequence
 from aerobat.trajectory import Trajectory
@@ -118,17 +116,6 @@ class _Planning:
         """All that a sequence fixes at the knots, given the velocities at its stages [m/s], (K - 2, 3)."""
         return fixed_at_knots(self.problem, sequence, self.config.order, self.balance, velocities)
 
-    @property
-    def unhurried(self) -> StageSequence:
-        """The stages without the least speeds of those that ask no attitude."""
-        stages = (
-            stage
-            if stage.attitude
-            else replace(stage, conditions=tuple(filterfalse(_hurries, stage.conditions)))
-            for stage in self.sequence.stages
-        )
-        return replace(self.sequence, stages=tuple(stages))
-
     def attempt(self, duration: float) -> Judged[None] | None:
         """Outcome of one duration; None unless it meets its stages and the vehicle can fly it.
 
@@ -199,7 +186,7 @@ class _ClosedForm:
         """
         started = perf_counter()
         planning, problem, order = self.planning, self.planning.problem, self.planning.config.order
-        for sequence in (planning.unhurried, planning.sequence):
+        for sequence in (unhurried(planning.sequence), planning.sequence):
             trajectory = self._trajectory(sequence)
             failure = violated_stage(planning.sequence, trajectory, planning.balance)
             if failure is None:
@@ -246,8 +233,3 @@ class _ClosedForm:
     def tighten(self, solution: Solution[None], certificate: Certificate | None) -> bool:
         """A longer duration is all that helps."""
         return False
-
-
-def _hurries(condition: Condition) -> bool:
-    """True of a least speed."""
-    return condition.quantity is Quantity.VELOCITY and 0.0 < condition.lower < condition.upper

@@ -125,7 +125,13 @@ class Backoff:
     def grown(self, bounds: Bounds, trajectory: Trajectory, reserve: float = 0.0) -> Backoff | None:
         """The same with what a trajectory exceeds added; None where that leaves nothing, or nothing is.
 
-        Of rotors, whose `reserve`, a fraction of their range, shall be kept, what it misses of that.
+        Of rotors, whose `reserve`, a fraction of their range, is kept from either of its ends, what it misses
+        of that.
+
+        Args:
+            bounds: What holds all along.
+            trajectory: The motion's.
+            reserve: Of each rotor's range.
         """
         values, kept = bounds.along(trajectory), np.zeros_like(bounds.sizes)
         rotors = slice(len(bounds.path), -1)
@@ -133,7 +139,7 @@ class Backoff:
         low = self.low + _more(bounds.lower + kept + _largest(-values), bounds.sizes)
         high = self.high + _more(_largest(values) - (bounds.upper - kept), bounds.sizes)
         unchanged = (low == self.low).all() and (high == self.high).all()
-        if unchanged or (low + high > MAX_BACKOFF * (bounds.upper - bounds.lower)).any():
+        if unchanged or (low + high > MAX_BACKOFF * (bounds.upper - bounds.lower) - 2.0 * kept).any():
             return None
         return replace(self, low=low, high=high)
 

@@ -54,6 +54,26 @@ class SolvedMotion:
         return tuple(PlacedStage(s.name, end - 1, time, s.gate) for s, end, time in stages)
 
     @property
+    def failure(self) -> str:
+        """The outcome of a solve that did not converge, in words, with the leg that is violated most."""
+        return f"the solver {self.answer.status}, {self._worst_leg}"
+
+    @property
+    def _worst_leg(self) -> str:
+        """The leg with the unknowns of the constraint that is violated most, in words."""
+        mesh, program = (
+            self.program.mesh,
+            self.program.control.program(self.program.mesh, self.program.backoff),
+        )
+        g = np.asarray(program.values(self.answer.x)[1], dtype=float).reshape(-1)
+        excess = np.nan_to_num(np.maximum(program.lower - g, g - program.upper), nan=np.inf)
+        rows, columns = map(np.array, program.derivatives["jac_g"].sparsity_out(1).get_triplet())
+        legs = mesh.leg_of_unknowns[columns[rows == int(np.argmax(excess))]]
+        leg = int(legs.max(initial=0))
+        names = ["the start", *(f"'{stage.name}'" for stage in self.program.control.stages), "the goal"]
+        return f"worst on the leg from {names[leg]} to {names[leg + 1]}"
+
+    @property
     def start(self) -> Start:
         """The motion as a start of other programs."""
         start = self.program.start
@@ -69,10 +89,10 @@ class CollocatedProgram:
         elements: Of the program's functions.
         start: The motion to begin from.
         reserve: Of each rotor's range, kept from either of its ends.
-        intervals: About how many in all.
-        min_intervals: Of each phase, at least.
+        mesh: The phases and their intervals.
         max_iterations: Of each solve.
         tolerance: Of each solve, on the scaled optimality conditions.
+        barrier: The first barrier parameter; None is the solver's own, a small one keeps near the start.
     """
 
     def __init__(
@@ -80,17 +100,16 @@ class CollocatedProgram:
         elements: Elements,
         start: Start,
         reserve: float,
-        intervals: int,
-        min_intervals: int,
+        mesh: Mesh,
         max_iterations: int,
         tolerance: float = 1e-8,
+        barrier: float | None = None,
     ) -> None:
-        self.control, self.start = optimal_control(elements, start, reserve), start
-        self.mesh: Mesh = self.control.mesh(start.guess.allocate_intervals(intervals, min_intervals))
+        self.control, self.start, self.mesh = optimal_control(elements, start, reserve), start, mesh
         self.duration = start.guess.trajectory.duration  # [s] of the start, or of what was solved ahead
         self._max_iterations, self._tolerance = max_iterations, tolerance
-        self._backoff = Backoff.none(self.mesh.total, elements.bounds)
-        self._barrier: float | None = None
+        self.backoff = Backoff.none(self.mesh.total, elements.bounds)
+        self._barrier = barrier
         self._multipliers: tuple[Array, Array] | None = None
         self._x = self.mesh.pack(initial_motion(start, self.mesh, elements.problem, elements.vehicle))
         self._ahead: Solution[SolvedMotion] | None = None
@@ -115,13 +134,13 @@ class CollocatedProgram:
             nodes=answer.iterations,
             solve_time=answer.time,
             cost=duration if answer.converged else None,
-            failure=None if answer.converged else f"the solver {answer.status}",
+            failure=None if answer.converged else solved.failure,
         )
 
     def solved(self) -> SolvedMotion:
         """The motion that the solver ends at, whether converged or not."""
         answer = solve_nonlinear(
-            self.control.program(self.mesh, self._backoff),
+            self.control.program(self.mesh, self.backoff),
             self._x,
             max_iterations=self._max_iterations,
             tolerance=self._tolerance,
@@ -134,11 +153,12 @@ class CollocatedProgram:
         """Tighten what is held at nodes by what is exceeded between them, and go on from the solution."""
         if solution.trajectory is None or certificate is None or out_of_time():
             return False
-        backoff = self._backoff.grown(self.control.elements.bounds, solution.trajectory, self.control.reserve)
+        control = self.control
+        backoff = self.backoff.grown(control.elements.bounds, solution.trajectory, control.reserve)
         if backoff is None:
             return False
         answer = solution.source.answer
-        self._backoff, self._barrier = backoff, WARM_BARRIER
+        self.backoff, self._barrier = backoff, WARM_BARRIER
         self._x, self._multipliers = answer.x, answer.multipliers
         return True
 
@@ -164,4 +184,4 @@ def optimal_control(elements: Elements, start: Start, reserve: float) -> Optimal
 def _end(state: EndState, elements: Elements) -> End:
     environment = elements.problem.environment
     thrust = force_balance(environment, elements.vehicle).specific_thrust(state.velocity, state.acceleration)
-    return End(state.position, state.velocity, thrust)
+    return End(state.position, state.velocity, thrust, state.free_attitude)

@@ -1,6 +1,6 @@
 """Two-point Hermite collocation: a motion of the rigid body as unknowns, equations, and a trajectory.
 
-Time is cut into phases of equal intervals, the input linear on each. From both ends of an interval the
+Time is cut into phases, these into intervals, the input linear on each. From both ends of an interval the
 equations of motion give x', x'', x''' exactly; the quintic through them, integrated, must lead from one state
 to the next,
 
@@ -37,6 +37,8 @@ STATE_SCALE = np.repeat([1.0, 5.0, 1.0, 5.0], [3, 3, 4, 2])  # what is large in 
 QUINTIC = polynomial.hermite(np.eye(6)[:3], np.eye(6)[3:])  # powers of y (rows) from y, y', y'' at both ends
 INTEGRAL = 1.0 / np.arange(1, 7)  # of each power over [0, 1]
 DOUBLE_INTEGRAL = INTEGRAL / np.arange(2, 8)
+TURNING_WEIGHT = 0.2  # of where a mesh's intervals lie: the change of body rates, the rest time
+BESIDE = 0.7  # times its angular acceleration, that an interval beside another is refined by
 BOUNDED_DERIVATIVES = 5  # position to snap, that limits can bound
 
 
@@ -58,8 +60,42 @@ class Mesh:
     """
 
     intervals: tuple[int, ...]  # of each phase, (P,)
+    fractions: Array  # part of its phase that each interval takes, (K,)
     continuous: bool
     input_scale: Array  # what is large for an input, (3,)
+
+    @classmethod
+    def even(cls, intervals: tuple[int, ...], continuous: bool, input_scale: Array) -> Mesh:
+        """Phases cut into so many equal intervals each."""
+        return cls(intervals, np.repeat(1.0 / np.array(intervals), intervals), continuous, input_scale)
+
+    def refined(self, motion: CollocatedMotion, intervals: int, minimum: int) -> Mesh:
+        """A mesh of about so many intervals that are shorter where a motion on this one turns its body.
+
+        Their boundaries cut a weight into equal parts: time, and the change of the body rates by it, which
+        jump within a few milliseconds in fast motions.
+
+        Args:
+            motion: On this mesh.
+            intervals: In all, shared among phases by their weights.
+            minimum: Of each phase.
+        """
+        durations = self.durations(motion.phases)
+        turning = np.linalg.norm(motion.starts[1:] + motion.ends[1:], axis=0) / 2.0
+        beside = np.pad(turning, 1)  # a jump may come to lie in an interval beside it
+        turning = np.maximum(turning, BESIDE * np.maximum(beside[:-2], beside[2:]))
+        change = turning * durations
+        weights = (
+            1.0 - TURNING_WEIGHT
+        ) * durations / durations.sum() + TURNING_WEIGHT * change / change.sum()
+        counts, fractions = [], []
+        for phase in range(len(self.intervals)):
+            inside = self.phase_of == phase
+            counts.append(max(minimum, round(intervals * float(weights[inside].sum()))))
+            passed, times = (np.append(0.0, np.cumsum(x[inside])) for x in (weights, self.fractions))
+            boundaries = np.interp(np.linspace(0.0, passed[-1], counts[-1] + 1), passed, times)
+            fractions.append(np.diff(boundaries) / times[-1])
+        return Mesh(tuple(counts), np.concatenate(fractions), self.continuous, self.input_scale)
 
     @property
     def total(self) -> int:
@@ -75,11 +111,6 @@ class Mesh:
     def phase_of(self) -> Indices:
         """The phase of each interval, which is the place of its duration too, (K,)."""
         return np.repeat(np.arange(len(self.intervals)), self.intervals)
-
-    @cached_property
-    def fractions(self) -> Array:
-        """Part of its phase that each interval takes, (K,)."""
-        return np.asarray(1.0 / np.array(self.intervals)[self.phase_of])
 
     @cached_property
     def states(self) -> Indices:
@@ -99,6 +130,16 @@ class Mesh:
         inputs = (self.inputs.max() + 1 - self.inputs.min()) // INPUTS
         states = np.tile(STATE_SCALE, self.total + 1)
         return np.concatenate([np.ones(len(self.intervals)), states, np.tile(self.input_scale, inputs)])
+
+    @cached_property
+    def leg_of_unknowns(self) -> Indices:
+        """The phase of each unknown, of those at a boundary the earlier one, (size,)."""
+        legs = np.empty(self.size, dtype=int)
+        legs[: len(self.intervals)] = np.arange(len(self.intervals))
+        legs[self.states[0]] = 0
+        legs[self.states[1:]] = self.phase_of[:, None]
+        legs[self.inputs] = self.phase_of[:, None]
+        return legs
 
     def side_unknowns(self, last: int) -> Indices:
         """Places of what a side of each interval depends on: duration, its state, both inputs, (K, 19)."""

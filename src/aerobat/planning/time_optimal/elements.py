@@ -15,7 +15,7 @@ from aerobat.flatness import force_balance
 from aerobat.optimization.nonlinear import import_casadi
 from aerobat.optimization.separable import ElementFunction
 from aerobat.planning.time_optimal.bounds import Bounds, PathBound
-from aerobat.planning.time_optimal.collocation import STATE_SCALE, IntervalSide
+from aerobat.planning.time_optimal.collocation import STATE_SCALE, IntervalSide, Mesh
 from aerobat.planning.time_optimal.zero_yaw_rate_body import (
     INPUTS,
     POSITION,
@@ -54,6 +54,10 @@ class Elements:
     def continuous(self) -> bool:
         """True where the input cannot jump, for the rotors lag."""
         return bool(self.vehicle.lags.any())
+
+    def mesh(self, intervals: tuple[int, ...]) -> Mesh:
+        """The unknowns of so many equal intervals in each phase."""
+        return Mesh.even(intervals, self.continuous, self.input_scale)
 
     @property
     def input_scale(self) -> Array:

@@ -34,17 +34,19 @@ SHORTEST_PHASE = 1e-3  # [s]
 # [s] for one change of an input by half its range in each interval: far below what is reported, it settles
 # what the duration leaves open
 CHANGE_COST = 1e-4
+BALL_SHARE = 1.0 - 1e-4  # of a ball's radius: what defects leave adds up along a course
 PLANE_TOLERANCE = 1e-6  # [m] to either side of it: equalities would repeat those of gates and waypoints in it
 ALONG_Z = (0.0, 0.0, 0.0), (0.0, 0.0, inf)  # bounds on a thrust direction in body axes
 
 
 @dataclass(frozen=True, eq=False)
 class End:
-    """State fixed at one end of the motion; body rates are zero there."""
+    """State fixed at one end of the motion; body rates are zero there unless its attitude is free."""
 
     position: Array  # [m], (3,)
     velocity: Array  # [m/s], (3,)
     thrust: Array  # f = a + g e3 + (d/m) w [m/s²], along the thrust axis, (3,)
+    free_attitude: bool = False  # thrust and body rates are not fixed
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,10 +65,6 @@ class OptimalControl:
     min_thrust: float  # [m/s²] specific thrust at least, which keeps the attitude determined
     reserve: float  # of each rotor's range, kept from either of its ends
 
-    def mesh(self, intervals: tuple[int, ...]) -> Mesh:
-        """The unknowns of so many intervals in each phase."""
-        return Mesh(intervals, self.elements.continuous, self.elements.input_scale)
-
     def program(self, mesh: Mesh, backoff: Backoff) -> NonlinearProgram:
         """The program of a mesh's unknowns, with bounds tightened at nodes."""
         rows = _Rows()
@@ -74,7 +72,8 @@ class OptimalControl:
         self._hold_nodes(rows, mesh, backoff)
         for index, stage in enumerate(self.stages):
             self._hold_stage(rows, mesh, index, stage)
-        rows.hold(self.elements.goal_thrust, mesh.states[-1:], *ALONG_Z, self.goal.thrust)
+        if not self.goal.free_attitude:
+            rows.hold(self.elements.goal_thrust, mesh.states[-1:], *ALONG_Z, self.goal.thrust)
         lower, upper = (mesh.pack(motion) for motion in self._box(mesh))
         return separable_program(
             SeparableFunction(self._cost(mesh), mesh.size, 1),
@@ -131,7 +130,7 @@ class OptimalControl:
                 rows.hold(function, np.hstack([mesh.states[node], u])[None], lower, upper)
         if stage.ball is not None:
             there = mesh.states[None, node, POSITION]
-            ball = (*stage.ball.centre, stage.ball.radius)
+            ball = (*stage.ball.centre, BALL_SHARE * stage.ball.radius)
             rows.hold(self.elements.squared_distance, there, -inf, 1.0, ball)
         phases = np.arange(len(mesh.intervals))
         earliest, latest = stage.window
@@ -152,11 +151,13 @@ class OptimalControl:
             for node, end in ((0, self.start), (-1, self.goal)):
                 motion.states[POSITION, node] = end.position
                 motion.states[VELOCITY, node] = end.velocity
-                motion.states[RATES, node] = 0.0
+                if not end.free_attitude:
+                    motion.states[RATES, node] = 0.0
             motion.states[ATTITUDE, 0] = self.q_start
             if mesh.continuous:
                 motion.starts[:, 0] = np.linalg.norm(self.start.thrust), 0.0, 0.0
-                motion.ends[:, -1] = np.linalg.norm(self.goal.thrust), 0.0, 0.0
+                if not self.goal.free_attitude:
+                    motion.ends[:, -1] = np.linalg.norm(self.goal.thrust), 0.0, 0.0
         return lower, upper
 
     def _cost(self, mesh: Mesh) -> list[Element]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 from aerobat.optimization.deadline import out_of_time, time_left, within_time
 from aerobat.planning.certified_solve import Judged, certified_solve
@@ -12,7 +13,7 @@ from aerobat.planning.recorder import Attempt, Recorder
 from aerobat.planning.result import OwnFlight
 from aerobat.planning.time_optimal.collocated_program import CollocatedProgram, SolvedMotion
 from aerobat.planning.time_optimal.elements import Elements
-from aerobat.planning.time_optimal.starts import Start
+from aerobat.planning.time_optimal.starts import Start, is_course
 from aerobat.problem.problem import Problem
 from aerobat.vehicle import Vehicle
 
@@ -24,6 +25,10 @@ COARSE_TOLERANCE = 1e-4
 COARSE_VIOLATION = 1e-2  # of constraints, at most: enough to begin the fine solve from
 FINALISTS = 2  # in a plane and in space each, the fastest on the coarse mesh, to be solved on the fine one
 SAME = 1e-3  # of the duration: starts that come to nearly the same have come to the same motion
+# on a course, whose legs take turns at the full body rate: intervals of a leg on either mesh,
+COURSE_COARSE_INTERVALS = 12
+COURSE_INTERVALS = 20
+COURSE_BARRIER = 1e-3  # of solves on the fine one, which begin near the solution
 ROUNDS = 8  # of solving, at most
 MORE_RESERVE = 1.6  # times the reserve, each time that the plan's own flight leaves its path
 RESERVE_RAISES = 4  # at most
@@ -44,6 +49,11 @@ class Race:
     reserve: float  # of each rotor's range
     durations: tuple[float, ...] = ()  # [s] that starts came to on the coarse mesh, rising
     _elements: dict[tuple[bool, bool], Elements] = field(default_factory=dict)
+
+    @cached_property
+    def on_course(self) -> bool:
+        """True of a course, whose starts lead to much the same motion: the first that converges will do."""
+        return is_course(self.problem.stages(self.vehicle.max_specific_thrust))
 
     def winner(self, starts: Sequence[Start], body: Vehicle) -> Judged[SolvedMotion] | None:
         """The fastest that is certified, of the finalists; of the others the first, if none of them is.
@@ -76,7 +86,7 @@ class Race:
                 break
             reserve = min(MORE_RESERVE * reserve, MAX_RESERVE)
             last = found.solution.source
-            again = self._certified(self._fine(last.program.control.elements, last.start, reserve))
+            again = self._certified(self._fine(last.program.control.elements, last, reserve))
             if again is not None:
                 found = again
                 best = min(best, (self._own_flight(found), found), key=lambda pair: pair[0].rank)
@@ -86,28 +96,42 @@ class Race:
         """Fine programs from where coarse ones end, the fastest first."""
         ended: list[CollocatedProgram] = []
         for start in starts:
-            if ended and out_of_time():
+            if ended and (self.on_course or out_of_time()):
                 break
             elements = self._elements_for(start, body)
             solved = CollocatedProgram(
                 elements,
                 start,
                 self.reserve,
-                min(COARSE_INTERVALS, self.intervals),
-                COARSE_MIN_INTERVALS,
+                elements.mesh(self._coarse_intervals(start)),
                 min(COARSE_ITERATIONS, self.iterations),
                 COARSE_TOLERANCE,
             ).solved()
             usable = solved.answer.violation < COARSE_VIOLATION
+            if self.on_course:  # where its legs trade with each other, what has not converged is far off
+                usable = solved.answer.converged
             self._record(solved, usable)
             if usable:
-                ended.append(self._fine(elements, solved.start, self.reserve))
+                ended.append(self._fine(elements, solved, self.reserve))
         ended.sort(key=lambda program: program.duration)
         self.durations = tuple(program.duration for program in ended)
         return ended
 
-    def _fine(self, elements: Elements, start: Start, reserve: float) -> CollocatedProgram:
-        return CollocatedProgram(elements, start, reserve, self.intervals, MIN_INTERVALS, self.iterations)
+    def _coarse_intervals(self, start: Start) -> tuple[int, ...]:
+        if self.on_course:
+            legs = len(start.guess.phases)
+            return start.guess.allocate_intervals(COURSE_COARSE_INTERVALS * legs, MIN_INTERVALS)
+        return start.guess.allocate_intervals(min(COARSE_INTERVALS, self.intervals), COARSE_MIN_INTERVALS)
+
+    def _fine(self, elements: Elements, solved: SolvedMotion, reserve: float) -> CollocatedProgram:
+        """The program on the fine mesh from a motion."""
+        start = solved.start
+        if not self.on_course:
+            mesh = elements.mesh(start.guess.allocate_intervals(self.intervals, MIN_INTERVALS))
+            return CollocatedProgram(elements, start, reserve, mesh, self.iterations)
+        intervals = max(self.intervals, COURSE_INTERVALS * len(solved.motion.phases))
+        mesh = solved.program.mesh.refined(solved.motion, intervals, MIN_INTERVALS)
+        return CollocatedProgram(elements, start, reserve, mesh, self.iterations, barrier=COURSE_BARRIER)
 
     def _elements_for(self, start: Start, body: Vehicle) -> Elements:
         """The functions of programs in the start's plane or in space, which starts share."""
@@ -128,7 +152,7 @@ class Race:
 
     def _record(self, solved: SolvedMotion, usable: bool) -> None:
         duration, answer = float(solved.motion.phases.sum()), solved.answer
-        ended = f"{duration:.3f} s on a coarse mesh" if usable else f"the solver {answer.status}"
+        ended = f"{duration:.3f} s on a coarse mesh" if usable else solved.failure
         attempt = Attempt(
             duration=duration,
             feasible=False,

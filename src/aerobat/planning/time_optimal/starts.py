@@ -13,14 +13,19 @@ from aerobat.errors import Infeasible
 from aerobat.flatness import force_balance, reference
 from aerobat.planning.miqp import Miqp
 from aerobat.planning.planners import Planner
+from aerobat.planning.polynomial.knots import stretched_path
 from aerobat.planning.polynomial.min_snap import MinSnap
 from aerobat.planning.result import Plan
 from aerobat.planning.time_optimal.collocation import CollocatedMotion, Mesh
 from aerobat.planning.warm_start import WarmStart
+from aerobat.problem.condition import Quantity
 from aerobat.problem.problem import Problem
-from aerobat.problem.stage import StageSequence
+from aerobat.problem.stage import Stage, StageSequence
+from aerobat.trajectory.minimum_effort import ORDERS
 from aerobat.vehicle import Vehicle
 
+COURSE_STAGES = 6  # that say where they are: from so many on a path through them is the start
+MANY_STAGES = 10  # of any kind, which no mixed-integer program places in reasonable time
 SLOWER = 1.5  # times the duration of a plan that knows no rotors
 PACE_SPREAD = 0.4  # standard deviation of the logarithm of a phase's pace, where paces are drawn
 SEED = 0
@@ -62,12 +67,43 @@ def starts(
     Raises:
         Infeasible: A stage asks more thrust than the vehicle has.
     """
-    plans = list(_plans(problem, vehicle, guess, first))
-    sources = list(
-        _sources(plans, problem.stages(vehicle.max_specific_thrust, vehicle.body_radius, polytopes=False))
-    )
+    sequence = problem.stages(vehicle.max_specific_thrust, vehicle.body_radius, polytopes=False)
+    if is_course(sequence):
+        plans = [] if first is None else [(first, f"{first.planner}'s plan")]
+        paths = [
+            (stretched(problem, vehicle, sequence, order), f"minimum {ORDERS[order]}") for order in (3, 4)
+        ]
+        sources = [*_sources(plans, sequence), *paths]
+    else:
+        plans = list(_plans(problem, vehicle, guess, first))
+        sources = list(_sources(plans, sequence))
     own = tuple(plan for plan, _ in plans if plan.certified and plan.vehicle == vehicle)
     return Starts(tuple(islice(_variations(sources, planar), count)), own)
+
+
+def is_course(sequence: StageSequence) -> bool:
+    """True of long sequences in order: a closed form is a good start, a mixed-integer plan takes too long."""
+    placed = all(map(_placed, sequence.stages))
+    return sequence.ordered and len(sequence.stages) >= (COURSE_STAGES if placed else MANY_STAGES)
+
+
+def _placed(stage: Stage) -> bool:
+    """True if a stage says where it is."""
+    where = [c for c in stage.conditions if c.quantity is Quantity.POSITION]
+    return stage.gate is not None or stage.ball is not None or len(where) >= 3
+
+
+def stretched(problem: Problem, vehicle: Vehicle, sequence: StageSequence, order: int) -> WarmStart:
+    """The closed form through a sequence as a start.
+
+    Args:
+        problem: Its ends are met.
+        vehicle: What flies it.
+        sequence: The stages, in order.
+        order: The derivative of position whose square is minimized.
+    """
+    path = stretched_path(problem, vehicle, sequence, order)
+    return WarmStart(path, sequence.stages, tuple(path.knots[1:-1].tolist()))
 
 
 def _sources(plans: Sequence[tuple[Plan, str]], sequence: StageSequence) -> Iterator[tuple[WarmStart, str]]:

@@ -42,12 +42,14 @@ SMOOTHING_LAG = 0.005  # [s] that rotors without lag are given, where thrusts th
 class TimeOptimal(Planner):
     """The full nonlinear dynamics at the rotors' limits; needs the extra casadi.
 
-    So many `intervals` in all are allocated to the phases. Of several `starts` on a coarse mesh, from the
-    plans of `guess` and of closed forms at several paces, the best are solved finely, and the fastest that
-    is certified is returned; `Plan.starts` has the durations of all. A `start`, a plan of whichever planner,
-    comes first. Each limit is used in full, which leaves nothing for a controller: `reserve`, a fraction of
-    each rotor's range of thrust, is kept from either of its ends for it. A `planar` plan stays in the
-    vertical plane of its start, where that has one; in space there may be a faster one.
+    So many `intervals` in all are allocated to the phases; a course of many stages has 20 a leg at least. Of
+    several `starts` on a coarse mesh, from the plans of `guess` and of closed forms at several paces, the
+    best are solved finely, and the fastest that is certified is returned; `Plan.starts` has the durations of
+    all. A course begins at the closed form through its stages, and elsewhere only where that leads nowhere.
+    A `start`, a plan of whichever planner, comes first. Each limit is used in full, which leaves nothing for
+    a controller: `reserve`, a fraction of each rotor's range of thrust, is kept from either of its ends for
+    it. A `planar` plan stays in the vertical plane of its start, where that has one; in space there may be a
+    faster one.
     """
 
     intervals: Annotated[int, Field(ge=MIN_INTERVALS)] = 60
