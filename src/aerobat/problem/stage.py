@@ -8,7 +8,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field, PlainValidator
 
-from aerobat.declaration import FieldError, Label, NonNegative, Positive, declared, shown
+from aerobat.declaration import Count, FieldError, Label, NonNegative, Positive, declared, shown
 from aerobat.problem.ball import Ball
 from aerobat.problem.condition import Attitude, Condition, Quantity
 from aerobat.problem.gate import Gate, at_centre, in_opening
@@ -66,6 +66,7 @@ class Stage:
     crossing_point: CrossingPoint = "centre"  # of the gate's opening: its centre, or free
     margin: NonNegative = 0.0  # [m] from the edges to the body, where the crossing point is free
     ball: Ball | None = None  # where it is, within a radius
+    lap: Count = 1  # the lap of a course that it belongs to
 
     def __post_init__(self) -> None:
         """Check."""

@@ -1,0 +1,57 @@
+"""Elements of courses that are no figures: a gate, a waypoint."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from aerobat.declaration import NonNegative, Positive
+from aerobat.problem.gate import Gate, passed_gate
+from aerobat.problem.maneuvers.maneuver import Maneuver, gate_in_words, maneuver
+from aerobat.problem.maneuvers.waypoints import THRUST_FRACTION, Waypoint
+from aerobat.problem.stage import MIN_CROSSING_SPEED, Stage, StageSequence
+
+
+@maneuver("gate")
+class PassGate(Maneuver):
+    """Through the centre of a gate; `upright` with the thrust along its upright, however it is tilted."""
+
+    gate: str | None = None  # its name; left out, the only one
+    speed: NonNegative = MIN_CROSSING_SPEED  # [m/s] at least, along the direction of passage
+    upright: bool = False  # the thrust axis along the gate's upright, within half its tolerance
+    # least specific thrust along it; left out, 20 % of what the vehicle has
+    min_thrust: Positive | None = None  # [m/s²]
+
+    def stage_sequence(self, gates: Sequence[Gate], max_specific_thrust: float) -> StageSequence:
+        """Return one stage, the gate. Raises SpecError where it names none of several."""
+        gate = passed_gate(gates, self.gate, self.kind)
+        thrust = (self.min_thrust or THRUST_FRACTION * max_specific_thrust) if self.upright else None
+        return StageSequence(
+            (Stage(gate.name, gate=gate.name, min_upright_thrust=thrust, min_speed=self.speed),)
+        )
+
+    def in_words(self, gates: Sequence[Gate]) -> str:
+        """Return the gate that is passed."""
+        return f"through {gate_in_words(passed_gate(gates, self.gate, self.kind).name)}"
+
+    @property
+    def through_points(self) -> bool:
+        """True where no attitude is asked."""
+        return not self.upright
+
+
+@maneuver("waypoint")
+class PassWaypoint(Waypoint, Maneuver):
+    """By one waypoint, with as many components given as one likes."""
+
+    def stage_sequence(self, gates: Sequence[Gate], max_specific_thrust: float) -> StageSequence:
+        """Return one stage."""
+        return StageSequence((self.stage("waypoint", max_specific_thrust),))
+
+    def in_words(self, gates: Sequence[Gate]) -> str:
+        """Return the waypoint, or its gate."""
+        return "by a waypoint" if self.gate is None else f"through {gate_in_words(self.gate)}"
+
+    @property
+    def through_points(self) -> bool:
+        """True: it is one."""
+        return True
