@@ -30,7 +30,7 @@ from aerobat.declaration import (
     validated,
 )
 from aerobat.errors import SpecError
-from aerobat.problem.condition import Condition, ConeAngle, at_point
+from aerobat.problem.condition import Condition, ConeAngle, Quantity, at_point
 
 TOUCHING = 1e-6  # [m] within which frames touch, and neither stands in the other's opening
 

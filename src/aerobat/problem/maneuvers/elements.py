@@ -8,26 +8,38 @@ from aerobat.declaration import NonNegative, Positive
 from aerobat.problem.gate import Gate, passed_gate
 from aerobat.problem.maneuvers.maneuver import Maneuver, gate_in_words, maneuver
 from aerobat.problem.maneuvers.waypoints import THRUST_FRACTION, Waypoint
-from aerobat.problem.stage import MIN_CROSSING_SPEED, Stage, StageSequence
+from aerobat.problem.stage import MIN_CROSSING_SPEED, CrossingPoint, Stage, StageSequence, check_margin
 
 
 @maneuver("gate")
 class PassGate(Maneuver):
-    """Through the centre of a gate; `upright` with the thrust along its upright, however it is tilted."""
+    """Through a gate, at its centre or anywhere; `upright` with the thrust along its upright."""
 
     gate: str | None = None  # its name; left out, the only one
+    crossing_point: CrossingPoint = "centre"  # of the opening: its centre, or free
+    margin: NonNegative = 0.0  # [m] from the edges to the body, where the crossing point is free
     speed: NonNegative = MIN_CROSSING_SPEED  # [m/s] at least, along the direction of passage
     upright: bool = False  # the thrust axis along the gate's upright, within half its tolerance
     # least specific thrust along it; left out, 20 % of what the vehicle has
     min_thrust: Positive | None = None  # [m/s²]
 
+    def __post_init__(self) -> None:
+        """Check."""
+        check_margin(self.crossing_point, self.margin)
+
     def stage_sequence(self, gates: Sequence[Gate], max_specific_thrust: float) -> StageSequence:
         """Return one stage, the gate. Raises SpecError where it names none of several."""
         gate = passed_gate(gates, self.gate, self.kind)
         thrust = (self.min_thrust or THRUST_FRACTION * max_specific_thrust) if self.upright else None
-        return StageSequence(
-            (Stage(gate.name, gate=gate.name, min_upright_thrust=thrust, min_speed=self.speed),)
+        stage = Stage(
+            gate.name,
+            gate=gate.name,
+            min_upright_thrust=thrust,
+            min_speed=self.speed,
+            crossing_point=self.crossing_point,
+            margin=self.margin,
         )
+        return StageSequence((stage,))
 
     def in_words(self, gates: Sequence[Gate]) -> str:
         """Return the gate that is passed."""
