@@ -13,6 +13,7 @@ from aerobat.problem import (
     Condition,
     CustomManeuver,
     EndState,
+    HalfFlip,
     Limits,
     Line,
     Problem,

@@ -52,6 +52,7 @@ class Outcome(Enum):
     WRONG_ATTITUDE = (
         "passed {gate} {angle:.1f}° off the attitude asked at {time:.2f} s, {tolerance:.3g}° allowed"
     )
+    MISSED_WAYPOINT = "missed {waypoint}, {miss:.3f} m from it at {time:.2f} s, {radius:g} m allowed"
     HIT_GROUND = "hit the ground at {time:.2f} s"
     DIVERGED = "diverged at {time:.2f} s: position error above {radius:g} m"
     STATE_NOT_FINITE = "diverged at {time:.2f} s: its state is no longer a number"

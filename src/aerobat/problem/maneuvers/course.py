@@ -46,10 +46,10 @@ class Course(Maneuver):
         Raises SpecError, which names the element, for gates that do not suit it and for stages in no order.
         """
         sequences = [self._sequence(i, gates, max_specific_thrust) for i in range(len(self.elements))]
-        stages: list[Stage] = []
-        for lap in range(1, self.laps + 1):
-            flown = sequences[: self.last_lap] if lap == self.laps else sequences
-            stages += _named([replace(stage, lap=lap) for sequence in flown for stage in sequence.stages])
+        lap = tuple(_named([stage for sequence in sequences for stage in sequence.stages]))
+        last = sum(len(sequence.stages) for sequence in sequences[: self.last_lap])
+        flown = (lap[:last] if number == self.laps else lap for number in range(1, self.laps + 1))
+        stages = [replace(stage, lap=number) for number, each in enumerate(flown, 1) for stage in each]
         return StageSequence(tuple(stages), tuple(self._path_constraints(sequences)))
 
     def in_words(self, gates: Sequence[Gate]) -> str:
