@@ -71,7 +71,7 @@ def _nearest_instants(centres: Array, times: Array, position: Array, in_order: b
         in_order: true where one follows the other, and what is passed again is later by PASSAGE_WINDOW.
     """
     squares = [np.sum((position - centre) ** 2, axis=-1) for centre in centres]
-    if not in_order:
+    if not in_order or not squares:
         return [float(times[int(np.argmin(square))]) for square in squares]
     gaps = [0.0, *(PASSAGE_WINDOW if (a == b).all() else 0.0 for a, b in pairwise(centres))]
     before = [np.searchsorted(times, times - gap, side="right") for gap in gaps]  # rows that may come before

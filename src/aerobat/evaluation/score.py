@@ -17,7 +17,7 @@ from aerobat.kernels.running_metrics import RunningMetrics
 from aerobat.planning import Plan
 from aerobat.problem import Problem, as_problem
 from aerobat.simulation.flight import Flight
-from aerobat.simulation.outcome import Outcome, counted, length
+from aerobat.simulation.outcome import TOUCHDOWN, Outcome, counted, length
 from aerobat.simulation.passages import (
     Passage,
     WaypointPassage,
@@ -208,7 +208,7 @@ def score(flight: Flight, goal: Problem | Plan | str, vehicle: Vehicle | str | N
     body = None if vehicle is None else as_vehicle(vehicle).bounding_ellipsoid
     planned = passages_asked(goal, flight.times, flight.setpoint.flat.position)
     ground = flight.environment.ground
-    below = np.zeros(1, bool) if ground is None else states.position[:, 2] < ground
+    below = np.zeros(1, bool) if ground is None else states.position[:, 2] < ground - TOUCHDOWN
     scored = Scores(
         max_position_error_m=np.sqrt([square.max()]),
         rms_position_error_m=np.sqrt([square.mean()]),

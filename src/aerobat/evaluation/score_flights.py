@@ -30,7 +30,7 @@ from aerobat.planning import Plan
 from aerobat.problem import Problem, as_problem
 from aerobat.simulation.config import FlightConfig
 from aerobat.simulation.loop import Signals
-from aerobat.simulation.outcome import DIVERGENCE_RADIUS
+from aerobat.simulation.outcome import DIVERGENCE_RADIUS, TOUCHDOWN
 from aerobat.simulation.passages import PASSAGE_DEPTH, PASSAGE_WINDOW
 from aerobat.simulation.prepare import prepare
 from aerobat.simulation.reference_source import BLOCK
@@ -190,7 +190,7 @@ def with_metrics(setup: FlightSetup, planned: Asked = NOTHING_ASKED) -> FlightSe
     vehicles = len(setup.fleet)
     planes = tuple(_plane(passage, vehicles) for passage in planned.gates)
     targets = tuple(_target(waypoint, vehicles) for waypoint in planned.waypoints)
-    ground = -np.inf if setup.environment.ground is None else setup.environment.ground
+    ground = -np.inf if setup.environment.ground is None else setup.environment.ground - TOUCHDOWN
     body = BoundingEllipsoid(*map(components, (setup.fleet.body_centres, setup.fleet.semi_axes)))
     limits = np.full(vehicles, DIVERGENCE_RADIUS**2), np.full(vehicles, ground)
     parameters = MetricsParameters(*limits, body, planes, targets)

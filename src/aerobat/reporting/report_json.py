@@ -132,6 +132,7 @@ def _plan(plan: Plan) -> dict[str, Any]:
         "nodes": plan.nodes,
         "solve_time_s": plan.solve_time,
         "stages": [{"name": s.name, "interval": s.interval, "time_s": s.time} for s in plan.stages],
+        "lap_ends_s": list(plan.laps),
         "attempts": [
             {
                 "dt_s": a.dt,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Mapping
-from itertools import groupby
+from itertools import groupby, pairwise
 from math import degrees, isinf, isnan
 
 from rich.console import Console
@@ -146,6 +146,9 @@ def plan_facts(plan: Plan) -> Iterable[Fact]:
         yield "stage intervals", ", ".join(f"{s.name} {s.interval}" for s in plan.stages)
     elif plan.stages:
         yield "stages", ", ".join(f"{s.name} at {s.time:.2f} s" for s in plan.stages)
+    if plan.laps:
+        splits = pairwise((0.0, *plan.laps))
+        yield "laps", ", ".join(f"{end - begin:.3f} s" for begin, end in splits)
     if plan.margin is not None:
         yield "rotors", str(plan.margin)
     if plan.certificate is not None:

@@ -7,6 +7,7 @@ from collections.abc import Iterable
 from enum import Enum
 
 DIVERGENCE_RADIUS = 5.0  # [m] of position error: no controller is expected back from there
+TOUCHDOWN = 1e-3  # [m] below the ground that is no hit: paths that land end on it
 NO_LENGTH = 1e-6  # [m] less is rounding
 FEW_DECIMALS = 0.095  # what rounds to less than 0.10 has no two digits in two decimals
 
