@@ -403,6 +403,7 @@ def instance(cls: type) -> Any:
         ab.FlatState: lambda: plan().trajectory.flat(0.1),
         ab.Flight: flight,
         ab.Gate: lambda: ab.tilted_gate((0.0, 0.0, 1.0)),
+        ab.Hold: lambda: ab.Hold((0.0, 0.0, 1.0), 0.5),
         ab.Immelmann: lambda: ab.Immelmann((0.0, 0.0, 1.0)),
         ab.Inspection: lambda: ab.inspect_flight(**_inspected()),
         ab.InvertedPass: lambda: ab.InvertedPass((0.0, 0.0, 1.0)),

@@ -2,7 +2,7 @@
 
 from aerobat.problem.maneuvers.course import Course
 from aerobat.problem.maneuvers.custom import CustomManeuver
-from aerobat.problem.maneuvers.elements import PassGate, PassWaypoint
+from aerobat.problem.maneuvers.elements import Hold, PassGate, PassWaypoint
 from aerobat.problem.maneuvers.figures import (
     BarrelRoll,
     Corkscrew,
@@ -31,6 +31,7 @@ __all__ = [
     "Flip",
     "GatePassage",
     "HalfFlip",
+    "Hold",
     "Immelmann",
     "InvertedPass",
     "KnifeEdgePass",

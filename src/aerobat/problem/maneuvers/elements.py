@@ -1,10 +1,13 @@
-"""Elements of courses that are no figures: a gate, a waypoint."""
+"""Elements of courses that are no figures: a gate, a waypoint, a rest."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 
-from aerobat.declaration import NonNegative, Positive
+import numpy as np
+
+from aerobat.declaration import NonNegative, Positive, Vector3
+from aerobat.problem.condition import Condition, Quantity, at_point
 from aerobat.problem.gate import Gate, passed_gate
 from aerobat.problem.maneuvers.maneuver import Maneuver, gate_in_words, maneuver
 from aerobat.problem.maneuvers.waypoints import THRUST_FRACTION, Waypoint
@@ -67,3 +70,20 @@ class PassWaypoint(Waypoint, Maneuver):
     def through_points(self) -> bool:
         """True: it is one."""
         return True
+
+
+@maneuver("hold")
+class Hold(Maneuver):
+    """At rest at a place for a time; what comes before it and what comes after are planned by themselves."""
+
+    position: Vector3  # [m] world
+    time: Positive  # [s]
+
+    def stage_sequence(self, gates: Sequence[Gate], max_specific_thrust: float) -> StageSequence:
+        """Return one stage."""
+        still = tuple(Condition(Quantity.VELOCITY, axis, 0.0, 0.0) for axis in np.eye(3))
+        return StageSequence((Stage(self.kind, (*at_point(self.position), *still), hold=self.time),))
+
+    def in_words(self, gates: Sequence[Gate]) -> str:
+        """Return how long it holds."""
+        return f"hold for {self.time:g} s"
