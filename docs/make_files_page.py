@@ -10,6 +10,7 @@ import dataclasses
 import inspect
 import re
 import types
+from collections.abc import Sequence
 from enum import Enum
 from importlib.resources import files
 from importlib.resources.abc import Traversable
@@ -25,6 +26,7 @@ from aerobat.problem import (
     Ball,
     Condition,
     EndState,
+    Figure,
     Gate,
     GatePassage,
     Limits,
@@ -49,6 +51,7 @@ PLACES = {  # where each class stands in a file
     Stage: "`[[maneuver.stages]]`",
     Attitude: "`attitude` of a stage: where the thrust points, its drag counted",
     Ball: "`ball` of a stage: where it is, within a radius",
+    Figure: "A figure of `[maneuver]`, or of the `elements` of a course; what each is: [courses](courses.md)",
     Condition: "`conditions` and `path_constraints`: lower ≤ direction · quantity ≤ upper",
     Waypoint: "`[[maneuver.waypoints]]`",
     Rotor: "`[[rotors]]`",
@@ -175,7 +178,8 @@ def page() -> str:
     parts += [section(cls) for cls in (EndState, Gate, Limits, Environment)]
     parts += ["### Maneuvers\n", "`[maneuver]` has a `kind`, and what that kind takes:\n"]
     parts += [kind(name, cls) for name, cls in registered_maneuvers().items() if of_package(cls)]
-    parts += [section(GatePassage), section(Stage), section(Ball), section(Attitude), section(Condition)]
+    parts += [section(Figure), section(GatePassage), section(Stage), section(Ball), section(Attitude)]
+    parts += [section(Condition)]
     parts += [STAGES, section(Waypoint), WAYPOINTS]
     parts += ["## Vehicle (`--vehicle vehicle.toml`)\n", VEHICLE, fenced(ANNOTATED), table(Vehicle)]
     parts += [section(Rotor), ROTOR, section(Ellipsoid), BODY, section(Controller), CONTROLLER, IMPORT]
@@ -208,18 +212,26 @@ def section(cls: type) -> str:
 def kind(name: str, cls: type) -> str:
     """A kind of maneuver."""
     first = (cls.__doc__ or "").strip().partition("\n")[0]
-    return f'**`kind = "{name}"`** {first}\n\n{table(cls)}'
+    shared = next((base for base in cls.__mro__[1:] if base in PLACES), None)
+    beside = "" if shared is None else f"Takes what a [{shared.__name__}](#{shared.__name__.lower()}) takes"
+    inherited = () if shared is None else tuple(field.name for field in dataclasses.fields(shared))
+    own = [field.name for field in dataclasses.fields(cls) if field.name not in inherited]
+    if shared is None:
+        return f'**`kind = "{name}"`** {first}\n\n{table(cls)}'
+    also = f", and:\n\n{table(cls, inherited)}" if own else ".\n"
+    return f'**`kind = "{name}"`** {first}\n\n{beside}{also}'
 
 
-def table(cls: Any) -> str:
-    """The fields and shorthands of a declared class, a row each."""
+def table(cls: Any, told: Sequence[str] = ()) -> str:
+    """The fields and shorthands of a declared class, a row each, without fields that are told elsewhere."""
     meanings = comments(cls)
     hints = get_type_hints(cls, include_extras=True)
     rows = [
         (f"`{field.name}`", type_of(hints[field.name]), default_of(field), *meanings[field.name])
         for field in dataclasses.fields(cls)
+        if field.name not in told
     ]
-    for key, meaning in getattr(cls, "SHORTHANDS", {}).items():
+    for key, meaning in ({} if told else getattr(cls, "SHORTHANDS", {})).items():
         unit, text = split_unit(meaning)
         rows.append((f"`{key}`", "shorthand", "", unit, text))
     lines = ["| key | type | default | unit | meaning |", "| --- | --- | --- | --- | --- |"]
@@ -227,7 +239,13 @@ def table(cls: Any) -> str:
 
 
 def comments(cls: type) -> dict[str, tuple[str, str]]:
-    """Unit and meaning of each field, from the comments beside it and right above it."""
+    """Unit and meaning of each field, from the comments beside it and right above it, its bases' too."""
+    bases = [base for base in reversed(cls.__mro__) if dataclasses.is_dataclass(base)]
+    return {name: told for base in bases for name, told in own_comments(base).items()}
+
+
+def own_comments(cls: type) -> dict[str, tuple[str, str]]:
+    """Unit and meaning of each field that the class itself declares."""
     source = inspect.getsource(cls)
     lines = source.splitlines()
     (definition,) = ast.parse(source).body

@@ -236,7 +236,7 @@ maneuver = { kind = "zoom", speed = 4.0 }
 def test_a_maneuver_of_a_users_file_is_known_by_name_checked_planned_and_written(tmp_path: Path) -> None:
     (tmp_path / "zoom.py").write_text(PLUGIN)
     (tmp_path / "zooming.toml").write_text(ZOOMING)
-    with pytest.raises(SpecError, match=r"maneuver\.kind must be one of 'flip', .* got 'zoom'"):
+    with pytest.raises(SpecError, match=r"maneuver\.kind must be one of .*'flip', .* got 'zoom'"):
         ab.load_problem(tmp_path / "zooming.toml")
     ab.import_plugin(tmp_path / "zoom.py")
     ab.import_plugin(tmp_path / "zoom.py")  # once is enough, twice is no harm

@@ -15,6 +15,7 @@ from matplotlib.quiver import Quiver, QuiverKey
 
 import aerobat as ab
 from aerobat import so3
+from aerobat.planning import PlacedStage
 from aerobat.reporting.figures import draw, report_figure
 from aerobat.reporting.page import png
 from aerobat.reporting.panels import path as path_panel
@@ -284,6 +285,17 @@ def test_stages_are_numbered_where_their_names_have_no_room(monkeypatch):
     assert {str(k) for k in range(1, 9)} <= shown
     assert not {stage.name for stage in plan.stages} & shown
     require_legible(figure, monkeypatch)
+
+
+@pytest.mark.parametrize("count", [12, 19, 40])
+def test_a_course_of_many_stages_is_legible(count, monkeypatch):
+    """Of very many some are drawn and numbered, all are marked."""
+    plan = planned("flip-roll-translation")
+    times = np.linspace(0.0, plan.duration, count + 2)[1:-1].tolist()
+    stages = tuple(PlacedStage(f"waypoint {k}", k, time) for k, time in enumerate(times, 1))
+    figure = report_figure(replace(plan, stages=stages), ab.load_vehicle("agile-quad"))
+    require_legible(figure, monkeypatch)
+    assert any(f"11 of {count} in order" in text.get_text() for axes in figure.axes for text in axes.texts)
 
 
 def test_every_gate_is_drawn_inside_the_picture_with_a_vehicle_in_it(monkeypatch):

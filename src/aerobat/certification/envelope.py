@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from aerobat.declaration import Label, Limit, NonNegative, Number, TiltLimit, UnitVector, declared
+from aerobat.declaration import Count, Label, Limit, NonNegative, Number, TiltLimit, UnitVector, declared
 from aerobat.problem import Ball, Condition, Gate, Limits, Quantity, Stage
 from aerobat.problem.stage import PARALLEL
 
@@ -22,14 +22,16 @@ class PlannedPassage:
     attitude_tolerance: Number = np.inf  # [rad] between them, at most; infinite where no attitude is asked
     min_speed: NonNegative = CROSSING_SPEED  # [m/s] in the gate's direction; 0 where it may be met along it
     margin: NonNegative = 0.0  # [m] from the edges of its opening
+    lap: Count = 1  # of a course
 
     @classmethod
     def of(cls, stage: Stage, gate: Gate, time: float) -> PlannedPassage:
         """The passage that a stage of `Problem.stages` asks for, placed at a time [s]."""
         min_speed = 0.0 if any(_keeps_from(gate, each) for each in stage.conditions) else CROSSING_SPEED
         if stage.attitude is None:
-            return cls(gate, time, gate.up, min_speed=min_speed, margin=stage.margin)
-        return cls(gate, time, stage.attitude.up, gate.attitude_tolerance, min_speed, stage.margin)
+            return cls(gate, time, gate.up, min_speed=min_speed, margin=stage.margin, lap=stage.lap)
+        asked = stage.attitude.up, gate.attitude_tolerance
+        return cls(gate, time, *asked, min_speed, stage.margin, stage.lap)
 
 
 @declared
@@ -39,6 +41,7 @@ class PlannedWaypoint:
     name: Label
     ball: Ball
     time: NonNegative  # [s]
+    lap: Count = 1  # of a course
 
 
 def _keeps_from(gate: Gate, condition: Condition) -> bool:

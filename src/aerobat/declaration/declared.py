@@ -39,6 +39,8 @@ def declared(cls: type[T]) -> type[T]:
     `expand(table)` replaces them by fields on reading, and the method `abbreviate(table)` does the reverse on
     writing.
     """
+    plain_class: Any = cls  # checked by its fields even where a field of its base takes tables
+    plain_class.__get_pydantic_core_schema__ = classmethod(lambda _, source, handler: handler(source))
     made: Any = pydantic_dataclass(frozen=True, eq=False, config=CONFIG)(cls)
     made.__get_pydantic_core_schema__ = classmethod(_field_schema)
     made.__checked_init__ = _checked(made.__init__)

@@ -1,18 +1,20 @@
 """Evaluation: how well flights went, and what that depends on."""
 
 from aerobat.evaluation.opening import Opening, smallest_opening
-from aerobat.evaluation.score import Score, Scores, score
+from aerobat.evaluation.score import LapTime, Score, Scores, score
 from aerobat.evaluation.score_flights import score_flights
 from aerobat.evaluation.sensitivity import Gradient, Sensitivity, sensitivity
-from aerobat.simulation.passages import Passage
+from aerobat.simulation.passages import Passage, WaypointPassage
 
 __all__ = [
     "Gradient",
+    "LapTime",
     "Opening",
     "Passage",
     "Score",
     "Scores",
     "Sensitivity",
+    "WaypointPassage",
     "score",
     "score_flights",
     "sensitivity",

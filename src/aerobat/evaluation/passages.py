@@ -1,25 +1,35 @@
-"""Passages that flights are judged by: a plan's, or a problem's at the nearest approaches to its gates."""
+"""Passages that flights are judged by: a plan's, or a problem's where the set-points come nearest."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 
 from aerobat.arrays import Array
-from aerobat.certification import PlannedPassage
-from aerobat.planning import Plan, planned_passages
-from aerobat.problem.gate import Gate
+from aerobat.certification import PlannedPassage, PlannedWaypoint
+from aerobat.planning import Plan, planned_passages, planned_waypoints
 from aerobat.problem.problem import Problem
 from aerobat.problem.stage import Stage
 from aerobat.simulation.passages import PASSAGE_WINDOW
 
 
-def passages_asked(goal: Problem | Plan, times: Array, position: Array) -> tuple[PlannedPassage, ...]:
-    """The passages of gates in the order of the stages, of all gates where no stage names one.
+class Asked(NamedTuple):
+    """Passages of gates and waypoints, each in the order of the stages."""
 
-    When is said by a plan's stages; otherwise by the set-points' nearest approach to the gate's centre, after
-    the last one of the same gate.
+    gates: tuple[PlannedPassage, ...]
+    waypoints: tuple[PlannedWaypoint, ...]
+
+
+NOTHING_ASKED = Asked((), ())
+
+
+def passages_asked(goal: Problem | Plan, times: Array, position: Array) -> Asked:
+    """The passages in the order of the stages, of all gates where no stage names one or has a ball.
+
+    When is said by a plan's stages; otherwise by the set-points' nearest approaches to the centres, those of
+    stages that follow one another in their order.
 
     Args:
         goal: the problem, or a plan for it.
@@ -27,20 +37,52 @@ def passages_asked(goal: Problem | Plan, times: Array, position: Array) -> tuple
         position: of the set-points [m], (T, 3).
     """
     problem = goal.problem if isinstance(goal, Plan) else goal
-    planned = planned_passages(goal.stages, problem) if isinstance(goal, Plan) else ()
-    if planned:
-        return planned
-    stages = [stage for stage in problem.stages(1.0).stages if stage.gate is not None]
-    asked = [(problem.gate(str(stage.gate)), stage) for stage in stages]
-    asked = asked or [(gate, Stage(gate.name)) for gate in problem.gates]
-    instants = _nearest_instants([gate for gate, _ in asked], times, position)
-    return tuple(PlannedPassage.of(stage, gate, t) for (gate, stage), t in zip(asked, instants, strict=True))
+    if isinstance(goal, Plan):
+        planned = Asked(planned_passages(goal.stages, problem), planned_waypoints(goal.stages, problem))
+        if planned != NOTHING_ASKED:
+            return planned
+    sequence = problem.stages(1.0)
+    stages = [stage for stage in sequence.stages if stage.gate is not None or stage.ball is not None]
+    stages = stages or [Stage(gate.name, gate=gate.name) for gate in problem.gates]
+    centres = np.reshape([_centre(problem, stage) for stage in stages], (-1, 3))
+    in_order = sequence.ordered and bool(sequence.stages)
+    placed = list(zip(stages, _nearest_instants(centres, times, position, in_order), strict=True))
+    return Asked(
+        tuple(PlannedPassage.of(s, problem.gate(s.gate), t) for s, t in placed if s.gate is not None),
+        tuple(PlannedWaypoint(s.name, s.ball, t, s.lap) for s, t in placed if s.ball is not None),
+    )
 
 
-def _nearest_instants(gates: Sequence[Gate], times: Array, position: Array) -> Iterator[float]:
-    latest: dict[str, float] = {}
-    for gate in gates:
-        distance = np.linalg.norm(position - gate.position, axis=-1)
-        after = latest.get(gate.name, -np.inf) + PASSAGE_WINDOW
-        latest[gate.name] = float(times[int(np.argmin(np.where(times > after, distance, np.inf)))])
-        yield latest[gate.name]
+def _centre(problem: Problem, stage: Stage) -> Array:
+    """The centre of the stage's gate, or of its ball [m], (3,)."""
+    if stage.gate is not None:
+        return problem.gate(stage.gate).position
+    assert stage.ball is not None
+    return stage.ball.centre
+
+
+def _nearest_instants(centres: Array, times: Array, position: Array, in_order: bool) -> list[float]:
+    """The instants of the nearest approaches; in order those of the least sum of squared distances.
+
+    Args:
+        centres: of what is passed [m], (n, 3).
+        times: of the set-points [s], (T,).
+        position: of the set-points [m], (T, 3).
+        in_order: true where one follows the other, and what is passed again is later by PASSAGE_WINDOW.
+    """
+    squares = [np.sum((position - centre) ** 2, axis=-1) for centre in centres]
+    if not in_order or not squares:
+        return [float(times[int(np.argmin(square))]) for square in squares]
+    gaps = [0.0, *(PASSAGE_WINDOW if (a == b).all() else 0.0 for a, b in pairwise(centres))]
+    before = [np.searchsorted(times, times - gap, side="right") for gap in gaps]  # rows that may come before
+    best = np.zeros(len(times) + 1)
+    sums = []
+    for square, rows in zip(squares, before, strict=True):
+        sums.append(square + best[rows])
+        best = np.append(np.inf, np.minimum.accumulate(sums[-1]))
+    chosen: list[int] = []
+    end = len(times)
+    for total, rows in zip(reversed(sums), reversed(before), strict=True):
+        chosen.append(int(np.argmin(total[: max(end, 1)])))
+        end = int(rows[chosen[-1]])
+    return [float(times[k]) for k in reversed(chosen)]

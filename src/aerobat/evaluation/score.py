@@ -10,17 +10,23 @@ from numpy.typing import NDArray
 
 from aerobat import so3
 from aerobat.arrays import Array
-from aerobat.certification import PlannedPassage
 from aerobat.declaration import by_value, in_notebooks, short, shown, validated
 from aerobat.errors import OutOfRange, SpecError
-from aerobat.evaluation.passages import passages_asked
+from aerobat.evaluation.passages import Asked, passages_asked
 from aerobat.kernels.running_metrics import RunningMetrics
 from aerobat.planning import Plan
 from aerobat.problem import Problem, as_problem
 from aerobat.simulation.contact import Contact
 from aerobat.simulation.flight import Flight
-from aerobat.simulation.outcome import Outcome, counted, length
-from aerobat.simulation.passages import Passage, flown_passages, passages
+from aerobat.simulation.outcome import TOUCHDOWN, Outcome, counted, length
+from aerobat.simulation.passages import (
+    Passage,
+    WaypointPassage,
+    flown_passages,
+    flown_waypoints,
+    passages,
+    waypoint_passages,
+)
 from aerobat.vehicle import Vehicle, as_vehicle
 
 COASTING = 0.1  # [s] without a pose: several periods of any motion capture
@@ -43,6 +49,15 @@ class ObserverScore:
         return self.longest_without_pose_s > COASTING
 
 
+@dataclass(frozen=True)
+class LapTime:
+    """A lap of a course as it was flown, to the last of its gates and waypoints."""
+
+    lap: int  # counted from 1
+    end: float  # [s] when that was passed; NaN where one of the lap was not
+    duration: float  # [s] since the lap before, or the start
+
+
 @in_notebooks
 @by_value
 @dataclass(frozen=True, eq=False)
@@ -58,6 +73,17 @@ class Score:
     outcome: Outcome  # the first thing that went wrong, if anything did
     sentence: str  # the outcome with its numbers
     observer: ObserverScore | None = None  # of a filter, where a logged flight had one
+    waypoints: tuple[WaypointPassage, ...] = ()  # one for each ball, in the order of the stages
+
+    @property
+    def laps(self) -> tuple[LapTime, ...]:
+        """The laps of a course of several; none where it has no gates or waypoints."""
+        passed = [(gate.lap, gate.time) for gate in self.passages]
+        passed += [(waypoint.lap, waypoint.time) for waypoint in self.waypoints]
+        numbers = sorted({lap for lap, _ in passed})
+        ends = [float(np.max([time for lap, time in passed if lap == number])) for number in numbers]
+        durations = np.diff([0.0, *ends]).tolist()
+        return tuple(map(LapTime, numbers, ends, durations)) if len(numbers) > 1 else ()
 
     def __str__(self) -> str:
         """One line for people."""
@@ -82,6 +108,7 @@ class Scores:
     rms_attitude_error_deg: Array
     saturated_fraction: Array
     passages: tuple[Passage, ...]  # one for each gate, its fields arrays
+    waypoints: tuple[WaypointPassage, ...]  # one for each ball, its fields arrays
     stop: Array  # [s] when a flight diverged, NaN if it did not
     is_finite: Array  # false where a flight diverged by what is not a number
     ground_time: Array  # [s] when a vehicle was below ground first, NaN if never
@@ -90,7 +117,8 @@ class Scores:
 
     def __post_init__(self) -> None:
         """Write-protect."""
-        for value in (*vars(self).values(), *(part for one in self.passages for part in vars(one).values())):
+        parts = (part for one in (*self.passages, *self.waypoints) for part in vars(one).values())
+        for value in (*vars(self).values(), *parts):
             if isinstance(value, np.ndarray):
                 value.flags.writeable = False
 
@@ -103,13 +131,15 @@ class Scores:
         if not -len(self) <= k < len(self):
             raise OutOfRange(f"there are {len(self)} flights, no flight {shown(k)}; count from 0")
         passed = tuple(passage.of_flight(k) for passage in self.passages)
-        outcome, sentence = self._outcome(k, passed)
+        met = tuple(waypoint.of_flight(k) for waypoint in self.waypoints)
+        outcome, sentence = self._outcome(k, passed, met)
         return Score(
             **{field.name: float(getattr(self, field.name)[k]) for field in fields(self)[:5]},
             passages=passed,
             outcome=outcome,
             sentence=sentence,
             observer=None,
+            waypoints=met,
         )
 
     def __iter__(self) -> Iterator[Score]:
@@ -130,7 +160,9 @@ class Scores:
         """Outcome of each flight."""
         return tuple(score.outcome for score in self)
 
-    def _outcome(self, k: int, passed: tuple[Passage, ...]) -> tuple[Outcome, str]:
+    def _outcome(
+        self, k: int, passed: tuple[Passage, ...], met: tuple[WaypointPassage, ...]
+    ) -> tuple[Outcome, str]:
         """The first thing that went wrong, else through all gates, else flown to the end."""
         found: list[tuple[float, Outcome, dict[str, object]]] = []
         if np.isfinite(self.stop[k]):
@@ -147,6 +179,9 @@ class Scores:
             if passage.failure is not None:
                 outcome, time, numbers = passage.failure
                 found.append((time, outcome, {"gate": label, **numbers}))
+        found += [
+            (time, outcome, numbers) for outcome, time, numbers in (w.failure for w in met if w.failure)
+        ]
         if found:
             time, outcome, numbers = min(found, key=lambda event: event[0])
             return outcome, outcome.sentence(time=time, **numbers)
@@ -181,14 +216,15 @@ def score(flight: Flight, goal: Problem | Plan | str, vehicle: Vehicle | str | N
     planned = passages_asked(goal, flight.times, flight.setpoint.flat.position)
     ground = flight.environment.ground
     contact, touched = flight.first_contact
-    below = np.zeros(1, bool) if ground is None else states.position[:, 2] < ground
+    below = np.zeros(1, bool) if ground is None else states.position[:, 2] < ground - TOUCHDOWN
     scored = Scores(
         max_position_error_m=np.sqrt([square.max()]),
         rms_position_error_m=np.sqrt([square.mean()]),
         max_attitude_error_deg=np.rad2deg([angle.max()]),
         rms_attitude_error_deg=np.rad2deg(np.sqrt([np.mean(angle**2)])),
         saturated_fraction=np.array([flight.saturated.mean()]),
-        passages=tuple(flown_passages(flight, planned, body)),
+        passages=tuple(flown_passages(flight, planned.gates, body)),
+        waypoints=tuple(flown_waypoints(flight, planned.waypoints)),
         stop=stop,
         is_finite=np.array([flight.outcome is not Outcome.STATE_NOT_FINITE]),
         ground_time=np.array([flight.times[int(np.argmax(below))] if below.any() else np.nan]),
@@ -215,7 +251,7 @@ def _observer(flight: Flight) -> ObserverScore | None:
     )
 
 
-def scores_of(metrics: RunningMetrics, planned: tuple[PlannedPassage, ...]) -> Scores:
+def scores_of(metrics: RunningMetrics, planned: Asked) -> Scores:
     """Scores of flights that were added up as they were flown, from their last metrics, leaves (flights,)."""
     ticks = np.maximum(metrics.ticks, 1.0)
     stop = np.where(metrics.flying < 0.5, metrics.stop, np.nan)
@@ -227,7 +263,12 @@ def scores_of(metrics: RunningMetrics, planned: tuple[PlannedPassage, ...]) -> S
         rms_attitude_error_deg=np.rad2deg(np.sqrt(metrics.sum_square_angle / ticks)),
         saturated_fraction=metrics.saturated / ticks,
         passages=tuple(
-            passages(each, progress, stop) for each, progress in zip(planned, metrics.gates, strict=True)
+            passages(each, progress, stop)
+            for each, progress in zip(planned.gates, metrics.gates, strict=True)
+        ),
+        waypoints=tuple(
+            waypoint_passages(each, approach, stop)
+            for each, approach in zip(planned.waypoints, metrics.waypoints, strict=True)
         ),
         stop=stop,
         is_finite=metrics.is_finite > 0.5,

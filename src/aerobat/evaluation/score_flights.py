@@ -11,16 +11,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from aerobat.arrays import Array
-from aerobat.certification import PlannedPassage
+from aerobat.certification import PlannedPassage, PlannedWaypoint
 from aerobat.declaration import validated
 from aerobat.engines import logged_ticks
 from aerobat.engines.components import components
 from aerobat.engines.pytree import tree_map, tree_stack
 from aerobat.environment import Environment
 from aerobat.errors import SpecError
-from aerobat.evaluation.passages import passages_asked
+from aerobat.evaluation.passages import NOTHING_ASKED, Asked, passages_asked
 from aerobat.evaluation.score import Scores, scores_of
 from aerobat.kernels import running_metrics
+from aerobat.kernels.gates.approach import Target
 from aerobat.kernels.gates.progress import GatePlane
 from aerobat.kernels.gates.section import BoundingEllipsoid, GateFrame
 from aerobat.kernels.ops import Ops
@@ -29,7 +30,7 @@ from aerobat.planning import Plan
 from aerobat.problem import Problem, as_problem
 from aerobat.simulation.config import FlightConfig
 from aerobat.simulation.loop import Signals
-from aerobat.simulation.outcome import DIVERGENCE_RADIUS
+from aerobat.simulation.outcome import DIVERGENCE_RADIUS, TOUCHDOWN
 from aerobat.simulation.passages import PASSAGE_DEPTH, PASSAGE_WINDOW
 from aerobat.simulation.prepare import prepare
 from aerobat.simulation.reference_source import BLOCK
@@ -43,6 +44,7 @@ class MetricsMonitor:
     """The loop's component that adds up a flight's metrics."""
 
     gates: int
+    waypoints: int
     period: int = 1
     name: str = "metrics"
     feedthrough: bool = True
@@ -51,7 +53,7 @@ class MetricsMonitor:
         self, ops: Ops, parameters: MetricsParameters, inputs: MetricsInput, signals: Signals
     ) -> RunningMetrics:
         """See `Component.init`."""
-        return running_metrics.init(self.gates)
+        return running_metrics.init(self.gates, self.waypoints)
 
     def step(
         self,
@@ -185,15 +187,16 @@ def metrics_row(signals: Signals) -> RunningMetrics:
     return metrics
 
 
-def with_metrics(setup: FlightSetup, planned: tuple[PlannedPassage, ...] = ()) -> FlightSetup:
+def with_metrics(setup: FlightSetup, planned: Asked = NOTHING_ASKED) -> FlightSetup:
     """The same flight with its metrics added up, those of planned passages among them."""
     vehicles = len(setup.fleet)
-    planes = tuple(_plane(passage, vehicles) for passage in planned)
-    ground = -np.inf if setup.environment.ground is None else setup.environment.ground
+    planes = tuple(_plane(passage, vehicles) for passage in planned.gates)
+    targets = tuple(_target(waypoint, vehicles) for waypoint in planned.waypoints)
+    ground = -np.inf if setup.environment.ground is None else setup.environment.ground - TOUCHDOWN
     body = BoundingEllipsoid(*map(components, (setup.fleet.body_centres, setup.fleet.semi_axes)))
     limits = np.full(vehicles, DIVERGENCE_RADIUS**2), np.full(vehicles, ground)
-    parameters = MetricsParameters(*limits, body, planes)
-    metrics = Part(MetricsMonitor(len(planes)), parameters, MetricsSource(setup.times))
+    parameters = MetricsParameters(*limits, body, planes, targets)
+    metrics = Part(MetricsMonitor(len(planes), len(targets)), parameters, MetricsSource(setup.times))
     return replace(setup, parts=(*setup.parts, metrics))
 
 
@@ -206,3 +209,9 @@ def _plane(passage: PlannedPassage, vehicles: int) -> GatePlane:
     )
     numbers = (np.full(vehicles, x) for x in (passage.time, PASSAGE_WINDOW, PASSAGE_DEPTH))
     return GatePlane(centre, GateFrame(*frame), *numbers)
+
+
+def _target(waypoint: PlannedWaypoint, vehicles: int) -> Target:
+    """A planned waypoint as kernels read it, leaves (vehicles,)."""
+    centre = components(np.broadcast_to(waypoint.ball.centre, (vehicles, 3)))
+    return Target(centre, np.full(vehicles, waypoint.time), np.full(vehicles, PASSAGE_WINDOW))

@@ -7,7 +7,8 @@ from math import inf
 from operator import add as plus
 from typing import NamedTuple
 
-from aerobat.kernels.gates import progress
+from aerobat.kernels.gates import approach, progress
+from aerobat.kernels.gates.approach import Approach, Target
 from aerobat.kernels.gates.progress import GatePlane, GateProgress
 from aerobat.kernels.gates.section import BoundingEllipsoid
 from aerobat.kernels.gates.snapshot import Snapshot
@@ -30,6 +31,7 @@ class MetricsParameters(NamedTuple):
     ground: Scalar  # [m] height, −infinity where there is none
     ellipsoid: BoundingEllipsoid  # of the vehicle
     gates: tuple[GatePlane, ...]
+    waypoints: tuple[Target, ...]
 
 
 class RunningMetrics(NamedTuple):
@@ -47,13 +49,15 @@ class RunningMetrics(NamedTuple):
     saturated: Scalar  # ticks
     last: Snapshot
     gates: tuple[GateProgress, ...]
+    waypoints: tuple[Approach, ...]
 
 
-def init(gates: int) -> RunningMetrics:
-    """Metrics before the first tick of a flight through so many gates."""
+def init(gates: int, waypoints: int) -> RunningMetrics:
+    """Metrics before the first tick of a flight through so many gates, by so many waypoints."""
     nowhere = Snapshot(0.0, ZERO, ZERO, (1.0, 0.0, 0.0, 0.0))
     passages = gates * (progress.init(),)
-    return RunningMetrics(1.0, 1.0, 0.0, inf, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, nowhere, passages)
+    approaches = waypoints * (approach.init(),)
+    return RunningMetrics(1.0, 1.0, 0.0, inf, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, nowhere, passages, approaches)
 
 
 def step(
@@ -105,17 +109,27 @@ def step(
                 gate,
                 plane,
                 parameters.ellipsoid,
-                (_relative(metrics.last, plane), _relative(now, plane)),
+                (_relative(metrics.last, plane.centre), _relative(now, plane.centre)),
                 (metrics.ticks > 0.5, counted),
             )
             for gate, plane in zip(metrics.gates, parameters.gates, strict=True)
         ),
+        waypoints=tuple(
+            approach.step(
+                ops,
+                latest,
+                target,
+                (_relative(metrics.last, target.centre), _relative(now, target.centre)),
+                (metrics.ticks > 0.5) & counted,
+            )
+            for latest, target in zip(metrics.waypoints, parameters.waypoints, strict=True)
+        ),
     )
 
 
-def _relative(snapshot: Snapshot, plane: GatePlane) -> Snapshot:
-    """The snapshot with its position from the centre of a gate's opening."""
-    return snapshot._replace(position=subtract(snapshot.position, plane.centre))
+def _relative(snapshot: Snapshot, centre: Vector) -> Snapshot:
+    """The snapshot with its position from a centre."""
+    return snapshot._replace(position=subtract(snapshot.position, centre))
 
 
 def _is_finite(body: Body, thrusts: PerRotor, commands: PerRotor) -> Scalar:

@@ -4,7 +4,7 @@ from .assessment.lower_bound import least_duration
 from .certified_solve import Judged, Solution, certified_solve, with_certificate
 from .flyability import nominal_flight, own_flight, with_flyability
 from .miqp import Miqp
-from .passages import planned_passages
+from .passages import planned_passages, planned_waypoints
 from .plan_file import load_plan
 from .planners import (
     Planner,
@@ -61,6 +61,7 @@ __all__ = [
     "own_flight",
     "plan",
     "planned_passages",
+    "planned_waypoints",
     "planner",
     "planner_class",
     "planner_options",

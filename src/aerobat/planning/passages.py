@@ -40,7 +40,7 @@ def planned_waypoints(stages: Sequence[PlacedStage], problem: Problem) -> tuple[
         stage = next((stage for stage in asked if stage.name == place.name), None)
         if stage is not None and stage.ball is not None:
             asked = [other for other in asked if other is not stage]
-            found.append(PlannedWaypoint(stage.name, stage.ball, place.time))
+            found.append(PlannedWaypoint(stage.name, stage.ball, place.time, stage.lap))
     return tuple(found)
 
 

@@ -20,6 +20,7 @@ from aerobat.errors import SpecError
 from aerobat.planning.assessment.assess import with_assessment
 from aerobat.planning.certified_solve import with_certificate
 from aerobat.planning.flyability import with_flyability
+from aerobat.planning.holds import between_holds
 from aerobat.planning.passages import require_openings
 from aerobat.planning.recorder import Progress
 from aerobat.planning.result import Plan
@@ -134,7 +135,8 @@ def planner(name: Label) -> Callable[[type[P]], type[P]]:
 
     def register(cls: type[P]) -> type[P]:
         if "plan" in vars(cls):
-            cls.plan = validated(cls.plan)  # type: ignore[method-assign]
+            planning: Any = cls
+            planning.plan = validated(between_holds(cls.plan))
         return cast(type[P], PLANNERS.add(name, cls))
 
     return register

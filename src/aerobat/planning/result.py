@@ -164,6 +164,15 @@ class Plan:
         return self.starts[-1] / self.starts[0] - 1.0 if len(self.starts) > 1 else None
 
     @property
+    def laps(self) -> tuple[float, ...]:
+        """The times [s] at which the laps of a course of several end, with their last stages."""
+        stages = self.problem.stages(1.0).stages
+        if len(stages) != len(self.stages):
+            return ()
+        ends = {stage.lap: place.time for stage, place in zip(stages, self.stages, strict=True)}
+        return tuple(ends.values()) if len(ends) > 1 else ()
+
+    @property
     def intervals(self) -> int:
         """The trajectory's number of segments."""
         return self.trajectory.segments

@@ -206,6 +206,17 @@ class Attitude:
         return (*(Condition(Quantity.SPECIFIC_THRUST, face, upper=0.0) for face in faces), along)
 
 
+def free() -> Array:
+    """Components of which none is given."""
+    return np.full(3, np.nan)
+
+
+def at_point(position: Array) -> tuple[Condition, ...]:
+    """The given components of a position [m], world, (3,); those that are NaN are free."""
+    given = zip(np.eye(3), position.tolist(), strict=True)
+    return tuple(Condition(Quantity.POSITION, axis, x, x) for axis, x in given if x == x)
+
+
 def thrust_in_plane(direction: Array, axis: Array, minimum: float) -> tuple[Condition, ...]:
     """Specific thrust along `direction` in the plane normal to `axis`: none across, a minimum along.
 

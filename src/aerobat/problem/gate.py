@@ -30,7 +30,9 @@ from aerobat.declaration import (
     validated,
 )
 from aerobat.errors import SpecError
-from aerobat.problem.condition import Condition, ConeAngle, Quantity
+from aerobat.problem.condition import Condition, ConeAngle, Quantity, at_point
+
+TOUCHING = 1e-6  # [m] within which frames touch, and neither stands in the other's opening
 
 
 @declared
@@ -107,6 +109,18 @@ class Gate:
             ]
         )
 
+    def stands_in(self, other: Gate) -> bool:
+        """True if a side of its opening, where its frame is, passes through the other's opening."""
+        corners = (self.corners - other.position) @ np.array([other.lateral, other.up, other.normal]).T
+        last = np.roll(corners, 1, axis=0)
+        height, last_height = corners[:, 2:], last[:, 2:]
+        crosses = np.minimum(height, last_height) * np.maximum(height, last_height) < 0.0
+        rise = np.where(crosses, height - last_height, 1.0)
+        crossings = np.where(crosses, last - last_height / rise * (corners - last), corners)
+        sizes = np.array([other.width, other.height, 0.0])
+        in_opening = (np.abs(crossings) - sizes / 2)[:, :2].max(axis=1) < -TOUCHING
+        return bool((in_opening & (np.abs(crossings[:, 2]) < TOUCHING)).any())
+
     @property
     def angles(self) -> tuple[float, float, float]:
         """Heading, elevation and tilt [rad], as `tilted_gate` takes them."""
@@ -155,9 +169,7 @@ def tilted_gate(
 
 def at_centre(gate: Gate) -> tuple[Condition, ...]:
     """Meeting the centre of a gate's opening."""
-    return tuple(
-        Condition(Quantity.POSITION, e, x, x) for e, x in zip(np.eye(3), gate.position.tolist(), strict=True)
-    )
+    return at_point(gate.position)
 
 
 def in_opening(gate: Gate, clearance: float) -> tuple[Condition, ...]:
@@ -178,9 +190,15 @@ def only_gate(gates: Sequence[Gate], maneuver: str) -> Gate:
     if len(gates) != 1:
         has = "none" if not gates else str(len(gates))
         raise SpecError(
-            f"a {maneuver} passes one gate, there is {has}; give one table [[gates]] with a position"
+            f"a {maneuver} passes one gate, there is {has}; give one table [[gates]] with a position, "
+            "or the name of its gate"
         )
     return gates[0]
+
+
+def passed_gate(gates: Sequence[Gate], name: str | None, maneuver: str) -> Gate:
+    """The gate of that name or, without one, the only gate. Raises SpecError when there is none."""
+    return only_gate(gates, maneuver) if name is None else named_gate(gates, name)
 
 
 def named_gate(gates: Sequence[Gate], name: str) -> Gate:

@@ -6,6 +6,7 @@ import re
 from collections.abc import Mapping
 from dataclasses import field, replace
 from functools import lru_cache
+from itertools import permutations
 from typing import Annotated, Any, ClassVar, cast
 
 import numpy as np
@@ -155,6 +156,12 @@ class Problem:
                 raise FieldError(f"gates[{i}].name", f": there are two gates named '{name}'; rename one")
         if self.start.free_attitude:
             raise FieldError("start.free_attitude", "is for goals, a start has its attitude; drop it")
+        for inner, outer in permutations(self.gates, 2):
+            if inner.stands_in(outer):
+                raise FieldError(
+                    "gates",
+                    f": gate '{inner.name}' stands in the opening of gate '{outer.name}'; move one of them",
+                )
         self._check_within_limits()
         sequence = self.stages(1.0)
         self._check_stages(sequence)
@@ -226,10 +233,12 @@ class Problem:
 
     def __str__(self) -> str:
         """One line for people."""
-        ends = (f"({x:g}, {y:g}, {z:g})" for x, y, z in (self.start.position, self.goal.position))
-        through = ", ".join(f"'{gate.name}'" for gate in self.gates)
-        gates = f" through {through}" if through else ""
-        facts = f"{self.name}: {self.maneuver.kind} from {' to '.join(ends)} m{gates}"
+        start, goal = (
+            "({:g}, {:g}, {:g}) m".format(*state.position.tolist()) for state in (self.start, self.goal)
+        )
+        on_ground = self.environment.ground is not None and self.goal.position[2] == self.environment.ground
+        at_end = ("land at" if on_ground else "stop at") if not self.goal.velocity.any() else "pass"
+        facts = f"{self.name}: from {start}: {self.maneuver.in_words(self.gates)}, {at_end} {goal}"
         return "; ".join(filter(None, (facts, " ".join(self.description.split()))))
 
     def _check_point(self, name: str, value: Array, derivative: int) -> None:

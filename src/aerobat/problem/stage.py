@@ -6,9 +6,11 @@ from dataclasses import replace
 from math import ceil, floor
 from typing import Annotated, Any, Literal
 
+import numpy as np
 from pydantic import Field, PlainValidator
 
-from aerobat.declaration import FieldError, Label, NonNegative, Positive, declared, shown
+from aerobat.arrays import Array
+from aerobat.declaration import Count, FieldError, Label, NonNegative, Positive, declared, shown
 from aerobat.problem.ball import Ball
 from aerobat.problem.condition import Attitude, Condition, Quantity
 from aerobat.problem.gate import Gate, at_centre, in_opening
@@ -66,12 +68,16 @@ class Stage:
     crossing_point: CrossingPoint = "centre"  # of the gate's opening: its centre, or free
     margin: NonNegative = 0.0  # [m] from the edges to the body, where the crossing point is free
     ball: Ball | None = None  # where it is, within a radius
+    lap: Count = 1  # the lap of a course that it belongs to
+    hold: NonNegative = 0.0  # [s] at rest at the position that `conditions` fix
 
     def __post_init__(self) -> None:
         """Check."""
         check_crossing(self.gate, self.crossing_point, self.margin)
         if self.ball is not None and self.gate is not None:
             raise FieldError("ball", "stands beside gate, which says where; give one of them")
+        if self.hold and np.isnan(self.place).any():
+            raise FieldError("hold", "needs conditions that fix the position along x, y and z; add them")
         if self.min_speed is not None and self.gate is None:
             raise FieldError("min_speed", "needs gate, whose direction of passage is meant; name it")
         if self.min_upright_thrust is not None:
@@ -79,6 +85,16 @@ class Stage:
                 raise FieldError("min_upright_thrust", "needs gate, whose upright is meant; name it")
             if self.attitude is not None:
                 raise FieldError("min_upright_thrust", "stands beside attitude; give one of them")
+
+    @property
+    def place(self) -> Array:
+        """The components of the position that its own conditions fix [m], the others NaN, (3,)."""
+        place = np.full(3, np.nan)
+        for c in self.conditions:
+            along = c.direction != 0.0
+            if c.quantity is Quantity.POSITION and c.lower == c.upper and along.sum() == 1:
+                place[along] = c.lower / c.direction[along]
+        return place
 
     @property
     def window(self) -> tuple[float, float]:

@@ -17,6 +17,7 @@ from aerobat.reporting.comparison import comparison_rows
 from aerobat.simulation import Flight
 from aerobat.studies.compare import Comparison
 from aerobat.studies.sweep import Sweep
+from aerobat.studies.sweep.flights import passage_names
 
 if TYPE_CHECKING:
     from pandas import DataFrame
@@ -87,7 +88,10 @@ def _of_scores(scores: Scores) -> dict[str, Any]:
     """The columns of many flights' scores."""
     columns: dict[str, Any] = {name: getattr(scores, name) for name in METRICS}
     columns["outcome"] = [outcome.name.lower() for outcome in scores.outcomes]
-    for passage in scores.passages:
-        names = (name for name in _names(type(passage)) if name != "gate")
-        columns |= {f"{passage.gate}_{name}": getattr(passage, name) for name in names}
+    for begin, passage in zip(passage_names(scores.passages), scores.passages, strict=True):
+        names = (name for name in _names(type(passage)) if name not in ("gate", "lap"))
+        columns |= {f"{begin}_{name}": getattr(passage, name) for name in names}
+    for waypoint in scores.waypoints:
+        begin = f"{waypoint.waypoint}_lap_{waypoint.lap}"
+        columns |= {f"{begin}_{name}": getattr(waypoint, name) for name in ("time", "miss", "speed")}
     return columns

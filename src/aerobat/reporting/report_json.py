@@ -49,10 +49,12 @@ def to_json(facts: dict[str, Any] | list[dict[str, Any]]) -> str:
 def _flight(score: Score) -> dict[str, Any]:
     """A score; what is not known or not limited is None, as JSON has neither NaN nor infinity."""
     facts = asdict(score) | {"outcome": score.outcome.name.lower()}
-    facts["passages"] = [
-        {name: None if value in ("", inf) or value != value else value for name, value in passage.items()}
-        for passage in facts["passages"]
-    ]
+    facts["laps"] = [asdict(lap) for lap in score.laps]
+    for places in ("passages", "waypoints", "laps"):
+        facts[places] = [
+            {name: None if value in ("", inf) or value != value else value for name, value in place.items()}
+            for place in facts[places]
+        ]
     return facts
 
 
@@ -137,6 +139,7 @@ def _plan(plan: Plan) -> dict[str, Any]:
         "nodes": plan.nodes,
         "solve_time_s": plan.solve_time,
         "stages": [{"name": s.name, "interval": s.interval, "time_s": s.time} for s in plan.stages],
+        "lap_ends_s": list(plan.laps),
         "attempts": [
             {
                 "dt_s": a.dt,

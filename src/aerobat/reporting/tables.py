@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Mapping
-from itertools import groupby
+from itertools import groupby, pairwise
 from math import degrees, isinf, isnan
 
 from rich.console import Console
@@ -153,6 +153,9 @@ def plan_facts(plan: Plan) -> Iterable[Fact]:
         yield "stage intervals", ", ".join(f"{s.name} {s.interval}" for s in plan.stages)
     elif plan.stages:
         yield "stages", ", ".join(f"{s.name} at {s.time:.2f} s" for s in plan.stages)
+    if plan.laps:
+        splits = pairwise((0.0, *plan.laps))
+        yield "laps", ", ".join(f"{end - begin:.3f} s" for begin, end in splits)
     if plan.margin is not None:
         yield "rotors", str(plan.margin)
     if plan.certificate is not None:
@@ -216,18 +219,19 @@ def flight_facts(score: Score, controller: str | None = None, plant: str | None 
     yield "attitude error", _pair(score.max_attitude_error_deg, score.rms_attitude_error_deg, "°")
     if score.observer is not None:
         yield "observer", _observer(score.observer)
+    several = bool(score.laps)
     for passage in score.passages:
-        clearance = "" if isnan(passage.clearance) else f", {_clearance(passage)}"
-        allowed = (
-            ""
-            if isinf(passage.attitude_tolerance_deg)
-            else f" of {passage.attitude_tolerance_deg:.3g}° allowed"
+        yield _of_lap(passage.gate, passage.lap, several), _passed(passage)
+    for waypoint in score.waypoints:
+        met = (
+            f"{length(waypoint.miss)} from it, {length(waypoint.radius)} allowed, "
+            f"at {waypoint.speed:.2f} m/s at {waypoint.time:.2f} s"
         )
-        passed = (
-            f"{length(passage.miss)} off, {passage.attitude_error_deg:.2f}°{allowed}, "
-            f"at {passage.speed:.2f} m/s{clearance}"
-        )
-        yield passage.gate, "not passed" if isnan(passage.time) else passed
+        missed = "not reached" if isnan(waypoint.time) else met
+        yield _of_lap(waypoint.waypoint, waypoint.lap, several), missed
+    for lap in score.laps:
+        split = "not flown" if isnan(lap.duration) else f"{lap.duration:.3f} s, until {lap.end:.3f} s"
+        yield f"lap {lap.lap}", split
     yield "saturated", f"{100 * score.saturated_fraction:.1f} % of the time"
 
 
@@ -240,6 +244,24 @@ def _observer(found: ObserverScore) -> str:
         return errors
     begin = found.until_s - found.longest_without_pose_s
     return f"{errors}; no poses from {begin:.2f} to {found.until_s:.2f} s, the IMU alone"
+
+
+def _of_lap(name: str, lap: int, several: bool) -> str:
+    """The name of what is passed, with its lap where there are several."""
+    return f"{name}, lap {lap}" if several else name
+
+
+def _passed(passage: Passage) -> str:
+    """A gate's passage in words."""
+    if isnan(passage.time):
+        return "not passed"
+    clearance = "" if isnan(passage.clearance) else f", {_clearance(passage)}"
+    tolerance = passage.attitude_tolerance_deg
+    allowed = "" if isinf(tolerance) else f" of {tolerance:.3g}° allowed"
+    return (
+        f"{length(passage.miss)} off, {passage.attitude_error_deg:.2f}°{allowed}, "
+        f"at {passage.speed:.2f} m/s{clearance}"
+    )
 
 
 def _clearance(passage: Passage) -> str:

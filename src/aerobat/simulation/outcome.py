@@ -7,6 +7,7 @@ from collections.abc import Iterable
 from enum import Enum
 
 DIVERGENCE_RADIUS = 5.0  # [m] of position error: no controller is expected back from there
+TOUCHDOWN = 1e-3  # [m] below the ground that is no hit: paths that land end on it
 NO_LENGTH = 1e-6  # [m] less is rounding
 FEW_DECIMALS = 0.095  # what rounds to less than 0.10 has no two digits in two decimals
 
@@ -54,6 +55,7 @@ class Outcome(Enum):
     )
     TOUCHED_GATE = "touched the frame of a gate at {time:.2f} s, as its plant felt"
     TOUCHED_GROUND = "touched the ground at {time:.2f} s, as its plant felt"
+    MISSED_WAYPOINT = "missed {waypoint}, {miss:.3f} m from it at {time:.2f} s, {radius:g} m allowed"
     HIT_GROUND = "hit the ground at {time:.2f} s"
     DIVERGED = "diverged at {time:.2f} s: position error above {radius:g} m"
     STATE_NOT_FINITE = "diverged at {time:.2f} s: its state is no longer a number"

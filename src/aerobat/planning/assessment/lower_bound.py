@@ -44,7 +44,8 @@ def least_duration(problem: Problem, vehicle: Vehicle) -> float:
 
     longest = moving(0.0)
     shortest = longest if axial_drag(vehicle) == 0.0 else _least_consistent(moving, longest)
-    return max(shortest, _turning_time(problem, vehicle, sequence))
+    rests = sum(stage.hold for stage in sequence.stages)
+    return rests + max(shortest, _turning_time(problem, vehicle, sequence))
 
 
 def _least_consistent(least: Callable[[float], float], longest: float) -> float:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import field, replace
 from math import inf
 from typing import ClassVar
 
@@ -10,17 +11,17 @@ import numpy as np
 
 from aerobat import so3
 from aerobat.arrays import Array
-from aerobat.declaration import Positive
+from aerobat.declaration import Count, PartialVector, Positive
 from aerobat.errors import SpecError
-from aerobat.problem.condition import Condition, thrust_in_plane
-from aerobat.problem.gate import Gate, only_gate
+from aerobat.problem.condition import Condition, at_point, free, thrust_in_plane
+from aerobat.problem.gate import Gate, passed_gate
 from aerobat.problem.maneuvers.gate_passage import (
     PAPER_INVERTED,
     PAPER_LATERAL,
     PAPER_PASSAGE,
     GatePassage,
 )
-from aerobat.problem.maneuvers.maneuver import Maneuver, maneuver
+from aerobat.problem.maneuvers.maneuver import Maneuver, gate_in_words, maneuver
 from aerobat.problem.stage import Stage, StageSequence
 from aerobat.so3 import UP
 
@@ -46,39 +47,61 @@ class Flip(Maneuver):
     signed: bool = True  # the thrust at 45° and 315° points upward; false: either way, as in the paper
     ordered: bool = True  # the stages follow one another; false: in any order, as in the paper
     passage: GatePassage = GatePassage()  # how the gate is passed
+    gate: str | None = None  # name of the gate; left out, the only one, or none
+    position: PartialVector = field(default_factory=free)  # [m] world, upside down, where there is no gate
+    count: Count = 1  # full turns
+    mirrored: bool = False  # turns the other way
 
     ANGLES_DEG: ClassVar[tuple[float, ...]] = (45.0, 90.0, 180.0, 270.0, 315.0)  # of the turn
     APART_DEG: ClassVar[float] = 22.5  # from the gate's: stages that are nearer ask the same
     IN_PLANE_DEG: ClassVar[float] = 0.1  # as exactly as files are written
+    SIDES: ClassVar[Mapping[int, str]] = {0: "forward", 1: "left", 2: "back", 3: "right"}
     LATERAL_FRACTION: ClassVar[float] = 0.2  # of the greatest specific thrust
     INVERTED_FRACTION: ClassVar[float] = 0.2
 
     def stage_sequence(self, gates: Sequence[Gate], max_specific_thrust: float) -> StageSequence:
         """Return the stages of the turn, the gate's among them.
 
-        Raises SpecError unless there is one gate, whose upright the turn comes by.
+        Raises SpecError where there are several gates and it names none, or the turn does not come by the
+        gate's upright.
         """
-        gate = only_gate(gates, self.kind)
-        at_gate_deg = self._angle_deg(gate)
-        angles_deg = [angle for angle in self.ANGLES_DEG if abs(angle - at_gate_deg) >= self.APART_DEG]
-        stages = []
-        for angle_deg in sorted([*angles_deg, at_gate_deg]):
-            minimum = self._min_thrust(angle_deg, max_specific_thrust)
-            in_plane = self._in_plane(angle_deg, minimum)
-            if angle_deg == at_gate_deg:
-                stages.append(self.passage.stage(gate, in_plane, minimum))
-            else:
-                stages.append(Stage(f"{angle_deg:g}°", in_plane))
+        gate = passed_gate(gates, self.gate, self.kind) if gates or self.gate is not None else None
+        at_gate_deg = inf if gate is None else self._angle_deg(gate)
+        turns = [360.0 * k + angle for k in range(self.count) for angle in self.ANGLES_DEG]
+        turns += [360.0 * k for k in range(1, self.count)]
+        angles_deg = [angle for angle in turns if abs(angle - at_gate_deg) >= self.APART_DEG]
+        stages = [self._stage(angle, gate is None, max_specific_thrust) for angle in sorted(angles_deg)]
+        if gate is not None:
+            minimum = self._min_thrust(at_gate_deg, max_specific_thrust)
+            passing = self.passage.stage(gate, self._in_plane(at_gate_deg, minimum), minimum)
+            stages.insert(sum(angle < at_gate_deg for angle in angles_deg), passing)
         return StageSequence(tuple(stages), ordered=self.ordered)
+
+    def in_words(self, gates: Sequence[Gate]) -> str:
+        """Return it with its count and its side, as seen along the gate's passage, or along +x."""
+        gate = passed_gate(gates, self.gate, self.kind) if self.gate or len(gates) == 1 else None
+        forward = np.array([1.0, 0.0, 0.0]) if gate is None else gate.normal
+        swing = np.cross(self.turn_axis, UP)
+        angle_deg = np.rad2deg(np.arctan2(np.cross(forward, swing)[2], forward @ swing))
+        side = self.SIDES.get(round(float(angle_deg) / 90.0) % 4, "")
+        within = "" if gate is None else f" in {gate_in_words(gate.name)}"
+        return f"{_times(self.count)}flip {side}{within}"
 
     def as_in_paper(self) -> Flip:
         """Return it unsigned, unordered, with ε_l = 18 and ε_z = 25 m/s²."""
-        return Flip(self.axis_deg, PAPER_LATERAL, PAPER_INVERTED, False, False, PAPER_PASSAGE)
+        return replace(
+            self,
+            min_lateral_thrust=PAPER_LATERAL,
+            min_inverted_thrust=PAPER_INVERTED,
+            signed=False,
+            ordered=False,
+            passage=PAPER_PASSAGE,
+        )
 
     @property
     def turn_axis(self) -> Array:
         """The horizontal unit vector about which the vehicle turns, right-handed, (3,)."""
-        heading = np.deg2rad(self.axis_deg)
+        heading = np.deg2rad(self.axis_deg + 180.0 * self.mirrored)
         return np.array([np.cos(heading), np.sin(heading), 0.0])
 
     def _angle_deg(self, gate: Gate) -> float:
@@ -105,15 +128,21 @@ class Flip(Maneuver):
             )
         return angle_deg
 
+    def _stage(self, angle_deg: float, is_free: bool, max_specific_thrust: float) -> Stage:
+        """The stage at an angle of the turns; upside down at its position where no gate is passed."""
+        asked = self._in_plane(angle_deg, self._min_thrust(angle_deg, max_specific_thrust))
+        there = at_point(self.position) if is_free and angle_deg == 180.0 else ()
+        return Stage(f"{angle_deg:g}°", (*there, *asked))
+
     def _in_plane(self, angle_deg: float, minimum: float) -> tuple[Condition, ...]:
         """Thrust at an angle of the turn; its sign free where it is `signed` only by the diagonals."""
-        diagonal = angle_deg in (self.ANGLES_DEG[0], self.ANGLES_DEG[-1])
+        diagonal = angle_deg % 360.0 in (self.ANGLES_DEG[0], self.ANGLES_DEG[-1])
         least = -inf if diagonal and not self.signed else minimum
         return thrust_in_plane(self._direction(angle_deg), self.turn_axis, least)
 
     def _min_thrust(self, angle_deg: float, max_specific_thrust: float) -> float:
         """The least specific thrust [m/s²] at an angle of the turn: upside down, or sideways."""
-        if abs(angle_deg - 180.0) < 45.0:
+        if abs(angle_deg % 360.0 - 180.0) < 45.0:
             return self.min_inverted_thrust or self.INVERTED_FRACTION * max_specific_thrust
         return self.min_lateral_thrust or self.LATERAL_FRACTION * max_specific_thrust
 
@@ -125,3 +154,8 @@ class Flip(Maneuver):
 def _wrapped(angle_deg: float) -> float:
     """The angle between -180 and 180."""
     return round((angle_deg + 180.0) % 360.0 - 180.0, 6)
+
+
+def _times(count: int) -> str:
+    """A number of turns before their noun."""
+    return {1: "", 2: "double ", 3: "triple "}.get(count, f"{count} turns of a ")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import ClassVar
 
 import numpy as np
@@ -10,7 +11,7 @@ import numpy as np
 from aerobat.declaration import Angle, Positive, validated
 from aerobat.errors import SpecError
 from aerobat.problem.condition import Condition, Quantity, thrust_in_plane
-from aerobat.problem.gate import Gate, only_gate
+from aerobat.problem.gate import Gate, passed_gate
 from aerobat.problem.maneuvers.gate_passage import PAPER_LATERAL, PAPER_PASSAGE, GatePassage
 from aerobat.problem.maneuvers.maneuver import Maneuver, maneuver
 from aerobat.problem.stage import StageSequence
@@ -25,23 +26,29 @@ class HalfFlip(Maneuver):
     # least 20 % of what the vehicle has
     min_lateral_thrust: Positive | None = None  # [m/s²]
     passage: GatePassage = GatePassage()  # how the gate is passed
+    gate: str | None = None  # name of the gate; left out, the only one
 
+    TITLE: ClassVar[str] = "half-flip"
     THRUST_FRACTION: ClassVar[float] = 0.2  # of the greatest specific thrust
 
     def stage_sequence(self, gates: Sequence[Gate], max_specific_thrust: float) -> StageSequence:
         """Return one stage, the gate, and thrust that never points down: (a_z + g) tan α = a_y, α ≤ 90°.
 
+        Where it names its gate, as among the elements of a course, only the stage: others may point it down.
         Raises SpecError unless there is one gate, its upright not below the horizontal.
         """
-        gate = only_gate(gates, self.kind)
+        gate = passed_gate(gates, self.gate, self.kind)
         minimum = self._min_thrust(gate, max_specific_thrust)
         in_plane = thrust_in_plane(gate.up, gate.normal, minimum)
+        stages = (self.passage.stage(gate, in_plane, minimum),)
+        if self.gate is not None:
+            return StageSequence(stages)
         never_upside_down = Condition(Quantity.SPECIFIC_THRUST, UP, lower=0.0)
-        return StageSequence((self.passage.stage(gate, in_plane, minimum),), (never_upside_down,))
+        return StageSequence(stages, (never_upside_down,))
 
     def as_in_paper(self) -> HalfFlip:
         """Return it with ε_y = 18 m/s²."""
-        return HalfFlip(PAPER_LATERAL, PAPER_PASSAGE)
+        return replace(self, min_lateral_thrust=PAPER_LATERAL, passage=PAPER_PASSAGE)
 
     @validated
     def with_gate_tilt(self, gates: Sequence[Gate], tilt: Angle) -> tuple[Gate, ...]:

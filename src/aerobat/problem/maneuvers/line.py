@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from aerobat.problem.gate import Gate
 from aerobat.problem.maneuvers.gate_passage import PAPER_PASSAGE, GatePassage
-from aerobat.problem.maneuvers.maneuver import Maneuver, maneuver
+from aerobat.problem.maneuvers.maneuver import Maneuver, gate_in_words, maneuver
 from aerobat.problem.stage import StageSequence
 
 
@@ -19,6 +19,10 @@ class Line(Maneuver):
     def stage_sequence(self, gates: Sequence[Gate], max_specific_thrust: float) -> StageSequence:
         """Return no stages but the gates."""
         return StageSequence(tuple(self.passage.stage(gate) for gate in gates))
+
+    def in_words(self, gates: Sequence[Gate]) -> str:
+        """Return the gates on the way."""
+        return ", ".join(f"through {gate_in_words(gate.name)}" for gate in gates) or "along a line"
 
     def as_in_paper(self) -> Line:
         """Return it with the gate passed as there."""

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import dataclasses
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from itertools import groupby
 from types import MappingProxyType
 from typing import ClassVar, TypeVar, cast, dataclass_transform
 
@@ -25,6 +26,7 @@ class Maneuver(ABC):
     """
 
     kind: ClassVar[str] = ""  # its name in files, set when it is registered
+    TITLE: ClassVar[str] = ""  # its name in text, where that is not `kind` with spaces
 
     @abstractmethod
     def stage_sequence(self, gates: Sequence[Gate], max_specific_thrust: float) -> StageSequence:
@@ -52,10 +54,33 @@ class Maneuver(ABC):
         """True where every stage is a point to pass, for which closed-form polynomials are a good start."""
         return False
 
+    def in_words(self, gates: Sequence[Gate]) -> str:
+        """Return the maneuver as one reads it aloud, with the gate that it names, or the only one."""
+        name: str | None = getattr(self, "gate", None)
+        if name is None and len(gates) == 1:
+            name = gates[0].name
+        within = "" if name is None else f" in {gate_in_words(name)}"
+        return (self.TITLE or self.kind.replace("-", " ")) + within
+
     @property
     def first_times(self) -> tuple[float, ...] | None:
         """The times [s] of all stages and of the end where a search begins; None: the planner's choice."""
         return None
+
+
+def gate_in_words(name: str) -> str:
+    """A gate as one reads it aloud: the gate, the red gate, gate 3."""
+    if name == "gate":
+        return "the gate"
+    if "gate" not in name.lower():
+        return f"the {name} gate"
+    return name if name[-1].isdigit() else f"the {name}"
+
+
+def in_sequence(words: Iterable[str]) -> str:
+    """What comes one after another, read aloud; what comes several times in a row, counted."""
+    runs = [(word, len(tuple(run))) for word, run in groupby(words)]
+    return ", ".join(word if count == 1 else f"{word}, {count} times" for word, count in runs)
 
 
 M = TypeVar("M", bound=Maneuver)

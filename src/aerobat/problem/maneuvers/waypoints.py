@@ -23,7 +23,7 @@ from aerobat.errors import SpecError
 from aerobat.problem.ball import Ball
 from aerobat.problem.condition import Attitude, Condition, Quantity
 from aerobat.problem.gate import Gate
-from aerobat.problem.maneuvers.maneuver import Maneuver, maneuver
+from aerobat.problem.maneuvers.maneuver import Maneuver, gate_in_words, in_sequence, maneuver
 from aerobat.problem.stage import CrossingPoint, Stage, StageSequence, check_crossing
 
 THRUST_FRACTION = 0.2  # of the greatest specific thrust: the least along an attitude that names no thrust
@@ -74,6 +74,19 @@ class Waypoint:
         if free and self.up is None and self.gate is None:
             raise SpecError("nothing is given; give at least one component of the position")
 
+    def stage(self, name: str, max_specific_thrust: float) -> Stage:
+        """The stage of passing it, named after its gate where it has one, its time free."""
+        return Stage(
+            name=self.gate or name,
+            conditions=tuple(self.conditions()),
+            gate=self.gate,
+            attitude=self.attitude(max_specific_thrust),
+            min_speed=self.min_speed,
+            crossing_point=self.crossing_point,
+            margin=self.margin,
+            ball=self.ball,
+        )
+
     def conditions(self) -> Iterable[Condition]:
         """The given components and a given thrust, as conditions of a stage; of a ball none."""
         for quantity in FIXABLE if self.radius is None else FIXABLE[1:]:
@@ -116,20 +129,16 @@ class Waypoints(Maneuver):
 
     def stage_sequence(self, gates: Sequence[Gate], max_specific_thrust: float) -> StageSequence:
         """Return a stage a waypoint, in order, each at a time that the planner chooses."""
+        numbered = enumerate(self.waypoints, 1)
         return StageSequence(
-            tuple(
-                Stage(
-                    name=waypoint.gate or f"waypoint {number}",
-                    conditions=tuple(waypoint.conditions()),
-                    gate=waypoint.gate,
-                    attitude=waypoint.attitude(max_specific_thrust),
-                    min_speed=waypoint.min_speed,
-                    crossing_point=waypoint.crossing_point,
-                    margin=waypoint.margin,
-                    ball=waypoint.ball,
-                )
-                for number, waypoint in enumerate(self.waypoints, 1)
-            )
+            tuple(waypoint.stage(f"waypoint {k}", max_specific_thrust) for k, waypoint in numbered)
+        )
+
+    def in_words(self, gates: Sequence[Gate]) -> str:
+        """Return its waypoints and gates, in order."""
+        return in_sequence(
+            "by a waypoint" if waypoint.gate is None else f"through {gate_in_words(waypoint.gate)}"
+            for waypoint in self.waypoints
         )
 
     @property

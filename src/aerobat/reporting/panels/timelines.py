@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from math import ceil
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -119,7 +120,8 @@ def draw_series(
 def mark_stages(axes: Axes, stages: Sequence[PlacedStage], duration: float, named: bool) -> None:
     """Draw upright lines at the stages' times, passages of gates in their colour, with names above if asked.
 
-    Where there is no room for all names, stages are numbered in their order.
+    Where there is no room for all names, stages are numbered in their order, of very many only every second
+    or third.
     """
     axes.set_xlim(0.0, duration)
     times = np.array([stage.time for stage in stages])
@@ -134,8 +136,10 @@ def mark_stages(axes: Axes, stages: Sequence[PlacedStage], duration: float, name
     names = [stage.name for stage in stages]
     pitch = max(NAME_WIDTH, LETTER * max(map(len, names)))
     if pitch * (len(names) - 1) > width:
-        names = [str(k) for k in range(1, len(names) + 1)]
         pitch = NAME_WIDTH
+        every = slice(None, None, ceil(pitch * (len(names) - 1) / width))
+        names = [str(k) for k in range(1, len(names) + 1)][every]
+        times, gates = times[every], gates[every]
     places = spread_out(times / duration * width, pitch, 0.0, width) / width * duration
     top = 1.0 + 0.1 / height
     for gate, name, place in zip(gates, names, places, strict=True):

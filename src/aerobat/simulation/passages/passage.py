@@ -36,10 +36,11 @@ PASSAGE_DEPTH = 0.05  # [m] beyond the plane, where who crosses it has not merel
 class Passage:
     """A gate's plane crossed in its direction, next to the planned instant; NaN where it was not.
 
-    Of many flights, the fields but the name are arrays (flights,).
+    Of many flights, the fields but the first two are arrays (flights,).
     """
 
     gate: str
+    lap: int  # of a course
     time: float  # [s] of the crossing
     miss: float  # [m] from the centre there
     lateral: float  # [m] from the centre there along the gate's lateral axis, to the left
@@ -62,7 +63,7 @@ class Passage:
 
     def of_flight(self, k: int) -> Passage:
         """One flight's of many, in plain numbers."""
-        numbers = {field.name: getattr(self, field.name)[k].item() for field in fields(self)[1:]}
+        numbers = {field.name: getattr(self, field.name)[k].item() for field in fields(self)[2:]}
         return replace(self, **numbers)
 
     @property
@@ -128,7 +129,7 @@ def passages(planned: PlannedPassage, progress: GateProgress, stop: Array) -> Pa
         "max_distance": known(progress.max_distance, ~ended_before),
         "min_distance": known(progress.min_distance, ~ended_before),
     }
-    return Passage(gate.name, **fields)
+    return Passage(gate.name, planned.lap, **fields)
 
 
 def _closest(gate: Gate, swath: Swath, crossed: NDArray[np.bool_]) -> dict[str, Any]:

@@ -1,0 +1,148 @@
+"""Rests on the way: what lies between two of them is planned by itself, and the plans are joined.
+
+At rest nothing is handed on but the place and the heading, so that the parts of a path know nothing of each
+other, and the planner of each part nothing of rests.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
+from functools import wraps
+from typing import Annotated, Any, TypeVar
+
+import numpy as np
+
+from aerobat import so3
+from aerobat.arrays import Array
+from aerobat.declaration import AS_IT_IS, declared
+from aerobat.errors import SpecError
+from aerobat.flatness import reference
+from aerobat.optimization.deadline import within_time
+from aerobat.planning.certified_solve import with_certificate
+from aerobat.planning.recorder import Progress
+from aerobat.planning.result import PlacedStage, Plan
+from aerobat.problem import Gate, Maneuver, Problem, Stage, StageSequence, at_rest
+from aerobat.trajectory import Trajectory
+from aerobat.vehicle import Vehicle
+
+P = TypeVar("P")
+PlanMethod = Callable[[P, Problem, Vehicle | None, Progress | None], Plan]
+
+
+def between_holds(method: PlanMethod[P]) -> PlanMethod[P]:
+    """A planner's method `plan` that plans, where a problem rests on the way, the parts between the rests."""
+
+    @wraps(method)
+    def plan(
+        self: P, problem: Problem, vehicle: Vehicle | None = None, progress: Progress | None = None
+    ) -> Plan:
+        if not any(stage.hold for stage in problem.stages(1.0).stages):
+            return method(self, problem, vehicle, progress)
+        planner = _without_start(self)
+        found: list[Plan | Stage] = []
+        heading = problem.heading
+        with within_time(getattr(self, "time_limit", None)):
+            for part in _parts(problem):
+                if isinstance(part, Stage):
+                    found.append(part)
+                    continue
+                each = method(planner, replace(part, heading=heading), vehicle, progress)
+                found.append(each)
+                heading = heading if vehicle is None else _heading_at_end(each, vehicle)
+        joined = _joined(problem, found)
+        return joined if vehicle is None else with_certificate(joined, vehicle)
+
+    return plan
+
+
+def _without_start(planner: P) -> P:
+    """The planner, without a plan of the whole to begin from."""
+    changed: Any = planner
+    return replace(changed, start=None) if getattr(changed, "start", None) is not None else planner
+
+
+@declared
+class Part(Maneuver):
+    """Some of the stages of a maneuver."""
+
+    whole: Annotated[Maneuver, AS_IT_IS]
+    first: int  # stage, counted from 0
+    end: int  # behind the last
+
+    def stage_sequence(self, gates: Sequence[Gate], max_specific_thrust: float) -> StageSequence:
+        """Return those stages, and what holds throughout."""
+        sequence = self.whole.stage_sequence(gates, max_specific_thrust)
+        return replace(sequence, stages=sequence.stages[self.first : self.end])
+
+    @property
+    def through_points(self) -> bool:
+        """As the whole."""
+        return self.whole.through_points
+
+
+def _parts(problem: Problem) -> Iterator[Problem | Stage]:
+    """The problems between rests, and the stages of the rests; no problem where there is nothing to move."""
+    sequence = problem.stages(1.0)
+    if not sequence.ordered:
+        raise SpecError("maneuver.ordered: stages in any order cannot hold; order them")
+    begin, first, name = problem.start, 0, f"{problem.name} part"
+    rests = [i for i, stage in enumerate(sequence.stages) if stage.hold]
+    for number, i in enumerate([*rests, len(sequence.stages)], 1):
+        is_last = i == len(sequence.stages)
+        end = problem.goal if is_last else at_rest(sequence.stages[i].place)
+        if i > first or begin != end:
+            part = Part(problem.maneuver, first, i)
+            yield replace(problem, name=f"{name} {number}", start=begin, goal=end, maneuver=part)
+        if not is_last:
+            yield sequence.stages[i]
+        begin, first = end, i + 1
+
+
+def _heading_at_end(plan: Plan, vehicle: Vehicle) -> float:
+    """The heading [rad] about the thrust axis with which a plan comes to rest, carried along without spin."""
+    end = reference(plan.trajectory, vehicle, [plan.duration], environment=plan.problem.environment)
+    q_world_body = end.setpoint.q_world_body[-1]
+    tilt = so3.smallest_rotation(so3.UP, so3.thrust_axis(q_world_body))
+    turn = so3.multiply(so3.conjugate(tilt), q_world_body)
+    return float(2.0 * np.arctan2(turn[3], turn[0]))
+
+
+def _joined(problem: Problem, found: Sequence[Plan | Stage]) -> Plan:
+    """The plans one after another, with the rests between them."""
+    plans = [each for each in found if isinstance(each, Plan)]
+    if not plans:
+        raise SpecError("maneuver: nothing moves between the rests; move the goal, or plan something else")
+    degree = max(plan.trajectory.degree for plan in plans)
+    pieces: list[tuple[Array, Array]] = []
+    stages: list[PlacedStage] = []
+    time, segments = 0.0, 0
+    for each in found:
+        if isinstance(each, Stage):
+            pieces.append((np.array([each.hold]), _padded(np.reshape(each.place, (1, 1, 3)), degree)))
+            stages.append(PlacedStage(each.name, max(segments - 1, 0), time))
+        else:
+            trajectory = each.trajectory
+            pieces.append((trajectory.durations, _padded(trajectory.coefficients, degree)))
+            stages += [replace(s, interval=s.interval + segments, time=s.time + time) for s in each.stages]
+        time += float(pieces[-1][0].sum())
+        segments += len(pieces[-1][0])
+    durations, coefficients = (np.concatenate(parts) for parts in zip(*pieces, strict=True))
+    statuses = {plan.status for plan in plans}
+    same = statuses.pop() if len(statuses) == 1 else "feasible"
+    return Plan(
+        problem,
+        Trajectory(durations, coefficients, problem.heading),
+        plans[0].planner,
+        order=plans[0].order,
+        status="time_limit" if "time_limit" in statuses else same,
+        backend=plans[0].backend,
+        stages=tuple(stages),
+        attempts=tuple(attempt for plan in plans for attempt in plan.attempts),
+        rescue="; ".join(filter(None, dict.fromkeys(plan.rescue for plan in plans))),
+    )
+
+
+def _padded(coefficients: Array, degree: int) -> Array:
+    """Coefficients (S, any, 3) as those of polynomials of a degree."""
+    return np.pad(coefficients, ((0, 0), (0, degree + 1 - coefficients.shape[1]), (0, 0)))

@@ -1,0 +1,97 @@
+"""A course: maneuvers one after another, in laps."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from typing import Annotated
+
+from pydantic import Field, PlainValidator
+
+from aerobat.declaration import Count, FieldError, within_field
+from aerobat.errors import SpecError
+from aerobat.problem.condition import Condition
+from aerobat.problem.gate import Gate, named_gate
+from aerobat.problem.maneuvers.maneuver import MANEUVERS, Maneuver, in_sequence, maneuver
+from aerobat.problem.stage import Stage, StageSequence
+
+Element = Annotated[Maneuver, PlainValidator(MANEUVERS.read)]
+
+
+@maneuver("course")
+class Course(Maneuver):
+    """Elements one after another, each a maneuver of any kind, flown `laps` times.
+
+    An element that names a gate is given that one, any other none; of a single element it may be left out.
+    The last lap may end early, after the first `last_lap` elements. What an element asks throughout, it
+    asks of the whole course.
+    """
+
+    elements: Annotated[tuple[Element, ...], Field(min_length=1)]  # in order
+    laps: Count = 1  # how often they are flown
+    last_lap: Count | None = None  # elements of the last lap; left out, all
+
+    def __post_init__(self) -> None:
+        """Check."""
+        if self.last_lap is not None and self.last_lap > len(self.elements):
+            raise FieldError(
+                "last_lap",
+                f"must be {len(self.elements)}, the number of elements, or less, got {self.last_lap}",
+            )
+
+    def stage_sequence(self, gates: Sequence[Gate], max_specific_thrust: float) -> StageSequence:
+        """Return the stages of all elements of all laps.
+
+        Raises SpecError, which names the element, for gates that do not suit it and for stages in no order.
+        """
+        sequences = [self._sequence(i, gates, max_specific_thrust) for i in range(len(self.elements))]
+        lap = tuple(_named([stage for sequence in sequences for stage in sequence.stages]))
+        last = sum(len(sequence.stages) for sequence in sequences[: self.last_lap])
+        flown = (lap[:last] if number == self.laps else lap for number in range(1, self.laps + 1))
+        stages = [replace(stage, lap=number) for number, each in enumerate(flown, 1) for stage in each]
+        return StageSequence(tuple(stages), tuple(self._path_constraints(sequences)))
+
+    def in_words(self, gates: Sequence[Gate]) -> str:
+        """Return its elements as one reads them aloud, those of a kind together."""
+        said = in_sequence(element.in_words(self._given(element, gates)) for element in self.elements)
+        if self.laps == 1:
+            return said
+        partial = "" if self.last_lap is None else f", the last of {self.last_lap} elements"
+        return f"{self.laps} laps of {said}{partial}"
+
+    @property
+    def through_points(self) -> bool:
+        """True where every stage of every element is a point to pass."""
+        return all(element.through_points for element in self.elements)
+
+    def _sequence(self, i: int, gates: Sequence[Gate], max_specific_thrust: float) -> StageSequence:
+        """The stages of one element."""
+        element = self.elements[i]
+        with within_field(f"maneuver.elements[{i}]"):
+            sequence = element.stage_sequence(self._given(element, gates), max_specific_thrust)
+            if not sequence.ordered and len(self.elements) > 1:
+                raise SpecError("its stages come in any order, which those of a course do not; order them")
+        return sequence
+
+    def _given(self, element: Maneuver, gates: Sequence[Gate]) -> Sequence[Gate]:
+        """The gates for an element: the one that it names, or none; all of them where it is the only one."""
+        if len(self.elements) == 1:
+            return gates
+        name = getattr(element, "gate", None)
+        return () if name is None else (named_gate(gates, name),)
+
+    @staticmethod
+    def _path_constraints(sequences: Sequence[StageSequence]) -> Iterator[Condition]:
+        """What any element asks throughout, once."""
+        yield from dict.fromkeys(each for sequence in sequences for each in sequence.path_constraints)
+
+
+def _named(stages: Sequence[Stage]) -> Iterator[Stage]:
+    """A lap's stages; of a name that several have they are numbered, but those of gates."""
+    counts = Counter(stage.name for stage in stages)
+    seen: Counter[str] = Counter()
+    for stage in stages:
+        seen[stage.name] += 1
+        is_one_of_several = counts[stage.name] > 1 and stage.gate is None
+        yield replace(stage, name=f"{stage.name} {seen[stage.name]}") if is_one_of_several else stage
