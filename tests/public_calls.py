@@ -78,7 +78,9 @@ RESULTS = (
     "ErrorCauses",
     "ErrorShare",
     "Inspection",
+    "Loss",
     "Estimates",
+    "Export",
     "Gradient",
     "Opening",
     "Passage",
@@ -135,6 +137,7 @@ def _arguments(name: str, folder: Path) -> dict[str, Any]:
             "start_velocity": (0.0, 0.0, 0.1),
             "max_gap": 0.2,
         },
+        "export": {"plan": plan(), "path": folder / "exported.csv", "to": "csv", "rate": 50.0},
         "fly": {
             "plan": plan(),
             "vehicle": agile,

@@ -1,4 +1,4 @@
-"""Trajectories for the Crazyflie: bytes as the firmware reads them, paths and attitudes as it derives them."""
+"""Trajectories for the Crazyflie: bytes, paths and attitudes as its firmware reads and derives them."""
 
 from __future__ import annotations
 

@@ -3,7 +3,7 @@
 A file of rows says nothing of what is between them. It is read as its format has it, along straight lines
 (attitudes by the shortest turn at a constant rate), or, where it is a stream of set-points, by holding the
 last. Differences of positions and of velocities are then piecewise polynomials, whose peaks are exact.
-Attitudes are compared at many instants, and half of what they turn between two of these is added.
+Attitudes are compared at many instants; between two of these they are apart as far as what they turn allows.
 """
 
 from __future__ import annotations
@@ -145,7 +145,7 @@ def peak_angles(attitude: Array, other: Array) -> tuple[float, float]:
 
 def _peak(angles: Array, turned: Array) -> float:
     """The largest angle that may be, by samples (n, m) and the turns from each to the next (n, m - 1)."""
-    between = np.maximum(angles[:, :-1], angles[:, 1:]) + turned / 2.0
+    between = (angles[:, :-1] + angles[:, 1:] + turned) / 2.0  # it changes by no more than is turned
     return float(min(between.max(), np.pi))
 
 
