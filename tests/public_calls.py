@@ -428,6 +428,8 @@ def instance(cls: type) -> Any:
         ab.Gradient: lambda: instance(ab.Sensitivity).mean_square_position_error,
         ab.Passage: _passage,
         ab.Replay: lambda: ab.view(plan()),
+        ab.Loss: lambda: ab.Loss(0.001, 0.01, 0.02, 0.02, "straight lines between rows"),
+        ab.Export: lambda: ab.Export("csv", (Path("plan.csv"),), instance(ab.Loss)),
     }
     return made.get(cls, cls)()
 

@@ -18,6 +18,8 @@ from aerobat.interchange.exports.px4 import SETPOINTS, px4_setpoints
 from aerobat.planning import Plan
 from aerobat.storage import require_replaceable, whole_folder, write_whole
 
+MAX_ROWS = 100_000  # a quarter of an hour at 100 a second; a bag of them takes a minute
+
 
 @dataclass(frozen=True)
 class Format:
@@ -85,6 +87,10 @@ def export(plan: Plan, path: PathName, to: str, rate: Positive | None = None) ->
         raise SpecError("vehicle is missing: attitudes follow from one, and the plan has none; plan for one")
     if form.rate is None and rate is not None:
         raise SpecError(f"rate is for rows, and {to} has none; leave it out")
+    if form.rate is not None and plan.duration * (rate or form.rate) > MAX_ROWS:
+        raise SpecError(
+            f"rate must ask for {MAX_ROWS} rows at most over {plan.duration:.4g} s; ask for fewer"
+        )
     target = Path(path)
     _require_place(target, to, form)
     content = form.content(plan, rate or form.rate or 0.0)

@@ -23,6 +23,7 @@ from aerobat.trajectory import Trajectory
 from aerobat.trajectory.piecewise import TIME_TOLERANCE
 
 PARTS = 16  # of the time between two rows, at whose ends attitudes are compared: off by some percent at most
+AT_ONCE = 2000  # rows whose attitudes are compared together: some tens of megabytes
 STRAIGHT = "straight lines between rows"
 HELD = "each row held until the next"
 
@@ -92,11 +93,18 @@ class Rows:
         return Trajectory(np.diff(self.times), powers)
 
     def _angles(self, plan: Plan, held: bool) -> tuple[float, float]:
+        """The largest angles between attitudes and between thrust axes [rad]."""
+        starts = range(0, len(self.times) - 1, AT_ONCE)
+        parts = [self._angles_of(slice(start, start + AT_ONCE + 1), plan, held) for start in starts]
+        return max(attitude for attitude, _ in parts), max(axis for _, axis in parts)
+
+    def _angles_of(self, rows: slice, plan: Plan, held: bool) -> tuple[float, float]:
+        times, q = self.times[rows], self.q_world_body[rows]
         s = np.linspace(0.0, 1.0, PARTS + 1)
-        instants = self.times[:-1, None] + s * np.diff(self.times)[:, None]
+        instants = times[:-1, None] + s * np.diff(times)[:, None]
         planned = attitudes(plan, instants.ravel()).reshape(*instants.shape, 4)
-        first = self.q_world_body[:-1, None]
-        turn = so3.log(so3.multiply(so3.conjugate(self.q_world_body[:-1]), self.q_world_body[1:]))
+        first = q[:-1, None]
+        turn = so3.log(so3.multiply(so3.conjugate(q[:-1]), q[1:]))
         read = first if held else so3.multiply(first, so3.exp(s[:, None] * turn[:, None]))
         return peak_angles(planned, np.broadcast_to(read, planned.shape))
 
