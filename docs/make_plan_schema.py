@@ -16,7 +16,7 @@ NUMBERS = {"type": "array", "items": {"type": "number"}, "minItems": 3, "maxItem
 
 def schema() -> str:
     """The whole file."""
-    evidence = without_titles(evidence_adapter().json_schema(mode="serialization"))
+    evidence = in_short(evidence_adapter().json_schema(mode="serialization"))
     definitions = evidence.pop("$defs")
     environment = {
         "type": "object",
@@ -48,14 +48,14 @@ def schema() -> str:
     return json.dumps(document, indent=1, ensure_ascii=False, allow_nan=False) + "\n"
 
 
-def without_titles(described: Any) -> Any:
-    """A schema without names that repeat its keys, and without defaults that JSON has no word for."""
+def in_short(described: Any) -> Any:
+    """A schema with descriptions of a line, without names that repeat its keys or defaults that JSON lacks."""
     if isinstance(described, list):
-        return [without_titles(each) for each in described]
+        return [in_short(each) for each in described]
     if not isinstance(described, dict):
         return described
     return {
-        key: without_titles(value)
+        key: value.partition("\n")[0] if key == "description" else in_short(value)
         for key, value in described.items()
         if not (key == "title" and isinstance(value, str))
         and not (key == "default" and isinstance(value, float) and not isfinite(value))
