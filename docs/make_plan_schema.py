@@ -49,7 +49,7 @@ def schema() -> str:
 
 
 def in_short(described: Any) -> Any:
-    """A schema with descriptions of a line, without names that repeat its keys or defaults that JSON lacks."""
+    """A schema with descriptions of a line, without names that repeat keys or defaults that JSON lacks."""
     if isinstance(described, list):
         return [in_short(each) for each in described]
     if not isinstance(described, dict):
