@@ -13,6 +13,7 @@ from scipy.spatial.transform import Rotation
 
 import aerobat as ab
 from aerobat.interchange.exports.crazyflie import MAX_PIECES, PIECE
+from aerobat.interchange.exports.heading import fit_yaw
 from aerobat.interchange.exports.loss import peak_difference
 from aerobat.interchange.exports.refit import refit
 
@@ -83,6 +84,36 @@ def test_the_firmware_flies_the_plan_within_the_stated_loss(
     apart = np.cross(turns.apply([0.0, 0.0, 1.0]), z_body)
     assert np.linalg.norm(apart, axis=1).max() <= made.loss.thrust_axis + 1e-7
     assert made.loss.thrust_axis < 1e-6
+
+
+@settings(max_examples=16)
+@given(seed=st.integers(0, 2**32 - 1), heading=st.just(0.0) | st.floats(-3.1, 3.1), planar=st.booleans())
+def test_any_tumble_is_fitted_and_its_loss_bounds_what_is_seen(
+    seed: int, heading: float, planar: bool, flip: ab.Plan, tmp_path_factory: pytest.TempPathFactory
+) -> None:
+    rng = np.random.default_rng(seed)
+    inputs = 400.0 * rng.normal(size=(8, 3)) * [1.0, not planar, 1.0]
+    tumble = ab.Trajectory.from_inputs(np.zeros((4, 3)), inputs, 0.2, heading)
+    plan = replace(flip, trajectory=tumble)
+    folder = tmp_path_factory.mktemp("tumble") / "x"
+    made = ab.export(plan, folder, "crazyflie")
+    times = np.linspace(0.0, tumble.duration - 1e-5, 700)
+    _, _, attitude, _ = evaluated(folder / "trajectory.csv", times)
+    turns = Rotation.from_quat(ab.reference(plan, times=times).setpoint.q_world_body[:, [1, 2, 3, 0]])
+    assert (turns.inv() * attitude).magnitude().max() <= made.loss.attitude + 1e-3
+    assert made.loss.thrust_axis <= made.loss.attitude + 1e-9
+
+
+@pytest.mark.parametrize("excess", [0.0, 1e-9, 1e-8, 1e-6])
+def test_yaw_is_fitted_where_a_piece_ends_with_the_thrust_all_but_along_the_heading(
+    excess: float, flip: ab.Plan
+) -> None:
+    """There the attitude depends on yaw without bound, or not at all."""
+    cube = np.array([-9.81 / 6.0, 0.0, -9.81 / 6.0]) * (1.0 + excess)  # from a hover to a thrust along -x
+    path = ab.Trajectory([1.0], [[[0.0, 0.0, 1.0], [0.0, 0.0, 0.0], [0.0, 0.0, 0.0], cube]])
+    fitted = fit_yaw(replace(flip, trajectory=path), path)
+    assert np.abs(fitted.coefficients).max() < 1e-6
+    assert fitted.thrust_axis_error < 1e-6
 
 
 def test_a_flip_about_the_bodys_own_x_loses_no_heading(tmp_path: Path) -> None:

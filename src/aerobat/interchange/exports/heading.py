@@ -22,12 +22,14 @@ POWERS = 8
 SAMPLES = 257  # of a piece
 FIRST_GUESSES = 64  # constants among which the fit begins
 ROUNDS = 40  # of Levenberg-Marquardt: more gain nothing
-DAMPING = 1e-3  # at its first step
+DAMPING = 1e-3  # at its first step,
+MIN_DAMPING = 1e-9  # and at any later one, which keeps its equations regular
+MAX_SLOPE = 1e3  # of attitude over yaw: beyond, where the heading is along the thrust, no yaw is of use
 REGULARIZATION = (
     1e-2  # [-] of coefficients, so that yaw does not fit rounding where attitude hardly depends on it
 )
 EXACT = 1e-6  # [rad] of attitude: what rounding makes of it
-DEFINED = 1e-9  # [-] sine of the angle between thrust and heading: less defines no attitude
+DEFINED = 1e-9  # [m/s²] of thrust, or the sine of its angle to the heading: less defines no attitude
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,7 +47,7 @@ def fit_yaw(plan: Plan, path: Trajectory) -> YawFit:
     instants = path.knots[:-1, None] + s * path.durations[:, None]
     planned = attitudes(plan, instants.ravel()).reshape(*instants.shape, 4)
     thrust = path.on_segments(s, 2) + GRAVITY * so3.UP
-    z = thrust / np.linalg.norm(thrust, axis=-1, keepdims=True)
+    z = thrust / np.maximum(np.linalg.norm(thrust, axis=-1, keepdims=True), DEFINED)
     powers = s[:, None] ** np.arange(POWERS)
     fitted = np.array([_fitted(*piece, powers) for piece in zip(z, planned, strict=True)])
     fitted[:, 0] -= 2.0 * np.pi * np.round((fitted[:, 0] - _ends_before(fitted)) / (2.0 * np.pi))
@@ -80,7 +82,7 @@ def _fitted(z: Array, planned: Array, powers: Array) -> Array:
         step = np.linalg.solve(normal + damping * np.eye(POWERS), -slopes.T @ residual)
         tried = np.concatenate([_turn(z, planned, powers @ (best + step)), weights * (best + step)])
         if tried @ tried < residual @ residual:
-            best, residual, damping = best + step, tried, damping / 10.0
+            best, residual, damping = best + step, tried, max(damping / 10.0, MIN_DAMPING)
         else:
             damping *= 10.0
     return best
@@ -89,8 +91,8 @@ def _fitted(z: Array, planned: Array, powers: Array) -> Array:
 def _slope(z: Array, yaw: Array) -> Array:
     """By how much an attitude turns about its thrust with yaw [-], (samples,)."""
     across_sq = (_across(z, yaw) ** 2).sum(axis=-1)
-    is_defined = across_sq > DEFINED**2
-    return np.asarray(np.divide(z[:, 2], across_sq, out=np.zeros(len(z)), where=is_defined))
+    slopes = z[:, 2] / np.maximum(across_sq, DEFINED**2)
+    return np.asarray(np.clip(slopes, -MAX_SLOPE, MAX_SLOPE))
 
 
 def _turn(z: Array, planned: Array, yaw: Array) -> Array:

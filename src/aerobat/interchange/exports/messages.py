@@ -156,34 +156,47 @@ class Messages:
 
     def _markers(self, plan: Plan, found: Reference) -> Iterator[Stamped]:
         """The path and the gates at the start, the vehicle's rotors there, at each stage and at the end."""
-        assert plan.vehicle is not None, "exports are of plans with a vehicle"
-        lines = [("path", found.setpoint.flat.position, PATH_WIDTH, GREY)]
-        lines += [
-            (gate.name, np.concatenate([gate.corners, gate.corners[:1]]), FRAME_WIDTH, ORANGE)
-            for gate in plan.problem.gates
-        ]
         start = _stamp(0.0)
-        yield self._array(start, [self._line(start, *line) for line in lines])
-        names = ("start", *(stage.name for stage in plan.stages), "end")
-        instants = np.array([0.0, *(stage.time for stage in plan.stages), plan.duration])
-        order = np.argsort(instants, kind="stable")
-        poses = reference(plan, times=instants[order]).setpoint
-        for row, i in enumerate(order):
-            stamp = _stamp(instants[i])
-            pose = poses.flat.position[row], poses.q_world_body[row]
-            discs = [
-                self._marker(
-                    stamp,
-                    f"vehicle: {names[i]}",
-                    rotor,
-                    type=CYLINDER,
-                    pose=self._pose(pose[0] + so3.rotate(pose[1], each.position_body), pose[1]),
-                    scale=self._vector("Vector3", np.array([2 * each.radius, 2 * each.radius, DISC_HEIGHT])),
-                    color=self._color(BLUE),
-                )
-                for rotor, each in enumerate(plan.vehicle.rotors)
-            ]
-            yield self._array(stamp, discs)
+        lines = [self._line(start, "path", found.setpoint.flat.position, PATH_WIDTH, GREY)]
+        for gate in plan.problem.gates:
+            frame = np.concatenate([gate.corners, gate.corners[:1]])
+            lines.append(self._line(start, gate.name, frame, FRAME_WIDTH, ORANGE))
+        yield self._array(start, lines)
+        instants = [
+            ("start", 0.0),
+            *((stage.name, stage.time) for stage in plan.stages),
+            ("end", plan.duration),
+        ]
+        instants.sort(key=lambda each: each[1])
+        shown = reference(plan, times=[time for _, time in instants]).setpoint
+        for row, (name, time) in enumerate(instants):
+            pose = shown.flat.position[row], shown.q_world_body[row]
+            yield self._array(_stamp(time), self._discs(_stamp(time), name, row, plan, *pose))
+
+    def _discs(self, stamp: int, name: str, row: int, plan: Plan, position: Array, q: Array) -> Sequence[Any]:
+        """The rotors of the vehicle at one instant, numbered apart from those of others of its name.
+
+        Args:
+            stamp: When [ns].
+            name: What is then.
+            row: The number of the instant.
+            plan: What is shown.
+            position: [m] world, (3,).
+            q: Body to world, (4,).
+        """
+        assert plan.vehicle is not None, "exports are of plans with a vehicle"
+        return [
+            self._marker(
+                stamp,
+                f"vehicle: {name}",
+                row * len(plan.vehicle.rotors) + number,
+                type=CYLINDER,
+                pose=self._pose(position + so3.rotate(q, rotor.position_body), q),
+                scale=self._vector("Vector3", np.array([2 * rotor.radius, 2 * rotor.radius, DISC_HEIGHT])),
+                color=self._color(BLUE),
+            )
+            for number, rotor in enumerate(plan.vehicle.rotors)
+        ]
 
     def _array(self, stamp: int, markers: Sequence[Any]) -> Stamped:
         kind = "visualization_msgs/msg/MarkerArray"

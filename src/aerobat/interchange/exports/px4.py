@@ -6,7 +6,7 @@ the same lines read plan and log. World axes are NED, body axes FRD, numbers flo
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -26,6 +26,24 @@ NED_ENU = np.array([0.0, -np.sqrt(0.5), -np.sqrt(0.5), 0.0])  # ENU to NED: x an
 FLU_FRD = np.array([0.0, 1.0, 0.0, 0.0])  # FRD to FLU: half a turn about x, and back by the same
 
 
+def _indexed(name: str, count: int) -> Sequence[str]:
+    return [f"{name}[{i}]" for i in range(count)]
+
+
+HEADERS: Mapping[str, Sequence[str]] = {
+    ATTITUDE: ["yaw_sp_move_rate", *_indexed("q_d", 4), *_indexed("thrust_body", 3)],
+    RATES: ["roll", "pitch", "yaw", *_indexed("thrust_body", 3)],
+    PATH: [
+        *_indexed("position", 3),
+        *_indexed("velocity", 3),
+        *_indexed("acceleration", 3),
+        *_indexed("jerk", 3),
+        "yaw",
+        "yawspeed",
+    ],
+}
+
+
 def px4_setpoints(plan: Plan, rate: float) -> Content:
     """The set-points of a plan with a vehicle at `rate` [1/s] and at the end.
 
@@ -34,30 +52,24 @@ def px4_setpoints(plan: Plan, rate: float) -> Content:
     timestamps = np.unique(np.floor(plan.trajectory.sample(rate) * MICROSECONDS))
     found = reference(plan, times=timestamps / MICROSECONDS)
     flat = found.setpoint.flat
+    position, velocity, acceleration, jerk = (
+        _float32(ned(curve)) for curve in (flat.position, flat.velocity, flat.acceleration, flat.jerk)
+    )
     q_d = _float32(so3.multiply(so3.multiply(NED_ENU, found.setpoint.q_world_body), FLU_FRD))
-    path = [_float32(ned(curve)) for curve in (flat.position, flat.velocity, flat.acceleration, flat.jerk)]
     rates = _float32(found.setpoint.omega_body * np.array([1.0, -1.0, -1.0]))
     thrust = _float32(_thrust_body(found, plan))
     zero = _float32(np.zeros((len(timestamps), 1)))
     yaw = _float32(_yaw(q_d)[:, None])
-    curves = ("position", "velocity", "acceleration", "jerk")
-    headers: dict[str, Sequence[str]] = {
-        ATTITUDE: ["yaw_sp_move_rate", *_indexed("q_d", 4), *_indexed("thrust_body", 3)],
-        RATES: ["roll", "pitch", "yaw", *_indexed("thrust_body", 3)],
-        PATH: [*(each for name in curves for each in _indexed(name, 3)), "yaw", "yawspeed"],
-    }
-    columns: dict[str, Sequence[Array]] = {
+    columns: Mapping[str, Sequence[Array]] = {
         ATTITUDE: [zero, q_d, thrust],
         RATES: [rates, thrust],
-        PATH: [*path, yaw, np.full_like(zero, np.nan)],
+        PATH: [position, velocity, acceleration, jerk, yaw, np.full_like(zero, np.nan)],
     }
-    rows = Rows(
-        found.times,
-        ned(path[0].astype(float)),
-        ned(path[1].astype(float)),
-        so3.multiply(so3.multiply(so3.conjugate(NED_ENU), so3.normalize(q_d)), so3.conjugate(FLU_FRD)),
+    q_world_body = so3.multiply(
+        so3.multiply(so3.conjugate(NED_ENU), so3.normalize(q_d)), so3.conjugate(FLU_FRD)
     )
-    files = {name: _table(timestamps, headers[name], columns[name]) for name in SETPOINTS}
+    rows = Rows(found.times, ned(position.astype(float)), ned(velocity.astype(float)), q_world_body)
+    files = {name: _table(timestamps, HEADERS[name], columns[name]) for name in SETPOINTS}
     return Content(files, rows.loss(plan, held=True))
 
 
@@ -83,10 +95,6 @@ def _yaw(q_ned_frd: Array) -> Array:
 def _float32(values: Array) -> Array:
     """The values as the messages have them; no negative zeros."""
     return np.asarray(np.asarray(values, dtype=np.float32) + np.float32(0.0))
-
-
-def _indexed(name: str, count: int) -> Sequence[str]:
-    return [f"{name}[{i}]" for i in range(count)]
 
 
 def _table(timestamps: Array, header: Sequence[str], columns: Sequence[Array]) -> bytes:
