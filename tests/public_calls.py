@@ -79,7 +79,9 @@ RESULTS = (
     "ErrorCauses",
     "ErrorShare",
     "Inspection",
+    "Loss",
     "Estimates",
+    "Export",
     "Gradient",
     "LiveView",
     "Opening",
@@ -144,6 +146,7 @@ def _arguments(name: str, folder: Path) -> dict[str, Any]:
             "start_velocity": (0.0, 0.0, 0.1),
             "max_gap": 0.2,
         },
+        "export": {"plan": plan(), "path": folder / "exported.csv", "to": "csv", "rate": 50.0},
         "fly": {
             "plan": plan(),
             "vehicle": agile,
@@ -453,6 +456,8 @@ def instance(cls: type) -> Any:
         ab.Gradient: lambda: instance(ab.Sensitivity).mean_square_position_error,
         ab.Passage: _passage,
         ab.Replay: lambda: ab.view(plan()),
+        ab.Loss: lambda: ab.Loss(0.001, 0.01, 0.02, 0.02, "straight lines between rows"),
+        ab.Export: lambda: ab.Export("csv", (Path("plan.csv"),), instance(ab.Loss)),
     }
     return made.get(cls, cls)()
 

@@ -84,6 +84,7 @@ VALUES: dict[str, tuple[str, ...]] = {
     "--max-tilt": ("60", *NUMBERS),
     "--max-rate": ("400", *NUMBERS),
     "--max-moment": ("0.1", *NUMBERS),
+    "--to": ("csv", "crazyflie", "px4", "blender", "mcap", "ros1-bag", "ros2-bag", "csw", ""),
     "--import": ("plugin.py", "nowhere.py", "broken.toml", "raises.py", ""),
     "--paper": (),
     "--json": (),
@@ -102,6 +103,7 @@ OWN = {
     ],
     "repeat": ["--out", "--json", "--import"],
     "view": ["--html", "--video", "--speed", "--json", "--import", "--vehicle"],
+    "export": ["--to", "--out", "--rate", "--json", "--import"],
     "inspect": ["--plan", "--figure", "--json", "--import", "--vehicle"],
     "vehicles": ["--help"],
     "problems": ["--help"],
@@ -137,7 +139,7 @@ def command_lines(count: int, seed: int) -> Iterator[list[str]]:
 
 
 def _command_line(rng: random.Random) -> list[str]:
-    often = ["fly", "plan", "check", "repeat", "view", "inspect"]
+    often = ["fly", "plan", "check", "repeat", "view", "inspect", "export"]
     command = rng.choice([*often * 4, "compare", "vehicles", "problems", "flyy", ""])
     line = [command] if command else []
     names = OWN.get(command, list(VALUES))
@@ -147,11 +149,14 @@ def _command_line(rng: random.Random) -> list[str]:
             "repeat": ("kept",),
             "view": ("kept", "kept/line.plan", "kept/flight.npz"),
             "inspect": ("kept", "kept/flight.npz"),
+            "export": ("kept", "kept/line.plan"),
             "compare": ("lien",),
         }
         line.append(rng.choice(right.get(command, CHEAP) if rng.random() < 0.6 else BROKEN))
     if command == "compare" and line[-1] in CHEAP:  # all planners take long
         line[-1] = "lien"
+    if command == "export" and rng.random() < 0.9:
+        line += ["--to", rng.choice(VALUES["--to"])]
     for _ in range(rng.choice((0, 1, 1, 2, 2, 3, 5))):
         option = rng.choice(names if rng.random() < 0.9 else list(VALUES))
         line.append(option)

@@ -31,6 +31,7 @@ from .evaluation import (
 from .flatness import Reference, reference
 from .interchange.columns import write_columns
 from .interchange.csv import read_csv, write_csv
+from .interchange.exports import Export, Loss, export
 from .interchange.read import read_plan, read_trajectory
 from .interchange.robots import import_vehicle
 from .interchange.tables import read_table, write_table
@@ -139,6 +140,7 @@ __all__ = [
     "ErrorCauses",
     "ErrorShare",
     "Estimates",
+    "Export",
     "FlatState",
     "Flight",
     "FlightConfig",
@@ -161,6 +163,7 @@ __all__ = [
     "Limits",
     "Line",
     "LiveView",
+    "Loss",
     "Maneuver",
     "MattyFlip",
     "MinSnap",
@@ -208,6 +211,7 @@ __all__ = [
     "draw",
     "error_causes",
     "estimate",
+    "export",
     "fly",
     "implausibilities",
     "import_plugin",

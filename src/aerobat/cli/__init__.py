@@ -1,4 +1,4 @@
-"""The command line: plan | fly | sweep | check | compare | repeat | vehicles | problems."""
+"""The command line: plan | fly | sweep | check | compare | export | repeat | vehicles | problems."""
 
 from aerobat.cli.entry import main
 

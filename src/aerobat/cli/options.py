@@ -296,3 +296,25 @@ class ViewOptions:
 
     json: Annotated[bool, Parameter(group=output, negative="", show_default=False)] = False
     """Print what was written as JSON on standard output, and nothing else."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class ExportOptions:
+    """What a plan is exported to, and where."""
+
+    to: Annotated[
+        Literal["csv", "crazyflie", "ros1-bag", "ros2-bag", "mcap", "px4", "blender"], Parameter(group=output)
+    ]
+    """The format."""
+
+    out: Annotated[Path | None, Parameter(group=output)] = None
+    """The file, or of crazyflie, px4 and ros2-bag the folder; an earlier export is replaced. Default:
+    in out/, named after the plan's file or folder."""
+
+    rate: Annotated[float | None, Parameter(group=output, validator=POSITIVE)] = None
+    """Rows, messages or keys a second. Default: 100, of px4 250; crazyflie has none."""
+
+    plugins: Annotated[tuple[Path, ...], Plugins(group=output)] = ()
+
+    json: Annotated[bool, Parameter(group=output, negative="", show_default=False)] = False
+    """Print what was written and lost as JSON on standard output, and nothing else."""

@@ -56,6 +56,11 @@ def write_columns(plan: Plan, path: PathName, columns: Sequence[str] = ALL, rate
     if wanted == PAPER:
         write_csv(plan.trajectory, path, rate)
         return
+    write_whole(path, columns_text(plan, wanted, rate))
+
+
+def columns_text(plan: Plan, columns: Sequence[str], rate: float) -> str:
+    """The table that `write_columns` writes of known groups. Raises SpecError where nothing is left."""
     times = plan.trajectory.sample(rate)
     groups: dict[str, Array] = {"time": times[:, None]}
     groups |= {name: plan.trajectory.evaluate(times, k) for k, name in enumerate(PATH)}
@@ -64,13 +69,13 @@ def write_columns(plan: Plan, path: PathName, columns: Sequence[str] = ALL, rate
         groups["attitude"] = found.setpoint.q_world_body
         groups["rates"] = found.setpoint.omega_body
         groups["thrusts"] = found.rotor_thrusts
-    written = [name for name in wanted if name in groups]
+    written = [name for name in columns if name in groups]
     if not written:
-        raise SpecError(f"{' and '.join(wanted)} follow from a vehicle, and the plan has none; plan for one")
+        raise SpecError(f"{' and '.join(columns)} follow from a vehicle, and the plan has none; plan for one")
     header = [column for name in written for column in _header(name, groups[name].shape[1])]
     rows = np.concatenate([groups[name] for name in written], axis=1)
     lines = [",".join(header), *(",".join(map(repr, row)) for row in rows.tolist())]
-    write_whole(path, "\n".join(lines) + "\n")
+    return "\n".join(lines) + "\n"
 
 
 def _header(group: str, count: int) -> Sequence[str]:

@@ -13,8 +13,8 @@ class FlatOutputs:
     """A plan's flat outputs over time; before its start and after its end it rests at either.
 
     `update(t)` answers as a trajectory of RotorPy does, so that an object of this class stands where one of
-    RotorPy's is expected; `target(t)` gives what gym-pybullet-drones' controllers take. Both know a vehicle by
-    its heading alone, and so lose what differs from it upside down: the yaw of either end is told throughout.
+    RotorPy's is expected; `target(t)` gives what gym-pybullet-drones' controllers take. Both know a vehicle's
+    attitude by its heading alone, and so lose the rest: the yaw of either end is told throughout.
     """
 
     @validated
@@ -28,7 +28,7 @@ class FlatOutputs:
         return self._trajectory.duration
 
     def update(self, t: float) -> dict[str, Array | float]:
-        """Position [m] and its derivatives up to snap, world frame with z up, (3,) each, and the yaw [rad]."""
+        """Position [m] and its derivatives up to snap, world frame, (3,) each, and the yaw [rad]."""
         names = ("x", "x_dot", "x_ddot", "x_dddot", "x_ddddot")
         outputs: dict[str, Array | float] = {name: self._derivative(t, k) for k, name in enumerate(names)}
         return outputs | {"yaw": self._trajectory.heading, "yaw_dot": 0.0, "yaw_ddot": 0.0}

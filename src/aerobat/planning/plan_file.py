@@ -2,8 +2,10 @@
 
 A .plan file is a NumPy .npz archive without pickles. Its arrays `durations` (S,), `coefficients`
 (S, degree + 1, 3) and `heading` are the trajectory's, bit for bit; `document` holds, as UTF-8 JSON, the rest:
-the problem and the vehicle as the tables of their files, how the plan was made, its stages, attempts,
-certificate, flyability, assessment and tube, and the version of Aerobat that wrote it.
+the problem and the vehicle as the tables of their files, the environment in full, how the plan was made, its
+stages, attempts, certificate, flyability, assessment and tube, frames, and which version of Aerobat wrote it.
+
+Schema and version rules are in docs/flight-package.md. `interchange.flight_package` reads it by NumPy alone.
 """
 
 from __future__ import annotations
@@ -17,6 +19,7 @@ import numpy as np
 
 from aerobat.certification import Certificate
 from aerobat.declaration import PathName, from_table, to_table, validated
+from aerobat.environment import Environment
 from aerobat.errors import SpecError
 from aerobat.planning.assessment.assessment import Assessment
 from aerobat.planning.recorder import Attempt
@@ -27,7 +30,14 @@ from aerobat.storage import format_of, read_arrays, whole_file
 from aerobat.trajectory import Trajectory
 from aerobat.vehicle import Vehicle
 
-FORMAT = "aerobat-plan-1"
+FORMAT = "aerobat-plan-1"  # another number where something goes, or means something else
+REVISION = 1  # of it: one more wherever something is added
+FRAMES = {
+    "world": "ENU: x east, y north, z up [m]",
+    "body": "FLU: x forward, y left, z up, thrust along +z",
+    "attitude": "unit quaternion (w, x, y, z), Hamilton, body to world",
+    "units": "SI, angles in radians but for keys that end in _deg",
+}
 
 
 @dataclass(frozen=True)
@@ -59,10 +69,13 @@ def save_plan(plan: Plan, path: PathName) -> None:
     """
     evidence = _Evidence(**{field.name: getattr(plan, field.name) for field in fields(_Evidence)})
     document = {
+        "revision": REVISION,
         "aerobat": version("aerobat"),
+        "frames": FRAMES,
+        "environment": _in_full(plan.problem.environment),
         "problem": to_table(plan.problem),
         "vehicle": None if plan.vehicle is None else to_table(plan.vehicle),
-        "evidence": _adapter().dump_python(evidence, mode="json"),
+        "evidence": evidence_adapter().dump_python(evidence, mode="json"),
     }
     with whole_file(path) as temporary, temporary.open("wb") as file:
         np.savez(
@@ -84,7 +97,7 @@ def load_plan(path: PathName) -> Plan:
         raise SpecError(f"plan file {path}: it holds {found}, not {FORMAT}; plan again and save that")
     try:
         document = json.loads(content["document"].tobytes())
-        evidence: _Evidence = _adapter().validate_python(document["evidence"])
+        evidence: _Evidence = evidence_adapter().validate_python(document["evidence"])
         vehicle = document["vehicle"]
         return Plan(
             problem=from_table(Problem, document["problem"]),
@@ -100,7 +113,14 @@ def load_plan(path: PathName) -> Plan:
         raise SpecError(f"plan file {path}: it is damaged; save it again") from None
 
 
-def _adapter() -> Any:
+def _in_full(environment: Environment) -> dict[str, Any]:
+    """Its table with what is left out of problems' files, where it is as usual."""
+    wind = environment.wind.tolist()
+    return {"gravity": environment.gravity, "wind": wind, "ground": environment.ground}
+
+
+def evidence_adapter() -> Any:
+    """Read, write and describe a document's evidence, a pydantic TypeAdapter."""
     from pydantic import TypeAdapter
 
     return TypeAdapter(_Evidence)

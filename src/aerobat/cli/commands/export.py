@@ -1,0 +1,48 @@
+"""`aerobat export`: a plan as another system reads it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+from cyclopts import Parameter
+
+from aerobat.cli.options import ExportOptions
+from aerobat.cli.terminal import print_json
+from aerobat.errors import SpecError
+from aerobat.interchange import read_plan
+from aerobat.interchange.exports import FORMATS
+from aerobat.interchange.exports import export as export_plan
+from aerobat.planning import Plan
+from aerobat.reporting.report_json import to_json
+
+
+def export(plan: Path, options: Annotated[ExportOptions, Parameter(name="*")]) -> None:
+    """Write a plan as another system reads it, and say what that lost.
+
+    The loss is the largest difference of position, velocity and attitude from the plan over continuous time.
+
+    --to csv         a table of path, attitude, rates and thrusts
+    --to crazyflie   pieces for the Crazyflie's memory, and the CSV that Crazyswarm reads (a folder)
+    --to ros1-bag    messages for ROS 1, with markers for RViz; ros2-bag (a folder) and mcap for ROS 2
+    --to px4         set-points of attitude, rates, thrust and path in PX4's axes (a folder)
+    --to blender     an animated scene, glTF, for Blender and other 3D programs
+
+    Parameters
+    ----------
+    plan
+        A .plan file, or a folder that `aerobat plan` or `aerobat fly` wrote.
+    """
+    found = read_plan(plan)
+    if not isinstance(found, Plan):
+        raise SpecError(f"{plan} holds a path alone; give it to `aerobat fly`, and export what that writes")
+    form = FORMATS[options.to]
+    default = Path("out") / f"{plan.resolve().stem}{form.suffix or '-' + options.to}"
+    made = export_plan(found, options.out or default, options.to, options.rate)
+    if options.json:
+        facts = {"format": made.format, "files": list(map(str, made.files)), "loss": made.loss.record()}
+        print_json(to_json(facts))
+        return
+    for file in made.files:
+        print(f"written to {file}")
+    print(made.loss)

@@ -1,0 +1,80 @@
+"""Bags of ROS 1 and ROS 2, written without ROS: a plan's path, poses and markers at their times."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Mapping, Sequence
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from aerobat.errors import BackendMissing
+from aerobat.flatness import reference
+from aerobat.interchange.exports.loss import Content, Rows
+from aerobat.interchange.exports.messages import NANOSECONDS, Messages, Stamped
+from aerobat.planning import Plan
+
+NAME = "plan"
+ROS2_BAG = ("metadata.yaml", f"{NAME}.db3")
+
+
+def _bag(container: str, plan: Plan, rate: float) -> Content:
+    """The bag of a plan with a vehicle, messages at `rate` [1/s] and at the end.
+
+    Lost is what lies between them. Raises BackendMissing without rosbags.
+    """
+    _require_rosbags()
+    from rosbags.typesys import Stores, get_typestore
+
+    store = get_typestore(Stores.ROS1_NOETIC if container == "ros1" else Stores.ROS2_HUMBLE)
+    times = np.unique(np.floor(plan.trajectory.sample(rate) * NANOSECONDS)) / NANOSECONDS
+    found = reference(plan, times=times)
+    messages = sorted(Messages(store).of(plan, found), key=lambda each: each.stamp)
+    flat = found.setpoint.flat
+    loss = Rows(times, flat.position, flat.velocity, found.setpoint.q_world_body).loss(plan)
+    with tempfile.TemporaryDirectory() as scratch:  # the writers want a place of their own
+        write = _write_ros1 if container == "ros1" else partial(_write_ros2, container)
+        return Content(write(store, messages, Path(scratch) / NAME), loss)
+
+
+ros1_bag = partial(_bag, "ros1")
+ros2_bag = partial(_bag, "ros2")
+mcap = partial(_bag, "mcap")
+
+
+def _require_rosbags() -> None:
+    try:
+        import rosbags  # noqa: F401
+    except ImportError:
+        remedy = 'pip install "aerobat[ros]"'
+        raise BackendMissing(f"bags need rosbags; install it with {remedy}, or export to csv") from None
+
+
+def _write_ros1(store: Any, messages: Sequence[Stamped], path: Path) -> Mapping[str, bytes]:
+    from rosbags.rosbag1 import Writer
+
+    with Writer(path) as bag:
+        connections: dict[str, Any] = {}
+        for each in messages:
+            if each.topic not in connections:
+                connections[each.topic] = bag.add_connection(each.topic, each.kind, typestore=store)
+            content = store.serialize_ros1(each.message, each.kind)
+            bag.write(connections[each.topic], each.stamp, content)
+    return {f"{NAME}.bag": path.read_bytes()}
+
+
+def _write_ros2(container: str, store: Any, messages: Sequence[Stamped], path: Path) -> Mapping[str, bytes]:
+    from rosbags.rosbag2 import StoragePlugin, Writer
+
+    plugin = StoragePlugin.MCAP if container == "mcap" else StoragePlugin.SQLITE3
+    with Writer(path, version=Writer.VERSION_LATEST, storage_plugin=plugin) as bag:
+        connections: dict[str, Any] = {}
+        for each in messages:
+            if each.topic not in connections:
+                connections[each.topic] = bag.add_connection(each.topic, each.kind, typestore=store)
+            bag.write(connections[each.topic], each.stamp, store.serialize_cdr(each.message, each.kind))
+    if container == "mcap":
+        return {f"{NAME}.mcap": (path / f"{NAME}.mcap").read_bytes()}
+    return {name: (path / name).read_bytes() for name in ROS2_BAG}

@@ -1,0 +1,74 @@
+"""Trajectories for the Crazyflie's memory: pieces of degree 7 in x, y, z and yaw, float32.
+
+A piece is what the firmware calls a poly4d, 132 bytes, little-endian: eight coefficients each of x, y, z
+and yaw, rising powers of seconds since its start, then its duration. The memory of 4 kB holds 31. The same
+numbers are a CSV in the layout of uav_trajectories, which Crazyswarm reads.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from aerobat.errors import SpecError
+from aerobat.interchange.exports.heading import YawFit, fit_yaw
+from aerobat.interchange.exports.loss import Content, Loss, peak_difference
+from aerobat.interchange.exports.refit import DEGREE, refit
+from aerobat.planning import Plan
+from aerobat.simulation.outcome import length
+from aerobat.trajectory import Trajectory
+
+PIECE = np.dtype([("polynomials", "<f4", (4, DEGREE + 1)), ("duration", "<f4")])  # x, y, z, yaw
+MEMORY = 4096  # bytes that the firmware has for trajectories
+MAX_PIECES = MEMORY // PIECE.itemsize
+MAX_ERROR = 2e-3  # [m] a fortieth of the vehicle's width: more is another path
+MAX_EXTENT = 100.0  # [m] float32 tells 8 µm apart there
+PIECES = ("trajectory.bin", "trajectory.csv")
+HEADER = ",".join(["duration", *(f"{axis}^{power}" for axis in ("x", "y", "z", "yaw") for power in range(8))])
+READING = "pieces of float32 coefficients"
+
+
+def crazyflie_pieces(plan: Plan, rate: float) -> Content:
+    """The pieces as bytes and as CSV. Lost is what a refit and float32 cost, and heading that no yaw can say.
+
+    Without a rate: it has no rows. Raises SpecError where 31 pieces do not follow the path, or it is too far.
+    """
+    fitted = refit(plan.trajectory, MAX_PIECES)
+    if not np.abs(fitted.coefficients[:, 0]).max() <= MAX_EXTENT:
+        raise SpecError(f"a path for the Crazyflie keeps within {MAX_EXTENT:g} m of the origin; move it")
+    pieces = np.zeros(fitted.segments, dtype=PIECE)
+    pieces["duration"] = fitted.durations
+    powers = fitted.durations[:, None, None] ** np.arange(fitted.degree + 1)[:, None]
+    pieces["polynomials"][:, :3, : fitted.degree + 1] = np.moveaxis(fitted.coefficients / powers, 1, 2)
+    path = as_path(pieces)
+    yaw = fit_yaw(plan, path)
+    pieces["polynomials"][:, 3] = yaw.coefficients
+    loss = _loss(plan, path, yaw)
+    if loss.position > MAX_ERROR:
+        raise SpecError(
+            f"{MAX_PIECES} pieces of degree {DEGREE}, as many as the Crazyflie holds, miss the path by "
+            f"{length(loss.position)}, {length(MAX_ERROR)} at most allowed; plan less at a time"
+        )
+    return Content(dict(zip(PIECES, (pieces.tobytes(), _csv(pieces)), strict=True)), loss)
+
+
+def as_path(pieces: np.ndarray[tuple[int], np.dtype[np.void]]) -> Trajectory:
+    """The path of pieces of the type PIECE, as the vehicle has it but for its arithmetic's rounding."""
+    durations = pieces["duration"].astype(float)
+    powers = durations[:, None, None] ** np.arange(DEGREE + 1)[:, None]
+    coefficients = np.moveaxis(pieces["polynomials"][:, :3].astype(float), 2, 1)
+    return Trajectory(durations, coefficients * powers)
+
+
+def _loss(plan: Plan, path: Trajectory, yaw: YawFit) -> Loss:
+    return Loss(
+        position=peak_difference(plan.trajectory, 0, path),
+        velocity=peak_difference(plan.trajectory, 1, path, 1),
+        attitude=yaw.attitude_error,
+        thrust_axis=yaw.thrust_axis_error,
+        reading=READING,
+    )
+
+
+def _csv(pieces: np.ndarray[tuple[int], np.dtype[np.void]]) -> bytes:
+    rows = np.column_stack([pieces["duration"], pieces["polynomials"].reshape(len(pieces), -1)])
+    return "\n".join([HEADER, *(",".join(map(repr, row)) for row in rows.tolist()), ""]).encode()

@@ -1,0 +1,181 @@
+"""A plan as an animated scene, a .glb file of glTF 2.0: Blender and other 3D programs import its keyframes.
+
+The vehicle's node has a position and an attitude at each key, joined by straight lines and turns at constant
+rates, as the format says of LINEAR. The format's y is up and our y is its -z, world and body alike: a reader
+with z up, as Blender, turns all of it back and has our axes, in the world and in the body.
+"""
+
+from __future__ import annotations
+
+import json
+import struct
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from aerobat import so3
+from aerobat.arrays import Array
+from aerobat.flatness import reference
+from aerobat.interchange.exports.loss import Content, Rows
+from aerobat.planning import Plan
+from aerobat.problem.gate import Gate
+from aerobat.vehicle import Vehicle
+
+Floats = NDArray[np.float32]
+MAGIC, VERSION, JSON_CHUNK, BINARY_CHUNK = b"glTF", 2, b"JSON", b"BIN\0"
+FLOAT, UNSIGNED_INT, LINES, LINE_STRIP, TRIANGLES = 5126, 5125, 1, 3, 4  # as the format numbers them
+BEAM = 0.05  # [m] of a gate's frame
+CORNERS = 24  # of a rotor's disc
+COLORS: Mapping[str, Sequence[float]] = {  # red, green, blue, opaque
+    "rotor": (0.05, 0.2, 0.6, 1.0),
+    "arm": (0.1, 0.1, 0.1, 1.0),
+    "gate": (0.85, 0.35, 0.05, 1.0),
+    "path": (0.4, 0.4, 0.4, 1.0),
+}
+
+
+def blender_scene(plan: Plan, rate: float) -> Content:
+    """The scene of a plan with a vehicle, keys at `rate` [1/s] and at the end.
+
+    Lost is what straight lines from key to key cut off, and float32's digits.
+    """
+    assert plan.vehicle is not None, "exports are of plans with a vehicle"
+    times = plan.trajectory.sample(rate).astype(np.float32)
+    times = np.unique(np.minimum(times, np.nextafter(np.float32(plan.duration), np.float32(0.0))))
+    found = reference(plan, times=times.astype(float))
+    position = found.setpoint.flat.position.astype(np.float32)
+    q = found.setpoint.q_world_body.astype(np.float32)
+    scene = _Scene()
+    vehicle = scene.node(plan.vehicle.name, scene.mesh("vehicle", _vehicle(scene, plan.vehicle)))
+    scene.node("path", scene.mesh("path", [scene.primitive(position, LINE_STRIP, "path")]))
+    for gate in plan.problem.gates:
+        scene.node(gate.name, scene.mesh(gate.name, [scene.primitive(_frame(gate), TRIANGLES, "gate")]))
+    rotation = np.concatenate([_y_up(q[:, 1:]), q[:, :1]], axis=1)
+    scene.animate(vehicle, times, {"translation": _y_up(position), "rotation": rotation})
+    rows = Rows(
+        found.times,
+        position.astype(float),
+        None,
+        so3.normalize(q),
+    )
+    return Content({f"{plan.problem.name}.glb": scene.binary(plan.problem.name)}, rows.loss(plan))
+
+
+@dataclass
+class _Scene:
+    """What a file holds, while it is put together."""
+
+    nodes: list[dict[str, Any]] = field(default_factory=list)
+    meshes: list[dict[str, Any]] = field(default_factory=list)
+    animations: list[dict[str, Any]] = field(default_factory=list)
+    accessors: list[dict[str, Any]] = field(default_factory=list)
+    views: list[dict[str, Any]] = field(default_factory=list)
+    buffer: bytearray = field(default_factory=bytearray)
+
+    def accessor(self, values: Floats, kind: str) -> int:
+        """The number of an array in the buffer, of float32, with its bounds."""
+        columns = values.reshape(len(values), -1)
+        self.views.append({"buffer": 0, "byteOffset": len(self.buffer), "byteLength": values.nbytes})
+        self.buffer += values.tobytes()
+        self.accessors.append(
+            {
+                "bufferView": len(self.views) - 1,
+                "componentType": FLOAT,
+                "count": len(values),
+                "type": kind,
+                "min": columns.min(axis=0).tolist(),
+                "max": columns.max(axis=0).tolist(),
+            }
+        )
+        return len(self.accessors) - 1
+
+    def primitive(self, points: Array | Floats, mode: int, color: str) -> dict[str, Any]:
+        """Points (n, 3) in our axes, joined as lines or triangles."""
+        position = self.accessor(_y_up(np.asarray(points, dtype=np.float32)), "VEC3")
+        return {"attributes": {"POSITION": position}, "mode": mode, "material": list(COLORS).index(color)}
+
+    def mesh(self, name: str, primitives: Sequence[dict[str, Any]]) -> int:
+        """The number of a mesh."""
+        self.meshes.append({"name": name, "primitives": list(primitives)})
+        return len(self.meshes) - 1
+
+    def node(self, name: str, mesh: int) -> int:
+        """The number of a node that shows a mesh."""
+        self.nodes.append({"name": name, "mesh": mesh})
+        return len(self.nodes) - 1
+
+    def animate(self, node: int, times: Floats, curves: Mapping[str, Floats]) -> None:
+        """Move a node: curves by the names of its properties, (T, 3) or (T, 4)."""
+        key = self.accessor(times, "SCALAR")
+        outputs = [self.accessor(curve, f"VEC{curve.shape[1]}") for curve in curves.values()]
+        self.animations.append(
+            {
+                "name": "plan",
+                "samplers": [{"input": key, "output": o, "interpolation": "LINEAR"} for o in outputs],
+                "channels": [
+                    {"sampler": i, "target": {"node": node, "path": path}} for i, path in enumerate(curves)
+                ],
+            }
+        )
+
+    def binary(self, name: str) -> bytes:
+        """The file: a header, the description as JSON, the buffer."""
+        description = {
+            "asset": {"version": "2.0", "generator": "aerobat"},
+            "scene": 0,
+            "scenes": [{"name": name, "nodes": list(range(len(self.nodes)))}],
+            "nodes": self.nodes,
+            "meshes": self.meshes,
+            "materials": [_material(color) for color in COLORS],
+            "animations": self.animations,
+            "accessors": self.accessors,
+            "bufferViews": self.views,
+            "buffers": [{"byteLength": len(self.buffer)}],
+        }
+        text = json.dumps(description, ensure_ascii=False).encode()
+        chunks = _chunk(JSON_CHUNK, text, b" ") + _chunk(BINARY_CHUNK, bytes(self.buffer), b"\0")
+        return MAGIC + struct.pack("<II", VERSION, 12 + len(chunks)) + chunks
+
+
+def _y_up(vectors: Floats) -> Floats:
+    """Vectors of our axes in the format's, (n, 3)."""
+    return np.ascontiguousarray(vectors[:, [0, 2, 1]] * np.array([1, 1, -1], dtype=np.float32))
+
+
+def _chunk(kind: bytes, content: bytes, padding: bytes) -> bytes:
+    padded = content + padding * (-len(content) % 4)
+    return struct.pack("<I", len(padded)) + kind + padded
+
+
+def _material(color: str) -> dict[str, Any]:
+    surface = {"baseColorFactor": COLORS[color], "metallicFactor": 0.0}
+    return {"name": color, "doubleSided": True, "pbrMetallicRoughness": surface}
+
+
+def _vehicle(scene: _Scene, vehicle: Vehicle) -> Sequence[dict[str, Any]]:
+    """Discs of the rotors, and arms to them and forward."""
+    angles = np.linspace(0.0, 2.0 * np.pi, CORNERS + 1)
+    rim = np.stack([np.cos(angles), np.sin(angles), np.zeros_like(angles)], axis=1)
+    fan = np.stack([np.zeros_like(rim[1:]), rim[:-1], rim[1:]], axis=1).reshape(-1, 3)
+    centres = np.array([rotor.position_body for rotor in vehicle.rotors])
+    radii = np.array([rotor.radius for rotor in vehicle.rotors])
+    discs = centres[:, None] + radii[:, None, None] * fan
+    tips = np.concatenate([centres, [[np.abs(centres).max(), 0.0, 0.0]]])
+    arms = np.stack([np.zeros_like(tips), tips], axis=1)
+    return [
+        scene.primitive(discs.reshape(-1, 3), TRIANGLES, "rotor"),
+        scene.primitive(arms.reshape(-1, 3), LINES, "arm"),
+    ]
+
+
+def _frame(gate: Gate) -> Array:
+    """Triangles of a gate's frame around its opening, (24, 3)."""
+    inner = gate.corners
+    signs = np.array([[1, 1], [-1, 1], [-1, -1], [1, -1]])  # of the corners, as `Gate.corners` has them
+    outer = inner + BEAM * (signs[:, :1] * gate.lateral + signs[:, 1:] * gate.up)
+    inner_next, outer_next = np.roll(inner, -1, axis=0), np.roll(outer, -1, axis=0)
+    sides = np.stack([inner, outer, outer_next, inner, outer_next, inner_next], axis=1)
+    return np.asarray(sides.reshape(-1, 3))

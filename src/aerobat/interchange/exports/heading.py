@@ -1,0 +1,115 @@
+"""The yaw that makes of a path the attitudes of a plan, where a vehicle derives them from both.
+
+The Crazyflie, as others after Mellinger and Kumar (ICRA 2011), puts the body's z along the thrust, drag left
+out, and y along z × (cos ψ, sin ψ, 0). Where the thrust is horizontal, the attitude does not depend on yaw
+ψ, or, where it is along that very direction, is undefined, and beyond it turned round.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from aerobat import so3
+from aerobat.arrays import Array
+from aerobat.interchange.exports.loss import attitudes, peak_angles
+from aerobat.planning import Plan
+from aerobat.trajectory import Trajectory
+
+GRAVITY = 9.81  # [m/s²] the firmware's
+POWERS = 8
+SAMPLES = 257  # of a piece
+FIRST_GUESSES = 64  # constants among which the fit begins
+ROUNDS = 40  # of Levenberg-Marquardt: more gain nothing
+DAMPING = 1e-3  # at its first step,
+MIN_DAMPING = 1e-9  # and at any later one, which keeps its equations regular
+MAX_SLOPE = 1e3  # of attitude over yaw: beyond, where the heading is along the thrust, no yaw is of use
+REGULARIZATION = (
+    1e-2  # [-] of coefficients, so that yaw does not fit rounding where attitude hardly depends on it
+)
+EXACT = 1e-6  # [rad] of attitude: what rounding makes of it
+DEFINED = 1e-9  # [m/s²] of thrust, or the sine of its angle to the heading: less defines no attitude
+
+
+@dataclass(frozen=True, eq=False)
+class YawFit:
+    """Polynomials of yaw, and the attitudes that come of them."""
+
+    coefficients: Array  # [rad/s^k] as float32 has them, (pieces, POWERS)
+    attitude_error: float  # [rad] the largest, heading and all
+    thrust_axis_error: float  # [rad] the largest, heading aside
+
+
+def fit_yaw(plan: Plan, path: Trajectory) -> YawFit:
+    """Polynomials of yaw on each of the path's segments that give attitudes nearest to the plan's."""
+    s = np.linspace(0.0, 1.0, SAMPLES)
+    instants = path.knots[:-1, None] + s * path.durations[:, None]
+    planned = attitudes(plan, instants.ravel()).reshape(*instants.shape, 4)
+    thrust = path.on_segments(s, 2) + GRAVITY * so3.UP
+    z = thrust / np.maximum(np.linalg.norm(thrust, axis=-1, keepdims=True), DEFINED)
+    powers = s[:, None] ** np.arange(POWERS)
+    fitted = np.array([_fitted(*piece, powers) for piece in zip(z, planned, strict=True)])
+    fitted[:, 0] -= 2.0 * np.pi * np.round((fitted[:, 0] - _ends_before(fitted)) / (2.0 * np.pi))
+    in_seconds = path.durations[:, None] ** np.arange(POWERS)
+    written = (fitted / in_seconds).astype(np.float32).astype(float)
+    read = _attitude(z, (written * in_seconds) @ powers.T)
+    return YawFit(written, *peak_angles(planned, read))
+
+
+def _ends_before(fitted: Array) -> Array:
+    """The yaw with which each piece's predecessor ends, turns aside, (pieces,)."""
+    ends = fitted.sum(axis=1)
+    whole_turns = 2.0 * np.pi * np.cumsum(np.round((ends[:-1] - fitted[1:, 0]) / (2.0 * np.pi)))
+    return np.concatenate([[0.0], ends[:-1] + np.concatenate([[0.0], whole_turns[:-1]])])
+
+
+def _fitted(z: Array, planned: Array, powers: Array) -> Array:
+    """One piece's coefficients in normalised time, (POWERS,)."""
+    guesses = np.linspace(-np.pi, np.pi, FIRST_GUESSES, endpoint=False)
+    cost = (_turn(z, planned, np.broadcast_to(guesses[:, None], (FIRST_GUESSES, len(z)))) ** 2).sum(axis=1)
+    best = np.zeros(POWERS)
+    best[0] = guesses[np.argmin(cost)]
+    weights = np.full(POWERS, REGULARIZATION)
+    weights[0] = 0.0  # a constant yaw is as good as any
+    damping = DAMPING
+    residual = np.concatenate([_turn(z, planned, powers @ best), weights * best])
+    for _ in range(ROUNDS):
+        if np.abs(residual).max() < EXACT:
+            break
+        slopes = np.concatenate([_slope(z, powers @ best)[:, None] * powers, np.diag(weights)])
+        normal = slopes.T @ slopes
+        step = np.linalg.solve(normal + damping * np.eye(POWERS), -slopes.T @ residual)
+        tried = np.concatenate([_turn(z, planned, powers @ (best + step)), weights * (best + step)])
+        if tried @ tried < residual @ residual:
+            best, residual, damping = best + step, tried, max(damping / 10.0, MIN_DAMPING)
+        else:
+            damping *= 10.0
+    return best
+
+
+def _slope(z: Array, yaw: Array) -> Array:
+    """By how much an attitude turns about its thrust with yaw [-], (samples,)."""
+    across_sq = (_across(z, yaw) ** 2).sum(axis=-1)
+    slopes = z[:, 2] / np.maximum(across_sq, DEFINED**2)
+    return np.asarray(np.clip(slopes, -MAX_SLOPE, MAX_SLOPE))
+
+
+def _turn(z: Array, planned: Array, yaw: Array) -> Array:
+    """How far the attitude of a yaw is turned about the thrust from the planned one [rad], (..., samples)."""
+    y = _across(z, yaw)
+    x_planned, y_planned = (so3.axes(planned)[..., axis] for axis in (0, 1))
+    return np.asarray(np.arctan2(-(y * x_planned).sum(axis=-1), (y * y_planned).sum(axis=-1)))
+
+
+def _across(z: Array, yaw: Array) -> Array:
+    """The direction of the body's y, z × (cos ψ, sin ψ, 0), not scaled to length one, (..., 3)."""
+    heading = np.stack([np.cos(yaw), np.sin(yaw), np.zeros_like(yaw)], axis=-1)
+    return so3.cross(z, heading)
+
+
+def _attitude(z: Array, yaw: Array) -> Array:
+    """Attitudes, body to world, of thrust directions and yaw, (..., 4)."""
+    upright = so3.smallest_rotation(so3.UP, z)
+    y = so3.unrotate(upright, _across(z, yaw))
+    return so3.multiply(upright, so3.about_axis(so3.UP, np.arctan2(-y[..., 0], y[..., 1])))

@@ -1,0 +1,166 @@
+"""How far a plan and a file made of it are apart, over continuous time: what an export costs.
+
+A file of rows says nothing of what is between them. It is read as its format has it, along straight lines
+(attitudes by the shortest turn at a constant rate), or, where it is a stream of set-points, by holding the
+last. Differences of positions and of velocities are then piecewise polynomials, whose peaks are exact.
+Attitudes are compared at many instants; between two of these they are apart as far as what they turn allows.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from math import degrees, factorial
+
+import numpy as np
+
+from aerobat import so3
+from aerobat.arrays import Array
+from aerobat.flatness import reference
+from aerobat.planning import Plan
+from aerobat.simulation.outcome import length
+from aerobat.trajectory import Trajectory
+from aerobat.trajectory.piecewise import TIME_TOLERANCE
+
+PARTS = 16  # of the time between two rows, at whose ends attitudes are compared: off by some percent at most
+AT_ONCE = 2000  # rows whose attitudes are compared together: some tens of megabytes
+STRAIGHT = "straight lines between rows"
+HELD = "each row held until the next"
+
+
+@dataclass(frozen=True)
+class Loss:
+    """The largest differences, over continuous time, between a plan and what the reader of a file has."""
+
+    position: float  # [m]
+    velocity: float  # [m/s]
+    attitude: float  # [rad] the angle between attitudes, heading and all
+    thrust_axis: float  # [rad] the angle between thrust axes, heading aside
+    reading: str  # how the file is read
+
+    def __str__(self) -> str:
+        """One line for people."""
+        return (
+            f"lost at most {length(self.position)} of position, {self.velocity:.2g} m/s of velocity, "
+            f"{degrees(self.attitude):.2g}° of attitude and {degrees(self.thrust_axis):.2g}° of the thrust's "
+            f"direction ({self.reading})"
+        )
+
+    def record(self) -> dict[str, object]:
+        """Plain data, units in the keys."""
+        return {
+            "position_m": self.position,
+            "velocity_m_s": self.velocity,
+            "attitude_deg": degrees(self.attitude),
+            "thrust_axis_deg": degrees(self.thrust_axis),
+            "reading": self.reading,
+        }
+
+
+@dataclass(frozen=True)
+class Content:
+    """What is made of a plan before anything is written: files by their names, and what they lost."""
+
+    files: Mapping[str, bytes]
+    loss: Loss
+
+
+@dataclass(frozen=True, eq=False)
+class Rows:
+    """What the rows of a file say, as it is rounded there, in our axes."""
+
+    times: Array  # [s] rising, (T,)
+    position: Array  # [m] world, (T, 3)
+    velocity: Array | None  # [m/s] world, (T, 3); None where it is read off the position
+    q_world_body: Array  # (T, 4)
+
+    def loss(self, plan: Plan, held: bool = False) -> Loss:
+        """The loss of these rows, read along straight lines, or `held`."""
+        position = self._curve(self.position, held)
+        velocity = position if self.velocity is None else self._curve(self.velocity, held)
+        attitude, thrust_axis = self._angles(plan, held)
+        return Loss(
+            position=peak_difference(plan.trajectory, 0, position),
+            velocity=peak_difference(plan.trajectory, 1, velocity, 1 if self.velocity is None else 0),
+            attitude=attitude,
+            thrust_axis=thrust_axis,
+            reading=HELD if held else STRAIGHT,
+        )
+
+    def _curve(self, rows: Array, held: bool) -> Trajectory:
+        """Rows (T, 3) as they are read, over the time from the first to the last."""
+        powers = rows[:-1, None] if held else np.stack([rows[:-1], np.diff(rows, axis=0)], axis=1)
+        return Trajectory(np.diff(self.times), powers)
+
+    def _angles(self, plan: Plan, held: bool) -> tuple[float, float]:
+        """The largest angles between attitudes and between thrust axes [rad]."""
+        starts = range(0, len(self.times) - 1, AT_ONCE)
+        parts = [self._angles_of(slice(start, start + AT_ONCE + 1), plan, held) for start in starts]
+        return max(attitude for attitude, _ in parts), max(axis for _, axis in parts)
+
+    def _angles_of(self, rows: slice, plan: Plan, held: bool) -> tuple[float, float]:
+        times, q = self.times[rows], self.q_world_body[rows]
+        s = np.linspace(0.0, 1.0, PARTS + 1)
+        instants = times[:-1, None] + s * np.diff(times)[:, None]
+        planned = attitudes(plan, instants.ravel()).reshape(*instants.shape, 4)
+        first = q[:-1, None]
+        turn = so3.log(so3.multiply(so3.conjugate(q[:-1]), q[1:]))
+        read = first if held else so3.multiply(first, so3.exp(s[:, None] * turn[:, None]))
+        return peak_angles(planned, np.broadcast_to(read, planned.shape))
+
+
+def attitudes(plan: Plan, times: Array) -> Array:
+    """A plan's attitudes, body to world, at times [s] that fall by rounding at most, (T,) -> (T, 4)."""
+    rising = np.minimum(np.maximum.accumulate(times), plan.duration)
+    found = reference(plan.trajectory, plan.vehicle, rising, environment=plan.problem.environment)
+    return found.setpoint.q_world_body
+
+
+def peak_difference(path: Trajectory, derivative: int, read: Trajectory, read_derivative: int = 0) -> float:
+    """The largest distance between two curves over the time that both last, exactly.
+
+    Args:
+        path: One path.
+        derivative: The order of its derivative that is one curve.
+        read: The other path.
+        read_derivative: The order of its derivative that is the other curve.
+    """
+    end = min(path.duration, read.duration)
+    cuts = np.unique(np.concatenate([path.knots, read.knots]))
+    cuts = np.concatenate([[0.0], cuts[(cuts > TIME_TOLERANCE) & (cuts < end - TIME_TOLERANCE)], [end]])
+    cuts = cuts[np.append(np.diff(cuts) > TIME_TOLERANCE, True)]  # of two that are one the later, see knots
+    size = 1 + max(path.degree - derivative, read.degree - read_derivative, 0)
+    apart = _expanded(path, derivative, cuts, size) - _expanded(read, read_derivative, cuts, size)
+    return Trajectory(np.diff(cuts), apart).peak(0).value
+
+
+def peak_angles(attitude: Array, other: Array) -> tuple[float, float]:
+    """Bounds on the angles [rad] between attitudes, and between their thrust axes.
+
+    Args:
+        attitude: Sampled along intervals, (intervals, samples, 4).
+        other: At the same instants.
+    """
+    apart = so3.multiply(so3.conjugate(attitude), other)
+    axes = so3.thrust_axis(apart)
+    upright = np.broadcast_to([1.0, 0.0, 0.0, 0.0], apart.shape)
+    tilt = so3.smallest_rotation(np.broadcast_to(so3.UP, axes.shape), axes)
+    return (
+        _peak(so3.angle_between(upright, apart), so3.angle_between(apart[:, :-1], apart[:, 1:])),
+        _peak(so3.angle_between(upright, tilt), np.linalg.norm(np.diff(axes, axis=1), axis=-1)),
+    )
+
+
+def _peak(angles: Array, turned: Array) -> float:
+    """The largest angle that may be, by samples (n, m) and the turns from each to the next (n, m - 1)."""
+    between = (angles[:, :-1] + angles[:, 1:] + turned) / 2.0  # it changes by no more than is turned
+    return float(min(between.max(), np.pi))
+
+
+def _expanded(path: Trajectory, derivative: int, cuts: Array, size: int) -> Array:
+    """The powers of normalised time of d^k p/dt^k from each cut to the next, (cuts - 1, size, 3)."""
+    steps = np.diff(cuts)[:, None]
+    powers = np.zeros((len(steps), size, 3))
+    for power in range(min(path.degree - derivative + 1, size)):
+        powers[:, power] = path.evaluate(cuts[:-1], derivative + power) * steps**power / factorial(power)
+    return powers

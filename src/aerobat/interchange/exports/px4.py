@@ -1,0 +1,105 @@
+"""Set-points for PX4: attitude, rates and thrust, and the path, in its messages' fields and axes.
+
+A table for each message, named and laid out as `ulog2csv` writes those messages of a flight's log, so that
+the same lines read plan and log. World axes are NED, body axes FRD, numbers float32 as in the messages.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from aerobat import so3
+from aerobat.arrays import Array
+from aerobat.flatness import Reference, reference
+from aerobat.interchange.exports.loss import Content, Rows
+from aerobat.planning import Plan
+
+ATTITUDE, RATES, PATH = SETPOINTS = (
+    "vehicle_attitude_setpoint_0.csv",
+    "vehicle_rates_setpoint_0.csv",
+    "trajectory_setpoint_0.csv",
+)
+MICROSECONDS = 1e6
+NED_ENU = np.array([0.0, -np.sqrt(0.5), -np.sqrt(0.5), 0.0])  # ENU to NED: x and y change places, z turns
+FLU_FRD = np.array([0.0, 1.0, 0.0, 0.0])  # FRD to FLU: half a turn about x, and back by the same
+
+
+def _indexed(name: str, count: int) -> Sequence[str]:
+    return [f"{name}[{i}]" for i in range(count)]
+
+
+HEADERS: Mapping[str, Sequence[str]] = {
+    ATTITUDE: ["yaw_sp_move_rate", *_indexed("q_d", 4), *_indexed("thrust_body", 3)],
+    RATES: ["roll", "pitch", "yaw", *_indexed("thrust_body", 3)],
+    PATH: [
+        *_indexed("position", 3),
+        *_indexed("velocity", 3),
+        *_indexed("acceleration", 3),
+        *_indexed("jerk", 3),
+        "yaw",
+        "yawspeed",
+    ],
+}
+
+
+def px4_setpoints(plan: Plan, rate: float) -> Content:
+    """The set-points of a plan with a vehicle at `rate` [1/s] and at the end.
+
+    Lost is what lies between rows, each of which is held until the next, microseconds, float32's digits.
+    """
+    timestamps = np.unique(np.floor(plan.trajectory.sample(rate) * MICROSECONDS))
+    found = reference(plan, times=timestamps / MICROSECONDS)
+    flat = found.setpoint.flat
+    position, velocity, acceleration, jerk = (
+        _float32(ned(curve)) for curve in (flat.position, flat.velocity, flat.acceleration, flat.jerk)
+    )
+    q_d = _float32(so3.multiply(so3.multiply(NED_ENU, found.setpoint.q_world_body), FLU_FRD))
+    rates = _float32(found.setpoint.omega_body * np.array([1.0, -1.0, -1.0]))
+    thrust = _float32(_thrust_body(found, plan))
+    zero = _float32(np.zeros((len(timestamps), 1)))
+    yaw = _float32(_yaw(q_d)[:, None])
+    columns: Mapping[str, Sequence[Array]] = {
+        ATTITUDE: [zero, q_d, thrust],
+        RATES: [rates, thrust],
+        PATH: [position, velocity, acceleration, jerk, yaw, np.full_like(zero, np.nan)],
+    }
+    q_world_body = so3.multiply(
+        so3.multiply(so3.conjugate(NED_ENU), so3.normalize(q_d)), so3.conjugate(FLU_FRD)
+    )
+    rows = Rows(found.times, ned(position.astype(float)), ned(velocity.astype(float)), q_world_body)
+    files = {name: _table(timestamps, HEADERS[name], columns[name]) for name in SETPOINTS}
+    return Content(files, rows.loss(plan, held=True))
+
+
+def ned(vectors: Array) -> Array:
+    """Vectors of ENU axes in NED ones, or the other way round, (..., 3)."""
+    return np.asarray(vectors[..., [1, 0, 2]] * np.array([1.0, 1.0, -1.0]))
+
+
+def _thrust_body(found: Reference, plan: Plan) -> Array:
+    """Thrust along the body's axes, FRD, as a fraction of that of all rotors at their limits, (T, 3)."""
+    assert plan.vehicle is not None, "exports are of plans with a vehicle"
+    thrust = np.zeros((len(found.times), 3))
+    thrust[:, 2] = -found.setpoint.wrench.thrust / plan.vehicle.max_thrusts.sum()
+    return thrust
+
+
+def _yaw(q_ned_frd: Array) -> Array:
+    """The heading of the body's x axis [rad], from north to east, (T,)."""
+    forward = so3.rotate(q_ned_frd, np.array([1.0, 0.0, 0.0]))
+    return np.asarray(np.arctan2(forward[:, 1], forward[:, 0]))
+
+
+def _float32(values: Array) -> Array:
+    """The values as the messages have them; no negative zeros."""
+    return np.asarray(np.asarray(values, dtype=np.float32) + np.float32(0.0))
+
+
+def _table(timestamps: Array, header: Sequence[str], columns: Sequence[Array]) -> bytes:
+    """A table with the timestamps [µs] first, numbers with the digits of float32."""
+    lines = [",".join(["timestamp", *header])]
+    for timestamp, row in zip(timestamps, np.concatenate(columns, axis=1), strict=True):
+        lines.append(",".join([str(int(timestamp)), *map(str, row)]))
+    return ("\n".join(lines) + "\n").encode()
