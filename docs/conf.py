@@ -18,7 +18,7 @@ author = "the Aerobat authors"
 extensions = ["myst_nb", "sphinx.ext.autodoc", "sphinx.ext.napoleon", "sphinx_copybutton"]
 exclude_patterns = ["site_pages"]
 
-myst_enable_extensions = ["dollarmath", "attrs_block"]
+myst_enable_extensions = ["dollarmath", "attrs_inline"]
 myst_fence_as_directive = ["math"]  # as GitHub has it
 myst_heading_anchors = 4
 nb_execution_mode = "off"  # the tutorial is kept with what it shows; a test runs it
@@ -48,6 +48,7 @@ def setup(app: Sphinx) -> None:
     """Write what is made from the code, and have formulas and docstrings read as they are meant."""
     mathml.register(app)
     app.connect("autodoc-process-docstring", docstrings.as_restructured_text, priority=400)
+    app.connect("autodoc-process-signature", docstrings.readable_types, priority=900)
     app.connect("source-read", outside.relink)
     generated = HERE / "generated"
     outside.write(generated)

@@ -2,12 +2,14 @@
 
 import dataclasses
 import re
+from itertools import accumulate
 from typing import Any
 
 from make_files_page import comments
 from sphinx.application import Sphinx
 
 CODE = re.compile(r"(`[^`]*`)")
+DESCRIPTION = re.compile(r"description='([^']*)'")
 SPECIAL = re.compile(r"([\\*|]|_(?=\W|$))")
 
 
@@ -39,3 +41,24 @@ def fields(cls: Any) -> list[str]:
             text = " ".join(filter(None, (f"[{unit}]" if unit else "", meaning)))
             lines.append(f":param {field.name}: {escaped(text)}")
     return lines
+
+
+def readable_types(app: Sphinx, what: str, name: str, value: Any, *signature: Any) -> None:
+    """Say types that carry a check by what the check asks: a positive number, three numbers."""
+    kept = app.env.current_document.autodoc_annotations.get(name, {})
+    for parameter, text in kept.items():
+        kept[parameter] = without_checks(text)
+
+
+def without_checks(text: str) -> str:
+    """A type's text with each Annotated[...] replaced by its description, or by the type that it checks."""
+    start = text.find("Annotated[")
+    if start < 0:
+        return text
+    inside = text.index("[", start) + 1
+    depths = accumulate((character == "[") - (character == "]") for character in text[inside:])
+    end = inside + next(k for k, depth in enumerate(depths) if depth < 0)
+    checks = DESCRIPTION.findall(text[inside:end])
+    plain = checks[-1] if checks else text[inside:end].partition(", ")[0]
+    before = text[:start].removesuffix("~typing.").removesuffix("typing.").removesuffix("~")
+    return before + plain + without_checks(text[end + 1 :])

@@ -1,4 +1,4 @@
-"""The gallery: every built-in maneuver and those of the examples, planned, flown and replayed for the page."""
+"""The gallery: every built-in maneuver and those of the examples, planned, flown and replayed for it."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -42,10 +42,12 @@ def write(folder: Path) -> None:
         plan = ab.plan(exhibit.problem, vehicle=exhibit.vehicle)
         flight = ab.fly(plan)
         ab.write_replay(flight, replays / f"{name}.html", plan)
-        ab.draw(flight, plan).savefig(pages / f"{name}.png", dpi=100)
+        draw(flight, plan, pages / name)
         (pages / f"{name}.md").write_text(page(exhibit, plan, ab.score(flight, plan)), encoding="utf-8")
-        cards.append(f"| [{name}]({name}.md) | {exhibit.problem.description} | {plan.duration:.2f} s |")
-    table = "\n".join(["| maneuver | | lasts |", "| --- | --- | --- |", *cards])
+        picture = f"[![The path of {name}]({name}-path.png){{width=260px}}]({name}.md)"
+        text = f"[**{name}**]({name}.md)<br>{exhibit.problem.description}.<br>{plan.duration:.2f} s"
+        cards.append(f"| {picture} | {text} |")
+    table = "\n".join(["| | |", "| --- | --- |", *cards])
     listed = "\n".join(exhibit.problem.name for exhibit in exhibits())
     (pages / "index.md").write_text(
         "# Gallery\n\nEach maneuver that comes with Aerobat, planned, proven and flown when this page was "
@@ -53,6 +55,14 @@ def write(folder: Path) -> None:
         f"{table}\n\n```{{toctree}}\n:hidden:\n\n{listed}\n```\n",
         encoding="utf-8",
     )
+
+
+def draw(flight: ab.Flight, plan: ab.Plan, stem: Path) -> None:
+    """Draw a flight's page, and its path by itself."""
+    figure = ab.draw(flight, plan)
+    figure.savefig(stem.with_name(f"{stem.name}.png"), dpi=100)
+    path = figure.axes[0].get_window_extent().transformed(figure.dpi_scale_trans.inverted())
+    figure.savefig(stem.with_name(f"{stem.name}-path.png"), dpi=80, bbox_inches=path)
 
 
 def page(exhibit: Exhibit, plan: ab.Plan, score: ab.Score) -> str:

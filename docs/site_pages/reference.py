@@ -60,8 +60,8 @@ def write(folder: Path) -> None:
     ordered = [*(room for room in TITLES if room in rooms), *(room for room in rooms if room not in TITLES)]
     listed = "\n".join(ordered)
     (target / "index.md").write_text(
-        "# Reference\n\nEvery public name of `import aerobat as ab`, by the room that it comes from. SI units, "
-        "world ENU, body FLU, quaternions (w, x, y, z) body to world.\n\n"
+        "# Reference\n\nEvery public name of `import aerobat as ab`, by the room that it comes from. SI "
+        "units, world ENU, body FLU, quaternions (w, x, y, z) body to world.\n\n"
         f"```{{toctree}}\n:maxdepth: 1\n\n{listed}\n```\n",
         encoding="utf-8",
     )

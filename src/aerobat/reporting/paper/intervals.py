@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 PLANE = (1, 2)  # the axes of the flip in roll: y and z
 SHOWN = 6  # the interval that is told in full
-NAMED = 0.3  # [m] from an interval's start to its end, for its number to have room
+NAMED = 0.25  # [m] from an interval's start to its end, for its number to have room
 SAMPLES = 41  # of an interval
 ROWS = (("position", "m"), ("velocity", "m/s"), ("acceleration", "m/s²"), ("jerk", "m/s³"))
 ROW = 1.2  # [in] a quantity's height
