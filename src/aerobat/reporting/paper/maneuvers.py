@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 
 COLUMNS = (0.3, 5.98)  # [in] where the two columns of maneuvers begin from the left
 PATH: tuple[float, float] = (3.35, 4.3)  # [in] width and height of a path's picture
+VEHICLE = 0.15  # as drawn, relative to its path: six rotors are to be told apart
 ERRORS = 3.78  # [in] from a column's left to its timelines
 WIDTH, ROW, PITCH = 1.6, 1.55, 2.15  # [in] a timeline's width and height, and from one to the next
 BLOCK = PATH[1] + 0.75  # [in] from one row of maneuvers to the next
@@ -63,9 +64,16 @@ def _caption(flown: Sequence[ManeuverFlights]) -> Caption:
         f"{max(s.max_attitude_error_deg for s in here):.2f}° off, all four through their gates; as "
         f"printed {_range([100 * s.max_position_error_m for s in printed], 'cm')} and "
         f"{_range([s.max_attitude_error_deg for s in printed], '°')}, "
-        f"{sum(s.outcome.is_success for s in printed)} of 4 through their gates, its jerk jumping as no "
-        "rotor's thrust can. Blue dot: start; dark: end; diamonds: stages.",
+        f"{sum(s.outcome.is_success for s in printed)} of 4 through their gates ({_failures(flown)}): its "
+        "jerk jumps as no rotor's thrust can. Blue dot: start; dark: end; diamonds: stages; discs are blue from "
+        "above, white from below.",
     )
+
+
+def _failures(flown: Sequence[ManeuverFlights]) -> str:
+    """What became of the printed flights that did not go well."""
+    printed = zip(TITLES, (each.printed.score for each in flown), strict=True)
+    return "; ".join(f"{title.lower()}: {s.sentence}" for title, s in printed if not s.outcome.is_success)
 
 
 def _range(values: Sequence[float], unit: str) -> str:
@@ -88,11 +96,12 @@ def _draw_block(
     path = panel(figure, left, bottom + 0.2, *PATH)
     reference = reference_poses(plan_reference(here.plan, here.vehicle))
     gates, stages = here.plan.problem.gates, here.plan.stages
-    draw_path(path, reference, actual_poses(here.flight), here.vehicle, gates, stages)
+    note = draw_path(path, reference, actual_poses(here.flight), here.vehicle, gates, stages, VEHICLE)
     drawn = path.get_legend()
     assert drawn is not None, "a path has its start and its end"
     drawn.remove()  # the caption says it once for all
-    heading(path, title, f"{here.plan.duration:.2f} s; as printed {printed.plan.duration:.2f} s")
+    durations = f"{here.plan.duration:.2f} s, as printed {printed.plan.duration:.2f} s"
+    heading(path, f"{title}: {durations}", note.partition(";")[0])
     position, attitude = (panel(figure, left + ERRORS, bottom + AXIS + k * PITCH, WIDTH, ROW) for k in (1, 0))
     for each, colour, name in ((printed, MUTED, "printed"), (here, BLUE, "here")):
         times = each.flight.times
