@@ -65,8 +65,8 @@ def _caption(flown: Sequence[ManeuverFlights]) -> Caption:
         f"printed {_range([100 * s.max_position_error_m for s in printed], 'cm')} and "
         f"{_range([s.max_attitude_error_deg for s in printed], '°')}, "
         f"{sum(s.outcome.is_success for s in printed)} of 4 through their gates ({_failures(flown)}): its "
-        "jerk jumps as no rotor's thrust can. Blue dot: start; dark: end; diamonds: stages; discs are blue from "
-        "above, white from below.",
+        "jerk jumps as no rotor's thrust can. Blue dot: start; dark: end; diamonds: stages; discs are "
+        "blue from above, white from below.",
     )
 
 
