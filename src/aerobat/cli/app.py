@@ -24,6 +24,7 @@ COMMANDS = {
     "inspect": "Say what caused a recorded flight's error, by its log and its plan.",
     "view": "Write a page that replays a run, a plan or a flight in a browser, or serve one to try plans on.",
     "export": "Write a plan as another system reads it, and say what that lost.",
+    "figures": "Draw the paper's figures anew, from real runs.",
     "repeat": "Do a run again from its folder, and say if it came to the same.",
     "vehicles": "List the built-in vehicles, or print one as a file to begin one's own with.",
     "problems": "List the built-in problems.",

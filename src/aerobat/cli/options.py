@@ -318,3 +318,14 @@ class ExportOptions:
 
     json: Annotated[bool, Parameter(group=output, negative="", show_default=False)] = False
     """Print what was written and lost as JSON on standard output, and nothing else."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class FiguresOptions:
+    """Where the paper's figures go."""
+
+    out: Annotated[Path, Parameter(group=output)] = Path("docs") / "figures"
+    """The folder to write to; figures of these numbers in it are replaced."""
+
+    json: Annotated[bool, Parameter(group=output, negative="", show_default=False)] = False
+    """Print captions and files as JSON on standard output, and nothing else."""

@@ -113,13 +113,26 @@ def tracking_figure(plan: Plan, vehicle: Vehicle | str, flight: Flight) -> Figur
     if flight.is_batch:
         raise SpecError("tracking_figure draws one flight; of a batch, give flight[k]")
     vehicle = as_vehicle(vehicle)
-    asked = reference(plan.trajectory, vehicle, rate=TRACKING_RATE, environment=plan.problem.environment)
     rotors = None if plan.margin is None else f"rotors asked for {plan.margin}"
     proof = rotors if plan.certificate is None else plan.certificate.why
     result = score_caption(score(flight, plan.problem, vehicle))
     facts = [plan_caption(plan), *([] if proof is None else [proof]), result]
+    return tracking_page(plan, vehicle, flight, f"{plan.problem.name} · tracking by {vehicle.name}", facts)
+
+
+def tracking_page(plan: Plan, vehicle: Vehicle, flight: Flight, title: str, facts: Sequence[str]) -> Figure:
+    """Draw the page of `tracking_figure` under a title.
+
+    Args:
+        plan: What was flown.
+        vehicle: What flew it.
+        flight: One flight.
+        title: The page's.
+        facts: A line each, under the title.
+    """
+    asked = reference(plan.trajectory, vehicle, rate=TRACKING_RATE, environment=plan.problem.environment)
     with house_style():
-        figure = blank_page(HEIGHT, f"{plan.problem.name} · tracking by {vehicle.name}", facts)
+        figure = blank_page(HEIGHT, title, facts)
         path = panel(figure, *PATH)
         poses = reference_poses(asked), actual_poses(flight)
         heading(path, "Path and attitude", draw_path(path, *poses, vehicle, plan.problem.gates, plan.stages))

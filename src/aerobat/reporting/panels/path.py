@@ -50,6 +50,7 @@ def draw_path(
     vehicle: Vehicle,
     gates: Sequence[Gate],
     stages: Sequence[PlacedStage] = (),
+    size: float = SIZE,
 ) -> str:
     """Draw paths, the first vehicle along its path, the gates, other stages, start and end.
 
@@ -60,11 +61,12 @@ def draw_path(
         vehicle: Whose glyph is drawn.
         gates: All gates of the problem; the picture holds each of them.
         stages: Of which those without a gate are marked by diamonds.
+        size: Of the vehicle as drawn, relative to the path's extent.
 
     Returns:
         A note on how the vehicle is drawn.
     """
-    scale = enlargement(vehicle, SIZE * reference.extent)
+    scale = enlargement(vehicle, size * reference.extent)
     reach = scale * span(vehicle)
     paths = [poses.path for poses in (reference, *actual)]
     box = box_around(np.concatenate([*paths, gate_corners(gates)]), 0.6 * reach)
@@ -90,8 +92,8 @@ def draw_path(
         axes.plot([], [], color=INK, linewidth=ACTUAL_WIDTH, label="actual")
     _mark_stages(axes, camera, reference, [stage for stage in stages if stage.gate is None])
     mark_ends(axes, camera.project(reference.position[[0, -1]]))
-    size = "" if scale == 1.0 else f", {scale:g} times its size"
-    return f"vehicle every {step:.2f} s{size}; blue seen from above, white from below"
+    enlarged = "" if scale == 1.0 else f", {scale:g} times its size"
+    return f"vehicle every {step:.2f} s{enlarged}; blue seen from above, white from below"
 
 
 def pose_samples(poses: PoseHistory, size: float, gates: Sequence[Gate]) -> tuple[list[int], float]:

@@ -1,0 +1,116 @@
+"""The paper's figures: drawn from runs, legible, the same each time, with its numbers beside ours."""
+
+from __future__ import annotations
+
+import json
+from functools import cache, partial
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from aerobat import cli
+from aerobat.errors import SpecError
+from aerobat.reporting.paper import PaperFigure, gates, paper_figure
+from aerobat.reporting.paper.files import write_figures
+from aerobat.reporting.paper.time_search import PAPER_TIMES
+from aerobat.studies.paper import hardware_causes, maneuver_flights, printed_plan, time_search
+from reporting_cases import require_legible
+
+FEW = 8  # flights that show the same in less time
+
+
+@cache
+def drawn(number: int) -> PaperFigure:
+    if number == 6:
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr(gates, "TILTS", (45,))
+            patch.setattr(gates, "hardware_causes", partial(hardware_causes, flights=FEW))
+            return paper_figure(number)
+    return paper_figure(number)
+
+
+@pytest.mark.parametrize("number", [2, 3, 5, 6, 8, 9, 10])
+def test_no_text_lies_over_another_or_beyond_the_page(number: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    require_legible(drawn(number).figure, monkeypatch)
+
+
+def test_the_same_runs_give_the_same_bytes() -> None:
+    first = drawn(3)
+    maneuver_flights.cache_clear()
+    again = paper_figure(3)
+    assert again.caption == first.caption
+    assert again.png == first.png
+    assert again.pdf == first.pdf
+
+
+def test_the_search_on_times_comes_to_the_paper_s_times_and_only_then_within_the_limits() -> None:
+    search = time_search()
+    for iteration, times in PAPER_TIMES.items():
+        np.testing.assert_allclose(search.iterations[iteration - 1].trajectory.knots[1:], times)
+    assert [plan.certified for plan in search.iterations] == 11 * [False] + [True]
+    assert search.optimized.score.outcome.is_success
+    assert not search.stopped.score.outcome.is_success
+
+
+def test_intervals_that_are_drawn_meet_and_have_constant_jerk() -> None:
+    axes = {panel.get_ylabel(): panel for panel in drawn(2).figure.axes}
+    trajectory = printed_plan("flip-roll").trajectory
+    for label, derivative in (("position [m]", 0), ("jerk [m/s³]", 3)):
+        y, z, *_ = (np.asarray(line.get_ydata(), dtype=float) for line in axes[label].get_lines())
+        expected = trajectory.on_segments(np.linspace(0.0, 1.0, len(y) // trajectory.segments), derivative)
+        np.testing.assert_allclose(np.stack([y, z], axis=-1), expected[..., 1:].reshape(-1, 2), atol=1e-9)
+    jerk = np.asarray(axes["jerk [m/s³]"].get_lines()[1].get_ydata()).reshape(trajectory.segments, -1)
+    assert np.ptp(jerk, axis=1).max() < 1e-6
+    assert np.abs(jerk).max() <= 200.0 + 1e-6
+
+
+def test_errors_that_are_told_are_those_of_the_flights() -> None:
+    flights = maneuver_flights("half-flip")
+    caption = drawn(5).caption
+    assert f"{100 * flights.printed.score.max_position_error_m:.0f} cm" in caption.here
+    assert f"{flights.printed.score.max_attitude_error_deg:.0f}°" in caption.here
+    assert flights.here.plan.certified
+    assert flights.here.score.max_position_error_m < 1e-3 * flights.printed.score.max_position_error_m
+
+
+def test_a_figure_that_is_drawn_anew_leaves_the_others_on_the_page(tmp_path: Path) -> None:
+    page = tmp_path / "figures.md"
+    write_figures([drawn(3)], tmp_path)
+    alone = page.read_text(encoding="utf-8")
+    write_figures([drawn(2)], tmp_path)
+    both = page.read_text(encoding="utf-8")
+    assert both.replace(both[both.index("## Fig. 2 ") : both.index("## Fig. 3 ")], "") == alone
+    write_figures([drawn(2)], tmp_path)
+    assert page.read_text(encoding="utf-8") == both
+
+
+def test_a_page_of_somebody_else_s_is_left_alone(tmp_path: Path) -> None:
+    page = tmp_path / "figures.md"
+    page.write_text("# Mine\n", encoding="utf-8")
+    with pytest.raises(SpecError, match=r"figures.md was not written by `aerobat figures`"):
+        write_figures([drawn(2)], tmp_path)
+    assert [path.name for path in tmp_path.iterdir()] == ["figures.md"]
+    assert page.read_text(encoding="utf-8") == "# Mine\n"
+
+
+def test_the_command_writes_what_it_names(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    cli.main(["figures", "3", "2", "2", "--out", str(tmp_path / "deep" / "figures"), "--json"])
+    facts = json.loads(capsys.readouterr().out)
+    assert [each["figure"] for each in facts["figures"]] == [2, 3]
+    assert sorted(map(str, (tmp_path / "deep" / "figures").iterdir())) == sorted(facts["files"])
+    assert facts["figures"][0]["here"] == drawn(2).caption.here
+
+
+@pytest.mark.parametrize("number", ["4", "-1", "11"])
+def test_an_unknown_figure_is_refused_before_anything_is_drawn(
+    number: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with pytest.raises(SystemExit) as stop:
+        cli.main(["figures", "2", number, "--out", str(tmp_path / "figures")])
+    assert stop.value.code == 2
+    out, err = capsys.readouterr()
+    assert out == ""
+    assert f"no figure {number}" in err or "Unknown option" in err
+    assert err.count("\n") == 1
+    assert not (tmp_path / "figures").exists()
