@@ -22,6 +22,8 @@ COMMANDS = {
     "sweep": "Fly a maneuver many times as it would really be flown, and count what becomes of it.",
     "tune": "Find controller gains for a vehicle over many flights, and write them to its file.",
     "inspect": "Say what caused a recorded flight's error, by its log and its plan.",
+    "mavlink": "Fly a plan on an autopilot over MAVLink.",
+    "mavlink-vehicle": "Simulate a vehicle that MAVLink clients can fly.",
     "view": "Write a page that replays a run, a plan or a flight in a browser.",
     "repeat": "Do a run again from its folder, and say if it came to the same.",
     "vehicles": "List the built-in vehicles, or print one as a file to begin one's own with.",
@@ -45,7 +47,8 @@ app = App(
     suppress_keyboard_interrupt=False,
 )
 for name, help in COMMANDS.items():
-    app.command(f"aerobat.cli.commands.{name}:{name}", name=name, help=help)
+    place = name.replace("-", "_")
+    app.command(f"aerobat.cli.commands.{place}:{place}", name=name, help=help)
 
 
 def run(arguments: Sequence[str]) -> ExitCode:
