@@ -6,15 +6,14 @@ The same for every link: it knows times, states and goals, but no messages.
 from __future__ import annotations
 
 from enum import StrEnum
-from math import atan2, hypot, pi
+from math import hypot, pi
 
 import numpy as np
 
-from aerobat import so3
 from aerobat.arrays import Array
 from aerobat.declaration import Positive, declared
 from aerobat.errors import SpecError
-from aerobat.links.goals import AttitudeGoal, Observed, PositionGoal
+from aerobat.links.goals import AttitudeGoal, Observed, PositionGoal, yaw_of
 from aerobat.links.path_follower import PathFollower
 from aerobat.links.routes import braking, rest_to_rest
 from aerobat.links.stream import SetpointStream
@@ -76,7 +75,7 @@ class Mission:
         first, last = self.stream.flat(0.0), self.stream.flat(self.stream.duration)
         self._start = first.position
         self._heading = plan.trajectory.heading
-        self._final_yaw = yaw_of(np.array(self.stream.at(self.stream.duration).q_world_body))
+        self._final_yaw = yaw_of(self.stream.at(self.stream.duration).q_world_body)
         self._after = braking(last.position, last.velocity, settings.cruise_acceleration, -np.inf)
         self.began = np.nan  # [s] when the phase did
         self.maneuver_began = np.nan  # [s]
@@ -91,13 +90,11 @@ class Mission:
         above = np.array([here[0], here[1], max(self._start[2], here[2] + _CLIMB)])
         limits = (self.settings.cruise_speed, self.settings.cruise_acceleration)
         self._routes = [rest_to_rest(here, above, *limits), rest_to_rest(above, self._start, *limits)]
-        yaw = yaw_of(np.array(seen.body.q_world_body))
+        yaw = yaw_of(seen.body.q_world_body)
         self._turn = (yaw, (self._heading - yaw + pi) % (2 * pi) - pi)
         self._enter(Phase.CLIMB, now)
 
-    def step(
-        self, now: float, seen: Observed, delay: float = 0.0
-    ) -> PositionGoal | AttitudeGoal | None:
+    def step(self, now: float, seen: Observed, delay: float = 0.0) -> PositionGoal | AttitudeGoal | None:
         """The goal at this time; None where the vehicle is to look after itself: to hold, or to land.
 
         `seen` is the latest of the vehicle, `delay` [s] how long a goal is on its way to it.
@@ -206,15 +203,11 @@ def require_flyable(plan: Plan, vehicle_name: str | None = None) -> None:
         )
     motion = [float(np.linalg.norm(plan.trajectory.evaluate(0.0, k))) for k in (1, 2)]
     if max(motion) > _AT_REST:
-        raise SpecError(f"the plan '{name}' begins in motion; plan it from a hover, where a link can begin it")
-
-
-def yaw_of(q_world_body: Array) -> float:
-    """The angle of the body's x axis about the vertical, from east [rad]."""
-    x, y, _ = so3.axes(q_world_body)[:, 0]
-    return atan2(y, x)
+        raise SpecError(
+            f"the plan '{name}' begins in motion; plan it from a hover, where a link can begin it"
+        )
 
 
 def _on(route: Trajectory, time: float, yaw: float) -> PositionGoal:
     flat = route.flat(time)
-    return PositionGoal(flat.position, flat.velocity, flat.acceleration, flat.jerk, yaw)
+    return PositionGoal(flat.position, flat.velocity, flat.acceleration, yaw)

@@ -15,7 +15,9 @@ from aerobat.states import FlatState
 from aerobat.trajectory import Trajectory
 from aerobat.vehicle import Vehicle
 
-_RATE = 1000.0  # [1/s] of the rows between which set-points are straight: 0.1 mm and 0.01° in the fastest flips
+_RATE = (
+    1000.0  # [1/s] of the rows between which set-points are straight: 0.1 mm and 0.01° in the fastest flips
+)
 
 
 class SetpointStream:
@@ -49,9 +51,7 @@ class SetpointStream:
     def flat(self, time: float) -> FlatState:
         """Position to snap [m/s^k] at a time [s] since the start, (3,) each."""
         flat = self.trajectory.flat(min(max(time, 0.0), self.duration))
-        return FlatState(
-            flat.position + self._offset, flat.velocity, flat.acceleration, flat.jerk, flat.snap
-        )
+        return FlatState(flat.position + self._offset, flat.velocity, flat.acceleration, flat.jerk, flat.snap)
 
     def at(self, time: float) -> ReferencePoint:
         """All that a controller follows at a time [s] since the start, in plain numbers."""

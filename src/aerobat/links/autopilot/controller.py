@@ -35,7 +35,9 @@ class AutopilotController:
     name: str = "controller"
     feedthrough: bool = True
 
-    def init(self, ops: Ops, parameters: ControllerModel, inputs: Scalar, signals: Signals) -> ControllerState:
+    def init(
+        self, ops: Ops, parameters: ControllerModel, inputs: Scalar, signals: Signals
+    ) -> ControllerState:
         """See `Component.init`."""
         return control.init(ops, parameters, signals["observer"].body, signals["reference"])
 
@@ -54,9 +56,7 @@ class AutopilotController:
         commanded = by_attitude > 0.5
         state = state._replace(outer=select_tree(ops, commanded, state.outer, outer))
         attitude = select_tree(ops, commanded, given, towards)
-        return control.track_attitude(
-            ops, self.flags, parameters, state, body, attitude, reference, elapsed
-        )
+        return control.track_attitude(ops, self.flags, parameters, state, body, attitude, reference, elapsed)
 
 
 def _towards_point(

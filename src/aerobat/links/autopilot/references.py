@@ -30,7 +30,7 @@ class Route(NamedTuple):
         since = times - self.began
         flat = self.path.flat(np.clip(since, 0.0, self.path.duration))
         jerk = np.where((since < self.path.duration)[:, None], flat.jerk, 0.0)  # at its end it jumps to rest
-        return _point_reference(flat.position, flat.velocity, flat.acceleration, jerk, self.yaw, gravity)
+        return point_reference(flat.position, flat.velocity, flat.acceleration, jerk, self.yaw, gravity)
 
 
 class PointReference(NamedTuple):
@@ -45,7 +45,7 @@ class PointReference(NamedTuple):
         age = np.clip(times - self.arrived, 0.0, _MAX_EXTRAPOLATION)[:, None]
         position = goal.position + age * goal.velocity
         velocity, acceleration = ones * goal.velocity, ones * goal.acceleration
-        return _point_reference(position, velocity, acceleration, ones * goal.jerk, goal.yaw, gravity)
+        return point_reference(position, velocity, acceleration, 0.0 * ones * velocity, goal.yaw, gravity)
 
 
 class AttitudeReference(NamedTuple):
@@ -112,7 +112,7 @@ class AttitudeReference(NamedTuple):
         )
 
 
-def _point_reference(
+def point_reference(
     position: Array, velocity: Array, acceleration: Array, jerk: Array, yaw: float, gravity: float
 ) -> ReferencePoint:
     """References of positions (T, 3) at a yaw; the controller leans as the acceleration asks."""

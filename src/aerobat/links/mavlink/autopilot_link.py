@@ -10,8 +10,7 @@ import numpy as np
 
 from aerobat import so3
 from aerobat.kernels.rigid_body import Body
-from aerobat.links.autopilot.vehicle import Mode
-from aerobat.links.goals import AttitudeGoal, Observed, PositionGoal
+from aerobat.links.goals import AttitudeGoal, Mode, Observed, PositionGoal
 from aerobat.links.mavlink.connection import Connection, dialect
 from aerobat.links.mavlink.frames import swap_attitude, swap_body, swap_world, swap_yaw
 from aerobat.links.mavlink.modes import ARMED, CUSTOM_MODE_ENABLED, MAIN_AND_SUB, mode_of

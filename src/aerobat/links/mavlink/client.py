@@ -11,12 +11,11 @@ import numpy as np
 
 from aerobat.arrays import Array
 from aerobat.errors import SpecError
-from aerobat.links.autopilot.vehicle import Mode
 from aerobat.links.clock import Clock
-from aerobat.links.goals import Observed, PositionGoal
+from aerobat.links.goals import Mode, Observed, PositionGoal, yaw_of
 from aerobat.links.mavlink.autopilot_link import AutopilotLink
 from aerobat.links.mavlink.connection import Connection
-from aerobat.links.mission import Mission, MissionSettings, Phase, yaw_of
+from aerobat.links.mission import Mission, MissionSettings, Phase
 from aerobat.links.report import LinkReport, link_report
 from aerobat.planning import Plan
 
@@ -162,8 +161,8 @@ class Client:
             self._max_thrust = self._weight / hover
             body = self._observed.body
             zero = np.zeros(3)
-            yaw = yaw_of(np.array(body.q_world_body))
-            self._ground = PositionGoal(np.array(body.position), zero, zero, zero, yaw)
+            yaw = yaw_of(body.q_world_body)
+            self._ground = PositionGoal(np.array(body.position), zero, zero, yaw)
             self._say(f"connected; a message takes {1e3 * self.link.delay:.0f} ms")
             self._enter(Stage.ARMING, now)
         elif self._since(now) > self._settings.wait:

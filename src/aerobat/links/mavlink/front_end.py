@@ -8,8 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from aerobat.links.autopilot.vehicle import Mode, SimulatedVehicle
-from aerobat.links.goals import AttitudeGoal, PositionGoal
+from aerobat import so3
+from aerobat.links.autopilot.vehicle import POINT_TIMEOUT, SimulatedVehicle
+from aerobat.links.goals import AttitudeGoal, Mode, PositionGoal, yaw_of
 from aerobat.links.mavlink.connection import Connection, dialect
 from aerobat.links.mavlink.frames import (
     from_global,
@@ -44,7 +45,7 @@ class FrontEnd:
         self.parameters = {
             "MPC_THR_HOVER": vehicle.hover_fraction,
             "MIS_TAKEOFF_ALT": TAKEOFF_HEIGHT,
-            "COM_OF_LOSS_T": vehicle.point_timeout,
+            "COM_OF_LOSS_T": POINT_TIMEOUT,
         }
         self._streams: dict[int, tuple[Callable[[], Any], float]] = {
             message.id: (make, interval)
@@ -94,7 +95,9 @@ class FrontEnd:
     def _heartbeat(self) -> Any:
         armed = ARMED if self.vehicle.armed else 0
         state = 4 if self.vehicle.armed else 3  # active, or on standby
-        kind = {4: 2, 6: 13, 8: 14}.get(len(self.vehicle.vehicle.rotors), 2)  # quadrotor, hexarotor, octorotor
+        kind = {4: 2, 6: 13, 8: 14}.get(
+            len(self.vehicle.vehicle.rotors), 2
+        )  # quadrotor, hexarotor, octorotor
         return self._mavlink.MAVLink_heartbeat_message(
             kind, 12, CUSTOM_MODE_ENABLED | armed, custom_mode(self.vehicle.mode), state, 3
         )
@@ -127,7 +130,10 @@ class FrontEnd:
 
     def _attitude(self) -> Any:
         state = self.vehicle.state
-        q, rates = swap_attitude(tuple(state.q_world_body.tolist())), swap_body(tuple(state.omega_body.tolist()))
+        q, rates = (
+            swap_attitude(tuple(state.q_world_body.tolist())),
+            swap_body(tuple(state.omega_body.tolist())),
+        )
         return self._mavlink.MAVLink_attitude_quaternion_message(self._milliseconds, *q, *rates)
 
     def _global_position(self) -> Any:
@@ -140,8 +146,6 @@ class FrontEnd:
 
     def _odometry(self) -> Any:
         state = self.vehicle.state
-        from aerobat import so3
-
         velocity = so3.unrotate(state.q_world_body, state.velocity)
         unknown = (nan, *(0.0,) * 20)
         return self._mavlink.MAVLink_odometry_message(
@@ -168,8 +172,6 @@ class FrontEnd:
 
     @property
     def _heading(self) -> int:
-        from aerobat.links.mission import yaw_of
-
         yaw = swap_yaw(yaw_of(self.vehicle.state.q_world_body))
         return round(100 * np.rad2deg(yaw % (2 * pi))) % 36000
 
@@ -272,12 +274,10 @@ class FrontEnd:
             velocity = np.array(swap_world((message.vx, message.vy, message.vz)))
         if not mask & _IGNORED_ACCELERATION:
             acceleration = np.array(swap_world((message.afx, message.afy, message.afz)))
-        from aerobat.links.mission import yaw_of
-
         yaw = yaw_of(state.q_world_body) if mask & _IGNORED_YAW else swap_yaw(message.yaw)
         numbers = np.concatenate([position, velocity, acceleration, [yaw]])
         if np.isfinite(numbers).all():
-            self.vehicle.follow_point(PositionGoal(position, velocity, acceleration, np.zeros(3), yaw))
+            self.vehicle.follow_point(PositionGoal(position, velocity, acceleration, yaw))
 
     def _take_set_attitude_target(self, message: Any) -> None:
         """An attitude with its rates and thrust; without the attitude it is not followed."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from aerobat.links.autopilot.vehicle import Mode
+from aerobat.links.goals import Mode
 
 CUSTOM_MODE_ENABLED = 1  # MAV_MODE_FLAG_CUSTOM_MODE_ENABLED
 ARMED = 128  # MAV_MODE_FLAG_SAFETY_ARMED
