@@ -68,7 +68,8 @@ class MavlinkVehicleOptions:
     """Options of a simulated vehicle that speaks MAVLink."""
 
     listen: Annotated[str, Parameter(group=linking)] = "udp:127.0.0.1:14540"
-    """Where it is to be reached: udp:HOST:PORT waits there, udpout:HOST:PORT sends there first, as PX4 does."""
+    """Where it is to be reached: udp:HOST:PORT waits there, udpout:HOST:PORT sends there first, as PX4
+    does."""
 
     loss: Annotated[float, Parameter(group=trials, validator=FRACTION)] = 0.0
     """The probability of each message, either way, to be lost."""

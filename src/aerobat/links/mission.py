@@ -184,27 +184,36 @@ class Mission:
         return None
 
 
-def require_flyable(plan: Plan, vehicle_name: str | None = None) -> None:
+def require_flyable(plan: Plan, offset: Array, vehicle_name: str | None = None) -> None:
     """Refuse what is not proven for the vehicle that is to fly it, or cannot be begun from a hover.
 
     Raises SpecError, one sentence; nothing is armed before.
+
+    Args:
+        plan: what is to be flown.
+        offset: where its origin lies in the vehicle's frame [m], ENU, (3,).
+        vehicle_name: of what is to fly it, where that is known.
     """
-    name = plan.problem.name
+    label = f"the plan '{plan.problem.name}'"
     if plan.vehicle is None:
-        raise SpecError(f"the plan '{name}' is for no vehicle; plan it for the one that shall fly it")
-    if vehicle_name is not None and plan.vehicle.name != vehicle_name:
+        raise SpecError(f"{label} is for no vehicle; plan it for the one that shall fly it")
+    name = plan.vehicle.name
+    if vehicle_name is not None and name != vehicle_name:
         raise SpecError(
-            f"the plan '{name}' is certified for {plan.vehicle.name}, not for {vehicle_name}; plan it for that"
+            f"{label} is certified for {name}, not for {vehicle_name}; plan it for the one that is there"
         )
     if plan.certificate is None or not plan.certificate.certified:
         why = "it was never checked" if plan.certificate is None else plan.certificate.why
-        raise SpecError(
-            f"the plan '{name}' is not certified for {plan.vehicle.name} ({why}); it is not flown"
-        )
+        raise SpecError(f"{label} is not certified for {name} ({why}); plan it within its limits")
+    if plan.flyability is not None and not plan.flies:
+        raise SpecError(f"{label} is {plan.flyability}; plan it again with a reserve")
     motion = [float(np.linalg.norm(plan.trajectory.evaluate(0.0, k))) for k in (1, 2)]
     if max(motion) > _AT_REST:
+        raise SpecError(f"{label} begins in motion; plan it from a hover, where a link can begin it")
+    lowest = float(plan.trajectory.component_range(0)[0][2] + offset[2])
+    if lowest <= 0.0:
         raise SpecError(
-            f"the plan '{name}' begins in motion; plan it from a hover, where a link can begin it"
+            f"{label} would go down to {lowest:.2f} m over where the vehicle stands; raise its origin"
         )
 
 

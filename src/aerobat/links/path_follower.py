@@ -75,7 +75,7 @@ class PathFollower:
         )
 
     def _predicted(self, time: float, reference: ReferencePoint) -> Body:
-        """The body at a time, as far from its reference then as what was seen and commanded since makes it."""
+        """The body at a time, as far from its reference as what was seen, and commanded since, makes it."""
         assert self._observed is not None, "a vehicle is observed before it is commanded"
         seen, body = self._observed.time, self._observed.body
         then = self._stream.at(seen)
@@ -83,7 +83,7 @@ class PathFollower:
         velocity = subtract(then.velocity, body.velocity)
         while len(self._commanded) > 1 and self._commanded[1][0] <= seen:
             self._commanded.popleft()
-        ends = [begin for begin, _ in self._commanded][1:] + [time]
+        ends = [*(begin for begin, _ in self._commanded), time][1:]
         reached = seen
         for (_, acceleration), end in zip(self._commanded, ends, strict=False):
             step = max(min(end, time) - reached, 0.0)

@@ -24,12 +24,12 @@ class LinkReport:
 
     aborted: str  # why; empty where it was flown to its end
     ended: str  # what was reached
-    max_position_error_m: float | None  # None where nothing was heard while the plan was flown
-    max_attitude_error_deg: float | None
-    passages: tuple[Passage, ...]
     delay_s: float  # of a message, either way
-    observations: int  # while the plan was flown
-    longest_silence_s: float | None  # between two of them
+    observations: int  # while the plan was flown; of fewer than two, nothing of what follows is known
+    max_position_error_m: float | None = None
+    max_attitude_error_deg: float | None = None
+    longest_silence_s: float | None = None  # between two observations
+    passages: tuple[Passage, ...] = ()
 
     @property
     def failures(self) -> tuple[str, ...]:
@@ -81,34 +81,30 @@ def link_report(
         delay: of a message, either way [s].
     """
     inside = [seen for seen in log if 0.0 <= seen.time <= stream.duration]
-    facts = {"aborted": aborted, "ended": ended, "delay_s": delay, "observations": len(inside)}
     if len(inside) < 2:
-        return LinkReport(
-            **facts,
-            max_position_error_m=None,
-            max_attitude_error_deg=None,
-            passages=(),
-            longest_silence_s=None,
-        )
+        return LinkReport(aborted, ended, delay, len(inside))
     times = np.array([seen.time for seen in inside])
-    states = [np.array([getattr(s.body, name) for s in inside]) for name in _PARTS]
+    position, velocity, q = (
+        np.array([getattr(seen.body, name) for seen in inside])
+        for name in ("position", "velocity", "q_world_body")
+    )
     points = [stream.at(t) for t in times]
-    off = states[0] - [point.position for point in points]
-    turned = so3.angle_between(states[2], np.array([point.q_world_body for point in points]))
+    off = np.linalg.norm(position - [point.position for point in points], axis=-1)
+    turned = so3.angle_between(q, np.array([point.q_world_body for point in points]))
+    states = (position - offset, velocity, q)
     body = None if plan.vehicle is None else plan.vehicle.bounding_ellipsoid
-    moved = (states[0] - offset, *states[1:])
-    asked = planned_passages(plan.stages, plan.problem)
+    stop = np.array([times[-1] if aborted else np.nan])
     flown = [
-        passages(each, gate_progress(each, times, moved, body), np.array([times[-1] if aborted else np.nan]))
-        for each in asked
+        passages(asked, gate_progress(asked, times, states, body), stop).of_flight(0)
+        for asked in planned_passages(plan.stages, plan.problem)
     ]
     return LinkReport(
-        **facts,
-        max_position_error_m=float(np.linalg.norm(off, axis=-1).max()),
+        aborted=aborted,
+        ended=ended,
+        delay_s=delay,
+        observations=len(inside),
+        max_position_error_m=float(off.max()),
         max_attitude_error_deg=degrees(float(turned.max())),
-        passages=tuple(passage.of_flight(0) for passage in flown),
         longest_silence_s=float(np.diff(times).max()),
+        passages=tuple(flown),
     )
-
-
-_PARTS = ("position", "velocity", "q_world_body")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from math import inf
+from math import inf, sqrt
 
 import numpy as np
 
@@ -11,7 +11,7 @@ from aerobat.trajectory import Trajectory, minimum_effort
 
 _SHORTEST = 0.2  # [s] of any route, however near its end is
 _PEAK_SPEED = 15.0 / 8.0  # [-] of the quintic from rest to rest, over its mean speed
-_PEAK_ACCELERATION = 5.7735  # [-] likewise, times duration squared over length: 10/√3
+_PEAK_ACCELERATION = 10.0 / sqrt(3.0)  # [-] likewise, times duration squared over length
 _PEAK_BRAKING = 1.5  # [-] of the quintic that brakes to rest, times duration over speed at first
 
 
@@ -26,7 +26,7 @@ def rest_to_rest(start: Array, goal: Array, max_speed: float, max_acceleration: 
     """
     length = float(np.linalg.norm(np.asarray(goal) - start))
     by_speed = _PEAK_SPEED * length / max_speed
-    by_acceleration = np.sqrt(_PEAK_ACCELERATION * length / max_acceleration)
+    by_acceleration = sqrt(_PEAK_ACCELERATION * length / max_acceleration)
     ends = np.zeros((2, 3, 3))
     ends[0, 0], ends[1, 0] = start, goal
     return minimum_effort(ends, [max(by_speed, by_acceleration, _SHORTEST)])

@@ -8,6 +8,7 @@ from typing import Annotated
 import numpy as np
 from cyclopts import Parameter
 
+from aerobat.arrays import Array
 from aerobat.cli.entry import ExitCode
 from aerobat.cli.link_options import MavlinkOptions
 from aerobat.cli.terminal import print_json, say
@@ -42,8 +43,8 @@ def mavlink(
     from aerobat.links.mavlink.connection import connect
     from aerobat.links.mission import MissionSettings, require_flyable
 
-    require_flyable(found, options.vehicle)
     offset = _origin(found) if options.origin is None else np.array(options.origin)
+    require_flyable(found, offset, options.vehicle)
     connection = connect(options.connect, listen=False, system=245, component=191, baud=options.baud)
     try:
         client = Client(
@@ -66,6 +67,6 @@ def mavlink(
     return ExitCode.WELL if report.is_success else ExitCode.NOT_WELL
 
 
-def _origin(plan: Plan) -> np.ndarray:
+def _origin(plan: Plan) -> Array:
     lowest = plan.trajectory.component_range(0)[0][2]
     return np.array([0.0, 0.0, CLEARANCE - lowest])

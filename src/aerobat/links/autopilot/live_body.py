@@ -15,10 +15,11 @@ from aerobat.engines.pytree import Tree, tree_map
 from aerobat.environment import Environment
 from aerobat.kernels.control_loops import Gains, ReferencePoint, init_position_loop
 from aerobat.kernels.motors import Motion
+from aerobat.kernels.rigid_body import Body
 from aerobat.links.autopilot.controller import AutopilotController
 from aerobat.links.autopilot.references import point_reference
 from aerobat.links.goals import yaw_of
-from aerobat.simulation.bodies import bodies, body_states
+from aerobat.simulation.bodies import bodies
 from aerobat.simulation.components import PlantParameters, RigidBodyPlant, StateObserver, log_row
 from aerobat.simulation.loop import Clock, LoopInput, LoopParameters, compose
 from aerobat.states import BodyState
@@ -44,17 +45,12 @@ class LiveBody:
             RigidBodyPlant.for_rate(RATE),
         )
         plant = PlantParameters(airframe_parameters(fleet), environment_parameters(environment, 1))
-        self._state = _at_rest(np.zeros(2), 0.0)
-        parameters = LoopParameters(bodies(self._state), ((), model, plant))
+        self.state = _at_rest(np.zeros(2), 0.0)  # the true one, (·,)
+        parameters = LoopParameters(_one(self.state), ((), model, plant))
         first = first_row(_inputs(_hovering(environment.gravity), False))
         self._loop = choose("auto", 1, _LONG).compile(*compose(parts, log_row), parameters, first)
         self._carry: Tree = self._loop.init(first)
         self.stop_rotors()
-
-    @property
-    def state(self) -> BodyState:
-        """The true state, (·,)."""
-        return BodyState(*(part[0] for part in vars(self._state).values()))
 
     def fly(self, references: ReferencePoint, by_attitude: bool) -> None:
         """Go on by as many ticks as there are references, leaves (T,).
@@ -62,7 +58,7 @@ class LiveBody:
         `by_attitude`: whether their attitude, rates and thrust are commanded, or their position.
         """
         self._carry, _ = self._loop.scan(self._carry, _inputs(references, by_attitude))
-        self._state = body_states(self._carry[2].body)
+        self.state = BodyState(*(np.concatenate(leaves) for leaves in self._carry[2].body))
 
     def restart_position_loop(self, references: ReferencePoint) -> None:
         """Have the outer loop begin anew towards the first of the references, without what was before."""
@@ -75,9 +71,9 @@ class LiveBody:
     def stand(self) -> None:
         """Be at rest on the ground below, rotors as they turn."""
         state = self.state
-        self._state = _at_rest(state.position[:2], yaw_of(state.q_world_body))
+        self.state = _at_rest(state.position[:2], yaw_of(state.q_world_body))
         observer, controller, motion = self._carry
-        self._carry = (observer, controller, Motion(bodies(self._state), motion.thrusts))
+        self._carry = (observer, controller, Motion(_one(self.state), motion.thrusts))
 
     def stop_rotors(self) -> None:
         """Have the rotors give the least that they can, and be known to."""
@@ -88,8 +84,13 @@ class LiveBody:
 
 
 def _at_rest(place: Array, yaw: float) -> BodyState:
-    q = np.array([[cos(yaw / 2), 0.0, 0.0, sin(yaw / 2)]])
-    return BodyState(np.array([[*place, 0.0]]), np.zeros((1, 3)), q, np.zeros((1, 3)))
+    q = np.array([cos(yaw / 2), 0.0, 0.0, sin(yaw / 2)])
+    return BodyState(np.array([*place, 0.0]), np.zeros(3), q, np.zeros(3))
+
+
+def _one(state: BodyState) -> Body:
+    """A state with leaves (1,)."""
+    return bodies(BodyState(*(part[None] for part in vars(state).values())))
 
 
 def _hovering(gravity: float) -> ReferencePoint:

@@ -21,7 +21,7 @@ from aerobat.vehicle import Vehicle
 ATTITUDE_TIMEOUT = 0.1
 POINT_TIMEOUT = 0.5
 
-_CHUNK = 25  # ticks at most between looks at the ground and at the client's silence
+_CHUNK = 5  # ticks at most between looks at the ground and at the client's silence
 _SPEED = 2.0  # [m/s] of the autopilot's own routes
 _ACCELERATION = 2.0  # [m/s²] likewise
 _DESCENT = 1.0  # [m/s] when landing
@@ -130,7 +130,7 @@ class SimulatedVehicle:
             self._restart_position_loop()
 
     def follow_attitude(self, goal: AttitudeGoal, sent: float) -> None:
-        """Take a goal from a client, `sent` [s] by the client's clock; it is followed in the mode offboard."""
+        """Take a goal, `sent` [s] by the client's clock; it is followed in the mode offboard."""
         known, self._heard = self._goal, self.time
         if isinstance(known, AttitudeReference):
             self._goal = known.followed_by(goal, sent, self.time)

@@ -130,10 +130,12 @@ class AutopilotLink:
 
     def _is_ours(self, message: Any) -> bool:
         """True for messages of the autopilot, the first that is heard."""
-        if message.get_type() == "HEARTBEAT" and not self.is_known:
-            if message.autopilot != _GROUND_STATION and message.get_srcComponent() == _AUTOPILOT:
-                self._system = message.get_srcSystem()
-        return bool(message.get_srcSystem() == self._system and message.get_srcComponent() == _AUTOPILOT)
+        if message.get_srcComponent() != _AUTOPILOT:
+            return False
+        beats = message.get_type() == "HEARTBEAT" and message.autopilot != _GROUND_STATION
+        if beats and not self.is_known:
+            self._system = message.get_srcSystem()
+        return bool(message.get_srcSystem() == self._system)
 
     def _again(self, order: object, every: float = _ASK_AGAIN) -> bool:
         """True where something was not sent for so long [s]; then it counts as sent now."""

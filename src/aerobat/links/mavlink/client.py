@@ -60,7 +60,7 @@ class Client:
         *,
         offset: Array,
         mission: MissionSettings = MissionSettings(),  # noqa: B008 - frozen
-        settings: ClientSettings = ClientSettings(),  # noqa: B008 - frozen
+        settings: ClientSettings = ClientSettings(),
         say: Callable[[str], None] = lambda sentence: None,
     ) -> None:
         """Prepare to fly.
@@ -166,17 +166,19 @@ class Client:
             self._say(f"connected; a message takes {1e3 * self.link.delay:.0f} ms")
             self._enter(Stage.ARMING, now)
         elif self._since(now) > self._settings.wait:
-            missing = f"its parameter {HOVER_THRUST}" if hover is None else "its state (ODOMETRY)"
-            remedy = "give --hover-thrust" if hover is None else "have it send that message"
-            raise SpecError(f"the vehicle does not tell {missing} within {self._settings.wait:g} s; {remedy}")
+            missing, remedy = "its state (ODOMETRY)", "have it send that message"
+            if hover is None:
+                missing, remedy = f"its parameter {HOVER_THRUST}", "give --hover-thrust"
+            waited = f"{self._settings.wait:g} s"
+            raise SpecError(f"the vehicle does not tell {missing} within {waited}; {remedy}")
 
     def _check(self, hover: float) -> None:
         if not self.link.landed:
             raise SpecError("the vehicle is flying already; land it first")
         if not abs(hover / self._own_hover - 1.0) <= _HOVER_TOLERANCE:
             raise SpecError(
-                f"the vehicle hovers at {hover:.3f} of its thrust, {self._name} at {self._own_hover:.3f}: the "
-                "plan is for another vehicle; plan it for this one"
+                f"the vehicle hovers at {hover:.3f} of its thrust, {self._name} at {self._own_hover:.3f}: "
+                "the plan is for another vehicle; plan it for this one"
             )
 
     def _while_arming(self, now: float) -> None:
@@ -199,13 +201,16 @@ class Client:
         phase = self.mission.phase
         goal = self.mission.step(now, self._observed, self.link.delay)
         if self.link.mode is not Mode.OFFBOARD and self.mission.phase is not Phase.LAND:
-            mode = "a mode of a pilot" if self.link.mode is None else f"the mode {self.link.mode}"
+            mode = "a mode of a pilot's" if self.link.mode is None else f"the mode {self.link.mode}"
             self.mission.abort(now, f"the vehicle went into {mode}")
         if self.mission.phase is not phase:
             self._say(str(self.mission.phase))
-        if self.mission.phase is Phase.ABORTED:
+        if self.mission.phase is Phase.ABORTED and self.link.mode is None:
+            self._say(f"aborted: {self.mission.reason}; it is left to the pilot")
+            self._enter(Stage.LOST, now)
+        elif self.mission.phase is Phase.ABORTED:
             self._say(f"aborted: {self.mission.reason}; the vehicle is told to hover")
-            self._enter(Stage.RECOVERING if self.link.mode is not None else Stage.LOST, now)
+            self._enter(Stage.RECOVERING, now)
             self._while_recovering(now)
         elif self.mission.phase is Phase.LAND:
             self._enter(Stage.LANDING, now)

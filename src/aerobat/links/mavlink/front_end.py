@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from math import isfinite, nan, pi
+from math import degrees, isfinite, nan, pi
 from typing import Any
 
 import numpy as np
@@ -64,12 +64,12 @@ class FrontEnd:
         self._due = {identity: self._began + 0.0 * every for identity, (_, every) in self._streams.items()}
 
     def tick(self, now: float) -> None:
-        """Take what has come, go on to this time [s], and send what is due."""
+        """Go on to this time [s], take what has come, and send what is due."""
+        self.vehicle.advance(now)
         for message in self._connection.receive():
             take = getattr(self, f"_take_{message.get_type().lower()}", None)
             if take is not None:
                 take(message)
-        self.vehicle.advance(now)
         for sentence in self.vehicle.told:
             self._say(sentence)
             self._send("statustext", 4, sentence.encode()[:50])
@@ -173,7 +173,7 @@ class FrontEnd:
     @property
     def _heading(self) -> int:
         yaw = swap_yaw(yaw_of(self.vehicle.state.q_world_body))
-        return round(100 * np.rad2deg(yaw % (2 * pi))) % 36000
+        return round(100 * degrees(yaw % (2 * pi))) % 36000
 
     # what is taken
 
