@@ -98,6 +98,7 @@ def flown(plan: Path) -> tuple[dict[str, Any], str]:
         command = [sys.executable, "-m", "aerobat", "mavlink", str(plan), "--connect", address, "--json"]
         options = ["--speed", SLOWLY, "--origin", "0", "0", "1.5"]
         done = subprocess.run([*command, *options], capture_output=True, text=True, check=False)
+    assert done.returncode in (0, 1), done.stderr
     report = json.loads(done.stdout)
     assert done.returncode == (0 if report["success"] else 1)
     return report, done.stderr

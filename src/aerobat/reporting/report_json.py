@@ -9,6 +9,7 @@ from typing import Any
 
 from aerobat.evaluation.score import Score
 from aerobat.planning import Assessment, Flyability, Plan, Tube
+from aerobat.simulation.passages import Passage
 from aerobat.vehicle import implausibilities
 
 
@@ -42,11 +43,14 @@ def to_json(facts: dict[str, Any] | list[dict[str, Any]]) -> str:
 def _flight(score: Score) -> dict[str, Any]:
     """A score; what is not known or not limited is None, as JSON has neither NaN nor infinity."""
     facts = asdict(score) | {"outcome": score.outcome.name.lower()}
-    facts["passages"] = [
-        {name: None if value in ("", inf) or value != value else value for name, value in passage.items()}
-        for passage in facts["passages"]
-    ]
+    facts["passages"] = [passage_facts(passage) for passage in score.passages]
     return facts
+
+
+def passage_facts(passage: Passage) -> dict[str, Any]:
+    """A passage as plain data, None for all that is not known of it."""
+    facts = asdict(passage)
+    return {name: None if value in ("", inf) or value != value else value for name, value in facts.items()}
 
 
 def _flyability(found: Flyability) -> dict[str, Any]:

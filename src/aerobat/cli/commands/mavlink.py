@@ -15,7 +15,7 @@ from aerobat.cli.terminal import print_json, say
 from aerobat.errors import SpecError
 from aerobat.interchange import read_plan
 from aerobat.planning import Plan
-from aerobat.reporting.report_json import to_json
+from aerobat.reporting.report_json import passage_facts, to_json
 
 CLEARANCE = 3.0  # [m] of a plan's lowest point over where the vehicle stands
 
@@ -63,7 +63,11 @@ def mavlink(
     finally:
         connection.close()
     report = client.report()
-    print_json(to_json(report.record())) if options.json else print(report)
+    if options.json:
+        passages = [passage_facts(passage) for passage in report.passages]
+        print_json(to_json({**report.record(), "passages": passages}))
+    else:
+        print(report)
     return ExitCode.WELL if report.is_success else ExitCode.NOT_WELL
 
 
