@@ -25,6 +25,8 @@ COMMANDS = {
     "view": "Write a page that replays a run, a plan or a flight in a browser, or serve one to try plans on.",
     "export": "Write a plan as another system reads it, and say what that lost.",
     "figures": "Draw the paper's figures anew, from real runs.",
+    "mavlink": "Fly a plan on an autopilot over MAVLink.",
+    "mavlink-vehicle": "Simulate a vehicle that MAVLink clients can fly.",
     "repeat": "Do a run again from its folder, and say if it came to the same.",
     "vehicles": "List the built-in vehicles, or print one as a file to begin one's own with.",
     "problems": "List the built-in problems.",
@@ -47,7 +49,8 @@ app = App(
     suppress_keyboard_interrupt=False,
 )
 for name, help in COMMANDS.items():
-    app.command(f"aerobat.cli.commands.{name}:{name}", name=name, help=help)
+    place = name.replace("-", "_")
+    app.command(f"aerobat.cli.commands.{place}:{place}", name=name, help=help)
 
 
 def run(arguments: Sequence[str]) -> ExitCode:

@@ -83,10 +83,35 @@ def step(
     elapsed: Scalar,
 ) -> ControllerState:
     """The state, new commands included, `elapsed` [s] after the last tick."""
-    mass_properties, rotors = model.airframe
     outer = step_position_loop(ops, model.gains, state.outer, body, reference, elapsed)
-    demand = thrust_demand(mass_properties, model.environment, reference)
+    demand = thrust_demand(model.airframe.mass_properties, model.environment, reference)
     attitude = attitude_command(ops, outer, demand, reference)
+    return track_attitude(ops, flags, model, state._replace(outer=outer), body, attitude, reference, elapsed)
+
+
+def track_attitude(
+    ops: Ops,
+    flags: FeatureFlags,
+    model: ControllerModel,
+    state: ControllerState,
+    body: Body,
+    attitude: AttitudeCommand,
+    rates: ReferencePoint,
+    elapsed: Scalar,
+) -> ControllerState:
+    """The inner loop: the state, new commands included, that turns the body to an attitude.
+
+    Args:
+        ops: of the arithmetic.
+        flags: features beyond the paper's law.
+        model: the nominal vehicle.
+        state: after the last tick, but for its outer loop, which is taken as it is.
+        body: as it is now.
+        attitude: what is commanded.
+        rates: the reference, of whose rates and their change the moment is fed forward.
+        elapsed: since the last tick [s].
+    """
+    mass_properties, rotors = model.airframe
     body_axes = axes(body.q_world_body)
     error = attitude_error(ops, body, body_axes, attitude)
     # while rotors saturate, the attitude error says nothing about a lasting moment
@@ -95,16 +120,15 @@ def step(
     moment, change = feedback_moment(model.gains, mass_properties.inertia, error, integral), ZERO
     if flags.moment_feedforward:
         now, then = (
-            reference_moment(mass_properties.inertia, body_axes, rates)
-            for rates in (reference, reference.ahead)
+            reference_moment(mass_properties.inertia, body_axes, each) for each in (rates, rates.ahead)
         )
         moment, change = add(moment, now), subtract(then, now)
     load = Wrench(_collective(ops, mass_properties.mass, body_axes[2], attitude), moment)
-    ahead = Wrench(mass_properties.mass * reference.ahead.thrust_change, change)
+    ahead = Wrench(mass_properties.mass * rates.ahead.thrust_change, change)
     decay_factors = motors.decay_factors(ops, rotors, elapsed)
     thrusts = motors.first_order_response(state.thrusts, state.commands.thrusts, decay_factors)
     commands = _commands(ops, flags, model, (load, ahead), thrusts, decay_factors, elapsed)
-    return ControllerState(outer, integral, thrusts, commands)
+    return ControllerState(state.outer, integral, thrusts, commands)
 
 
 def predicted(

@@ -9,6 +9,7 @@ from typing import Any
 
 from aerobat.evaluation.score import Score
 from aerobat.planning import Assessment, Flyability, Plan, Tube
+from aerobat.simulation.passages import Passage
 from aerobat.vehicle import implausibilities
 
 
@@ -51,11 +52,17 @@ def _flight(score: Score) -> dict[str, Any]:
     facts = asdict(score) | {"outcome": score.outcome.name.lower()}
     facts["laps"] = [asdict(lap) for lap in score.laps]
     for places in ("passages", "waypoints", "laps"):
-        facts[places] = [
-            {name: None if value in ("", inf) or value != value else value for name, value in place.items()}
-            for place in facts[places]
-        ]
+        facts[places] = [_known(place) for place in facts[places]]
     return facts
+
+
+def passage_facts(passage: Passage) -> dict[str, Any]:
+    """A passage; what is not known or not limited is None."""
+    return _known(asdict(passage))
+
+
+def _known(facts: dict[str, Any]) -> dict[str, Any]:
+    return {name: None if value in ("", inf) or value != value else value for name, value in facts.items()}
 
 
 def _flyability(found: Flyability) -> dict[str, Any]:

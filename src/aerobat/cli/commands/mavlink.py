@@ -1,0 +1,76 @@
+"""`aerobat mavlink`: a plan flown on an autopilot."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import numpy as np
+from cyclopts import Parameter
+
+from aerobat.arrays import Array
+from aerobat.cli.entry import ExitCode
+from aerobat.cli.link_options import MavlinkOptions
+from aerobat.cli.terminal import print_json, say
+from aerobat.errors import SpecError
+from aerobat.interchange import read_plan
+from aerobat.planning import Plan
+from aerobat.reporting.report_json import passage_facts, to_json
+
+CLEARANCE = 3.0  # [m] of a plan's lowest point over where the vehicle stands
+
+
+def mavlink(
+    plan: Path, options: Annotated[MavlinkOptions, Parameter(name="*")] = MavlinkOptions()
+) -> ExitCode:
+    """Fly a plan on an autopilot over MAVLink: PX4, or `aerobat mavlink-vehicle`.
+
+    Arms, takes off, goes to the plan's start, streams attitude, rates and thrust along the plan, holds where
+    it ends, and lands. Whatever goes wrong on the way, the vehicle is told to hover, then to land. Read
+    docs/vehicles.md before anything real is armed. Exits with 0 only if the plan was flown to its end,
+    through its gates, and the vehicle has landed.
+
+    Parameters
+    ----------
+    plan
+        A .plan file, or a run's folder.
+    """
+    found = read_plan(plan)
+    if not isinstance(found, Plan):
+        raise SpecError(f"{plan} holds a path alone; give a .plan file, which is certified for its vehicle")
+    from aerobat.links.clock import WallClock
+    from aerobat.links.mavlink.client import Client, ClientSettings, run
+    from aerobat.links.mavlink.connection import connect
+    from aerobat.links.mission import MissionSettings, require_flyable
+
+    offset = _origin(found) if options.origin is None else np.array(options.origin)
+    require_flyable(found, offset, options.vehicle)
+    connection = connect(options.connect, listen=False, system=245, component=191, baud=options.baud)
+    try:
+        client = Client(
+            found,
+            connection,
+            offset=offset,
+            mission=MissionSettings(
+                max_error=options.max_error,
+                max_silence=options.max_silence,
+                max_lateness=options.max_lateness,
+            ),
+            settings=ClientSettings(options.rate, wait=options.wait, hover_thrust=options.hover_thrust),
+            say=say,
+        )
+        run(client, WallClock(options.speed), options.rate)
+    finally:
+        connection.close()
+    report = client.report()
+    if options.json:
+        passages = [passage_facts(passage) for passage in report.passages]
+        print_json(to_json({**report.record(), "passages": passages}))
+    else:
+        print(report)
+    return ExitCode.WELL if report.is_success else ExitCode.NOT_WELL
+
+
+def _origin(plan: Plan) -> Array:
+    lowest = plan.trajectory.component_range(0)[0][2]
+    return np.array([0.0, 0.0, CLEARANCE - lowest])

@@ -1,0 +1,25 @@
+from .autopilot.vehicle import SimulatedVehicle
+from .clock import Clock, WallClock
+from .goals import AttitudeGoal, Mode, Observed, PositionGoal
+from .mission import Mission, MissionSettings, Phase, require_flyable
+from .path_follower import PathFollower
+from .report import LinkReport, link_report
+from .stream import SetpointStream
+
+__all__ = [
+    "AttitudeGoal",
+    "Clock",
+    "LinkReport",
+    "Mission",
+    "MissionSettings",
+    "Mode",
+    "Observed",
+    "PathFollower",
+    "Phase",
+    "PositionGoal",
+    "SetpointStream",
+    "SimulatedVehicle",
+    "WallClock",
+    "link_report",
+    "require_flyable",
+]

@@ -1,0 +1,130 @@
+"""The references that an autopilot follows: routes, points that a client sends, attitudes that it sends."""
+
+from __future__ import annotations
+
+from math import cos, sin
+from typing import NamedTuple
+
+import numpy as np
+
+from aerobat import so3
+from aerobat.arrays import Array
+from aerobat.engines.components import components
+from aerobat.kernels.control_loops import Lookahead, ReferencePoint
+from aerobat.links.goals import AttitudeGoal, PositionGoal
+from aerobat.trajectory import Trajectory
+
+_MAX_EXTRAPOLATION = 0.04  # [s] for which a goal is carried on by its rates where no newer one comes
+_SMOOTHING = 0.002  # [s] time constant of the low-pass on the change of commanded rates and thrust
+
+
+class Route(NamedTuple):
+    """A way to go, at whose end the vehicle hovers."""
+
+    path: Trajectory
+    began: float  # [s]
+    yaw: float  # [rad] from east
+
+    def reference(self, times: Array, gravity: float) -> ReferencePoint:
+        """References at times [s], leaves (T,)."""
+        since = times - self.began
+        flat = self.path.flat(np.clip(since, 0.0, self.path.duration))
+        jerk = np.where((since < self.path.duration)[:, None], flat.jerk, 0.0)  # at its end it jumps to rest
+        return point_reference(flat.position, flat.velocity, flat.acceleration, jerk, self.yaw, gravity)
+
+
+class PointReference(NamedTuple):
+    """A goal of position, carried on by its velocity."""
+
+    goal: PositionGoal
+    arrived: float  # [s]
+
+    def reference(self, times: Array, gravity: float) -> ReferencePoint:
+        """References at times [s], leaves (T,)."""
+        goal, ones = self.goal, np.ones((len(times), 1))
+        age = np.clip(times - self.arrived, 0.0, _MAX_EXTRAPOLATION)[:, None]
+        position = goal.position + age * goal.velocity
+        velocity, acceleration = ones * goal.velocity, ones * goal.acceleration
+        return point_reference(position, velocity, acceleration, 0.0 * ones * velocity, goal.yaw, gravity)
+
+
+class AttitudeReference(NamedTuple):
+    """A goal of attitude, carried on by its rates, and what it is turning into as the last ones tell.
+
+    Goals come with the time at which they were sent, so that those which the link held up for longer than
+    others count as if they had not been.
+    """
+
+    goal: AttitudeGoal
+    sent: float  # [s] by the sender's clock
+    since: float  # [s] by our clock, when it holds
+    omega_dot: Array  # [rad/s²] body axes, (3,)
+    thrust_rate: float  # [N/s]
+
+    @classmethod
+    def first(cls, goal: AttitudeGoal, sent: float, arrived: float) -> AttitudeReference:
+        """The first of a series."""
+        return cls(goal, sent, arrived, np.zeros(3), 0.0)
+
+    def followed_by(self, goal: AttitudeGoal, sent: float, arrived: float) -> AttitudeReference:
+        """The next one after this; itself where it is older than this."""
+        elapsed = sent - self.sent
+        if elapsed <= 0.0:
+            return self
+        if elapsed > 10.0 * _MAX_EXTRAPOLATION:
+            return self.first(goal, sent, arrived)
+        fraction = elapsed / (elapsed + _SMOOTHING)
+        change = (np.array(goal.omega_body) - self.goal.omega_body) / elapsed
+        rate = (goal.thrust - self.goal.thrust) / elapsed
+        return AttitudeReference(
+            goal,
+            sent,
+            min(arrived, self.since + elapsed + 0.1 * max(arrived - self.since - elapsed, 0.0)),
+            self.omega_dot + fraction * (change - self.omega_dot),
+            self.thrust_rate + fraction * (rate - self.thrust_rate),
+        )
+
+    def reference(self, times: Array, period: float, mass: float) -> ReferencePoint:
+        """References at times [s], leaves (T,), for a controller that steps so often, of a vehicle's mass."""
+        age = np.clip(times - self.since, 0.0, _MAX_EXTRAPOLATION)[:, None]
+        omega_body = self.goal.omega_body + age * self.omega_dot
+        mean_rate = self.goal.omega_body + 0.5 * age * self.omega_dot
+        q = so3.multiply(so3.normalize(np.array(self.goal.q_world_body)), so3.exp(age * mean_rate))
+        thrust = (self.goal.thrust + age * self.thrust_rate) / mass
+        zero = components(np.zeros((len(times), 3)))
+        omega, omega_dot, ahead = (
+            components(so3.rotate(q, rate))
+            for rate in (
+                omega_body,
+                np.broadcast_to(self.omega_dot, omega_body.shape),
+                omega_body + period * self.omega_dot,
+            )
+        )
+        return ReferencePoint(
+            zero,
+            zero,
+            components(thrust * so3.thrust_axis(q)),
+            zero,
+            components(q),
+            omega,
+            omega_dot,
+            Lookahead(np.full(len(times), period * self.thrust_rate / mass), ahead, omega_dot),
+        )
+
+
+def point_reference(
+    position: Array, velocity: Array, acceleration: Array, jerk: Array, yaw: float, gravity: float
+) -> ReferencePoint:
+    """References of positions (T, 3) at a yaw; the controller leans as the acceleration asks."""
+    zero = components(np.zeros_like(position))
+    q = np.broadcast_to([cos(yaw / 2), 0.0, 0.0, sin(yaw / 2)], (len(position), 4))
+    return ReferencePoint(
+        components(position),
+        components(velocity),
+        components(acceleration + gravity * so3.UP),
+        components(jerk),
+        components(q),
+        zero,
+        zero,
+        Lookahead(np.zeros(len(position)), zero, zero),
+    )

@@ -1,0 +1,216 @@
+"""A simulated vehicle with the modes and the failsafe of an autopilot, stepped by whoever talks to it."""
+
+from __future__ import annotations
+
+from math import degrees
+
+import numpy as np
+
+from aerobat import so3
+from aerobat.arrays import Array
+from aerobat.environment import Environment
+from aerobat.links.autopilot.live_body import RATE, LiveBody
+from aerobat.links.autopilot.references import AttitudeReference, PointReference, Route
+from aerobat.links.goals import AttitudeGoal, Mode, PositionGoal, yaw_of
+from aerobat.links.routes import braking, rest_to_rest
+from aerobat.states import BodyState
+from aerobat.trajectory import Trajectory
+from aerobat.vehicle import Vehicle
+
+# [s] without goals after which a client is taken for lost: attitudes lead away fast, points do not
+ATTITUDE_TIMEOUT = 0.1
+POINT_TIMEOUT = 0.5
+
+_CHUNK = 5  # ticks at most between looks at the ground and at the client's silence
+_SPEED = 2.0  # [m/s] of the autopilot's own routes
+_ACCELERATION = 2.0  # [m/s²] likewise
+_DESCENT = 1.0  # [m/s] when landing
+_BELOW = 0.3  # [m] under the ground, where the way of a landing ends, so that it is reached in motion
+_FLOOR = 0.5  # [m] above the ground, below which no hover is sought
+_BRAKING = 0.8  # [-] of what thrust can do beyond hovering, used to come to a hover
+_FALLING = 0.7  # [-] of gravity, used to end a climb
+_HARD_SPEED = 1.5  # [m/s] of a touchdown that is none
+_HARD_TILT = 0.5  # [rad] likewise
+
+
+class SimulatedVehicle:
+    """A vehicle that obeys; on the ground at first, disarmed.
+
+    Times are those of a clock that `advance` is told. Its own frame is ENU with the origin where it stands,
+    on flat ground.
+    """
+
+    def __init__(self, vehicle: Vehicle, environment: Environment, now: float = 0.0) -> None:
+        """Put a vehicle on the ground.
+
+        Args:
+            vehicle: which; its controller's gains count.
+            environment: where; its gravity and wind count.
+            now: the time [s].
+        """
+        self.vehicle, self.gravity = vehicle, environment.gravity
+        self.time = now
+        self.mode = Mode.HOLD
+        self.armed, self.landed, self.crashed = False, True, False
+        self.told: list[str] = []  # sentences for whoever listens, who empties it
+        self._body = LiveBody(vehicle, environment)
+        self._route = Route(rest_to_rest(np.zeros(3), np.zeros(3), _SPEED, _ACCELERATION), now, 0.0)
+        self._then: tuple[Array, float | None] | None = None  # [m], [rad] where to go once it hovers
+        self._goal: PointReference | AttitudeReference | None = None
+        self._heard = -np.inf  # [s] when the last goal came
+
+    @property
+    def state(self) -> BodyState:
+        """The true state, (·,)."""
+        return self._body.state
+
+    @property
+    def hover_fraction(self) -> float:
+        """The fraction of all rotors' greatest thrust at which it hovers [-]."""
+        return self.vehicle.mass * self.gravity / float(self.vehicle.max_thrusts.sum())
+
+    def arm(self) -> bool:
+        """Let the rotors turn; false after a crash."""
+        self.armed = not self.crashed
+        return self.armed
+
+    def disarm(self) -> bool:
+        """Stop the rotors, on the ground only; false in flight."""
+        if self.landed:
+            self.armed = False
+            self._body.stop_rotors()
+        return self.landed
+
+    def take_off(self, height: float) -> bool:
+        """Climb by so much [m] from the ground; false where it is disarmed or flies already."""
+        if not self.armed or not self.landed:
+            return False
+        here = self.state.position
+        self._go(Mode.TAKEOFF, rest_to_rest(here, here + height * so3.UP, _SPEED, _ACCELERATION))
+        return True
+
+    def go_to(self, position: Array, yaw: float | None = None) -> bool:
+        """Come to a hover, then fly to a point [m] at a yaw [rad] and hover there; false on the ground."""
+        if self.landed:
+            return False
+        self.hold()
+        self._then = (position, yaw)
+        return True
+
+    def hold(self) -> bool:
+        """Come to a hover from whatever it does."""
+        self.mode, self._then = Mode.HOLD, None
+        if not self.landed:
+            state = self.state
+            deceleration = _BRAKING * (self.vehicle.max_specific_thrust - self.gravity)
+            falling = _FALLING * self.gravity
+            self._go(Mode.HOLD, braking(state.position, state.velocity, deceleration, _FLOOR, falling))
+        return True
+
+    def land(self) -> bool:
+        """Come to a hover, and from there down to the ground."""
+        self.hold()
+        if not self.landed:
+            self.mode = Mode.LAND
+        return True
+
+    def go_offboard(self) -> bool:
+        """Follow the goals that a client streams; false where none came lately."""
+        if self._goal is None or self.time - self._heard > POINT_TIMEOUT:
+            return False
+        self.mode, self._then = Mode.OFFBOARD, None
+        self._restart_position_loop()
+        return True
+
+    def follow_point(self, goal: PositionGoal) -> None:
+        """Take a goal from a client; it is followed in the mode offboard."""
+        switching = not isinstance(self._goal, PointReference)
+        self._goal, self._heard = PointReference(goal, self.time), self.time
+        if switching:
+            self._restart_position_loop()
+
+    def follow_attitude(self, goal: AttitudeGoal, sent: float) -> None:
+        """Take a goal, `sent` [s] by the client's clock; it is followed in the mode offboard."""
+        known, self._heard = self._goal, self.time
+        if isinstance(known, AttitudeReference):
+            self._goal = known.followed_by(goal, sent, self.time)
+        else:
+            self._goal = AttitudeReference.first(goal, sent, self.time)
+
+    def advance(self, now: float) -> None:
+        """Go on to a time [s], to the last tick before it."""
+        while (ticks := min(int((now - self.time) * RATE + 1e-6), _CHUNK)) > 0:
+            self._watch_client()
+            if not self.landed and self.time - self._route.began >= self._route.path.duration:
+                self._go_on()
+            # on the ground it waits for an order
+            if self.armed and not (self.landed and self.mode is Mode.HOLD):
+                self._fly(ticks)
+            self.time += ticks / RATE
+
+    def _fly(self, ticks: int) -> None:
+        goal = self._followed
+        times = self.time + np.arange(ticks) / RATE
+        if isinstance(goal, AttitudeReference):
+            self._body.fly(goal.reference(times, 1.0 / RATE, self.vehicle.mass), by_attitude=True)
+        else:
+            self._body.fly(goal.reference(times, self.gravity), by_attitude=False)
+        if self.state.position[2] <= 0.0:
+            self._touch_ground()
+        else:
+            self.landed = False
+
+    @property
+    def _followed(self) -> Route | PointReference | AttitudeReference:
+        """The present goal."""
+        offboard = self.mode is Mode.OFFBOARD and self._goal is not None
+        return self._goal if offboard and self._goal is not None else self._route
+
+    def _go(self, mode: Mode, path: Trajectory, yaw: float | None = None) -> None:
+        """Take a way of its own."""
+        own = yaw_of(self.state.q_world_body) if yaw is None else yaw
+        self.mode, self._then = mode, None
+        self._route = Route(path, self.time, own)
+        self._restart_position_loop()
+
+    def _go_on(self) -> None:
+        """Begin what follows the present way, which has ended."""
+        here = self._route.path.evaluate(self._route.path.duration)
+        if self._then is not None and self.mode is Mode.HOLD:
+            position, yaw = self._then
+            self._go(Mode.HOLD, rest_to_rest(here, position, _SPEED, _ACCELERATION), yaw)
+        elif self.mode is Mode.LAND and here[2] > 0.0:
+            down = np.array([here[0], here[1], -_BELOW])
+            self._go(Mode.LAND, rest_to_rest(here, down, _DESCENT, _ACCELERATION))
+        elif self.mode is Mode.TAKEOFF:
+            self.mode = Mode.HOLD
+
+    def _watch_client(self) -> None:
+        """Come to a hover where a client that is obeyed has fallen silent."""
+        if self.mode is not Mode.OFFBOARD:
+            return
+        silence = self.time - self._heard
+        allowed = ATTITUDE_TIMEOUT if isinstance(self._goal, AttitudeReference) else POINT_TIMEOUT
+        if silence > allowed + 1e-9:
+            self.told.append(f"no set-points for {silence:.2f} s: holding")
+            self.hold()
+
+    def _restart_position_loop(self) -> None:
+        goal = self._followed
+        if not isinstance(goal, AttitudeReference):
+            self._body.restart_position_loop(goal.reference(np.array([self.time]), self.gravity))
+
+    def _touch_ground(self) -> None:
+        """Stand on the ground, or lie there."""
+        state = self.state
+        tilt = float(np.arccos(np.clip(so3.thrust_axis(state.q_world_body)[2], -1.0, 1.0)))
+        speed = float(np.linalg.norm(state.velocity))
+        if not self.landed and (speed > _HARD_SPEED or tilt > _HARD_TILT):
+            self.crashed = True
+            self.told.append(f"hit the ground at {speed:.1f} m/s, tilted by {degrees(tilt):.0f}°")
+        has_landed = self.mode is Mode.LAND or self.crashed
+        self.landed = True
+        self._body.stand()
+        if has_landed:
+            self.mode = Mode.HOLD
+            self.disarm()

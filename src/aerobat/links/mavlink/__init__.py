@@ -1,0 +1,1 @@
+"""MAVLink: our client for an autopilot, and a front end that makes the simulated vehicle one."""

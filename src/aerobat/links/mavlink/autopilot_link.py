@@ -1,0 +1,186 @@
+"""What a client knows of an autopilot: its clock, its state, its mode; and how to give it orders."""
+
+from __future__ import annotations
+
+from collections import deque
+from math import inf, nan
+from typing import Any
+
+import numpy as np
+
+from aerobat import so3
+from aerobat.kernels.rigid_body import Body
+from aerobat.links.goals import AttitudeGoal, Mode, Observed, PositionGoal
+from aerobat.links.mavlink.connection import Connection, dialect
+from aerobat.links.mavlink.frames import swap_attitude, swap_body, swap_world, swap_yaw
+from aerobat.links.mavlink.modes import ARMED, CUSTOM_MODE_ENABLED, MAIN_AND_SUB, mode_of
+
+SYSTEM, COMPONENT = 245, 191  # ours: a companion computer
+_AUTOPILOT = 1  # the component of an autopilot
+_GROUND_STATION = 8  # the autopilot number of who is none
+_ASK_AGAIN = 0.3  # [s] from an order to the same again, where it is not obeyed
+_SYNCHRONIZE = 0.1  # [s] between questions for the time
+_SYNCHRONIZATIONS = 50  # of which the quickest counts
+
+
+class AutopilotLink:
+    """An autopilot at the other end of a connection."""
+
+    def __init__(self, connection: Connection, telemetry_rate: float) -> None:
+        """Prepare to talk.
+
+        Args:
+            connection: the way to it.
+            telemetry_rate: of its state, as it is asked for [1/s].
+        """
+        self._connection = connection
+        self._mavlink = dialect()
+        self._interval = 1e6 / telemetry_rate
+        self._system = 0
+        self._sent: dict[object, float] = {}  # [s] when an order, or a question, was sent last
+        self._times: deque[tuple[float, float]] = deque(maxlen=_SYNCHRONIZATIONS)  # [s] round trip, offset
+        self._now = 0.0
+        self.mode: Mode | None = None
+        self.armed = False
+        self.landed: bool | None = None
+        self.observed: Observed | None = None
+        self.parameters: dict[str, float] = {}
+        self.refusals: dict[int, int] = {}  # the result of commands that were not accepted
+        self.told: list[str] = []
+
+    @property
+    def is_known(self) -> bool:
+        """True once it has answered."""
+        return self._system != 0
+
+    @property
+    def is_synchronized(self) -> bool:
+        """True once its clock is known."""
+        return len(self._times) >= 5
+
+    @property
+    def delay(self) -> float:
+        """How long a message is on its way [s]: half of the shortest round trip."""
+        return 0.5 * min(self._times, default=(0.0, 0.0))[0]
+
+    def receive(self, now: float) -> list[Observed]:
+        """Take what has come by this time [s], keep the link up, and return the states among it."""
+        self._now = now
+        seen = []
+        for message in self._connection.receive():
+            if not self._is_ours(message):
+                continue
+            if message.get_type() == "ODOMETRY":
+                seen += self._odometry(message)
+            take = getattr(self, f"_take_{message.get_type().lower()}", None)
+            if take is not None:
+                take(message)
+        if self._again("heartbeat", 0.5):
+            self._send("heartbeat", 18, _GROUND_STATION, 0, 0, 4, 3)
+        if self.is_known:
+            if self._again("time", _SYNCHRONIZE):
+                self._send("timesync", 0, round(1e9 * now))
+            if self.observed is None or now - self.observed.time > 1.0:
+                self.command(511, self._mavlink.MAVLink_odometry_message.id, self._interval)
+        return seen
+
+    def ask_parameter(self, name: str) -> None:
+        """Ask for a parameter, now and then until it is there."""
+        if name not in self.parameters and self._again(name):
+            self._send("param_request_read", self._system, _AUTOPILOT, name.encode(), -1)
+
+    def set_mode(self, mode: Mode) -> None:
+        """Order a mode, now and then until it is on."""
+        if self.mode is not mode:
+            self.command(176, CUSTOM_MODE_ENABLED, *MAIN_AND_SUB[mode])
+
+    def arm(self) -> None:
+        """Have the rotors turn, now and then until they do."""
+        if not self.armed:
+            self.command(400, 1.0)
+
+    def command(self, number: int, *parameters: float) -> None:
+        """Give an order, unless the same was given just now."""
+        if self._again((number, parameters)):
+            padded = (*parameters, *(0.0,) * (7 - len(parameters)))
+            self._send("command_long", self._system, _AUTOPILOT, number, 0, *padded)
+
+    def follow(self, goal: PositionGoal | AttitudeGoal, max_thrust: float) -> None:
+        """Send a goal, of thrusts as a part of the greatest [N]."""
+        stamp = round(1e3 * self._now)
+        if isinstance(goal, AttitudeGoal):
+            q, rates = swap_attitude(goal.q_world_body), swap_body(goal.omega_body)
+            thrust = min(max(goal.thrust / max_thrust, 0.0), 1.0)
+            self._send("set_attitude_target", stamp, self._system, _AUTOPILOT, 0, q, *rates, thrust)
+            return
+        vectors = (goal.position, goal.velocity, goal.acceleration)
+        numbers = [x for vector in vectors for x in swap_world(tuple(vector.tolist()))]
+        yaw_rate_ignored, local_ned = 2048, 1
+        self._send(
+            "set_position_target_local_ned",
+            stamp,
+            self._system,
+            _AUTOPILOT,
+            local_ned,
+            yaw_rate_ignored,
+            *numbers,
+            swap_yaw(goal.yaw),
+            nan,
+        )
+
+    def _is_ours(self, message: Any) -> bool:
+        """True for messages of the autopilot, the first that is heard."""
+        if message.get_srcComponent() != _AUTOPILOT:
+            return False
+        beats = message.get_type() == "HEARTBEAT" and message.autopilot != _GROUND_STATION
+        if beats and not self.is_known:
+            self._system = message.get_srcSystem()
+        return bool(message.get_srcSystem() == self._system)
+
+    def _again(self, order: object, every: float = _ASK_AGAIN) -> bool:
+        """True where something was not sent for so long [s]; then it counts as sent now."""
+        if self._now - self._sent.get(order, -inf) < every - 1e-9:
+            return False
+        self._sent[order] = self._now
+        return True
+
+    def _send(self, name: str, *fields: Any) -> None:
+        self._connection.send(getattr(self._mavlink, f"MAVLink_{name}_message")(*fields))
+
+    def _take_heartbeat(self, message: Any) -> None:
+        self.mode = mode_of(message.custom_mode)
+        self.armed = bool(message.base_mode & ARMED)
+
+    def _take_extended_sys_state(self, message: Any) -> None:
+        self.landed = message.landed_state == 1
+
+    def _take_timesync(self, message: Any) -> None:
+        if message.tc1 > 0:
+            sent = 1e-9 * message.ts1
+            self._times.append((self._now - sent, 1e-9 * message.tc1 - 0.5 * (self._now + sent)))
+
+    def _take_param_value(self, message: Any) -> None:
+        self.parameters[str(message.param_id)] = float(message.param_value)
+
+    def _take_command_ack(self, message: Any) -> None:
+        if message.result == 0:
+            self.refusals.pop(message.command, None)
+        else:
+            self.refusals[message.command] = message.result
+
+    def _take_statustext(self, message: Any) -> None:
+        self.told.append(str(message.text))
+
+    def _odometry(self, message: Any) -> list[Observed]:
+        """A state, by our clock; nothing before that of the vehicle is known."""
+        if not self.is_synchronized:
+            return []
+        _, offset = min(self._times)
+        q = swap_attitude(tuple(message.q))
+        velocity_body = swap_body((message.vx, message.vy, message.vz))
+        velocity = so3.rotate(np.array(q), np.array(velocity_body))
+        rates = swap_body((message.rollspeed, message.pitchspeed, message.yawspeed))
+        place = swap_world((message.x, message.y, message.z))
+        x, y, z = velocity.tolist()
+        self.observed = Observed(1e-6 * message.time_usec - offset, Body(place, (x, y, z), q, rates))
+        return [self.observed]

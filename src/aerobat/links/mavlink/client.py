@@ -1,0 +1,260 @@
+"""Our client: flies a plan on an autopilot over MAVLink, from the ground to the ground."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from enum import StrEnum
+from math import hypot, inf
+
+import numpy as np
+
+from aerobat.arrays import Array
+from aerobat.errors import SpecError
+from aerobat.links.clock import Clock
+from aerobat.links.goals import Mode, Observed, PositionGoal, yaw_of
+from aerobat.links.mavlink.autopilot_link import AutopilotLink
+from aerobat.links.mavlink.connection import Connection
+from aerobat.links.mission import Mission, MissionSettings, Phase
+from aerobat.links.report import LinkReport, link_report
+from aerobat.planning import Plan
+
+HOVER_THRUST = "MPC_THR_HOVER"
+_HOVER_TOLERANCE = 0.1  # [-] by which a vehicle's hovering thrust may differ from that of the plan's vehicle
+_STREAMED = 1.2  # [s] of set-points before PX4 takes the mode offboard
+_PATIENCE = 8.0  # [s] for a vehicle to do as it is told
+_HOVERING = 3.0  # [s] of hover after an abort, before it lands
+_STILL = 0.3  # [m/s] of a hover
+
+
+class Stage(StrEnum):
+    """What the client is at."""
+
+    CONNECTING = "connecting"
+    ASKING = "asking the vehicle"
+    ARMING = "arming"
+    FLYING = "flying"
+    RECOVERING = "hovering after the abort"
+    LANDING = "landing"
+    LANDED = "landed"
+    LOST = "out of reach"
+
+
+@dataclass(frozen=True)
+class ClientSettings:
+    """Settings of the link."""
+
+    rate: float = 200.0  # [1/s] of set-points
+    telemetry_rate: float = 100.0  # [1/s] of states, as the vehicle is asked for them
+    wait: float = 10.0  # [s] for a vehicle to answer
+    hover_thrust: float | None = None  # [-] where the vehicle does not say it
+
+
+class Client:
+    """One flight of a plan; `tick` it at its rate until it is `done`."""
+
+    def __init__(
+        self,
+        plan: Plan,
+        connection: Connection,
+        *,
+        offset: Array,
+        mission: MissionSettings = MissionSettings(),  # noqa: B008 - frozen
+        settings: ClientSettings = ClientSettings(),
+        say: Callable[[str], None] = lambda sentence: None,
+    ) -> None:
+        """Prepare to fly.
+
+        Args:
+            plan: what is flown; see `require_flyable`.
+            connection: the way to the vehicle.
+            offset: where the plan's origin lies in the vehicle's frame [m], ENU, (3,).
+            mission: how it is flown, and when it is given up.
+            settings: of the link.
+            say: what takes sentences about the course of things.
+        """
+        assert plan.vehicle is not None, "a plan that is flyable has a vehicle"
+        self.mission = Mission(plan, mission, offset)
+        self._plan, self._offset = plan, offset
+        self.link = AutopilotLink(connection, settings.telemetry_rate)
+        self.stage = Stage.CONNECTING
+        self.log: list[Observed] = []  # while the plan was flown
+        self._settings = settings
+        self._say = say
+        self._began: float | None = None
+        self._ground: PositionGoal | None = None
+        self._hovering_since = inf
+        vehicle, gravity = plan.vehicle, plan.problem.environment.gravity
+        self._name = vehicle.name
+        self._weight = vehicle.mass * gravity
+        self._own_hover = self._weight / float(vehicle.max_thrusts.sum())
+        self._max_thrust = float(vehicle.max_thrusts.sum())
+
+    @property
+    def done(self) -> bool:
+        """True once there is nothing left to do."""
+        return self.stage in (Stage.LANDED, Stage.LOST)
+
+    def tick(self, now: float) -> None:
+        """Take what has come by this time [s], and send what is due.
+
+        Raises SpecError for a vehicle that does not answer, is another one, or cannot be armed; nothing flies
+        then.
+        """
+        now = round(now, 3)  # goals are stamped in whole milliseconds, and are those of their stamps
+        if self._began is None:
+            self._began = now
+        seen = self.link.receive(now)
+        if self.mission.phase is Phase.MANEUVER:
+            self.log += seen
+        for sentence in self.link.told:
+            self._say(f"the vehicle: {sentence}")
+        self.link.told.clear()
+        getattr(self, f"_while_{self.stage.name.lower()}")(now)
+
+    def abort(self, now: float, reason: str) -> None:
+        """Give the flight up: the vehicle is told to hover, then to land."""
+        if self.stage is Stage.FLYING:
+            self.mission.abort(now, reason)
+            self._enter(Stage.RECOVERING, now)
+            self._say(f"aborted: {self.mission.reason}; the vehicle is told to hover")
+
+    def report(self) -> LinkReport:
+        """What the flight came to."""
+        began = self.mission.maneuver_began
+        return link_report(
+            self._plan,
+            self.mission.stream,
+            [seen._replace(time=seen.time - began) for seen in self.log],
+            offset=self._offset,
+            aborted=self.mission.reason,
+            ended=str(self.stage),
+            delay=self.link.delay,
+        )
+
+    def _enter(self, stage: Stage, now: float) -> None:
+        self.stage, self._began = stage, now
+
+    @property
+    def _observed(self) -> Observed:
+        assert self.link.observed is not None, "flown only once it is seen"
+        return self.link.observed
+
+    def _since(self, now: float) -> float:
+        return now - (self._began or 0.0)
+
+    def _while_connecting(self, now: float) -> None:
+        if self.link.is_known:
+            self._enter(Stage.ASKING, now)
+        elif self._since(now) > self._settings.wait:
+            raise SpecError(
+                f"no vehicle answers within {self._settings.wait:g} s; check the address, and that it is on"
+            )
+
+    def _while_asking(self, now: float) -> None:
+        """Wait for its clock, its state and its hovering thrust, and see that it is the plan's vehicle."""
+        hover = self._settings.hover_thrust or self.link.parameters.get(HOVER_THRUST)
+        if hover is None:
+            self.link.ask_parameter(HOVER_THRUST)
+        if hover is not None and self.link.observed is not None and self.link.landed is not None:
+            self._check(hover)
+            self._max_thrust = self._weight / hover
+            body = self._observed.body
+            zero = np.zeros(3)
+            yaw = yaw_of(body.q_world_body)
+            self._ground = PositionGoal(np.array(body.position), zero, zero, yaw)
+            self._say(f"connected; a message takes {1e3 * self.link.delay:.0f} ms")
+            self._enter(Stage.ARMING, now)
+        elif self._since(now) > self._settings.wait:
+            missing, remedy = "its state (ODOMETRY)", "have it send that message"
+            if hover is None:
+                missing, remedy = f"its parameter {HOVER_THRUST}", "give --hover-thrust"
+            waited = f"{self._settings.wait:g} s"
+            raise SpecError(f"the vehicle does not tell {missing} within {waited}; {remedy}")
+
+    def _check(self, hover: float) -> None:
+        if not self.link.landed:
+            raise SpecError("the vehicle is flying already; land it first")
+        if not abs(hover / self._own_hover - 1.0) <= _HOVER_TOLERANCE:
+            raise SpecError(
+                f"the vehicle hovers at {hover:.3f} of its thrust, {self._name} at {self._own_hover:.3f}: "
+                "the plan is for another vehicle; plan it for this one"
+            )
+
+    def _while_arming(self, now: float) -> None:
+        """Stream where it stands, as PX4 asks before it obeys; then take the mode, then arm."""
+        assert self._ground is not None, "its state is known"
+        self.link.follow(self._ground, self._max_thrust)
+        if self._since(now) > _STREAMED:
+            self.link.set_mode(Mode.OFFBOARD)
+            if self.link.mode is Mode.OFFBOARD:
+                self.link.arm()
+        if self.link.armed and self.link.mode is Mode.OFFBOARD:
+            self.mission.begin(now, self._observed)
+            self._enter(Stage.FLYING, now)
+            self._say("armed")
+        elif self._since(now) > _PATIENCE:
+            what = "be armed" if self.link.mode is Mode.OFFBOARD else "take the mode offboard"
+            raise SpecError(f"the vehicle does not {what}; its own ground station says why")
+
+    def _while_flying(self, now: float) -> None:
+        phase = self.mission.phase
+        goal = self.mission.step(now, self._observed, self.link.delay)
+        if self.link.mode is not Mode.OFFBOARD and self.mission.phase is not Phase.LAND:
+            mode = "a mode of a pilot's" if self.link.mode is None else f"the mode {self.link.mode}"
+            self.mission.abort(now, f"the vehicle went into {mode}")
+        if self.mission.phase is not phase:
+            self._say(str(self.mission.phase))
+        if self.mission.phase is Phase.ABORTED and self.link.mode is None:
+            self._say(f"aborted: {self.mission.reason}; it is left to the pilot")
+            self._enter(Stage.LOST, now)
+        elif self.mission.phase is Phase.ABORTED:
+            self._say(f"aborted: {self.mission.reason}; the vehicle is told to hover")
+            self._enter(Stage.RECOVERING, now)
+            self._while_recovering(now)
+        elif self.mission.phase is Phase.LAND:
+            self._enter(Stage.LANDING, now)
+            self._while_landing(now)
+        elif goal is not None:
+            self.link.follow(goal, self._max_thrust)
+
+    def _while_recovering(self, now: float) -> None:
+        """Have it hover, and once it has for a while, land."""
+        self.link.set_mode(Mode.HOLD)
+        is_still = hypot(*self._observed.body.velocity) < _STILL and self.link.mode is Mode.HOLD
+        self._hovering_since = min(self._hovering_since, now) if is_still else inf
+        if now - self._hovering_since > _HOVERING or (self.link.landed and not self.link.armed):
+            self._enter(Stage.LANDING, now)
+        elif self._since(now) > 60.0:
+            self._enter(Stage.LOST, now)
+        self._give_up_where_silent(now)
+
+    def _while_landing(self, now: float) -> None:
+        self.link.set_mode(Mode.LAND)
+        if self.link.landed and not self.link.armed:
+            self._enter(Stage.LANDED, now)
+            self._say("landed")
+        self._give_up_where_silent(now)
+
+    def _give_up_where_silent(self, now: float) -> None:
+        if now - self._observed.time > self._settings.wait:
+            self._enter(Stage.LOST, now)
+            self._say("no news of the vehicle; it is left to its own failsafe")
+
+
+def run(client: Client, clock: Clock, rate: float) -> None:
+    """Tick a client until it is done. Interrupted, it tells the vehicle to hover first."""
+    due = clock.now()
+    try:
+        while not client.done:
+            clock.sleep_until(due)
+            now = clock.now()
+            client.tick(now)
+            due = max(due + 1.0 / rate, now)
+    except KeyboardInterrupt:
+        until = clock.now() + 1.0
+        client.abort(clock.now(), "interrupted")
+        while clock.now() < until and client.stage is Stage.RECOVERING:
+            client.tick(clock.now())
+            clock.sleep_until(clock.now() + 1.0 / rate)
+        raise

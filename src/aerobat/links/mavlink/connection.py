@@ -1,0 +1,163 @@
+"""Connections that carry MAVLink messages, by pymavlink, and one that loses and delays them for trials."""
+
+from __future__ import annotations
+
+import heapq
+import os
+from collections.abc import Iterator
+from functools import cache
+from importlib.util import find_spec
+from itertools import count
+from typing import Any, Protocol
+
+import numpy as np
+
+from aerobat.errors import BackendMissing, SpecError
+from aerobat.links.clock import Clock
+
+_KINDS = ("udp", "udpin", "udpout", "tcp", "tcpin")
+_MANY = 1000  # messages at once, after which others have their turn
+
+
+class Connection(Protocol):
+    """A way for messages."""
+
+    def receive(self) -> list[Any]:
+        """The messages that have come since the last call; never waits."""
+
+    def send(self, message: Any) -> None:
+        """Send a message of the dialect `common`."""
+
+    def close(self) -> None:
+        """Give up the socket or the device."""
+
+
+@cache
+def dialect() -> Any:
+    """The messages of pymavlink's dialect `common`. Raises BackendMissing where that is not installed."""
+    if find_spec("pymavlink") is None:
+        raise BackendMissing('MAVLink needs pymavlink; install it with pip install "aerobat[mavlink]"')
+    os.environ["MAVLINK20"] = "1"  # read by pymavlink when it is imported
+    from pymavlink.dialects.v20 import common
+
+    return common
+
+
+def connect(address: str, *, listen: bool, system: int, component: int = 1, baud: int = 57600) -> Connection:
+    """Open a connection.
+
+    Raises SpecError, one sentence, for an address that is none or cannot be had, BackendMissing without
+    pymavlink.
+
+    Args:
+        address: udp:HOST:PORT, udpin:, udpout:, tcp: or tcpin: likewise, or a serial device.
+        listen: of udp:, to wait on that port rather than send there first.
+        system: our number among MAVLink's systems.
+        component: likewise among its components.
+        baud: the rate of a serial device [bit/s].
+    """
+    dialect()
+    _check(address)
+    from pymavlink import mavutil
+
+    try:
+        link = mavutil.mavlink_connection(
+            address,
+            baud=baud,
+            source_system=system,
+            source_component=component,
+            input=listen,
+            dialect="common",
+            retries=0,
+        )
+    except Exception as error:  # sockets, devices and resolvers raise what they like
+        reason = getattr(error, "strerror", None) or str(error) or type(error).__name__
+        raise SpecError(f"cannot open {address}: {reason}; give another address or port") from None
+    return _PymavlinkConnection(link)
+
+
+def _check(address: str) -> None:
+    kind, _, rest = address.partition(":")
+    if kind in _KINDS:
+        host, _, port = rest.rpartition(":")
+        if not host or not port.isdecimal() or not 0 < int(port) < 65536:
+            raise SpecError(f"{address} is no address; give {kind}:HOST:PORT, as in {kind}:127.0.0.1:14540")
+    elif not os.path.exists(address):
+        raise SpecError(
+            f"{address} is neither a device nor an address; give udp:HOST:PORT, tcp:HOST:PORT or a serial "
+            "device that is there"
+        )
+
+
+class _PymavlinkConnection:
+    def __init__(self, link: Any) -> None:
+        self._link = link
+
+    def receive(self) -> list[Any]:
+        """See `Connection.receive`."""
+        return [message for message in self._messages() if message.get_type() != "BAD_DATA"]
+
+    def send(self, message: Any) -> None:
+        """See `Connection.send`."""
+        self._link.mav.send(message)
+
+    def close(self) -> None:
+        """See `Connection.close`."""
+        self._link.close()
+
+    def _messages(self) -> Iterator[Any]:
+        for _ in range(_MANY):
+            message = self._link.recv_msg()
+            if message is None:
+                return
+            yield message
+
+
+class LossyConnection:
+    """A connection that loses some messages of either direction and delays all others alike."""
+
+    def __init__(
+        self, connection: Connection, clock: Clock, *, loss: float = 0.0, delay: float = 0.0, seed: int = 0
+    ) -> None:
+        """Wrap a connection.
+
+        Args:
+            connection: what carries the messages.
+            clock: of the delay.
+            loss: the probability of a message to be lost, either way.
+            delay: of each message, either way [s].
+            seed: of the losses.
+        """
+        self._connection = connection
+        self._clock = clock
+        self._loss, self._delay = loss, delay
+        self._random = np.random.default_rng(seed)
+        self._order = count()
+        self._coming: list[tuple[float, int, Any]] = []
+        self._going: list[tuple[float, int, Any]] = []
+
+    def receive(self) -> list[Any]:
+        """See `Connection.receive`; also sends what has waited for long enough."""
+        for message in self._connection.receive():
+            self._keep(self._coming, message)
+        for message in self._due(self._going):
+            self._connection.send(message)
+        return self._due(self._coming)
+
+    def send(self, message: Any) -> None:
+        """See `Connection.send`."""
+        self._keep(self._going, message)
+
+    def close(self) -> None:
+        """See `Connection.close`."""
+        self._connection.close()
+
+    def _keep(self, queue: list[tuple[float, int, Any]], message: Any) -> None:
+        if self._random.random() >= self._loss:
+            heapq.heappush(queue, (self._clock.now() + self._delay, next(self._order), message))
+
+    def _due(self, queue: list[tuple[float, int, Any]]) -> list[Any]:
+        due = []
+        while queue and queue[0][0] <= self._clock.now():
+            due.append(heapq.heappop(queue)[2])
+        return due

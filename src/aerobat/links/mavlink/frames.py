@@ -1,0 +1,63 @@
+"""MAVLink's axes and units against ours.
+
+MAVLink's local frame is NED (x north, y east, z down), its body frame FRD (x forward, y right, z down); ours
+are ENU and FLU. Vectors of the world swap x and y and turn z about; those of the body turn y and z about;
+q_ned_frd = q_M ⊗ q_enu_flu ⊗ q_X with half turns about (1, 1, 0)/√2 and about x. Each map is its own inverse,
+of attitudes but for the quaternion's sign. Yaw is counted from north clockwise there, from east here.
+
+Thrust is a fraction of what all rotors can give, taken to grow linearly with it: T / T_max. What T_max is an
+autopilot says by the fraction at which it hovers, PX4's parameter MPC_THR_HOVER: T_max = m g / MPC_THR_HOVER.
+"""
+
+from __future__ import annotations
+
+from math import cos, pi, radians, sqrt
+
+from aerobat.kernels.ops import Quaternion, Vector
+from aerobat.kernels.quaternions import multiply
+
+_S = sqrt(0.5)
+_WORLD: Quaternion = (0.0, _S, _S, 0.0)
+_BODY: Quaternion = (0.0, 1.0, 0.0, 0.0)
+_EARTH = 6_371_000.0  # [m] mean radius
+HOME = (47.397742, 8.545594, 488.0)  # [°], [°], [m] where simulated vehicles stand, as PX4's own do
+
+
+def swap_world(vector: Vector) -> Vector:
+    """ENU to NED, or back."""
+    x, y, z = vector
+    return y, x, -z
+
+
+def swap_body(vector: Vector) -> Vector:
+    """FLU to FRD, or back."""
+    x, y, z = vector
+    return x, -y, -z
+
+
+def swap_attitude(q: Quaternion) -> Quaternion:
+    """The attitude of FLU in ENU to that of FRD in NED, or back; with w ≥ 0."""
+    w, x, y, z = multiply(multiply(_WORLD, q), _BODY)
+    sign = -1.0 if w < 0.0 else 1.0
+    return sign * w, sign * x, sign * y, sign * z
+
+
+def swap_yaw(yaw: float) -> float:
+    """Yaw from east counter-clockwise to yaw from north clockwise, or back [rad], in [-π, π)."""
+    return (1.5 * pi - yaw) % (2 * pi) - pi
+
+
+def to_global(position: Vector) -> tuple[int, int, float]:
+    """Latitude and longitude [1e-7 °] and altitude [m] of a place in ENU about HOME, on a flat earth."""
+    latitude, longitude, altitude = HOME
+    x, y, z = position
+    degree = _EARTH * radians(1.0)
+    north, east = latitude + y / degree, longitude + x / (degree * cos(radians(latitude)))
+    return round(1e7 * north), round(1e7 * east), altitude + z
+
+
+def from_global(latitude: int, longitude: int, altitude: float) -> Vector:
+    """The inverse of `to_global`."""
+    degree = _EARTH * radians(1.0)
+    x = (1e-7 * longitude - HOME[1]) * degree * cos(radians(HOME[0]))
+    return x, (1e-7 * latitude - HOME[0]) * degree, altitude - HOME[2]

@@ -1,0 +1,292 @@
+"""The simulated vehicle as an autopilot that MAVLink clients know how to fly: the messages of a PX4."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from math import degrees, isfinite, nan, pi
+from typing import Any
+
+import numpy as np
+
+from aerobat import so3
+from aerobat.links.autopilot.vehicle import POINT_TIMEOUT, SimulatedVehicle
+from aerobat.links.goals import AttitudeGoal, Mode, PositionGoal, yaw_of
+from aerobat.links.mavlink.connection import Connection, dialect
+from aerobat.links.mavlink.frames import (
+    from_global,
+    swap_attitude,
+    swap_body,
+    swap_world,
+    swap_yaw,
+    to_global,
+)
+from aerobat.links.mavlink.modes import ARMED, CUSTOM_MODE_ENABLED, MAIN_AND_SUB, custom_mode
+
+TAKEOFF_HEIGHT = 2.5  # [m] PX4's own, until a client says otherwise
+_FIRMWARE = 0x010F00FF  # 1.15.0, a release: which autopilot clients take it for
+_IGNORED_POSITION, _IGNORED_VELOCITY, _IGNORED_ACCELERATION, _IGNORED_YAW = 7, 56, 448, 1024
+_IGNORED_RATES, _IGNORED_ATTITUDE = 7, 128
+
+
+class FrontEnd:
+    """The messages of a simulated vehicle: streams that it sends, orders that it takes."""
+
+    def __init__(
+        self,
+        vehicle: SimulatedVehicle,
+        connection: Connection,
+        say: Callable[[str], None] = lambda sentence: None,
+    ) -> None:
+        self.vehicle = vehicle
+        self._say = say
+        self._connection = connection
+        self._mavlink = dialect()
+        self._began = vehicle.time
+        self.parameters = {
+            "MPC_THR_HOVER": vehicle.hover_fraction,
+            "MIS_TAKEOFF_ALT": TAKEOFF_HEIGHT,
+            "COM_OF_LOSS_T": POINT_TIMEOUT,
+        }
+        self._streams: dict[int, tuple[Callable[[], Any], float]] = {
+            message.id: (make, interval)
+            for message, make, interval in (
+                (self._mavlink.MAVLink_heartbeat_message, self._heartbeat, 0.5),
+                (self._mavlink.MAVLink_sys_status_message, self._sys_status, 1.0),
+                (self._mavlink.MAVLink_extended_sys_state_message, self._extended_state, 0.2),
+                (self._mavlink.MAVLink_home_position_message, self._home, 1.0),
+                (self._mavlink.MAVLink_gps_raw_int_message, self._gps, 0.2),
+                (self._mavlink.MAVLink_local_position_ned_message, self._local_position, 0.02),
+                (self._mavlink.MAVLink_attitude_quaternion_message, self._attitude, 0.02),
+                (self._mavlink.MAVLink_global_position_int_message, self._global_position, 0.02),
+                (self._mavlink.MAVLink_odometry_message, self._odometry, nan),
+            )
+        }
+        self._due = {identity: self._began + 0.0 * every for identity, (_, every) in self._streams.items()}
+
+    def tick(self, now: float) -> None:
+        """Go on to this time [s], take what has come, and send what is due."""
+        self.vehicle.advance(now)
+        for message in self._connection.receive():
+            take = getattr(self, f"_take_{message.get_type().lower()}", None)
+            if take is not None:
+                take(message)
+        for sentence in self.vehicle.told:
+            self._say(sentence)
+            self._send("statustext", 4, sentence.encode()[:50])
+        self.vehicle.told.clear()
+        for identity, (make, interval) in self._streams.items():
+            if self._due[identity] <= now + 1e-9:
+                self._connection.send(make())
+                self._due[identity] = max(self._due[identity] + interval, now)
+
+    def _send(self, name: str, *fields: Any) -> None:
+        self._connection.send(getattr(self._mavlink, f"MAVLink_{name}_message")(*fields))
+
+    # what is streamed
+
+    @property
+    def _milliseconds(self) -> int:
+        return round(1e3 * (self.vehicle.time - self._began))
+
+    @property
+    def _microseconds(self) -> int:
+        return round(1e6 * (self.vehicle.time - self._began))
+
+    def _heartbeat(self) -> Any:
+        armed = ARMED if self.vehicle.armed else 0
+        state = 4 if self.vehicle.armed else 3  # active, or on standby
+        kind = {4: 2, 6: 13, 8: 14}.get(
+            len(self.vehicle.vehicle.rotors), 2
+        )  # quadrotor, hexarotor, octorotor
+        return self._mavlink.MAVLink_heartbeat_message(
+            kind, 12, CUSTOM_MODE_ENABLED | armed, custom_mode(self.vehicle.mode), state, 3
+        )
+
+    def _sys_status(self) -> Any:
+        sensors = 0x2F | 0x0C00 | 1 << 28  # gyro, accelerometer, magnetometer, GPS, control, may be armed
+        return self._mavlink.MAVLink_sys_status_message(
+            sensors, sensors, sensors, 100, 16000, -1, 100, 0, 0, 0, 0, 0, 0
+        )
+
+    def _extended_state(self) -> Any:
+        landed = 1 if self.vehicle.landed else {Mode.TAKEOFF: 3, Mode.LAND: 4}.get(self.vehicle.mode, 2)
+        return self._mavlink.MAVLink_extended_sys_state_message(0, landed)
+
+    def _home(self) -> Any:
+        latitude, longitude, altitude = to_global((0.0, 0.0, 0.0))
+        return self._mavlink.MAVLink_home_position_message(
+            latitude, longitude, round(1e3 * altitude), 0.0, 0.0, 0.0, (1.0, 0.0, 0.0, 0.0), 0.0, 0.0, 0.0
+        )
+
+    def _gps(self) -> Any:
+        latitude, longitude, altitude = to_global(self._position)
+        return self._mavlink.MAVLink_gps_raw_int_message(
+            self._microseconds, 3, latitude, longitude, round(1e3 * altitude), 100, 100, 0, 0, 12
+        )
+
+    def _local_position(self) -> Any:
+        place, velocity = swap_world(self._position), swap_world(self._velocity)
+        return self._mavlink.MAVLink_local_position_ned_message(self._milliseconds, *place, *velocity)
+
+    def _attitude(self) -> Any:
+        state = self.vehicle.state
+        q, rates = (
+            swap_attitude(tuple(state.q_world_body.tolist())),
+            swap_body(tuple(state.omega_body.tolist())),
+        )
+        return self._mavlink.MAVLink_attitude_quaternion_message(self._milliseconds, *q, *rates)
+
+    def _global_position(self) -> Any:
+        latitude, longitude, altitude = to_global(self._position)
+        velocity = (round(100 * v) for v in swap_world(self._velocity))
+        heights = round(1e3 * altitude), round(1e3 * self._position[2])
+        return self._mavlink.MAVLink_global_position_int_message(
+            self._milliseconds, latitude, longitude, *heights, *velocity, self._heading
+        )
+
+    def _odometry(self) -> Any:
+        state = self.vehicle.state
+        velocity = so3.unrotate(state.q_world_body, state.velocity)
+        unknown = (nan, *(0.0,) * 20)
+        return self._mavlink.MAVLink_odometry_message(
+            self._microseconds,
+            1,
+            12,
+            *swap_world(self._position),
+            swap_attitude(tuple(state.q_world_body.tolist())),
+            *swap_body(tuple(velocity.tolist())),
+            *swap_body(tuple(state.omega_body.tolist())),
+            unknown,
+            unknown,
+        )
+
+    @property
+    def _position(self) -> tuple[float, float, float]:
+        x, y, z = self.vehicle.state.position.tolist()
+        return x, y, z
+
+    @property
+    def _velocity(self) -> tuple[float, float, float]:
+        x, y, z = self.vehicle.state.velocity.tolist()
+        return x, y, z
+
+    @property
+    def _heading(self) -> int:
+        yaw = swap_yaw(yaw_of(self.vehicle.state.q_world_body))
+        return round(100 * degrees(yaw % (2 * pi))) % 36000
+
+    # what is taken
+
+    def _take_timesync(self, message: Any) -> None:
+        if message.tc1 == 0:
+            self._send("timesync", round(1e9 * (self.vehicle.time - self._began)), message.ts1)
+
+    def _take_param_request_read(self, message: Any) -> None:
+        self._give_parameter(str(message.param_id))
+
+    def _take_param_request_list(self, message: Any) -> None:
+        for name in self.parameters:
+            self._give_parameter(name)
+
+    def _take_param_set(self, message: Any) -> None:
+        if message.param_id == "MIS_TAKEOFF_ALT" and 0.5 <= message.param_value <= 100.0:
+            self.parameters[message.param_id] = float(message.param_value)
+        self._give_parameter(str(message.param_id))
+
+    def _give_parameter(self, name: str) -> None:
+        if name in self.parameters:
+            index = list(self.parameters).index(name)
+            self._send("param_value", name.encode(), self.parameters[name], 9, len(self.parameters), index)
+
+    def _take_command_long(self, message: Any) -> None:
+        numbers = [message.param1, message.param2, message.param3, message.param4]
+        place = (1e7 * message.param5, 1e7 * message.param6, message.param7)
+        self._obey(message, [*numbers, message.param5, message.param6, message.param7], place)
+
+    def _take_command_int(self, message: Any) -> None:
+        numbers = [message.param1, message.param2, message.param3, message.param4]
+        self._obey(message, [*numbers, message.x, message.y, message.z], (message.x, message.y, message.z))
+
+    def _obey(self, message: Any, numbers: list[float], place: tuple[float, float, float]) -> None:
+        """Do what a command says, and acknowledge it: accepted, denied, or not known."""
+        known: dict[int, Callable[[], bool]] = {
+            400: lambda: self.vehicle.arm() if numbers[0] > 0.5 else self.vehicle.disarm(),
+            176: lambda: self._change_mode(int(numbers[1]), int(numbers[2])),
+            22: self._take_off,
+            21: self.vehicle.land,
+            192: lambda: self._reposition(place, numbers[3]),
+            511: lambda: self._set_interval(int(numbers[0]), numbers[1]),
+            512: lambda: self._give_message(int(numbers[0])),
+        }
+        act = known.get(message.command)
+        result = 3 if act is None else 0 if act() else 2  # unsupported, accepted, denied
+        source = message.get_srcSystem(), message.get_srcComponent()
+        self._send("command_ack", message.command, result, 0, 0, *source)
+
+    def _change_mode(self, main: int, sub: int) -> bool:
+        orders = {
+            Mode.TAKEOFF: self._take_off,
+            Mode.HOLD: self.vehicle.hold,
+            Mode.LAND: self.vehicle.land,
+            Mode.OFFBOARD: self.vehicle.go_offboard,
+        }
+        return any(orders[mode]() for mode, numbers in MAIN_AND_SUB.items() if numbers == (main, sub))
+
+    def _take_off(self) -> bool:
+        return self.vehicle.take_off(self.parameters["MIS_TAKEOFF_ALT"])
+
+    def _reposition(self, place: tuple[float, float, float], yaw: float) -> bool:
+        latitude, longitude, altitude = place
+        if not all(map(isfinite, place)):
+            return False
+        goal = np.array(from_global(round(latitude), round(longitude), altitude))
+        return self.vehicle.go_to(goal, swap_yaw(yaw) if isfinite(yaw) else None)
+
+    def _set_interval(self, identity: int, microseconds: float) -> bool:
+        if identity not in self._streams:
+            return False
+        make, _ = self._streams[identity]
+        self._streams[identity] = (make, nan if microseconds < 0 else max(1e-6 * microseconds, 0.004))
+        self._due[identity] = self.vehicle.time if microseconds >= 0 else nan
+        return True
+
+    def _give_message(self, identity: int) -> bool:
+        if identity == self._mavlink.MAVLink_autopilot_version_message.id:
+            capabilities = 64 | 128 | 8192 | 16384  # set-points in three ways, MAVLink 2
+            self._send(
+                "autopilot_version", capabilities, _FIRMWARE, 0, 0, 0, (0,) * 8, (0,) * 8, (0,) * 8, 0, 0, 1
+            )
+            return True
+        if identity not in self._streams:
+            return False
+        self._connection.send(self._streams[identity][0]())
+        return True
+
+    def _take_set_position_target_local_ned(self, message: Any) -> None:
+        """A point with its velocity and acceleration; of velocity alone, from where the vehicle is."""
+        mask = message.type_mask
+        state = self.vehicle.state
+        position = state.position
+        if not mask & _IGNORED_POSITION:
+            position = np.array(swap_world((message.x, message.y, message.z)))
+        velocity, acceleration = np.zeros(3), np.zeros(3)
+        if not mask & _IGNORED_VELOCITY:
+            velocity = np.array(swap_world((message.vx, message.vy, message.vz)))
+        if not mask & _IGNORED_ACCELERATION:
+            acceleration = np.array(swap_world((message.afx, message.afy, message.afz)))
+        yaw = yaw_of(state.q_world_body) if mask & _IGNORED_YAW else swap_yaw(message.yaw)
+        numbers = np.concatenate([position, velocity, acceleration, [yaw]])
+        if np.isfinite(numbers).all():
+            self.vehicle.follow_point(PositionGoal(position, velocity, acceleration, yaw))
+
+    def _take_set_attitude_target(self, message: Any) -> None:
+        """An attitude with its rates and thrust; without the attitude it is not followed."""
+        if message.type_mask & _IGNORED_ATTITUDE:
+            return
+        q = swap_attitude(tuple(message.q))
+        rates = (0.0, 0.0, 0.0)
+        if not message.type_mask & _IGNORED_RATES:
+            rates = swap_body((message.body_roll_rate, message.body_pitch_rate, message.body_yaw_rate))
+        thrust = message.thrust * float(self.vehicle.vehicle.max_thrusts.sum())
+        if np.isfinite([*q, *rates, thrust]).all() and np.linalg.norm(q) > 0.5:
+            self.vehicle.follow_attitude(AttitudeGoal(q, rates, thrust), 1e-3 * message.time_boot_ms)

@@ -1,0 +1,222 @@
+"""A plan's whole flight by a live link: to its start, along it, to a hover and down; and when to give it up.
+
+The same for every link: it knows times, states and goals, but no messages.
+"""
+
+from __future__ import annotations
+
+from enum import StrEnum
+from math import hypot, pi
+
+import numpy as np
+
+from aerobat.arrays import Array
+from aerobat.declaration import Positive, declared
+from aerobat.errors import SpecError
+from aerobat.links.goals import AttitudeGoal, Observed, PositionGoal, yaw_of
+from aerobat.links.path_follower import PathFollower
+from aerobat.links.routes import braking, rest_to_rest
+from aerobat.links.stream import SetpointStream
+from aerobat.planning import Plan
+from aerobat.simulation.outcome import length
+from aerobat.trajectory import Trajectory
+
+_NEAR = 0.1  # [m] from the start, within which a vehicle has come to it
+_SLOW = 0.15  # [m/s] likewise
+_AT_REST = 1e-3  # [m/s] of a plan's start that is a hover
+_CLIMB = 1.0  # [m] straight up at the least, before anything else
+
+
+class Phase(StrEnum):
+    """The part of a mission that is on."""
+
+    READY = "ready on the ground"
+    CLIMB = "climbing"
+    APPROACH = "going to the plan's start"
+    SETTLE = "coming to rest there"
+    MANEUVER = "flying the plan"
+    HOLD = "holding where it ends"
+    LAND = "landing"
+    ABORTED = "aborted"
+
+
+@declared
+class MissionSettings:
+    """Settings of a flight by a live link, and the bounds beyond which it is given up."""
+
+    cruise_speed: Positive = 2.0  # [m/s] on the way to the plan's start
+    cruise_acceleration: Positive = 2.0  # [m/s²] likewise
+    settling: Positive = 0.5  # [s] at rest at the start before the plan begins, and at its end
+    patience: Positive = 20.0  # [s] for coming to rest at the start
+    max_error: Positive = 1.0  # [m] off the path
+    max_silence: Positive = 0.25  # [s] without news of the vehicle while the plan is flown
+    max_silence_outside: Positive = 1.0  # [s] likewise at other times
+    max_lateness: Positive = 0.1  # [s] by which a set-point may miss its time while the plan is flown
+
+
+class Mission:
+    """The course of a flight: the goal of each tick, from what is seen of the vehicle."""
+
+    def __init__(self, plan: Plan, settings: MissionSettings, offset: Array) -> None:
+        """Prepare to fly a plan.
+
+        Args:
+            plan: what is flown, certified for its vehicle; see `require_flyable`.
+            settings: how.
+            offset: where the plan's origin lies in the vehicle's own frame [m], ENU, (3,).
+        """
+        assert plan.vehicle is not None, "a plan that is flyable has a vehicle"
+        self.settings = settings
+        self.phase = Phase.READY
+        self.reason = ""  # of an abort
+        environment = plan.problem.environment
+        self.stream = SetpointStream(plan.trajectory, plan.vehicle, environment, offset)
+        self._follower = PathFollower(self.stream, plan.vehicle, environment)
+        first, last = self.stream.flat(0.0), self.stream.flat(self.stream.duration)
+        self._start = first.position
+        self._heading = plan.trajectory.heading
+        self._final_yaw = yaw_of(self.stream.at(self.stream.duration).q_world_body)
+        self._after = braking(last.position, last.velocity, settings.cruise_acceleration, -np.inf)
+        self.began = np.nan  # [s] when the phase did
+        self.maneuver_began = np.nan  # [s]
+        self._last_tick = np.nan
+        self._rested_since = np.nan
+        self._routes: list[Trajectory] = []
+        self._turn = (0.0, 0.0)  # [rad] the yaw at first, and by how much to turn while climbing
+
+    def begin(self, now: float, seen: Observed) -> None:
+        """Leave the ground, the vehicle being armed and obedient; `seen` is how it stands."""
+        here = np.array(seen.body.position)
+        above = np.array([here[0], here[1], max(self._start[2], here[2] + _CLIMB)])
+        limits = (self.settings.cruise_speed, self.settings.cruise_acceleration)
+        self._routes = [rest_to_rest(here, above, *limits), rest_to_rest(above, self._start, *limits)]
+        yaw = yaw_of(seen.body.q_world_body)
+        self._turn = (yaw, (self._heading - yaw + pi) % (2 * pi) - pi)
+        self._enter(Phase.CLIMB, now)
+
+    def step(self, now: float, seen: Observed, delay: float = 0.0) -> PositionGoal | AttitudeGoal | None:
+        """The goal at this time; None where the vehicle is to look after itself: to hold, or to land.
+
+        `seen` is the latest of the vehicle, `delay` [s] how long a goal is on its way to it.
+        """
+        self._watch(now, seen)
+        self._last_tick = now
+        if self.phase is Phase.CLIMB:
+            return self._along(now, Phase.APPROACH)
+        if self.phase is Phase.APPROACH:
+            return self._along(now, Phase.SETTLE)
+        if self.phase is Phase.SETTLE:
+            self._settle(now, seen)
+        if self.phase is Phase.MANEUVER:
+            return self._maneuver(now, seen, delay)
+        if self.phase is Phase.HOLD and now - self.began > self._after.duration + self.settings.settling:
+            self._enter(Phase.LAND, now)
+        return self._hovering(now)
+
+    def abort(self, now: float, reason: str) -> None:
+        """Give it up: the vehicle is to hover."""
+        if self.phase not in (Phase.ABORTED, Phase.LAND):
+            self.reason = reason
+            self._enter(Phase.ABORTED, now)
+
+    def error(self, seen: Observed) -> float:
+        """How far the vehicle is off the plan at the time that it was seen [m]."""
+        expected = self.stream.flat(seen.time - self.maneuver_began).position
+        return float(np.linalg.norm(np.array(seen.body.position) - expected))
+
+    def _enter(self, phase: Phase, now: float) -> None:
+        self.phase, self.began = phase, now
+
+    def _watch(self, now: float, seen: Observed) -> None:
+        """Abort where something is over its bound."""
+        flying = self.phase is Phase.MANEUVER
+        if self.phase in (Phase.READY, Phase.ABORTED, Phase.LAND):
+            return
+        silence = now - seen.time
+        allowed = self.settings.max_silence if flying else self.settings.max_silence_outside
+        late = now - self._last_tick
+        if silence > allowed:
+            self.abort(now, f"no news of the vehicle for {silence:.2f} s")
+        elif flying and late > self.settings.max_lateness:
+            self.abort(now, f"a set-point was {late:.2f} s late")
+        elif flying and (error := self.error(seen)) > self.settings.max_error:
+            self.abort(now, f"the vehicle is {length(error)} off its path")
+
+    def _along(self, now: float, following: Phase) -> PositionGoal:
+        """A point on the way to the plan's start, and the next phase at its end."""
+        route = self._routes[0]
+        since = min(now - self.began, route.duration)
+        yaw, turn = self._turn
+        if since == route.duration:
+            self._routes = self._routes[1:]
+            self._turn = (yaw + turn, 0.0)
+            self._enter(following, now)
+        return _on(route, since, yaw + turn * since / route.duration)
+
+    def _settle(self, now: float, seen: Observed) -> None:
+        """Begin the plan once the vehicle has been at rest at its start for long enough."""
+        body = seen.body
+        off = float(np.linalg.norm(np.array(body.position) - self._start))
+        if off > _NEAR or hypot(*body.velocity) > _SLOW:
+            self._rested_since = np.nan
+        elif np.isnan(self._rested_since):
+            self._rested_since = now
+        if now - self._rested_since >= self.settings.settling:
+            self._enter(Phase.MANEUVER, now)
+            self.maneuver_began = now
+        elif now - self.began > self.settings.patience:
+            self.abort(now, f"the vehicle does not come to rest at the plan's start, it is {length(off)} off")
+
+    def _maneuver(self, now: float, seen: Observed, delay: float) -> PositionGoal | AttitudeGoal:
+        since = now - self.maneuver_began + delay
+        if since >= self.stream.duration:
+            self._enter(Phase.HOLD, now)
+            return _on(self._after, 0.0, self._final_yaw)
+        self._follower.observe(seen._replace(time=seen.time - self.maneuver_began))
+        return self._follower.command(since)
+
+    def _hovering(self, now: float) -> PositionGoal | None:
+        """The goal at the plan's start or end."""
+        if self.phase is Phase.SETTLE:
+            return _on(rest_to_rest(self._start, self._start, 1.0, 1.0), 0.0, self._heading)
+        if self.phase is Phase.HOLD:
+            return _on(self._after, min(now - self.began, self._after.duration), self._final_yaw)
+        return None
+
+
+def require_flyable(plan: Plan, offset: Array, vehicle_name: str | None = None) -> None:
+    """Refuse what is not proven for the vehicle that is to fly it, or cannot be begun from a hover.
+
+    Raises SpecError, one sentence; nothing is armed before.
+
+    Args:
+        plan: what is to be flown.
+        offset: where its origin lies in the vehicle's frame [m], ENU, (3,).
+        vehicle_name: of what is to fly it, where that is known.
+    """
+    label = f"the plan '{plan.problem.name}'"
+    if plan.vehicle is None:
+        raise SpecError(f"{label} is for no vehicle; plan it for the one that shall fly it")
+    name = plan.vehicle.name
+    if vehicle_name is not None and name != vehicle_name:
+        raise SpecError(
+            f"{label} is certified for {name}, not for {vehicle_name}; plan it for the one that is there"
+        )
+    if plan.certificate is None or not plan.certificate.certified:
+        why = "it was never checked" if plan.certificate is None else plan.certificate.why
+        raise SpecError(f"{label} is not certified for {name} ({why}); plan it within its limits")
+    if plan.flyability is not None and not plan.flies:
+        raise SpecError(f"{label} is {plan.flyability}; plan it again with a reserve")
+    motion = [float(np.linalg.norm(plan.trajectory.evaluate(0.0, k))) for k in (1, 2)]
+    if max(motion) > _AT_REST:
+        raise SpecError(f"{label} begins in motion; plan it from a hover, where a link can begin it")
+    lowest = float(plan.trajectory.component_range(0)[0][2] + offset[2])
+    if lowest <= 0.0:
+        raise SpecError(
+            f"{label} would go down to {lowest:.2f} m over where the vehicle stands; raise its origin"
+        )
+
+
+def _on(route: Trajectory, time: float, yaw: float) -> PositionGoal:
+    flat = route.flat(time)
+    return PositionGoal(flat.position, flat.velocity, flat.acceleration, yaw)

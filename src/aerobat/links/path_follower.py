@@ -1,0 +1,96 @@
+"""Attitude, rates and thrust that keep a vehicle on a plan, from telemetry that comes late.
+
+The outer loop of the tracking controller, run where the plan is. A state is held against the set-point of its
+own instant; from there its error is carried on to when a command arrives, by the feedback that was commanded
+in between (Smith's predictor: e'' = -a). So a link's delay takes no damping from the loop.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+
+import numpy as np
+
+from aerobat.control.parameters import controller_parameters
+from aerobat.engines.floats import FloatOps
+from aerobat.engines.pytree import tree_map
+from aerobat.environment import Environment
+from aerobat.kernels.control import ControllerModel
+from aerobat.kernels.control_loops import (
+    PositionLoopState,
+    ReferencePoint,
+    attitude_command,
+    init_position_loop,
+    step_position_loop,
+    thrust_demand,
+)
+from aerobat.kernels.ops import Vector
+from aerobat.kernels.quaternions import axes, to_body
+from aerobat.kernels.rigid_body import Body
+from aerobat.kernels.vectors import add_scaled, norm, subtract
+from aerobat.links.goals import AttitudeGoal, Observed
+from aerobat.links.stream import SetpointStream
+from aerobat.vehicle import Vehicle
+from aerobat.vehicle.fleet import Fleet
+
+
+class PathFollower:
+    """The outer loop of a vehicle's tracking controller along a stream of set-points."""
+
+    def __init__(self, stream: SetpointStream, vehicle: Vehicle, environment: Environment) -> None:
+        """Prepare to follow.
+
+        Args:
+            stream: set-points.
+            vehicle: the nominal one, whose gains count.
+            environment: where it flies.
+        """
+        model = controller_parameters(vehicle.controller, Fleet.of([vehicle]), environment)
+        self._model: ControllerModel = tree_map(lambda leaf: float(np.asarray(leaf).ravel()[0]), model)
+        self._stream = stream
+        self._outer: PositionLoopState | None = None
+        self._observed: Observed | None = None
+        self._commanded: deque[tuple[float, Vector]] = deque()  # [s] from when, [m/s²] the feedback
+
+    def observe(self, observed: Observed) -> None:
+        """Take note of a state; its time is since the plan's start [s]. Older ones than known say nothing."""
+        if self._observed is None or observed.time > self._observed.time:
+            self._observed = observed
+
+    def command(self, time: float) -> AttitudeGoal:
+        """The goal at a time [s] since the plan's start. Something must have been observed before."""
+        reference = self._stream.at(time)
+        model, body = self._model, self._predicted(time, reference)
+        if self._outer is None:
+            self._outer = init_position_loop(FloatOps, model.gains, body, reference)
+        elif (elapsed := time - self._commanded[-1][0]) > 0.0:
+            self._outer = step_position_loop(FloatOps, model.gains, self._outer, body, reference, elapsed)
+        self._commanded.append((time, self._outer.acceleration))
+        demand = thrust_demand(model.airframe.mass_properties, model.environment, reference)
+        attitude = attitude_command(FloatOps, self._outer, demand, reference)
+        return AttitudeGoal(
+            attitude.q_world_body,
+            to_body(axes(attitude.q_world_body), attitude.omega),
+            model.airframe.mass_properties.mass * norm(FloatOps, attitude.specific_thrust),
+        )
+
+    def _predicted(self, time: float, reference: ReferencePoint) -> Body:
+        """The body at a time, as far from its reference as what was seen, and commanded since, makes it."""
+        assert self._observed is not None, "a vehicle is observed before it is commanded"
+        seen, body = self._observed.time, self._observed.body
+        then = self._stream.at(seen)
+        position = subtract(then.position, body.position)
+        velocity = subtract(then.velocity, body.velocity)
+        while len(self._commanded) > 1 and self._commanded[1][0] <= seen:
+            self._commanded.popleft()
+        ends = [*(begin for begin, _ in self._commanded), time][1:]
+        reached = seen
+        for (_, acceleration), end in zip(self._commanded, ends, strict=False):
+            step = max(min(end, time) - reached, 0.0)
+            position = add_scaled(add_scaled(position, step, velocity), -0.5 * step**2, acceleration)
+            velocity = add_scaled(velocity, -step, acceleration)
+            reached += step
+        position = add_scaled(position, time - reached, velocity)
+        return body._replace(
+            position=subtract(reference.position, position), velocity=subtract(reference.velocity, velocity)
+        )

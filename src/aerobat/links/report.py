@@ -1,0 +1,110 @@
+"""What a live flight came to, by the telemetry that was heard of it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from math import degrees
+
+import numpy as np
+
+from aerobat import so3
+from aerobat.arrays import Array
+from aerobat.links.goals import Observed
+from aerobat.links.stream import SetpointStream
+from aerobat.planning import Plan, planned_passages
+from aerobat.simulation.outcome import length
+from aerobat.simulation.passages import Passage, passages
+from aerobat.simulation.passages.polyline import gate_progress
+
+
+@dataclass(frozen=True)
+class LinkReport:
+    """A flight by a live link: how far off its plan, through which gates, or why it was given up."""
+
+    aborted: str  # why; empty where it was flown to its end
+    ended: str  # what was reached
+    delay_s: float  # of a message, either way
+    observations: int  # while the plan was flown; of fewer than two, nothing of what follows is known
+    max_position_error_m: float | None = None
+    max_attitude_error_deg: float | None = None
+    longest_silence_s: float | None = None  # between two observations
+    passages: tuple[Passage, ...] = ()
+
+    @property
+    def failures(self) -> tuple[str, ...]:
+        """All that went wrong, in words."""
+        missed = []
+        for passage in self.passages:
+            if passage.failure is not None:
+                outcome, time, numbers = passage.failure
+                missed.append(outcome.sentence(time=time, gate=f"gate '{passage.gate}'", **numbers))
+        return (*((f"aborted: {self.aborted}",) if self.aborted else ()), *missed)
+
+    @property
+    def is_success(self) -> bool:
+        """True where the plan was flown to its end, through its gates, and the vehicle has landed."""
+        return not self.failures and self.ended == "landed"
+
+    def record(self) -> dict[str, object]:
+        """Plain data."""
+        return {**asdict(self), "success": self.is_success, "failures": list(self.failures)}
+
+    def __str__(self) -> str:
+        """One sentence."""
+        if self.failures:
+            return f"{'; '.join(self.failures)}; {self.ended}"
+        error = length(self.max_position_error_m or 0.0)
+        through = ", ".join(f"gate '{p.gate}' {length(p.miss)} off its centre" for p in self.passages)
+        return f"flown within {error} of the plan{', through ' + through if through else ''}; {self.ended}"
+
+
+def link_report(
+    plan: Plan,
+    stream: SetpointStream,
+    log: Sequence[Observed],
+    *,
+    offset: Array,
+    aborted: str,
+    ended: str,
+    delay: float,
+) -> LinkReport:
+    """Judge a flight.
+
+    Args:
+        plan: what was flown.
+        stream: its set-points.
+        log: states while it was flown, times since its start [s].
+        offset: where the plan's origin lay [m], (3,).
+        aborted: why it was given up, empty where it was not.
+        ended: what was reached.
+        delay: of a message, either way [s].
+    """
+    inside = [seen for seen in log if 0.0 <= seen.time <= stream.duration]
+    if len(inside) < 2:
+        return LinkReport(aborted, ended, delay, len(inside))
+    times = np.array([seen.time for seen in inside])
+    position, velocity, q = (
+        np.array([getattr(seen.body, name) for seen in inside])
+        for name in ("position", "velocity", "q_world_body")
+    )
+    points = [stream.at(t) for t in times]
+    off = np.linalg.norm(position - [point.position for point in points], axis=-1)
+    turned = so3.angle_between(q, np.array([point.q_world_body for point in points]))
+    states = (position - offset, velocity, q)
+    body = None if plan.vehicle is None else plan.vehicle.bounding_ellipsoid
+    stop = np.array([times[-1] if aborted else np.nan])
+    flown = [
+        passages(asked, gate_progress(asked, times, states, body), stop).of_flight(0)
+        for asked in planned_passages(plan.stages, plan.problem)
+    ]
+    return LinkReport(
+        aborted=aborted,
+        ended=ended,
+        delay_s=delay,
+        observations=len(inside),
+        max_position_error_m=float(off.max()),
+        max_attitude_error_deg=degrees(float(turned.max())),
+        longest_silence_s=float(np.diff(times).max()),
+        passages=tuple(flown),
+    )

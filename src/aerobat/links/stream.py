@@ -1,0 +1,67 @@
+"""Set-points of a plan at any time: what every live link streams, on a clock of its own."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from aerobat.arrays import Array
+from aerobat.engines.pytree import tree_leaves, tree_unflatten
+from aerobat.environment import Environment
+from aerobat.flatness import reference
+from aerobat.kernels.control_loops import ReferencePoint
+from aerobat.simulation.flight import setpoint_rows
+from aerobat.simulation.reference_source import reference_points
+from aerobat.states import FlatState
+from aerobat.trajectory import Trajectory
+from aerobat.vehicle import Vehicle
+
+_RATE = (
+    1000.0  # [1/s] of the rows between which set-points are straight: 0.1 mm and 0.01° in the fastest flips
+)
+
+
+class SetpointStream:
+    """Set-points of a trajectory, moved by an offset, at any time; before and after it those of its ends."""
+
+    def __init__(
+        self, trajectory: Trajectory, vehicle: Vehicle, environment: Environment, offset: Array
+    ) -> None:
+        """Prepare to give set-points.
+
+        Args:
+            trajectory: the path.
+            vehicle: what it is for.
+            environment: where it is flown.
+            offset: where the path's origin lies [m], world, (3,).
+        """
+        self.trajectory = trajectory
+        self._offset = np.asarray(offset, dtype=float)
+        rows = reference(trajectory, vehicle, rate=_RATE, environment=environment).setpoint
+        ticks = len(rows.q_world_body)
+        following = setpoint_rows(rows, np.minimum(np.arange(1, ticks + 1), ticks - 1))
+        points = reference_points(rows, following, environment, vehicle)
+        self._tree = points
+        self._rows = np.column_stack(tree_leaves(points))
+
+    @property
+    def duration(self) -> float:
+        """Of the trajectory [s]."""
+        return self.trajectory.duration
+
+    def flat(self, time: float) -> FlatState:
+        """Position to snap [m/s^k] at a time [s] since the start, (3,) each."""
+        flat = self.trajectory.flat(min(max(time, 0.0), self.duration))
+        return FlatState(flat.position + self._offset, flat.velocity, flat.acceleration, flat.jerk, flat.snap)
+
+    def at(self, time: float) -> ReferencePoint:
+        """All that a controller follows at a time [s] since the start, in plain numbers."""
+        place = min(max(time, 0.0), self.duration) * _RATE
+        row = min(int(place), len(self._rows) - 2)
+        # the last row is at the end, which need not be a whole one after the row before
+        length = 1.0 if row < len(self._rows) - 2 else self.duration * _RATE - row
+        fraction = min((place - row) / length, 1.0)
+        values = self._rows[row] + fraction * (self._rows[row + 1] - self._rows[row])
+        point: ReferencePoint = tree_unflatten(self._tree, values.tolist())
+        x, y, z = point.position
+        dx, dy, dz = self._offset.tolist()
+        return point._replace(position=(x + dx, y + dy, z + dz))

@@ -1,0 +1,173 @@
+"""Plans flown over MAVLink: through the gate over a poor link, and given up without a fall."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import aerobat as ab
+from aerobat.errors import SpecError
+from aerobat.links.goals import Mode
+from aerobat.links.mavlink.client import ClientSettings, Stage
+from aerobat.links.mission import MissionSettings, Phase, require_flyable
+from mavlink_sky import ORIGIN, Sky, flip, over_a_link
+
+
+@pytest.mark.parametrize(("loss", "delay", "bound"), [(0.01, 0.02, 0.04), (0.05, 0.03, 0.06)])
+def test_a_flip_goes_through_its_gate_over_a_link_that_loses_and_delays(
+    loss: float, delay: float, bound: float
+) -> None:
+    """And what the client reports, from what it heard, is what happened."""
+    sky = over_a_link(loss, delay)
+    sky.run(lambda: sky.client.done)
+    report = sky.client.report()
+    assert report.is_success, str(report)
+    assert max(sky.errors) < bound
+    assert report.max_position_error_m == pytest.approx(max(sky.errors), abs=0.02)  # 2 ms of clocks
+    assert report.delay_s == pytest.approx(delay, abs=0.006)
+    (gate,) = report.passages
+    assert gate.miss < bound
+    assert gate.attitude_error_deg < 5.0
+    assert sky.vehicle.landed
+    assert not sky.vehicle.armed
+    np.testing.assert_allclose(sky.position[:2], 0.0, atol=0.1)
+
+
+@pytest.mark.parametrize("instant", [0.3, 0.8, 1.06, 1.4, 1.7])
+def test_a_client_killed_at_any_instant_of_the_flip_leaves_a_hover(instant: float) -> None:
+    sky = over_a_link()
+    sky.run_into_the_plan(instant)
+    sky.client_lives = False
+    sky.run_for(6.0)
+    assert sky.hovers
+    assert sky.vehicle.mode is Mode.HOLD
+    assert min(sky.heights) > 0.5
+    assert abs(sky.vehicle.state.q_world_body[0]) == pytest.approx(1.0, abs=1e-3)
+
+
+@pytest.mark.parametrize("cut", ["receives", "sends", "both"])
+def test_a_link_that_is_cut_in_mid_flip_gives_it_up_and_lands_once_it_is_back(cut: str) -> None:
+    sky = over_a_link()
+    sky.run_into_the_plan(1.1)
+    for way in ("receives", "sends") if cut == "both" else (cut,):
+        setattr(sky.cable, way, False)
+    sky.run_for(2.0)
+    assert sky.client.stage is Stage.RECOVERING
+    sky.cable.receives = sky.cable.sends = True
+    sky.run(lambda: sky.client.done)
+    assert sky.client.stage is Stage.LANDED
+    assert not sky.vehicle.crashed
+    report = sky.client.report()
+    assert not report.is_success
+    expected = "the vehicle went into the mode hold" if cut == "sends" else "no news of the vehicle"
+    assert expected in report.aborted
+
+
+def test_a_link_that_stays_cut_is_left_to_the_vehicles_own_failsafe() -> None:
+    sky = over_a_link()
+    sky.run_into_the_plan(0.9)
+    sky.cable.receives = sky.cable.sends = False
+    sky.run(lambda: sky.client.done)
+    assert sky.client.stage is Stage.LOST
+    assert sky.hovers
+    assert "failsafe" in sky.said[-1]
+
+
+def test_a_set_point_that_is_late_gives_the_plan_up() -> None:
+    """Earlier than the vehicle would by itself."""
+    sky = over_a_link(settings=MissionSettings(max_lateness=0.05))
+    sky.run_into_the_plan(1.2)
+    sky.client_lives = False
+    sky.run_for(0.08)
+    sky.client_lives = True
+    sky.run(lambda: sky.client.done)
+    assert sky.client.report().aborted == "a set-point was 0.08 s late"
+    assert sky.client.stage is Stage.LANDED
+    assert not sky.vehicle.crashed
+
+
+def test_an_error_over_its_bound_gives_the_plan_up() -> None:
+    """Of a vehicle with a drag that its plan knows nothing of."""
+    own = flip().vehicle
+    assert own is not None
+    sky = Sky(vehicle=replace(own, drag_body=np.full(3, 0.8)), mission=MissionSettings(max_error=0.3))
+    sky.run(lambda: sky.client.done)
+    assert "off its path" in sky.client.report().aborted
+    assert sky.client.stage is Stage.LANDED
+    assert not sky.vehicle.crashed
+
+
+def test_a_pilot_who_takes_over_is_not_interfered_with() -> None:
+    """A heartbeat with a mode that is none of ours: from then on nothing is sent that moves the vehicle."""
+    sky = over_a_link()
+    sky.run_into_the_plan(0.05)
+    manual = 1 << 16
+    sky.front_end._heartbeat = lambda: None  # type: ignore[method-assign]
+    beat = sky.front_end._mavlink.MAVLink_heartbeat_message(2, 12, 129, manual, 4, 3)
+    sent: list[str] = []
+    sky.client.link._take_heartbeat(beat)
+    sky.cable.send = lambda message: sent.append(message.get_type())  # type: ignore[method-assign]
+    sky.client.tick(sky.clock.now() + 0.001)
+    assert sky.client.stage is Stage.LOST
+    assert not {"COMMAND_LONG", "SET_ATTITUDE_TARGET", "SET_POSITION_TARGET_LOCAL_NED"} & set(sent)
+
+
+def test_a_plan_for_another_vehicle_is_refused_before_anything_is_armed() -> None:
+    sky = Sky(vehicle=ab.load_vehicle("crazyflie"))
+    with pytest.raises(SpecError, match=r"hovers at .* another vehicle"):
+        sky.run(lambda: sky.client.done)
+    assert not sky.vehicle.armed
+
+
+def test_a_vehicle_that_says_not_where_it_hovers_is_asked_of_the_user() -> None:
+    sky = Sky(settings=ClientSettings(wait=2.0))
+    del sky.front_end.parameters["MPC_THR_HOVER"]
+    with pytest.raises(SpecError, match=r"MPC_THR_HOVER .* give --hover-thrust"):
+        sky.run(lambda: sky.client.done)
+    told = Sky(settings=ClientSettings(hover_thrust=1.0 / 3.3))
+    del told.front_end.parameters["MPC_THR_HOVER"]
+    told.run(lambda: told.client.stage is Stage.FLYING)
+
+
+def test_a_vehicle_that_cannot_be_armed_is_told_in_a_sentence() -> None:
+    sky = Sky()
+    sky.vehicle.crashed = True
+    with pytest.raises(SpecError, match="does not be armed"):
+        sky.run(lambda: sky.client.done)
+
+
+def test_what_is_not_proven_for_its_vehicle_is_refused() -> None:
+    plan = flip()
+    bare = replace(plan, vehicle=None, certificate=None, flyability=None)
+    unproven = replace(plan, certificate=None)
+    assert plan.vehicle is not None
+    weak = replace(plan.vehicle, rotors=tuple(replace(r, max_thrust=6.0) for r in plan.vehicle.rotors))
+    refuted = replace(
+        plan, vehicle=weak, certificate=ab.certify(plan.trajectory, weak, plan.problem.environment)
+    )
+    require_flyable(plan, ORIGIN, "agile-quad")
+    for wrong, words in (
+        ((bare, ORIGIN, None), "for no vehicle"),
+        ((plan, ORIGIN, "hexarotor"), "certified for agile-quad, not for hexarotor"),
+        ((unproven, ORIGIN, None), "not certified for agile-quad .it was never checked"),
+        ((refuted, ORIGIN, None), "not certified for agile-quad .rotor"),
+        ((plan, np.zeros(3), None), "raise its origin"),
+    ):
+        with pytest.raises(SpecError, match=words):
+            require_flyable(*wrong)
+
+
+def test_a_plan_that_begins_in_motion_is_refused() -> None:
+    plan = flip()
+    moving = ab.Trajectory([1.0], [[[0.0, 0.0, 0.0], [1.0, 0.0, 0.0]]])
+    with pytest.raises(SpecError, match="begins in motion"):
+        require_flyable(replace(plan, trajectory=moving), ORIGIN)
+
+
+def test_the_phases_follow_each_other_and_are_told() -> None:
+    sky = over_a_link()
+    sky.run(lambda: sky.client.mission.phase is Phase.HOLD)
+    expected = ["armed", "going to the plan's start", "coming to rest there", "flying the plan"]
+    assert sky.said[1:5] == expected
