@@ -226,7 +226,7 @@ class PathPoint:
         )
 
     def excess(self, parts: int) -> Array:
-        """By how much constraints, what is kept counted, are exceeded in each interval at such places, (N, c)."""
+        """By how much constraints, the reserve counted, are exceeded in each interval at places, (N, c)."""
         chain = self.program.chain
         samples = chain.samples(self.x, Places.even(chain.intervals, parts))
         frames = self.program.rotors.frames(samples.times, samples.derivatives)
