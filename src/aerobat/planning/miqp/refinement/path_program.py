@@ -203,8 +203,8 @@ class PathPoint:
     def excess_sentence(self) -> str:
         """Which constraint is exceeded most, by how much and when."""
         place, column = np.unravel_index(int(self._values.argmax()), self._values.shape)
-        rotors = self.program.rotors
-        name = [*rotors.names[: rotors.count], *self.program.path.names][column]
+        rotors, path = self.program.rotors, self.program.path
+        name = [*rotors.names[: rotors.count], *path.names][column]
         excess, time = 100.0 * float(self._values[place, column]), float(self._samples.times[place])
         return f"{name} beyond its limit by {excess:.3g} % of its range at {time:.2f} s"
 
@@ -226,10 +226,7 @@ class PathPoint:
         )
 
     def excess(self, parts: int) -> Array:
-        """By how much constraints are exceeded in each interval, (N, c), at places this dense.
-
-        Of what the vehicle can do, less what shall be kept of it.
-        """
+        """By how much constraints, the reserve counted, are exceeded in each interval at places, (N, c)."""
         chain = self.program.chain
         samples = chain.samples(self.x, Places.even(chain.intervals, parts))
         frames = self.program.rotors.frames(samples.times, samples.derivatives)
