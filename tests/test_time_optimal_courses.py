@@ -101,10 +101,13 @@ def test_openings_are_crossed_anywhere_inside():
     stages = tuple(Waypoint(gate=gate.name, crossing_point="free", margin=margin) for gate in gates[:6])
     problem = replace(course(LAP), maneuver=Waypoints(stages), gates=gates)
     plan = TimeOptimal().plan(problem, JERKY)
+    reached = []
     for placed, gate in zip(plan.stages, gates, strict=False):
         offset = plan.trajectory.evaluate(placed.time) - gate.position
-        assert max(abs(offset @ gate.lateral), abs(offset @ gate.up)) == pytest.approx(0.8, abs=1e-4)
+        reached.append(max(abs(offset @ gate.lateral), abs(offset @ gate.up)))
     assert plan.certified
+    assert reached[:5] == pytest.approx([0.8] * 5, abs=1e-4)  # corners are cut; the last lies at the goal
+    assert reached[5] < 0.8
 
 
 def test_a_course_that_cannot_be_flown_names_the_leg():
