@@ -16,8 +16,9 @@ from aerobat import so3
 from aerobat.arrays import Array
 from aerobat.links.autopilot.vehicle import ATTITUDE_TIMEOUT, POINT_TIMEOUT, SimulatedVehicle
 from aerobat.links.goals import AttitudeGoal, Mode, PositionGoal
-from aerobat.links.routes import braking, rest_to_rest
+from aerobat.links.routes import rest_to_rest
 from aerobat.links.stream import SetpointStream
+from aerobat.simulation.autopilot.braking import Braking
 
 ZERO = np.zeros(3)
 SPEEDS = st.tuples(*[st.floats(-6.0, 6.0)] * 3)
@@ -156,14 +157,15 @@ def place(vehicle: SimulatedVehicle, position: Array, velocity: Array, q: Array)
 @given(SPEEDS, st.floats(1.0, 20.0))
 def test_braking_ends_at_rest_within_its_bounds(velocity: tuple, height: float) -> None:
     start = np.array([1.0, 2.0, height])
-    path = braking(start, np.array(velocity), 10.0, 0.5, 6.0)
+    vehicle = ab.load_vehicle("agile-quad")
+    path = Braking.of(start, np.array(velocity), vehicle, 9.81, 0.5).trajectory
     times = np.linspace(0.0, path.duration, 200)
     np.testing.assert_allclose(path.evaluate(0.0), start, atol=1e-9)
     np.testing.assert_allclose(path.evaluate(0.0, 1), velocity, atol=1e-9)
     np.testing.assert_allclose(path.evaluate(path.duration, 1), 0.0, atol=1e-9)
     assert path.evaluate(path.duration)[2] >= 0.5 - 1e-9
     if path.evaluate(path.duration)[2] > 0.5 + 1e-6:  # the floor asks nothing more
-        assert np.linalg.norm(path.evaluate(times, 2), axis=-1).max() <= 10.0 + 1e-6
+        assert np.linalg.norm(path.evaluate(times, 2), axis=-1).max() <= 0.8 * 2.3 * 9.81 + 1e-6
 
 
 @given(SPEEDS)

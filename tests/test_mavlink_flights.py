@@ -43,6 +43,8 @@ def test_a_client_killed_at_any_instant_of_the_flip_leaves_a_hover(instant: floa
     sky.run_for(6.0)
     assert sky.hovers
     assert sky.vehicle.mode is Mode.HOLD
+    expected = ab.recoveries(flip(), times=[instant], ground=-ORIGIN[2]).lowest[0] + ORIGIN[2]
+    assert min(sky.heights) > min(expected, ORIGIN[2]) - 0.3  # what was announced
     assert min(sky.heights) > 0.5
     assert abs(sky.vehicle.state.q_world_body[0]) == pytest.approx(1.0, abs=1e-3)
 

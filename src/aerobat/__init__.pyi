@@ -100,6 +100,7 @@ from .reporting.motion.video import write_video
 from .reporting.sweeps.figure import sweep_figure
 from .reporting.tracking import tracking_figure
 from .simulation import Flight, FlightConfig, Outcome, fly, load_flight, prepare
+from .simulation.autopilot import Recoveries, recoveries
 from .states import BodyState, FlatState, Setpoint, Wrench
 from .studies.compare import Comparison, compare
 from .studies.error_causes import Cause, ErrorCauses, error_causes
@@ -181,6 +182,7 @@ __all__ = [
     "PowerLoop",
     "Problem",
     "Quantity",
+    "Recoveries",
     "Reference",
     "Replay",
     "Rotor",
@@ -236,6 +238,7 @@ __all__ = [
     "read_plan",
     "read_table",
     "read_trajectory",
+    "recoveries",
     "reference",
     "registered_maneuvers",
     "registered_planners",

@@ -15,9 +15,10 @@ from aerobat.declaration import Positive, declared
 from aerobat.errors import SpecError
 from aerobat.links.goals import AttitudeGoal, Observed, PositionGoal, yaw_of
 from aerobat.links.path_follower import PathFollower
-from aerobat.links.routes import braking, rest_to_rest
+from aerobat.links.routes import rest_to_rest
 from aerobat.links.stream import SetpointStream
 from aerobat.planning import Plan
+from aerobat.simulation.autopilot.braking import Braking
 from aerobat.simulation.outcome import length
 from aerobat.trajectory import Trajectory
 
@@ -76,7 +77,8 @@ class Mission:
         self._start = first.position
         self._heading = plan.trajectory.heading
         self._final_yaw = yaw_of(self.stream.at(self.stream.duration).q_world_body)
-        self._after = braking(last.position, last.velocity, settings.cruise_acceleration, -np.inf)
+        motion = last.position, last.velocity
+        self._after = Braking.of(*motion, plan.vehicle, environment.gravity, -np.inf).trajectory
         self.began = np.nan  # [s] when the phase did
         self.maneuver_began = np.nan  # [s]
         self._last_tick = np.nan

@@ -1,8 +1,8 @@
-"""Routes outside a maneuver: from hover to hover, and from any motion to a hover."""
+"""Ways outside a maneuver, from hover to hover."""
 
 from __future__ import annotations
 
-from math import inf, sqrt
+from math import sqrt
 
 import numpy as np
 
@@ -12,7 +12,6 @@ from aerobat.trajectory import Trajectory, minimum_effort
 _SHORTEST = 0.2  # [s] of any route, however near its end is
 _PEAK_SPEED = 15.0 / 8.0  # [-] of the quintic from rest to rest, over its mean speed
 _PEAK_ACCELERATION = 10.0 / sqrt(3.0)  # [-] likewise, times duration squared over length
-_PEAK_BRAKING = 1.5  # [-] of the quintic that brakes to rest, times duration over speed at first
 
 
 def rest_to_rest(start: Array, goal: Array, max_speed: float, max_acceleration: float) -> Trajectory:
@@ -30,24 +29,3 @@ def rest_to_rest(start: Array, goal: Array, max_speed: float, max_acceleration: 
     ends = np.zeros((2, 3, 3))
     ends[0, 0], ends[1, 0] = start, goal
     return minimum_effort(ends, [max(by_speed, by_acceleration, _SHORTEST)])
-
-
-def braking(
-    position: Array, velocity: Array, max_deceleration: float, floor: float, max_fall: float = inf
-) -> Trajectory:
-    """The way from a motion to a hover, straight on, but no lower than a floor.
-
-    Args:
-        position: at first [m], (3,).
-        velocity: at first [m/s], (3,).
-        max_deceleration: [m/s²], but for what the floor asks more.
-        floor: the height [m] below which it shall not end.
-        max_fall: the deceleration [m/s²] of a climb, which gravity alone gives.
-    """
-    needed = max(float(np.linalg.norm(velocity)) / max_deceleration, float(velocity[2]) / max_fall)
-    duration = max(_PEAK_BRAKING * needed, _SHORTEST)
-    stop = position + 0.5 * duration * velocity
-    stop[2] = max(stop[2], floor)
-    ends = np.zeros((2, 3, 3))
-    ends[0, :2], ends[1, 0] = (position, velocity), stop
-    return minimum_effort(ends, [duration])

@@ -16,8 +16,10 @@ from aerobat.errors import SpecError
 from aerobat.interchange import read_plan
 from aerobat.planning import Plan
 from aerobat.reporting.report_json import passage_facts, to_json
+from aerobat.simulation.autopilot import recoveries
 
 CLEARANCE = 3.0  # [m] of a plan's lowest point over where the vehicle stands
+RECOVERED = 1.0  # [m] of the lowest point of a recovery from any instant of it, at the least
 
 
 def mavlink(
@@ -45,6 +47,7 @@ def mavlink(
 
     offset = _origin(found) if options.origin is None else np.array(options.origin)
     require_flyable(found, offset, options.vehicle)
+    say(str(recoveries(found, ground=-offset[2])))
     connection = connect(options.connect, listen=False, system=245, component=191, baud=options.baud)
     try:
         client = Client(
@@ -72,5 +75,9 @@ def mavlink(
 
 
 def _origin(plan: Plan) -> Array:
-    lowest = plan.trajectory.component_range(0)[0][2]
-    return np.array([0.0, 0.0, CLEARANCE - lowest])
+    """High enough for the plan, and for the recoveries from all of it."""
+    if plan.vehicle is None:
+        return np.zeros(3)  # it is refused for that
+    lowest = float(plan.trajectory.component_range(0)[0][2])
+    recovered = float(recoveries(plan, ground=lowest - CLEARANCE).lowest.min())
+    return np.array([0.0, 0.0, max(CLEARANCE - lowest, RECOVERED - recovered)])

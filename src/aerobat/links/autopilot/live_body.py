@@ -16,9 +16,9 @@ from aerobat.environment import Environment
 from aerobat.kernels.control_loops import Gains, ReferencePoint, init_position_loop
 from aerobat.kernels.motors import Motion
 from aerobat.kernels.rigid_body import Body
-from aerobat.links.autopilot.controller import AutopilotController
-from aerobat.links.autopilot.references import point_reference
 from aerobat.links.goals import yaw_of
+from aerobat.simulation.autopilot.braking import point_reference
+from aerobat.simulation.autopilot.controller import AutopilotController
 from aerobat.simulation.bodies import bodies
 from aerobat.simulation.components import PlantParameters, RigidBodyPlant, StateObserver, log_row
 from aerobat.simulation.loop import Clock, LoopInput, LoopParameters, compose

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from math import cos, sin
 from typing import NamedTuple
 
 import numpy as np
@@ -12,6 +11,7 @@ from aerobat.arrays import Array
 from aerobat.engines.components import components
 from aerobat.kernels.control_loops import Lookahead, ReferencePoint
 from aerobat.links.goals import AttitudeGoal, PositionGoal
+from aerobat.simulation.autopilot.braking import point_reference
 from aerobat.trajectory import Trajectory
 
 _MAX_EXTRAPOLATION = 0.04  # [s] for which a goal is carried on by its rates where no newer one comes
@@ -110,21 +110,3 @@ class AttitudeReference(NamedTuple):
             omega_dot,
             Lookahead(np.full(len(times), period * self.thrust_rate / mass), ahead, omega_dot),
         )
-
-
-def point_reference(
-    position: Array, velocity: Array, acceleration: Array, jerk: Array, yaw: float, gravity: float
-) -> ReferencePoint:
-    """References of positions (T, 3) at a yaw; the controller leans as the acceleration asks."""
-    zero = components(np.zeros_like(position))
-    q = np.broadcast_to([cos(yaw / 2), 0.0, 0.0, sin(yaw / 2)], (len(position), 4))
-    return ReferencePoint(
-        components(position),
-        components(velocity),
-        components(acceleration + gravity * so3.UP),
-        components(jerk),
-        components(q),
-        zero,
-        zero,
-        Lookahead(np.zeros(len(position)), zero, zero),
-    )

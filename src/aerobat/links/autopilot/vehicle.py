@@ -12,7 +12,8 @@ from aerobat.environment import Environment
 from aerobat.links.autopilot.live_body import RATE, LiveBody
 from aerobat.links.autopilot.references import AttitudeReference, PointReference, Route
 from aerobat.links.goals import AttitudeGoal, Mode, PositionGoal, yaw_of
-from aerobat.links.routes import braking, rest_to_rest
+from aerobat.links.routes import rest_to_rest
+from aerobat.simulation.autopilot.braking import MIN_FLOOR, Braking
 from aerobat.states import BodyState
 from aerobat.trajectory import Trajectory
 from aerobat.vehicle import Vehicle
@@ -26,9 +27,6 @@ _SPEED = 2.0  # [m/s] of the autopilot's own routes
 _ACCELERATION = 2.0  # [m/s²] likewise
 _DESCENT = 1.0  # [m/s] when landing
 _BELOW = 0.3  # [m] under the ground, where the way of a landing ends, so that it is reached in motion
-_FLOOR = 0.5  # [m] above the ground, below which no hover is sought
-_BRAKING = 0.8  # [-] of what thrust can do beyond hovering, used to come to a hover
-_FALLING = 0.7  # [-] of gravity, used to end a climb
 _HARD_SPEED = 1.5  # [m/s] of a touchdown that is none
 _HARD_TILT = 0.5  # [rad] likewise
 
@@ -101,10 +99,8 @@ class SimulatedVehicle:
         """Come to a hover from whatever it does."""
         self.mode, self._then = Mode.HOLD, None
         if not self.landed:
-            state = self.state
-            deceleration = _BRAKING * (self.vehicle.max_specific_thrust - self.gravity)
-            falling = _FALLING * self.gravity
-            self._go(Mode.HOLD, braking(state.position, state.velocity, deceleration, _FLOOR, falling))
+            motion = self.state.position, self.state.velocity
+            self._go(Mode.HOLD, Braking.of(*motion, self.vehicle, self.gravity, MIN_FLOOR).trajectory)
         return True
 
     def land(self) -> bool:

@@ -1,0 +1,5 @@
+"""What an autopilot does by itself: it follows points and attitudes, brakes, and recovers to a hover."""
+
+from aerobat.simulation.autopilot.recovery import Recoveries, recoveries
+
+__all__ = ["Recoveries", "recoveries"]

@@ -1,0 +1,98 @@
+"""From any motion to a hover: the way that an autopilot brakes, for one vehicle or many."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from aerobat import so3
+from aerobat.arrays import Array
+from aerobat.engines.components import components
+from aerobat.kernels.control_loops import Lookahead, ReferencePoint
+from aerobat.trajectory import Trajectory
+from aerobat.vehicle import Vehicle
+
+MIN_FLOOR = 0.5  # [m] above the ground, below which no hover is sought
+_SHORTEST = 0.2  # [s] of any braking
+_PEAK = 1.5  # [-] of its deceleration, times duration over speed at first
+_BRAKING = 0.8  # [-] of what thrust can do beyond hovering
+_FALLING = 0.7  # [-] of gravity, which alone ends a climb
+
+
+class Braking(NamedTuple):
+    """To a rest straight on, or r higher: p = p₀ + v T (s − s³ + s⁴/2) + r (10 s³ − 15 s⁴ + 6 s⁵)."""
+
+    durations: Array  # [s] T, (...)
+    coefficients: Array  # [m] of s⁰ to s⁵, (..., 6, 3)
+
+    @classmethod
+    def of(cls, position: Array, velocity: Array, vehicle: Vehicle, gravity: float, floor: float) -> Braking:
+        """As hard as a vehicle can.
+
+        Args:
+            position: at first [m], (..., 3).
+            velocity: at first [m/s], (..., 3).
+            vehicle: whose thrust counts.
+            gravity: [m/s²].
+            floor: the height [m] below which it shall not end.
+        """
+        deceleration = _BRAKING * (vehicle.max_specific_thrust - gravity)
+        needed = np.linalg.norm(velocity, axis=-1) / deceleration
+        needed = np.maximum(needed, velocity[..., 2] / (_FALLING * gravity))
+        durations = np.maximum(_PEAK * needed, _SHORTEST)
+        reach = durations[..., None] * velocity
+        raised = np.zeros_like(position)
+        raised[..., 2] = np.maximum(floor - (position + 0.5 * reach)[..., 2], 0.0)
+        zero = np.zeros_like(position)
+        rows = (position, reach, zero, 10.0 * raised - reach, 0.5 * reach - 15.0 * raised, 6.0 * raised)
+        return cls(durations, np.stack(rows, axis=-2))
+
+    def at(self, since: Array) -> tuple[Array, Array, Array, Array]:
+        """Position to jerk [m/s^k] at times [s] (T,), (T, ..., 3) each; at rest from its end on."""
+        each = since.reshape(-1, *(1,) * self.durations.ndim)
+        s = np.minimum(each / self.durations, 1.0)[..., None]
+        parts, rates = [], self.coefficients
+        for _ in range(4):
+            value = np.zeros_like(s * rates[..., 0, :])
+            for k in range(rates.shape[-2] - 1, -1, -1):
+                value = value * s + rates[..., k, :]
+            parts.append(value)
+            powers = np.arange(1, rates.shape[-2])[:, None]
+            rates = powers * rates[..., 1:, :] / self.durations[..., None, None]
+        parts[3] = np.where(s < 1.0, parts[3], 0.0)  # it jumps to rest
+        return parts[0], parts[1], parts[2], parts[3]
+
+    @property
+    def trajectory(self) -> Trajectory:
+        """Of one vehicle."""
+        return Trajectory(np.array([self.durations]), self.coefficients[None])
+
+
+def point_reference(
+    position: Array, velocity: Array, acceleration: Array, jerk: Array, yaw: ArrayLike, gravity: float
+) -> ReferencePoint:
+    """References of a point that moves; the controller leans as the acceleration asks.
+
+    Args:
+        position: [m], (..., 3).
+        velocity: [m/s], (..., 3).
+        acceleration: [m/s²], (..., 3).
+        jerk: [m/s³], (..., 3).
+        yaw: of the body's x axis from east [rad], (...) or one for all.
+        gravity: [m/s²].
+    """
+    zero = components(np.zeros_like(position))
+    half = 0.5 * np.broadcast_to(yaw, position.shape[:-1])
+    q = (np.cos(half), np.zeros_like(half), np.zeros_like(half), np.sin(half))
+    return ReferencePoint(
+        components(position),
+        components(velocity),
+        components(acceleration + gravity * so3.UP),
+        components(jerk),
+        q,
+        zero,
+        zero,
+        Lookahead(np.zeros(position.shape[:-1]), zero, zero),
+    )

@@ -1,0 +1,219 @@
+"""The way back to a hover from every instant of a path: how long it takes, and how much height it costs.
+
+What is flown is an autopilot's recovery: from the state that the path asks at an instant, the last attitude,
+rates and thrust are kept for as long as it takes until the loss is noticed; then it brakes to a hover.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from aerobat import so3
+from aerobat.arrays import Array, frozen
+from aerobat.control.parameters import airframe_parameters, controller_parameters, environment_parameters
+from aerobat.declaration import Finite, NonNegative, by_value, short, validated
+from aerobat.engines import choose
+from aerobat.engines.components import components, from_components
+from aerobat.engines.engine import first_row
+from aerobat.engines.pytree import Tree
+from aerobat.environment import Environment
+from aerobat.errors import SpecError
+from aerobat.flatness import Planned, TimeInterval, environment_of, reference, vehicle_of
+from aerobat.kernels.control_loops import Lookahead, ReferencePoint
+from aerobat.kernels.motors import Motion
+from aerobat.kernels.rigid_body import Body
+from aerobat.simulation.autopilot.braking import MIN_FLOOR, Braking, point_reference
+from aerobat.simulation.autopilot.controller import AutopilotController
+from aerobat.simulation.bodies import bodies
+from aerobat.simulation.components import PlantParameters, RigidBodyPlant, StateObserver
+from aerobat.simulation.loop import Clock, LoopInput, LoopParameters, Signals, compose
+from aerobat.states import BodyState, Setpoint
+from aerobat.trajectory import Trajectory, as_trajectory
+from aerobat.vehicle import Vehicle
+from aerobat.vehicle.fleet import Fleet
+
+RATE = 500.0  # [1/s] of the ticks
+HORIZON = 6.0  # [s] in which a recovery comes to a hover, or never does
+KEPT = 0.04  # [s] for which commanded rates are kept where nothing comes; then the attitude is
+_CHUNK = 100  # ticks flown at once, so that their references take little memory
+_STILL = 0.2  # [m/s] of a hover
+_LEVEL = 0.2  # [rad] likewise
+
+
+@short
+@by_value
+@dataclass(frozen=True, eq=False, repr=False)
+class Recoveries:
+    """The recoveries from instants of a path."""
+
+    times: Array  # [s] of the instants, (T,)
+    heights: Array  # [m] of the path then, (T,)
+    lowest: Array  # [m] the least height from then on, (T,)
+    durations: Array  # [s] until it hovers; infinite where it never does, (T,)
+    ground: float  # [m] below which there is none
+
+    @property
+    def height_lost(self) -> Array:
+        """How far below the instant's height it comes [m], (T,)."""
+        return self.heights - self.lowest
+
+    @property
+    def possible(self) -> NDArray[np.bool_]:
+        """True where it comes to a hover above the ground, (T,)."""
+        return np.asarray((self.lowest > self.ground) & np.isfinite(self.durations))
+
+    @property
+    def no_return(self) -> tuple[TimeInterval, ...]:
+        """The spans of instants from which there is none, each out to the instants that have one."""
+        lost = np.flatnonzero(~self.possible)
+        runs = np.split(lost, np.flatnonzero(np.diff(lost) > 1) + 1) if len(lost) else []
+        last = len(self.times) - 1
+        return tuple(
+            TimeInterval(float(self.times[max(run[0] - 1, 0)]), float(self.times[min(run[-1] + 1, last)]))
+            for run in runs
+        )
+
+    def __str__(self) -> str:
+        """One sentence."""
+        if not self.possible.any():
+            return "from no instant does it come back to a hover above the ground"
+        worst = f"no lower than {self.lowest[self.possible].min() - self.ground:.2f} m above the ground"
+        slowest = f"within {self.durations[self.possible].max():.1f} s"
+        spans = " and ".join(f"{span.start:.2f} to {span.end:.2f} s" for span in self.no_return)
+        except_from = f", but not from {spans}" if spans else ""
+        return f"given up at any instant it hovers {slowest}, {worst}{except_from}"
+
+
+@validated
+def recoveries(
+    plan: Planned | Trajectory,
+    vehicle: Vehicle | str | None = None,
+    *,
+    times: ArrayLike | None = None,
+    ground: Finite = 0.0,
+    reaction: NonNegative = 0.1,
+    environment: Environment | None = None,
+) -> Recoveries:
+    """Fly the recovery to a hover from instants of a path.
+
+    Raises SpecError for times outside the path.
+
+    Args:
+        plan: the path; a bare trajectory needs a vehicle.
+        vehicle: what flies it, or its name, by default the plan's.
+        times: of the instants [s], (T,), rising; by default a hundred a second.
+        ground: the height [m], in the path's own frame, that a recovery must stay above.
+        reaction: the time [s] for which the last command is kept before the recovery begins.
+        environment: where, by default the problem's.
+    """
+    vehicle, environment = vehicle_of(plan, vehicle).without_dead_rotors(), environment_of(plan, environment)
+    path = as_trajectory(plan)
+    instants = path.sample(100.0) if times is None else frozen(times, "times", (None,))
+    asked = reference(path, vehicle, instants, environment=environment)
+    if asked.undetermined:
+        raise SpecError("the path's attitude is undetermined where its thrust vanishes; plan another")
+    flock = _Flock(asked.setpoint, asked.rotor_thrusts, vehicle, environment)
+    flock.keep(asked.setpoint, reaction)
+    flock.brake(ground + MIN_FLOOR)
+    heights = asked.setpoint.flat.position[:, 2]
+    return Recoveries(instants, frozen(heights, "heights"), flock.lowest, flock.durations, ground)
+
+
+class _Flock:
+    """Copies of a vehicle, one at each instant, that fly at once."""
+
+    def __init__(
+        self, setpoint: Setpoint, thrusts: Array, vehicle: Vehicle, environment: Environment
+    ) -> None:
+        self._vehicle, self._gravity = vehicle, environment.gravity
+        count = len(thrusts)
+        fleet = Fleet.of([vehicle] * count)
+        model = controller_parameters(vehicle.controller, fleet, environment)
+        plant = PlantParameters(airframe_parameters(fleet), environment_parameters(environment, count))
+        flat = setpoint.flat
+        start = bodies(BodyState(flat.position, flat.velocity, setpoint.q_world_body, setpoint.omega_body))
+        parts = (
+            StateObserver(),
+            AutopilotController(vehicle.controller.feature_flags),
+            RigidBodyPlant.for_rate(RATE),
+        )
+        ticks = count * round(HORIZON * RATE)
+        parameters = LoopParameters(start, ((), model, plant))
+        first = first_row(self._inputs(_kept(setpoint, np.zeros(1), vehicle), True))
+        engine = choose("auto", count, ticks)
+        self._loop = engine.compile(*compose(parts, _body), parameters, first)
+        observer, controller, motion = self._loop.init(first)
+        turning = components(np.clip(thrusts, vehicle.min_thrusts, vehicle.max_thrusts))
+        self._carry: Tree = (
+            observer,
+            controller._replace(thrusts=turning),
+            Motion(motion.body, turning),
+        )
+        self._time = 0.0
+        self.lowest = setpoint.flat.position[:, 2].copy()
+        self.durations = np.zeros(count)
+
+    def keep(self, setpoint: Setpoint, seconds: float) -> None:
+        """Go on by the commands of the instants."""
+        since = np.arange(round(seconds * RATE)) / RATE
+        for begin in range(0, len(since), _CHUNK):
+            self._fly(_kept(setpoint, since[begin : begin + _CHUNK], self._vehicle), True)
+
+    def brake(self, floor: float) -> None:
+        """Come to a hover, no lower than a floor [m], and stay there until the horizon."""
+        body = self._carry[2].body
+        velocity = from_components(body.velocity)
+        way = Braking.of(from_components(body.position), velocity, self._vehicle, self._gravity, floor)
+        since = np.arange(round(HORIZON * RATE)) / RATE
+        yaw = np.arctan2(*so3.axes(from_components(body.q_world_body))[:, 1::-1, 0].T)
+        for begin in range(0, len(since), _CHUNK):
+            parts = way.at(since[begin : begin + _CHUNK])
+            self._fly(point_reference(*parts, yaw, self._gravity), False)
+        self.durations[self.durations >= self._time - _CHUNK / RATE] = np.inf
+        self.lowest.flags.writeable = self.durations.flags.writeable = False
+
+    def _fly(self, references: ReferencePoint, by_attitude: bool) -> None:
+        self._carry, body = self._loop.scan(self._carry, self._inputs(references, by_attitude))
+        self.lowest = np.minimum(self.lowest, body.position[2].min(axis=1))
+        speed = np.linalg.norm(from_components(body.velocity), axis=-1)
+        lean = so3.thrust_axis(from_components(body.q_world_body))[..., 2]
+        moving = (speed > _STILL) | (lean < np.cos(_LEVEL))
+        ticks = moving.shape[1]
+        latest = ticks - np.argmax(moving[:, ::-1], axis=1)
+        self.durations = np.where(moving.any(axis=1), self._time + latest / RATE, self.durations)
+        self._time += ticks / RATE
+
+    def _inputs(self, references: ReferencePoint, by_attitude: bool) -> LoopInput:
+        ticks = len(references.position[0])
+        period = np.full(ticks, 1.0 / RATE)
+        own = ((), np.full(ticks, float(by_attitude)), ())
+        return LoopInput(Clock(period, period), ((), (), ()), references, own)
+
+
+def _body(signals: Signals) -> Body:
+    """The row of a log."""
+    body: Body = signals["plant"].body
+    return body
+
+
+def _kept(setpoint: Setpoint, since: Array, vehicle: Vehicle) -> ReferencePoint:
+    """Commands of instants, kept for so long [s] (T,), leaves (T, instants)."""
+    age = np.minimum(since, KEPT)[:, None, None]
+    omega_body = np.broadcast_to(setpoint.omega_body, (len(since), *setpoint.omega_body.shape))
+    q = so3.multiply(setpoint.q_world_body, so3.exp(age * omega_body))
+    thrust = (setpoint.wrench.thrust / vehicle.mass)[:, None] * so3.thrust_axis(q)
+    zero = components(np.zeros_like(omega_body))
+    omega = components(so3.rotate(q, omega_body))
+    return ReferencePoint(
+        zero,
+        zero,
+        components(thrust),
+        zero,
+        components(q),
+        omega,
+        zero,
+        Lookahead(np.zeros(q.shape[:-1]), omega, zero),
+    )

@@ -1,0 +1,64 @@
+"""Recoveries to a hover from instants of a path: announced, and kept."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import aerobat as ab
+
+LOW = -0.7  # [m] a ground so near under the flip that there is a point of no return
+
+
+@pytest.fixture(scope="module")
+def flip() -> ab.Plan:
+    return ab.plan("flip-roll", vehicle="agile-quad")
+
+
+def test_a_thousand_instants_outside_the_span_of_no_return_all_reach_a_hover_above_the_ground(
+    flip: ab.Plan,
+) -> None:
+    announced = ab.recoveries(flip, ground=LOW)
+    (span,) = announced.no_return
+    assert 1.2 < span.start < span.end < 1.8  # on the way down
+    assert f"but not from {span.start:.2f} to {span.end:.2f} s" in str(announced)
+    instants = np.sort(np.random.default_rng(5).uniform(0.0, flip.duration, 1000))
+    found = ab.recoveries(flip, times=instants, ground=LOW)
+    outside = (instants <= span.start) | (instants >= span.end)
+    assert outside.sum() > 700
+    assert found.possible[outside].all()
+    assert not found.possible.all()
+
+
+def test_on_high_ground_and_without_delay_there_is_always_a_way_back(flip: ab.Plan) -> None:
+    late, at_once = (ab.recoveries(flip, ground=-3.0, reaction=reaction) for reaction in (0.1, 0.0))
+    for found in (late, at_once):
+        assert found.no_return == ()
+        assert found.possible.all()
+        assert (found.height_lost >= 0.0).all()
+        assert found.durations.max() < 3.0
+    assert at_once.height_lost.max() < late.height_lost.max()
+
+
+def test_a_hover_is_kept_at_once_and_loses_no_height(flip: ab.Plan) -> None:
+    found = ab.recoveries(flip, times=[0.0, flip.duration], ground=-3.0)
+    np.testing.assert_allclose(found.durations, 0.0)
+    np.testing.assert_allclose(found.height_lost, 0.0, atol=0.01)
+
+
+def test_where_the_ground_is_too_near_for_all_of_a_path_it_is_said(flip: ab.Plan) -> None:
+    found = ab.recoveries(flip, times=[1.4, 1.5], ground=2.0)
+    assert str(found) == "from no instant does it come back to a hover above the ground"
+    (span,) = found.no_return
+    assert (span.start, span.end) == (1.4, 1.5)
+
+
+def test_an_instant_is_judged_the_same_whatever_flies_beside_it(flip: ab.Plan) -> None:
+    together, alone = (ab.recoveries(flip, times=times, ground=-3.0) for times in ([0.3, 0.9, 1.5], [0.9]))
+    assert together.lowest[1] == pytest.approx(alone.lowest[0], abs=1e-9)
+    assert together.durations[1] == pytest.approx(alone.durations[0])
+
+
+def test_times_outside_the_path_are_refused(flip: ab.Plan) -> None:
+    with pytest.raises(ab.SpecError, match="must lie in"):
+        ab.recoveries(flip, times=[5.0])
