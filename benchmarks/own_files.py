@@ -28,12 +28,13 @@ from aerobat.planning import plan
 from aerobat.problem import load_problem
 from aerobat.simulation import fly
 from aerobat.vehicle import implausibilities, load_vehicle
+from own_courses import course, crossing, figure, place_of_stage
 
 Table = dict[str, Any]
 Draw = Callable[["Pen"], Any]
 MAX_SENTENCE = 400  # [characters] of a refusal, beside the file's name
 QUANTITIES = {"position": 3.0, "velocity": 3.0, "acceleration": 6.0, "specific_thrust": 8.0}
-KINDS = ("flip", "half-flip", "line", "stages", "waypoints")
+KINDS = ("flip", "half-flip", "line", "stages", "waypoints", "figure", "course")
 
 
 class Pen:
@@ -228,7 +229,7 @@ def _passage(pen: Pen) -> Table:
         "centred": lambda p: p.chance(0.5),
         "upright": lambda p: p.chance(0.5),
     }
-    found = pen.some(keys, 0.2)
+    found = pen.some(keys, 0.2) | crossing(pen)
     return {"passage": found} if found else {}
 
 
@@ -243,6 +244,8 @@ def _flip(pen: Pen, middle: list[float], gates: list[Table]) -> Table:
         "min_inverted_thrust": lambda p: p.number(0.5, 6.0),
         "signed": lambda p: p.chance(0.7),
         "ordered": lambda p: p.chance(0.7),
+        "mirrored": lambda p: p.chance(0.5),
+        "count": lambda p: p.one_of(1, 2),
     }
     axis = gates[0].get("heading_deg", 0.0) + pen.one_of(0.0, 90.0, -90.0, 180.0)
     return {"axis_deg": axis} | pen.some(keys, 0.2) | _passage(pen)
@@ -258,6 +261,8 @@ def _line(pen: Pen, middle: list[float], gates: list[Table]) -> Table:
 
 def _stages(pen: Pen, middle: list[float], gates: list[Table]) -> Table:
     stages = [_stage(pen, i, gates) for i in range(pen.one_of(1, 2, 3))]
+    if pen.chance(0.2):
+        stages.append({"name": "place"} | place_of_stage(pen, middle))
     upright = {"quantity": "specific_thrust", "direction": [0.0, 0.0, 1.0], "lower": 0.0}
     always = {"path_constraints": [upright]} if pen.chance(0.3) else {}
     return {"stages": stages} | always | pen.some({"ordered": lambda p: p.chance(0.5)}, 0.3)
@@ -271,7 +276,7 @@ def _stage(pen: Pen, i: int, gates: list[Table]) -> Table:
     if gates and pen.chance(0.5):
         stage["gate"] = gates[0].get("name", "gate")
         keys = {"min_upright_thrust": lambda p: p.number(1.0, 6.0), "min_speed": lambda p: p.number(0.0, 3.0)}
-        return stage | pen.some(keys, 0.5)
+        return stage | pen.some(keys, 0.5) | crossing(pen)
     if pen.chance(0.5):
         attitude = {
             "up": [pen.number(-1, 1), pen.number(-1, 1), pen.number(0, 1)],
@@ -309,7 +314,9 @@ def _waypoints(pen: Pen, middle: list[float], gates: list[Table]) -> Table:
         if "up" in point:
             point |= pen.some({"thrust": lambda p: p.number(5.0, 15.0)}, 0.5)
         if gates and i == 0 and pen.chance(0.5):
-            point = {"gate": gates[0].get("name", "gate")}
+            point = {"gate": gates[0].get("name", "gate")} | crossing(pen)
+        elif isinstance(point.get("position"), list):
+            point |= pen.some({"radius": lambda p: p.number(0.1, 0.5)}, 0.3)
         found.append(point)
     return {"waypoints": found} | pen.some({"duration": lambda p: p.number(2.5, 6.0)}, 0.2)
 
@@ -320,6 +327,8 @@ _MANEUVERS: Mapping[str, Callable[[Pen, list[float], list[Table]], Table]] = {
     "line": _line,
     "stages": _stages,
     "waypoints": _waypoints,
+    "figure": figure,
+    "course": course,
 }
 
 

@@ -33,13 +33,16 @@ def main() -> None:
         )
 
 
+PROBLEMS = ("flip-pitch", "flip-roll", "flip-roll-translation", "half-flip", "line", "section-v")
+
+
 def plans() -> Iterator[tuple[ab.Vehicle, ab.Problem, ab.Plan, str]]:
     for name in ("crazyflie", "agile-quad", "hexarotor"):
         vehicle = ab.load_vehicle(name)
-        for problem in map(ab.load_problem, ab.problem_names()):
+        for problem in map(ab.load_problem, PROBLEMS):
             for order in (4, 5):
                 yield vehicle, problem, ab.plan(problem, ab.Miqp(order=order), vehicle), f"order {order}"
-    for problem in map(ab.load_problem, ab.problem_names()):
+    for problem in map(ab.load_problem, PROBLEMS):
         paper = problem.as_in_paper()
         yield vehicle, paper, ab.plan(paper, ab.Miqp(order=3)), "paper"
 

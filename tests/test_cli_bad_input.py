@@ -78,7 +78,7 @@ PROBLEM_FAULTS = {
     "maneuver without kind": (dropping("maneuver.kind"), "maneuver.kind"),
     "unknown key": (setting("maneuver.axis", 3.0), "maneuver.axis"),
     "unknown table": (setting("obstacles", {}), "obstacles"),
-    "flip without gate": (dropping("gate"), "gate"),
+    "flip in a gate that is not there": (setting("maneuver.gate", "red"), "no gate named 'red'"),
     "gate without width": (setting("gate.width", 0.0), "gate.width"),
     "negative limit": (setting("limits.velocity", -10.0), "limits.velocity"),
     "limit in words": (setting("limits.velocity", "fast"), "limits.velocity"),
