@@ -83,10 +83,10 @@ def rotorpys_own_controller(plan: ab.Plan) -> float:
 
 
 def controllers() -> Table:
-    table = Table("maneuver, reserve 0.15", "ours", "RotorPy's SE3Control")
+    table = Table("maneuver, reserve 0.05", "ours", "RotorPy's SE3Control")
     hummingbird = rotorpy_vehicle("hummingbird")
     for name in MANEUVERS:
-        plan = ab.plan(name, ab.Miqp(order=4, reserve=0.15), hummingbird)
+        plan = ab.plan(name, ab.Miqp(order=4, reserve=0.05), hummingbird)
         ours = ab.fly(plan, plant=RotorPy(vehicle="hummingbird")).position_error.max()
         its = rotorpys_own_controller(plan)
         table.add_row(name, f"{100 * ours:.1f} cm", f"{100 * its:.1f} cm" if its < LOST else "lost")
