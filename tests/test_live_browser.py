@@ -122,7 +122,8 @@ def test_the_next_plan_is_drawn_by_the_programs_of_the_last(show) -> None:
     slide(seen, "gates[0].z", 3.0)
     seen.page.evaluate(
         "() => { window.linked = 0; const gl = replay.renderer.getContext();"
-        "const link = gl.linkProgram.bind(gl); gl.linkProgram = (program) => ((window.linked += 1), link(program)) }"
+        "const link = gl.linkProgram.bind(gl);"
+        "gl.linkProgram = (program) => ((window.linked += 1), link(program)) }"
     )
     for height in (3.2, 4.0):
         slide(seen, "gates[0].z", height)
