@@ -157,6 +157,8 @@ def _problem(pen: Pen, kind: str, case: int) -> Table:
     middle[2] += above
     gates = [_gate(pen, middle, kind)] if kind in ("flip", "half-flip") or pen.chance(0.4) else []
     table: Table = {"name": f"own-{case}-{kind}", "start": _end(pen, start), "goal": _end(pen, goal)}
+    if pen.chance(0.1):
+        table["goal"]["free_attitude"] = True
     table["maneuver"] = {"kind": kind} | _MANEUVERS[kind](pen, middle, gates)
     table |= {"gates": gates} if pen.chance(0.3) else {"gate": gates[0]} if gates else {}
     limits = pen.some(_LIMITS, 0.15)
