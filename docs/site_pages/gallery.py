@@ -1,13 +1,14 @@
 """The gallery: every built-in maneuver and those of the examples, planned, flown and replayed for it."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import aerobat as ab
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 VEHICLE = "agile-quad"  # as the commands take it, but for problems that are made for one
+LEFT_OUT = ("split-s-19",)  # planning it takes longer than all the rest of a build
 OWN_VEHICLES = {"section-v": "section-v"}
 FRAME = '<iframe class="replay" src="{source}" title="{title}" loading="lazy"></iframe>'
 
@@ -24,11 +25,16 @@ class Exhibit:
 def exhibits() -> Iterator[Exhibit]:
     """The built-in problems, then those of the examples."""
     for name in ab.problem_names():
+        if name in LEFT_OUT:
+            continue
         vehicle = OWN_VEHICLES.get(name, VEHICLE)
         option = "" if vehicle == VEHICLE else f" --vehicle {vehicle}"
         yield Exhibit(ab.load_problem(name), vehicle, f"aerobat fly {name}{option}")
     for file in sorted(EXAMPLES.glob("*.toml")):
-        yield Exhibit(ab.load_problem(file), VEHICLE, f"aerobat fly examples/{file.name}")
+        problem = ab.load_problem(file)
+        if problem.name in ab.problem_names():  # a page of that name is there
+            problem = replace(problem, name=f"{problem.name}-example")
+        yield Exhibit(problem, VEHICLE, f"aerobat fly examples/{file.name}")
 
 
 def write(folder: Path) -> None:
