@@ -1,7 +1,7 @@
 """The gallery: every built-in maneuver and those of the examples, planned, flown and replayed for it."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import aerobat as ab
@@ -31,7 +31,10 @@ def exhibits() -> Iterator[Exhibit]:
         option = "" if vehicle == VEHICLE else f" --vehicle {vehicle}"
         yield Exhibit(ab.load_problem(name), vehicle, f"aerobat fly {name}{option}")
     for file in sorted(EXAMPLES.glob("*.toml")):
-        yield Exhibit(ab.load_problem(file), VEHICLE, f"aerobat fly examples/{file.name}")
+        problem = ab.load_problem(file)
+        if problem.name in ab.problem_names():  # a page of that name is there
+            problem = replace(problem, name=f"{problem.name}-example")
+        yield Exhibit(problem, VEHICLE, f"aerobat fly examples/{file.name}")
 
 
 def write(folder: Path) -> None:
