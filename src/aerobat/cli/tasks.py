@@ -28,6 +28,7 @@ from aerobat.planning import (
     plan,
     planner_class,
     planner_options,
+    suited_planner,
     with_evidence,
     with_second_opinion,
 )
@@ -84,7 +85,7 @@ def planned(
         command=command,
         problem=problem,
         vehicle=vehicle,
-        planner=make_planner(options),
+        planner=make_planner(options, problem, vehicle),
         paper=options.paper,
         angle=options.angle,
         flight=flight,
@@ -148,9 +149,12 @@ def _plan_that_passes(record: RunRecord) -> Plan:
         ).plan
 
 
-def make_planner(options: PlanningOptions) -> Planner:
-    """The planner that the options name. Raises SpecError for options that belong to another."""
-    name = options.planner or "miqp"
+def make_planner(options: PlanningOptions, problem: Problem, vehicle: Vehicle) -> Planner:
+    """The planner that the options name, or one that suits problem and options.
+
+    Raises SpecError for options that belong to another.
+    """
+    name = options.planner or _suited(options, problem, vehicle)
     cls = planner_class(name)
     _check_options(options, name)
     settings: dict[str, Any] = {"order": 3} if options.paper else {}
@@ -163,6 +167,16 @@ def make_planner(options: PlanningOptions) -> Planner:
         elif option.command_default is not None:
             settings[option.name] = option.command_default
     return cls(**settings)
+
+
+def _suited(options: PlanningOptions, problem: Problem, vehicle: Vehicle) -> str:
+    """The name of the planner that suits a problem, or of the usual one, whose options were given."""
+    name = suited_planner(problem, vehicle)
+    try:
+        _check_options(options, name)
+    except SpecError:
+        return "miqp"
+    return name
 
 
 def _tilted(problem: Problem, angle: float) -> Problem:

@@ -16,6 +16,7 @@ from .planners import (
     planner_class,
     planner_options,
     registered_planners,
+    suited_planner,
     with_evidence,
 )
 from .polynomial.free_knots import FreeKnots
@@ -66,6 +67,7 @@ __all__ = [
     "planner_class",
     "planner_options",
     "registered_planners",
+    "suited_planner",
     "with_assessment",
     "with_certificate",
     "with_evidence",

@@ -10,6 +10,7 @@ import dataclasses
 from abc import abstractmethod
 from collections.abc import Callable, Mapping
 from dataclasses import MISSING, dataclass, field, fields
+from importlib.util import find_spec
 from types import MappingProxyType, ModuleType
 from typing import Any, Protocol, TypeVar, cast, dataclass_transform, get_type_hints, runtime_checkable
 
@@ -19,6 +20,7 @@ from aerobat.declaration import Label, Registry, shown, validated
 from aerobat.errors import SpecError
 from aerobat.planning.assessment.assess import with_assessment
 from aerobat.planning.certified_solve import with_certificate
+from aerobat.planning.courses import is_course
 from aerobat.planning.flyability import with_flyability
 from aerobat.planning.holds import between_holds
 from aerobat.planning.passages import require_openings
@@ -60,7 +62,7 @@ PLANNERS: Registry[Planner] = Registry(
 @validated
 def plan(
     problem: Problem | str,
-    planner: Planner | str = "miqp",
+    planner: Planner | str | None = None,
     vehicle: Vehicle | str | None = None,
     progress: Progress | None = None,
 ) -> Plan:
@@ -72,7 +74,8 @@ def plan(
 
     Args:
         problem: What is planned, or its name.
-        planner: How to plan, say `Miqp(order=5)`, or a registered name, whose defaults are taken.
+        planner: How to plan, say `Miqp(order=5)`, or a registered name, whose defaults are taken; left out,
+            the one that `suited_planner` names.
         vehicle: What shall fly it, or its name, within its rotors' limits; without one the plan knows no
             limits but the problem's.
         progress: Called with every attempt as it ends.
@@ -83,10 +86,23 @@ def plan(
         vehicle = vehicle.without_dead_rotors()
         vehicle.require_hover(problem.environment.gravity)
         require_openings(problem, vehicle)
-    found = as_planner(planner).plan(problem, vehicle, progress)
+    found = as_planner(planner or suited_planner(problem, vehicle)).plan(problem, vehicle, progress)
     if vehicle is None:
         return found
     return with_evidence(found, None if found.certificate is not None else vehicle)
+
+
+def suited_planner(problem: Problem, vehicle: Vehicle | None) -> str:
+    """The name of the planner to take where nobody names one.
+
+    It is miqp, whose search is exact, but for long courses, which it cannot search in reasonable time: for a
+    vehicle those are time-optimal's, or min-snap's where CasADi is not installed and all stages are points.
+    """
+    if vehicle is None or not is_course(problem.stages(vehicle.max_specific_thrust)):
+        return "miqp"
+    if find_spec("casadi") is not None:
+        return "time-optimal"
+    return "min-snap" if problem.maneuver.through_points else "miqp"
 
 
 def with_evidence(plan: Plan, vehicle: Vehicle | None = None) -> Plan:

@@ -11,6 +11,7 @@ import numpy as np
 from aerobat.arrays import Array
 from aerobat.errors import Infeasible
 from aerobat.flatness import force_balance, reference
+from aerobat.planning.courses import is_course
 from aerobat.planning.miqp import Miqp
 from aerobat.planning.planners import Planner
 from aerobat.planning.polynomial.knots import stretched_path
@@ -18,14 +19,11 @@ from aerobat.planning.polynomial.min_snap import MinSnap
 from aerobat.planning.result import Plan
 from aerobat.planning.time_optimal.collocation import CollocatedMotion, Mesh
 from aerobat.planning.warm_start import WarmStart
-from aerobat.problem.condition import Quantity
 from aerobat.problem.problem import Problem
-from aerobat.problem.stage import Stage, StageSequence
+from aerobat.problem.stage import StageSequence
 from aerobat.trajectory.minimum_effort import ORDERS
 from aerobat.vehicle import Vehicle
 
-COURSE_STAGES = 6  # that say where they are: from so many on a path through them is the start
-MANY_STAGES = 10  # of any kind, which no mixed-integer program places in reasonable time
 SLOWER = 1.5  # times the duration of a plan that knows no rotors
 PACE_SPREAD = 0.4  # standard deviation of the logarithm of a phase's pace, where paces are drawn
 SEED = 0
@@ -79,18 +77,6 @@ def starts(
         sources = list(_sources(plans, sequence))
     own = tuple(plan for plan, _ in plans if plan.certified and plan.vehicle == vehicle)
     return Starts(tuple(islice(_variations(sources, planar), count)), own)
-
-
-def is_course(sequence: StageSequence) -> bool:
-    """True of long sequences in order: a closed form is a good start, a mixed-integer plan takes too long."""
-    placed = all(map(_placed, sequence.stages))
-    return sequence.ordered and len(sequence.stages) >= (COURSE_STAGES if placed else MANY_STAGES)
-
-
-def _placed(stage: Stage) -> bool:
-    """True if a stage says where it is."""
-    where = [c for c in stage.conditions if c.quantity is Quantity.POSITION]
-    return stage.gate is not None or stage.ball is not None or len(where) >= 3
 
 
 def stretched(problem: Problem, vehicle: Vehicle, sequence: StageSequence, order: int) -> WarmStart:
