@@ -47,7 +47,6 @@ def mavlink(
 
     offset = _origin(found) if options.origin is None else np.array(options.origin)
     require_flyable(found, offset, options.vehicle)
-    say(str(recoveries(found, ground=-offset[2])))
     connection = connect(options.connect, listen=False, system=245, component=191, baud=options.baud)
     try:
         client = Client(
@@ -61,6 +60,7 @@ def mavlink(
             ),
             settings=ClientSettings(options.rate, wait=options.wait, hover_thrust=options.hover_thrust),
             say=say,
+            announcement=str(recoveries(found, ground=-offset[2])),
         )
         run(client, WallClock(options.speed), options.rate)
     finally:

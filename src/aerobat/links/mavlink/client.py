@@ -62,6 +62,7 @@ class Client:
         mission: MissionSettings = MissionSettings(),  # noqa: B008 - frozen
         settings: ClientSettings = ClientSettings(),
         say: Callable[[str], None] = lambda sentence: None,
+        announcement: str = "",
     ) -> None:
         """Prepare to fly.
 
@@ -72,6 +73,7 @@ class Client:
             mission: how it is flown, and when it is given up.
             settings: of the link.
             say: what takes sentences about the course of things.
+            announcement: what is said before the vehicle is armed.
         """
         assert plan.vehicle is not None, "a plan that is flyable has a vehicle"
         self.mission = Mission(plan, mission, offset)
@@ -81,6 +83,7 @@ class Client:
         self.log: list[Observed] = []  # while the plan was flown
         self._settings = settings
         self._say = say
+        self._announcement = announcement
         self._began: float | None = None
         self._ground: PositionGoal | None = None
         self._hovering_since = inf
@@ -164,6 +167,8 @@ class Client:
             yaw = yaw_of(body.q_world_body)
             self._ground = PositionGoal(np.array(body.position), zero, zero, yaw)
             self._say(f"connected; a message takes {1e3 * self.link.delay:.0f} ms")
+            if self._announcement:
+                self._say(self._announcement)
             self._enter(Stage.ARMING, now)
         elif self._since(now) > self._settings.wait:
             missing, remedy = "its state (ODOMETRY)", "have it send that message"
