@@ -88,7 +88,7 @@ def test_the_first_command_prints_what_the_readme_shows(tmp_path: Path) -> None:
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
 def test_links_lead_somewhere(page: Path) -> None:
     for link in LINK.findall(BLOCK.sub("", page.read_text(encoding="utf-8"))):
-        if "://" in link:
+        if "://" in link or link.startswith("generated/"):  # what the site's build makes, it checks
             continue
         path, _, heading = link.partition("#")
         target = page.parent / path if path else page
