@@ -17,6 +17,8 @@ settings.load_profile("reproducible")
 
 # what takes long on a busy machine tells nothing more: no test depends on the clock
 os.environ["AEROBAT_PROGRESS"] = "1e6"
+# ffmpeg is started without a fork of Python's own, which JAX's threads, of other tests, may lock up
+os.environ["IMAGEIO_FFMPEG_NO_PREVENT_SIGINT"] = "1"
 
 
 @pytest.fixture(autouse=True)

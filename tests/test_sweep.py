@@ -156,6 +156,7 @@ def progress(done, well):
     os.kill(os.getpid(), int(sys.argv[1]))
 
 if __name__ == "__main__":
+    signal.signal(signal.SIGINT, signal.default_int_handler)  # which a job in the background begins without
     sweep(hop(), SPREAD, RUNS, SEED, workers=2, keep="kept", progress=progress)
 """
 

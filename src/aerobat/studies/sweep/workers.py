@@ -44,8 +44,9 @@ def workers(count: int, forked: bool) -> Iterator[Executor]:
     if count == 1:
         yield InProcess()
         return
-    # macOS has forks that its own libraries do not survive
-    context: Any = multiprocessing.get_context("fork" if forked and sys.platform == "linux" else "spawn")
+    # macOS has forks that its own libraries do not survive; JAX's threads hold locks that no fork frees
+    survives = sys.platform == "linux" and "jax" not in sys.modules
+    context: Any = multiprocessing.get_context("fork" if forked and survives else "spawn")
     watched, held = context.Pipe(duplex=False)
     pool = ProcessPoolExecutor(count, context, _begin, (watched, held, imported_plugins()))
     try:
