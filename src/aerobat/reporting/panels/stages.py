@@ -37,7 +37,8 @@ KEY_HEIGHT = 0.38  # [in] of the keys above the axes
 VEHICLE = 0.6  # [in] a vehicle, about
 COLUMN = 0.62  # [in] kept free for names on either side of a tall panel, at least
 LETTER = 0.082  # [in] the width of a name's letter
-FACTS = 1.2  # [in] kept free for what is told of a stage that is shown in a plane of its own
+FACTS = 1.2  # [in] kept free beside what is told of a stage that is shown in a plane of its own
+FACTS_ACROSS = 1.55  # [in] kept free across it, where stages stand side by side
 MOST_STAGES = 11  # that follow one another legibly
 STAGE_ROW = 0.5  # [in] kept free for names at the foot of a wide panel
 # [in] from a hair line's end to the text, for each alignment of it
@@ -70,9 +71,12 @@ def draw_stages(axes: Axes, plan: Plan, vehicle: Vehicle) -> str:
         note = "a stage holds at the end of interval n" if plan.stages else "equal steps of time"
     else:
         stages = [k for k, keyframe in enumerate(shots.instants) if keyframe.interval is not None]
-        shown = sorted({stages[round(k)] for k in np.linspace(0, len(stages) - 1, MOST_STAGES)})
+        width, height = size_of(axes)
+        most = MOST_STAGES if height >= width else min(MOST_STAGES, int(width / FACTS_ACROSS))
+        facts = FACTS if height >= width else FACTS_ACROSS
+        shown = sorted({stages[round(k)] for k in np.linspace(0, len(stages) - 1, most)})
         shots, gates = _storyboard(axes, shots.only(shown), gates, plane)
-        scale = _draw(axes, shots, gates, plane, vehicle, max(column, FACTS), STORYBOARD)
+        scale = _draw(axes, shots, gates, plane, vehicle, max(column, facts), STORYBOARD)
         some = "" if len(shown) == len(stages) else f"{len(shown)} of {len(stages)} "
         note = f"{some}in order, each seen across its thrust"
     return note if scale == 1.0 else f"{note}; vehicle {scale:g} times its size"
