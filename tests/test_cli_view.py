@@ -101,3 +101,18 @@ def test_what_cannot_be_shown_is_refused_in_a_sentence(run: Path, capsys: pytest
     np.savez(run / "flight.npz", **content)
     assert "position" in refused(capsys, str(run))
     assert not (run / "replay.html").exists()
+
+
+def test_of_a_sweep_its_own_first_flights_are_shown(run: Path, tmp_path: Path, capsys) -> None:
+    """The errors that the page is told are those of the sweep's table."""
+    swept = tmp_path / "swept"
+    cli.main(["sweep", str(run), "--runs", "3", "--seed", "5", "--workers", "1", "--out", str(swept)])
+    capsys.readouterr()
+    cli.main(["view", str(swept), "--json"])
+    told = json.loads(capsys.readouterr().out)["flights"]
+    rows = (swept / "flights.csv").read_text(encoding="utf-8").splitlines()
+    column = rows[0].split(",").index("max_position_error_m")
+    errors = [float(row.split(",")[column]) for row in rows[1:]]
+    assert len(told) == len(errors) == 3
+    for flight, error in zip(told, errors, strict=True):
+        assert f"{100 * error:.2f} cm off its path" in flight["sentence"]

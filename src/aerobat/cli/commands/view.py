@@ -14,19 +14,23 @@ from aerobat.cli.live import LiveOptions, serve
 from aerobat.cli.options import ViewOptions
 from aerobat.cli.progress import DrawingProgress, showing
 from aerobat.cli.runs.folder import FLIGHT, REPLAY
-from aerobat.cli.runs.record import RECORD
+from aerobat.cli.runs.record import RECORD, RunRecord, read_record
 from aerobat.cli.runs.saved_plans import named_vehicle
 from aerobat.cli.terminal import print_json, say
+from aerobat.control import named_controller
 from aerobat.errors import SpecError
 from aerobat.interchange import read_plan
 from aerobat.planning import Plan
 from aerobat.reporting.motion.video import write_video
 from aerobat.reporting.report_json import to_json
 from aerobat.simulation import Flight, load_flight
+from aerobat.simulation.fly import fly as simulate
 from aerobat.storage import format_of, read_arrays
 from aerobat.viewer.replay import Replay, require_replaceable, save_replay
 from aerobat.viewer.replay import view as replay_of
 from aerobat.viewer.scene import plan_fits
+
+SWEPT = 50  # flights of a sweep that are shown
 
 
 def view(
@@ -37,9 +41,10 @@ def view(
     """Write a page that replays a run, a plan or a flight: one HTML file that a browser opens from the disk.
 
     It shows the vehicle on its path, gates, stages and thrusts, and beside them errors and rotor thrusts.
-    Space plays, the arrow keys step, 1, 2 and 3 are its cameras. Of a batch all flights are shown, and which
-    of them failed. It is written to replay.html in a run's folder, which the next run there replaces with all
-    else, or beside another file, unless --html says otherwise. --video FILE.mp4 or FILE.gif writes a video.
+    Space plays, the arrow keys step, 1, 2 and 3 are its cameras. Of a batch all flights are shown, of a sweep
+    the first 50, flown again, and which of them failed. It is written to replay.html in a run's folder,
+    which the next run there replaces with all else, or beside another file, unless --html says otherwise.
+    --video FILE.mp4 or FILE.gif writes a video.
 
     --live serves a page with sliders instead, until Ctrl-C: they move and tilt gates, say how much thrust
     the maneuver asks at least, the order, the thrust-to-weight and how much flights are dispersed, and
@@ -48,7 +53,7 @@ def view(
     Parameters
     ----------
     source
-        A folder that `aerobat plan` or `aerobat fly` wrote, a .plan file, or a flight's .npz file; with
+        A folder that `aerobat plan`, `fly` or `sweep` wrote, a .plan file, or a flight's .npz file; with
         --live a problem's name or file too, by default flip-roll.
     """
     if serving.live:
@@ -106,7 +111,24 @@ def _read(source: Path) -> _Source:
         raise SpecError(f"{source} holds a path alone; give it to `aerobat fly`, and view what that writes")
     if os.path.isdir(source) and (source / FLIGHT).exists():
         return _Source(load_flight(source / FLIGHT), found)
+    if os.path.isdir(source) and (source / RECORD).exists():
+        record = read_record(source)
+        if record.command == "sweep":
+            return _Source(_first_flights(found, record), found)
     return _Source(found)
+
+
+def _first_flights(plan: Plan, record: RunRecord) -> Flight:
+    """A sweep's first flights, flown again as they were: its table keeps what they came to alone."""
+    settings = record.flight
+    return simulate(
+        plan,
+        record.vehicle,
+        controller=named_controller(settings.controller, record.vehicle.controller),
+        conditions=settings.conditions,
+        seed=settings.seed,
+        flights=min(settings.runs, SWEPT),
+    )
 
 
 def _holds_flight(file: Path) -> bool:
