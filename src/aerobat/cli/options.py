@@ -115,7 +115,7 @@ def _help(planner: str, option: PlannerOption) -> str:
 def _planners_help() -> str:
     summaries = ((name, getdoc(cls) or cls.__name__) for name, cls in registered_planners().items())
     first = (f"{name}, {doc.splitlines()[0].rstrip('.')}" for name, doc in summaries)
-    return "How to plan: " + "; ".join(first) + ". Default: miqp."
+    return "How to plan: " + "; ".join(first) + ". Default: miqp, of long courses time-optimal."
 
 
 @_with_planner_options

@@ -11,7 +11,7 @@ from pydantic import Field
 
 from aerobat.declaration import validated
 from aerobat.environment import Dispersion, as_dispersion
-from aerobat.planning import Plan, Planner, as_planner, registered_planners, with_evidence
+from aerobat.planning import Plan, Planner, as_planner, registered_planners, suited_planner, with_evidence
 from aerobat.problem import Problem, as_problem
 from aerobat.vehicle import Vehicle, as_vehicle
 from aerobat.viewer.document import document
@@ -21,7 +21,7 @@ from aerobat.viewer.live.server import HOST, LiveServer
 from aerobat.viewer.live.sliders import Setting, sliders_of
 from aerobat.viewer.replay import INLINE_HEIGHT
 
-VEHICLE, PLANNER = "agile-quad", "miqp"  # where nobody names one
+VEHICLE = "agile-quad"  # where nobody names one
 TICK = 0.5  # [s] of waiting at a time: not every system lets Ctrl-C end a longer one
 
 Port = Annotated[int, Field(ge=0, le=65535, description="whole number from 0 to 65535")]
@@ -113,18 +113,18 @@ def _begun(
 ) -> tuple[Setting, Plan]:
     """The setting at first, and its plan."""
     if not isinstance(shown, Plan):
-        flyer = as_vehicle(vehicle or VEHICLE)
-        setting = Setting(as_problem(shown), as_planner(planner or PLANNER), flyer, conditions)
+        problem, flyer = as_problem(shown), as_vehicle(vehicle or VEHICLE)
+        setting = Setting(problem, as_planner(planner or suited_planner(problem, flyer)), flyer, conditions)
         return setting, Replanner(setting, ()).plan(setting)
     flyer = shown.vehicle if vehicle is None and shown.vehicle is not None else as_vehicle(vehicle or VEHICLE)
     plan = shown if flyer == shown.vehicle and shown.certificate else with_evidence(shown, flyer)
-    return Setting(
-        shown.problem, _planner_of(shown) if planner is None else as_planner(planner), flyer, conditions
-    ), plan
+    planner = _planner_of(shown, flyer) if planner is None else as_planner(planner)
+    return Setting(shown.problem, planner, flyer, conditions), plan
 
 
-def _planner_of(plan: Plan) -> Planner:
-    """The planner of a plan's name and order; of a path from elsewhere, the usual one."""
-    planner = as_planner(plan.planner if plan.planner in registered_planners() else PLANNER)
+def _planner_of(plan: Plan, vehicle: Vehicle) -> Planner:
+    """The planner of a plan's name and order; of a path from elsewhere, the one that suits its problem."""
+    is_known = plan.planner in registered_planners()
+    planner = as_planner(plan.planner if is_known else suited_planner(plan.problem, vehicle))
     changes: dict[str, Any] = {"order": plan.order} if hasattr(planner, "order") else {}
     return replace(planner, **changes)  # type: ignore[type-var]
