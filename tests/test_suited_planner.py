@@ -20,7 +20,7 @@ def test_long_courses_are_time_optimals_and_the_rest_is_searched_exactly(name: s
 
 
 def test_without_casadi_a_course_of_points_is_planned_in_closed_form(monkeypatch) -> None:
-    monkeypatch.setattr(planners, "find_spec", lambda name: None)
+    monkeypatch.setattr(planners, "has_casadi", lambda: False)
     course = ab.load_problem("race-7")
     assert suited_planner(course, QUAD) == "min-snap"
     found = ab.plan(course, vehicle=QUAD)

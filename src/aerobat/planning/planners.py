@@ -10,7 +10,6 @@ import dataclasses
 from abc import abstractmethod
 from collections.abc import Callable, Mapping
 from dataclasses import MISSING, dataclass, field, fields
-from importlib.util import find_spec
 from types import MappingProxyType, ModuleType
 from typing import Any, Protocol, TypeVar, cast, dataclass_transform, get_type_hints, runtime_checkable
 
@@ -18,6 +17,7 @@ from pydantic import Field
 
 from aerobat.declaration import Label, Registry, shown, validated
 from aerobat.errors import SpecError
+from aerobat.optimization.nonlinear import has_casadi
 from aerobat.planning.assessment.assess import with_assessment
 from aerobat.planning.certified_solve import with_certificate
 from aerobat.planning.courses import is_course
@@ -100,7 +100,7 @@ def suited_planner(problem: Problem, vehicle: Vehicle | None) -> str:
     """
     if vehicle is None or not is_course(problem.stages(vehicle.max_specific_thrust)):
         return "miqp"
-    if find_spec("casadi") is not None:
+    if has_casadi():
         return "time-optimal"
     return "min-snap" if problem.maneuver.through_points else "miqp"
 
