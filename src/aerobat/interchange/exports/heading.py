@@ -14,20 +14,19 @@ import numpy as np
 from aerobat import so3
 from aerobat.arrays import Array
 from aerobat.interchange.exports.loss import attitudes, peak_angles
+from aerobat.interchange.exports.refit import DEGREE
 from aerobat.planning import Plan
 from aerobat.trajectory import Trajectory
 
 GRAVITY = 9.81  # [m/s²] the firmware's
-POWERS = 8
+POWERS = DEGREE + 1
 SAMPLES = 257  # of a piece
 FIRST_GUESSES = 64  # constants among which the fit begins
 ROUNDS = 40  # of Levenberg-Marquardt: more gain nothing
 DAMPING = 1e-3  # at its first step,
 MIN_DAMPING = 1e-9  # and at any later one, which keeps its equations regular
 MAX_SLOPE = 1e3  # of attitude over yaw: beyond, where the heading is along the thrust, no yaw is of use
-REGULARIZATION = (
-    1e-2  # [-] of coefficients, so that yaw does not fit rounding where attitude hardly depends on it
-)
+REGULARIZATION = 1e-2  # [-] of coefficients: where attitude hardly depends on yaw, that fits no rounding
 EXACT = 1e-6  # [rad] of attitude: what rounding makes of it
 DEFINED = 1e-9  # [m/s²] of thrust, or the sine of its angle to the heading: less defines no attitude
 
