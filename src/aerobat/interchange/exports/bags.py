@@ -32,8 +32,7 @@ def _bag(container: str, plan: Plan, rate: float) -> Content:
     times = np.unique(np.floor(plan.trajectory.sample(rate) * NANOSECONDS)) / NANOSECONDS
     found = reference(plan, times=times)
     messages = sorted(Messages(store).of(plan, found), key=lambda each: each.stamp)
-    flat = found.setpoint.flat
-    loss = Rows(times, flat.position, flat.velocity, found.setpoint.q_world_body).loss(plan)
+    loss = Rows.of(found).loss(plan)
     with tempfile.TemporaryDirectory() as scratch:  # the writers want a place of their own
         write = _write_ros1 if container == "ros1" else partial(_write_ros2, container)
         return Content(write(store, messages, Path(scratch) / NAME), loss)
