@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 from aerobat.declaration import from_table, unknown_name
 from aerobat.errors import SpecError
-from aerobat.storage import read_whole, whole_file
+from aerobat.storage import read_whole, write_whole
 
 if TYPE_CHECKING:
     from importlib.resources.abc import Traversable
@@ -65,8 +65,7 @@ def read_document(path: str | Document, cls: type[T], kind: str, **defaults: Any
 
 def write_document(path: str | os.PathLike[str], table: Mapping[str, Any]) -> None:
     """Write `table` as a TOML file, whole or not at all. Raises SpecError when the file cannot be written."""
-    with whole_file(Path(path)) as temporary:
-        temporary.write_text(to_toml(table), encoding="utf-8")
+    write_whole(path, to_toml(table))
 
 
 def to_toml(table: Mapping[str, Any]) -> str:

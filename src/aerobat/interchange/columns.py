@@ -65,7 +65,7 @@ def columns_text(plan: Plan, columns: Sequence[str], rate: float) -> str:
     groups: dict[str, Array] = {"time": times[:, None]}
     groups |= {name: plan.trajectory.evaluate(times, k) for k, name in enumerate(PATH)}
     if plan.vehicle is not None:
-        found = reference(plan.trajectory, plan.vehicle, times, environment=plan.problem.environment)
+        found = reference(plan, times=times)
         groups["attitude"] = found.setpoint.q_world_body
         groups["rates"] = found.setpoint.omega_body
         groups["thrusts"] = found.rotor_thrusts

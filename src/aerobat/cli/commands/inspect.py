@@ -19,7 +19,7 @@ from aerobat.reporting.inspection import inspection_figure
 from aerobat.reporting.page import png
 from aerobat.reporting.report_json import to_json
 from aerobat.simulation import load_flight
-from aerobat.storage import whole_file
+from aerobat.storage import write_whole
 from aerobat.studies.inspection import inspect_flight
 
 
@@ -44,9 +44,7 @@ def inspect(log: Path, options: Annotated[InspectOptions, Parameter(name="*")] =
     vehicle = None if options.vehicle is None else named_vehicle(options.vehicle)
     found = inspect_flight(flight, plan, vehicle)
     picture = options.figure or file.parent / INSPECTION
-    image = png(inspection_figure(found))
-    with whole_file(picture) as temporary:
-        temporary.write_bytes(image)
+    write_whole(picture, png(inspection_figure(found)))
     if options.json:
         print_json(to_json(found.record()))
         return

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -32,8 +32,7 @@ def _bag(container: str, plan: Plan, rate: float) -> Content:
     times = np.unique(np.floor(plan.trajectory.sample(rate) * NANOSECONDS)) / NANOSECONDS
     found = reference(plan, times=times)
     messages = sorted(Messages(store).of(plan, found), key=lambda each: each.stamp)
-    flat = found.setpoint.flat
-    loss = Rows(times, flat.position, flat.velocity, found.setpoint.q_world_body).loss(plan)
+    loss = Rows.of(found).loss(plan)
     with tempfile.TemporaryDirectory() as scratch:  # the writers want a place of their own
         write = _write_ros1 if container == "ros1" else partial(_write_ros2, container)
         return Content(write(store, messages, Path(scratch) / NAME), loss)
@@ -56,12 +55,7 @@ def _write_ros1(store: Any, messages: Sequence[Stamped], path: Path) -> Mapping[
     from rosbags.rosbag1 import Writer
 
     with Writer(path) as bag:
-        connections: dict[str, Any] = {}
-        for each in messages:
-            if each.topic not in connections:
-                connections[each.topic] = bag.add_connection(each.topic, each.kind, typestore=store)
-            content = store.serialize_ros1(each.message, each.kind)
-            bag.write(connections[each.topic], each.stamp, content)
+        _fill(bag, store, store.serialize_ros1, messages)
     return {f"{NAME}.bag": path.read_bytes()}
 
 
@@ -70,11 +64,23 @@ def _write_ros2(container: str, store: Any, messages: Sequence[Stamped], path: P
 
     plugin = StoragePlugin.MCAP if container == "mcap" else StoragePlugin.SQLITE3
     with Writer(path, version=Writer.VERSION_LATEST, storage_plugin=plugin) as bag:
-        connections: dict[str, Any] = {}
-        for each in messages:
-            if each.topic not in connections:
-                connections[each.topic] = bag.add_connection(each.topic, each.kind, typestore=store)
-            bag.write(connections[each.topic], each.stamp, store.serialize_cdr(each.message, each.kind))
+        _fill(bag, store, store.serialize_cdr, messages)
     if container == "mcap":
         return {f"{NAME}.mcap": (path / f"{NAME}.mcap").read_bytes()}
     return {name: (path / name).read_bytes() for name in ROS2_BAG}
+
+
+def _fill(bag: Any, store: Any, serialize: Callable[[Any, str], Any], messages: Sequence[Stamped]) -> None:
+    """Write messages to an open bag, each topic's type before its first.
+
+    Args:
+        bag: A writer of `rosbags`.
+        store: The types of the messages.
+        serialize: A message of a kind, as bytes.
+        messages: In order of time.
+    """
+    connections: dict[str, Any] = {}
+    for each in messages:
+        if each.topic not in connections:
+            connections[each.topic] = bag.add_connection(each.topic, each.kind, typestore=store)
+        bag.write(connections[each.topic], each.stamp, serialize(each.message, each.kind))

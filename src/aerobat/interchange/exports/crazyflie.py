@@ -10,20 +10,21 @@ from __future__ import annotations
 import numpy as np
 
 from aerobat.errors import SpecError
-from aerobat.interchange.exports.heading import YawFit, fit_yaw
+from aerobat.interchange.exports.heading import POWERS, YawFit, fit_yaw
 from aerobat.interchange.exports.loss import Content, Loss, peak_difference
 from aerobat.interchange.exports.refit import DEGREE, refit
 from aerobat.planning import Plan
 from aerobat.simulation.outcome import length
 from aerobat.trajectory import Trajectory
 
-PIECE = np.dtype([("polynomials", "<f4", (4, DEGREE + 1)), ("duration", "<f4")])  # x, y, z, yaw
+PIECE = np.dtype([("polynomials", "<f4", (4, POWERS)), ("duration", "<f4")])  # x, y, z, yaw
 MEMORY = 4096  # bytes that the firmware has for trajectories
 MAX_PIECES = MEMORY // PIECE.itemsize
 MAX_ERROR = 2e-3  # [m] a fortieth of the vehicle's width: more is another path
 MAX_EXTENT = 100.0  # [m] float32 tells 8 µm apart there
 PIECES = ("trajectory.bin", "trajectory.csv")
-HEADER = ",".join(["duration", *(f"{axis}^{power}" for axis in ("x", "y", "z", "yaw") for power in range(8))])
+AXES = ("x", "y", "z", "yaw")
+HEADER = ",".join(["duration", *(f"{axis}^{power}" for axis in AXES for power in range(POWERS))])
 READING = "pieces of float32 coefficients"
 
 
@@ -54,7 +55,7 @@ def crazyflie_pieces(plan: Plan, rate: float) -> Content:
 def as_path(pieces: np.ndarray[tuple[int], np.dtype[np.void]]) -> Trajectory:
     """The path of pieces of the type PIECE, as the vehicle has it but for its arithmetic's rounding."""
     durations = pieces["duration"].astype(float)
-    powers = durations[:, None, None] ** np.arange(DEGREE + 1)[:, None]
+    powers = durations[:, None, None] ** np.arange(POWERS)[:, None]
     coefficients = np.moveaxis(pieces["polynomials"][:, :3].astype(float), 2, 1)
     return Trajectory(durations, coefficients * powers)
 

@@ -33,9 +33,7 @@ class Format:
 
 def _table(plan: Plan, rate: float) -> Content:
     """Every column that there is, as in a run's plan.csv. Lost is what lies between rows."""
-    found = reference(plan, rate=rate)
-    flat = found.setpoint.flat
-    rows = Rows(found.times, flat.position, flat.velocity, found.setpoint.q_world_body)
+    rows = Rows.of(reference(plan, rate=rate))
     return Content({"plan.csv": columns_text(plan, ALL, rate).encode()}, rows.loss(plan))
 
 

@@ -14,20 +14,19 @@ import numpy as np
 from aerobat import so3
 from aerobat.arrays import Array
 from aerobat.interchange.exports.loss import attitudes, peak_angles
+from aerobat.interchange.exports.refit import DEGREE
 from aerobat.planning import Plan
 from aerobat.trajectory import Trajectory
 
 GRAVITY = 9.81  # [m/s²] the firmware's
-POWERS = 8
+POWERS = DEGREE + 1
 SAMPLES = 257  # of a piece
 FIRST_GUESSES = 64  # constants among which the fit begins
 ROUNDS = 40  # of Levenberg-Marquardt: more gain nothing
 DAMPING = 1e-3  # at its first step,
 MIN_DAMPING = 1e-9  # and at any later one, which keeps its equations regular
 MAX_SLOPE = 1e3  # of attitude over yaw: beyond, where the heading is along the thrust, no yaw is of use
-REGULARIZATION = (
-    1e-2  # [-] of coefficients, so that yaw does not fit rounding where attitude hardly depends on it
-)
+REGULARIZATION = 1e-2  # [-] of coefficients: where attitude hardly depends on yaw, that fits no rounding
 EXACT = 1e-6  # [rad] of attitude: what rounding makes of it
 DEFINED = 1e-9  # [m/s²] of thrust, or the sine of its angle to the heading: less defines no attitude
 
@@ -49,7 +48,8 @@ def fit_yaw(plan: Plan, path: Trajectory) -> YawFit:
     thrust = path.on_segments(s, 2) + GRAVITY * so3.UP
     z = thrust / np.maximum(np.linalg.norm(thrust, axis=-1, keepdims=True), DEFINED)
     powers = s[:, None] ** np.arange(POWERS)
-    fitted = np.array([_fitted(*piece, powers) for piece in zip(z, planned, strict=True)])
+    axes = so3.axes(planned)
+    fitted = np.array([_fitted(*piece, powers) for piece in zip(z, axes, strict=True)])
     fitted[:, 0] -= 2.0 * np.pi * np.round((fitted[:, 0] - _ends_before(fitted)) / (2.0 * np.pi))
     in_seconds = path.durations[:, None] ** np.arange(POWERS)
     written = (fitted / in_seconds).astype(np.float32).astype(float)
@@ -64,23 +64,29 @@ def _ends_before(fitted: Array) -> Array:
     return np.concatenate([[0.0], ends[:-1] + np.concatenate([[0.0], whole_turns[:-1]])])
 
 
-def _fitted(z: Array, planned: Array, powers: Array) -> Array:
-    """One piece's coefficients in normalised time, (POWERS,)."""
+def _fitted(z: Array, axes: Array, powers: Array) -> Array:
+    """One piece's coefficients in normalised time, (POWERS,).
+
+    Args:
+        z: Directions of the thrust, (samples, 3).
+        axes: The planned body's in the world, its columns, (samples, 3, 3).
+        powers: Of normalised time, (samples, POWERS).
+    """
     guesses = np.linspace(-np.pi, np.pi, FIRST_GUESSES, endpoint=False)
-    cost = (_turn(z, planned, np.broadcast_to(guesses[:, None], (FIRST_GUESSES, len(z)))) ** 2).sum(axis=1)
+    cost = (_turn(z, axes, np.broadcast_to(guesses[:, None], (FIRST_GUESSES, len(z)))) ** 2).sum(axis=1)
     best = np.zeros(POWERS)
     best[0] = guesses[np.argmin(cost)]
     weights = np.full(POWERS, REGULARIZATION)
     weights[0] = 0.0  # a constant yaw is as good as any
     damping = DAMPING
-    residual = np.concatenate([_turn(z, planned, powers @ best), weights * best])
+    residual = np.concatenate([_turn(z, axes, powers @ best), weights * best])
     for _ in range(ROUNDS):
         if np.abs(residual).max() < EXACT:
             break
         slopes = np.concatenate([_slope(z, powers @ best)[:, None] * powers, np.diag(weights)])
         normal = slopes.T @ slopes
         step = np.linalg.solve(normal + damping * np.eye(POWERS), -slopes.T @ residual)
-        tried = np.concatenate([_turn(z, planned, powers @ (best + step)), weights * (best + step)])
+        tried = np.concatenate([_turn(z, axes, powers @ (best + step)), weights * (best + step)])
         if tried @ tried < residual @ residual:
             best, residual, damping = best + step, tried, max(damping / 10.0, MIN_DAMPING)
         else:
@@ -95,10 +101,10 @@ def _slope(z: Array, yaw: Array) -> Array:
     return np.asarray(np.clip(slopes, -MAX_SLOPE, MAX_SLOPE))
 
 
-def _turn(z: Array, planned: Array, yaw: Array) -> Array:
-    """How far the attitude of a yaw is turned about the thrust from the planned one [rad], (..., samples)."""
+def _turn(z: Array, axes: Array, yaw: Array) -> Array:
+    """How far the attitude of a yaw is turned about the thrust from planned axes [rad], (..., samples)."""
     y = _across(z, yaw)
-    x_planned, y_planned = (so3.axes(planned)[..., axis] for axis in (0, 1))
+    x_planned, y_planned = axes[..., 0], axes[..., 1]
     return np.asarray(np.arctan2(-(y * x_planned).sum(axis=-1), (y * y_planned).sum(axis=-1)))
 
 

@@ -16,7 +16,7 @@ import numpy as np
 
 from aerobat import so3
 from aerobat.arrays import Array
-from aerobat.flatness import reference
+from aerobat.flatness import Reference, reference
 from aerobat.planning import Plan
 from aerobat.simulation.outcome import length
 from aerobat.trajectory import Trajectory
@@ -74,6 +74,12 @@ class Rows:
     velocity: Array | None  # [m/s] world, (T, 3); None where it is read off the position
     q_world_body: Array  # (T, 4)
 
+    @classmethod
+    def of(cls, found: Reference) -> Rows:
+        """What rows say that have a reference's numbers as they are."""
+        flat = found.setpoint.flat
+        return cls(found.times, flat.position, flat.velocity, found.setpoint.q_world_body)
+
     def loss(self, plan: Plan, held: bool = False) -> Loss:
         """The loss of these rows, read along straight lines, or `held`."""
         position = self._curve(self.position, held)
@@ -112,8 +118,7 @@ class Rows:
 def attitudes(plan: Plan, times: Array) -> Array:
     """A plan's attitudes, body to world, at times [s] that fall by rounding at most, (T,) -> (T, 4)."""
     rising = np.minimum(np.maximum.accumulate(times), plan.duration)
-    found = reference(plan.trajectory, plan.vehicle, rising, environment=plan.problem.environment)
-    return found.setpoint.q_world_body
+    return reference(plan, times=rising).setpoint.q_world_body
 
 
 def peak_difference(path: Trajectory, derivative: int, read: Trajectory, read_derivative: int = 0) -> float:

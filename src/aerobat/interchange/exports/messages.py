@@ -49,14 +49,16 @@ class Messages:
     def of(self, plan: Plan, found: Reference) -> Iterator[Stamped]:
         """All messages of a plan with a vehicle, sampled as `found`, in no order of time."""
         stamps = [_stamp(time) for time in found.times]
-        yield Stamped("/aerobat/trajectory", *self._trajectory(found, stamps))
-        poses = [
+        yield self._trajectory(found, stamps)
+        poses = self._poses(found)
+        stamped = [
             self.make("geometry_msgs/msg/PoseStamped", header=self._header(stamp), pose=pose)
-            for stamp, pose in zip(stamps, self._poses(found), strict=True)
+            for stamp, pose in zip(stamps, poses, strict=True)
         ]
-        path = self.make("nav_msgs/msg/Path", header=self._header(stamps[0]), poses=poses)
+        path = self.make("nav_msgs/msg/Path", header=self._header(stamps[0]), poses=stamped)
         yield Stamped("/aerobat/path", "nav_msgs/msg/Path", stamps[0], path)
-        for stamp, pose, odometry in zip(stamps, poses, self._odometry(found, stamps), strict=True):
+        states = self._odometry(found, stamps, poses)
+        for stamp, pose, odometry in zip(stamps, stamped, states, strict=True):
             yield Stamped("/aerobat/pose", "geometry_msgs/msg/PoseStamped", stamp, pose)
             yield Stamped("/aerobat/odometry", "nav_msgs/msg/Odometry", stamp, odometry)
         yield from self._markers(plan, found)
@@ -111,7 +113,7 @@ class Messages:
             angular=self._vector("Vector3", angular),
         )
 
-    def _odometry(self, found: Reference, stamps: Sequence[int]) -> Sequence[Any]:
+    def _odometry(self, found: Reference, stamps: Sequence[int], poses: Sequence[Any]) -> Sequence[Any]:
         """Poses in the world, velocities in the body, as the message has it."""
         setpoint = found.setpoint
         velocities = so3.unrotate(setpoint.q_world_body, setpoint.flat.velocity)
@@ -124,10 +126,10 @@ class Messages:
                 pose=self.make("geometry_msgs/msg/PoseWithCovariance", pose=pose),
                 twist=self.make("geometry_msgs/msg/TwistWithCovariance", twist=twist),
             )
-            for stamp, pose, twist in zip(stamps, self._poses(found), twists, strict=True)
+            for stamp, pose, twist in zip(stamps, poses, twists, strict=True)
         ]
 
-    def _trajectory(self, found: Reference, stamps: Sequence[int]) -> tuple[str, int, Any]:
+    def _trajectory(self, found: Reference, stamps: Sequence[int]) -> Stamped:
         """All points in one message, everything in world axes, as controllers of multirotors take them."""
         setpoint = found.setpoint
         rates, accelerations = (
@@ -152,7 +154,7 @@ class Messages:
         ]
         kind = "trajectory_msgs/msg/MultiDOFJointTrajectory"
         message = self.make(kind, header=self._header(stamps[0]), joint_names=[BODY], points=points)
-        return kind, stamps[0], message
+        return Stamped("/aerobat/trajectory", kind, stamps[0], message)
 
     def _markers(self, plan: Plan, found: Reference) -> Iterator[Stamped]:
         """The path and the gates at the start, the vehicle's rotors there, at each stage and at the end."""
