@@ -8,7 +8,7 @@ import numpy as np
 
 from aerobat.arrays import Array
 from aerobat.engines.engine import first_row
-from aerobat.engines.floats import FloatOps
+from aerobat.engines.floats import FloatOps, first_numbers
 from aerobat.engines.pytree import Tree, tree_map
 from aerobat.environment import Environment
 from aerobat.kernels.control_loops import Gains, ReferencePoint, init_position_loop
@@ -34,7 +34,7 @@ class LiveBody:
         self.state = _at_rest(np.zeros(2), 0.0)  # the true one, (·,)
         parameters = autopilot_parameters(_one(self.state), vehicle, environment)
         _, model, _ = parameters.own
-        self._gains: Gains = tree_map(lambda leaf: float(np.ravel(leaf)[0]), model.gains)
+        self._gains: Gains = first_numbers(model.gains)
         first = first_row(autopilot_inputs(_hovering(environment.gravity), False))
         self._loop = autopilot_loop(vehicle, parameters, first, log_row, _LONG)
         self._carry: Tree = self._loop.init(first)
@@ -51,7 +51,7 @@ class LiveBody:
     def restart_position_loop(self, references: ReferencePoint) -> None:
         """Have the outer loop begin anew towards the first of the references, without what was before."""
         observer, controller, motion = self._carry
-        body, reference = (tree_map(lambda leaf: leaf[0].item(), tree) for tree in (motion.body, references))
+        body, reference = first_numbers(motion.body), first_numbers(references)
         outer = init_position_loop(FloatOps, self._gains, body, reference)
         restarted = controller._replace(outer=tree_map(lambda leaf: np.array([leaf]), outer))
         self._carry = (observer, restarted, motion)
