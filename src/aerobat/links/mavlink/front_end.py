@@ -13,6 +13,7 @@ from aerobat.links.autopilot.vehicle import POINT_TIMEOUT, SimulatedVehicle
 from aerobat.links.goals import AttitudeGoal, Mode, PositionGoal, yaw_of
 from aerobat.links.mavlink.connection import Connection, dialect
 from aerobat.links.mavlink.frames import (
+    HOVER_THRUST,
     from_global,
     swap_attitude,
     swap_body,
@@ -22,7 +23,7 @@ from aerobat.links.mavlink.frames import (
 )
 from aerobat.links.mavlink.modes import ARMED, CUSTOM_MODE_ENABLED, MAIN_AND_SUB, custom_mode
 
-TAKEOFF_HEIGHT = 2.5  # [m] PX4's own, until a client says otherwise
+_TAKEOFF_HEIGHT = "MIS_TAKEOFF_ALT"  # the one parameter that clients may set
 _FIRMWARE = 0x010F00FF  # 1.15.0, a release: which autopilot clients take it for
 _IGNORED_POSITION, _IGNORED_VELOCITY, _IGNORED_ACCELERATION, _IGNORED_YAW = 7, 56, 448, 1024
 _IGNORED_RATES, _IGNORED_ATTITUDE = 7, 128
@@ -43,8 +44,8 @@ class FrontEnd:
         self._mavlink = dialect()
         self._began = vehicle.time
         self.parameters = {
-            "MPC_THR_HOVER": vehicle.hover_fraction,
-            "MIS_TAKEOFF_ALT": TAKEOFF_HEIGHT,
+            HOVER_THRUST: vehicle.hover_fraction,
+            _TAKEOFF_HEIGHT: 2.5,  # [m] PX4's own, until a client says otherwise
             "COM_OF_LOSS_T": POINT_TIMEOUT,
         }
         self._streams: dict[int, tuple[Callable[[], Any], float]] = {
@@ -189,7 +190,7 @@ class FrontEnd:
             self._give_parameter(name)
 
     def _take_param_set(self, message: Any) -> None:
-        if message.param_id == "MIS_TAKEOFF_ALT" and 0.5 <= message.param_value <= 100.0:
+        if message.param_id == _TAKEOFF_HEIGHT and 0.5 <= message.param_value <= 100.0:
             self.parameters[message.param_id] = float(message.param_value)
         self._give_parameter(str(message.param_id))
 
@@ -233,7 +234,7 @@ class FrontEnd:
         return any(orders[mode]() for mode, numbers in MAIN_AND_SUB.items() if numbers == (main, sub))
 
     def _take_off(self) -> bool:
-        return self.vehicle.take_off(self.parameters["MIS_TAKEOFF_ALT"])
+        return self.vehicle.take_off(self.parameters[_TAKEOFF_HEIGHT])
 
     def _reposition(self, place: tuple[float, float, float], yaw: float) -> bool:
         latitude, longitude, altitude = place
