@@ -160,8 +160,9 @@ class SimulatedVehicle:
     @property
     def _followed(self) -> Route | PointReference | AttitudeReference:
         """The present goal."""
-        offboard = self.mode is Mode.OFFBOARD and self._goal is not None
-        return self._goal if offboard and self._goal is not None else self._route
+        if self.mode is Mode.OFFBOARD and self._goal is not None:
+            return self._goal
+        return self._route
 
     def _go(self, mode: Mode, path: Trajectory, yaw: float | None = None) -> None:
         """Take a way of its own."""

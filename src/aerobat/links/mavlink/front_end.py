@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from math import degrees, isfinite, nan, pi
+from math import degrees, isfinite, isnan, nan, pi
 from typing import Any
 
 import numpy as np
@@ -62,7 +62,10 @@ class FrontEnd:
                 (self._mavlink.MAVLink_odometry_message, self._odometry, nan),
             )
         }
-        self._due = {identity: self._began + 0.0 * every for identity, (_, every) in self._streams.items()}
+        self._due = {
+            identity: nan if isnan(interval) else self._began
+            for identity, (_, interval) in self._streams.items()
+        }  # [s] NaN for those that nobody has asked for
 
     def tick(self, now: float) -> None:
         """Go on to this time [s], take what has come, and send what is due."""
@@ -96,9 +99,8 @@ class FrontEnd:
     def _heartbeat(self) -> Any:
         armed = ARMED if self.vehicle.armed else 0
         state = 4 if self.vehicle.armed else 3  # active, or on standby
-        kind = {4: 2, 6: 13, 8: 14}.get(
-            len(self.vehicle.vehicle.rotors), 2
-        )  # quadrotor, hexarotor, octorotor
+        kinds = {4: 2, 6: 13, 8: 14}  # quadrotor, hexarotor, octorotor
+        kind = kinds.get(len(self.vehicle.vehicle.rotors), 2)
         return self._mavlink.MAVLink_heartbeat_message(
             kind, 12, CUSTOM_MODE_ENABLED | armed, custom_mode(self.vehicle.mode), state, 3
         )
@@ -200,24 +202,24 @@ class FrontEnd:
             self._send("param_value", name.encode(), self.parameters[name], 9, len(self.parameters), index)
 
     def _take_command_long(self, message: Any) -> None:
-        numbers = [message.param1, message.param2, message.param3, message.param4]
-        place = (1e7 * message.param5, 1e7 * message.param6, message.param7)
-        self._obey(message, [*numbers, message.param5, message.param6, message.param7], place)
+        self._obey(message, (1e7 * message.param5, 1e7 * message.param6, message.param7))
 
     def _take_command_int(self, message: Any) -> None:
-        numbers = [message.param1, message.param2, message.param3, message.param4]
-        self._obey(message, [*numbers, message.x, message.y, message.z], (message.x, message.y, message.z))
+        self._obey(message, (message.x, message.y, message.z))
 
-    def _obey(self, message: Any, numbers: list[float], place: tuple[float, float, float]) -> None:
-        """Do what a command says, and acknowledge it: accepted, denied, or not known."""
+    def _obey(self, message: Any, place: tuple[float, float, float]) -> None:
+        """Do what a command says, and acknowledge it: accepted, denied, or not known.
+
+        `place`: latitude and longitude [1e-7 °] and altitude [m].
+        """
         known: dict[int, Callable[[], bool]] = {
-            400: lambda: self.vehicle.arm() if numbers[0] > 0.5 else self.vehicle.disarm(),
-            176: lambda: self._change_mode(int(numbers[1]), int(numbers[2])),
+            400: lambda: self.vehicle.arm() if message.param1 > 0.5 else self.vehicle.disarm(),
+            176: lambda: self._change_mode(int(message.param2), int(message.param3)),
             22: self._take_off,
             21: self.vehicle.land,
-            192: lambda: self._reposition(place, numbers[3]),
-            511: lambda: self._set_interval(int(numbers[0]), numbers[1]),
-            512: lambda: self._give_message(int(numbers[0])),
+            192: lambda: self._reposition(place, message.param4),
+            511: lambda: self._set_interval(int(message.param1), message.param2),
+            512: lambda: self._give_message(int(message.param1)),
         }
         act = known.get(message.command)
         result = 3 if act is None else 0 if act() else 2  # unsupported, accepted, denied
