@@ -84,6 +84,11 @@ def _ticks(inputs: Tree, vehicle: int) -> Iterator[Tree]:
     return tree_rows(inputs, lambda leaf: _floats(leaf if leaf.ndim == 1 else leaf[:, vehicle]))
 
 
+def first_numbers(tree: Tree) -> Any:
+    """The first number of each leaf, as `FloatOps` takes it: of one vehicle, or of the first tick."""
+    return tree_map(lambda leaf: float(np.ravel(leaf)[0]), tree)
+
+
 def _stacked(carries: list[Tree]) -> Tree:
     return tree_stack(carries, lambda values: read_only(np.array(values)))
 

@@ -9,11 +9,8 @@ from __future__ import annotations
 
 from collections import deque
 
-import numpy as np
-
 from aerobat.control.parameters import controller_parameters
-from aerobat.engines.floats import FloatOps
-from aerobat.engines.pytree import tree_map
+from aerobat.engines.floats import FloatOps, first_numbers
 from aerobat.environment import Environment
 from aerobat.kernels.control import ControllerModel
 from aerobat.kernels.control_loops import (
@@ -46,7 +43,7 @@ class PathFollower:
             environment: where it flies.
         """
         model = controller_parameters(vehicle.controller, Fleet.of([vehicle]), environment)
-        self._model: ControllerModel = tree_map(lambda leaf: float(np.asarray(leaf).ravel()[0]), model)
+        self._model: ControllerModel = first_numbers(model)
         self._stream = stream
         self._outer: PositionLoopState | None = None
         self._observed: Observed | None = None

@@ -41,13 +41,14 @@ def mavlink(
     if not isinstance(found, Plan):
         raise SpecError(f"{plan} holds a path alone; give a .plan file, which is certified for its vehicle")
     from aerobat.links.clock import WallClock
+    from aerobat.links.mavlink.autopilot_link import COMPONENT, SYSTEM
     from aerobat.links.mavlink.client import Client, ClientSettings, run
     from aerobat.links.mavlink.connection import connect
     from aerobat.links.mission import MissionSettings, require_flyable
 
     offset = _origin(found) if options.origin is None else np.array(options.origin)
     require_flyable(found, offset, options.vehicle)
-    connection = connect(options.connect, listen=False, system=245, component=191, baud=options.baud)
+    connection = connect(options.connect, listen=False, system=SYSTEM, component=COMPONENT, baud=options.baud)
     try:
         client = Client(
             found,
@@ -62,7 +63,7 @@ def mavlink(
             say=say,
             announcement=str(recoveries(found, ground=-offset[2])),
         )
-        run(client, WallClock(options.speed), options.rate)
+        run(client, WallClock(options.speed))
     finally:
         connection.close()
     report = client.report()

@@ -7,10 +7,8 @@ from math import cos, sin
 import numpy as np
 
 from aerobat.arrays import Array
-from aerobat.control.parameters import airframe_parameters, controller_parameters, environment_parameters
-from aerobat.engines import choose
 from aerobat.engines.engine import first_row
-from aerobat.engines.floats import FloatOps
+from aerobat.engines.floats import FloatOps, first_numbers
 from aerobat.engines.pytree import Tree, tree_map
 from aerobat.environment import Environment
 from aerobat.kernels.control_loops import Gains, ReferencePoint, init_position_loop
@@ -18,15 +16,12 @@ from aerobat.kernels.motors import Motion
 from aerobat.kernels.rigid_body import Body
 from aerobat.links.goals import yaw_of
 from aerobat.simulation.autopilot.braking import point_reference
-from aerobat.simulation.autopilot.controller import AutopilotController
+from aerobat.simulation.autopilot.loop import autopilot_inputs, autopilot_loop, autopilot_parameters
 from aerobat.simulation.bodies import bodies
-from aerobat.simulation.components import PlantParameters, RigidBodyPlant, StateObserver, log_row
-from aerobat.simulation.loop import Clock, LoopInput, LoopParameters, compose
+from aerobat.simulation.components import log_row
 from aerobat.states import BodyState
 from aerobat.vehicle import Vehicle
-from aerobat.vehicle.fleet import Fleet
 
-RATE = 500.0  # [1/s] of the controller and the plant
 _LONG = 10**6  # ticks: what a live flight takes is not known
 
 
@@ -36,19 +31,12 @@ class LiveBody:
     def __init__(self, vehicle: Vehicle, environment: Environment) -> None:
         vehicle.require_hover(environment.gravity)
         self._idle = tuple(np.array([least]) for least in vehicle.min_thrusts)
-        fleet = Fleet.of([vehicle])
-        model = controller_parameters(vehicle.controller, fleet, environment)
-        self._gains: Gains = tree_map(lambda leaf: float(np.ravel(leaf)[0]), model.gains)
-        parts = (
-            StateObserver(),
-            AutopilotController(vehicle.controller.feature_flags),
-            RigidBodyPlant.for_rate(RATE),
-        )
-        plant = PlantParameters(airframe_parameters(fleet), environment_parameters(environment, 1))
         self.state = _at_rest(np.zeros(2), 0.0)  # the true one, (·,)
-        parameters = LoopParameters(_one(self.state), ((), model, plant))
-        first = first_row(_inputs(_hovering(environment.gravity), False))
-        self._loop = choose("auto", 1, _LONG).compile(*compose(parts, log_row), parameters, first)
+        parameters = autopilot_parameters(_one(self.state), vehicle, environment)
+        _, model, _ = parameters.own
+        self._gains: Gains = first_numbers(model.gains)
+        first = first_row(autopilot_inputs(_hovering(environment.gravity), False))
+        self._loop = autopilot_loop(vehicle, parameters, first, log_row, _LONG)
         self._carry: Tree = self._loop.init(first)
         self.stop_rotors()
 
@@ -57,13 +45,13 @@ class LiveBody:
 
         `by_attitude`: whether their attitude, rates and thrust are commanded, or their position.
         """
-        self._carry, _ = self._loop.scan(self._carry, _inputs(references, by_attitude))
+        self._carry, _ = self._loop.scan(self._carry, autopilot_inputs(references, by_attitude))
         self.state = BodyState(*(np.concatenate(leaves) for leaves in self._carry[2].body))
 
     def restart_position_loop(self, references: ReferencePoint) -> None:
         """Have the outer loop begin anew towards the first of the references, without what was before."""
         observer, controller, motion = self._carry
-        body, reference = (tree_map(lambda leaf: leaf[0].item(), tree) for tree in (motion.body, references))
+        body, reference = first_numbers(motion.body), first_numbers(references)
         outer = init_position_loop(FloatOps, self._gains, body, reference)
         restarted = controller._replace(outer=tree_map(lambda leaf: np.array([leaf]), outer))
         self._carry = (observer, restarted, motion)
@@ -96,11 +84,3 @@ def _one(state: BodyState) -> Body:
 def _hovering(gravity: float) -> ReferencePoint:
     zero = np.zeros((1, 3))
     return point_reference(zero, zero, zero, zero, 0.0, gravity)
-
-
-def _inputs(references: ReferencePoint, by_attitude: bool) -> LoopInput:
-    """The loop's inputs, leaves (T,)."""
-    ticks = len(references.position[0])
-    period = np.full(ticks, 1.0 / RATE)
-    own = ((), np.full(ticks, float(by_attitude)), ())
-    return LoopInput(Clock(period, period), ((), (), ()), references, own)

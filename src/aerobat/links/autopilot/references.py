@@ -12,9 +12,9 @@ from aerobat.engines.components import components
 from aerobat.kernels.control_loops import Lookahead, ReferencePoint
 from aerobat.links.goals import AttitudeGoal, PositionGoal
 from aerobat.simulation.autopilot.braking import point_reference
+from aerobat.simulation.autopilot.loop import KEPT
 from aerobat.trajectory import Trajectory
 
-_MAX_EXTRAPOLATION = 0.04  # [s] for which a goal is carried on by its rates where no newer one comes
 _SMOOTHING = 0.002  # [s] time constant of the low-pass on the change of commanded rates and thrust
 
 
@@ -42,7 +42,7 @@ class PointReference(NamedTuple):
     def reference(self, times: Array, gravity: float) -> ReferencePoint:
         """References at times [s], leaves (T,)."""
         goal, ones = self.goal, np.ones((len(times), 1))
-        age = np.clip(times - self.arrived, 0.0, _MAX_EXTRAPOLATION)[:, None]
+        age = np.clip(times - self.arrived, 0.0, KEPT)[:, None]
         position = goal.position + age * goal.velocity
         velocity, acceleration = ones * goal.velocity, ones * goal.acceleration
         return point_reference(position, velocity, acceleration, 0.0 * ones * velocity, goal.yaw, gravity)
@@ -71,7 +71,7 @@ class AttitudeReference(NamedTuple):
         elapsed = sent - self.sent
         if elapsed <= 0.0:
             return self
-        if elapsed > 10.0 * _MAX_EXTRAPOLATION:
+        if elapsed > 10.0 * KEPT:
             return self.first(goal, sent, arrived)
         fraction = elapsed / (elapsed + _SMOOTHING)
         change = (np.array(goal.omega_body) - self.goal.omega_body) / elapsed
@@ -86,7 +86,7 @@ class AttitudeReference(NamedTuple):
 
     def reference(self, times: Array, period: float, mass: float) -> ReferencePoint:
         """References at times [s], leaves (T,), for a controller that steps so often, of a vehicle's mass."""
-        age = np.clip(times - self.since, 0.0, _MAX_EXTRAPOLATION)[:, None]
+        age = np.clip(times - self.since, 0.0, KEPT)[:, None]
         omega_body = self.goal.omega_body + age * self.omega_dot
         mean_rate = self.goal.omega_body + 0.5 * age * self.omega_dot
         q = so3.multiply(so3.normalize(np.array(self.goal.q_world_body)), so3.exp(age * mean_rate))

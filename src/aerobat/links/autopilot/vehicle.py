@@ -9,11 +9,12 @@ import numpy as np
 from aerobat import so3
 from aerobat.arrays import Array
 from aerobat.environment import Environment
-from aerobat.links.autopilot.live_body import RATE, LiveBody
+from aerobat.links.autopilot.live_body import LiveBody
 from aerobat.links.autopilot.references import AttitudeReference, PointReference, Route
 from aerobat.links.goals import AttitudeGoal, Mode, PositionGoal, yaw_of
 from aerobat.links.routes import rest_to_rest
 from aerobat.simulation.autopilot.braking import MIN_FLOOR, Braking
+from aerobat.simulation.autopilot.loop import RATE
 from aerobat.states import BodyState
 from aerobat.trajectory import Trajectory
 from aerobat.vehicle import Vehicle
@@ -159,8 +160,9 @@ class SimulatedVehicle:
     @property
     def _followed(self) -> Route | PointReference | AttitudeReference:
         """The present goal."""
-        offboard = self.mode is Mode.OFFBOARD and self._goal is not None
-        return self._goal if offboard and self._goal is not None else self._route
+        if self.mode is Mode.OFFBOARD and self._goal is not None:
+            return self._goal
+        return self._route
 
     def _go(self, mode: Mode, path: Trajectory, yaw: float | None = None) -> None:
         """Take a way of its own."""

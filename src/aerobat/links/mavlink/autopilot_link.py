@@ -45,7 +45,6 @@ class AutopilotLink:
         self.landed: bool | None = None
         self.observed: Observed | None = None
         self.parameters: dict[str, float] = {}
-        self.refusals: dict[int, int] = {}  # the result of commands that were not accepted
         self.told: list[str] = []
 
     @property
@@ -161,12 +160,6 @@ class AutopilotLink:
 
     def _take_param_value(self, message: Any) -> None:
         self.parameters[str(message.param_id)] = float(message.param_value)
-
-    def _take_command_ack(self, message: Any) -> None:
-        if message.result == 0:
-            self.refusals.pop(message.command, None)
-        else:
-            self.refusals[message.command] = message.result
 
     def _take_statustext(self, message: Any) -> None:
         self.told.append(str(message.text))

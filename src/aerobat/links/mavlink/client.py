@@ -15,11 +15,11 @@ from aerobat.links.clock import Clock
 from aerobat.links.goals import Mode, Observed, PositionGoal, yaw_of
 from aerobat.links.mavlink.autopilot_link import AutopilotLink
 from aerobat.links.mavlink.connection import Connection
+from aerobat.links.mavlink.frames import HOVER_THRUST
 from aerobat.links.mission import Mission, MissionSettings, Phase
 from aerobat.links.report import LinkReport, link_report
 from aerobat.planning import Plan
 
-HOVER_THRUST = "MPC_THR_HOVER"
 _HOVER_TOLERANCE = 0.1  # [-] by which a vehicle's hovering thrust may differ from that of the plan's vehicle
 _STREAMED = 1.2  # [s] of set-points before PX4 takes the mode offboard
 _PATIENCE = 8.0  # [s] for a vehicle to do as it is told
@@ -81,7 +81,7 @@ class Client:
         self.link = AutopilotLink(connection, settings.telemetry_rate)
         self.stage = Stage.CONNECTING
         self.log: list[Observed] = []  # while the plan was flown
-        self._settings = settings
+        self.settings = settings
         self._say = say
         self._announcement = announcement
         self._began: float | None = None
@@ -149,14 +149,14 @@ class Client:
     def _while_connecting(self, now: float) -> None:
         if self.link.is_known:
             self._enter(Stage.ASKING, now)
-        elif self._since(now) > self._settings.wait:
+        elif self._since(now) > self.settings.wait:
             raise SpecError(
-                f"no vehicle answers within {self._settings.wait:g} s; check the address, and that it is on"
+                f"no vehicle answers within {self.settings.wait:g} s; check the address, and that it is on"
             )
 
     def _while_asking(self, now: float) -> None:
         """Wait for its clock, its state and its hovering thrust, and see that it is the plan's vehicle."""
-        hover = self._settings.hover_thrust or self.link.parameters.get(HOVER_THRUST)
+        hover = self.settings.hover_thrust or self.link.parameters.get(HOVER_THRUST)
         if hover is None:
             self.link.ask_parameter(HOVER_THRUST)
         if hover is not None and self.link.observed is not None and self.link.landed is not None:
@@ -170,11 +170,11 @@ class Client:
             if self._announcement:
                 self._say(self._announcement)
             self._enter(Stage.ARMING, now)
-        elif self._since(now) > self._settings.wait:
+        elif self._since(now) > self.settings.wait:
             missing, remedy = "its state (ODOMETRY)", "have it send that message"
             if hover is None:
                 missing, remedy = f"its parameter {HOVER_THRUST}", "give --hover-thrust"
-            waited = f"{self._settings.wait:g} s"
+            waited = f"{self.settings.wait:g} s"
             raise SpecError(f"the vehicle does not tell {missing} within {waited}; {remedy}")
 
     def _check(self, hover: float) -> None:
@@ -242,24 +242,24 @@ class Client:
         self._give_up_where_silent(now)
 
     def _give_up_where_silent(self, now: float) -> None:
-        if now - self._observed.time > self._settings.wait:
+        if now - self._observed.time > self.settings.wait:
             self._enter(Stage.LOST, now)
             self._say("no news of the vehicle; it is left to its own failsafe")
 
 
-def run(client: Client, clock: Clock, rate: float) -> None:
+def run(client: Client, clock: Clock) -> None:
     """Tick a client until it is done. Interrupted, it tells the vehicle to hover first."""
-    due = clock.now()
+    due, period = clock.now(), 1.0 / client.settings.rate
     try:
         while not client.done:
             clock.sleep_until(due)
             now = clock.now()
             client.tick(now)
-            due = max(due + 1.0 / rate, now)
+            due = max(due + period, now)
     except KeyboardInterrupt:
         until = clock.now() + 1.0
         client.abort(clock.now(), "interrupted")
         while clock.now() < until and client.stage is Stage.RECOVERING:
             client.tick(clock.now())
-            clock.sleep_until(clock.now() + 1.0 / rate)
+            clock.sleep_until(clock.now() + period)
         raise

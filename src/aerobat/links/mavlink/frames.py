@@ -19,6 +19,7 @@ from aerobat.kernels.quaternions import multiply
 _S = sqrt(0.5)
 _WORLD: Quaternion = (0.0, _S, _S, 0.0)
 _BODY: Quaternion = (0.0, 1.0, 0.0, 0.0)
+HOVER_THRUST = "MPC_THR_HOVER"  # the parameter by whose value thrusts are scaled
 _EARTH = 6_371_000.0  # [m] mean radius
 HOME = (47.397742, 8.545594, 488.0)  # [°], [°], [m] where simulated vehicles stand, as PX4's own do
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from math import degrees, isfinite, nan, pi
+from math import degrees, isfinite, isnan, nan, pi
 from typing import Any
 
 import numpy as np
@@ -13,6 +13,7 @@ from aerobat.links.autopilot.vehicle import POINT_TIMEOUT, SimulatedVehicle
 from aerobat.links.goals import AttitudeGoal, Mode, PositionGoal, yaw_of
 from aerobat.links.mavlink.connection import Connection, dialect
 from aerobat.links.mavlink.frames import (
+    HOVER_THRUST,
     from_global,
     swap_attitude,
     swap_body,
@@ -22,7 +23,7 @@ from aerobat.links.mavlink.frames import (
 )
 from aerobat.links.mavlink.modes import ARMED, CUSTOM_MODE_ENABLED, MAIN_AND_SUB, custom_mode
 
-TAKEOFF_HEIGHT = 2.5  # [m] PX4's own, until a client says otherwise
+_TAKEOFF_HEIGHT = "MIS_TAKEOFF_ALT"  # the one parameter that clients may set
 _FIRMWARE = 0x010F00FF  # 1.15.0, a release: which autopilot clients take it for
 _IGNORED_POSITION, _IGNORED_VELOCITY, _IGNORED_ACCELERATION, _IGNORED_YAW = 7, 56, 448, 1024
 _IGNORED_RATES, _IGNORED_ATTITUDE = 7, 128
@@ -43,8 +44,8 @@ class FrontEnd:
         self._mavlink = dialect()
         self._began = vehicle.time
         self.parameters = {
-            "MPC_THR_HOVER": vehicle.hover_fraction,
-            "MIS_TAKEOFF_ALT": TAKEOFF_HEIGHT,
+            HOVER_THRUST: vehicle.hover_fraction,
+            _TAKEOFF_HEIGHT: 2.5,  # [m] PX4's own, until a client says otherwise
             "COM_OF_LOSS_T": POINT_TIMEOUT,
         }
         self._streams: dict[int, tuple[Callable[[], Any], float]] = {
@@ -61,7 +62,10 @@ class FrontEnd:
                 (self._mavlink.MAVLink_odometry_message, self._odometry, nan),
             )
         }
-        self._due = {identity: self._began + 0.0 * every for identity, (_, every) in self._streams.items()}
+        self._due = {
+            identity: nan if isnan(interval) else self._began
+            for identity, (_, interval) in self._streams.items()
+        }  # [s] NaN for those that nobody has asked for
 
     def tick(self, now: float) -> None:
         """Go on to this time [s], take what has come, and send what is due."""
@@ -95,9 +99,8 @@ class FrontEnd:
     def _heartbeat(self) -> Any:
         armed = ARMED if self.vehicle.armed else 0
         state = 4 if self.vehicle.armed else 3  # active, or on standby
-        kind = {4: 2, 6: 13, 8: 14}.get(
-            len(self.vehicle.vehicle.rotors), 2
-        )  # quadrotor, hexarotor, octorotor
+        kinds = {4: 2, 6: 13, 8: 14}  # quadrotor, hexarotor, octorotor
+        kind = kinds.get(len(self.vehicle.vehicle.rotors), 2)
         return self._mavlink.MAVLink_heartbeat_message(
             kind, 12, CUSTOM_MODE_ENABLED | armed, custom_mode(self.vehicle.mode), state, 3
         )
@@ -189,7 +192,7 @@ class FrontEnd:
             self._give_parameter(name)
 
     def _take_param_set(self, message: Any) -> None:
-        if message.param_id == "MIS_TAKEOFF_ALT" and 0.5 <= message.param_value <= 100.0:
+        if message.param_id == _TAKEOFF_HEIGHT and 0.5 <= message.param_value <= 100.0:
             self.parameters[message.param_id] = float(message.param_value)
         self._give_parameter(str(message.param_id))
 
@@ -199,24 +202,24 @@ class FrontEnd:
             self._send("param_value", name.encode(), self.parameters[name], 9, len(self.parameters), index)
 
     def _take_command_long(self, message: Any) -> None:
-        numbers = [message.param1, message.param2, message.param3, message.param4]
-        place = (1e7 * message.param5, 1e7 * message.param6, message.param7)
-        self._obey(message, [*numbers, message.param5, message.param6, message.param7], place)
+        self._obey(message, (1e7 * message.param5, 1e7 * message.param6, message.param7))
 
     def _take_command_int(self, message: Any) -> None:
-        numbers = [message.param1, message.param2, message.param3, message.param4]
-        self._obey(message, [*numbers, message.x, message.y, message.z], (message.x, message.y, message.z))
+        self._obey(message, (message.x, message.y, message.z))
 
-    def _obey(self, message: Any, numbers: list[float], place: tuple[float, float, float]) -> None:
-        """Do what a command says, and acknowledge it: accepted, denied, or not known."""
+    def _obey(self, message: Any, place: tuple[float, float, float]) -> None:
+        """Do what a command says, and acknowledge it: accepted, denied, or not known.
+
+        `place`: latitude and longitude [1e-7 °] and altitude [m].
+        """
         known: dict[int, Callable[[], bool]] = {
-            400: lambda: self.vehicle.arm() if numbers[0] > 0.5 else self.vehicle.disarm(),
-            176: lambda: self._change_mode(int(numbers[1]), int(numbers[2])),
+            400: lambda: self.vehicle.arm() if message.param1 > 0.5 else self.vehicle.disarm(),
+            176: lambda: self._change_mode(int(message.param2), int(message.param3)),
             22: self._take_off,
             21: self.vehicle.land,
-            192: lambda: self._reposition(place, numbers[3]),
-            511: lambda: self._set_interval(int(numbers[0]), numbers[1]),
-            512: lambda: self._give_message(int(numbers[0])),
+            192: lambda: self._reposition(place, message.param4),
+            511: lambda: self._set_interval(int(message.param1), message.param2),
+            512: lambda: self._give_message(int(message.param1)),
         }
         act = known.get(message.command)
         result = 3 if act is None else 0 if act() else 2  # unsupported, accepted, denied
@@ -233,7 +236,7 @@ class FrontEnd:
         return any(orders[mode]() for mode, numbers in MAIN_AND_SUB.items() if numbers == (main, sub))
 
     def _take_off(self) -> bool:
-        return self.vehicle.take_off(self.parameters["MIS_TAKEOFF_ALT"])
+        return self.vehicle.take_off(self.parameters[_TAKEOFF_HEIGHT])
 
     def _reposition(self, place: tuple[float, float, float], yaw: float) -> bool:
         latitude, longitude, altitude = place

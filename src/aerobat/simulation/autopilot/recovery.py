@@ -13,9 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from aerobat import so3
 from aerobat.arrays import Array, frozen
-from aerobat.control.parameters import airframe_parameters, controller_parameters, environment_parameters
 from aerobat.declaration import Finite, NonNegative, by_value, short, validated
-from aerobat.engines import choose
 from aerobat.engines.components import components, from_components
 from aerobat.engines.engine import first_row
 from aerobat.engines.pytree import Tree
@@ -26,18 +24,20 @@ from aerobat.kernels.control_loops import Lookahead, ReferencePoint
 from aerobat.kernels.motors import Motion
 from aerobat.kernels.rigid_body import Body
 from aerobat.simulation.autopilot.braking import MIN_FLOOR, Braking, point_reference
-from aerobat.simulation.autopilot.controller import AutopilotController
+from aerobat.simulation.autopilot.loop import (
+    KEPT,
+    RATE,
+    autopilot_inputs,
+    autopilot_loop,
+    autopilot_parameters,
+)
 from aerobat.simulation.bodies import bodies
-from aerobat.simulation.components import PlantParameters, RigidBodyPlant, StateObserver
-from aerobat.simulation.loop import Clock, LoopInput, LoopParameters, Signals, compose
+from aerobat.simulation.loop import Signals
 from aerobat.states import BodyState, Setpoint
 from aerobat.trajectory import Trajectory, as_trajectory
 from aerobat.vehicle import Vehicle
-from aerobat.vehicle.fleet import Fleet
 
-RATE = 500.0  # [1/s] of the ticks
 HORIZON = 6.0  # [s] in which a recovery comes to a hover, or never does
-KEPT = 0.04  # [s] for which commanded rates are kept where nothing comes; then the attitude is
 _CHUNK = 100  # ticks flown at once, so that their references take little memory
 _STILL = 0.2  # [m/s] of a hover
 _LEVEL = 0.2  # [rad] likewise
@@ -129,22 +129,16 @@ class _Flock:
         self, setpoint: Setpoint, thrusts: Array, vehicle: Vehicle, environment: Environment
     ) -> None:
         self._vehicle, self._gravity = vehicle, environment.gravity
-        count = len(thrusts)
-        fleet = Fleet.of([vehicle] * count)
-        model = controller_parameters(vehicle.controller, fleet, environment)
-        plant = PlantParameters(airframe_parameters(fleet), environment_parameters(environment, count))
-        flat = setpoint.flat
+        flat, count = setpoint.flat, len(thrusts)
         start = bodies(BodyState(flat.position, flat.velocity, setpoint.q_world_body, setpoint.omega_body))
-        parts = (
-            StateObserver(),
-            AutopilotController(vehicle.controller.feature_flags),
-            RigidBodyPlant.for_rate(RATE),
+        first = first_row(autopilot_inputs(_kept(setpoint, np.zeros(1), vehicle), True))
+        self._loop = autopilot_loop(
+            vehicle,
+            autopilot_parameters(start, vehicle, environment),
+            first,
+            _body,
+            round(HORIZON * RATE),
         )
-        ticks = count * round(HORIZON * RATE)
-        parameters = LoopParameters(start, ((), model, plant))
-        first = first_row(self._inputs(_kept(setpoint, np.zeros(1), vehicle), True))
-        engine = choose("auto", count, ticks)
-        self._loop = engine.compile(*compose(parts, _body), parameters, first)
         observer, controller, motion = self._loop.init(first)
         turning = components(np.clip(thrusts, vehicle.min_thrusts, vehicle.max_thrusts))
         self._carry: Tree = (
@@ -153,7 +147,7 @@ class _Flock:
             Motion(motion.body, turning),
         )
         self._time = 0.0
-        self.lowest = setpoint.flat.position[:, 2].copy()
+        self.lowest = flat.position[:, 2].copy()
         self.durations = np.zeros(count)
 
     def keep(self, setpoint: Setpoint, seconds: float) -> None:
@@ -176,7 +170,7 @@ class _Flock:
         self.lowest.flags.writeable = self.durations.flags.writeable = False
 
     def _fly(self, references: ReferencePoint, by_attitude: bool) -> None:
-        self._carry, body = self._loop.scan(self._carry, self._inputs(references, by_attitude))
+        self._carry, body = self._loop.scan(self._carry, autopilot_inputs(references, by_attitude))
         self.lowest = np.minimum(self.lowest, body.position[2].min(axis=1))
         speed = np.linalg.norm(from_components(body.velocity), axis=-1)
         lean = so3.thrust_axis(from_components(body.q_world_body))[..., 2]
@@ -185,12 +179,6 @@ class _Flock:
         latest = ticks - np.argmax(moving[:, ::-1], axis=1)
         self.durations = np.where(moving.any(axis=1), self._time + latest / RATE, self.durations)
         self._time += ticks / RATE
-
-    def _inputs(self, references: ReferencePoint, by_attitude: bool) -> LoopInput:
-        ticks = len(references.position[0])
-        period = np.full(ticks, 1.0 / RATE)
-        own = ((), np.full(ticks, float(by_attitude)), ())
-        return LoopInput(Clock(period, period), ((), (), ()), references, own)
 
 
 def _body(signals: Signals) -> Body:

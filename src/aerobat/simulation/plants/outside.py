@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from aerobat.engines.pytree import Tree, tree_map, tree_stack
+from aerobat.engines.floats import first_numbers
+from aerobat.engines.pytree import tree_map, tree_stack
 from aerobat.errors import SpecError
 from aerobat.kernels.motors import Motion
 from aerobat.kernels.ops import Ops
@@ -96,19 +97,21 @@ def fly_outside(
     parameters: PlantParameters = setup.parts[-1].parameters
     parts = (Part(OutsidePlant()), *setup.parts[:-1], Part(Actuator(), parameters))
     inside = replace(setup, parts=parts)
-    motion = Motion(_numbers(setup.start), tuple(0.0 for _ in parameters.airframe.rotors.max_thrust))
+    motion = Motion(first_numbers(setup.start), tuple(0.0 for _ in parameters.airframe.rotors.max_thrust))
     first = _told(inside.first_tick, motion)
     loop = inside.engine().compile(*compose(inside.components, _outside_row), inside.parameters, first)
     carry = loop.init(first)
     states = dict(zip((part.component.name for part in parts), carry, strict=True))
-    run = plant.begin(_scene(setup, gates), motion._replace(thrusts=_numbers(states["controller"].thrusts)))
+    run = plant.begin(
+        _scene(setup, gates), motion._replace(thrusts=first_numbers(states["controller"].thrusts))
+    )
     rows, touched = [], np.zeros(len(setup.times), dtype=np.int64)
     for tick, period in enumerate(np.diff(setup.times, append=setup.times[-1]).tolist()):
         carry, row = loop.step(carry, _told(inside.tick(tick), run.motion))
         rows.append(row.log)
         touched[tick] = run.contact
         if period > 0.0:
-            run.advance(_numbers(row.actuation), period)
+            run.advance(first_numbers(row.actuation), period)
     return tree_stack(rows, lambda parts: np.stack(parts, axis=-1)), touched
 
 
@@ -124,14 +127,9 @@ def _told(inputs: LoopInput, motion: Motion) -> LoopInput:
 def _scene(setup: FlightSetup, gates: tuple[Gate, ...]) -> PlantScene:
     fleet, environment = setup.fleet, setup.environment
     return PlantScene(
-        airframe=_numbers(setup.parts[-1].parameters.airframe),
+        airframe=first_numbers(setup.parts[-1].parameters.airframe),
         gravity=environment.gravity,
         ground=environment.ground,
         body=Ellipsoid(fleet.semi_axes[0], fleet.body_centres[0]),
         gates=gates,
     )
-
-
-def _numbers(tree: Tree) -> Any:
-    """A tree of one vehicle's leaves (1,) as plain numbers."""
-    return tree_map(lambda leaf: float(np.ravel(leaf)[0]), tree)

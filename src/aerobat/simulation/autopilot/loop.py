@@ -1,0 +1,60 @@
+"""The loop of vehicles under an autopilot's controller, whose references come from outside."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from aerobat.control.parameters import airframe_parameters, controller_parameters, environment_parameters
+from aerobat.engines import CompiledLoop, choose
+from aerobat.environment import Environment
+from aerobat.kernels.control_loops import ReferencePoint
+from aerobat.kernels.rigid_body import Body
+from aerobat.simulation.autopilot.controller import AutopilotController
+from aerobat.simulation.components import PlantParameters, RigidBodyPlant, StateObserver
+from aerobat.simulation.loop import Clock, Log, LoopInput, LoopParameters, compose
+from aerobat.vehicle import Vehicle
+from aerobat.vehicle.fleet import Fleet
+
+RATE = 500.0  # [1/s] of the controller and the plant
+KEPT = 0.04  # [s] for which commanded rates are kept where nothing newer comes; then the attitude is
+
+
+def autopilot_parameters(start: Body, vehicle: Vehicle, environment: Environment) -> LoopParameters:
+    """Parameters of as many copies of a vehicle as there are states at first, leaves (copies,)."""
+    copies = len(start.position[0])
+    fleet = Fleet.of([vehicle] * copies)
+    model = controller_parameters(vehicle.controller, fleet, environment)
+    plant = PlantParameters(airframe_parameters(fleet), environment_parameters(environment, copies))
+    return LoopParameters(start, ((), model, plant))
+
+
+def autopilot_loop(
+    vehicle: Vehicle, parameters: LoopParameters, first: LoopInput, log: Log, ticks: int
+) -> CompiledLoop:
+    """The loop of observer, controller and plant, in whichever engine is the fastest.
+
+    Args:
+        vehicle: whose controller's features count.
+        parameters: see `autopilot_parameters`.
+        first: inputs of one tick.
+        log: what a row takes of the signals.
+        ticks: about how many will be flown.
+    """
+    parts = (
+        StateObserver(),
+        AutopilotController(vehicle.controller.feature_flags),
+        RigidBodyPlant.for_rate(RATE),
+    )
+    engine = choose("auto", len(parameters.start.position[0]), ticks)
+    return engine.compile(*compose(parts, log), parameters, first)
+
+
+def autopilot_inputs(references: ReferencePoint, by_attitude: bool) -> LoopInput:
+    """Inputs of as many ticks as there are references, leaves (T, ...).
+
+    `by_attitude`: whether their attitude, rates and thrust are commanded, or their position.
+    """
+    ticks = len(references.position[0])
+    period = np.full(ticks, 1.0 / RATE)
+    own = ((), np.full(ticks, float(by_attitude)), ())
+    return LoopInput(Clock(period, period), ((), (), ()), references, own)
