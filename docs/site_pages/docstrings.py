@@ -30,10 +30,7 @@ def escaped(line: str) -> str:
 
 def fields(cls: Any) -> list[str]:
     """A class's fields as its parameters, with the comments beside them in its source."""
-    told = {}
-    for base in reversed(cls.__mro__):
-        if dataclasses.is_dataclass(base):
-            told.update(comments(base))
+    told = comments(cls)
     lines = []
     for field in dataclasses.fields(cls):
         if not field.name.startswith("_"):

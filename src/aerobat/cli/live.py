@@ -2,7 +2,6 @@
 
 # no postponed annotations here: options are made from them
 
-import webbrowser
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
@@ -11,7 +10,7 @@ from cyclopts import Group, Parameter, validators
 
 from aerobat.cli.options import PlanningOptions, ViewOptions
 from aerobat.cli.tasks import planned
-from aerobat.cli.terminal import print_json, say
+from aerobat.cli.terminal import open_in_browser, print_json
 from aerobat.environment import load_dispersion
 from aerobat.errors import SpecError
 from aerobat.reporting.report_json import to_json
@@ -70,8 +69,8 @@ def serve(source: Path | None, options: ViewOptions, serving: LiveOptions) -> No
             print(
                 f"{page.address} shows {plan.problem.name}, planned anew as its sliders say; Ctrl-C ends it"
             )
-        if not serving.no_browser and not webbrowser.open(page.address):
-            say(f"no browser could be started; open {page.address} in one")
+        if not serving.no_browser:
+            open_in_browser(page.address)
         try:
             page.wait()
         except KeyboardInterrupt:  # the one way in which it ends, and no failure

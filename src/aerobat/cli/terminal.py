@@ -9,6 +9,7 @@ import os
 import sys
 import unicodedata
 from contextlib import suppress
+from pathlib import Path
 from typing import TextIO
 
 # what tables and sentences hold beside ASCII, for terminals that have no more
@@ -66,6 +67,15 @@ def say(sentence: str) -> None:
         print(f"aerobat: {line}", file=sys.stderr, flush=True)
     except OSError:
         discard(sys.stderr)
+
+
+def open_in_browser(place: Path | str) -> None:
+    """Open a file or an address in the browser, or say that nothing does."""
+    import webbrowser  # most commands open nothing
+
+    address = place if isinstance(place, str) else place.resolve().as_uri()
+    if not webbrowser.open(address):
+        say(f"no browser could be started; open {place} in one")
 
 
 def print_json(text: str) -> None:

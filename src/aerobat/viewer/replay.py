@@ -32,9 +32,13 @@ class Replay:
 
     def _repr_html_(self) -> str:
         """The page in a frame of its own, in which it disturbs nothing."""
-        frame = "width:100%;border:1px solid #dfe6ec;border-radius:8px"
-        page = escape(self.html, quote=True)
-        return f'<iframe style="{frame}" height="{INLINE_HEIGHT}" srcdoc="{page}"></iframe>'
+        return inline_frame(f'srcdoc="{escape(self.html, quote=True)}"')
+
+
+def inline_frame(content: str) -> str:
+    """A frame in a notebook around a page, which is given as the frame's attribute."""
+    style = "width:100%;border:1px solid #dfe6ec;border-radius:8px"
+    return f'<iframe style="{style}" height="{INLINE_HEIGHT}" {content}></iframe>'
 
 
 @validated

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import webbrowser
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
@@ -16,7 +15,7 @@ from aerobat.cli.progress import DrawingProgress, showing
 from aerobat.cli.runs.folder import FLIGHT, REPLAY
 from aerobat.cli.runs.record import RECORD, RunRecord, read_record
 from aerobat.cli.runs.saved_plans import named_vehicle
-from aerobat.cli.terminal import print_json, say
+from aerobat.cli.terminal import open_in_browser, print_json
 from aerobat.control import named_controller
 from aerobat.errors import SpecError
 from aerobat.interchange import read_plan
@@ -81,14 +80,9 @@ def view(
         print(f"{replay.scene.title}: {'; '.join(replay.scene.facts)}")
         for written in filter(None, (options.video, page)):
             print(f"written to {written}")
-    if options.open:
-        _open(page or options.video)
-
-
-def _open(file: Path | None) -> None:
-    """Open what was written, or say that nothing does."""
-    if file is not None and not webbrowser.open(file.resolve().as_uri()):
-        say(f"no browser could be started; open {file} in one")
+    opened = page or options.video
+    if options.open and opened is not None:
+        open_in_browser(opened)
 
 
 @dataclass(frozen=True)

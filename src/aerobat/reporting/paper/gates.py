@@ -149,8 +149,7 @@ def _draw_gate(axes: Axes, trials: HardwareTrials, vehicle: Vehicle, opening: tu
 
 
 def _outline(flight: Flight, k: int, time: float, centre: Array, vehicle: Vehicle) -> Array:
-    """The body of flight k as it is seen along the passage at a time [s], from the gate's centre [m], "
-    "(n, 2)."""
+    """The body of flight k as seen along the passage at a time [s], from the gate's centre [m], (n, 2)."""
     row = int(np.argmin(np.abs(flight.times - time)))
     position, attitude = flight.states.position[k, row], flight.states.q_world_body[k, row]
     seen = ALONG @ (so3.axes(attitude) * np.array(vehicle.bounding_ellipsoid.semi_axes))

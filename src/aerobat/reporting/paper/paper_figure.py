@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from textwrap import wrap
 from typing import TYPE_CHECKING
 
-from aerobat.reporting.page import DPI, house_style
+from aerobat.reporting.page import house_style, png
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -56,9 +56,7 @@ class PaperFigure:
         """The bytes of its PNG file, the same for the same data."""
         from PIL import Image
 
-        drawn, packed = io.BytesIO(), io.BytesIO()
-        with house_style():
-            self.figure.savefig(drawn, format="png", dpi=DPI)
-        picture = Image.open(drawn).convert("RGB").quantize(COLOURS, dither=Image.Dither.NONE)
-        picture.save(packed, format="png", optimize=True)
+        packed = io.BytesIO()
+        drawn = Image.open(io.BytesIO(png(self.figure))).convert("RGB")
+        drawn.quantize(COLOURS, dither=Image.Dither.NONE).save(packed, format="png", optimize=True)
         return packed.getvalue()

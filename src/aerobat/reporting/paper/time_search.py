@@ -19,6 +19,7 @@ from aerobat.reporting.style import BAND, BLUE, INK, MUTED, RED, SMALL
 from aerobat.reporting.tracking import tracking_page
 from aerobat.simulation.outcome import length
 from aerobat.studies.paper import TimeSearch, time_search
+from aerobat.studies.paper.maneuvers import FlownPlan
 from aerobat.studies.paper.time_search import STOPPED_AFTER
 
 if TYPE_CHECKING:
@@ -66,8 +67,7 @@ def figure_9(begin: Callable[[str], None]) -> PaperFigure:
         f"{flown.score.max_attitude_error_deg:.2f}° off at most, saturated "
         f"{100 * flown.score.saturated_fraction:.1f} % of the time.",
     )
-    page = tracking_page(flown.plan, flown.vehicle, flown.flight, caption.heading, caption.lines)
-    return PaperFigure(caption, page)
+    return _tracking_figure(caption, flown)
 
 
 def figure_10(begin: Callable[[str], None]) -> PaperFigure:
@@ -84,6 +84,10 @@ def figure_10(begin: Callable[[str], None]) -> PaperFigure:
         f"do saturate, {100 * flown.score.saturated_fraction:.0f} % of the time, and the flight "
         f"{flown.score.sentence}.",
     )
+    return _tracking_figure(caption, flown)
+
+
+def _tracking_figure(caption: Caption, flown: FlownPlan) -> PaperFigure:
     page = tracking_page(flown.plan, flown.vehicle, flown.flight, caption.heading, caption.lines)
     return PaperFigure(caption, page)
 

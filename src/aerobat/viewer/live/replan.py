@@ -7,10 +7,10 @@ from dataclasses import asdict, dataclass, field, replace
 from typing import Any
 
 from aerobat.errors import AerobatError, Infeasible
+from aerobat.flatness import vehicle_of
 from aerobat.optimization.deadline import within_time
 from aerobat.planning import Plan, nominal_flight, plan
 from aerobat.simulation import Flight, fly
-from aerobat.vehicle import Vehicle
 from aerobat.viewer.document import packed
 from aerobat.viewer.live.sliders import Setting, Slider, moved
 from aerobat.viewer.scene import Scene, scene_of
@@ -88,7 +88,7 @@ def _key(setting: Setting) -> tuple[Any, ...]:
 def flown(plan: Plan, setting: Setting) -> Flight:
     """The flight of a plan as planned, or under conditions, several of them."""
     if setting.dispersion == 0.0:
-        return nominal_flight(plan.trajectory, _vehicle(plan), plan.problem.environment)
+        return nominal_flight(plan.trajectory, vehicle_of(plan, None), plan.problem.environment)
     conditions = setting.conditions.scaled(setting.dispersion)
     return fly(plan, conditions=conditions, flights=FLIGHTS)
 
@@ -115,11 +115,6 @@ def _planned(setting: Setting, is_overtaken: Callable[[], bool]) -> Plan:
     with within_time(PATIENCE):
         found = plan(setting.problem, setting.planner, setting.vehicle, look_up)
     return replace(found, attempts=())  # nobody looks at them here
-
-
-def _vehicle(plan: Plan) -> Vehicle:
-    assert plan.vehicle is not None, "a setting has one"
-    return plan.vehicle
 
 
 def _sentence(error: AerobatError) -> str:

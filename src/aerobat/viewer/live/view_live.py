@@ -19,7 +19,7 @@ from aerobat.viewer.live.desk import Desk
 from aerobat.viewer.live.replan import Replanner, flown, judged
 from aerobat.viewer.live.server import HOST, LiveServer
 from aerobat.viewer.live.sliders import Setting, sliders_of
-from aerobat.viewer.replay import INLINE_HEIGHT
+from aerobat.viewer.replay import inline_frame
 
 VEHICLE = "agile-quad"  # where nobody names one
 TICK = 0.5  # [s] of waiting at a time: not every system lets Ctrl-C end a longer one
@@ -61,8 +61,7 @@ class LiveView:
         return f"LiveView({self.address})"
 
     def _repr_html_(self) -> str:
-        style = "width:100%;border:1px solid #dfe6ec;border-radius:8px"
-        return f'<iframe style="{style}" height="{INLINE_HEIGHT}" src="{self.address}"></iframe>'
+        return inline_frame(f'src="{self.address}"')
 
 
 @validated
@@ -116,10 +115,10 @@ def _begun(
         problem, flyer = as_problem(shown), as_vehicle(vehicle or VEHICLE)
         setting = Setting(problem, as_planner(planner or suited_planner(problem, flyer)), flyer, conditions)
         return setting, Replanner(setting, ()).plan(setting)
-    flyer = shown.vehicle if vehicle is None and shown.vehicle is not None else as_vehicle(vehicle or VEHICLE)
+    flyer = as_vehicle(vehicle or shown.vehicle or VEHICLE)
     plan = shown if flyer == shown.vehicle and shown.certificate else with_evidence(shown, flyer)
-    planner = _planner_of(shown, flyer) if planner is None else as_planner(planner)
-    return Setting(shown.problem, planner, flyer, conditions), plan
+    own = _planner_of(shown, flyer) if planner is None else as_planner(planner)
+    return Setting(shown.problem, own, flyer, conditions), plan
 
 
 def _planner_of(plan: Plan, vehicle: Vehicle) -> Planner:
