@@ -115,13 +115,19 @@ class Stage:
         earliest = max(ceil(first * intervals - ROUNDING) - 1, 0)
         return range(earliest, min(floor(last * intervals + ROUNDING), intervals - 1))
 
-    def explicit(self, gate: Gate | None = None, body_radius: float = 0.0, polytopes: bool = True) -> Stage:
-        """The same at its gate, with all that it asks among its conditions: also where, and its attitude.
+    @property
+    def linear(self) -> Stage:
+        """The same with a polytope in its ball, if it has one, among its conditions."""
+        return (
+            self if self.ball is None else replace(self, conditions=(*self.ball.inscribed, *self.conditions))
+        )
+
+    def explicit(self, gate: Gate | None = None, body_radius: float = 0.0) -> Stage:
+        """The same at its gate, with all that it asks but its ball among its conditions: its attitude too.
 
         Args:
             gate: Its gate.
             body_radius: Of the vehicle's body [m], kept from the edges of an opening.
-            polytopes: Whether a polytope in its ball is among the conditions.
         """
         attitude = self.attitude
         if gate is not None:
@@ -131,13 +137,9 @@ class Stage:
             elif attitude is not None:
                 attitude = replace(attitude, tolerance=min(attitude.tolerance, tolerance))
         there: tuple[Condition, ...] = ()
-        if gate is not None and self.crossing_point == "free":
-            there = in_opening(gate, body_radius + self.margin)
-        elif gate is not None:
-            there = at_centre(gate)
-        elif self.ball is not None and polytopes:
-            there = self.ball.inscribed
         if gate is not None:
+            is_free = self.crossing_point == "free"
+            there = in_opening(gate, body_radius + self.margin) if is_free else at_centre(gate)
             there += self._moving_through(gate)
         pointing = () if attitude is None else attitude.conditions
         conditions = (*there, *self.conditions, *pointing)
@@ -171,3 +173,8 @@ class StageSequence:
     stages: tuple[Stage, ...] = ()
     path_constraints: tuple[Condition, ...] = ()
     ordered: bool = True
+
+    @property
+    def linear(self) -> StageSequence:
+        """The same, a polytope in each ball among the conditions, for who holds nothing but those."""
+        return replace(self, stages=tuple(stage.linear for stage in self.stages))
