@@ -195,10 +195,8 @@ class Problem:
     def _check_stages(self, sequence: StageSequence) -> None:
         """Refuse stages at places outside the limits or under ground."""
         for stage in sequence.stages:
-            enclosing = () if stage.ball is None else stage.ball.circumscribed
-            for condition in (*stage.conditions, *enclosing):
-                if condition.quantity is Quantity.POSITION:
-                    self._check_place(stage.name, condition)
+            for condition in stage.where:
+                self._check_place(stage.name, condition)
 
     def _check_place(self, stage: str, condition: Condition) -> None:
         """Refuse a condition on one axis's position that the limits leave no room for."""

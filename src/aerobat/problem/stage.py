@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from math import ceil, floor
 from typing import Annotated, Any, Literal
@@ -13,7 +14,7 @@ from aerobat.arrays import Array
 from aerobat.declaration import Count, FieldError, Label, NonNegative, Positive, declared, shown
 from aerobat.problem.ball import Ball
 from aerobat.problem.condition import Attitude, Condition, Quantity
-from aerobat.problem.gate import Gate, at_centre, in_opening
+from aerobat.problem.gate import Gate, at_centre, in_opening, named_gate
 
 
 def _crossing_time(value: Any) -> Any:
@@ -95,6 +96,18 @@ class Stage:
             if c.quantity is Quantity.POSITION and c.lower == c.upper and along.sum() == 1:
                 place[along] = c.lower / c.direction[along]
         return place
+
+    @property
+    def where(self) -> tuple[Condition, ...]:
+        """The conditions on its position, of its ball those of the cube about that."""
+        enclosing = () if self.ball is None else self.ball.circumscribed
+        return tuple(c for c in (*self.conditions, *enclosing) if c.quantity is Quantity.POSITION)
+
+    def centre(self, gates: Sequence[Gate]) -> Array | None:
+        """The centre of the gate that it passes, or of its ball [m], (3,); None where it has neither."""
+        if self.gate is not None:
+            return named_gate(gates, self.gate).position
+        return None if self.ball is None else self.ball.centre
 
     @property
     def window(self) -> tuple[float, float]:

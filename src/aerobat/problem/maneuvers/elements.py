@@ -64,7 +64,7 @@ class PassWaypoint(Waypoint, Maneuver):
 
     def in_words(self, gates: Sequence[Gate]) -> str:
         """Return the waypoint, or its gate."""
-        return "by a waypoint" if self.gate is None else f"through {gate_in_words(self.gate)}"
+        return self.in_passing
 
     @property
     def through_points(self) -> bool:

@@ -94,6 +94,11 @@ class Waypoint:
         """The ball that its radius makes of its position."""
         return None if self.radius is None else Ball(self.position, self.radius)
 
+    @property
+    def in_passing(self) -> str:
+        """The waypoint, or its gate, as one reads it aloud."""
+        return "by a waypoint" if self.gate is None else f"through {gate_in_words(self.gate)}"
+
     def attitude(self, max_specific_thrust: float) -> Attitude | None:
         """The attitude that `up` asks for with no thrust given."""
         if self.up is None or self.thrust is not None:
@@ -127,10 +132,7 @@ class Waypoints(Maneuver):
 
     def in_words(self, gates: Sequence[Gate]) -> str:
         """Return its waypoints and gates, in order."""
-        return in_sequence(
-            "by a waypoint" if waypoint.gate is None else f"through {gate_in_words(waypoint.gate)}"
-            for waypoint in self.waypoints
-        )
+        return in_sequence(waypoint.in_passing for waypoint in self.waypoints)
 
     @property
     def through_points(self) -> bool:
