@@ -87,8 +87,8 @@ def test_a_course_is_written_and_read_exactly() -> None:
 
 def test_the_course_of_the_record_has_19_waypoints_in_three_laps() -> None:
     """Foehn, Romero, Scaramuzza: three laps of seven, the last of five."""
-    lap = [stage.conditions for stage in ab.load_problem("race-7").stages(30.0).stages]
-    stages = ab.load_problem("split-s-19").stages(30.0).stages
+    lap = [stage.conditions for stage in ab.load_problem("race-7").stages(30.0).linear.stages]
+    stages = ab.load_problem("split-s-19").stages(30.0).linear.stages
     assert [stage.conditions for stage in stages] == [*lap, *lap, *lap[:5]]
     assert [stage.lap for stage in stages] == [1] * 7 + [2] * 7 + [3] * 5
 

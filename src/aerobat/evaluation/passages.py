@@ -44,21 +44,13 @@ def passages_asked(goal: Problem | Plan, times: Array, position: Array) -> Asked
     sequence = problem.stages(1.0)
     stages = [stage for stage in sequence.stages if stage.gate is not None or stage.ball is not None]
     stages = stages or [Stage(gate.name, gate=gate.name) for gate in problem.gates]
-    centres = np.reshape([_centre(problem, stage) for stage in stages], (-1, 3))
+    centres = np.reshape([stage.centre(problem.gates) for stage in stages], (-1, 3))
     in_order = sequence.ordered and bool(sequence.stages)
     placed = list(zip(stages, _nearest_instants(centres, times, position, in_order), strict=True))
     return Asked(
         tuple(PlannedPassage.of(s, problem.gate(s.gate), t) for s, t in placed if s.gate is not None),
         tuple(PlannedWaypoint(s.name, s.ball, t, s.lap) for s, t in placed if s.ball is not None),
     )
-
-
-def _centre(problem: Problem, stage: Stage) -> Array:
-    """The centre of the stage's gate, or of its ball [m], (3,)."""
-    if stage.gate is not None:
-        return problem.gate(stage.gate).position
-    assert stage.ball is not None
-    return stage.ball.centre
 
 
 def _nearest_instants(centres: Array, times: Array, position: Array, in_order: bool) -> list[float]:

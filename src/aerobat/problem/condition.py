@@ -211,10 +211,10 @@ def free() -> Array:
     return np.full(3, np.nan)
 
 
-def at_point(position: Array) -> tuple[Condition, ...]:
-    """The given components of a position [m], world, (3,); those that are NaN are free."""
-    given = zip(np.eye(3), position.tolist(), strict=True)
-    return tuple(Condition(Quantity.POSITION, axis, x, x) for axis, x in given if x == x)
+def fixed(quantity: Quantity, value: Array) -> tuple[Condition, ...]:
+    """The given components of a quantity, world, SI units, (3,); those that are NaN are free."""
+    given = zip(np.eye(3), value.tolist(), strict=True)
+    return tuple(Condition(quantity, axis, x, x) for axis, x in given if x == x)
 
 
 def thrust_in_plane(direction: Array, axis: Array, minimum: float) -> tuple[Condition, ...]:

@@ -30,7 +30,7 @@ from aerobat.declaration import (
     validated,
 )
 from aerobat.errors import SpecError
-from aerobat.problem.condition import Condition, ConeAngle, Quantity, at_point
+from aerobat.problem.condition import Condition, ConeAngle, Quantity, fixed
 
 TOUCHING = 1e-6  # [m] within which frames touch, and neither stands in the other's opening
 
@@ -169,7 +169,7 @@ def tilted_gate(
 
 def at_centre(gate: Gate) -> tuple[Condition, ...]:
     """Meeting the centre of a gate's opening."""
-    return at_point(gate.position)
+    return fixed(Quantity.POSITION, gate.position)
 
 
 def in_opening(gate: Gate, clearance: float) -> tuple[Condition, ...]:

@@ -195,10 +195,8 @@ class Problem:
     def _check_stages(self, sequence: StageSequence) -> None:
         """Refuse stages at places outside the limits or under ground."""
         for stage in sequence.stages:
-            enclosing = () if stage.ball is None else stage.ball.circumscribed
-            for condition in (*stage.conditions, *enclosing):
-                if condition.quantity is Quantity.POSITION:
-                    self._check_place(stage.name, condition)
+            for condition in stage.where:
+                self._check_place(stage.name, condition)
 
     def _check_place(self, stage: str, condition: Condition) -> None:
         """Refuse a condition on one axis's position that the limits leave no room for."""
@@ -261,26 +259,21 @@ class Problem:
         return replace(self.limits, lower=np.maximum(self.limits.lower, [-np.inf, -np.inf, ground]))
 
     @validated
-    def stages(
-        self, max_specific_thrust: Positive, body_radius: NonNegative = 0.0, polytopes: bool = True
-    ) -> StageSequence:
+    def stages(self, max_specific_thrust: Positive, body_radius: NonNegative = 0.0) -> StageSequence:
         """The maneuver's stages through the problem's gates, for a vehicle of such thrust and size.
 
-        All that a stage asks is among its conditions, where it is and its attitude too.
+        All that a stage asks is among its conditions, where it is and its attitude too, but for its ball:
+        `StageSequence.linear` has a polytope in that among them.
 
         Args:
             max_specific_thrust: That the vehicle has [m/s²].
             body_radius: Of the vehicle's body about its centre of mass [m], which is kept from the edges of
                 openings that are crossed anywhere.
-            polytopes: Whether those of stages within a ball are of a polytope in it, which are linear; false
-                for who holds the ball itself.
 
         Raises:
             SpecError: Gates do not suit the maneuver.
         """
-        return _explicit_stages(
-            self.maneuver, self.gates, float(max_specific_thrust), float(body_radius), polytopes
-        )
+        return _explicit_stages(self.maneuver, self.gates, float(max_specific_thrust), float(body_radius))
 
     @validated
     def gate(self, name: str) -> Gate:
@@ -298,12 +291,11 @@ def _explicit_stages(
     gates: tuple[Gate, ...],
     max_specific_thrust: float,
     body_radius: float,
-    polytopes: bool,
 ) -> StageSequence:
     """As `Problem.stages`, kept: planner, certificate and score each ask for the same."""
     sequence = maneuver.stage_sequence(gates, max_specific_thrust)
     stages = (
-        s.explicit(None if s.gate is None else named_gate(gates, s.gate), body_radius, polytopes)
+        s.explicit(None if s.gate is None else named_gate(gates, s.gate), body_radius)
         for s in sequence.stages
     )
     return replace(sequence, stages=tuple(stages))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from math import ceil, floor
 from typing import Annotated, Any, Literal
@@ -13,7 +14,7 @@ from aerobat.arrays import Array
 from aerobat.declaration import Count, FieldError, Label, NonNegative, Positive, declared, shown
 from aerobat.problem.ball import Ball
 from aerobat.problem.condition import Attitude, Condition, Quantity
-from aerobat.problem.gate import Gate, at_centre, in_opening
+from aerobat.problem.gate import Gate, at_centre, in_opening, named_gate
 
 
 def _crossing_time(value: Any) -> Any:
@@ -97,6 +98,18 @@ class Stage:
         return place
 
     @property
+    def where(self) -> tuple[Condition, ...]:
+        """The conditions on its position, of its ball those of the cube about that."""
+        enclosing = () if self.ball is None else self.ball.circumscribed
+        return tuple(c for c in (*self.conditions, *enclosing) if c.quantity is Quantity.POSITION)
+
+    def centre(self, gates: Sequence[Gate]) -> Array | None:
+        """The centre of the gate that it passes, or of its ball [m], (3,); None where it has neither."""
+        if self.gate is not None:
+            return named_gate(gates, self.gate).position
+        return None if self.ball is None else self.ball.centre
+
+    @property
     def window(self) -> tuple[float, float]:
         """The earliest and the latest instant at which it may hold, as fractions of the duration."""
         if isinstance(self.at, tuple):
@@ -115,13 +128,19 @@ class Stage:
         earliest = max(ceil(first * intervals - ROUNDING) - 1, 0)
         return range(earliest, min(floor(last * intervals + ROUNDING), intervals - 1))
 
-    def explicit(self, gate: Gate | None = None, body_radius: float = 0.0, polytopes: bool = True) -> Stage:
-        """The same at its gate, with all that it asks among its conditions: also where, and its attitude.
+    @property
+    def linear(self) -> Stage:
+        """The same with a polytope in its ball, if it has one, among its conditions."""
+        return (
+            self if self.ball is None else replace(self, conditions=(*self.ball.inscribed, *self.conditions))
+        )
+
+    def explicit(self, gate: Gate | None = None, body_radius: float = 0.0) -> Stage:
+        """The same at its gate, with all that it asks but its ball among its conditions: its attitude too.
 
         Args:
             gate: Its gate.
             body_radius: Of the vehicle's body [m], kept from the edges of an opening.
-            polytopes: Whether a polytope in its ball is among the conditions.
         """
         attitude = self.attitude
         if gate is not None:
@@ -131,13 +150,9 @@ class Stage:
             elif attitude is not None:
                 attitude = replace(attitude, tolerance=min(attitude.tolerance, tolerance))
         there: tuple[Condition, ...] = ()
-        if gate is not None and self.crossing_point == "free":
-            there = in_opening(gate, body_radius + self.margin)
-        elif gate is not None:
-            there = at_centre(gate)
-        elif self.ball is not None and polytopes:
-            there = self.ball.inscribed
         if gate is not None:
+            is_free = self.crossing_point == "free"
+            there = in_opening(gate, body_radius + self.margin) if is_free else at_centre(gate)
             there += self._moving_through(gate)
         pointing = () if attitude is None else attitude.conditions
         conditions = (*there, *self.conditions, *pointing)
@@ -171,3 +186,8 @@ class StageSequence:
     stages: tuple[Stage, ...] = ()
     path_constraints: tuple[Condition, ...] = ()
     ordered: bool = True
+
+    @property
+    def linear(self) -> StageSequence:
+        """The same, a polytope in each ball among the conditions, for who holds nothing but those."""
+        return replace(self, stages=tuple(stage.linear for stage in self.stages))

@@ -17,7 +17,6 @@ from aerobat.planning.assessment.lower_bound import least_duration
 from aerobat.planning.flyability import with_flyability
 from aerobat.planning.recorder import Progress
 from aerobat.planning.result import FLYING_RESERVE, Plan
-from aerobat.problem.condition import Quantity
 from aerobat.problem.problem import Problem
 from aerobat.vehicle import Vehicle
 
@@ -96,10 +95,9 @@ def _asked(problem: Problem, vehicle: Vehicle) -> Box:
     points = np.array([problem.start.position, problem.goal.position, *(g.position for g in problem.gates)])
     lower, upper = points.min(axis=0), points.max(axis=0)
     for stage in problem.stages(vehicle.max_specific_thrust).stages:
-        enclosing = () if stage.ball is None else stage.ball.circumscribed
-        for condition in (*stage.conditions, *enclosing):
+        for condition in stage.where:
             axes = np.flatnonzero(condition.direction)
-            if condition.quantity is Quantity.POSITION and len(axes) == 1:
+            if len(axes) == 1:
                 for bound in (condition.lower, condition.upper):
                     if abs(bound) < inf:
                         place = bound / condition.direction[axes[0]]

@@ -35,7 +35,7 @@ def least_duration(problem: Problem, vehicle: Vehicle) -> float:
 
     Raises SpecError for gates that do not suit the maneuver.
     """
-    sequence = problem.stages(vehicle.max_specific_thrust, vehicle.body_radius, polytopes=False)
+    sequence = problem.stages(vehicle.max_specific_thrust, vehicle.body_radius)
     lines = [_Line.of(problem, vehicle, sequence, n) for n in _directions(problem, sequence)]
 
     def moving(duration: float) -> float:

@@ -148,7 +148,7 @@ def formulate(problem: Problem, order: int, intervals: int, vehicle: Vehicle | N
     """
     gravity = problem.environment.gravity
     thrust = ASSUMED_THRUST_TO_WEIGHT * gravity if vehicle is None else vehicle.max_specific_thrust
-    sequence = problem.stages(thrust, 0.0 if vehicle is None else vehicle.body_radius)
+    sequence = problem.stages(thrust, 0.0 if vehicle is None else vehicle.body_radius).linear
     if vehicle is not None:
         _check_thrust(sequence, vehicle)
     balance = force_balance(problem.environment, vehicle)

@@ -75,7 +75,7 @@ class FreeKnots(Planner):
         """
         vehicle = require_attitudes("free-knots", problem, vehicle)
         import_casadi()
-        sequence = problem.stages(vehicle.max_specific_thrust, vehicle.body_radius)
+        sequence = problem.stages(vehicle.max_specific_thrust, vehicle.body_radius).linear
         recorder = Recorder(progress)
         with within_time(self.time_limit):
             found = self._planned(problem, vehicle, sequence, recorder)

@@ -50,10 +50,9 @@ def fixed_at_knots(
     for knot, (stage, velocity) in enumerate(zip(sequence.stages, velocities, strict=True), 1):
         for derivative in range(3):
             fixed[knot, derivative] = _fixed(stage, derivative, balance, velocity)
-        if stage.ball is not None:
-            fixed[knot, 0] = stage.ball.centre
-        elif stage.gate is not None:
-            fixed[knot, 0] = problem.gate(stage.gate).position
+        centre = stage.centre(problem.gates)
+        if centre is not None:
+            fixed[knot, 0] = centre
     return fixed
 
 

@@ -105,7 +105,7 @@ class _Planning:
         thrust = FIRST_GUESS_THRUST_TO_WEIGHT * weight if vehicle is None else vehicle.max_specific_thrust
         self.config, self.problem, self.vehicle, self.recorder = config, problem, vehicle, recorder
         body_radius = 0.0 if vehicle is None else vehicle.body_radius
-        self.sequence: StageSequence = problem.stages(thrust, body_radius, polytopes=False)
+        self.sequence: StageSequence = problem.stages(thrust, body_radius)
         self.balance = force_balance(problem.environment, vehicle)
         still = np.zeros((len(self.sequence.stages), 3))
         self.durations = first_times(problem, self.fixed(self.sequence, still), thrust)

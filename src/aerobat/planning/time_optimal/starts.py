@@ -65,7 +65,7 @@ def starts(
     Raises:
         Infeasible: A stage asks more thrust than the vehicle has.
     """
-    sequence = problem.stages(vehicle.max_specific_thrust, vehicle.body_radius, polytopes=False)
+    sequence = problem.stages(vehicle.max_specific_thrust, vehicle.body_radius)
     if is_course(sequence):
         plans = [] if first is None else [(first, f"{first.planner}'s plan")]
         paths = [

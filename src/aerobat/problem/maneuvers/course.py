@@ -11,7 +11,6 @@ from pydantic import Field, PlainValidator
 
 from aerobat.declaration import Count, FieldError, within_field
 from aerobat.errors import SpecError
-from aerobat.problem.condition import Condition
 from aerobat.problem.gate import Gate, named_gate
 from aerobat.problem.maneuvers.maneuver import MANEUVERS, Maneuver, in_sequence, maneuver
 from aerobat.problem.stage import Stage, StageSequence
@@ -50,7 +49,8 @@ class Course(Maneuver):
         last = sum(len(sequence.stages) for sequence in sequences[: self.last_lap])
         flown = (lap[:last] if number == self.laps else lap for number in range(1, self.laps + 1))
         stages = [replace(stage, lap=number) for number, each in enumerate(flown, 1) for stage in each]
-        return StageSequence(tuple(stages), tuple(self._path_constraints(sequences)))
+        throughout = dict.fromkeys(each for sequence in sequences for each in sequence.path_constraints)
+        return StageSequence(tuple(stages), tuple(throughout))
 
     def in_words(self, gates: Sequence[Gate]) -> str:
         """Return its elements as one reads them aloud, those of a kind together."""
@@ -80,11 +80,6 @@ class Course(Maneuver):
             return gates
         name = getattr(element, "gate", None)
         return () if name is None else (named_gate(gates, name),)
-
-    @staticmethod
-    def _path_constraints(sequences: Sequence[StageSequence]) -> Iterator[Condition]:
-        """What any element asks throughout, once."""
-        yield from dict.fromkeys(each for sequence in sequences for each in sequence.path_constraints)
 
 
 def _named(stages: Sequence[Stage]) -> Iterator[Stage]:

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from aerobat.declaration import NonNegative, Positive, Vector3
-from aerobat.problem.condition import Condition, Quantity, at_point
+from aerobat.problem.condition import Quantity, fixed
 from aerobat.problem.gate import Gate, passed_gate
 from aerobat.problem.maneuvers.maneuver import Maneuver, gate_in_words, maneuver
 from aerobat.problem.maneuvers.waypoints import THRUST_FRACTION, Waypoint
@@ -64,7 +64,7 @@ class PassWaypoint(Waypoint, Maneuver):
 
     def in_words(self, gates: Sequence[Gate]) -> str:
         """Return the waypoint, or its gate."""
-        return "by a waypoint" if self.gate is None else f"through {gate_in_words(self.gate)}"
+        return self.in_passing
 
     @property
     def through_points(self) -> bool:
@@ -81,8 +81,9 @@ class Hold(Maneuver):
 
     def stage_sequence(self, gates: Sequence[Gate], max_specific_thrust: float) -> StageSequence:
         """Return one stage."""
-        still = tuple(Condition(Quantity.VELOCITY, axis, 0.0, 0.0) for axis in np.eye(3))
-        return StageSequence((Stage(self.kind, (*at_point(self.position), *still), hold=self.time),))
+        still = fixed(Quantity.VELOCITY, np.zeros(3))
+        there = fixed(Quantity.POSITION, self.position)
+        return StageSequence((Stage(self.kind, (*there, *still), hold=self.time),))
 
     def in_words(self, gates: Sequence[Gate]) -> str:
         """Return how long it holds."""

@@ -13,7 +13,7 @@ from aerobat import so3
 from aerobat.arrays import Array
 from aerobat.declaration import Count, PartialVector, Positive
 from aerobat.errors import SpecError
-from aerobat.problem.condition import Condition, at_point, free, thrust_in_plane
+from aerobat.problem.condition import Condition, Quantity, fixed, free, thrust_in_plane
 from aerobat.problem.gate import Gate, passed_gate
 from aerobat.problem.maneuvers.gate_passage import (
     PAPER_INVERTED,
@@ -131,7 +131,7 @@ class Flip(Maneuver):
     def _stage(self, angle_deg: float, is_free: bool, max_specific_thrust: float) -> Stage:
         """The stage at an angle of the turns; upside down at its position where no gate is passed."""
         asked = self._in_plane(angle_deg, self._min_thrust(angle_deg, max_specific_thrust))
-        there = at_point(self.position) if is_free and angle_deg == 180.0 else ()
+        there = fixed(Quantity.POSITION, self.position) if is_free and angle_deg == 180.0 else ()
         return Stage(f"{angle_deg:g}°", (*there, *asked))
 
     def _in_plane(self, angle_deg: float, minimum: float) -> tuple[Condition, ...]:

@@ -10,7 +10,6 @@ from typing import Annotated
 import numpy as np
 from pydantic import Field
 
-from aerobat.arrays import Array
 from aerobat.declaration import (
     FieldError,
     NonNegative,
@@ -21,17 +20,13 @@ from aerobat.declaration import (
 )
 from aerobat.errors import SpecError
 from aerobat.problem.ball import Ball
-from aerobat.problem.condition import Attitude, Condition, Quantity
+from aerobat.problem.condition import Attitude, Condition, Quantity, fixed, free
 from aerobat.problem.gate import Gate
 from aerobat.problem.maneuvers.maneuver import Maneuver, gate_in_words, in_sequence, maneuver
 from aerobat.problem.stage import CrossingPoint, Stage, StageSequence, check_crossing
 
 THRUST_FRACTION = 0.2  # of the greatest specific thrust: the least along an attitude that names no thrust
 FIXABLE = (Quantity.POSITION, Quantity.VELOCITY, Quantity.ACCELERATION)
-
-
-def _free() -> Array:
-    return np.full(3, np.nan)
 
 
 @declared
@@ -43,9 +38,9 @@ class Waypoint:
     nothing is given, or acceleration and attitude both are.
     """
 
-    position: PartialVector = field(default_factory=_free)  # [m] world
-    velocity: PartialVector = field(default_factory=_free)  # [m/s] world
-    acceleration: PartialVector = field(default_factory=_free)  # [m/s²] world
+    position: PartialVector = field(default_factory=free)  # [m] world
+    velocity: PartialVector = field(default_factory=free)  # [m/s] world
+    acceleration: PartialVector = field(default_factory=free)  # [m/s²] world
     up: UnitVector | None = None  # direction of the thrust
     # specific thrust along `up`, the norm of a + g e₃; left out, 20 % or more of what the vehicle has
     thrust: Positive | None = None  # [m/s²]
@@ -70,8 +65,8 @@ class Waypoint:
             raise FieldError("thrust", "needs up, its direction; add it")
         if self.up is not None and not np.isnan(self.acceleration).all():
             raise SpecError("acceleration and up both fix the attitude; give one of them")
-        free = all(np.isnan(getattr(self, q.value)).all() for q in FIXABLE)
-        if free and self.up is None and self.gate is None:
+        fixes_nothing = all(np.isnan(getattr(self, q.value)).all() for q in FIXABLE)
+        if fixes_nothing and self.up is None and self.gate is None:
             raise SpecError("nothing is given; give at least one component of the position")
 
     def stage(self, name: str, max_specific_thrust: float) -> Stage:
@@ -90,18 +85,19 @@ class Waypoint:
     def conditions(self) -> Iterable[Condition]:
         """The given components and a given thrust, as conditions of a stage; of a ball none."""
         for quantity in FIXABLE if self.radius is None else FIXABLE[1:]:
-            for direction, value in zip(np.eye(3), getattr(self, quantity.value).tolist(), strict=True):
-                if not np.isnan(value):
-                    yield Condition(quantity, direction, value, value)
-        if self.up is None or self.thrust is None:
-            return
-        for direction, value in zip(np.eye(3), (self.thrust * self.up).tolist(), strict=True):
-            yield Condition(Quantity.SPECIFIC_THRUST, direction, value, value)
+            yield from fixed(quantity, getattr(self, quantity.value))
+        if self.up is not None and self.thrust is not None:
+            yield from fixed(Quantity.SPECIFIC_THRUST, self.thrust * self.up)
 
     @property
     def ball(self) -> Ball | None:
         """The ball that its radius makes of its position."""
         return None if self.radius is None else Ball(self.position, self.radius)
+
+    @property
+    def in_passing(self) -> str:
+        """The waypoint, or its gate, as one reads it aloud."""
+        return "by a waypoint" if self.gate is None else f"through {gate_in_words(self.gate)}"
 
     def attitude(self, max_specific_thrust: float) -> Attitude | None:
         """The attitude that `up` asks for with no thrust given."""
@@ -136,10 +132,7 @@ class Waypoints(Maneuver):
 
     def in_words(self, gates: Sequence[Gate]) -> str:
         """Return its waypoints and gates, in order."""
-        return in_sequence(
-            "by a waypoint" if waypoint.gate is None else f"through {gate_in_words(waypoint.gate)}"
-            for waypoint in self.waypoints
-        )
+        return in_sequence(waypoint.in_passing for waypoint in self.waypoints)
 
     @property
     def through_points(self) -> bool:
