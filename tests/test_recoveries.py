@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
+import json
+from dataclasses import replace
+from pathlib import Path
+
 import numpy as np
 import pytest
 
 import aerobat as ab
+from aerobat.reporting.report_json import report, to_json
 
 LOW = -0.7  # [m] a ground so near under the flip that there is a point of no return
 
@@ -29,6 +34,54 @@ def test_a_thousand_instants_outside_the_span_of_no_return_all_reach_a_hover_abo
     assert outside.sum() > 700
     assert found.possible[outside].all()
     assert not found.possible.all()
+
+
+@pytest.mark.parametrize(
+    ("problem", "vehicle"),
+    [("half-flip", "hexarotor"), ("power-loop", "hexarotor"), ("split-s", "crazyflie")],
+)
+def test_whoever_flies_whatever_a_thousand_instants_keep_what_is_announced(
+    problem: str, vehicle: str
+) -> None:
+    plan = ab.plan(problem, vehicle=vehicle)
+    announced = ab.recoveries(plan)
+    assert announced.possible.all()
+    assert announced.ground is None
+    instants = np.sort(np.random.default_rng(6).uniform(0.0, plan.duration, 1000))
+    found = ab.recoveries(plan, times=instants)
+    assert found.possible.all()
+    # between the instants of the plan's own, up to 1/200 s away, a recovery takes another turn at times
+    assert found.lowest.min() > announced.lowest.min() - 0.15
+
+
+def test_a_plan_keeps_its_recoveries_in_its_file_and_in_its_report(
+    flip: ab.Plan, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    weak = ab.recoveries(flip, times=[0.0, 1.4], ground=2.0)
+    endless = replace(weak, durations=np.array([0.5, np.inf]))
+    for found in (ab.recoveries(flip), endless):
+        plan = replace(flip, recoveries=found)
+        plan.save(tmp_path / "flip.plan")
+        assert ab.load_plan(tmp_path / "flip.plan").recoveries == found
+        told = report(plan)["plan"]["recoveries"]
+        assert json.loads(to_json(told)) == told
+        assert told["sentence"] == str(found)
+    assert told["durations_s"] == [0.5, None]
+    assert told["no_return_s"] == [[0.0, 1.4]]
+
+
+def test_above_ground_it_is_told_how_near_to_it_a_recovery_comes(flip: ab.Plan) -> None:
+    low = replace(flip.problem, environment=ab.Environment(ground=LOW))
+    found = ab.recoveries(replace(flip, problem=low))
+    assert found == ab.recoveries(flip, ground=LOW)
+    assert "above the ground, but not from" in str(found)
+
+
+def test_many_spans_of_no_return_are_told_in_short(flip: ab.Plan) -> None:
+    times = np.arange(12.0)
+    durations = np.where(times % 2 == 1, np.inf, 1.0)
+    found = ab.Recoveries(times, np.zeros(12), np.zeros(12), durations, reaction=0.1, ground=None)
+    assert str(found).endswith("but not from 6 spans between 0.00 and 11.00 s, 50 % of the instants")
 
 
 def test_on_high_ground_and_without_delay_there_is_always_a_way_back(flip: ab.Plan) -> None:

@@ -11,7 +11,7 @@ from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
-from pydantic import AfterValidator, Field, GetCoreSchemaHandler, PlainValidator
+from pydantic import AfterValidator, Field, GetCoreSchemaHandler, PlainSerializer, PlainValidator
 from pydantic_core import CoreSchema, core_schema
 
 from aerobat.arrays import AXES, Array
@@ -131,6 +131,10 @@ def _partial(value: Any) -> Array:
     return vector
 
 
+def _series(value: Any) -> Array:
+    return array(value, len(value) if hasattr(value, "__len__") else 0)
+
+
 def _corner(value: Any) -> Array:
     return _small(array(value, 3))
 
@@ -240,6 +244,12 @@ PartialVector = Annotated[
     Array, PlainValidator(_partial), Field(description="three numbers, or a table of some of `x`, `y`, `z`")
 ]
 Corner = Annotated[Array, PlainValidator(_corner), Field(description="three numbers, `inf` and `-inf` too")]
+Series = Annotated[
+    Array,
+    PlainValidator(_series),
+    PlainSerializer(lambda numbers: numbers.tolist(), return_type=list[float]),
+    Field(description="numbers, `inf` and `-inf` too"),
+]
 PerAxis = Annotated[
     Array | float,
     PlainValidator(_per_axis),

@@ -2,7 +2,7 @@ from .assessment.assess import with_assessment, with_second_opinion
 from .assessment.assessment import Assessment, Box, SecondOpinion
 from .assessment.lower_bound import least_duration
 from .certified_solve import Judged, Solution, certified_solve, with_certificate
-from .flyability import nominal_flight, own_flight, with_flyability
+from .flyability import nominal_flight, own_flight, with_flyability, with_recoveries
 from .miqp import Miqp
 from .passages import planned_passages, planned_waypoints
 from .plan_file import load_plan
@@ -72,5 +72,6 @@ __all__ = [
     "with_certificate",
     "with_evidence",
     "with_flyability",
+    "with_recoveries",
     "with_second_opinion",
 ]

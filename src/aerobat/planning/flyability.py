@@ -17,14 +17,18 @@ from math import isinf, isnan, radians
 
 from aerobat.environment import Environment
 from aerobat.errors import SpecError
+from aerobat.flatness import reference
 from aerobat.planning.passages import planned_passages
 from aerobat.planning.result import FlownPassage, Flyability, OwnFlight, PlacedStage, Plan
 from aerobat.problem.problem import Problem
 from aerobat.simulation import Flight, FlightConfig, Outcome, fly
+from aerobat.simulation.autopilot import recoveries
 from aerobat.simulation.outcome import DIVERGENCE_RADIUS
 from aerobat.simulation.passages import Passage, flown_passages
 from aerobat.trajectory import Trajectory
 from aerobat.vehicle import Vehicle
+
+CHECK_RATE = 100.0  # [1/s] of instants at which a thrust that vanishes is looked for
 
 
 def own_flight(
@@ -78,6 +82,16 @@ def with_flyability(plan: Plan) -> Plan:
             disturbed_error=_largest_error(disturbed),
         ),
     )
+
+
+def with_recoveries(plan: Plan) -> Plan:
+    """The plan for a vehicle with its recoveries to a hover; without where its attitude is undetermined.
+
+    Raises SpecError without a vehicle.
+    """
+    if plan.recoveries is not None or reference(plan, rate=CHECK_RATE).undetermined:
+        return plan
+    return replace(plan, recoveries=recoveries(plan))
 
 
 @lru_cache(maxsize=2)

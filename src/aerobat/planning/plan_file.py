@@ -3,7 +3,8 @@
 A .plan file is a NumPy .npz archive without pickles. Its arrays `durations` (S,), `coefficients`
 (S, degree + 1, 3) and `heading` are the trajectory's, bit for bit; `document` holds, as UTF-8 JSON, the rest:
 the problem and the vehicle as the tables of their files, the environment in full, how the plan was made, its
-stages, attempts, certificate, flyability, assessment and tube, frames, and which version of Aerobat wrote it.
+stages, attempts, certificate, flyability, recoveries, assessment and tube, frames, and which version of
+Aerobat wrote it.
 
 Schema and version rules are in docs/flight-package.md. `interchange.flight_package` reads it by NumPy alone.
 """
@@ -26,12 +27,13 @@ from aerobat.planning.recorder import Attempt
 from aerobat.planning.result import Flyability, PlacedStage, Plan
 from aerobat.planning.tube import Tube
 from aerobat.problem.problem import Problem
+from aerobat.simulation.autopilot import Recoveries
 from aerobat.storage import format_of, read_arrays, whole_file
 from aerobat.trajectory import Trajectory
 from aerobat.vehicle import Vehicle
 
 FORMAT = "aerobat-plan-1"  # another number where something goes, or means something else
-REVISION = 1  # of it: one more wherever something is added
+REVISION = 2  # of it: one more wherever something is added
 FRAMES = {
     "world": "ENU: x east, y north, z up [m]",
     "body": "FLU: x forward, y left, z up, thrust along +z",
@@ -56,6 +58,7 @@ class _Evidence:
     gap: float | None
     certificate: Certificate | None
     flyability: Flyability | None = None
+    recoveries: Recoveries | None = None
     assessment: Assessment | None = None
     rescue: str = ""
     starts: tuple[float, ...] = ()

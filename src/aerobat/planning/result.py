@@ -11,6 +11,7 @@ from aerobat.planning.recorder import Attempt
 from aerobat.planning.rotor_margin import RotorMargin
 from aerobat.planning.tube import Tube
 from aerobat.problem.problem import Problem
+from aerobat.simulation.autopilot import Recoveries
 from aerobat.simulation.outcome import length
 from aerobat.trajectory import Trajectory
 from aerobat.vehicle import Vehicle
@@ -133,6 +134,7 @@ class Plan:
     vehicle: Vehicle | None = None  # what it was planned or certified for
     certificate: Certificate | None = None  # for the vehicle, over continuous time
     flyability: Flyability | None = None  # of the vehicle's own flight, simulated
+    recoveries: Recoveries | None = None  # to a hover, from instants all along it; None where none is known
     assessment: Assessment | None = None  # beside what is possible and usual, for the vehicle
     rescue: str = ""  # what found it, where what was asked for found nothing
     starts: tuple[float, ...] = ()  # [s] that first, coarse solves from several starts came to, rising
@@ -203,6 +205,7 @@ class Plan:
         margin = "" if self.margin is None else f"; rotors {self.margin}"
         proof = "" if self.certificate is None else f"; {self.certificate}"
         flown = "" if self.flyability is None else f"; {self.flyability}"
+        given_up = "" if self.recoveries is None else f"; {self.recoveries}"
         assessed = "" if self.assessment is None else f"; {self.assessment}"
         rescue = f"; {self.rescue}" if self.rescue else ""
         tube = "" if self.tube is None else f"; {self.tube}"
@@ -210,5 +213,5 @@ class Plan:
         backend = f" ({self.backend})" if self.backend else ""
         return (
             f"{self.problem.name}: {self.duration:.3f} s in {self.intervals} intervals{dt}, {self.status} by "
-            f"{self.planner}{backend}; {stages}{margin}{proof}{flown}{assessed}{rescue}{tube}"
+            f"{self.planner}{backend}; {stages}{margin}{proof}{flown}{given_up}{assessed}{rescue}{tube}"
         )

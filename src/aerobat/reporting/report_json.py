@@ -9,6 +9,7 @@ from typing import Any
 
 from aerobat.evaluation.score import Score
 from aerobat.planning import Assessment, Flyability, Plan, Tube
+from aerobat.simulation.autopilot import Recoveries
 from aerobat.simulation.passages import Passage
 from aerobat.vehicle import implausibilities
 
@@ -82,6 +83,20 @@ def _flyability(found: Flyability) -> dict[str, Any]:
             }
             for passage in found.passages
         ],
+        "sentence": str(found),
+    }
+
+
+def _recoveries(found: Recoveries) -> dict[str, Any]:
+    """The recoveries from instants at `times_s`; those that never come to a hover last None."""
+    return {
+        "reaction_s": found.reaction,
+        "ground_m": found.ground,
+        "times_s": found.times.tolist(),
+        "lowest_m": found.lowest.tolist(),
+        "height_lost_m": found.height_lost.tolist(),
+        "durations_s": [None if duration == inf else duration for duration in found.durations.tolist()],
+        "no_return_s": [[span.start, span.end] for span in found.no_return],
         "sentence": str(found),
     }
 
@@ -167,6 +182,7 @@ def _plan(plan: Plan) -> dict[str, Any]:
         "rotor_feasible": plan.certificate and plan.certificate.certified,
         "certificate": plan.certificate and plan.certificate.record(),
         "flyability": plan.flyability and _flyability(plan.flyability),
+        "recoveries": plan.recoveries and _recoveries(plan.recoveries),
         "assessment": plan.assessment and _assessment(plan.assessment),
         "tube": plan.tube and _tube(plan.tube, plan.duration),
     }

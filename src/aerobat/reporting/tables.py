@@ -162,6 +162,8 @@ def plan_facts(plan: Plan) -> Iterable[Fact]:
         yield "proof", ("" if plan.certificate.certified else "not certified: ") + plan.certificate.why
     if plan.flyability is not None:
         yield "flyability", str(plan.flyability)
+    if plan.recoveries is not None:
+        yield "recovery", str(plan.recoveries)
     if plan.tube is not None:
         yield from _tube_facts(plan.tube, plan.duration)
     if plan.assessment is not None:

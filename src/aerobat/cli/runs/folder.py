@@ -17,7 +17,7 @@ from aerobat.cli.runs.record import RECORD, RunRecord, write_record
 from aerobat.cli.terminal import print_json
 from aerobat.evaluation import Score
 from aerobat.interchange.columns import write_columns
-from aerobat.planning import Plan
+from aerobat.planning import Plan, with_recoveries
 from aerobat.reporting.figures import report_figure
 from aerobat.reporting.page import png
 from aerobat.reporting.report_json import report, to_json
@@ -106,6 +106,7 @@ def finish(plan: Plan, record: RunRecord, options: OutputOptions, flown: Flown |
         options: Where to write, and in what form to say it.
         flown: The plan's flight, if it was flown.
     """
+    plan = with_recoveries(plan)
     assert plan.vehicle is not None, "a command plans for a vehicle"
     flight, score = (flown.flight, flown.score) if flown else (None, None)
     by = (flown.controller, flown.plant) if flown else ()

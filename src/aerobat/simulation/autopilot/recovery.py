@@ -7,13 +7,14 @@ rates and thrust are kept for as long as it takes until the loss is noticed; the
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import inf
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from aerobat import so3
 from aerobat.arrays import Array, frozen
-from aerobat.declaration import Finite, NonNegative, by_value, short, validated
+from aerobat.declaration import Finite, NonNegative, Series, by_value, short, validated
 from aerobat.engines.components import components, from_components
 from aerobat.engines.engine import first_row
 from aerobat.engines.pytree import Tree
@@ -37,8 +38,10 @@ from aerobat.states import BodyState, Setpoint
 from aerobat.trajectory import Trajectory, as_trajectory
 from aerobat.vehicle import Vehicle
 
-HORIZON = 6.0  # [s] in which a recovery comes to a hover, or never does
+HORIZON = 15.0  # [s] in which a recovery comes to a hover, or never does
 _CHUNK = 100  # ticks flown at once, so that their references take little memory
+_HOVERING = 0.5  # [s] of all of them, which are not followed any longer then
+_FEW_SPANS = 3  # that a sentence names one by one
 _STILL = 0.2  # [m/s] of a hover
 _LEVEL = 0.2  # [rad] likewise
 
@@ -49,11 +52,12 @@ _LEVEL = 0.2  # [rad] likewise
 class Recoveries:
     """The recoveries from instants of a path."""
 
-    times: Array  # [s] of the instants, (T,)
-    heights: Array  # [m] of the path then, (T,)
-    lowest: Array  # [m] the least height from then on, (T,)
-    durations: Array  # [s] until it hovers; infinite where it never does, (T,)
-    ground: float  # [m] below which there is none
+    times: Series  # [s] of the instants, (T,)
+    heights: Series  # [m] of the path then, (T,)
+    lowest: Series  # [m] the least height from then on, (T,)
+    durations: Series  # [s] until it hovers; infinite where it never does, (T,)
+    reaction: float  # [s] for which the last command is kept before each
+    ground: float | None  # [m] below which there is none; None: no ground
 
     @property
     def height_lost(self) -> Array:
@@ -62,8 +66,9 @@ class Recoveries:
 
     @property
     def possible(self) -> NDArray[np.bool_]:
-        """True where it comes to a hover above the ground, (T,)."""
-        return np.asarray((self.lowest > self.ground) & np.isfinite(self.durations))
+        """True where it comes to a hover, and that above the ground, (T,)."""
+        floor = -inf if self.ground is None else self.ground
+        return np.asarray((self.lowest > floor) & np.isfinite(self.durations))
 
     @property
     def no_return(self) -> tuple[TimeInterval, ...]:
@@ -79,12 +84,26 @@ class Recoveries:
     def __str__(self) -> str:
         """One sentence."""
         if not self.possible.any():
-            return "from no instant does it come back to a hover above the ground"
-        worst = f"no lower than {self.lowest[self.possible].min() - self.ground:.2f} m above the ground"
+            above = "" if self.ground is None else " above the ground"
+            return f"from no instant does it come back to a hover{above}"
+        lowest = float(self.lowest[self.possible].min())
+        height = (
+            f"z = {lowest:.2f} m" if self.ground is None else f"{lowest - self.ground:.2f} m above the ground"
+        )
         slowest = f"within {self.durations[self.possible].max():.1f} s"
-        spans = " and ".join(f"{span.start:.2f} to {span.end:.2f} s" for span in self.no_return)
-        except_from = f", but not from {spans}" if spans else ""
-        return f"given up at any instant it hovers {slowest}, {worst}{except_from}"
+        except_from = f", but not from {self._spans}" if self.no_return else ""
+        return f"given up at any instant it hovers {slowest}, no lower than {height}{except_from}"
+
+    @property
+    def _spans(self) -> str:
+        """The spans of no return in words."""
+        if len(self.no_return) <= _FEW_SPANS:
+            return " and ".join(f"{span.start:.2f} to {span.end:.2f} s" for span in self.no_return)
+        first, last = self.no_return[0].start, self.no_return[-1].end
+        share = 100.0 * float(np.mean(~self.possible))
+        return (
+            f"{len(self.no_return)} spans between {first:.2f} and {last:.2f} s, {share:.0f} % of the instants"
+        )
 
 
 @validated
@@ -93,7 +112,7 @@ def recoveries(
     vehicle: Vehicle | str | None = None,
     *,
     times: ArrayLike | None = None,
-    ground: Finite = 0.0,
+    ground: Finite | None = None,
     reaction: NonNegative = 0.1,
     environment: Environment | None = None,
 ) -> Recoveries:
@@ -105,7 +124,8 @@ def recoveries(
         plan: the path; a bare trajectory needs a vehicle.
         vehicle: what flies it, or its name, by default the plan's.
         times: of the instants [s], (T,), rising; by default a hundred a second.
-        ground: the height [m], in the path's own frame, that a recovery must stay above.
+        ground: the height [m], in the path's own frame, that a recovery must stay above; by default the
+            environment's, which may have none.
         reaction: the time [s] for which the last command is kept before the recovery begins.
         environment: where, by default the problem's.
     """
@@ -117,9 +137,16 @@ def recoveries(
         raise SpecError("the path's attitude is undetermined where its thrust vanishes; plan another")
     flock = _Flock(asked.setpoint, asked.rotor_thrusts, vehicle, environment)
     flock.keep(asked.setpoint, reaction)
-    flock.brake(ground + MIN_FLOOR)
-    heights = asked.setpoint.flat.position[:, 2]
-    return Recoveries(instants, frozen(heights, "heights"), flock.lowest, flock.durations, ground)
+    ground = environment.ground if ground is None else ground
+    flock.brake(-inf if ground is None else ground + MIN_FLOOR)
+    return Recoveries(
+        times=instants,
+        heights=frozen(asked.setpoint.flat.position[:, 2], "heights"),
+        lowest=flock.lowest,
+        durations=flock.durations,
+        reaction=reaction,
+        ground=ground,
+    )
 
 
 class _Flock:
@@ -157,16 +184,19 @@ class _Flock:
             self._fly(_kept(setpoint, since[begin : begin + _CHUNK], self._vehicle), True)
 
     def brake(self, floor: float) -> None:
-        """Come to a hover, no lower than a floor [m], and stay there until the horizon."""
+        """Come to a hover, no lower than a floor [m]; who does not by the horizon never will."""
         body = self._carry[2].body
         velocity = from_components(body.velocity)
         way = Braking.of(from_components(body.position), velocity, self._vehicle, self._gravity, floor)
         since = np.arange(round(HORIZON * RATE)) / RATE
         yaw = np.arctan2(*so3.axes(from_components(body.q_world_body))[:, 1::-1, 0].T)
+        begun = self._time
         for begin in range(0, len(since), _CHUNK):
             parts = way.at(since[begin : begin + _CHUNK])
             self._fly(point_reference(*parts, yaw, self._gravity), False)
-        self.durations[self.durations >= self._time - _CHUNK / RATE] = np.inf
+            if self._time > max(begun + way.durations.max(), self.durations.max()) + _HOVERING:
+                break
+        self.durations[self.durations >= self._time - _CHUNK / RATE] = inf
         self.lowest.flags.writeable = self.durations.flags.writeable = False
 
     def _fly(self, references: ReferencePoint, by_attitude: bool) -> None:
