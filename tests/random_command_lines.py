@@ -36,6 +36,7 @@ NUMBERS = (
     "0", "1", "2", "3", "5", "-1", "0.5", "1e-9", "1e9", "1e308", "1e999", "nan", "inf", "-inf", "", "ten",
     "0x10", "1_000", "٣", "3,5", "99999999999999999999", "--", "True", "None", " 4",
 )  # fmt: skip
+FEW = tuple(n for n in NUMBERS if n not in ("1e9", "1e308", "99999999999999999999"))  # nothing that lasts
 VALUES: dict[str, tuple[str, ...]] = {
     "--vehicle": (
         "agile-quad",
@@ -77,6 +78,28 @@ VALUES: dict[str, tuple[str, ...]] = {
     "--conditions": ("none", "lab", "field", "lap", "../lab.toml"),
     "--seed": ("7", *NUMBERS),
     "--controller": ("full", "paper", "none", ""),
+    "--runs": FEW,
+    "--workers": FEW,
+    "--table": ("csv", "xlsx", ""),
+    "--flights": FEW,
+    "--evaluations": FEW,
+    "--connect": (
+        "udp:127.0.0.1:9",
+        "udp:127.0.0.1",
+        "udp:127.0.0.1:70000",
+        "/dev/null",
+        "kept",
+        "ftp:x:1",
+        "",
+    ),
+    "--listen": ("udp:127.0.0.1:0", "udp:127.0.0.1", "udp:nowhere.invalid:9", "tcp", ""),
+    "--wait": ("0.01", "-1", "nan", "ten"),
+    "--hover-thrust": ("0.5", *NUMBERS),
+    "--origin": ("0", "nan", "x"),
+    "--max-error": NUMBERS,
+    "--loss": NUMBERS,
+    "--delay": NUMBERS,
+    "--for": ("0.05", "-1", "nan", "ten"),
     "--columns": ("time", "paper", "time,position", "time,time", "speed", ",", ""),
     "--rate": ("50", *NUMBERS),
     "--heading": ("45", *NUMBERS),
@@ -108,7 +131,19 @@ OWN = {
     "vehicles": ["--help"],
     "problems": ["--help"],
     "compare": ["--out", "--angle", "--json", "--vehicle"],
-}
+    "sweep": ["--runs", "--workers", "--table", "--conditions", "--seed", "--vehicle", "--out", "--json"],
+    "tune": ["--flights", "--evaluations", "--conditions", "--seed", "--vehicle", "--out", "--time-limit"],
+    "mavlink": [
+        "--connect", "--wait", "--rate", "--hover-thrust", "--vehicle", "--origin", "--max-error", "--speed",
+    ],
+    "mavlink-vehicle": ["--listen", "--loss", "--delay", "--seed", "--speed", "--for"],
+}  # fmt: skip
+SHORT = {
+    "sweep": {"--runs": "3", "--workers": "1"},
+    "tune": {"--flights": "2", "--evaluations": "2"},
+    "mavlink": {"--wait": "0.05", "--connect": "udp:127.0.0.1:9"},
+    "mavlink-vehicle": {"--for": "0.05", "--listen": "udp:127.0.0.1:0"},
+}  # what makes commands end soon
 
 
 def fill(folder: Path) -> None:
@@ -140,7 +175,8 @@ def command_lines(count: int, seed: int) -> Iterator[list[str]]:
 
 def _command_line(rng: random.Random) -> list[str]:
     often = ["fly", "plan", "check", "repeat", "view", "inspect", "export"]
-    command = rng.choice([*often * 4, "compare", "vehicles", "problems", "flyy", ""])
+    seldom = ["compare", "vehicles", "problems", "flyy", ""]
+    command = rng.choice([*often * 4, *SHORT, *SHORT, *seldom])
     line = [command] if command else []
     names = OWN.get(command, list(VALUES))
     if command not in ("vehicles", "problems") and rng.random() < 0.95:
@@ -151,6 +187,9 @@ def _command_line(rng: random.Random) -> list[str]:
             "inspect": ("kept", "kept/flight.npz"),
             "export": ("kept", "kept/line.plan"),
             "compare": ("lien",),
+            "tune": ("line", "kept"),
+            "mavlink": ("kept", "kept/line.plan"),
+            "mavlink-vehicle": ("agile-quad", "hexarotor"),
         }
         line.append(rng.choice(right.get(command, CHEAP) if rng.random() < 0.6 else BROKEN))
     if command == "compare" and line[-1] in CHEAP:  # all planners take long
@@ -162,6 +201,9 @@ def _command_line(rng: random.Random) -> list[str]:
         line.append(option)
         if VALUES[option] and rng.random() < 0.97:
             line.append(rng.choice(VALUES[option]))
+    for option, value in SHORT.get(command, {}).items():
+        if option not in line:
+            line += [option, value]
     return line
 
 

@@ -44,6 +44,13 @@ def run(capsys: pytest.CaptureFixture[str], *arguments: str) -> tuple[int, str, 
     return code, *capsys.readouterr()
 
 
+def test_without_a_command_the_commands_are_told(capsys) -> None:
+    bare, asked = run(capsys), run(capsys, "--help")
+    assert bare == asked
+    assert bare[0] == 0
+    assert "Plan a maneuver, fly it" in bare[1]
+
+
 def test_fly_writes_the_plan_the_flight_the_picture_and_the_report(capsys) -> None:
     code, out, err = run(capsys, "fly", "flip-roll")
     assert (code, err) == (0, "")

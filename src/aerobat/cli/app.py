@@ -5,6 +5,7 @@ from __future__ import annotations
 import atexit
 import gc
 from collections.abc import Iterator, Sequence
+from itertools import pairwise
 
 from cyclopts import App, CycloptsError
 
@@ -77,7 +78,7 @@ def _import_plugins(tokens: Sequence[str]) -> None:
 
 
 def _import_paths(tokens: Sequence[str]) -> Iterator[str]:
-    for token, following in zip(tokens, [*tokens[1:], ""], strict=True):
+    for token, following in pairwise((*tokens, "")):
         if token == IMPORT_FLAG and following:
             yield following
         elif token.startswith(f"{IMPORT_FLAG}="):
