@@ -11,11 +11,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from aerobat import cli
 from aerobat.interchange.csv import read_csv
 from aerobat.problem import problem_names
 from aerobat.simulation import load_flight
 from aerobat.vehicle import vehicle_names
+from command_lines import run
 
 PLAN_KEYS = {
     "planner", "order", "intervals", "dt_s", "duration_s", "cost", "backend", "nodes", "solve_time_s",
@@ -32,16 +32,6 @@ PAPERS = ("flip-roll", "flip-roll-translation", "flip-pitch", "half-flip", "line
 @pytest.fixture(autouse=True)
 def _elsewhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
-
-
-def run(capsys: pytest.CaptureFixture[str], *arguments: str) -> tuple[int, str, str]:
-    """Exit code, standard output and standard error."""
-    code = 0
-    try:
-        cli.main(arguments)
-    except SystemExit as stop:
-        code = stop.code or 0
-    return code, *capsys.readouterr()
 
 
 def test_without_a_command_the_commands_are_told(capsys) -> None:

@@ -12,6 +12,7 @@ from aerobat import cli
 from aerobat.cli.entry import ExitCode
 from aerobat.planning import load_plan
 from aerobat.simulation import Outcome
+from command_lines import code
 
 LINE = ("line", "--order", "5")  # its rotor thrusts are continuous: rotors with lag can follow it
 
@@ -19,14 +20,6 @@ LINE = ("line", "--order", "5")  # its rotor thrusts are continuous: rotors with
 @pytest.fixture(autouse=True)
 def _elsewhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
-
-
-def code(*arguments: str) -> int:
-    try:
-        cli.main(arguments)
-    except SystemExit as stop:
-        return stop.code
-    return 0
 
 
 @pytest.mark.parametrize("command", [["fly", *LINE], ["plan", *LINE], ["vehicles"], ["--help"]])

@@ -9,9 +9,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from aerobat import cli
 from aerobat.interchange import read_trajectory
 from aerobat.vehicle import load_vehicle, write_vehicle
+from command_lines import run
 
 ROW_KEYS = {
     "planner", "segments", "duration_s", "ratio", "certified", "min_margin_n", "planning_s",
@@ -22,16 +22,6 @@ ROW_KEYS = {
 @pytest.fixture(autouse=True)
 def _elsewhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
-
-
-def run(capsys: pytest.CaptureFixture[str], *arguments: str) -> tuple[int, str, str]:
-    """Exit code, standard output and standard error."""
-    code = 0
-    try:
-        cli.main(arguments)
-    except SystemExit as stop:
-        code = stop.code or 0
-    return code, *capsys.readouterr()
 
 
 @pytest.mark.parametrize("planner", ["miqp", "min-snap", "free-knots", "time-optimal"])

@@ -10,13 +10,13 @@ import numpy as np
 import pytest
 import tomli_w
 
-from aerobat import cli
 from aerobat.cli.runs.record import RunRecord, read_record
 from aerobat.interchange import read_trajectory
 from aerobat.planning import Miqp, load_plan
 from aerobat.problem import load_problem
 from aerobat.simulation import load_flight
 from aerobat.vehicle import load_vehicle
+from command_lines import code
 
 RUNS = {
     "a flight under conditions": ("fly", "line", "--conditions", "lab", "--seed", "7", "--order", "5"),
@@ -51,14 +51,6 @@ def _elsewhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     Path("mine.toml").write_text(MINE)
     write_vehicle(replace(load_vehicle("agile-quad"), name="heavy", mass=1.1), "heavy.toml")
-
-
-def code(*arguments: str) -> int:
-    try:
-        cli.main(arguments)
-    except SystemExit as stop:
-        return int(stop.code or 0)
-    return 0
 
 
 @pytest.mark.parametrize("run", RUNS)

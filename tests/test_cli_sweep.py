@@ -12,9 +12,9 @@ import numpy as np
 import pytest
 
 import aerobat as ab
-from aerobat import cli
 from aerobat.cli.progress import SweepProgress
 from aerobat.interchange import read_table
+from command_lines import code
 
 SPREAD = "mass = 0.03\nlag = 0.2\nstart_position = 0.02\n"  # quick to compile
 RUNS = 60  # a chunk and a part of another
@@ -24,14 +24,6 @@ RUNS = 60  # a chunk and a part of another
 def _elsewhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     Path("spread.toml").write_text(SPREAD)
-
-
-def code(*arguments: str) -> int:
-    try:
-        cli.main(arguments)
-    except SystemExit as stop:
-        return int(stop.code or 0)
-    return 0
 
 
 def swept(*more: str) -> int:

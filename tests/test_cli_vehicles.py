@@ -4,8 +4,8 @@ from pathlib import Path
 
 import pytest
 
-from aerobat import cli
 from aerobat.vehicle import load_vehicle, vehicle_names
+from command_lines import run
 
 ROOT = Path(__file__).parent.parent
 ANNOTATED = ROOT / "examples" / "vehicles" / "annotated.toml"
@@ -15,16 +15,6 @@ ROBOTS = ROOT / "tests" / "cases" / "robots"
 @pytest.fixture(autouse=True)
 def _elsewhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
-
-
-def run(capsys: pytest.CaptureFixture[str], *arguments: object) -> tuple[int, str, str]:
-    """Exit code, standard output and standard error."""
-    code = 0
-    try:
-        cli.main([str(each) for each in arguments])
-    except SystemExit as stop:
-        code = stop.code or 0
-    return code, *capsys.readouterr()
 
 
 @pytest.mark.parametrize("name", vehicle_names())

@@ -12,7 +12,6 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from aerobat import cli
 from aerobat.errors import SpecError
 from aerobat.flatness import reference
 from aerobat.interchange import column_groups, read_csv, read_rows, write_columns
@@ -22,6 +21,7 @@ from aerobat.problem import load_problem
 from aerobat.simulation import load_flight
 from aerobat.trajectory import Trajectory
 from aerobat.vehicle import load_vehicle
+from command_lines import code
 
 
 @pytest.fixture(scope="module")
@@ -101,14 +101,6 @@ def test_groups_of_columns_that_are_none_are_refused(text: str, named: str) -> N
         column_groups(text)
     assert column_groups("position,time") == ("time", "position")
     assert column_groups(",".join(ALL)) == ALL
-
-
-def code(*arguments: str) -> int:
-    try:
-        cli.main(arguments)
-    except SystemExit as stop:
-        return int(stop.code or 0)
-    return 0
 
 
 def test_somebody_elses_path_is_flown_and_what_is_assumed_is_said(

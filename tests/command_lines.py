@@ -1,0 +1,22 @@
+"""Command lines as tests run them: in this process, ending in an exit code."""
+
+from __future__ import annotations
+
+import pytest
+
+from aerobat import cli
+
+
+def code(*arguments: object) -> int:
+    """The exit code of a command line."""
+    try:
+        cli.main([str(each) for each in arguments])
+    except SystemExit as stop:
+        return int(stop.code or 0)
+    return 0
+
+
+def run(capsys: pytest.CaptureFixture[str], *arguments: object) -> tuple[int, str, str]:
+    """Exit code, standard output and standard error."""
+    ended = code(*arguments)
+    return ended, *capsys.readouterr()
