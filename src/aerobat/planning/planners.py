@@ -20,7 +20,7 @@ from aerobat.errors import SpecError
 from aerobat.optimization.nonlinear import has_casadi
 from aerobat.planning.assessment.assess import with_assessment
 from aerobat.planning.certified_solve import with_certificate
-from aerobat.planning.courses import is_course
+from aerobat.planning.courses import is_course, on_open_courses
 from aerobat.planning.flyability import with_flyability
 from aerobat.planning.holds import between_holds
 from aerobat.planning.passages import require_openings
@@ -34,7 +34,8 @@ from aerobat.vehicle import Vehicle, as_vehicle, vehicle_names
 class Planner(Protocol):
     """Whatever turns a problem into a plan.
 
-    A planner of one's own inherits from this class and is registered by `@planner("its-name")`.
+    A planner of one's own inherits from this class and is registered by `@planner("its-name")`. It is given
+    closed courses, which have neither start nor goal, if its class says `PLANS_CLOSED_COURSES = True`.
     """
 
     @abstractmethod
@@ -97,7 +98,10 @@ def suited_planner(problem: Problem, vehicle: Vehicle | None) -> str:
 
     It is miqp, whose search is exact, but for long courses, which it cannot search in reasonable time: for a
     vehicle those are time-optimal's, or min-snap's where CasADi is not installed and all stages are points.
+    Closed courses are time-optimal's alone.
     """
+    if not problem.ends:
+        return "time-optimal"
     if vehicle is None or not is_course(problem.stages(vehicle.max_specific_thrust)):
         return "miqp"
     if has_casadi():
@@ -152,7 +156,9 @@ def planner(name: Label) -> Callable[[type[P]], type[P]]:
     def register(cls: type[P]) -> type[P]:
         if "plan" in vars(cls):
             planning: Any = cls
-            planning.plan = validated(between_holds(cls.plan))
+            method = between_holds(cls.plan)
+            closes = getattr(cls, "PLANS_CLOSED_COURSES", False)
+            planning.plan = validated(method if closes else on_open_courses(name, method))
         return cast(type[P], PLANNERS.add(name, cls))
 
     return register

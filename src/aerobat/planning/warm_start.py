@@ -72,7 +72,7 @@ def require_attitudes(planner: str, problem: Problem, vehicle: Vehicle | None) -
     """
     if vehicle is None:
         raise SpecError(f"the {planner} planner needs a vehicle: no limits, no least time; give --vehicle")
-    for name, state in (("start", problem.start), ("goal", problem.goal)):
+    for name, state in problem.ends.items():
         thrust = force_balance(problem.environment, vehicle).specific_thrust(
             state.velocity, state.acceleration
         )

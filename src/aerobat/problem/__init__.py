@@ -2,6 +2,7 @@
 
 from aerobat.problem.ball import Ball
 from aerobat.problem.condition import Attitude, Condition, ForceBalance, LinearBound, Quantity
+from aerobat.problem.end_state import EndState, at_rest
 from aerobat.problem.files import as_problem, load_problem, problem_names, write_problem
 from aerobat.problem.gate import Gate, tilted_gate
 from aerobat.problem.maneuvers import (
@@ -29,7 +30,7 @@ from aerobat.problem.maneuvers import (
     maneuver,
     registered_maneuvers,
 )
-from aerobat.problem.problem import PAPER_LIMITS, EndState, Limits, Problem, at_rest
+from aerobat.problem.problem import PAPER_LIMITS, Limits, Problem
 from aerobat.problem.stage import Stage, StageSequence
 
 __all__ = [

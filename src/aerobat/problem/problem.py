@@ -7,10 +7,10 @@ from collections.abc import Mapping
 from dataclasses import field, replace
 from functools import lru_cache
 from itertools import permutations
-from typing import Annotated, Any, ClassVar, cast
+from typing import Annotated, Any, ClassVar
 
 import numpy as np
-from pydantic import AfterValidator, Field, PlainValidator
+from pydantic import AfterValidator, PlainValidator
 
 from aerobat.arrays import Array
 from aerobat.declaration import (
@@ -22,8 +22,6 @@ from aerobat.declaration import (
     NonNegative,
     PerAxis,
     Positive,
-    Vector3,
-    VectorLike,
     declared,
     from_table,
     in_degrees,
@@ -35,6 +33,7 @@ from aerobat.declaration import (
 from aerobat.environment import Environment
 from aerobat.errors import SpecError
 from aerobat.problem.condition import Condition, ForceBalance, Quantity
+from aerobat.problem.end_state import EndState
 from aerobat.problem.gate import Gate, named_gate
 from aerobat.problem.maneuvers import MANEUVERS, Line, Maneuver
 from aerobat.problem.stage import StageSequence
@@ -42,26 +41,7 @@ from aerobat.problem.stage import StageSequence
 DERIVATIVES = ("position", "velocity", "acceleration", "jerk", "snap", "crackle")
 UNITS = ("m", "m/s", "m/s²", "m/s³", "m/s⁴", "m/s⁵")
 ROUNDING = 1e-9  # of a bound's size
-
-
-@declared
-class EndState:
-    """Where a trajectory begins or ends; derivatives above acceleration are zero there. World frame.
-
-    A goal of `free_attitude` may be reached in any attitude, at whatever body rate and thrust, as races end;
-    planners that cannot leave it free take the acceleration.
-    """
-
-    position: Vector3  # [m] world
-    velocity: Vector3 = field(default_factory=lambda: np.zeros(3))  # [m/s] world
-    acceleration: Vector3 = field(default_factory=lambda: np.zeros(3))  # [m/s²] world
-    free_attitude: bool = False  # of a goal: any attitude will do, whatever the acceleration
-
-    @validated
-    def derivatives(self, order: Annotated[int, Field(ge=1, le=100)]) -> Array:
-        """Position and its derivatives below `order`, (order, 3)."""
-        known = [self.position, self.velocity, self.acceleration]
-        return np.array([known[k] if k < len(known) else np.zeros(3) for k in range(order)])
+MIN_PLACES = 2  # of a closed course: between fewer there is no way
 
 
 def _unbounded() -> Array:
@@ -127,15 +107,15 @@ def _file_name(name: str) -> str:
 
 @declared
 class Problem:
-    """A maneuver between two states, free of any vehicle.
+    """A maneuver between two states, or a closed course, free of any vehicle.
 
-    Raises SpecError when an end lies outside the limits or contradicts what the maneuver asks throughout, or
-    the maneuver lacks its gate.
+    Raises SpecError when an end lies outside the limits or contradicts what the maneuver asks throughout, is
+    missing or given to a closed course, or the maneuver lacks its gate.
     """
 
     name: Annotated[Label, AfterValidator(_file_name)]  # also names the output folder
-    start: EndState  # where and how fast it begins
-    goal: EndState  # where and how fast it ends
+    start: EndState = field(default_factory=EndState)  # where and how fast it begins
+    goal: EndState = field(default_factory=EndState)  # where and how fast it ends
     maneuver: Annotated[Maneuver, PlainValidator(MANEUVERS.read)] = Line()  # what happens on the way
     gates: tuple[Gate, ...] = ()  # openings to pass
     limits: Limits = field(default_factory=Limits)  # bounds on the path
@@ -162,8 +142,9 @@ class Problem:
                     "gates",
                     f": gate '{inner.name}' stands in the opening of gate '{outer.name}'; move one of them",
                 )
-        self._check_within_limits()
         sequence = self.stages(1.0)
+        self._check_given_ends(sequence)
+        self._check_within_limits()
         self._check_stages(sequence)
         for i, condition in enumerate(sequence.path_constraints):
             self._check_ends(i, condition)
@@ -185,9 +166,28 @@ class Problem:
         table.setdefault("maneuver", to_table(self.maneuver))
         return in_degrees(table, "heading")
 
+    def _check_given_ends(self, sequence: StageSequence) -> None:
+        """Refuse an end that is missing, and of a closed course what gives it one."""
+        for end, state in (("start", self.start), ("goal", self.goal)):
+            if not sequence.closed and state.is_left_out:
+                raise FieldError(end, "is missing; add it, with its position")
+            if sequence.closed and state != EndState():
+                raise FieldError(end, "stands beside maneuver.closed, which has none; drop either")
+        if not sequence.closed:
+            return
+        if sum(len(stage.where) >= 3 for stage in sequence.stages) < MIN_PLACES:
+            raise FieldError("maneuver.closed", f"needs {MIN_PLACES} elements that say where; add some")
+        for stage in sequence.stages:
+            if stage.hold:
+                raise FieldError("maneuver.closed", ": a hold rests, a closed course never does; drop either")
+            if stage.window != (0.0, 1.0):
+                raise FieldError(
+                    "maneuver.closed", f": '{stage.name}' asks for its time, which no lap counts; free it"
+                )
+
     def _check_within_limits(self) -> None:
         for derivative, quantity in enumerate(DERIVATIVES[:3]):
-            for end, state in (("start", self.start), ("goal", self.goal)):
+            for end, state in self.ends.items():
                 self._check_point(f"{end}.{quantity}", state.derivatives(3)[derivative], derivative)
         for i, gate in enumerate(self.gates):
             self._check_point(f"gates[{i}].position", gate.position, 0)
@@ -214,7 +214,7 @@ class Problem:
     def _check_ends(self, number: int, condition: Condition) -> None:
         """Refuse ends that contradict what holds throughout; drag, of a vehicle unknown here, is left out."""
         balance = ForceBalance(self.environment.gravity)
-        for end, state in (("start", self.start), ("goal", self.goal)):
+        for end, state in self.ends.items():
             bound = condition.bound(balance)
             still = (state.velocity == self.environment.wind).all()
             if condition.quantity is Quantity.SPECIFIC_THRUST and not still:
@@ -231,6 +231,9 @@ class Problem:
 
     def __str__(self) -> str:
         """One line for people."""
+        if not self.ends:
+            facts = f"{self.name}: {self.maneuver.in_words(self.gates)}"
+            return "; ".join(filter(None, (facts, " ".join(self.description.split()))))
         start, goal = (
             "({:g}, {:g}, {:g}) m".format(*state.position.tolist()) for state in (self.start, self.goal)
         )
@@ -249,6 +252,11 @@ class Problem:
                     f": its {axis} component, {x:g} {UNITS[derivative]}, lies outside the limits "
                     f"[{low:g}, {high:g}]; move it or widen limits.{limit}",
                 )
+
+    @property
+    def ends(self) -> Mapping[str, EndState]:
+        """Its start and its goal, by these names; none of a closed course, which ends as it begins."""
+        return {} if self.start.is_left_out else {"start": self.start, "goal": self.goal}
 
     @property
     def path_limits(self) -> Limits:
@@ -299,9 +307,3 @@ def _explicit_stages(
         for s in sequence.stages
     )
     return replace(sequence, stages=tuple(stages))
-
-
-@validated
-def at_rest(position: VectorLike) -> EndState:
-    """At rest at `position` [m], (3,)."""
-    return EndState(cast(Array, position))

@@ -181,11 +181,15 @@ def check_margin(crossing_point: CrossingPoint, margin: float) -> None:
 
 @declared
 class StageSequence:
-    """A maneuver made explicit: its stages, what holds throughout, and whether order counts."""
+    """A maneuver made explicit: its stages, what holds throughout, and whether order counts.
+
+    One that is `closed` ends as it begins, in flight, half-way in time from its last stage to its first.
+    """
 
     stages: tuple[Stage, ...] = ()
     path_constraints: tuple[Condition, ...] = ()
     ordered: bool = True
+    closed: bool = False
 
     @property
     def linear(self) -> StageSequence:

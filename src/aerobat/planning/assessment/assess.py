@@ -92,8 +92,9 @@ def _assessment(plan: Plan, vehicle: Vehicle) -> Assessment:
 
 def _asked(problem: Problem, vehicle: Vehicle) -> Box:
     """The box of start, goal, gates, and of what stages ask of positions along the world's axes."""
-    points = np.array([problem.start.position, problem.goal.position, *(g.position for g in problem.gates)])
-    lower, upper = points.min(axis=0), points.max(axis=0)
+    places = [end.position for end in problem.ends.values()] + [gate.position for gate in problem.gates]
+    points = np.reshape(places, (-1, 3))
+    lower, upper = points.min(axis=0, initial=inf), points.max(axis=0, initial=-inf)
     for stage in problem.stages(vehicle.max_specific_thrust).stages:
         for condition in stage.where:
             axes = np.flatnonzero(condition.direction)

@@ -20,7 +20,8 @@ from aerobat.flatness import force_balance
 from aerobat.flatness.references import axial_drag
 from aerobat.planning.assessment.damped_point import DampedPoint
 from aerobat.problem.condition import Condition, ForceBalance, Quantity
-from aerobat.problem.problem import EndState, Problem
+from aerobat.problem.end_state import EndState
+from aerobat.problem.problem import Problem
 from aerobat.problem.stage import Stage, StageSequence
 from aerobat.so3 import UP
 from aerobat.vehicle import Vehicle
@@ -64,7 +65,8 @@ def _max_thrust(problem: Problem, vehicle: Vehicle, duration: float) -> float:
     """The largest |f| [m/s²] within a duration.
 
     Where drag along the thrust axis differs from that across it, the airspeed adds to it. Drag only ever
-    slows, so that in the duration no more airspeed is gained than thrust and weight give.
+    slows, so that in the duration no more airspeed is gained than thrust and weight give. Of a closed lap,
+    whose velocity is zero on average, each component is zero somewhere, as in a start at rest.
     """
     environment, drag = problem.environment, abs(axial_drag(vehicle))
     if drag == 0.0:
@@ -80,7 +82,8 @@ def _directions(problem: Problem, sequence: StageSequence) -> Iterator[Array]:
     found = [*np.eye(3)]
     found += [c.direction for s in sequence.stages for c in s.conditions if c.quantity is Quantity.POSITION]
     balls = (stage.ball.centre for stage in sequence.stages if stage.ball is not None)
-    points = [problem.start.position, *(g.position for g in problem.gates), *balls, problem.goal.position]
+    places = [*(g.position for g in problem.gates), *balls]
+    points = [problem.start.position, *places, problem.goal.position] if problem.ends else places
     found += [b - a for a, b in pairwise(points)]
     seen: list[Array] = []
     for vector in found:
@@ -117,8 +120,9 @@ class _Place:
 class _Line:
     """A problem seen along one direction."""
 
-    groups: tuple[tuple[_Place, ...], ...]  # start, what each stage asks, goal
+    groups: tuple[tuple[_Place, ...], ...]  # start, what each stage asks, goal; of a lap the stages
     ordered: bool
+    closed: bool
     lower: float  # [m/s²] of the thrust along it that is allowed throughout
     upper: float  # [m/s²]
     constant: float  # [m/s²] of the thrust along it, what does not accelerate
@@ -132,14 +136,15 @@ class _Line:
         lower, upper = _range(Quantity.SPECIFIC_THRUST, sequence.path_constraints, direction)
         crossed = np.flatnonzero(direction)
         speeds = np.asarray(problem.limits.velocity)[crossed]
-        ends = (
+        places = [_places(stage, direction) for stage in sequence.stages]
+        ends = [
             (_Place(_Turn.AT, float(end.position @ direction), float(end.velocity @ direction)),)
-            for end in (problem.start, problem.goal)
-        )
-        start, goal = ends
+            for end in problem.ends.values()
+        ]
         return cls(
-            groups=(start, *(_places(stage, direction) for stage in sequence.stages), goal),
+            groups=(ends[0], *places, ends[1]) if ends else tuple(places),
             ordered=sequence.ordered,
+            closed=sequence.closed,
             lower=lower,
             upper=upper,
             constant=float(balance.constant @ direction),
@@ -150,15 +155,26 @@ class _Line:
     def least_time(self, max_thrust: float) -> float:
         """The longest of the least times [s] by way of places that have to be met one after another.
 
-        Of stages in no order only one at a time counts.
+        Of stages in no order only one at a time counts; of a closed lap every way from a place back to it.
         """
         forward = min(max_thrust, self.upper) - self.constant
         backward = min(max_thrust, -self.lower) + self.constant
         up = DampedPoint(forward, backward, self.damping, self.max_speed)
         down = DampedPoint(backward, forward, self.damping, self.max_speed)
+        return max((_longest(course, up, down) for course in self._courses()), default=0.0)
+
+    def _courses(self) -> Iterator[Sequence[tuple[_Place, ...]]]:
+        """Groups of places that are met one after another, one of each, from the first to the last."""
+        if self.closed:
+            for i, group in enumerate(self.groups):
+                for place in group:
+                    yield (place,), *self.groups[i + 1 :], *self.groups[:i], (place,)
+            return
         start, *stages, goal = self.groups
-        courses = [stages] if self.ordered or not stages else [[stage] for stage in stages]
-        return max(_longest([start, *course, goal], up, down) for course in courses)
+        if self.ordered or not stages:
+            yield self.groups
+        else:
+            yield from ((start, stage, goal) for stage in stages)
 
 
 def _longest(groups: Sequence[Sequence[_Place]], up: DampedPoint, down: DampedPoint) -> float:
@@ -220,7 +236,10 @@ def _turning_time(problem: Problem, vehicle: Vehicle, sequence: StageSequence) -
     attitudes = [stage.attitude for stage in sequence.stages if stage.attitude is not None]
     cones = [_Cone(attitude.up, attitude.tolerance) for attitude in attitudes]
     balance = force_balance(problem.environment, vehicle)
-    start, goal = (_Cone.of(end, balance) for end in (problem.start, problem.goal))
+    if sequence.closed:
+        inner = sum(a.angle(b) for a, b in pairwise(cones[-1:] + cones))
+        return inner / vehicle.max_body_rate
+    start, goal = (_Cone.of(end, balance) for end in problem.ends.values())
     if not sequence.ordered:
         return max((_turn(vehicle, start, cone) + _turn(vehicle, goal, cone) for cone in cones), default=0.0)
     if not cones:

@@ -18,7 +18,8 @@ from aerobat.planning.polynomial.path_limits import (
     TO_COEFFICIENTS,
 )
 from aerobat.planning.warm_start import WarmStart
-from aerobat.problem.problem import EndState, Problem
+from aerobat.problem.end_state import EndState
+from aerobat.problem.problem import Problem
 from aerobat.so3 import UP
 from aerobat.trajectory import Trajectory
 from aerobat.vehicle import Vehicle

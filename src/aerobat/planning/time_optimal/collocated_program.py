@@ -6,28 +6,24 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from aerobat import so3
 from aerobat.arrays import Array
 from aerobat.certification import Certificate
-from aerobat.flatness import force_balance
 from aerobat.optimization.deadline import out_of_time
 from aerobat.optimization.nonlinear import NonlinearResult, solve_nonlinear
 from aerobat.planning.certified_solve import Solution
 from aerobat.planning.result import PlacedStage
+from aerobat.planning.time_optimal.boundary import ClosedLap, FixedEnds
 from aerobat.planning.time_optimal.bounds import Backoff
 from aerobat.planning.time_optimal.collocation import CollocatedMotion, Mesh, trajectory_of
 from aerobat.planning.time_optimal.elements import Elements
-from aerobat.planning.time_optimal.program import End, OptimalControl
+from aerobat.planning.time_optimal.program import OptimalControl
 from aerobat.planning.time_optimal.starts import Start, initial_motion
 from aerobat.planning.warm_start import WarmStart
-from aerobat.problem.problem import EndState
-from aerobat.so3 import UP
 from aerobat.trajectory import Trajectory
 
 THRUST_FLOOR = 0.02  # of the largest collective thrust: more, and the attitude stays determined
 # times the reserve, of the largest collective thrust, at least: feedback turns a small thrust by a lot
 THRUST_RESERVE = 3.0
-END_SHARE = 0.5  # of the thrust that either end asks: a floor may be no higher
 WARM_BARRIER = 1e-6  # the first barrier parameter of a solve that starts from a solution
 
 
@@ -43,7 +39,8 @@ class SolvedMotion:
     def trajectory(self) -> Trajectory:
         """The motion's trajectory."""
         elements = self.program.control.elements
-        return trajectory_of(elements.body, self.program.mesh, self.motion, elements.problem.heading)
+        motion = self.motion.closed if self.program.control.boundary.is_closed else self.motion
+        return trajectory_of(elements.body, self.program.mesh, motion, elements.problem.heading)
 
     @property
     def placed(self) -> tuple[PlacedStage, ...]:
@@ -70,7 +67,9 @@ class SolvedMotion:
         rows, columns = map(np.array, program.derivatives["jac_g"].sparsity_out(1).get_triplet())
         legs = mesh.leg_of_unknowns[columns[rows == int(np.argmax(excess))]]
         leg = int(legs.max(initial=0))
-        names = ["the start", *(f"'{stage.name}'" for stage in self.program.control.stages), "the goal"]
+        names = [f"'{stage.name}'" for stage in self.program.control.stages]
+        is_closed = self.program.control.boundary.is_closed
+        names = [names[-1], *names, names[0]] if is_closed else ["the start", *names, "the goal"]
         return f"worst on the leg from {names[leg]} to {names[leg + 1]}"
 
     @property
@@ -165,23 +164,12 @@ class CollocatedProgram:
 
 def optimal_control(elements: Elements, start: Start, reserve: float) -> OptimalControl:
     """The optimal control through the stages in the order of a start, a reserve kept from rotors' limits."""
-    problem, vehicle = elements.problem, elements.vehicle
-    first, last = (_end(state, elements) for state in (problem.start, problem.goal))
-    floor = max(THRUST_FLOOR, THRUST_RESERVE * reserve) * vehicle.max_specific_thrust
-    at_ends = min(float(np.linalg.norm(end.thrust)) for end in (first, last))
-    upright = so3.smallest_rotation(UP, first.thrust / np.linalg.norm(first.thrust))
+    floor = max(THRUST_FLOOR, THRUST_RESERVE * reserve) * elements.vehicle.max_specific_thrust
+    boundary = FixedEnds(elements) if elements.problem.ends else ClosedLap(elements)
     return OptimalControl(
         elements=elements,
-        start=first,
-        q_start=so3.multiply(upright, so3.about_axis(UP, np.array(problem.heading))),
-        goal=last,
+        boundary=boundary,
         stages=start.guess.stages,
-        min_thrust=min(floor, END_SHARE * at_ends),
+        min_thrust=boundary.thrust_floor(floor),
         reserve=reserve,
     )
-
-
-def _end(state: EndState, elements: Elements) -> End:
-    environment = elements.problem.environment
-    thrust = force_balance(environment, elements.vehicle).specific_thrust(state.velocity, state.acceleration)
-    return End(state.position, state.velocity, thrust, state.free_attitude)

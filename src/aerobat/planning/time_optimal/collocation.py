@@ -15,7 +15,7 @@ All this is a sum of what either side of an interval contributes, of its own sta
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -50,6 +50,13 @@ class CollocatedMotion:
     states: Array  # at the nodes, (12, K + 1)
     starts: Array  # inputs at the starts of the intervals, (3, K)
     ends: Array  # and at their ends, (3, K)
+
+    @property
+    def closed(self) -> CollocatedMotion:
+        """The same with the end made exactly the start, which solvers do but for their tolerance."""
+        states, ends = self.states.copy(), self.ends.copy()
+        states[:, -1], ends[:, -1] = states[:, 0], self.starts[:, 0]
+        return replace(self, states=states, ends=ends)
 
 
 @dataclass(frozen=True, eq=False)

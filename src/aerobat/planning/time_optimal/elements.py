@@ -109,8 +109,9 @@ class Elements:
         ca, node = import_casadi(), _Node(self)
         path = [_weighted(b, node.derivatives) for b in self.bounds.path if self.has_one_value(b)]
         rate = ca.sumsqr(node.state[RATES]) / self.rate_scale**2
-        normal = np.zeros(3) if self.plane is None else self.plane
-        across = ca.dot(ca.DM(normal), node.state[POSITION] - ca.DM(self.problem.start.position))
+        across = ca.SX.zeros(1)
+        if self.plane is not None:
+            across = ca.dot(ca.DM(self.plane), node.state[POSITION] - ca.DM(self.problem.start.position))
         return node.function(ca.vertcat(*path, rate, across))
 
     def at_stage(self, conditions: tuple[Condition, ...]) -> tuple[ElementFunction, Array, Array]:

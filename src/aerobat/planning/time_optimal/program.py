@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from math import inf
 
 import numpy as np
@@ -16,17 +16,12 @@ from aerobat.optimization.separable import (
     SeparableFunction,
     separable_program,
 )
+from aerobat.planning.time_optimal.boundary import Boundary
 from aerobat.planning.time_optimal.bounds import Backoff
 from aerobat.planning.time_optimal.collocation import CollocatedMotion, Mesh
 from aerobat.planning.time_optimal.elements import BETWEEN, Elements, is_of_direction, weighted_sum
-from aerobat.planning.time_optimal.zero_yaw_rate_body import (
-    ATTITUDE,
-    INPUTS,
-    POSITION,
-    RATES,
-    STATES,
-    VELOCITY,
-)
+from aerobat.planning.time_optimal.rows import Rows, repeated
+from aerobat.planning.time_optimal.zero_yaw_rate_body import INPUTS, POSITION, STATES
 from aerobat.problem.condition import Condition
 from aerobat.problem.stage import Stage
 
@@ -36,44 +31,30 @@ SHORTEST_PHASE = 1e-3  # [s]
 CHANGE_COST = 1e-4
 BALL_SHARE = 1.0 - 1e-4  # of a ball's radius: what defects leave adds up along a course
 PLANE_TOLERANCE = 1e-6  # [m] to either side of it: equalities would repeat those of gates and waypoints in it
-ALONG_Z = (0.0, 0.0, 0.0), (0.0, 0.0, inf)  # bounds on a thrust direction in body axes
-
-
-@dataclass(frozen=True, eq=False)
-class End:
-    """State fixed at one end of the motion; body rates are zero there unless its attitude is free."""
-
-    position: Array  # [m], (3,)
-    velocity: Array  # [m/s], (3,)
-    thrust: Array  # f = a + g e3 + (d/m) w [m/s²], along the thrust axis, (3,)
-    free_attitude: bool = False  # thrust and body rates are not fixed
 
 
 @dataclass(frozen=True, eq=False)
 class OptimalControl:
-    """The fastest motion from `start` to `goal`; `stages` hold where one phase ends and the next begins.
+    """The fastest motion within its boundary; `stages` hold where one phase ends and the next begins.
 
     Without rotor lag the input may jump at every node. With it the motion is what lagging rotors can follow:
     their thrusts are continuous, from those that go with one end's acceleration to those of the other.
     """
 
     elements: Elements
-    start: End
-    q_start: Array  # (4,)
-    goal: End
+    boundary: Boundary
     stages: tuple[Stage, ...]  # (P - 1,)
     min_thrust: float  # [m/s²] specific thrust at least, which keeps the attitude determined
     reserve: float  # of each rotor's range, kept from either of its ends
 
     def program(self, mesh: Mesh, backoff: Backoff) -> NonlinearProgram:
         """The program of a mesh's unknowns, with bounds tightened at nodes."""
-        rows = _Rows()
+        rows = Rows()
         self._hold_intervals(rows, mesh, backoff)
         self._hold_nodes(rows, mesh, backoff)
         for index, stage in enumerate(self.stages):
             self._hold_stage(rows, mesh, index, stage)
-        if not self.goal.free_attitude:
-            rows.hold(self.elements.goal_thrust, mesh.states[-1:], *ALONG_Z, self.goal.thrust)
+        self.boundary.hold(rows, mesh)
         lower, upper = (mesh.pack(motion) for motion in self._box(mesh))
         return separable_program(
             SeparableFunction(self._cost(mesh), mesh.size, 1),
@@ -84,7 +65,7 @@ class OptimalControl:
             x_max=upper,
         )
 
-    def _hold_intervals(self, rows: _Rows, mesh: Mesh, backoff: Backoff) -> None:
+    def _hold_intervals(self, rows: Rows, mesh: Mesh, backoff: Backoff) -> None:
         """The equations of motion, rotors, and bounds on the path where it may jump at nodes, or between."""
         elements, bounds = self.elements, self.elements.bounds
         path = len(bounds.path)
@@ -107,20 +88,21 @@ class OptimalControl:
             unknowns, fractions = mesh.side_unknowns(last), mesh.fractions[:, None]
             rows.elements.append(Element(elements.sides[last], unknowns, fractions, np.hstack([shared, own])))
 
-    def _hold_nodes(self, rows: _Rows, mesh: Mesh, backoff: Backoff) -> None:
-        """At inner nodes: bounds on what has one value there, the body rate, the plane."""
-        bounds = self.elements.bounds
+    def _hold_nodes(self, rows: Rows, mesh: Mesh, backoff: Backoff) -> None:
+        """At inner nodes, and where a lap closes: what has one value there, the body rate, the plane."""
+        bounds, first = self.elements.bounds, 0 if self.boundary.is_closed else 1
         path = [i for i, bound in enumerate(bounds.path) if self.elements.has_one_value(bound)]
-        low, high = (np.maximum(b[:-1], b[1:]) for b in (backoff.low, backoff.high))
+        before, after = np.arange(first, mesh.total) - 1, np.arange(first, mesh.total)  # intervals
+        low, high = (np.maximum(b[before], b[after]) for b in (backoff.low, backoff.high))
         rates = self._squared_rates(bounds.upper[-1] - high[:, -1:])
         across = np.full_like(rates, inf if self.elements.plane is None else PLANE_TOLERANCE)
         lower = np.hstack([(bounds.lower + low)[:, path], np.full_like(rates, -inf), -across])
         upper = np.hstack([(bounds.upper - high)[:, path], rates, across])
         if np.isfinite([lower, upper]).any():
-            unknowns = np.hstack([mesh.states[1:-1], mesh.inputs[1, :-1]])
+            unknowns = np.hstack([mesh.states[first:-1], mesh.inputs[1, before]])
             rows.hold(self.elements.node, unknowns, lower, upper)
 
-    def _hold_stage(self, rows: _Rows, mesh: Mesh, index: int, stage: Stage) -> None:
+    def _hold_stage(self, rows: Rows, mesh: Mesh, index: int, stage: Stage) -> None:
         """What a stage asks of the node where it holds, and when."""
         node = int(np.cumsum(mesh.intervals)[index])
         for jumping, conditions in _by_continuity(stage):
@@ -148,16 +130,7 @@ class OptimalControl:
         lower.phases[:] = SHORTEST_PHASE
         lower.starts[0] = lower.ends[0] = self.min_thrust
         for motion in (lower, upper):
-            for node, end in ((0, self.start), (-1, self.goal)):
-                motion.states[POSITION, node] = end.position
-                motion.states[VELOCITY, node] = end.velocity
-                if not end.free_attitude:
-                    motion.states[RATES, node] = 0.0
-            motion.states[ATTITUDE, 0] = self.q_start
-            if mesh.continuous:
-                motion.starts[:, 0] = np.linalg.norm(self.start.thrust), 0.0, 0.0
-                if not self.goal.free_attitude:
-                    motion.ends[:, -1] = np.linalg.norm(self.goal.thrust), 0.0, 0.0
+            self.boundary.fix(motion, mesh.continuous)
         return lower, upper
 
     def _cost(self, mesh: Mesh) -> list[Element]:
@@ -171,43 +144,9 @@ class OptimalControl:
         return [duration, *(_cost_element(self.elements.change, change, weight) for change in changes)]
 
 
-@dataclass
-class _Rows:
-    """Constraints as they come."""
-
-    elements: list[Element] = field(default_factory=list)
-    lower: list[Array] = field(default_factory=list)
-    upper: list[Array] = field(default_factory=list)
-    count: int = 0
-
-    def reserve(self, lower: Array, upper: Array) -> Indices:
-        """Rows of their own with these bounds, of the bounds' shape."""
-        rows = self.count + np.arange(lower.size).reshape(lower.shape)
-        self.lower.append(lower.ravel())
-        self.upper.append(upper.ravel())
-        self.count += lower.size
-        return rows
-
-    def hold(
-        self,
-        function: ElementFunction,
-        unknowns: Indices,
-        lower: ArrayLike,
-        upper: ArrayLike,
-        parameters: ArrayLike = (),
-    ) -> None:
-        """lower ≤ values ≤ upper at every place, with the same parameters."""
-        rows = self.reserve(np.atleast_2d(lower), np.atleast_2d(upper))
-        self.elements.append(Element(function, unknowns, _repeated(parameters, len(unknowns)), rows))
-
-
 def _cost_element(function: ElementFunction, unknowns: Indices, parameters: ArrayLike) -> Element:
     rows = np.zeros((len(unknowns), 1), dtype=int)
-    return Element(function, unknowns, _repeated(parameters, len(unknowns)), rows)
-
-
-def _repeated(parameters: ArrayLike, places: int) -> Array:
-    return np.tile(np.atleast_1d(np.asarray(parameters, dtype=float)), (places, 1))
+    return Element(function, unknowns, repeated(parameters, len(unknowns)), rows)
 
 
 def _by_continuity(stage: Stage) -> list[tuple[bool, tuple[Condition, ...]]]:

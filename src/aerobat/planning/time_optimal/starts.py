@@ -8,6 +8,7 @@ from itertools import islice
 
 import numpy as np
 
+from aerobat import so3
 from aerobat.arrays import Array
 from aerobat.errors import Infeasible
 from aerobat.flatness import force_balance, reference
@@ -19,8 +20,12 @@ from aerobat.planning.polynomial.min_snap import MinSnap
 from aerobat.planning.result import Plan
 from aerobat.planning.time_optimal.collocation import CollocatedMotion, Mesh
 from aerobat.planning.warm_start import WarmStart
+from aerobat.problem.end_state import at_rest
+from aerobat.problem.maneuvers import Line
 from aerobat.problem.problem import Problem
-from aerobat.problem.stage import StageSequence
+from aerobat.problem.stage import Stage, StageSequence
+from aerobat.so3 import UP
+from aerobat.trajectory import Trajectory
 from aerobat.trajectory.minimum_effort import ORDERS
 from aerobat.vehicle import Vehicle
 
@@ -28,6 +33,7 @@ SLOWER = 1.5  # times the duration of a plan that knows no rotors
 PACE_SPREAD = 0.4  # standard deviation of the logarithm of a phase's pace, where paces are drawn
 SEED = 0
 NEAR_PLANE = 0.05  # of a path's length: what leaves a plane by less may begin in it
+UNROLLED = 3  # laps in a row, of which the middle one is a flying lap
 ASIDE = 0.1  # of a path's length, by which it is bent out of its plane: symmetry is an optimum of its own
 
 
@@ -66,6 +72,11 @@ def starts(
         Infeasible: A stage asks more thrust than the vehicle has.
     """
     sequence = problem.stages(vehicle.max_specific_thrust, vehicle.body_radius)
+    if sequence.closed:
+        laps = [
+            (flying_lap(problem, vehicle, sequence, order), f"minimum {ORDERS[order]}") for order in (3, 4)
+        ]
+        return Starts(tuple(islice(in_space(_variations(laps, False)), count)), ())
     if is_course(sequence):
         plans = [] if first is None else [(first, f"{first.planner}'s plan")]
         paths = [
@@ -90,6 +101,40 @@ def stretched(problem: Problem, vehicle: Vehicle, sequence: StageSequence, order
     """
     path = stretched_path(problem, vehicle, sequence, order)
     return WarmStart(path, sequence.stages, tuple(path.knots[1:-1].tolist()))
+
+
+def flying_lap(problem: Problem, vehicle: Vehicle, sequence: StageSequence, order: int) -> WarmStart:
+    """A lap of the closed form through a closed sequence as a start: of three in a row the middle one.
+
+    From a rest at its last place to one at its first, laps begin and end half-way in time between those two.
+
+    Args:
+        problem: Its gates and its environment count.
+        vehicle: What flies it.
+        sequence: The stages, in order.
+        order: The derivative of position whose square is minimized.
+    """
+    places = [place for stage in sequence.stages if (place := _place(stage, problem)) is not None]
+    lap = (Stage("seam"), *sequence.stages)
+    laps = replace(sequence, stages=(*UNROLLED * lap, Stage("seam")), closed=False)
+    open_ends = replace(problem, maneuver=Line(), start=at_rest(places[-1]), goal=at_rest(places[0]))
+    path = stretched_path(open_ends, vehicle, laps, order)
+    first = 1 + len(lap) * (UNROLLED // 2)  # the knot at which the middle lap begins
+    segments = slice(first, first + len(lap))
+    middle = Trajectory(path.durations[segments], path.coefficients[segments], problem.heading)
+    return WarmStart(middle, sequence.stages, tuple(middle.knots[1:-1].tolist()))
+
+
+def _place(stage: Stage, problem: Problem) -> Array | None:
+    """Where a stage is; None where it does not say."""
+    centre = stage.centre(problem.gates)
+    place = stage.place if centre is None else centre
+    return None if np.isnan(place).any() else place
+
+
+def in_space(starts: Iterator[Start]) -> Iterator[Start]:
+    """Those that keep to no plane."""
+    return (start for start in starts if start.plane is None)
 
 
 def _sources(plans: Sequence[tuple[Plan, str]], sequence: StageSequence) -> Iterator[tuple[WarmStart, str]]:
@@ -178,11 +223,33 @@ def initial_motion(start: Start, mesh: Mesh, problem: Problem, vehicle: Vehicle)
     setpoint = reference(guess.trajectory, vehicle, times, environment=environment).setpoint
     flat = setpoint.flat
     thrust = force_balance(environment, vehicle).specific_thrust(flat.velocity, flat.acceleration)
-    rates = setpoint.omega_body[:, :2]
+    attitude, turning = setpoint.q_world_body, (setpoint.omega_body, setpoint.omega_dot_body)
+    if not problem.ends:
+        attitude, turning = _without_twist(attitude, turning, times / times[-1])
+    rates, accelerations = (vectors[:, :2] for vectors in turning)
     place = flat.position + np.sin(np.pi * times / times[-1])[:, None] * start.aside
-    states = np.concatenate([place, flat.velocity, setpoint.q_world_body, rates], axis=1).T
+    states = np.concatenate([place, flat.velocity, attitude, rates], axis=1).T
     norm = np.linalg.norm(thrust, axis=-1)[:, None]
-    inputs = np.concatenate([norm, setpoint.omega_dot_body[:, :2]], axis=1).T
+    inputs = np.concatenate([norm, accelerations], axis=1).T
     bound = 2.0 * mesh.input_scale[:, None]
     inputs = np.clip(inputs, -bound, bound)
     return CollocatedMotion(guess.phases, states, inputs[:, :-1], inputs[:, 1:])
+
+
+def _without_twist(
+    attitude: Array, vectors: tuple[Array, Array], fractions: Array
+) -> tuple[Array, tuple[Array, Array]]:
+    """Attitudes along a lap turned about the thrust axis, evenly, so that the last is as the first.
+
+    What is carried along a lap without spin comes back turned, by the solid angle about which thrust went.
+
+    Args:
+        attitude: Of the body, (K, 4).
+        vectors: In body axes, (K, 3) each.
+        fractions: Of the lap's duration, (K,).
+    """
+    twist = so3.multiply(so3.conjugate(attitude[0]), attitude[-1])
+    angle = 2.0 * np.arctan2(twist[3], twist[0])
+    turn = so3.about_axis(UP, -np.arctan2(np.sin(angle), np.cos(angle)) * fractions)
+    omega, omega_dot = (so3.rotate(so3.conjugate(turn), each) for each in vectors)
+    return so3.multiply(attitude, turn), (omega, omega_dot)

@@ -11,7 +11,7 @@ fine one, and the fastest that is certified is kept.
 from __future__ import annotations
 
 from dataclasses import field, replace
-from typing import Annotated
+from typing import Annotated, ClassVar
 
 import numpy as np
 from pydantic import Field
@@ -49,8 +49,11 @@ class TimeOptimal(Planner):
     A `start`, a plan of whichever planner, comes first. Each limit is used in full, which leaves nothing for
     a controller: `reserve`, a fraction of each rotor's range of thrust, is kept from either of its ends for
     it. A `planar` plan stays in the vertical plane of its start, where that has one; in space there may be a
-    faster one.
+    faster one. A closed course ends in the state in which it begins, of position, velocity, attitude, body
+    rates and thrusts, all of which are chosen.
     """
+
+    PLANS_CLOSED_COURSES: ClassVar[bool] = True
 
     intervals: Annotated[int, Field(ge=MIN_INTERVALS)] = 60
     reserve: Reserve = option(

@@ -25,11 +25,15 @@ class Course(Maneuver):
     An element that names a gate is given that one, any other none; of a single element it may be left out.
     The last lap may end early, after the first `last_lap` elements. What an element asks throughout, it
     asks of the whole course.
+
+    A `closed` course has neither start nor goal: it ends in the very state in which it begins, in flight
+    between its last element and its first, and can be flown over and over.
     """
 
     elements: Annotated[tuple[Element, ...], Field(min_length=1)]  # in order
     laps: Count = 1  # how often they are flown
     last_lap: Count | None = None  # elements of the last lap; left out, all
+    closed: bool = False  # it ends as it begins, in flight; `start` and `goal` are left out
 
     def __post_init__(self) -> None:
         """Check."""
@@ -38,6 +42,8 @@ class Course(Maneuver):
                 "last_lap",
                 f"must be {len(self.elements)}, the number of elements, or less, got {self.last_lap}",
             )
+        if self.last_lap is not None and self.closed:
+            raise FieldError("last_lap", "stands beside closed, whose laps are all whole; drop one of them")
 
     def stage_sequence(self, gates: Sequence[Gate], max_specific_thrust: float) -> StageSequence:
         """Return the stages of all elements of all laps.
@@ -50,11 +56,13 @@ class Course(Maneuver):
         flown = (lap[:last] if number == self.laps else lap for number in range(1, self.laps + 1))
         stages = [replace(stage, lap=number) for number, each in enumerate(flown, 1) for stage in each]
         throughout = dict.fromkeys(each for sequence in sequences for each in sequence.path_constraints)
-        return StageSequence(tuple(stages), tuple(throughout))
+        return StageSequence(tuple(stages), tuple(throughout), closed=self.closed)
 
     def in_words(self, gates: Sequence[Gate]) -> str:
         """Return its elements as one reads them aloud, those of a kind together."""
         said = in_sequence(element.in_words(self._given(element, gates)) for element in self.elements)
+        if self.closed:
+            return f"{'a closed lap' if self.laps == 1 else f'{self.laps} closed laps'} of {said}"
         if self.laps == 1:
             return said
         partial = "" if self.last_lap is None else f", the last of {self.last_lap} elements"
@@ -72,6 +80,8 @@ class Course(Maneuver):
             sequence = element.stage_sequence(self._given(element, gates), max_specific_thrust)
             if not sequence.ordered and len(self.elements) > 1:
                 raise SpecError("its stages come in any order, which those of a course do not; order them")
+            if sequence.closed:
+                raise FieldError("closed", "is for whole courses, this one is an element; drop it")
         return sequence
 
     def _given(self, element: Maneuver, gates: Sequence[Gate]) -> Sequence[Gate]:

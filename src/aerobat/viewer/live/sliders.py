@@ -126,8 +126,8 @@ def _turned(gate: Gate, axis: Array, angle: float) -> Gate:
 
 def _reach(problem: Problem) -> float:
     """Half the size of what is flown through [m]."""
-    places = [problem.start.position, problem.goal.position, *(gate.position for gate in problem.gates)]
-    return max(0.5 * float(np.ptp(places, axis=0).max()), LEAST_REACH)
+    places = [end.position for end in problem.ends.values()] + [gate.position for gate in problem.gates]
+    return max(0.5 * float(np.ptp(places, axis=0).max()), LEAST_REACH) if places else LEAST_REACH
 
 
 def _round_step(length: float) -> float:

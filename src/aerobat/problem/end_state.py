@@ -1,0 +1,49 @@
+"""Where a motion begins and where it ends."""
+
+from __future__ import annotations
+
+from dataclasses import field
+from typing import Annotated, cast
+
+import numpy as np
+from pydantic import Field
+
+from aerobat.arrays import Array
+from aerobat.declaration import FieldError, PartialVector, Vector3, VectorLike, declared, validated
+from aerobat.problem.condition import free
+
+
+@declared
+class EndState:
+    """Where a trajectory begins or ends; derivatives above acceleration are zero there. World frame.
+
+    A goal of `free_attitude` may be reached in any attitude, at whatever body rate and thrust, as races end;
+    planners that cannot leave it free take the acceleration. A closed course has no ends: both are left out.
+    """
+
+    position: PartialVector = field(default_factory=free)  # [m] world, all of it, but of a closed course
+    velocity: Vector3 = field(default_factory=lambda: np.zeros(3))  # [m/s] world
+    acceleration: Vector3 = field(default_factory=lambda: np.zeros(3))  # [m/s²] world
+    free_attitude: bool = False  # of a goal: any attitude will do, whatever the acceleration
+
+    def __post_init__(self) -> None:
+        """Check."""
+        if np.isnan(self.position).any() and not self.is_left_out:
+            raise FieldError("position", "must be given in all components; add those that are missing")
+
+    @property
+    def is_left_out(self) -> bool:
+        """True of an end that no problem gives, a closed course's."""
+        return bool(np.isnan(self.position).all())
+
+    @validated
+    def derivatives(self, order: Annotated[int, Field(ge=1, le=100)]) -> Array:
+        """Position and its derivatives below `order`, (order, 3)."""
+        known = [self.position, self.velocity, self.acceleration]
+        return np.array([known[k] if k < len(known) else np.zeros(3) for k in range(order)])
+
+
+@validated
+def at_rest(position: VectorLike) -> EndState:
+    """At rest at `position` [m], (3,)."""
+    return EndState(cast(Array, position))
