@@ -14,7 +14,7 @@ from aerobat.vehicle import Vehicle
 
 P = TypeVar("P")
 
-COURSE_STAGES = 6  # that say where they are: from so many on a path through them is the start
+COURSE_STAGES = 4  # that say where they are: from so many on a path through them is the start
 MANY_STAGES = 10  # of any kind
 
 

@@ -43,6 +43,11 @@ class FlownPassage:
     failure: str = ""  # what went wrong, in words; empty where it was passed as asked
     clearance: float | None = None  # [m] the least between body and frame; None: not crossed
 
+    @property
+    def is_missed(self) -> bool:
+        """True where the gate is not crossed, or not as far as counts, or its frame is touched."""
+        return bool(self.failure) and (self.clearance is None or self.clearance < 0.0)
+
 
 @dataclass(frozen=True, kw_only=True)
 class OwnFlight:
@@ -59,16 +64,12 @@ class OwnFlight:
     @property
     def lingers(self) -> bool:
         """True if it does not pass the plane of a gate, or not as far as counts, or touches the frame."""
-        return any(
-            passage.failure and (passage.clearance is None or passage.clearance < 0.0)
-            for passage in self.passages
-        )
+        return any(passage.is_missed for passage in self.passages)
 
     @property
     def wants_reserve(self) -> bool:
-        """True if it has a defect that more reserve for the controller may mend: any but touching a frame."""
-        touching = sum((passage.clearance or 0.0) < 0.0 for passage in self.passages if passage.failure)
-        return len(self.defects) > touching
+        """True if it has a defect that more reserve for the controller may mend: any but a gate missed."""
+        return len(self.defects) > sum(passage.is_missed for passage in self.passages)
 
     @property
     def rank(self) -> tuple[int, float]:

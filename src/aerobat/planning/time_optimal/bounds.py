@@ -136,8 +136,8 @@ class Backoff:
         values, kept = bounds.along(trajectory), np.zeros_like(bounds.sizes)
         rotors = slice(len(bounds.path), -1)
         kept[rotors] = reserve * bounds.sizes[rotors]
-        low = self.low + _more(bounds.lower + kept + _largest(-values), bounds.sizes)
-        high = self.high + _more(_largest(values) - (bounds.upper - kept), bounds.sizes)
+        low = _raised(self.low, bounds.lower + kept + _largest(-values), bounds.sizes)
+        high = _raised(self.high, _largest(values) - (bounds.upper - kept), bounds.sizes)
         unchanged = (low == self.low).all() and (high == self.high).all()
         if unchanged or (low + high > MAX_BACKOFF * (bounds.upper - bounds.lower) - 2.0 * kept).any():
             return None
@@ -153,9 +153,14 @@ def _largest(values: Array) -> Array:
     return np.asarray(np.maximum(values.max(axis=1), (here + rise).max(axis=1)))
 
 
-def _more(excess: Array, sizes: Array) -> Array:
-    """What is to be kept in addition, (K, M)."""
-    return np.where(excess > -NEAR * sizes, OVERSHOOT * np.maximum(excess, 0.0) + BACKOFF * sizes, 0.0)
+def _raised(backoff: Array, excess: Array, sizes: Array) -> Array:
+    """What is to be kept where so much is exceeded, (K, M).
+
+    Twice what was kept where it is exceeded still: what lies in the middle of an interval may be far above
+    its nodes, which then hold nothing until as much is kept there.
+    """
+    more = OVERSHOOT * np.maximum(excess, 0.0) + BACKOFF * sizes + np.where(excess > 0.0, backoff, 0.0)
+    return backoff + np.where(excess > -NEAR * sizes, more, 0.0)
 
 
 def _size(lower: float, upper: float) -> float:

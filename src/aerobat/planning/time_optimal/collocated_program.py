@@ -170,6 +170,7 @@ def optimal_control(elements: Elements, start: Start, reserve: float) -> Optimal
         elements=elements,
         boundary=boundary,
         stages=start.guess.stages,
+        ways=start.ways,
         min_thrust=boundary.thrust_floor(floor),
         reserve=reserve,
     )

@@ -29,6 +29,7 @@ from aerobat.problem.problem import Problem
 from aerobat.vehicle import Vehicle
 
 BETWEEN = (0.25, 0.5, 0.75)  # of an interval: where bounds on the path are held too, beside its nodes
+SLOWEST = 0.5  # [m/s] through a gate, below which no more room is asked: far less than what is asked there
 RATE_SCALE = 10.0  # [rad/s] of body rates that have no bound
 
 
@@ -137,6 +138,33 @@ class Elements:
         z, ball = ca.SX.sym("z", 3), ca.SX.sym("ball", 4)
         distance = (z * STATE_SCALE[POSITION] - ball[:3]) / ball[3]
         return ElementFunction(ca.Function("distance", [z, ball], [ca.sumsqr(distance)]))
+
+    @cached_property
+    def room_ahead(self) -> ElementFunction:
+        """Room [m²/s] on either side before and behind a gate, times the speed through it; that speed.
+
+        By the gate's place and axes (12,), half its sides (2,), how far before and behind, and the
+        acceleration by which the path may bend there, (9,).
+        """
+        ca, z, way = import_casadi(), import_casadi().SX.sym("z", STATES), import_casadi().SX.sym("way", 16)
+        velocity = z[VELOCITY] * STATE_SCALE[VELOCITY]
+        through, values = ca.dot(way[3:6], velocity), []
+        bent = way[15] * way[14] ** 2 / 2.0 / ca.fmax(through, SLOWEST)
+        for axis, half in ((way[6:9], way[12]), (way[9:12], way[13])):
+            height, reach = self._reached(z, way[:3], axis)
+            across = way[14] * ca.dot(axis, velocity)
+            for side in (1.0, -1.0):
+                room = (half - reach - side * height) * through - bent
+                values += [room - across, room + across]
+        return ElementFunction(ca.Function("room", [z, way], [ca.vertcat(*values, through)]))
+
+    def _reached(self, z: Any, place: Any, direction: Any) -> tuple[Any, Any]:
+        """Of the body in a scaled state, its centre's distance from a place along a direction, its reach."""
+        ca, body = import_casadi(), self.vehicle.bounding_ellipsoid
+        state = z * STATE_SCALE
+        along = self.body.axes(state).T @ direction
+        height = ca.dot(direction, state[POSITION] - place) + ca.dot(ca.DM(body.centre), along)
+        return height, ca.norm_2(ca.DM(body.semi_axes) * along)
 
     @cached_property
     def goal_thrust(self) -> ElementFunction:

@@ -21,6 +21,7 @@ from aerobat.planning.time_optimal.bounds import Backoff
 from aerobat.planning.time_optimal.collocation import CollocatedMotion, Mesh
 from aerobat.planning.time_optimal.elements import BETWEEN, Elements, is_of_direction, weighted_sum
 from aerobat.planning.time_optimal.rows import Rows, repeated
+from aerobat.planning.time_optimal.ways import Way
 from aerobat.planning.time_optimal.zero_yaw_rate_body import INPUTS, POSITION, STATES
 from aerobat.problem.condition import Condition
 from aerobat.problem.stage import Stage
@@ -44,6 +45,7 @@ class OptimalControl:
     elements: Elements
     boundary: Boundary
     stages: tuple[Stage, ...]  # (P - 1,)
+    ways: tuple[Way, ...]  # through the gates that are among them
     min_thrust: float  # [m/s²] specific thrust at least, which keeps the attitude determined
     reserve: float  # of each rotor's range, kept from either of its ends
 
@@ -54,6 +56,8 @@ class OptimalControl:
         self._hold_nodes(rows, mesh, backoff)
         for index, stage in enumerate(self.stages):
             self._hold_stage(rows, mesh, index, stage)
+        for way in self.ways:
+            way.hold(rows, mesh, self.elements)
         self.boundary.hold(rows, mesh)
         lower, upper = (mesh.pack(motion) for motion in self._box(mesh))
         return separable_program(

@@ -11,10 +11,11 @@ from aerobat.planning.certified_solve import Judged, certified_solve
 from aerobat.planning.courses import is_course
 from aerobat.planning.flyability import own_flight
 from aerobat.planning.recorder import Attempt, Recorder
-from aerobat.planning.result import OwnFlight
+from aerobat.planning.result import FLYABLE_ERROR, OwnFlight
 from aerobat.planning.time_optimal.collocated_program import CollocatedProgram, SolvedMotion
 from aerobat.planning.time_optimal.elements import Elements
 from aerobat.planning.time_optimal.starts import Start
+from aerobat.planning.time_optimal.ways import Way, straighter
 from aerobat.problem.problem import Problem
 from aerobat.vehicle import Vehicle
 
@@ -29,9 +30,11 @@ SAME = 1e-3  # of the duration: starts that come to nearly the same have come to
 # on a course, whose legs take turns at the full body rate: intervals of a leg on either mesh,
 COURSE_COARSE_INTERVALS = 12
 COURSE_INTERVALS = 20
+COURSE_COARSE_ITERATIONS = 250  # at most, of first solves
 COURSE_BARRIER = 1e-3  # of solves on the fine one, which begin near the solution
 ROUNDS = 8  # of solving, at most
 MORE_RESERVE = 1.6  # times the reserve, each time that the plan's own flight leaves its path
+STRAIGHTENINGS = 4  # of ways through gates, at most
 RESERVE_RAISES = 4  # at most
 MAX_RESERVE = 0.4
 COARSE_TIME = 0.4  # of the time that is left, where there is a limit, for all coarse solves,
@@ -77,11 +80,12 @@ class Race:
         return best or next(filter(None, map(self._certified, others)), None)
 
     def flyable(self, found: Judged[SolvedMotion]) -> Judged[SolvedMotion]:
-        """What was found, with so much more reserve that its own flight has no defect.
+        """What was found, with ways so straight and so much more reserve that its own flight has no defect.
 
         Where no reserve is wanted it stays as it is, and where none is enough the best is returned.
         """
-        best, reserve = (self._own_flight(found), found), self.reserve
+        best, reserve = self._through_gates(found), self.reserve
+        found = best[1]
         for _ in range(RESERVE_RAISES if reserve > 0.0 else 0):
             if not best[0].wants_reserve or out_of_time():
                 break
@@ -92,6 +96,28 @@ class Race:
                 found = again
                 best = min(best, (self._own_flight(found), found), key=lambda pair: pair[0].rank)
         return best[1]
+
+    def _through_gates(self, found: Judged[SolvedMotion]) -> tuple[OwnFlight, Judged[SolvedMotion]]:
+        """What was found, or with straighter ways through the gates that its own flight misses, and that.
+
+        Only of a flight that keeps to its path: where it leaves it, the path is not what misses them.
+        """
+        best = flight, _ = self._own_flight(found), found
+        for _ in range(STRAIGHTENINGS):
+            program = found.solution.source.program
+            keeps_path = flight.error <= FLYABLE_ERROR
+            if not (flight.lingers and keeps_path and program.start.ways) or out_of_time():
+                break
+            stages = program.control.stages
+            ways = straighter(program.start.ways, stages, flight)
+            again = self._certified(
+                self._fine(program.control.elements, found.solution.source, self.reserve, ways)
+            )
+            if again is None:
+                break
+            flight, found = self._own_flight(again), again
+            best = min(best, (flight, found), key=lambda pair: pair[0].rank)
+        return best
 
     def _coarse(self, starts: Sequence[Start], body: Vehicle) -> list[CollocatedProgram]:
         """Fine programs from where coarse ones end, the fastest first."""
@@ -105,7 +131,7 @@ class Race:
                 start,
                 self.reserve,
                 elements.mesh(self._coarse_intervals(start)),
-                min(COARSE_ITERATIONS, self.iterations),
+                min(COURSE_COARSE_ITERATIONS if self.on_course else COARSE_ITERATIONS, self.iterations),
                 COARSE_TOLERANCE,
             ).solved()
             usable = solved.answer.violation < COARSE_VIOLATION
@@ -124,9 +150,15 @@ class Race:
             return start.guess.allocate_intervals(COURSE_COARSE_INTERVALS * legs, MIN_INTERVALS)
         return start.guess.allocate_intervals(min(COARSE_INTERVALS, self.intervals), COARSE_MIN_INTERVALS)
 
-    def _fine(self, elements: Elements, solved: SolvedMotion, reserve: float) -> CollocatedProgram:
-        """The program on the fine mesh from a motion."""
-        start = solved.start
+    def _fine(
+        self,
+        elements: Elements,
+        solved: SolvedMotion,
+        reserve: float,
+        ways: tuple[Way, ...] | None = None,
+    ) -> CollocatedProgram:
+        """The program on the fine mesh from a motion, its ways through gates the same or others."""
+        start = solved.start if ways is None else replace(solved.start, ways=ways)
         if not self.on_course:
             mesh = elements.mesh(start.guess.allocate_intervals(self.intervals, MIN_INTERVALS))
             return CollocatedProgram(elements, start, reserve, mesh, self.iterations)
