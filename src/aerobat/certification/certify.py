@@ -15,7 +15,7 @@ from aerobat.arrays import Array
 from aerobat.certification import quantities
 from aerobat.certification.attitude import ThrustDirectionRates
 from aerobat.certification.certificate import Certificate, Finding, Side
-from aerobat.certification.continuity import discontinuities
+from aerobat.certification.continuity import discontinuities, seam
 from aerobat.certification.enclosure import chebyshev
 from aerobat.certification.enclosure.interpolation_error import accuracy
 from aerobat.certification.enclosure.queries import (
@@ -87,7 +87,10 @@ def certify(
     findings += kinematic_findings(trajectory, envelope, balance)
     findings += passage_findings(trajectory, envelope.passages, balance)
     findings += waypoint_findings(trajectory, envelope.waypoints)
-    return Certificate(tuple(findings), found.vanishing, discontinuities(curve, floor, series))
+    jumps = discontinuities(curve, floor, series)
+    if envelope.closed:
+        jumps += seam(trajectory, vehicle, environment)
+    return Certificate(tuple(findings), found.vanishing, jumps)
 
 
 def _queries(vehicle: Vehicle, envelope: Envelope) -> list[ExtremumQuery]:

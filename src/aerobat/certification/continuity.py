@@ -9,6 +9,7 @@ import math
 
 import numpy as np
 
+from aerobat import so3
 from aerobat.arrays import Array
 from aerobat.certification import quantities
 from aerobat.certification.certificate import Discontinuity
@@ -16,9 +17,13 @@ from aerobat.certification.enclosure.interpolation_error import first_order
 from aerobat.certification.enclosure.queries import ChebyshevSeries
 from aerobat.certification.quantities import MagnitudeBounds
 from aerobat.certification.thrust_curve import ThrustCurve
+from aerobat.environment import Environment
+from aerobat.flatness import reference
 from aerobat.trajectory import Trajectory
+from aerobat.vehicle import Vehicle
 
 NEGLIGIBLE_JUMP = 1e-6  # of the largest value at knots: less than any controller or solver can tell
+NEGLIGIBLE_SEAM = 1e-6  # of the largest value, rad, or of 1 rad/s, where a lap closes
 COMMAND_RESOLUTION = (
     1 / 1000
 )  # of a rotor's range: the steps of a pulse of 1000 to 2000 µs, as motors take commands
@@ -65,6 +70,35 @@ def discontinuities(
             time = float(trajectory.knots[knot + 1])
             jumps.setdefault(int(knot), Discontinuity(name, unit, float(norm[knot]), time))
     return tuple(jumps[knot] for knot in sorted(jumps))
+
+
+def seam(trajectory: Trajectory, vehicle: Vehicle, environment: Environment) -> tuple[Discontinuity, ...]:
+    """What a lap that is flown over and over jumps by from its end to its start, the first of it, if any.
+
+    Attitudes are compared whole: a body that is carried around without spin may come back turned.
+
+    Args:
+        trajectory: The lap.
+        vehicle: What flies it.
+        environment: Where.
+    """
+    flat = reference(trajectory, vehicle, [0.0, trajectory.duration], environment=environment)
+    state = flat.setpoint
+    checks = (
+        ("position", "m", state.flat.position, np.ptp(trajectory.on_segments([0.0]), axis=0)),
+        ("velocity", "m/s", state.flat.velocity, trajectory.peak(1).value),
+        ("body rate", "rad/s", state.omega_body, max(1.0, float(np.abs(state.omega_body).max()))),
+        ("rotor thrusts", "N", flat.rotor_thrusts * (vehicle.lags > 0.0), vehicle.max_thrusts),
+    )
+    jumps = [("attitude", "rad", float(so3.angle_between(*state.q_world_body)), 1.0)]
+    for name, unit, ends, size in checks:
+        jumps.append((name, unit, float(np.linalg.norm(ends[1] - ends[0])), float(np.max(size))))
+    found = [
+        Discontinuity(name, unit, jump, trajectory.duration)
+        for name, unit, jump, size in jumps
+        if jump > NEGLIGIBLE_SEAM * size
+    ]
+    return tuple(found[:1])
 
 
 def _thrust_jumps(curve: ThrustCurve, ends: Array, min_thrust: Array, found: ChebyshevSeries | None) -> Array:

@@ -56,7 +56,7 @@ class Envelope:
     """Limits over continuous time; infinite where there is none.
 
     `limits` bounds position and its derivatives per axis, as a problem does; `conditions` hold throughout,
-    and `passages` and `waypoints` at their instants.
+    and `passages` and `waypoints` at their instants. What is `closed` goes on from its end as from its start.
     """
 
     speed: Limit = np.inf  # [m/s] |v|
@@ -67,3 +67,4 @@ class Envelope:
     conditions: tuple[Condition, ...] = ()
     passages: tuple[PlannedPassage, ...] = ()
     waypoints: tuple[PlannedWaypoint, ...] = ()
+    closed: bool = False

@@ -20,6 +20,7 @@ class Asked(NamedTuple):
 
     gates: tuple[PlannedPassage, ...]
     waypoints: tuple[PlannedWaypoint, ...]
+    lap_begin: float = 0.0  # [s] when the first lap begins
 
 
 NOTHING_ASKED = Asked((), ())
@@ -27,6 +28,8 @@ NOTHING_ASKED = Asked((), ())
 
 def passages_asked(goal: Problem | Plan, times: Array, position: Array) -> Asked:
     """The passages in the order of the stages, of all gates where no stage names one or has a ball.
+
+    The first lap begins with the path; a closed one's with the last passage, a whole round before that.
 
     When is said by a plan's stages; otherwise by the set-points' nearest approaches to the centres, those of
     stages that follow one another in their order.
@@ -36,6 +39,15 @@ def passages_asked(goal: Problem | Plan, times: Array, position: Array) -> Asked
         times: of the set-points [s], (T,).
         position: of the set-points [m], (T, 3).
     """
+    asked = _asked(goal, times, position)
+    problem = goal.problem if isinstance(goal, Plan) else goal
+    passed = [gate.time for gate in asked.gates] + [waypoint.time for waypoint in asked.waypoints]
+    latest = max(passed, default=0.0)
+    return asked if problem.ends else asked._replace(lap_begin=latest - float(times[-1]))
+
+
+def _asked(goal: Problem | Plan, times: Array, position: Array) -> Asked:
+    """The passages, whenever the first lap begins."""
     problem = goal.problem if isinstance(goal, Plan) else goal
     if isinstance(goal, Plan):
         planned = Asked(planned_passages(goal.stages, problem), planned_waypoints(goal.stages, problem))

@@ -55,7 +55,7 @@ class LapTime:
 
     lap: int  # counted from 1
     end: float  # [s] when that was passed; NaN where one of the lap was not
-    duration: float  # [s] since the lap before, or the start
+    duration: float  # [s] since the lap before, or the start; of a closed course as if it came round
 
 
 @in_notebooks
@@ -74,16 +74,18 @@ class Score:
     sentence: str  # the outcome with its numbers
     observer: ObserverScore | None = None  # of a filter, where a logged flight had one
     waypoints: tuple[WaypointPassage, ...] = ()  # one for each ball, in the order of the stages
+    lap_begin_s: float = 0.0  # when the first lap begins; a closed course's before the flight
 
     @property
     def laps(self) -> tuple[LapTime, ...]:
-        """The laps of a course of several; none where it has no gates or waypoints."""
+        """The laps of a closed course or of one of several; none where it has no gates or waypoints."""
         passed = [(gate.lap, gate.time) for gate in self.passages]
         passed += [(waypoint.lap, waypoint.time) for waypoint in self.waypoints]
         numbers = sorted({lap for lap, _ in passed})
         ends = [float(np.max([time for lap, time in passed if lap == number])) for number in numbers]
-        durations = np.diff([0.0, *ends]).tolist()
-        return tuple(map(LapTime, numbers, ends, durations)) if len(numbers) > 1 else ()
+        durations = np.diff([self.lap_begin_s, *ends]).tolist()
+        has_laps = len(numbers) > 1 or self.lap_begin_s < 0.0
+        return tuple(map(LapTime, numbers, ends, durations)) if has_laps else ()
 
     def __str__(self) -> str:
         """One line for people."""
@@ -114,6 +116,7 @@ class Scores:
     ground_time: Array  # [s] when a vehicle was below ground first, NaN if never
     contact: Array  # what it came to touch first, by the codes of Contact, where its plant felt that
     contact_time: Array  # [s] when, NaN if never
+    lap_begin_s: float = 0.0  # when the first lap begins; a closed course's before the flight
 
     def __post_init__(self) -> None:
         """Write-protect."""
@@ -140,6 +143,7 @@ class Scores:
             sentence=sentence,
             observer=None,
             waypoints=met,
+            lap_begin_s=self.lap_begin_s,
         )
 
     def __iter__(self) -> Iterator[Score]:
@@ -230,6 +234,7 @@ def score(flight: Flight, goal: Problem | Plan | str, vehicle: Vehicle | str | N
         ground_time=np.array([flight.times[int(np.argmax(below))] if below.any() else np.nan]),
         contact=np.array([contact]),
         contact_time=np.array([touched]),
+        lap_begin_s=planned.lap_begin,
     )[0]
     return replace(scored, observer=_observer(flight))
 
@@ -275,4 +280,5 @@ def scores_of(metrics: RunningMetrics, planned: Asked) -> Scores:
         ground_time=np.where(never, np.nan, metrics.ground_time),
         contact=np.zeros(stop.shape),
         contact_time=np.full(stop.shape, np.nan),
+        lap_begin_s=planned.lap_begin,
     )

@@ -154,10 +154,14 @@ def certificate_for(
 
 def envelope_for(problem: Problem, vehicle: Vehicle, stages: Sequence[PlacedStage] = ()) -> Envelope:
     """The limits of a problem for a vehicle, with the gates that are passed at placed stages."""
-    throughout = problem.stages(vehicle.max_specific_thrust).path_constraints
-    passages = planned_passages(stages, problem)
-    waypoints = planned_waypoints(stages, problem)
-    return Envelope(limits=problem.path_limits, conditions=throughout, passages=passages, waypoints=waypoints)
+    sequence = problem.stages(vehicle.max_specific_thrust)
+    return Envelope(
+        limits=problem.path_limits,
+        conditions=sequence.path_constraints,
+        passages=planned_passages(stages, problem),
+        waypoints=planned_waypoints(stages, problem),
+        closed=sequence.closed,
+    )
 
 
 def with_certificate(plan: Plan, vehicle: Vehicle) -> Plan:

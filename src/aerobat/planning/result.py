@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numpy as np
+
 from aerobat.certification import Certificate
 from aerobat.declaration import PathName, by_value, in_notebooks, short, validated
 from aerobat.planning.assessment.assessment import Assessment
@@ -168,12 +170,20 @@ class Plan:
 
     @property
     def laps(self) -> tuple[float, ...]:
-        """The times [s] at which the laps of a course of several end, with their last stages."""
+        """The times [s] at which laps end, with their last stages, of a closed course or one of several."""
         stages = self.problem.stages(1.0).stages
         if len(stages) != len(self.stages):
             return ()
         ends = {stage.lap: place.time for stage, place in zip(stages, self.stages, strict=True)}
-        return tuple(ends.values()) if len(ends) > 1 else ()
+        return tuple(ends.values()) if len(ends) > 1 or not self.problem.ends else ()
+
+    @property
+    def lap_times(self) -> tuple[float, ...]:
+        """The durations [s] of laps, the first since the start; of a closed course as if it came round."""
+        if not self.laps:
+            return ()
+        begin = 0.0 if self.problem.ends else self.laps[-1] - self.duration
+        return tuple(np.diff([begin, *self.laps]).tolist())
 
     @property
     def intervals(self) -> int:

@@ -162,6 +162,7 @@ def _plan(plan: Plan) -> dict[str, Any]:
         "solve_time_s": plan.solve_time,
         "stages": [{"name": s.name, "interval": s.interval, "time_s": s.time} for s in plan.stages],
         "lap_ends_s": list(plan.laps),
+        "lap_times_s": list(plan.lap_times),
         "attempts": [
             {
                 "dt_s": a.dt,

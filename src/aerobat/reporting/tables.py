@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Mapping
-from itertools import groupby, pairwise
+from itertools import groupby
 from math import degrees, isinf, isnan
 
 from rich.console import Console
@@ -154,8 +154,7 @@ def plan_facts(plan: Plan) -> Iterable[Fact]:
     elif plan.stages:
         yield "stages", ", ".join(f"{s.name} at {s.time:.2f} s" for s in plan.stages)
     if plan.laps:
-        splits = pairwise((0.0, *plan.laps))
-        yield "laps", ", ".join(f"{end - begin:.3f} s" for begin, end in splits)
+        yield "laps", ", ".join(f"{duration:.3f} s" for duration in plan.lap_times)
     if plan.margin is not None:
         yield "rotors", str(plan.margin)
     if plan.certificate is not None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from math import cos, inf, sin
 from typing import Any, Protocol
@@ -11,7 +11,7 @@ import numpy as np
 
 from aerobat import so3
 from aerobat.arrays import Array
-from aerobat.flatness import force_balance
+from aerobat.flatness import force_balance, reference
 from aerobat.kernels.quaternions import conjugate, multiply
 from aerobat.optimization.nonlinear import import_casadi
 from aerobat.optimization.separable import ElementFunction
@@ -28,9 +28,11 @@ from aerobat.planning.time_optimal.zero_yaw_rate_body import (
 )
 from aerobat.problem.end_state import EndState
 from aerobat.so3 import UP
+from aerobat.trajectory import Trajectory
 
 END_SHARE = 0.5  # of the thrust that either end asks: a floor of thrust may be no higher
 ALONG_Z = (0.0, 0.0, 0.0), (0.0, 0.0, inf)  # bounds on a thrust direction in body axes
+NEGLIGIBLE_TWIST = 1e-8  # [rad] about half of it
 SECONDS = 0.1  # [s] that scales the slope of the thrust, beside its own scale
 
 
@@ -52,6 +54,10 @@ class Boundary(Protocol):
 
     def thrust_floor(self, floor: float) -> float:
         """The least specific thrust [m/s²] that may be asked all along, where so much is wanted."""
+        ...
+
+    def corrected(self, trajectory: Trajectory) -> Boundary:
+        """The same but for what a solution's trajectory misses of it; itself where that misses nothing."""
         ...
 
 
@@ -114,6 +120,10 @@ class FixedEnds:
         at_ends = min(float(np.linalg.norm(end.thrust)) for end in (self.start, self.goal))
         return min(floor, END_SHARE * at_ends)
 
+    def corrected(self, trajectory: Trajectory) -> FixedEnds:
+        """Itself."""
+        return self
+
 
 @dataclass(frozen=True, eq=False)
 class ClosedLap:
@@ -125,6 +135,7 @@ class ClosedLap:
     """
 
     elements: Elements
+    twist: float = 0.0  # [-] of the quaternion from start to end, z: what its collocation makes of none
     is_closed: bool = field(default=True, init=False)
 
     def fix(self, motion: CollocatedMotion, continuous: bool) -> None:
@@ -134,8 +145,9 @@ class ClosedLap:
         """Add that the end is the start, and where on the lap that is."""
         first = np.concatenate([mesh.states[0], mesh.inputs[0, 0]])
         last = np.concatenate([mesh.states[-1], mesh.inputs[1, -1]])
-        nothing = np.zeros(STATES - 1 + INPUTS)
-        rows.hold(self._apart, np.concatenate([first, last])[None], nothing, nothing)
+        apart = np.zeros(STATES - 1 + INPUTS)
+        apart[ATTITUDE.start + 2] = self.twist
+        rows.hold(self._apart, np.concatenate([first, last])[None], apart, apart)
         ends = [[0, *mesh.inputs[:, 0, 0]], [len(mesh.intervals) - 1, *mesh.inputs[:, -1, 0]]]
         fractions = mesh.fractions[[0, -1]]
         rows.hold(self._slope_apart, np.concatenate(ends)[None], 0.0, 0.0, fractions)
@@ -146,6 +158,15 @@ class ClosedLap:
     def thrust_floor(self, floor: float) -> float:
         """The floor."""
         return floor
+
+    def corrected(self, trajectory: Trajectory) -> ClosedLap:
+        """The lap without the twist that errors of its attitudes' collocation add up to."""
+        times = [0.0, trajectory.duration]
+        environment = self.elements.problem.environment
+        flown = reference(trajectory, self.elements.vehicle, times, environment=environment)
+        first, last = flown.setpoint.q_world_body
+        missed = float(so3.multiply(so3.conjugate(first), last)[3])
+        return self if abs(missed) <= NEGLIGIBLE_TWIST else replace(self, twist=self.twist - missed)
 
     @cached_property
     def _apart(self) -> ElementFunction:

@@ -14,7 +14,7 @@ from aerobat.planning.certified_solve import Solution
 from aerobat.planning.result import PlacedStage
 from aerobat.planning.time_optimal.boundary import ClosedLap, FixedEnds
 from aerobat.planning.time_optimal.bounds import Backoff
-from aerobat.planning.time_optimal.collocation import CollocatedMotion, Mesh, trajectory_of
+from aerobat.planning.time_optimal.collocation import CollocatedMotion, Mesh, closed, trajectory_of
 from aerobat.planning.time_optimal.elements import Elements
 from aerobat.planning.time_optimal.program import OptimalControl
 from aerobat.planning.time_optimal.starts import Start, initial_motion
@@ -39,8 +39,10 @@ class SolvedMotion:
     def trajectory(self) -> Trajectory:
         """The motion's trajectory."""
         elements = self.program.control.elements
-        motion = self.motion.closed if self.program.control.boundary.is_closed else self.motion
-        return trajectory_of(elements.body, self.program.mesh, motion, elements.problem.heading)
+        mesh, heading = self.program.mesh, elements.problem.heading
+        if not self.program.control.boundary.is_closed:
+            return trajectory_of(elements.body, mesh, self.motion, heading)
+        return closed(trajectory_of(elements.body, mesh, self.motion.closed, heading))
 
     @property
     def placed(self) -> tuple[PlacedStage, ...]:
@@ -154,10 +156,12 @@ class CollocatedProgram:
             return False
         control = self.control
         backoff = self.backoff.grown(control.elements.bounds, solution.trajectory, control.reserve)
-        if backoff is None:
+        boundary = control.boundary.corrected(solution.trajectory)
+        if backoff is None and boundary is control.boundary:
             return False
         answer = solution.source.answer
-        self.backoff, self._barrier = backoff, WARM_BARRIER
+        self.control = replace(control, boundary=boundary)
+        self.backoff, self._barrier = backoff or self.backoff, WARM_BARRIER
         self._x, self._multipliers = answer.x, answer.multipliers
         return True
 
