@@ -1,11 +1,12 @@
 """Time-optimal plans through published courses, beside the numbers that were published for them.
 
-    uv run python benchmarks/courses.py [--cases balls hover flown squares lap]
+    uv run python benchmarks/courses.py [--cases balls hover flown squares lap closed]
 
 Times are of the processor, on one core, from the problem to the certified plan, imports left out. The course
-is that of Foehn, Romero and Scaramuzza, Science Robotics 6 (56), 2021; headings and sizes of the square
-openings are those of TOGT-Planner's race_uzh_19g.yaml. `flown` is with the vehicle's rotor lag and a reserve
-of 3 %, upright at the end, and flown by its controller; the others have neither lag nor reserve, as there.
+is that of Foehn, Romero and Scaramuzza, Science Robotics 6 (56), 2021, as the presets hold it; headings and
+sizes of the square openings are those of TOGT-Planner's race_uzh_19g.yaml. `flown` is with the vehicle's rotor
+lag and a reserve of 3 %, upright at the end, and flown by its controller; the others have neither lag nor
+reserve, as there. `closed` is a lap that ends as it begins.
 """
 
 import argparse
@@ -22,27 +23,20 @@ from aerobat.planning import Plan
 from aerobat.problem import EndState
 from aerobat.vehicle import Vehicle
 
-LAP = (
-    (-1.1, -1.6, 3.6),
-    (9.2, 6.6, 1.0),
-    (9.2, -4.0, 1.2),
-    (-4.5, -6.0, 3.5),
-    (-4.5, -6.0, 0.8),
-    (4.75, -0.9, 1.2),
-    (-2.8, 6.8, 1.2),
-)
+PRESET = ab.load_problem("split-s-19")
+LAP = tuple(tuple(element.position.tolist()) for element in PRESET.maneuver.elements)
 HEADINGS = (0.0, -20.0, -130.0, 180.0, 0.0, 70.0, 200.0)  # [deg]
-RADIUS = 0.3  # [m] of waypoints
+RADIUS = PRESET.maneuver.elements[0].radius  # [m] of waypoints
 SIDE = 2.4  # [m] of gates, whose centre of mass may pass within
 OPENING = 1.6  # [m]
 WINDOW = 0.1  # [s] about the planned instant
-GOAL = (4.75, -0.9, 1.2)
 PUBLISHED = {
     "balls": "CPC 17.56 s in 50 min, AOS 17.93 s in 6 s",
     "hover": "the same, upright at the end",
     "flown": "",
     "squares": "AOS-TOGT 16.83 s",
     "lap": "a prototype of ours 7.346 s",
+    "closed": "",
 }
 
 
@@ -72,22 +66,21 @@ def main() -> None:
 
 def problem_of(case: str, vehicle: Vehicle) -> ab.Problem:
     """The problem of a case."""
-    count = 7 if case == "lap" else 19
-    points = (LAP * 3)[:count]
-    goal = EndState(GOAL, free_attitude=case not in ("hover", "flown"))
-    start = ab.at_rest((-5.0, 4.5, 1.2))
+    if case == "closed":
+        return ab.load_problem("lap-7")
+    preset = ab.load_problem("race-7") if case == "lap" else PRESET
+    goal = EndState(preset.goal.position, free_attitude=case not in ("hover", "flown"))
     if case != "squares":
-        balls = tuple(ab.Waypoint(point, radius=RADIUS) for point in points)
-        return ab.Problem(name=case, start=start, goal=goal, maneuver=ab.Waypoints(balls))
+        return replace(preset, name=case, goal=goal)
     gates = tuple(
         ab.tilted_gate(point, np.radians(heading), width=SIDE, height=SIDE, name=f"gate {number}")
         for number, (point, heading) in enumerate(zip(LAP, HEADINGS, strict=True), 1)
     )
     margin = (SIDE - OPENING) / 2 - vehicle.body_radius
     through = tuple(
-        ab.Waypoint(gate=gate.name, crossing_point="free", margin=margin) for gate in (gates * 3)[:count]
+        ab.Waypoint(gate=gate.name, crossing_point="free", margin=margin) for gate in (gates * 3)[:19]
     )
-    return ab.Problem(name=case, start=start, goal=goal, maneuver=ab.Waypoints(through), gates=gates)
+    return replace(preset, name=case, goal=goal, maneuver=ab.Waypoints(through), gates=gates)
 
 
 def flown(plan: Plan) -> str:
@@ -95,9 +88,9 @@ def flown(plan: Plan) -> str:
     flight = ab.fly(plan)
     position, velocity = flight.states.position, flight.states.velocity
     nearest = []
-    for placed, waypoint in zip(plan.stages, plan.problem.maneuver.waypoints, strict=True):
+    for placed, stage in zip(plan.stages, plan.problem.stages(1.0).stages, strict=True):
         near = np.abs(flight.times - placed.time) < WINDOW
-        offset = position[near] - waypoint.position
+        offset = position[near] - stage.ball.centre
         # between two ticks the path is straight
         along = velocity[near] / np.linalg.norm(velocity[near], axis=-1, keepdims=True)
         across = offset - np.sum(offset * along, axis=-1, keepdims=True) * along

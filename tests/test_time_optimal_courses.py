@@ -1,35 +1,31 @@
 """Time-optimal plans through many stages: certified, flown by an independent integration, or told why not."""
 
+import sys
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from aerobat.errors import Infeasible, SpecError
+from aerobat.evaluation import score
 from aerobat.planning import Miqp, Plan, TimeOptimal
 from aerobat.planning.assessment.lower_bound import least_duration
 from aerobat.planning.time_optimal.bounds import Backoff, Bounds
 from aerobat.planning.time_optimal.collocation import CollocatedMotion, Mesh
 from aerobat.problem import EndState, Problem, Waypoint, Waypoints, at_rest, load_problem, tilted_gate
+from aerobat.simulation import fly
 from aerobat.trajectory import Trajectory
 from aerobat.vehicle import load_vehicle
 from random_flights import with_lags
 from rigid_body_replay import replayed_at_knots
 
+sys.path.append(str(Path(__file__).parents[1] / "benchmarks"))
+from courses import HEADINGS, LAP, RADIUS
+from random_courses import planned, random_course
+
 QUAD = load_vehicle("agile-quad")
 JERKY = with_lags(QUAD, 0.0)
-# Foehn, Romero, Scaramuzza, Science Robotics 6 (56), 2021, and TOGT-Planner's race_uzh_19g.yaml
-LAP = (
-    (-1.1, -1.6, 3.6),
-    (9.2, 6.6, 1.0),
-    (9.2, -4.0, 1.2),
-    (-4.5, -6.0, 3.5),
-    (-4.5, -6.0, 0.8),
-    (4.75, -0.9, 1.2),
-    (-2.8, 6.8, 1.2),
-)
-HEADINGS = (0.0, -20.0, -130.0, 180.0, 0.0, 70.0, 200.0)
-RADIUS = 0.3
 STOP = EndState((4.75, -0.9, 1.2), free_attitude=True)
 
 
@@ -54,6 +50,17 @@ def assert_flown_through(plan: Plan) -> None:
         assert np.linalg.norm(states[knot, :3] - waypoint.position) <= RADIUS + 1e-4
     assert np.linalg.norm(states[-1, :3] - plan.problem.goal.position) < 1e-3
     assert np.linalg.norm(states[-1, 3:6]) < 1e-2
+
+
+def test_the_presets_hold_the_published_points():
+    """Foehn, Romero, Scaramuzza, Science Robotics 6 (56), 2021."""
+    published = [(-1.1, -1.6, 3.6), (9.2, 6.6, 1.0), (9.2, -4.0, 1.2), (-4.5, -6.0, 3.5), (-4.5, -6.0, 0.8)]
+    published += [(4.75, -0.9, 1.2), (-2.8, 6.8, 1.2)]
+    for name in ("race-7", "split-s-19", "lap-7"):
+        elements = load_problem(name).maneuver.elements
+        assert [tuple(element.position) for element in elements] == published
+        assert {element.radius for element in elements} == {0.3}
+    assert tuple(published) == LAP
 
 
 def test_the_published_course_is_as_fast_as_published_and_a_rigid_body_without_control_flies_it():
@@ -106,8 +113,8 @@ def test_openings_are_crossed_anywhere_inside():
         offset = plan.trajectory.evaluate(placed.time) - gate.position
         reached.append(max(abs(offset @ gate.lateral), abs(offset @ gate.up)))
     assert plan.certified
-    assert reached[:5] == pytest.approx([0.8] * 5, abs=1e-4)  # corners are cut; the last lies at the goal
-    assert reached[5] < 0.8
+    assert max(reached) == pytest.approx(0.8, abs=1e-4)  # corners are cut
+    assert min(reached[:5]) > 0.6  # the last lies at the goal
 
 
 def test_a_course_that_cannot_be_flown_names_the_leg():
@@ -156,3 +163,27 @@ def test_a_refined_mesh_covers_its_phases_and_is_finer_where_the_body_turns():
     at = np.cumsum(second) - second / 2
     assert second[np.argmin(np.abs(at - 3.5 / 6))] == pytest.approx(second.min())
     assert second.min() < 0.6 * second.max()
+
+
+@pytest.mark.parametrize("case", [11, 16, 25])
+def test_gates_of_any_attitude_are_passed_by_the_whole_body(case: int):
+    """Anywhere in the opening or at its centre, some of them with the thrust along their upright."""
+    plan = planned(random_course(0, case), QUAD)
+    assert plan.planner == "time-optimal"
+    assert plan.certified
+    passages = score(fly(plan), plan).passages
+    assert [passage.gate for passage in passages] == [gate.name for gate in plan.problem.gates]
+    assert [passage.failure for passage in passages] == [None] * len(passages)
+    assert min(passage.clearance for passage in passages) > 0.0
+
+
+def test_what_is_exceeded_still_is_backed_off_from_twice_as_far():
+    """Between nodes it may be exceeded by so little that what is added to nodes never reached it."""
+    bounds = Bounds.of(load_problem("line"), JERKY)
+    # upward at a hair more than rotors give
+    fast = Trajectory([0.1], [[[0, 0, 0], [0, 0, 0], [0, 0, 0.5 * 0.01 * (3.3 - 1 + 1e-6) * 9.81]]])
+    backoff = Backoff.none(1, bounds).grown(bounds, fast)
+    for _ in range(6):
+        grown = backoff.grown(bounds, fast)
+        assert (grown.high[:, -5:-1] >= 2.0 * backoff.high[:, -5:-1]).all()
+        backoff = grown

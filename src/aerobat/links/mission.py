@@ -74,6 +74,11 @@ class Mission:
         self.stream = SetpointStream(plan.trajectory, plan.vehicle, environment, offset)
         self._follower = PathFollower(self.stream, plan.vehicle, environment)
         first, last = self.stream.flat(0.0), self.stream.flat(self.stream.duration)
+        speed = float(np.linalg.norm(first.velocity))
+        if speed > _SLOW:
+            raise SpecError(
+                f"the plan begins at {speed:.2f} m/s, a mission at rest; plan from a start at rest"
+            )
         self._start = first.position
         self._heading = plan.trajectory.heading
         self._final_yaw = yaw_of(self.stream.at(self.stream.duration).q_world_body)

@@ -1,0 +1,183 @@
+"""Closed courses: they end in the state in which they begin, can be flown over and over, and name no ends."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+
+import aerobat as ab
+from aerobat import so3
+from aerobat.certification import Envelope, certify
+from aerobat.declaration import from_table, to_table
+from aerobat.errors import SpecError
+from aerobat.flatness import reference
+from aerobat.links.mission import Mission, MissionSettings
+from aerobat.planning import least_duration
+from aerobat.trajectory import Trajectory
+from random_flights import with_lags
+
+QUAD = ab.load_vehicle("agile-quad")
+GATE = ab.tilted_gate((5.0, 0.0, 2.0), np.pi / 2, width=1.2, height=1.2, name="red")
+LAP = (
+    ab.PassWaypoint((0.0, -3.0, 1.0), radius=0.3),
+    ab.PassGate("red", crossing_point="free", margin=0.1),
+    ab.PassWaypoint((0.0, 3.0, 1.5), radius=0.3),
+    ab.PassWaypoint((-3.0, 0.0, 1.5), radius=0.3),
+)
+CLOSED = ab.Problem("closed", maneuver=ab.Course(LAP, closed=True), gates=(GATE,))
+
+
+@cache
+def planned(lagging: bool = True) -> ab.Plan:
+    """A lap with rotor lag and a reserve, or at the limits of rotors without."""
+    if lagging:
+        return ab.plan(CLOSED, ab.TimeOptimal(reserve=0.03), QUAD)
+    return ab.plan(CLOSED, vehicle=with_lags(QUAD, 0.0))
+
+
+@cache
+def flown() -> ab.Flight:
+    """Its flight."""
+    return ab.fly(planned())
+
+
+@pytest.mark.parametrize("lagging", [True, False])
+def test_a_closed_lap_ends_in_the_state_in_which_it_begins(lagging: bool) -> None:
+    """Position to jerk, the whole attitude, body rates, and the thrusts of rotors."""
+    plan = planned(lagging)
+    assert plan.certified
+    for derivative in range(4):
+        ends = plan.trajectory.on_segments([0.0, 1.0], derivative)[[0, -1], [0, 1]]
+        assert ends[0] == pytest.approx(ends[1], abs=1e-6)
+    flat = reference(plan.trajectory, plan.vehicle, [0.0, plan.duration], environment=CLOSED.environment)
+    assert so3.angle_between(*flat.setpoint.q_world_body) < 1e-6
+    assert flat.setpoint.omega_body[0] == pytest.approx(flat.setpoint.omega_body[1], abs=1e-5)
+    assert flat.rotor_thrusts[0] == pytest.approx(flat.rotor_thrusts[1], abs=1e-5)
+    assert np.linalg.norm(flat.setpoint.flat.velocity[0]) > 3.0
+
+
+def test_a_lap_flown_twice_over_is_certified_as_one_path() -> None:
+    """The seam is a knot like any other, and the second time around the rotors bear the same."""
+    lap = planned().trajectory
+    twice = Trajectory(np.tile(lap.durations, 2), np.tile(lap.coefficients, (2, 1, 1)), lap.heading)
+    found = certify(twice, QUAD)
+    assert found.certified, found.why
+    assert found.margin == pytest.approx(planned().certificate.margin, abs=1e-4)
+
+
+def test_a_closed_lap_is_shorter_than_from_rest_and_longer_than_physics_allows() -> None:
+    rest = ab.at_rest((-3.0, 0.0, 1.5))
+    from_rest = ab.Problem("rest", rest, rest, ab.Course(LAP), (GATE,))
+    slower = ab.TimeOptimal(reserve=0.03).plan(from_rest, QUAD)
+    assert planned().duration < 0.9 * slower.duration
+    assert 0.5 * planned().duration < least_duration(CLOSED, QUAD) < planned(lagging=False).duration
+
+
+def test_a_flight_begins_in_the_laps_state_and_is_judged_and_timed_all_the_way_round() -> None:
+    plan = planned()
+    score = ab.score(flown(), plan)
+    assert flown().states.velocity[0] == pytest.approx(plan.trajectory.evaluate(0.0, 1))
+    assert score.outcome.is_success, score.sentence
+    assert score.max_position_error_m < 1e-3
+    assert [(p.gate, p.failure) for p in score.passages] == [("red", None)]
+    assert [w.waypoint for w in score.waypoints] == ["waypoint 1", "waypoint 2", "waypoint 3"]
+    assert plan.lap_times == (pytest.approx(plan.duration),)
+    (lap,) = score.laps
+    assert lap.duration == pytest.approx(plan.duration, abs=1e-3)
+    assert ab.score_flights(plan)[0].laps[0].duration == pytest.approx(lap.duration, abs=1e-6)
+
+
+def test_several_closed_laps_are_timed_each_from_the_end_of_the_one_before() -> None:
+    twice = replace(CLOSED, maneuver=replace(CLOSED.maneuver, laps=2))
+    lap = planned()
+    stages = [replace(s, time=s.time + k * lap.duration) for k in (0, 1) for s in lap.stages]
+    path = lap.trajectory
+    both = Trajectory(np.tile(path.durations, 2), np.tile(path.coefficients, (2, 1, 1)), path.heading)
+    plan = replace(lap, problem=twice, trajectory=both, stages=tuple(stages))
+    assert plan.lap_times == pytest.approx([lap.duration] * 2)
+
+
+def test_a_path_that_does_not_close_is_refuted() -> None:
+    lap = planned().trajectory
+    cut = Trajectory(lap.durations[:-1], lap.coefficients[:-1], lap.heading)
+    assert certify(cut, QUAD).certified
+    found = certify(cut, QUAD, envelope=Envelope(closed=True))
+    assert not found.certified
+    assert found.discontinuities[0].time == cut.duration
+
+
+@pytest.mark.parametrize("planner", ["miqp", "min-snap", "free-knots"])
+def test_planners_that_need_ends_refuse_a_closed_course_and_name_the_one_that_does_not(planner: str) -> None:
+    with pytest.raises(SpecError, match=rf"closed: the {planner} planner .* take time-optimal"):
+        ab.plan(CLOSED, planner, QUAD)
+
+
+def test_a_plan_that_begins_in_flight_is_not_begun_from_rest() -> None:
+    with pytest.raises(SpecError, match=r"begins at .* m/s, a mission at rest"):
+        Mission(planned(), MissionSettings(), np.zeros(3))
+
+
+@pytest.mark.parametrize(
+    ("change", "sentence"),
+    [
+        (
+            {"goal": {"position": [0, 0, 0]}},
+            "goal stands beside maneuver.closed, which has none; drop either",
+        ),
+        ({"start": {"position": [0, 0, 0]}}, "start stands beside maneuver.closed, which has none"),
+        ({"maneuver": {"last_lap": 1}}, "maneuver.last_lap stands beside closed, whose laps are all whole"),
+        ({"maneuver": {"closed": False}}, "start is missing; add it, with its position"),
+        (
+            {"maneuver": {"elements": [{"kind": "gate", "gate": "red"}]}},
+            "maneuver.closed needs 2 elements that say where; add some",
+        ),
+        (
+            {
+                "maneuver": {
+                    "elements": [
+                        {"kind": "gate", "gate": "red"},
+                        {"kind": "hold", "position": [0, 0, 1], "time": 1},
+                    ]
+                }
+            },
+            "maneuver.closed: a hold rests, a closed course never does; drop either",
+        ),
+        (
+            {"maneuver": {"elements": [{"kind": "course", "closed": True, "elements": []}]}},
+            "maneuver.elements[0].elements must have 1 or more entries",
+        ),
+        (
+            {
+                "maneuver": {
+                    "elements": [
+                        {"kind": "waypoint", "position": [0, 0, 1]},
+                        {
+                            "kind": "course",
+                            "closed": True,
+                            "elements": [{"kind": "waypoint", "position": [1, 0, 1]}],
+                        },
+                    ]
+                }
+            },
+            "maneuver.elements[1].closed is for whole courses, this one is an element; drop it",
+        ),
+    ],
+)
+def test_a_contradiction_is_refused_in_one_sentence(change, sentence: str) -> None:
+    table = to_table(CLOSED)
+    table |= {key: table[key] | value if key == "maneuver" else value for key, value in change.items()}
+    with pytest.raises(SpecError) as refused:
+        from_table(ab.Problem, table)
+    assert str(refused.value).startswith(sentence)
+
+
+def test_a_closed_course_is_written_read_and_read_aloud() -> None:
+    assert from_table(ab.Problem, to_table(CLOSED)) == CLOSED
+    assert {"start", "goal"}.isdisjoint(to_table(CLOSED))
+    assert (
+        str(CLOSED) == "closed: a closed lap of by a waypoint, through the red gate, by a waypoint, 2 times"
+    )
+    assert ab.load_problem("lap-7").maneuver.elements == ab.load_problem("race-7").maneuver.elements
