@@ -4,9 +4,9 @@
 
 Times are of the processor, on one core, from the problem to the certified plan, imports left out. The course
 is that of Foehn, Romero and Scaramuzza, Science Robotics 6 (56), 2021, as the presets hold it; headings and
-sizes of the square openings are those of TOGT-Planner's race_uzh_19g.yaml. `flown` is with the vehicle's rotor
-lag and a reserve of 3 %, upright at the end, and flown by its controller; the others have neither lag nor
-reserve, as there. `closed` is a lap that ends as it begins.
+sizes of the square openings are those of TOGT-Planner's race_uzh_19g.yaml. `flown` is with the vehicle's
+rotor lag and a reserve of 3 %, upright at the end, and flown by its controller; the others have neither lag
+nor reserve, as there. `closed` is a lap that ends as it begins.
 """
 
 import argparse

@@ -11,8 +11,8 @@ from aerobat.errors import Infeasible, SpecError
 from aerobat.evaluation import score
 from aerobat.planning import Miqp, Plan, TimeOptimal
 from aerobat.planning.assessment.lower_bound import least_duration
-from aerobat.planning.time_optimal.bounds import Backoff, Bounds
-from aerobat.planning.time_optimal.collocation import CollocatedMotion, Mesh
+from aerobat.planning.time_optimal.optimal_control.bounds import Backoff, Bounds
+from aerobat.planning.time_optimal.optimal_control.collocation import CollocatedMotion, Mesh
 from aerobat.problem import EndState, Problem, Waypoint, Waypoints, at_rest, load_problem, tilted_gate
 from aerobat.simulation import fly
 from aerobat.trajectory import Trajectory

@@ -12,11 +12,16 @@ from aerobat.optimization.deadline import out_of_time
 from aerobat.optimization.nonlinear import NonlinearResult, solve_nonlinear
 from aerobat.planning.certified_solve import Solution
 from aerobat.planning.result import PlacedStage
-from aerobat.planning.time_optimal.boundary import ClosedLap, FixedEnds
-from aerobat.planning.time_optimal.bounds import Backoff
-from aerobat.planning.time_optimal.collocation import CollocatedMotion, Mesh, closed, trajectory_of
-from aerobat.planning.time_optimal.elements import Elements
-from aerobat.planning.time_optimal.program import OptimalControl
+from aerobat.planning.time_optimal.optimal_control.boundary import ClosedLap, FixedEnds
+from aerobat.planning.time_optimal.optimal_control.bounds import Backoff
+from aerobat.planning.time_optimal.optimal_control.collocation import (
+    CollocatedMotion,
+    Mesh,
+    closed,
+    trajectory_of,
+)
+from aerobat.planning.time_optimal.optimal_control.elements import Elements
+from aerobat.planning.time_optimal.optimal_control.program import OptimalControl
 from aerobat.planning.time_optimal.starts import Start, initial_motion
 from aerobat.planning.warm_start import WarmStart
 from aerobat.trajectory import Trajectory

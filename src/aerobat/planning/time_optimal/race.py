@@ -13,9 +13,9 @@ from aerobat.planning.flyability import own_flight
 from aerobat.planning.recorder import Attempt, Recorder
 from aerobat.planning.result import FLYABLE_ERROR, OwnFlight
 from aerobat.planning.time_optimal.collocated_program import CollocatedProgram, SolvedMotion
-from aerobat.planning.time_optimal.elements import Elements
+from aerobat.planning.time_optimal.optimal_control.elements import Elements
+from aerobat.planning.time_optimal.optimal_control.ways import Way, straighter
 from aerobat.planning.time_optimal.starts import Start
-from aerobat.planning.time_optimal.ways import Way, straighter
 from aerobat.problem.problem import Problem
 from aerobat.vehicle import Vehicle
 

@@ -18,8 +18,8 @@ from aerobat.planning.planners import Planner
 from aerobat.planning.polynomial.knots import stretched_path
 from aerobat.planning.polynomial.min_snap import MinSnap
 from aerobat.planning.result import Plan
-from aerobat.planning.time_optimal.collocation import CollocatedMotion, Mesh
-from aerobat.planning.time_optimal.ways import Way, ways_through_gates
+from aerobat.planning.time_optimal.optimal_control.collocation import CollocatedMotion, Mesh
+from aerobat.planning.time_optimal.optimal_control.ways import Way, ways_through_gates
 from aerobat.planning.warm_start import WarmStart
 from aerobat.problem.condition import Condition, Quantity, fixed
 from aerobat.problem.end_state import at_rest

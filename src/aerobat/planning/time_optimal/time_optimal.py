@@ -28,7 +28,7 @@ from aerobat.planning.result import FLYING_RESERVE, Plan
 from aerobat.planning.rotor_margin import reserve_shortfalls
 from aerobat.planning.time_limit import TIME_LIMIT, stopped, too_short
 from aerobat.planning.time_optimal.collocated_program import SolvedMotion
-from aerobat.planning.time_optimal.collocation import BOUNDED_DERIVATIVES
+from aerobat.planning.time_optimal.optimal_control.collocation import BOUNDED_DERIVATIVES
 from aerobat.planning.time_optimal.race import MIN_INTERVALS, Race, with_smoother
 from aerobat.planning.time_optimal.starts import Starts, starts
 from aerobat.planning.warm_start import Reserve, require_attitudes

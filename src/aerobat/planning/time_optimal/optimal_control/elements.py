@@ -14,9 +14,9 @@ from aerobat.arrays import Array
 from aerobat.flatness import force_balance
 from aerobat.optimization.nonlinear import import_casadi
 from aerobat.optimization.separable import ElementFunction
-from aerobat.planning.time_optimal.bounds import Bounds, PathBound
-from aerobat.planning.time_optimal.collocation import STATE_SCALE, IntervalSide, Mesh
-from aerobat.planning.time_optimal.zero_yaw_rate_body import (
+from aerobat.planning.time_optimal.optimal_control.bounds import Bounds, PathBound
+from aerobat.planning.time_optimal.optimal_control.collocation import STATE_SCALE, IntervalSide, Mesh
+from aerobat.planning.time_optimal.optimal_control.zero_yaw_rate_body import (
     INPUTS,
     POSITION,
     RATES,

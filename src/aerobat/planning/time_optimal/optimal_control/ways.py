@@ -21,9 +21,9 @@ import numpy as np
 
 from aerobat.certification import PlannedPassage
 from aerobat.planning.result import OwnFlight
-from aerobat.planning.time_optimal.collocation import Mesh
-from aerobat.planning.time_optimal.elements import Elements
-from aerobat.planning.time_optimal.rows import Rows
+from aerobat.planning.time_optimal.optimal_control.collocation import Mesh
+from aerobat.planning.time_optimal.optimal_control.elements import Elements
+from aerobat.planning.time_optimal.optimal_control.rows import Rows
 from aerobat.problem.gate import Gate
 from aerobat.problem.problem import Problem
 from aerobat.problem.stage import Stage

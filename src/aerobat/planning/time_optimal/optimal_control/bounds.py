@@ -9,7 +9,7 @@ import numpy as np
 
 from aerobat.arrays import Array
 from aerobat.flatness import force_balance, reference
-from aerobat.planning.time_optimal.collocation import BOUNDED_DERIVATIVES
+from aerobat.planning.time_optimal.optimal_control.collocation import BOUNDED_DERIVATIVES
 from aerobat.problem.condition import LinearBound
 from aerobat.problem.problem import Problem
 from aerobat.trajectory import Trajectory

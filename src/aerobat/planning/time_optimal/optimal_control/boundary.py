@@ -15,10 +15,10 @@ from aerobat.flatness import force_balance, reference
 from aerobat.kernels.quaternions import conjugate, multiply
 from aerobat.optimization.nonlinear import import_casadi
 from aerobat.optimization.separable import ElementFunction
-from aerobat.planning.time_optimal.collocation import STATE_SCALE, CollocatedMotion, Mesh
-from aerobat.planning.time_optimal.elements import Elements, weighted_sum
-from aerobat.planning.time_optimal.rows import Rows
-from aerobat.planning.time_optimal.zero_yaw_rate_body import (
+from aerobat.planning.time_optimal.optimal_control.collocation import STATE_SCALE, CollocatedMotion, Mesh
+from aerobat.planning.time_optimal.optimal_control.elements import Elements, weighted_sum
+from aerobat.planning.time_optimal.optimal_control.rows import Rows
+from aerobat.planning.time_optimal.optimal_control.zero_yaw_rate_body import (
     ATTITUDE,
     INPUTS,
     POSITION,

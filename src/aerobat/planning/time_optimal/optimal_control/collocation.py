@@ -23,7 +23,7 @@ import numpy as np
 
 from aerobat.arrays import Array, Indices
 from aerobat.optimization.nonlinear import import_casadi
-from aerobat.planning.time_optimal.zero_yaw_rate_body import (
+from aerobat.planning.time_optimal.optimal_control.zero_yaw_rate_body import (
     INPUTS,
     POSITION,
     RATES,

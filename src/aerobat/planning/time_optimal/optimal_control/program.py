@@ -16,13 +16,18 @@ from aerobat.optimization.separable import (
     SeparableFunction,
     separable_program,
 )
-from aerobat.planning.time_optimal.boundary import Boundary
-from aerobat.planning.time_optimal.bounds import Backoff
-from aerobat.planning.time_optimal.collocation import CollocatedMotion, Mesh
-from aerobat.planning.time_optimal.elements import BETWEEN, Elements, is_of_direction, weighted_sum
-from aerobat.planning.time_optimal.rows import Rows, repeated
-from aerobat.planning.time_optimal.ways import Way
-from aerobat.planning.time_optimal.zero_yaw_rate_body import INPUTS, POSITION, STATES
+from aerobat.planning.time_optimal.optimal_control.boundary import Boundary
+from aerobat.planning.time_optimal.optimal_control.bounds import Backoff
+from aerobat.planning.time_optimal.optimal_control.collocation import CollocatedMotion, Mesh
+from aerobat.planning.time_optimal.optimal_control.elements import (
+    BETWEEN,
+    Elements,
+    is_of_direction,
+    weighted_sum,
+)
+from aerobat.planning.time_optimal.optimal_control.rows import Rows, repeated
+from aerobat.planning.time_optimal.optimal_control.ways import Way
+from aerobat.planning.time_optimal.optimal_control.zero_yaw_rate_body import INPUTS, POSITION, STATES
 from aerobat.problem.condition import Condition
 from aerobat.problem.stage import Stage
 
