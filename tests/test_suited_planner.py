@@ -12,7 +12,13 @@ QUAD = ab.load_vehicle("agile-quad")
 
 @pytest.mark.parametrize(
     ("name", "planner"),
-    [("line", "miqp"), ("flip-roll", "miqp"), ("section-v", "miqp"), ("race-7", "time-optimal")],
+    [
+        ("line", "miqp"),
+        ("flip-roll", "miqp"),
+        ("section-v", "miqp"),
+        ("race-7", "time-optimal"),
+        ("power-loop", "miqp"),
+    ],
 )
 def test_long_courses_are_time_optimals_and_the_rest_is_searched_exactly(name: str, planner: str) -> None:
     assert suited_planner(ab.load_problem(name), QUAD) == planner

@@ -6,15 +6,18 @@ from collections.abc import Callable
 from functools import wraps
 from typing import TypeVar
 
+import numpy as np
+
 from aerobat.errors import SpecError
 from aerobat.planning.recorder import Progress
 from aerobat.planning.result import Plan
-from aerobat.problem import Problem, StageSequence
+from aerobat.problem import Problem, Stage, StageSequence
 from aerobat.vehicle import Vehicle
 
 P = TypeVar("P")
 
-COURSE_STAGES = 4  # that say where they are: from so many on a path through them is the start
+COURSE_STAGES = 6  # that say where they are: from so many on a path through them is the start
+POINTS = 4  # gates and waypoints alone, likewise
 MANY_STAGES = 10  # of any kind
 
 
@@ -24,8 +27,15 @@ def is_course(sequence: StageSequence) -> bool:
     """
     if sequence.closed:
         return True
-    placed = all(len(stage.where) >= 3 for stage in sequence.stages)
-    return sequence.ordered and len(sequence.stages) >= (COURSE_STAGES if placed else MANY_STAGES)
+    needed = MANY_STAGES
+    if all(len(stage.where) >= 3 for stage in sequence.stages):
+        needed = POINTS if all(map(_is_point, sequence.stages)) else COURSE_STAGES
+    return sequence.ordered and len(sequence.stages) >= needed
+
+
+def _is_point(stage: Stage) -> bool:
+    """True of a gate or a waypoint."""
+    return stage.gate is not None or stage.ball is not None or not np.isnan(stage.place).any()
 
 
 def on_open_courses(
