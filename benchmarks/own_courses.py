@@ -29,9 +29,11 @@ def figure(pen: Any, middle: list[float], gates: list[Table]) -> Table:
 
 
 def course(pen: Any, middle: list[float], gates: list[Table]) -> Table:
-    """Up to three elements, in one lap or two."""
+    """Up to three elements, in one lap or two; a few are closed, which start and goal contradict."""
     elements = [_element(pen, middle, gates) for _ in range(pen.one_of(1, 2, 3))]
     laps = {"laps": 2} | pen.some({"last_lap": lambda _: 1}, 0.5) if pen.chance(0.5) else {}
+    if not laps and len(elements) == 3:
+        laps = {"closed": True}
     return {"elements": elements} | laps
 
 
