@@ -19,7 +19,8 @@ from aerobat.planning.assessment.assessment import SUSPICIOUS
 from aerobat.planning.assessment.lower_bound import least_duration
 from aerobat.planning.miqp import Miqp
 from aerobat.planning.planners import Planner, option, planner
-from aerobat.planning.polynomial.knot_descent import Course, Descent
+from aerobat.planning.polynomial.descent.framed_problem import FramedProblem
+from aerobat.planning.polynomial.descent.knot_descent import Descent
 from aerobat.planning.polynomial.min_snap import MinSnap
 from aerobat.planning.recorder import Progress, Recorder
 from aerobat.planning.result import FLYING_RESERVE, Plan
@@ -99,8 +100,8 @@ class FreeKnots(Planner):
         best: Plan | None = None
         for start in self._starts(problem, vehicle):
             guess = WarmStart.of(start, sequence)
-            course = Course.of(problem, vehicle, sequence, guess, self.reserve)
-            descent = Descent(course, recorder, self.still_ends, self.iterations)
+            framed = FramedProblem.of(problem, vehicle, sequence, guess, self.reserve)
+            descent = Descent(framed, recorder, self.still_ends, self.iterations)
             descent.consider(start, guess)
             for segments in sorted({min(COARSE, self.segments), self.segments}):
                 if not out_of_time():

@@ -8,7 +8,7 @@ from math import ceil
 import numpy as np
 
 from aerobat.arrays import Array
-from aerobat.planning.polynomial.path_limits import END_ORDER, PathLimits, Samples
+from aerobat.planning.polynomial.descent.path_limits import END_ORDER, PathLimits, Samples
 from aerobat.trajectory import Trajectory, polynomial
 
 SAMPLES = 80  # of all segments together at first

@@ -17,8 +17,8 @@ import numpy as np
 
 from aerobat.arrays import Array
 from aerobat.optimization.nonlinear import NonlinearProgram, NonlinearResult, import_casadi, solve_nonlinear
-from aerobat.planning.polynomial.knot_variables import KnotVariables
-from aerobat.planning.polynomial.path_limits import (
+from aerobat.planning.polynomial.descent.knot_variables import KnotVariables
+from aerobat.planning.polynomial.descent.path_limits import (
     ORDERS,
     POLYNOMIAL_DEGREE,
     TO_COEFFICIENTS,
