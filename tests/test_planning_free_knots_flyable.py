@@ -18,6 +18,7 @@ from aerobat.planning.polynomial.descent.knot_variables import KnotVariables
 from aerobat.planning.polynomial.free_knots import FreeKnots
 from aerobat.planning.warm_start import WarmStart
 from aerobat.problem import GatePassage, HalfFlip, Problem, Waypoint, Waypoints, at_rest, load_problem
+from aerobat.problem.ball import Ball
 from aerobat.problem.stage import CrossingTime
 from aerobat.vehicle import Vehicle, load_vehicle
 
@@ -118,11 +119,13 @@ def test_derivatives_given_to_the_solver_are_those_of_differentiation() -> None:
     start = MinSnap(stop_after=5).plan(problem, vehicle)
     sequence = problem.stages(vehicle.max_specific_thrust)
     guess = WarmStart.of(start, sequence)
+    ball = Ball(np.array([1.0, 2.0, 3.0]), 0.5)
+    guess = replace(guess, stages=tuple(replace(stage, ball=ball) for stage in guess.stages))
     framed = FramedProblem.of(problem, vehicle, sequence, guess, 0.0)
     guess = replace(guess, trajectory=refit(guess.trajectory, 3))
     place = int(np.searchsorted(guess.trajectory.knots[1:-1], guess.times[0], side="right"))
     variables = KnotVariables(problem, vehicle, guess, (place,), framed.frame, 1.0, still_ends=False)
-    program = KnotProgram(variables, framed.limits, chebyshev_samples(3), framed.balance, 0.0).program
+    program = KnotProgram(variables, framed.limits, chebyshev_samples(3), framed.balance, np.zeros(3)).program
     rng = np.random.default_rng(0)
     x = variables.start + 1e-3 * rng.normal(size=variables.size)
     multipliers = rng.normal(size=program.lower.size)

@@ -105,6 +105,9 @@ class FramedProblem:
                 excess = float(bound.excess(flat))
                 if excess > RELATIVE_STAGE_TOLERANCE * bound_scale(bound):
                     return f"the stage '{stage.name}' is missed by {excess:.2g} in SI units"
+            ball = stage.ball
+            if ball is not None and (distance := float(np.linalg.norm(flat[0] - ball.centre))) > ball.radius:
+                return f"the stage '{stage.name}' is missed by {distance - ball.radius:.2g} m"
             fraction, (earliest, latest) = time / guess.trajectory.duration, stage.window
             if max(earliest - fraction, fraction - latest) > RELATIVE_STAGE_TOLERANCE:
                 return f"the stage '{stage.name}' is passed at {fraction:.3g} of the duration, not when asked"

@@ -16,7 +16,7 @@ from aerobat.certification import Certificate, Verdict
 from aerobat.optimization.deadline import out_of_time
 from aerobat.planning.certified_solve import Judged, Solution, certified_solve
 from aerobat.planning.polynomial.descent.framed_problem import TRUSTED, FramedProblem, Path
-from aerobat.planning.polynomial.descent.knot_program import KnotProgram
+from aerobat.planning.polynomial.descent.knot_program import ROUGH, KnotProgram, Multipliers, Precision
 from aerobat.planning.polynomial.descent.knot_samples import chebyshev_samples, refit
 from aerobat.planning.polynomial.descent.knot_variables import KnotVariables
 from aerobat.planning.recorder import Recorder
@@ -31,6 +31,7 @@ LARGE_GAIN = 0.2  # of the duration: the start was far, trust regions confine wh
 TRUST_RADIUS = 2.0  # in scaled variables, see KnotVariables
 MIN_RADIUS = 0.2  # a smaller region may hold no path that mends what is exceeded
 SHRINK = 3.0  # by how much the trust region is smaller where a limit is exceeded between samples
+NEAR = 0.02  # the same, where the next solution lies near: with multipliers as first guesses it is soon found
 SOLVED = 1e-3  # the same at samples: more means that the region is too large
 FIRST_BACKOFF = 1e-4  # of every limit's range, kept at samples
 MAX_BACKOFF = 0.02  # that is added at once: where much is exceeded, samples mend most of it
@@ -45,6 +46,7 @@ class Descent:
     recorder: Recorder
     still_ends: bool
     iterations: int  # of each solve, at most
+    precision: Precision = ROUGH
     best: Judged[Path] | None = None
 
     def consider(self, start: Plan, guess: WarmStart) -> None:
@@ -130,7 +132,8 @@ class _Exchange:
         self._begun = guess.trajectory.duration
         self._samples = chebyshev_samples(guess.trajectory.segments)
         self._radius = TRUST_RADIUS
-        self._backoff = FIRST_BACKOFF + descent.framed.reserve
+        self._backoff = np.full(guess.trajectory.segments, FIRST_BACKOFF + descent.framed.reserve)
+        self._multipliers: Multipliers | None = None
         self._relaxed: float | None = None  # [s] the duration of the first solution near the guess
 
     def solve(self) -> Solution[Path]:
@@ -147,10 +150,12 @@ class _Exchange:
             still_ends=descent.still_ends,
         )
         program = KnotProgram(variables, framed.limits, self._samples, framed.balance, self._backoff)
-        found, answer = program.solve(descent.iterations)
+        found, answer, multipliers = program.solve(descent.iterations, descent.precision, self._multipliers)
         status = CONVERGED if answer.converged else "unknown"
         path = replace(framed.path(found), unsolved=answer.violation)
-        if self._relaxed is None:
+        near = answer.converged and path.violation.worst <= NEAR
+        self._multipliers = multipliers if near else None
+        if self._relaxed is None and answer.converged:
             self._relaxed = found.trajectory.duration
         return framed.solution(path, status, answer.iterations, answer.time)
 
@@ -166,7 +171,7 @@ class _Exchange:
         self.guess = certified
         self._relaxed = None
         self._radius = TRUST_RADIUS
-        self._backoff = FIRST_BACKOFF + self._descent.framed.reserve
+        self._backoff[:] = FIRST_BACKOFF + self._descent.framed.reserve
 
     def tighten(self, solution: Solution[Path], certificate: Certificate | None) -> bool:
         """Sample where limits are exceeded, and go on from there in a smaller region.
@@ -178,7 +183,7 @@ class _Exchange:
             return False
         solved = path.unsolved <= SOLVED
         converged = solution.status == CONVERGED
-        if converged and best is not None and solution.duration >= best.solution.duration:
+        if best is not None and solution.duration >= best.solution.duration:
             return False
         violation = path.violation
         for finding in () if certificate is None else certificate.findings:
@@ -189,9 +194,9 @@ class _Exchange:
         self._samples = violation.joined(self._samples)
         if not solved and self._radius <= MIN_RADIUS:
             return False
-        if not (solved and converged) or violation.worst > 0.0:
+        if not (solved and converged) or violation.worst > NEAR:
             self._radius = max(self._radius / SHRINK, MIN_RADIUS)
         if solved and violation.worst <= TRUSTED:
             self.guess = path.guess
-            self._backoff += min(max(violation.worst, FIRST_BACKOFF) / 2.0, MAX_BACKOFF)
+            self._backoff += np.clip(violation.excess, FIRST_BACKOFF, 2.0 * MAX_BACKOFF) / 2.0
         return True
