@@ -19,7 +19,7 @@ from aerobat.planning.polynomial.free_knots import FreeKnots
 from aerobat.planning.warm_start import WarmStart
 from aerobat.problem import GatePassage, HalfFlip, Problem, Waypoint, Waypoints, at_rest, load_problem
 from aerobat.problem.ball import Ball
-from aerobat.problem.stage import CrossingTime
+from aerobat.problem.stage import CrossingTime, Stage
 from aerobat.vehicle import Vehicle, load_vehicle
 
 ca = pytest.importorskip("casadi")
@@ -120,7 +120,7 @@ def test_derivatives_given_to_the_solver_are_those_of_differentiation() -> None:
     sequence = problem.stages(vehicle.max_specific_thrust)
     guess = WarmStart.of(start, sequence)
     ball = Ball(np.array([1.0, 2.0, 3.0]), 0.5)
-    guess = replace(guess, stages=tuple(replace(stage, ball=ball) for stage in guess.stages))
+    guess = replace(guess, stages=tuple(Stage(s.name, s.conditions, ball=ball) for s in guess.stages))
     framed = FramedProblem.of(problem, vehicle, sequence, guess, 0.0)
     guess = replace(guess, trajectory=refit(guess.trajectory, 3))
     place = int(np.searchsorted(guess.trajectory.knots[1:-1], guess.times[0], side="right"))

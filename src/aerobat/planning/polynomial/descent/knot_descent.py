@@ -24,6 +24,7 @@ from aerobat.planning.result import PlacedStage, Plan
 from aerobat.planning.rotor_margin import reserve_shortfalls
 from aerobat.planning.warm_start import WarmStart
 
+NEAR_ITERATIONS = 50  # of a solve, at most, once a path is certified: what takes longer leads away from it
 ROUNDS = 12  # of solving, at most, from one start
 LITTLE_GAIN = 0.005  # of the duration, from one certified path to the next: the end
 LITTLE_LOSS = 0.02  # of the duration, that certainty between samples costs: the end if the start was near
@@ -150,7 +151,10 @@ class _Exchange:
             still_ends=descent.still_ends,
         )
         program = KnotProgram(variables, framed.limits, self._samples, framed.balance, self._backoff)
-        found, answer, multipliers = program.solve(descent.iterations, descent.precision, self._multipliers)
+        iterations = descent.iterations
+        if descent.best is not None:
+            iterations = min(iterations, NEAR_ITERATIONS)
+        found, answer, multipliers = program.solve(iterations, descent.precision, self._multipliers)
         status = CONVERGED if answer.converged else "unknown"
         path = replace(framed.path(found), unsolved=answer.violation)
         near = answer.converged and path.violation.worst <= NEAR
@@ -183,7 +187,7 @@ class _Exchange:
             return False
         solved = path.unsolved <= SOLVED
         converged = solution.status == CONVERGED
-        if best is not None and solution.duration >= best.solution.duration:
+        if (solved or converged) and best is not None and solution.duration >= best.solution.duration:
             return False
         violation = path.violation
         for finding in () if certificate is None else certificate.findings:
@@ -194,9 +198,10 @@ class _Exchange:
         self._samples = violation.joined(self._samples)
         if not solved and self._radius <= MIN_RADIUS:
             return False
-        if not (solved and converged) or violation.worst > NEAR:
+        if not (solved and converged) or violation.worst > 0.0:
             self._radius = max(self._radius / SHRINK, MIN_RADIUS)
         if solved and violation.worst <= TRUSTED:
             self.guess = path.guess
-            self._backoff += np.clip(violation.excess, FIRST_BACKOFF, 2.0 * MAX_BACKOFF) / 2.0
+            excess = np.clip(violation.excess_nearby, FIRST_BACKOFF, 2.0 * MAX_BACKOFF)
+            self._backoff += excess / 2.0
         return True

@@ -42,10 +42,10 @@ class Precision:
 
     tolerance: float  # of IPOPT
     barrier: float  # the first barrier parameter
-    warm_barrier: float  # the same where multipliers are known
+    warm_barrier: float | None  # the same where multipliers are known; None: they are not used
 
 
-ROUGH = Precision(1e-3, 1e-3, 1e-3)  # a path of a few segments comes within a percent
+ROUGH = Precision(1e-3, 1e-3, None)  # a path of a few segments comes within a percent
 FINE = Precision(1e-5, 2e-4, 1e-6)  # many samples, each a little short of its limit, add up
 
 
@@ -97,7 +97,7 @@ class KnotProgram:
             multipliers: Of a program about this guess or near it, at some of these samples.
         """
         answer = None
-        if multipliers is not None:
+        if multipliers is not None and precision.warm_barrier is not None:
             answer = self._solved(min(iterations, WARM_ITERATIONS), precision, multipliers)
         if answer is None or not answer.converged:
             answer = self._solved(iterations, precision)

@@ -13,7 +13,8 @@ from aerobat.trajectory import Trajectory, polynomial
 
 SAMPLES = 80  # of all segments together at first
 MIN_SAMPLES = 16  # of each: more than a polynomial of degree 9 needs
-MIN_END_SAMPLES = 32  # of the first and the last: between rest and full thrust the body turns at once
+END_SAMPLES = 32  # of the first and the last of many: between rest and full thrust the body turns at once
+NEARBY = 2  # segments on either side: few of many, all of four
 DENSE = 81  # places in a segment that are looked at
 JUST_INSIDE = 1e-9  # of a duration from its knots, where a segment is still itself and not its neighbour
 APART = 1e-4  # of a duration, the least distance of samples
@@ -49,6 +50,13 @@ class ConstraintViolation:
         """The largest excess."""
         return float(self.excess.max())
 
+    @property
+    def excess_nearby(self) -> Array:
+        """The largest excess in each segment and those near it, where it moves when it is mended, (S,)."""
+        beside = np.pad(self.excess, NEARBY, constant_values=-np.inf)
+        windows = np.lib.stride_tricks.sliding_window_view(beside, 2 * NEARBY + 1)
+        return np.asarray(windows.max(axis=-1))
+
     def __str__(self) -> str:
         """One sentence without its full stop."""
         return f"{self.limit}: exceeded by {100.0 * self.worst:.2g} % of the range at {self.time:.3f} s"
@@ -69,7 +77,7 @@ class ConstraintViolation:
 def chebyshev_samples(segments: int) -> Samples:
     """The first samples: denser toward the knots, as polynomials vary most there."""
     inner = max(ceil(SAMPLES / segments), MIN_SAMPLES)
-    ends = max(inner, MIN_END_SAMPLES)
+    ends = END_SAMPLES if inner == MIN_SAMPLES else inner
     counts = [inner if 0 < i < segments - 1 else ends for i in range(segments)]
     return tuple((1.0 - np.cos(np.linspace(0.0, np.pi, count))) / 2.0 for count in counts)
 
