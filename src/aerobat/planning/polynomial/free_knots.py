@@ -34,9 +34,7 @@ from aerobat.problem.stage import StageSequence
 from aerobat.vehicle import Vehicle
 
 MAX_SEGMENTS = 24  # a judgement: more gain next to nothing, and a solve takes longer with each
-LEG_SEGMENTS = (
-    2  # of a course's leg, where that does not make more than so many: turns are sharp at both ends
-)
+LEG_SEGMENTS = 2  # of a course's leg, where that makes no more than MAX_SEGMENTS, else one
 START_ORDERS = (3, 4)  # of closed forms that courses begin at: minimum jerk, minimum snap
 COURSE_ITERATIONS = 150  # of a solve at most, for all segments of a course at once
 COARSE = 4  # segments to begin with where there shall be more: they are quick and come near the least time
@@ -48,18 +46,19 @@ class FreeKnots(Planner):
 
     It begins from `start`, a plan of the same problem, certified or not; without one from the closed form
     through waypoints, or else from the MIQP's plan. Stages hold anywhere in their order and their
-    windows; two segments have room for a flip's five. Rotors that lag are held to their limits by their
-    commands, their thrusts continuous. At the ends the body does not turn, but its thrust may be
-    changing, so that there is jerk along it, unless `still_ends` asks for none. A `reserve`, a fraction
-    of every limit's range, is kept from either end for the controller, proven of rotors, at samples of
-    the path's limits: without one, four segments leave rotors without lag, whose thrusts may jump, 13 cm
-    off the paper's second example; one percent makes that 4 mm.
+    windows; two segments have room for a flip's five. A course of many stages has a segment a leg at least,
+    two where it is short, and begins at the closed form through its stages, stretched. Rotors that lag are
+    held to their limits by their commands, their thrusts continuous. At the ends the body does not turn, but
+    its thrust may be changing, so that there is jerk along it, unless `still_ends` asks for none. A
+    `reserve`, a fraction of every limit's range, is kept from either end for the controller, proven of
+    rotors, at samples of the path's limits: without one, four segments leave rotors without lag, whose
+    thrusts may jump, 13 cm off the paper's second example; one percent makes that 4 mm.
     """
 
     segments: Annotated[int, Field(ge=2, le=MAX_SEGMENTS)] = option(
         COARSE,
         "How many polynomial segments. 2 leaves something to the controller; 8 comes closer to time-optimal "
-        f"and takes longer; {MAX_SEGMENTS} at most.",
+        f"and takes longer; {MAX_SEGMENTS} at most. A course has one a leg, or more.",
     )
     start: Annotated[Plan, AS_IT_IS] | None = None
     still_ends: bool = False
