@@ -1,6 +1,6 @@
-"""Time-optimal plans through published courses, beside the numbers that were published for them.
+"""Plans through published courses, time-optimal or polynomials, beside the numbers published for them.
 
-    uv run python benchmarks/courses.py [--cases balls hover flown squares lap closed]
+    uv run python benchmarks/courses.py [--planner free-knots] [--cases balls hover flown squares lap closed]
 
 Times are of the processor, on one core, from the problem to the certified plan, imports left out. The course
 is that of Foehn, Romero and Scaramuzza, Science Robotics 6 (56), 2021, as the presets hold it; headings and
@@ -29,6 +29,7 @@ HEADINGS = (0.0, -20.0, -130.0, 180.0, 0.0, 70.0, 200.0)  # [deg]
 RADIUS = PRESET.maneuver.elements[0].radius  # [m] of waypoints
 SIDE = 2.4  # [m] of gates, whose centre of mass may pass within
 OPENING = 1.6  # [m]
+PLANNERS = {"time-optimal": ab.TimeOptimal, "free-knots": ab.FreeKnots}
 WINDOW = 0.1  # [s] about the planned instant
 PUBLISHED = {
     "balls": "CPC 17.56 s in 50 min, AOS 17.93 s in 6 s",
@@ -43,14 +44,17 @@ PUBLISHED = {
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("--cases", nargs="+", choices=PUBLISHED, default=list(PUBLISHED), help="which (all)")
+    parser.add_argument("--planner", choices=PLANNERS, default="time-optimal", help="which (time-optimal)")
+    options = parser.parse_args()
+    planner = PLANNERS[options.planner]
     lagging = ab.load_vehicle("agile-quad")
     vehicle = replace(lagging, rotors=tuple(replace(rotor, lag=0.0) for rotor in lagging.rotors))
-    for case in parser.parse_args().cases:
+    for case in options.cases:
         began = time.process_time()
         if case == "flown":
-            plan = ab.TimeOptimal(reserve=0.03).plan(problem_of(case, lagging), lagging)
+            plan = planner(reserve=0.03).plan(problem_of(case, lagging), lagging)
         else:
-            plan = ab.TimeOptimal().plan(problem_of(case, vehicle), vehicle)
+            plan = planner().plan(problem_of(case, vehicle), vehicle)
         spent = time.process_time() - began
         proof = "certified" if plan.certified else f"NOT CERTIFIED: {plan.certificate.why}"
         facts = [

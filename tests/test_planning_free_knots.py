@@ -9,8 +9,8 @@ import pytest
 from aerobat.errors import SpecError
 from aerobat.planning import MinSnap, Miqp, Plan
 from aerobat.planning.certified_solve import certificate_for
+from aerobat.planning.polynomial.descent.knot_samples import refit
 from aerobat.planning.polynomial.free_knots import FreeKnots
-from aerobat.planning.polynomial.knot_samples import refit
 from aerobat.planning.polynomial.min_snap import TimeScaling
 from aerobat.problem import EndState, Limits, Problem, Waypoint, Waypoints, load_problem
 from aerobat.states import STANDARD_GRAVITY

@@ -11,14 +11,15 @@ from aerobat.environment import Environment
 from aerobat.errors import Infeasible
 from aerobat.flatness import force_balance, reference
 from aerobat.planning import MinSnap, Plan, own_flight
+from aerobat.planning.polynomial.descent.framed_problem import FramedProblem
+from aerobat.planning.polynomial.descent.knot_program import KnotProgram
+from aerobat.planning.polynomial.descent.knot_samples import chebyshev_samples, refit
+from aerobat.planning.polynomial.descent.knot_variables import KnotVariables
 from aerobat.planning.polynomial.free_knots import FreeKnots
-from aerobat.planning.polynomial.knot_descent import Course
-from aerobat.planning.polynomial.knot_program import KnotProgram
-from aerobat.planning.polynomial.knot_samples import chebyshev_samples, refit
-from aerobat.planning.polynomial.knot_variables import KnotVariables
 from aerobat.planning.warm_start import WarmStart
 from aerobat.problem import GatePassage, HalfFlip, Problem, Waypoint, Waypoints, at_rest, load_problem
-from aerobat.problem.stage import CrossingTime
+from aerobat.problem.ball import Ball
+from aerobat.problem.stage import CrossingTime, Stage
 from aerobat.vehicle import Vehicle, load_vehicle
 
 ca = pytest.importorskip("casadi")
@@ -118,11 +119,13 @@ def test_derivatives_given_to_the_solver_are_those_of_differentiation() -> None:
     start = MinSnap(stop_after=5).plan(problem, vehicle)
     sequence = problem.stages(vehicle.max_specific_thrust)
     guess = WarmStart.of(start, sequence)
-    course = Course.of(problem, vehicle, sequence, guess, 0.0)
+    ball = Ball(np.array([1.0, 2.0, 3.0]), 0.5)
+    guess = replace(guess, stages=tuple(Stage(s.name, s.conditions, ball=ball) for s in guess.stages))
+    framed = FramedProblem.of(problem, vehicle, sequence, guess, 0.0)
     guess = replace(guess, trajectory=refit(guess.trajectory, 3))
     place = int(np.searchsorted(guess.trajectory.knots[1:-1], guess.times[0], side="right"))
-    variables = KnotVariables(problem, vehicle, guess, (place,), course.frame, 1.0, still_ends=False)
-    program = KnotProgram(variables, course.limits, chebyshev_samples(3), course.balance, 0.0).program
+    variables = KnotVariables(problem, vehicle, guess, (place,), framed.frame, 1.0, still_ends=False)
+    program = KnotProgram(variables, framed.limits, chebyshev_samples(3), framed.balance, np.zeros(3)).program
     rng = np.random.default_rng(0)
     x = variables.start + 1e-3 * rng.normal(size=variables.size)
     multipliers = rng.normal(size=program.lower.size)

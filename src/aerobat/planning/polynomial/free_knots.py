@@ -17,9 +17,13 @@ from aerobat.optimization.deadline import out_of_time, within_time
 from aerobat.optimization.nonlinear import import_casadi
 from aerobat.planning.assessment.assessment import SUSPICIOUS
 from aerobat.planning.assessment.lower_bound import least_duration
+from aerobat.planning.courses import is_course
 from aerobat.planning.miqp import Miqp
 from aerobat.planning.planners import Planner, option, planner
-from aerobat.planning.polynomial.knot_descent import Course, Descent
+from aerobat.planning.polynomial.descent.framed_problem import FramedProblem
+from aerobat.planning.polynomial.descent.knot_descent import Descent
+from aerobat.planning.polynomial.descent.knot_program import FINE
+from aerobat.planning.polynomial.knots import stretched_path
 from aerobat.planning.polynomial.min_snap import MinSnap
 from aerobat.planning.recorder import Progress, Recorder
 from aerobat.planning.result import FLYING_RESERVE, Plan
@@ -30,6 +34,9 @@ from aerobat.problem.stage import StageSequence
 from aerobat.vehicle import Vehicle
 
 MAX_SEGMENTS = 24  # a judgement: more gain next to nothing, and a solve takes longer with each
+LEG_SEGMENTS = 2  # of a course's leg, where that makes no more than MAX_SEGMENTS, else one
+START_ORDERS = (3, 4)  # of closed forms that courses begin at: minimum jerk, minimum snap
+COURSE_ITERATIONS = 150  # of a solve at most, for all segments of a course at once
 COARSE = 4  # segments to begin with where there shall be more: they are quick and come near the least time
 
 
@@ -39,18 +46,19 @@ class FreeKnots(Planner):
 
     It begins from `start`, a plan of the same problem, certified or not; without one from the closed form
     through waypoints, or else from the MIQP's plan. Stages hold anywhere in their order and their
-    windows; two segments have room for a flip's five. Rotors that lag are held to their limits by their
-    commands, their thrusts continuous. At the ends the body does not turn, but its thrust may be
-    changing, so that there is jerk along it, unless `still_ends` asks for none. A `reserve`, a fraction
-    of every limit's range, is kept from either end for the controller, proven of rotors, at samples of
-    the path's limits: without one, four segments leave rotors without lag, whose thrusts may jump, 13 cm
-    off the paper's second example; one percent makes that 4 mm.
+    windows; two segments have room for a flip's five. A course of many stages has a segment a leg at least,
+    two where it is short, and begins at the closed form through its stages, stretched. Rotors that lag are
+    held to their limits by their commands, their thrusts continuous. At the ends the body does not turn, but
+    its thrust may be changing, so that there is jerk along it, unless `still_ends` asks for none. A
+    `reserve`, a fraction of every limit's range, is kept from either end for the controller, proven of
+    rotors, at samples of the path's limits: without one, four segments leave rotors without lag, whose
+    thrusts may jump, 13 cm off the paper's second example; one percent makes that 4 mm.
     """
 
     segments: Annotated[int, Field(ge=2, le=MAX_SEGMENTS)] = option(
         COARSE,
         "How many polynomial segments. 2 leaves something to the controller; 8 comes closer to time-optimal "
-        f"and takes longer; {MAX_SEGMENTS} at most.",
+        f"and takes longer; {MAX_SEGMENTS} at most. A course has one a leg, or more.",
     )
     start: Annotated[Plan, AS_IT_IS] | None = None
     still_ends: bool = False
@@ -75,7 +83,7 @@ class FreeKnots(Planner):
         """
         vehicle = require_attitudes("free-knots", problem, vehicle)
         import_casadi()
-        sequence = problem.stages(vehicle.max_specific_thrust, vehicle.body_radius).linear
+        sequence = problem.stages(vehicle.max_specific_thrust, vehicle.body_radius)
         recorder = Recorder(progress)
         with within_time(self.time_limit):
             found = self._planned(problem, vehicle, sequence, recorder)
@@ -97,27 +105,61 @@ class FreeKnots(Planner):
         A poor start leads to a poor optimum; a plan that is not slow beside what is possible is taken.
         """
         best: Plan | None = None
-        for start in self._starts(problem, vehicle):
-            guess = WarmStart.of(start, sequence)
-            course = Course.of(problem, vehicle, sequence, guess, self.reserve)
-            descent = Descent(course, recorder, self.still_ends, self.iterations)
-            descent.consider(start, guess)
-            for segments in sorted({min(COARSE, self.segments), self.segments}):
+        numbers = self._numbers_of_segments(sequence)
+        for start, guess in self._starts(problem, vehicle, sequence):
+            descent = self._descent(problem, vehicle, sequence, guess, recorder)
+            if start is not None:
+                descent.consider(start, guess)
+            for segments in numbers:
                 if not out_of_time():
                     descent.run(guess, segments)
             if descent.best is None and not out_of_time():
-                descent.run(guess, 2 * self.segments)
-            found = descent.plan(self.segments)
+                descent.run(guess, 2 * numbers[-1])
+            found = descent.plan(numbers[-1])
             if found is not None and (best is None or found.duration < best.duration):
                 best = found
-            if out_of_time() or (best is not None and (start is self.start or not _slow(best, vehicle))):
+            taken = start is None or start is self.start
+            if out_of_time() or (best is not None and (taken or not _slow(best, vehicle))):
                 break
         return best
 
-    def _starts(self, problem: Problem, vehicle: Vehicle) -> Iterator[Plan]:
-        """Plans to begin from, the best first; the last knows no rotors."""
+    def _numbers_of_segments(self, sequence: StageSequence) -> list[int]:
+        """How many segments to begin with, and in the end: at least one a leg, of a course."""
+        if not is_course(sequence):
+            return sorted({min(COARSE, self.segments), self.segments})
+        legs = len(sequence.stages) + 1
+        of_leg = LEG_SEGMENTS if LEG_SEGMENTS * legs <= MAX_SEGMENTS else 1
+        return [max(self.segments, of_leg * legs)]
+
+    def _descent(
+        self,
+        problem: Problem,
+        vehicle: Vehicle,
+        sequence: StageSequence,
+        guess: WarmStart,
+        recorder: Recorder,
+    ) -> Descent:
+        """The descent from a guess."""
+        framed = FramedProblem.of(problem, vehicle, sequence, guess, self.reserve)
+        if is_course(sequence):
+            return Descent(framed, recorder, self.still_ends, COURSE_ITERATIONS, FINE)
+        return Descent(framed, recorder, self.still_ends, self.iterations)
+
+    def _starts(
+        self, problem: Problem, vehicle: Vehicle, sequence: StageSequence
+    ) -> Iterator[tuple[Plan | None, WarmStart]]:
+        """Where to begin, the best first, with the plan whose path it is if there is one."""
         if self.start is not None:
-            yield self.start
+            yield self.start, WarmStart.of(self.start, sequence)
+        if is_course(sequence):
+            for order in START_ORDERS:
+                path = stretched_path(problem, vehicle, sequence, order)
+                yield None, WarmStart(path, sequence.stages, tuple(path.knots[1:-1].tolist()))
+        for plan in self._plans(problem, vehicle):
+            yield plan, WarmStart.of(plan, sequence)
+
+    def _plans(self, problem: Problem, vehicle: Vehicle) -> Iterator[Plan]:
+        """Other planners' plans to begin from; the last knows no rotors."""
         closed_form: list[Planner] = [MinSnap()] if problem.maneuver.through_points else []
         yield from plans_to_begin_from(closed_form, problem, vehicle)
         for reserve in sorted({self.reserve, 0.0}, reverse=True):

@@ -8,11 +8,13 @@ from math import ceil
 import numpy as np
 
 from aerobat.arrays import Array
-from aerobat.planning.polynomial.path_limits import END_ORDER, PathLimits, Samples
+from aerobat.planning.polynomial.descent.path_limits import END_ORDER, PathLimits, Samples
 from aerobat.trajectory import Trajectory, polynomial
 
 SAMPLES = 80  # of all segments together at first
 MIN_SAMPLES = 16  # of each: more than a polynomial of degree 9 needs
+END_SAMPLES = 32  # of the first and the last of many: between rest and full thrust the body turns at once
+NEARBY = 2  # segments on either side: few of many, all of four
 DENSE = 81  # places in a segment that are looked at
 JUST_INSIDE = 1e-9  # of a duration from its knots, where a segment is still itself and not its neighbour
 APART = 1e-4  # of a duration, the least distance of samples
@@ -22,7 +24,7 @@ APART = 1e-4  # of a duration, the least distance of samples
 class ConstraintViolation:
     """By how much a trajectory exceeds limits, where, and which most."""
 
-    worst: float  # as a fraction of the limit's range; negative: all hold
+    excess: Array  # in each segment, as a fraction of the limit's range; negative: all hold, (S,)
     limit: str  # the name of the one that is exceeded most
     time: float  # [s] when
     peaks: Samples  # normalised times in each segment at which a limit is exceeded more than beside them
@@ -37,11 +39,23 @@ class ConstraintViolation:
         peaks = (values > 0.0) & (values >= neighbours[..., :-2]) & (values >= neighbours[..., 2:])
         segment, row, place = np.unravel_index(np.argmax(values), values.shape)
         return cls(
-            worst=float(values.max()),
+            excess=values.max(axis=(1, 2)),
             limit=limits.names[row],
             time=float(trajectory.knots[segment] + s[place] * trajectory.durations[segment]),
             peaks=tuple(s[p.any(axis=0)] for p in peaks),
         )
+
+    @property
+    def worst(self) -> float:
+        """The largest excess."""
+        return float(self.excess.max())
+
+    @property
+    def excess_nearby(self) -> Array:
+        """The largest excess in each segment and those near it, where it moves when it is mended, (S,)."""
+        beside = np.pad(self.excess, NEARBY, constant_values=-np.inf)
+        windows = np.lib.stride_tricks.sliding_window_view(beside, 2 * NEARBY + 1)
+        return np.asarray(windows.max(axis=-1))
 
     def __str__(self) -> str:
         """One sentence without its full stop."""
@@ -62,8 +76,10 @@ class ConstraintViolation:
 
 def chebyshev_samples(segments: int) -> Samples:
     """The first samples: denser toward the knots, as polynomials vary most there."""
-    count = max(ceil(SAMPLES / segments), MIN_SAMPLES)
-    return ((1.0 - np.cos(np.linspace(0.0, np.pi, count))) / 2.0,) * segments
+    inner = max(ceil(SAMPLES / segments), MIN_SAMPLES)
+    ends = END_SAMPLES if inner == MIN_SAMPLES else inner
+    counts = [inner if 0 < i < segments - 1 else ends for i in range(segments)]
+    return tuple((1.0 - np.cos(np.linspace(0.0, np.pi, count))) / 2.0 for count in counts)
 
 
 def refit(trajectory: Trajectory, segments: int) -> Trajectory:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from aerobat.arrays import Array
 from aerobat.flatness import force_balance, lateral_drag
-from aerobat.planning.polynomial.path_limits import (
+from aerobat.planning.polynomial.descent.path_limits import (
     END_ORDER,
     ORDERS,
     POLYNOMIAL_DEGREE,

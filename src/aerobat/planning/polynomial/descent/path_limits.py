@@ -17,7 +17,7 @@ import numpy as np
 
 from aerobat.arrays import AXES, Array
 from aerobat.optimization.nonlinear import import_casadi
-from aerobat.planning.polynomial.rotor_constraints import RotorConstraints
+from aerobat.planning.polynomial.descent.rotor_constraints import RotorConstraints
 from aerobat.problem.condition import ForceBalance, LinearBound
 from aerobat.problem.problem import DERIVATIVES, Problem
 from aerobat.problem.stage import StageSequence

@@ -17,8 +17,8 @@ import numpy as np
 
 from aerobat.arrays import Array
 from aerobat.optimization.nonlinear import NonlinearProgram, NonlinearResult, import_casadi, solve_nonlinear
-from aerobat.planning.polynomial.knot_variables import KnotVariables
-from aerobat.planning.polynomial.path_limits import (
+from aerobat.planning.polynomial.descent.knot_variables import KnotVariables
+from aerobat.planning.polynomial.descent.path_limits import (
     ORDERS,
     POLYNOMIAL_DEGREE,
     TO_COEFFICIENTS,
@@ -28,11 +28,52 @@ from aerobat.planning.polynomial.path_limits import (
     scaled,
 )
 from aerobat.planning.warm_start import WarmStart
+from aerobat.problem.ball import Ball
 from aerobat.problem.condition import ForceBalance, LinearBound
 
-TOLERANCE = 1e-3  # of IPOPT
-WARM = 1e-3  # the first barrier parameter
+WARM_ITERATIONS = 40  # where multipliers are known, at most: what takes longer is not near
+BALL_SHARE = 1.0 - 1e-5  # of a ball's squared radius: rounding has the rest
 NORMAL = 1e-9  # what a direction has of a plane that it is normal to
+
+
+@dataclass(frozen=True)
+class Precision:
+    """How closely a program is solved, whose cost is one."""
+
+    tolerance: float  # of IPOPT
+    barrier: float  # the first barrier parameter
+    warm_barrier: float | None  # the same where multipliers are known; None: they are not used
+
+
+ROUGH = Precision(1e-3, 1e-3, None)  # a path of a few segments comes within a percent
+FINE = Precision(1e-5, 2e-4, 1e-6)  # many samples, each a little short of its limit, add up
+
+
+@dataclass(frozen=True, eq=False)
+class Multipliers:
+    """Of a solution: of the box, of limits at samples, of stages."""
+
+    box: Array  # (n,)
+    samples: Samples
+    sampled: tuple[Array, ...]  # of each segment, (samples, limits)
+    stages: Array
+
+    @classmethod
+    def of(cls, answer: NonlinearResult, samples: Samples, limits: int) -> Multipliers:
+        """Of an answer to a program with so many limits at samples."""
+        box, rows = answer.multipliers
+        ends = np.cumsum([limits * len(s) for s in samples])
+        *sampled, stages = np.split(rows, ends)
+        return cls(box, samples, tuple(each.reshape(-1, limits) for each in sampled), stages)
+
+    def at(self, samples: Samples) -> tuple[Array, Array]:
+        """Of the box, and of a program's rows at these samples, among which are all of its own."""
+        rows = []
+        for own, wanted, known in zip(self.samples, samples, self.sampled, strict=True):
+            each = np.zeros((len(wanted), known.shape[1]))
+            each[np.searchsorted(wanted, own)] = known
+            rows.append(each.ravel())
+        return self.box, np.concatenate([*rows, self.stages])
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,15 +84,37 @@ class KnotProgram:
     limits: PathLimits
     samples: Samples  # at which limits hold
     balance: ForceBalance  # that the stages' conditions on thrust are about
-    reserve: float  # of every limit's range, kept at samples
+    reserve: Array  # of every limit's range, kept at the samples of each segment, (S,)
 
-    def solve(self, iterations: int) -> tuple[WarmStart, NonlinearResult]:
-        """The solution near the guess, as the next guess. Raises BackendMissing without CasADi."""
-        start = self.variables.start
-        answer = solve_nonlinear(
-            self.program, start, max_iterations=iterations, tolerance=TOLERANCE, initial_barrier=WARM
+    def solve(
+        self, iterations: int, precision: Precision, multipliers: Multipliers | None = None
+    ) -> tuple[WarmStart, NonlinearResult, Multipliers]:
+        """The solution near the guess, as the next guess. Raises BackendMissing without CasADi.
+
+        Args:
+            iterations: Of the solver, at most.
+            precision: Of the solver.
+            multipliers: Of a program about this guess or near it, at some of these samples.
+        """
+        answer = None
+        if multipliers is not None and precision.warm_barrier is not None:
+            answer = self._solved(min(iterations, WARM_ITERATIONS), precision, multipliers)
+        if answer is None or not answer.converged:
+            answer = self._solved(iterations, precision)
+        found = Multipliers.of(answer, self.samples, self.limits.size)
+        return self.variables.read(answer.x), answer, found
+
+    def _solved(
+        self, iterations: int, precision: Precision, multipliers: Multipliers | None = None
+    ) -> NonlinearResult:
+        return solve_nonlinear(
+            self.program,
+            self.variables.start,
+            max_iterations=iterations,
+            tolerance=precision.tolerance,
+            initial_barrier=precision.barrier if multipliers is None else precision.warm_barrier,
+            multipliers=None if multipliers is None else multipliers.at(self.samples),
         )
-        return self.variables.read(answer.x), answer
 
     @cached_property
     def program(self) -> NonlinearProgram:
@@ -138,8 +201,11 @@ class KnotProgram:
 
     def _along_limits(self) -> tuple[Array, Array]:
         """Limits of all values at samples; linear bounds do not count at the very ends, which are fixed."""
-        count = sum(map(len, self.samples))
-        lower, upper = (np.tile(limits, (count, 1)) for limits in self.limits.limits(self.reserve))
+        own = [
+            np.tile(self.limits.limits(reserve), (1, len(s))).reshape(2, len(s), -1)
+            for reserve, s in zip(self.reserve.tolist(), self.samples, strict=True)
+        ]
+        lower, upper = np.concatenate(own, axis=1)
         linear = slice(self.limits.size - len(self.limits.bounds), None)
         lower[[0, -1], linear], upper[[0, -1], linear] = -inf, inf
         return lower.ravel(), upper.ravel()
@@ -171,6 +237,8 @@ class KnotProgram:
             coefficients = ca.DM(TO_COEFFICIENTS) @ (duration ** ca.DM(ORDERS.astype(float)) * ends)
             for condition in stage.conditions:
                 rows += self._held(condition.bound(self.balance), coefficients, duration, s)
+            if stage.ball is not None:
+                rows.append(self._met(stage.ball, coefficients, s))
             earliest, latest = stage.window
             time = starts[segment] + x[segment] * s
             if earliest > 0.0:
@@ -181,6 +249,13 @@ class KnotProgram:
             if segment == following:
                 rows.append((x[columns[j + 1]] - x[columns[j]], 0.0, inf))
         return rows
+
+    def _met(self, ball: Ball, coefficients: Any, s: Any) -> tuple[Any, float, float]:
+        """The squared distance from a ball's centre at a place in a segment, over its radius squared."""
+        ca, axes = import_casadi(), self.limits.rotors.axes
+        powers = ca.horzcat(*(s**p for p in range(POLYNOMIAL_DEGREE + 1)))
+        offset = ca.DM(self.limits.origin - ball.centre) + ca.DM(axes) @ (powers @ coefficients).T
+        return ca.sumsqr(offset) / ball.radius**2, -inf, BALL_SHARE
 
     def _held(
         self, bound: LinearBound, coefficients: Any, duration: Any, s: Any
