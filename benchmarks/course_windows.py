@@ -1,11 +1,11 @@
-"""Stages of courses placed in windows that move along, beside one search of the whole for as many QPs or more.
+"""Stages of courses placed in windows that move along, beside one short search of the whole.
 
     uv run python benchmarks/course_windows.py
 
-One program each, at one dt: `race-7` (seven waypoints) and flips through gates in a row, four stages a gate, as
-in growth_with_stages.py. "whole" is the built-in search, ended after 500 QPs; windows begin with what it found.
-Where the optimum is known (three gates: growth_with_stages.py proves it) the last column is how much dearer the
-windows' answer is. Times are of the processor, on one core.
+One program each, at one dt: `race-7` (seven waypoints) and flips through gates in a row, four stages a gate,
+as in growth_with_stages.py. "whole" is the built-in search, ended after 500 QPs; windows begin with what it
+found. Where the optimum is known (three gates, proven by growth_with_stages.py) the last column is how much
+dearer the windows' answer is. Times are of the processor, on one core.
 """
 
 import os
@@ -31,7 +31,8 @@ def main() -> None:
         "five flips, N = 100": (flips(5, 100, 10.0), None),
     }
     print(
-        f"{'':22}{'whole':>10}{'bound':>10}{'windows':>10}{'ratio':>8}{'QPs':>7}{'time':>9}  above the optimum"
+        f"{'':22}{'whole':>10}{'bound':>10}{'windows':>10}{'ratio':>8}{'QPs':>7}{'time':>9}"
+        "  above the optimum"
     )
     for name, (program, optimum) in cases.items():
         whole = solver().solve(program, node_limit=WHOLE)
@@ -40,7 +41,8 @@ def main() -> None:
         spent = time.process_time() - began
         above = "" if optimum is None else f"{100 * (placed.cost / optimum - 1):.2g} %"
         print(
-            f"{name:22}{whole.cost:10.4g}{whole.bound:10.3g}{placed.cost:10.4g}{whole.cost / placed.cost:8.2f}"
+            f"{name:22}{whole.cost:10.4g}{whole.bound:10.3g}{placed.cost:10.4g}"
+            f"{whole.cost / placed.cost:8.2f}"
             f"{placed.nodes - whole.nodes:7}{spent:7.2f} s  {above}"
         )
 

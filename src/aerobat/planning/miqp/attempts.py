@@ -55,7 +55,7 @@ class Attempts:
     def solve(self, dt: float, node_limit: int | None = None) -> AssignmentResult:
         """The paper's program at one dt; solved exactly where neither time nor nodes are limited.
 
-        Courses of more gates than can be searched at once have their stages placed in windows that move along.
+        Courses of more gates than are searched at once have their stages placed in windows that move along.
         """
         program = self.formulation.program(dt)
         if not is_placed_in_windows(self.formulation.sequence):

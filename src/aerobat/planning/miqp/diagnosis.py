@@ -35,8 +35,8 @@ def why_infeasible(formulation: Formulation, attempts: Sequence[Attempt], vehicl
     if not binding and unanswered:
         return (
             f"no plan of '{formulation.problem.name}' was found at any dt from {min(tried):.3g} to "
-            f"{max(tried):.3g} s; {unanswered} of {len(attempts)} programs were left without an answer, so that "
-            "there may be one"
+            f"{max(tried):.3g} s; {unanswered} of {len(attempts)} programs were left without an answer, so "
+            "that there may be one"
         )
     if not binding:
         return (
