@@ -121,6 +121,11 @@ class AssignmentProgram:
         precedes.flags.writeable = False
         return precedes
 
+    @property
+    def is_totally_ordered(self) -> bool:
+        """True if the stages come in the order in which they are listed."""
+        return all(self.precedes[i, i + 1] for i in range(len(self.stages) - 1))
+
     def with_bounds(
         self,
         *,

@@ -9,7 +9,7 @@ from typing import Literal
 from aerobat.arrays import Array, frozen
 from aerobat.optimization.assignment import AssignmentProgram
 
-Status = Literal["optimal", "time_limit", "infeasible", "unknown"]
+Status = Literal["optimal", "locally optimal", "time_limit", "infeasible", "unknown"]
 
 VIOLATION_TOLERANCE = 1e-6  # of a row a x <= b, relative to |a| |x| + |b|, that a solution may have
 
@@ -18,9 +18,9 @@ VIOLATION_TOLERANCE = 1e-6  # of a row a x <= b, relative to |a| |x| + |b|, that
 class AssignmentResult:
     """The outcome of a solve. Cost and violation are recomputed from the program, not taken from the solver.
 
-    "optimal": x is feasible and no other costs less. "time_limit": the search ended early, x is the best
-    found and within `gap` of the bound. "infeasible": there is no x. "unknown": none was found, which proves
-    nothing.
+    "optimal": x is feasible and no other costs less. "locally optimal": no few consecutive stages can be
+    placed better while the others stay. "time_limit": the search ended early, x is the best found; both are
+    within `gap` of the bound. "infeasible": there is no x. "unknown": none was found, which proves nothing.
     """
 
     status: Status

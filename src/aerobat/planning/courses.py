@@ -19,6 +19,7 @@ P = TypeVar("P")
 COURSE_STAGES = 6  # that say where they are: from so many on a path through them is the start
 POINTS = 4  # gates and waypoints alone, likewise
 MANY_STAGES = 10  # of any kind
+MAX_EXACT_PLACES = 3  # gates and points that one mixed-integer search places with proof in seconds
 
 
 def is_course(sequence: StageSequence) -> bool:
@@ -36,6 +37,12 @@ def is_course(sequence: StageSequence) -> bool:
 def _is_point(stage: Stage) -> bool:
     """True of a gate or a waypoint."""
     return stage.gate is not None or stage.ball is not None or not np.isnan(stage.place).any()
+
+
+def is_placed_in_windows(sequence: StageSequence) -> bool:
+    """True of sequences in order through more places than are searched at once."""
+    places = sum(len(stage.where) >= 3 for stage in sequence.stages)
+    return sequence.ordered and places > MAX_EXACT_PLACES
 
 
 def on_open_courses(

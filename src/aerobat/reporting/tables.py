@@ -206,7 +206,8 @@ def _optimality(plan: Plan) -> str:
         return best_by_limit(plan)
     if plan.gap is None or plan.gap < 1e-6:
         return plan.status
-    return f"within {100 * plan.gap:.2g} % of the optimum"
+    within = f"within {100 * plan.gap:.2g} % of the optimum"
+    return within if plan.status == "time_limit" else f"{plan.status}, {within}"
 
 
 def flight_facts(score: Score, controller: str | None = None, plant: str | None = None) -> Iterable[Fact]:

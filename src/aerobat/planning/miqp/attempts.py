@@ -9,9 +9,10 @@ from time import perf_counter
 import numpy as np
 
 from aerobat.certification import Certificate, Verdict
-from aerobat.optimization import AssignmentResult, Solver
+from aerobat.optimization import AssignmentResult, Solver, improved_in_windows
 from aerobat.optimization.deadline import out_of_time
 from aerobat.planning.certified_solve import Judged, Solution, certified_solve
+from aerobat.planning.courses import is_placed_in_windows
 from aerobat.planning.miqp.diagnosis import NOT_CONVERGED, OUT_OF_TIME
 from aerobat.planning.miqp.formulation import Formulation
 from aerobat.planning.miqp.integrator import INPUT_NAMES
@@ -25,6 +26,8 @@ from aerobat.vehicle import Vehicle
 
 PROOF_ROUNDS = 4  # of certificates, at most, each after backing off from what the last one refutes
 PROOF_BACKOFF = 5e-4  # of the ranges of constraints that are near, in each of them, at least
+COURSE_SCAN_NODES = 50  # of one along a scan, for which no bound is said
+COURSE_NODES = 5000  # of a search of a whole course: for its bound, windows place its stages better
 SMALL_INPUT = 1e-6  # normalised: an input of this size moves nothing
 MOMENT_ORDER = 4  # the lowest order whose body rates do not jump; one more for thrusts that do not
 
@@ -50,9 +53,17 @@ class Attempts:
     slots: tuple[int, ...] | None = None  # of the last solution: where the next solve begins
 
     def solve(self, dt: float, node_limit: int | None = None) -> AssignmentResult:
-        """The paper's program at one dt; solved exactly where neither time nor nodes are limited."""
+        """The paper's program at one dt; solved exactly where neither time nor nodes are limited.
+
+        Courses of more gates than are searched at once have their stages placed in windows that move along.
+        """
         program = self.formulation.program(dt)
-        answer = self.solver.solve(program, node_limit=node_limit, start=self.slots)
+        if not is_placed_in_windows(self.formulation.sequence):
+            answer = self.solver.solve(program, node_limit=node_limit, start=self.slots)
+        else:
+            limit = COURSE_NODES if node_limit is None else min(node_limit, COURSE_SCAN_NODES)
+            answer = self.solver.solve(program, node_limit=limit, start=self.slots)
+            answer = improved_in_windows(program, answer, self.slots)
         self.slots = answer.slots or self.slots
         return answer
 

@@ -31,6 +31,13 @@ def why_infeasible(formulation: Formulation, attempts: Sequence[Attempt], vehicl
         best = max(solved, key=lambda a: -inf if a.margin is None else a.margin).outcome
         return f"{said} that {vehicle.name} can fly: at best, {best}"
     binding = list(_binding(formulation, tried))
+    unanswered = sum(a.status == "unknown" for a in attempts)
+    if not binding and unanswered:
+        return (
+            f"no plan of '{formulation.problem.name}' was found at any dt from {min(tried):.3g} to "
+            f"{max(tried):.3g} s; {unanswered} of {len(attempts)} programs were left without an answer, so "
+            "that there may be one"
+        )
     if not binding:
         return (
             f"{said}: its stages, goal and limits exclude each other, and dropping any one of them does not "

@@ -1,0 +1,148 @@
+"""Stages placed a few at a time: a window of consecutive ones is searched exactly, and moves along.
+
+All other stages stay where they are meanwhile, so that every solution is one of the whole program, cheaper
+than the last. Windows overlap, and move along until none finds anything better. Nothing of that is a proof
+for all stages together: the bound is that of the search whose answer is improved.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from itertools import cycle
+
+import numpy as np
+
+from aerobat.optimization.assignment import AssignmentProgram, SlottedStage
+from aerobat.optimization.backends import solver
+from aerobat.optimization.deadline import out_of_time
+from aerobat.optimization.result import AssignmentResult, Status
+
+WIDTH = 3  # stages of a window: two place a course worse, four take twice as long and place none better
+STEP = 2  # stages by which it moves along
+WINDOW_NODES = 2000  # of a window's search: some are flat in all their slots
+IMPROVEMENT = 1e-9  # of the cost, at least: less is rounding
+
+
+def improved_in_windows(
+    program: AssignmentProgram, answer: AssignmentResult, start: Sequence[int] | None = None
+) -> AssignmentResult:
+    """Return a search's answer with stages placed better; without any, one from `start` or evenly spread.
+
+    It is "locally optimal" where no window can be placed better, with the answer's bound on the optimum.
+    Answers that are proven are returned as they are, as are those of programs whose stages have no order.
+    """
+    slots = answer.slots or start or evenly_spread(program)
+    if answer.status in ("optimal", "infeasible") or slots is None or not program.is_totally_ordered:
+        return answer
+    search = _Windows(program, slots)
+    search.run()
+    spent = replace(answer, nodes=answer.nodes + search.nodes, time=answer.time + search.time)
+    best = search.best
+    if best is None or not best.cost <= answer.cost:
+        return spent
+    status: Status = "locally optimal" if search.settled else "time_limit"
+    bound = min(answer.bound, best.cost)
+    return replace(best, status=status, bound=bound, nodes=spent.nodes, time=spent.time)
+
+
+def evenly_spread(program: AssignmentProgram) -> tuple[int, ...] | None:
+    """Return slots in the stages' order, as far apart as they allow; None where there are too few."""
+    slots: list[int] = []
+    last = max((slot for stage in program.stages for slot in stage.slots), default=0)
+    latest = _latest(program)
+    if latest is None:
+        return None
+    for i, stage in enumerate(program.stages):
+        after = slots[-1] if slots else -1
+        free = [slot for slot in stage.slots if after < slot <= latest[i]]
+        wanted = (i + 1) * (last + 1) / (len(program.stages) + 1)
+        slots.append(min(free, key=lambda slot: abs(slot - wanted)))
+    return tuple(slots)
+
+
+def _latest(program: AssignmentProgram) -> list[int] | None:
+    """The latest slot of each stage that leaves one to all behind it; None where some stage has none."""
+    latest: list[int] = []
+    for stage in reversed(program.stages):
+        free = [slot for slot in stage.slots if not latest or slot < latest[-1]]
+        if not free:
+            return None
+        latest.append(max(free))
+    latest.reverse()
+    return latest
+
+
+class _Windows:
+    """Windows that move along one program, and the best that they found."""
+
+    def __init__(self, program: AssignmentProgram, slots: Sequence[int]) -> None:
+        self._program = program
+        self._slots = tuple(slots)
+        self._search = solver("builtin")
+        self.best: AssignmentResult | None = None
+        self.settled = False
+        self.nodes = 0
+        self.time = 0.0
+
+    def run(self) -> None:
+        """Move the windows along until a whole round finds nothing better, or no time is left."""
+        firsts = self._firsts
+        unchanged, proven = 0, True
+        for first in cycle(firsts):
+            if out_of_time():
+                return
+            result = self._solved(first)
+            if self._improves(result):
+                unchanged, proven = 0, True
+            proven = proven and result.status == "optimal"
+            unchanged += 1
+            if unchanged == len(firsts):
+                self.settled = proven
+                return
+
+    @property
+    def _firsts(self) -> list[int]:
+        """The first stages of the windows, the last of which ends with the last stage."""
+        last = max(len(self._slots) - WIDTH, 0)
+        return [*range(0, last, STEP), last]
+
+    def _solved(self, first: int) -> AssignmentResult:
+        window = range(first, first + WIDTH)
+        stages = self._program.stages
+        free = [self._between(i, window) if i in window else self._fixed(i) for i in range(len(stages))]
+        start = None if self.best is None else self._slots
+        result = self._search.solve(
+            self._program.with_bounds(stages=free), node_limit=WINDOW_NODES, start=start
+        )
+        self.nodes += result.nodes
+        self.time += result.time
+        return result
+
+    def _improves(self, result: AssignmentResult) -> bool:
+        """Take a result that costs less, or the first; tell if it did."""
+        if result.x is None:
+            return False
+        assert result.slots is not None
+        known = np.inf if self.best is None else self.best.cost
+        if result.cost >= known * (1.0 - IMPROVEMENT):
+            return False
+        self.best, self._slots = result, result.slots
+        return True
+
+    def _between(self, i: int, window: range) -> SlottedStage:
+        """A stage in the slots that the neighbours of its window leave to it."""
+        after = self._slots[window.start - 1] if window.start > 0 else -1
+        before = self._slots[window.stop] if window.stop < len(self._slots) else np.inf
+        stage = self._program.stages[i]
+        return _restricted(stage, [k for k, slot in enumerate(stage.slots) if after < slot < before])
+
+    def _fixed(self, i: int) -> SlottedStage:
+        stage = self._program.stages[i]
+        return _restricted(stage, [stage.index(self._slots[i])])
+
+
+def _restricted(stage: SlottedStage, places: list[int]) -> SlottedStage:
+    """A stage with some of its slots."""
+    slots = tuple(stage.slots[k] for k in places)
+    return SlottedStage(stage.name, slots, stage.rows[places], stage.lower[places], stage.upper[places])
