@@ -1,0 +1,78 @@
+"""One scenario planned: whether there is a plan, which limits bind, or why there is none."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import StrEnum
+
+from aerobat.errors import Infeasible, SpecError
+from aerobat.optimization.deadline import out_of_time, within_time
+from aerobat.planning import Plan, Planner, plan, without_advice
+from aerobat.planning.assessment.contradiction import contradiction
+from aerobat.studies.feasibility.binding import binding_limits, limits_in
+from aerobat.studies.feasibility.fields import Field, Scenario
+
+TIME_LIMIT = 30.0  # [s] of planning, where no other is given: most scenarios take one
+
+
+class Feasibility(StrEnum):
+    """An answer to whether there is a plan."""
+
+    PLANNED = "planned"  # certified, and it flies
+    NOT_FLYABLE = "not flyable"  # planned, but not certified, or its own flight is not as it should be
+    NO_PLAN = "no plan"  # the planner finds none, which proves nothing
+    REFUSED = "refused at sight"  # what is asked contradicts itself, the limits or the vehicle
+    NO_ANSWER = "no answer"  # in the time given
+
+
+@dataclass(frozen=True, eq=False)
+class Probe:
+    """The answer for one scenario."""
+
+    feasibility: Feasibility
+    sentence: str  # the proof, or why there is none
+    limits: tuple[str, ...]  # that bind, by the names of their fields; none where that is not known
+    plan: Plan | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Task:
+    """A scenario of which fields are to be changed, and how each is planned."""
+
+    scenario: Scenario
+    fields: tuple[Field, ...]
+    planner: Planner | None  # None for the one that suits each problem
+    time_limit: float  # [s] of each
+
+
+def probe(task: Task, values: Sequence[float]) -> Probe:
+    """The answer where the fields have these values."""
+    scenario = task.scenario
+    try:
+        for field, value in zip(task.fields, values, strict=True):
+            scenario = field.changed(scenario, value)
+        found = contradiction(scenario.problem, scenario.vehicle)
+        if found is not None:
+            limits = found.limits or (f"stage '{found.stage}'",)
+            return Probe(Feasibility.REFUSED, found.sentence, limits)
+        return _planned(scenario, task)
+    except SpecError as error:
+        return Probe(Feasibility.REFUSED, str(error), limits_in(str(error)))
+
+
+def _planned(scenario: Scenario, task: Task) -> Probe:
+    with within_time(task.time_limit), without_advice():
+        try:
+            found = plan(scenario.problem, task.planner, scenario.vehicle)
+        except Infeasible as error:
+            reason = Feasibility.NO_PLAN if error.attempts else Feasibility.REFUSED
+            return Probe(
+                Feasibility.NO_ANSWER if out_of_time() else reason, str(error), limits_in(str(error))
+            )
+    assert found.certificate is not None, "a plan for a vehicle is certified"
+    assert found.flyability is not None, "and flown"
+    if found.certified and found.flies:
+        return Probe(Feasibility.PLANNED, found.certificate.why, binding_limits(found), found)
+    why = found.certificate.why if not found.certified else str(found.flyability)
+    return Probe(Feasibility.NOT_FLYABLE, why, limits_in(why), found)
