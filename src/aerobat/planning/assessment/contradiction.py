@@ -54,7 +54,9 @@ def _contradiction(stage: Stage, asked: list[LinearBound], limits: Limits) -> Co
     binding = [k for k in range(KNOWN) if _is_possible(asked, limits.without(k))]
     names = tuple(f"limits.{DERIVATIVES[k]}" if k else "limits.lower and limits.upper" for k in binding)
     if not _is_possible(asked, Limits()):
-        sentence = f"the conditions of the stage '{stage.name}' exclude each other; change or drop one of them"
+        sentence = (
+            f"the conditions of the stage '{stage.name}' exclude each other; change or drop one of them"
+        )
         return Contradiction(stage.name, (), sentence)
     told = " or ".join(_told(k, name, limits) for k, name in zip(binding, names, strict=True))
     return Contradiction(

@@ -65,7 +65,8 @@ class Change:
 def advice(asked: Miqp, problem: Problem, vehicle: Vehicle) -> str:
     """The other ways to plan that found nothing, and the changes with which it is planned, if any is.
 
-    Within `without_advice` the former alone. Single changes; where none of them is enough, the fewest of all of them together.
+    Within `without_advice` the former alone. Single changes; where none of them is enough, the fewest of all
+    of them together.
 
     Args:
         asked: The planner that found none, a rescue included.

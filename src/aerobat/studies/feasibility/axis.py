@@ -30,7 +30,9 @@ class Axis:
         except (TypeError, ValueError):
             row = np.zeros((0, 0))
         if row.ndim != 1 or not np.isfinite(row).all():
-            raise SpecError(f"over: the values of {name} must be finite numbers in a row, got {shown(values)}")
+            raise SpecError(
+                f"over: the values of {name} must be finite numbers in a row, got {shown(values)}"
+            )
         if not len(row) or len(row) > MAX_CELLS:
             raise SpecError(f"over: {name} must have from 1 to {MAX_CELLS} values, got {len(row)}")
         if len(set(row.tolist())) < len(row):
@@ -43,7 +45,9 @@ class Axis:
         name, separator, numbers = text.partition("=")
         name = name.strip()
         if not separator or not name or not numbers.strip():
-            raise SpecError(f"must be a field and its values, as speed=2:20:2 or angle=0,45,90, got {shown(text)}")
+            raise SpecError(
+                f"must be a field and its values, as speed=2:20:2 or angle=0,45,90, got {shown(text)}"
+            )
         if ":" not in numbers:
             return cls.of(name, [_number(each, text) for each in numbers.split(",")])
         parts = [_number(each, text) for each in numbers.split(":")]

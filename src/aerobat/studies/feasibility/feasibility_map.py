@@ -23,7 +23,8 @@ from aerobat.studies.feasibility.axis import MAX_CELLS, Axis
 from aerobat.studies.feasibility.binding import least_reserve
 from aerobat.studies.feasibility.fields import Field, Scenario
 from aerobat.studies.feasibility.probe import TIME_LIMIT, Feasibility, Task, probe
-from aerobat.studies.workers import Workers, workers as processes
+from aerobat.studies.workers import Workers
+from aerobat.studies.workers import workers as processes
 from aerobat.vehicle import Vehicle, as_vehicle
 
 MAX_AXES = 2
@@ -52,12 +53,12 @@ class Cell:
 @by_value
 @dataclass(frozen=True, eq=False, repr=False)
 class FeasibilityMap:
-    """For which values of one or two fields a problem has a plan, a cell for each; the last field's vary first."""
+    """For which values of one or two fields a problem has a plan: a cell for each, row by row."""
 
     problem: Problem
     vehicle: Vehicle
     axes: tuple[Axis, ...]
-    cells: tuple[Cell, ...]
+    cells: tuple[Cell, ...]  # of the first field's first value with each of the second's, and so on
 
     def __str__(self) -> str:
         """One line for people."""

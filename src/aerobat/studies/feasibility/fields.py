@@ -142,7 +142,7 @@ def _names(value: Any) -> list[str]:
     names += [key for key in getattr(value, "SHORTHANDS", ()) if key.removesuffix(DEGREES) in names]
     if isinstance(value, Gate):
         names += Gate.ANGLES
-    return names + [THRUST_TO_WEIGHT, ALL_ROTORS] if isinstance(value, Vehicle) else names
+    return [*names, THRUST_TO_WEIGHT, ALL_ROTORS] if isinstance(value, Vehicle) else names
 
 
 def _found(value: Any, keys: Sequence[Key]) -> tuple[Key, ...]:
@@ -164,7 +164,7 @@ def _found(value: Any, keys: Sequence[Key]) -> tuple[Key, ...]:
     elif key not in _names(value):
         raise unknown_key(_joined([key]), _names(value))
     inner = _inner(value, key)
-    if isinstance(inner, np.ndarray) and not rest and _takes_number(value, key):
+    if isinstance(inner, np.ndarray) and not rest and isinstance(key, str) and _takes_number(value, key):
         return (key,)
     with within_field(_joined([key])):
         return key, *_found(inner, rest)

@@ -5,13 +5,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import StrEnum
+from typing import Protocol
 
 from aerobat.errors import Infeasible, SpecError
 from aerobat.optimization.deadline import out_of_time, within_time
 from aerobat.planning import Plan, Planner, plan, without_advice
 from aerobat.planning.assessment.contradiction import contradiction
 from aerobat.studies.feasibility.binding import binding_limits, limits_in
-from aerobat.studies.feasibility.fields import Field, Scenario
+from aerobat.studies.feasibility.fields import Scenario
 
 TIME_LIMIT = 30.0  # [s] of planning, where no other is given: most scenarios take one
 
@@ -35,23 +36,35 @@ class Probe:
     limits: tuple[str, ...]  # that bind, by the names of their fields; none where that is not known
     plan: Plan | None = None
 
+    @property
+    def is_planned(self) -> bool:
+        """True where there is a plan that is certified and flies."""
+        return self.feasibility is Feasibility.PLANNED
+
+
+class Variable(Protocol):
+    """Something of a scenario that can be set to a number."""
+
+    def changed(self, scenario: Scenario, value: float) -> Scenario:
+        """The scenario with it at a value. Raises SpecError where that cannot be."""
+
 
 @dataclass(frozen=True, eq=False)
 class Task:
-    """A scenario of which fields are to be changed, and how each is planned."""
+    """A scenario of which something varies, and how each is planned."""
 
     scenario: Scenario
-    fields: tuple[Field, ...]
+    variables: tuple[Variable, ...]
     planner: Planner | None  # None for the one that suits each problem
     time_limit: float  # [s] of each
 
 
 def probe(task: Task, values: Sequence[float]) -> Probe:
-    """The answer where the fields have these values."""
+    """The answer where the variables have these values."""
     scenario = task.scenario
     try:
-        for field, value in zip(task.fields, values, strict=True):
-            scenario = field.changed(scenario, value)
+        for variable, value in zip(task.variables, values, strict=True):
+            scenario = variable.changed(scenario, value)
         found = contradiction(scenario.problem, scenario.vehicle)
         if found is not None:
             limits = found.limits or (f"stage '{found.stage}'",)
