@@ -47,7 +47,7 @@ def _grid(found: FeasibilityMap) -> Table:
     down, across = found.axes
     kinds = kinds_of(found)
     title = f"{_title(found)} · duration [s] over {down.name} (down) and {across.name} (across)"
-    table = Table(title=Text(title), title_justify="left", caption_justify="left", box=None, pad_edge=False)
+    table = Table(box=None, pad_edge=False)
     table.add_column(down.name, style="bold", no_wrap=True)
     for value in across.values:
         table.add_column(f"{value:g}", justify="right", no_wrap=True)
@@ -56,8 +56,10 @@ def _grid(found: FeasibilityMap) -> Table:
         row = found.cells[i * width : (i + 1) * width]
         texts = (_text(cell, letter_of(cell, kinds), width > WIDE) for cell in row)
         table.add_row(f"{value:g}", *texts)
-    table.caption = Text("\n".join(_legend(found)))
-    return table
+    page = Table.grid()  # the legend may be wider than the cells
+    for part in (Text(title, style="italic"), table, Text("\n".join(_legend(found)), style="italic")):
+        page.add_row(part)
+    return page
 
 
 def _line(found: FeasibilityMap) -> Table:

@@ -45,9 +45,7 @@ class Axis:
         name, separator, numbers = text.partition("=")
         name = name.strip()
         if not separator or not name or not numbers.strip():
-            raise SpecError(
-                f"must be a field and its values, as speed=2:20:2 or angle=0,45,90, got {shown(text)}"
-            )
+            raise SpecError(f"over: give a field and its values, as speed=2:20:2, got {shown(text)}")
         if ":" not in numbers:
             return cls.of(name, [_number(each, text) for each in numbers.split(",")])
         parts = [_number(each, text) for each in numbers.split(":")]

@@ -15,7 +15,8 @@ from typing import Any
 
 import numpy as np
 
-from aerobat.declaration import FieldError, from_table, shown, unknown_key, unknown_name, within_field
+from aerobat.declaration import FieldError, from_table, shown, unknown_key, within_field
+from aerobat.declaration.sentences import closest
 from aerobat.errors import SpecError
 from aerobat.problem import Gate, Problem
 from aerobat.vehicle import Vehicle
@@ -115,7 +116,9 @@ def _only(name: str, scenario: Scenario) -> tuple[Key, ...]:
     known = [*_leaves(scenario.problem, ()), *_leaves(scenario.vehicle, (VEHICLE,))]
     meant = [keys for keys in known if keys[-1] == name]
     if not meant:
-        raise unknown_name("field", name, sorted({ANGLE, *(str(keys[-1]) for keys in known)}))
+        guess = closest(name, [ANGLE, *(str(keys[-1]) for keys in known)])
+        remedy = f"did you mean {guess!r}?" if guess else "give one as limits.velocity or vehicle.mass"
+        raise SpecError(f"no field named {shown(name)}; {remedy}")
     if len(meant) > 1:
         names = " or ".join(map(_joined, meant[:FEW]))
         more = f" or one of {len(meant) - FEW} more" if len(meant) > FEW else ""
