@@ -277,7 +277,7 @@ def _arguments(name: str, folder: Path) -> dict[str, Any]:
             "port": 0,
             "browser": False,
         },
-        "with_second_opinion": {"plan": plan(), "progress": None},
+        "with_second_opinion": {"plan": plan(), "progress": ignored},
         "tune": _tuned(),
         "vehicle_names": {},
         "write_columns": {
