@@ -185,9 +185,7 @@ def test_bisection_comes_to_the_threshold_from_either_side(
 
 
 def test_what_no_strength_suffices_for_is_infeasible_and_says_so() -> None:
-    with pytest.raises(
-        ab.Infeasible, match=r"no plan on agile-quad: thrust-to-weight: none will do up to 25"
-    ):
+    with pytest.raises(ab.Infeasible, match="thrust-to-weight: none will do up to 25"):
         ab.min_requirements("line", of=["thrust-to-weight"], planner=Refusing(), workers=1)
 
 
@@ -218,10 +216,12 @@ def test_the_smallest_gate_and_the_lowest_ceiling_have_plans_and_less_is_refused
         width=gate.refused * problem.gates[0].width,
         height=gate.refused * problem.gates[0].height,
     )
-    try:
-        assert not ab.plan(replace(problem, gates=(smaller,)), vehicle="agile-quad").flies
-    except ab.SpecError as refused:
-        assert "takes" in str(refused)
+    problem = replace(problem, gates=(smaller,))
+    if gate.feasibility is Feasibility.REFUSED:
+        with pytest.raises(ab.SpecError, match="widen the opening"):
+            ab.plan(problem, vehicle="agile-quad")
+    else:
+        assert not ab.plan(problem, vehicle="agile-quad").flies
     assert lowest.plan is not None
     assert lowest.value is not None
     assert lowest.plan.trajectory.component_range(0)[1][2] <= lowest.value + 1e-9
