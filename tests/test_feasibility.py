@@ -106,7 +106,7 @@ def test_what_the_planner_does_not_find_is_no_plan_and_names_its_limit() -> None
 
 def test_without_time_there_is_no_answer() -> None:
     over = {"vehicle.mass": [0.9]}
-    (cell,) = ab.feasibility_map("line", over, planner=Refusing(), time_limit=1e-9, workers=1).cells
+    (cell,) = ab.feasibility_map("line", over, planner=Refusing(), time_limit=0.0, workers=1).cells
     assert cell.feasibility is Feasibility.NO_ANSWER
 
 

@@ -76,7 +76,7 @@ def map_of(record: RunRecord, workers: int | None = None) -> FeasibilityMap:
             over,
             record.vehicle,
             record.planner,
-            time_limit=record.time_limit or TIME_LIMIT,
+            time_limit=TIME_LIMIT if record.time_limit is None else record.time_limit,
             workers=workers,
             progress=progress.record,
         )

@@ -67,7 +67,7 @@ def need_of(record: RunRecord, workers: int | None = None) -> tuple[Requirement,
             record.of,
             record.planner,
             tolerance=record.tolerance,
-            time_limit=record.time_limit or TIME_LIMIT,
+            time_limit=TIME_LIMIT if record.time_limit is None else record.time_limit,
             workers=workers,
             progress=progress.record,
         )

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from aerobat.declaration import Positive, by_value, in_notebooks, short, validated
+from aerobat.declaration import NonNegative, by_value, in_notebooks, short, validated
 from aerobat.engines.cores import available_cores
 from aerobat.errors import SpecError
 from aerobat.planning import Planner, as_planner
@@ -97,7 +97,7 @@ def feasibility_map(
     vehicle: Vehicle | str = "agile-quad",
     planner: Planner | str | None = None,
     *,
-    time_limit: Positive = TIME_LIMIT,
+    time_limit: NonNegative = TIME_LIMIT,
     workers: Workers | None = None,
     executor: Executor | None = None,
     progress: Callable[[int, int], None] | None = None,

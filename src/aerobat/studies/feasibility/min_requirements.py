@@ -10,7 +10,7 @@ from typing import Annotated
 
 from pydantic import Field as Bounds
 
-from aerobat.declaration import Positive, by_value, validated
+from aerobat.declaration import NonNegative, by_value, validated
 from aerobat.engines.cores import available_cores
 from aerobat.errors import Infeasible
 from aerobat.planning import Plan, Planner, as_planner
@@ -70,7 +70,7 @@ def min_requirements(
     planner: Planner | str | None = None,
     *,
     tolerance: Tolerance = 0.01,
-    time_limit: Positive = TIME_LIMIT,
+    time_limit: NonNegative = TIME_LIMIT,
     workers: Workers | None = None,
     progress: Tried | None = None,
 ) -> tuple[Requirement, ...]:

@@ -87,5 +87,9 @@ def _planned(scenario: Scenario, task: Task) -> Probe:
     assert found.flyability is not None, "and flown"
     if found.certified and found.flies:
         return Probe(Feasibility.PLANNED, found.certificate.why, binding_limits(found), found)
-    why = found.certificate.why if not found.certified else str(found.flyability)
+    why = (
+        f"its own flight {' and '.join(found.flyability.defects)}"
+        if found.certified
+        else found.certificate.why
+    )
     return Probe(Feasibility.NOT_FLYABLE, why, limits_in(why), found)
