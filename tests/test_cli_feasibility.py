@@ -148,7 +148,7 @@ cli.main(sys.argv[1:])
 
 
 @pytest.mark.parametrize("workers", ["1", "2"])
-@pytest.mark.parametrize("command", [MAP, (*NEED[:-2],)])
+@pytest.mark.parametrize("command", [("map", "half-flip", "--over", "speed=2:9:0.1"), NEED[:-2]])
 def test_an_interrupt_leaves_nothing_but_a_word(command: tuple[str, ...], workers: str) -> None:
     ended = subprocess.run(
         [sys.executable, "-c", INTERRUPTED, *command, "--workers", workers],

@@ -128,7 +128,7 @@ def feasibility_map(
     places = list(product(*(axis.values for axis in axes)))
     count = min(workers or available_cores(), len(places))
     if executor is not None:
-        cells = _cells(executor, task, places, progress)
+        cells = _cells(executor, task, places, progress, cancels=True)
     else:
         with processes(count, forked=True) as pool:
             cells = _cells(pool, task, places, progress)
@@ -155,6 +155,7 @@ def _cells(
     task: Task,
     places: Sequence[tuple[float, ...]],
     progress: Callable[[int, int], None] | None,
+    cancels: bool = False,
 ) -> tuple[Cell, ...]:
     """The cells of places, in their order.
 
@@ -163,6 +164,7 @@ def _cells(
         task: what is planned.
         places: values of its fields.
         progress: called with the cells done and planned.
+        cancels: True for an executor that goes on when the map does not.
     """
     pending: dict[Future[Cell], int] = {}
     cells: dict[int, Cell] = {}
@@ -174,7 +176,7 @@ def _cells(
             if progress is not None:
                 progress(len(cells), sum(cell.is_planned for cell in cells.values()))
     finally:
-        for future in pending:
+        for future in pending if cancels else ():
             future.cancel()
     return tuple(cells[number] for number in range(len(places)))
 
