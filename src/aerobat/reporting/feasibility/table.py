@@ -148,7 +148,7 @@ def _facts(found: Requirement) -> Iterable[Fact]:
     yield "least", found.shown(found.value) + _sizes(found)
     proof = "" if found.plan.certificate is None else f", {found.plan.certificate.why}"
     yield "planned", f"{found.plan.duration:.3f} s{proof}"
-    yield f"at {found.shown(found.refused)}", f"{found.feasibility}: {found.refusal}"
+    yield "beside it", f"at {found.shown(found.refused)} {found.feasibility}: {found.refusal}"
 
 
 def _sizes(found: Requirement) -> str:
