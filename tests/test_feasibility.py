@@ -16,6 +16,7 @@ from hypothesis import strategies as st
 
 import aerobat as ab
 from aerobat.planning import without_advice
+from aerobat.reporting.feasibility.table import requirements_report
 from aerobat.studies.feasibility import Feasibility
 
 ANGLES, SPEEDS = (0.0, 70.0), (5.0, 10.0, 12.0)
@@ -184,8 +185,18 @@ def test_bisection_comes_to_the_threshold_from_either_side(
     assert found.refusal == "it is too little"
 
 
+def test_where_only_no_ceiling_suffices_that_is_the_answer() -> None:
+    unbounded = Threshold(ceiling, np.inf)
+    (found,) = ab.min_requirements("line", of=["ceiling"], planner=unbounded, workers=1)
+    assert found.value == np.inf
+    assert found.plan == line()
+    assert str(found).startswith("ceiling: no limit, planned in")
+    report = requirements_report("line", "agile-quad", [found])
+    assert report["requirements"][0]["least"] is None
+
+
 def test_what_no_strength_suffices_for_is_infeasible_and_says_so() -> None:
-    with pytest.raises(ab.Infeasible, match="thrust-to-weight: none will do up to 25"):
+    with pytest.raises(ab.Infeasible, match=r"thrust-to-weight: none will do, 25.06 neither"):
         ab.min_requirements("line", of=["thrust-to-weight"], planner=Refusing(), workers=1)
 
 

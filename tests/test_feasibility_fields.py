@@ -176,6 +176,11 @@ def test_a_text_that_is_no_range_is_refused(text: str, said: str) -> None:
         Axis.parse(text)
 
 
+@pytest.mark.parametrize("name", ab.problem_names())
+def test_no_built_in_problem_contradicts_itself(name: str) -> None:
+    assert contradiction(ab.load_problem(name), ab.load_vehicle("agile-quad")) is None
+
+
 @given(
     speed=st.floats(0.5, 20.0),
     heading=st.floats(-180.0, 180.0),

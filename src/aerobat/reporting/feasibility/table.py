@@ -114,7 +114,7 @@ def requirements_table(problem: str, vehicle: str, found: Iterable[Requirement])
 
 
 def requirements_report(problem: str, vehicle: str, found: Iterable[Requirement]) -> dict[str, Any]:
-    """The same as plain data; None for a quantity of which none will do, and for no bound at all.
+    """The same as plain data; None for a quantity of which none will do, and for no limit.
 
     Args:
         problem: Its name.
@@ -128,9 +128,9 @@ def requirements_report(problem: str, vehicle: str, found: Iterable[Requirement]
             {
                 "quantity": each.quantity,
                 "unit": each.unit,
-                "least": each.value,
+                "least": None if each.value is None else _finite(each.value),
                 "duration_s": None if each.plan is None else each.plan.duration,
-                "refused": each.refused if isfinite(each.refused) else None,
+                "refused": _finite(each.refused),
                 "feasibility": each.feasibility.value,
                 "refusal": each.refusal,
                 "trials": each.trials,
@@ -140,9 +140,13 @@ def requirements_report(problem: str, vehicle: str, found: Iterable[Requirement]
     }
 
 
+def _finite(value: float) -> float | None:
+    return value if isfinite(value) else None
+
+
 def _facts(found: Requirement) -> Iterable[Fact]:
     if found.value is None or found.plan is None:
-        yield "least", f"none will do up to {found.shown(found.refused)}"
+        yield "least", f"none will do, {found.shown(found.refused)} neither"
         yield "refused", found.refusal
         return
     yield "least", found.shown(found.value) + _sizes(found)

@@ -39,7 +39,7 @@ class Requirement:
 
     quantity: str  # thrust-to-weight, ceiling or gate
     unit: str
-    value: float | None  # for which there is the plan; None where none was found
+    value: float | None  # for which there is the plan, infinite for no limit; None where none was found
     plan: Plan | None  # certified, and it flies
     refused: float  # for which there is none, beside `value`
     feasibility: Feasibility  # there
@@ -49,7 +49,7 @@ class Requirement:
     def __str__(self) -> str:
         """One line for people."""
         if self.value is None or self.plan is None:
-            return f"{self.quantity}: none will do up to {self.shown(self.refused)}: {self.refusal}"
+            return f"{self.quantity}: none will do, {self.shown(self.refused)} neither: {self.refusal}"
         return (
             f"{self.quantity}: {self.shown(self.value)}, planned in {self.plan.duration:.3f} s; at "
             f"{self.shown(self.refused)} {self.feasibility}: {self.refusal}"
@@ -57,9 +57,7 @@ class Requirement:
 
     def shown(self, value: float) -> str:
         """A value of the quantity with its unit."""
-        if not isfinite(value):
-            return "any"
-        return f"{value:.4g} {self.unit}".rstrip()
+        return f"{value:.4g} {self.unit}".rstrip() if isfinite(value) else "no limit"
 
 
 @validated
@@ -155,7 +153,7 @@ class _Search:
     refused: tuple[float, Probe] | None = None  # the most so far
     trials: int = 0
 
-    def run(self) -> Generator[float, Probe]:
+    def run(self) -> Generator[float, Probe, None]:
         """The values to be tried, one after another, each answered by a probe."""
         quantity = self.quantity
         floor = quantity.floor(self.scenario)
@@ -202,7 +200,7 @@ class _Search:
         """The largest distance to a refusal that will do."""
         return self.tolerance * max(value - self.quantity.floor(self.scenario), self.quantity.least_size)
 
-    def _climb(self, value: float) -> Generator[float, Probe]:
+    def _climb(self, value: float) -> Generator[float, Probe, None]:
         """Try a value, and more while it is refused."""
         floor = self.quantity.floor(self.scenario)
         for _ in range(MAX_STEPS + 1):
