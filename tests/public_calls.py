@@ -65,6 +65,10 @@ def ignored_counts(done: int, well: int) -> None:
     pass
 
 
+def ignored_trial(quantity: str, value: float, planned: bool) -> None:
+    pass
+
+
 PASSING: dict[str, Any] = {
     "problem": "line",
     "planner": ab.Miqp(order=4),
@@ -74,10 +78,28 @@ PASSING: dict[str, Any] = {
     "seed": 1,
     "flights": 2,
 }
+MAP: dict[str, Any] = {
+    "problem": "line",
+    "over": {"vehicle.thrust_to_weight": [0.5]},
+    "vehicle": "agile-quad",
+    "planner": NoPlan(),
+    "time_limit": 1.0,
+    "workers": 1,
+}
+NEED: dict[str, Any] = {
+    "problem": "line",
+    "vehicle": "agile-quad",
+    "of": ["ceiling"],
+    "planner": "min-snap",
+    "tolerance": 0.5,
+    "time_limit": 5.0,
+    "workers": 1,
+}
 RESULTS = (
     "Assessment",
     "ErrorCauses",
     "ErrorShare",
+    "FeasibilityMap",
     "Inspection",
     "Loss",
     "Estimates",
@@ -93,6 +115,7 @@ RESULTS = (
     "Share",
     "Sweep",
     "Recoveries",
+    "Requirement",
     "Reference",
     "Replay",
     "Tuning",
@@ -155,7 +178,10 @@ def _arguments(name: str, folder: Path) -> dict[str, Any]:
             "config": ab.FlightConfig(rate=100.0, engine="floats"),
         },
         "implausibilities": {"vehicle": agile},
+        "feasibility_map": {**MAP, "progress": ignored_counts},
         "inspect_flight": _inspected(),
+        "map_figure": {"found": instance(ab.FeasibilityMap)},
+        "min_requirements": {**NEED, "progress": ignored_trial},
         "inspection_figure": {"inspection": instance(ab.Inspection)},
         "import_plugin": {"path": saved["plugin"]},
         "load_dispersion": {"name_or_path": "lab"},
@@ -251,7 +277,7 @@ def _arguments(name: str, folder: Path) -> dict[str, Any]:
             "port": 0,
             "browser": False,
         },
-        "with_second_opinion": {"plan": plan(), "progress": None},
+        "with_second_opinion": {"plan": plan(), "progress": ignored},
         "tune": _tuned(),
         "vehicle_names": {},
         "write_columns": {
@@ -429,6 +455,7 @@ def instance(cls: type) -> Any:
         ab.ErrorCauses: lambda: ab.error_causes(**_causes()),
         ab.ErrorShare: lambda: ab.inspect_flight(**_inspected()).shares[0],
         ab.Estimates: lambda: ab.estimate(_log()),
+        ab.FeasibilityMap: lambda: ab.feasibility_map(**MAP),
         ab.FlatState: lambda: plan().trajectory.flat(0.1),
         ab.Flight: flight,
         ab.Gate: lambda: ab.tilted_gate((0.0, 0.0, 1.0)),
@@ -445,6 +472,7 @@ def instance(cls: type) -> Any:
         ab.Plan: plan,
         ab.PowerLoop: lambda: ab.PowerLoop((0.0, 0.0, 1.0)),
         ab.Problem: lambda: ab.load_problem("half-flip"),
+        ab.Requirement: lambda: ab.min_requirements(**NEED)[0],
         ab.Rotor: lambda: ab.load_vehicle("agile-quad").rotors[0],
         ab.SensorLog: _log,
         ab.Setpoint: lambda: flight().setpoint,

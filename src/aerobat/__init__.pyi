@@ -94,6 +94,7 @@ from .problem import (
 )
 from .reporting.comparison import comparison_figure
 from .reporting.data_frames import to_dataframe
+from .reporting.feasibility.figure import map_figure
 from .reporting.figures import draw
 from .reporting.inspection import inspection_figure
 from .reporting.motion.video import write_video
@@ -104,6 +105,7 @@ from .simulation.autopilot import Recoveries, recoveries
 from .states import BodyState, FlatState, Setpoint, Wrench
 from .studies.compare import Comparison, compare
 from .studies.error_causes import Cause, ErrorCauses, error_causes
+from .studies.feasibility import FeasibilityMap, Requirement, feasibility_map, min_requirements
 from .studies.inspection import ErrorShare, Inspection, inspect_flight
 from .studies.passing import Passing, plan_to_pass
 from .studies.sweep import Share, Sweep, sweep
@@ -142,6 +144,7 @@ __all__ = [
     "ErrorShare",
     "Estimates",
     "Export",
+    "FeasibilityMap",
     "FlatState",
     "Flight",
     "FlightConfig",
@@ -185,6 +188,7 @@ __all__ = [
     "Recoveries",
     "Reference",
     "Replay",
+    "Requirement",
     "Rotor",
     "Score",
     "Scores",
@@ -214,6 +218,7 @@ __all__ = [
     "error_causes",
     "estimate",
     "export",
+    "feasibility_map",
     "fly",
     "implausibilities",
     "import_plugin",
@@ -227,6 +232,8 @@ __all__ = [
     "load_trajectory",
     "load_vehicle",
     "maneuver",
+    "map_figure",
+    "min_requirements",
     "minimum_effort",
     "option",
     "plan",

@@ -21,6 +21,8 @@ COMMANDS = {
     "check": "Prove that a vehicle can fly a trajectory, or say when and why it cannot.",
     "compare": "Plan a maneuver with every planner and put the plans side by side.",
     "sweep": "Fly a maneuver many times as it would really be flown, and count what becomes of it.",
+    "map": "Plan a maneuver over values of two fields, and say where there is a plan and which limits bind.",
+    "need": "Find the least thrust-to-weight ratio, the lowest ceiling and the smallest gates with a plan.",
     "tune": "Find controller gains for a vehicle over many flights, and write them to its file.",
     "inspect": "Say what caused a recorded flight's error, by its log and its plan.",
     "view": "Write a page that replays a run, a plan or a flight in a browser, or serve one to try plans on.",

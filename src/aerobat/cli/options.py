@@ -120,12 +120,17 @@ def _planners_help() -> str:
 
 @_with_planner_options
 @dataclass(frozen=True, kw_only=True)
-class PlanningOptions(TaskOptions):
-    """Options of all commands that plan once."""
+class PlannerOptions(TaskOptions):
+    """Options of all commands that plan by one planner."""
 
     planner: Annotated[str | None, Parameter(group=planning, help=_planners_help(), show_default=False)] = (
         None
     )
+
+
+@dataclass(frozen=True, kw_only=True)
+class PlanningOptions(PlannerOptions):
+    """Options of all commands that plan once."""
 
     rate: Annotated[float | None, Parameter(group=planning, validator=POSITIVE)] = None
     """Rows a second of a CSV file without times. Default: 100."""

@@ -154,6 +154,51 @@ class SweepProgress(Progress):
         return f"{text}: {well}; {left:.0f} s to go"
 
 
+class MapProgress(Progress):
+    """What a map has come to by now.
+
+    Args:
+        cells: How many there shall be.
+        clock: Seconds that rise.
+    """
+
+    def __init__(self, cells: int, clock: Callable[[], float] = perf_counter) -> None:
+        self._clock = clock
+        self._began = clock()
+        self._cells = cells
+        self._done = self._planned = 0
+
+    def record(self, done: int, planned: int) -> None:
+        """Take note of the cells done, and of those that have a plan."""
+        self._done, self._planned = done, planned
+
+    def __str__(self) -> str:
+        """How many cells, how many of them planned, for how long, how long still."""
+        spent = self._clock() - self._began
+        text = f"{self._done} of {self._cells} cells in {spent:.0f} s"
+        if not self._done:
+            return text
+        left = (self._cells - self._done) * spent / self._done
+        return f"{text}: {self._planned} planned; {left:.0f} s to go"
+
+
+class NeedProgress(Progress):
+    """The last value that was tried of each quantity."""
+
+    def __init__(self) -> None:
+        self._tried = 0
+        self._last: dict[str, str] = {}
+
+    def record(self, quantity: str, value: float, planned: bool) -> None:
+        """Take note of a value that was tried."""
+        self._tried += 1
+        self._last[quantity] = f"{quantity} {value:.4g} {'planned' if planned else 'refused'}"
+
+    def __str__(self) -> str:
+        """How many were tried, and how the last of each quantity ended."""
+        return "; ".join([f"{self._tried} plans tried", *self._last.values()])
+
+
 class FiguresProgress(Progress):
     """Which of the paper's figures is being made, and what is planned or flown for it.
 

@@ -9,6 +9,7 @@ from typing import Any, Literal
 
 from aerobat.cli.options import (
     ConditionsOptions,
+    PlannerOptions,
     PlanningOptions,
     TaskOptions,
     is_given,
@@ -85,7 +86,7 @@ def planned(
         command=command,
         problem=problem,
         vehicle=vehicle,
-        planner=make_planner(options, problem, vehicle),
+        planner=make_planner(options, problem, vehicle, options.paper),
         paper=options.paper,
         angle=options.angle,
         flight=flight,
@@ -149,15 +150,24 @@ def _plan_that_passes(record: RunRecord) -> Plan:
         ).plan
 
 
-def make_planner(options: PlanningOptions, problem: Problem, vehicle: Vehicle) -> Planner:
+def make_planner(options: PlannerOptions, problem: Problem, vehicle: Vehicle, paper: bool = False) -> Planner:
     """The planner that the options name, or one that suits problem and options.
 
-    Raises SpecError for options that belong to another.
+    Args:
+        options: As they were given.
+        problem: What is planned.
+        vehicle: What flies it.
+        paper: Whether it is planned as in the paper.
+
+    Raises:
+        SpecError: Options belong to another planner.
     """
-    name = options.planner or _suited(options, problem, vehicle)
+    name = options.planner or ("miqp" if paper else _suited(options, problem, vehicle))
     cls = planner_class(name)
     _check_options(options, name)
-    settings: dict[str, Any] = {"order": 3} if options.paper else {}
+    if paper:
+        _check_paper(options, name)
+    settings: dict[str, Any] = {"order": 3} if paper else {}
     for option in planner_options(cls):
         given = getattr(options, option_name(option.flag))
         if option.type is bool and given:
@@ -169,7 +179,7 @@ def make_planner(options: PlanningOptions, problem: Problem, vehicle: Vehicle) -
     return cls(**settings)
 
 
-def _suited(options: PlanningOptions, problem: Problem, vehicle: Vehicle) -> str:
+def _suited(options: PlannerOptions, problem: Problem, vehicle: Vehicle) -> str:
     """The name of the planner that suits a problem, or of the usual one, whose options were given."""
     name = suited_planner(problem, vehicle)
     try:
@@ -189,15 +199,19 @@ def _tilted(problem: Problem, angle: float) -> Problem:
     return replace(problem, gates=gates)
 
 
-def _check_options(options: PlanningOptions, planner: str) -> None:
+def _check_options(options: PlannerOptions, planner: str) -> None:
     """Refuse options that mean nothing to a planner."""
     for flag, offers in offered_options().items():
         # a planner registered after the command's options were made brings some that nobody can have given
         if planner not in offers and is_given(getattr(options, option_name(flag), None)):
             takers = " or ".join(offers)
             raise SpecError(f"{flag} is for --planner {takers}, not {planner}; leave one of them out")
-    if options.paper and planner != "miqp":
+
+
+def _check_paper(options: PlannerOptions, planner: str) -> None:
+    """Refuse options that the paper's formulation leaves no choice in."""
+    if planner != "miqp":
         raise SpecError(f"--paper is for --planner miqp, not {planner}; leave one of them out")
     order = getattr(options, "order", None)
-    if options.paper and order not in (None, 3):
+    if order not in (None, 3):
         raise SpecError(f"--paper plans with order 3 (jerk), got --order {order}; leave one out")

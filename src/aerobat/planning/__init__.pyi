@@ -4,6 +4,7 @@ from .assessment.lower_bound import least_duration
 from .certified_solve import Judged, Solution, certified_solve, with_certificate
 from .flyability import nominal_flight, own_flight, with_flyability, with_recoveries
 from .miqp import Miqp
+from .miqp.remedies import without_advice
 from .passages import planned_passages, planned_waypoints
 from .plan_file import load_plan
 from .planners import (
@@ -74,4 +75,5 @@ __all__ = [
     "with_flyability",
     "with_recoveries",
     "with_second_opinion",
+    "without_advice",
 ]

@@ -16,6 +16,7 @@ from aerobat.planning import Attempt, Plan
 from aerobat.reporting.comparison import comparison_rows
 from aerobat.simulation import Flight
 from aerobat.studies.compare import Comparison
+from aerobat.studies.feasibility import FeasibilityMap
 from aerobat.studies.sweep import Sweep
 from aerobat.studies.sweep.flights import passage_names
 
@@ -33,13 +34,13 @@ METRICS = (
 
 
 @validated
-def to_dataframe(table: Flight | Plan | Comparison | Scores | Sweep) -> DataFrame:
+def to_dataframe(table: Flight | Plan | Comparison | Scores | Sweep | FeasibilityMap) -> DataFrame:
     """Return a pandas DataFrame, SI units unless a column says otherwise.
 
     Of a flight its rows: time, then each series of SERIES by its components, as `position_x` and `thrusts_0`;
     of a batch all flights' rows, one flight below the other, with the number of the vehicle first. Of a plan
     its attempts, of a comparison its planners, of scores the flights with their passages through each gate,
-    of a sweep its table.
+    of a sweep its table, of a map of what is feasible its cells.
     Raises BackendMissing without pandas.
     """
     try:
@@ -49,7 +50,7 @@ def to_dataframe(table: Flight | Plan | Comparison | Scores | Sweep) -> DataFram
         raise BackendMissing(f"to_dataframe needs pandas; install it with {remedy}") from None
     if isinstance(table, Plan):
         return DataFrame([asdict(attempt) for attempt in table.attempts], columns=_names(Attempt))
-    if isinstance(table, Sweep):
+    if isinstance(table, Sweep | FeasibilityMap):
         return DataFrame(dict(table.table))
     if isinstance(table, Comparison):
         return DataFrame(comparison_rows(table))

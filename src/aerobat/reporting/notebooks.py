@@ -15,6 +15,8 @@ from aerobat.errors import SpecError
 from aerobat.evaluation.score import Score
 from aerobat.planning import Plan
 from aerobat.reporting.comparison import comparison_figure, comparison_table
+from aerobat.reporting.feasibility.figure import map_figure
+from aerobat.reporting.feasibility.table import map_table
 from aerobat.reporting.figures import draw
 from aerobat.reporting.page import png as png_of
 from aerobat.reporting.sweeps.figure import sweep_figure
@@ -23,6 +25,7 @@ from aerobat.reporting.sweeps.tuning import tuning_table
 from aerobat.reporting.tables import certificate_table, facts_table, flight_facts, plan_facts
 from aerobat.simulation import Flight
 from aerobat.studies.compare import Comparison
+from aerobat.studies.feasibility import FeasibilityMap
 from aerobat.studies.sweep import Sweep
 from aerobat.studies.tune import Tuning
 
@@ -35,7 +38,7 @@ KEPT = 8  # pictures: a notebook asks for one twice
 
 
 def html(value: Any) -> str:
-    """HTML of a plan, a flight, a score, a certificate, a comparison, a sweep or a tuning."""
+    """HTML of a plan, a flight, a score, a certificate, a comparison, a sweep, a map or a tuning."""
     console = Console(record=True, file=StringIO(), width=COLUMNS, force_jupyter=False)
     console.print(_table(value))
     text = console.export_html(inline_styles=True, code_format=PRE)
@@ -69,6 +72,8 @@ def _table(value: Any) -> Table:
         return comparison_table(value)
     if isinstance(value, Sweep):
         return sweep_table(value)
+    if isinstance(value, FeasibilityMap):
+        return map_table(value)
     if isinstance(value, Tuning):
         return tuning_table(value)
     return facts_table(str(value), {})
@@ -80,4 +85,6 @@ def _figure(value: Any) -> Figure | None:
         return comparison_figure(value)
     if isinstance(value, Sweep):
         return sweep_figure(value)
+    if isinstance(value, FeasibilityMap):
+        return map_figure(value)
     return draw(value) if isinstance(value, Plan | Flight) else None

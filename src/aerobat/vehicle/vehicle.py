@@ -185,6 +185,13 @@ class Vehicle:
         """All rotors at full thrust, in weights on Earth [-]."""
         return self.max_specific_thrust / STANDARD_GRAVITY
 
+    @validated
+    def with_thrust_to_weight(self, ratio: Positive) -> Vehicle:
+        """Return the vehicle whose rotors give so many weights together, each its part of them as before."""
+        factor = ratio / self.thrust_to_weight
+        rotors = tuple(replace(rotor, max_thrust=factor * rotor.max_thrust) for rotor in self.rotors)
+        return replace(self, rotors=rotors)
+
     def __str__(self) -> str:
         about_axes = ", ".join(f"{value:.3g}" for value in np.diag(self.inertia))
         facts = (

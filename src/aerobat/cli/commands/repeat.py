@@ -13,6 +13,8 @@ from numpy.typing import NDArray
 
 from aerobat.cli.commands.compare import COMPARISON, comparison_of, finish_comparison
 from aerobat.cli.commands.fly import flown
+from aerobat.cli.commands.map import finish_map, map_of
+from aerobat.cli.commands.need import NEED, finish_need, need_of
 from aerobat.cli.commands.sweep import finish_sweep, sweep_of, table_name
 from aerobat.cli.entry import ExitCode
 from aerobat.cli.options import RepeatOptions
@@ -24,6 +26,8 @@ from aerobat.errors import SpecError
 from aerobat.interchange import read_plan, read_table
 from aerobat.planning import Plan
 from aerobat.reporting.comparison import comparison_rows
+from aerobat.reporting.feasibility.table import requirements_report
+from aerobat.reporting.report_json import to_json
 from aerobat.simulation import Flight, load_flight
 
 SAME = ("planner", "duration_s")  # of a comparison's rows: times of the clock are not
@@ -42,7 +46,7 @@ def repeat(
     Parameters
     ----------
     folder
-        A folder that `aerobat plan`, `fly`, `sweep` or `compare` wrote.
+        A folder that `aerobat plan`, `fly`, `sweep`, `map`, `need` or `compare` wrote.
     """
     record = read_record(folder)
     out = options.out or folder.with_name(f"{folder.resolve().name}-repeated")
@@ -51,6 +55,10 @@ def repeat(
         return _repeat_comparison(folder, record, options)
     if record.command == "sweep":
         return _repeat_sweep(folder, record, options)
+    if record.command == "map":
+        return _repeat_map(folder, record, options)
+    if record.command == "need":
+        return _repeat_need(folder, record, options)
     old = _Run.read(folder, record)
     plan = old.plan if record.planner is None else plan_of(record)
     again = flown(plan, record.flight) if record.command == "fly" else None
@@ -76,6 +84,26 @@ def _repeat_sweep(folder: Path, record: RunRecord, options: RepeatOptions) -> Ex
     names = [name for name, column in swept.table.items() if not _same(column, old.get(name, np.zeros(0)))]
     finish_sweep(swept, record, options)
     return _told(folder, record, f"flights differ in {', '.join(names)}" if names else "", ExitCode.WELL)
+
+
+def _repeat_map(folder: Path, record: RunRecord, options: RepeatOptions) -> ExitCode:
+    old = read_table(folder / f"map.{record.flight.table}")
+    found = map_of(record)
+    names = [name for name, column in found.table.items() if not _same(column, old.get(name, np.zeros(0)))]
+    finish_map(found, record, options)
+    return _told(folder, record, f"cells differ in {', '.join(names)}" if names else "", ExitCode.WELL)
+
+
+def _repeat_need(folder: Path, record: RunRecord, options: RepeatOptions) -> ExitCode:
+    try:
+        old = json.loads((folder / NEED).read_bytes())
+    except (OSError, ValueError):
+        raise SpecError(f"{folder}/ has no {NEED} that can be read; search anew") from None
+    found = need_of(record)
+    finish_need(found, record, options)
+    report = to_json(requirements_report(record.problem.name, record.vehicle.name, found))
+    difference = "" if json.loads(report) == old else "what is needed is another"
+    return _told(folder, record, difference, ExitCode.WELL)
 
 
 def _told(folder: Path, record: RunRecord, difference: str, code: ExitCode) -> ExitCode:

@@ -43,6 +43,11 @@ FILES = (
     "flights.parquet",
     "sweep.json",
     "sweep.png",
+    "map.csv",
+    "map.parquet",
+    "map.json",
+    "map.png",
+    "need.json",
 )
 
 

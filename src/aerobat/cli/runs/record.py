@@ -12,7 +12,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import PlainValidator
 
-from aerobat.declaration import Count, NonNegative, Seed, declared, to_table
+from aerobat.declaration import Count, NonNegative, Positive, Seed, declared, to_table
 from aerobat.documents import read_document, write_document
 from aerobat.environment import Dispersion
 from aerobat.errors import SpecError
@@ -52,7 +52,7 @@ class FlightSettings:
     seed: Seed = 0  # of the conditions
     plant: str | None = None  # whose physics, left out the built-in
     runs: Count = 1  # flights of a sweep
-    table: Literal["csv", "parquet"] = "csv"  # the form of a sweep's table
+    table: Literal["csv", "parquet"] = "csv"  # the form of the table of a sweep, or of a map
     probability: Probability | None = None  # of passing under the conditions, that it was planned for
 
 
@@ -63,7 +63,7 @@ class RunRecord:
     Without a planner, the plan came from a file and lies in the folder; `compare` takes all planners.
     """
 
-    command: Literal["fly", "plan", "compare", "sweep"]
+    command: Literal["fly", "plan", "compare", "sweep", "map", "need"]
     problem: Problem  # as it was planned, with --angle and --paper
     vehicle: Vehicle
     planner: Annotated[Planner | None, PlainValidator(_planner)] = None
@@ -71,7 +71,10 @@ class RunRecord:
     angle: float | None = None  # [deg] that --angle gave, for the folder's name
     source: str | None = None  # the file that the plan came from
     flight: FlightSettings = FlightSettings()
-    time_limit: NonNegative | None = None  # [s] of each planner that is compared
+    time_limit: NonNegative | None = None  # [s] of each planner that is compared, or of each of many plans
+    over: tuple[str, ...] = ()  # fields and values of a map, as --over gave them
+    of: tuple[str, ...] | None = None  # what the least is sought of, left out all that there is
+    tolerance: Positive = 0.01  # of that, between the answer and a refusal
     columns: tuple[str, ...] = ALL  # of plan.csv
     plugins: tuple[str, ...] = ()  # files that --import named
     versions: Mapping[str, str] = field(default_factory=dict)  # of what made it
@@ -85,16 +88,14 @@ class RunRecord:
             parts.append(self.vehicle.name)
         if self.angle is not None:
             parts.append(f"{self.angle:g}deg")
-        if self.command == "compare":
-            parts.append("compare")
-        elif self.planner is None:
-            parts += {"fly": ["flown"], "plan": ["judged"]}.get(self.command, [])
+        if self.planner is None:
+            parts += {"fly": ["flown"], "plan": ["judged"], "compare": ["compare"]}.get(self.command, [])
         elif self.planner_name != "miqp":
             parts.append(self.planner_name)
         if self.paper:
             parts.append("paper")
-        if self.command == "sweep":
-            parts.append("sweep")
+        if self.command in ("sweep", "map", "need"):
+            parts.append(self.command)
         if self.flight.probability is not None:
             parts.append(f"pass-{self.flight.probability:g}")
         if self.flight.conditions is not None:

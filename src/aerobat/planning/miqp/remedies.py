@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from contextvars import ContextVar
 from dataclasses import dataclass, replace
 from functools import partial, reduce
 from typing import TYPE_CHECKING, Any
@@ -21,6 +23,17 @@ if TYPE_CHECKING:
     from aerobat.planning.miqp.miqp import Miqp
 
 STRONGER = 1.5  # times the rotors' largest thrusts
+_is_wanted: ContextVar[bool] = ContextVar("advice", default=True)
+
+
+@contextmanager
+def without_advice() -> Iterator[None]:
+    """Let refusals in the block name the bound that binds, and try no change, which takes seconds each."""
+    token = _is_wanted.set(False)
+    try:
+        yield
+    finally:
+        _is_wanted.reset(token)
 
 
 @dataclass(frozen=True)
@@ -52,7 +65,8 @@ class Change:
 def advice(asked: Miqp, problem: Problem, vehicle: Vehicle) -> str:
     """The other ways to plan that found nothing, and the changes with which it is planned, if any is.
 
-    Single changes; where none of them is enough, the fewest of all of them together.
+    Within `without_advice` the former alone. Single changes; where none of them is enough, the fewest of all
+    of them together.
 
     Args:
         asked: The planner that found none, a rescue included.
@@ -62,6 +76,8 @@ def advice(asked: Miqp, problem: Problem, vehicle: Vehicle) -> str:
     others = "other intervals, orders and free-knots find none"
     if not has_casadi():
         others = "other intervals and orders find none; free-knots was not tried, it needs the extra casadi"
+    if not _is_wanted.get():
+        return others
     task = Task(asked, problem, vehicle)
     found = changes(task)
     tried: list[str] = []

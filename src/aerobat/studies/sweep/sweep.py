@@ -21,13 +21,12 @@ from aerobat.simulation import Outcome
 from aerobat.studies.sweep.flights import CHUNK, Chunk, SweepTask, fly_chunk
 from aerobat.studies.sweep.kept import KeptChunks
 from aerobat.studies.sweep.result import Sweep
-from aerobat.studies.sweep.workers import InProcess
-from aerobat.studies.sweep.workers import workers as processes
+from aerobat.studies.workers import InProcess, Workers
+from aerobat.studies.workers import workers as processes
 from aerobat.vehicle import Vehicle
 
 Runs = Annotated[int, Field(ge=1, le=10**7, description="whole number from 1 to ten million")]
 Batch = Annotated[int, Field(ge=1, le=CHUNK, description=f"whole number from 1 to {CHUNK}")]
-Workers = Annotated[int, Field(ge=1, le=4096, description="whole number from 1 to 4096")]
 
 _AHEAD = 2  # chunks for each worker that wait to be flown
 _WELL = tuple(outcome.name.lower() for outcome in Outcome if outcome.is_success)

@@ -191,11 +191,7 @@ def _vehicle_slider(setting: Setting) -> Slider:
 
 
 def _with_thrust(setting: Setting, value: float) -> Setting:
-    """The setting whose rotors give so many weights together, each its part of them as before."""
-    vehicle = setting.vehicle
-    factor = value / vehicle.thrust_to_weight
-    rotors = tuple(replace(rotor, max_thrust=factor * rotor.max_thrust) for rotor in vehicle.rotors)
-    return replace(setting, vehicle=replace(vehicle, rotors=rotors))
+    return replace(setting, vehicle=setting.vehicle.with_thrust_to_weight(value))
 
 
 def _dispersion_slider(setting: Setting) -> Slider:

@@ -1,4 +1,4 @@
-"""Processes that fly, one a core: they end when the sweep does, however it ends."""
+"""Processes that plan or fly, one a core: they end when the study does, however it ends."""
 
 from __future__ import annotations
 
@@ -13,10 +13,14 @@ from concurrent.futures import Executor, Future, ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from multiprocessing.connection import Connection
-from typing import Any
+from typing import Annotated, Any
+
+from pydantic import Field
 
 from aerobat.declaration.registry import import_plugin, imported_plugins
 from aerobat.errors import SpecError
+
+Workers = Annotated[int, Field(ge=1, le=4096, description="whole number from 1 to 4096")]
 
 
 class InProcess(Executor):
@@ -57,8 +61,8 @@ def workers(count: int, forked: bool) -> Iterator[Executor]:
         pool.shutdown()
     except BrokenProcessPool:
         raise SpecError(
-            "a process that flies has ended by itself: where memory is short, take fewer workers; a script "
-            'on Windows or macOS sweeps below `if __name__ == "__main__":`, or with workers=1'
+            "a worker process has ended by itself: where memory is short, take fewer workers; a script on "
+            'Windows or macOS calls it below `if __name__ == "__main__":`, or with workers=1'
         ) from None
     finally:
         held.close()
@@ -67,7 +71,7 @@ def workers(count: int, forked: bool) -> Iterator[Executor]:
 
 
 def _begin(watched: Connection, held: Connection, plugins: tuple[str, ...]) -> None:
-    """Begin a worker: interrupts are for the process that sweeps, whose end is the worker's."""
+    """Begin a worker: interrupts are for the process that it works for, whose end is the worker's."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     held.close()
     threading.Thread(target=_end_with, args=(watched,), daemon=True).start()

@@ -1,0 +1,90 @@
+"""Contradictions that no motion resolves, proven in milliseconds: what a stage asks beside the limits.
+
+Where a stage is and how fast is linear; so are the limits per axis, which hold there too. No attitude counts,
+nor what the vehicle's rotors give: without a contradiction a problem may have no plan all the same.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from aerobat.flatness import force_balance
+from aerobat.optimization import AssignmentProgram, solver
+from aerobat.problem.condition import Condition, LinearBound, Quantity
+from aerobat.problem.problem import DERIVATIVES, UNITS, Limits, Problem
+from aerobat.problem.stage import Stage
+from aerobat.vehicle import Vehicle
+
+KNOWN = 3  # derivatives of position that stages speak of: itself, velocity, acceleration
+LINEAR = (Quantity.POSITION, Quantity.VELOCITY, Quantity.ACCELERATION)
+
+
+@dataclass(frozen=True)
+class Contradiction:
+    """A stage whose conditions and the limits exclude each other, at whatever time it holds."""
+
+    stage: str
+    limits: tuple[str, ...]  # the fields of the problem each of which, alone, would have to give way
+    sentence: str
+
+
+def contradiction(problem: Problem, vehicle: Vehicle) -> Contradiction | None:
+    """The first stage's whose position, velocity and acceleration no instant within the limits can have.
+
+    None where there is no such stage, which proves nothing. Raises SpecError for gates that do not suit the
+    maneuver.
+    """
+    balance = force_balance(problem.environment, vehicle)
+    for stage in problem.stages(vehicle.max_specific_thrust, vehicle.body_radius).stages:
+        asked = [c.bound(balance) for c in _linear(stage)]
+        if asked and not _is_possible(asked, problem.path_limits):
+            return _contradiction(stage, asked, problem.path_limits)
+    return None
+
+
+def _linear(stage: Stage) -> list[Condition]:
+    """The conditions of a stage that speak of no thrust, and of its ball the cube about it."""
+    others = (c for c in stage.conditions if c.quantity is not Quantity.POSITION)
+    return [c for c in (*stage.where, *others) if c.quantity in LINEAR]
+
+
+def _contradiction(stage: Stage, asked: list[LinearBound], limits: Limits) -> Contradiction:
+    binding = [k for k in range(KNOWN) if _is_possible(asked, limits.without(k))]
+    names = tuple(f"limits.{DERIVATIVES[k]}" if k else "limits.lower and limits.upper" for k in binding)
+    if not _is_possible(asked, Limits()):
+        sentence = (
+            f"the conditions of the stage '{stage.name}' exclude each other; change or drop one of them"
+        )
+        return Contradiction(stage.name, (), sentence)
+    told = " or ".join(_told(k, name, limits) for k, name in zip(binding, names, strict=True))
+    return Contradiction(
+        stage.name,
+        names,
+        f"what the stage '{stage.name}' asks lies outside {told or 'the limits together'} at whatever time; "
+        "ask less of it or widen them",
+    )
+
+
+def _told(derivative: int, name: str, limits: Limits) -> str:
+    """A limit with its value, where it has one."""
+    if derivative == 0:
+        return name
+    return f"{name} ({np.min(limits.of(derivative)[1]):g} {UNITS[derivative]})"
+
+
+def _is_possible(asked: list[LinearBound], limits: Limits) -> bool:
+    """False where no position, velocity and acceleration within the limits are as they are asked."""
+    boxes = [limits.of(derivative) for derivative in range(KNOWN)]
+    lower, upper = (np.concatenate([box[side] for box in boxes]) for side in (0, 1))
+    bounded = np.flatnonzero(np.isfinite(lower) | np.isfinite(upper))
+    rows = [bound.weights.ravel() for bound in asked]
+    instant = AssignmentProgram(
+        equality=np.zeros((0, 3 * KNOWN)),
+        target=np.zeros(0),
+        rows=np.array([*rows, *np.eye(3 * KNOWN)[bounded]]),
+        lower=np.array([*(bound.limits[0] for bound in asked), *lower[bounded]]),
+        upper=np.array([*(bound.limits[1] for bound in asked), *upper[bounded]]),
+    )
+    return solver("builtin").solve(instant).status != "infeasible"

@@ -1,0 +1,159 @@
+"""A map of what is feasible as a picture: durations of plans as colours, or as a line, letters for limits."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from aerobat.arrays import Array
+from aerobat.declaration import validated
+from aerobat.reporting.feasibility.legend import kinds_of, letter_of
+from aerobat.reporting.page import AXIS, COLUMNS, MARGIN, PAGE_WIDTH, blank_page, house_style, panel, write
+from aerobat.reporting.style import BAND, BLUE, FAINT, HAIR, INK, MUTED, PAPER, RED, SMALL
+from aerobat.studies.feasibility import Cell, Feasibility, FeasibilityMap
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.colors import Colormap
+    from matplotlib.figure import Figure
+
+FILLS = {  # of cells without a plan that flies
+    Feasibility.NOT_FLYABLE: RED,
+    Feasibility.NO_PLAN: FAINT,
+    Feasibility.REFUSED: HAIR,
+    Feasibility.NO_ANSWER: PAPER,
+}
+MAX_WIDTH, MAX_HEIGHT = 9.6, 6.5  # [in] of a grid
+CELL = (1.1, 0.5)  # [in] of one of its cells, at most
+LINE = 2.6  # [in] the height of a line's axes
+ROW = 0.2  # [in] of the legend
+BAR = 0.14  # [in] the width of the scale of durations
+DARK = 0.55  # of the scale of durations: from there letters are white
+WRITTEN = (0.42, 0.2)  # [in] a cell that holds a duration and a letter
+NARROW = (0.12, 0.14)  # [in] one that holds a letter
+MAX_LETTERS = 60  # that stand side by side above a line
+MAX_TICKS = 20
+
+
+@validated
+def map_figure(found: FeasibilityMap) -> Figure:
+    """Draw for which values there is a plan, how long it takes, and which limits bind.
+
+    Of two fields a grid, the first one's values upward; of one a line. What has no plan is grey; a plan that
+    is not flyable is red.
+    """
+    legend = [f"{kind.letter}   {kind.name} ({kind.count})" for kind in kinds_of(found).values()]
+    foot = AXIS + ROW * len(legend) + 0.1
+    width, height = _size(found)
+    counts = ", ".join(f"{count} {feasibility}" for feasibility, count in found.counts.items())
+    with house_style():
+        title = f"{found.problem.name} · feasible region for {found.vehicle.name}"
+        figure = blank_page(foot + height + MARGIN, title, [f"cells: {counts}"])
+        axes = panel(figure, COLUMNS[0], foot, width, height)
+        if len(found.axes) == 1:
+            _draw_line(axes, found)
+        else:
+            _draw_grid(figure, axes, found)
+        for row, text in enumerate(legend):
+            at = foot - AXIS - ROW * (row + 0.5)
+            write(figure, COLUMNS[0], at, text, size=SMALL, color=MUTED, va="center")
+    return figure
+
+
+def _size(found: FeasibilityMap) -> tuple[float, float]:
+    """Width and height of the axes [in]."""
+    if len(found.axes) == 1:
+        return PAGE_WIDTH - COLUMNS[0] - MARGIN, LINE
+    rows, columns = (len(axis.values) for axis in found.axes)
+    return min(CELL[0] * columns, MAX_WIDTH), min(CELL[1] * rows, MAX_HEIGHT)
+
+
+def _draw_grid(figure: Figure, axes: Axes, found: FeasibilityMap) -> None:
+    """Draw a cell a value of each field, and the scale of durations beside them."""
+    rows, columns = (len(axis.values) for axis in found.axes)
+    durations = np.array([c.duration if c.is_planned else np.nan for c in found.cells], dtype=float)
+    scale, colours = _colours(found, durations)
+    axes.imshow(colours.reshape(rows, columns, 4), origin="lower", aspect="auto", interpolation="nearest")
+    for axis, set_ticks, set_label, size in (
+        (found.axes[0], axes.set_yticks, axes.set_ylabel, _size(found)[1] / ROW),
+        (found.axes[1], axes.set_xticks, axes.set_xlabel, _size(found)[0] / CELL[0] * 3.0),
+    ):
+        step = max(1, int(np.ceil(len(axis.values) / size)))
+        places = np.arange(0, len(axis.values), step)
+        set_ticks(places, [f"{axis.values[i]:g}" for i in places])
+        set_label(axis.name)
+    axes.grid(visible=False)
+    _write_cells(axes, found, durations)
+    if np.isfinite(durations).any() and np.nanmax(durations) > np.nanmin(durations):
+        _draw_scale(figure, axes, scale, durations)
+
+
+def _write_cells(axes: Axes, found: FeasibilityMap, durations: Array) -> None:
+    """Write into each cell of a grid what it has room for."""
+    kinds, columns = kinds_of(found), len(found.axes[1].values)
+    width, height = _size(found) / np.array([columns, len(found.axes[0].values)])
+    for number, (cell, part) in enumerate(zip(found.cells, _parts(durations), strict=True)):
+        row, column = divmod(number, columns)
+        is_dark = cell.is_planned and part > DARK
+        text = _cell_text(cell, letter_of(cell, kinds), width, height)
+        axes.text(column, row, text, size=SMALL, ha="center", va="center", color=PAPER if is_dark else INK)
+
+
+def _colours(found: FeasibilityMap, durations: Array) -> tuple[Colormap, Array]:
+    """The scale of durations, and the colour of each cell, (cells, 4)."""
+    from matplotlib.colors import LinearSegmentedColormap, to_rgba
+
+    scale = LinearSegmentedColormap.from_list("durations", [BAND, BLUE])
+    colours = scale(_parts(durations))
+    for number, cell in enumerate(found.cells):
+        if not cell.is_planned:
+            colours[number] = to_rgba(FILLS[cell.feasibility])
+    return scale, np.asarray(colours)
+
+
+def _parts(durations: Array) -> Array:
+    """Durations as parts of their range, 0 where there is none."""
+    known = durations[np.isfinite(durations)]
+    low, high = (known.min(), known.max()) if len(known) else (0.0, 1.0)
+    return np.asarray(np.nan_to_num((durations - low) / ((high - low) or 1.0)))
+
+
+def _cell_text(cell: Cell, letter: str, width: float, height: float) -> str:
+    """As much as a cell of that size [in] holds: its duration and letter, the letter alone, or nothing."""
+    if width >= WRITTEN[0] and height >= WRITTEN[1] and cell.duration is not None:
+        return f"{cell.duration:.2f} {letter}"
+    return letter if width >= NARROW[0] and height >= NARROW[1] else ""
+
+
+def _draw_scale(figure: Figure, axes: Axes, scale: Colormap, durations: Array) -> None:
+    """Draw the scale of durations at the right of a grid."""
+    from matplotlib.cm import ScalarMappable
+    from matplotlib.colors import Normalize
+
+    box, across = axes.get_position(), float(figure.get_size_inches()[0])
+    side = figure.add_axes((box.x1 + 0.15 / across, box.y0, BAR / across, box.height))
+    values = Normalize(float(np.nanmin(durations)), float(np.nanmax(durations)))
+    figure.colorbar(ScalarMappable(values, scale), cax=side, label="duration [s]")
+    side.grid(visible=False)
+
+
+def _draw_line(axes: Axes, found: FeasibilityMap) -> None:
+    """Draw durations over the values of one field, letters above them, and bands where there is no plan."""
+    (axis,) = found.axes
+    places = np.arange(len(axis.values))
+    kinds = kinds_of(found)
+    durations = np.array([c.duration if c.is_planned else np.nan for c in found.cells], dtype=float)
+    axes.plot(places, durations, color=BLUE, marker="o", markersize=4)
+    axes.set_xlim(-0.5, len(places) - 0.5)
+    known = durations[np.isfinite(durations)]
+    top = 1.15 * float(known.max()) if len(known) else 1.0
+    axes.set_ylim(0.0, top)
+    for place, cell in zip(places, found.cells, strict=True):
+        if not cell.is_planned:
+            axes.axvspan(place - 0.5, place + 0.5, color=FILLS[cell.feasibility], linewidth=0.0)
+        if len(places) <= MAX_LETTERS:
+            axes.text(float(place), 0.97 * top, letter_of(cell, kinds), size=SMALL, ha="center", va="top")
+    step = max(1, len(places) // MAX_TICKS)
+    axes.set_xticks(places[::step], [f"{value:g}" for value in axis.values[::step]])
+    axes.set(xlabel=axis.name, ylabel="duration [s]")

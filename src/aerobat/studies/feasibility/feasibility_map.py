@@ -1,0 +1,194 @@
+"""feasibility_map(): for which values of two fields there is a plan, and which limits bind where."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import Executor, Future, as_completed
+from dataclasses import dataclass
+from itertools import product
+from math import nan, prod
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from aerobat.declaration import NonNegative, by_value, in_notebooks, short, validated
+from aerobat.engines.cores import available_cores
+from aerobat.errors import SpecError
+from aerobat.planning import Planner, as_planner
+from aerobat.problem import Problem, as_problem
+from aerobat.studies.feasibility.axis import MAX_CELLS, Axis
+from aerobat.studies.feasibility.binding import least_reserve
+from aerobat.studies.feasibility.fields import Field, Scenario
+from aerobat.studies.feasibility.probe import TIME_LIMIT, Feasibility, Task, probe
+from aerobat.studies.workers import Workers
+from aerobat.studies.workers import workers as processes
+from aerobat.vehicle import Vehicle, as_vehicle
+
+MAX_AXES = 2
+
+
+@by_value
+@dataclass(frozen=True)
+class Cell:
+    """The answer for one value of each field."""
+
+    values: tuple[float, ...]  # in the axes' order
+    feasibility: Feasibility
+    duration: float | None  # [s] of the plan; None where there is none
+    limits: tuple[str, ...]  # that bind, by the names of their fields; none where that is not known
+    reserve: float | None  # of its range, that every rotor is proven to keep from either limit
+    sentence: str  # the proof, or why there is none
+
+    @property
+    def is_planned(self) -> bool:
+        """True where there is a plan that is certified and flies."""
+        return self.feasibility is Feasibility.PLANNED
+
+
+@in_notebooks
+@short
+@by_value
+@dataclass(frozen=True, eq=False, repr=False)
+class FeasibilityMap:
+    """For which values of one or two fields a problem has a plan: a cell for each, row by row."""
+
+    problem: Problem
+    vehicle: Vehicle
+    axes: tuple[Axis, ...]
+    cells: tuple[Cell, ...]  # of the first field's first value with each of the second's, and so on
+
+    def __str__(self) -> str:
+        """One line for people."""
+        over = " and ".join(axis.name for axis in self.axes)
+        counts = ", ".join(f"{count} {feasibility}" for feasibility, count in self.counts.items())
+        return f"{self.problem.name} on {self.vehicle.name} over {over}: {counts}"
+
+    @property
+    def counts(self) -> Mapping[Feasibility, int]:
+        """The number of cells of each kind, in the order of the kinds."""
+        counted = Counter(cell.feasibility for cell in self.cells)
+        return {each: counted[each] for each in Feasibility if counted[each]}
+
+    @property
+    def table(self) -> Mapping[str, NDArray[Any]]:
+        """A row a cell: a column for each field by its name, then what there is to say of it.
+
+        Columns `feasibility`, `limits` and `sentence` are text, `duration_s` and `reserve` numbers, NaN where
+        there is no plan.
+        """
+        columns = {axis.name: np.array([c.values[i] for c in self.cells]) for i, axis in enumerate(self.axes)}
+        columns |= {
+            "feasibility": np.array([cell.feasibility.value for cell in self.cells]),
+            "duration_s": np.array([nan if c.duration is None else c.duration for c in self.cells]),
+            "limits": np.array([", ".join(cell.limits) for cell in self.cells]),
+            "reserve": np.array([nan if c.reserve is None else c.reserve for c in self.cells]),
+            "sentence": np.array([cell.sentence for cell in self.cells]),
+        }
+        return MappingProxyType(columns)
+
+
+@validated
+def feasibility_map(
+    problem: Problem | str,
+    over: Mapping[str, Any],
+    vehicle: Vehicle | str = "agile-quad",
+    planner: Planner | str | None = None,
+    *,
+    time_limit: NonNegative = TIME_LIMIT,
+    workers: Workers | None = None,
+    executor: Executor | None = None,
+    progress: Callable[[int, int], None] | None = None,
+) -> FeasibilityMap:
+    """Plan a problem for all values of one or two of its or its vehicle's fields, and say which limits bind.
+
+    Every cell is planned by itself, as `plan` would with those values, none is inferred from another; but a
+    refusal tries no changes that would help, and what contradicts itself is refused without a search.
+
+    Args:
+        problem: what is planned, or its name.
+        over: the values of each field, by its name: `{"angle": [0, 45, 90], "speed": range(2, 21, 2)}`. Names
+            are those of files, as `limits.velocity`, `gates[0].width`, `vehicle.mass`; the last part alone
+            where no other field has it; and `angle` for the tilt [deg] of a half-flip's gate.
+        vehicle: what flies it, or its name.
+        planner: how, or its registered name, by default the one that suits each problem.
+        time_limit: of each cell [s].
+        workers: processes, by default one a core; 1 plans in this process.
+        executor: what plans instead, as `dask.distributed.Client(...).get_executor()`.
+        progress: called with the cells done, and of them those that are planned, as they are finished.
+
+    Raises SpecError for names of no field, and for values that a field cannot take.
+    """
+    scenario = Scenario(as_problem(problem), as_vehicle(vehicle))
+    axes = tuple(Axis.of(name, values) for name, values in over.items())
+    fields = _fields(axes, scenario)
+    task = Task(scenario, fields, None if planner is None else as_planner(planner), time_limit)
+    places = list(product(*(axis.values for axis in axes)))
+    count = min(workers or available_cores(), len(places))
+    if executor is not None:
+        cells = _cells(executor, task, places, progress, cancels=True)
+    else:
+        with processes(count, forked=True) as pool:
+            cells = _cells(pool, task, places, progress)
+    return FeasibilityMap(scenario.problem, scenario.vehicle, axes, cells)
+
+
+def _fields(axes: Sequence[Axis], scenario: Scenario) -> tuple[Field, ...]:
+    """The fields of axes. Raises SpecError for what is no map of a scenario."""
+    if not 1 <= len(axes) <= MAX_AXES:
+        raise SpecError(f"over must name one field or two, got {len(axes)}")
+    cells = prod(len(axis.values) for axis in axes)
+    if cells > MAX_CELLS:
+        raise SpecError(f"over: {cells} cells are too many, {MAX_CELLS} at most; take larger steps")
+    fields = tuple(Field.of(axis.name, scenario) for axis in axes)
+    if len({field.place for field in fields}) < len(fields):
+        raise SpecError(f"over: {axes[0].name} and {axes[1].name} are the same field; drop one of them")
+    for field, axis in zip(fields, axes, strict=True):
+        field.require(scenario, axis.values)
+    return fields
+
+
+def _cells(
+    executor: Executor,
+    task: Task,
+    places: Sequence[tuple[float, ...]],
+    progress: Callable[[int, int], None] | None,
+    cancels: bool = False,
+) -> tuple[Cell, ...]:
+    """The cells of places, in their order.
+
+    Args:
+        executor: what plans.
+        task: what is planned.
+        places: values of its fields.
+        progress: called with the cells done and planned.
+        cancels: True for an executor that goes on when the map does not.
+    """
+    pending: dict[Future[Cell], int] = {}
+    cells: dict[int, Cell] = {}
+    try:
+        for number, values in enumerate(places):
+            pending[executor.submit(_cell, task, values)] = number
+        for future in as_completed(pending):
+            cells[pending[future]] = future.result()
+            if progress is not None:
+                progress(len(cells), sum(cell.is_planned for cell in cells.values()))
+    finally:
+        for future in pending if cancels else ():
+            future.cancel()
+    return tuple(cells[number] for number in range(len(places)))
+
+
+def _cell(task: Task, values: tuple[float, ...]) -> Cell:
+    found = probe(task, values)
+    plan = found.plan
+    return Cell(
+        values=values,
+        feasibility=found.feasibility,
+        duration=None if plan is None else plan.duration,
+        limits=found.limits,
+        reserve=None if plan is None else least_reserve(plan),
+        sentence=found.sentence,
+    )

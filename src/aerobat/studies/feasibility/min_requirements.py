@@ -1,0 +1,219 @@
+"""min_requirements(): the least thrust-to-weight ratio, the lowest ceiling, the smallest gates that do."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Generator, Sequence
+from concurrent.futures import FIRST_COMPLETED, Executor, Future, wait
+from dataclasses import dataclass
+from math import isfinite
+from typing import Annotated
+
+from pydantic import Field as Bounds
+
+from aerobat.declaration import NonNegative, by_value, validated
+from aerobat.engines.cores import available_cores
+from aerobat.errors import Infeasible
+from aerobat.planning import Plan, Planner, as_planner
+from aerobat.problem import Problem, as_problem
+from aerobat.studies.feasibility.fields import Scenario
+from aerobat.studies.feasibility.probe import TIME_LIMIT, Feasibility, Probe, Task, probe
+from aerobat.studies.feasibility.quantities import Quantity, named_quantities
+from aerobat.studies.workers import Workers
+from aerobat.studies.workers import workers as processes
+from aerobat.vehicle import Vehicle, as_vehicle
+
+GROWTH = 1.5  # from one value to the next, where what there is does not suffice
+MAX_STEPS = 5  # of it: 7.6 times as much at most
+Tolerance = Annotated[float, Bounds(ge=1e-4, le=0.5, description="number from 0.0001 to 0.5")]
+Tried = Callable[[str, float, bool], None]
+
+
+@by_value
+@dataclass(frozen=True, eq=False)
+class Requirement:
+    """The least of a quantity for which a plan is found, proven by it, and what is refused just below.
+
+    Without a plan even the most that was tried is refused. Where feasibility is not monotone, less still may
+    be feasible again; nothing is said about that.
+    """
+
+    quantity: str  # thrust-to-weight, ceiling or gate
+    unit: str
+    value: float | None  # for which there is the plan, infinite for no limit; None where none was found
+    plan: Plan | None  # certified, and it flies
+    refused: float  # for which there is none, beside `value`
+    feasibility: Feasibility  # there
+    refusal: str  # why, a sentence
+    trials: int  # plans that were tried
+
+    def __str__(self) -> str:
+        """One line for people."""
+        if self.value is None or self.plan is None:
+            return f"{self.quantity}: none will do, {self.shown(self.refused)} neither: {self.refusal}"
+        return (
+            f"{self.quantity}: {self.shown(self.value)}, planned in {self.plan.duration:.3f} s; at "
+            f"{self.shown(self.refused)} {self.feasibility}: {self.refusal}"
+        )
+
+    def shown(self, value: float) -> str:
+        """A value of the quantity with its unit."""
+        return f"{value:.4g} {self.unit}".rstrip() if isfinite(value) else "no limit"
+
+
+@validated
+def min_requirements(
+    problem: Problem | str,
+    vehicle: Vehicle | str = "agile-quad",
+    of: Sequence[str] | None = None,
+    planner: Planner | str | None = None,
+    *,
+    tolerance: Tolerance = 0.01,
+    time_limit: NonNegative = TIME_LIMIT,
+    workers: Workers | None = None,
+    progress: Tried | None = None,
+) -> tuple[Requirement, ...]:
+    """Find the least of each quantity for which a problem has a plan, the others as they are, by bisection.
+
+    Each answer comes with a plan, certified and flown, and with a value less by the tolerance or so at which
+    none was found. Where what there is does not suffice, more is tried, up to 7.6 times as much.
+
+    Args:
+        problem: what is planned, or its name.
+        vehicle: what flies it, or its name.
+        of: any of "thrust-to-weight", the rotors' full thrust in weights; "ceiling", the height that the path
+            stays below; "gate", the openings of all gates as parts of their sizes. By default all that the
+            problem has.
+        planner: how, or its registered name, by default the one that suits each problem.
+        tolerance: between the answer and the refusal, as a part of the answer, of a ceiling of its height
+            above what is met below it, or of a metre where that is more.
+        time_limit: of each plan [s]; where none is found by then, it counts as refused.
+        workers: processes, by default one a core; 1 plans in this process.
+        progress: called with each quantity, value and whether it is planned, as they are tried.
+
+    Raises:
+        SpecError: quantities are unknown, or the problem has no such thing.
+        Infeasible: nothing suffices, whichever quantity grows; the sentence says why.
+    """
+    scenario = Scenario(as_problem(problem), as_vehicle(vehicle))
+    planner = None if planner is None else as_planner(planner)
+    searches = [_Search(q, scenario, tolerance) for q in named_quantities(of, scenario.problem)]
+    with processes(min(workers or available_cores(), len(searches)), forked=True) as pool:
+        found = _found(pool, searches, planner, time_limit, progress)
+    if all(each.plan is None for each in found):
+        raise Infeasible(f"'{scenario.problem.name}' has no plan on {scenario.vehicle.name}: {found[0]}")
+    return found
+
+
+def _found(
+    executor: Executor,
+    searches: Sequence[_Search],
+    planner: Planner | None,
+    time_limit: float,
+    tried: Tried | None,
+) -> tuple[Requirement, ...]:
+    """The answers of searches, each of which has one plan made at a time.
+
+    Args:
+        executor: what plans.
+        searches: of a quantity each.
+        planner: how; None for the one that suits each problem.
+        time_limit: of each plan [s].
+        tried: called with each value that was tried.
+    """
+    runs = {search: search.run() for search in searches}
+    pending: dict[Future[Probe], tuple[_Search, float]] = {}
+
+    def submit(search: _Search, value: float) -> None:
+        task = Task(search.scenario, (search.quantity,), planner, time_limit)
+        pending[executor.submit(probe, task, (value,))] = search, value
+
+    for search, run in runs.items():
+        submit(search, next(run))
+    while pending:
+        for future in wait(pending, return_when=FIRST_COMPLETED).done:
+            search, value = pending.pop(future)
+            found = future.result()
+            if tried is not None:
+                tried(search.quantity.name, value, found.is_planned)
+            try:
+                submit(search, runs[search].send(found))
+            except StopIteration:
+                continue
+    return tuple(search.requirement for search in searches)
+
+
+@dataclass(eq=False)
+class _Search:
+    """The bisection of one quantity, between a value that is refused and one for which there is a plan."""
+
+    quantity: Quantity
+    scenario: Scenario
+    tolerance: float
+    planned: tuple[float, Probe] | None = None  # the least so far
+    refused: tuple[float, Probe] | None = None  # the most so far
+    trials: int = 0
+
+    def run(self) -> Generator[float, Probe, None]:
+        """The values to be tried, one after another, each answered by a probe."""
+        quantity = self.quantity
+        floor = quantity.floor(self.scenario)
+        yield from self._climb(quantity.own(self.scenario))
+        if self.planned is not None and not isfinite(self.planned[0]):
+            yield from self._climb(self._used + self._gap(self._used))
+        while self.planned is not None and isfinite(self.planned[0]):
+            least, most = self.planned[0], floor if self.refused is None else self.refused[0]
+            gap = self._gap(least)
+            if least - most > gap:
+                # the plan's own highest point, say, is as good as proven
+                is_loose = self._used - most > gap
+                yield from self._try(0.5 * (most + (min(least, self._used) if is_loose else least)))
+            elif self.refused is None:
+                yield from self._try(floor if least > floor else floor - gap)
+            else:
+                return
+
+    @property
+    def requirement(self) -> Requirement:
+        """What came of it."""
+        assert self.refused is not None, "a search ends beside a refusal"
+        value, found = (None, None) if self.planned is None else self.planned
+        at, refusal = self.refused
+        return Requirement(
+            quantity=self.quantity.name,
+            unit=self.quantity.unit,
+            value=value,
+            plan=None if found is None else found.plan,
+            refused=at,
+            feasibility=refusal.feasibility,
+            refusal=refusal.sentence,
+            trials=self.trials,
+        )
+
+    @property
+    def _used(self) -> float:
+        """How much of it the last plan makes use of."""
+        assert self.planned is not None, "there is a plan"
+        assert self.planned[1].plan is not None
+        return self.quantity.used(self.planned[1].plan)
+
+    def _gap(self, value: float) -> float:
+        """The largest distance to a refusal that will do."""
+        return self.tolerance * max(value - self.quantity.floor(self.scenario), self.quantity.least_size)
+
+    def _climb(self, value: float) -> Generator[float, Probe, None]:
+        """Try a value, and more while it is refused."""
+        floor = self.quantity.floor(self.scenario)
+        for _ in range(MAX_STEPS + 1):
+            is_planned = yield from self._try(value)
+            if is_planned or not isfinite(value):
+                return
+            value = floor + GROWTH * max(value - floor, self.quantity.least_size)
+
+    def _try(self, value: float) -> Generator[float, Probe, bool]:
+        found = yield value
+        self.trials += 1
+        if found.is_planned:
+            self.planned = value, found
+        else:
+            self.refused = value, found
+        return found.is_planned

@@ -1,0 +1,95 @@
+"""One scenario planned: whether there is a plan, which limits bind, or why there is none."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import Protocol
+
+from aerobat.errors import Infeasible, SpecError
+from aerobat.optimization.deadline import out_of_time, within_time
+from aerobat.planning import Plan, Planner, plan, without_advice
+from aerobat.planning.assessment.contradiction import contradiction
+from aerobat.studies.feasibility.binding import binding_limits, limits_in
+from aerobat.studies.feasibility.fields import Scenario
+
+TIME_LIMIT = 30.0  # [s] of planning, where no other is given: most scenarios take one
+
+
+class Feasibility(StrEnum):
+    """An answer to whether there is a plan."""
+
+    PLANNED = "planned"  # certified, and it flies
+    NOT_FLYABLE = "not flyable"  # planned, but not certified, or its own flight is not as it should be
+    NO_PLAN = "no plan"  # the planner finds none, which proves nothing
+    REFUSED = "refused at sight"  # what is asked contradicts itself, the limits or the vehicle
+    NO_ANSWER = "no answer"  # in the time given
+
+
+@dataclass(frozen=True, eq=False)
+class Probe:
+    """The answer for one scenario."""
+
+    feasibility: Feasibility
+    sentence: str  # the proof, or why there is none
+    limits: tuple[str, ...]  # that bind, by the names of their fields; none where that is not known
+    plan: Plan | None = None
+
+    @property
+    def is_planned(self) -> bool:
+        """True where there is a plan that is certified and flies."""
+        return self.feasibility is Feasibility.PLANNED
+
+
+class Variable(Protocol):
+    """Something of a scenario that can be set to a number."""
+
+    def changed(self, scenario: Scenario, value: float) -> Scenario:
+        """The scenario with it at a value. Raises SpecError where that cannot be."""
+
+
+@dataclass(frozen=True, eq=False)
+class Task:
+    """A scenario of which something varies, and how each is planned."""
+
+    scenario: Scenario
+    variables: tuple[Variable, ...]
+    planner: Planner | None  # None for the one that suits each problem
+    time_limit: float  # [s] of each
+
+
+def probe(task: Task, values: Sequence[float]) -> Probe:
+    """The answer where the variables have these values."""
+    scenario = task.scenario
+    try:
+        for variable, value in zip(task.variables, values, strict=True):
+            scenario = variable.changed(scenario, value)
+        found = contradiction(scenario.problem, scenario.vehicle)
+        if found is not None:
+            limits = found.limits or (f"stage '{found.stage}'",)
+            return Probe(Feasibility.REFUSED, found.sentence, limits)
+        return _planned(scenario, task)
+    except SpecError as error:
+        return Probe(Feasibility.REFUSED, str(error), limits_in(str(error)))
+
+
+def _planned(scenario: Scenario, task: Task) -> Probe:
+    with within_time(task.time_limit), without_advice():
+        try:
+            found = plan(scenario.problem, task.planner, scenario.vehicle)
+        except Infeasible as error:
+            reason = Feasibility.NO_PLAN if error.attempts else Feasibility.REFUSED
+            return Probe(
+                Feasibility.NO_ANSWER if out_of_time() else reason, str(error), limits_in(str(error))
+            )
+    assert found.certificate is not None, "a plan for a vehicle is certified"
+    assert found.flyability is not None, "and flown"
+    if found.certified and found.flies:
+        return Probe(Feasibility.PLANNED, found.certificate.why, binding_limits(found), found)
+    why = (
+        f"its own flight {' and '.join(found.flyability.defects)}"
+        if found.certified
+        else found.certificate.why
+    )
+    return Probe(Feasibility.NOT_FLYABLE, why, limits_in(why), found)

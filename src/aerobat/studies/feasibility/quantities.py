@@ -1,0 +1,118 @@
+"""What a problem needs so much of at least: how it is set to a value, and where to look for the least."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from math import inf
+from typing import ClassVar
+
+import numpy as np
+
+from aerobat.declaration import unknown_name
+from aerobat.errors import SpecError
+from aerobat.planning import Plan
+from aerobat.problem import Problem
+from aerobat.studies.feasibility.fields import THRUST_TO_WEIGHT, VEHICLE, Field, Scenario
+
+
+class Quantity(ABC):
+    """Something of which less makes a scenario harder."""
+
+    name: ClassVar[str]
+    unit: ClassVar[str] = ""
+    least_size: ClassVar[float] = 0.0  # above the floor: of less no part is told apart
+
+    @abstractmethod
+    def own(self, scenario: Scenario) -> float:
+        """Return what the scenario has, infinite where it has no bound."""
+
+    @abstractmethod
+    def changed(self, scenario: Scenario, value: float) -> Scenario:
+        """Return the scenario with so much of it. Raises SpecError where that contradicts the rest."""
+
+    def floor(self, scenario: Scenario) -> float:
+        """Return a value below which nothing needs to be tried, from which it is counted too."""
+        return 0.0
+
+    def used(self, plan: Plan) -> float:
+        """Return how much a plan makes use of; infinite where it does not tell."""
+        return inf
+
+
+class ThrustToWeight(Quantity):
+    """All rotors at full thrust, in weights on Earth, each its part of them as it is."""
+
+    name = "thrust-to-weight"
+
+    def own(self, scenario: Scenario) -> float:
+        """Return the vehicle's."""
+        return scenario.vehicle.thrust_to_weight
+
+    def changed(self, scenario: Scenario, value: float) -> Scenario:
+        """Return the scenario with rotors as strong."""
+        return Field(self.name, (VEHICLE, THRUST_TO_WEIGHT)).changed(scenario, value)
+
+
+class Ceiling(Quantity):
+    """The height that the path stays below."""
+
+    name = "ceiling"
+    unit = "m"
+    least_size = 1.0
+
+    def own(self, scenario: Scenario) -> float:
+        """Return the problem's limit."""
+        return float(scenario.problem.limits.upper[2])
+
+    def floor(self, scenario: Scenario) -> float:
+        """Return the height of the highest of start, goal and gates."""
+        problem = scenario.problem
+        points = [problem.start.position, problem.goal.position, *(gate.position for gate in problem.gates)]
+        return float(np.max([point[2] for point in points]))
+
+    def used(self, plan: Plan) -> float:
+        """Return the height of its highest point."""
+        return float(plan.trajectory.component_range(0)[1][2])
+
+    def changed(self, scenario: Scenario, value: float) -> Scenario:
+        """Return the scenario under such a ceiling."""
+        return Field(self.name, ("limits", "upper", 2)).changed(scenario, value)
+
+
+class GateSize(Quantity):
+    """The openings of all gates, as parts of what they are."""
+
+    name = "gate"
+    unit = "of its size"
+
+    def own(self, scenario: Scenario) -> float:
+        """Return one. Raises SpecError where there is no gate."""
+        if not scenario.problem.gates:
+            raise SpecError(f"'{scenario.problem.name}' has no gate that could be smaller; leave gate out")
+        return 1.0
+
+    def changed(self, scenario: Scenario, value: float) -> Scenario:
+        """Return the scenario with openings of that part of their width and height."""
+        for i, gate in enumerate(scenario.problem.gates):
+            for side in ("width", "height"):
+                field = Field(self.name, ("gates", i, side))
+                scenario = field.changed(scenario, value * getattr(gate, side))
+        return scenario
+
+
+QUANTITIES: dict[str, Quantity] = {each.name: each for each in (ThrustToWeight(), Ceiling(), GateSize())}
+
+
+def named_quantities(names: Sequence[str] | None, problem: Problem) -> tuple[Quantity, ...]:
+    """The quantities of these names, by default all that a problem has. Raises SpecError for others."""
+    if names is None:
+        return tuple(each for each in QUANTITIES.values() if problem.gates or not isinstance(each, GateSize))
+    for i, name in enumerate(names):
+        if name not in QUANTITIES:
+            raise unknown_name("quantity", name, QUANTITIES)
+        if name in names[:i]:
+            raise SpecError(f"of: {name} is named twice; name it once")
+    if not names:
+        raise SpecError("of must name one quantity or more; leave it out for all")
+    return tuple(QUANTITIES[name] for name in names)

@@ -1,0 +1,174 @@
+"""`aerobat map` and `aerobat need`, and their folders: what is there, what is repeated, what is refused."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import aerobat as ab
+from aerobat import cli
+from aerobat.cli.progress import MapProgress, NeedProgress
+from aerobat.interchange import read_table
+
+MAP = ("map", "half-flip", "--over", "angle=0:90:90", "--over", "speed=4:12:4")
+NEED = ("need", "half-flip", "--of", "gate", "--of", "ceiling", "--tolerance", "0.2", "--workers", "1")
+
+
+@pytest.fixture(autouse=True)
+def _elsewhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+
+
+def code(*arguments: str) -> int:
+    try:
+        cli.main(arguments)
+    except SystemExit as stop:
+        return int(stop.code or 0)
+    return 0
+
+
+def test_a_map_writes_a_row_a_cell_which_is_what_plan_says(capsys) -> None:
+    assert code(*MAP, "--json", "--workers", "2") == 0
+    facts = json.loads(capsys.readouterr().out)
+    folder = Path("out/half-flip-map")
+    assert {path.name for path in folder.iterdir()} == {"map.csv", "map.json", "map.png", "run.toml"}
+    assert facts == json.loads((folder / "map.json").read_bytes())
+    table = read_table(folder / "map.csv")
+    np.testing.assert_array_equal(table["angle"], [0.0, 0.0, 0.0, 90.0, 90.0, 90.0])
+    np.testing.assert_array_equal(table["speed"], [4.0, 8.0, 12.0] * 2)
+    planned = [cell["duration_s"] for cell in facts["cells"]]
+    np.testing.assert_array_equal(table["duration_s"], [np.nan if x is None else x for x in planned])
+    assert [x is None for x in planned] == [False, False, True] * 2
+    assert all("limits.velocity" in cell["limits"] for cell in facts["cells"][2::3])
+    problem = ab.load_problem("half-flip")
+    problem_file = Path("fast.toml")
+    ab.write_problem(problem, problem_file)
+    text = problem_file.read_text()
+    problem_file.write_text(text.replace('kind = "half-flip"', 'kind = "half-flip"\npassage = {speed = 8.0}'))
+    assert code("plan", "fast.toml", "--angle", "0", "--json") == 0
+    assert json.loads(capsys.readouterr().out)["plan"]["duration_s"] == planned[1]
+
+
+def test_a_repeated_map_comes_to_the_same_bits(capsys) -> None:
+    assert code("map", "line", "--over", "goal.position.x=1:3:1", "--table", "parquet") == 0
+    assert capsys.readouterr().out.endswith("written to out/line-map/\n")
+    assert code("repeat", "out/line-map") == 0
+    assert "the same as in out/line-map/, bit for bit" in capsys.readouterr().err
+    again, old = (read_table(f"out/{name}/map.parquet") for name in ("line-map-repeated", "line-map"))
+    np.testing.assert_array_equal(again["duration_s"], old["duration_s"])
+    (Path("out/line-map") / "map.parquet").write_bytes(b"")
+    assert code("repeat", "out/line-map") == 2
+
+
+def test_what_is_needed_is_written_with_its_plans_and_repeated(capsys) -> None:
+    assert code(*NEED) == 0
+    shown = capsys.readouterr().out
+    assert "of its size" in shown
+    folder = Path("out/half-flip-need")
+    plans = {f"half-flip-{quantity}.plan" for quantity in ("gate", "ceiling")}
+    assert {path.name for path in folder.iterdir()} == {"need.json", "run.toml", *plans}
+    facts = json.loads((folder / "need.json").read_bytes())
+    for each in facts["requirements"]:
+        plan = ab.load_plan(folder / f"half-flip-{each['quantity']}.plan")
+        assert plan.certified
+        assert plan.flies
+        assert plan.duration == each["duration_s"]
+        assert each["refused"] < each["least"]
+        assert each["refusal"]
+    assert code("repeat", str(folder), "--json") == 0
+    out, err = capsys.readouterr()
+    assert json.loads(out) == facts
+    assert "bit for bit" in err
+
+
+REFUSED = (
+    (("map", "half-flip"), "--over is missing"),
+    (("map", "half-flip", "--over", "sped=1:2:1"), "did you mean 'speed'?"),
+    (("map", "half-flip", "--over", "speed=2:1:1"), "the range of speed is empty"),
+    (("map", "half-flip", "--over", "speed=1:2:0"), "the step of speed is 0"),
+    (("map", "half-flip", "--over", "speed=0:1:1e-7"), "10000 at most"),
+    (("map", "half-flip", "--over", "speed=1:200:1", "--over", "angle=0:90:1"), "18200 cells are too many"),
+    (("map", "half-flip", "--over", "speed=1", "--over", "speed=2"), "--over names speed twice"),
+    (("map", "half-flip", "--over", "angle=0:100:50"), "angle must be from -90 to 90 degrees"),
+    (("map", "flip-roll", "--over", "angle=0:90:50"), "only the gate of a half-flip can be tilted"),
+    (("map", "line", "--over", "vehicle.mass=1", "--planner", "free-knot"), "did you mean"),
+    (("map", "line", "--over", "vehicle.mass=1", "--segments", "3"), "--segments is for --planner"),
+    (("map", "line", "--over", "vehicle.mass=1", "--out", "mine"), "mine/ holds thesis.tex"),
+    (("need", "half-flip", "--of", "weight"), "weight"),
+    (("need", "line", "--of", "gate"), "has no gate that could be smaller"),
+    (("need", "line", "--tolerance", "0"), "tolerance"),
+    (("need", "line", "--out", "mine"), "mine/ holds thesis.tex"),
+)
+
+
+@pytest.mark.parametrize(("arguments", "said"), REFUSED)
+def test_what_makes_no_sense_is_refused_in_a_sentence(arguments: tuple[str, ...], said: str, capsys) -> None:
+    Path("mine").mkdir()
+    Path("mine/thesis.tex").write_text("years of work")
+    assert code(*arguments) == 2
+    err = capsys.readouterr().err
+    assert said in err
+    assert err.count("\n") == 1
+    assert [path.name for path in Path().iterdir()] == ["mine"]
+
+
+def test_what_nothing_suffices_for_ends_with_its_own_code(capsys) -> None:
+    Path("stuck.py").write_text(
+        "import aerobat as ab\n\n\n"
+        '@ab.planner("stuck")\nclass Stuck(ab.Planner):\n'
+        "    def plan(self, problem, vehicle=None, progress=None):\n"
+        '        raise ab.Infeasible("nothing", ["one attempt"])\n'
+    )
+    arguments = ("line", "--import", "stuck.py", "--planner", "stuck", "--workers", "1")
+    assert code("need", *arguments) == 3
+    assert "'line' has no plan on agile-quad" in capsys.readouterr().err
+    assert code("map", *arguments, "--over", "vehicle.mass=0.9,1") == 0
+    assert capsys.readouterr().out.count("no plan") == 2
+    assert [path.name for path in Path("out").iterdir()] == ["line-stuck-map"]
+
+
+# is interrupted when the first plan is there
+INTERRUPTED = """
+import os, signal, sys
+from aerobat import cli
+from aerobat.cli import progress
+
+def interrupt(self, *arguments):
+    os.kill(os.getpid(), signal.SIGINT)
+progress.MapProgress.record = progress.NeedProgress.record = interrupt
+signal.signal(signal.SIGINT, signal.default_int_handler)  # which a job in the background begins without
+cli.main(sys.argv[1:])
+"""
+
+
+@pytest.mark.parametrize("workers", ["1", "2"])
+@pytest.mark.parametrize("command", [("map", "half-flip", "--over", "speed=2:9:0.1"), NEED[:-2]])
+def test_an_interrupt_leaves_nothing_but_a_word(command: tuple[str, ...], workers: str) -> None:
+    ended = subprocess.run(
+        [sys.executable, "-c", INTERRUPTED, *command, "--workers", workers],
+        capture_output=True,  # to its end: the pipes close when the last process that holds them ends
+        text=True,
+        env=os.environ | {"AEROBAT_PROGRESS": "1000"},
+    )
+    assert (ended.returncode, ended.stdout, ended.stderr) == (130, "", "aerobat: interrupted\n")
+    assert not list(Path().iterdir())
+
+
+def test_progress_says_how_many_and_how_long_still() -> None:
+    now = [0.0]
+    progress = MapProgress(100, lambda: now[0])
+    assert str(progress) == "0 of 100 cells in 0 s"
+    now[0] = 5.0
+    progress.record(20, 12)
+    assert str(progress) == "20 of 100 cells in 5 s: 12 planned; 20 s to go"
+    need = NeedProgress()
+    need.record("ceiling", 3.51, True)
+    need.record("gate", 0.5, False)
+    need.record("ceiling", 3.5, False)
+    assert str(need) == "3 plans tried; ceiling 3.5 refused; gate 0.5 refused"
