@@ -15,7 +15,7 @@ from aerobat.arrays import Array
 from aerobat.declaration import Positive, declared
 from aerobat.errors import SpecError
 from aerobat.links.goals import Observed, PositionGoal, yaw_of
-from aerobat.links.routes import rest_to_rest
+from aerobat.links.routes import goal_on, rest_to_rest
 from aerobat.links.stream import SetpointStream
 from aerobat.planning import Plan
 from aerobat.simulation.autopilot.braking import Braking
@@ -143,6 +143,11 @@ class Mission(Generic[GoalT_co]):
             self.reason = reason
             self._enter(Phase.ABORTED, now)
 
+    @property
+    def end(self) -> PositionGoal:
+        """The hover after the plan."""
+        return goal_on(self._after, self._after.duration, self._final_yaw)
+
     def error(self, seen: Observed) -> float:
         """How far the vehicle is off the plan at the time that it was seen [m]."""
         expected = self.stream.flat(seen.time - self.maneuver_began).position
@@ -180,7 +185,7 @@ class Mission(Generic[GoalT_co]):
             self._routes = self._routes[1:]
             self._turn = (yaw + turn, 0.0)
             self._enter(following, now)
-        return _on(route, since, yaw + turn * since / route.duration)
+        return goal_on(route, since, yaw + turn * since / route.duration)
 
     def _settle(self, now: float, seen: Observed) -> None:
         """Begin the plan once the vehicle has been at rest at its start for long enough."""
@@ -200,16 +205,16 @@ class Mission(Generic[GoalT_co]):
         since = now - self.maneuver_began + delay
         if since >= self.stream.duration:
             self._enter(Phase.HOLD, now)
-            return _on(self._after, 0.0, self._final_yaw)
+            return goal_on(self._after, 0.0, self._final_yaw)
         self._follower.observe(seen._replace(time=seen.time - self.maneuver_began))
         return self._follower.command(since)
 
     def _hovering(self, now: float) -> PositionGoal | None:
         """The goal at the plan's start or end."""
         if self.phase is Phase.SETTLE:
-            return _on(rest_to_rest(self._start, self._start, 1.0, 1.0), 0.0, self._heading)
+            return goal_on(rest_to_rest(self._start, self._start, 1.0, 1.0), 0.0, self._heading)
         if self.phase is Phase.HOLD:
-            return _on(self._after, min(now - self.began, self._after.duration), self._final_yaw)
+            return goal_on(self._after, now - self.began, self._final_yaw)
         return None
 
 
@@ -244,8 +249,3 @@ def require_flyable(plan: Plan, offset: Array, vehicle_name: str | None = None) 
         raise SpecError(
             f"{label} would go down to {lowest:.2f} m over where the vehicle stands; raise its origin"
         )
-
-
-def _on(route: Trajectory, time: float, yaw: float) -> PositionGoal:
-    flat = route.flat(time)
-    return PositionGoal(flat.position, flat.velocity, flat.acceleration, yaw, flat.jerk)

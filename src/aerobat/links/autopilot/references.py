@@ -17,6 +17,7 @@ from aerobat.simulation.autopilot.braking import point_reference
 from aerobat.simulation.autopilot.loop import KEPT
 from aerobat.trajectory import Trajectory
 
+_SLOW = 0.5  # [m/s] and [m/s²] of a path that hardly leads away from where it is
 _SMOOTHING = 0.002  # [s] time constant of the low-pass on the change of commanded rates and thrust
 
 
@@ -54,6 +55,12 @@ class PathReference(NamedTuple):
     """A short piece of a path, carried on beyond its end by the snap and angular jerk that it tells."""
 
     piece: PathPiece
+
+    @property
+    def leads_away(self) -> bool:
+        """True unless it is hardly anything but a hover."""
+        end = self.piece.end
+        return float(np.linalg.norm(end.velocity)) > _SLOW or float(np.linalg.norm(end.acceleration)) > _SLOW
 
     def reference(self, times: Array, period: float, gravity: float) -> ReferencePoint:
         """References at times [s], leaves (T,), for a controller that steps so often."""

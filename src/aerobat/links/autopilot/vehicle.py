@@ -198,7 +198,9 @@ class SimulatedVehicle:
         if self.mode is not Mode.OFFBOARD:
             return
         silence = self.time - self._heard
-        allowed = POINT_TIMEOUT if isinstance(self._goal, PointReference) else ATTITUDE_TIMEOUT
+        stays = isinstance(self._goal, PointReference)
+        stays = stays or (isinstance(self._goal, PathReference) and not self._goal.leads_away)
+        allowed = POINT_TIMEOUT if stays else ATTITUDE_TIMEOUT
         if silence > allowed + 1e-9:
             self.told.append(f"no set-points for {silence:.2f} s: holding")
             self.hold()

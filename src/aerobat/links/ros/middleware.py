@@ -1,0 +1,90 @@
+"""ROS of either generation, as the nodes here use it: its calls come one after the other, in one thread."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from concurrent.futures import Future
+from queue import Empty, SimpleQueue
+from typing import Any, Protocol, TypeAlias
+
+from aerobat.interchange.ros import NANOSECONDS, Make
+
+Answer: TypeAlias = Callable[[bool, str], None]  # success, and a sentence
+
+_MAX_WAIT, _MIN_WAIT = 0.005, 0.0002  # [s] between looks at a clock that may run at another pace than ours
+
+
+class PacedClock:
+    """A clock that others follow, `speed` times as fast as the wall's; at first it shows the same."""
+
+    def __init__(self, speed: float) -> None:
+        self._speed = speed
+        self._began = time.time_ns()
+        self._since = time.monotonic_ns()
+
+    def time(self) -> int:
+        """The time [ns]."""
+        return self._began + round(self._speed * (time.monotonic_ns() - self._since))
+
+
+class Middleware(Protocol):
+    """A node's access to ROS."""
+
+    make: Make
+
+    def time(self) -> int:
+        """ROS time [ns]."""
+
+    def publisher(self, topic: str, kind: str, latched: bool = False) -> Callable[[Any], None]:
+        """Announce a topic; what sends a message to it. Latched, the last one reaches who comes later."""
+
+    def subscribe(self, topic: str, kind: str, take: Callable[[Any], None], every: bool = True) -> None:
+        """Have messages of a topic taken, in order: `every` one, or those that come through at once."""
+
+    def offer(self, service: str, take: Callable[[Answer], None]) -> None:
+        """Offer a service of std_srvs/Trigger; what takes a request answers it, now or later."""
+
+    def work_until(self, instant: int) -> None:
+        """Do what comes until a time [ns]: messages and requests are taken here."""
+
+    def close(self) -> None:
+        """Leave."""
+
+
+class Calls:
+    """Calls that the threads of ROS ask for, done by the thread that `work`s."""
+
+    def __init__(self) -> None:
+        self._waiting: SimpleQueue[Callable[[], None]] = SimpleQueue()
+        self._unanswered: set[Future[tuple[bool, str]]] = set()
+
+    def put(self, call: Callable[[], None]) -> None:
+        """Have it done soon."""
+        self._waiting.put(call)
+
+    def answer(self, take: Callable[[Answer], None]) -> tuple[bool, str]:
+        """Have a request taken, and wait for its answer."""
+        answered: Future[tuple[bool, str]] = Future()
+        self._unanswered.add(answered)
+        self.put(lambda: take(lambda success, sentence: self._settle(answered, success, sentence)))
+        return answered.result()
+
+    def close(self) -> None:
+        """Answer whoever still waits."""
+        for answered in tuple(self._unanswered):
+            self._settle(answered, False, "the node has ended")
+
+    def _settle(self, answered: Future[tuple[bool, str]], success: bool, sentence: str) -> None:
+        if answered in self._unanswered:
+            self._unanswered.discard(answered)
+            answered.set_result((success, sentence))
+
+    def work_until(self, instant: int, clock: Callable[[], int]) -> None:
+        """Do calls until a time [ns] of a clock."""
+        while (left := (instant - clock()) / NANOSECONDS) > 0.0:
+            try:
+                call = self._waiting.get(timeout=min(max(left, _MIN_WAIT), _MAX_WAIT))
+            except Empty:
+                continue
+            call()

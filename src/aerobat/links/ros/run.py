@@ -1,0 +1,34 @@
+"""The loop of a node: tick, and take what comes until the next one is due."""
+
+from __future__ import annotations
+
+from math import inf
+from typing import Protocol
+
+from aerobat.interchange.ros import NANOSECONDS
+from aerobat.links.ros.middleware import Middleware
+
+
+class Node(Protocol):
+    """What is ticked."""
+
+    origin: int  # [ns] when its clock began
+
+    def tick(self, now: float) -> None:
+        """Go on to this time [s]."""
+
+
+def run(node: Node, ros: Middleware, rate: float, seconds: float = inf) -> None:
+    """Tick a node.
+
+    Args:
+        node: which.
+        ros: its clock, and its messages.
+        rate: of ticks [1/s], each at its own time; those that were missed are left out.
+        seconds: after which it ends.
+    """
+    period, tick = round(NANOSECONDS / rate), 0
+    while tick * period < seconds * NANOSECONDS:
+        ros.work_until(node.origin + tick * period)
+        node.tick(tick * period / NANOSECONDS)
+        tick = max(tick + 1, (ros.time() - node.origin) // period)
