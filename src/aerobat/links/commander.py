@@ -152,7 +152,7 @@ class Commander:
         assert self.mission is not None, "maneuvers are missions"
         assert self.seen is not None, "a vehicle is seen before it is flown"
         phase, goal = self.mission.phase, self.mission.step(now, self.seen, self._period)
-        if self.mission.phase is not phase:
+        if self.mission.phase not in (phase, Phase.LAND):
             reason = f": {self.mission.reason}" if self.mission.reason else ""
             self._say(f"{self.mission.phase}{reason}")
         if self.mission.phase is Phase.LAND:  # where it ends it stays

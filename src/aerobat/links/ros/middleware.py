@@ -8,7 +8,7 @@ from concurrent.futures import Future
 from queue import Empty, SimpleQueue
 from typing import Any, Protocol, TypeAlias
 
-from aerobat.interchange.ros import NANOSECONDS, Make
+from aerobat.interchange.ros import NANOSECONDS
 
 Answer: TypeAlias = Callable[[bool, str], None]  # success, and a sentence
 
@@ -31,7 +31,8 @@ class PacedClock:
 class Middleware(Protocol):
     """A node's access to ROS."""
 
-    make: Make
+    def make(self, kind: str, /, **given: Any) -> Any:
+        """A message of a kind; see `interchange.ros.Make`."""
 
     def time(self) -> int:
         """ROS time [ns]."""

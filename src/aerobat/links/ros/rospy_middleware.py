@@ -87,7 +87,7 @@ def _rospy() -> Any:
     except ImportError as error:
         raise BackendMissing(
             f"ROS 1 needs rospy, which this Python does not find ({error}): source "
-            "/opt/ros/DISTRIBUTION/setup.bash, or apt-get install python3-rospy, and run aerobat with that Python"
+            "/opt/ros/noetic/setup.bash, or apt-get install python3-rospy, and run aerobat with that Python"
         ) from None
 
 

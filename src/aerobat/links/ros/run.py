@@ -2,11 +2,19 @@
 
 from __future__ import annotations
 
+from importlib.resources import files
 from math import inf
 from typing import Protocol
 
 from aerobat.interchange.ros import NANOSECONDS
 from aerobat.links.ros.middleware import Middleware
+
+# by the class of the middleware: what shows the topics
+_FOLDER = files("aerobat.links.ros") / "rviz"
+RVIZ = {
+    "RospyMiddleware": f"rviz -d {_FOLDER / 'ros1.rviz'}",
+    "RclpyMiddleware": f"rviz2 -d {_FOLDER / 'ros2.rviz'}",
+}
 
 
 class Node(Protocol):
