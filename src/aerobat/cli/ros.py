@@ -12,7 +12,6 @@ from aerobat.cli.link_options import RosOptions, RosVehicleOptions
 from aerobat.cli.runs.saved_plans import named_vehicle
 from aerobat.cli.terminal import say
 from aerobat.environment import Environment
-from aerobat.errors import SpecError
 from aerobat.links.autopilot.vehicle import SimulatedVehicle
 from aerobat.links.mission import MissionSettings
 from aerobat.links.ros.maneuver_node import ManeuverNode, NodeSettings
@@ -112,8 +111,5 @@ def _service(name: str) -> str:
 
 def _planner(problem: Problem, vehicle: Vehicle, options: RosOptions) -> Planner:
     name = options.planner or suited_planner(problem, vehicle)
-    cls = planner_class(name)
-    try:
-        return cls(**{"reserve": options.reserve})
-    except TypeError:
-        raise SpecError(f"the planner {name} knows no reserve; name another") from None
+    reserve: dict[str, float] = {"reserve": options.reserve}
+    return planner_class(name)(**reserve)
