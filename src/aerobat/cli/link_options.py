@@ -156,8 +156,8 @@ class RosVehicleOptions:
     """States a second."""
 
     speed: Annotated[float | None, Parameter(group=trials, validator=POSITIVE)] = None
-    """How fast time goes, told to all on the topic /clock: below 1, slow machines keep up. Default: it is ROS
-    time, and nothing is told."""
+    """How fast time goes at most, told to all on the topic /clock; it waits for goals that are late. Default:
+    it is ROS time, and nothing is told."""
 
     seconds: Annotated[float | None, Parameter(name="--for", group=trials, validator=POSITIVE)] = None
     """Seconds after which it ends. Default: when it is interrupted."""

@@ -88,7 +88,8 @@ def simulate(
         options: of the command.
     """
     found = named_vehicle(vehicle)
-    ros = join(None if options.speed is None else PacedClock(options.speed))
+    clock = None if options.speed is None else PacedClock(options.speed)
+    ros = join(clock)
     try:
         node = VehicleNode(
             ros,
@@ -96,7 +97,7 @@ def simulate(
             goal=options.goal,
             odometry=options.odometry,
             rate=options.rate,
-            clock=options.speed is not None,
+            clock=clock,
             say=say,
         )
         say(f"{found.name} stands on the ground, and obeys {options.goal}")

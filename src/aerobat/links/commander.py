@@ -19,6 +19,7 @@ from aerobat.links.goals import Observed, PathGoal, PositionGoal, yaw_of
 from aerobat.links.mission import Mission, Phase
 from aerobat.links.routes import goal_on, rest_to_rest
 from aerobat.simulation.autopilot.braking import MIN_FLOOR, Braking
+from aerobat.simulation.outcome import length
 from aerobat.trajectory import Trajectory
 from aerobat.vehicle import Vehicle
 
@@ -26,6 +27,8 @@ _SPEED, _ACCELERATION = 2.0, 2.0  # [m/s], [m/s²] of climbs
 _DESCENT = 1.0  # [m/s] when landing
 _BELOW = 0.3  # [m] under the ground, where the way of a landing ends, so that it is reached in motion
 _STANDING = 1.0  # [s] that goals stay there once it is reached
+_SPINNING_UP = 1.5  # [s] that goals stay on the ground before they climb, so that who obeys gets ready
+_ASTRAY = 1.5  # [m] from its goal, from which on a vehicle does not follow it
 _STILL = 0.15  # [m/s] of a hover
 _ALOFT = 0.3  # [m] above the ground, from which on a still vehicle hovers
 _RECENT = 0.5  # [s] for which what was seen counts as how it is
@@ -97,7 +100,7 @@ class Commander:
         here = np.array(seen.body.position)
         self.ground = float(here[2])
         up = rest_to_rest(here, here + height * so3.UP, _SPEED, _ACCELERATION)
-        self._go(Doing.CLIMBING, now, up, yaw_of(seen.body.q_world_body))
+        self._go(Doing.CLIMBING, now + _SPINNING_UP, up, yaw_of(seen.body.q_world_body))
 
     def hover(self, now: float) -> None:
         """Come to a hover from whatever it does. Raises SpecError where it does nothing."""
@@ -137,7 +140,7 @@ class Commander:
         """The goal for a period after this time [s]; None where the vehicle is left to itself."""
         if self.doing is Doing.MANEUVERING:
             return self._upright(self._of_mission(now))
-        if self._way is None or self._leave_unseen(now):
+        if self._way is None or self._leave_unseen(now) or self._leave_astray():
             return None
         since = now + self._period - self._way.began
         if self.doing is not Doing.LANDING and since >= self._way.path.duration:
@@ -186,6 +189,18 @@ class Commander:
         self._say(f"no news of the vehicle for {silence:.1f} s; it is left to itself")
         return True
 
+    def _leave_astray(self) -> bool:
+        """True where a vehicle does not follow its way: it is left to itself then."""
+        assert self.seen is not None and self._way is not None, "asked on a way only"  # noqa: PT018
+        path, began, yaw = self._way
+        asked = goal_on(path, max(self.seen.time - began, 0.0), yaw).position
+        off = float(np.linalg.norm(np.array(self.seen.body.position) - asked))
+        if off <= _ASTRAY:
+            return False
+        self.doing, self._way = Doing.NOTHING, None
+        self._say(f"the vehicle is {length(off)} off its goal; it is left to itself")
+        return True
+
     def _recent(self, now: float) -> Observed:
         if self.seen is None or now - self.seen.time > _RECENT:
             raise SpecError("nothing was heard of the vehicle lately; see that its odometry comes")
@@ -197,7 +212,7 @@ class Commander:
     def _on_way(self, now: float) -> PositionGoal:
         assert self._way is not None, "asked on a way only"
         path, began, yaw = self._way
-        return goal_on(path, now + self._period - began, yaw)
+        return goal_on(path, max(now + self._period - began, 0.0), yaw)
 
     def _hover_point(self) -> Array:
         assert self._way is not None, "it hovers at the end of a way"

@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from concurrent.futures import Future
+from math import inf
 from queue import Empty, SimpleQueue
 from typing import Any, Protocol, TypeAlias
 
@@ -12,20 +13,36 @@ from aerobat.interchange.ros import NANOSECONDS
 
 Answer: TypeAlias = Callable[[bool, str], None]  # success, and a sentence
 
+_PATIENCE = 2.0  # [s] of the wall, for which a clock waits
 _MAX_WAIT, _MIN_WAIT = 0.005, 0.0002  # [s] between looks at a clock that may run at another pace than ours
 
 
 class PacedClock:
-    """A clock that others follow, `speed` times as fast as the wall's; at first it shows the same."""
+    """A clock that others follow, `speed` times as fast as the wall's; at first it shows the same.
+
+    It waits for who is late, so that a flight is the same on a machine that has much else to do.
+    """
 
     def __init__(self, speed: float) -> None:
         self._speed = speed
         self._began = time.time_ns()
-        self._since = time.monotonic_ns()
+        self._elapsed = 0.0  # [ns] of this clock
+        self._looked = self._asked = time.monotonic()
+        self._end = inf  # [ns] of `_elapsed`, to be waited at
 
     def time(self) -> int:
         """The time [ns]."""
-        return self._began + round(self._speed * (time.monotonic_ns() - self._since))
+        wall = time.monotonic()
+        further = self._elapsed + NANOSECONDS * self._speed * (wall - self._looked)
+        waits = wall - self._asked < _PATIENCE
+        self._elapsed = min(further, max(self._end, self._elapsed)) if waits else further
+        self._looked = wall
+        return self._began + round(self._elapsed)
+
+    def wait_at(self, instant: int) -> None:
+        """Go no further than to a time [ns], until asked again or for as long as patience lasts."""
+        self.time()
+        self._end, self._asked = float(instant - self._began), self._looked
 
 
 class Middleware(Protocol):
@@ -82,7 +99,9 @@ class Calls:
             answered.set_result((success, sentence))
 
     def work_until(self, instant: int, clock: Callable[[], int]) -> None:
-        """Do calls until a time [ns] of a clock."""
+        """Do calls until a time [ns] of a clock, those that wait already in any case."""
+        for _ in range(self._waiting.qsize()):
+            self._waiting.get()()
         while (left := (instant - clock()) / NANOSECONDS) > 0.0:
             try:
                 call = self._waiting.get(timeout=min(max(left, _MIN_WAIT), _MAX_WAIT))

@@ -27,18 +27,21 @@ class RclpyMiddleware:
         """
         self._rclpy = rclpy = _rclpy()
         from rclpy.callback_groups import ReentrantCallbackGroup
-        from rclpy.executors import MultiThreadedExecutor
+        from rclpy.executors import MultiThreadedExecutor, SingleThreadedExecutor
         from rclpy.parameter import Parameter
         from rclpy.signals import SignalHandlerOptions
 
         rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
         self._node = rclpy.create_node(name, parameter_overrides=[Parameter("use_sim_time", value=sim_time)])
+        # a node of their own: the executor that lets them wait takes several times as long for each message
+        self._waiting = rclpy.create_node(f"{name}_services")
         self._clock = clock
         self._calls = Calls()
         self._services = ReentrantCallbackGroup()
-        self._executor = MultiThreadedExecutor(_THREADS)
-        self._executor.add_node(self._node)
-        Thread(target=self._executor.spin, daemon=True).start()
+        self._executors = SingleThreadedExecutor(), MultiThreadedExecutor(_THREADS)
+        for executor, node in zip(self._executors, (self._node, self._waiting), strict=True):
+            executor.add_node(node)
+            Thread(target=executor.spin, daemon=True).start()
 
     @staticmethod
     def make(kind: str, /, **given: Any) -> Any:
@@ -76,7 +79,7 @@ class RclpyMiddleware:
             response.success, response.message = self._calls.answer(take)
             return response
 
-        self._node.create_service(trigger, service, respond, callback_group=self._services)
+        self._waiting.create_service(trigger, service, respond, callback_group=self._services)
 
     def work_until(self, instant: int) -> None:
         """See `Middleware.work_until`."""
@@ -85,7 +88,8 @@ class RclpyMiddleware:
     def close(self) -> None:
         """See `Middleware.close`."""
         self._calls.close()
-        self._executor.shutdown(0.0)
+        for executor in self._executors:
+            executor.shutdown(0.0)
         self._rclpy.try_shutdown()
 
 
