@@ -154,7 +154,7 @@ def ros2_services(node: Any) -> Ask:
         wait(lambda: answered.done() or time.monotonic() > end, service)
         if (
             not answered.done()
-        ):  # a server that was killed is known for a while, and may have got the question
+        ):  # a server that was killed is known for a while, and may have been asked
             return ask(service)
         answer = answered.result()
         return answer.success, answer.message

@@ -17,8 +17,9 @@ from aerobat.states import BodyState
 
 WORLD, BODY = "world", "base_link"
 NANOSECONDS = 10**9
-LINE_STRIP, CYLINDER = 4, 3  # kinds of markers
+LINE_STRIP, LINE_LIST, CYLINDER = 4, 5, 3  # kinds of markers
 DISC_HEIGHT = 0.01  # [m]
+BLACK = (0.1, 0.1, 0.1)
 
 
 class Make(Protocol):
@@ -125,6 +126,32 @@ class Messages:
             scale=self.vector("Vector3", np.array([width, 0.0, 0.0])),
             color=self._color(color),
             points=[self.vector("Point", point) for point in points],
+        )
+
+    def cross(
+        self, stamp: int, name: str, number: int, *, position: Array, q: Array, ends: Array, width: float
+    ) -> Any:
+        """A marker of arms from a middle.
+
+        Args:
+            stamp: when [ns].
+            name: what it belongs to.
+            number: of it there.
+            position: of the middle [m], (3,).
+            q: its attitude, (4,).
+            ends: of the arms [m], in its own axes, (arms, 3).
+            width: of the lines [m].
+        """
+        points = [self.vector("Point", point) for end in ends for point in (np.zeros(3), end)]
+        return self._marker(
+            stamp,
+            name,
+            number,
+            type=LINE_LIST,
+            pose=self.pose(position, q),
+            scale=self.vector("Vector3", np.array([width, 0.0, 0.0])),
+            color=self._color(BLACK),
+            points=points,
         )
 
     def disc(

@@ -79,19 +79,23 @@ class PlanMessages:
             lines.append(self.messages.line(stamp, gate.name, frame, width=FRAME_WIDTH, color=ORANGE))
         return lines
 
-    def snapshots(self) -> Iterator[tuple[float, Sequence[Any]]]:
-        """Markers of the vehicle at the start, at each stage and at the end, after their times [s]."""
+    def snapshots(self, every: float = np.inf) -> Iterator[tuple[float, Sequence[Any]]]:
+        """Markers of the vehicle at the start, at each stage and at the end, after their times [s].
+
+        `every`: so often [s] on the way, too.
+        """
         stages = ((stage.name, stage.time) for stage in self.plan.stages)
-        instants = sorted(
-            [("start", 0.0), *stages, ("end", self.plan.duration)], key=lambda instant: instant[1]
-        )
+        between = np.arange(every, self.plan.duration, every) if np.isfinite(every) else ()
+        instants = [("start", 0.0), *stages, ("end", self.plan.duration)]
+        instants += [(f"{time:.2f} s", float(time)) for time in between]
+        instants.sort(key=lambda instant: instant[1])
         shown = reference(self.plan, times=[time for _, time in instants]).setpoint
         for row, (name, time) in enumerate(instants):
             position, q = shown.flat.position[row] + self.origin, shown.q_world_body[row]
-            yield time, self._discs(f"vehicle: {name}", row, position, q, self._stamp(time))
+            yield time, self._vehicle(f"vehicle: {name}", row, position, q, self._stamp(time))
 
-    def _discs(self, name: str, row: int, position: Array, q: Array, stamp: int) -> Sequence[Any]:
-        """The rotors of the vehicle at one instant, numbered apart from those of others of its name.
+    def _vehicle(self, name: str, row: int, position: Array, q: Array, stamp: int) -> Sequence[Any]:
+        """The rotors and arms of the vehicle at one instant, numbered apart from those of others of its name.
 
         Args:
             name: what is then.
@@ -102,11 +106,16 @@ class PlanMessages:
         """
         assert self.plan.vehicle is not None, "messages are of plans with a vehicle"
         rotors = self.plan.vehicle.rotors
-        return [
+        first = row * (len(rotors) + 1)
+        ends = np.array([rotor.position_body for rotor in rotors])
+        arms = self.messages.cross(
+            stamp, name, first + len(rotors), position=position, q=q, ends=ends, width=PATH_WIDTH
+        )
+        discs = [
             self.messages.disc(
                 stamp,
                 name,
-                row * len(rotors) + number,
+                first + number,
                 position=position + so3.rotate(q, rotor.position_body),
                 q=q,
                 radius=rotor.radius,
@@ -114,6 +123,7 @@ class PlanMessages:
             )
             for number, rotor in enumerate(rotors)
         ]
+        return [arms, *discs]
 
     def _trajectory(self, found: Reference, stamps: Sequence[int]) -> Stamped:
         """All points in one message, everything in world axes, as controllers of multirotors take them."""

@@ -26,6 +26,7 @@ from aerobat.problem import Problem
 from aerobat.vehicle import Vehicle
 
 _DELETE_ALL = 3  # what a marker does to those before it
+_SHOWN_EVERY = 0.15  # [s] between snapshots of the vehicle along a path that is shown
 _SHOWN_RATE = 50.0  # [1/s] of the points of a path that is shown
 
 
@@ -176,6 +177,6 @@ class ManeuverNode:
         kind = "visualization_msgs/msg/Marker"
         wipe = self._messages.make(kind, header=self._messages.header(stamp), action=_DELETE_ALL)
         lines = shown.lines(reference(planned.plan, rate=_SHOWN_RATE))
-        discs = [disc for _, found in shown.snapshots() for disc in found]
+        discs = [disc for _, found in shown.snapshots(_SHOWN_EVERY) for disc in found]
         markers = self._messages.make(topics.KIND_OF_MARKERS, markers=[wipe, *lines, *discs])
         self._send_markers(markers)
