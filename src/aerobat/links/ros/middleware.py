@@ -13,14 +13,15 @@ from aerobat.interchange.ros import NANOSECONDS
 
 Answer: TypeAlias = Callable[[bool, str], None]  # success, and a sentence
 
-_PATIENCE = 2.0  # [s] of the wall, for which a clock waits
+_PATIENCE = 5.0  # [s] of the wall, for which a clock waits
+_MAX_STEP = 0.01  # [s] between two looks at a clock that waits, its own process' being held up among it
 _MAX_WAIT, _MIN_WAIT = 0.005, 0.0002  # [s] between looks at a clock that may run at another pace than ours
 
 
 class PacedClock:
     """A clock that others follow, `speed` times as fast as the wall's; at first it shows the same.
 
-    It waits for who is late, so that a flight is the same on a machine that has much else to do.
+    It waits for who is late, itself among them, so that a flight is the same on a busy machine.
     """
 
     def __init__(self, speed: float) -> None:
@@ -33,7 +34,8 @@ class PacedClock:
     def time(self) -> int:
         """The time [ns]."""
         wall = time.monotonic()
-        further = self._elapsed + NANOSECONDS * self._speed * (wall - self._looked)
+        passed = min(self._speed * (wall - self._looked), _MAX_STEP)
+        further = self._elapsed + NANOSECONDS * passed
         waits = wall - self._asked < _PATIENCE
         self._elapsed = min(further, max(self._end, self._elapsed)) if waits else further
         self._looked = wall
