@@ -60,7 +60,7 @@ class Middleware(Protocol):
         """Announce a topic; what sends a message to it. Latched, the last one reaches who comes later."""
 
     def subscribe(self, topic: str, kind: str, take: Callable[[Any], None], every: bool = True) -> None:
-        """Have messages of a topic taken, in order: `every` one, or those that come through at once."""
+        """Have messages of a topic taken, in order: `every` one, or where they come too fast the newest."""
 
     def offer(self, service: str, take: Callable[[Answer], None]) -> None:
         """Offer a service of std_srvs/Trigger; what takes a request answers it, now or later."""

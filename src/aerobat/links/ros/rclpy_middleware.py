@@ -11,6 +11,7 @@ from aerobat.errors import BackendMissing
 from aerobat.links.ros.middleware import Answer, Calls, PacedClock
 
 _QUEUE = 1000  # messages that wait for a slow receiver: ten seconds of goals
+_NEWEST = 5  # messages of which not every one counts
 _THREADS = 4  # services wait for their answers, each in one
 
 
@@ -68,7 +69,7 @@ class RclpyMiddleware:
             _type(kind),
             topic,
             lambda message: self._calls.put(lambda: take(message)),
-            qos.QoSProfile(depth=_QUEUE, reliability=reliability),
+            qos.QoSProfile(depth=_QUEUE if every else _NEWEST, reliability=reliability),
         )
 
     def offer(self, service: str, take: Callable[[Answer], None]) -> None:

@@ -10,6 +10,7 @@ from aerobat.errors import BackendMissing, SpecError
 from aerobat.links.ros.middleware import Answer, Calls, PacedClock
 
 _SIM_TIME = "/use_sim_time"  # the parameter that nodes read when they begin
+_NEWEST = 5  # messages of which not every one counts
 _QUEUE = 1000  # messages that wait for a slow receiver: ten seconds of goals
 
 
@@ -54,9 +55,13 @@ class RospyMiddleware:
         return publish
 
     def subscribe(self, topic: str, kind: str, take: Callable[[Any], None], every: bool = True) -> None:
-        """See `Middleware.subscribe`; over TCP every one comes through."""
+        """See `Middleware.subscribe`."""
         self._rospy.Subscriber(
-            topic, _type(kind), lambda message: self._calls.put(lambda: take(message)), tcp_nodelay=True
+            topic,
+            _type(kind),
+            lambda message: self._calls.put(lambda: take(message)),
+            queue_size=None if every else _NEWEST,
+            tcp_nodelay=True,
         )
 
     def offer(self, service: str, take: Callable[[Answer], None]) -> None:
