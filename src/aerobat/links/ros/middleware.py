@@ -9,11 +9,13 @@ from math import inf
 from queue import Empty, SimpleQueue
 from typing import Any, Protocol, TypeAlias
 
+from aerobat.errors import SpecError
 from aerobat.interchange.ros import NANOSECONDS
 
 Answer: TypeAlias = Callable[[bool, str], None]  # success, and a sentence
 
 _PATIENCE = 5.0  # [s] of the wall, for which a clock waits
+_FIRST_TIME = 20.0  # [s] of the wall, for which somebody who tells the time is waited for
 _MAX_STEP = 0.01  # [s] between two looks at a clock that waits, its own process' being held up among it
 _MAX_WAIT, _MIN_WAIT = 0.005, 0.0002  # [s] between looks at a clock that may run at another pace than ours
 
@@ -70,6 +72,15 @@ class Middleware(Protocol):
 
     def close(self) -> None:
         """Leave."""
+
+
+def require_time(clock: Callable[[], int]) -> None:
+    """Wait for simulated time to begin. Raises SpecError where nobody tells it."""
+    end = time.monotonic() + _FIRST_TIME
+    while clock() == 0:
+        if time.monotonic() > end:
+            raise SpecError("ROS time is simulated, but nobody tells it on /clock; start the simulator first")
+        time.sleep(_MAX_WAIT)
 
 
 class Calls:

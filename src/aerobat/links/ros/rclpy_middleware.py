@@ -8,7 +8,7 @@ from threading import Thread
 from typing import Any
 
 from aerobat.errors import BackendMissing
-from aerobat.links.ros.middleware import Answer, Calls, PacedClock
+from aerobat.links.ros.middleware import Answer, Calls, PacedClock, require_time
 
 _QUEUE = 1000  # messages that wait for a slow receiver: ten seconds of goals
 _NEWEST = 5  # messages of which not every one counts
@@ -19,7 +19,7 @@ class RclpyMiddleware:
     """A node of ROS 2; see `Middleware`."""
 
     def __init__(self, name: str, clock: PacedClock | None = None, sim_time: bool = False) -> None:
-        """Join the graph. Raises BackendMissing without rclpy.
+        """Join the graph. Raises SpecError where time stands still, BackendMissing without rclpy.
 
         Args:
             name: of the node.
@@ -43,6 +43,7 @@ class RclpyMiddleware:
         for executor, node in zip(self._executors, (self._node, self._waiting), strict=True):
             executor.add_node(node)
             Thread(target=executor.spin, daemon=True).start()
+        require_time(self.time)
 
     @staticmethod
     def make(kind: str, /, **given: Any) -> Any:

@@ -7,7 +7,7 @@ from importlib import import_module
 from typing import Any
 
 from aerobat.errors import BackendMissing, SpecError
-from aerobat.links.ros.middleware import Answer, Calls, PacedClock
+from aerobat.links.ros.middleware import Answer, Calls, PacedClock, require_time
 
 _SIM_TIME = "/use_sim_time"  # the parameter that nodes read when they begin
 _NEWEST = 5  # messages of which not every one counts
@@ -18,7 +18,9 @@ class RospyMiddleware:
     """A node of ROS 1; see `Middleware`."""
 
     def __init__(self, name: str, clock: PacedClock | None = None) -> None:
-        """Register with the master. Raises SpecError where none answers, BackendMissing without rospy.
+        """Register with the master.
+
+        Raises SpecError where none answers or time stands still, BackendMissing without rospy.
 
         Args:
             name: of the node.
@@ -34,6 +36,7 @@ class RospyMiddleware:
         self._calls = Calls()
         if clock is not None:
             rospy.set_param(_SIM_TIME, True)
+        require_time(self.time)
 
     @staticmethod
     def make(kind: str, /, **given: Any) -> Any:
