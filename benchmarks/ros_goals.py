@@ -20,6 +20,7 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests"))
 
+from aerobat.interchange.ros import NANOSECONDS
 from aerobat.links.ros import topics
 from ros_session import asked, session, whole
 
@@ -39,10 +40,10 @@ def main() -> None:
             ages.append(time.time() - stamps[-1])
 
         ros.subscribe(topics.GOAL, topics.KIND_OF_GOAL, take)
-        watch.wait_for(2.0)
+        ros.work_until(ros.time() + 2 * NANOSECONDS)
         ages.clear()
         watch.goals.clear()
-        watch.wait_for(seconds)
+        ros.work_until(ros.time() + round(seconds * NANOSECONDS))
         count, taken = len(ages), 1e3 * np.array(ages)
         arrivals = np.diff(taken)
         lasted = whole(watch.goals, waits=False)
