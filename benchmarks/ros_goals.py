@@ -22,7 +22,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests"))
 
 from aerobat.interchange.ros import NANOSECONDS
 from aerobat.links.ros import topics
-from ros_session import asked, session, whole
+from ros_session import brought, session, whole
 
 
 def main() -> None:
@@ -30,8 +30,7 @@ def main() -> None:
     seconds = float(sys.argv[2]) if len(sys.argv) > 2 else 30.0
     with session(generation, speed=None) as (ros, watch, ask, node), node():
         watch.wait(lambda: bool(watch.states), "odometry")
-        asked(ask, "takeoff")
-        watch.wait(lambda: bool(watch.goals) and watch.hovers, "the take-off")
+        brought(watch, ask, "takeoff", lambda: bool(watch.goals) and watch.hovers)
         ages: list[float] = []
         stamps: list[float] = []
 

@@ -31,6 +31,7 @@ from aerobat.links.ros.middleware import Middleware
 
 SPEED = "1"  # times the wall's, at most
 ANSWERED = 30.0  # [s] of the wall, for which a plan may take on a busy machine
+LONG = 15.0  # [s] of the vehicle's time, for a take-off or a landing
 LONG_ENOUGH = 30.0  # [s] of goals
 MORE = 0.02  # [m] that a flight by topics may be off more than one in process, which is off by 0.01 mm
 
@@ -98,8 +99,12 @@ class Watch:
 
     def wait_for(self, seconds: float) -> None:
         """Take messages for a time of the vehicle's [s]."""
+        self.wait(self.passed(seconds), f"{seconds} s to pass")
+
+    def passed(self, seconds: float, unless: Callable[[], bool] = lambda: False) -> Callable[[], bool]:
+        """True once so much of the vehicle's time [s] has passed, or something holds."""
         end = self.now + seconds
-        self.wait(lambda: self.now >= end, f"{seconds} s to pass")
+        return lambda: self.now >= end or unless()
 
     @property
     def now(self) -> float:
@@ -171,6 +176,17 @@ def asked(ask: Ask, service: str) -> None:
         time.sleep(0.2)
 
 
+def brought(watch: Watch, ask: Ask, service: str, there: Callable[[], bool]) -> None:
+    """Have the vehicle brought up or down.
+
+    Where it has not yet found who sends goals it does not move, and the node leaves it to itself: then again.
+    """
+    while not there():
+        watch.goals.clear()
+        asked(ask, service)
+        watch.wait(watch.passed(LONG, there), service)
+
+
 def whole(goals: list[PathPiece], waits: bool = True) -> float:
     """The time [s] that goals last: each begins when and where the one before ends, so that none was lost.
 
@@ -196,8 +212,7 @@ def fly(watch: Watch, ask: Ask, node: Callable[[], Any]) -> None:
     with node() as killed:
         refused, why = ask("/aerobat/flip")
         assert not refused, why
-        asked(ask, "takeoff")
-        watch.wait(lambda: bool(watch.goals) and watch.hovers, "the take-off")
+        brought(watch, ask, "takeoff", lambda: bool(watch.goals) and watch.hovers)
         watch.wait_for(2.0)
         asked(ask, "flip")
         watch.wait(lambda: bool(watch.reports), "a report")
@@ -220,8 +235,7 @@ def fly(watch: Watch, ask: Ask, node: Callable[[], Any]) -> None:
     lasted = whole(watch.goals)
     print(f"{last} goals in {lasted:.1f} s, none lost; {report}; killed in mid-flip, hovers", flush=True)
     with node():
-        asked(ask, "land")
-        watch.wait(lambda: watch.states[-1].body.position[2] < 0.01, "the landing")
+        brought(watch, ask, "land", lambda: watch.states[-1].body.position[2] < 0.01)
         watch.wait_for(2.0)
         assert hypot(*watch.states[-1].body.velocity) < 1e-6
 
