@@ -6,7 +6,7 @@ from typing import Annotated
 
 from cyclopts import Group, Parameter, validators
 
-from aerobat.cli.options import POSITIVE, Plugins, output
+from aerobat.cli.options import POSITIVE, Plugins, output, planning
 
 linking = Group("Link", sort_key=1)
 trials = Group("Trials", sort_key=2)
@@ -82,6 +82,82 @@ class MavlinkVehicleOptions:
 
     speed: Annotated[float, Parameter(group=trials, validator=POSITIVE)] = 1.0
     """How fast time goes, 1 as it does: below it, slow machines keep up."""
+
+    seconds: Annotated[float | None, Parameter(name="--for", group=trials, validator=POSITIVE)] = None
+    """Seconds after which it ends. Default: when it is interrupted."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class RosOptions:
+    """Options of a ROS node that flies maneuvers."""
+
+    vehicle: Annotated[str, Parameter(group=planning)] = "agile-quad"
+    """The vehicle that is flown: a name that `aerobat vehicles` lists, or a TOML file."""
+
+    planner: Annotated[str | None, Parameter(group=planning)] = None
+    """How to plan, with its own defaults; see `aerobat plan`. Default: what suits each problem."""
+
+    reserve: Annotated[float, Parameter(group=planning, validator=FRACTION)] = 0.15
+    """The fraction of thrusts that plans leave to the controller."""
+
+    world: Annotated[bool, Parameter(group=planning, negative="")] = False
+    """Gates and goals stay in the world where their problems have them. Default: they move along, so that
+    each maneuver begins where the vehicle is."""
+
+    rate: Annotated[float, Parameter(group=linking, validator=validators.Number(gte=50, lte=250))] = 100.0
+    """Goals a second."""
+
+    takeoff_height: Annotated[float, Parameter(group=linking, validator=POSITIVE)] = 3.0
+    """Metres that the service takeoff climbs."""
+
+    goal: Annotated[str, Parameter(group=linking)] = "/aerobat/goal"
+    """The topic of goals."""
+
+    odometry: Annotated[str, Parameter(group=linking)] = "/aerobat/odometry"
+    """The topic of the vehicle's state."""
+
+    jerk: Annotated[bool, Parameter(group=linking)] = True
+    """Goals tell the jerk, as a second joint; some controllers warn of more than one."""
+
+    max_error: Annotated[float, Parameter(group=bounds, validator=POSITIVE)] = 1.0
+    """Metres off the path at which a maneuver is given up: the vehicle is brought to a hover."""
+
+    max_silence: Annotated[float, Parameter(group=bounds, validator=POSITIVE)] = 0.25
+    """Seconds without odometry, in a maneuver, at which it is given up: goals stop."""
+
+    max_lateness: Annotated[float, Parameter(group=bounds, validator=POSITIVE)] = 0.1
+    """Seconds by which a goal may be late, in a maneuver."""
+
+    seconds: Annotated[float | None, Parameter(name="--for", group=trials, validator=POSITIVE)] = None
+    """Seconds after which it ends. Default: when it is interrupted."""
+
+    plugins: Annotated[tuple[Path, ...], Plugins(group=planning)] = ()
+
+
+@dataclass(frozen=True, kw_only=True)
+class Ros2Options(RosOptions):
+    """Options of a node of ROS 2."""
+
+    sim_time: Annotated[bool, Parameter(group=linking, negative="")] = False
+    """Time is that of the topic /clock (use_sim_time)."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class RosVehicleOptions:
+    """Options of a simulated vehicle that is a ROS node."""
+
+    goal: Annotated[str, Parameter(group=linking)] = "/aerobat/goal"
+    """The topic of goals."""
+
+    odometry: Annotated[str, Parameter(group=linking)] = "/aerobat/odometry"
+    """The topic of the vehicle's state."""
+
+    rate: Annotated[float, Parameter(group=linking, validator=validators.Number(gte=20, lte=250))] = 100.0
+    """States a second."""
+
+    speed: Annotated[float | None, Parameter(group=trials, validator=POSITIVE)] = None
+    """How fast time goes at most, told to all on the topic /clock; it waits for goals that are late. Default:
+    it is ROS time, and nothing is told."""
 
     seconds: Annotated[float | None, Parameter(name="--for", group=trials, validator=POSITIVE)] = None
     """Seconds after which it ends. Default: when it is interrupted."""

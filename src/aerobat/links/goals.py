@@ -6,6 +6,8 @@ from enum import StrEnum
 from math import atan2
 from typing import NamedTuple
 
+import numpy as np
+
 from aerobat import so3
 from aerobat.arrays import Array
 from aerobat.kernels.ops import Quaternion, Vector
@@ -21,6 +23,10 @@ class Mode(StrEnum):
     OFFBOARD = "offboard"
 
 
+_STILL: Array = np.zeros(3)
+_STILL.flags.writeable = False
+
+
 class PositionGoal(NamedTuple):
     """A point to be at, moving as it says."""
 
@@ -28,6 +34,38 @@ class PositionGoal(NamedTuple):
     velocity: Array  # [m/s], (3,)
     acceleration: Array  # [m/s²], (3,)
     yaw: float  # [rad] of the body's x axis about the vertical, from east
+    jerk: Array = _STILL  # [m/s³], (3,)
+
+
+class PathGoal(NamedTuple):
+    """A point of a path, with the attitude that it is passed in; all of it in world axes."""
+
+    position: Array  # [m], (3,)
+    velocity: Array  # [m/s], (3,)
+    acceleration: Array  # [m/s²], (3,)
+    jerk: Array  # [m/s³], (3,)
+    q_world_body: Array  # (4,)
+    omega: Array  # [rad/s], (3,)
+    omega_dot: Array  # [rad/s²], (3,)
+
+    @classmethod
+    def upright(cls, goal: PositionGoal, gravity: float) -> PathGoal:
+        """A point of a way near a hover, leaning as its acceleration asks; its rates change slowly."""
+        thrust = goal.acceleration + gravity * so3.UP
+        size = float(np.linalg.norm(thrust))
+        heading = so3.about_axis(so3.UP, goal.yaw)
+        q = so3.multiply(so3.smallest_rotation(so3.UP, thrust / size), heading)
+        omega = so3.cross(thrust, goal.jerk) / size**2
+        return cls(goal.position, goal.velocity, goal.acceleration, goal.jerk, q, omega, _STILL)
+
+
+class PathPiece(NamedTuple):
+    """A short piece of a path, as the two points at its ends."""
+
+    begin: PathGoal
+    end: PathGoal
+    stamp: float  # [s] when it begins
+    duration: float  # [s]
 
 
 class AttitudeGoal(NamedTuple):

@@ -7,15 +7,15 @@ from __future__ import annotations
 
 from enum import StrEnum
 from math import hypot, pi
+from typing import Generic, Protocol, TypeVar
 
 import numpy as np
 
 from aerobat.arrays import Array
 from aerobat.declaration import Positive, declared
 from aerobat.errors import SpecError
-from aerobat.links.goals import AttitudeGoal, Observed, PositionGoal, yaw_of
-from aerobat.links.path_follower import PathFollower
-from aerobat.links.routes import rest_to_rest
+from aerobat.links.goals import Observed, PositionGoal, yaw_of
+from aerobat.links.routes import goal_on, rest_to_rest
 from aerobat.links.stream import SetpointStream
 from aerobat.planning import Plan
 from aerobat.simulation.autopilot.braking import Braking
@@ -55,24 +55,40 @@ class MissionSettings:
     max_lateness: Positive = 0.1  # [s] by which a set-point may miss its time while the plan is flown
 
 
-class Mission:
+GoalT_co = TypeVar("GoalT_co", covariant=True)
+
+
+class Follower(Protocol[GoalT_co]):
+    """Goals along a path, from what is seen of the vehicle; times are since the path's start [s]."""
+
+    def observe(self, observed: Observed) -> None:
+        """Take note of a state."""
+
+    def command(self, time: float) -> GoalT_co:
+        """The goal at a time. Something must have been observed before."""
+
+
+class Mission(Generic[GoalT_co]):
     """The course of a flight: the goal of each tick, from what is seen of the vehicle."""
 
-    def __init__(self, plan: Plan, settings: MissionSettings, offset: Array) -> None:
+    def __init__(
+        self, plan: Plan, settings: MissionSettings, stream: SetpointStream, follower: Follower[GoalT_co]
+    ) -> None:
         """Prepare to fly a plan.
 
         Args:
             plan: what is flown, certified for its vehicle; see `require_flyable`.
             settings: how.
-            offset: where the plan's origin lies in the vehicle's own frame [m], ENU, (3,).
+            stream: its set-points, in the vehicle's own frame.
+            follower: the goals along them.
         """
         assert plan.vehicle is not None, "a plan that is flyable has a vehicle"
         self.settings = settings
         self.phase = Phase.READY
         self.reason = ""  # of an abort
         environment = plan.problem.environment
-        self.stream = SetpointStream(plan.trajectory, plan.vehicle, environment, offset)
-        self._follower = PathFollower(self.stream, plan.vehicle, environment)
+        self.stream = stream
+        self._follower = follower
         first, last = self.stream.flat(0.0), self.stream.flat(self.stream.duration)
         speed = float(np.linalg.norm(first.velocity))
         if speed > _SLOW:
@@ -97,11 +113,17 @@ class Mission:
         above = np.array([here[0], here[1], max(self._start[2], here[2] + _CLIMB)])
         limits = (self.settings.cruise_speed, self.settings.cruise_acceleration)
         self._routes = [rest_to_rest(here, above, *limits), rest_to_rest(above, self._start, *limits)]
-        yaw = yaw_of(seen.body.q_world_body)
-        self._turn = (yaw, (self._heading - yaw + pi) % (2 * pi) - pi)
+        self._turn = self._turn_from(seen)
         self._enter(Phase.CLIMB, now)
 
-    def step(self, now: float, seen: Observed, delay: float = 0.0) -> PositionGoal | AttitudeGoal | None:
+    def join(self, now: float, seen: Observed) -> None:
+        """Go to the plan's start from a hover; `seen` is where."""
+        limits = (self.settings.cruise_speed, self.settings.cruise_acceleration)
+        self._routes = [rest_to_rest(np.array(seen.body.position), self._start, *limits)]
+        self._turn = self._turn_from(seen)
+        self._enter(Phase.APPROACH, now)
+
+    def step(self, now: float, seen: Observed, delay: float = 0.0) -> PositionGoal | GoalT_co | None:
         """The goal at this time; None where the vehicle is to look after itself: to hold, or to land.
 
         `seen` is the latest of the vehicle, `delay` [s] how long a goal is on its way to it.
@@ -126,10 +148,20 @@ class Mission:
             self.reason = reason
             self._enter(Phase.ABORTED, now)
 
+    @property
+    def end(self) -> PositionGoal:
+        """The hover after the plan."""
+        return goal_on(self._after, self._after.duration, self._final_yaw)
+
     def error(self, seen: Observed) -> float:
         """How far the vehicle is off the plan at the time that it was seen [m]."""
         expected = self.stream.flat(seen.time - self.maneuver_began).position
         return float(np.linalg.norm(np.array(seen.body.position) - expected))
+
+    def _turn_from(self, seen: Observed) -> tuple[float, float]:
+        """The yaw of a vehicle [rad], and how far it has to turn to the plan's."""
+        yaw = yaw_of(seen.body.q_world_body)
+        return yaw, (self._heading - yaw + pi) % (2 * pi) - pi
 
     def _enter(self, phase: Phase, now: float) -> None:
         self.phase, self.began = phase, now
@@ -158,7 +190,7 @@ class Mission:
             self._routes = self._routes[1:]
             self._turn = (yaw + turn, 0.0)
             self._enter(following, now)
-        return _on(route, since, yaw + turn * since / route.duration)
+        return goal_on(route, since, yaw + turn * since / route.duration)
 
     def _settle(self, now: float, seen: Observed) -> None:
         """Begin the plan once the vehicle has been at rest at its start for long enough."""
@@ -174,20 +206,20 @@ class Mission:
         elif now - self.began > self.settings.patience:
             self.abort(now, f"the vehicle does not come to rest at the plan's start, it is {length(off)} off")
 
-    def _maneuver(self, now: float, seen: Observed, delay: float) -> PositionGoal | AttitudeGoal:
+    def _maneuver(self, now: float, seen: Observed, delay: float) -> PositionGoal | GoalT_co:
         since = now - self.maneuver_began + delay
         if since >= self.stream.duration:
             self._enter(Phase.HOLD, now)
-            return _on(self._after, 0.0, self._final_yaw)
+            return goal_on(self._after, 0.0, self._final_yaw)
         self._follower.observe(seen._replace(time=seen.time - self.maneuver_began))
         return self._follower.command(since)
 
     def _hovering(self, now: float) -> PositionGoal | None:
         """The goal at the plan's start or end."""
         if self.phase is Phase.SETTLE:
-            return _on(rest_to_rest(self._start, self._start, 1.0, 1.0), 0.0, self._heading)
+            return goal_on(rest_to_rest(self._start, self._start, 1.0, 1.0), 0.0, self._heading)
         if self.phase is Phase.HOLD:
-            return _on(self._after, min(now - self.began, self._after.duration), self._final_yaw)
+            return goal_on(self._after, now - self.began, self._final_yaw)
         return None
 
 
@@ -222,8 +254,3 @@ def require_flyable(plan: Plan, offset: Array, vehicle_name: str | None = None) 
         raise SpecError(
             f"{label} would go down to {lowest:.2f} m over where the vehicle stands; raise its origin"
         )
-
-
-def _on(route: Trajectory, time: float, yaw: float) -> PositionGoal:
-    flat = route.flat(time)
-    return PositionGoal(flat.position, flat.velocity, flat.acceleration, yaw)

@@ -9,6 +9,8 @@ from __future__ import annotations
 
 from collections import deque
 
+import numpy as np
+
 from aerobat.control.parameters import controller_parameters
 from aerobat.engines.floats import FloatOps, first_numbers
 from aerobat.environment import Environment
@@ -25,10 +27,27 @@ from aerobat.kernels.ops import Vector
 from aerobat.kernels.quaternions import axes, to_body
 from aerobat.kernels.rigid_body import Body
 from aerobat.kernels.vectors import add_scaled, norm, subtract
-from aerobat.links.goals import AttitudeGoal, Observed
+from aerobat.links.goals import AttitudeGoal, Observed, PathGoal
 from aerobat.links.stream import SetpointStream
 from aerobat.vehicle import Vehicle
 from aerobat.vehicle.fleet import Fleet
+
+
+class PathForwarder:
+    """The points of a stream as they are, for vehicles whose own controller tracks them."""
+
+    def __init__(self, stream: SetpointStream) -> None:
+        self._stream = stream
+
+    def observe(self, observed: Observed) -> None:
+        """Let the vehicle see to its errors."""
+
+    def command(self, time: float) -> PathGoal:
+        """The goal at a time [s] since the plan's start."""
+        point = self._stream.at(time)
+        flat = self._stream.flat(time)
+        turning = (np.array(part) for part in (point.q_world_body, point.omega, point.omega_dot))
+        return PathGoal(flat.position, flat.velocity, flat.acceleration, flat.jerk, *turning)
 
 
 class PathFollower:

@@ -7,6 +7,7 @@ from math import sqrt
 import numpy as np
 
 from aerobat.arrays import Array
+from aerobat.links.goals import PositionGoal
 from aerobat.trajectory import Trajectory, minimum_effort
 
 _SHORTEST = 0.2  # [s] of any route, however near its end is
@@ -29,3 +30,10 @@ def rest_to_rest(start: Array, goal: Array, max_speed: float, max_acceleration: 
     ends = np.zeros((2, 3, 3))
     ends[0, 0], ends[1, 0] = start, goal
     return minimum_effort(ends, [max(by_speed, by_acceleration, _SHORTEST)])
+
+
+def goal_on(route: Trajectory, time: float, yaw: float) -> PositionGoal:
+    """The goal at a time [s] on a route to a hover, at its end from then on, at a yaw [rad]."""
+    flat = route.flat(min(time, route.duration))
+    jerk = flat.jerk if time < route.duration else np.zeros(3)  # it jumps to rest
+    return PositionGoal(flat.position, flat.velocity, flat.acceleration, yaw, jerk)

@@ -13,7 +13,8 @@ import numpy as np
 from aerobat.errors import BackendMissing
 from aerobat.flatness import reference
 from aerobat.interchange.exports.loss import Content, Rows
-from aerobat.interchange.exports.messages import NANOSECONDS, Messages, Stamped
+from aerobat.interchange.exports.stored_types import StoredTypes
+from aerobat.interchange.ros import NANOSECONDS, Messages, PlanMessages, Stamped
 from aerobat.planning import Plan
 
 NAME = "plan"
@@ -31,7 +32,8 @@ def _bag(container: str, plan: Plan, rate: float) -> Content:
     store = get_typestore(Stores.ROS1_NOETIC if container == "ros1" else Stores.ROS2_HUMBLE)
     times = np.unique(np.floor(plan.trajectory.sample(rate) * NANOSECONDS)) / NANOSECONDS
     found = reference(plan, times=times)
-    messages = sorted(Messages(store).of(plan, found), key=lambda each: each.stamp)
+    made = PlanMessages(Messages(StoredTypes(store)), plan).all(found)
+    messages = sorted(made, key=lambda each: each.stamp)
     loss = Rows.of(found).loss(plan)
     with tempfile.TemporaryDirectory() as scratch:  # the writers want a place of their own
         write = _write_ros1 if container == "ros1" else partial(_write_ros2, container)

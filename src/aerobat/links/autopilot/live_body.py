@@ -40,12 +40,9 @@ class LiveBody:
         self._carry: Tree = self._loop.init(first)
         self.stop_rotors()
 
-    def fly(self, references: ReferencePoint, by_attitude: bool) -> None:
-        """Go on by as many ticks as there are references, leaves (T,).
-
-        `by_attitude`: whether their attitude, rates and thrust are commanded, or their position.
-        """
-        self._carry, _ = self._loop.scan(self._carry, autopilot_inputs(references, by_attitude))
+    def fly(self, references: ReferencePoint, by_attitude: bool, upright: bool = True) -> None:
+        """Go on by as many ticks as there are references, leaves (T,); see `autopilot_inputs`."""
+        self._carry, _ = self._loop.scan(self._carry, autopilot_inputs(references, by_attitude, upright))
         self.state = BodyState(*(np.concatenate(leaves) for leaves in self._carry[2].body))
 
     def restart_position_loop(self, references: ReferencePoint) -> None:

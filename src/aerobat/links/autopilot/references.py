@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from math import factorial
 from typing import NamedTuple
 
 import numpy as np
@@ -10,11 +12,12 @@ from aerobat import so3
 from aerobat.arrays import Array
 from aerobat.engines.components import components
 from aerobat.kernels.control_loops import Lookahead, ReferencePoint
-from aerobat.links.goals import AttitudeGoal, PositionGoal
+from aerobat.links.goals import AttitudeGoal, PathPiece, PositionGoal
 from aerobat.simulation.autopilot.braking import point_reference
 from aerobat.simulation.autopilot.loop import KEPT
 from aerobat.trajectory import Trajectory
 
+_SLOW = 0.5  # [m/s] and [m/s²] of a path that hardly leads away from where it is
 _SMOOTHING = 0.002  # [s] time constant of the low-pass on the change of commanded rates and thrust
 
 
@@ -46,6 +49,57 @@ class PointReference(NamedTuple):
         position = goal.position + age * goal.velocity
         velocity, acceleration = ones * goal.velocity, ones * goal.acceleration
         return point_reference(position, velocity, acceleration, 0.0 * ones * velocity, goal.yaw, gravity)
+
+
+class PathReference(NamedTuple):
+    """A short piece of a path, carried on beyond its end by the snap and angular jerk that it tells."""
+
+    piece: PathPiece
+
+    @property
+    def leads_away(self) -> bool:
+        """True unless it is hardly anything but a hover."""
+        end = self.piece.end
+        return float(np.linalg.norm(end.velocity)) > _SLOW or float(np.linalg.norm(end.acceleration)) > _SLOW
+
+    def reference(self, times: Array, period: float, gravity: float) -> ReferencePoint:
+        """References at times [s], leaves (T,), for a controller that steps so often."""
+        begin, end, stamp, duration = self.piece
+        age = np.clip(times - stamp, 0.0, duration + KEPT)[:, None]
+        snap = (end.jerk - begin.jerk) / duration
+        position, velocity, acceleration, jerk, _ = _carried_on(age, (*begin[:4], snap))
+        (omega_body, omega_dot_body), (_, final) = (
+            [so3.unrotate(goal.q_world_body, rate) for rate in (goal.omega, goal.omega_dot)]
+            for goal in (begin, end)
+        )
+        turning = omega_body, omega_dot_body, (final - omega_dot_body) / duration
+        rotation, *_ = _carried_on(age, (np.zeros(3), *turning))
+        q = so3.multiply(begin.q_world_body, so3.exp(rotation))
+        (omega, omega_dot, _), (ahead, ahead_dot, _) = (
+            [components(so3.rotate(q, rate)) for rate in _carried_on(at, turning)]
+            for at in (age, age + period)
+        )
+        thrust = acceleration + gravity * so3.UP
+        coming = np.linalg.norm(thrust + period * (jerk + 0.5 * period * snap), axis=-1)
+        return ReferencePoint(
+            components(position),
+            components(velocity),
+            components(thrust),
+            components(jerk),
+            components(q),
+            omega,
+            omega_dot,
+            Lookahead(coming - np.linalg.norm(thrust, axis=-1), ahead, ahead_dot),
+        )
+
+
+def _carried_on(age: Array, derivatives: Sequence[Array]) -> list[Array]:
+    """What has those derivatives at first, and its derivatives, at ages [s] (T, 1); the last one stays."""
+    parts = [np.broadcast_to(derivatives[-1], (len(age), 3))]
+    for lower in range(len(derivatives) - 2, -1, -1):
+        terms = (d * age**k / factorial(k) for k, d in enumerate(derivatives[lower:]))
+        parts.append(np.sum(list(terms), axis=0))
+    return parts[::-1]
 
 
 class AttitudeReference(NamedTuple):

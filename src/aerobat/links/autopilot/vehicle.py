@@ -10,8 +10,8 @@ from aerobat import so3
 from aerobat.arrays import Array
 from aerobat.environment import Environment
 from aerobat.links.autopilot.live_body import LiveBody
-from aerobat.links.autopilot.references import AttitudeReference, PointReference, Route
-from aerobat.links.goals import AttitudeGoal, Mode, PositionGoal, yaw_of
+from aerobat.links.autopilot.references import AttitudeReference, PathReference, PointReference, Route
+from aerobat.links.goals import AttitudeGoal, Mode, PathPiece, PositionGoal, yaw_of
 from aerobat.links.routes import rest_to_rest
 from aerobat.simulation.autopilot.braking import MIN_FLOOR, Braking
 from aerobat.simulation.autopilot.loop import RATE
@@ -19,7 +19,7 @@ from aerobat.states import BodyState
 from aerobat.trajectory import Trajectory
 from aerobat.vehicle import Vehicle
 
-# [s] without goals after which a client is taken for lost: attitudes lead away fast, points do not
+# [s] without goals after which a client is taken for lost: attitudes and paths lead away fast, points do not
 ATTITUDE_TIMEOUT = 0.1
 POINT_TIMEOUT = 0.5
 
@@ -55,7 +55,7 @@ class SimulatedVehicle:
         self._body = LiveBody(vehicle, environment)
         self._route = Route(rest_to_rest(np.zeros(3), np.zeros(3), _SPEED, _ACCELERATION), now, 0.0)
         self._then: tuple[Array, float | None] | None = None  # [m], [rad] where to go once it hovers
-        self._goal: PointReference | AttitudeReference | None = None
+        self._goal: PointReference | PathReference | AttitudeReference | None = None
         self._heard = -np.inf  # [s] when the last goal came
 
     @property
@@ -126,6 +126,13 @@ class SimulatedVehicle:
         if switching:
             self._restart_position_loop()
 
+    def follow_path(self, piece: PathPiece) -> None:
+        """Take a piece of a path from a client; it is followed in the mode offboard."""
+        switching = not isinstance(self._goal, PathReference)
+        self._goal, self._heard = PathReference(piece), self.time
+        if switching:
+            self._restart_position_loop()
+
     def follow_attitude(self, goal: AttitudeGoal, sent: float) -> None:
         """Take a goal, `sent` [s] by the client's clock; it is followed in the mode offboard."""
         known, self._heard = self._goal, self.time
@@ -150,6 +157,9 @@ class SimulatedVehicle:
         times = self.time + np.arange(ticks) / RATE
         if isinstance(goal, AttitudeReference):
             self._body.fly(goal.reference(times, 1.0 / RATE, self.vehicle.mass), by_attitude=True)
+        elif isinstance(goal, PathReference):
+            references = goal.reference(times, 1.0 / RATE, self.gravity)
+            self._body.fly(references, by_attitude=False, upright=False)
         else:
             self._body.fly(goal.reference(times, self.gravity), by_attitude=False)
         if self.state.position[2] <= 0.0:
@@ -158,7 +168,7 @@ class SimulatedVehicle:
             self.landed = False
 
     @property
-    def _followed(self) -> Route | PointReference | AttitudeReference:
+    def _followed(self) -> Route | PointReference | PathReference | AttitudeReference:
         """The present goal."""
         if self.mode is Mode.OFFBOARD and self._goal is not None:
             return self._goal
@@ -188,15 +198,19 @@ class SimulatedVehicle:
         if self.mode is not Mode.OFFBOARD:
             return
         silence = self.time - self._heard
-        allowed = ATTITUDE_TIMEOUT if isinstance(self._goal, AttitudeReference) else POINT_TIMEOUT
+        stays = isinstance(self._goal, PointReference)
+        stays = stays or (isinstance(self._goal, PathReference) and not self._goal.leads_away)
+        allowed = POINT_TIMEOUT if stays else ATTITUDE_TIMEOUT
         if silence > allowed + 1e-9:
             self.told.append(f"no set-points for {silence:.2f} s: holding")
             self.hold()
 
     def _restart_position_loop(self) -> None:
-        goal = self._followed
-        if not isinstance(goal, AttitudeReference):
-            self._body.restart_position_loop(goal.reference(np.array([self.time]), self.gravity))
+        goal, now = self._followed, np.array([self.time])
+        if isinstance(goal, PathReference):
+            self._body.restart_position_loop(goal.reference(now, 1.0 / RATE, self.gravity))
+        elif not isinstance(goal, AttitudeReference):
+            self._body.restart_position_loop(goal.reference(now, self.gravity))
 
     def _touch_ground(self) -> None:
         """Stand on the ground, or lie there."""

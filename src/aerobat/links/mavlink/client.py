@@ -17,7 +17,9 @@ from aerobat.links.mavlink.autopilot_link import AutopilotLink
 from aerobat.links.mavlink.connection import Connection
 from aerobat.links.mavlink.frames import HOVER_THRUST
 from aerobat.links.mission import Mission, MissionSettings, Phase
+from aerobat.links.path_follower import PathFollower
 from aerobat.links.report import LinkReport, link_report
+from aerobat.links.stream import SetpointStream
 from aerobat.planning import Plan
 
 _HOVER_TOLERANCE = 0.1  # [-] by which a vehicle's hovering thrust may differ from that of the plan's vehicle
@@ -76,7 +78,9 @@ class Client:
             announcement: what is said before the vehicle is armed.
         """
         assert plan.vehicle is not None, "a plan that is flyable has a vehicle"
-        self.mission = Mission(plan, mission, offset)
+        environment = plan.problem.environment
+        stream = SetpointStream(plan.trajectory, plan.vehicle, environment, offset)
+        self.mission = Mission(plan, mission, stream, PathFollower(stream, plan.vehicle, environment))
         self._plan, self._offset = plan, offset
         self.link = AutopilotLink(connection, settings.telemetry_rate)
         self.stage = Stage.CONNECTING
@@ -87,7 +91,7 @@ class Client:
         self._began: float | None = None
         self._ground: PositionGoal | None = None
         self._hovering_since = inf
-        vehicle, gravity = plan.vehicle, plan.problem.environment.gravity
+        vehicle, gravity = plan.vehicle, environment.gravity
         self._name = vehicle.name
         self._weight = vehicle.mass * gravity
         self._own_hover = self._weight / float(vehicle.max_thrusts.sum())

@@ -9,7 +9,7 @@ from aerobat.engines import CompiledLoop, choose
 from aerobat.environment import Environment
 from aerobat.kernels.control_loops import ReferencePoint
 from aerobat.kernels.rigid_body import Body
-from aerobat.simulation.autopilot.controller import AutopilotController
+from aerobat.simulation.autopilot.controller import AutopilotController, Guidance
 from aerobat.simulation.components import PlantParameters, RigidBodyPlant, StateObserver
 from aerobat.simulation.loop import Clock, Log, LoopInput, LoopParameters, compose
 from aerobat.vehicle import Vehicle
@@ -49,12 +49,15 @@ def autopilot_loop(
     return engine.compile(*compose(parts, log), parameters, first)
 
 
-def autopilot_inputs(references: ReferencePoint, by_attitude: bool) -> LoopInput:
+def autopilot_inputs(references: ReferencePoint, by_attitude: bool, upright: bool = True) -> LoopInput:
     """Inputs of as many ticks as there are references, leaves (T, ...).
 
-    `by_attitude`: whether their attitude, rates and thrust are commanded, or their position.
+    Args:
+        references: what is followed.
+        by_attitude: whether their attitude, rates and thrust are commanded, or their position.
+        upright: of positions, whether the vehicle stays upright on the way.
     """
     ticks = len(references.position[0])
     period = np.full(ticks, 1.0 / RATE)
-    own = ((), np.full(ticks, float(by_attitude)), ())
+    own = ((), Guidance(np.full(ticks, float(by_attitude)), np.full(ticks, float(upright))), ())
     return LoopInput(Clock(period, period), ((), (), ()), references, own)

@@ -1,0 +1,116 @@
+"""The nodes of the command line, of ROS 1 and ROS 2 alike."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from concurrent.futures import Executor
+from math import inf
+from pathlib import Path
+
+from aerobat import so3
+from aerobat.cli.link_options import RosOptions, RosVehicleOptions
+from aerobat.cli.runs.saved_plans import named_vehicle
+from aerobat.cli.terminal import say
+from aerobat.environment import Environment
+from aerobat.links.autopilot.vehicle import SimulatedVehicle
+from aerobat.links.mission import MissionSettings
+from aerobat.links.ros.maneuver_node import ManeuverNode, NodeSettings
+from aerobat.links.ros.middleware import Middleware, PacedClock
+from aerobat.links.ros.preparation import MANEUVERS, Request, prepare
+from aerobat.links.ros.run import RVIZ, run
+from aerobat.links.ros.vehicle_node import VehicleNode
+from aerobat.planning import Planner, planner_class, suited_planner
+from aerobat.problem import Problem, load_problem
+from aerobat.studies.sweep.workers import workers
+from aerobat.vehicle import Vehicle
+
+_VEHICLE_RATE = 250.0  # [1/s] at which the simulated vehicle goes on
+
+
+def fly_on_demand(join: Callable[[], Middleware], problems: tuple[str, ...], options: RosOptions) -> None:
+    """Offer maneuvers as services, until interrupted.
+
+    Args:
+        join: what makes this process a node.
+        problems: names or files of those beside the paper's.
+        options: of the command.
+    """
+    vehicle = named_vehicle(options.vehicle)
+    settings = NodeSettings(
+        rate=options.rate,
+        takeoff_height=options.takeoff_height,
+        in_world=options.world,
+        with_jerk=options.jerk,
+        goal=options.goal,
+        odometry=options.odometry,
+        mission=MissionSettings(
+            max_error=options.max_error, max_silence=options.max_silence, max_lateness=options.max_lateness
+        ),
+    )
+    services = {**MANEUVERS, **{_service(name): name for name in problems}}
+    maneuvers = {}
+    for service, name in services.items():
+        problem = load_problem(name)
+        maneuvers[service] = problem, _planner(problem, vehicle, options)
+    ros = join()
+    try:
+        # two, so that none of them is this one
+        with workers(2, forked=False) as executor:
+            _rehearse(executor, vehicle, maneuvers, settings)
+            node = ManeuverNode(ros, vehicle, maneuvers, executor, settings, say)
+            say(f"flies {vehicle.name}: /aerobat/ takeoff, {', '.join(maneuvers)}, hold, land")
+            say(f"to look: {RVIZ[type(ros).__name__]}")
+            run(node, ros, options.rate, options.seconds or inf)
+    finally:
+        ros.close()
+
+
+def _rehearse(
+    executor: Executor,
+    vehicle: Vehicle,
+    maneuvers: Mapping[str, tuple[Problem, Planner]],
+    settings: NodeSettings,
+) -> None:
+    """Begin to plan one maneuver for nobody, so that the first real one finds everything imported."""
+    problem, planner = next(iter(maneuvers.values()))
+    aloft = settings.takeoff_height * so3.UP
+    executor.submit(prepare, Request(problem, vehicle, planner, aloft, 0.0, 0.0, in_world=False))
+
+
+def simulate(
+    join: Callable[[PacedClock | None], Middleware], vehicle: str, options: RosVehicleOptions
+) -> None:
+    """Simulate a vehicle, until interrupted.
+
+    Args:
+        join: what makes this process a node, that lives by a clock of its own or by ROS time.
+        vehicle: its name or file.
+        options: of the command.
+    """
+    found = named_vehicle(vehicle)
+    clock = None if options.speed is None else PacedClock(options.speed)
+    ros = join(clock)
+    try:
+        node = VehicleNode(
+            ros,
+            SimulatedVehicle(found, Environment()),
+            goal=options.goal,
+            odometry=options.odometry,
+            rate=options.rate,
+            clock=clock,
+            say=say,
+        )
+        say(f"{found.name} stands on the ground, and obeys {options.goal}")
+        run(node, ros, _VEHICLE_RATE, options.seconds or inf)
+    finally:
+        ros.close()
+
+
+def _service(name: str) -> str:
+    return "".join(sign if sign.isalnum() else "_" for sign in Path(name).stem)
+
+
+def _planner(problem: Problem, vehicle: Vehicle, options: RosOptions) -> Planner:
+    name = options.planner or suited_planner(problem, vehicle)
+    reserve: dict[str, float] = {"reserve": options.reserve}
+    return planner_class(name)(**reserve)

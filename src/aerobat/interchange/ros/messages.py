@@ -1,0 +1,196 @@
+"""ROS messages of states and shapes, for ROS 1 and ROS 2 alike.
+
+World axes are ENU and body axes FLU, as REP 103 has them and we do. Frames are named `world` and `base_link`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, NamedTuple, Protocol
+
+import numpy as np
+
+from aerobat import so3
+from aerobat.arrays import Array
+from aerobat.states import BodyState
+
+WORLD, BODY = "world", "base_link"
+NANOSECONDS = 10**9
+LINE_STRIP, LINE_LIST, CYLINDER = 4, 5, 3  # kinds of markers
+DISC_HEIGHT = 0.01  # [m]
+BLACK = (0.1, 0.1, 0.1)
+
+
+class Make(Protocol):
+    """A maker of one distribution's messages."""
+
+    def __call__(self, kind: str, /, **given: Any) -> Any:
+        """A message of a kind, as in "geometry_msgs/msg/Pose"; what is not given is zero, empty or false."""
+
+
+class JointMotion(NamedTuple):
+    """The motion of one joint of a trajectory's point, all of it in world axes."""
+
+    position: Array  # [m], (3,)
+    q_world_body: Array  # (4,)
+    velocity: Array  # [m/s], (3,)
+    omega: Array  # [rad/s], (3,)
+    acceleration: Array  # [m/s²], (3,)
+    omega_dot: Array  # [rad/s²], (3,)
+
+
+@dataclass(frozen=True)
+class Messages:
+    """Messages of one distribution of ROS; stamps are in nanoseconds."""
+
+    make: Make
+
+    def header(self, stamp: int) -> Any:
+        """The header of what is in the world."""
+        return self.make("std_msgs/msg/Header", stamp=self.time("Time", stamp), frame_id=WORLD)
+
+    def time(self, kind: str, nanoseconds: int) -> Any:
+        """An instant, kind `Time`, or a `Duration`."""
+        sec, nanosec = divmod(nanoseconds, NANOSECONDS)
+        return self.make(f"builtin_interfaces/msg/{kind}", sec=sec, nanosec=nanosec)
+
+    def vector(self, kind: str, components: Array) -> Any:
+        """A `Vector3` or a `Point`."""
+        x, y, z = components.tolist()
+        return self.make(f"geometry_msgs/msg/{kind}", x=x, y=y, z=z)
+
+    def quaternion(self, q: Array) -> Any:
+        """A rotation, (w, x, y, z)."""
+        w, x, y, z = q.tolist()
+        return self.make("geometry_msgs/msg/Quaternion", w=w, x=x, y=y, z=z)
+
+    def pose(self, position: Array, q: Array) -> Any:
+        """A place [m] and an attitude."""
+        place, turn = self.vector("Point", position), self.quaternion(q)
+        return self.make("geometry_msgs/msg/Pose", position=place, orientation=turn)
+
+    def twist(self, linear: Array, angular: Array) -> Any:
+        """A velocity [m/s] and a rate [rad/s], or what they change by in a second."""
+        vectors = self.vector("Vector3", linear), self.vector("Vector3", angular)
+        return self.make("geometry_msgs/msg/Twist", linear=vectors[0], angular=vectors[1])
+
+    def odometry(self, stamp: int, state: BodyState) -> Any:
+        """The pose in the world, velocities in the body's axes, as the message has it."""
+        velocity = so3.unrotate(state.q_world_body, state.velocity)
+        pose, twist = self.pose(state.position, state.q_world_body), self.twist(velocity, state.omega_body)
+        return self.make(
+            "nav_msgs/msg/Odometry",
+            header=self.header(stamp),
+            child_frame_id=BODY,
+            pose=self.make("geometry_msgs/msg/PoseWithCovariance", pose=pose),
+            twist=self.make("geometry_msgs/msg/TwistWithCovariance", twist=twist),
+        )
+
+    def trajectory_point(self, time_from_start: int, *joints: JointMotion) -> Any:
+        """The point of a trajectory at a time [ns] since it began."""
+        transforms = [
+            self.make(
+                "geometry_msgs/msg/Transform",
+                translation=self.vector("Vector3", joint.position),
+                rotation=self.quaternion(joint.q_world_body),
+            )
+            for joint in joints
+        ]
+        return self.make(
+            "trajectory_msgs/msg/MultiDOFJointTrajectoryPoint",
+            transforms=transforms,
+            velocities=[self.twist(joint.velocity, joint.omega) for joint in joints],
+            accelerations=[self.twist(joint.acceleration, joint.omega_dot) for joint in joints],
+            time_from_start=self.time("Duration", time_from_start),
+        )
+
+    def line(
+        self, stamp: int, name: str, points: Array, *, width: float, color: tuple[float, float, float]
+    ) -> Any:
+        """A marker of a line.
+
+        Args:
+            stamp: when [ns].
+            name: what it is.
+            points: along it [m], (points, 3).
+            width: of the line [m].
+            color: red, green and blue, 0 to 1.
+        """
+        return self._marker(
+            stamp,
+            name,
+            0,
+            type=LINE_STRIP,
+            pose=self.pose(np.zeros(3), so3.IDENTITY),
+            scale=self.vector("Vector3", np.array([width, 0.0, 0.0])),
+            color=self._color(color),
+            points=[self.vector("Point", point) for point in points],
+        )
+
+    def cross(
+        self, stamp: int, name: str, number: int, *, position: Array, q: Array, ends: Array, width: float
+    ) -> Any:
+        """A marker of arms from a middle.
+
+        Args:
+            stamp: when [ns].
+            name: what it belongs to.
+            number: of it there.
+            position: of the middle [m], (3,).
+            q: its attitude, (4,).
+            ends: of the arms [m], in its own axes, (arms, 3).
+            width: of the lines [m].
+        """
+        points = [self.vector("Point", point) for end in ends for point in (np.zeros(3), end)]
+        return self._marker(
+            stamp,
+            name,
+            number,
+            type=LINE_LIST,
+            pose=self.pose(position, q),
+            scale=self.vector("Vector3", np.array([width, 0.0, 0.0])),
+            color=self._color(BLACK),
+            points=points,
+        )
+
+    def disc(
+        self,
+        stamp: int,
+        name: str,
+        number: int,
+        *,
+        position: Array,
+        q: Array,
+        radius: float,
+        color: tuple[float, float, float],
+    ) -> Any:
+        """A marker of a flat disc.
+
+        Args:
+            stamp: when [ns].
+            name: what it belongs to.
+            number: of it there.
+            position: of its middle [m], (3,).
+            q: its attitude; it lies across its z axis, (4,).
+            radius: [m].
+            color: red, green and blue, 0 to 1.
+        """
+        return self._marker(
+            stamp,
+            name,
+            number,
+            type=CYLINDER,
+            pose=self.pose(position, q),
+            scale=self.vector("Vector3", np.array([2 * radius, 2 * radius, DISC_HEIGHT])),
+            color=self._color(color),
+        )
+
+    def _marker(self, stamp: int, name: str, number: int, **given: Any) -> Any:
+        return self.make(
+            "visualization_msgs/msg/Marker", header=self.header(stamp), ns=name, id=number, **given
+        )
+
+    def _color(self, color: Sequence[float]) -> Any:
+        red, green, blue = color
+        return self.make("std_msgs/msg/ColorRGBA", r=red, g=green, b=blue, a=1.0)

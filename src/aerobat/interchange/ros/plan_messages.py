@@ -1,0 +1,159 @@
+"""ROS messages of a plan: its trajectory, path, poses and states, and markers that show it in RViz."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from aerobat import so3
+from aerobat.arrays import Array
+from aerobat.flatness import Reference, reference
+from aerobat.interchange.ros.messages import BODY, NANOSECONDS, JointMotion, Messages
+from aerobat.planning import Plan
+from aerobat.states import BodyState
+
+START = 1  # [s] stamp of the plan's start: ROS takes a stamp of 0 for none
+PATH_WIDTH, FRAME_WIDTH = 0.02, 0.05  # [m]
+BLUE, ORANGE, GREY = (0.05, 0.2, 0.6), (0.85, 0.35, 0.05), (0.4, 0.4, 0.4)
+KIND_OF_MARKERS = "visualization_msgs/msg/MarkerArray"
+
+
+@dataclass(frozen=True)
+class Stamped:
+    """A message and when it is published."""
+
+    topic: str
+    kind: str
+    stamp: int  # [ns]
+    message: Any
+
+
+@dataclass(frozen=True)
+class PlanMessages:
+    """The messages of a plan with a vehicle."""
+
+    messages: Messages
+    plan: Plan
+    start: int = START * NANOSECONDS  # [ns] the stamp of its start
+    origin: Array = field(default_factory=lambda: np.zeros(3))  # [m] where the plan's lies in the world
+
+    def all(self, found: Reference) -> Iterator[Stamped]:
+        """Each of them, the plan sampled as `found`, in no order of time."""
+        stamps = [self._stamp(time) for time in found.times]
+        yield self._trajectory(found, stamps)
+        setpoint = found.setpoint
+        poses = [
+            self.messages.make(
+                "geometry_msgs/msg/PoseStamped",
+                header=self.messages.header(stamp),
+                pose=self.messages.pose(position + self.origin, q),
+            )
+            for stamp, position, q in zip(stamps, setpoint.flat.position, setpoint.q_world_body, strict=True)
+        ]
+        header = self.messages.header(stamps[0])
+        path = self.messages.make("nav_msgs/msg/Path", header=header, poses=poses)
+        yield Stamped("/aerobat/path", "nav_msgs/msg/Path", stamps[0], path)
+        for row, (stamp, pose) in enumerate(zip(stamps, poses, strict=True)):
+            yield Stamped("/aerobat/pose", "geometry_msgs/msg/PoseStamped", stamp, pose)
+            state = BodyState(
+                setpoint.flat.position[row] + self.origin,
+                setpoint.flat.velocity[row],
+                setpoint.q_world_body[row],
+                setpoint.omega_body[row],
+            )
+            odometry = self.messages.odometry(stamp, state)
+            yield Stamped("/aerobat/odometry", "nav_msgs/msg/Odometry", stamp, odometry)
+        yield self._array(self._stamp(0.0), self.lines(found))
+        for time, discs in self.snapshots():
+            yield self._array(self._stamp(time), discs)
+
+    def lines(self, found: Reference) -> Sequence[Any]:
+        """Markers of the path, sampled as `found`, and of the gates."""
+        stamp, path = self._stamp(0.0), found.setpoint.flat.position + self.origin
+        lines = [self.messages.line(stamp, "path", path, width=PATH_WIDTH, color=GREY)]
+        for gate in self.plan.problem.gates:
+            frame = np.concatenate([gate.corners, gate.corners[:1]]) + self.origin
+            lines.append(self.messages.line(stamp, gate.name, frame, width=FRAME_WIDTH, color=ORANGE))
+        return lines
+
+    def snapshots(self, every: float = np.inf) -> Iterator[tuple[float, Sequence[Any]]]:
+        """Markers of the vehicle at the start, at each stage and at the end, after their times [s].
+
+        `every`: so often [s] on the way, too.
+        """
+        stages = ((stage.name, stage.time) for stage in self.plan.stages)
+        between = np.arange(every, self.plan.duration, every) if np.isfinite(every) else ()
+        instants = [("start", 0.0), *stages, ("end", self.plan.duration)]
+        instants += [(f"{time:.2f} s", float(time)) for time in between]
+        instants.sort(key=lambda instant: instant[1])
+        shown = reference(self.plan, times=[time for _, time in instants]).setpoint
+        for row, (name, time) in enumerate(instants):
+            position, q = shown.flat.position[row] + self.origin, shown.q_world_body[row]
+            yield time, self._vehicle(f"vehicle: {name}", row, position, q, self._stamp(time))
+
+    def _vehicle(self, name: str, row: int, position: Array, q: Array, stamp: int) -> Sequence[Any]:
+        """The rotors and arms of the vehicle at one instant, numbered apart from those of others of its name.
+
+        Args:
+            name: what is then.
+            row: the number of the instant.
+            position: [m] world, (3,).
+            q: body to world, (4,).
+            stamp: when [ns].
+        """
+        assert self.plan.vehicle is not None, "messages are of plans with a vehicle"
+        rotors = self.plan.vehicle.rotors
+        first = row * (len(rotors) + 1)
+        ends = np.array([rotor.position_body for rotor in rotors])
+        arms = self.messages.cross(
+            stamp, name, first + len(rotors), position=position, q=q, ends=ends, width=PATH_WIDTH
+        )
+        discs = [
+            self.messages.disc(
+                stamp,
+                name,
+                first + number,
+                position=position + so3.rotate(q, rotor.position_body),
+                q=q,
+                radius=rotor.radius,
+                color=BLUE,
+            )
+            for number, rotor in enumerate(rotors)
+        ]
+        return [arms, *discs]
+
+    def _trajectory(self, found: Reference, stamps: Sequence[int]) -> Stamped:
+        """All points in one message, everything in world axes, as controllers of multirotors take them."""
+        setpoint = found.setpoint
+        rates, accelerations = (
+            so3.rotate(setpoint.q_world_body, vectors)
+            for vectors in (setpoint.omega_body, setpoint.omega_dot_body)
+        )
+        rows = zip(
+            setpoint.flat.position + self.origin,
+            setpoint.q_world_body,
+            setpoint.flat.velocity,
+            rates,
+            setpoint.flat.acceleration,
+            accelerations,
+            strict=True,
+        )
+        points = [
+            self.messages.trajectory_point(stamp - stamps[0], JointMotion(*row))
+            for stamp, row in zip(stamps, rows, strict=True)
+        ]
+        kind = "trajectory_msgs/msg/MultiDOFJointTrajectory"
+        header = self.messages.header(stamps[0])
+        message = self.messages.make(kind, header=header, joint_names=[BODY], points=points)
+        return Stamped("/aerobat/trajectory", kind, stamps[0], message)
+
+    def _array(self, stamp: int, markers: Sequence[Any]) -> Stamped:
+        message = self.messages.make(KIND_OF_MARKERS, markers=list(markers))
+        return Stamped("/aerobat/markers", KIND_OF_MARKERS, stamp, message)
+
+    def _stamp(self, time: float) -> int:
+        """The stamp [ns] of a time of the plan [s]."""
+        return self.start + int(np.floor(time * NANOSECONDS))

@@ -1,0 +1,222 @@
+"""A vehicle's way through a session of maneuvers: up, from hover to hover by missions, and down.
+
+The same for every link whose vehicle tracks points of a path: it knows times, states and goals, no messages.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from enum import StrEnum
+from math import hypot
+from typing import NamedTuple
+
+import numpy as np
+
+from aerobat import so3
+from aerobat.arrays import Array
+from aerobat.errors import SpecError
+from aerobat.links.goals import Observed, PathGoal, PositionGoal, yaw_of
+from aerobat.links.mission import Mission, Phase
+from aerobat.links.routes import goal_on, rest_to_rest
+from aerobat.simulation.autopilot.braking import MIN_FLOOR, Braking
+from aerobat.simulation.outcome import length
+from aerobat.trajectory import Trajectory
+from aerobat.vehicle import Vehicle
+
+_SPEED, _ACCELERATION = 2.0, 2.0  # [m/s], [m/s²] of climbs
+_DESCENT = 1.0  # [m/s] when landing
+_BELOW = 0.3  # [m] under the ground, where the way of a landing ends, so that it is reached in motion
+_STANDING = 1.0  # [s] that goals stay there once it is reached
+_SPINNING_UP = 1.5  # [s] that goals stay on the ground before they climb, so that who obeys gets ready
+_ASTRAY = 1.5  # [m] from its goal, from which on a vehicle does not follow it
+_STILL = 0.15  # [m/s] of a hover
+_ALOFT = 0.3  # [m] above the ground, from which on a still vehicle hovers
+_RECENT = 0.5  # [s] for which what was seen counts as how it is
+_LONG = 1.0  # [s] without news, after which nothing can be told it any more
+
+
+class Doing(StrEnum):
+    """What a vehicle is at."""
+
+    NOTHING = "left to itself"
+    CLIMBING = "climbing"
+    HOVERING = "hovering"
+    MANEUVERING = "flying a maneuver"
+    BRAKING = "coming to a hover"
+    LANDING = "landing"
+
+
+class _Way(NamedTuple):
+    """A way to a hover, or to the ground."""
+
+    path: Trajectory
+    began: float  # [s]
+    yaw: float  # [rad]
+
+
+class Commander:
+    """The goal of each tick, from orders and from what is seen of the vehicle.
+
+    Goals are given one period ahead, so that each is known when its time comes.
+    """
+
+    def __init__(
+        self, vehicle: Vehicle, gravity: float, period: float, say: Callable[[str], None] = lambda _: None
+    ) -> None:
+        """Prepare, with the vehicle left to itself.
+
+        Args:
+            vehicle: whose thrust counts when braking.
+            gravity: [m/s²].
+            period: from one tick to the next [s].
+            say: what takes sentences about the course of things.
+        """
+        self.doing = Doing.NOTHING
+        self.seen: Observed | None = None
+        self.ground = 0.0  # [m] the height at which it took off
+        self.log: list[Observed] = []  # of the last plan that was flown, times since its start
+        self.mission: Mission[PathGoal] | None = None  # the last one
+        self._vehicle, self._gravity, self._period, self._say = vehicle, gravity, period, say
+        self._way: _Way | None = None
+
+    @property
+    def reason(self) -> str:
+        """The reason why the last mission was given up; empty where it was not."""
+        return "" if self.mission is None else self.mission.reason
+
+    def observe(self, seen: Observed) -> None:
+        """Take note of a state."""
+        if self.seen is not None and seen.time <= self.seen.time:
+            return
+        self.seen = seen
+        if self.mission is not None and self.mission.phase is Phase.MANEUVER:
+            self.log.append(seen._replace(time=seen.time - self.mission.maneuver_began))
+
+    def take_off(self, now: float, height: float) -> None:
+        """Climb by so much [m] from the ground. Raises SpecError for a vehicle that is not on it."""
+        seen = self._recent(now)
+        if self.doing is not Doing.NOTHING:
+            raise SpecError(f"the vehicle is {self.doing} already")
+        here = np.array(seen.body.position)
+        self.ground = float(here[2])
+        up = rest_to_rest(here, here + height * so3.UP, _SPEED, _ACCELERATION)
+        self._go(Doing.CLIMBING, now + _SPINNING_UP, up, yaw_of(seen.body.q_world_body))
+
+    def hover(self, now: float) -> None:
+        """Come to a hover from whatever it does. Raises SpecError where it does nothing."""
+        if self.doing is Doing.NOTHING:
+            raise SpecError("the vehicle is left to itself; have it take off first")
+        self._give_up(now, "hold was called")
+        self._brake(now, self._recent(now))
+
+    def land(self, now: float) -> None:
+        """Go down to the ground from a hover. Raises SpecError where it does not hover."""
+        seen = self.require_hover(now)
+        here = np.array(seen.body.position) if self._way is None else self._hover_point()
+        bottom = np.array([here[0], here[1], self.ground - _BELOW])
+        yaw = yaw_of(seen.body.q_world_body) if self._way is None else self._way.yaw
+        self._go(Doing.LANDING, now, rest_to_rest(here, bottom, _DESCENT, _ACCELERATION), yaw)
+
+    def require_hover(self, now: float) -> Observed:
+        """What is seen of a vehicle that hovers, ours or left to itself. Raises SpecError for another."""
+        seen = self._recent(now)
+        speed, height = hypot(*seen.body.velocity), seen.body.position[2] - self.ground
+        if self.doing is Doing.HOVERING and speed <= _STILL:
+            return seen
+        if self.doing is Doing.NOTHING and speed <= _STILL and height >= _ALOFT:
+            return seen
+        if self.doing is Doing.NOTHING and height < _ALOFT:
+            raise SpecError("the vehicle stands on the ground; have it take off first")
+        doing = self.doing if self.doing is not Doing.HOVERING else f"moving at {speed:.1f} m/s"
+        raise SpecError(f"the vehicle is {doing}; wait until it hovers")
+
+    def begin(self, now: float, mission: Mission[PathGoal]) -> None:
+        """Fly a mission from a hover. Raises SpecError where it does not hover."""
+        mission.join(now, self.require_hover(now))
+        self.mission, self.log, self._way = mission, [], None
+        self.doing = Doing.MANEUVERING
+
+    def step(self, now: float) -> PathGoal | None:
+        """The goal for a period after this time [s]; None where the vehicle is left to itself."""
+        if self.doing is Doing.MANEUVERING:
+            return self._upright(self._of_mission(now))
+        if self._way is None or self._leave_unseen(now) or self._leave_astray():
+            return None
+        since = now + self._period - self._way.began
+        if self.doing is not Doing.LANDING and since >= self._way.path.duration:
+            self.doing = Doing.HOVERING
+        if self.doing is Doing.LANDING and since > self._way.path.duration + _STANDING:
+            self.doing, self._way = Doing.NOTHING, None
+            return None
+        return self._upright(self._on_way(now))
+
+    def _of_mission(self, now: float) -> PathGoal | PositionGoal | None:
+        """The goal of the mission, or of what follows it."""
+        assert self.mission is not None, "maneuvers are missions"
+        assert self.seen is not None, "a vehicle is seen before it is flown"
+        phase, goal = self.mission.phase, self.mission.step(now, self.seen, self._period)
+        if self.mission.phase not in (phase, Phase.LAND):
+            reason = f": {self.mission.reason}" if self.mission.reason else ""
+            self._say(f"{self.mission.phase}{reason}")
+        if self.mission.phase is Phase.LAND:  # where it ends it stays
+            end = self.mission.end
+            at_end = rest_to_rest(end.position, end.position, _SPEED, _ACCELERATION)
+            self._go(Doing.HOVERING, now, at_end, end.yaw)
+            return self._on_way(now)
+        if self.mission.phase is Phase.ABORTED:
+            self._brake(now, self.seen)
+            silent = self._leave_unseen(now, self.mission.settings.max_silence)
+            return None if silent else self._on_way(now)
+        return goal
+
+    def _brake(self, now: float, seen: Observed) -> None:
+        body, floor = seen.body, self.ground + MIN_FLOOR
+        motion = np.array(body.position), np.array(body.velocity)
+        way = Braking.of(*motion, self._vehicle, self._gravity, floor).trajectory
+        self._go(Doing.BRAKING, now, way, yaw_of(body.q_world_body))
+
+    def _give_up(self, now: float, reason: str) -> None:
+        if self.doing is Doing.MANEUVERING and self.mission is not None:
+            self.mission.abort(now, reason)
+
+    def _leave_unseen(self, now: float, allowed: float = _LONG) -> bool:
+        """True where nothing was seen for longer than allowed [s]: the vehicle is left to itself then."""
+        assert self.seen is not None, "a vehicle is seen before it is flown"
+        silence = now - self.seen.time
+        if silence <= allowed:
+            return False
+        self.doing, self._way = Doing.NOTHING, None
+        self._say(f"no news of the vehicle for {silence:.1f} s; it is left to itself")
+        return True
+
+    def _leave_astray(self) -> bool:
+        """True where a vehicle does not follow its way: it is left to itself then."""
+        assert self.seen is not None and self._way is not None, "asked on a way only"  # noqa: PT018
+        path, began, yaw = self._way
+        asked = goal_on(path, max(self.seen.time - began, 0.0), yaw).position
+        off = float(np.linalg.norm(np.array(self.seen.body.position) - asked))
+        if off <= _ASTRAY:
+            return False
+        self.doing, self._way = Doing.NOTHING, None
+        self._say(f"the vehicle is {length(off)} off its goal; it is left to itself")
+        return True
+
+    def _recent(self, now: float) -> Observed:
+        if self.seen is None or now - self.seen.time > _RECENT:
+            raise SpecError("nothing was heard of the vehicle lately; see that its odometry comes")
+        return self.seen
+
+    def _go(self, doing: Doing, now: float, path: Trajectory, yaw: float) -> None:
+        self.doing, self._way = doing, _Way(path, now, yaw)
+
+    def _on_way(self, now: float) -> PositionGoal:
+        assert self._way is not None, "asked on a way only"
+        path, began, yaw = self._way
+        return goal_on(path, max(now + self._period - began, 0.0), yaw)
+
+    def _hover_point(self) -> Array:
+        assert self._way is not None, "it hovers at the end of a way"
+        return self._way.path.evaluate(self._way.path.duration)
+
+    def _upright(self, goal: PathGoal | PositionGoal | None) -> PathGoal | None:
+        return PathGoal.upright(goal, self._gravity) if isinstance(goal, PositionGoal) else goal

@@ -1,0 +1,182 @@
+"""The node that flies maneuvers on demand: services in, goals at a steady rate out, states from odometry."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from concurrent.futures import Executor, Future
+from dataclasses import dataclass, field
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from aerobat.errors import SpecError
+from aerobat.flatness import reference
+from aerobat.interchange.ros import NANOSECONDS, Messages, PlanMessages
+from aerobat.links.commander import Commander, Doing
+from aerobat.links.goals import PathGoal, PathPiece, yaw_of
+from aerobat.links.mission import Mission, MissionSettings
+from aerobat.links.path_follower import PathForwarder
+from aerobat.links.report import LinkReport
+from aerobat.links.ros import topics
+from aerobat.links.ros.middleware import Answer, Middleware
+from aerobat.links.ros.preparation import Prepared, Request, judge, prepare
+from aerobat.planning import Planner
+from aerobat.problem import Problem
+from aerobat.vehicle import Vehicle
+
+_DELETE_ALL = 3  # what a marker does to those before it
+_SHOWN_EVERY = 0.15  # [s] between snapshots of the vehicle along a path that is shown
+_SHOWN_RATE = 50.0  # [1/s] of the points of a path that is shown
+
+
+@dataclass(frozen=True)
+class NodeSettings:
+    """Settings of the node."""
+
+    rate: float = 100.0  # [1/s] of goals
+    takeoff_height: float = 3.0  # [m]
+    in_world: bool = False  # whether gates and goals stay where their problems have them
+    with_jerk: bool = True  # whether goals tell the jerk, as a second joint
+    goal: str = topics.GOAL
+    odometry: str = topics.ODOMETRY
+    mission: MissionSettings = field(default_factory=MissionSettings)
+
+
+class ManeuverNode:
+    """The node; `tick` it at its rate. Its clock begins with it."""
+
+    def __init__(
+        self,
+        ros: Middleware,
+        vehicle: Vehicle,
+        maneuvers: Mapping[str, tuple[Problem, Planner]],
+        executor: Executor,
+        settings: NodeSettings = NodeSettings(),
+        say: Callable[[str], None] = lambda sentence: None,
+    ) -> None:
+        """Offer the services.
+
+        Args:
+            ros: of which generation.
+            vehicle: what flies.
+            maneuvers: by their services' names, each with how it is planned.
+            executor: what plans, beside this process.
+            settings: of the node.
+            say: what takes sentences about the course of things.
+        """
+        self.origin = ros.time()  # [ns]
+        self.settings = settings
+        gravity = next(iter(maneuvers.values()))[0].environment.gravity
+        self.commander = Commander(vehicle, gravity, 1.0 / settings.rate, say)
+        self._vehicle, self._maneuvers, self._executor = vehicle, maneuvers, executor
+        self._messages, self._say, self._period = Messages(ros.make), say, 1.0 / settings.rate
+        self._send_goal = ros.publisher(settings.goal, topics.KIND_OF_GOAL)
+        self._send_markers = ros.publisher(topics.MARKERS, topics.KIND_OF_MARKERS, latched=True)
+        self._send_report = ros.publisher(topics.REPORT, topics.KIND_OF_REPORT, latched=True)
+        self._now = 0.0  # [s] of the last tick
+        self._last: tuple[float, PathGoal] | None = None  # [s] when the goal before holds
+        self._planning: tuple[Future[Prepared | str], Answer] | None = None
+        self._flown: Prepared | None = None  # what is flown
+        self._judging: Future[LinkReport] | None = None  # what came of it
+        ros.subscribe(settings.odometry, topics.KIND_OF_ODOMETRY, self._take_odometry, every=False)
+        for name in maneuvers:
+            ros.offer(f"/aerobat/{name}", partial(self._take_request, partial(self._plan, name)))
+        ros.offer("/aerobat/takeoff", partial(self._take_request, self._take_off))
+        ros.offer("/aerobat/hold", partial(self._take_request, self._hold))
+        ros.offer("/aerobat/land", partial(self._take_request, self._land))
+
+    def tick(self, now: float) -> None:
+        """Go on to this time [s]: take what was planned, and send the goal that is due."""
+        self._now = now
+        if self._planning is not None and self._planning[0].done():
+            (planned, answer), self._planning = self._planning, None
+            self._begin(planned.result(), answer)
+        goal = self.commander.step(now)
+        if goal is not None and self._last is not None:
+            stamp, before = self._last
+            piece = PathPiece(before, goal, stamp, now + self._period - stamp)
+            at = self.origin + round(stamp * NANOSECONDS)
+            self._send_goal(topics.goal_message(self._messages, piece, at, self.settings.with_jerk))
+        self._last = None if goal is None else (now + self._period, goal)
+        self._follow_up()
+
+    def _follow_up(self) -> None:
+        """Have a maneuver judged once it is over, and tell what came of it."""
+        if self._flown is not None and self.commander.doing is not Doing.MANEUVERING:
+            ended = str(self.commander.doing)
+            self._judging = self._executor.submit(
+                judge, self._flown, self.commander.log, self.commander.reason, ended
+            )
+            self._flown = None
+        if self._judging is not None and self._judging.done():
+            sentence, self._judging = str(self._judging.result()), None
+            self._say(sentence)
+            self._send_report(self._messages.make(topics.KIND_OF_REPORT, data=sentence))
+
+    def _take_odometry(self, message: Any) -> None:
+        self.commander.observe(topics.read_odometry(message, self.origin))
+
+    def _take_request(self, obey: Callable[[Answer], None], answer: Answer) -> None:
+        """Obey, or answer why not."""
+        try:
+            if self._planning is not None:
+                raise SpecError("a maneuver is being planned; wait for it")
+            obey(answer)
+        except SpecError as error:
+            answer(False, str(error))
+
+    def _take_off(self, answer: Answer) -> None:
+        self.commander.take_off(self._now, self.settings.takeoff_height)
+        answer(True, f"climbing by {self.settings.takeoff_height:g} m")
+
+    def _hold(self, answer: Answer) -> None:
+        self.commander.hover(self._now)
+        answer(True, str(Doing.BRAKING))
+
+    def _land(self, answer: Answer) -> None:
+        self.commander.land(self._now)
+        answer(True, str(Doing.LANDING))
+
+    def _plan(self, name: str, answer: Answer) -> None:
+        """Have a maneuver planned from where the vehicle hovers."""
+        seen = self.commander.require_hover(self._now)
+        problem, planner = self._maneuvers[name]
+        request = Request(
+            problem,
+            self._vehicle,
+            planner,
+            np.array(seen.body.position),
+            yaw_of(seen.body.q_world_body),
+            self.commander.ground,
+            self.settings.in_world,
+        )
+        self._planning = self._executor.submit(prepare, request), answer
+
+    def _begin(self, planned: Prepared | str, answer: Answer) -> None:
+        """Fly what was planned, or answer why not."""
+        if isinstance(planned, str):
+            answer(False, planned)
+            return
+        stream = planned.stream
+        mission = Mission(planned.plan, self.settings.mission, stream, PathForwarder(stream))
+        try:
+            self.commander.begin(self._now, mission)
+        except SpecError as error:
+            answer(False, str(error))
+            return
+        self._show(planned)
+        self._flown = planned
+        self._say(planned.announcement)
+        answer(True, planned.announcement)
+
+    def _show(self, planned: Prepared) -> None:
+        """Have markers of the path, its gates and the vehicle along it take the place of those before."""
+        stamp = self.origin + round(self._now * NANOSECONDS)
+        shown = PlanMessages(self._messages, planned.plan, stamp, planned.offset)
+        kind = "visualization_msgs/msg/Marker"
+        wipe = self._messages.make(kind, header=self._messages.header(stamp), action=_DELETE_ALL)
+        lines = shown.lines(reference(planned.plan, rate=_SHOWN_RATE))
+        discs = [disc for _, found in shown.snapshots(_SHOWN_EVERY) for disc in found]
+        markers = self._messages.make(topics.KIND_OF_MARKERS, markers=[wipe, *lines, *discs])
+        self._send_markers(markers)

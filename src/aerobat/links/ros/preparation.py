@@ -1,0 +1,100 @@
+"""Work beside a node, in a process of its own so that goals keep coming: plans, and what came of them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from aerobat.arrays import Array
+from aerobat.errors import AerobatError, SpecError
+from aerobat.links.goals import Observed
+from aerobat.links.mission import require_flyable
+from aerobat.links.report import LinkReport, link_report
+from aerobat.links.stream import SetpointStream
+from aerobat.planning import Plan, Planner, plan
+from aerobat.problem import Problem, at_rest
+from aerobat.simulation.autopilot import recoveries
+from aerobat.vehicle import Vehicle
+
+# the paper's services, and the built-in problems that they fly
+MANEUVERS = {
+    "line": "line",
+    "flip": "flip-roll",
+    "flip_pitch": "flip-pitch",
+    "flip_trans": "flip-roll-translation",
+    "window": "half-flip",
+}
+
+
+@dataclass(frozen=True)
+class Request:
+    """What is to be planned, and from where."""
+
+    problem: Problem
+    vehicle: Vehicle
+    planner: Planner
+    position: Array  # [m] of the vehicle that hovers, (3,)
+    yaw: float  # [rad] likewise
+    ground: float  # [m] the height of the ground
+    in_world: bool  # whether gates and goal stay where the problem has them; else they move with its start
+
+
+@dataclass(frozen=True, eq=False)
+class Prepared:
+    """A plan that may be flown."""
+
+    plan: Plan
+    offset: Array  # [m] where its origin lies in the world, (3,)
+    stream: SetpointStream
+    announcement: str
+
+
+def prepare(request: Request) -> Prepared | str:
+    """The plan from where the vehicle hovers, or a sentence that says why there is none."""
+    try:
+        return _prepared(request)
+    except AerobatError as error:
+        return str(error)
+
+
+def _prepared(request: Request) -> Prepared:
+    problem, offset = _from_here(request)
+    found = plan(problem, request.planner, request.vehicle)
+    height = offset - (0.0, 0.0, request.ground)
+    require_flyable(found, height)
+    way_back = recoveries(found, ground=-float(height[2]))
+    if way_back.no_return:
+        raise SpecError(f"{way_back}; climb, or raise its gates")
+    through = f" through {len(problem.gates)} gate(s)" if problem.gates else ""
+    told = f"'{problem.name}' in {found.duration:.2f} s{through}, {found.planner}; {way_back}"
+    assert found.vehicle is not None, "it was planned for one"
+    stream = SetpointStream(found.trajectory, found.vehicle, problem.environment, offset)
+    return Prepared(found, offset, stream, told)
+
+
+def _from_here(request: Request) -> tuple[Problem, Array]:
+    """The problem that begins where the vehicle hovers, and where its origin lies in the world [m]."""
+    asked = replace(request.problem, heading=request.yaw)
+    if request.in_world:
+        return replace(asked, start=at_rest(request.position)), np.zeros(3)
+    offset = request.position - asked.start.position
+    if asked.environment.ground is None:
+        return asked, offset
+    below = request.ground - float(offset[2])
+    return replace(asked, environment=replace(asked.environment, ground=below)), offset
+
+
+def judge(flown: Prepared, log: Sequence[Observed], aborted: str, ended: str) -> LinkReport:
+    """The report of a maneuver.
+
+    Args:
+        flown: what was flown.
+        log: states while it was, times since its start [s].
+        aborted: why it was given up, empty where it was not.
+        ended: what was reached.
+    """
+    return link_report(
+        flown.plan, flown.stream, log, offset=flown.offset, aborted=aborted, ended=ended, delay=0.0
+    )

@@ -1,0 +1,110 @@
+"""ROS 2: rclpy, of whichever installation the interpreter has at hand."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from importlib import import_module
+from threading import Thread
+from typing import Any
+
+from aerobat.errors import BackendMissing
+from aerobat.links.ros.middleware import Answer, Calls, PacedClock, require_time
+
+_QUEUE = 1000  # messages that wait for a slow receiver: ten seconds of goals
+_NEWEST = 5  # messages of which not every one counts
+_THREADS = 4  # services wait for their answers, each in one
+
+
+class RclpyMiddleware:
+    """A node of ROS 2; see `Middleware`."""
+
+    def __init__(self, name: str, clock: PacedClock | None = None, sim_time: bool = False) -> None:
+        """Join the graph. Raises SpecError where time stands still, BackendMissing without rclpy.
+
+        Args:
+            name: of the node.
+            clock: what it lives by; else ROS time.
+            sim_time: whether ROS time is that of the topic /clock.
+        """
+        self._rclpy = rclpy = _rclpy()
+        from rclpy.callback_groups import ReentrantCallbackGroup
+        from rclpy.executors import MultiThreadedExecutor, SingleThreadedExecutor
+        from rclpy.parameter import Parameter
+        from rclpy.signals import SignalHandlerOptions
+
+        rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
+        self._node = rclpy.create_node(name, parameter_overrides=[Parameter("use_sim_time", value=sim_time)])
+        # a node of their own: the executor that lets them wait takes several times as long for each message
+        self._waiting = rclpy.create_node(f"{name}_services")
+        self._clock = clock
+        self._calls = Calls()
+        self._services = ReentrantCallbackGroup()
+        self._executors = SingleThreadedExecutor(), MultiThreadedExecutor(_THREADS)
+        for executor, node in zip(self._executors, (self._node, self._waiting), strict=True):
+            executor.add_node(node)
+            Thread(target=executor.spin, daemon=True).start()
+        require_time(self.time)
+
+    @staticmethod
+    def make(kind: str, /, **given: Any) -> Any:
+        """See `Make.__call__`."""
+        return _type(kind)(**given)
+
+    def time(self) -> int:
+        """See `Middleware.time`."""
+        return int(self._node.get_clock().now().nanoseconds) if self._clock is None else self._clock.time()
+
+    def publisher(self, topic: str, kind: str, latched: bool = False) -> Callable[[Any], None]:
+        """See `Middleware.publisher`."""
+        qos = import_module("rclpy.qos")
+        durability = qos.DurabilityPolicy.TRANSIENT_LOCAL if latched else qos.DurabilityPolicy.VOLATILE
+        profile = qos.QoSProfile(depth=1 if latched else _QUEUE, durability=durability)
+        publish: Callable[[Any], None] = self._node.create_publisher(_type(kind), topic, profile).publish
+        return publish
+
+    def subscribe(self, topic: str, kind: str, take: Callable[[Any], None], every: bool = True) -> None:
+        """See `Middleware.subscribe`."""
+        qos = import_module("rclpy.qos")
+        reliability = qos.ReliabilityPolicy.RELIABLE if every else qos.ReliabilityPolicy.BEST_EFFORT
+        self._node.create_subscription(
+            _type(kind),
+            topic,
+            lambda message: self._calls.put(lambda: take(message)),
+            qos.QoSProfile(depth=_QUEUE if every else _NEWEST, reliability=reliability),
+        )
+
+    def offer(self, service: str, take: Callable[[Answer], None]) -> None:
+        """See `Middleware.offer`."""
+        trigger = import_module("std_srvs.srv").Trigger
+
+        def respond(_request: Any, response: Any) -> Any:
+            response.success, response.message = self._calls.answer(take)
+            return response
+
+        self._waiting.create_service(trigger, service, respond, callback_group=self._services)
+
+    def work_until(self, instant: int) -> None:
+        """See `Middleware.work_until`."""
+        self._calls.work_until(instant, self.time)
+
+    def close(self) -> None:
+        """See `Middleware.close`."""
+        self._calls.close()
+        for executor in self._executors:
+            executor.shutdown(0.0)
+        self._rclpy.try_shutdown()
+
+
+def _rclpy() -> Any:
+    try:
+        return import_module("rclpy")
+    except ImportError as error:
+        raise BackendMissing(
+            f"ROS 2 needs rclpy, which this Python does not find ({error}): source "
+            "/opt/ros/DISTRIBUTION/setup.bash, and run aerobat with the Python of that distribution"
+        ) from None
+
+
+def _type(kind: str) -> Any:
+    package, _, name = kind.split("/")
+    return getattr(import_module(f"{package}.msg"), name)

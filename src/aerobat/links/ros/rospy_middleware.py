@@ -1,0 +1,104 @@
+"""ROS 1: rospy, of whichever installation the interpreter has at hand."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from importlib import import_module
+from typing import Any
+
+from aerobat.errors import BackendMissing, SpecError
+from aerobat.links.ros.middleware import Answer, Calls, PacedClock, require_time
+
+_SIM_TIME = "/use_sim_time"  # the parameter that nodes read when they begin
+_NEWEST = 5  # messages of which not every one counts
+_QUEUE = 1000  # messages that wait for a slow receiver: ten seconds of goals
+
+
+class RospyMiddleware:
+    """A node of ROS 1; see `Middleware`."""
+
+    def __init__(self, name: str, clock: PacedClock | None = None) -> None:
+        """Register with the master.
+
+        Raises SpecError where none answers or time stands still, BackendMissing without rospy.
+
+        Args:
+            name: of the node.
+            clock: what it lives by, and all that come after it; else ROS time.
+        """
+        self._rospy = rospy = _rospy()
+        import rosgraph
+
+        if not rosgraph.is_master_online():
+            raise SpecError(f"no ROS master answers at {rosgraph.get_master_uri()}; start roscore first")
+        rospy.init_node(name, disable_signals=True)
+        self._clock = clock
+        self._calls = Calls()
+        if clock is not None:
+            rospy.set_param(_SIM_TIME, True)
+        require_time(self.time)
+
+    @staticmethod
+    def make(kind: str, /, **given: Any) -> Any:
+        """See `Make.__call__`."""
+        package, _, name = kind.split("/")
+        if package == "builtin_interfaces":
+            return getattr(import_module("genpy"), name)(given["sec"], given["nanosec"])
+        return getattr(import_module(f"{package}.msg"), name)(**given)
+
+    def time(self) -> int:
+        """See `Middleware.time`."""
+        return int(self._rospy.get_rostime().to_nsec()) if self._clock is None else self._clock.time()
+
+    def publisher(self, topic: str, kind: str, latched: bool = False) -> Callable[[Any], None]:
+        """See `Middleware.publisher`."""
+        publish: Callable[[Any], None] = self._rospy.Publisher(
+            topic, _type(kind), queue_size=_QUEUE, latch=latched, tcp_nodelay=True
+        ).publish
+        return publish
+
+    def subscribe(self, topic: str, kind: str, take: Callable[[Any], None], every: bool = True) -> None:
+        """See `Middleware.subscribe`."""
+        self._rospy.Subscriber(
+            topic,
+            _type(kind),
+            lambda message: self._calls.put(lambda: take(message)),
+            queue_size=None if every else _NEWEST,
+            tcp_nodelay=True,
+        )
+
+    def offer(self, service: str, take: Callable[[Answer], None]) -> None:
+        """See `Middleware.offer`."""
+        srv = import_module("std_srvs.srv")
+
+        def respond(_request: Any) -> Any:
+            success, sentence = self._calls.answer(take)
+            return srv.TriggerResponse(success=success, message=sentence)
+
+        self._rospy.Service(service, srv.Trigger, respond)
+
+    def work_until(self, instant: int) -> None:
+        """See `Middleware.work_until`."""
+        self._calls.work_until(instant, self.time)
+
+    def close(self) -> None:
+        """See `Middleware.close`."""
+        self._calls.close()
+        if self._clock is not None:
+            self._rospy.delete_param(_SIM_TIME)
+        self._rospy.signal_shutdown("done")
+
+
+def _rospy() -> Any:
+    try:
+        return import_module("rospy")
+    except ImportError as error:
+        raise BackendMissing(
+            f"ROS 1 needs rospy, which this Python does not find ({error}): source "
+            "/opt/ros/noetic/setup.bash, or apt-get install python3-rospy, and run aerobat with that Python"
+        ) from None
+
+
+def _type(kind: str) -> Any:
+    package, _, name = kind.split("/")
+    return getattr(import_module(f"{package}.msg"), name)

@@ -1,0 +1,112 @@
+"""Time that waits for who is late, and ticks that are made up for; by a wall whose time the tests tell."""
+
+from __future__ import annotations
+
+from threading import Thread
+from types import SimpleNamespace
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from aerobat.errors import SpecError
+from aerobat.links.ros import middleware
+from aerobat.links.ros.middleware import Calls, PacedClock, require_time
+from aerobat.links.ros.run import run
+
+SECOND = 10**9  # [ns]
+
+
+class Wall:
+    """What stands in for the module `time`."""
+
+    def __init__(self) -> None:
+        self.now = 0.0  # [s]
+
+    def monotonic(self) -> float:
+        return self.now
+
+    def time_ns(self) -> int:
+        return 5 * SECOND
+
+    def sleep(self, seconds: float) -> None:
+        self.now += seconds
+
+
+@given(steps=st.lists(st.floats(0.0, 0.3), max_size=40), speed=st.floats(0.1, 4.0))
+def test_a_clock_never_runs_ahead_of_who_is_waited_for_nor_back(steps: list[float], speed: float) -> None:
+    wall = Wall()
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(middleware, "time", wall)
+        clock = PacedClock(speed)
+        before, end = clock.time(), 5 * SECOND + SECOND // 5
+        clock.wait_at(end)
+        for step in steps:
+            wall.now += step
+            now = clock.time()
+            assert before <= now
+            assert now - before <= speed * step * SECOND + 1
+            assert now <= end or wall.now >= 5.0
+            before = now
+
+
+def test_a_clock_goes_on_without_who_never_comes() -> None:
+    wall = Wall()
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(middleware, "time", wall)
+        clock = PacedClock(1.0)
+        clock.wait_at(5 * SECOND + SECOND // 100)
+        for _ in range(1000):
+            wall.now += 0.01
+            clock.time()
+        assert clock.time() - 5 * SECOND == pytest.approx(5.0 * SECOND, rel=0.01)
+
+
+class Late:
+    """ROS whose time jumps, and a node that notes for when it is ticked."""
+
+    def __init__(self, jumps: dict[int, int]) -> None:
+        self.origin, self.now = 7 * SECOND, 7 * SECOND
+        self.jumps = jumps  # [ns] after which tick
+        self.ticks: list[float] = []
+
+    def time(self) -> int:
+        return self.now
+
+    def work_until(self, instant: int) -> None:
+        self.now = max(self.now, instant)
+
+    def tick(self, now: float) -> None:
+        self.now += self.jumps.get(len(self.ticks), 0)
+        self.ticks.append(now)
+
+
+def test_a_few_ticks_that_were_missed_are_made_up_for_and_of_many_the_last() -> None:
+    node = Late({3: SECOND // 20, 20: SECOND // 2})
+    run(node, node, 100.0, 1.0)  # type: ignore[arg-type]
+    numbers = [round(100.0 * now) for now in node.ticks]
+    assert numbers == [*range(21), *range(70, 100)]
+
+
+def test_whoever_still_waits_is_answered_when_the_node_ends() -> None:
+    calls, answers = Calls(), []
+    asking = Thread(target=lambda: answers.append(calls.answer(lambda answer: None)))
+    asking.start()
+    clock = SimpleNamespace(now=0)
+
+    def time() -> int:
+        clock.now += 1
+        return int(clock.now)
+
+    while not calls._unanswered:
+        calls.work_until(1, time)
+    calls.close()
+    asking.join()
+    assert answers == [(False, "the node has ended")]
+
+
+def test_time_that_nobody_tells_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(middleware, "time", Wall())
+    with pytest.raises(SpecError, match="/clock"):
+        require_time(lambda: 0)
+    require_time(lambda: SECOND)
