@@ -21,7 +21,7 @@ from aerobat.links.ros.run import RVIZ, run
 from aerobat.links.ros.vehicle_node import VehicleNode
 from aerobat.planning import Planner, planner_class, suited_planner
 from aerobat.problem import Problem, load_problem
-from aerobat.studies.sweep.workers import workers
+from aerobat.studies.workers import workers
 from aerobat.vehicle import Vehicle
 
 _VEHICLE_RATE = 250.0  # [1/s] at which the simulated vehicle goes on
