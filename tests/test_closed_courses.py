@@ -15,6 +15,8 @@ from aerobat.declaration import from_table, to_table
 from aerobat.errors import SpecError
 from aerobat.flatness import reference
 from aerobat.links.mission import Mission, MissionSettings
+from aerobat.links.path_follower import PathForwarder
+from aerobat.links.stream import SetpointStream
 from aerobat.planning import least_duration
 from aerobat.trajectory import Trajectory
 from random_flights import with_lags
@@ -116,8 +118,10 @@ def test_planners_that_need_ends_refuse_a_closed_course_and_name_the_one_that_do
 
 
 def test_a_plan_that_begins_in_flight_is_not_begun_from_rest() -> None:
+    plan = planned()
+    stream = SetpointStream(plan.trajectory, plan.vehicle, plan.problem.environment, np.zeros(3))
     with pytest.raises(SpecError, match=r"begins at .* m/s, a mission at rest"):
-        Mission(planned(), MissionSettings(), np.zeros(3))
+        Mission(plan, MissionSettings(), stream, PathForwarder(stream))
 
 
 @pytest.mark.parametrize(
@@ -129,7 +133,7 @@ def test_a_plan_that_begins_in_flight_is_not_begun_from_rest() -> None:
         ),
         ({"start": {"position": [0, 0, 0]}}, "start stands beside maneuver.closed, which has none"),
         ({"maneuver": {"last_lap": 1}}, "maneuver.last_lap stands beside closed, whose laps are all whole"),
-        ({"maneuver": {"closed": False}}, "start is missing; add it, with its position"),
+        ({"maneuver": {"closed": False}}, "start.position is missing; add it"),
         (
             {"maneuver": {"elements": [{"kind": "gate", "gate": "red"}]}},
             "maneuver.closed needs 2 elements that say where; add some",

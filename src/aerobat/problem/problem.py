@@ -170,7 +170,7 @@ class Problem:
         """Refuse an end that is missing, and of a closed course what gives it one."""
         for end, state in (("start", self.start), ("goal", self.goal)):
             if not sequence.closed and state.is_left_out:
-                raise FieldError(end, "is missing; add it, with its position")
+                raise FieldError(f"{end}.position", "is missing; add it")
             if sequence.closed and state != EndState():
                 raise FieldError(end, "stands beside maneuver.closed, which has none; drop either")
         if not sequence.closed:
