@@ -191,6 +191,8 @@ def checking_lines(rng: random.Random) -> Iterator[list[str]]:
 
 def main(lines: Callable[[random.Random], Iterator[list[str]]], count: int, seed: int, kept: Path) -> None:
     """Run so many, print what is wrong, and keep the files that it was wrong with."""
+    kept = kept.resolve()
+    kept.mkdir(parents=True, exist_ok=True)
     wrong, refused, silence = 0, 0, 0.0
     with tempfile.TemporaryDirectory() as scratch, chdir(scratch):
         for i, line in enumerate(islice(lines(random.Random(seed)), count)):
