@@ -5,7 +5,7 @@ And, before anything is searched, the openings of gates beside the vehicle that 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 
@@ -22,26 +22,35 @@ from aerobat.vehicle import Vehicle
 
 def planned_passages(stages: Sequence[PlacedStage], problem: Problem) -> tuple[PlannedPassage, ...]:
     """The gates that are passed at placed stages, as the problem's own stages ask, in their order."""
-    asked = list(problem.stages(1.0).stages)  # the attitudes are the same, whatever thrust there is
-    found = []
-    for place in stages:
-        if place.gate is not None:
-            stage = next((stage for stage in asked if stage.gate == place.gate), Stage(place.name))
-            asked = [other for other in asked if other is not stage]
-            found.append(PlannedPassage.of(stage, problem.gate(place.gate), place.time))
-    return tuple(found)
+    placed = [place for place in stages if place.gate is not None]
+    return tuple(
+        PlannedPassage.of(stage or Stage(place.name), problem.gate(str(place.gate)), place.time)
+        for place, stage in _matched(placed, problem, lambda stage, place: stage.gate == place.gate)
+    )
 
 
 def planned_waypoints(stages: Sequence[PlacedStage], problem: Problem) -> tuple[PlannedWaypoint, ...]:
     """The balls that are met at placed stages, in their order."""
-    asked = [stage for stage in problem.stages(1.0).stages if stage.ball is not None]
-    found = []
-    for place in stages:
-        stage = next((stage for stage in asked if stage.name == place.name), None)
-        if stage is not None and stage.ball is not None:
-            asked = [other for other in asked if other is not stage]
-            found.append(PlannedWaypoint(stage.name, stage.ball, place.time, stage.lap))
-    return tuple(found)
+    return tuple(
+        PlannedWaypoint(stage.name, stage.ball, place.time, stage.lap)
+        for place, stage in _matched(stages, problem, _is_its_ball)
+        if stage is not None and stage.ball is not None
+    )
+
+
+def _is_its_ball(stage: Stage, place: PlacedStage) -> bool:
+    return stage.ball is not None and stage.name == place.name
+
+
+def _matched(
+    places: Sequence[PlacedStage], problem: Problem, belongs: Callable[[Stage, PlacedStage], bool]
+) -> Iterator[tuple[PlacedStage, Stage | None]]:
+    """Each place with the first of the problem's own stages that belongs to it and to none before."""
+    asked = list(problem.stages(1.0).stages)  # the attitudes are the same, whatever thrust there is
+    for place in places:
+        stage = next((stage for stage in asked if belongs(stage, place)), None)
+        asked = [other for other in asked if other is not stage]
+        yield place, stage
 
 
 def require_openings(problem: Problem, vehicle: Vehicle) -> None:

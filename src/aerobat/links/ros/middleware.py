@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from concurrent.futures import Future
+from importlib import import_module
 from math import inf
 from queue import Empty, SimpleQueue
 from typing import Any, Protocol, TypeAlias
@@ -14,10 +15,19 @@ from aerobat.interchange.ros import NANOSECONDS
 
 Answer: TypeAlias = Callable[[bool, str], None]  # success, and a sentence
 
+QUEUE = 1000  # messages that wait for a slow receiver: ten seconds of goals
+NEWEST = 5  # messages of which not every one counts
+
 _PATIENCE = 5.0  # [s] of the wall, for which a clock waits
 _FIRST_TIME = 20.0  # [s] of the wall, for which somebody who tells the time is waited for
 _MAX_STEP = 0.01  # [s] between two looks at a clock that waits, its own process' being held up among it
 _MAX_WAIT, _MIN_WAIT = 0.005, 0.0002  # [s] between looks at a clock that may run at another pace than ours
+
+
+def message_class(kind: str) -> Any:
+    """The class of messages of a kind, package/msg/Name, of whichever ROS is at hand."""
+    package, _, name = kind.split("/")
+    return getattr(import_module(f"{package}.msg"), name)
 
 
 class PacedClock:

@@ -8,10 +8,16 @@ from threading import Thread
 from typing import Any
 
 from aerobat.errors import BackendMissing
-from aerobat.links.ros.middleware import Answer, Calls, PacedClock, require_time
+from aerobat.links.ros.middleware import (
+    NEWEST,
+    QUEUE,
+    Answer,
+    Calls,
+    PacedClock,
+    message_class,
+    require_time,
+)
 
-_QUEUE = 1000  # messages that wait for a slow receiver: ten seconds of goals
-_NEWEST = 5  # messages of which not every one counts
 _THREADS = 4  # services wait for their answers, each in one
 
 
@@ -48,7 +54,7 @@ class RclpyMiddleware:
     @staticmethod
     def make(kind: str, /, **given: Any) -> Any:
         """See `Make.__call__`."""
-        return _type(kind)(**given)
+        return message_class(kind)(**given)
 
     def time(self) -> int:
         """See `Middleware.time`."""
@@ -58,8 +64,10 @@ class RclpyMiddleware:
         """See `Middleware.publisher`."""
         qos = import_module("rclpy.qos")
         durability = qos.DurabilityPolicy.TRANSIENT_LOCAL if latched else qos.DurabilityPolicy.VOLATILE
-        profile = qos.QoSProfile(depth=1 if latched else _QUEUE, durability=durability)
-        publish: Callable[[Any], None] = self._node.create_publisher(_type(kind), topic, profile).publish
+        profile = qos.QoSProfile(depth=1 if latched else QUEUE, durability=durability)
+        publish: Callable[[Any], None] = self._node.create_publisher(
+            message_class(kind), topic, profile
+        ).publish
         return publish
 
     def subscribe(self, topic: str, kind: str, take: Callable[[Any], None], every: bool = True) -> None:
@@ -67,10 +75,10 @@ class RclpyMiddleware:
         qos = import_module("rclpy.qos")
         reliability = qos.ReliabilityPolicy.RELIABLE if every else qos.ReliabilityPolicy.BEST_EFFORT
         self._node.create_subscription(
-            _type(kind),
+            message_class(kind),
             topic,
             lambda message: self._calls.put(lambda: take(message)),
-            qos.QoSProfile(depth=_QUEUE if every else _NEWEST, reliability=reliability),
+            qos.QoSProfile(depth=QUEUE if every else NEWEST, reliability=reliability),
         )
 
     def offer(self, service: str, take: Callable[[Answer], None]) -> None:
@@ -103,8 +111,3 @@ def _rclpy() -> Any:
             f"ROS 2 needs rclpy, which this Python does not find ({error}): source "
             "/opt/ros/DISTRIBUTION/setup.bash, and run aerobat with the Python of that distribution"
         ) from None
-
-
-def _type(kind: str) -> Any:
-    package, _, name = kind.split("/")
-    return getattr(import_module(f"{package}.msg"), name)

@@ -7,11 +7,17 @@ from importlib import import_module
 from typing import Any
 
 from aerobat.errors import BackendMissing, SpecError
-from aerobat.links.ros.middleware import Answer, Calls, PacedClock, require_time
+from aerobat.links.ros.middleware import (
+    NEWEST,
+    QUEUE,
+    Answer,
+    Calls,
+    PacedClock,
+    message_class,
+    require_time,
+)
 
 _SIM_TIME = "/use_sim_time"  # the parameter that nodes read when they begin
-_NEWEST = 5  # messages of which not every one counts
-_QUEUE = 1000  # messages that wait for a slow receiver: ten seconds of goals
 
 
 class RospyMiddleware:
@@ -44,7 +50,7 @@ class RospyMiddleware:
         package, _, name = kind.split("/")
         if package == "builtin_interfaces":
             return getattr(import_module("genpy"), name)(given["sec"], given["nanosec"])
-        return getattr(import_module(f"{package}.msg"), name)(**given)
+        return message_class(kind)(**given)
 
     def time(self) -> int:
         """See `Middleware.time`."""
@@ -53,7 +59,7 @@ class RospyMiddleware:
     def publisher(self, topic: str, kind: str, latched: bool = False) -> Callable[[Any], None]:
         """See `Middleware.publisher`."""
         publish: Callable[[Any], None] = self._rospy.Publisher(
-            topic, _type(kind), queue_size=_QUEUE, latch=latched, tcp_nodelay=True
+            topic, message_class(kind), queue_size=QUEUE, latch=latched, tcp_nodelay=True
         ).publish
         return publish
 
@@ -61,9 +67,9 @@ class RospyMiddleware:
         """See `Middleware.subscribe`."""
         self._rospy.Subscriber(
             topic,
-            _type(kind),
+            message_class(kind),
             lambda message: self._calls.put(lambda: take(message)),
-            queue_size=None if every else _NEWEST,
+            queue_size=None if every else NEWEST,
             tcp_nodelay=True,
         )
 
@@ -97,8 +103,3 @@ def _rospy() -> Any:
             f"ROS 1 needs rospy, which this Python does not find ({error}): source "
             "/opt/ros/noetic/setup.bash, or apt-get install python3-rospy, and run aerobat with that Python"
         ) from None
-
-
-def _type(kind: str) -> Any:
-    package, _, name = kind.split("/")
-    return getattr(import_module(f"{package}.msg"), name)
