@@ -29,7 +29,7 @@ def is_course(sequence: StageSequence) -> bool:
     if sequence.closed:
         return True
     needed = MANY_STAGES
-    if all(len(stage.where) >= 3 for stage in sequence.stages):
+    if all(stage.is_placed for stage in sequence.stages):
         needed = POINTS if all(map(_is_point, sequence.stages)) else COURSE_STAGES
     return sequence.ordered and len(sequence.stages) >= needed
 
@@ -41,7 +41,7 @@ def _is_point(stage: Stage) -> bool:
 
 def is_placed_in_windows(sequence: StageSequence) -> bool:
     """True of sequences in order through more places than are searched at once."""
-    places = sum(len(stage.where) >= 3 for stage in sequence.stages)
+    places = sum(stage.is_placed for stage in sequence.stages)
     return sequence.ordered and places > MAX_EXACT_PLACES
 
 

@@ -175,7 +175,7 @@ class Problem:
                 raise FieldError(end, "stands beside maneuver.closed, which has none; drop either")
         if not sequence.closed:
             return
-        if sum(len(stage.where) >= 3 for stage in sequence.stages) < MIN_PLACES:
+        if sum(stage.is_placed for stage in sequence.stages) < MIN_PLACES:
             raise FieldError("maneuver.closed", f"needs {MIN_PLACES} elements that say where; add some")
         for stage in sequence.stages:
             if stage.hold:

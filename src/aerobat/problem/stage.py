@@ -103,6 +103,11 @@ class Stage:
         enclosing = () if self.ball is None else self.ball.circumscribed
         return tuple(c for c in (*self.conditions, *enclosing) if c.quantity is Quantity.POSITION)
 
+    @property
+    def is_placed(self) -> bool:
+        """True if it says where it is, along all axes."""
+        return len(self.where) >= 3
+
     def centre(self, gates: Sequence[Gate]) -> Array | None:
         """The centre of the gate that it passes, or of its ball [m], (3,); None where it has neither."""
         if self.gate is not None:
