@@ -16,10 +16,12 @@ from aerobat.planning import (
     Miqp,
     Plan,
     Planner,
+    SecondOpinion,
     TimeOptimal,
     plan,
     with_second_opinion,
 )
+from aerobat.planning.assessment.assess import OPINION_TIME
 from aerobat.planning.recorder import Progress
 from aerobat.problem import load_problem
 from aerobat.reporting.tables import plan_facts
@@ -122,6 +124,23 @@ def test_what_is_left_of_a_limit_is_all_that_a_second_opinion_has(tmp_path, monk
         told = with_second_opinion(poor).assessment
     assert told is not None
     assert told.sentence.endswith("no second opinion: the time was over")
+
+
+def test_a_second_opinion_ends_by_itself_where_nobody_gave_a_limit(monkeypatch) -> None:
+    found = plan(load_problem("line"), MinSnap(), "agile-quad")
+    assert found.assessment is not None
+    poor = replace(found, assessment=replace(found.assessment, least_duration=0.1))
+    left: list[float | None] = []
+
+    def opinion(plan: Plan, progress: Progress | None) -> SecondOpinion:
+        left.append(deadline.time_left())
+        return SecondOpinion("", None)
+
+    monkeypatch.setattr("aerobat.planning.assessment.assess._second_opinion", opinion)
+    with_second_opinion(poor)
+    assert left[0] is not None
+    assert left[0] <= OPINION_TIME
+    assert deadline.time_left() is None
 
 
 def test_an_inner_limit_never_outlasts_an_outer_one() -> None:

@@ -54,6 +54,16 @@ def test_whoever_flies_whatever_a_thousand_instants_keep_what_is_announced(
     assert found.lowest.min() > announced.lowest.min() - 0.15
 
 
+def test_the_instants_of_a_long_path_are_few_and_reach_from_its_start_to_its_end(
+    flip: ab.Plan, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("aerobat.simulation.autopilot.recovery.MOST_INSTANTS", 20)
+    found = ab.recoveries(flip)
+    assert len(found.times) == 20
+    assert (found.times[0], found.times[-1]) == (0.0, flip.duration)
+    np.testing.assert_allclose(np.diff(found.times), flip.duration / 19)
+
+
 def test_a_plan_keeps_its_recoveries_in_its_file_and_in_its_report(
     flip: ab.Plan, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

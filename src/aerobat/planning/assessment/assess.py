@@ -11,7 +11,7 @@ from aerobat.arrays import Array
 from aerobat.certification import Certificate, Side
 from aerobat.declaration import validated
 from aerobat.errors import BackendMissing, Infeasible, SpecError
-from aerobat.optimization.deadline import out_of_time
+from aerobat.optimization.deadline import out_of_time, within_time
 from aerobat.planning.assessment.assessment import Assessment, Box, Point, SecondOpinion
 from aerobat.planning.assessment.lower_bound import least_duration
 from aerobat.planning.flyability import with_flyability
@@ -21,6 +21,7 @@ from aerobat.problem.problem import Problem
 from aerobat.vehicle import Vehicle
 
 OPINION_SEGMENTS = (2, 4)  # of free knots: two are quick and enough for a flip's five stages; else four
+OPINION_TIME = 20.0  # [s] at most: a poor plan of a long course would keep free knots busy for an hour
 
 
 def with_assessment(plan: Plan) -> Plan:
@@ -34,9 +35,9 @@ def with_assessment(plan: Plan) -> Plan:
 def with_second_opinion(plan: Plan, progress: Progress | None = None) -> Plan:
     """The plan; where its assessment finds it suspicious, with what free knots make of the same problem.
 
-    They begin from the plan. That takes seconds of the processor, and no more than is left of a limit
-    (`optimization.deadline.within_time`). Time-optimal plans need none, and a plan that a limit ended gets
-    none.
+    They begin from the plan. That takes seconds, OPINION_TIME at most, and no more than is left of a limit
+    (`optimization.deadline.within_time`); what they found by then counts. Time-optimal plans need none, and
+    a plan that a limit ended gets none.
     Raises SpecError without a vehicle.
 
     Args:
@@ -48,7 +49,9 @@ def with_second_opinion(plan: Plan, progress: Progress | None = None) -> Plan:
     assert assessment is not None
     if not assessment.suspicious or plan.planner == "time-optimal" or plan.status == "time_limit":
         return plan
-    return replace(plan, assessment=replace(assessment, opinion=_second_opinion(plan, progress)))
+    with within_time(OPINION_TIME):
+        opinion = _second_opinion(plan, progress)
+    return replace(plan, assessment=replace(assessment, opinion=opinion))
 
 
 def _second_opinion(plan: Plan, progress: Progress | None) -> SecondOpinion:

@@ -39,6 +39,8 @@ from aerobat.trajectory import Trajectory, as_trajectory
 from aerobat.vehicle import Vehicle
 
 HORIZON = 15.0  # [s] in which a recovery comes to a hover, or never does
+INSTANTS_RATE = 100.0  # [1/s] of instants that nobody names
+MOST_INSTANTS = 2000  # of them; a longer path has them further apart
 _CHUNK = 100  # ticks flown at once, so that their references take little memory
 _HOVERING = 0.5  # [s] of all of them, which are not followed any longer then
 _FEW_SPANS = 3  # that a sentence names one by one
@@ -123,7 +125,7 @@ def recoveries(
     Args:
         plan: the path; a bare trajectory needs a vehicle.
         vehicle: what flies it, or its name, by default the plan's.
-        times: of the instants [s], (T,), rising; by default a hundred a second.
+        times: of the instants [s], (T,), rising; by default a hundred a second, at most 2000 evenly.
         ground: the height [m], in the path's own frame, that a recovery must stay above; by default the
             environment's, which may have none.
         reaction: the time [s] for which the last command is kept before the recovery begins.
@@ -131,7 +133,8 @@ def recoveries(
     """
     vehicle, environment = vehicle_of(plan, vehicle).without_dead_rotors(), environment_of(plan, environment)
     path = as_trajectory(plan)
-    instants = path.sample(100.0) if times is None else frozen(times, "times", (None,))
+    rate = min(INSTANTS_RATE, (MOST_INSTANTS - 1) / path.duration)
+    instants = path.sample(rate) if times is None else frozen(times, "times", (None,))
     asked = reference(path, vehicle, instants, environment=environment)
     if asked.undetermined:
         raise SpecError("the path's attitude is undetermined where its thrust vanishes; plan another")
