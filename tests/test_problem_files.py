@@ -83,6 +83,14 @@ def test_a_problem_survives_its_file(problem: Problem, tmp_path: Path) -> None:
     assert load_problem(tmp_path / "problem.toml") == problem
 
 
+def test_a_file_without_a_name_is_named_after_itself(tmp_path: Path) -> None:
+    path = tmp_path / "backyard.toml"
+    write_problem(SPELLED_OUT, path)
+    lines = path.read_text().splitlines(keepends=True)
+    path.write_text("".join(line for line in lines if line != 'name = "spelled-out"\n'))
+    assert load_problem(path) == replace(SPELLED_OUT, name="backyard")
+
+
 def test_the_built_in_problems_are_the_reference_codes() -> None:
     """Gates and goals of the authors' public code."""
     names = ("flip-roll", "flip-pitch", "flip-roll-translation", "half-flip", "line", "section-v")

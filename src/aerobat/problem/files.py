@@ -22,7 +22,8 @@ def load_problem(name: PathName) -> Problem:
 
     Raises SpecError, in one sentence that names the field, when there is no such problem or it is malformed.
     """
-    return read_document(resolve_document(name, PRESETS, "problem"), Problem, "problem")
+    path = resolve_document(name, PRESETS, "problem")
+    return read_document(path, Problem, "problem", name=path.name.removesuffix(".toml"))
 
 
 def as_problem(problem: Problem | str) -> Problem:
