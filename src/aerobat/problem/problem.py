@@ -113,7 +113,7 @@ class Problem:
     missing or given to a closed course, or the maneuver lacks its gate.
     """
 
-    name: Annotated[Label, AfterValidator(_file_name)]  # left out in a file, the file's; names the output folder too
+    name: Annotated[Label, AfterValidator(_file_name)]  # left out in a file, the file's
     start: EndState = field(default_factory=EndState)  # where and how fast it begins
     goal: EndState = field(default_factory=EndState)  # where and how fast it ends
     maneuver: Annotated[Maneuver, PlainValidator(MANEUVERS.read)] = Line()  # what happens on the way
