@@ -31,7 +31,7 @@ from aerobat.vehicle import load_vehicle
 from random_flights import random_flight, with_lags
 
 VEHICLE = with_lags(load_vehicle("agile-quad"), 0.0)
-QUANTITIES = ["off plane", "sideways", "upward", "speed through", "attitude"]
+QUANTITIES = ["off plane", "inside by", "speed through", "attitude"]
 AHEAD = np.array([1.0, 0.0, 0.0])
 UP = np.array([0.0, 0.0, 1.0])
 
@@ -134,7 +134,7 @@ def test_beside_the_opening_is_not_through(side):
     aside = {"width": [0, 0.4, 0], "height": [0, 0, 0.4]}[side]
     for size, verdict in ((0.9, Verdict.HOLDS), (0.7, Verdict.VIOLATED)):
         found = judged(level(1.0), Gate(np.array(aside), AHEAD, UP, **{side: size}))
-        assert found["sideways" if side == "width" else "upward"].verdict is verdict
+        assert found["inside by"].verdict is verdict
 
 
 def test_standing_in_the_gate_is_not_through_unless_the_stage_forbids_to_move():

@@ -31,6 +31,7 @@ from aerobat.declaration import (
 )
 from aerobat.errors import SpecError
 from aerobat.problem.condition import Condition, ConeAngle, Quantity, fixed
+from aerobat.problem.opening import OpeningShape, Rectangle
 
 TOUCHING = 1e-6  # [m] within which frames touch, and neither stands in the other's opening
 
@@ -98,27 +99,38 @@ class Gate:
         """The unit vector across the opening, to the left of who passes upright, (3,)."""
         return unit(np.cross(self.up, self.normal))
 
+    @cached_property
+    def opening(self) -> OpeningShape:
+        """The opening's shape in its plane, by points (left, up)."""
+        return Rectangle(self.width, self.height)
+
     @property
-    def corners(self) -> Array:
-        """The corners of the opening in the world [m], in order around it, (4, 3)."""
-        half_width, half_height = self.lateral * self.width / 2, self.up * self.height / 2
-        return np.array(
-            [
-                self.position + a * half_width + b * half_height
-                for a, b in ((1, 1), (-1, 1), (-1, -1), (1, -1))
-            ]
-        )
+    def plane_axes(self) -> Array:
+        """Left and up of the opening in the world, (2, 3)."""
+        return np.array([self.lateral, self.up])
+
+    @property
+    def outline(self) -> Array:
+        """Points around the opening in the world [m], in order, a rectangle's corners, (K, 3)."""
+        return self.position + self.opening.outline @ self.plane_axes
+
+    def frame(self, thickness: float) -> Array:
+        """The outer corners in the world [m] of a frame so thick, one beside each of `outline`, (K, 3)."""
+        return self.position + self.opening.frame(thickness) @ self.plane_axes
+
+    def resized(self, across: float, up: float) -> Gate:
+        """The same gate with another size, by parts of what it is, by the lesser where it has but one."""
+        return replace(self, **self.opening.resized(across, up).fields)
 
     def stands_in(self, other: Gate) -> bool:
         """True if a side of its opening, where its frame is, passes through the other's opening."""
-        corners = (self.corners - other.position) @ np.array([other.lateral, other.up, other.normal]).T
-        last = np.roll(corners, 1, axis=0)
-        height, last_height = corners[:, 2:], last[:, 2:]
+        points = (self.outline - other.position) @ np.array([other.lateral, other.up, other.normal]).T
+        last = np.roll(points, 1, axis=0)
+        height, last_height = points[:, 2:], last[:, 2:]
         crosses = np.minimum(height, last_height) * np.maximum(height, last_height) < 0.0
         rise = np.where(crosses, height - last_height, 1.0)
-        crossings = np.where(crosses, last - last_height / rise * (corners - last), corners)
-        sizes = np.array([other.width, other.height, 0.0])
-        in_opening = (np.abs(crossings) - sizes / 2)[:, :2].max(axis=1) < -TOUCHING
+        crossings = np.where(crosses, last - last_height / rise * (points - last), points)
+        in_opening = other.opening.depth(crossings[:, :2]) > TOUCHING
         return bool((in_opening & (np.abs(crossings[:, 2]) < TOUCHING)).any())
 
     @property
@@ -178,11 +190,18 @@ def in_opening(gate: Gate, clearance: float) -> tuple[Condition, ...]:
     Where the opening is too narrow for that, in the middle between the edges that are too near.
     """
     in_plane = float(gate.normal @ gate.position)
-    found = [Condition(Quantity.POSITION, gate.normal, in_plane, in_plane)]
-    for axis, side in ((gate.lateral, gate.width), (gate.up, gate.height)):
-        middle, reach = float(axis @ gate.position), max(side / 2.0 - clearance, 0.0)
-        found.append(Condition(Quantity.POSITION, axis, middle - reach, middle + reach))
-    return tuple(found)
+    bounds = gate.opening.at_clearance(clearance)
+    directions = bounds.directions @ gate.plane_axes
+    middles = directions @ gate.position
+    return (
+        Condition(Quantity.POSITION, gate.normal, in_plane, in_plane),
+        *(
+            Condition(Quantity.POSITION, direction, lower, upper)
+            for direction, lower, upper in zip(
+                directions, (middles + bounds.lower).tolist(), (middles + bounds.upper).tolist(), strict=True
+            )
+        ),
+    )
 
 
 def only_gate(gates: Sequence[Gate], maneuver: str) -> Gate:
