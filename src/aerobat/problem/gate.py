@@ -1,4 +1,4 @@
-"""A gate: a rectangular opening somewhere in the world, with a direction of passage and an upright."""
+"""A gate: an opening somewhere in the world, with a direction of passage and an upright."""
 
 from __future__ import annotations
 
@@ -31,35 +31,41 @@ from aerobat.declaration import (
 )
 from aerobat.errors import SpecError
 from aerobat.problem.condition import Condition, ConeAngle, Quantity, fixed
-from aerobat.problem.opening import OpeningShape, Rectangle
+from aerobat.problem.opening import Circle, Corners, OpeningShape, Polygon, Rectangle
 
+DEFAULT_SIZE = (1.0, 0.6)  # [m] width and height of a rectangular opening
 TOUCHING = 1e-6  # [m] within which frames touch, and neither stands in the other's opening
 
 
 @declared
 class Gate:
-    """A rectangular opening that a vehicle passes with its thrust axis along `up`.
+    """An opening that a vehicle passes with its thrust axis along `up`: rectangle, circle or convex polygon.
 
     An upright gate has up = +z; one that is passed upside down has up = −z; the paper's half-flip
     gate, tilted by 90°, has up in the horizontal plane (Section II-D). Files give its attitude by angles.
 
-    Raises SpecError when `up` is not normal to `normal`.
+    A polygon's corners are given as who passes upright sees them, in either order around it.
+
+    Raises SpecError when `up` is not normal to `normal`, and for an opening of two kinds.
     """
 
-    position: Vector3  # [m] centre of the opening
+    position: Vector3  # [m] centre of the opening, a place inside of a polygon
     normal: UnitVector  # direction of passage; instead of angles
     up: UnitVector  # upright of the opening, normal to `normal`; instead of angles
-    width: Positive = 1.0  # [m] of the opening
-    height: Positive = 0.6  # [m] of the opening
+    width: Positive | None = None  # [m] of a rectangular opening; left out, 1
+    height: Positive | None = None  # [m] likewise; left out, 0.6
     name: Label = "gate"  # by which stages and waypoints refer to it
     # [rad] between the thrust axis and `up` in the gate, at most, where a maneuver asks for its attitude
     attitude_tolerance: ConeAngle = radians(5.0)
+    radius: Positive | None = None  # [m] of a round opening, instead of width and height
+    polygon: Corners | None = None  # [m] of any other convex opening, from `position`, instead of those
 
     SHORTHANDS: ClassVar[Mapping[str, str]] = {
         "heading_deg": "[deg] direction of passage, from x toward y (0)",
         "elevation_deg": "[deg] climb of the direction of passage (0)",
         "tilt_deg": "[deg] roll about the passage, to the right: 90 sideways, 180 upside down (0)",
         "attitude_tolerance_deg": "[deg] `attitude_tolerance` in degrees (5)",
+        "diameter": "[m] twice `radius`",
     }
     ANGLES: ClassVar[tuple[str, ...]] = ("heading_deg", "elevation_deg", "tilt_deg")
 
@@ -67,11 +73,31 @@ class Gate:
         """Check."""
         if abs(self.normal @ self.up) > 1e-6:
             raise FieldError("up", "must be normal to normal, the direction of passage")
+        kinds = (
+            ("polygon", self.polygon),
+            ("radius", self.radius),
+            ("width", self.width),
+            ("height", self.height),
+        )
+        given = [key for key, value in kinds if value is not None]
+        if given[0:1] in (["polygon"], ["radius"]):
+            if len(given) > 1:
+                raise FieldError(
+                    given[0], f"stands beside {given[1]}, an opening of another kind; drop either"
+                )
+            return
+        for key, size in zip(("width", "height"), DEFAULT_SIZE, strict=True):
+            if getattr(self, key) is None:
+                object.__setattr__(self, key, size)
 
     @classmethod
     def expand(cls, table: dict[str, Any]) -> dict[str, Any]:
         """Replace the angles by `normal` and `up`, which are given instead of them or not at all."""
         table = in_radians(table, "attitude_tolerance")
+        if "diameter" in table:
+            if "radius" in table:
+                raise FieldError("diameter", "stands beside radius; give one or the other")
+            table["radius"] = _half(table.pop("diameter"))
         angles = {key: table.pop(key) for key in cls.ANGLES if key in table}
         if "normal" not in table and "up" not in table:
             attitude = [radians(number(angles.get(key, 0.0), key)) for key in cls.ANGLES]
@@ -83,6 +109,9 @@ class Gate:
     def abbreviate(self, table: dict[str, Any]) -> dict[str, Any]:
         """Write `normal` and `up` as angles where those say exactly the same."""
         table = in_degrees(table, "attitude_tolerance")
+        for key, size in zip(("width", "height"), DEFAULT_SIZE, strict=True):
+            if table.get(key) == size:
+                del table[key]
         for digits in (9, 17):
             angles = {
                 key: round(degrees(angle), digits)
@@ -102,7 +131,11 @@ class Gate:
     @cached_property
     def opening(self) -> OpeningShape:
         """The opening's shape in its plane, by points (left, up)."""
-        return Rectangle(self.width, self.height)
+        if self.polygon is not None:
+            return Polygon(self.polygon)
+        if self.radius is not None:
+            return Circle(self.radius)
+        return Rectangle(self.width or 0.0, self.height or 0.0)
 
     @property
     def plane_axes(self) -> Array:
@@ -155,9 +188,12 @@ def tilted_gate(
     heading: Angle = 0.0,
     elevation: Angle = 0.0,
     tilt: Angle = 0.0,
-    width: Positive = 1.0,
-    height: Positive = 0.6,
+    width: Positive | None = None,
+    height: Positive | None = None,
     name: Label = "gate",
+    *,
+    radius: Positive | None = None,
+    polygon: Corners | None = None,
 ) -> Gate:
     """Return the gate whose attitude is given by angles.
 
@@ -168,15 +204,17 @@ def tilted_gate(
         tilt: roll about the direction of passage [rad], right-handed: 0 upright, π/2 with its upright to the
             right of who passes, π upside down. The paper's α (Section II-D) is measured toward +y when
             passing toward +x: α = −tilt.
-        width: of the opening [m].
-        height: of the opening [m].
+        width: of a rectangular opening [m], by default 1.
+        height: of a rectangular opening [m], by default 0.6.
         name: by which stages refer to it.
+        radius: of a round opening [m], instead of width and height.
+        polygon: corners of any other convex opening [m], from `position` to the left and up, (K, 2).
 
     Raises:
-        SpecError: a number is not finite, or a side not positive.
+        SpecError: a number is not finite, a side not positive, or the opening of two kinds.
     """
     normal, up = _directions(heading, elevation, tilt)
-    return Gate(cast(Array, position), normal, up, width, height, name)
+    return Gate(cast(Array, position), normal, up, width, height, name, radius=radius, polygon=polygon)
 
 
 def at_centre(gate: Gate) -> tuple[Condition, ...]:
@@ -226,6 +264,14 @@ def named_gate(gates: Sequence[Gate], name: str) -> Gate:
         if gate.name == name:
             return gate
     raise unknown_name("gate", name, [gate.name for gate in gates])
+
+
+def _half(diameter: Any) -> float:
+    """The radius of a diameter [m]. Raises FieldError for one that is none."""
+    whole = number(diameter, "diameter")
+    if whole <= 0.0:
+        raise FieldError("diameter", f"must be a positive number, got {whole:g}")
+    return whole / 2.0
 
 
 def _directions(heading: float, elevation: float, tilt: float) -> tuple[Array, Array]:

@@ -1,141 +1,24 @@
-"""Openings of gates: convex shapes in a gate's plane, by points (left, up) [m] from the gate's position.
-
-All that plans, judges or draws an opening reads it here: which points lie inside and how deep, what is left
-at a clearance from the edges, along which directions a body that passes is measured, the outline, the edges.
-"""
+"""Convex polygons as openings, rectangles among them."""
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from functools import cached_property
 from itertools import combinations
-from typing import Any, NamedTuple
+from typing import Annotated, Any
 
 import numpy as np
+from pydantic import Field, PlainValidator
 
 from aerobat.arrays import Array
+from aerobat.declaration import FieldError, finite, shown
+from aerobat.problem.opening.shape import Edge, LinearBounds, OpeningShape, Probe
 
 STRAIGHT = 1e-6  # [-] the sine of a turn that is none
+FARTHEST = 1e15  # [m] likewise of all lengths in files
+MAX_CORNERS = 24  # of a polygon: each side is followed through every tick of a flight
 ROUNDING = 1e-12  # of an opening's size
 TURNS = np.radians(np.arange(0.0, 180.0, 5.0))  # in which a section is tried in a polygon
-SHARPEST = 4.0  # by which a frame's outer corner may lie farther out than its bars are thick
-
-
-class Probe(NamedTuple):
-    """A direction in which a body that passes is measured against an opening."""
-
-    direction: tuple[float, float]  # unit vector (left, up)
-    limit: float  # [m] from the gate's position to the edge
-    both_ways: bool = False  # against the direction too
-    radial: bool = False  # the distance of the farthest point, in whichever direction that is
-
-
-class Edge(NamedTuple):
-    """A straight part of a frame's inner side."""
-
-    middle: Array  # [m] (2,)
-    normal: Array  # outward unit vector, (2,)
-    half_length: float  # [m]
-
-
-class LinearBounds(NamedTuple):
-    """lower ≤ directions · point ≤ upper."""
-
-    directions: Array  # unit vectors, (n, 2)
-    lower: Array  # [m] (n,)
-    upper: Array  # [m] (n,)
-
-
-class OpeningShape(ABC):
-    """A convex shape in a gate's plane."""
-
-    @property
-    @abstractmethod
-    def outline(self) -> Array:
-        """Points around it [m], anticlockwise with left as the first axis, (K, 2)."""
-
-    @property
-    @abstractmethod
-    def probes(self) -> tuple[Probe, ...]:
-        """The directions in which a body that passes is measured; all within their limits, it is inside."""
-
-    @property
-    @abstractmethod
-    def sides(self) -> tuple[Array, Array]:
-        """Outward normals (S, 2) and distances [m] (S,) of the sides of the polygon that planners take."""
-
-    @property
-    @abstractmethod
-    def edges(self) -> tuple[Edge, ...]:
-        """What a frame around it is made of."""
-
-    @property
-    @abstractmethod
-    def fields(self) -> Mapping[str, Any]:
-        """The fields of a gate with this opening."""
-
-    @property
-    @abstractmethod
-    def kind(self) -> str:
-        """Its kind as it is said before its width, empty of a rectangle."""
-
-    @abstractmethod
-    def depth(self, points: Array) -> Array:
-        """How deep points (..., 2) lie inside, their distance to the nearest edge [m], (...), or below 0."""
-
-    @abstractmethod
-    def at_clearance(self, clearance: float) -> LinearBounds:
-        """What is left at a clearance [m] from the edges: in too narrow an opening its middle."""
-
-    @abstractmethod
-    def admits(self, section: Array) -> bool:
-        """True if the ellipse of all √S u fits in as it is turned, with unit vectors u and S (2, 2) [m²]."""
-
-    @abstractmethod
-    def admits_turned(self, small: float, large: float) -> bool:
-        """True if an ellipse of such semi-axes [m] fits in however it is turned, or may do."""
-
-    @abstractmethod
-    def outward(self, probe: int, points: Array) -> Array:
-        """The outward normals of the edges that points measured by a probe are next to, (..., 2)."""
-
-    @abstractmethod
-    def nearest_on_edge(self, outward: Array, points: Array) -> Array:
-        """The points of the edges with those outward normals that are next to points, (..., 2)."""
-
-    @abstractmethod
-    def resized(self, across: float, up: float) -> OpeningShape:
-        """The same with other sizes, as parts of what they are; by the lesser part where it has but one."""
-
-    @abstractmethod
-    def needed(self, reach: Array) -> Array:
-        """Width and height [m] of the least such opening about the same place, (..., 2).
-
-        Args:
-            reach: of bodies along the probes [m], (..., probes).
-        """
-
-    @property
-    @abstractmethod
-    def inradius(self) -> float:
-        """How deep [m] its deepest point lies inside."""
-
-    @property
-    def size(self) -> Array:
-        """Width and height [m] of the upright box around it, (2,)."""
-        return np.asarray(np.ptp(self.outline, axis=0))
-
-    def frame(self, thickness: float) -> Array:
-        """The outer corners of a frame of such thickness [m], one for each point of the outline, (K, 2)."""
-        points = self.outline
-        along = np.roll(points, -1, axis=0) - points
-        along /= np.linalg.norm(along, axis=1)[:, None]
-        normal = np.column_stack([along[:, 1], -along[:, 0]])
-        last = np.roll(normal, 1, axis=0)
-        mitre = (normal + last) / (1.0 + np.sum(normal * last, axis=1))[:, None]
-        far = np.maximum(np.linalg.norm(mitre, axis=1) / SHARPEST, 1.0)[:, None]
-        return np.asarray(points + thickness * mitre / far)
 
 
 class Polygon(OpeningShape):
@@ -152,7 +35,7 @@ class Polygon(OpeningShape):
     @property
     def fields(self) -> Mapping[str, Any]:
         """The fields of a gate with this opening."""
-        return {"polygon": self.corners}
+        return {"width": None, "height": None, "radius": None, "polygon": self.corners}
 
     @property
     def kind(self) -> str:
@@ -262,7 +145,7 @@ class Rectangle(Polygon):
     @property
     def fields(self) -> Mapping[str, Any]:
         """The fields of a gate with this opening."""
-        return {"width": self.width, "height": self.height}
+        return {"width": self.width, "height": self.height, "radius": None, "polygon": None}
 
     @property
     def kind(self) -> str:
@@ -304,12 +187,48 @@ class Rectangle(Polygon):
         return Rectangle(across * self.width, up * self.height)
 
 
-def edge_name(outward: Array) -> str:
-    """The edge with an outward normal (2,), as who passes upright sees it: left, upper, upper left, …"""
-    left, up = outward / np.linalg.norm(outward)
-    diagonal = np.sin(np.pi / 8.0)
-    words = (
-        "upper" if up > diagonal else "lower" if up < -diagonal else "",
-        "left" if left > diagonal else "right" if left < -diagonal else "",
-    )
-    return " ".join(filter(None, words))
+def _corners(value: Any) -> Array:
+    """The corners of a convex polygon about (0, 0), anticlockwise. Raises FieldError for what is none."""
+    if not isinstance(value, list | tuple | np.ndarray) or np.ndim(np.asarray(value, dtype=object)) < 1:
+        raise FieldError("", f"must be a list of corners, two numbers each, got {shown(value)}")
+    if not 3 <= len(value) <= MAX_CORNERS:
+        raise FieldError("", f"must have from 3 to {MAX_CORNERS} corners, got {len(value)}; give as many")
+    corners = finite(value, len(value), 2)
+    if np.abs(corners).max() > FARTHEST:
+        raise FieldError(
+            "", f"must have corners within {FARTHEST:g} m, got {np.abs(corners).max():g}; check units"
+        )
+    sides = np.roll(corners, -1, axis=0) - corners
+    lengths = np.linalg.norm(sides, axis=1)
+    if not (lengths > 0.0).all():
+        raise FieldError("", f"has the corner {_text(corners[lengths == 0.0])} twice; drop one")
+    sides = sides / lengths[:, None]
+    last = np.roll(sides, 1, axis=0)
+    sines, cosines = last[:, 0] * sides[:, 1] - last[:, 1] * sides[:, 0], np.sum(last * sides, axis=1)
+    turns = np.arctan2(sines, cosines)
+    sign = np.sign(turns.sum())
+    straight = np.abs(sines) < STRAIGHT
+    if straight.any():
+        where = _text(corners[straight])
+        raise FieldError("", f"has its corner {where} on a line with those beside it; drop or move it")
+    if (sign * turns <= 0.0).any():
+        where = _text(corners[sign * turns <= 0.0])
+        raise FieldError("", f"must be convex, at its corner {where} it turns inward; drop or move that")
+    if abs(turns.sum()) > 3.0 * np.pi:
+        raise FieldError("", "must go around once, its sides cross; order the corners around it")
+    around = corners if sign > 0.0 else np.ascontiguousarray(corners[::-1])
+    around.flags.writeable = False
+    if Polygon(around).depth(np.zeros(2)) <= 0.0:
+        raise FieldError("", "must hold the gate's position, (0, 0), inside; move the corners or the gate")
+    return around
+
+
+def _text(corners: Array) -> str:
+    """The first of some corners, as a file has it."""
+    return "[{:g}, {:g}]".format(*corners[0])
+
+
+# corners in a gate's plane, to the left and up of its position as who passes upright sees it [m], (K, 2)
+Corners = Annotated[
+    Array, PlainValidator(_corners), Field(description="corners in order, two numbers each: left and up")
+]
