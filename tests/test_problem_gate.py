@@ -25,7 +25,7 @@ def test_the_opening_is_a_rectangle_of_its_size_across_the_passage(
     heading: float, elevation: float, tilt: float
 ) -> None:
     gate = tilted_gate(np.zeros(3), heading, elevation, tilt, width=1.2, height=0.5)
-    corners = gate.corners
+    corners = gate.outline
     sides = np.linalg.norm(np.diff(np.vstack([corners, corners[:1]]), axis=0), axis=1)
     np.testing.assert_allclose(sides, [1.2, 0.5, 1.2, 0.5])
     np.testing.assert_allclose((corners - gate.position) @ gate.normal, 0.0, atol=1e-12)

@@ -80,7 +80,7 @@ def test_the_inner_edge_of_a_drawn_gate_is_its_opening(gate):
     half = np.array([gate.width, gate.height]) / 2
     at_the_opening = corners[np.isclose(np.abs(inside), half, rtol=0, atol=1e-9).all(axis=1)]
     flat = at_the_opening - np.outer((at_the_opening - gate.position) @ gate.normal, gate.normal)
-    for corner in gate.corners:  # each is drawn, half before and half behind the gate's plane
+    for corner in gate.outline:  # each is drawn, half before and half behind the gate's plane
         assert np.linalg.norm(flat - corner, axis=1).min() < 1e-9
     assert np.isclose((at_the_opening - gate.position) @ gate.normal, 0.0).sum() == 0
     np.testing.assert_allclose(at_the_opening.mean(axis=0), gate.position, atol=1e-9)

@@ -25,7 +25,8 @@ Side = Literal["both", "width", "height"]
 class Opening:
     """An opening about a gate's centre, and how far the flights at hand vouch for it."""
 
-    width: float  # [m] infinite where more flights fail to cross the gate's plane than may
+    # of the upright box around it, infinite where more flights fail to cross the gate's plane than may
+    width: float  # [m]
     height: float  # [m] likewise
     scale: float  # [-] of the gate's own opening, or of the side that was sought
     sample_scale: float  # [-] that the wanted fraction of the flights at hand has passed: an estimate
@@ -97,9 +98,10 @@ def opening_of(
             f"{100 * confidence:g} % confidence; score {least} flights or more"
         )
     scale = float(scales[_rank(len(scales), probability, confidence) - 1])
+    width, height = gate.opening.size.tolist()
     return Opening(
-        width=gate.width * (1.0 if side == "height" else scale),
-        height=gate.height * (1.0 if side == "width" else scale),
+        width=width * (1.0 if side == "height" else scale),
+        height=height * (1.0 if side == "width" else scale),
         scale=scale,
         sample_scale=float(scales[ceil(probability * len(scales)) - 1]),
         probability=probability,
@@ -127,8 +129,9 @@ def _needed(scores: Scores, gate: Gate, side: Side) -> Array:
             [passage.needed_height for passage in passages],
         )
     )
+    own_width, own_height = gate.opening.size
     if side == "width":
-        return np.where(height <= gate.height, width / gate.width, np.inf)
+        return np.where(height <= own_height, width / own_width, np.inf)
     if side == "height":
-        return np.where(width <= gate.width, height / gate.height, np.inf)
-    return np.asarray(np.maximum(width / gate.width, height / gate.height))
+        return np.where(width <= own_width, height / own_height, np.inf)
+    return np.asarray(np.maximum(width / own_width, height / own_height))

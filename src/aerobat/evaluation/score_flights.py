@@ -23,7 +23,7 @@ from aerobat.evaluation.score import Scores, scores_of
 from aerobat.kernels import running_metrics
 from aerobat.kernels.gates.approach import Target
 from aerobat.kernels.gates.progress import GatePlane
-from aerobat.kernels.gates.section import BoundingEllipsoid, GateFrame
+from aerobat.kernels.gates.section import BoundingEllipsoid
 from aerobat.kernels.ops import Ops
 from aerobat.kernels.running_metrics import MetricsInput, MetricsParameters, RunningMetrics
 from aerobat.planning import Plan
@@ -31,7 +31,7 @@ from aerobat.problem import Problem, as_problem
 from aerobat.simulation.config import FlightConfig
 from aerobat.simulation.loop import Signals
 from aerobat.simulation.outcome import DIVERGENCE_RADIUS, TOUCHDOWN
-from aerobat.simulation.passages import PASSAGE_DEPTH, PASSAGE_WINDOW
+from aerobat.simulation.passages import PASSAGE_DEPTH, PASSAGE_WINDOW, plane_directions
 from aerobat.simulation.prepare import prepare
 from aerobat.simulation.reference_source import BLOCK
 from aerobat.simulation.setup import FlightSetup, Part
@@ -43,7 +43,7 @@ from aerobat.vehicle import Vehicle
 class MetricsMonitor:
     """The loop's component that adds up a flight's metrics."""
 
-    gates: int
+    gates: tuple[int, ...]  # along how many directions each measures bodies
     waypoints: int
     period: int = 1
     name: str = "metrics"
@@ -196,19 +196,19 @@ def with_metrics(setup: FlightSetup, planned: Asked = NOTHING_ASKED) -> FlightSe
     body = BoundingEllipsoid(*map(components, (setup.fleet.body_centres, setup.fleet.semi_axes)))
     limits = np.full(vehicles, DIVERGENCE_RADIUS**2), np.full(vehicles, ground)
     parameters = MetricsParameters(*limits, body, planes, targets)
-    metrics = Part(MetricsMonitor(len(planes), len(targets)), parameters, MetricsSource(setup.times))
+    monitor = MetricsMonitor(tuple(len(plane.directions) for plane in planes), len(targets))
+    metrics = Part(monitor, parameters, MetricsSource(setup.times))
     return replace(setup, parts=(*setup.parts, metrics))
 
 
 def _plane(passage: PlannedPassage, vehicles: int) -> GatePlane:
     """A planned passage as kernels read it, leaves (vehicles,)."""
     gate = passage.gate
-    centre, *frame = (
-        components(np.broadcast_to(v, (vehicles, 3)))
-        for v in (gate.position, gate.normal, gate.lateral, gate.up)
-    )
-    numbers = (np.full(vehicles, x) for x in (passage.time, PASSAGE_WINDOW, PASSAGE_DEPTH))
-    return GatePlane(centre, GateFrame(*frame), *numbers)
+    directions = plane_directions(gate)
+    place = components(gate.position), components(gate.normal)
+    plane = GatePlane(*place, directions, passage.time, PASSAGE_WINDOW, PASSAGE_DEPTH)
+    spread: GatePlane = tree_map(lambda leaf: np.full(vehicles, leaf), plane)
+    return spread
 
 
 def _target(waypoint: PlannedWaypoint, vehicles: int) -> Target:

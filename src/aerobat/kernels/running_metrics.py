@@ -52,10 +52,10 @@ class RunningMetrics(NamedTuple):
     waypoints: tuple[Approach, ...]
 
 
-def init(gates: int, waypoints: int) -> RunningMetrics:
-    """Metrics before the first tick of a flight through so many gates, by so many waypoints."""
+def init(gates: tuple[int, ...], waypoints: int) -> RunningMetrics:
+    """Metrics before the first tick of a flight through gates of so many directions, by so many waypoints."""
     nowhere = Snapshot(0.0, ZERO, ZERO, (1.0, 0.0, 0.0, 0.0))
-    passages = gates * (progress.init(),)
+    passages = tuple(progress.init(directions) for directions in gates)
     approaches = waypoints * (approach.init(),)
     return RunningMetrics(1.0, 1.0, 0.0, inf, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, nowhere, passages, approaches)
 

@@ -65,26 +65,27 @@ def require_openings(problem: Problem, vehicle: Vehicle) -> None:
 
 
 def _require(gate: Gate, stage: Stage, vehicle: Vehicle) -> None:
-    semi_axes = np.sort(vehicle.bounding_ellipsoid.semi_axes)
+    semi_axes = vehicle.bounding_ellipsoid.semi_axes
     if stage.attitude is None:
-        small, large = 2 * semi_axes[:2]
-        fits = min(gate.width, gate.height) >= small
-        fits = fits and np.hypot(gate.width, gate.height) >= np.hypot(small, large)
-        need, how = (large, small), "even edgewise, in whichever attitude is the best"
+        small, large = np.sort(semi_axes)[:2].tolist()
+        fits = gate.opening.admits_turned(small, large)
+        need, how = (2 * large, 2 * small), "even edgewise, in whichever attitude is the best"
     else:
-        need = tuple(2 * _least_section(gate, stage.attitude.up, vehicle.bounding_ellipsoid.semi_axes))
-        fits = gate.width >= need[0] and gate.height >= need[1]
-        how = "in the attitude that is asked there"
+        section = _least_section(gate, stage.attitude.up, semi_axes)
+        fits = gate.opening.admits(section)
+        need, how = tuple(2 * np.sqrt(np.diag(section))), "in the attitude that is asked there"
     if not fits:
+        width, height = gate.opening.size
+        kind = gate.opening.kind
         raise SpecError(
-            f"gate '{gate.name}' is {length(gate.width)} wide and {length(gate.height)} high, but the body "
+            f"gate '{gate.name}' is {kind}{length(width)} wide and {length(height)} high, but the body "
             f"of {vehicle.name} takes {length(need[0])} by {length(need[1])}, {how}; widen the opening, or "
             "take a smaller vehicle"
         )
 
 
 def _least_section(gate: Gate, thrust_axis: Array, semi_axes: Array) -> Array:
-    """Half the width and height [m] of a body's section in the gate, its centre there, at the least, (2,).
+    """The least section of a body in the gate, its centre there: of all √S u left and up, S (2, 2) [m²].
 
     The section of an ellipsoid grows with it: the one about the thrust axis with the lesser of both other
     semi-axes lies within it, however it is turned about that.
@@ -93,4 +94,4 @@ def _least_section(gate: Gate, thrust_axis: Array, semi_axes: Array) -> Array:
     shape = lesser * np.eye(3) + (semi_axes[2] ** 2 - lesser) * np.outer(thrust_axis, thrust_axis)
     along = shape @ gate.normal
     inside = shape - np.outer(along, along) / (gate.normal @ along)
-    return np.sqrt([gate.lateral @ inside @ gate.lateral, gate.up @ inside @ gate.up])
+    return np.asarray(gate.plane_axes @ inside @ gate.plane_axes.T)

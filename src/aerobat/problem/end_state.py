@@ -12,29 +12,44 @@ from aerobat.arrays import Array
 from aerobat.declaration import FieldError, PartialVector, Vector3, VectorLike, declared, validated
 from aerobat.problem.condition import free
 
+VELOCITY = 1  # the derivative of position
+
 
 @declared
 class EndState:
     """Where a trajectory begins or ends; derivatives above acceleration are zero there. World frame.
 
     A goal of `free_attitude` may be reached in any attitude, at whatever body rate and thrust, as races end;
-    planners that cannot leave it free take the acceleration. A closed course has no ends: both are left out.
+    planners that cannot leave it free take the acceleration. One of `free_velocity` is passed however fast and
+    in any direction, so in any attitude too. A closed course has no ends: both are left out.
     """
 
     position: PartialVector = field(default_factory=free)  # [m] world, all of it, but of a closed course
     velocity: Vector3 = field(default_factory=lambda: np.zeros(3))  # [m/s] world
     acceleration: Vector3 = field(default_factory=lambda: np.zeros(3))  # [m/s²] world
     free_attitude: bool = False  # of a goal: any attitude will do, whatever the acceleration
+    free_velocity: bool = False  # of a goal: any velocity will do, and any attitude
 
     def __post_init__(self) -> None:
         """Check."""
         if np.isnan(self.position).any() and not self.is_left_out:
             raise FieldError("position", "must be given in all components; add those that are missing")
+        if self.free_velocity and self.velocity.any():
+            raise FieldError("free_velocity", "stands beside velocity, which gives one; drop either")
 
     @property
     def is_left_out(self) -> bool:
         """True of an end that no problem gives, a closed course's."""
         return bool(np.isnan(self.position).all())
+
+    @property
+    def leaves_attitude_free(self) -> bool:
+        """True where any attitude will do."""
+        return self.free_attitude or self.free_velocity
+
+    def fixed(self, order: int) -> Array:
+        """The derivatives below `order` that it fixes, of position among them, whole numbers from 0."""
+        return np.array([k for k in range(order) if k != VELOCITY or not self.free_velocity])
 
     @validated
     def derivatives(self, order: Annotated[int, Field(ge=1, le=100)]) -> Array:

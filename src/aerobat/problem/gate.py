@@ -1,4 +1,4 @@
-"""A gate: a rectangular opening somewhere in the world, with a direction of passage and an upright."""
+"""A gate: an opening somewhere in the world, with a direction of passage and an upright."""
 
 from __future__ import annotations
 
@@ -31,34 +31,41 @@ from aerobat.declaration import (
 )
 from aerobat.errors import SpecError
 from aerobat.problem.condition import Condition, ConeAngle, Quantity, fixed
+from aerobat.problem.opening import Circle, Corners, OpeningShape, Polygon, Rectangle
 
+DEFAULT_SIZE = (1.0, 0.6)  # [m] width and height of a rectangular opening
 TOUCHING = 1e-6  # [m] within which frames touch, and neither stands in the other's opening
 
 
 @declared
 class Gate:
-    """A rectangular opening that a vehicle passes with its thrust axis along `up`.
+    """An opening that a vehicle passes with its thrust axis along `up`: rectangle, circle or convex polygon.
 
     An upright gate has up = +z; one that is passed upside down has up = −z; the paper's half-flip
     gate, tilted by 90°, has up in the horizontal plane (Section II-D). Files give its attitude by angles.
 
-    Raises SpecError when `up` is not normal to `normal`.
+    A polygon's corners are given as who passes upright sees them, in either order around it.
+
+    Raises SpecError when `up` is not normal to `normal`, and for an opening of two kinds.
     """
 
-    position: Vector3  # [m] centre of the opening
+    position: Vector3  # [m] centre of the opening, a place inside of a polygon
     normal: UnitVector  # direction of passage; instead of angles
     up: UnitVector  # upright of the opening, normal to `normal`; instead of angles
-    width: Positive = 1.0  # [m] of the opening
-    height: Positive = 0.6  # [m] of the opening
+    width: Positive | None = None  # [m] of a rectangular opening; left out, 1
+    height: Positive | None = None  # [m] likewise; left out, 0.6
     name: Label = "gate"  # by which stages and waypoints refer to it
     # [rad] between the thrust axis and `up` in the gate, at most, where a maneuver asks for its attitude
     attitude_tolerance: ConeAngle = radians(5.0)
+    radius: Positive | None = None  # [m] of a round opening, instead of width and height
+    polygon: Corners | None = None  # [m] of any other convex opening, from `position`, instead of those
 
     SHORTHANDS: ClassVar[Mapping[str, str]] = {
         "heading_deg": "[deg] direction of passage, from x toward y (0)",
         "elevation_deg": "[deg] climb of the direction of passage (0)",
         "tilt_deg": "[deg] roll about the passage, to the right: 90 sideways, 180 upside down (0)",
         "attitude_tolerance_deg": "[deg] `attitude_tolerance` in degrees (5)",
+        "diameter": "[m] twice `radius`",
     }
     ANGLES: ClassVar[tuple[str, ...]] = ("heading_deg", "elevation_deg", "tilt_deg")
 
@@ -66,11 +73,31 @@ class Gate:
         """Check."""
         if abs(self.normal @ self.up) > 1e-6:
             raise FieldError("up", "must be normal to normal, the direction of passage")
+        kinds = (
+            ("polygon", self.polygon),
+            ("radius", self.radius),
+            ("width", self.width),
+            ("height", self.height),
+        )
+        given = [key for key, value in kinds if value is not None]
+        if given[0:1] in (["polygon"], ["radius"]):
+            if len(given) > 1:
+                raise FieldError(
+                    given[0], f"stands beside {given[1]}, an opening of another kind; drop either"
+                )
+            return
+        for key, size in zip(("width", "height"), DEFAULT_SIZE, strict=True):
+            if getattr(self, key) is None:
+                object.__setattr__(self, key, size)
 
     @classmethod
     def expand(cls, table: dict[str, Any]) -> dict[str, Any]:
         """Replace the angles by `normal` and `up`, which are given instead of them or not at all."""
         table = in_radians(table, "attitude_tolerance")
+        if "diameter" in table:
+            if "radius" in table:
+                raise FieldError("diameter", "stands beside radius; give one or the other")
+            table["radius"] = _half(table.pop("diameter"))
         angles = {key: table.pop(key) for key in cls.ANGLES if key in table}
         if "normal" not in table and "up" not in table:
             attitude = [radians(number(angles.get(key, 0.0), key)) for key in cls.ANGLES]
@@ -82,6 +109,9 @@ class Gate:
     def abbreviate(self, table: dict[str, Any]) -> dict[str, Any]:
         """Write `normal` and `up` as angles where those say exactly the same."""
         table = in_degrees(table, "attitude_tolerance")
+        for key, size in zip(("width", "height"), DEFAULT_SIZE, strict=True):
+            if table.get(key) == size:
+                del table[key]
         for digits in (9, 17):
             angles = {
                 key: round(degrees(angle), digits)
@@ -98,27 +128,42 @@ class Gate:
         """The unit vector across the opening, to the left of who passes upright, (3,)."""
         return unit(np.cross(self.up, self.normal))
 
+    @cached_property
+    def opening(self) -> OpeningShape:
+        """The opening's shape in its plane, by points (left, up)."""
+        if self.polygon is not None:
+            return Polygon(self.polygon)
+        if self.radius is not None:
+            return Circle(self.radius)
+        return Rectangle(self.width or 0.0, self.height or 0.0)
+
     @property
-    def corners(self) -> Array:
-        """The corners of the opening in the world [m], in order around it, (4, 3)."""
-        half_width, half_height = self.lateral * self.width / 2, self.up * self.height / 2
-        return np.array(
-            [
-                self.position + a * half_width + b * half_height
-                for a, b in ((1, 1), (-1, 1), (-1, -1), (1, -1))
-            ]
-        )
+    def plane_axes(self) -> Array:
+        """Left and up of the opening in the world, (2, 3)."""
+        return np.array([self.lateral, self.up])
+
+    @property
+    def outline(self) -> Array:
+        """Points around the opening in the world [m], in order, a rectangle's corners, (K, 3)."""
+        return self.position + self.opening.outline @ self.plane_axes
+
+    def frame(self, thickness: float) -> Array:
+        """The outer corners in the world [m] of a frame so thick, one beside each of `outline`, (K, 3)."""
+        return self.position + self.opening.frame(thickness) @ self.plane_axes
+
+    def resized(self, across: float, up: float) -> Gate:
+        """The same gate with another size, by parts of what it is, by the lesser where it has but one."""
+        return replace(self, **self.opening.resized(across, up).fields)
 
     def stands_in(self, other: Gate) -> bool:
         """True if a side of its opening, where its frame is, passes through the other's opening."""
-        corners = (self.corners - other.position) @ np.array([other.lateral, other.up, other.normal]).T
-        last = np.roll(corners, 1, axis=0)
-        height, last_height = corners[:, 2:], last[:, 2:]
+        points = (self.outline - other.position) @ np.array([other.lateral, other.up, other.normal]).T
+        last = np.roll(points, 1, axis=0)
+        height, last_height = points[:, 2:], last[:, 2:]
         crosses = np.minimum(height, last_height) * np.maximum(height, last_height) < 0.0
         rise = np.where(crosses, height - last_height, 1.0)
-        crossings = np.where(crosses, last - last_height / rise * (corners - last), corners)
-        sizes = np.array([other.width, other.height, 0.0])
-        in_opening = (np.abs(crossings) - sizes / 2)[:, :2].max(axis=1) < -TOUCHING
+        crossings = np.where(crosses, last - last_height / rise * (points - last), points)
+        in_opening = other.opening.depth(crossings[:, :2]) > TOUCHING
         return bool((in_opening & (np.abs(crossings[:, 2]) < TOUCHING)).any())
 
     @property
@@ -143,9 +188,12 @@ def tilted_gate(
     heading: Angle = 0.0,
     elevation: Angle = 0.0,
     tilt: Angle = 0.0,
-    width: Positive = 1.0,
-    height: Positive = 0.6,
+    width: Positive | None = None,
+    height: Positive | None = None,
     name: Label = "gate",
+    *,
+    radius: Positive | None = None,
+    polygon: Corners | None = None,
 ) -> Gate:
     """Return the gate whose attitude is given by angles.
 
@@ -156,15 +204,17 @@ def tilted_gate(
         tilt: roll about the direction of passage [rad], right-handed: 0 upright, π/2 with its upright to the
             right of who passes, π upside down. The paper's α (Section II-D) is measured toward +y when
             passing toward +x: α = −tilt.
-        width: of the opening [m].
-        height: of the opening [m].
+        width: of a rectangular opening [m], by default 1.
+        height: of a rectangular opening [m], by default 0.6.
         name: by which stages refer to it.
+        radius: of a round opening [m], instead of width and height.
+        polygon: corners of any other convex opening [m], from `position` to the left and up, (K, 2).
 
     Raises:
-        SpecError: a number is not finite, or a side not positive.
+        SpecError: a number is not finite, a side not positive, or the opening of two kinds.
     """
     normal, up = _directions(heading, elevation, tilt)
-    return Gate(cast(Array, position), normal, up, width, height, name)
+    return Gate(cast(Array, position), normal, up, width, height, name, radius=radius, polygon=polygon)
 
 
 def at_centre(gate: Gate) -> tuple[Condition, ...]:
@@ -178,11 +228,18 @@ def in_opening(gate: Gate, clearance: float) -> tuple[Condition, ...]:
     Where the opening is too narrow for that, in the middle between the edges that are too near.
     """
     in_plane = float(gate.normal @ gate.position)
-    found = [Condition(Quantity.POSITION, gate.normal, in_plane, in_plane)]
-    for axis, side in ((gate.lateral, gate.width), (gate.up, gate.height)):
-        middle, reach = float(axis @ gate.position), max(side / 2.0 - clearance, 0.0)
-        found.append(Condition(Quantity.POSITION, axis, middle - reach, middle + reach))
-    return tuple(found)
+    bounds = gate.opening.at_clearance(clearance)
+    directions = bounds.directions @ gate.plane_axes
+    middles = directions @ gate.position
+    return (
+        Condition(Quantity.POSITION, gate.normal, in_plane, in_plane),
+        *(
+            Condition(Quantity.POSITION, direction, lower, upper)
+            for direction, lower, upper in zip(
+                directions, (middles + bounds.lower).tolist(), (middles + bounds.upper).tolist(), strict=True
+            )
+        ),
+    )
 
 
 def only_gate(gates: Sequence[Gate], maneuver: str) -> Gate:
@@ -207,6 +264,14 @@ def named_gate(gates: Sequence[Gate], name: str) -> Gate:
         if gate.name == name:
             return gate
     raise unknown_name("gate", name, [gate.name for gate in gates])
+
+
+def _half(diameter: Any) -> float:
+    """The radius of a diameter [m]. Raises FieldError for one that is none."""
+    whole = number(diameter, "diameter")
+    if whole <= 0.0:
+        raise FieldError("diameter", f"must be a positive number, got {whole:g}")
+    return whole / 2.0
 
 
 def _directions(heading: float, elevation: float, tilt: float) -> tuple[Array, Array]:

@@ -134,8 +134,9 @@ class Problem:
         for i, name in enumerate(names):
             if name in names[:i]:
                 raise FieldError(f"gates[{i}].name", f": there are two gates named '{name}'; rename one")
-        if self.start.free_attitude:
-            raise FieldError("start.free_attitude", "is for goals, a start has its attitude; drop it")
+        for key, what in (("free_attitude", "attitude"), ("free_velocity", "velocity")):
+            if getattr(self.start, key):
+                raise FieldError(f"start.{key}", f"is for goals, a start has its {what}; drop it")
         for inner, outer in permutations(self.gates, 2):
             if inner.stands_in(outer):
                 raise FieldError(
@@ -219,6 +220,8 @@ class Problem:
             still = (state.velocity == self.environment.wind).all()
             if condition.quantity is Quantity.SPECIFIC_THRUST and not still:
                 continue
+            if state.free_velocity and condition.quantity is not Quantity.POSITION:
+                continue
             derivatives = state.derivatives(3)
             if bound.excess(derivatives) > ROUNDING * bound.scale:
                 value = float(bound.value(derivatives))
@@ -238,7 +241,8 @@ class Problem:
             "({:g}, {:g}, {:g}) m".format(*state.position.tolist()) for state in (self.start, self.goal)
         )
         on_ground = self.environment.ground is not None and self.goal.position[2] == self.environment.ground
-        at_end = ("land at" if on_ground else "stop at") if not self.goal.velocity.any() else "pass"
+        moves = self.goal.free_velocity or self.goal.velocity.any()
+        at_end = "pass" if moves else "land at" if on_ground else "stop at"
         facts = f"{self.name}: from {start}: {self.maneuver.in_words(self.gates)}, {at_end} {goal}"
         return "; ".join(filter(None, (facts, " ".join(self.description.split()))))
 

@@ -127,13 +127,15 @@ def _header(scene: Scene, blob: Blob) -> dict[str, Any]:
 
 
 def _gate(gate: Gate) -> dict[str, Any]:
+    width, height = gate.opening.size.tolist()
     return {
         "name": gate.name,
         "position": gate.position.tolist(),
         "normal": gate.normal.tolist(),
         "up": gate.up.tolist(),
-        "width": gate.width,
-        "height": gate.height,
+        "width": width,
+        "height": height,
+        "outline": [_rounded(point) for point in gate.opening.outline],
     }
 
 

@@ -75,12 +75,12 @@ class _Instant:
     def findings(self) -> list[Finding]:
         """What is asked of the passage, and what it does."""
         gate = self.passage.gate
-        along, across, up = (float(self.offset @ axis) for axis in (gate.normal, gate.lateral, gate.up))
+        along, depth = float(self.offset @ gate.normal), gate.opening.depth(gate.plane_axes @ self.offset)
+        margin = min(self.passage.margin, gate.opening.inradius)
         speed = float(self.velocity @ gate.normal)
         found = [
             self._at_most("off plane", "m", abs(along), PLANE_DISTANCE),
-            self._at_most("sideways", "m", abs(across), max(gate.width / 2 - self.passage.margin, 0.0)),
-            self._at_most("upward", "m", abs(up), max(gate.height / 2 - self.passage.margin, 0.0)),
+            self._finding("inside by", "m", Side.MIN, float(depth), margin),
             self._finding("speed through", "m/s", Side.MIN, speed, self.passage.min_speed),
         ]
         return found if self.passage.attitude_tolerance == np.inf else [*found, self._attitude()]

@@ -167,10 +167,9 @@ def _vehicle(scene: _Scene, vehicle: Vehicle) -> Sequence[dict[str, Any]]:
 
 
 def _frame(gate: Gate) -> Array:
-    """Triangles of a gate's frame around its opening, (24, 3)."""
-    inner = gate.corners
-    signs = np.array([[1, 1], [-1, 1], [-1, -1], [1, -1]])  # of the corners, as `Gate.corners` has them
-    outer = inner + BEAM * (signs[:, :1] * gate.lateral + signs[:, 1:] * gate.up)
+    """Triangles of a gate's frame around its opening, two for each side of that, (6 sides, 3)."""
+    inner = gate.outline
+    outer = gate.frame(BEAM)
     inner_next, outer_next = np.roll(inner, -1, axis=0), np.roll(outer, -1, axis=0)
     sides = np.stack([inner, outer, outer_next, inner, outer_next, inner_next], axis=1)
     return np.asarray(sides.reshape(-1, 3))

@@ -75,7 +75,7 @@ class PlanMessages:
         stamp, path = self._stamp(0.0), found.setpoint.flat.position + self.origin
         lines = [self.messages.line(stamp, "path", path, width=PATH_WIDTH, color=GREY)]
         for gate in self.plan.problem.gates:
-            frame = np.concatenate([gate.corners, gate.corners[:1]]) + self.origin
+            frame = np.concatenate([gate.outline, gate.outline[:1]]) + self.origin
             lines.append(self.messages.line(stamp, gate.name, frame, width=FRAME_WIDTH, color=ORANGE))
         return lines
 

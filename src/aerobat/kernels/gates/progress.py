@@ -6,7 +6,7 @@ from math import inf
 from typing import NamedTuple
 
 from aerobat.kernels.gates import swath
-from aerobat.kernels.gates.section import BoundingEllipsoid, GateFrame
+from aerobat.kernels.gates.section import BoundingEllipsoid, PlaneDirection
 from aerobat.kernels.gates.snapshot import Snapshot, between
 from aerobat.kernels.gates.swath import SwathProgress
 from aerobat.kernels.ops import Ops, Scalar, Vector, magnitude, select_tree
@@ -17,7 +17,8 @@ class GatePlane(NamedTuple):
     """A gate as a plane to be crossed at a time."""
 
     centre: Vector  # [m]
-    frame: GateFrame
+    normal: Vector  # unit vector in the direction of passage
+    directions: tuple[PlaneDirection, ...]  # along which bodies are measured
     planned: Scalar  # [s] when it is to be crossed
     window: Scalar  # [s] by which the crossing may be earlier or later
     depth: Scalar  # [m] beyond the plane that makes a crossing a passage
@@ -35,10 +36,10 @@ class GateProgress(NamedTuple):
     swath: SwathProgress  # of the body through the plane
 
 
-def init() -> GateProgress:
-    """Progress before the first tick."""
+def init(directions: int) -> GateProgress:
+    """Progress before the first tick, of a body measured along so many directions."""
     never = Snapshot(inf, ZERO, ZERO, (1.0, 0.0, 0.0, 0.0))
-    return GateProgress(never, 0.0, never, inf, -inf, inf, swath.init())
+    return GateProgress(never, 0.0, never, inf, -inf, inf, swath.init(directions))
 
 
 def step(
@@ -60,7 +61,7 @@ def step(
         counted: true where there was a last tick, and where this one counts.
     """
     last, now = snapshots
-    before, behind = dot(last.position, plane.frame.normal), dot(now.position, plane.frame.normal)
+    before, behind = dot(last.position, plane.normal), dot(now.position, plane.normal)
     both = counted[0] & counted[1]
     forward = both & (before <= 0.0) & (behind > 0.0)
     back = both & (before > 0.0) & (behind <= 0.0)
@@ -85,7 +86,7 @@ def step(
         swath.step(
             ops,
             progress.swath,
-            (plane.frame, plane.depth, ellipsoid),
+            (plane.normal, plane.directions, plane.depth, ellipsoid),
             snapshots,
             counted,
             crosses,

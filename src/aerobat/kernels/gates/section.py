@@ -26,12 +26,13 @@ class BoundingEllipsoid(NamedTuple):
     semi_axes: Vector  # [m]
 
 
-class GateFrame(NamedTuple):
-    """The axes of a gate, unit vectors in the world."""
+class PlaneDirection(NamedTuple):
+    """A direction in a gate's plane along which a body is measured, unit vectors in the world."""
 
-    normal: Vector  # direction of passage
-    lateral: Vector  # to the left of who passes upright
-    up: Vector
+    along: Vector
+    beside: Vector  # in the plane too, a quarter of a turn on
+    both_ways: Scalar  # 1 where against it counts too
+    radial: Scalar  # 1 where the distance of the point that reaches the farthest counts, not how far
 
 
 class Section(NamedTuple):
@@ -96,20 +97,24 @@ def gap(ops: Ops, at: Section) -> Scalar:
     return magnitude(ops, at.height) - at.reach
 
 
-def farthest(ops: Ops, at: Section) -> PlanePoint:
-    """The section's point farthest along the direction, to the side where the section's centre is.
+def farthest(ops: Ops, at: Section, both_ways: Scalar) -> PlanePoint:
+    """The section's point farthest along the direction; both ways, to the side where the section's centre is.
 
     Where the plane is not met, of the point of the ellipsoid next to it.
     """
     relative = at.height / at.reach
     size = ops.sqrt(ops.maximum(1.0 - relative * relative, 0.0))
     along, beside = at.along - at.height * at.shear_along, at.beside - at.height * at.shear_beside
-    sided = ops.select(along < -_ROUNDING, -size, size)
+    sided = ops.select(_is_against(along, both_ways), -size, size)
     return PlanePoint(along + sided * at.half, beside + sided * at.covariance / at.half)
 
 
 def fraction_of_farthest(
-    ops: Ops, at: Section, change: tuple[Scalar, Scalar], within: tuple[Scalar, Scalar]
+    ops: Ops,
+    at: Section,
+    change: tuple[Scalar, Scalar],
+    within: tuple[Scalar, Scalar],
+    both_ways: Scalar,
 ) -> Scalar:
     """The fraction of a straight way, its end at `at`, at which a section reaches the farthest.
 
@@ -121,15 +126,21 @@ def fraction_of_farthest(
         at: at the end of the way.
         change: of the centre on the way, along the normal and along the direction [m].
         within: the least and the greatest fraction to choose from.
+        both_ways: 1 where the farthest against the direction is meant, if the section's centre is there.
     """
     rise, drift = change
     rise = ops.select(magnitude(ops, rise) < _ROUNDING, _ROUNDING, rise)
     sheared = drift - rise * at.shear_along
     middle = 1.0 - 0.5 * (within[0] + within[1])
     along = at.along - at.height * at.shear_along - middle * sheared
-    slope = ops.select(along < -_ROUNDING, -sheared, sheared) * at.reach / (at.half * rise)
+    slope = ops.select(_is_against(along, both_ways), -sheared, sheared) * at.reach / (at.half * rise)
     height = at.reach * slope / ops.sqrt(1.0 + slope * slope)
     return clip(ops, 1.0 + (height - at.height) / rise, *within)
+
+
+def _is_against(along: Scalar, both_ways: Scalar) -> Scalar:
+    """True where the other way counts, and the section's centre lies there."""
+    return (along < -_ROUNDING) & (both_ways > 0.5)
 
 
 def _stretched(ellipsoid: BoundingEllipsoid, direction: Vector) -> Vector:

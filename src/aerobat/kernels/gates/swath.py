@@ -1,4 +1,4 @@
-"""The swath of a body through a gate's plane, tick by tick: how far it reached across and up.
+"""The swath of a body through a gate's plane, tick by tick: how far it reached along some directions.
 
 What counts is the stay about the plane in which the gate is crossed: from when the body, or the centre within
 the gate's depth, comes to the plane until both have left it. A body that comes into the plane beside the
@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 from aerobat.kernels.gates.section import (
     BoundingEllipsoid,
-    GateFrame,
+    PlaneDirection,
     PlanePoint,
     farthest,
     fraction_of_farthest,
@@ -28,14 +28,11 @@ class Extreme(NamedTuple):
     """A point of the body in a gate's plane, from the centre of the opening, and when."""
 
     time: Scalar  # [s] infinite where there is none
-    point: PlanePoint
+    reach: Scalar  # [m] by which it is the farthest; −infinite where there is none
+    point: PlanePoint  # along and beside the direction
 
 
-class Swath(NamedTuple):
-    """The farthest that a body reached in a gate's plane."""
-
-    widest: Extreme  # along the lateral, to either side
-    highest: Extreme  # along the upright, up or down
+Swath = tuple[Extreme, ...]  # the farthest that a body reached in a gate's plane, by directions
 
 
 class SwathProgress(NamedTuple):
@@ -48,19 +45,19 @@ class SwathProgress(NamedTuple):
     crossing: Swath  # of the one in which the gate is crossed
 
 
-NOWHERE = Extreme(inf, PlanePoint(0.0, 0.0))
-NO_SWATH = Swath(NOWHERE, NOWHERE)
+NOWHERE = Extreme(inf, -inf, PlanePoint(0.0, 0.0))
 
 
-def init() -> SwathProgress:
-    """Progress before the first tick."""
-    return SwathProgress(inf, 0.0, 0.0, NO_SWATH, NO_SWATH)
+def init(directions: int) -> SwathProgress:
+    """Progress before the first tick, along so many directions."""
+    nothing = directions * (NOWHERE,)
+    return SwathProgress(inf, 0.0, 0.0, nothing, nothing)
 
 
 def step(
     ops: Ops,
     progress: SwathProgress,
-    parameters: tuple[GateFrame, Scalar, BoundingEllipsoid],
+    parameters: tuple[Vector, tuple[PlaneDirection, ...], Scalar, BoundingEllipsoid],
     snapshots: tuple[Snapshot, Snapshot],
     counted: tuple[Scalar, Scalar],
     crosses: Scalar,
@@ -71,19 +68,21 @@ def step(
     Args:
         ops: of the arithmetic.
         progress: before the tick.
-        parameters: the gate's axes, the depth [m] about its plane, and what encloses the vehicle.
+        parameters: the plane's normal, directions in it, the depth [m] about it, and what encloses a vehicle.
         snapshots: the last tick's and this one's, positions from the opening's centre.
         counted: true where there was a last tick, and where this one counts.
         crosses: 1 where the centre crosses the plane between them.
         passed: true where with this tick the stay, this or the last, has become the one that counts.
     """
-    frame, depth, ellipsoid = parameters
+    normal, directions, depth, ellipsoid = parameters
     now = snapshots[1]
-    gap_now = gap(ops, section(ops, ellipsoid, frame, now.position, now.q_world_body))
-    distance = magnitude(ops, dot(now.position, frame.normal))
+    gap_now = gap(ops, section(ops, ellipsoid, (normal, *directions[0][:2]), now.position, now.q_world_body))
+    distance = magnitude(ops, dot(now.position, normal))
     is_about = counted[1] & (ops.minimum(gap_now, distance - depth) <= 0.0)
-    met, here = swept_between(ops, frame, ellipsoid, snapshots, (progress.gap, gap_now), crosses)
-    before = select_tree(ops, progress.is_about > 0.5, progress.stay, NO_SWATH)
+    met, here = swept_between(
+        ops, (normal, directions), ellipsoid, snapshots, (progress.gap, gap_now), crosses
+    )
+    before = select_tree(ops, progress.is_about > 0.5, progress.stay, len(directions) * (NOWHERE,))
     stay = _wider(ops, counted[0] & counted[1] & met, here, before)
     is_crossing = ops.select(passed, 1.0, progress.is_crossing) > 0.5
     return SwathProgress(
@@ -97,7 +96,7 @@ def step(
 
 def swept_between(
     ops: Ops,
-    frame: GateFrame,
+    plane: tuple[Vector, tuple[PlaneDirection, ...]],
     ellipsoid: BoundingEllipsoid,
     snapshots: tuple[Snapshot, Snapshot],
     gaps: tuple[Scalar, Scalar],
@@ -109,7 +108,7 @@ def swept_between(
 
     Args:
         ops: of the arithmetic.
-        frame: the gate's axes.
+        plane: its normal, and directions in it.
         ellipsoid: what encloses the vehicle.
         snapshots: at both ticks, positions from the opening's centre.
         gaps: between body and plane at both [m].
@@ -121,36 +120,47 @@ def swept_between(
     edge = before / ops.select(changes, before - behind, 1.0)
     comes, leaves = changes & (before > 0.0), changes & (behind > 0.0)
     within = ops.select(comes, edge, 0.0), ops.select(leaves, edge, 1.0)
-    normal, lateral, up = frame
-    extremes = (
-        _extreme(ops, (normal, along, beside), ellipsoid, snapshots, within)
-        for along, beside in ((lateral, up), (up, lateral))
-    )
-    return ops.select(meets, 1.0, crosses) > 0.5, Swath(*extremes)
+    normal, directions = plane
+    extremes = tuple(_extreme(ops, normal, each, ellipsoid, snapshots, within) for each in directions)
+    return ops.select(meets, 1.0, crosses) > 0.5, extremes
 
 
 def _extreme(
     ops: Ops,
-    directions: tuple[Vector, Vector, Vector],
+    normal: Vector,
+    direction: PlaneDirection,
     ellipsoid: BoundingEllipsoid,
     snapshots: tuple[Snapshot, Snapshot],
     within: tuple[Scalar, Scalar],
 ) -> Extreme:
-    """The farthest along the second of the directions, within fractions of the way between two ticks."""
+    """The farthest along a direction, within fractions of the way between two ticks.
+
+    Args:
+        ops: of the arithmetic.
+        normal: of the plane.
+        direction: in the plane.
+        ellipsoid: what encloses the vehicle.
+        snapshots: at both ticks, positions from the opening's centre.
+        within: the fractions.
+    """
     last, now = snapshots
+    directions = normal, direction.along, direction.beside
     way = subtract(now.position, last.position)
     there = section(ops, ellipsoid, directions, now.position, now.q_world_body)
     change = dot(way, directions[0]), dot(way, directions[1])
-    at = between(last, now, fraction_of_farthest(ops, there, change, within))
+    fraction = fraction_of_farthest(ops, there, change, within, direction.both_ways)
+    at = between(last, now, fraction)
     here = section(ops, ellipsoid, directions, at.position, at.q_world_body)
-    return Extreme(at.time, farthest(ops, here))
+    point = farthest(ops, here, direction.both_ways)
+    reach = ops.select(direction.both_ways > 0.5, magnitude(ops, point.along), point.along)
+    distance = ops.sqrt(point.along * point.along + point.beside * point.beside)
+    return Extreme(at.time, ops.select(direction.radial > 0.5, distance, reach), point)
 
 
 def _wider(ops: Ops, condition: Scalar, a: Swath, b: Swath) -> Swath:
-    """Of both extremes the farther, `a`'s only where the condition holds."""
-    return Swath(*(_farther(ops, condition, p, q) for p, q in zip(a, b, strict=True)))
+    """Of all extremes the farther, `a`'s only where the condition holds."""
+    return tuple(_farther(ops, condition, p, q) for p, q in zip(a, b, strict=True))
 
 
 def _farther(ops: Ops, condition: Scalar, a: Extreme, b: Extreme) -> Extreme:
-    is_farther = magnitude(ops, a.point.along) > magnitude(ops, b.point.along)
-    return select_tree(ops, condition & is_farther, a, b)
+    return select_tree(ops, condition & (a.reach > b.reach), a, b)

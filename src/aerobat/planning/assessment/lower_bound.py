@@ -8,7 +8,7 @@ from the attitude of one stage to that of the next. Whatever else is left out co
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import Enum
 from itertools import pairwise, product
 from math import inf, pi, sqrt
@@ -27,6 +27,7 @@ from aerobat.so3 import UP
 from aerobat.vehicle import Vehicle
 
 PARALLEL = 1e-9  # [-] how near to 1 the cosine between two directions is that are one
+AT_ONCE = 1e9  # [m/s²] by which a point stops that need not: who is passed however fast
 MANY_ROTORS = 12  # whose moments are bounded axis by axis: the vertices of all would be too many
 HALVINGS = 3  # of the interval of durations by which speeds are bounded
 
@@ -114,6 +115,13 @@ class _Place:
     turn: _Turn
     position: float  # [m]
     velocity: float = 0.0  # [m/s]
+    is_passed: bool = False  # in the end, however fast
+
+    @classmethod
+    def of_end(cls, end: EndState, direction: Array) -> _Place:
+        """Where a motion begins or ends."""
+        position, velocity = (float(vector @ direction) for vector in (end.position, end.velocity))
+        return cls(_Turn.AT, position, velocity, end.free_velocity)
 
 
 @dataclass(frozen=True)
@@ -137,10 +145,7 @@ class _Line:
         crossed = np.flatnonzero(direction)
         speeds = np.asarray(problem.limits.velocity)[crossed]
         places = [_places(stage, direction) for stage in sequence.stages]
-        ends = [
-            (_Place(_Turn.AT, float(end.position @ direction), float(end.velocity @ direction)),)
-            for end in problem.ends.values()
-        ]
+        ends = [(_Place.of_end(end, direction),) for end in problem.ends.values()]
         return cls(
             groups=(ends[0], *places, ends[1]) if ends else tuple(places),
             ordered=sequence.ordered,
@@ -192,6 +197,8 @@ def _longest(groups: Sequence[Sequence[_Place]], up: DampedPoint, down: DampedPo
 def _leg(a: _Place, b: _Place, up: DampedPoint, down: DampedPoint) -> float:
     """The least time [s] from one place to another; -inf where the second does not ask to go on to it."""
     distance = b.position - a.position
+    if b.is_passed:
+        up, down = replace(up, backward=AT_ONCE), replace(down, backward=AT_ONCE)
     if distance == 0.0:
         return up.least_time(0.0, a.velocity, b.velocity) if a.turn is b.turn is _Turn.AT else -inf
     if distance > 0.0:
@@ -261,7 +268,7 @@ class _Cone:
         """The direction at an end, where jerk is zero and only drag may turn the thrust."""
         thrust = balance.specific_thrust(end.velocity, end.acceleration)
         norm = float(np.linalg.norm(thrust))
-        if norm == 0.0 or end.free_attitude:
+        if norm == 0.0 or end.leaves_attitude_free:
             return cls(UP, half_angle=pi)
         rate = balance.drag * float(np.linalg.norm(np.cross(thrust, end.acceleration))) / norm**2
         return cls(thrust / norm, rate=rate)

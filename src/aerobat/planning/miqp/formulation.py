@@ -19,6 +19,7 @@ from aerobat.errors import SpecError
 from aerobat.optimization import AssignmentProgram, SlottedStage
 from aerobat.planning.miqp.integrator import INPUT_NAMES, IntegratorChain
 from aerobat.problem.condition import Condition, ForceBalance, Quantity
+from aerobat.problem.end_state import VELOCITY
 from aerobat.problem.problem import DERIVATIVES, Limits, Problem
 from aerobat.problem.stage import Stage, StageSequence
 
@@ -81,10 +82,11 @@ class Formulation:
         scale, free = dt**self._derivatives, self._free(dt)
         lower, upper = self._limits
         goal = self.problem.goal.derivatives(self.chain.order) * self.chain.scales(dt)[:, None]
+        met = self._met
         reached = self.chain.free(self.initial, dt)[-1]
         return AssignmentProgram(
             equality=self._equality,
-            target=(goal - reached).T.ravel(),
+            target=(goal - reached)[met].T.ravel(),
             rows=self._matrix if not self._drags.any() else self._rows_at(dt),
             lower=lower * scale - free,
             upper=upper * scale - free,
@@ -107,8 +109,13 @@ class Formulation:
 
     @cached_property
     def _equality(self) -> Array:
-        """The goal: every derivative below the order at the end of the last interval."""
-        return frozen(np.kron(np.eye(3), self.chain.forced[-1]), "equality")
+        """The goal: the derivatives below the order that it fixes at the end of the last interval."""
+        return frozen(np.kron(np.eye(3), self.chain.forced[-1][self._met]), "equality")
+
+    @property
+    def _met(self) -> Array:
+        """The derivatives below the order that the goal fixes."""
+        return self.problem.goal.fixed(self.chain.order)
 
     @cached_property
     def _precedence(self) -> tuple[tuple[int, int], ...]:
@@ -130,7 +137,8 @@ class Formulation:
 
     def _limit_rows(self, bounds: Limits) -> Iterable[tuple[Row, float, float]]:
         for derivative in range(self.chain.order + 1):
-            intervals = self.chain.intervals if derivative == self.chain.order else self.chain.intervals - 1
+            at_goal = derivative == VELOCITY and self.problem.goal.free_velocity
+            intervals = self.chain.intervals - (derivative != self.chain.order and not at_goal)
             for axis, low, high in zip(UNIT_AXES, *bounds.of(derivative), strict=True):
                 if low > -inf or high < inf:
                     for interval in range(intervals):

@@ -46,7 +46,8 @@ def fixed_at_knots(
         velocities: At the stages [m/s], of which the drag is taken, (K - 2, 3).
     """
     fixed = np.full((len(sequence.stages) + 2, order, 3), np.nan)
-    fixed[0], fixed[-1] = problem.start.derivatives(order), problem.goal.derivatives(order)
+    met = problem.goal.fixed(order)
+    fixed[0], fixed[-1, met] = problem.start.derivatives(order), problem.goal.derivatives(order)[met]
     for knot, (stage, velocity) in enumerate(zip(sequence.stages, velocities, strict=True), 1):
         for derivative in range(3):
             fixed[knot, derivative] = _fixed(stage, derivative, balance, velocity)

@@ -159,5 +159,7 @@ def _sizes(found: Requirement) -> str:
     """The openings of the gates of a plan, where those were made smaller."""
     if found.quantity != "gate" or found.plan is None:
         return ""
-    sizes = (f"{gate.name} {gate.width:.3g} x {gate.height:.3g} m" for gate in found.plan.problem.gates)
+    sizes = (
+        "{} {:.3g} x {:.3g} m".format(gate.name, *gate.opening.size) for gate in found.plan.problem.gates
+    )
     return f" ({', '.join(sizes)})"

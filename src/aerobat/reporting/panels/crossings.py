@@ -29,7 +29,9 @@ class Crossings:
     right: Array  # [m] of the opening's centre, NaN where a flight did not cross, (flights,)
     up: Array  # [m] likewise, (flights,)
     wrong: Mask  # true for those that did not pass as they should, (flights,)
-    smallest: tuple[float, float] | None  # [m] width and height of the opening that 99 % pass, if known
+    smallest: (
+        tuple[float, float] | None
+    )  # [m] width and height of the opening of this kind that 99 % pass, if known
 
     @property
     def crossed(self) -> Mask:
@@ -54,20 +56,19 @@ class Crossings:
 
 def draw_opening(axes: Axes, crossings: Crossings) -> None:
     """Draw a gate's frame with all crossings, to one scale along both axes [m]."""
-    from matplotlib.patches import Rectangle
+    from matplotlib.patches import Polygon
 
-    gate = crossings.gate
-    corner = (-gate.width / 2, -gate.height / 2)
-    axes.add_patch(Rectangle(corner, gate.width, gate.height, facecolor=PAPER, edgecolor="none", zorder=0.2))
-    axes.add_patch(
-        Rectangle(corner, gate.width, gate.height, fill=False, edgecolor=YELLOW, linewidth=3.0, zorder=1.5)
-    )
+    opening = crossings.gate.opening
+    outline = opening.outline * [-1.0, 1.0]  # to the right
+    axes.add_patch(Polygon(outline, facecolor=PAPER, edgecolor="none", zorder=0.2))
+    axes.add_patch(Polygon(outline, fill=False, edgecolor=YELLOW, linewidth=3.0, zorder=1.5))
     if crossings.smallest is not None:
-        width, height = crossings.smallest
-        needed = Rectangle((-width / 2, -height / 2), width, height, fill=False, edgecolor=INK, linewidth=0.9)
+        needed = Polygon(
+            outline * crossings.smallest / opening.size, fill=False, edgecolor=INK, linewidth=0.9
+        )
         needed.set_linestyle((0, (4, 2)))
         axes.add_patch(needed)
-    half = np.array([gate.width, gate.height]) * (0.5 + MARGIN)
+    half = np.abs(outline).max(axis=0) * (1.0 + 2.0 * MARGIN)
     off = np.nanmax(np.abs([crossings.right, crossings.up]), axis=1) if crossings.crossed.any() else half
     half = np.clip(1.05 * off, half, 2.0 * half)
     _draw_crossings(axes, crossings, half, 1.0)

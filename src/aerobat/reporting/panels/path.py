@@ -77,7 +77,7 @@ def draw_path(
     rows, step = pose_samples(poses, reach, gates)
     shapes = _path_shapes(reference, actual, floor)
     for gate in gates:
-        lowest = np.sort(gate.corners[:, 2])[:2].mean()  # the middle of the lower edge
+        lowest = np.sort(gate.outline[:, 2])[:2].mean()  # the middle of the lower edge
         foot = gate.position + np.array([0.0, 0.0, lowest - gate.position[2]])
         shapes += [*gate_shapes(gate), drop_line(foot, floor)]
     for k in rows:

@@ -59,7 +59,7 @@ def draw_stages(axes: Axes, plan: Plan, vehicle: Vehicle) -> str:
     camera = plane.camera
     gates = plan.problem.gates
     column = max(COLUMN, LETTER * max(len(keyframe.name) for keyframe in shots.instants))
-    frame = camera.project(np.concatenate([shots.position, *(gate.corners for gate in gates)]))
+    frame = camera.project(np.concatenate([shots.position, *(gate.outline for gate in gates)]))
     inches = _fit(axes, frame, VEHICLE, span(vehicle), column)  # per metre
     reach = enlargement(vehicle, VEHICLE / inches) * span(vehicle)  # [m]
     axes.set(xlabel=plane.label, ylabel="z [m]")
@@ -132,7 +132,7 @@ def _draw(
     Names take `column` [in]; vehicles and arrows are `shrink` times as large as usual.
     """
     camera = plane.camera
-    frame = camera.project(np.concatenate([shots.position, *(gate.corners for gate in gates)]))
+    frame = camera.project(np.concatenate([shots.position, *(gate.outline for gate in gates)]))
     inches = _fit(axes, frame, shrink * VEHICLE, span(vehicle), column)  # per metre
     scale = enlargement(vehicle, shrink * VEHICLE / inches)
     places, thrust = camera.project(shots.position), camera.project(shots.thrust)

@@ -131,9 +131,9 @@ def _draw_gate(axes: Axes, trials: HardwareTrials, vehicle: Vehicle, opening: tu
     gate = replace(result.plan.problem.gates[0], width=opening[0], height=opening[1])
     [passage] = result.scores.passages
     width, height = np.asarray(passage.needed_width), np.asarray(passage.needed_height)
-    fits = (width <= gate.width) & (height <= gate.height)
+    fits = (width <= opening[0]) & (height <= opening[1])
     times = np.asarray(passage.time)
-    corners = ALONG @ (gate.corners - gate.position).T
+    corners = ALONG @ (gate.outline - gate.position).T
     axes.fill(*corners, facecolor=PAPER, edgecolor=YELLOW, linewidth=2.2, zorder=1.0)
     shown = sorted(range(len(flight.states.position)), key=lambda k: not fits[k])  # red ones above
     near = np.abs(flight.times - result.plan.stages[0].time) < NEAR

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import pairwise
 
 import numpy as np
 
@@ -103,18 +104,16 @@ def direction_marks(path: Array, rows: Sequence[int], camera: Camera, size: floa
 
 
 def gate_bars(gate: Gate) -> list[Array]:
-    """The four bars of a gate's frame, each the corners of its faces [m], (4 faces, 4, 3).
+    """The bars of a gate's frame, each the corners of its faces [m], (4 faces, 4, 3).
 
-    The inner edges of the frame are the opening, `Gate.corners`; the bars lie outside it and are as deep
+    The inner edges of the frame are the opening, `Gate.outline`; the bars lie outside it and are as deep
     as they are thick, half before the gate's plane and half behind.
     """
-    thickness = FRAME * min(gate.width, gate.height)
-    inner = gate.corners
-    sides = np.sign((inner - gate.position) @ np.array([gate.lateral, gate.up]).T)
-    outer = inner + thickness * sides @ np.array([gate.lateral, gate.up])
+    thickness = FRAME * float(gate.opening.size.min())
+    inner, outer = gate.outline, gate.frame(thickness)
     depth = gate.normal * thickness / 2
     bars = []
-    for a, b in ((0, 1), (1, 2), (2, 3), (3, 0)):
+    for a, b in pairwise([*range(len(inner)), 0]):
         section = [(inner, depth), (outer, depth), (outer, -depth), (inner, -depth)]
         rims = [np.array([ring[a] + shift, ring[b] + shift]) for ring, shift in section]
         faces = zip(rims, [*rims[1:], rims[0]], strict=True)

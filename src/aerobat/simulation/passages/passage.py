@@ -22,9 +22,12 @@ from aerobat import so3
 from aerobat.arrays import Array
 from aerobat.certification import PlannedPassage
 from aerobat.declaration import by_value
+from aerobat.engines.components import components
 from aerobat.kernels.gates.progress import GateProgress
-from aerobat.kernels.gates.swath import Swath
+from aerobat.kernels.gates.section import PlaneDirection
+from aerobat.kernels.gates.swath import Extreme, Swath
 from aerobat.problem.gate import Gate
+from aerobat.problem.opening import Probe, edge_name
 from aerobat.simulation.outcome import Outcome
 
 PASSAGE_WINDOW = 0.25  # [s] around the planned instant in which the crossing is looked for
@@ -112,14 +115,14 @@ def passages(planned: PlannedPassage, progress: GateProgress, stop: Array) -> Pa
     def known(values: Array | float, where: NDArray[np.bool_] = crossed) -> Array:
         return np.where(where, values, np.nan)
 
-    across, up = np.abs(offset @ gate.lateral), np.abs(offset @ gate.up)
+    in_plane = offset @ gate.plane_axes.T
     tilt = np.arccos(np.clip(so3.thrust_axis(q) @ planned.up, -1, 1))
     fields: dict[str, Any] = {
         "time": known(time),
         "miss": known(np.linalg.norm(offset, axis=-1)),
-        "lateral": known(offset @ gate.lateral),
-        "up": known(offset @ gate.up),
-        "inside": crossed & (across < gate.width / 2) & (up < gate.height / 2),
+        "lateral": known(in_plane[..., 0]),
+        "up": known(in_plane[..., 1]),
+        "inside": crossed & (gate.opening.depth(in_plane) > 0.0),
         "speed": known(np.linalg.norm(velocity, axis=-1)),
         "attitude_error_deg": known(np.rad2deg(tilt)),
         "attitude_tolerance_deg": np.full(len(q), degrees(planned.attitude_tolerance)),
@@ -140,25 +143,44 @@ def _closest(gate: Gate, swath: Swath, crossed: NDArray[np.bool_]) -> dict[str, 
         swath: through its plane, leaves (flights,).
         crossed: true where it is crossed.
     """
-    known = crossed & np.isfinite(swath.widest.time)
-    (across, up), (above, beside) = swath.widest.point, swath.highest.point
-    needed = 2 * np.abs(across), 2 * np.abs(above)
-    at_side = gate.width - needed[0] <= gate.height - needed[1]
-    half_width, half_height = gate.width / 2, gate.height / 2
-    lateral = np.where(at_side, np.copysign(half_width, across), beside)
-    upward = np.where(at_side, up, np.copysign(half_height, above))
-    edges = np.where(
-        at_side,
-        np.where(across > 0.0, "left", "right"),
-        np.where(above > 0.0, "upper", "lower"),
-    )
+    opening = gate.opening
+    times, reach = (np.stack(part, axis=-1) for part in zip(*(each[:2] for each in swath), strict=True))
+    limits = np.array([probe.limit for probe in opening.probes])
+    known = crossed & np.isfinite(times).all(axis=-1)
+    left = np.where(known[:, None], limits - reach, 0.0)
+    nearest = np.argmin(left, axis=-1)
+    points = np.stack([_in_opening(*pair) for pair in zip(opening.probes, swath, strict=True)])
+    outward = np.stack([opening.outward(k, each) for k, each in enumerate(points)])
+    rows = np.arange(len(nearest))
+    outward = outward[nearest, rows]
+    edge = opening.nearest_on_edge(outward, points[nearest, rows])
+    needed = opening.needed(np.where(known[:, None], reach, 0.0))
     numbers = {
-        "clearance": np.minimum(gate.width - needed[0], gate.height - needed[1]) / 2,
-        "closest_time": np.where(at_side, swath.widest.time, swath.highest.time),
-        "closest_lateral": np.clip(lateral, -half_width, half_width),
-        "closest_up": np.clip(upward, -half_height, half_height),
-        "needed_width": needed[0],
-        "needed_height": needed[1],
+        "clearance": left[rows, nearest],
+        "closest_time": times[rows, nearest],
+        "closest_lateral": edge[:, 0],
+        "closest_up": edge[:, 1],
+        "needed_width": needed[..., 0],
+        "needed_height": needed[..., 1],
     }
     places = {name: np.where(known, values, np.nan) for name, values in numbers.items()}
-    return places | {"closest_edge": np.where(known, edges, "")}
+    names = [edge_name(normal) if there else "" for normal, there in zip(outward, known, strict=True)]
+    return places | {"closest_edge": np.array(names)}
+
+
+def _in_opening(probe: Probe, extreme: Extreme) -> Array:
+    """The points (left, up) of a gate's plane that reach the farthest along a probe [m], (flights, 2)."""
+    left, up = probe.direction
+    along, beside = extreme.point
+    return np.stack([left * along - up * beside, up * along + left * beside], axis=-1)
+
+
+def plane_directions(gate: Gate) -> tuple[PlaneDirection, ...]:
+    """The directions in which a body that passes a gate is measured, as kernels read them."""
+    probes = gate.opening.probes
+    turned = [probe.direction @ gate.plane_axes for probe in probes]
+    beside = [np.array([-up, left]) @ gate.plane_axes for (left, up), *_ in probes]
+    return tuple(
+        PlaneDirection(components(a), components(b), float(probe.both_ways), float(probe.radial))
+        for a, b, probe in zip(turned, beside, probes, strict=True)
+    )

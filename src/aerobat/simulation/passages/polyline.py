@@ -17,12 +17,18 @@ from aerobat.engines.numpy import ArrayOps
 from aerobat.engines.pytree import tree_map
 from aerobat.kernels.gates import progress
 from aerobat.kernels.gates.progress import GateProgress
-from aerobat.kernels.gates.section import BoundingEllipsoid, GateFrame, gap, section
+from aerobat.kernels.gates.section import BoundingEllipsoid, gap, section
 from aerobat.kernels.gates.snapshot import Snapshot, between
-from aerobat.kernels.gates.swath import Extreme, Swath, swept_between
+from aerobat.kernels.gates.swath import Swath, swept_between
 from aerobat.simulation.flight import Flight
 from aerobat.simulation.outcome import Outcome
-from aerobat.simulation.passages.passage import PASSAGE_DEPTH, PASSAGE_WINDOW, Passage, passages
+from aerobat.simulation.passages.passage import (
+    PASSAGE_DEPTH,
+    PASSAGE_WINDOW,
+    Passage,
+    passages,
+    plane_directions,
+)
 from aerobat.vehicle import Ellipsoid
 
 T = TypeVar("T")
@@ -60,7 +66,9 @@ def gate_progress(
     forward, backward = track.nearest(track.passages), track.nearest(track.crossings(-1))
     in_window = np.abs(times - planned.time) <= PASSAGE_WINDOW
     about = track.distance[in_window] if in_window.any() else track.distance[-1:]
-    before: GateProgress = tree_map(lambda leaf: np.full(1, leaf), progress.init())
+    before: GateProgress = tree_map(
+        lambda leaf: np.full(1, leaf), progress.init(len(planned.gate.opening.probes))
+    )
     found = before._replace(max_distance=np.array([about.max()]), min_distance=np.array([about.min()]))
     if backward is not None:
         found = found._replace(backward=track.crossing(backward).time)
@@ -121,10 +129,13 @@ class _Track:
     def swept(self, crossing: np.intp, body: Ellipsoid) -> Swath:
         """What the body sweeps of the plane in the stay in which it is crossed, leaves (1,)."""
         gate = self.planned.gate
-        frame = GateFrame(*(tuple(axis.tolist()) for axis in (gate.normal, gate.lateral, gate.up)))
+        normal, directions = components(gate.normal), plane_directions(gate)
         ellipsoid = BoundingEllipsoid(tuple(body.centre.tolist()), tuple(body.semi_axes.tolist()))
         rows = self.rows
-        gaps = gap(ArrayOps, section(ArrayOps, ellipsoid, frame, rows.position, rows.q_world_body))
+        gaps = gap(
+            ArrayOps,
+            section(ArrayOps, ellipsoid, (normal, *directions[0][:2]), rows.position, rows.q_world_body),
+        )
         away = np.flatnonzero((gaps > 0.0) & (np.abs(self.distance) > PASSAGE_DEPTH))
         first, end = away[away <= crossing], away[away > crossing]
         stay = slice(first[-1] if first.size else 0, end[0] + 1 if end.size else len(gaps))
@@ -132,18 +143,10 @@ class _Track:
         snapshots = _part(rows, slice(-1)), _part(rows, slice(1, None))
         crosses = np.arange(len(gaps) - 1) == crossing - stay.start
         met, swept = swept_between(
-            ArrayOps, frame, ellipsoid, snapshots, (gaps[:-1], gaps[1:]), crosses.astype(float)
+            ArrayOps, (normal, directions), ellipsoid, snapshots, (gaps[:-1], gaps[1:]), crosses.astype(float)
         )
-        return Swath(
-            _farthest(swept.widest, np.where(met, np.abs(swept.widest.point.along), 0.0)),
-            _farthest(swept.highest, np.where(met, np.abs(swept.highest.point.along), 0.0)),
-        )
-
-
-def _farthest(points: Extreme, distance: Array) -> Extreme:
-    """Of points, leaves (intervals,), the first of the farthest."""
-    k = int(np.argmax(distance))
-    return _part(points, slice(k, k + 1))
+        farthest = [int(np.argmax(np.where(met, extreme.reach, -np.inf))) for extreme in swept]
+        return tuple(_part(each, slice(k, k + 1)) for each, k in zip(swept, farthest, strict=True))
 
 
 def _part(tree: T, part: slice) -> T:

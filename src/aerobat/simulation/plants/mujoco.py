@@ -126,11 +126,11 @@ def mujoco_model(scene: PlantScene, contacts: bool = True) -> str:
             rgba="0.9 0.9 0.9 1", contype="0", conaffinity=meets,
         )  # fmt: skip
     for number, gate in enumerate(scene.gates):
-        axes = _text((*gate.normal, *gate.lateral))
-        for side, (centre, half_size) in enumerate(_frame_bars(gate)):
+        for side, (centre, outward, half_size) in enumerate(_frame_bars(gate)):
             SubElement(
                 world, "geom", name=f"{_GATE} {number} {side}", type="box", pos=_text(centre),
-                size=_text(half_size), xyaxes=axes, rgba="0.85 0.4 0.1 1", contype="0", conaffinity=meets,
+                size=_text(half_size), xyaxes=_text((*gate.normal, *outward)), rgba="0.85 0.4 0.1 1",
+                contype="0", conaffinity=meets,
             )  # fmt: skip
     _add_vehicle(world, scene)
     actuators = SubElement(root, "actuator")
@@ -139,17 +139,16 @@ def mujoco_model(scene: PlantScene, contacts: bool = True) -> str:
     return tostring(root, encoding="unicode")
 
 
-def _frame_bars(gate: Gate) -> Iterator[tuple[Array, tuple[float, float, float]]]:
-    """The bars about a gate's opening: centres [m] and half sizes [m] along its normal, lateral and upright.
+def _frame_bars(gate: Gate) -> Iterator[tuple[Array, Array, tuple[float, float, float]]]:
+    """The bars about a gate's opening, each its centre [m], the direction outward and half its sizes [m].
 
-    Those above and below reach over the corners.
+    These are along the gate's normal, outward and along the bar, which reaches over the corners.
     """
-    depth, half = FRAME_DEPTH / 2, FRAME_WIDTH / 2
-    beside = (gate.width / 2 + half) * gate.lateral
-    above = (gate.height / 2 + half) * gate.up
-    for sign in (1.0, -1.0):
-        yield gate.position + sign * beside, (depth, half, gate.height / 2)
-        yield gate.position + sign * above, (depth, gate.width / 2 + FRAME_WIDTH, half)
+    half = FRAME_WIDTH / 2
+    for middle, normal, half_length in gate.opening.edges:
+        outward = normal @ gate.plane_axes
+        centre = gate.position + middle @ gate.plane_axes + half * outward
+        yield centre, outward, (FRAME_DEPTH / 2, half, half_length + FRAME_WIDTH)
 
 
 def _add_vehicle(world: Element, scene: PlantScene) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
+from dataclasses import replace
 from math import inf
 from typing import ClassVar
 
@@ -93,12 +94,9 @@ class GateSize(Quantity):
         return 1.0
 
     def changed(self, scenario: Scenario, value: float) -> Scenario:
-        """Return the scenario with openings of that part of their width and height."""
-        for i, gate in enumerate(scenario.problem.gates):
-            for side in ("width", "height"):
-                field = Field(self.name, ("gates", i, side))
-                scenario = field.changed(scenario, value * getattr(gate, side))
-        return scenario
+        """Return the scenario with openings of that part of their size."""
+        gates = tuple(gate.resized(value, value) for gate in scenario.problem.gates)
+        return replace(scenario, problem=replace(scenario.problem, gates=gates))
 
 
 QUANTITIES: dict[str, Quantity] = {each.name: each for each in (ThrustToWeight(), Ceiling(), GateSize())}

@@ -94,11 +94,11 @@ def _pointed(gate: Gate, scores: Scores) -> Gate:
 
 def _smaller(gate: Gate, scores: Scores) -> Gate:
     """The gate with the rest of its opening."""
-    width, height = (
-        max(side - 2.0 * _quantile(gate, scores, offset), MIN_OPENING * side)
-        for side, offset in ((gate.width, "lateral"), (gate.height, "up"))
+    across, up = (
+        max(1.0 - 2.0 * _quantile(gate, scores, offset) / side, MIN_OPENING)
+        for side, offset in zip(gate.opening.size.tolist(), ("lateral", "up"), strict=True)
     )
-    return replace(gate, width=width, height=height)
+    return gate.resized(across, up)
 
 
 def _quantile(gate: Gate, scores: Scores, field: str) -> float:

@@ -124,7 +124,8 @@ class Sweep:
         Raises SpecError for an unknown name, and where the flights are too few for such a probability.
         """
         gate = self._gate(passage)
-        sides = ((f"{passage}_needed_width_m", gate.width), (f"{passage}_needed_height_m", gate.height))
+        names = (f"{passage}_needed_width_m", f"{passage}_needed_height_m")
+        sides = zip(names, gate.opening.size.tolist(), strict=True)
         scales = np.maximum(*(self._errors(column) / side for column, side in sides))
         return opening_of(scales, gate, probability, confidence)
 

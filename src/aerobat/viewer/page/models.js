@@ -125,16 +125,24 @@ function plainModel(accent, opacity, rims = true) {
   return model;
 }
 
+// The bar outside one side of an outline, anticlockwise in y and z, as far beyond its ends as it meets the next ones.
+function bar(outline, k, thick) {
+  const point = (i) => outline[(k + i + outline.length) % outline.length];
+  const heading = (i) => Math.atan2(point(i + 1)[1] - point(i)[1], point(i + 1)[0] - point(i)[0]);
+  const beyond = (i) => thick * Math.min(Math.abs(Math.tan((heading(i) - heading(i - 1)) / 2)), 4);
+  const [[y, z], [nextY, nextZ], before, behind] = [point(0), point(1), beyond(0), beyond(1)];
+  const shape = new THREE.BoxGeometry(thick, Math.hypot(nextY - y, nextZ - z) + before + behind, thick);
+  shape.translate(0, (behind - before) / 2, -thick / 2).rotateX(heading(0));
+  return shape.translate(0, (y + nextY) / 2, (z + nextZ) / 2);
+}
+
 function gateModel(gate) {
   const model = new THREE.Group();
   const thick = BAR * Math.min(gate.width, gate.height);
-  const [w, h] = [gate.width, gate.height];
-  const bars = [
-    [w + 2 * thick, thick, 0, (h + thick) / 2], [w + 2 * thick, thick, 0, -(h + thick) / 2],
-    [thick, h, (w + thick) / 2, 0], [thick, h, -(w + thick) / 2, 0],
-  ].map(([across, up, y, z]) => [new THREE.BoxGeometry(thick, across, up).translate(0, y, z), COLOUR.yellow]);
+  const top = Math.max(...gate.outline.map(([, up]) => up));
+  const bars = gate.outline.map((_, k) => [bar(gate.outline, k, thick), COLOUR.yellow]);
   const upright = new THREE.ConeGeometry(0.5 * thick, 0.9 * thick, 3).rotateX(Math.PI / 2);
-  bars.push([upright.translate(0, 0, h / 2 + 1.5 * thick), COLOUR.yellow]); // on the side that is the gate's up
+  bars.push([upright.translate(0, 0, top + 1.5 * thick), COLOUR.yellow]); // on the side that is the gate's up
   model.add(new THREE.Mesh(merged(bars), new THREE.MeshLambertMaterial({ vertexColors: true })));
   const [x, z] = [vector(gate.normal), vector(gate.up)];
   model.matrix.makeBasis(x, z.clone().cross(x), z).setPosition(...gate.position);

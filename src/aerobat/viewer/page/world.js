@@ -55,7 +55,7 @@ class World {
     this.gates = new THREE.Group();
     for (const gate of gates) {
       const foot = vector(gate.position);
-      foot.z -= Math.abs(vector(gate.up).z) * gate.height / 2 + Math.hypot(...crossOf(gate).slice(2)) * gate.width / 2;
+      foot.z = Math.min(...outlineOf(gate).map((point) => point.z));
       this.gates.add(gateModel(gate), dropLine(foot, this.bounds.floor));
     }
     this.scene.add(this.gates);
@@ -197,6 +197,13 @@ function crossOf(gate) {
   return vector(gate.up).cross(vector(gate.normal)).toArray();
 }
 
+// Points around a gate's opening, so many times as large as it is.
+function outlineOf(gate, scale = 1) {
+  const [up, across] = [vector(gate.up), vector(crossOf(gate))];
+  const point = ([left, above]) => vector(gate.position).addScaledVector(across, scale * left).addScaledVector(up, scale * above);
+  return gate.outline.map(point);
+}
+
 // The box around all that is to be seen, some points that stand for it, its size and the floor below it.
 function bounds() {
   const points = [];
@@ -205,9 +212,7 @@ function bounds() {
     for (let k = 0; k < positions.length; k += stride) points.push(vector(positions.subarray(k, k + 3)));
   }
   for (const gate of HEADER.gates) {
-    const [up, across] = [vector(gate.up), vector(crossOf(gate))];
-    const corners = [[1, 1], [1, -1], [-1, 1], [-1, -1]].map(([a, b]) => [0.62 * a * gate.height, 0.62 * b * gate.width]);
-    for (const [a, b] of corners) points.push(vector(gate.position).addScaledVector(up, a).addScaledVector(across, b));
+    points.push(...outlineOf(gate, 1.24));
   }
   const [lower, upper] = [points[0].clone(), points[0].clone()];
   for (const point of points) (lower.min(point), upper.max(point));

@@ -168,14 +168,16 @@ class PathProgram:
     def _met(self) -> tuple[Indices, Array, Array]:
         """What is met exactly, goal and equalities of stages: places (p,), weights (p, 6, 3), bounds (p,)."""
         order = self.chain.order
-        goal = self.formulation.problem.goal.derivatives(order)
-        weights = np.zeros((3 * order, DERIVATIVES, 3))
-        weights[:, :order] = np.eye(3 * order).reshape(-1, order, 3)
+        goal = self.formulation.problem.goal
+        met = goal.fixed(order)
+        weights = np.zeros((order, 3, DERIVATIVES, 3))
+        weights[:, :, :order] = np.eye(3 * order).reshape(order, 3, order, 3)
+        weights = weights[met].reshape(-1, DERIVATIVES, 3)
         places, stage_weights, bounds, equal = self._stage_rows
         return (
-            np.concatenate([np.zeros(3 * order, dtype=np.intp), places[equal]]),
+            np.concatenate([np.zeros(len(weights), dtype=np.intp), places[equal]]),
             np.concatenate([weights, stage_weights[equal]]),
-            np.concatenate([goal.ravel(), bounds[equal]]),
+            np.concatenate([goal.derivatives(order)[met].ravel(), bounds[equal]]),
         )
 
 

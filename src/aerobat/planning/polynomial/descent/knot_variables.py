@@ -18,7 +18,7 @@ from aerobat.planning.polynomial.descent.path_limits import (
     TO_COEFFICIENTS,
 )
 from aerobat.planning.warm_start import WarmStart
-from aerobat.problem.end_state import EndState
+from aerobat.problem.end_state import VELOCITY, EndState
 from aerobat.problem.problem import Problem
 from aerobat.so3 import UP
 from aerobat.trajectory import Trajectory
@@ -165,7 +165,8 @@ class KnotVariables:
         """Give an end (5, 3) its state's derivatives and the rest of the body, which turns with f' or f''."""
         along, drag = self._thrust_direction(state), lateral_drag(self.vehicle)
         jerk = 0.0 if self.still_ends else float(along @ end[JERK])
-        end[:JERK] = state.derivatives(JERK)
+        met = state.fixed(JERK)
+        end[met] = state.derivatives(JERK)[met]
         end[JERK] = jerk * along + (0.0 if self.still_ends else -drag) * end[JERK - 1]
         if self._shared == END_ORDER:
             end[SNAP] = float(along @ end[SNAP]) * along - drag * (
@@ -204,6 +205,8 @@ class KnotVariables:
         rows[1:, 0, :shared] = rows[:-1, 1, :shared] = knots
         if shared == SNAP:
             rows[:, :, SNAP] = knots.size + np.arange(2 * count).reshape(count, 2)
+        if self.problem.goal.free_velocity:
+            rows[-1, 1, VELOCITY] = rows.max() + 1
         return rows
 
     def _thrust_direction(self, state: EndState) -> Array:

@@ -69,13 +69,14 @@ class End:
     velocity: Array  # [m/s], (3,)
     thrust: Array  # f = a + g e3 + (d/m) w [m/s²], along the thrust axis, (3,)
     free_attitude: bool = False  # thrust and body rates are not fixed
+    free_velocity: bool = False  # likewise the velocity
 
     @classmethod
     def of(cls, state: EndState, elements: Elements) -> End:
         """A problem's, drag counted."""
         balance = force_balance(elements.problem.environment, elements.vehicle)
         thrust = balance.specific_thrust(state.velocity, state.acceleration)
-        return cls(state.position, state.velocity, thrust, state.free_attitude)
+        return cls(state.position, state.velocity, thrust, state.leaves_attitude_free, state.free_velocity)
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,7 +100,8 @@ class FixedEnds:
         """Write the states, the start's attitude, and with lag the inputs, into a bound on all unknowns."""
         for node, end in ((0, self.start), (-1, self.goal)):
             motion.states[POSITION, node] = end.position
-            motion.states[VELOCITY, node] = end.velocity
+            if not end.free_velocity:
+                motion.states[VELOCITY, node] = end.velocity
             if not end.free_attitude:
                 motion.states[RATES, node] = 0.0
         upright = so3.smallest_rotation(UP, self.start.thrust / np.linalg.norm(self.start.thrust))

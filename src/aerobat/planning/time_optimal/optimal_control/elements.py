@@ -139,23 +139,26 @@ class Elements:
         distance = (z * STATE_SCALE[POSITION] - ball[:3]) / ball[3]
         return ElementFunction(ca.Function("distance", [z, ball], [ca.sumsqr(distance)]))
 
-    @cached_property
-    def room_ahead(self) -> ElementFunction:
-        """Room [m²/s] on either side before and behind a gate, times the speed through it; that speed.
+    def room_ahead(self, sides: int) -> ElementFunction:
+        """Room [m²/s] at each side before and behind a gate, times the speed through it; that speed.
 
-        By the gate's place and axes (12,), half its sides (2,), how far before and behind, and the
-        acceleration by which the path may bend there, (9,).
+        By the gate's place and normal (6,), the outward normals of its sides (3 sides,) and their distances
+        (sides,), how far before and behind, and the acceleration by which the path may bend there.
         """
-        ca, z, way = import_casadi(), import_casadi().SX.sym("z", STATES), import_casadi().SX.sym("way", 16)
+        ca, z = import_casadi(), import_casadi().SX.sym("z", STATES)
+        way = ca.SX.sym("way", 8 + 4 * sides)
+        place, normal, outward, distances, ahead, bending = ca.vertsplit(
+            way, np.cumsum([0, 3, 3, 3 * sides, sides, 1, 1]).tolist()
+        )
         velocity = z[VELOCITY] * STATE_SCALE[VELOCITY]
-        through, values = ca.dot(way[3:6], velocity), []
-        bent = way[15] * way[14] ** 2 / 2.0 / ca.fmax(through, SLOWEST)
-        for axis, half in ((way[6:9], way[12]), (way[9:12], way[13])):
-            height, reach = self._reached(z, way[:3], axis)
-            across = way[14] * ca.dot(axis, velocity)
-            for side in (1.0, -1.0):
-                room = (half - reach - side * height) * through - bent
-                values += [room - across, room + across]
+        through, values = ca.dot(normal, velocity), []
+        bent = bending * ahead**2 / 2.0 / ca.fmax(through, SLOWEST)
+        for k in range(sides):
+            axis = outward[3 * k : 3 * k + 3]
+            height, reach = self._reached(z, place, axis)
+            across = ahead * ca.dot(axis, velocity)
+            room = (distances[k] - reach - height) * through - bent
+            values += [room - across, room + across]
         return ElementFunction(ca.Function("room", [z, way], [ca.vertcat(*values, through)]))
 
     def _reached(self, z: Any, place: Any, direction: Any) -> tuple[Any, Any]:

@@ -1,11 +1,11 @@
 """The way of the body through a gate, clear of its frame from before the plane until it is behind it.
 
 A stage asks where the centre of mass is at one instant. The body is about the plane for a while, and passes
-the opening if it flies on much as it flies there. With v_n along the normal and v_a along a side of the
-opening, d its reach and more before and behind the plane, s what it reaches along that side as it is turned,
-and r the room that is left of half the opening from where it crosses, |path − straight line| ≤ ½ a (d/v_n)²:
+the opening if it flies on much as it flies there. With v_n along the normal and v_a outward across a
+side of the opening, d its reach and more before and behind the plane, s what it reaches outward as it is
+turned, and r the room that is left to that side from where it crosses, |path − straight line| ≤ ½ a (d/v_n)²:
 
-    (r − s) v_n ± d v_a ≥ ½ a d²/v_n    on both sides    and    v_n² ≥ 2 a d,
+    (r − s) v_n ± d v_a ≥ ½ a d²/v_n    on all sides    and    v_n² ≥ 2 a d,
 
 so that it does not turn back. The body is an ellipsoid with its semi-axes on the diagonal of D and the
 attitude R, so that s = |D Rᵀ e| along e.
@@ -47,11 +47,13 @@ class Way:
     def hold(self, rows: Rows, mesh: Mesh, elements: Elements) -> None:
         """Add the constraints."""
         gate, node = self.gate, int(np.cumsum(mesh.intervals)[self.stage])
-        sides = np.array([gate.width, gate.height]) / 2.0 - FRAME_CLEARANCE
-        frame = [gate.position, gate.normal, gate.lateral, gate.up]
-        way = np.concatenate([*frame, sides, [self.reach, self.bending]])
-        lower = np.append(np.zeros(8), sqrt(2.0 * self.bending * self.reach))
-        rows.hold(elements.room_ahead, mesh.states[node : node + 1], lower, np.full(9, inf), way)
+        normals, distances = gate.opening.sides
+        outward, left = normals @ gate.plane_axes, distances - FRAME_CLEARANCE
+        frame = [gate.position, gate.normal, outward.ravel(), left]
+        way = np.concatenate([*frame, [self.reach, self.bending]])
+        lower = np.append(np.zeros(2 * len(left)), sqrt(2.0 * self.bending * self.reach))
+        room = elements.room_ahead(len(left))
+        rows.hold(room, mesh.states[node : node + 1], lower, np.full(len(lower), inf), way)
 
 
 def ways_through_gates(stages: Sequence[Stage], problem: Problem, vehicle: Vehicle) -> tuple[Way, ...]:

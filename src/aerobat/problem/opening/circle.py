@@ -1,0 +1,107 @@
+"""Circles as openings."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from aerobat.arrays import Array
+from aerobat.problem.opening.shape import Edge, LinearBounds, OpeningShape, Probe
+
+CIRCLE_POINTS = 48  # of a circle's outline, and of the frame around it
+CIRCLE_SIDES = 24  # of the polygon in a circle that planners take: 0.9 % of the radius is lost
+
+
+class Circle(OpeningShape):
+    """A circle about the gate's position.
+
+    Judged as what it is, bodies by the farthest of the points that they reach in CIRCLE_SIDES directions: of
+    the radius 0.2 % are missed at most. Planners take the regular polygon in it.
+    """
+
+    def __init__(self, radius: float) -> None:
+        self.radius = radius
+
+    @property
+    def outline(self) -> Array:
+        """Points on it, the first on the left."""
+        return self.radius * _directions(CIRCLE_POINTS)
+
+    @property
+    def fields(self) -> Mapping[str, Any]:
+        """The fields of a gate with this opening."""
+        return {"width": None, "height": None, "radius": self.radius, "polygon": None}
+
+    @property
+    def kind(self) -> str:
+        """Its kind as it is said before its width."""
+        return "round, "
+
+    @property
+    def probes(self) -> tuple[Probe, ...]:
+        """Half of the directions around it, both ways each."""
+        half = _directions(CIRCLE_SIDES)[: CIRCLE_SIDES // 2]
+        return tuple(Probe((x, y), self.radius, True, True) for x, y in half.tolist())
+
+    @property
+    def sides(self) -> tuple[Array, Array]:
+        """Those of the regular polygon in it."""
+        return _directions(CIRCLE_SIDES), np.full(CIRCLE_SIDES, _INSCRIBED * self.radius)
+
+    @property
+    def edges(self) -> tuple[Edge, ...]:
+        """Tangents all around."""
+        half = self.radius * np.tan(np.pi / CIRCLE_POINTS)
+        return tuple(Edge(self.radius * normal, normal, half) for normal in _directions(CIRCLE_POINTS))
+
+    @property
+    def inradius(self) -> float:
+        """Its radius [m]."""
+        return self.radius
+
+    def depth(self, points: Array) -> Array:
+        """See `OpeningShape`."""
+        return np.asarray(self.radius - np.linalg.norm(points, axis=-1))
+
+    def at_clearance(self, clearance: float) -> LinearBounds:
+        """See `OpeningShape`; the regular polygon in the smaller circle."""
+        if clearance >= self.radius:
+            return LinearBounds(np.eye(2), np.zeros(2), np.zeros(2))
+        reach = np.full(CIRCLE_SIDES // 2, _INSCRIBED * (self.radius - clearance))
+        return LinearBounds(_directions(CIRCLE_SIDES)[: CIRCLE_SIDES // 2], -reach, reach)
+
+    def admits(self, section: Array) -> bool:
+        """See `OpeningShape`."""
+        return bool(np.linalg.eigvalsh(section)[-1] <= self.radius**2)
+
+    def admits_turned(self, small: float, large: float) -> bool:
+        """See `OpeningShape`."""
+        return large <= self.radius
+
+    def outward(self, probe: int, points: Array) -> Array:
+        """Away from the middle."""
+        distance = np.linalg.norm(points, axis=-1, keepdims=True)
+        return np.where(distance > 0.0, points / np.where(distance > 0.0, distance, 1.0), [0.0, 1.0])
+
+    def nearest_on_edge(self, outward: Array, points: Array) -> Array:
+        """See `OpeningShape`."""
+        return self.radius * outward
+
+    def needed(self, reach: Array) -> Array:
+        """See `OpeningShape`."""
+        return np.repeat(2.0 * reach.max(axis=-1)[..., None], 2, axis=-1)
+
+    def resized(self, across: float, up: float) -> OpeningShape:
+        """See `OpeningShape`."""
+        return Circle(min(across, up) * self.radius)
+
+
+_INSCRIBED = float(np.cos(np.pi / CIRCLE_SIDES))  # [-] of a circle's radius: how far the polygon's sides are
+
+
+def _directions(count: int) -> Array:
+    """So many unit vectors, evenly around, the first to the left, (count, 2)."""
+    angles = 2.0 * np.pi * np.arange(count) / count
+    return np.column_stack([np.cos(angles), np.sin(angles)])

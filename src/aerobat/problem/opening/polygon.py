@@ -1,0 +1,234 @@
+"""Convex polygons as openings, rectangles among them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import cached_property
+from itertools import combinations
+from typing import Annotated, Any
+
+import numpy as np
+from pydantic import Field, PlainValidator
+
+from aerobat.arrays import Array
+from aerobat.declaration import FieldError, finite, shown
+from aerobat.problem.opening.shape import Edge, LinearBounds, OpeningShape, Probe
+
+STRAIGHT = 1e-6  # [-] the sine of a turn that is none
+FARTHEST = 1e15  # [m] likewise of all lengths in files
+MAX_CORNERS = 24  # of a polygon: each side is followed through every tick of a flight
+ROUNDING = 1e-12  # of an opening's size
+TURNS = np.radians(np.arange(0.0, 180.0, 5.0))  # in which a section is tried in a polygon
+
+
+class Polygon(OpeningShape):
+    """A convex polygon that holds the gate's position, its corners anticlockwise."""
+
+    def __init__(self, corners: Array) -> None:
+        self.corners = corners
+
+    @property
+    def outline(self) -> Array:
+        """Its corners."""
+        return self.corners
+
+    @property
+    def fields(self) -> Mapping[str, Any]:
+        """The fields of a gate with this opening."""
+        return {"width": None, "height": None, "radius": None, "polygon": self.corners}
+
+    @property
+    def kind(self) -> str:
+        """Its kind as it is said before its width."""
+        return f"a polygon of {len(self.corners)} corners, "
+
+    @cached_property
+    def sides(self) -> tuple[Array, Array]:
+        """Its own sides, the first from the first corner to the second."""
+        along = np.roll(self.corners, -1, axis=0) - self.corners
+        normals = np.column_stack([along[:, 1], -along[:, 0]]) / np.linalg.norm(along, axis=1)[:, None]
+        return normals, np.sum(normals * self.corners, axis=1)
+
+    @property
+    def probes(self) -> tuple[Probe, ...]:
+        """Its sides."""
+        normals, distances = self.sides
+        return tuple(Probe((x, y), d) for (x, y), d in zip(normals.tolist(), distances.tolist(), strict=True))
+
+    @property
+    def edges(self) -> tuple[Edge, ...]:
+        """Its sides."""
+        ends = np.roll(self.corners, -1, axis=0)
+        halves = np.linalg.norm(ends - self.corners, axis=1) / 2.0
+        return tuple(map(Edge, (self.corners + ends) / 2.0, self.sides[0], halves.tolist()))
+
+    def depth(self, points: Array) -> Array:
+        """See `OpeningShape`."""
+        normals, distances = self.sides
+        return np.asarray((distances - points @ normals.T).min(axis=-1))
+
+    @cached_property
+    def inradius(self) -> float:
+        """How deep [m] its deepest point lies inside."""
+        return self._largest_inset(np.zeros(len(self.corners)))[0]
+
+    def needed(self, reach: Array) -> Array:
+        """See `OpeningShape`."""
+        return np.asarray((reach / self.sides[1]).max(axis=-1)[..., None] * self.size)
+
+    def at_clearance(self, clearance: float) -> LinearBounds:
+        """See `OpeningShape`; each side is bounded from beyond by where the opposite corner is."""
+        normals, distances = self.sides
+        room, middle = self._largest_inset(np.zeros(len(distances)))
+        if clearance >= room:
+            return LinearBounds(np.eye(2), middle, middle)
+        return LinearBounds(normals, (self.corners @ normals.T).min(axis=0), distances - clearance)
+
+    def admits(self, section: Array) -> bool:
+        """See `OpeningShape`; wherever its centre is."""
+        normals, distances = self.sides
+        reach = np.sqrt(np.einsum("ki,ij,kj->k", normals, section, normals))
+        return self._largest_inset(reach)[0] >= -ROUNDING * float(distances.max())
+
+    def admits_turned(self, small: float, large: float) -> bool:
+        """See `OpeningShape`; where it reaches too far by what half a turn of TURNS changes it may fit."""
+        slack = (large - small) * np.sin((TURNS[1] - TURNS[0]) / 2.0)
+        normals, _ = self.sides
+        for turn in TURNS:
+            along = normals @ [np.cos(turn), np.sin(turn)]
+            reach = np.sqrt(large**2 * along**2 + small**2 * (1.0 - along**2))
+            if self._largest_inset(reach)[0] >= -slack:
+                return True
+        return False
+
+    def outward(self, probe: int, points: Array) -> Array:
+        """The side's normal."""
+        return np.broadcast_to(self.sides[0][probe], points.shape)
+
+    def nearest_on_edge(self, outward: Array, points: Array) -> Array:
+        """See `OpeningShape`."""
+        side = np.argmax(outward @ self.sides[0].T, axis=-1)
+        first, along = self.corners[side], (np.roll(self.corners, -1, axis=0) - self.corners)[side]
+        part = np.sum((points - first) * along, axis=-1) / np.sum(along * along, axis=-1)
+        return np.asarray(first + np.clip(part, 0.0, 1.0)[..., None] * along)
+
+    def resized(self, across: float, up: float) -> OpeningShape:
+        """See `OpeningShape`."""
+        return Polygon(min(across, up) * self.corners)
+
+    def _largest_inset(self, reach: Array) -> tuple[float, Array]:
+        """The largest distance [m] that is left on all sides beside what is reached there, and the point.
+
+        Three sides are as near as that: of all three the point is tried, which is few for few corners.
+
+        Args:
+            reach: of a body beyond the point along each outward normal [m], (S,).
+        """
+        normals, distances = self.sides
+        left = distances - reach
+        threes = np.array(list(combinations(range(len(normals)), 3)))
+        rows = np.concatenate([normals[threes], np.ones((len(threes), 3, 1))], axis=2)
+        solvable = np.abs(np.linalg.det(rows)) > STRAIGHT
+        found = np.linalg.solve(rows[solvable], left[threes[solvable]][..., None])[..., 0]
+        fits = (left - found[:, :2] @ normals.T - found[:, 2:]).min(axis=1) >= -ROUNDING * distances.max()
+        best = found[fits][np.argmax(found[fits][:, 2])]
+        return float(best[2]), best[:2]
+
+
+class Rectangle(Polygon):
+    """A rectangle about the gate's position, its sides along lateral and upright."""
+
+    def __init__(self, width: float, height: float) -> None:
+        self.width, self.height = width, height
+        super().__init__(np.array([(1, 1), (-1, 1), (-1, -1), (1, -1)]) * [width / 2.0, height / 2.0])
+
+    @property
+    def fields(self) -> Mapping[str, Any]:
+        """The fields of a gate with this opening."""
+        return {"width": self.width, "height": self.height, "radius": None, "polygon": None}
+
+    @property
+    def kind(self) -> str:
+        """Its kind as it is said before its width: none, it is what gates are."""
+        return ""
+
+    @property
+    def probes(self) -> tuple[Probe, ...]:
+        """Across and up, both ways each."""
+        return Probe((1.0, 0.0), self.width / 2.0, True), Probe((0.0, 1.0), self.height / 2.0, True)
+
+    @property
+    def inradius(self) -> float:
+        """How deep [m] its deepest point lies inside."""
+        return min(self.width, self.height) / 2.0
+
+    def needed(self, reach: Array) -> Array:
+        """See `OpeningShape`; width and height, each for itself."""
+        return 2.0 * reach
+
+    def at_clearance(self, clearance: float) -> LinearBounds:
+        """See `OpeningShape`; the middle along each axis where it is too narrow along that."""
+        reach = np.maximum(np.array([self.width, self.height]) / 2.0 - clearance, 0.0)
+        return LinearBounds(np.eye(2), -reach, reach)
+
+    def admits_turned(self, small: float, large: float) -> bool:
+        """See `OpeningShape`; exactly: the box around an ellipse has one diagonal, however it is turned."""
+        narrow = min(self.width, self.height) >= 2.0 * small
+        return bool(narrow and np.hypot(self.width, self.height) >= 2.0 * np.hypot(small, large))
+
+    def outward(self, probe: int, points: Array) -> Array:
+        """Across or up, to the side where the points are."""
+        outward = np.zeros(points.shape)
+        outward[..., probe] = np.where(points[..., probe] > 0.0, 1.0, -1.0)
+        return outward
+
+    def resized(self, across: float, up: float) -> OpeningShape:
+        """See `OpeningShape`."""
+        return Rectangle(across * self.width, up * self.height)
+
+
+def _corners(value: Any) -> Array:
+    """The corners of a convex polygon about (0, 0), anticlockwise. Raises FieldError for what is none."""
+    if not isinstance(value, list | tuple | np.ndarray) or np.ndim(np.asarray(value, dtype=object)) < 1:
+        raise FieldError("", f"must be a list of corners, two numbers each, got {shown(value)}")
+    if not 3 <= len(value) <= MAX_CORNERS:
+        raise FieldError("", f"must have from 3 to {MAX_CORNERS} corners, got {len(value)}; give as many")
+    corners = finite(value, len(value), 2)
+    if np.abs(corners).max() > FARTHEST:
+        raise FieldError(
+            "", f"must have corners within {FARTHEST:g} m, got {np.abs(corners).max():g}; check units"
+        )
+    sides = np.roll(corners, -1, axis=0) - corners
+    lengths = np.linalg.norm(sides, axis=1)
+    if not (lengths > 0.0).all():
+        raise FieldError("", f"has the corner {_text(corners[lengths == 0.0])} twice; drop one")
+    sides = sides / lengths[:, None]
+    last = np.roll(sides, 1, axis=0)
+    sines, cosines = last[:, 0] * sides[:, 1] - last[:, 1] * sides[:, 0], np.sum(last * sides, axis=1)
+    turns = np.arctan2(sines, cosines)
+    sign = np.sign(turns.sum())
+    straight = np.abs(sines) < STRAIGHT
+    if straight.any():
+        where = _text(corners[straight])
+        raise FieldError("", f"has its corner {where} on a line with those beside it; drop or move it")
+    if (sign * turns <= 0.0).any():
+        where = _text(corners[sign * turns <= 0.0])
+        raise FieldError("", f"must be convex, at its corner {where} it turns inward; drop or move that")
+    if abs(turns.sum()) > 3.0 * np.pi:
+        raise FieldError("", "must go around once, its sides cross; order the corners around it")
+    around = corners if sign > 0.0 else np.ascontiguousarray(corners[::-1])
+    around.flags.writeable = False
+    if Polygon(around).depth(np.zeros(2)) <= 0.0:
+        raise FieldError("", "must hold the gate's position, (0, 0), inside; move the corners or the gate")
+    return around
+
+
+def _text(corners: Array) -> str:
+    """The first of some corners, as a file has it."""
+    return "[{:g}, {:g}]".format(*corners[0])
+
+
+# corners in a gate's plane, to the left and up of its position as who passes upright sees it [m], (K, 2)
+Corners = Annotated[
+    Array, PlainValidator(_corners), Field(description="corners in order, two numbers each: left and up")
+]
