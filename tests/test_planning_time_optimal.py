@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from aerobat.errors import BackendMissing, Infeasible, SpecError
-from aerobat.planning import Plan
+from aerobat.planning import Plan, plan
 from aerobat.planning.time_optimal.time_optimal import TimeOptimal
 from aerobat.problem import (
     EndState,
@@ -19,6 +19,7 @@ from aerobat.problem import (
     Waypoints,
     at_rest,
     load_problem,
+    tilted_gate,
 )
 from aerobat.simulation import fly
 from aerobat.states import STANDARD_GRAVITY
@@ -138,6 +139,14 @@ def test_limits_hold_between_nodes_and_cost_time():
         assert (most <= upper + 1e-9).all()
     assert bound.certificate.certified
     assert bound.duration > TimeOptimal(intervals=20, starts=1).plan(free, QUAD).duration
+
+
+def test_who_would_come_into_a_gate_along_its_plane_flies_straighter_through_it():
+    gate = tilted_gate((1.5, 1.0, 0.0), heading=np.radians(60.0))
+    problem = Problem("aside", at_rest((0.0, 0.0, 0.0)), at_rest((3.0, 0.0, 0.0)), Line(), (gate,))
+    found = plan(problem, TimeOptimal(reserve=0.03, starts=1, intervals=24), "hexarotor")
+    assert found.flies, found.flyability
+    assert found.flyability.passages[0].clearance > 0.0
 
 
 def test_ends_in_motion_are_met():

@@ -106,10 +106,12 @@ class Race:
         for _ in range(STRAIGHTENINGS):
             program = found.solution.source.program
             keeps_path = flight.error <= FLYABLE_ERROR
-            if not (flight.lingers and keeps_path and program.start.ways) or out_of_time():
+            if not (flight.lingers and keeps_path) or out_of_time():
                 break
-            stages = program.control.stages
-            ways = straighter(program.start.ways, stages, flight)
+            before = program.start.ways
+            ways = straighter(before, program.control.stages, self.problem, self.vehicle, flight)
+            if ways == before:
+                break
             again = self._certified(
                 self._fine(program.control.elements, found.solution.source, self.reserve, ways)
             )

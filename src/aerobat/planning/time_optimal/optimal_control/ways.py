@@ -32,6 +32,7 @@ from aerobat.vehicle import Vehicle
 
 FRAME_CLEARANCE = 0.01  # [m] from body to frame
 BENDING = 0.4  # of the largest specific thrust: the acceleration by which a path may bend there, at first
+BENDING_IN_MANEUVER = 0.1  # likewise, where a maneuver bends it as it likes
 MORE_BENDING = 1.6  # times that, where the plan's own flight does not pass
 
 
@@ -59,31 +60,45 @@ class Way:
 def ways_through_gates(stages: Sequence[Stage], problem: Problem, vehicle: Vehicle) -> tuple[Way, ...]:
     """The ways through the gates that stages cross.
 
-    Those among stages that do not say where they are have none: a flip in a gate begins and ends where it
-    likes.
+    Those among stages that do not say where they are have none, until a flight does not pass them: a flip in
+    a gate begins and ends where it likes.
     """
-    reach, bending = vehicle.body_radius + PASSAGE_DEPTH, BENDING * vehicle.max_specific_thrust
     found = []
-    for k, stage in enumerate(stages):
+    for k in range(len(stages)):
         around = stages[max(k - 1, 0) : k + 2]
-        if stage.gate is None or any(len(each.where) < 3 for each in around):
-            continue
-        gate = problem.gate(stage.gate)
-        if PlannedPassage.of(stage, gate, 0.0).min_speed > 0.0:
-            found.append(Way(gate, k, reach, bending))
-    return tuple(found)
+        if all(len(each.where) == 3 for each in around):
+            found.append(_way(k, stages, problem, vehicle, BENDING))
+    return tuple(filter(None, found))
 
 
-def straighter(ways: Sequence[Way], stages: Sequence[Stage], flight: OwnFlight) -> tuple[Way, ...]:
-    """The ways, straighter through the gates that a flight along them did not pass.
+def straighter(
+    ways: Sequence[Way], stages: Sequence[Stage], problem: Problem, vehicle: Vehicle, flight: OwnFlight
+) -> tuple[Way, ...]:
+    """The ways, straighter through the gates that a flight along them did not pass, and new ones there.
 
     Args:
         ways: Through gates that the stages cross.
         stages: In order.
+        problem: Its gates are crossed.
+        vehicle: What flies.
         flight: With a passage for each stage that names a gate.
     """
     crossing = [k for k, stage in enumerate(stages) if stage.gate is not None]
-    missed = {k for k, flown in zip(crossing, flight.passages, strict=True) if flown.is_missed}
-    return tuple(
-        replace(way, bending=MORE_BENDING * way.bending) if way.stage in missed else way for way in ways
-    )
+    missed = [k for k, flown in zip(crossing, flight.passages, strict=True) if flown.is_missed]
+    found: dict[int, Way | None] = {way.stage: way for way in ways}
+    for k in missed:
+        last = found.get(k)
+        if last is None:
+            found[k] = _way(k, stages, problem, vehicle, BENDING_IN_MANEUVER)
+        else:
+            found[k] = replace(last, bending=MORE_BENDING * last.bending)
+    return tuple(way for way in found.values() if way is not None)
+
+
+def _way(k: int, stages: Sequence[Stage], problem: Problem, vehicle: Vehicle, bending: float) -> Way | None:
+    """The way through the gate that stage k crosses, in its direction; None where it crosses none."""
+    name = stages[k].gate
+    if name is None or PlannedPassage.of(stages[k], problem.gate(name), 0.0).min_speed <= 0.0:
+        return None
+    reach = vehicle.body_radius + PASSAGE_DEPTH
+    return Way(problem.gate(name), k, reach, bending * vehicle.max_specific_thrust)
