@@ -54,6 +54,15 @@ def test_whoever_flies_whatever_a_thousand_instants_keep_what_is_announced(
     assert found.lowest.min() > announced.lowest.min() - 0.15
 
 
+def test_a_vehicle_that_flies_to_pieces_is_told_by_numbers_and_never_hovers(flip: ab.Plan) -> None:
+    assert flip.vehicle is not None
+    inertia = np.diag([*np.diag(flip.vehicle.inertia)[:2], 1e-300])
+    found = ab.recoveries(flip, replace(flip.vehicle, inertia=inertia), times=[0.2, 0.5])
+    assert not found.possible.any()
+    assert np.isfinite(found.lowest).all()
+    assert np.isinf(found.durations).all()
+
+
 def test_the_instants_of_a_long_path_are_few_and_reach_from_its_start_to_its_end(
     flip: ab.Plan, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -204,10 +204,10 @@ class _Flock:
 
     def _fly(self, references: ReferencePoint, by_attitude: bool) -> None:
         self._carry, body = self._loop.scan(self._carry, autopilot_inputs(references, by_attitude))
-        self.lowest = np.minimum(self.lowest, body.position[2].min(axis=1))
+        self.lowest = np.fmin(self.lowest, np.fmin.reduce(body.position[2], axis=1))  # NaN: it flew to pieces
         speed = np.linalg.norm(from_components(body.velocity), axis=-1)
         lean = so3.thrust_axis(from_components(body.q_world_body))[..., 2]
-        moving = (speed > _STILL) | (lean < np.cos(_LEVEL))
+        moving = ~((speed <= _STILL) & (lean >= np.cos(_LEVEL)))
         ticks = moving.shape[1]
         latest = ticks - np.argmax(moving[:, ::-1], axis=1)
         self.durations = np.where(moving.any(axis=1), self._time + latest / RATE, self.durations)
