@@ -107,6 +107,7 @@ def test_a_certified_plan_that_does_not_fly_says_so_as_a_defect_of_its_own() -> 
     assert flyability(plan).error > FLYABLE_ERROR
     for text in (str(plan), str(report(plan)["plan"]["flyability"]["sentence"])):
         assert "a defect of the plan, not of the flight" in text
+        assert text.count("keep more reserve for the controller, or take another planner") == 1
     assert report(plan)["plan"]["flyability"]["flies"] is False
 
 

@@ -100,11 +100,23 @@ class Flyability(OwnFlight):
     disturbed_fraction: float  # [-] the same over the largest thrust of a rotor
     disturbed_error: float  # [m] the largest position error where all rotors give less by that fraction
 
+    @property
+    def remedy(self) -> str:
+        """What may mend its defects, in words; empty where there are none."""
+        found = []
+        if self.lingers:
+            found.append("ask more speed of the passage or widen the opening")
+        if self.wants_reserve:
+            found.append("keep more reserve for the controller")
+        return ", ".join([*found, "or take another planner"]) if found else ""
+
     def __str__(self) -> str:
         """The finding in a sentence without its full stop."""
         if self.defects:
             found = " and ".join(self.defects)
-            return f"not flyable: its own flight {found}, a defect of the plan, not of the flight"
+            return (
+                f"not flyable: its own flight {found}, a defect of the plan, not of the flight; {self.remedy}"
+            )
         if not self.disturbance:
             return f"flies within {length(self.error)}, with no reserve left"
         return (
