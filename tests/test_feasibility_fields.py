@@ -74,7 +74,7 @@ def test_units_are_those_that_the_page_on_files_tells() -> None:
         key = str(next(key for key in reversed(field.keys) if isinstance(key, str)))
         assert field.unit.replace("°", "deg") in told[key]
     assert Field.of("angle", scenario()).unit == "°"
-    assert Field.of("vehicle.rotors.min_thrust", scenario()).unit == "N"
+    assert Field.of("vehicle.rotor_defaults.min_thrust", scenario()).unit == "N"
     assert Field.of("limits.upper[2]", scenario()).unit == "m"
 
 
