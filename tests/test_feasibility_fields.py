@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 from functools import cache
 from math import degrees
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -17,6 +19,7 @@ from aerobat.declaration import from_table, to_table
 from aerobat.planning.assessment.contradiction import contradiction
 from aerobat.studies.feasibility import Axis
 from aerobat.studies.feasibility.fields import Field, Scenario
+from aerobat.studies.feasibility.units import UNITS
 
 NAMES = {  # of fields: the place of the same in a file's tables, and values that it takes
     "gate.width": (("gates", 0, "width"), (0.5, 3.0)),
@@ -54,6 +57,25 @@ def by_file(keys: tuple[Any, ...], value: float) -> Scenario:
         table = table[key]
     table[last] = value
     return Scenario(from_table(ab.Problem, tables["problem"]), from_table(ab.Vehicle, tables["vehicle"]))
+
+
+def test_units_are_those_that_the_page_on_files_tells() -> None:
+    page = (
+        (Path(__file__).parents[1] / "docs" / "files.md")
+        .read_text(encoding="utf-8")
+        .partition("## Conditions")[0]
+    )
+    rows = re.findall(r"^\| `(\w+)` \| .* \| (\S+) \| [^|]* \|$", page, re.MULTILINE)
+    told = {key: {unit for name, unit in rows if name == key} for key, _ in rows}
+    for key, unit in UNITS.items():
+        assert told[key] == {unit}, key
+    for name in NAMES:
+        field = Field.of(name, scenario())
+        key = str(next(key for key in reversed(field.keys) if isinstance(key, str)))
+        assert field.unit.replace("°", "deg") in told[key]
+    assert Field.of("angle", scenario()).unit == "°"
+    assert Field.of("vehicle.rotor_defaults.min_thrust", scenario()).unit == "N"
+    assert Field.of("limits.upper[2]", scenario()).unit == "m"
 
 
 @given(name=st.sampled_from(sorted(NAMES)), data=st.data())

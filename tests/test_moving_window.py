@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 from itertools import product
 from math import inf
@@ -153,3 +154,20 @@ def test_a_plan_placed_in_windows_states_its_gap() -> None:
     said = dict(plan_facts(plan))
     if plan.gap > 1e-6:
         assert any("% of the optimum" in str(each) for each in said.values())
+
+
+def test_a_course_without_room_for_its_stages_is_refused_at_once_with_the_leg_and_what_frees_it() -> None:
+    problem, vehicle = ab.load_problem("split-s-19"), ab.load_vehicle("agile-quad")
+    with pytest.raises(
+        ab.Infeasible, match=r"has no plan with 20 intervals: its 19 stages spread"
+    ) as refused:
+        ab.plan(problem, ab.Miqp(rescue=False), vehicle)
+    assert len(refused.value.attempts) == 1
+    leg = r"the leg from '(.*)' of lap 1 to '(.*)' of lap 1 has no path; with (\d+) intervals"
+    said = re.search(leg, str(refused.value))
+    assert said is not None
+    names = [stage.name for stage in problem.stages(1.0).stages]
+    assert names.index(said[2]) == names.index(said[1]) + 1
+    for intervals, has_room in ((20, False), (int(said[3]), True)):
+        formulation = formulate(problem, 5, intervals, vehicle)
+        assert (diagnosis.leg_without_room(formulation, 0.5) is None) == has_room

@@ -25,7 +25,10 @@ LIMITS = (("max_thrust",), ("limits.velocity", "max_thrust"), ("gate",), ("rotor
 def made(rows: int, columns: int) -> ab.FeasibilityMap:
     """A map with cells of every kind, of one field where there is one row."""
     kinds = list(Feasibility)
-    axes = (Axis("angle", tuple(map(float, range(rows)))), Axis("speed", tuple(2.0 * np.arange(columns))))
+    axes = (
+        Axis("angle", tuple(map(float, range(rows))), "°"),
+        Axis("speed", tuple(2.0 * np.arange(columns)), "m/s"),
+    )
     axes = axes if rows > 1 else axes[1:]
     cells = []
     for number in range(rows * columns):
@@ -64,6 +67,12 @@ def test_red_cells_are_those_whose_plan_is_not_flyable() -> None:
     assert any(red)
 
 
+def test_the_picture_s_axes_have_their_units() -> None:
+    grid, line = (ab.map_figure(made(*size)).axes[0] for size in ((4, 4), (1, 4)))
+    assert (grid.get_ylabel(), grid.get_xlabel()) == ("angle [°]", "speed [m/s]")
+    assert (line.get_ylabel(), line.get_xlabel()) == ("duration [s]", "speed [m/s]")
+
+
 def test_a_map_without_any_plan_is_drawn_too() -> None:
     found = made(4, 4)
     cells = tuple(replace(c, feasibility=Feasibility.REFUSED, duration=None) for c in found.cells)
@@ -75,7 +84,7 @@ def test_a_grid_has_a_duration_and_a_letter_in_each_cell_and_says_what_the_lette
     found = made(4, 5)
     kinds = kinds_of(found)
     lines = shown(found).splitlines()
-    assert "duration [s] over angle (down) and speed (across)" in lines[0]
+    assert "duration [s] over angle [°] (down) and speed [m/s] (across)" in lines[0]
     for row in range(4):
         cells = found.cells[5 * row : 5 * row + 5]
         texts = [

@@ -51,11 +51,14 @@ class ObserverScore:
 
 @dataclass(frozen=True)
 class LapTime:
-    """A lap of a course as it was flown, to the last of its gates and waypoints."""
+    """A lap of a course as it was flown, to the last of its gates and waypoints.
+
+    One of a closed course goes all the way round: it ends as long after that as is planned to its seam.
+    """
 
     lap: int  # counted from 1
-    end: float  # [s] when that was passed; NaN where one of the lap was not
-    duration: float  # [s] since the lap before, or the start; of a closed course as if it came round
+    end: float  # [s] when it ended; NaN where one of the lap was not
+    duration: float  # [s] since the lap before, or the start
 
 
 @in_notebooks
@@ -83,8 +86,9 @@ class Score:
         passed += [(waypoint.lap, waypoint.time) for waypoint in self.waypoints]
         numbers = sorted({lap for lap, _ in passed})
         ends = [float(np.max([time for lap, time in passed if lap == number])) for number in numbers]
-        durations = np.diff([self.lap_begin_s, *ends]).tolist()
         has_laps = len(numbers) > 1 or self.lap_begin_s < 0.0
+        ends = [end - self.lap_begin_s for end in ends]
+        durations = np.diff([0.0, *ends]).tolist()
         return tuple(map(LapTime, numbers, ends, durations)) if has_laps else ()
 
     def __str__(self) -> str:

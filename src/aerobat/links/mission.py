@@ -90,11 +90,12 @@ class Mission(Generic[GoalT_co]):
         self.stream = stream
         self._follower = follower
         first, last = self.stream.flat(0.0), self.stream.flat(self.stream.duration)
-        speed = float(np.linalg.norm(first.velocity))
-        if speed > _SLOW:
-            raise SpecError(
-                f"the plan begins at {speed:.2f} m/s, a mission at rest; plan from a start at rest"
-            )
+        for end, state in (("begins", first), ("ends", last)):
+            speed = float(np.linalg.norm(state.velocity))
+            if speed > _SLOW:
+                raise SpecError(
+                    f"the plan {end} at {speed:.2f} m/s, a mission at rest; plan it from and to rest"
+                )
         self._start = first.position
         self._heading = plan.trajectory.heading
         self._final_yaw = yaw_of(self.stream.at(self.stream.duration).q_world_body)
@@ -224,7 +225,7 @@ class Mission(Generic[GoalT_co]):
 
 
 def require_flyable(plan: Plan, offset: Array, vehicle_name: str | None = None) -> None:
-    """Refuse what is not proven for the vehicle that is to fly it, or cannot be begun from a hover.
+    """Refuse what is not proven for the vehicle that is to fly it, or leads not from a hover to a hover.
 
     Raises SpecError, one sentence; nothing is armed before.
 
@@ -246,9 +247,13 @@ def require_flyable(plan: Plan, offset: Array, vehicle_name: str | None = None) 
         raise SpecError(f"{label} is not certified for {name} ({why}); plan it within its limits")
     if plan.flyability is not None and not plan.flies:
         raise SpecError(f"{label} is {plan.flyability}; plan it again with a reserve")
-    motion = [float(np.linalg.norm(plan.trajectory.evaluate(0.0, k))) for k in (1, 2)]
-    if max(motion) > _AT_REST:
-        raise SpecError(f"{label} begins in motion; plan it from a hover, where a link can begin it")
+    for time, at_end, remedy in (
+        (0.0, "begins", "plan it from a hover, where a link can begin it"),
+        (plan.duration, "ends", "plan it to a goal at rest, where a link can hover"),
+    ):
+        motion = [float(np.linalg.norm(plan.trajectory.evaluate(time, k))) for k in (1, 2)]
+        if max(motion) > _AT_REST:
+            raise SpecError(f"{label} {at_end} in motion; {remedy}")
     lowest = float(plan.trajectory.component_range(0)[0][2] + offset[2])
     if lowest <= 0.0:
         raise SpecError(

@@ -2,7 +2,7 @@
 
 from aerobat.optimization.assignment import AssignmentProgram, SlottedStage
 from aerobat.optimization.backends import BACKENDS, Solver, available_backends, solver
-from aerobat.optimization.moving_window import improved_in_windows
+from aerobat.optimization.moving_window import evenly_spread, improved_in_windows
 from aerobat.optimization.result import AssignmentResult
 
 __all__ = [
@@ -12,6 +12,7 @@ __all__ = [
     "SlottedStage",
     "Solver",
     "available_backends",
+    "evenly_spread",
     "improved_in_windows",
     "solver",
 ]

@@ -58,6 +58,12 @@ class SlottedStage:
             raise SpecError(f"stage '{self.name}' cannot sit in slot {slot}; its slots are {self.slots}")
         return self.slots.index(slot)
 
+    def restricted(self, places: Sequence[int]) -> SlottedStage:
+        """The stage with those of its slots that stand at some places among them."""
+        at = list(places)
+        slots = tuple(self.slots[k] for k in at)
+        return SlottedStage(self.name, slots, self.rows[at], self.lower[at], self.upper[at])
+
 
 @dataclass(frozen=True, eq=False)
 class AssignmentProgram:

@@ -135,14 +135,8 @@ class _Windows:
         after = self._slots[window.start - 1] if window.start > 0 else -1
         before = self._slots[window.stop] if window.stop < len(self._slots) else np.inf
         stage = self._program.stages[i]
-        return _restricted(stage, [k for k, slot in enumerate(stage.slots) if after < slot < before])
+        return stage.restricted([k for k, slot in enumerate(stage.slots) if after < slot < before])
 
     def _fixed(self, i: int) -> SlottedStage:
         stage = self._program.stages[i]
-        return _restricted(stage, [stage.index(self._slots[i])])
-
-
-def _restricted(stage: SlottedStage, places: list[int]) -> SlottedStage:
-    """A stage with some of its slots."""
-    slots = tuple(stage.slots[k] for k in places)
-    return SlottedStage(stage.name, slots, stage.rows[places], stage.lower[places], stage.upper[places])
+        return stage.restricted([stage.index(self._slots[i])])

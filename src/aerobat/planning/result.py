@@ -182,20 +182,23 @@ class Plan:
 
     @property
     def laps(self) -> tuple[float, ...]:
-        """The times [s] at which laps end, with their last stages, of a closed course or one of several."""
+        """The times [s] at which laps end, of a closed course or one of several.
+
+        They end with their last stages, those of a closed course as long after that as it is to the seam.
+        """
         stages = self.problem.stages(1.0).stages
         if len(stages) != len(self.stages):
             return ()
         ends = {stage.lap: place.time for stage, place in zip(stages, self.stages, strict=True)}
-        return tuple(ends.values()) if len(ends) > 1 or not self.problem.ends else ()
+        if self.problem.ends:
+            return tuple(ends.values()) if len(ends) > 1 else ()
+        to_seam = self.duration - max(ends.values())
+        return tuple(end + to_seam for end in ends.values())
 
     @property
     def lap_times(self) -> tuple[float, ...]:
-        """The durations [s] of laps, the first since the start; of a closed course as if it came round."""
-        if not self.laps:
-            return ()
-        begin = 0.0 if self.problem.ends else self.laps[-1] - self.duration
-        return tuple(np.diff([begin, *self.laps]).tolist())
+        """The durations [s] of laps, the first since the start."""
+        return tuple(np.diff([0.0, *self.laps]).tolist())
 
     @property
     def intervals(self) -> int:

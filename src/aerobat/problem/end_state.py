@@ -20,8 +20,8 @@ class EndState:
     """Where a trajectory begins or ends; derivatives above acceleration are zero there. World frame.
 
     A goal of `free_attitude` may be reached in any attitude, at whatever body rate and thrust, as races end;
-    planners that cannot leave it free take the acceleration. One of `free_velocity` is passed however fast
-    and in any direction, so in any attitude too. A closed course has no ends: both are left out.
+    planners that cannot leave it free take the acceleration. One of `free_velocity` is passed however fast,
+    whatever its direction, and so in any attitude too. A closed course has no ends: both are left out.
     """
 
     position: PartialVector = field(default_factory=free)  # [m] world, all of it, but of a closed course

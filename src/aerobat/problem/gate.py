@@ -55,8 +55,8 @@ class Gate:
     width: Positive | None = None  # [m] of a rectangular opening; left out, 1
     height: Positive | None = None  # [m] likewise; left out, 0.6
     name: Label = "gate"  # by which stages and waypoints refer to it
-    # [rad] between the thrust axis and `up` in the gate, at most, where a maneuver asks for its attitude
-    attitude_tolerance: ConeAngle = radians(5.0)
+    # between the thrust axis and `up` in the gate, at most, where a maneuver asks for its attitude
+    attitude_tolerance: ConeAngle = radians(5.0)  # [rad]
     radius: Positive | None = None  # [m] of a round opening, instead of width and height
     polygon: Corners | None = None  # [m] of any other convex opening, from `position`, instead of those
 

@@ -7,18 +7,21 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from math import inf
+from math import ceil, inf
 
 import numpy as np
 
-from aerobat.optimization import solver
+from aerobat.optimization import evenly_spread, solver
+from aerobat.planning.courses import is_placed_in_windows
 from aerobat.planning.miqp.formulation import Formulation
 from aerobat.planning.recorder import Attempt
 from aerobat.problem.problem import DERIVATIVES, UNITS
+from aerobat.problem.stage import Stage
 from aerobat.vehicle import Vehicle
 
 OUT_OF_TIME = "no solution was found in time"
 NOT_CONVERGED = "the solver did not converge"
+MORE_INTERVALS = (1.3, 1.8, 2.5)  # times as many as there are that are tried, or as there are stages
 PROBES = 4  # durations at which a relaxed problem is tried
 
 
@@ -44,6 +47,50 @@ def why_infeasible(formulation: Formulation, attempts: Sequence[Attempt], vehicl
             "help"
         )
     return f"{said}: {' or '.join(binding)} binds; without it the program has a solution"
+
+
+def leg_without_room(formulation: Formulation, dt: float) -> str | None:
+    """One sentence: the first leg of a course that has no path, and how many intervals free it.
+
+    Its stages are spread evenly, as where windows begin. None where all legs have a path, where no number of
+    intervals that is tried gives them one, and of sequences that are searched whole.
+    """
+    if not is_placed_in_windows(formulation.sequence):
+        return None
+    stages, count = formulation.sequence.stages, formulation.chain.intervals
+    placed = _placed_when_spread(formulation, dt)
+    if placed is None or placed == len(stages):
+        return None
+    begin = "the start" if placed == 0 else _told(stages, placed - 1)
+    said = (
+        f"'{formulation.problem.name}' has no plan with {count} intervals: its {len(stages)} stages spread "
+        f"evenly over them, the leg from {begin} to {_told(stages, placed)} has no path"
+    )
+    for more in (ceil(factor * max(count, len(stages))) for factor in MORE_INTERVALS):
+        chain = replace(formulation.chain, intervals=more)
+        if _placed_when_spread(replace(formulation, chain=chain), dt * count / more) == len(stages):
+            return f"{said}; with {more} intervals all of them have one"
+    return None
+
+
+def _placed_when_spread(formulation: Formulation, dt: float) -> int | None:
+    """How many stages, from the first on, have a path through slots spread evenly; None without slots."""
+    program = formulation.program(dt)
+    slots = evenly_spread(program)
+    if slots is None:
+        return None
+    fixed = [stage.restricted([stage.index(slot)]) for stage, slot in zip(program.stages, slots, strict=True)]
+    for count in range(1, len(fixed) + 1):
+        tried = replace(program, stages=tuple(fixed[:count]), precedence=())
+        if solver("builtin").solve(tried).status == "infeasible":
+            return count - 1
+    return len(fixed)
+
+
+def _told(stages: Sequence[Stage], number: int) -> str:
+    """A stage's name, with its lap where there are several."""
+    stage = stages[number]
+    return f"'{stage.name}'" + (f" of lap {stage.lap}" if stages[-1].lap > 1 else "")
 
 
 def _binding(formulation: Formulation, dts: Sequence[float]) -> Iterator[str]:

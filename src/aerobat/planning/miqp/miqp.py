@@ -14,8 +14,8 @@ from aerobat.flatness import force_balance
 from aerobat.optimization import AssignmentProgram, solver
 from aerobat.optimization.deadline import out_of_time, within_time
 from aerobat.planning.certified_solve import Judged
-from aerobat.planning.miqp.attempts import Attempts, Placement, default_order, plan_of
-from aerobat.planning.miqp.diagnosis import why_infeasible
+from aerobat.planning.miqp.attempts import COURSE_SCAN_NODES, Attempts, Placement, default_order, plan_of
+from aerobat.planning.miqp.diagnosis import leg_without_room, why_infeasible
 from aerobat.planning.miqp.formulation import Formulation
 from aerobat.planning.miqp.integrator import IntegratorChain, Intervals, Order
 from aerobat.planning.miqp.refinement import descent, settled
@@ -109,6 +109,10 @@ class Miqp(Planner):
             found = (self.search or GridSearch()).smallest(partial(_attempt, attempts))
         else:
             first = duration_lower_bound(problem, vehicle) / self.intervals
+            leg = leg_without_room(formulation, first)
+            if leg is not None:
+                attempts.judge(Placement(attempts.solve(first, COURSE_SCAN_NODES), first))
+                raise Infeasible(leg, recorder.attempts)
             found = shortest(attempts, first, last=max(4.0, 2.0 * first))
         if found is None:
             if out_of_time():

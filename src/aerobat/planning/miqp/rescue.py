@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from aerobat.planning.miqp.miqp import Miqp
 
 MORE_INTERVALS = (1.3, 1.8)  # times as many
+A_STAGE = 2  # intervals at least: fewer leave the path of a course no choice
 MANY_INTERVALS = 40  # where that is more still: a narrow window at an end needs intervals on either side
 
 
@@ -32,7 +33,8 @@ def rescued_plan(asked: Miqp, problem: Problem, vehicle: Vehicle, recorder: Reco
         vehicle: What shall fly it.
         recorder: The attempts so far; those that follow are passed on to its `progress`.
     """
-    for planner, how in _alternatives(asked, default_order(problem, vehicle)):
+    stages = len(problem.stages(vehicle.max_specific_thrust).stages)
+    for planner, how in _alternatives(asked, default_order(problem, vehicle), stages):
         if out_of_time():
             return None
         try:
@@ -46,9 +48,9 @@ def rescued_plan(asked: Miqp, problem: Problem, vehicle: Vehicle, recorder: Reco
     return None
 
 
-def _alternatives(asked: Miqp, first: int) -> Iterator[tuple[Planner, str]]:
+def _alternatives(asked: Miqp, first: int, stages: int) -> Iterator[tuple[Planner, str]]:
     """Planners, and how they plan in words; `first` is the order that is taken where none is asked for."""
-    more = {round(factor * asked.intervals) for factor in MORE_INTERVALS}
+    more = {max(round(factor * asked.intervals), A_STAGE * stages) for factor in MORE_INTERVALS}
     if max(more) * MORE_INTERVALS[0] < MANY_INTERVALS:
         more.add(MANY_INTERVALS)
     for intervals in sorted(more):

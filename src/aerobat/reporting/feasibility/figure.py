@@ -82,7 +82,7 @@ def _draw_grid(figure: Figure, axes: Axes, found: FeasibilityMap) -> None:
         step = max(1, int(np.ceil(len(axis.values) / size)))
         places = np.arange(0, len(axis.values), step)
         set_ticks(places, [f"{axis.values[i]:g}" for i in places])
-        set_label(axis.name)
+        set_label(axis.label)
     axes.grid(visible=False)
     _write_cells(axes, found, durations)
     if np.isfinite(durations).any() and np.nanmax(durations) > np.nanmin(durations):
@@ -156,4 +156,4 @@ def _draw_line(axes: Axes, found: FeasibilityMap) -> None:
             axes.text(float(place), 0.97 * top, letter_of(cell, kinds), size=SMALL, ha="center", va="top")
     step = max(1, len(places) // MAX_TICKS)
     axes.set_xticks(places[::step], [f"{value:g}" for value in axis.values[::step]])
-    axes.set(xlabel=axis.name, ylabel="duration [s]")
+    axes.set(xlabel=axis.label, ylabel="duration [s]")

@@ -46,9 +46,9 @@ def map_report(found: FeasibilityMap) -> dict[str, Any]:
 def _grid(found: FeasibilityMap) -> Table:
     down, across = found.axes
     kinds = kinds_of(found)
-    title = f"{_title(found)} · duration [s] over {down.name} (down) and {across.name} (across)"
+    title = f"{_title(found)} · duration [s] over {down.label} (down) and {across.label} (across)"
     table = Table(box=None, pad_edge=False)
-    table.add_column(down.name, style="bold", no_wrap=True)
+    table.add_column(down.label, style="bold", no_wrap=True)
     for value in across.values:
         table.add_column(f"{value:g}", justify="right", no_wrap=True)
     width = len(across.values)
@@ -64,7 +64,7 @@ def _grid(found: FeasibilityMap) -> Table:
 
 def _line(found: FeasibilityMap) -> Table:
     (axis,) = found.axes
-    names = (axis.name, "", "duration", "reserve", "limits")
+    names = (axis.label, "", "duration", "reserve", "limits")
     table = Table(*names, title=Text(_title(found)), title_justify="left", box=None, pad_edge=False)
     for cell in found.cells:
         duration = NONE if cell.duration is None else f"{cell.duration:.3f} s"

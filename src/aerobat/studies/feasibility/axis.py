@@ -21,6 +21,12 @@ class Axis:
 
     name: str
     values: tuple[float, ...]
+    unit: str = ""  # of the values
+
+    @property
+    def label(self) -> str:
+        """The name with the unit."""
+        return f"{self.name} [{self.unit}]" if self.unit else self.name
 
     @classmethod
     def of(cls, name: str, values: object) -> Axis:

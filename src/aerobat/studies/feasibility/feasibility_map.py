@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Executor, Future, as_completed
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import product
 from math import nan, prod
 from types import MappingProxyType
@@ -132,7 +132,8 @@ def feasibility_map(
     else:
         with processes(count, forked=True) as pool:
             cells = _cells(pool, task, places, progress)
-    return FeasibilityMap(scenario.problem, scenario.vehicle, axes, cells)
+    told = tuple(replace(axis, unit=field.unit) for axis, field in zip(axes, fields, strict=True))
+    return FeasibilityMap(scenario.problem, scenario.vehicle, told, cells)
 
 
 def _fields(axes: Sequence[Axis], scenario: Scenario) -> tuple[Field, ...]:

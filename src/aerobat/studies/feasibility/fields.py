@@ -19,6 +19,7 @@ from aerobat.declaration import FieldError, from_table, shown, unknown_key, with
 from aerobat.declaration.sentences import closest
 from aerobat.errors import SpecError
 from aerobat.problem import Gate, Problem
+from aerobat.studies.feasibility.units import DEGREES, unit_of
 from aerobat.vehicle import Vehicle
 
 VEHICLE = "vehicle"  # begins the names of the vehicle's fields
@@ -27,7 +28,6 @@ ANGLE = "angle"
 MAX_ANGLE = 90.0  # [deg] of a half-flip's gate
 THRUST_TO_WEIGHT = "thrust_to_weight"
 ALL_ROTORS = "rotor_defaults"  # in files, what all rotors share
-DEGREES = "_deg"  # ends the names of angles in files
 AXES = ("x", "y", "z")
 FEW = 4  # names in a sentence
 _PART = re.compile(r"([^\W\d]\w*)((?:\[\d{1,6}\])*)")  # between the points of a name, as gates[0]
@@ -70,6 +70,15 @@ class Field:
     def place(self) -> str:
         """Its whole name."""
         return _joined(self.keys)
+
+    @property
+    def unit(self) -> str:
+        """Its unit, empty where it has none."""
+        if self.keys == (ANGLE,):
+            return "°"
+        of_vehicle = self.keys[0] == VEHICLE
+        names = tuple(key for key in self.keys[of_vehicle:] if isinstance(key, str))
+        return unit_of(names, of_vehicle)
 
     def changed(self, scenario: Scenario, value: float) -> Scenario:
         """The scenario with this field at a value.
