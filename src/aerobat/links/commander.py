@@ -18,7 +18,7 @@ from aerobat.errors import SpecError
 from aerobat.links.goals import Observed, PathGoal, PositionGoal, yaw_of
 from aerobat.links.mission import Mission, Phase
 from aerobat.links.routes import goal_on, rest_to_rest
-from aerobat.simulation.autopilot.braking import MIN_FLOOR, Braking
+from aerobat.simulation.autopilot.braking import MIN_FLOOR, Braking, nearest_heading
 from aerobat.simulation.outcome import length
 from aerobat.trajectory import Trajectory
 from aerobat.vehicle import Vehicle
@@ -173,7 +173,7 @@ class Commander:
         body, floor = seen.body, self.ground + MIN_FLOOR
         motion = np.array(body.position), np.array(body.velocity)
         way = Braking.of(*motion, self._vehicle, self._gravity, floor).trajectory
-        self._go(Doing.BRAKING, now, way, yaw_of(body.q_world_body))
+        self._go(Doing.BRAKING, now, way, float(nearest_heading(np.array(body.q_world_body))))
 
     def _give_up(self, now: float, reason: str) -> None:
         if self.doing is Doing.MANEUVERING and self.mission is not None:
