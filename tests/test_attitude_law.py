@@ -1,4 +1,4 @@
-"""The autopilot's attitude law: errors of any size settle, whatever flies, alone and under a position loop."""
+"""The autopilot's attitude law: errors of any size settle, alone and under a position loop."""
 
 from __future__ import annotations
 
