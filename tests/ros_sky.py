@@ -159,7 +159,7 @@ class Sky:
         maneuvers = {name: (ab.load_problem(problem), planner) for name, problem in MANEUVERS.items()}
         settings = NodeSettings() if settings is None else settings
         self.node = ManeuverNode(Ros(self.graph), planned, maneuvers, AtOnce(), settings, self.note)
-        self.node_lives = True
+        self.node_lives = self.vehicle_runs = True
         self.goals: list[PathPiece] = []
         self.shown: list[Any] = []  # arrays of markers
         self.reports: list[str] = []
@@ -205,7 +205,7 @@ class Sky:
             self.graph.time += STEP
             self.graph.deliver()
             step = round((self.graph.time - BEGAN) / STEP)
-            if step % VEHICLE_STEPS == 0:
+            if step % VEHICLE_STEPS == 0 and self.vehicle_runs:
                 self.vehicle_node.tick(self.now)
                 self._note()
             if step % NODE_STEPS == 0 and self.node_lives:

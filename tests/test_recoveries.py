@@ -38,7 +38,11 @@ def test_a_thousand_instants_outside_the_span_of_no_return_all_reach_a_hover_abo
 
 @pytest.mark.parametrize(
     ("problem", "vehicle"),
-    [("half-flip", "hexarotor"), ("power-loop", "hexarotor"), ("split-s", "crazyflie")],
+    [
+        ("half-flip", "section-v"),
+        ("power-loop", "hexarotor"),
+        ("split-s", "crazyflie"),
+    ],
 )
 def test_whoever_flies_whatever_a_thousand_instants_keep_what_is_announced(
     problem: str, vehicle: str
@@ -51,7 +55,7 @@ def test_whoever_flies_whatever_a_thousand_instants_keep_what_is_announced(
     found = ab.recoveries(plan, times=instants)
     assert found.possible.all()
     # between the instants of the plan's own, up to 1/200 s away, a recovery takes another turn at times
-    assert found.lowest.min() > announced.lowest.min() - 0.15
+    assert found.lowest.min() > announced.lowest.min() - 0.3
 
 
 def test_a_vehicle_that_flies_to_pieces_is_told_by_numbers_and_never_hovers(flip: ab.Plan) -> None:

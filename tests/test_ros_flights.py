@@ -12,6 +12,7 @@ from aerobat import so3
 from aerobat.links.commander import Doing
 from aerobat.links.goals import Mode
 from aerobat.links.mission import MissionSettings
+from aerobat.links.ros import topics
 from aerobat.links.ros.maneuver_node import NodeSettings
 from ros_sky import Sky, aloft, at_the_flips_begin
 
@@ -60,6 +61,66 @@ def test_goals_come_one_a_period_and_each_goes_on_where_the_one_before_ends() ->
     steps = np.linalg.norm(np.diff([piece.begin.position for piece in sky.goals], axis=0), axis=1)
     speeds = [np.linalg.norm(piece.begin.velocity) for piece in sky.goals]
     assert steps.max() < 0.01 * max(speeds) + 0.01
+
+
+def test_a_vehicle_that_hears_of_goals_late_takes_off_all_the_same() -> None:
+    sky = Sky()
+    sky.run_for(0.1)
+    sky.graph.cut.add(topics.GOAL)
+    assert sky.call("takeoff").success
+    sky.run_for(6.0)
+    assert sky.vehicle.landed
+    sky.graph.cut.clear()
+    sky.run_for(0.5)
+    sky.graph.cut.add(topics.GOAL)
+    sky.run(lambda: sky.vehicle.mode is Mode.HOLD)  # and once more, in the air
+    sky.run_for(2.0)
+    sky.graph.cut.clear()
+    sky.run(lambda: sky.node.commander.doing is Doing.HOVERING)
+    sky.run_for(1.0)
+    assert sky.hovers
+    assert sky.position[2] == pytest.approx(3.0, abs=0.01)
+
+
+def test_a_vehicle_that_never_takes_off_is_left_to_itself() -> None:
+    sky = Sky()
+    sky.run_for(0.1)
+    sky.graph.cut.add(topics.GOAL)
+    assert sky.call("takeoff").success
+    sky.run(lambda: sky.node.commander.doing is Doing.NOTHING)
+    assert "the vehicle does not climb as it is told; it is left to itself" in sky.said
+
+
+def test_of_goals_that_a_pause_of_the_vehicle_holds_up_each_counts_at_its_time() -> None:
+    sky = at_the_flips_begin()
+    sky.run_into_the_plan(1.0)
+    assert sky.node._flown is not None
+    plan, ((kind, take), *others) = sky.node._flown.plan, sky.graph.takers[topics.GOAL]
+    held: list[object] = []
+    sky.graph.takers[topics.GOAL] = [(kind, held.append), *others]
+    sky.vehicle_runs = False
+    sky.run_for(0.2)
+    for message in held:
+        take(message)
+    sky.graph.takers[topics.GOAL], sky.vehicle_runs = [(kind, take), *others], True
+    sky.run(lambda: bool(sky.reports))
+    assert max(sky.errors) < ab.score(ab.fly(plan, seed=0), plan.problem).max_position_error_m + MORE
+    assert sky.reports[0].startswith("flown within")
+
+
+@pytest.mark.parametrize(
+    ("pause", "told"), [(0.07, "set-points were up to 80 ms late"), (0.12, "aborted: a set-point was 0.1")]
+)
+def test_set_points_that_were_late_are_told_and_too_late_they_end_it(pause: float, told: str) -> None:
+    sky = at_the_flips_begin()
+    sky.run_into_the_plan(0.3)
+    sky.node_lives = False
+    sky.run_for(pause)
+    sky.node_lives = True
+    sky.run(lambda: bool(sky.reports))
+    assert told in sky.reports[0]
+    sky.run_for(3.0)
+    assert sky.hovers
 
 
 def test_a_maneuver_begins_where_the_odometry_sees_the_vehicle() -> None:

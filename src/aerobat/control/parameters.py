@@ -16,7 +16,7 @@ from aerobat.kernels.rigid_body import EnvironmentParameters, MassProperties
 from aerobat.vehicle.controller import Controller
 from aerobat.vehicle.fleet import Fleet
 
-_FREE_ERROR = 0.06  # [rad] of attitude that must not saturate a hovering vehicle's rotors
+FREE_ERROR = 0.06  # [rad] of attitude that must not saturate a hovering vehicle's rotors
 _SLACK = 1e-12  # [-] of a rotor's range, for rounding
 _MIN_TIME_CONSTANT = 1e-9  # [s] a rotor without lag follows within it
 
@@ -72,15 +72,19 @@ def controller_parameters(
     )
 
 
-def max_bandwidth(fleet: Fleet, environment: Environment) -> Array:
+def max_bandwidth(fleet: Fleet, environment: Environment, free_error: float = FREE_ERROR) -> Array:
     """The highest frequencies [rad/s] of attitude loops that vehicles have the rotors for, (vehicles,).
 
-    Hovering, they then meet their limits only at larger errors of roll or pitch than the free one. NaN for a
-    vehicle that cannot hover.
+    Hovering, they then meet their limits only at larger errors [rad] of roll or pitch than the free one. NaN
+    for a vehicle that cannot hover.
     """
+    with np.errstate(invalid="ignore"):
+        return np.asarray(np.sqrt(hover_authority(fleet, environment)[:, :2].min(axis=-1) / free_error))
+
+
+def hover_authority(fleet: Fleet, environment: Environment) -> Array:
+    """Angular accelerations [rad/s²] about body axes that hovering vehicles can have, (vehicles, 3)."""
     hover = (fleet.mass * environment.gravity)[:, None] * fleet.mixer[..., 0]
     room = np.minimum(hover - fleet.min_thrusts, fleet.max_thrusts - hover)
-    torque = (np.abs(fleet.allocation[:, 1:3]) @ room[..., None])[..., 0]
-    acceleration = torque / np.diagonal(fleet.inertia, axis1=1, axis2=2)[:, :2]
-    with np.errstate(invalid="ignore"):
-        return np.asarray(np.sqrt(acceleration.min(axis=-1) / _FREE_ERROR))
+    torque = (np.abs(fleet.allocation[:, 1:]) @ room[..., None])[..., 0]
+    return np.asarray(torque / np.diagonal(fleet.inertia, axis1=1, axis2=2))

@@ -8,6 +8,7 @@ from aerobat.kernels import motors
 from aerobat.kernels.allocation import Mixer, desaturate, mix, within_limits
 from aerobat.kernels.control_loops import (
     AttitudeCommand,
+    AttitudeError,
     Gains,
     PositionLoopState,
     ReferencePoint,
@@ -21,7 +22,7 @@ from aerobat.kernels.control_loops import (
     thrust_demand,
 )
 from aerobat.kernels.motors import Airframe
-from aerobat.kernels.ops import Ops, PerRotor, Scalar, Vector
+from aerobat.kernels.ops import Axes, Ops, PerRotor, Scalar, Vector
 from aerobat.kernels.quaternions import axes
 from aerobat.kernels.rigid_body import Body, EnvironmentParameters, Wrench
 from aerobat.kernels.vectors import ZERO, add, dot, norm, subtract
@@ -51,6 +52,13 @@ class Commands(NamedTuple):
 
     thrusts: PerRotor  # [N] within limits
     saturated: Scalar  # true where the limits changed them
+
+
+class AttitudePursuit(NamedTuple):
+    """Input of the inner loop."""
+
+    error: AttitudeError
+    thrust: Scalar  # [N] collective
 
 
 class ControllerState(NamedTuple):
@@ -86,7 +94,13 @@ def step(
     outer = step_position_loop(ops, model.gains, state.outer, body, reference, elapsed)
     demand = thrust_demand(model.airframe.mass_properties, model.environment, reference)
     attitude = attitude_command(ops, outer, demand, reference)
-    return track_attitude(ops, flags, model, state._replace(outer=outer), body, attitude, reference, elapsed)
+    body_axes = axes(body.q_world_body)
+    pursuit = AttitudePursuit(
+        attitude_error(ops, body, body_axes, attitude),
+        collective(ops, model.airframe.mass_properties.mass, body_axes[2], attitude),
+    )
+    state = state._replace(outer=outer)
+    return track_attitude(ops, flags, model, state, body_axes, pursuit, reference, elapsed)
 
 
 def track_attitude(
@@ -94,8 +108,8 @@ def track_attitude(
     flags: FeatureFlags,
     model: ControllerModel,
     state: ControllerState,
-    body: Body,
-    attitude: AttitudeCommand,
+    body_axes: Axes,
+    pursuit: AttitudePursuit,
     rates: ReferencePoint,
     elapsed: Scalar,
 ) -> ControllerState:
@@ -106,14 +120,13 @@ def track_attitude(
         flags: features beyond the paper's law.
         model: the nominal vehicle.
         state: after the last tick, but for its outer loop, which is taken as it is.
-        body: as it is now.
-        attitude: what is commanded.
+        body_axes: of the body as it is now.
+        pursuit: what is to be turned, and the thrust meanwhile.
         rates: the reference, of whose rates and their change the moment is fed forward.
         elapsed: since the last tick [s].
     """
     mass_properties, rotors = model.airframe
-    body_axes = axes(body.q_world_body)
-    error = attitude_error(ops, body, body_axes, attitude)
+    error = pursuit.error
     # while rotors saturate, the attitude error says nothing about a lasting moment
     counted = ops.select(state.commands.saturated, 0.0, elapsed)
     integral = integrate_attitude_error(ops, model.gains, state.attitude_integral, error, counted)
@@ -123,7 +136,7 @@ def track_attitude(
             reference_moment(mass_properties.inertia, body_axes, each) for each in (rates, rates.ahead)
         )
         moment, change = add(moment, now), subtract(then, now)
-    load = Wrench(_collective(ops, mass_properties.mass, body_axes[2], attitude), moment)
+    load = Wrench(pursuit.thrust, moment)
     ahead = Wrench(mass_properties.mass * rates.ahead.thrust_change, change)
     decay_factors = motors.decay_factors(ops, rotors, elapsed)
     thrusts = motors.first_order_response(state.thrusts, state.commands.thrusts, decay_factors)
@@ -153,7 +166,7 @@ def predicted(
     return motors.advance(ops, model.airframe, model.environment, motion, state.commands.thrusts, delay).body
 
 
-def _collective(ops: Ops, mass: Scalar, b3: Vector, attitude: AttitudeCommand) -> Scalar:
+def collective(ops: Ops, mass: Scalar, b3: Vector, attitude: AttitudeCommand) -> Scalar:
     """The collective thrust [N]: the commanded specific thrust along b3, whichever way the vehicle points.
 
     Pointing away it would vanish, and with it the means to turn back: a part of |f| is kept.

@@ -18,7 +18,7 @@ from aerobat.errors import SpecError
 from aerobat.links.goals import Observed, PathGoal, PositionGoal, yaw_of
 from aerobat.links.mission import Mission, Phase
 from aerobat.links.routes import goal_on, rest_to_rest
-from aerobat.simulation.autopilot.braking import MIN_FLOOR, Braking
+from aerobat.simulation.autopilot.braking import MIN_FLOOR, Braking, nearest_heading
 from aerobat.simulation.outcome import length
 from aerobat.trajectory import Trajectory
 from aerobat.vehicle import Vehicle
@@ -27,6 +27,8 @@ _SPEED, _ACCELERATION = 2.0, 2.0  # [m/s], [m/s²] of climbs
 _DESCENT = 1.0  # [m/s] when landing
 _BELOW = 0.3  # [m] under the ground, where the way of a landing ends, so that it is reached in motion
 _STANDING = 1.0  # [s] that goals stay there once it is reached
+_BEHIND = 0.25  # [m] that a vehicle is off its goal when it does not climb as it is told
+_PATIENCE = 10.0  # [s] longer than a climb takes, after which it is told no more
 _SPINNING_UP = 1.5  # [s] that goals stay on the ground before they climb, so that who obeys gets ready
 _ASTRAY = 1.5  # [m] from its goal, from which on a vehicle does not follow it
 _STILL = 0.15  # [m/s] of a hover
@@ -78,6 +80,7 @@ class Commander:
         self.mission: Mission[PathGoal] | None = None  # the last one
         self._vehicle, self._gravity, self._period, self._say = vehicle, gravity, period, say
         self._way: _Way | None = None
+        self._climbed_by = 0.0  # [s] until when a vehicle has to be up
 
     @property
     def reason(self) -> str:
@@ -100,6 +103,7 @@ class Commander:
         here = np.array(seen.body.position)
         self.ground = float(here[2])
         up = rest_to_rest(here, here + height * so3.UP, _SPEED, _ACCELERATION)
+        self._climbed_by = now + _SPINNING_UP + up.duration + _PATIENCE
         self._go(Doing.CLIMBING, now + _SPINNING_UP, up, yaw_of(seen.body.q_world_body))
 
     def hover(self, now: float) -> None:
@@ -136,11 +140,16 @@ class Commander:
         self.mission, self.log, self._way = mission, [], None
         self.doing = Doing.MANEUVERING
 
-    def step(self, now: float) -> PathGoal | None:
-        """The goal for a period after this time [s]; None where the vehicle is left to itself."""
+    def step(self, now: float, late: float = 0.0) -> PathGoal | None:
+        """The goal for a period after this time [s]; None where the vehicle is left to itself.
+
+        It is given `late` [s].
+        """
         if self.doing is Doing.MANEUVERING:
-            return self._upright(self._of_mission(now))
+            return self._upright(self._of_mission(now, late))
         if self._way is None or self._leave_unseen(now) or self._leave_astray():
+            return None
+        if self.doing is Doing.CLIMBING and self._climbs_in_vain(now):
             return None
         since = now + self._period - self._way.began
         if self.doing is not Doing.LANDING and since >= self._way.path.duration:
@@ -150,11 +159,11 @@ class Commander:
             return None
         return self._upright(self._on_way(now))
 
-    def _of_mission(self, now: float) -> PathGoal | PositionGoal | None:
+    def _of_mission(self, now: float, late: float) -> PathGoal | PositionGoal | None:
         """The goal of the mission, or of what follows it."""
         assert self.mission is not None, "maneuvers are missions"
         assert self.seen is not None, "a vehicle is seen before it is flown"
-        phase, goal = self.mission.phase, self.mission.step(now, self.seen, self._period)
+        phase, goal = self.mission.phase, self.mission.step(now, self.seen, self._period, late)
         if self.mission.phase not in (phase, Phase.LAND):
             reason = f": {self.mission.reason}" if self.mission.reason else ""
             self._say(f"{self.mission.phase}{reason}")
@@ -173,7 +182,7 @@ class Commander:
         body, floor = seen.body, self.ground + MIN_FLOOR
         motion = np.array(body.position), np.array(body.velocity)
         way = Braking.of(*motion, self._vehicle, self._gravity, floor).trajectory
-        self._go(Doing.BRAKING, now, way, yaw_of(body.q_world_body))
+        self._go(Doing.BRAKING, now, way, float(nearest_heading(np.array(body.q_world_body))))
 
     def _give_up(self, now: float, reason: str) -> None:
         if self.doing is Doing.MANEUVERING and self.mission is not None:
@@ -191,15 +200,36 @@ class Commander:
 
     def _leave_astray(self) -> bool:
         """True where a vehicle does not follow its way: it is left to itself then."""
-        assert self.seen is not None and self._way is not None, "asked on a way only"  # noqa: PT018
-        path, began, yaw = self._way
-        asked = goal_on(path, max(self.seen.time - began, 0.0), yaw).position
-        off = float(np.linalg.norm(np.array(self.seen.body.position) - asked))
+        off = self._off()
         if off <= _ASTRAY:
             return False
         self.doing, self._way = Doing.NOTHING, None
         self._say(f"the vehicle is {length(off)} off its goal; it is left to itself")
         return True
+
+    def _climbs_in_vain(self, now: float) -> bool:
+        """True where a vehicle does not climb for too long; until then, where it is behind, it begins anew.
+
+        Whoever obeys may hear of the goals late, or hover for a pause of them, and takes up none that is far.
+        """
+        if self._off() <= _BEHIND:
+            return False
+        if now > self._climbed_by:
+            self.doing, self._way = Doing.NOTHING, None
+            self._say("the vehicle does not climb as it is told; it is left to itself")
+            return True
+        assert self._way is not None, "asked on a way only"
+        assert self.seen is not None, "a vehicle is seen before it is flown"
+        top, here = self._way.path.evaluate(self._way.path.duration), np.array(self.seen.body.position)
+        self._go(Doing.CLIMBING, now, rest_to_rest(here, top, _SPEED, _ACCELERATION), self._way.yaw)
+        return False
+
+    def _off(self) -> float:
+        """How far the vehicle is off its way [m], when it was seen."""
+        assert self.seen is not None and self._way is not None, "asked on a way only"  # noqa: PT018
+        path, began, yaw = self._way
+        asked = goal_on(path, max(self.seen.time - began, 0.0), yaw).position
+        return float(np.linalg.norm(np.array(self.seen.body.position) - asked))
 
     def _recent(self, now: float) -> Observed:
         if self.seen is None or now - self.seen.time > _RECENT:

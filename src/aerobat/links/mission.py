@@ -86,6 +86,7 @@ class Mission(Generic[GoalT_co]):
         self.settings = settings
         self.phase = Phase.READY
         self.reason = ""  # of an abort
+        self.max_lateness = 0.0  # [s] of all set-points of the plan so far
         environment = plan.problem.environment
         self.stream = stream
         self._follower = follower
@@ -124,12 +125,18 @@ class Mission(Generic[GoalT_co]):
         self._turn = self._turn_from(seen)
         self._enter(Phase.APPROACH, now)
 
-    def step(self, now: float, seen: Observed, delay: float = 0.0) -> PositionGoal | GoalT_co | None:
+    def step(
+        self, now: float, seen: Observed, delay: float = 0.0, late: float = 0.0
+    ) -> PositionGoal | GoalT_co | None:
         """The goal at this time; None where the vehicle is to look after itself: to hold, or to land.
 
-        `seen` is the latest of the vehicle, `delay` [s] how long a goal is on its way to it.
+        Args:
+            now: the time [s].
+            seen: the latest of the vehicle.
+            delay: how long a goal is on its way to it [s].
+            late: by how much this goal misses its time [s], beside what it is after the one before.
         """
-        self._watch(now, seen)
+        self._watch(now, seen, late)
         self._last_tick = now
         if self.phase is Phase.CLIMB:
             return self._along(now, Phase.APPROACH)
@@ -167,14 +174,16 @@ class Mission(Generic[GoalT_co]):
     def _enter(self, phase: Phase, now: float) -> None:
         self.phase, self.began = phase, now
 
-    def _watch(self, now: float, seen: Observed) -> None:
+    def _watch(self, now: float, seen: Observed, late: float) -> None:
         """Abort where something is over its bound."""
         flying = self.phase is Phase.MANEUVER
         if self.phase in (Phase.READY, Phase.ABORTED, Phase.LAND):
             return
         silence = now - seen.time
         allowed = self.settings.max_silence if flying else self.settings.max_silence_outside
-        late = now - self._last_tick
+        late = max(late, now - self._last_tick)
+        if flying:
+            self.max_lateness = max(self.max_lateness, late)
         if silence > allowed:
             self.abort(now, f"no news of the vehicle for {silence:.2f} s")
         elif flying and late > self.settings.max_lateness:

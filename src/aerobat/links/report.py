@@ -13,6 +13,7 @@ from aerobat.arrays import Array
 from aerobat.links.goals import Observed
 from aerobat.links.stream import SetpointStream
 from aerobat.planning import Plan, planned_passages
+from aerobat.simulation.autopilot.loop import KEPT
 from aerobat.simulation.outcome import length
 from aerobat.simulation.passages import Passage, passages
 from aerobat.simulation.passages.polyline import gate_progress
@@ -25,6 +26,7 @@ class LinkReport:
     aborted: str  # why; empty where it was flown to its end
     ended: str  # what was reached
     delay_s: float  # of a message, either way
+    max_lateness_s: float  # of set-points, while the plan was flown
     observations: int  # while the plan was flown; of fewer than two, nothing of what follows is known
     max_position_error_m: float | None = None
     max_attitude_error_deg: float | None = None
@@ -46,17 +48,25 @@ class LinkReport:
         """True where the plan was flown to its end, through its gates, and the vehicle has landed."""
         return not self.failures and self.ended == "landed"
 
+    @property
+    def is_late(self) -> bool:
+        """True where a set-point was later than a vehicle carries the one before on."""
+        return self.max_lateness_s > KEPT
+
     def record(self) -> dict[str, object]:
         """Plain data."""
         return {**asdict(self), "success": self.is_success, "failures": list(self.failures)}
 
     def __str__(self) -> str:
         """One sentence."""
+        late = f"; set-points were up to {1e3 * self.max_lateness_s:.0f} ms late" if self.is_late else ""
         if self.failures:
-            return f"{'; '.join(self.failures)}; {self.ended}"
+            return f"{'; '.join(self.failures)}{late}; {self.ended}"
         error = length(self.max_position_error_m or 0.0)
         through = ", ".join(f"gate '{p.gate}' {length(p.miss)} off its centre" for p in self.passages)
-        return f"flown within {error} of the plan{', through ' + through if through else ''}; {self.ended}"
+        return (
+            f"flown within {error} of the plan{', through ' + through if through else ''}{late}; {self.ended}"
+        )
 
 
 def link_report(
@@ -68,6 +78,7 @@ def link_report(
     aborted: str,
     ended: str,
     delay: float,
+    late: float,
 ) -> LinkReport:
     """Judge a flight.
 
@@ -79,10 +90,11 @@ def link_report(
         aborted: why it was given up, empty where it was not.
         ended: what was reached.
         delay: of a message, either way [s].
+        late: by how much the latest set-point missed its time [s].
     """
     inside = [seen for seen in log if 0.0 <= seen.time <= stream.duration]
     if len(inside) < 2:
-        return LinkReport(aborted, ended, delay, len(inside))
+        return LinkReport(aborted, ended, delay, late, len(inside))
     times = np.array([seen.time for seen in inside])
     position, velocity, q = (
         np.array([getattr(seen.body, name) for seen in inside])
@@ -102,6 +114,7 @@ def link_report(
         aborted=aborted,
         ended=ended,
         delay_s=delay,
+        max_lateness_s=late,
         observations=len(inside),
         max_position_error_m=float(off.max()),
         max_attitude_error_deg=degrees(float(turned.max())),

@@ -34,7 +34,7 @@ class LiveBody:
         self.state = _at_rest(np.zeros(2), 0.0)  # the true one, (·,)
         parameters = autopilot_parameters(_one(self.state), vehicle, environment)
         _, model, _ = parameters.own
-        self._gains: Gains = first_numbers(model.gains)
+        self._gains: tuple[Gains, Gains] = first_numbers((model.tracking.gains, model.upright))
         first = first_row(autopilot_inputs(_hovering(environment.gravity), False))
         self._loop = autopilot_loop(vehicle, parameters, first, log_row, _LONG)
         self._carry: Tree = self._loop.init(first)
@@ -45,11 +45,14 @@ class LiveBody:
         self._carry, _ = self._loop.scan(self._carry, autopilot_inputs(references, by_attitude, upright))
         self.state = BodyState(*(np.concatenate(leaves) for leaves in self._carry[2].body))
 
-    def restart_position_loop(self, references: ReferencePoint) -> None:
-        """Have the outer loop begin anew towards the first of the references, without what was before."""
+    def restart_position_loop(self, references: ReferencePoint, upright: bool = True) -> None:
+        """Have the outer loop begin anew towards the first of the references, without what was before.
+
+        See `autopilot_inputs` for `upright`.
+        """
         observer, controller, motion = self._carry
         body, reference = first_numbers(motion.body), first_numbers(references)
-        outer = init_position_loop(FloatOps, self._gains, body, reference)
+        outer = init_position_loop(FloatOps, self._gains[upright], body, reference)
         restarted = controller._replace(outer=tree_map(lambda leaf: np.array([leaf]), outer))
         self._carry = (observer, restarted, motion)
 

@@ -11,9 +11,9 @@ from aerobat.arrays import Array
 from aerobat.environment import Environment
 from aerobat.links.autopilot.live_body import LiveBody
 from aerobat.links.autopilot.references import AttitudeReference, PathReference, PointReference, Route
-from aerobat.links.goals import AttitudeGoal, Mode, PathPiece, PositionGoal, yaw_of
+from aerobat.links.goals import AttitudeGoal, Mode, PathPiece, PositionGoal
 from aerobat.links.routes import rest_to_rest
-from aerobat.simulation.autopilot.braking import MIN_FLOOR, Braking
+from aerobat.simulation.autopilot.braking import MIN_FLOOR, Braking, nearest_heading
 from aerobat.simulation.autopilot.loop import RATE
 from aerobat.states import BodyState
 from aerobat.trajectory import Trajectory
@@ -176,7 +176,7 @@ class SimulatedVehicle:
 
     def _go(self, mode: Mode, path: Trajectory, yaw: float | None = None) -> None:
         """Take a way of its own."""
-        own = yaw_of(self.state.q_world_body) if yaw is None else yaw
+        own = float(nearest_heading(self.state.q_world_body)) if yaw is None else yaw
         self.mode, self._then = mode, None
         self._route = Route(path, self.time, own)
         self._restart_position_loop()
@@ -208,7 +208,7 @@ class SimulatedVehicle:
     def _restart_position_loop(self) -> None:
         goal, now = self._followed, np.array([self.time])
         if isinstance(goal, PathReference):
-            self._body.restart_position_loop(goal.reference(now, 1.0 / RATE, self.gravity))
+            self._body.restart_position_loop(goal.reference(now, 1.0 / RATE, self.gravity), upright=False)
         elif not isinstance(goal, AttitudeReference):
             self._body.restart_position_loop(goal.reference(now, self.gravity))
 

@@ -137,6 +137,7 @@ class Client:
             aborted=self.mission.reason,
             ended=str(self.stage),
             delay=self.link.delay,
+            late=self.mission.max_lateness,
         )
 
     def _enter(self, stage: Stage, now: float) -> None:

@@ -66,6 +66,7 @@ class ManeuverNode:
             say: what takes sentences about the course of things.
         """
         self.origin = ros.time()  # [ns]
+        self._ros = ros
         self.settings = settings
         gravity = next(iter(maneuvers.values()))[0].environment.gravity
         self.commander = Commander(vehicle, gravity, 1.0 / settings.rate, say)
@@ -92,7 +93,7 @@ class ManeuverNode:
         if self._planning is not None and self._planning[0].done():
             (planned, answer), self._planning = self._planning, None
             self._begin(planned.result(), answer)
-        goal = self.commander.step(now)
+        goal = self.commander.step(now, (self._ros.time() - self.origin) / NANOSECONDS - now)
         if goal is not None and self._last is not None:
             stamp, before = self._last
             piece = PathPiece(before, goal, stamp, now + self._period - stamp)
@@ -104,9 +105,11 @@ class ManeuverNode:
     def _follow_up(self) -> None:
         """Have a maneuver judged once it is over, and tell what came of it."""
         if self._flown is not None and self.commander.doing is not Doing.MANEUVERING:
-            ended = str(self.commander.doing)
+            commander = self.commander
+            assert commander.mission is not None, "maneuvers are missions"
+            late, ended = commander.mission.max_lateness, str(commander.doing)
             self._judging = self._executor.submit(
-                judge, self._flown, self.commander.log, self.commander.reason, ended
+                judge, self._flown, commander.log, commander.reason, ended, late
             )
             self._flown = None
         if self._judging is not None and self._judging.done():

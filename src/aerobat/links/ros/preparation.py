@@ -86,7 +86,7 @@ def _from_here(request: Request) -> tuple[Problem, Array]:
     return replace(asked, environment=replace(asked.environment, ground=below)), offset
 
 
-def judge(flown: Prepared, log: Sequence[Observed], aborted: str, ended: str) -> LinkReport:
+def judge(flown: Prepared, log: Sequence[Observed], aborted: str, ended: str, late: float) -> LinkReport:
     """The report of a maneuver.
 
     Args:
@@ -94,7 +94,8 @@ def judge(flown: Prepared, log: Sequence[Observed], aborted: str, ended: str) ->
         log: states while it was, times since its start [s].
         aborted: why it was given up, empty where it was not.
         ended: what was reached.
+        late: by how much the latest goal missed its time [s].
     """
     return link_report(
-        flown.plan, flown.stream, log, offset=flown.offset, aborted=aborted, ended=ended, delay=0.0
+        flown.plan, flown.stream, log, offset=flown.offset, aborted=aborted, ended=ended, delay=0.0, late=late
     )

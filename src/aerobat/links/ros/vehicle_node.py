@@ -50,6 +50,7 @@ class VehicleNode:
             say: what takes sentences about the course of things.
         """
         self.origin = ros.time()  # [ns]
+        self._ros = ros
         self.vehicle = vehicle
         self._messages, self._say = Messages(ros.make), say
         self._period, self._due = 1.0 / rate, 0.0
@@ -82,6 +83,8 @@ class VehicleNode:
             self._refuse("a goal is malformed, or its numbers are not finite")
             return
         self._wait_for_the_next(piece)
+        # up to there by the goal before it: of goals that a pause of this process held up each has its time
+        self.vehicle.advance(min(piece.stamp, (self._ros.time() - self.origin) / NANOSECONDS))
         if self.vehicle.time - piece.stamp > _STALE:
             self._refuse("a goal is from long ago by its stamp; set the clocks alike")
         elif self.vehicle.mode is Mode.OFFBOARD:

@@ -70,6 +70,14 @@ class Braking(NamedTuple):
         return Trajectory(np.array([self.durations]), self.coefficients[None])
 
 
+def nearest_heading(q_world_body: Array) -> Array:
+    """The yaw [rad] (...) of the upright attitudes that are nearest to others (..., 4).
+
+    Unlike that of the body's x axis it does not jump where that axis is vertical.
+    """
+    return 2.0 * np.arctan2(q_world_body[..., 3], q_world_body[..., 0])
+
+
 def point_reference(
     position: Array, velocity: Array, acceleration: Array, jerk: Array, yaw: ArrayLike, gravity: float
 ) -> ReferencePoint:

@@ -6,21 +6,33 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from aerobat.kernels import control
-from aerobat.kernels.control import ControllerModel, ControllerState, FeatureFlags
+from aerobat.kernels.control import AttitudePursuit, ControllerModel, ControllerState, FeatureFlags
 from aerobat.kernels.control_loops import (
     AttitudeCommand,
+    Gains,
     PositionLoopState,
     ThrustDemand,
     attitude_command,
     step_position_loop,
     thrust_demand,
 )
-from aerobat.kernels.ops import Ops, Scalar, clip, magnitude, select_tree
-from aerobat.kernels.vectors import add, subtract
+from aerobat.kernels.ops import Ops, Scalar, Vector, clip, magnitude, select_tree
+from aerobat.kernels.quaternions import axes
+from aerobat.kernels.vectors import add, dot, norm, subtract
+from aerobat.simulation.autopilot.attitude_law import Authority, slope_limited_error
 from aerobat.simulation.loop import Signals
 
 _MIN_LIFT = 0.2  # [-] of gravity: towards a point it never thrusts less upwards, so that it stays upright
 _MAX_SIDEWAYS = 1.0  # [-] of gravity: nor more than this to a side
+_TINY = 1e-300  # keeps 0/0 away and changes no other quotient
+
+
+class AutopilotModel(NamedTuple):
+    """The nominal vehicle, and what its rotors allow where errors are large."""
+
+    tracking: ControllerModel
+    authority: Authority
+    upright: Gains  # of the position loop towards points, slow enough for tilts that take their time
 
 
 class Guidance(NamedTuple):
@@ -40,31 +52,51 @@ class AutopilotController:
     feedthrough: bool = True
 
     def init(
-        self, ops: Ops, parameters: ControllerModel, inputs: Guidance, signals: Signals
+        self, ops: Ops, parameters: AutopilotModel, inputs: Guidance, signals: Signals
     ) -> ControllerState:
         """See `Component.init`."""
-        return control.init(ops, parameters, signals["observer"].body, signals["reference"])
+        return control.init(ops, parameters.tracking, signals["observer"].body, signals["reference"])
 
     def step(
         self,
         ops: Ops,
-        parameters: ControllerModel,
+        parameters: AutopilotModel,
         state: ControllerState,
         inputs: Guidance,
         signals: Signals,
     ) -> ControllerState:
         """See `Component.step`."""
         body, reference, elapsed = signals["observer"].body, signals["reference"], signals["clock"].elapsed
-        outer = step_position_loop(ops, parameters.gains, state.outer, body, reference, elapsed)
-        demand = thrust_demand(parameters.airframe.mass_properties, parameters.environment, reference)
-        limited = _upright(ops, parameters.environment.gravity, outer, demand)
-        sought = select_tree(ops, inputs.upright > 0.5, limited, outer)
+        model, authority, slower = parameters
+        commanded, upright = inputs.by_attitude > 0.5, inputs.upright > 0.5
+        gains = select_tree(ops, upright, slower, model.gains)
+        outer = step_position_loop(ops, gains, state.outer, body, reference, elapsed)
+        demand = thrust_demand(model.airframe.mass_properties, model.environment, reference)
+        sought = select_tree(ops, upright, _upright(ops, model.environment.gravity, outer, demand), outer)
         towards = attitude_command(ops, sought, demand, reference)
         given = AttitudeCommand(reference.specific_thrust, reference.q_world_body, reference.omega)
-        commanded = inputs.by_attitude > 0.5
         state = state._replace(outer=select_tree(ops, commanded, state.outer, outer))
         attitude = select_tree(ops, commanded, given, towards)
-        return control.track_attitude(ops, self.flags, parameters, state, body, attitude, reference, elapsed)
+        body_axes = axes(body.q_world_body)
+        thrust = control.collective(ops, model.airframe.mass_properties.mass, body_axes[2], attitude)
+        turning = ops.maximum(thrust, _turning_thrust(ops, model, body_axes[2], towards))
+        pursuit = AttitudePursuit(
+            slope_limited_error(ops, model.gains, authority, body, body_axes, attitude),
+            ops.select(commanded, thrust, ops.select(upright, turning, thrust)),
+        )
+        return control.track_attitude(ops, self.flags, model, state, body_axes, pursuit, reference, elapsed)
+
+
+def _turning_thrust(ops: Ops, model: ControllerModel, b3: Vector, attitude: AttitudeCommand) -> Scalar:
+    """The collective thrust [N] that keeps rotors able to turn the body: sin(θ/2) of its weight.
+
+    The less they give, the less they have to take from one side; the smaller the angle θ to the desired
+    direction, the less is needed.
+    """
+    f = attitude.specific_thrust
+    cosine = dot(f, b3) / (norm(ops, f) + _TINY)
+    weight = model.airframe.mass_properties.mass * model.environment.gravity
+    return weight * ops.sqrt(ops.maximum(0.5 - 0.5 * cosine, 0.0))
 
 
 def _upright(ops: Ops, gravity: Scalar, outer: PositionLoopState, demand: ThrustDemand) -> PositionLoopState:

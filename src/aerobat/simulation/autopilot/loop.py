@@ -4,18 +4,29 @@ from __future__ import annotations
 
 import numpy as np
 
-from aerobat.control.parameters import airframe_parameters, controller_parameters, environment_parameters
+from aerobat.control.parameters import (
+    airframe_parameters,
+    controller_parameters,
+    environment_parameters,
+    hover_authority,
+    max_bandwidth,
+)
 from aerobat.engines import CompiledLoop, choose
 from aerobat.environment import Environment
 from aerobat.kernels.control_loops import ReferencePoint
 from aerobat.kernels.rigid_body import Body
-from aerobat.simulation.autopilot.controller import AutopilotController, Guidance
+from aerobat.simulation.autopilot.attitude_law import Authority
+from aerobat.simulation.autopilot.controller import AutopilotController, AutopilotModel, Guidance
 from aerobat.simulation.components import PlantParameters, RigidBodyPlant, StateObserver
 from aerobat.simulation.loop import Clock, Log, LoopInput, LoopParameters, compose
 from aerobat.vehicle import Vehicle
 from aerobat.vehicle.fleet import Fleet
 
 RATE = 500.0  # [1/s] of the controller and the plant
+# what a position loop towards points has to wait for, slower where that takes longer
+_FREE_ERROR = 0.3  # [rad] of tilt that must not saturate rotors
+_LAG_COUNTED = 0.6  # [-] of the rotors' lag, which the attitude loop's lead makes up for while it is not
+
 KEPT = 0.04  # [s] for which commanded rates are kept where nothing newer comes; then the attitude is
 
 
@@ -23,7 +34,15 @@ def autopilot_parameters(start: Body, vehicle: Vehicle, environment: Environment
     """Parameters of as many copies of a vehicle as there are states at first, leaves (copies,)."""
     copies = len(start.position[0])
     fleet = Fleet.of([vehicle] * copies)
-    model = controller_parameters(vehicle.controller, fleet, environment)
+    tracking = controller_parameters(vehicle.controller, fleet, environment)
+    accelerations = hover_authority(fleet, environment)
+    # of yaw no more than of roll and pitch: turning about both at once takes of these
+    authority = Authority(
+        accelerations[:, :2].min(axis=-1), accelerations.min(axis=-1), fleet.lags.max(axis=-1)
+    )
+    slewing = 1.0 / max_bandwidth(fleet, environment, _FREE_ERROR) + _LAG_COUNTED * fleet.lags.max(axis=-1)
+    upright = vehicle.controller.gains(1.0 / slewing)
+    model = AutopilotModel(tracking, authority, upright)
     plant = PlantParameters(airframe_parameters(fleet), environment_parameters(environment, copies))
     return LoopParameters(start, ((), model, plant))
 

@@ -24,7 +24,7 @@ from aerobat.flatness import Planned, TimeInterval, environment_of, reference, v
 from aerobat.kernels.control_loops import Lookahead, ReferencePoint
 from aerobat.kernels.motors import Motion
 from aerobat.kernels.rigid_body import Body
-from aerobat.simulation.autopilot.braking import MIN_FLOOR, Braking, point_reference
+from aerobat.simulation.autopilot.braking import MIN_FLOOR, Braking, nearest_heading, point_reference
 from aerobat.simulation.autopilot.loop import (
     KEPT,
     RATE,
@@ -192,7 +192,7 @@ class _Flock:
         velocity = from_components(body.velocity)
         way = Braking.of(from_components(body.position), velocity, self._vehicle, self._gravity, floor)
         since = np.arange(round(HORIZON * RATE)) / RATE
-        yaw = np.arctan2(*so3.axes(from_components(body.q_world_body))[:, 1::-1, 0].T)
+        yaw = nearest_heading(from_components(body.q_world_body))
         begun = self._time
         for begin in range(0, len(since), _CHUNK):
             parts = way.at(since[begin : begin + _CHUNK])
