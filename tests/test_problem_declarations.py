@@ -58,7 +58,7 @@ def test_no_field_takes_an_object_a_complex_number_or_a_huge_one(cls: type, fiel
     [
         (ab.Problem, "heading"),
         (ab.Environment, "gravity"),
-        (ab.Gate, "width"),
+        (ab.Gate, "attitude_tolerance"),
         (ab.Flip, "axis_deg"),
         (GatePassage, "speed"),
         (ab.Condition, "lower"),
