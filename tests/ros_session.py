@@ -31,7 +31,7 @@ from aerobat.links.ros.middleware import Middleware
 
 SPEED = "1"  # times the wall's, at most
 ANSWERED = 30.0  # [s] of the wall, for which a plan may take on a busy machine
-LONG = 15.0  # [s] of the vehicle's time, for a take-off or a landing
+LONG = 30.0  # [s] of the vehicle's time, for a take-off or a landing
 LONG_ENOUGH = 30.0  # [s] of goals
 MORE = 0.02  # [m] that a flight by topics may be off more than one in process, which is off by 0.01 mm
 

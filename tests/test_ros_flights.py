@@ -82,6 +82,20 @@ def test_a_vehicle_that_hears_of_goals_late_takes_off_all_the_same() -> None:
     assert sky.position[2] == pytest.approx(3.0, abs=0.01)
 
 
+def test_a_pause_of_goals_and_odometry_in_a_climb_ends_up_there_too() -> None:
+    sky = Sky()
+    sky.run_for(0.1)
+    assert sky.call("takeoff").success
+    sky.run(lambda: sky.position[2] > 0.2)
+    sky.graph.cut |= {topics.GOAL, topics.ODOMETRY}
+    sky.run_for(0.9)  # by then the goal is 1.5 m away
+    sky.graph.cut.clear()
+    sky.run(lambda: sky.node.commander.doing is Doing.HOVERING)
+    sky.run_for(1.0)
+    assert sky.hovers
+    assert sky.position[2] == pytest.approx(3.0, abs=0.01)
+
+
 def test_a_vehicle_that_never_takes_off_is_left_to_itself() -> None:
     sky = Sky()
     sky.run_for(0.1)

@@ -147,9 +147,9 @@ class Commander:
         """
         if self.doing is Doing.MANEUVERING:
             return self._upright(self._of_mission(now, late))
-        if self._way is None or self._leave_unseen(now) or self._leave_astray():
+        if self._way is None or self._leave_unseen(now):
             return None
-        if self.doing is Doing.CLIMBING and self._climbs_in_vain(now):
+        if self._climbs_in_vain(now) if self.doing is Doing.CLIMBING else self._leave_astray():
             return None
         since = now + self._period - self._way.began
         if self.doing is not Doing.LANDING and since >= self._way.path.duration:

@@ -17,18 +17,15 @@ from math import isinf, isnan, radians
 
 from aerobat.environment import Environment
 from aerobat.errors import SpecError
-from aerobat.flatness import reference
 from aerobat.planning.passages import planned_passages
 from aerobat.planning.result import FlownPassage, Flyability, OwnFlight, PlacedStage, Plan
 from aerobat.problem.problem import Problem
 from aerobat.simulation import Flight, FlightConfig, Outcome, fly
-from aerobat.simulation.autopilot import recoveries
+from aerobat.simulation.autopilot import UndeterminedAttitude, recoveries
 from aerobat.simulation.outcome import DIVERGENCE_RADIUS
 from aerobat.simulation.passages import Passage, flown_passages
 from aerobat.trajectory import Trajectory
 from aerobat.vehicle import Vehicle
-
-CHECK_RATE = 100.0  # [1/s] of instants at which a thrust that vanishes is looked for
 
 
 def own_flight(
@@ -89,9 +86,12 @@ def with_recoveries(plan: Plan) -> Plan:
 
     Raises SpecError without a vehicle.
     """
-    if plan.recoveries is not None or reference(plan, rate=CHECK_RATE).undetermined:
+    if plan.recoveries is not None:
         return plan
-    return replace(plan, recoveries=recoveries(plan))
+    try:
+        return replace(plan, recoveries=recoveries(plan))
+    except UndeterminedAttitude:
+        return plan
 
 
 @lru_cache(maxsize=2)

@@ -48,6 +48,10 @@ _STILL = 0.2  # [m/s] of a hover
 _LEVEL = 0.2  # [rad] likewise
 
 
+class UndeterminedAttitude(SpecError):
+    """Thrust vanishes on the way, and with it the attitude from which a recovery would begin."""
+
+
 @short
 @by_value
 @dataclass(frozen=True, eq=False, repr=False)
@@ -120,7 +124,7 @@ def recoveries(
 ) -> Recoveries:
     """Fly the recovery to a hover from instants of a path.
 
-    Raises SpecError for times outside the path.
+    Raises SpecError for times outside the path, UndeterminedAttitude where its thrust vanishes.
 
     Args:
         plan: the path; a bare trajectory needs a vehicle.
@@ -137,7 +141,9 @@ def recoveries(
     instants = path.sample(rate) if times is None else frozen(times, "times", (None,))
     asked = reference(path, vehicle, instants, environment=environment)
     if asked.undetermined:
-        raise SpecError("the path's attitude is undetermined where its thrust vanishes; plan another")
+        raise UndeterminedAttitude(
+            "the path's attitude is undetermined where its thrust vanishes; plan another"
+        )
     flock = _Flock(asked.setpoint, asked.rotor_thrusts, vehicle, environment)
     flock.keep(asked.setpoint, reaction)
     ground = environment.ground if ground is None else ground
