@@ -174,7 +174,7 @@ def operations(path: ab.Trajectory, quad: ab.Vehicle) -> TracedLoop:
         loops.append(trace_loop(*given))
         return loops[-1]
 
-    with mock.patch.object(llvm_engine, "trace_loop", kept):
+    with mock.patch.object(llvm_engine, "_traced", kept):
         ab.fly(path, quad, rate=1000.0, engine="compiled")
     return loops[0]
 
