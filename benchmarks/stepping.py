@@ -7,6 +7,10 @@ process, after a first run that compiles; medians of RUNS, engines and peers in 
 `fly` for one flip; "a step more" is what a longer flight adds, which is compared with peers, whose setup is
 not timed either.
 
+With "sensors and filter" each flight draws its vehicle, start and errors, and has an IMU at 1 kHz, motion
+capture at 100 Hz and the Kalman filter in its loop, the controller at 500 Hz and 2 ms late; "lab" adds gusts
+and a battery. Their floor is 4 M a second.
+
 uv run python benchmarks/stepping.py [RUNS]
 
 Peers that are not installed are left out. MuJoCo is among the tests' dependencies; for the others
@@ -33,6 +37,7 @@ from aerobat.engines.traced_loop import TracedLoop, trace_loop
 from stepping_peers import PEERS, VEHICLES, Peer
 
 ENGINES = ("numpy", "jax", "jax-float32", "compiled")
+CONDITIONS = ("compiled, sensors and filter", "compiled, lab")
 FLOORS = {"crazyflow": 20, "RotorPy, batched": 100}
 FLIPS = (1, 4)  # in a row, in the shorter and the longer flight
 FREE = ("input", "constant")  # operations of a listing that compute nothing
@@ -63,12 +68,13 @@ def main() -> None:
     plan = ab.plan(ab.load_problem("flip-roll"), ab.Miqp(), crew[0])
     paths = [in_a_row(plan.trajectory, count) for count in FLIPS]
     flights = {(name, path): flight(path, crew, start, name) for name in ENGINES for path in paths}
+    flights |= {(name, path): observed(path, crew[0], name) for name in CONDITIONS for path in paths}
     peers = ready()
     times = measured({**flights, **peers}, runs)
 
     steps = [len(crew) * (len(path.sample(1000.0)) - 1) for path in paths]
     print(f"| engine | a call, M/s | a step more, M/s | (median of {runs})\n| --- | --- | --- |")
-    for name in ENGINES:
+    for name in (*ENGINES[:-1], *CONDITIONS, ENGINES[-1]):
         short, long = (times[name, path] for path in paths)
         speed = (steps[1] - steps[0]) / (long - short)
         print(f"| {name} | {steps[0] / short / 1e6:.2f} | {speed / 1e6:.2f} |")
@@ -103,6 +109,15 @@ def flight(
 ) -> Callable[[], object]:
     begin = replace(start, position=start.position + path.evaluate(0.0))
     return lambda: ab.fly(path, crew, start=begin, rate=1000.0, log_rate=1.0, engine=engine)
+
+
+def observed(path: ab.Trajectory, quad: ab.Vehicle, conditions: str) -> Callable[[], object]:
+    """As many flights under conditions, controlled by what a filter makes of sensors."""
+    lab = ab.load_dispersion("lab")
+    flown = lab if conditions == "compiled, lab" else replace(lab, gusts=None, battery=None)
+    return lambda: ab.fly(
+        path, quad, conditions=flown, flights=range(VEHICLES), log_rate=1.0, engine="compiled"
+    )
 
 
 def ready() -> dict[Peer, Callable[[], object]]:
@@ -159,7 +174,7 @@ def operations(path: ab.Trajectory, quad: ab.Vehicle) -> TracedLoop:
         loops.append(trace_loop(*given))
         return loops[-1]
 
-    with mock.patch.object(llvm_engine, "trace_loop", kept):
+    with mock.patch.object(llvm_engine, "_traced", kept):
         ab.fly(path, quad, rate=1000.0, engine="compiled")
     return loops[0]
 

@@ -116,7 +116,7 @@ def test_wind_weak_rotors_and_an_empty_battery_each_change_a_flight() -> None:
 
 def numbers(source: RandomSource, begin: int, end: int) -> np.ndarray:
     """Those of every tick, (numbers, ticks, vehicles)."""
-    return np.array(expanded(source.inputs(begin, end, tuple)))
+    return np.array(expanded(source.inputs(begin, end, lambda normals, uniforms: (*normals, *uniforms))))
 
 
 @settings(max_examples=30)

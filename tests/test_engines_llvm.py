@@ -16,6 +16,7 @@ from aerobat.engines.llvm import ENGINE
 from aerobat.engines.llvm.codegen import module
 from aerobat.engines.llvm.engine import MachineLoop, machine_code, target_machine
 from aerobat.engines.llvm.layout import Layout
+from aerobat.engines.llvm.packing import InputKind
 from aerobat.engines.traced_loop import trace_loop
 from aerobat.simulation import fly
 from aerobat.trajectory import Trajectory
@@ -109,8 +110,8 @@ def test_no_multiplication_is_fused_with_an_addition(width: int) -> None:
         Layout(
             width,
             shared_parameters=(False,),
-            shared_inputs=(False,),
-            held=(None,),
+            inputs=(InputKind(shared=False),),
+            held_kinds=(),
             piecewise_constant=(False,),
         ),
     )

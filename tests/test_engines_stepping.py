@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from aerobat.engines import ENGINE_NAMES, CompiledLoop, choose, logged_ticks
-from aerobat.engines.engine import Held, expanded, first_row
+from aerobat.engines.engine import Coded, Held, expanded, first_row
 from aerobat.engines.pytree import tree_leaves, tree_map
 
 FAST = ("floats", "bytecode", "numpy", "compiled")  # to be ready
@@ -136,6 +136,41 @@ def shown(inputs: Inputs, begin: int, end: int) -> Inputs:
     clock, common, own = inputs
     held = (Held(each.row[begin:end], each.values) for each in (common, own))
     return Inputs(Clock(clock.elapsed[begin:end]), *held)
+
+
+class Noisy(NamedTuple):
+    every: Any
+    seldom: Any
+
+
+def begin_walk(ops: Any, stiffness: Any, inputs: Noisy) -> Any:
+    return 0.0
+
+
+def walk(ops: Any, stiffness: Any, total: Any, inputs: Noisy) -> Any:
+    total = total + stiffness * inputs.every + inputs.seldom[0] * inputs.seldom[1]
+    return total, total
+
+
+@pytest.mark.parametrize("vehicles", [3, VEHICLES])
+@pytest.mark.parametrize("engine", FAST)
+def test_coded_inputs_give_the_bits_of_the_numbers_that_they_stand_for(engine: str, vehicles: int) -> None:
+    """Told at every tick, and held, beside a number that is told as such."""
+    rng = np.random.default_rng(3)
+    table = rng.normal(size=2**16)
+    every, seldom = (rng.integers(0, 2**16, (n, vehicles), dtype=np.uint16) for n in (200, 29))
+    held = Held(np.arange(200) // 7, (Coded(seldom, table), rng.normal(size=(29, vehicles))))
+    inputs = Noisy(Coded(every, table), held)
+    plain = expanded(inputs)
+    np.testing.assert_array_equal(plain.every, table[every])
+    stiffness = rng.uniform(0.5, 2.0, vehicles)
+    ends = []
+    for told in (plain, inputs):
+        loop = choose(engine, vehicles, TICKS).compile(begin_walk, walk, stiffness, first_row(told))
+        start = loop.init(first_row(told))
+        carry, row = loop.step(start, first_row(told))
+        ends.append((carry, row, *loop.scan(start, told)))
+    assert_same(*ends)
 
 
 @pytest.mark.parametrize("engine", ENGINE_NAMES)

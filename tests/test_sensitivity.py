@@ -29,7 +29,7 @@ QUAD = replace(
 )  # not quite the nominal one
 PATH, RATE = loops(6.0), 500.0
 NUMBERS = tuple(f.name for f in fields(Controller) if isinstance(f.default, float))
-GAINS = tuple(name for name in NUMBERS if name != "lead_time_constant")
+GAINS = tuple(name for name in NUMBERS if name not in ("lead_time_constant", "disturbance_filter"))
 FIVE = ("position_gain", "velocity_gain", "integral_gain", "attitude_frequency", "attitude_damping")
 ROTORS = ("lag", "torque_coefficient", "min_thrust", "max_thrust", "position_body")
 START = BodyState(

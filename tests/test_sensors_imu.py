@@ -9,6 +9,7 @@ import pytest
 import aerobat as ab
 from aerobat import so3
 from aerobat.engines.components import from_components
+from aerobat.engines.engine import expanded
 from aerobat.engines.numpy import ArrayOps
 from aerobat.environment import Dispersion, Imu, MotionCapture
 from aerobat.kernels import imu
@@ -75,7 +76,8 @@ def measured(parameters: ImuParameters, felt: ImuSample, noise: ImuSample) -> Im
 
 def noise_of(ticks: int, vehicles: int, stream: str = "imu") -> ImuSample:
     draws = draw_flights(Dispersion(), 4, 1, range(vehicles))
-    return ImuSource(draws, stream, 1).chunk(0, ticks)
+    noise: ImuSample = expanded(ImuSource(draws, stream, 1).chunk(0, ticks))
+    return noise
 
 
 def test_white_noise_has_the_density_stated() -> None:

@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 from scipy import signal
 
 import aerobat as ab
+from aerobat.engines.engine import expanded
 from aerobat.environment import Battery, Dispersion, Environment, Gusts
 from aerobat.kernels import wind
 from aerobat.kernels.wind import GustFilter, GustNoise
@@ -31,7 +32,7 @@ def gusts_of(rate: float, steps: int, **changes: float) -> np.ndarray:
     flights = DispersedFlights(draws, dispersed_fleet(HEXA, draws), HEXA, Environment(), rate, hover(1.0))
     part = wind_part(dispersion.gusts, flights)
     state = wind.init(part.parameters)
-    noise = WindSource(draws, 1).chunk(0, steps)
+    noise = expanded(WindSource(draws, 1).chunk(0, steps))
     rows = []
     for k in range(steps):
         along, across, vertical = noise.along[k], *(tuple(x[k] for x in pair) for pair in noise[1:])

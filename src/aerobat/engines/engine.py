@@ -10,7 +10,8 @@ from typing import Any, NamedTuple, Protocol, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from aerobat.engines.pytree import Tree, tree_leaves, tree_map, tree_replace
+from aerobat.arrays import Array
+from aerobat.engines.pytree import Tree, tree_leaves, tree_like, tree_map, tree_replace
 from aerobat.kernels.ops import Ops
 
 Init: TypeAlias = Callable[[Ops, Tree, Tree], Tree]
@@ -26,8 +27,21 @@ class Held(NamedTuple):
     def expanded(self) -> Tree:
         """The values of each tick."""
         if isinstance(self.row, tuple):
-            return self.values
-        return tree_map(lambda leaf: leaf[self.row], self.values)
+            return expanded(self.values)
+        return tree_map(lambda leaf: leaf[self.row], expanded(self.values))
+
+
+class Coded(NamedTuple):
+    """Inputs that are entries of a table, told by their places in it; kernels see the tree of the entries."""
+
+    codes: (
+        Tree  # leaves (ticks, vehicles), or (vehicles,) for one tick, in a `Held` (samples, vehicles); uint16
+    )
+    table: Array  # (65536,), one for all `Coded` inputs of a loop
+
+    def expanded(self) -> Tree:
+        """The entries."""
+        return tree_map(lambda leaf: self.table[leaf], self.codes)
 
 
 class CompiledLoop(ABC):
@@ -41,7 +55,7 @@ class CompiledLoop(ABC):
     def init(self, inputs: Tree) -> Tree:
         """The carry before the first tick; leaves of its `inputs` are numbers or arrays (vehicles,).
 
-        As for `scan`, what is `Held` in them is so at compilation too.
+        As for `scan`, what is `Held` or `Coded` in them is so at compilation too.
         """
 
     @abstractmethod
@@ -59,7 +73,7 @@ class CompiledLoop(ABC):
 
     def step(self, carry: Tree, inputs: Tree) -> tuple[Tree, Tree]:
         """The carry after one tick, and its row with leaves (vehicles,); inputs as for `init`."""
-        carry, rows = self.scan(carry, tree_map(lambda leaf: np.asarray(leaf)[None], inputs))
+        carry, rows = self.scan(carry, tree_map(lambda leaf: np.asarray(leaf)[None], expanded(inputs)))
         return carry, tree_map(lambda leaf: leaf[..., 0], rows)
 
 
@@ -80,7 +94,7 @@ class Compile(Protocol):
 
 
 class _ToldAtEveryTick(CompiledLoop):
-    """A loop that knows nothing of what is `Held`: it is told at every tick."""
+    """A loop that knows nothing of what is `Held` or `Coded`: it is told the numbers at every tick."""
 
     def __init__(self, loop: CompiledLoop) -> None:
         self._loop = loop
@@ -95,7 +109,7 @@ class _ToldAtEveryTick(CompiledLoop):
 
 
 def told_at_every_tick(compile_loop: Compile) -> Compile:
-    """The way to a loop whose inputs may be `Held`, of one to a loop whose inputs may not."""
+    """The way to a loop whose inputs may be `Held` or `Coded`, of one to a loop whose inputs may not."""
 
     def compiled(init: Init, step: Step, parameters: Tree, inputs: Tree) -> CompiledLoop:
         return _ToldAtEveryTick(compile_loop(init, step, parameters, expanded(inputs)))
@@ -125,13 +139,23 @@ def run_whole(engine: Engine, init: Init, step: Step, parameters: Tree, inputs: 
 
 def first_row(inputs: Tree) -> Tree:
     """Inputs of the first tick."""
-    of_first = tree_replace(inputs, Held, lambda held: Held((), held._replace(row=held.row[:1]).expanded()))
-    return tree_map(lambda leaf: np.asarray(leaf)[0], of_first)
+    return _row(inputs, 0)
+
+
+def _row(inputs: Tree, index: int) -> Tree:
+    match inputs:
+        case Held():
+            return Held((), _row(inputs.values, inputs.row[index]))
+        case Coded():
+            return Coded(_row(inputs.codes, index), inputs.table)
+        case tuple():
+            return tree_like(inputs, (_row(each, index) for each in inputs))
+    return np.asarray(inputs)[index]
 
 
 def expanded(inputs: Tree) -> Tree:
-    """Inputs as kernels see them: what is `Held` stands at every tick."""
-    return tree_replace(inputs, Held, Held.expanded)
+    """Inputs as kernels see them: what is `Held` stands at every tick, and what is `Coded` as its entries."""
+    return tree_replace(inputs, (Held, Coded), lambda node: node.expanded())
 
 
 def tick_count(inputs: Tree) -> int:

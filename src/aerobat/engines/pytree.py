@@ -26,20 +26,25 @@ def tree_map(function: Callable[[Any], Any], tree: Tree) -> Tree:
     return tree_unflatten(tree, map(function, tree_leaves(tree)))
 
 
-def tree_replace(tree: Tree, kind: type, function: Callable[[Any], Tree]) -> Tree:
-    """The tree with `function` applied to each tuple of a kind."""
+def tree_replace(tree: Tree, kind: type | tuple[type, ...], function: Callable[[Any], Tree]) -> Tree:
+    """The tree with `function` applied to each tuple of a kind, or of some kinds."""
     if isinstance(tree, kind):
         return function(tree)
     if not isinstance(tree, tuple):
         return tree
-    return _like(tree, [tree_replace(child, kind, function) for child in tree])
+    return tree_like(tree, [tree_replace(child, kind, function) for child in tree])
+
+
+def tree_like(tree: tuple[Any, ...], children: Iterable[Tree]) -> Tree:
+    """The tuple of the same type with other children."""
+    return tuple.__new__(type(tree), children)  # named tuples too, without their constructors' detour
 
 
 def tree_stack(trees: Sequence[Tree], join: Callable[[Sequence[Any]], Any]) -> Tree:
     """The tree whose leaves are `join` of the leaves of alike trees."""
     first = trees[0]
     if isinstance(first, tuple):
-        return _like(first, [tree_stack(children, join) for children in zip(*trees, strict=True)])
+        return tree_like(first, [tree_stack(children, join) for children in zip(*trees, strict=True)])
     return join(trees)
 
 
@@ -75,8 +80,4 @@ def _collect(tree: tuple[Any, ...], leaves: list[Any]) -> None:
 
 def _unflatten(tree: tuple[Any, ...], leaves: Iterator[Any]) -> Tree:
     children = [_unflatten(child, leaves) if isinstance(child, tuple) else next(leaves) for child in tree]
-    return _like(tree, children)
-
-
-def _like(tree: tuple[Any, ...], children: list[Any]) -> Tree:
-    return tuple.__new__(type(tree), children)  # named tuples too, without their constructors' detour
+    return tree_like(tree, children)

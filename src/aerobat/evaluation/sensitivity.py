@@ -39,7 +39,7 @@ from aerobat.vehicle import Vehicle
 
 # the lead's filter also sets how far ahead set-points are read, which may jump from piece to piece
 _NUMBERS = (name for name, kind in get_type_hints(Controller).items() if kind is float)
-_GAINS = tuple(name for name in _NUMBERS if name != "lead_time_constant")
+_GAINS = tuple(name for name in _NUMBERS if name not in ("lead_time_constant", "disturbance_filter"))
 _EACH_ROTOR = 0
 _SHAPES: Mapping[str, tuple[int, ...]] = {
     **dict.fromkeys(_GAINS, ()),
@@ -105,10 +105,11 @@ def sensitivity(
 
     Args:
         plan: what is flown; a bare trajectory needs a vehicle.
-        of: names of quantities: a gain of Controller (all but lead_time_constant); of the vehicle that flies
-            "mass", "inertia", "drag_body"; of each of its rotors "rotors.position_body", "rotors.min_thrust",
-            "rotors.max_thrust", "rotors.torque_coefficient", "rotors.lag"; "start.position",
-            "start.velocity", "start.attitude" (a rotation [rad] about body axes), "start.omega_body".
+        of: names of quantities: a gain of Controller (no time constant but jerk_filter); of the vehicle that
+            flies "mass", "inertia", "drag_body"; of each of its rotors "rotors.position_body",
+            "rotors.min_thrust", "rotors.max_thrust", "rotors.torque_coefficient", "rotors.lag";
+            "start.position", "start.velocity", "start.attitude" (a rotation [rad] about body axes),
+            "start.omega_body".
         vehicle: what flies it, or its name, by default the plan's.
         environment: where, by default the problem's.
         config: how.

@@ -15,6 +15,7 @@ from aerobat.kernels.control_loops import ReferencePoint
 from aerobat.kernels.motors import Airframe, Motion
 from aerobat.kernels.ops import Ops, PerRotor, Scalar, select_tree
 from aerobat.kernels.rigid_body import Body, EnvironmentParameters
+from aerobat.kernels.vectors import subtract
 from aerobat.simulation.loop import Signals
 
 MAX_STEP = 0.002  # [s] of RK4: enough for 1e-6 m in the fastest flips
@@ -86,9 +87,13 @@ class TrackingController:
         """See `Component.step`."""
         model, delay = parameters
         body, elapsed = signals["observer"].body, signals["clock"].elapsed
+        reference: ReferencePoint = inputs or signals["reference"]
+        if "disturbance" in signals:
+            thrust = subtract(reference.specific_thrust, signals["disturbance"].force)
+            reference = reference._replace(specific_thrust=thrust)
         if not isinstance(delay, tuple):
             body = control.predicted(ops, model, state, body, elapsed, delay)
-        return control.step(ops, self.flags, model, state, body, inputs or signals["reference"], elapsed)
+        return control.step(ops, self.flags, model, state, body, reference, elapsed)
 
 
 class CommandsOnTheirWay(NamedTuple):

@@ -21,7 +21,7 @@ from aerobat.simulation.reference_source import BLOCK, ReferenceSource
 from aerobat.vehicle.controller import Controller
 from aerobat.vehicle.fleet import Fleet
 
-_VEHICLE_TICKS = 160_000  # whose own inputs are made at once, so that they take little memory (50 MB)
+_VEHICLE_TICKS = 512_000  # whose own inputs are made at once, so that they take little memory (30 MB)
 _MIN_CHUNK = 16  # ticks
 
 

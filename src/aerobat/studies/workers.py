@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ctypes
 import multiprocessing
 import os
 import signal
@@ -33,6 +34,13 @@ class InProcess(Executor):
         return future
 
 
+def _return_freed_memory() -> None:
+    """Give back to the system what a compiler has freed, which every copy of this process would hold too."""
+    trim = getattr(ctypes.CDLL(None), "malloc_trim", None)  # of glibc alone
+    if trim is not None:
+        trim(0)
+
+
 @contextmanager
 def workers(count: int, forked: bool) -> Iterator[Executor]:
     """So many processes; one is this process.
@@ -51,6 +59,8 @@ def workers(count: int, forked: bool) -> Iterator[Executor]:
     # macOS has forks that its own libraries do not survive; JAX's threads hold locks that no fork frees
     survives = sys.platform == "linux" and "jax" not in sys.modules
     context: Any = multiprocessing.get_context("fork" if forked and survives else "spawn")
+    if sys.platform == "linux":
+        _return_freed_memory()
     watched, held = context.Pipe(duplex=False)
     pool = ProcessPoolExecutor(count, context, _begin, (watched, held, imported_plugins()))
     try:

@@ -24,6 +24,10 @@ class Controller:
     Gains are per unit of mass and of inertia, so that one set suits all vehicles; one whose rotors are too
     weak for the attitude loop gets both loops slowed down alike (`gains`). The three switches add to the
     paper's law what its tracking error depends on; with all off it is the paper's law (`paper`).
+
+    The disturbance observer answers forces that the model does not know (drag, lost thrust, gusts) as fast as
+    its filter lets them be seen, where the conditions of a flight have an IMU that feels them; without one,
+    the integral of the position error alone does.
     """
 
     position_gain: NonNegative = 25.0  # [1/s²]
@@ -37,6 +41,7 @@ class Controller:
     attitude_integral_gain: NonNegative = 1000.0  # [1/s³]
     max_attitude_integral: NonNegative = 0.05  # [rad·s]
     lead_time_constant: NonNegative = 0.01  # [s] time constant that the lead leaves of the rotors' lag
+    disturbance_filter: NonNegative = 0.0  # [s] time constant of the disturbance observer; 0 for none
     moment_feedforward: bool = True  # the moment that the reference asks, J ω' + ω × Jω
     motor_lag_compensation: bool = True  # commands that lead the rotors' lag
     prioritize_tilt: bool = True  # on saturation, give up the yaw moment before roll and pitch
@@ -86,4 +91,6 @@ def named_controller(name: str, own: Controller = CONTROLLERS["full"]) -> Contro
     """
     if name not in CONTROLLERS:
         raise unknown_name("controller", name, CONTROLLERS)
-    return own if name == "full" else replace(own, **CONTROLLERS[name].feature_flags._asdict())
+    if name == "full":
+        return own
+    return replace(own, disturbance_filter=0.0, **CONTROLLERS[name].feature_flags._asdict())

@@ -10,6 +10,7 @@ from llvmlite import ir
 NUMBER = ir.DoubleType()
 LOGICAL = ir.IntType(1)
 INTEGER = ir.IntType(64)
+CODE = ir.IntType(16)
 
 LOG2_E = 1.4426950408889634
 LN2 = (6.93147180369123816490e-01, 1.90821492927058770002e-10)  # the first ends in zeros: k · LN2[0] is exact

@@ -18,8 +18,9 @@ from typing import Any
 
 from llvmlite import ir
 
-from aerobat.engines.llvm.arithmetic import INTEGER, LOGICAL, NUMBER, exponential, filled, shaped
+from aerobat.engines.llvm.arithmetic import CODE, INTEGER, LOGICAL, NUMBER, exponential, filled, shaped
 from aerobat.engines.llvm.layout import ARRAYS, COUNTS, Layout
+from aerobat.engines.llvm.packing import InputKind
 from aerobat.engines.traced_loop import TracedLoop
 from aerobat.engines.tracing import Operation
 
@@ -226,34 +227,34 @@ class _Codegen:
     def _load_inputs(self, tick: Any, lane: Any) -> None:
         """One tick's inputs, to be loaded where they are needed first."""
         layout = self._layout
-        rows: dict[int | None, tuple[str, Any]] = {None: ("inputs", self._own_inputs_row(tick, lane))}
-        for index in range(layout.helds):
-            rows[index] = ("held inputs", self._held_inputs_row(index, tick, lane))
-        columns: dict[Any, Iterator[int]] = defaultdict(count)
-        for number, shared, held in zip(self._loop.inputs, layout.shared_inputs, layout.held, strict=True):
-            column = next(columns["shared" if shared else held])
-            if shared:
+        rows = {kind: self._row(kind, tick, lane) for kind in {*layout.inputs} if not kind.shared}
+        columns: dict[InputKind | str, Iterator[int]] = defaultdict(count)
+        for number, kind in zip(self._loop.inputs, layout.inputs, strict=True):
+            column = next(columns["shared" if kind.shared else kind])
+            if kind.shared:
                 address = self._address("shared inputs", tick, layout.shared_columns, column, None)
-            else:
-                array, row = rows[held]
-                place = self._builder.add(row, INTEGER(column * layout.width))
-                address = self._builder.gep(self._arguments[array], [place], source_etype=NUMBER)
-            self._unloaded[number] = (address, self._type(shared), 8)
+                self._unloaded[number] = (address, NUMBER, 8)
+                continue
+            array, row = rows[kind]
+            element = CODE if kind.coded else NUMBER
+            place = self._builder.add(row, INTEGER(column * layout.width))
+            address = self._builder.gep(self._arguments[array], [place], source_etype=element)
+            self._unloaded[number] = (address, self._wide_type(element), 2 if kind.coded else 8)
 
-    def _own_inputs_row(self, tick: Any, lane: Any) -> Any:
-        """The place of a tick's first input in a block of lanes."""
-        b, columns = self._builder, INTEGER(self._layout.own_inputs)
-        before = b.mul(b.mul(lane, self._arguments["ticks"]), columns)
-        return b.add(before, b.mul(b.mul(tick, columns), INTEGER(self._layout.width)))
-
-    def _held_inputs_row(self, held: int, tick: Any, lane: Any) -> Any:
-        """The place of the first of a Held's values at a tick, in a block of lanes."""
+    def _row(self, kind: InputKind, tick: Any, lane: Any) -> tuple[str, Any]:
+        """The array of a kind of inputs, and the place of its first one at a tick, in a block of lanes."""
         b, layout = self._builder, self._layout
-        column = layout.shared_columns - layout.helds + held
-        address = self._address("shared inputs", tick, layout.shared_columns, column, None)
-        row = b.fptosi(b.load(address, typ=NUMBER, align=8), INTEGER)
-        before = b.mul(lane, self._arguments["held rows"])
-        return b.add(before, b.mul(row, INTEGER(layout.width)))
+        array = "codes" if kind.coded else "inputs"
+        if kind.held is None:
+            columns = INTEGER(layout.inputs.count(kind))
+            block, row = b.mul(self._arguments["ticks"], columns), b.mul(tick, columns)
+        else:
+            array = f"held {array}"
+            column = sum(layout.shared_inputs) + layout.held_kinds.index(kind)
+            address = self._address("shared inputs", tick, layout.shared_columns, column, None)
+            block = self._arguments[f"{array} rows"]
+            row = b.fptosi(b.load(address, typ=NUMBER, align=8), INTEGER)
+        return array, b.add(b.mul(lane, block), b.mul(row, INTEGER(layout.width)))
 
     def _type(self, shared: bool) -> Any:
         return NUMBER if shared else self._wide_type(NUMBER)
@@ -302,8 +303,22 @@ class _Codegen:
         """A value that is known, or loaded now."""
         if number not in self._values:
             address, type_, alignment = self._unloaded[number]
-            self._values[number] = self._builder.load(address, typ=type_, align=alignment)
+            value = self._builder.load(address, typ=type_, align=alignment)
+            self._values[number] = self._entry(value) if shaped(type_, CODE) == type_ else value
         return self._values[number]
+
+    def _entry(self, code: Any) -> Any:
+        """The table's entry at a place, in each lane."""
+        b, place = self._builder, self._builder.zext(code, shaped(code.type, INTEGER))
+        if not _is_wide(code):
+            return b.load(b.gep(self._arguments["table"], [place], source_etype=NUMBER), typ=NUMBER, align=8)
+        table = self._widen(self._arguments["table"])
+        addresses = b.gep(table, [place], source_etype=NUMBER)
+        wide, every = self._wide_type(NUMBER), filled(self._wide_type(LOGICAL), LOGICAL(1))
+        arguments = (addresses, ir.IntType(32)(8), every, ir.Constant(wide, ir.Undefined))
+        signature = ir.FunctionType(wide, [argument.type for argument in arguments])
+        name = f"llvm.masked.gather.v{wide.count}f64.v{wide.count}p0"
+        return b.call(b.module.declare_intrinsic(name, (), signature), arguments)
 
     def _widen(self, value: Any) -> Any:
         """A value with a lane for each vehicle."""

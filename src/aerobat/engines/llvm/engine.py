@@ -32,6 +32,7 @@ from aerobat.engines.pytree import Tree, piecewise_constant_leaves, tree_leaves,
 from aerobat.engines.traced_loop import TracedLoop, trace_loop
 
 REGISTERS = 2  # of vehicles side by side, so that one need not wait for another's result
+MAX_KEPT = 24_000  # [bytes] that a block of two registers may keep from tick to tick: half of a first cache
 MAX_SCALAR_VEHICLES = 4  # up to which they fly one by one
 
 Function = Callable[..., None]
@@ -46,19 +47,20 @@ class MachineLoop(CompiledLoop):
     ) -> None:
         leaves = [np.asarray(leaf, dtype=np.float64) for leaf in tree_leaves(parameters)]
         vehicles = len(leaves[0])
-        width = 1 if vehicles <= MAX_SCALAR_VEHICLES else REGISTERS * _lanes()
-        self._packing = Packing.of(inputs, vehicles, width)
         equal = [bool((leaf == leaf[0]).all()) for leaf in leaves]
-        constant = zip(piecewise_constant_leaves(inputs), self._packing.shared, strict=True)
+        bare_inputs = _bare(expanded(inputs))
+        self._loop = _traced(init, step, _bare(parameters), bare_inputs)
+        width = 1 if vehicles <= MAX_SCALAR_VEHICLES else _width(equal.count(False) + len(self._loop.carry))
+        self._packing = Packing.of(inputs, vehicles, width)
+        constant = zip(piecewise_constant_leaves(bare_inputs), self._packing.kinds, strict=True)
         layout = Layout(
             width,
             shared_parameters=tuple(equal),
-            shared_inputs=self._packing.shared,
-            held=self._packing.held,
-            piecewise_constant=tuple(a and b for a, b in constant),
+            inputs=self._packing.kinds,
+            held_kinds=self._packing.held_kinds,
+            piecewise_constant=tuple(changes_seldom and kind.shared for changes_seldom, kind in constant),
         )
-        bare_inputs = _bare(expanded(inputs))
-        self._loop, self._init, self._scan = _program(init, step, _bare(parameters), bare_inputs, layout)
+        self._init, self._scan = machine_code(self._loop, layout)
         self._parameters = (
             np.array([leaf[0] for leaf in compress(leaves, equal)]),
             self._packing.pad_lanes([leaf for leaf, one in zip(leaves, equal, strict=True) if not one]),
@@ -119,9 +121,8 @@ class MachineLoop(CompiledLoop):
         self, function: Function, inputs: PackedInputs, arrays: Sequence[Array], ticks: int, log_stride: int
     ) -> None:
         """All lanes, divided among threads in whole blocks; a thread holds no lock of Python's meanwhile."""
-        packed = (inputs.shared, inputs.own, inputs.held, *arrays)
-        arguments = [*self._addresses, *(array.ctypes.data for array in packed)]
-        arguments += [self._packing.lanes, ticks, inputs.held_rows, log_stride]
+        arguments = [*self._addresses, *(array.ctypes.data for array in (*inputs.arrays, *arrays))]
+        arguments += [self._packing.lanes, ticks, *inputs.rows, log_stride]
         if len(self._cuts) == 2:
             function(*arguments, *self._cuts)
             return
@@ -130,12 +131,9 @@ class MachineLoop(CompiledLoop):
 
 
 @lru_cache(maxsize=32)
-def _program(
-    init: Init, step: Step, parameters: Tree, inputs: Tree, layout: Layout
-) -> tuple[TracedLoop, Function, Function]:
-    """A loop and its machine code, for bare trees; once for functions that are the same."""
-    loop = trace_loop(init, step, parameters, inputs)
-    return loop, *machine_code(loop, layout)
+def _traced(init: Init, step: Step, parameters: Tree, inputs: Tree) -> TracedLoop:
+    """A loop, for bare trees; once for functions that are the same."""
+    return trace_loop(init, step, parameters, inputs)
 
 
 def _bare(tree: Tree) -> Tree:
@@ -171,6 +169,12 @@ def target_machine() -> llvm.TargetMachine:
     return llvm.Target.from_default_triple().create_target_machine(
         cpu=llvm.get_host_cpu_name(), features=llvm.get_host_cpu_features().flatten(), opt=2, jit=True
     )
+
+
+def _width(kept: int) -> int:
+    """The vehicles of a block, each of which keeps so many numbers from tick to tick."""
+    together = REGISTERS * _lanes()
+    return together if kept * together * np.float64().nbytes <= MAX_KEPT else _lanes()
 
 
 def _lanes() -> int:

@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
+
+from aerobat.engines.llvm.packing import InputKind
 
 ARRAYS = (
     "shared parameters",
@@ -10,11 +13,14 @@ ARRAYS = (
     "shared inputs",
     "inputs",
     "held inputs",
+    "codes",
+    "held codes",
+    "table",
     "carry",
     "next carry",
     "outputs",
 )
-COUNTS = ("lanes", "ticks", "held rows", "log_stride", "begin", "end")
+COUNTS = ("lanes", "ticks", "held inputs rows", "held codes rows", "log_stride", "begin", "end")
 
 
 @dataclass(frozen=True)
@@ -22,9 +28,10 @@ class Layout:
     """Vehicles side by side, and which parameters and inputs are one number for all.
 
     Both functions take arrays of float64: shared parameters (s,), parameters (blocks, p, width), shared
-    inputs (ticks, r + h), inputs (blocks, ticks, i, width), held inputs (blocks, held rows, width), carry and
-    next carry (blocks, c, width), outputs (logged ticks, o, lanes). The last h columns of the shared inputs
-    say where in a block of the held inputs the values of each `Held` begin at a tick.
+    inputs (ticks, r + h), inputs (blocks, ticks, i, width), held inputs (blocks, held rows, width), a table,
+    carry and next carry (blocks, c, width), outputs (logged ticks, o, lanes); and of uint16 the codes of what
+    is `Coded`, shaped as inputs and held inputs are. The last h columns of the shared inputs say where in a
+    block of the held inputs or codes the values of each kind of `Held` begin at a tick.
 
     `scan` logs the first tick, each `log_stride` ticks after it, and the last; `init` reads the inputs of one
     tick and writes the next carry. The lanes `begin` to `end` are run, multiples of the width.
@@ -32,21 +39,16 @@ class Layout:
 
     width: int
     shared_parameters: tuple[bool, ...]
-    shared_inputs: tuple[bool, ...]
-    held: tuple[int | None, ...]  # of each input, the `Held` that it stands in
+    inputs: tuple[InputKind, ...]
+    held_kinds: tuple[InputKind, ...]
     piecewise_constant: tuple[bool, ...]  # inputs that are shared, and at most ticks the same as before
 
-    @property
-    def own_inputs(self) -> int:
-        """Inputs of each vehicle that are told at every tick."""
-        return sum(not one and held is None for one, held in zip(self.shared_inputs, self.held, strict=True))
-
-    @property
-    def helds(self) -> int:
-        """The number of `Held`s."""
-        return len({*self.held} - {None})
+    @cached_property
+    def shared_inputs(self) -> tuple[bool, ...]:
+        """True for inputs that are one number for all vehicles."""
+        return tuple(kind.shared for kind in self.inputs)
 
     @property
     def shared_columns(self) -> int:
         """Of the shared inputs."""
-        return sum(self.shared_inputs) + self.helds
+        return sum(self.shared_inputs) + len(self.held_kinds)

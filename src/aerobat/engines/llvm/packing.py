@@ -3,24 +3,36 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from itertools import compress
-from typing import NamedTuple
+from dataclasses import dataclass, replace
+from functools import cached_property
+from itertools import count
+from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from aerobat.arrays import Array
-from aerobat.engines.engine import Held
+from aerobat.engines.engine import Coded, Held
 from aerobat.engines.pytree import Tree, tree_leaves, tree_map, tree_replace
+
+_NO_TABLE = np.zeros(0)
+_DTYPES = {False: np.float64, True: np.uint16}  # of inputs, by whether they are coded
 
 
 class PackedInputs(NamedTuple):
-    """Inputs of some ticks; see `layout.Layout`."""
+    """Inputs of some ticks, in the order of the first arrays and counts of `layout`."""
 
-    shared: Array
-    own: Array
-    held: Array
-    held_rows: int  # of a block of lanes
+    arrays: tuple[NDArray[Any], ...]
+    rows: tuple[int, int]  # of a block of lanes: of the held inputs, and of the held codes
+
+
+@dataclass(frozen=True)
+class InputKind:
+    """Where one of the inputs stands."""
+
+    shared: bool  # one number for all vehicles
+    held: int | None = None  # the `Held` that it stands in
+    coded: bool = False  # it is an entry of the table
 
 
 @dataclass(frozen=True)
@@ -29,21 +41,29 @@ class Packing:
 
     vehicles: int
     width: int
-    shared: tuple[bool, ...]  # of each input: one number for all vehicles
-    held: tuple[int | None, ...]  # of each input: the `Held` that it stands in
+    kinds: tuple[InputKind, ...]  # of each input
 
     @classmethod
     def of(cls, inputs: Tree, vehicles: int, width: int) -> Packing:
         """The packing of inputs like those of one tick."""
-        nodes: list[Held] = []
+        helds = count()
 
-        def numbered(held: Held) -> Tree:
-            nodes.append(held)
-            return tree_map(lambda _: _Number(len(nodes) - 1), held.values)
+        def coded(node: Coded) -> Tree:
+            return tree_map(lambda _: InputKind(shared=False, coded=True), node.codes)
 
-        numbers = tree_leaves(tree_replace(inputs, Held, numbered))
-        held = (leaf.value if isinstance(leaf, _Number) else None for leaf in numbers)
-        return cls(vehicles, width, tuple(np.ndim(leaf) == 0 for leaf in tree_leaves(inputs)), tuple(held))
+        def held(node: Held) -> Tree:
+            number = next(helds)
+            return tree_map(
+                lambda leaf: replace(_kind(leaf), held=number), tree_replace(node.values, Coded, coded)
+            )
+
+        leaves = tree_leaves(tree_replace(tree_replace(inputs, Held, held), Coded, coded))
+        return cls(vehicles, width, tuple(map(_kind, leaves)))
+
+    @cached_property
+    def held_kinds(self) -> tuple[InputKind, ...]:
+        """Those that are held, of each vehicle's own."""
+        return tuple(dict.fromkeys(k for k in self.kinds if k.held is not None and not k.shared))
 
     @property
     def blocks(self) -> int:
@@ -58,36 +78,58 @@ class Packing:
     def inputs(self, inputs: Tree, ticks: int) -> PackedInputs:
         """Inputs of so many ticks, or without an axis of ticks those of one."""
         nodes: list[Held] = []
+        tables = [_NO_TABLE]
 
-        def noted(held: Held) -> Tree:
-            nodes.append(held)
-            return held.values
+        def codes_of(node: Coded) -> Tree:
+            tables.append(node.table)
+            return node.codes
 
-        leaves = tree_leaves(tree_replace(inputs, Held, noted))
+        def values_of(node: Held) -> Tree:
+            nodes.append(node)
+            return node.values
+
+        leaves = tree_leaves(tree_replace(tree_replace(inputs, Held, values_of), Coded, codes_of))
         rows = [np.zeros(ticks, dtype=np.intp) if isinstance(node.row, tuple) else node.row for node in nodes]
         columns = [
-            np.asarray(leaf)[rows[number]] if number is not None and np.ndim(leaf) else leaf
-            for leaf, number in compress(zip(leaves, self.held, strict=True), self.shared)
+            np.asarray(leaf)[rows[kind.held]] if kind.held is not None and np.ndim(leaf) else leaf
+            for leaf, kind in zip(leaves, self.kinds, strict=True)
+            if kind.shared
         ]
-        groups = [self._of_vehicles(leaves, number) for number in range(len(nodes))]
-        begins = np.cumsum([0, *(len(group) * len(group[0]) if group else 0 for group in groups)]).tolist()
-        held = np.empty((self.blocks, begins[-1], self.width))
-        for group, row, begin, end in zip(groups, rows, begins, begins[1:], strict=False):
-            columns.append(begin + len(group) * row)
-            if group:
-                self._fill(held[:, begin:end].reshape(self.blocks, -1, len(group), self.width), group)
-        own = self._of_vehicles(leaves, None)
-        packed = np.empty((self.blocks, ticks, len(own), self.width))
-        self._fill(packed, own)
+        held, begins = self._held(leaves)
+        for kind, begin in begins.items():
+            columns.append(begin + self.kinds.count(kind) * rows[kind.held or 0])
         shared = np.empty((ticks, len(columns)))
         for index, column in enumerate(columns):
             shared[:, index] = column
-        return PackedInputs(shared, packed, held, begins[-1])
+        arrays = (shared, self._told(leaves, ticks), held[False], self._told(leaves, ticks, True), held[True])
+        return PackedInputs((*arrays, tables[-1]), (held[False].shape[1], held[True].shape[1]))
 
-    def _of_vehicles(self, leaves: Sequence[Array], number: int | None) -> list[Array]:
-        """The leaves (rows, vehicles) that stand in a certain Held, or in none."""
-        places = zip(leaves, self.shared, self.held, strict=True)
-        chosen = (leaf for leaf, shared, held in places if not shared and held == number)
+    def _told(self, leaves: Sequence[Array], ticks: int, coded: bool = False) -> NDArray[Any]:
+        """What is told at every tick, (blocks, ticks, leaf, width)."""
+        chosen = self._of(leaves, InputKind(False, coded=coded))
+        packed = np.empty((self.blocks, ticks, len(chosen), self.width), _DTYPES[coded])
+        self._fill(packed, chosen)
+        return packed
+
+    def _held(self, leaves: Sequence[Array]) -> tuple[dict[bool, NDArray[Any]], dict[InputKind, int]]:
+        """What is held as numbers and as codes, (blocks, rows, width), and the row at which a kind begins."""
+        sizes = {False: 0, True: 0}
+        begins, chosen = {}, {}
+        for kind in self.held_kinds:
+            chosen[kind] = self._of(leaves, kind)
+            begins[kind] = sizes[kind.coded]
+            sizes[kind.coded] += len(chosen[kind]) * len(chosen[kind][0])
+        packed = {
+            coded: np.empty((self.blocks, size, self.width), _DTYPES[coded]) for coded, size in sizes.items()
+        }
+        for kind, own in chosen.items():
+            part = packed[kind.coded][:, begins[kind] : begins[kind] + len(own) * len(own[0])]
+            self._fill(part.reshape(self.blocks, -1, len(own), self.width), own)
+        return packed, begins
+
+    def _of(self, leaves: Sequence[Array], kind: InputKind) -> list[Array]:
+        """The leaves (rows, vehicles) of one kind."""
+        chosen = (leaf for leaf, own in zip(leaves, self.kinds, strict=True) if own == kind)
         return [np.reshape(leaf, (-1, self.vehicles)) for leaf in chosen]
 
     def pad_lanes(self, leaves: Sequence[Array]) -> Array:
@@ -106,14 +148,15 @@ class Packing:
         """Leaves (rows, vehicles) into an array (blocks, rows, leaf, lane)."""
         whole = self.vehicles // self.width
         full = whole * self.width
+        lanes = np.dtype((np.void, self.width * packed.itemsize))  # are copied as one
         for index, leaf in enumerate(leaves):
-            blocks = leaf[:, :full].reshape(len(leaf), whole, self.width)
-            packed[:whole, :, index] = blocks.swapaxes(0, 1)
+            blocks = np.ascontiguousarray(leaf[:, :full], packed.dtype).view(lanes)
+            packed.view(lanes)[:whole, :, index, 0] = blocks.T
             if full < self.vehicles:
                 packed[whole, :, index, : self.vehicles - full] = leaf[:, full:]
                 packed[whole, :, index, self.vehicles - full :] = leaf[:, -1:]
 
 
-@dataclass(frozen=True)
-class _Number:
-    value: int
+def _kind(leaf: Any) -> InputKind:
+    """The kind of one tick's leaf, or that which stands in its place."""
+    return leaf if isinstance(leaf, InputKind) else InputKind(shared=np.ndim(leaf) == 0)

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from aerobat.arrays import Array
+from aerobat.engines.engine import Coded
 from aerobat.engines.pytree import Tree
 from aerobat.kernels import battery, wind
 from aerobat.kernels.battery import BatteryParameters, BatteryState
@@ -46,7 +48,7 @@ class WindSource:
     def chunk(self, begin: int, end: int) -> Tree:
         """See `Source.chunk`; a GustNoise."""
 
-        def noise(x: Array) -> GustNoise:
+        def noise(x: Sequence[Coded], _: Array) -> GustNoise:
             return GustNoise(x[0], (x[1], x[2]), (x[3], x[4]))
 
         return self._numbers.inputs(begin, end, noise)

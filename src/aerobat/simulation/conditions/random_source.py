@@ -15,20 +15,22 @@ from numpy.random.bit_generator import ISeedSequence
 from numpy.typing import NDArray
 
 from aerobat.arrays import Array, frozen
-from aerobat.engines.engine import Held
+from aerobat.engines.engine import Coded, Held
 from aerobat.engines.pytree import Tree
 
 Words: TypeAlias = NDArray[np.uint16]
 
 _LEVELS = 2**16
 _WORDS_AT_ONCE = 4  # 16-bit words in a number of the generator
-_TOGETHER = 64  # vehicles whose words are turned at once, so that they stay in a cache
+_TOGETHER = 128  # vehicles whose words are turned at once, so that they stay in a cache
+_APART = 8  # numbers of the generator between vehicles' words: rows a power of two apart share a cache badly
+_DRAWN_AT_ONCE = 256  # samples of a vehicle: a call of its generator takes as long as some hundred words
 
 
 class RandomSource:
     """Standard normals and uniform numbers of a component that steps at every so many ticks.
 
-    They are drawn in blocks of samples that begin at multiples of their size, so that any cuts of the ticks
+    They are drawn by blocks of samples that begin at multiples of their size, so that any cuts of the ticks
     into chunks, in any order, give the same bits, and only for ticks at which the component steps.
     """
 
@@ -48,59 +50,62 @@ class RandomSource:
             normals: standard normals a sample.
             uniforms: numbers in (0, 1) a sample.
             period: ticks from one sample to the next.
-            block: samples drawn at once, a multiple of 4.
+            block: samples whose numbers lie together in the generator's, a multiple of 4.
         """
         self._seeds = seeds
         self._normals = normals
         self._words = normals + 2 * uniforms
         self._period = period
         self._size = block
+        self._blocks = max(1, _DRAWN_AT_ONCE // block)
         self._restart()
 
-    def inputs(self, begin: int, end: int, arrange: Callable[[Array], Tree]) -> Tree:
+    def inputs(self, begin: int, end: int, arrange: Callable[[Sequence[Coded], Array], Tree]) -> Tree:
         """Inputs of the ticks from `begin` to before `end`, held from one sample to the next.
 
-        `arrange` makes a tree of numbers (numbers, samples, vehicles), normals first.
+        `arrange` makes a tree of the normals and of the uniforms (numbers, samples, vehicles).
         """
         first = begin // self._period
-        numbers = arrange(self._samples(first, (end - 1) // self._period + 1))
-        return numbers if self._period == 1 else Held(np.arange(begin, end) // self._period - first, numbers)
+        words = self._samples(first, (end - 1) // self._period + 1)
+        high, low = words[self._normals :: 2], words[self._normals + 1 :: 2]
+        uniforms = (high + (low + 0.5) / _LEVELS) / _LEVELS
+        samples = arrange([Coded(word, _quantiles()) for word in words[: self._normals]], uniforms)
+        return samples if self._period == 1 else Held(np.arange(begin, end) // self._period - first, samples)
 
-    def _samples(self, begin: int, end: int) -> Array:
+    def _samples(self, begin: int, end: int) -> Words:
+        """Random words (words, samples, vehicles) of some samples."""
         blocks = [self._block(k) for k in range(begin // self._size, (end - 1) // self._size + 1)]
         words = blocks[0] if len(blocks) == 1 else np.concatenate(blocks, axis=1)
         offset = begin // self._size * self._size
-        words = words[:, begin - offset : end - offset]
-        high, low = words[self._normals :: 2], words[self._normals + 1 :: 2]
-        numbers = np.empty((self._normals + len(high), *words.shape[1:]))
-        _quantiles().take(
-            words[: self._normals], out=numbers[: self._normals], mode="clip"
-        )  # quicker, checks less
-        numbers[self._normals :] = (high + (low + 0.5) / _LEVELS) / _LEVELS
-        return numbers
+        return words[:, begin - offset : end - offset]
 
     def _block(self, number: int) -> Words:
         """Random words (words, samples, vehicles) of a block."""
-        if number < self._latest:
+        turn = number // self._blocks
+        if turn < self._turn:
             self._restart()
-        while self._latest < number:
+        while self._turn < turn:
             self._draw()
-        return self._drawn
+        block: Words = self._drawn[number % self._blocks]
+        return block
 
     def _draw(self) -> None:
-        count = self._words * self._size
-        drawn = np.empty((len(self._generators), count // _WORDS_AT_ONCE), dtype="<u8")
-        for own, generator in zip(drawn, self._generators, strict=True):
-            own[:] = generator.random_raw(len(own))
-        turned = np.empty((count, len(drawn)), dtype=np.uint16)
-        for first in range(0, len(drawn), _TOGETHER):
-            turned[:, first : first + _TOGETHER] = drawn[first : first + _TOGETHER].view("<u2").T
-        self._drawn: Words = turned.reshape(self._words, self._size, -1)
-        self._latest += 1
+        """The next blocks of all vehicles, some of which are drawn and turned while they lie in a cache."""
+        count, vehicles = self._blocks * self._words * self._size, len(self._generators)
+        numbers = count // _WORDS_AT_ONCE
+        drawn = np.empty((min(_TOGETHER, vehicles), numbers + _APART), dtype="<u8")
+        turned = np.empty((count, vehicles), dtype=np.uint16)
+        for first in range(0, vehicles, _TOGETHER):
+            together = self._generators[first : first + _TOGETHER]
+            for own, generator in zip(drawn, together, strict=False):
+                own[:numbers] = generator.random_raw(numbers)
+            turned[:, first : first + _TOGETHER] = drawn[: len(together)].view("<u2")[:, :count].T
+        self._drawn: Words = turned.reshape(self._blocks, self._words, self._size, vehicles)
+        self._turn += 1
 
     def _restart(self) -> None:
         self._generators = [np.random.SFC64(seed) for seed in self._seeds]  # type: ignore[arg-type]  # NumPy's fastest
-        self._latest = -1
+        self._turn = -1
 
 
 @cache

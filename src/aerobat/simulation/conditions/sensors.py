@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 
 from aerobat.arrays import Array, Mask
+from aerobat.engines.engine import Coded
 from aerobat.engines.pytree import Tree
 from aerobat.kernels import imu, mocap, motors, rigid_body
 from aerobat.kernels.imu import BiasParameters, ImuParameters, ImuSample, ImuState
@@ -92,7 +94,7 @@ class ImuSource:
     def chunk(self, begin: int, end: int) -> Tree:
         """See `Source.chunk`; an ImuSample."""
 
-        def noise(x: Array) -> ImuSample:
+        def noise(x: Sequence[Coded], _: Array) -> ImuSample:
             return ImuSample((x[0], x[1], x[2]), (x[3], x[4], x[5]))
 
         return self._numbers.inputs(begin, end, noise)
@@ -167,8 +169,8 @@ class MocapSource:
     def chunk(self, begin: int, end: int) -> Tree:
         """See `Source.chunk`; a MocapInput."""
 
-        def sampled(x: Array) -> MocapInput:
-            times = (begin // self._period + np.arange(x.shape[1])) * self._period / self._rate
-            return MocapInput(times, (x[0], x[1], x[2]), (x[3], x[4], x[5]), (x[6], x[7], x[8]), x[9])
+        def sampled(x: Sequence[Coded], chance: Array) -> MocapInput:
+            times = (begin // self._period + np.arange(chance.shape[1])) * self._period / self._rate
+            return MocapInput(times, (x[0], x[1], x[2]), (x[3], x[4], x[5]), (x[6], x[7], x[8]), chance[0])
 
         return self._numbers.inputs(begin, end, sampled)

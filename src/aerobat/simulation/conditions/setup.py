@@ -22,6 +22,7 @@ from aerobat.simulation.components import (
     StateObserver,
     TrackingController,
 )
+from aerobat.simulation.conditions.disturbance_observer import DisturbanceObserver, DisturbanceParameters
 from aerobat.simulation.conditions.draw import dispersed_fleet, draw_flights
 from aerobat.simulation.conditions.observer import EkfObserver, ObserverParameters, ObserverSource
 from aerobat.simulation.conditions.parts import WHOLE, DispersedFlights, condition_parts, whole_ticks
@@ -139,12 +140,17 @@ def _controller(
             f"got {conditions.computation_delay:g} s; lower control_rate"
         )
     controller = TrackingController(settings.feature_flags, period)
+    observer: tuple[Part, ...] = ()
+    if settings.disturbance_filter > 0.0 and conditions.imu is not None:
+        times = flights.all(settings.disturbance_filter), flights.all(delay / rate)
+        observer = (Part(DisturbanceObserver(period), DisturbanceParameters(model, *times)),)
     if period == 1 and delay == 0:
-        return (Part(controller, ControllerParameters(model, ())),)
+        return (*observer, Part(controller, ControllerParameters(model, ())))
     source = ReferenceSource(flights.trajectory, nominal, environment, rate, every=period, delay=delay / rate)
     if delay == 0:
-        return (Part(controller, ControllerParameters(model, ()), source),)
+        return (*observer, Part(controller, ControllerParameters(model, ()), source))
     return (
+        *observer,
         Part(controller, ControllerParameters(model, flights.all(delay / rate)), source),
         Part(ComputationDelay(), (), DelayTicks(period, delay)),
     )
