@@ -23,11 +23,12 @@ from aerobat.planning.planners import Planner, option, planner
 from aerobat.planning.polynomial.descent.framed_problem import FramedProblem
 from aerobat.planning.polynomial.descent.knot_descent import Descent
 from aerobat.planning.polynomial.descent.knot_program import FINE
-from aerobat.planning.polynomial.knots import stretched_path
+from aerobat.planning.polynomial.knots import start_along_normals
 from aerobat.planning.polynomial.min_snap import MinSnap
 from aerobat.planning.recorder import Progress, Recorder
 from aerobat.planning.result import FLYING_RESERVE, Plan
 from aerobat.planning.time_limit import TIME_LIMIT, stopped, too_short
+from aerobat.planning.time_optimal.optimal_control.ways import ways_through_gates
 from aerobat.planning.warm_start import Reserve, WarmStart, plans_to_begin_from, require_attitudes
 from aerobat.problem.problem import Problem
 from aerobat.problem.stage import StageSequence
@@ -140,9 +141,11 @@ class FreeKnots(Planner):
         recorder: Recorder,
     ) -> Descent:
         """The descent from a guess."""
-        framed = FramedProblem.of(problem, vehicle, sequence, guess, self.reserve)
         if is_course(sequence):
+            ways = ways_through_gates(guess.stages, problem, vehicle)
+            framed = FramedProblem.of(problem, vehicle, sequence, guess, self.reserve, ways)
             return Descent(framed, recorder, self.still_ends, COURSE_ITERATIONS, FINE)
+        framed = FramedProblem.of(problem, vehicle, sequence, guess, self.reserve)
         return Descent(framed, recorder, self.still_ends, self.iterations)
 
     def _starts(
@@ -153,8 +156,7 @@ class FreeKnots(Planner):
             yield self.start, WarmStart.of(self.start, sequence)
         if is_course(sequence):
             for order in START_ORDERS:
-                path = stretched_path(problem, vehicle, sequence, order)
-                yield None, WarmStart(path, sequence.stages, tuple(path.knots[1:-1].tolist()))
+                yield None, start_along_normals(problem, vehicle, sequence, order)
         for plan in self._plans(problem, vehicle):
             yield plan, WarmStart.of(plan, sequence)
 

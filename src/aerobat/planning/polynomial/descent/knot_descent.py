@@ -19,6 +19,7 @@ from aerobat.planning.polynomial.descent.framed_problem import TRUSTED, FramedPr
 from aerobat.planning.polynomial.descent.knot_program import ROUGH, KnotProgram, Multipliers, Precision
 from aerobat.planning.polynomial.descent.knot_samples import chebyshev_samples, refit
 from aerobat.planning.polynomial.descent.knot_variables import KnotVariables
+from aerobat.planning.polynomial.descent.stage_constraints import StageConstraints
 from aerobat.planning.recorder import Recorder
 from aerobat.planning.result import PlacedStage, Plan
 from aerobat.planning.rotor_margin import reserve_shortfalls
@@ -150,7 +151,8 @@ class _Exchange:
             radius=self._radius,
             still_ends=descent.still_ends,
         )
-        program = KnotProgram(variables, framed.limits, self._samples, framed.balance, self._backoff)
+        stages = StageConstraints(variables, framed.limits, framed.balance, framed.ways)
+        program = KnotProgram(variables, framed.limits, self._samples, stages, self._backoff)
         iterations = descent.iterations
         if descent.best is not None:
             iterations = min(iterations, NEAR_ITERATIONS)
