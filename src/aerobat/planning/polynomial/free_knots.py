@@ -21,8 +21,7 @@ from aerobat.planning.courses import is_course
 from aerobat.planning.miqp import Miqp
 from aerobat.planning.planners import Planner, option, planner
 from aerobat.planning.polynomial.descent.framed_problem import FramedProblem
-from aerobat.planning.polynomial.descent.knot_descent import Descent
-from aerobat.planning.polynomial.descent.knot_program import FINE
+from aerobat.planning.polynomial.descent.knot_descent import OF_COURSES, Descent
 from aerobat.planning.polynomial.knots import start_along_normals
 from aerobat.planning.polynomial.min_snap import MinSnap
 from aerobat.planning.recorder import Progress, Recorder
@@ -35,7 +34,8 @@ from aerobat.problem.stage import StageSequence
 from aerobat.vehicle import Vehicle
 
 MAX_SEGMENTS = 24  # a judgement: more gain next to nothing, and a solve takes longer with each
-LEG_SEGMENTS = 2  # of a course's leg, where that makes no more than MAX_SEGMENTS, else one
+LEG_SEGMENTS = 2  # of a course's leg, where that makes no more than MAX_COURSE_SEGMENTS, else one
+MAX_COURSE_SEGMENTS = 26  # of thirteen legs: a minute
 START_ORDERS = (3, 4)  # of closed forms that courses begin at: minimum jerk, minimum snap
 COURSE_ITERATIONS = 150  # of a solve at most, for all segments of a course at once
 COARSE = 4  # segments to begin with where there shall be more: they are quick and come near the least time
@@ -114,9 +114,9 @@ class FreeKnots(Planner):
             for segments in numbers:
                 if not out_of_time():
                     descent.run(guess, segments)
-            if descent.best is None and not out_of_time():
+            if descent.best is None and not (is_course(sequence) or out_of_time()):
                 descent.run(guess, 2 * numbers[-1])
-            found = descent.plan(numbers[-1])
+            found = descent.through_gates(numbers[-1])
             if found is not None and (best is None or found.duration < best.duration):
                 best = found
             taken = start is None or start is self.start
@@ -129,7 +129,7 @@ class FreeKnots(Planner):
         if not is_course(sequence):
             return sorted({min(COARSE, self.segments), self.segments})
         legs = len(sequence.stages) + 1
-        of_leg = LEG_SEGMENTS if LEG_SEGMENTS * legs <= MAX_SEGMENTS else 1
+        of_leg = LEG_SEGMENTS if LEG_SEGMENTS * legs <= MAX_COURSE_SEGMENTS else 1
         return [max(self.segments, of_leg * legs)]
 
     def _descent(
@@ -144,7 +144,7 @@ class FreeKnots(Planner):
         if is_course(sequence):
             ways = ways_through_gates(guess.stages, problem, vehicle)
             framed = FramedProblem.of(problem, vehicle, sequence, guess, self.reserve, ways)
-            return Descent(framed, recorder, self.still_ends, COURSE_ITERATIONS, FINE)
+            return Descent(framed, recorder, self.still_ends, COURSE_ITERATIONS, OF_COURSES)
         framed = FramedProblem.of(problem, vehicle, sequence, guess, self.reserve)
         return Descent(framed, recorder, self.still_ends, self.iterations)
 
@@ -157,6 +157,7 @@ class FreeKnots(Planner):
         if is_course(sequence):
             for order in START_ORDERS:
                 yield None, start_along_normals(problem, vehicle, sequence, order)
+            return
         for plan in self._plans(problem, vehicle):
             yield plan, WarmStart.of(plan, sequence)
 

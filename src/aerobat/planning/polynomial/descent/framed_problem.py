@@ -84,7 +84,7 @@ class FramedProblem:
         trajectory = path.guess.trajectory
         failure = self._missed_stage(path.guess)
         if failure is None and path.violation.worst > 0.0:
-            failure = str(path.violation)
+            failure = f"{path.violation}{path.guess.leg_at(path.violation.time)}"
         return Solution(
             source=path,
             duration=trajectory.duration,

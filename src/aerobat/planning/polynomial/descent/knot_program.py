@@ -24,7 +24,9 @@ from aerobat.planning.polynomial.descent.path_limits import (
 from aerobat.planning.polynomial.descent.stage_constraints import StageConstraints
 from aerobat.planning.warm_start import WarmStart
 
-WARM_ITERATIONS = 40  # where multipliers are known, at most: what takes longer is not near
+WARM_ITERATIONS = 25  # where multipliers are known, at most: what takes longer is not near
+# rows are scaled already: MUMPS needs not permute the system's to find pivots, a quarter of its time
+UNPERMUTED = {"mumps_permuting_scaling": 0}
 
 
 @dataclass(frozen=True)
@@ -105,6 +107,7 @@ class KnotProgram:
             tolerance=precision.tolerance,
             initial_barrier=precision.barrier if multipliers is None else precision.warm_barrier,
             multipliers=None if multipliers is None else multipliers.at(self.samples),
+            options=UNPERMUTED,
         )
 
     @cached_property
