@@ -101,9 +101,10 @@ class FreeKnots(Planner):
     def _planned(
         self, problem: Problem, vehicle: Vehicle, sequence: StageSequence, recorder: Recorder
     ) -> Plan | None:
-        """The fastest certified plan from the first start that leads to one; from further ones if it is slow.
+        """The fastest certified plan from the first start that leads to one; from further ones if it is poor.
 
-        A poor start leads to a poor optimum; a plan that is not slow beside what is possible is taken.
+        A poor start leads to a poor optimum, or to none; an optimum that is not slow beside what is possible
+        is taken.
         """
         best: Plan | None = None
         numbers = self._numbers_of_segments(sequence)
@@ -120,7 +121,9 @@ class FreeKnots(Planner):
             if found is not None and (best is None or found.duration < best.duration):
                 best = found
             taken = start is None or start is self.start
-            if out_of_time() or (best is not None and (taken or not _slow(best, vehicle))):
+            if out_of_time() or (
+                best is not None and (taken or (descent.converged and not _slow(best, vehicle)))
+            ):
                 break
         return best
 
@@ -165,11 +168,8 @@ class FreeKnots(Planner):
         """Other planners' plans to begin from; the last knows no rotors."""
         closed_form: list[Planner] = [MinSnap()] if problem.maneuver.through_points else []
         yield from plans_to_begin_from(closed_form, problem, vehicle)
-        for reserve in sorted({self.reserve, 0.0}, reverse=True):
-            kept = list(plans_to_begin_from([Miqp(reserve=reserve, rescue=False)], problem, vehicle))
-            yield from kept
-            if kept:
-                break
+        for reserve in (self.reserve, 0.0 if self.reserve > 0.0 else FLYING_RESERVE):
+            yield from plans_to_begin_from([Miqp(reserve=reserve, rescue=False)], problem, vehicle)
         if not out_of_time():
             yield Miqp().plan(problem)
 

@@ -94,6 +94,11 @@ class Descent:
                 return
             program.go_on_from(found.solution.source.guess)
 
+    @property
+    def converged(self) -> bool:
+        """True where the best is an optimum, neither the start's path nor one that a solve stopped at."""
+        return self.best is not None and self.best.solution.status == CONVERGED
+
     def through_gates(self, segments: int) -> Plan | None:
         """The plan, or one on straighter ways through the gates whose frames its own flight does not clear.
 
