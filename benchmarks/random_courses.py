@@ -1,6 +1,6 @@
-"""Random courses, planned by whichever planner `aerobat` takes where none is named, and flown.
+"""Random courses, planned by a named planner or the one that is taken where none is named, and flown.
 
-    uv run python benchmarks/random_courses.py [--count 30] [--seed 0] [--cases K ...]
+    uv run python benchmarks/random_courses.py [--planner free-knots] [--count 30] [--seed 0] [--cases K ...]
 
 Case k of a seed is always the same: 3 to 12 gates of any heading, slope and tilt in a room of 20 m, some of
 them passed anywhere in their opening, some with the thrust along their upright, however they are tilted, from
@@ -73,9 +73,9 @@ def _passage(rng: np.random.Generator, gate: Gate) -> PassGate:
     return PassGate(gate.name, crossing_point=point, margin=margin, upright=upright)
 
 
-def planned(problem: ab.Problem, vehicle: ab.Vehicle) -> Plan:
+def planned(problem: ab.Problem, vehicle: ab.Vehicle, planner: str | None) -> Plan:
     """The plan that the command line makes."""
-    cls = planner_class(suited_planner(problem, vehicle))
+    cls = planner_class(planner or suited_planner(problem, vehicle))
     options = {o.name: o.command_default for o in planner_options(cls) if o.command_default is not None}
     return ab.plan(problem, cls(**options), vehicle)
 
@@ -85,6 +85,7 @@ def main() -> None:
     parser.add_argument("--count", type=int, default=30, help="cases (30)")
     parser.add_argument("--seed", type=int, default=0, help="their seed (0)")
     parser.add_argument("--cases", type=int, nargs="+", help="these alone")
+    parser.add_argument("--planner", help="by this one, say free-knots")
     options = parser.parse_args()
     vehicle = ab.load_vehicle("agile-quad")
     spent, errors = [], []
@@ -94,7 +95,7 @@ def main() -> None:
         facts = [f"{k:>3}", f"{len(problem.gates):>2} gates, {asked} upright"]
         began = time.process_time()
         try:
-            plan = planned(problem, vehicle)
+            plan = planned(problem, vehicle, options.planner)
         except ab.Infeasible as refusal:
             spent.append(time.process_time() - began)
             print(*facts, f"refused in {spent[-1]:.1f} s: {refusal}", sep="; ", flush=True)

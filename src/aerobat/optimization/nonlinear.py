@@ -12,6 +12,7 @@ from importlib import import_module
 from importlib.util import find_spec
 from math import inf
 from time import perf_counter
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -135,6 +136,7 @@ def solve_nonlinear(
     multipliers: tuple[Array, Array] | None = None,
     time_limit: float | None = None,
     exact_hessian: bool = True,
+    options: Mapping[str, Any] = MappingProxyType({}),
 ) -> NonlinearResult:
     """Return a local minimum near `start`, by IPOPT with CasADi's exact derivatives.
 
@@ -148,6 +150,7 @@ def solve_nonlinear(
         multipliers: of a result near the start, which with a small first barrier parameter saves iterations.
         time_limit: [s]; None sets no limit.
         exact_hessian: False has the Hessian built up by BFGS updates.
+        options: of IPOPT beside these, by their names.
 
     Raises:
         SpecError: `start` has the wrong size.
@@ -156,22 +159,23 @@ def solve_nonlinear(
     """
     began = perf_counter()
     x0 = frozen(start, "start", (int(program.variables.numel()),))
-    options: dict[str, Any] = {**_OPTIONS, "ipopt.max_iter": max_iterations, "ipopt.tol": tolerance}
-    options |= program.derivatives
+    settings: dict[str, Any] = {**_OPTIONS, "ipopt.max_iter": max_iterations, "ipopt.tol": tolerance}
+    settings |= program.derivatives
+    settings |= {f"ipopt.{name}": value for name, value in options.items()}
     if (limit := shorter(time_limit)) is not None:
-        options["ipopt.max_wall_time"] = max(limit, _SHORTEST)
+        settings["ipopt.max_wall_time"] = max(limit, _SHORTEST)
     if not exact_hessian:
-        options["ipopt.hessian_approximation"] = "limited-memory"
+        settings["ipopt.hessian_approximation"] = "limited-memory"
     if initial_barrier is not None:
-        options |= {"ipopt.mu_init": initial_barrier, "ipopt.bound_push": 1e-6, "ipopt.bound_frac": 1e-6}
+        settings |= {"ipopt.mu_init": initial_barrier, "ipopt.bound_push": 1e-6, "ipopt.bound_frac": 1e-6}
     known = {}
     if multipliers is not None:
-        options |= _WARM
+        settings |= _WARM
         known = dict(zip(("lam_x0", "lam_g0"), multipliers, strict=True))
     symbols = {"x": program.variables, "f": program.objective, "g": program.constraints}
     bounds = {"lbg": program.lower, "ubg": program.upper, "lbx": program.x_min, "ubx": program.x_max}
     with interrupts_kept():
-        solver = import_casadi().nlpsol("program", "ipopt", symbols, options)
+        solver = import_casadi().nlpsol("program", "ipopt", symbols, settings)
         answer = solver(x0=x0, **known, **bounds)
     x, *found = (np.asarray(answer[name], dtype=float).reshape(-1) for name in ("x", "lam_x", "lam_g"))
     for array in (x, *found):

@@ -46,6 +46,14 @@ class WarmStart:
         """From the start to the first stage, ..., from the last to the end [s], (P,)."""
         return np.diff([0.0, *self.times, self.trajectory.duration])
 
+    def leg_at(self, time: float) -> str:
+        """In words between which of several stages a time [s] lies; nothing of one or none."""
+        if len(self.stages) < 2:
+            return ""
+        names = ["the start", *(f"'{stage.name}'" for stage in self.stages), "the goal"]
+        leg = int(np.searchsorted(self.times, time))
+        return f", between {names[leg]} and {names[leg + 1]}"
+
     def time_scaled(self, factor: float) -> WarmStart:
         """The same path, flown longer by a factor."""
         trajectory = replace(self.trajectory, durations=factor * self.trajectory.durations)

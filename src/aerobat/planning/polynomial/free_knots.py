@@ -21,20 +21,21 @@ from aerobat.planning.courses import is_course
 from aerobat.planning.miqp import Miqp
 from aerobat.planning.planners import Planner, option, planner
 from aerobat.planning.polynomial.descent.framed_problem import FramedProblem
-from aerobat.planning.polynomial.descent.knot_descent import Descent
-from aerobat.planning.polynomial.descent.knot_program import FINE
-from aerobat.planning.polynomial.knots import stretched_path
+from aerobat.planning.polynomial.descent.knot_descent import OF_COURSES, Descent
+from aerobat.planning.polynomial.knots import start_along_normals
 from aerobat.planning.polynomial.min_snap import MinSnap
 from aerobat.planning.recorder import Progress, Recorder
 from aerobat.planning.result import FLYING_RESERVE, Plan
 from aerobat.planning.time_limit import TIME_LIMIT, stopped, too_short
+from aerobat.planning.time_optimal.optimal_control.ways import ways_through_gates
 from aerobat.planning.warm_start import Reserve, WarmStart, plans_to_begin_from, require_attitudes
 from aerobat.problem.problem import Problem
 from aerobat.problem.stage import StageSequence
 from aerobat.vehicle import Vehicle
 
 MAX_SEGMENTS = 24  # a judgement: more gain next to nothing, and a solve takes longer with each
-LEG_SEGMENTS = 2  # of a course's leg, where that makes no more than MAX_SEGMENTS, else one
+LEG_SEGMENTS = 2  # of a course's leg, where that makes no more than MAX_COURSE_SEGMENTS, else one
+MAX_COURSE_SEGMENTS = 26  # of thirteen legs: a minute
 START_ORDERS = (3, 4)  # of closed forms that courses begin at: minimum jerk, minimum snap
 COURSE_ITERATIONS = 150  # of a solve at most, for all segments of a course at once
 COARSE = 4  # segments to begin with where there shall be more: they are quick and come near the least time
@@ -100,9 +101,10 @@ class FreeKnots(Planner):
     def _planned(
         self, problem: Problem, vehicle: Vehicle, sequence: StageSequence, recorder: Recorder
     ) -> Plan | None:
-        """The fastest certified plan from the first start that leads to one; from further ones if it is slow.
+        """The fastest certified plan from the first start that leads to one; from further ones if it is poor.
 
-        A poor start leads to a poor optimum; a plan that is not slow beside what is possible is taken.
+        A poor start leads to a poor optimum, or to none; an optimum that is not slow beside what is possible
+        is taken.
         """
         best: Plan | None = None
         numbers = self._numbers_of_segments(sequence)
@@ -113,13 +115,15 @@ class FreeKnots(Planner):
             for segments in numbers:
                 if not out_of_time():
                     descent.run(guess, segments)
-            if descent.best is None and not out_of_time():
+            if descent.best is None and not (is_course(sequence) or out_of_time()):
                 descent.run(guess, 2 * numbers[-1])
-            found = descent.plan(numbers[-1])
+            found = descent.through_gates(numbers[-1])
             if found is not None and (best is None or found.duration < best.duration):
                 best = found
             taken = start is None or start is self.start
-            if out_of_time() or (best is not None and (taken or not _slow(best, vehicle))):
+            if out_of_time() or (
+                best is not None and (taken or (descent.converged and not _slow(best, vehicle)))
+            ):
                 break
         return best
 
@@ -128,7 +132,7 @@ class FreeKnots(Planner):
         if not is_course(sequence):
             return sorted({min(COARSE, self.segments), self.segments})
         legs = len(sequence.stages) + 1
-        of_leg = LEG_SEGMENTS if LEG_SEGMENTS * legs <= MAX_SEGMENTS else 1
+        of_leg = LEG_SEGMENTS if LEG_SEGMENTS * legs <= MAX_COURSE_SEGMENTS else 1
         return [max(self.segments, of_leg * legs)]
 
     def _descent(
@@ -140,9 +144,11 @@ class FreeKnots(Planner):
         recorder: Recorder,
     ) -> Descent:
         """The descent from a guess."""
-        framed = FramedProblem.of(problem, vehicle, sequence, guess, self.reserve)
         if is_course(sequence):
-            return Descent(framed, recorder, self.still_ends, COURSE_ITERATIONS, FINE)
+            ways = ways_through_gates(guess.stages, problem, vehicle)
+            framed = FramedProblem.of(problem, vehicle, sequence, guess, self.reserve, ways)
+            return Descent(framed, recorder, self.still_ends, COURSE_ITERATIONS, OF_COURSES)
+        framed = FramedProblem.of(problem, vehicle, sequence, guess, self.reserve)
         return Descent(framed, recorder, self.still_ends, self.iterations)
 
     def _starts(
@@ -153,8 +159,8 @@ class FreeKnots(Planner):
             yield self.start, WarmStart.of(self.start, sequence)
         if is_course(sequence):
             for order in START_ORDERS:
-                path = stretched_path(problem, vehicle, sequence, order)
-                yield None, WarmStart(path, sequence.stages, tuple(path.knots[1:-1].tolist()))
+                yield None, start_along_normals(problem, vehicle, sequence, order)
+            return
         for plan in self._plans(problem, vehicle):
             yield plan, WarmStart.of(plan, sequence)
 
@@ -162,11 +168,8 @@ class FreeKnots(Planner):
         """Other planners' plans to begin from; the last knows no rotors."""
         closed_form: list[Planner] = [MinSnap()] if problem.maneuver.through_points else []
         yield from plans_to_begin_from(closed_form, problem, vehicle)
-        for reserve in sorted({self.reserve, 0.0}, reverse=True):
-            kept = list(plans_to_begin_from([Miqp(reserve=reserve, rescue=False)], problem, vehicle))
-            yield from kept
-            if kept:
-                break
+        for reserve in (self.reserve, 0.0 if self.reserve > 0.0 else FLYING_RESERVE):
+            yield from plans_to_begin_from([Miqp(reserve=reserve, rescue=False)], problem, vehicle)
         if not out_of_time():
             yield Miqp().plan(problem)
 

@@ -12,7 +12,9 @@ import numpy as np
 from aerobat.arrays import Array
 from aerobat.flatness import force_balance
 from aerobat.planning.rotor_margin import sampled_margin
-from aerobat.problem.condition import Condition, ForceBalance, Quantity
+from aerobat.planning.warm_start import WarmStart
+from aerobat.problem.condition import Condition, ForceBalance, Quantity, fixed
+from aerobat.problem.gate import Gate
 from aerobat.problem.problem import Problem
 from aerobat.problem.stage import Stage, StageSequence
 from aerobat.trajectory import Trajectory
@@ -24,6 +26,7 @@ SHORTEST_LEG = 0.2  # [s] that a leg is given at first
 EXCEEDED = 0.3  # of the rotors' range, by which a stretched path may exceed it
 PACE = 1.05  # times the duration, in one step of stretching
 PACES = 80  # steps at most: 50 times the duration
+MIN_GATE_SPEED = 3.0  # [m/s] of starts through gates
 STAGE_TOLERANCE = 1e-6  # in SI units: by how much a condition may be missed through rounding
 
 
@@ -109,6 +112,41 @@ def stretched_path(problem: Problem, vehicle: Vehicle, sequence: StageSequence, 
     return path(1 - next((steps for steps in range(1, PACES) if too_fast(-steps)), PACES))
 
 
+def path_along_normals(problem: Problem, vehicle: Vehicle, sequence: StageSequence, order: int) -> Trajectory:
+    """The closed form through ordered stages, stretched, gates passed along their normals.
+
+    As fast there as the closed form that leaves that open, or as MIN_GATE_SPEED says.
+
+    Args:
+        problem: Its ends are met, its gates passed.
+        vehicle: What flies it.
+        sequence: The stages.
+        order: The derivative of position whose square is minimized.
+    """
+    path = stretched_path(problem, vehicle, sequence, order)
+    speeds = np.linalg.norm(path.evaluate(path.knots[1:-1], 1), axis=-1).tolist()
+    stages = [
+        stage
+        if stage.gate is None
+        else replace(stage, conditions=(*stage.conditions, *_along(problem.gate(stage.gate), speed)))
+        for stage, speed in zip(sequence.stages, speeds, strict=True)
+    ]
+    return stretched_path(problem, vehicle, replace(sequence, stages=tuple(stages)), order)
+
+
+def start_along_normals(problem: Problem, vehicle: Vehicle, sequence: StageSequence, order: int) -> WarmStart:
+    """That path as a start.
+
+    Args:
+        problem: Its ends are met, its gates passed.
+        vehicle: What flies it.
+        sequence: The stages, in order.
+        order: The derivative of position whose square is minimized.
+    """
+    path = path_along_normals(problem, vehicle, sequence, order)
+    return WarmStart(path, sequence.stages, tuple(path.knots[1:-1].tolist()))
+
+
 def violated_stage(sequence: StageSequence, trajectory: Trajectory, balance: ForceBalance) -> str | None:
     """The first stage that a trajectory with a knot a stage misses, in a sentence; or None."""
     values = [trajectory.evaluate(trajectory.knots[1:-1], k) for k in range(3)]
@@ -129,6 +167,11 @@ def violated_stage(sequence: StageSequence, trajectory: Trajectory, balance: For
                 f"duration, the closed form passes it at {fraction:.4g}"
             )
     return None
+
+
+def _along(gate: Gate, speed: float) -> tuple[Condition, ...]:
+    """Passing a gate along its normal, so fast [m/s] or faster."""
+    return fixed(Quantity.VELOCITY, max(speed, MIN_GATE_SPEED) * gate.normal)
 
 
 def _hurries(condition: Condition) -> bool:

@@ -15,15 +15,13 @@ from aerobat.flatness import force_balance, reference
 from aerobat.planning.courses import is_course
 from aerobat.planning.miqp import Miqp
 from aerobat.planning.planners import Planner
-from aerobat.planning.polynomial.knots import stretched_path
+from aerobat.planning.polynomial.knots import path_along_normals, start_along_normals
 from aerobat.planning.polynomial.min_snap import MinSnap
 from aerobat.planning.result import Plan
 from aerobat.planning.time_optimal.optimal_control.collocation import CollocatedMotion, Mesh
 from aerobat.planning.time_optimal.optimal_control.ways import Way, ways_through_gates
 from aerobat.planning.warm_start import WarmStart
-from aerobat.problem.condition import Condition, Quantity, fixed
 from aerobat.problem.end_state import at_rest
-from aerobat.problem.gate import Gate
 from aerobat.problem.maneuvers import Line
 from aerobat.problem.problem import Problem
 from aerobat.problem.stage import Stage, StageSequence
@@ -37,7 +35,6 @@ PACE_SPREAD = 0.4  # standard deviation of the logarithm of a phase's pace, wher
 SEED = 0
 NEAR_PLANE = 0.05  # of a path's length: what leaves a plane by less may begin in it
 UNROLLED = 3  # laps in a row, of which the middle one is a flying lap
-MIN_GATE_SPEED = 3.0  # [m/s] of starts through gates
 ASIDE = 0.1  # of a path's length, by which it is bent out of its plane: symmetry is an optimum of its own
 
 
@@ -87,7 +84,8 @@ def starts(
     if is_course(sequence):
         plans = [] if first is None else [(first, f"{first.planner}'s plan")]
         paths = [
-            (stretched(problem, vehicle, sequence, order), f"minimum {ORDERS[order]}") for order in (3, 4)
+            (start_along_normals(problem, vehicle, sequence, order), f"minimum {ORDERS[order]}")
+            for order in (3, 4)
         ]
         sources = [*_sources(plans, sequence), *paths]
     else:
@@ -96,42 +94,6 @@ def starts(
     own = tuple(plan for plan, _ in plans if plan.certified and plan.vehicle == vehicle)
     motions = islice(_variations(sources, planar), count)
     return Starts(tuple(replace(start, ways=ways) for start in motions), own)
-
-
-def stretched(problem: Problem, vehicle: Vehicle, sequence: StageSequence, order: int) -> WarmStart:
-    """The closed form through a sequence as a start.
-
-    Args:
-        problem: Its ends are met.
-        vehicle: What flies it.
-        sequence: The stages, in order.
-        order: The derivative of position whose square is minimized.
-    """
-    path = _straight_through_gates(problem, vehicle, sequence, order)
-    return WarmStart(path, sequence.stages, tuple(path.knots[1:-1].tolist()))
-
-
-def _straight_through_gates(
-    problem: Problem, vehicle: Vehicle, sequence: StageSequence, order: int
-) -> Trajectory:
-    """The closed form through ordered stages, gates passed along their normals.
-
-    As fast there as the closed form that leaves that open, or as MIN_GATE_SPEED says.
-    """
-    path = stretched_path(problem, vehicle, sequence, order)
-    speeds = np.linalg.norm(path.evaluate(path.knots[1:-1], 1), axis=-1).tolist()
-    stages = [
-        stage
-        if stage.gate is None
-        else replace(stage, conditions=(*stage.conditions, *_along(problem.gate(stage.gate), speed)))
-        for stage, speed in zip(sequence.stages, speeds, strict=True)
-    ]
-    return stretched_path(problem, vehicle, replace(sequence, stages=tuple(stages)), order)
-
-
-def _along(gate: Gate, speed: float) -> tuple[Condition, ...]:
-    """Passing a gate along its normal, so fast [m/s] or faster."""
-    return fixed(Quantity.VELOCITY, max(speed, MIN_GATE_SPEED) * gate.normal)
 
 
 def flying_lap(problem: Problem, vehicle: Vehicle, sequence: StageSequence, order: int) -> WarmStart:
@@ -149,7 +111,7 @@ def flying_lap(problem: Problem, vehicle: Vehicle, sequence: StageSequence, orde
     lap = (Stage("seam"), *sequence.stages)
     laps = replace(sequence, stages=(*UNROLLED * lap, Stage("seam")), closed=False)
     open_ends = replace(problem, maneuver=Line(), start=at_rest(places[-1]), goal=at_rest(places[0]))
-    path = _straight_through_gates(open_ends, vehicle, laps, order)
+    path = path_along_normals(open_ends, vehicle, laps, order)
     first = 1 + len(lap) * (UNROLLED // 2)  # the knot at which the middle lap begins
     segments = slice(first, first + len(lap))
     middle = Trajectory(path.durations[segments], path.coefficients[segments], problem.heading)

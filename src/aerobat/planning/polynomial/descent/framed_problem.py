@@ -13,6 +13,7 @@ from aerobat.planning.polynomial.descent.knot_variables import Frame
 from aerobat.planning.polynomial.descent.path_limits import PathLimits, bound_scale, path_bounds
 from aerobat.planning.polynomial.descent.rotor_constraints import RotorConstraints
 from aerobat.planning.result import Plan
+from aerobat.planning.time_optimal.optimal_control.ways import Way
 from aerobat.planning.warm_start import WarmStart
 from aerobat.problem.condition import ForceBalance
 from aerobat.problem.problem import Problem
@@ -45,10 +46,17 @@ class FramedProblem:
     limits: PathLimits
     balance: ForceBalance
     reserve: float  # of every limit's range, proven of rotors
+    ways: tuple[Way, ...] = ()  # of the body through gates, among the stages of the start
 
     @classmethod
     def of(
-        cls, problem: Problem, vehicle: Vehicle, sequence: StageSequence, guess: WarmStart, reserve: float
+        cls,
+        problem: Problem,
+        vehicle: Vehicle,
+        sequence: StageSequence,
+        guess: WarmStart,
+        reserve: float,
+        ways: tuple[Way, ...] = (),
     ) -> FramedProblem:
         """Of a guess, in whose vertical plane all stays if it has one.
 
@@ -58,13 +66,14 @@ class FramedProblem:
             sequence: The problem's stages for it.
             guess: Where to begin.
             reserve: Of every limit's range, kept from either of its ends.
+            ways: Of the body through gates that the guess's stages cross.
         """
         environment = problem.environment
         frame = Frame.around(guess, environment.wind)
         balance = force_balance(environment, vehicle)
         rotors = RotorConstraints(vehicle, frame.axes, environment, problem.heading)
         limits = PathLimits(rotors, frame.origin, path_bounds(problem, sequence, balance))
-        return cls(problem, vehicle, frame, limits, balance, reserve)
+        return cls(problem, vehicle, frame, limits, balance, reserve, ways)
 
     def path(self, guess: WarmStart, start: Plan | None = None) -> Path:
         """A guess, looked at densely."""
@@ -75,7 +84,7 @@ class FramedProblem:
         trajectory = path.guess.trajectory
         failure = self._missed_stage(path.guess)
         if failure is None and path.violation.worst > 0.0:
-            failure = str(path.violation)
+            failure = f"{path.violation}{path.guess.leg_at(path.violation.time)}"
         return Solution(
             source=path,
             duration=trajectory.duration,

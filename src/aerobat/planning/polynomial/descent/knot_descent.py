@@ -15,28 +15,57 @@ import numpy as np
 from aerobat.certification import Certificate, Verdict
 from aerobat.optimization.deadline import out_of_time
 from aerobat.planning.certified_solve import Judged, Solution, certified_solve
+from aerobat.planning.flyability import own_flight
 from aerobat.planning.polynomial.descent.framed_problem import TRUSTED, FramedProblem, Path
-from aerobat.planning.polynomial.descent.knot_program import ROUGH, KnotProgram, Multipliers, Precision
-from aerobat.planning.polynomial.descent.knot_samples import chebyshev_samples, refit
+from aerobat.planning.polynomial.descent.knot_program import (
+    FINE,
+    ROUGH,
+    KnotProgram,
+    Multipliers,
+    Precision,
+)
+from aerobat.planning.polynomial.descent.knot_samples import (
+    GATE_SAMPLES,
+    MIN_SAMPLES,
+    chebyshev_samples,
+    refit,
+)
 from aerobat.planning.polynomial.descent.knot_variables import KnotVariables
+from aerobat.planning.polynomial.descent.stage_constraints import StageConstraints
 from aerobat.planning.recorder import Recorder
-from aerobat.planning.result import PlacedStage, Plan
+from aerobat.planning.result import FLYABLE_ERROR, OwnFlight, PlacedStage, Plan
 from aerobat.planning.rotor_margin import reserve_shortfalls
+from aerobat.planning.time_optimal.optimal_control.ways import straighter
 from aerobat.planning.warm_start import WarmStart
 
 NEAR_ITERATIONS = 50  # of a solve, at most, once a path is certified: what takes longer leads away from it
 ROUNDS = 12  # of solving, at most, from one start
+STRAIGHTENINGS = 4  # of ways through gates, at most
 LITTLE_GAIN = 0.005  # of the duration, from one certified path to the next: the end
 LITTLE_LOSS = 0.02  # of the duration, that certainty between samples costs: the end if the start was near
 LARGE_GAIN = 0.2  # of the duration: the start was far, trust regions confine what follows it
-TRUST_RADIUS = 2.0  # in scaled variables, see KnotVariables
 MIN_RADIUS = 0.2  # a smaller region may hold no path that mends what is exceeded
 SHRINK = 3.0  # by how much the trust region is smaller where a limit is exceeded between samples
-NEAR = 0.02  # the same, where the next solution lies near: with multipliers as first guesses it is soon found
+NEAR = 0.05  # the same, where the next solution lies near: with multipliers as first guesses it is soon found
 SOLVED = 1e-3  # the same at samples: more means that the region is too large
-FIRST_BACKOFF = 1e-4  # of every limit's range, kept at samples
 MAX_BACKOFF = 0.02  # that is added at once: where much is exceeded, samples mend most of it
 CONVERGED = "locally optimal"  # the status of such a solution
+
+
+@dataclass(frozen=True)
+class Strategy:
+    """How solves follow each other."""
+
+    precision: Precision
+    first_tolerance: float  # of IPOPT, of the first solve from a start: what it finds is mended anyhow
+    radius: float  # of the trust region at first, in scaled variables, see KnotVariables
+    kept: float  # of a limit's range: a smaller excess between samples leaves the trust region as it is
+    backoff: float  # of every limit's range, kept at samples at first
+    until_free: bool  # what stands at no edge of its trust region counts as near, however far it began
+
+
+OF_MANEUVERS = Strategy(ROUGH, ROUGH.tolerance, 2.0, 0.0, 1e-4, until_free=False)
+OF_COURSES = Strategy(FINE, ROUGH.tolerance, 3.0, 0.02, 5e-4, until_free=True)
 
 
 @dataclass
@@ -47,7 +76,7 @@ class Descent:
     recorder: Recorder
     still_ends: bool
     iterations: int  # of each solve, at most
-    precision: Precision = ROUGH
+    strategy: Strategy = OF_MANEUVERS
     best: Judged[Path] | None = None
 
     def consider(self, start: Plan, guess: WarmStart) -> None:
@@ -64,6 +93,39 @@ class Descent:
             if (found := self._certified(program, left)) is None or program.little_to_gain(found, before):
                 return
             program.go_on_from(found.solution.source.guess)
+
+    @property
+    def converged(self) -> bool:
+        """True where the best is an optimum, neither the start's path nor one that a solve stopped at."""
+        return self.best is not None and self.best.solution.status == CONVERGED
+
+    def through_gates(self, segments: int) -> Plan | None:
+        """The plan, or one on straighter ways through the gates whose frames its own flight does not clear.
+
+        Only of a flight that keeps to its path: where it leaves it, the path is not what misses them.
+        """
+        descent, found = self, self.plan(segments)
+        best: tuple[tuple[int, float], Plan] | None = None
+        for left in reversed(range(STRAIGHTENINGS + 1)):
+            if found is None or not self.framed.ways:
+                break
+            flight = own_flight(found.trajectory, self.framed.vehicle, self.framed.problem, found.stages)
+            if best is None or flight.rank < best[0]:
+                best = flight.rank, found
+            if not (left and flight.lingers and flight.error <= FLYABLE_ERROR) or out_of_time():
+                break
+            descent = descent._on_straighter_ways(flight)
+            found = descent.plan(segments)
+        return found if best is None else best[1]
+
+    def _on_straighter_ways(self, flight: OwnFlight) -> Descent:
+        """The descent from its best path, straighter through the gates that its own flight did not pass."""
+        assert self.best is not None, "the path that was flown"
+        framed, guess = self.framed, self.best.solution.source.guess
+        framed = replace(framed, ways=straighter(framed.ways, guess.stages, flight))
+        again = replace(self, framed=framed, best=None)
+        again.run(guess, guess.trajectory.segments)
+        return again
 
     def plan(self, segments: int) -> Plan | None:
         """The plan of what is certified, its start's path where that is the best; None if nothing is.
@@ -128,14 +190,17 @@ class _Exchange:
     """The program near a guess, with limits at samples, which counterexamples join as they are found."""
 
     def __init__(self, descent: Descent, guess: WarmStart) -> None:
+        strategy, segments = descent.strategy, guess.trajectory.segments
         self.guess = guess
         self._descent = descent
         self._begun = guess.trajectory.duration
-        self._samples = chebyshev_samples(guess.trajectory.segments)
-        self._radius = TRUST_RADIUS
-        self._backoff = np.full(guess.trajectory.segments, FIRST_BACKOFF + descent.framed.reserve)
+        self._samples = chebyshev_samples(segments, GATE_SAMPLES if descent.framed.ways else MIN_SAMPLES)
+        self._radius = strategy.radius
+        self._precision = replace(strategy.precision, tolerance=strategy.first_tolerance)
+        self._backoff = np.full(segments, strategy.backoff + descent.framed.reserve)
         self._multipliers: Multipliers | None = None
         self._relaxed: float | None = None  # [s] the duration of the first solution near the guess
+        self._confined = False  # whether the last solution stands at an edge of its trust region
 
     def solve(self) -> Solution[Path]:
         """The fastest path within the trust region around the guess."""
@@ -150,11 +215,14 @@ class _Exchange:
             radius=self._radius,
             still_ends=descent.still_ends,
         )
-        program = KnotProgram(variables, framed.limits, self._samples, framed.balance, self._backoff)
+        stages = StageConstraints(variables, framed.limits, framed.balance, framed.ways)
+        program = KnotProgram(variables, framed.limits, self._samples, stages, self._backoff)
         iterations = descent.iterations
         if descent.best is not None:
             iterations = min(iterations, NEAR_ITERATIONS)
-        found, answer, multipliers = program.solve(iterations, descent.precision, self._multipliers)
+        found, answer, multipliers = program.solve(iterations, self._precision, self._multipliers)
+        self._precision = descent.strategy.precision
+        self._confined = variables.is_at_edge(answer.x)
         status = CONVERGED if answer.converged else "unknown"
         path = replace(framed.path(found), unsolved=answer.violation)
         near = answer.converged and path.violation.worst <= NEAR
@@ -167,6 +235,7 @@ class _Exchange:
         """True if what is certified is hardly faster than before, or as fast as where samples alone count."""
         duration, relaxed = found.solution.duration, self._relaxed or 0.0
         near = duration >= (1.0 - LARGE_GAIN) * self._begun
+        near = near or (self._descent.strategy.until_free and not self._confined)
         settled = near and duration <= (1.0 + LITTLE_LOSS) * relaxed
         return settled or duration >= (1.0 - LITTLE_GAIN) * before
 
@@ -174,15 +243,16 @@ class _Exchange:
         """Begin again from a certified path, in the whole trust region and with the least backoff."""
         self.guess = certified
         self._relaxed = None
-        self._radius = TRUST_RADIUS
-        self._backoff[:] = FIRST_BACKOFF + self._descent.framed.reserve
+        self._radius = self._descent.strategy.radius
+        self._backoff[:] = self._descent.strategy.backoff + self._descent.framed.reserve
 
     def tighten(self, solution: Solution[Path], certificate: Certificate | None) -> bool:
         """Sample where limits are exceeded, and go on from there in a smaller region.
 
         A path slower than the best that is certified is given up: tightening only slows it further.
         """
-        best, framed, path = self._descent.best, self._descent.framed, solution.source
+        descent, path = self._descent, solution.source
+        best, framed = descent.best, descent.framed
         if out_of_time():
             return False
         solved = path.unsolved <= SOLVED
@@ -198,10 +268,10 @@ class _Exchange:
         self._samples = violation.joined(self._samples)
         if not solved and self._radius <= MIN_RADIUS:
             return False
-        if not (solved and converged) or violation.worst > 0.0:
+        if not (solved and converged) or violation.worst > self._descent.strategy.kept:
             self._radius = max(self._radius / SHRINK, MIN_RADIUS)
         if solved and violation.worst <= TRUSTED:
             self.guess = path.guess
-            excess = np.clip(violation.excess_nearby, FIRST_BACKOFF, 2.0 * MAX_BACKOFF)
+            excess = np.clip(violation.excess_nearby, descent.strategy.backoff, 2.0 * MAX_BACKOFF)
             self._backoff += excess / 2.0
         return True

@@ -9,8 +9,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import pairwise
-from math import inf, perm
+from math import inf
 from typing import Any
 
 import numpy as np
@@ -19,21 +18,15 @@ from aerobat.arrays import Array
 from aerobat.optimization.nonlinear import NonlinearProgram, NonlinearResult, import_casadi, solve_nonlinear
 from aerobat.planning.polynomial.descent.knot_variables import KnotVariables
 from aerobat.planning.polynomial.descent.path_limits import (
-    ORDERS,
-    POLYNOMIAL_DEGREE,
-    TO_COEFFICIENTS,
     PathLimits,
     Samples,
-    bound_scale,
-    scaled,
 )
+from aerobat.planning.polynomial.descent.stage_constraints import StageConstraints
 from aerobat.planning.warm_start import WarmStart
-from aerobat.problem.ball import Ball
-from aerobat.problem.condition import ForceBalance, LinearBound
 
-WARM_ITERATIONS = 40  # where multipliers are known, at most: what takes longer is not near
-BALL_SHARE = 1.0 - 1e-5  # of a ball's squared radius: rounding has the rest
-NORMAL = 1e-9  # what a direction has of a plane that it is normal to
+WARM_ITERATIONS = 25  # where multipliers are known, at most: what takes longer is not near
+# rows are scaled already: MUMPS needs not permute the system's to find pivots, a quarter of its time
+UNPERMUTED = {"mumps_permuting_scaling": 0}
 
 
 @dataclass(frozen=True)
@@ -83,7 +76,7 @@ class KnotProgram:
     variables: KnotVariables
     limits: PathLimits
     samples: Samples  # at which limits hold
-    balance: ForceBalance  # that the stages' conditions on thrust are about
+    stages: StageConstraints
     reserve: Array  # of every limit's range, kept at the samples of each segment, (S,)
 
     def solve(
@@ -114,6 +107,7 @@ class KnotProgram:
             tolerance=precision.tolerance,
             initial_barrier=precision.barrier if multipliers is None else precision.warm_barrier,
             multipliers=None if multipliers is None else multipliers.at(self.samples),
+            options=UNPERMUTED,
         )
 
     @cached_property
@@ -121,7 +115,7 @@ class KnotProgram:
         """Its symbols, limits and exact derivatives."""
         ca, variables = import_casadi(), self.variables
         x = ca.MX.sym("x", variables.size)
-        seldom, seldom_slopes, seldom_curvature, seldom_limits = self._seldom()
+        seldom, seldom_slopes, seldom_curvature, seldom_limits = self.stages.functions()
         lower, upper = self._along_limits()
         count = len(self.samples)
         cost = np.zeros(variables.size)
@@ -172,14 +166,14 @@ class KnotProgram:
         ca, rows = import_casadi(), []
         for matrix, constant, weights, frames, count in self._places:
             mapped = self.limits.values.map("values", "serial", count, [0, 1], [])
-            rows.append(ca.vec(mapped(*self._ends(matrix, constant, x), weights, frames)))
+            rows.append(ca.vec(mapped(*self.limits.ends(matrix @ x + constant), weights, frames)))
         return ca.vertcat(*rows)
 
     def _jacobian(self, x: Any) -> Any:
         ca, rows = import_casadi(), []
         for matrix, constant, weights, frames, count in self._places:
             mapped = self.limits.jacobian.map("jacobian", "serial", count, [0, 1], [])
-            _, turned = mapped(*self._ends(matrix, constant, x), weights, frames)
+            _, turned = mapped(*self.limits.ends(matrix @ x + constant), weights, frames)
             rows.append(turned.T @ matrix)
         return ca.vertcat(*rows)
 
@@ -190,14 +184,9 @@ class KnotProgram:
             mapped = self.limits.hessian.map("hessian", "serial", count, [0, 1], [0])
             own = ca.reshape(multipliers[first : first + size * count], size, count)
             first += size * count
-            local = mapped(*self._ends(matrix, constant, x), weights, frames, own)
+            local = mapped(*self.limits.ends(matrix @ x + constant), weights, frames, own)
             parts += matrix.T @ local @ matrix
         return parts
-
-    def _ends(self, matrix: Any, constant: Any, x: Any) -> tuple[Any, Any]:
-        """E and T of a segment."""
-        ca, local = import_casadi(), matrix @ x + constant
-        return ca.reshape(local[:-1], self.limits.dimensions, len(ORDERS)).T, local[-1]
 
     def _along_limits(self) -> tuple[Array, Array]:
         """Limits of all values at samples; linear bounds do not count at the very ends, which are fixed."""
@@ -209,68 +198,3 @@ class KnotProgram:
         linear = slice(self.limits.size - len(self.limits.bounds), None)
         lower[[0, -1], linear], upper[[0, -1], linear] = -inf, inf
         return lower.ravel(), upper.ravel()
-
-    def _seldom(self) -> tuple[Any, Any, Any, tuple[Array, Array]]:
-        """Values of the stages as a function of x, their Jacobian, their product's Hessian, their limits."""
-        ca = import_casadi()
-        x = ca.SX.sym("x", self.variables.size)
-        rows = self._rows(x)
-        values = ca.vertcat(*(value for value, _, _ in rows), ca.SX(0, 1))
-        weights = ca.SX.sym("multipliers", values.numel())
-        limits = np.array([(lower, upper) for _, lower, upper in rows]).reshape(-1, 2)
-        return (
-            ca.Function("values", [x], [values]),
-            ca.Function("jacobian", [x], [ca.jacobian(values, x)]),
-            ca.Function("hessian", [x, weights], [ca.hessian(ca.dot(values, weights), x)[0]]),
-            (limits[:, 0], limits[:, 1]),
-        )
-
-    def _rows(self, x: Any) -> list[tuple[Any, float, float]]:
-        """Constraints of the stages, each at its place, and of their order and windows."""
-        ca, variables = import_casadi(), self.variables
-        columns, rows = variables.place_columns, []
-        starts = ca.cumsum(ca.vertcat(0, x[: len(self.samples)]))
-        for j, stage in enumerate(variables.guess.stages):
-            segment, s = variables.segments[j], x[columns[j]]
-            matrix, constant = variables.local(segment)
-            ends, duration = self._ends(ca.sparsify(ca.DM(matrix)), ca.DM(constant), x)
-            coefficients = ca.DM(TO_COEFFICIENTS) @ (duration ** ca.DM(ORDERS.astype(float)) * ends)
-            for condition in stage.conditions:
-                rows += self._held(condition.bound(self.balance), coefficients, duration, s)
-            if stage.ball is not None:
-                rows.append(self._met(stage.ball, coefficients, s))
-            earliest, latest = stage.window
-            time = starts[segment] + x[segment] * s
-            if earliest > 0.0:
-                rows.append((time / starts[-1], earliest, latest))
-            elif latest < 1.0:
-                rows.append((time / starts[-1], -inf, latest))
-        for j, (segment, following) in enumerate(pairwise(variables.segments)):
-            if segment == following:
-                rows.append((x[columns[j + 1]] - x[columns[j]], 0.0, inf))
-        return rows
-
-    def _met(self, ball: Ball, coefficients: Any, s: Any) -> tuple[Any, float, float]:
-        """The squared distance from a ball's centre at a place in a segment, over its radius squared."""
-        ca, axes = import_casadi(), self.limits.rotors.axes
-        powers = ca.horzcat(*(s**p for p in range(POLYNOMIAL_DEGREE + 1)))
-        offset = ca.DM(self.limits.origin - ball.centre) + ca.DM(axes) @ (powers @ coefficients).T
-        return ca.sumsqr(offset) / ball.radius**2, -inf, BALL_SHARE
-
-    def _held(
-        self, bound: LinearBound, coefficients: Any, duration: Any, s: Any
-    ) -> list[tuple[Any, float, float]]:
-        """A bound at a place in a segment; nothing where no variable matters."""
-        ca, axes = import_casadi(), self.limits.rotors.axes
-        value = float(bound.weights[0] @ self.limits.origin)
-        matters = False
-        for k in bound.derivatives:
-            along = bound.weights[k] @ axes
-            if np.abs(along).max() < NORMAL:
-                continue
-            matters = True
-            at = ca.horzcat(*(perm(p, k) * s ** max(p - k, 0) for p in range(POLYNOMIAL_DEGREE + 1)))
-            value += at @ coefficients @ ca.DM(along) / duration**k
-        if not matters:
-            return []
-        return [(value / bound_scale(bound), *scaled(bound))]

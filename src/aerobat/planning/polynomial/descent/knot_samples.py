@@ -13,6 +13,7 @@ from aerobat.trajectory import Trajectory, polynomial
 
 SAMPLES = 80  # of all segments together at first
 MIN_SAMPLES = 16  # of each: more than a polynomial of degree 9 needs
+GATE_SAMPLES = 24  # the same of paths through gates, about which the body turns sharply
 END_SAMPLES = 32  # of the first and the last of many: between rest and full thrust the body turns at once
 NEARBY = 2  # segments on either side: few of many, all of four
 DENSE = 81  # places in a segment that are looked at
@@ -74,10 +75,10 @@ class ConstraintViolation:
         return tuple(_with(old, new) for old, new in zip(samples, self.peaks, strict=True))
 
 
-def chebyshev_samples(segments: int) -> Samples:
-    """The first samples: denser toward the knots, as polynomials vary most there."""
-    inner = max(ceil(SAMPLES / segments), MIN_SAMPLES)
-    ends = END_SAMPLES if inner == MIN_SAMPLES else inner
+def chebyshev_samples(segments: int, least: int = MIN_SAMPLES) -> Samples:
+    """The first samples, so many of a segment at least: denser toward its knots, where it varies most."""
+    inner = max(ceil(SAMPLES / segments), least)
+    ends = END_SAMPLES if inner == least else inner
     counts = [inner if 0 < i < segments - 1 else ends for i in range(segments)]
     return tuple((1.0 - np.cos(np.linspace(0.0, np.pi, count))) / 2.0 for count in counts)
 

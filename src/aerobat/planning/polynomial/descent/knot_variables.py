@@ -26,6 +26,7 @@ from aerobat.vehicle import Vehicle
 
 SNAP = END_ORDER - 1
 JERK = SNAP - 1
+AT_EDGE = 1e-3  # of the box's width
 SHORTEST = 0.3  # of the mean, the least duration of a segment: shorter ones spoil the numbers
 
 
@@ -101,6 +102,13 @@ class KnotVariables:
             np.concatenate([shortest, free, offsets - self.radius]),
             np.concatenate([parts * stretch, free + 1.0, offsets + self.radius]),
         )
+
+    def is_at_edge(self, x: Array) -> bool:
+        """True if a duration or an offset stands at an edge of the box."""
+        lower, upper = self.box
+        to_edge = np.minimum(x - lower, upper - x) / (upper - lower)
+        to_edge[self.place_columns] = 1.0
+        return bool(to_edge.min() < AT_EDGE)
 
     def local(self, segment: int) -> tuple[Array, Array]:
         """A segment's E, row after row, and its T as a linear function of x: matrix and constant."""

@@ -84,6 +84,10 @@ class PathLimits:
             found.append(np.maximum(lower - values, values - upper))
         return np.array(found)
 
+    def ends(self, local: Any) -> tuple[Any, Any]:
+        """E and T of a segment's unknowns, a column of E row after row and T."""
+        return import_casadi().reshape(local[:-1], self.dimensions, len(ORDERS)).T, local[-1]
+
     def at(self, s: Array) -> Array:
         """The weights G at samples s (n,), side by side, (derivatives, 10 n)."""
         weights = np.stack([powers(s, k) @ TO_COEFFICIENTS for k in self._derivatives])

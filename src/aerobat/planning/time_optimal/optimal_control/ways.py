@@ -19,6 +19,7 @@ from math import inf, sqrt
 
 import numpy as np
 
+from aerobat.arrays import Array
 from aerobat.certification import PlannedPassage
 from aerobat.planning.result import OwnFlight
 from aerobat.planning.time_optimal.optimal_control.collocation import Mesh
@@ -44,6 +45,13 @@ class Way:
     stage: int
     reach: float  # [m] before and behind the plane, over which it counts
     bending: float  # [m/s²] across a straight line, at most
+
+    @property
+    def sides(self) -> tuple[Array, Array]:
+        """Outward normals of the opening's sides in the world, (K, 3), and how far they are, (K,) [m]."""
+        gate, sign = self.gate, np.array([1.0, -1.0])
+        outward = np.concatenate([np.outer(sign, axis) for axis in (gate.lateral, gate.up)])
+        return outward, np.repeat([gate.width, gate.height], 2) / 2.0 - FRAME_CLEARANCE
 
     def hold(self, rows: Rows, mesh: Mesh, elements: Elements) -> None:
         """Add the constraints."""
