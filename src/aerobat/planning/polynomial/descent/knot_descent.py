@@ -59,13 +59,12 @@ class Strategy:
     precision: Precision
     first_tolerance: float  # of IPOPT, of the first solve from a start: what it finds is mended anyhow
     radius: float  # of the trust region at first, in scaled variables, see KnotVariables
-    kept: float  # of a limit's range: a smaller excess between samples leaves the trust region as it is
     backoff: float  # of every limit's range, kept at samples at first
     until_free: bool  # what stands at no edge of its trust region counts as near, however far it began
 
 
-OF_MANEUVERS = Strategy(ROUGH, ROUGH.tolerance, 2.0, 0.0, 1e-4, until_free=False)
-OF_COURSES = Strategy(FINE, ROUGH.tolerance, 3.0, 0.02, 5e-4, until_free=True)
+OF_MANEUVERS = Strategy(ROUGH, ROUGH.tolerance, 2.0, 1e-4, until_free=False)
+OF_COURSES = Strategy(FINE, ROUGH.tolerance, 3.0, 5e-4, until_free=True)
 
 
 @dataclass
@@ -268,7 +267,7 @@ class _Exchange:
         self._samples = violation.joined(self._samples)
         if not solved and self._radius <= MIN_RADIUS:
             return False
-        if not (solved and converged) or violation.worst > self._descent.strategy.kept:
+        if not (solved and converged) or violation.worst > 0.0:
             self._radius = max(self._radius / SHRINK, MIN_RADIUS)
         if solved and violation.worst <= TRUSTED:
             self.guess = path.guess
