@@ -1,9 +1,12 @@
 """Free knots through many stages: certified, smooth, near the least time, through every ball and opening."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from aerobat.planning import FreeKnots, MinSnap, Plan
+from aerobat.planning.flyability import own_flight
 from aerobat.planning.polynomial.descent.knot_program import Multipliers
 from aerobat.planning.rotor_margin import reserve_shortfalls
 from aerobat.problem import Course, PassGate, Problem, at_rest, load_problem, tilted_gate
@@ -15,7 +18,7 @@ pytest.importorskip("casadi")
 QUAD = load_vehicle("agile-quad")
 JERKY = with_lags(QUAD, 0.0)
 # time-optimal's durations [s], to rest upright: benchmarks/courses.py
-LEAST = {"race-7": 7.395, "split-s-19 with lag and 3 %": 17.967}
+LEAST = {"split-s-19 with lag and 3 %": 17.967}
 SHARE = 1.06
 TOLERANCE = 1e-5  # [SI units], of jumps relative to the largest value
 
@@ -46,23 +49,6 @@ def assert_through_every_ball(plan: Plan) -> None:
         assert distance > 0.9 * stage.ball.radius  # corners are cut
 
 
-@pytest.fixture(scope="module")
-def lap() -> Plan:
-    return planned(load_problem("race-7"), JERKY)
-
-
-def test_a_lap_is_certified_and_near_the_least_time_without_the_closed_form(lap: Plan) -> None:
-    """It fell back to the closed form's 13.3 s."""
-    assert lap.certified
-    assert lap.rescue == ""
-    assert lap.duration < SHARE * LEAST["race-7"]
-
-
-def test_a_lap_passes_every_ball_and_jerk_does_not_jump(lap: Plan) -> None:
-    assert_through_every_ball(lap)
-    assert_smooth(lap, 4)
-
-
 def test_the_published_course_with_lag_and_reserve_is_near_the_least_time_and_snap_does_not_jump() -> None:
     plan = planned(load_problem("split-s-19"), QUAD, reserve=0.03)
     assert plan.certified
@@ -74,32 +60,29 @@ def test_the_published_course_with_lag_and_reserve_is_near_the_least_time_and_sn
     assert_smooth(plan, 5)
 
 
-def test_openings_are_crossed_anywhere_inside() -> None:
-    places = (
-        (3.0, 0.0, 1.5),
-        (6.0, 3.0, 2.0),
-        (3.0, 6.0, 2.5),
-        (-1.0, 6.0, 1.5),
-        (-4.0, 3.0, 2.0),
-        (-1.0, 0.0, 3.0),
-    )
-    headings = np.radians([0.0, 90.0, 180.0, 180.0, 270.0, 0.0])
+def test_tilted_gates_are_passed_with_the_whole_body_anywhere_or_upright_as_asked() -> None:
+    """None was planned: the start passed them from any side, and samples missed how sharply bodies turn."""
+    places = ((3.0, 0.0, 1.5), (6.0, 3.0, 2.5), (3.0, 7.0, 3.5), (-1.0, 5.0, 2.0))
+    attitudes = ((0.0, 20.0, 0.0), (90.0, 0.0, 60.0), (180.0, -20.0, -120.0), (250.0, 10.0, 0.0))
     gates = tuple(
-        tilted_gate(place, heading, width=2.0, height=2.0, name=f"gate {number}")
-        for number, (place, heading) in enumerate(zip(places, headings, strict=True), 1)
+        tilted_gate(place, *np.radians(attitude).tolist(), 1.2, 0.9, f"gate {number}")
+        for number, (place, attitude) in enumerate(zip(places, attitudes, strict=True), 1)
     )
-    elements = tuple(PassGate(gate.name, crossing_point="free") for gate in gates)
-    start, goal = at_rest((0.0, 0.0, 1.5)), at_rest((2.0, 0.0, 3.0))
-    plan = planned(Problem("openings", start, goal, Course(elements), gates), JERKY)
+    free = PassGate("gate 1", crossing_point="free", margin=0.1)
+    asked = (free, PassGate("gate 2", upright=True), replace(free, gate="gate 3"), PassGate("gate 4"))
+    start, goal = at_rest((0.0, 0.0, 1.5)), at_rest((-1.0, 0.0, 2.0))
+    plan = planned(Problem("tilted", start, goal, Course(asked), gates), JERKY)
     assert plan.certified
-    reach = 1.0 - QUAD.body_radius
-    offsets = []
-    for placed, gate in zip(plan.stages, gates, strict=True):
-        offset = plan.trajectory.evaluate(placed.time) - gate.position
-        assert abs(offset @ gate.normal) < 1e-5
-        offsets.append(max(abs(offset @ gate.lateral), abs(offset @ gate.up)))
-    assert max(offsets) <= reach + 1e-5
-    assert min(offsets) > 0.05  # no one's centre is asked
+    assert_smooth(plan, 4)
+    assert len(plan.stages) == len(gates)
+    offsets = [
+        plan.trajectory.evaluate(placed.time) - gate.position
+        for placed, gate in zip(plan.stages, gates, strict=True)
+    ]
+    assert min(np.linalg.norm(offsets[k]) for k in (0, 2)) > 0.05  # no one's centre is asked
+    assert max(np.linalg.norm(offsets[k]) for k in (1, 3)) < 1e-5
+    flight = own_flight(plan.trajectory, JERKY, plan.problem, plan.stages)
+    assert all(passage.clearance is not None and passage.clearance > 0.0 for passage in flight.passages)
 
 
 def test_multipliers_find_their_rows_among_more_samples() -> None:

@@ -59,13 +59,12 @@ class Strategy:
     precision: Precision
     first_tolerance: float  # of IPOPT, of the first solve from a start: what it finds is mended anyhow
     radius: float  # of the trust region at first, in scaled variables, see KnotVariables
-    kept: float  # of a limit's range: a smaller excess between samples leaves the trust region as it is
     backoff: float  # of every limit's range, kept at samples at first
     until_free: bool  # what stands at no edge of its trust region counts as near, however far it began
 
 
-OF_MANEUVERS = Strategy(ROUGH, ROUGH.tolerance, 2.0, 0.0, 1e-4, until_free=False)
-OF_COURSES = Strategy(FINE, ROUGH.tolerance, 3.0, 0.02, 5e-4, until_free=True)
+OF_MANEUVERS = Strategy(ROUGH, ROUGH.tolerance, 2.0, 1e-4, until_free=False)
+OF_COURSES = Strategy(FINE, ROUGH.tolerance, 3.0, 5e-4, until_free=True)
 
 
 @dataclass
@@ -107,7 +106,7 @@ class Descent:
         descent, found = self, self.plan(segments)
         best: tuple[tuple[int, float], Plan] | None = None
         for left in reversed(range(STRAIGHTENINGS + 1)):
-            if found is None or not self.framed.ways:
+            if found is None or not self.framed.problem.gates:
                 break
             flight = own_flight(found.trajectory, self.framed.vehicle, self.framed.problem, found.stages)
             if best is None or flight.rank < best[0]:
@@ -122,7 +121,8 @@ class Descent:
         """The descent from its best path, straighter through the gates that its own flight did not pass."""
         assert self.best is not None, "the path that was flown"
         framed, guess = self.framed, self.best.solution.source.guess
-        framed = replace(framed, ways=straighter(framed.ways, guess.stages, flight))
+        ways = straighter(framed.ways, guess.stages, framed.problem, framed.vehicle, flight)
+        framed = replace(framed, ways=ways)
         again = replace(self, framed=framed, best=None)
         again.run(guess, guess.trajectory.segments)
         return again
@@ -268,7 +268,7 @@ class _Exchange:
         self._samples = violation.joined(self._samples)
         if not solved and self._radius <= MIN_RADIUS:
             return False
-        if not (solved and converged) or violation.worst > self._descent.strategy.kept:
+        if not (solved and converged) or violation.worst > 0.0:
             self._radius = max(self._radius / SHRINK, MIN_RADIUS)
         if solved and violation.worst <= TRUSTED:
             self.guess = path.guess
