@@ -1,4 +1,4 @@
-"""How far off the gate's centre flights under `lab` pass, with the usual gains and with the disturbance observer.
+"""How far off the gate's centre flights under `lab` pass, without and with the disturbance observer.
 
 The floors: 95 % within 5 cm, more than 99 % through a gate 1.3 times the body's width, no crash.
 
