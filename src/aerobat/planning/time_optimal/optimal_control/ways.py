@@ -49,15 +49,13 @@ class Way:
     @property
     def sides(self) -> tuple[Array, Array]:
         """Outward normals of the opening's sides in the world, (K, 3), and how far they are, (K,) [m]."""
-        gate, sign = self.gate, np.array([1.0, -1.0])
-        outward = np.concatenate([np.outer(sign, axis) for axis in (gate.lateral, gate.up)])
-        return outward, np.repeat([gate.width, gate.height], 2) / 2.0 - FRAME_CLEARANCE
+        normals, distances = self.gate.opening.sides
+        return normals @ self.gate.plane_axes, distances - FRAME_CLEARANCE
 
     def hold(self, rows: Rows, mesh: Mesh, elements: Elements) -> None:
         """Add the constraints."""
         gate, node = self.gate, int(np.cumsum(mesh.intervals)[self.stage])
-        normals, distances = gate.opening.sides
-        outward, left = normals @ gate.plane_axes, distances - FRAME_CLEARANCE
+        outward, left = self.sides
         frame = [gate.position, gate.normal, outward.ravel(), left]
         way = np.concatenate([*frame, [self.reach, self.bending]])
         lower = np.append(np.zeros(2 * len(left)), sqrt(2.0 * self.bending * self.reach))
