@@ -224,6 +224,7 @@ def test_answers_cannot_be_written_to() -> None:
         ("positon_gain", "no differentiable quantity named 'positon_gain'; did you mean 'position_gain'?"),
         (("mass", 3), "sensitivity: of[1] must be a name, got 3"),
         ("lead_time_constant", "lead_time_constant has no slope"),
+        ("disturbance_filter", "disturbance_filter has no slope"),
         ("prioritize_tilt", "no differentiable quantity named 'prioritize_tilt'"),
     ],
 )
@@ -231,3 +232,8 @@ def test_what_has_no_slope_is_refused(of: object, message: str) -> None:
     with pytest.raises(SpecError) as caught:
         sensitivity(PATH, of, QUAD)
     assert str(caught.value).startswith(message)
+
+
+def test_conditions_are_refused_in_one_sentence() -> None:
+    with pytest.raises(SpecError, match="conditions draw what flies, which leaves no slopes"):
+        sensitivity(PATH, "mass", QUAD, conditions="lab")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from types import MappingProxyType
 from typing import Any, NamedTuple, get_type_hints
@@ -126,7 +126,10 @@ def sensitivity(
     and for arguments that do not fit together, BackendMissing for an engine that is not installed.
     """
     names = _known((of,) if isinstance(of, str) else tuple(of))
-    setup = with_metrics(prepare(plan, vehicle, environment=environment, config=config, **changes))
+    config = replace(config, **changes)
+    if config.conditions is not None:
+        raise SpecError("conditions draw what flies, which leaves no slopes; leave them out, or sweep")
+    setup = with_metrics(prepare(plan, vehicle, environment=environment, config=config))
     rotors = setup.fleet.lags.shape[1]
     shapes = {name: tuple(n or rotors for n in _SHAPES[name]) for name in names}
     directions = [
@@ -145,6 +148,10 @@ def _known(names: tuple[str, ...]) -> tuple[str, ...]:
         if name == "lead_time_constant":
             raise SpecError(
                 "lead_time_constant has no slope: it also moves where set-points are read, and they jump"
+            )
+        if name == "disturbance_filter":
+            raise SpecError(
+                "disturbance_filter has no slope: it counts under conditions only, which have none"
             )
         if name not in _SHAPES:
             raise unknown_name("differentiable quantity", str(name), _SHAPES)
