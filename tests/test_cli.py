@@ -265,7 +265,7 @@ def test_check_says_commands_rates_and_gates_in_words_and_in_numbers(capsys) -> 
     assert {f["quantity"] for f in findings if f["gate"] == "gate"} >= {
         "attitude",
         "speed through",
-        "sideways",
+        "inside by",
     }
     assert {f"rotor {i} command" for i in range(4)} <= {f["quantity"] for f in findings}
     assert "specific thrust along (0, 0, 1)" in {f["quantity"] for f in findings}
