@@ -27,8 +27,8 @@ from aerobat.planning.polynomial.min_snap import MinSnap
 from aerobat.planning.recorder import Progress, Recorder
 from aerobat.planning.result import FLYING_RESERVE, Plan
 from aerobat.planning.time_limit import TIME_LIMIT, stopped, too_short
-from aerobat.planning.time_optimal.optimal_control.ways import ways_through_gates
 from aerobat.planning.warm_start import Reserve, WarmStart, plans_to_begin_from, require_attitudes
+from aerobat.planning.ways import ways_through_gates
 from aerobat.problem.problem import Problem
 from aerobat.problem.stage import StageSequence
 from aerobat.vehicle import Vehicle

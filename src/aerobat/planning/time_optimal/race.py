@@ -14,8 +14,8 @@ from aerobat.planning.recorder import Attempt, Recorder
 from aerobat.planning.result import FLYABLE_ERROR, OwnFlight
 from aerobat.planning.time_optimal.collocated_program import CollocatedProgram, SolvedMotion
 from aerobat.planning.time_optimal.optimal_control.elements import Elements
-from aerobat.planning.time_optimal.optimal_control.ways import Way, straighter
 from aerobat.planning.time_optimal.starts import Start
+from aerobat.planning.ways import STRAIGHTENINGS, Way, straighter
 from aerobat.problem.problem import Problem
 from aerobat.vehicle import Vehicle
 
@@ -34,7 +34,6 @@ COURSE_COARSE_ITERATIONS = 250  # at most, of first solves
 COURSE_BARRIER = 1e-3  # of solves on the fine one, which begin near the solution
 ROUNDS = 8  # of solving, at most
 MORE_RESERVE = 1.6  # times the reserve, each time that the plan's own flight leaves its path
-STRAIGHTENINGS = 4  # of ways through gates, at most
 RESERVE_RAISES = 4  # at most
 MAX_RESERVE = 0.4
 COARSE_TIME = 0.4  # of the time that is left, where there is a limit, for all coarse solves,

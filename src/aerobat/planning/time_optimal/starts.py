@@ -19,8 +19,8 @@ from aerobat.planning.polynomial.knots import path_along_normals, start_along_no
 from aerobat.planning.polynomial.min_snap import MinSnap
 from aerobat.planning.result import Plan
 from aerobat.planning.time_optimal.optimal_control.collocation import CollocatedMotion, Mesh
-from aerobat.planning.time_optimal.optimal_control.ways import Way, ways_through_gates
 from aerobat.planning.warm_start import WarmStart
+from aerobat.planning.ways import Way, ways_through_gates
 from aerobat.problem.end_state import at_rest
 from aerobat.problem.maneuvers import Line
 from aerobat.problem.problem import Problem

@@ -13,8 +13,8 @@ from aerobat.planning.polynomial.descent.knot_variables import Frame
 from aerobat.planning.polynomial.descent.path_limits import PathLimits, bound_scale, path_bounds
 from aerobat.planning.polynomial.descent.rotor_constraints import RotorConstraints
 from aerobat.planning.result import Plan
-from aerobat.planning.time_optimal.optimal_control.ways import Way
 from aerobat.planning.warm_start import WarmStart
+from aerobat.planning.ways import Way
 from aerobat.problem.condition import ForceBalance
 from aerobat.problem.problem import Problem
 from aerobat.problem.stage import StageSequence

@@ -35,12 +35,11 @@ from aerobat.planning.polynomial.descent.stage_constraints import StageConstrain
 from aerobat.planning.recorder import Recorder
 from aerobat.planning.result import FLYABLE_ERROR, OwnFlight, PlacedStage, Plan
 from aerobat.planning.rotor_margin import reserve_shortfalls
-from aerobat.planning.time_optimal.optimal_control.ways import straighter
 from aerobat.planning.warm_start import WarmStart
+from aerobat.planning.ways import STRAIGHTENINGS, straighter
 
 NEAR_ITERATIONS = 50  # of a solve, at most, once a path is certified: what takes longer leads away from it
 ROUNDS = 12  # of solving, at most, from one start
-STRAIGHTENINGS = 4  # of ways through gates, at most
 LITTLE_GAIN = 0.005  # of the duration, from one certified path to the next: the end
 LITTLE_LOSS = 0.02  # of the duration, that certainty between samples costs: the end if the start was near
 LARGE_GAIN = 0.2  # of the duration: the start was far, trust regions confine what follows it

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import pairwise
-from math import inf, perm, sqrt
+from math import inf, perm
 from typing import Any
 
 import numpy as np
@@ -21,8 +21,7 @@ from aerobat.planning.polynomial.descent.path_limits import (
     bound_scale,
     scaled,
 )
-from aerobat.planning.time_optimal.optimal_control.elements import SLOWEST
-from aerobat.planning.time_optimal.optimal_control.ways import Way
+from aerobat.planning.ways import SLOWEST, Way
 from aerobat.problem.ball import Ball
 from aerobat.problem.condition import ForceBalance, LinearBound
 
@@ -134,7 +133,7 @@ class StageConstraints:
             room = (distance - reached - ca.dot(axis, offset)) * through - bent
             for ahead in (-way.reach, way.reach):
                 yield room + ahead * ca.dot(axis, velocity), 0.0, inf
-        yield through, sqrt(2.0 * way.bending * way.reach), inf
+        yield through, way.min_speed, inf
 
 
 @dataclass(frozen=True, eq=False)

@@ -24,12 +24,12 @@ from aerobat.planning.time_optimal.optimal_control.zero_yaw_rate_body import (
     VELOCITY,
     ZeroYawRateBody,
 )
+from aerobat.planning.ways import SLOWEST
 from aerobat.problem.condition import Condition, Quantity
 from aerobat.problem.problem import Problem
 from aerobat.vehicle import Vehicle
 
 BETWEEN = (0.25, 0.5, 0.75)  # of an interval: where bounds on the path are held too, beside its nodes
-SLOWEST = 0.5  # [m/s] through a gate, below which no more room is asked: far less than what is asked there
 RATE_SCALE = 10.0  # [rad/s] of body rates that have no bound
 
 

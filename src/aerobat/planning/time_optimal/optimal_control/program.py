@@ -26,8 +26,8 @@ from aerobat.planning.time_optimal.optimal_control.elements import (
     weighted_sum,
 )
 from aerobat.planning.time_optimal.optimal_control.rows import Rows, repeated
-from aerobat.planning.time_optimal.optimal_control.ways import Way
 from aerobat.planning.time_optimal.optimal_control.zero_yaw_rate_body import INPUTS, POSITION, STATES
+from aerobat.planning.ways import Way
 from aerobat.problem.condition import Condition
 from aerobat.problem.stage import Stage
 
@@ -62,7 +62,7 @@ class OptimalControl:
         for index, stage in enumerate(self.stages):
             self._hold_stage(rows, mesh, index, stage)
         for way in self.ways:
-            way.hold(rows, mesh, self.elements)
+            self._hold_way(rows, mesh, way)
         self.boundary.hold(rows, mesh)
         lower, upper = (mesh.pack(motion) for motion in self._box(mesh))
         return separable_program(
@@ -129,6 +129,16 @@ class OptimalControl:
         for fraction, low, high in ((earliest, 0.0, 0.0 if latest == earliest else inf), (latest, -inf, 0.0)):
             if 0.0 < fraction < 1.0 and (fraction == earliest or latest > earliest):
                 rows.hold(weighted_sum(len(phases)), phases[None], low, high, before - fraction)
+
+    def _hold_way(self, rows: Rows, mesh: Mesh, way: Way) -> None:
+        """The room of the body on a way through a gate, and its speed, at the stage that crosses it."""
+        node = int(np.cumsum(mesh.intervals)[way.stage])
+        outward, left = way.sides
+        gate = np.concatenate([way.gate.position, way.gate.normal])
+        parameters = np.concatenate([gate, outward.ravel(), left, [way.reach, way.bending]])
+        lower = np.append(np.zeros(2 * len(left)), way.min_speed)
+        there = mesh.states[node : node + 1]
+        rows.hold(self.elements.room_ahead(len(left)), there, lower, np.full(len(lower), inf), parameters)
 
     def _squared_rates(self, rates: Array) -> Array:
         return np.asarray((rates / self.elements.rate_scale) ** 2)

@@ -15,22 +15,19 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from math import inf, sqrt
-
-import numpy as np
+from math import sqrt
 
 from aerobat.arrays import Array
 from aerobat.certification import PlannedPassage
 from aerobat.planning.result import OwnFlight
-from aerobat.planning.time_optimal.optimal_control.collocation import Mesh
-from aerobat.planning.time_optimal.optimal_control.elements import Elements
-from aerobat.planning.time_optimal.optimal_control.rows import Rows
 from aerobat.problem.gate import Gate
 from aerobat.problem.problem import Problem
 from aerobat.problem.stage import Stage
 from aerobat.simulation.passages import PASSAGE_DEPTH
 from aerobat.vehicle import Vehicle
 
+STRAIGHTENINGS = 4  # of the ways of one plan, at most
+SLOWEST = 0.5  # [m/s] through a gate, below which no more room is asked: far less than what is asked there
 FRAME_CLEARANCE = 0.01  # [m] from body to frame
 BENDING = 0.4  # of the largest specific thrust: the acceleration by which a path may bend there, at first
 BENDING_IN_MANEUVER = 0.1  # likewise, where a maneuver bends it as it likes
@@ -52,15 +49,10 @@ class Way:
         normals, distances = self.gate.opening.sides
         return normals @ self.gate.plane_axes, distances - FRAME_CLEARANCE
 
-    def hold(self, rows: Rows, mesh: Mesh, elements: Elements) -> None:
-        """Add the constraints."""
-        gate, node = self.gate, int(np.cumsum(mesh.intervals)[self.stage])
-        outward, left = self.sides
-        frame = [gate.position, gate.normal, outward.ravel(), left]
-        way = np.concatenate([*frame, [self.reach, self.bending]])
-        lower = np.append(np.zeros(2 * len(left)), sqrt(2.0 * self.bending * self.reach))
-        room = elements.room_ahead(len(left))
-        rows.hold(room, mesh.states[node : node + 1], lower, np.full(len(lower), inf), way)
+    @property
+    def min_speed(self) -> float:
+        """The least speed through the gate [m/s], at which the path does not turn back."""
+        return sqrt(2.0 * self.bending * self.reach)
 
 
 def ways_through_gates(stages: Sequence[Stage], problem: Problem, vehicle: Vehicle) -> tuple[Way, ...]:
