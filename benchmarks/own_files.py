@@ -159,6 +159,9 @@ def _problem(pen: Pen, kind: str, case: int) -> Table:
     table: Table = {"name": f"own-{case}-{kind}", "start": _end(pen, start), "goal": _end(pen, goal)}
     if pen.chance(0.1):
         table["goal"]["free_attitude"] = True
+    if pen.chance(0.1):
+        table["goal"].pop("velocity", None)
+        table["goal"]["free_velocity"] = True
     table["maneuver"] = {"kind": kind} | _MANEUVERS[kind](pen, middle, gates)
     table |= {"gates": gates} if pen.chance(0.3) else {"gate": gates[0]} if gates else {}
     limits = pen.some(_LIMITS, 0.15)
@@ -200,14 +203,12 @@ def _gate(pen: Pen, position: list[float], kind: str) -> Table:
             {"heading_deg": lambda p: p.number(-60, 60), "elevation_deg": lambda p: p.number(-20, 20)}, 0.5
         )
         gate["tilt_deg"] = tilt
-    gate |= pen.some(
-        {
-            "width": lambda p: p.number(0.5, 2.0),
-            "height": lambda p: p.number(0.3, 1.0),
-            "name": lambda _: "gate",
-        },
-        0.3,
-    )
+    sides = pen.some({"width": lambda p: p.number(0.5, 2.0), "height": lambda p: p.number(0.3, 1.0)}, 0.3)
+    low, high = pen.number(0.3, 0.6), pen.number(0.5, 1.0)
+    corner: list[list[float]] = [[-high, -low], [high, -low], [0.0, high]]
+    others = pen.one_of({"radius": high}, {"diameter": pen.number(0.8, 2.0)}, {"polygon": corner})
+    gate |= others if pen.chance(0.25) else sides
+    gate |= pen.some({"name": lambda _: "gate"}, 0.3)
     tolerance = pen.one_of(
         {}, {"attitude_tolerance": pen.number(0.02, 0.2)}, {"attitude_tolerance_deg": pen.number(1, 15)}
     )

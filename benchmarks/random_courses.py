@@ -73,8 +73,8 @@ def _passage(rng: np.random.Generator, gate: Gate) -> PassGate:
     return PassGate(gate.name, crossing_point=point, margin=margin, upright=upright)
 
 
-def planned(problem: ab.Problem, vehicle: ab.Vehicle, planner: str | None) -> Plan:
-    """The plan that the command line makes."""
+def planned(problem: ab.Problem, vehicle: ab.Vehicle, planner: str | None = None) -> Plan:
+    """The plan that the command line makes, by a named planner or the one that it takes itself."""
     cls = planner_class(planner or suited_planner(problem, vehicle))
     options = {o.name: o.command_default for o in planner_options(cls) if o.command_default is not None}
     return ab.plan(problem, cls(**options), vehicle)

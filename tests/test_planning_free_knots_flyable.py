@@ -15,6 +15,7 @@ from aerobat.planning.polynomial.descent.framed_problem import FramedProblem
 from aerobat.planning.polynomial.descent.knot_program import KnotProgram
 from aerobat.planning.polynomial.descent.knot_samples import chebyshev_samples, refit
 from aerobat.planning.polynomial.descent.knot_variables import KnotVariables
+from aerobat.planning.polynomial.descent.stage_constraints import StageConstraints
 from aerobat.planning.polynomial.free_knots import FreeKnots
 from aerobat.planning.warm_start import WarmStart
 from aerobat.problem import GatePassage, HalfFlip, Problem, Waypoint, Waypoints, at_rest, load_problem
@@ -125,7 +126,8 @@ def test_derivatives_given_to_the_solver_are_those_of_differentiation() -> None:
     guess = replace(guess, trajectory=refit(guess.trajectory, 3))
     place = int(np.searchsorted(guess.trajectory.knots[1:-1], guess.times[0], side="right"))
     variables = KnotVariables(problem, vehicle, guess, (place,), framed.frame, 1.0, still_ends=False)
-    program = KnotProgram(variables, framed.limits, chebyshev_samples(3), framed.balance, np.zeros(3)).program
+    stages = StageConstraints(variables, framed.limits, framed.balance)
+    program = KnotProgram(variables, framed.limits, chebyshev_samples(3), stages, np.zeros(3)).program
     rng = np.random.default_rng(0)
     x = variables.start + 1e-3 * rng.normal(size=variables.size)
     multipliers = rng.normal(size=program.lower.size)
