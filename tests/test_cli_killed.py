@@ -40,10 +40,12 @@ try:
     main(["fly", "line", "--json", "--out", "warm/run"])
 except SystemExit:
     pass
+for order in "45":
+    child(["plan", "line", "--order", order, "--json", "--out", f"plans/{order}"])
 for function, nth in json.loads(sys.argv[1]):
-    child(["fly", "line", "--order", "4", "--json", "--out", "runs/run"])
+    child(["fly", "plans/4", "--json", "--out", "runs/run"])
     cleared = sorted(os.listdir("runs"))
-    code = child(["fly", "line", "--order", "5", "--json", "--out", "runs/run"], function, nth)
+    code = child(["fly", "plans/5", "--json", "--out", "runs/run"], function, nth)
     files = {path.name: path.read_bytes().hex() for path in Path("runs/run").iterdir()}
     order = json.loads(bytes.fromhex(files["report.json"]))["plan"]["order"]
     print(json.dumps([function, nth, code, cleared, order, files]), file=sys.stderr)
