@@ -16,6 +16,7 @@ from aerobat.vehicle import Vehicle
 from aerobat.vehicle.controller import Controller
 
 ControlRate = Annotated[float, Field(ge=1, le=1e6, description="number from 1 to 1e6")]
+MAX_FLIGHTS = 10_000_000  # under conditions
 LogRate = Annotated[float, Field(ge=1e-3, le=1e6, description="number from 0.001 to 1e6")]
 
 
@@ -28,11 +29,14 @@ def _conditions(value: Any) -> Dispersion | None:
 
 
 def _flights(value: Any) -> range | None:
-    if isinstance(value, int) and not isinstance(value, bool) and value > 0:
-        return range(value)
-    if value is None or (isinstance(value, range) and value and min(value) >= 0):
-        return value
-    raise FieldError("", f"must be a whole number of flights, or a range of theirs, got {shown(value)}")
+    flights = range(value) if isinstance(value, int) and not isinstance(value, bool) else value
+    if value is None:
+        return None
+    if not isinstance(flights, range) or not flights or min(flights[0], flights[-1]) < 0:
+        raise FieldError("", f"must be a whole number of flights, or a range of theirs, got {shown(value)}")
+    if max(flights[0], flights[-1]) >= MAX_FLIGHTS:
+        raise FieldError("", f"must be {MAX_FLIGHTS} flights at most, got {shown(value)}")
+    return flights
 
 
 @declared

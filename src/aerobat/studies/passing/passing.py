@@ -5,9 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from math import ceil, log
-from typing import Any
+from typing import Annotated, Any
 
-from aerobat.declaration import Count, Seed, validated
+from pydantic import Field
+
+from aerobat.declaration import Seed, validated
 from aerobat.environment import Dispersion, as_dispersion
 from aerobat.errors import Infeasible, SpecError
 from aerobat.evaluation import Scores, score_flights
@@ -31,6 +33,7 @@ MAX_STEPS = 20  # a reserve of two fifths at either end leaves a fifth of the ra
 PROVING_FAILURES = 20
 # proofs are attempted on flights of their own: each errs with 2.5 % at most, both together with 5 %
 PROOFS = 2
+Flights = Annotated[int, Field(ge=1, le=10**6, description="whole number from 1 to a million")]
 
 
 @validated
@@ -42,8 +45,8 @@ def plan_to_pass(
     probability: Probability = 0.99,
     conditions: Dispersion | str = "lab",
     seed: Seed = 0,
-    flights: Count = 1000,
-    fresh: Count | None = None,
+    flights: Flights = 1000,
+    fresh: Flights | None = None,
     progress: Callable[[Attempt], None] | None = None,
     tried: Callable[[Round], None] | None = None,
 ) -> Passing:
