@@ -97,3 +97,9 @@ def test_what_cannot_be_reached_names_the_cause_in_the_way():
 def test_what_can_prove_nothing_is_refused(settings, named):
     with pytest.raises(ab.SpecError, match=named):
         ab.plan_to_pass("line", **settings)
+
+
+@pytest.mark.parametrize("flights", [10**15, range(5, 10**15), range(10**15, 0, -1)])
+def test_more_flights_than_can_be_flown_are_refused_at_once(flights):
+    with pytest.raises(ab.SpecError, match="flights must be 10000000 flights at most"):
+        ab.FlightConfig(conditions=WEAK, flights=flights)
