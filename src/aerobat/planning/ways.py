@@ -13,18 +13,22 @@ attitude R, so that s = |D Rᵀ e| along e.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from math import sqrt
+from typing import TypeVar
 
 from aerobat.arrays import Array
 from aerobat.certification import PlannedPassage
-from aerobat.planning.result import OwnFlight
+from aerobat.optimization.deadline import out_of_time
+from aerobat.planning.result import FLYABLE_ERROR, OwnFlight
 from aerobat.problem.gate import Gate
 from aerobat.problem.problem import Problem
 from aerobat.problem.stage import Stage
 from aerobat.simulation.passages import PASSAGE_DEPTH
 from aerobat.vehicle import Vehicle
+
+Found = TypeVar("Found")
 
 STRAIGHTENINGS = 4  # of the ways of one plan, at most
 SLOWEST = 0.5  # [m/s] through a gate, below which no more room is asked: far less than what is asked there
@@ -91,6 +95,32 @@ def straighter(
         else:
             found[k] = replace(last, bending=MORE_BENDING * last.bending)
     return tuple(way for way in found.values() if way is not None)
+
+
+def straightened(
+    found: Found,
+    flown: Callable[[Found], OwnFlight],
+    again: Callable[[Found, OwnFlight], Found | None],
+) -> tuple[OwnFlight, Found]:
+    """The best of what was found and of straighter ways through gates that its own flight does not pass.
+
+    Returned with its flight. Only where the flight keeps to its path: else it is not the path that misses them.
+
+    Args:
+        found: What flies.
+        flown: Its own flight.
+        again: What is found on straighter ways than those of a flight; None where there is nothing.
+    """
+    best = flight, _ = flown(found), found
+    for _ in range(STRAIGHTENINGS):
+        if not (flight.lingers and flight.error <= FLYABLE_ERROR) or out_of_time():
+            break
+        following = again(found, flight)
+        if following is None:
+            break
+        flight, found = flown(following), following
+        best = min(best, (flight, found), key=lambda pair: pair[0].rank)
+    return best
 
 
 def _way(k: int, stages: Sequence[Stage], problem: Problem, vehicle: Vehicle, bending: float) -> Way | None:

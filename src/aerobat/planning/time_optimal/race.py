@@ -11,11 +11,11 @@ from aerobat.planning.certified_solve import Judged, certified_solve
 from aerobat.planning.courses import is_course
 from aerobat.planning.flyability import own_flight
 from aerobat.planning.recorder import Attempt, Recorder
-from aerobat.planning.result import FLYABLE_ERROR, OwnFlight
+from aerobat.planning.result import OwnFlight
 from aerobat.planning.time_optimal.collocated_program import CollocatedProgram, SolvedMotion
 from aerobat.planning.time_optimal.optimal_control.elements import Elements
 from aerobat.planning.time_optimal.starts import Start
-from aerobat.planning.ways import STRAIGHTENINGS, Way, straighter
+from aerobat.planning.ways import Way, straightened, straighter
 from aerobat.problem.problem import Problem
 from aerobat.vehicle import Vehicle
 
@@ -83,7 +83,7 @@ class Race:
 
         Where no reserve is wanted it stays as it is, and where none is enough the best is returned.
         """
-        best, reserve = self._through_gates(found), self.reserve
+        best, reserve = straightened(found, self._own_flight, self._straighter), self.reserve
         found = best[1]
         for _ in range(RESERVE_RAISES if reserve > 0.0 else 0):
             if not best[0].wants_reserve or out_of_time():
@@ -96,29 +96,14 @@ class Race:
                 best = min(best, (self._own_flight(found), found), key=lambda pair: pair[0].rank)
         return best[1]
 
-    def _through_gates(self, found: Judged[SolvedMotion]) -> tuple[OwnFlight, Judged[SolvedMotion]]:
-        """What was found, or with straighter ways through the gates that its own flight misses, and that.
-
-        Only of a flight that keeps to its path: where it leaves it, the path is not what misses them.
-        """
-        best = flight, _ = self._own_flight(found), found
-        for _ in range(STRAIGHTENINGS):
-            program = found.solution.source.program
-            keeps_path = flight.error <= FLYABLE_ERROR
-            if not (flight.lingers and keeps_path) or out_of_time():
-                break
-            before = program.start.ways
-            ways = straighter(before, program.control.stages, self.problem, self.vehicle, flight)
-            if ways == before:
-                break
-            again = self._certified(
-                self._fine(program.control.elements, found.solution.source, self.reserve, ways)
-            )
-            if again is None:
-                break
-            flight, found = self._own_flight(again), again
-            best = min(best, (flight, found), key=lambda pair: pair[0].rank)
-        return best
+    def _straighter(self, found: Judged[SolvedMotion], flight: OwnFlight) -> Judged[SolvedMotion] | None:
+        """What is found on straighter ways through the gates that a flight did not pass, if anything is."""
+        solved = found.solution.source
+        before, control = solved.program.start.ways, solved.program.control
+        ways = straighter(before, control.stages, self.problem, self.vehicle, flight)
+        if ways == before:
+            return None
+        return self._certified(self._fine(control.elements, solved, self.reserve, ways))
 
     def _coarse(self, starts: Sequence[Start], body: Vehicle) -> list[CollocatedProgram]:
         """Fine programs from where coarse ones end, the fastest first."""

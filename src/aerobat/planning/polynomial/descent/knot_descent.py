@@ -33,10 +33,10 @@ from aerobat.planning.polynomial.descent.knot_samples import (
 from aerobat.planning.polynomial.descent.knot_variables import KnotVariables
 from aerobat.planning.polynomial.descent.stage_constraints import StageConstraints
 from aerobat.planning.recorder import Recorder
-from aerobat.planning.result import FLYABLE_ERROR, OwnFlight, PlacedStage, Plan
+from aerobat.planning.result import OwnFlight, PlacedStage, Plan
 from aerobat.planning.rotor_margin import reserve_shortfalls
 from aerobat.planning.warm_start import WarmStart
-from aerobat.planning.ways import STRAIGHTENINGS, straighter
+from aerobat.planning.ways import straightened, straighter
 
 NEAR_ITERATIONS = 50  # of a solve, at most, once a path is certified: what takes longer leads away from it
 ROUNDS = 12  # of solving, at most, from one start
@@ -102,29 +102,30 @@ class Descent:
 
         Only of a flight that keeps to its path: where it leaves it, the path is not what misses them.
         """
-        descent, found = self, self.plan(segments)
-        best: tuple[tuple[int, float], Plan] | None = None
-        for left in reversed(range(STRAIGHTENINGS + 1)):
-            if found is None or not self.framed.problem.gates:
-                break
-            flight = own_flight(found.trajectory, self.framed.vehicle, self.framed.problem, found.stages)
-            if best is None or flight.rank < best[0]:
-                best = flight.rank, found
-            if not (left and flight.lingers and flight.error <= FLYABLE_ERROR) or out_of_time():
-                break
-            descent = descent._on_straighter_ways(flight)
-            found = descent.plan(segments)
-        return found if best is None else best[1]
+        if self.best is None or not self.framed.problem.gates:
+            return self.plan(segments)
+        _, descent = straightened(self, Descent._own_flight, Descent._on_straighter_ways)
+        return descent.plan(segments)
 
-    def _on_straighter_ways(self, flight: OwnFlight) -> Descent:
+    def _own_flight(self) -> OwnFlight:
+        """The flight of the best path."""
+        path, framed = self._best_path, self.framed
+        return own_flight(path.trajectory, framed.vehicle, framed.problem, _placed(path))
+
+    def _on_straighter_ways(self, flight: OwnFlight) -> Descent | None:
         """The descent from its best path, straighter through the gates that its own flight did not pass."""
-        assert self.best is not None, "the path that was flown"
-        framed, guess = self.framed, self.best.solution.source.guess
+        framed, guess = self.framed, self._best_path
         ways = straighter(framed.ways, guess.stages, framed.problem, framed.vehicle, flight)
-        framed = replace(framed, ways=ways)
-        again = replace(self, framed=framed, best=None)
+        if ways == framed.ways:
+            return None
+        again = replace(self, framed=replace(framed, ways=ways), best=None)
         again.run(guess, guess.trajectory.segments)
-        return again
+        return None if again.best is None else again
+
+    @property
+    def _best_path(self) -> WarmStart:
+        assert self.best is not None, "a path that is certified"
+        return self.best.solution.source.guess
 
     def plan(self, segments: int) -> Plan | None:
         """The plan of what is certified, its start's path where that is the best; None if nothing is.
@@ -134,15 +135,13 @@ class Descent:
         if self.best is None:
             return None
         path, start = self.best.solution.source.guess, self.best.solution.source.start
-        numbers = np.searchsorted(path.trajectory.knots[1:-1], path.times, side="right").tolist()
-        stages = zip(path.stages, numbers, path.times, strict=True)
         return self.best.plan(
             self.recorder,
             planner="free-knots",
             order=5 if start is None else start.order,
             status=CONVERGED if start is None else "feasible",
             backend="ipopt" if start is None else start.backend,
-            stages=tuple(PlacedStage(s.name, segment, time, s.gate) for s, segment, time in stages),
+            stages=_placed(path),
             rescue=_instead(start, path.trajectory.segments, segments),
         )
 
@@ -157,6 +156,13 @@ class Descent:
         if self.best is None or found.solution.duration < self.best.solution.duration:
             self.best = found
         return found
+
+
+def _placed(path: WarmStart) -> tuple[PlacedStage, ...]:
+    """The stages of a path, each in its segment."""
+    numbers = np.searchsorted(path.trajectory.knots[1:-1], path.times, side="right").tolist()
+    stages = zip(path.stages, numbers, path.times, strict=True)
+    return tuple(PlacedStage(s.name, segment, time, s.gate) for s, segment, time in stages)
 
 
 def _instead(start: Plan | None, found: int, asked: int) -> str:
