@@ -104,7 +104,7 @@ def straightened(
 ) -> tuple[OwnFlight, Found]:
     """The best of what was found and of straighter ways through gates that its own flight does not pass.
 
-    Returned with its flight. Only where the flight keeps to its path: else it is not the path that misses them.
+    With its flight. Only where that keeps to its path: else it is not the path that misses them.
 
     Args:
         found: What flies.
