@@ -20,6 +20,7 @@ from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from itertools import pairwise
 from math import hypot
+from threading import Thread
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -30,8 +31,9 @@ from aerobat.links.ros import topics
 from aerobat.links.ros.middleware import Middleware
 
 SPEED = "1"  # times the wall's, at most
-ANSWERED = 30.0  # [s] of the wall, for which a plan may take on a busy machine
+ANSWERED = 60.0  # [s] of the wall, for which a plan may take on a busy machine
 LONG = 30.0  # [s] of the vehicle's time, for a take-off or a landing
+TRIES = 4  # of either
 LONG_ENOUGH = 30.0  # [s] of goals
 MORE = 0.02  # [m] that a flight by topics may be off more than one in process, which is off by 0.01 mm
 
@@ -44,7 +46,7 @@ def free_port() -> int:
 
 @contextmanager
 def process(*command: str, says: str = "") -> Iterator[subprocess.Popen[str]]:
-    """A process in the background, once it has said something."""
+    """A process in the background, once it has said something; of a failed session it tells where it is."""
     with tempfile.TemporaryFile("w+") as log:
         started = subprocess.Popen(command, stdout=log, stderr=log, text=True, start_new_session=True)
 
@@ -56,6 +58,9 @@ def process(*command: str, says: str = "") -> Iterator[subprocess.Popen[str]]:
             wait(lambda: says in said() or started.poll() is not None, f"{command} to begin")
             assert started.poll() is None, said()
             yield started
+        except BaseException:
+            started.send_signal(signal.SIGABRT)  # tells where each of its threads is
+            raise
         finally:
             started.send_signal(signal.SIGINT)
             try:
@@ -92,7 +97,7 @@ class Watch:
         """Take messages until something holds."""
 
         def holds() -> bool:
-            self._ros.work_until(self._ros.time() + 20_000_000)  # [ns]
+            self._ros.work_until(0)  # what has come, whether or not time goes on
             return until()
 
         wait(holds, what)
@@ -140,9 +145,11 @@ def ros1_services() -> Ask:
     from std_srvs.srv import Trigger
 
     def ask(service: str) -> tuple[bool, str]:
-        rospy.wait_for_service(service, 30.0)
-        answer = rospy.ServiceProxy(service, Trigger)()
-        return answer.success, answer.message
+        rospy.wait_for_service(service, ANSWERED)
+        answers: list[Any] = []
+        Thread(target=lambda: answers.append(rospy.ServiceProxy(service, Trigger)()), daemon=True).start()
+        wait(lambda: bool(answers), f"an answer of {service}", ANSWERED)
+        return answers[0].success, answers[0].message
 
     return ask
 
@@ -153,27 +160,30 @@ def ros2_services(node: Any) -> Ask:
 
     def ask(service: str) -> tuple[bool, str]:
         client = node.create_client(Trigger, service)
-        assert client.wait_for_service(30.0), service
-        answered = client.call_async(Trigger.Request())
-        end = time.monotonic() + ANSWERED
-        wait(lambda: answered.done() or time.monotonic() > end, service)
-        if not answered.done():  # a server that was killed is known for a while, and may have been asked
-            return ask(service)
-        answer = answered.result()
-        return answer.success, answer.message
+        for _ in range(TRIES):  # a server that was killed is known for a while, and may have been asked
+            assert client.wait_for_service(ANSWERED), service
+            answered = client.call_async(Trigger.Request())
+            end = time.monotonic() + ANSWERED
+            while not answered.done() and time.monotonic() < end:
+                time.sleep(0.05)
+            if answered.done():
+                answer = answered.result()
+                return answer.success, answer.message
+        raise AssertionError(f"asked in vain for {service}")
 
     return ask
 
 
 def asked(ask: Ask, service: str) -> None:
     """Have a service succeed; it is asked again where the node has not yet heard of the vehicle."""
-    while True:
-        success, sentence = ask(f"/aerobat/{service}")
+    success, sentence = ask(f"/aerobat/{service}")
+    for _ in range(100):
         if "nothing was heard" not in sentence:
-            print(f"{service}: {sentence}", flush=True)
-            assert success or f"is {service}ing" in sentence, sentence
-            return
+            break
         time.sleep(0.2)
+        success, sentence = ask(f"/aerobat/{service}")
+    print(f"{service}: {sentence}", flush=True)
+    assert success or " is climbing already" in sentence or " is landing" in sentence, sentence
 
 
 def brought(watch: Watch, ask: Ask, service: str, there: Callable[[], bool]) -> None:
@@ -181,10 +191,14 @@ def brought(watch: Watch, ask: Ask, service: str, there: Callable[[], bool]) -> 
 
     Where it has not yet found who sends goals it does not move, and the node leaves it to itself: then again.
     """
-    while not there():
-        watch.goals.clear()
+    watch.goals.clear()
+    for _ in range(TRIES):
         asked(ask, service)
         watch.wait(watch.passed(LONG, there), service)
+        if there():
+            return
+        watch.goals.clear()
+    raise AssertionError(f"{service} has led nowhere")
 
 
 def whole(goals: list[PathPiece], waits: bool = True) -> float:
@@ -250,7 +264,7 @@ def session(generation: str, speed: str | None) -> Iterator[Session]:
     A vehicle stands on the ground; of a given speed it is the clock.
     """
     with ExitStack() as stack:
-        aerobat = (sys.executable, "-m", "aerobat")
+        aerobat = (sys.executable, "-X", "faulthandler", "-m", "aerobat")
         options: tuple[str, ...] = ()
         pace = () if speed is None else ("--speed", speed)
         ros: Any

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -94,6 +97,38 @@ def test_a_pause_of_goals_and_odometry_in_a_climb_ends_up_there_too() -> None:
     sky.run_for(1.0)
     assert sky.hovers
     assert sky.position[2] == pytest.approx(3.0, abs=0.01)
+
+
+def test_nothing_is_imported_while_a_vehicle_waits_for_goals() -> None:
+    """An import takes longer than the silence after which a vehicle leaves its client."""
+    script = Path(__file__).parent / "flight_of_imports.py"
+    done = subprocess.run([sys.executable, script], capture_output=True, text=True, check=True)
+    assert not done.stdout.split()
+
+
+def test_a_vehicle_that_hears_late_of_a_landings_goals_lands_all_the_same() -> None:
+    """As one does for which a node that has just begun is still unknown."""
+    sky = aloft()
+    sky.graph.cut.add(topics.GOAL)
+    sky.run_for(1.0)
+    assert sky.call("land").success
+    sky.run_for(4.0)
+    assert sky.hovers
+    sky.graph.cut.clear()
+    sky.run(lambda: sky.node.commander.doing is Doing.NOTHING)
+    assert sky.vehicle.landed
+    assert not sky.vehicle.armed
+    assert not sky.vehicle.crashed
+
+
+def test_a_vehicle_that_never_lands_is_left_to_itself() -> None:
+    sky = aloft()
+    sky.graph.cut.add(topics.GOAL)
+    sky.run_for(1.0)
+    assert sky.call("land").success
+    sky.run(lambda: sky.node.commander.doing is Doing.NOTHING)
+    assert "the vehicle does not land as it is told; it is left to itself" in sky.said
+    assert sky.hovers
 
 
 def test_a_vehicle_that_never_takes_off_is_left_to_itself() -> None:

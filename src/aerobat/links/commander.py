@@ -27,8 +27,8 @@ _SPEED, _ACCELERATION = 2.0, 2.0  # [m/s], [m/s²] of climbs
 _DESCENT = 1.0  # [m/s] when landing
 _BELOW = 0.3  # [m] under the ground, where the way of a landing ends, so that it is reached in motion
 _STANDING = 1.0  # [s] that goals stay there once it is reached
-_BEHIND = 0.25  # [m] that a vehicle is off its goal when it does not climb as it is told
-_PATIENCE = 10.0  # [s] longer than a climb takes, after which it is told no more
+_BEHIND = 0.25  # [m] that a vehicle is off its goal when it does not climb or land as it is told
+_PATIENCE = 10.0  # [s] longer than either takes, after which it is told no more
 _SPINNING_UP = 1.5  # [s] that goals stay on the ground before they climb, so that who obeys gets ready
 _ASTRAY = 1.5  # [m] from its goal, from which on a vehicle does not follow it
 _STILL = 0.15  # [m/s] of a hover
@@ -80,7 +80,7 @@ class Commander:
         self.mission: Mission[PathGoal] | None = None  # the last one
         self._vehicle, self._gravity, self._period, self._say = vehicle, gravity, period, say
         self._way: _Way | None = None
-        self._climbed_by = 0.0  # [s] until when a vehicle has to be up
+        self._there_by = 0.0  # [s] until when a vehicle has to be up, or down
 
     @property
     def reason(self) -> str:
@@ -103,7 +103,7 @@ class Commander:
         here = np.array(seen.body.position)
         self.ground = float(here[2])
         up = rest_to_rest(here, here + height * so3.UP, _SPEED, _ACCELERATION)
-        self._climbed_by = now + _SPINNING_UP + up.duration + _PATIENCE
+        self._there_by = now + _SPINNING_UP + up.duration + _PATIENCE
         self._go(Doing.CLIMBING, now + _SPINNING_UP, up, yaw_of(seen.body.q_world_body))
 
     def hover(self, now: float) -> None:
@@ -119,7 +119,9 @@ class Commander:
         here = np.array(seen.body.position) if self._way is None else self._hover_point()
         bottom = np.array([here[0], here[1], self.ground - _BELOW])
         yaw = yaw_of(seen.body.q_world_body) if self._way is None else self._way.yaw
-        self._go(Doing.LANDING, now, rest_to_rest(here, bottom, _DESCENT, _ACCELERATION), yaw)
+        down = rest_to_rest(here, bottom, _DESCENT, _ACCELERATION)
+        self._there_by = now + down.duration + _PATIENCE
+        self._go(Doing.LANDING, now, down, yaw)
 
     def require_hover(self, now: float) -> Observed:
         """What is seen of a vehicle that hovers, ours or left to itself. Raises SpecError for another."""
@@ -149,7 +151,9 @@ class Commander:
             return self._upright(self._of_mission(now, late))
         if self._way is None or self._leave_unseen(now):
             return None
-        if self._climbs_in_vain(now) if self.doing is Doing.CLIMBING else self._leave_astray():
+        if self._begins_anew and not self._begin_anew(now):
+            return None
+        if self._leave_astray():
             return None
         since = now + self._period - self._way.began
         if self.doing is not Doing.LANDING and since >= self._way.path.duration:
@@ -207,22 +211,29 @@ class Commander:
         self._say(f"the vehicle is {length(off)} off its goal; it is left to itself")
         return True
 
-    def _climbs_in_vain(self, now: float) -> bool:
-        """True where a vehicle does not climb for too long; until then, where it is behind, it begins anew.
+    @property
+    def _begins_anew(self) -> bool:
+        """True of a vehicle that does not climb or land as it is told, and is in the air or to get there.
 
         Whoever obeys may hear of the goals late, or hover for a pause of them, and takes up none that is far.
         """
-        if self._off() <= _BEHIND:
+        if self.doing not in (Doing.CLIMBING, Doing.LANDING) or self._off() <= _BEHIND:
             return False
-        if now > self._climbed_by:
-            self.doing, self._way = Doing.NOTHING, None
-            self._say("the vehicle does not climb as it is told; it is left to itself")
-            return True
-        assert self._way is not None, "asked on a way only"
         assert self.seen is not None, "a vehicle is seen before it is flown"
-        top, here = self._way.path.evaluate(self._way.path.duration), np.array(self.seen.body.position)
-        self._go(Doing.CLIMBING, now, rest_to_rest(here, top, _SPEED, _ACCELERATION), self._way.yaw)
-        return False
+        return self.doing is Doing.CLIMBING or self.seen.body.position[2] > self.ground + _ALOFT
+
+    def _begin_anew(self, now: float) -> bool:
+        """Lead it on from where it is; false where that has lasted too long, and it is left to itself."""
+        assert self.seen is not None and self._way is not None, "asked on a way only"  # noqa: PT018
+        if now > self._there_by:
+            order = "climb" if self.doing is Doing.CLIMBING else "land"
+            self.doing, self._way = Doing.NOTHING, None
+            self._say(f"the vehicle does not {order} as it is told; it is left to itself")
+            return False
+        end, here = self._way.path.evaluate(self._way.path.duration), np.array(self.seen.body.position)
+        speed = _SPEED if self.doing is Doing.CLIMBING else _DESCENT
+        self._go(self.doing, now, rest_to_rest(here, end, speed, _ACCELERATION), self._way.yaw)
+        return True
 
     def _off(self) -> float:
         """How far the vehicle is off its way [m], when it was seen."""

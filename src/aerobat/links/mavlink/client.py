@@ -18,6 +18,7 @@ from aerobat.links.mavlink.connection import Connection
 from aerobat.links.mavlink.frames import HOVER_THRUST
 from aerobat.links.mission import Mission, MissionSettings, Phase
 from aerobat.links.path_follower import PathFollower
+from aerobat.links.rehearsal import rehearse
 from aerobat.links.report import LinkReport, link_report
 from aerobat.links.stream import SetpointStream
 from aerobat.planning import Plan
@@ -79,6 +80,7 @@ class Client:
         """
         assert plan.vehicle is not None, "a plan that is flyable has a vehicle"
         environment = plan.problem.environment
+        rehearse(plan.vehicle, environment.gravity)
         stream = SetpointStream(plan.trajectory, plan.vehicle, environment, offset)
         self.mission = Mission(plan, mission, stream, PathFollower(stream, plan.vehicle, environment))
         self._plan, self._offset = plan, offset

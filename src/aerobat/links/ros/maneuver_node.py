@@ -17,6 +17,7 @@ from aerobat.links.commander import Commander, Doing
 from aerobat.links.goals import PathGoal, PathPiece, yaw_of
 from aerobat.links.mission import Mission, MissionSettings
 from aerobat.links.path_follower import PathForwarder
+from aerobat.links.rehearsal import rehearse
 from aerobat.links.report import LinkReport
 from aerobat.links.ros import topics
 from aerobat.links.ros.middleware import Answer, Middleware
@@ -69,6 +70,7 @@ class ManeuverNode:
         self._ros = ros
         self.settings = settings
         gravity = next(iter(maneuvers.values()))[0].environment.gravity
+        rehearse(vehicle, gravity)
         self.commander = Commander(vehicle, gravity, 1.0 / settings.rate, say)
         self._vehicle, self._maneuvers, self._executor = vehicle, maneuvers, executor
         self._messages, self._say, self._period = Messages(ros.make), say, 1.0 / settings.rate
