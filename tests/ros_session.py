@@ -2,8 +2,9 @@
 
 python tests/ros_session.py ros1|ros2
 
-Run by .ci/run with an interpreter that has that ROS and aerobat; ends with 1 where something does not hold.
-The vehicle's clock waits for goals that are late, so that a busy machine takes longer, and no more.
+Run by .ci/run with an interpreter that has that ROS and aerobat; ends with 1 where something does not hold,
+with 75 where it waited in vain. The vehicle's clock waits for goals that are late, so that a busy machine
+takes longer, and no more.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ import subprocess
 import sys
 import tempfile
 import time
+import traceback
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from itertools import pairwise
@@ -74,7 +76,8 @@ def wait(until: Callable[[], bool], what: str, limit: float = 120.0) -> None:
     """Wait for something, for no longer than so many seconds of the wall."""
     end = time.monotonic() + limit
     while not until():
-        assert time.monotonic() < end, f"waited in vain for {what}"
+        if time.monotonic() > end:
+            raise TimeoutError(f"waited in vain for {what}")
         time.sleep(0.05)
 
 
@@ -169,7 +172,7 @@ def ros2_services(node: Any) -> Ask:
             if answered.done():
                 answer = answered.result()
                 return answer.success, answer.message
-        raise AssertionError(f"asked in vain for {service}")
+        raise TimeoutError(f"asked in vain for {service}")
 
     return ask
 
@@ -291,7 +294,18 @@ def session(generation: str, speed: str | None) -> Iterator[Session]:
         yield ros, Watch(ros), ask, lambda: process(*aerobat, generation, *options, says="to look")
 
 
+def main(generation: str) -> int:
+    """The exit status."""
+    signal.signal(signal.SIGTERM, signal.default_int_handler)  # so that no process is left
+    try:
+        with session(generation, SPEED) as (_, watch, ask, node):
+            fly(watch, ask, node)
+    except TimeoutError:
+        traceback.print_exc()
+        return os.EX_TEMPFAIL
+    print(f"{generation}: all holds", flush=True)
+    return 0
+
+
 if __name__ == "__main__":
-    with session(sys.argv[1], SPEED) as (_, watch, ask, node):
-        fly(watch, ask, node)
-    print(f"{sys.argv[1]}: all holds", flush=True)
+    sys.exit(main(sys.argv[1]))
