@@ -7,6 +7,8 @@ by a cost that knows nothing of them: that is where the closed form loses most o
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import chain
 from typing import Annotated, ClassVar
 
 from pydantic import Field
@@ -21,12 +23,20 @@ from aerobat.planning.courses import is_course
 from aerobat.planning.miqp import Miqp
 from aerobat.planning.planners import Planner, option, planner
 from aerobat.planning.polynomial.descent.framed_problem import FramedProblem
-from aerobat.planning.polynomial.descent.knot_descent import OF_COURSES, Descent
+from aerobat.planning.polynomial.descent.knot_descent import (
+    NEAR_MOTIONS,
+    OF_COURSES,
+    OF_MANEUVERS,
+    Descent,
+    Strategy,
+)
 from aerobat.planning.polynomial.knots import start_along_normals
 from aerobat.planning.polynomial.min_snap import MinSnap
+from aerobat.planning.polynomial.nearest import nearest_polynomials
 from aerobat.planning.recorder import Progress, Recorder
 from aerobat.planning.result import FLYING_RESERVE, Plan
 from aerobat.planning.time_limit import TIME_LIMIT, stopped, too_short
+from aerobat.planning.time_optimal.race import coarse_motion
 from aerobat.planning.warm_start import Reserve, WarmStart, plans_to_begin_from, require_attitudes
 from aerobat.planning.ways import ways_through_gates
 from aerobat.problem.problem import Problem
@@ -38,6 +48,8 @@ LEG_SEGMENTS = 2  # of a course's leg, where that makes no more than MAX_COURSE_
 MAX_COURSE_SEGMENTS = 26  # of thirteen legs: a minute
 START_ORDERS = (3, 4)  # of closed forms that courses begin at: minimum jerk, minimum snap
 COURSE_ITERATIONS = 150  # of a solve at most, for all segments of a course at once
+MAX_LEG_SEGMENTS = 3  # of a course's legs on average, where one begins near a motion
+FIT = 0.08  # of the largest specific thrust: polynomials so near to a motion can turn as it does
 COARSE = 4  # segments to begin with where there shall be more: they are quick and come near the least time
 
 
@@ -107,62 +119,70 @@ class FreeKnots(Planner):
         is taken.
         """
         best: Plan | None = None
-        numbers = self._numbers_of_segments(sequence)
-        for start, guess in self._starts(problem, vehicle, sequence):
-            descent = self._descent(problem, vehicle, sequence, guess, recorder)
-            if start is not None:
-                descent.consider(start, guess)
+        on_course = is_course(sequence)
+        starts = self._on_course if on_course else self._on_maneuver
+        for start in starts(problem, vehicle, sequence, recorder):
+            numbers = start.numbers
+            descent = self._descent(problem, vehicle, sequence, start, recorder)
+            if start.plan is not None:
+                descent.consider(start.plan, WarmStart.of(start.plan, sequence))
             for segments in numbers:
                 if not out_of_time():
-                    descent.run(guess, segments)
-            if descent.best is None and not (is_course(sequence) or out_of_time()):
-                descent.run(guess, 2 * numbers[-1])
+                    descent.run(start.guess, segments)
+            if descent.best is None and not (on_course or out_of_time()):
+                descent.run(start.guess, 2 * numbers[-1])
             found = descent.through_gates(numbers[-1])
             if found is not None and (best is None or found.duration < best.duration):
                 best = found
-            taken = start is None or start is self.start
+            taken = start.plan is None or start.plan is self.start
             if out_of_time() or (
                 best is not None and (taken or (descent.converged and not _slow(best, vehicle)))
             ):
                 break
         return best
 
-    def _numbers_of_segments(self, sequence: StageSequence) -> list[int]:
-        """How many segments to begin with, and in the end: at least one a leg, of a course."""
-        if not is_course(sequence):
-            return sorted({min(COARSE, self.segments), self.segments})
-        legs = len(sequence.stages) + 1
-        of_leg = LEG_SEGMENTS if LEG_SEGMENTS * legs <= MAX_COURSE_SEGMENTS else 1
-        return [max(self.segments, of_leg * legs)]
-
     def _descent(
         self,
         problem: Problem,
         vehicle: Vehicle,
         sequence: StageSequence,
-        guess: WarmStart,
+        start: _Start,
         recorder: Recorder,
     ) -> Descent:
-        """The descent from a guess."""
-        if is_course(sequence):
-            ways = ways_through_gates(guess.stages, problem, vehicle)
-            framed = FramedProblem.of(problem, vehicle, sequence, guess, self.reserve, ways)
-            return Descent(framed, recorder, self.still_ends, COURSE_ITERATIONS, OF_COURSES)
-        framed = FramedProblem.of(problem, vehicle, sequence, guess, self.reserve)
-        return Descent(framed, recorder, self.still_ends, self.iterations)
+        """The descent from a start."""
+        iterations, ways = self.iterations, ()
+        if start.strategy is not OF_MANEUVERS:
+            iterations, ways = COURSE_ITERATIONS, ways_through_gates(start.guess.stages, problem, vehicle)
+        framed = FramedProblem.of(problem, vehicle, sequence, start.guess, self.reserve, ways)
+        return Descent(framed, recorder, self.still_ends, iterations, start.strategy)
 
-    def _starts(
-        self, problem: Problem, vehicle: Vehicle, sequence: StageSequence
-    ) -> Iterator[tuple[Plan | None, WarmStart]]:
-        """Where to begin, the best first, with the plan whose path it is if there is one."""
+    def _on_course(
+        self, problem: Problem, vehicle: Vehicle, sequence: StageSequence, recorder: Recorder
+    ) -> Iterator[_Start]:
+        """Where to begin on a course: near a motion of the rigid body, given or its own; at closed forms."""
+        legs = len(sequence.stages) + 1
+        allowed = FIT * vehicle.max_specific_thrust
         if self.start is not None:
-            yield self.start, WarmStart.of(self.start, sequence)
-        if is_course(sequence):
-            for order in START_ORDERS:
-                yield None, start_along_normals(problem, vehicle, sequence, order)
-            return
-        for plan in self._plans(problem, vehicle):
-            yield plan, WarmStart.of(plan, sequence)
+            motion = WarmStart.of(self.start, sequence)
+        else:
+            motion = coarse_motion(problem, vehicle, recorder, self.reserve)
+        if motion is not None:
+            guess = nearest_polynomials(motion, allowed, MAX_LEG_SEGMENTS * legs)
+            number = max(self.segments, guess.trajectory.segments)
+            yield _Start(self.start, guess, (number,), NEAR_MOTIONS)
+        of_leg = LEG_SEGMENTS if LEG_SEGMENTS * legs <= MAX_COURSE_SEGMENTS else 1
+        for order in START_ORDERS:
+            guess = start_along_normals(problem, vehicle, sequence, order)
+            yield _Start(None, guess, (max(self.segments, of_leg * legs),), OF_COURSES)
+
+    def _on_maneuver(
+        self, problem: Problem, vehicle: Vehicle, sequence: StageSequence, recorder: Recorder
+    ) -> Iterator[_Start]:
+        """Where to begin elsewhere: at plans, the best first."""
+        numbers = tuple(sorted({min(COARSE, self.segments), self.segments}))
+        given = () if self.start is None else (self.start,)
+        for plan in chain(given, self._plans(problem, vehicle)):
+            yield _Start(plan, WarmStart.of(plan, sequence), numbers, OF_MANEUVERS)
 
     def _plans(self, problem: Problem, vehicle: Vehicle) -> Iterator[Plan]:
         """Other planners' plans to begin from; the last knows no rotors."""
@@ -172,6 +192,16 @@ class FreeKnots(Planner):
             yield from plans_to_begin_from([Miqp(reserve=reserve, rescue=False)], problem, vehicle)
         if not out_of_time():
             yield Miqp().plan(problem)
+
+
+@dataclass(frozen=True, eq=False)
+class _Start:
+    """Where a descent begins, with the plan whose path it is if there is one."""
+
+    plan: Plan | None
+    guess: WarmStart
+    numbers: tuple[int, ...]  # of segments, to begin with and in the end
+    strategy: Strategy
 
 
 def _slow(plan: Plan, vehicle: Vehicle) -> bool:

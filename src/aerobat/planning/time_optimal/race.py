@@ -10,11 +10,13 @@ from aerobat.optimization.deadline import out_of_time, time_left, within_time
 from aerobat.planning.certified_solve import Judged, certified_solve
 from aerobat.planning.courses import is_course
 from aerobat.planning.flyability import own_flight
+from aerobat.planning.miqp import Miqp
 from aerobat.planning.recorder import Attempt, Recorder
 from aerobat.planning.result import OwnFlight
 from aerobat.planning.time_optimal.collocated_program import CollocatedProgram, SolvedMotion
 from aerobat.planning.time_optimal.optimal_control.elements import Elements
-from aerobat.planning.time_optimal.starts import Start
+from aerobat.planning.time_optimal.starts import Start, starts
+from aerobat.planning.warm_start import WarmStart
 from aerobat.planning.ways import Way, straightened, straighter
 from aerobat.problem.problem import Problem
 from aerobat.vehicle import Vehicle
@@ -36,6 +38,7 @@ ROUNDS = 8  # of solving, at most
 MORE_RESERVE = 1.6  # times the reserve, each time that the plan's own flight leaves its path
 RESERVE_RAISES = 4  # at most
 MAX_RESERVE = 0.4
+COURSE_STARTS = 2  # of a motion for others to begin from: closed forms at their own pace
 COARSE_TIME = 0.4  # of the time that is left, where there is a limit, for all coarse solves,
 AHEAD_TIME = 0.7  # of what is left then for the first of each fine one
 
@@ -182,6 +185,22 @@ class Race:
             solve_time=answer.time,
         )
         self.recorder.record(attempt)
+
+
+def coarse_motion(
+    problem: Problem, vehicle: Vehicle, recorder: Recorder, reserve: float
+) -> WarmStart | None:
+    """A course's fastest motion on a coarse mesh, within limits at its nodes; None where none is found.
+
+    Args:
+        problem: What is planned.
+        vehicle: What flies it.
+        recorder: Keeps an attempt a solve.
+        reserve: Of each rotor's range, kept from either of its ends.
+    """
+    race = Race(problem, vehicle, recorder, MIN_INTERVALS, COURSE_COARSE_ITERATIONS, reserve)
+    begun = starts(problem, vehicle, Miqp(), planar=False, count=COURSE_STARTS, first=None)
+    return next((program.start.guess for program in race._coarse(begun.motions, vehicle)), None)
 
 
 def _part(fraction: float) -> float | None:

@@ -60,10 +60,12 @@ class Strategy:
     radius: float  # of the trust region at first, in scaled variables, see KnotVariables
     backoff: float  # of every limit's range, kept at samples at first
     until_free: bool  # what stands at no edge of its trust region counts as near, however far it began
+    paced: bool = True  # a start that exceeds limits by far is slowed
 
 
 OF_MANEUVERS = Strategy(ROUGH, ROUGH.tolerance, 2.0, 1e-4, until_free=False)
 OF_COURSES = Strategy(FINE, ROUGH.tolerance, 3.0, 5e-4, until_free=True)
+NEAR_MOTIONS = replace(OF_COURSES, radius=1.0, paced=False)  # polynomials next to a rigid body's fast motion
 
 
 @dataclass
@@ -84,7 +86,9 @@ class Descent:
     def run(self, guess: WarmStart, segments: int) -> None:
         """Free the knots of a path, or of the best that is certified, with so many segments."""
         guess = guess if self.best is None else self.best.solution.source.guess
-        guess = self.framed.paced(replace(guess, trajectory=refit(guess.trajectory, segments)))
+        guess = replace(guess, trajectory=refit(guess.trajectory, segments))
+        if self.strategy.paced:
+            guess = self.framed.paced(guess)
         program, end = _Exchange(self, guess), len(self.recorder.attempts) + ROUNDS
         while (left := end - len(self.recorder.attempts)) > 0 and not out_of_time():
             before = program.guess.trajectory.duration
@@ -202,7 +206,8 @@ class _Exchange:
         self._samples = chebyshev_samples(segments, GATE_SAMPLES if descent.framed.ways else MIN_SAMPLES)
         self._radius = strategy.radius
         self._precision = replace(strategy.precision, tolerance=strategy.first_tolerance)
-        self._backoff = np.full(segments, strategy.backoff + descent.framed.reserve)
+        size = descent.framed.limits.size
+        self._backoff = np.full((segments, size), strategy.backoff + descent.framed.reserve)
         self._multipliers: Multipliers | None = None
         self._relaxed: float | None = None  # [s] the duration of the first solution near the guess
         self._confined = False  # whether the last solution stands at an edge of its trust region

@@ -77,7 +77,7 @@ class KnotProgram:
     limits: PathLimits
     samples: Samples  # at which limits hold
     stages: StageConstraints
-    reserve: Array  # of every limit's range, kept at the samples of each segment, (S,)
+    reserve: Array  # of every limit's range, kept at the samples of each segment, (S, size)
 
     def solve(
         self, iterations: int, precision: Precision, multipliers: Multipliers | None = None
@@ -192,7 +192,7 @@ class KnotProgram:
         """Limits of all values at samples; linear bounds do not count at the very ends, which are fixed."""
         own = [
             np.tile(self.limits.limits(reserve), (1, len(s))).reshape(2, len(s), -1)
-            for reserve, s in zip(self.reserve.tolist(), self.samples, strict=True)
+            for reserve, s in zip(self.reserve, self.samples, strict=True)
         ]
         lower, upper = np.concatenate(own, axis=1)
         linear = slice(self.limits.size - len(self.limits.bounds), None)

@@ -25,7 +25,7 @@ APART = 1e-4  # of a duration, the least distance of samples
 class ConstraintViolation:
     """By how much a trajectory exceeds limits, where, and which most."""
 
-    excess: Array  # in each segment, as a fraction of the limit's range; negative: all hold, (S,)
+    excess: Array  # in each segment, as a fraction of each limit's range; negative: it holds, (S, size)
     limit: str  # the name of the one that is exceeded most
     time: float  # [s] when
     peaks: Samples  # normalised times in each segment at which a limit is exceeded more than beside them
@@ -39,8 +39,10 @@ class ConstraintViolation:
         neighbours = np.pad(values, ((0, 0), (0, 0), (1, 1)), constant_values=-np.inf)
         peaks = (values > 0.0) & (values >= neighbours[..., :-2]) & (values >= neighbours[..., 2:])
         segment, row, place = np.unravel_index(np.argmax(values), values.shape)
+        alike = np.equal.outer(np.array(limits.names), np.array(limits.names))  # rotors, which trade
+        excess = np.where(alike, values.max(axis=2)[:, None], -np.inf).max(axis=-1)
         return cls(
-            excess=values.max(axis=(1, 2)),
+            excess=excess,
             limit=limits.names[row],
             time=float(trajectory.knots[segment] + s[place] * trajectory.durations[segment]),
             peaks=tuple(s[p.any(axis=0)] for p in peaks),
@@ -53,9 +55,9 @@ class ConstraintViolation:
 
     @property
     def excess_nearby(self) -> Array:
-        """The largest excess in each segment and those near it, where it moves when it is mended, (S,)."""
-        beside = np.pad(self.excess, NEARBY, constant_values=-np.inf)
-        windows = np.lib.stride_tricks.sliding_window_view(beside, 2 * NEARBY + 1)
+        """The largest in each segment and those near it, where it moves when it is mended, (S, size)."""
+        beside = np.pad(self.excess, ((NEARBY, NEARBY), (0, 0)), constant_values=-np.inf)
+        windows = np.lib.stride_tricks.sliding_window_view(beside, 2 * NEARBY + 1, axis=0)
         return np.asarray(windows.max(axis=-1))
 
     def __str__(self) -> str:

@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from aerobat.arrays import AXES, Array
+from aerobat.arrays import AXES, Array, Mask
 from aerobat.optimization.nonlinear import import_casadi
 from aerobat.planning.polynomial.descent.rotor_constraints import RotorConstraints
 from aerobat.problem.condition import ForceBalance, LinearBound
@@ -40,15 +40,17 @@ class PathLimits:
     origin: Array  # [m] of the frame of motion, world, (3,)
     bounds: tuple[tuple[str, LinearBound], ...]  # each with its name
 
-    def limits(self, reserve: float) -> tuple[Array, Array]:
-        """The least and the most of every value, less a reserve, (size,) each."""
-        lower, upper = self.rotors.limits
-        kept = np.where(self.rotors.has_range, reserve, 0.0)
+    def limits(self, reserve: Array) -> tuple[Array, Array]:
+        """The least and the most of every value, less a reserve of each, (size,) all."""
         ends = np.array([scaled(bound) for _, bound in self.bounds]).reshape(-1, 2).T
-        return (
-            np.concatenate([lower + kept, ends[0] + reserve]),
-            np.concatenate([upper - kept, ends[1] - reserve]),
-        )
+        lower, upper = np.concatenate([self.rotors.limits, ends], axis=1)
+        kept = np.where(self.has_range, reserve, 0.0)
+        return lower + kept, upper - kept
+
+    @property
+    def has_range(self) -> Mask:
+        """Whether a value has a range of which a part can be kept, (size,)."""
+        return np.append(self.rotors.has_range, np.ones(len(self.bounds), dtype=bool))
 
     def frames(self, trajectory: Trajectory, samples: Samples) -> list[Array]:
         """The rotors' frames at samples of every segment, (9, n) or (3, n) each."""
@@ -67,10 +69,8 @@ class PathLimits:
 
         Of the vehicle's limits, less a reserve.
         """
-        kept = np.zeros((len(self.names), 1))
-        kept[: len(self.rotors.names), 0] = np.where(self.rotors.has_range, reserve, 0.0)
-        lower, upper = (limits[:, None] for limits in self.limits(0.0))
-        lower, upper = lower + kept, upper - kept
+        of_vehicle = np.arange(self.size) < len(self.rotors.names)
+        lower, upper = (limits[:, None] for limits in self.limits(reserve * of_vehicle))
         frames = self.frames(trajectory, samples)
         found = []
         for i, (s, frame) in enumerate(zip(samples, frames, strict=True)):
