@@ -21,7 +21,7 @@ import aerobat as ab
 from aerobat.arrays import Array
 from aerobat.errors import SpecError
 from aerobat.planning import Plan
-from aerobat.planning.planners import planner_class, planner_options, suited_planner
+from aerobat.planning.planners import planner_class, planner_options
 from aerobat.problem import Gate, PassGate
 
 ROOM = 20.0  # [m] its sides
@@ -75,7 +75,9 @@ def _passage(rng: np.random.Generator, gate: Gate) -> PassGate:
 
 def planned(problem: ab.Problem, vehicle: ab.Vehicle, planner: str | None = None) -> Plan:
     """The plan that the command line makes, by a named planner or the one that it takes itself."""
-    cls = planner_class(planner or suited_planner(problem, vehicle))
+    if planner is None:
+        return ab.plan(problem, vehicle=vehicle)
+    cls = planner_class(planner)
     options = {o.name: o.command_default for o in planner_options(cls) if o.command_default is not None}
     return ab.plan(problem, cls(**options), vehicle)
 

@@ -7,9 +7,8 @@ import numpy as np
 import pytest
 
 from aerobat.flatness import force_balance, reference
-from aerobat.planning import Miqp, Plan, Planner, TimeScaling
+from aerobat.planning import FreeKnots, MinSnap, Miqp, Plan, Planner, TimeScaling
 from aerobat.planning.flyability import own_flight
-from aerobat.planning.polynomial import FreeKnots, MinSnap
 from aerobat.planning.time_optimal import TimeOptimal
 from aerobat.problem import Limits, Problem, Waypoint, Waypoints, at_rest, load_problem
 from aerobat.problem.gate import tilted_gate

@@ -111,5 +111,6 @@ def test_plain_data_has_every_cell_and_a_notebook_the_table() -> None:
     report = map_report(found)
     assert [cell["sentence"] for cell in report["cells"]] == [cell.sentence for cell in found.cells]
     assert report["over"] == {"angle": [0.0, 1.0, 2.0], "speed": [0.0, 2.0, 4.0, 6.0]}
+    assert report["units"] == {"angle": "°", "speed": "m/s"}
     assert sum(report["counts"].values()) == 12
     assert "no plan" in html(found)

@@ -5,7 +5,7 @@ from dataclasses import replace
 import pytest
 
 import aerobat as ab
-from aerobat.planning import planners, suited_planner
+from aerobat.planning import planner_for, planners, suited_planner
 
 QUAD = ab.load_vehicle("agile-quad")
 
@@ -47,6 +47,7 @@ def test_options_of_the_usual_planner_bring_it_back(tmp_path, capsys) -> None:
     from aerobat.cli.options import PlanningOptions
     from aerobat.cli.tasks import make_planner
 
-    assert make_planner(PlanningOptions(), course, QUAD).kind == "time-optimal"
+    assert make_planner(PlanningOptions(), course, QUAD) == planner_for(course, QUAD)
+    assert planner_for(course, QUAD) == ab.TimeOptimal(reserve=0.03)  # what is planned is to be flown
     assert make_planner(replace(PlanningOptions(), order=4), course, QUAD) == ab.Miqp(order=4, reserve=0.0)
     assert make_planner(replace(PlanningOptions(), planner="miqp"), course, QUAD).kind == "miqp"

@@ -76,7 +76,8 @@ def plan(
     Args:
         problem: What is planned, or its name.
         planner: How to plan, say `Miqp(order=5)`, or a registered name, whose defaults are taken; left out,
-            the one that `suited_planner` names.
+            the one that `suited_planner` names, as on the command line: where it keeps a reserve for the
+            controller, 3 %.
         vehicle: What shall fly it, or its name, within its rotors' limits; without one the plan knows no
             limits but the problem's.
         progress: Called with every attempt as it ends.
@@ -87,7 +88,8 @@ def plan(
         vehicle = vehicle.without_dead_rotors()
         vehicle.require_hover(problem.environment.gravity)
         require_openings(problem, vehicle)
-    found = as_planner(planner or suited_planner(problem, vehicle)).plan(problem, vehicle, progress)
+    method = planner_for(problem, vehicle) if planner is None else as_planner(planner)
+    found = method.plan(problem, vehicle, progress)
     if vehicle is None:
         return found
     return with_evidence(found, None if found.certificate is not None else vehicle)
@@ -107,6 +109,13 @@ def suited_planner(problem: Problem, vehicle: Vehicle | None) -> str:
     if has_casadi():
         return "time-optimal"
     return "min-snap" if problem.maneuver.through_points else "miqp"
+
+
+def planner_for(problem: Problem, vehicle: Vehicle | None) -> Planner:
+    """The planner of that name, as the command line makes it without options: for plans that are flown."""
+    cls = planner_class(suited_planner(problem, vehicle))
+    flown = {o.name: o.command_default for o in planner_options(cls) if o.command_default is not None}
+    return cls(**flown)
 
 
 def with_evidence(plan: Plan, vehicle: Vehicle | None = None) -> Plan:

@@ -150,9 +150,11 @@ class FreeKnots(Planner):
         recorder: Recorder,
     ) -> Descent:
         """The descent from a start."""
-        iterations, ways = self.iterations, ()
-        if start.strategy is not OF_MANEUVERS:
-            iterations, ways = COURSE_ITERATIONS, ways_through_gates(start.guess.stages, problem, vehicle)
+        if is_course(sequence):
+            iterations = COURSE_ITERATIONS
+            ways = ways_through_gates(start.guess.stages, problem, vehicle)
+        else:
+            iterations, ways = self.iterations, ()
         framed = FramedProblem.of(problem, vehicle, sequence, start.guess, self.reserve, ways)
         return Descent(framed, recorder, self.still_ends, iterations, start.strategy)
 
@@ -162,10 +164,8 @@ class FreeKnots(Planner):
         """Where to begin on a course: near a motion of the rigid body, given or its own; at closed forms."""
         legs = len(sequence.stages) + 1
         allowed = FIT * vehicle.max_specific_thrust
-        if self.start is not None:
-            motion = WarmStart.of(self.start, sequence)
-        else:
-            motion = coarse_motion(problem, vehicle, recorder, self.reserve)
+        given = None if self.start is None else WarmStart.of(self.start, sequence)
+        motion = given or coarse_motion(problem, vehicle, recorder, self.reserve)
         if motion is not None:
             guess = nearest_polynomials(motion, allowed, MAX_LEG_SEGMENTS * legs)
             number = max(self.segments, guess.trajectory.segments)

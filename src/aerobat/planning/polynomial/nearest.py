@@ -9,7 +9,7 @@ path is left.
 from __future__ import annotations
 
 from dataclasses import replace
-from math import perm
+from math import factorial
 
 import numpy as np
 
@@ -45,29 +45,33 @@ def nearest_polynomials(motion: WarmStart, max_deviation: float, max_segments: i
 
 def _fitted(motion: Trajectory, durations: Array) -> Trajectory:
     """Polynomials of these durations, least squares from a motion's first derivatives, its ends met."""
-    count, mean = len(durations), durations.mean()
+    effects, wanted = _rows(motion, durations)
+    at_ends = np.zeros((len(durations) + 1, END_ORDER), dtype=bool)
+    at_ends[[0, -1], :MET] = True
+    values = np.zeros((*at_ends.shape, 3))
+    values[[0, -1], :MET] = np.stack([motion.evaluate([0.0, motion.duration], k) for k in range(MET)], axis=1)
+    sizes = np.broadcast_to(durations.mean() ** -np.arange(END_ORDER, dtype=float), at_ends.shape)[~at_ends]
+    left = wanted - effects[:, at_ends] @ values[at_ends]
+    values[~at_ends] = sizes[:, None] * np.linalg.lstsq(effects[:, ~at_ends] * sizes, left, rcond=None)[0]
+    of_segments = np.concatenate([values[:-1], values[1:]], axis=1)
+    by_part = durations[:, None, None] ** ORDERS[:, None]
+    return Trajectory(durations, TO_COEFFICIENTS @ (by_part * of_segments), motion.heading)
+
+
+def _rows(motion: Trajectory, durations: Array) -> tuple[Array, Array]:
+    """Effects of all knots' derivatives on what is met, (rows, knots, 5), and the motion's own, (rows, 3)."""
     s = np.linspace(0.0, 1.0, PLACES)
     starts = np.cumsum(durations) - durations
-    rows = np.zeros((count, MET, PLACES, count + 1, END_ORDER))
-    wanted = np.zeros((count, MET, PLACES, 3))
+    effects = np.zeros((len(durations), MET, PLACES, len(durations) + 1, END_ORDER))
+    wanted = np.zeros((len(durations), MET, PLACES, 3))
     for i, duration in enumerate(durations.tolist()):
         times = np.minimum(starts[i] + duration * s, motion.duration)
         for k in range(MET):
-            size = mean**k / perm(MET, k)
+            size = durations.mean() ** k / factorial(k)
             effect = powers(s, k) @ TO_COEFFICIENTS * duration ** (ORDERS - float(k))
-            rows[i, k, :, i : i + 2] = size * effect.reshape(PLACES, 2, END_ORDER)
+            effects[i, k, :, i : i + 2] = size * effect.reshape(PLACES, 2, END_ORDER)
             wanted[i, k] = size * motion.evaluate(times, k)
-    ends = np.zeros((count + 1, END_ORDER), dtype=bool)
-    ends[[0, -1], :MET] = True
-    values = np.zeros((count + 1, END_ORDER, 3))
-    values[[0, -1], :MET] = np.stack([motion.evaluate([0.0, motion.duration], k) for k in range(MET)], axis=1)
-    rows, wanted = rows.reshape(-1, count + 1, END_ORDER), wanted.reshape(-1, 3)
-    scale = np.broadcast_to(mean ** -np.arange(END_ORDER, dtype=float), ends.shape)[~ends]
-    left = wanted - np.tensordot(rows[:, ends], values[ends], axes=1)
-    values[~ends] = scale[:, None] * np.linalg.lstsq(rows[:, ~ends] * scale, left, rcond=None)[0]
-    at_both = np.concatenate([values[:-1], values[1:]], axis=1)
-    by_part = durations[:, None, None] ** ORDERS[:, None]
-    return Trajectory(durations, TO_COEFFICIENTS @ (by_part * at_both), motion.heading)
+    return effects.reshape(-1, *effects.shape[-2:]), wanted.reshape(-1, 3)
 
 
 def _deviations(path: Trajectory, motion: WarmStart) -> Array:

@@ -187,9 +187,7 @@ class Race:
         self.recorder.record(attempt)
 
 
-def coarse_motion(
-    problem: Problem, vehicle: Vehicle, recorder: Recorder, reserve: float
-) -> WarmStart | None:
+def coarse_motion(problem: Problem, vehicle: Vehicle, recorder: Recorder, reserve: float) -> WarmStart | None:
     """A course's fastest motion on a coarse mesh, within limits at its nodes; None where none is found.
 
     Args:

@@ -28,6 +28,7 @@ def map_report(found: FeasibilityMap) -> dict[str, Any]:
         "problem": found.problem.name,
         "vehicle": found.vehicle.name,
         "over": {axis.name: list(axis.values) for axis in found.axes},
+        "units": {axis.name: axis.unit for axis in found.axes},
         "counts": {feasibility.value: count for feasibility, count in found.counts.items()},
         "cells": [
             dict(zip((axis.name for axis in found.axes), cell.values, strict=True))

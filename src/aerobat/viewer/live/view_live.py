@@ -11,7 +11,7 @@ from pydantic import Field
 
 from aerobat.declaration import validated
 from aerobat.environment import Dispersion, as_dispersion
-from aerobat.planning import Plan, Planner, as_planner, registered_planners, suited_planner, with_evidence
+from aerobat.planning import Plan, Planner, as_planner, planner_for, registered_planners, with_evidence
 from aerobat.problem import Problem, as_problem
 from aerobat.vehicle import Vehicle, as_vehicle
 from aerobat.viewer.document import document
@@ -113,7 +113,8 @@ def _begun(
     """The setting at first, and its plan."""
     if not isinstance(shown, Plan):
         problem, flyer = as_problem(shown), as_vehicle(vehicle or VEHICLE)
-        setting = Setting(problem, as_planner(planner or suited_planner(problem, flyer)), flyer, conditions)
+        method = planner_for(problem, flyer) if planner is None else as_planner(planner)
+        setting = Setting(problem, method, flyer, conditions)
         return setting, Replanner(setting, ()).plan(setting)
     flyer = as_vehicle(vehicle or shown.vehicle or VEHICLE)
     plan = shown if flyer == shown.vehicle and shown.certificate else with_evidence(shown, flyer)
@@ -124,6 +125,6 @@ def _begun(
 def _planner_of(plan: Plan, vehicle: Vehicle) -> Planner:
     """The planner of a plan's name and order; of a path from elsewhere, the one that suits its problem."""
     is_known = plan.planner in registered_planners()
-    planner = as_planner(plan.planner if is_known else suited_planner(plan.problem, vehicle))
+    planner = as_planner(plan.planner) if is_known else planner_for(plan.problem, vehicle)
     changes: dict[str, Any] = {"order": plan.order} if hasattr(planner, "order") else {}
     return replace(planner, **changes)  # type: ignore[type-var]

@@ -59,13 +59,15 @@ class Strategy:
     first_tolerance: float  # of IPOPT, of the first solve from a start: what it finds is mended anyhow
     radius: float  # of the trust region at first, in scaled variables, see KnotVariables
     backoff: float  # of every limit's range, kept at samples at first
+    samples: int  # of a segment at first, at least
     until_free: bool  # what stands at no edge of its trust region counts as near, however far it began
     paced: bool = True  # a start that exceeds limits by far is slowed
 
 
-OF_MANEUVERS = Strategy(ROUGH, ROUGH.tolerance, 2.0, 1e-4, until_free=False)
-OF_COURSES = Strategy(FINE, ROUGH.tolerance, 3.0, 5e-4, until_free=True)
-NEAR_MOTIONS = replace(OF_COURSES, radius=1.0, paced=False)  # polynomials next to a rigid body's fast motion
+OF_MANEUVERS = Strategy(ROUGH, ROUGH.tolerance, 2.0, 1e-4, MIN_SAMPLES, until_free=False)
+OF_COURSES = Strategy(FINE, ROUGH.tolerance, 3.0, 5e-4, GATE_SAMPLES, until_free=True)
+# of polynomials next to the rigid body's own motion, shorter where it turns sharply
+NEAR_MOTIONS = replace(OF_COURSES, radius=1.0, samples=MIN_SAMPLES, paced=False)
 
 
 @dataclass
@@ -203,7 +205,7 @@ class _Exchange:
         self.guess = guess
         self._descent = descent
         self._begun = guess.trajectory.duration
-        self._samples = chebyshev_samples(segments, GATE_SAMPLES if descent.framed.ways else MIN_SAMPLES)
+        self._samples = chebyshev_samples(segments, strategy.samples)
         self._radius = strategy.radius
         self._precision = replace(strategy.precision, tolerance=strategy.first_tolerance)
         size = descent.framed.limits.size

@@ -33,7 +33,7 @@ class ConstraintViolation:
     @classmethod
     def of(cls, trajectory: Trajectory, limits: PathLimits, reserve: float = 0.0) -> ConstraintViolation:
         """Of limits along a trajectory, the vehicle's less a reserve, at a dense look."""
-        s = np.linspace(0.0, 1.0, DENSE)
+        s = _chebyshev(DENSE)
         inside = np.clip(s, JUST_INSIDE, 1.0 - JUST_INSIDE)
         values = limits.excess(trajectory, (inside,) * trajectory.segments, reserve)
         neighbours = np.pad(values, ((0, 0), (0, 0), (1, 1)), constant_values=-np.inf)
@@ -82,7 +82,7 @@ def chebyshev_samples(segments: int, least: int = MIN_SAMPLES) -> Samples:
     inner = max(ceil(SAMPLES / segments), least)
     ends = END_SAMPLES if inner == least else inner
     counts = [inner if 0 < i < segments - 1 else ends for i in range(segments)]
-    return tuple((1.0 - np.cos(np.linspace(0.0, np.pi, count))) / 2.0 for count in counts)
+    return tuple(map(_chebyshev, counts))
 
 
 def refit(trajectory: Trajectory, segments: int) -> Trajectory:
@@ -105,7 +105,18 @@ def refit(trajectory: Trajectory, segments: int) -> Trajectory:
     return Trajectory(durations, polynomial.hermite(ends[0], ends[1]), trajectory.heading)
 
 
+def _chebyshev(count: int) -> Array:
+    """So many places in a segment, denser toward its ends, which are among them."""
+    return np.asarray((1.0 - np.cos(np.linspace(0.0, np.pi, count))) / 2.0)
+
+
 def _with(old: Array, new: Array) -> Array:
-    """Both, without those of the new that are next to an old one."""
+    """Both, without those of the new that are next to an old one, and what is half-way on either side.
+
+    A peak that is held down at one place comes up beside it.
+    """
+    after = np.clip(np.searchsorted(old, new), 1, len(old) - 1)
+    beside = [(new + old[neighbour]) / 2.0 for neighbour in (after - 1, after)]
+    new = np.concatenate([new, *beside])
     far = np.abs(new[:, None] - old).min(axis=1) > APART
     return np.union1d(old, new[far])

@@ -69,8 +69,9 @@ class PathLimits:
 
         Of the vehicle's limits, less a reserve.
         """
-        of_vehicle = np.arange(self.size) < len(self.rotors.names)
-        lower, upper = (limits[:, None] for limits in self.limits(reserve * of_vehicle))
+        kept = np.zeros(self.size)
+        kept[: len(self.rotors.names)] = reserve
+        lower, upper = (limits[:, None] for limits in self.limits(kept))
         frames = self.frames(trajectory, samples)
         found = []
         for i, (s, frame) in enumerate(zip(samples, frames, strict=True)):
