@@ -63,8 +63,8 @@ class FreeKnots(Planner):
     two where it is short, and begins at the closed form through its stages, stretched. Rotors that lag are
     held to their limits by their commands, their thrusts continuous. At the ends the body does not turn, but
     its thrust may be changing, so that there is jerk along it, unless `still_ends` asks for none. A
-    `reserve`, a fraction of every limit's range, is kept from either end for the controller, proven of
-    rotors, at samples of the path's limits: without one, four segments leave rotors without lag, whose
+    `reserve`, a fraction of the range of rotors and body rate, is kept from either end for the controller,
+    proven of rotors: without one, four segments leave rotors without lag, whose
     thrusts may jump, 13 cm off the paper's second example; one percent makes that 4 mm.
     """
 
@@ -77,7 +77,7 @@ class FreeKnots(Planner):
     still_ends: bool = False
     reserve: Reserve = option(
         0.0,
-        "The fraction of every limit's range that is kept from either of its ends for the controller; with 0 "
+        "The fraction of the vehicle's limits' ranges that is kept from either end for the controller; with 0 "
         "a plan of four segments or more leaves it next to nothing.",
         command_default=FLYING_RESERVE,
     )

@@ -45,7 +45,7 @@ class FramedProblem:
     frame: Frame
     limits: PathLimits
     balance: ForceBalance
-    reserve: float  # of every limit's range, proven of rotors
+    reserve: float  # of the range of each of the vehicle's limits, proven of rotors
     ways: tuple[Way, ...] = ()  # of the body through gates, among the stages of the start
 
     @classmethod
@@ -65,7 +65,7 @@ class FramedProblem:
             vehicle: What flies it.
             sequence: The problem's stages for it.
             guess: Where to begin.
-            reserve: Of every limit's range, kept from either of its ends.
+            reserve: Of the range of each of the vehicle's limits, kept from either of its ends.
             ways: Of the body through gates that the guess's stages cross.
         """
         environment = problem.environment

@@ -208,8 +208,7 @@ class _Exchange:
         self._samples = chebyshev_samples(segments, strategy.samples)
         self._radius = strategy.radius
         self._precision = replace(strategy.precision, tolerance=strategy.first_tolerance)
-        size = descent.framed.limits.size
-        self._backoff = np.full((segments, size), strategy.backoff + descent.framed.reserve)
+        self._backoff = np.tile(self._least_backoff, (segments, 1))
         self._multipliers: Multipliers | None = None
         self._relaxed: float | None = None  # [s] the duration of the first solution near the guess
         self._confined = False  # whether the last solution stands at an edge of its trust region
@@ -256,7 +255,13 @@ class _Exchange:
         self.guess = certified
         self._relaxed = None
         self._radius = self._descent.strategy.radius
-        self._backoff[:] = self._descent.strategy.backoff + self._descent.framed.reserve
+        self._backoff[:] = self._least_backoff
+
+    @property
+    def _least_backoff(self) -> Array:
+        """Of every limit's range, the reserve included, (size,)."""
+        framed = self._descent.framed
+        return self._descent.strategy.backoff + framed.limits.of_vehicle(framed.reserve)
 
     def tighten(self, solution: Solution[Path], certificate: Certificate | None) -> bool:
         """Sample where limits are exceeded, and go on from there in a smaller region.

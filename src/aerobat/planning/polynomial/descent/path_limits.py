@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from aerobat.arrays import AXES, Array, Mask
+from aerobat.arrays import AXES, Array
 from aerobat.optimization.nonlinear import import_casadi
 from aerobat.planning.polynomial.descent.rotor_constraints import RotorConstraints
 from aerobat.problem.condition import ForceBalance, LinearBound
@@ -41,16 +41,19 @@ class PathLimits:
     bounds: tuple[tuple[str, LinearBound], ...]  # each with its name
 
     def limits(self, reserve: Array) -> tuple[Array, Array]:
-        """The least and the most of every value, less a reserve of each, (size,) all."""
+        """The least and the most of every value, less a reserve where it has a range, (size,) all."""
         ends = np.array([scaled(bound) for _, bound in self.bounds]).reshape(-1, 2).T
         lower, upper = np.concatenate([self.rotors.limits, ends], axis=1)
-        kept = np.where(self.has_range, reserve, 0.0)
+        has_range = np.append(self.rotors.has_range, np.ones(len(self.bounds), dtype=bool))
+        kept = np.where(has_range, reserve, 0.0)
         return lower + kept, upper - kept
 
-    @property
-    def has_range(self) -> Mask:
-        """Whether a value has a range of which a part can be kept, (size,)."""
-        return np.append(self.rotors.has_range, np.ones(len(self.bounds), dtype=bool))
+    def of_vehicle(self, reserve: float) -> Array:
+        """A reserve of the vehicle's limits, none of the path's, (size,).
+
+        A part of a coordinate's range is no distance to keep: it would depend on where the origin is.
+        """
+        return np.where(np.arange(self.size) < len(self.rotors.names), reserve, 0.0)
 
     def frames(self, trajectory: Trajectory, samples: Samples) -> list[Array]:
         """The rotors' frames at samples of every segment, (9, n) or (3, n) each."""
@@ -69,9 +72,7 @@ class PathLimits:
 
         Of the vehicle's limits, less a reserve.
         """
-        kept = np.zeros(self.size)
-        kept[: len(self.rotors.names)] = reserve
-        lower, upper = (limits[:, None] for limits in self.limits(kept))
+        lower, upper = (limits[:, None] for limits in self.limits(self.of_vehicle(reserve)))
         frames = self.frames(trajectory, samples)
         found = []
         for i, (s, frame) in enumerate(zip(samples, frames, strict=True)):
