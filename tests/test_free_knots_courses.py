@@ -7,9 +7,15 @@ import pytest
 
 from aerobat.planning import FreeKnots, MinSnap, Plan
 from aerobat.planning.flyability import own_flight
+from aerobat.planning.polynomial.descent.framed_problem import FramedProblem
 from aerobat.planning.polynomial.descent.knot_program import Multipliers
+from aerobat.planning.polynomial.nearest import nearest_polynomials
 from aerobat.planning.rotor_margin import reserve_shortfalls
-from aerobat.problem import Course, PassGate, Problem, at_rest, load_problem, tilted_gate
+from aerobat.planning.warm_start import WarmStart
+from aerobat.problem import Course, Limits, PassGate, Problem, Stage, at_rest, load_problem, tilted_gate
+from aerobat.trajectory import Trajectory
+from aerobat.trajectory.minimum_effort import minimum_effort
+from aerobat.trajectory.polynomial import hermite
 from aerobat.vehicle import Vehicle, load_vehicle
 from random_flights import with_lags
 
@@ -83,6 +89,45 @@ def test_tilted_gates_are_passed_with_the_whole_body_anywhere_or_upright_as_aske
     assert max(np.linalg.norm(offsets[k]) for k in (1, 3)) < 1e-5
     flight = own_flight(plan.trajectory, JERKY, plan.problem, plan.stages)
     assert all(passage.clearance is not None and passage.clearance > 0.0 for passage in flight.passages)
+
+
+@pytest.mark.parametrize("allowed", [4.0, 0.5])
+def test_polynomials_near_a_motion_are_smooth_and_as_near_as_asked_with_as_many_as_that_takes(
+    allowed: float,
+) -> None:
+    flat = np.random.default_rng(1).normal(scale=2.0, size=(4, 3, 3))  # position to acceleration at knots
+    durations = np.array([1.0, 1.2, 1.5])
+    scaled = durations[:, None, None] ** np.arange(3.0)[:, None]
+    path = Trajectory(durations, hermite(scaled * flat[:-1], scaled * flat[1:]))  # its jerk jumps
+    motion = WarmStart(path, (Stage("a"), Stage("b")), (1.0, 2.2))
+    near = nearest_polynomials(motion, allowed, 60).trajectory
+    times = np.linspace(0.0, path.duration, 500)
+    apart = np.linalg.norm(near.evaluate(times, 2) - path.evaluate(times, 2), axis=-1)
+    assert apart.max() <= 1.1 * allowed
+    assert np.isin([1.0, 2.2], near.knots.round(12)).all()
+    for order in range(5):
+        assert near.jumps(order).max() <= TOLERANCE * np.abs(near.component_range(order)).max()
+    fewest = nearest_polynomials(motion, allowed, 3).trajectory
+    assert fewest.segments == 3
+    again = nearest_polynomials(replace(motion, trajectory=fewest), 1e-6, 60).trajectory
+    assert again.segments == 3  # what they can be is met
+
+
+def test_each_limit_is_backed_off_from_by_its_own_excess_and_no_reserve_is_kept_from_walls() -> None:
+    """A room's walls moved inward by a part of their coordinates where rotors were beyond their limits."""
+    room = Limits(lower=np.array([90.0, -9.0, 90.0]), upper=np.array([101.0, 9.0, 110.0]))
+    problem = Problem("room", at_rest((100.0, 0.0, 100.0)), at_rest((100.5, 0.0, 100.0)), limits=room)
+    path = minimum_effort(np.stack([[[100.0 + x, 0.0, 100.0], *np.zeros((3, 3))] for x in (0, 2)]), [3.0])
+    framed = FramedProblem.of(problem, QUAD, problem.stages(40.0), WarmStart(path, (), ()), 0.03)
+    limits = framed.limits
+    of_vehicle = np.arange(limits.size) < len(limits.rotors.names)
+    beyond = np.array([name == "position x" for name in limits.names])
+    (excess,) = framed.path(WarmStart(path, (), ())).violation.excess
+    assert (excess[beyond] > 0.0).all()
+    assert (excess[~beyond] <= 0.0).all()
+    for kept, whole in zip(limits.limits(limits.of_vehicle(0.03)), limits.limits(np.zeros(1)), strict=True):
+        np.testing.assert_array_equal(kept[~of_vehicle], whole[~of_vehicle])
+        assert (kept[of_vehicle] != whole[of_vehicle]).any()
 
 
 def test_multipliers_find_their_rows_among_more_samples() -> None:

@@ -127,7 +127,9 @@ def test_derivatives_given_to_the_solver_are_those_of_differentiation() -> None:
     place = int(np.searchsorted(guess.trajectory.knots[1:-1], guess.times[0], side="right"))
     variables = KnotVariables(problem, vehicle, guess, (place,), framed.frame, 1.0, still_ends=False)
     stages = StageConstraints(variables, framed.limits, framed.balance)
-    program = KnotProgram(variables, framed.limits, chebyshev_samples(3), stages, np.zeros(3)).program
+    program = KnotProgram(
+        variables, framed.limits, chebyshev_samples(3), stages, np.zeros((3, framed.limits.size))
+    ).program
     rng = np.random.default_rng(0)
     x = variables.start + 1e-3 * rng.normal(size=variables.size)
     multipliers = rng.normal(size=program.lower.size)

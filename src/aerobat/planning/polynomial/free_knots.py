@@ -59,13 +59,14 @@ class FreeKnots(Planner):
 
     It begins from `start`, a plan of the same problem, certified or not; without one from the closed form
     through waypoints, or else from the MIQP's plan. Stages hold anywhere in their order and their
-    windows; two segments have room for a flip's five. A course of many stages has a segment a leg at least,
-    two where it is short, and begins at the closed form through its stages, stretched. Rotors that lag are
-    held to their limits by their commands, their thrusts continuous. At the ends the body does not turn, but
-    its thrust may be changing, so that there is jerk along it, unless `still_ends` asks for none. A
-    `reserve`, a fraction of the range of rotors and body rate, is kept from either end for the controller,
-    proven of rotors: without one, four segments leave rotors without lag, whose
-    thrusts may jump, 13 cm off the paper's second example; one percent makes that 4 mm.
+    windows; two segments have room for a flip's five. A course of many stages begins near the rigid body's
+    motion on a coarse mesh, with as many segments a leg as it turns sharply, or else at the closed form
+    through its stages, stretched, with one or two a leg. Rotors that lag are held to their limits by their
+    commands, their thrusts continuous. At the ends the body does not turn, but its thrust may be changing,
+    so that there is jerk along it, unless `still_ends` asks for none. A `reserve`, a fraction of the range of
+    rotors and body rate, is kept from either end for the controller, proven of rotors: without one, four
+    segments leave rotors without lag, whose thrusts may jump, 13 cm off the paper's second example; one
+    percent makes that 4 mm.
     """
 
     segments: Annotated[int, Field(ge=2, le=MAX_SEGMENTS)] = option(
@@ -77,8 +78,8 @@ class FreeKnots(Planner):
     still_ends: bool = False
     reserve: Reserve = option(
         0.0,
-        "The fraction of the vehicle's limits' ranges that is kept from either end for the controller; with 0 "
-        "a plan of four segments or more leaves it next to nothing.",
+        "The fraction of every limit of the vehicle that is kept from either of its ends for the controller; "
+        "with 0 a plan of four segments or more leaves it next to nothing.",
         command_default=FLYING_RESERVE,
     )
     iterations: Count = 50  # at most, each solve
