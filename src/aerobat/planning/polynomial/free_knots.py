@@ -168,7 +168,8 @@ class FreeKnots(Planner):
         given = None if self.start is None else WarmStart.of(self.start, sequence)
         motion = given or coarse_motion(problem, vehicle, recorder, self.reserve)
         if motion is not None:
-            guess = nearest_polynomials(motion, allowed, MAX_LEG_SEGMENTS * legs)
+            with_jerk = not vehicle.lags.any()
+            guess = nearest_polynomials(motion, allowed, MAX_LEG_SEGMENTS * legs, with_jerk)
             number = max(self.segments, guess.trajectory.segments)
             yield _Start(self.start, guess, (number,), NEAR_MOTIONS)
         of_leg = LEG_SEGMENTS if LEG_SEGMENTS * legs <= MAX_COURSE_SEGMENTS else 1
