@@ -91,25 +91,25 @@ def test_tilted_gates_are_passed_with_the_whole_body_anywhere_or_upright_as_aske
     assert all(passage.clearance is not None and passage.clearance > 0.0 for passage in flight.passages)
 
 
-@pytest.mark.parametrize(("allowed", "with_jerk"), [(4.0, False), (0.5, True)])
+@pytest.mark.parametrize("allowed", [4.0, 0.5])
 def test_polynomials_near_a_motion_are_smooth_and_as_near_as_asked_with_as_many_as_that_takes(
-    allowed: float, with_jerk: bool
+    allowed: float,
 ) -> None:
     flat = np.random.default_rng(1).normal(scale=2.0, size=(4, 3, 3))  # position to acceleration at knots
     durations = np.array([1.0, 1.2, 1.5])
     scaled = durations[:, None, None] ** np.arange(3.0)[:, None]
     path = Trajectory(durations, hermite(scaled * flat[:-1], scaled * flat[1:]))  # its jerk jumps
     motion = WarmStart(path, (Stage("a"), Stage("b")), (1.0, 2.2))
-    near = nearest_polynomials(motion, allowed, 60, with_jerk).trajectory
+    near = nearest_polynomials(motion, allowed, 60).trajectory
     times = np.linspace(0.0, path.duration, 500)
     apart = np.linalg.norm(near.evaluate(times, 2) - path.evaluate(times, 2), axis=-1)
     assert apart.max() <= 1.1 * allowed
     assert np.isin([1.0, 2.2], near.knots.round(12)).all()
     for order in range(5):
         assert near.jumps(order).max() <= TOLERANCE * np.abs(near.component_range(order)).max()
-    fewest = nearest_polynomials(motion, allowed, 3, with_jerk).trajectory
+    fewest = nearest_polynomials(motion, allowed, 3).trajectory
     assert fewest.segments == 3
-    again = nearest_polynomials(replace(motion, trajectory=fewest), 1e-6, 60, with_jerk).trajectory
+    again = nearest_polynomials(replace(motion, trajectory=fewest), 1e-6, 60).trajectory
     assert again.segments == 3  # what they can be is met
 
 

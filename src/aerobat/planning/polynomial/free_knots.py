@@ -58,15 +58,15 @@ class FreeKnots(Planner):
     """Such polynomials at the rotors' limits, derivatives and times at knots free; needs the extra casadi.
 
     It begins from `start`, a plan of the same problem, certified or not; without one from the closed form
-    through waypoints, or else from the MIQP's plan. Stages hold anywhere in their order and their
-    windows; two segments have room for a flip's five. A course of many stages begins near the rigid body's
-    motion on a coarse mesh, with as many segments a leg as it turns sharply, or else at the closed form
-    through its stages, stretched, with one or two a leg. Rotors that lag are held to their limits by their
-    commands, their thrusts continuous. At the ends the body does not turn, but its thrust may be changing,
-    so that there is jerk along it, unless `still_ends` asks for none. A `reserve`, a fraction of the range of
-    rotors and body rate, is kept from either end for the controller, proven of rotors: without one, four
-    segments leave rotors without lag, whose thrusts may jump, 13 cm off the paper's second example; one
-    percent makes that 4 mm.
+    through waypoints, or else from the MIQP's plan. Stages hold anywhere in their order and their windows;
+    two segments have room for a flip's five. A course of many stages begins near the rigid body's motion on a
+    coarse mesh, with as many segments a leg as it turns sharply, or else, and without rotor lag, at the
+    closed form through its stages, stretched, with one or two a leg. Rotors that lag are held to their limits
+    by their commands, their thrusts continuous. At the ends the body does not turn, but its thrust may be
+    changing, so that there is jerk along it, unless `still_ends` asks for none. A `reserve`, a fraction of
+    the range of rotors and body rate, is kept from either end for the controller, proven of rotors: without
+    one, four segments leave rotors without lag, whose thrusts may jump, 13 cm off the paper's second example;
+    one percent makes that 4 mm.
     """
 
     segments: Annotated[int, Field(ge=2, le=MAX_SEGMENTS)] = option(
@@ -162,14 +162,17 @@ class FreeKnots(Planner):
     def _on_course(
         self, problem: Problem, vehicle: Vehicle, sequence: StageSequence, recorder: Recorder
     ) -> Iterator[_Start]:
-        """Where to begin on a course: near a motion of the rigid body, given or its own; at closed forms."""
+        """Where to begin on a course: near a motion of the rigid body, given or its own; at closed forms.
+
+        Without lag thrusts jump in such a motion: smooth polynomials begin nearer at the closed form.
+        """
         legs = len(sequence.stages) + 1
         allowed = FIT * vehicle.max_specific_thrust
-        given = None if self.start is None else WarmStart.of(self.start, sequence)
-        motion = given or coarse_motion(problem, vehicle, recorder, self.reserve)
+        motion = None if self.start is None else WarmStart.of(self.start, sequence)
+        if motion is None and vehicle.lags.any():
+            motion = coarse_motion(problem, vehicle, recorder, self.reserve)
         if motion is not None:
-            with_jerk = not vehicle.lags.any()
-            guess = nearest_polynomials(motion, allowed, MAX_LEG_SEGMENTS * legs, with_jerk)
+            guess = nearest_polynomials(motion, allowed, MAX_LEG_SEGMENTS * legs)
             number = max(self.segments, guess.trajectory.segments)
             yield _Start(self.start, guess, (number,), NEAR_MOTIONS)
         of_leg = LEG_SEGMENTS if LEG_SEGMENTS * legs <= MAX_COURSE_SEGMENTS else 1

@@ -18,14 +18,12 @@ from aerobat.planning.polynomial.descent.path_limits import END_ORDER, ORDERS, T
 from aerobat.planning.warm_start import WarmStart
 from aerobat.trajectory import Trajectory
 
-STATE = 3  # derivatives of position, itself the first, that say where the thrust points: met at the ends
+MET = 3  # derivatives of position that are met, itself the first: they decide where the thrust points
 PLACES = 25  # in a segment at which they are: some twice its unknowns
 DENSER = 2  # times as many, at which the deviation is looked for
 
 
-def nearest_polynomials(
-    motion: WarmStart, max_deviation: float, max_segments: int, with_jerk: bool
-) -> WarmStart:
+def nearest_polynomials(motion: WarmStart, max_deviation: float, max_segments: int) -> WarmStart:
     """The motion in few polynomials of degree 9 a leg, continuous up to snap, its ends and phases kept.
 
     Legs are cut into equal parts, again and again the one whose acceleration deviates most.
@@ -34,12 +32,10 @@ def nearest_polynomials(
         motion: What is met, by least squares.
         max_deviation: Of the acceleration [m/s²]; legs that keep to it are cut no more.
         max_segments: In all; every leg has one at least.
-        with_jerk: Whether its jerk is met too, which ties snap down at the ends where no state does.
     """
     parts = np.ones(len(motion.phases), dtype=int)
     while True:
-        durations = np.repeat(motion.phases / parts, parts)
-        path = _fitted(motion.trajectory, durations, STATE + with_jerk)
+        path = _fitted(motion.trajectory, np.repeat(motion.phases / parts, parts))
         deviations = _deviations(path, motion)
         worst = int(np.argmax(deviations))
         if deviations[worst] <= max_deviation or parts.sum() >= max_segments:
@@ -47,14 +43,13 @@ def nearest_polynomials(
         parts[worst] += 1
 
 
-def _fitted(motion: Trajectory, durations: Array, met: int) -> Trajectory:
+def _fitted(motion: Trajectory, durations: Array) -> Trajectory:
     """Polynomials of these durations, least squares from a motion's first derivatives, its ends met."""
-    effects, wanted = _rows(motion, durations, met)
+    effects, wanted = _rows(motion, durations)
     at_ends = np.zeros((len(durations) + 1, END_ORDER), dtype=bool)
-    at_ends[[0, -1], :STATE] = True
+    at_ends[[0, -1], :MET] = True
     values = np.zeros((*at_ends.shape, 3))
-    ends = [motion.evaluate([0.0, motion.duration], k) for k in range(STATE)]
-    values[[0, -1], :STATE] = np.stack(ends, axis=1)
+    values[[0, -1], :MET] = np.stack([motion.evaluate([0.0, motion.duration], k) for k in range(MET)], axis=1)
     sizes = np.broadcast_to(durations.mean() ** -np.arange(END_ORDER, dtype=float), at_ends.shape)[~at_ends]
     left = wanted - effects[:, at_ends] @ values[at_ends]
     values[~at_ends] = sizes[:, None] * np.linalg.lstsq(effects[:, ~at_ends] * sizes, left, rcond=None)[0]
@@ -63,15 +58,15 @@ def _fitted(motion: Trajectory, durations: Array, met: int) -> Trajectory:
     return Trajectory(durations, TO_COEFFICIENTS @ (by_part * of_segments), motion.heading)
 
 
-def _rows(motion: Trajectory, durations: Array, met: int) -> tuple[Array, Array]:
+def _rows(motion: Trajectory, durations: Array) -> tuple[Array, Array]:
     """Effects of all knots' derivatives on what is met, (rows, knots, 5), and the motion's own, (rows, 3)."""
     s = np.linspace(0.0, 1.0, PLACES)
     starts = np.cumsum(durations) - durations
-    effects = np.zeros((len(durations), met, PLACES, len(durations) + 1, END_ORDER))
-    wanted = np.zeros((len(durations), met, PLACES, 3))
+    effects = np.zeros((len(durations), MET, PLACES, len(durations) + 1, END_ORDER))
+    wanted = np.zeros((len(durations), MET, PLACES, 3))
     for i, duration in enumerate(durations.tolist()):
         times = np.minimum(starts[i] + duration * s, motion.duration)
-        for k in range(met):
+        for k in range(MET):
             size = durations.mean() ** k / factorial(k)
             effect = powers(s, k) @ TO_COEFFICIENTS * duration ** (ORDERS - float(k))
             effects[i, k, :, i : i + 2] = size * effect.reshape(PLACES, 2, END_ORDER)
@@ -85,5 +80,5 @@ def _deviations(path: Trajectory, motion: WarmStart) -> Array:
     inside = np.linspace(0.0, 1.0, DENSER * PLACES, endpoint=False)
     times = (ends - motion.phases)[:, None] + motion.phases[:, None] * inside
     times = np.minimum(times, motion.trajectory.duration)
-    apart = path.evaluate(times, STATE - 1) - motion.trajectory.evaluate(times, STATE - 1)
+    apart = path.evaluate(times, MET - 1) - motion.trajectory.evaluate(times, MET - 1)
     return np.asarray(np.linalg.norm(apart, axis=-1).max(axis=-1))
