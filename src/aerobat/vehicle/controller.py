@@ -26,9 +26,9 @@ class Controller:
     paper's law what its tracking error depends on; with all off it is the paper's law (`paper`).
 
     The disturbance observer answers forces and moments that the model does not know (drag, gusts, rotors that
-    give more or less than they should) as fast as its filter, and the rotors' lag, let them be seen, where the
-    conditions of a flight have an IMU that feels them; without one, the integrals of the errors alone do.
-    Moments are answered with `moment_feedforward`.
+    give more or less than they should) as fast as its filter, and the rotors' lag, let them be seen, where
+    the conditions of a flight have an IMU that feels them; without one, the integrals of the errors alone
+    do. Moments are answered with `moment_feedforward`.
     """
 
     position_gain: NonNegative = 25.0  # [1/s²]
