@@ -428,9 +428,7 @@ def _files(folder: Path) -> dict[str, Path]:
     files["log"] = folder / "log.csv"
     row = {"x": 0.0, "y": 0.0, "z": 0.0, "qw": 1.0, "qx": 0.0, "qy": 0.0, "qz": 0.0}
     row |= {f"f{k}": 2.0 for k in range(4)}
-    ab.write_table(
-        {"t": [0.0, 0.1, 0.2], **{name: [value] * 3 for name, value in row.items()}}, files["log"]
-    )
+    ab.write_table({"t": [0.0, 0.1, 0.2], **{name: [value] * 3 for name, value in row.items()}}, files["log"])
     files["plugin"] = folder / "plugin.py"
     files["plugin"].write_text("")
     plan().save(files["plan"])
