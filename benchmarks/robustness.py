@@ -2,7 +2,7 @@
 
 The floors: 95 % within 5 cm, more than 99 % through a gate 1.3 times the body's width, no crash.
 
-Usage: python benchmarks/robustness.py [runs]
+Usage: python benchmarks/robustness.py [runs] [seed]
 """
 
 from __future__ import annotations
@@ -15,13 +15,14 @@ import aerobat as ab
 
 VEHICLES = ("hexarotor", "agile-quad")
 MANEUVERS = ("flip-roll", "flip-pitch", "flip-roll-translation", "half-flip")
-FILTERS = (0.0, 0.03)  # [s] of the disturbance observer, 0 for none
+FILTERS = (0.0, ab.Controller().disturbance_filter)  # [s] of the disturbance observer, 0 for none
 WIDER = 1.3  # [-] the gate over the body
 CRASHED = ("diverged", "state_not_finite", "hit_ground")
 
 
 def main() -> None:
     runs = int(sys.argv[1]) if len(sys.argv) > 1 else 1000
+    seed = int(sys.argv[2]) if len(sys.argv) > 2 else 7
     print("| vehicle | maneuver | filter | 95 % within | 1.3 × body | attitude missed | lost |")
     print("| --- | --- | --- | --- | --- | --- | --- |")
     for vehicle in VEHICLES:
@@ -29,7 +30,7 @@ def main() -> None:
             plan = ab.plan(maneuver, ab.Miqp(order=4, reserve=0.15), vehicle)
             for seconds in FILTERS:
                 swept = ab.sweep(
-                    plan, "lab", runs, seed=7, controller=ab.Controller(disturbance_filter=seconds)
+                    plan, "lab", runs, seed=seed, controller=ab.Controller(disturbance_filter=seconds)
                 )
                 print(f"| {vehicle} | {maneuver} | {seconds} s | {told(swept)} |", flush=True)
 

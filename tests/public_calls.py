@@ -205,6 +205,7 @@ def _arguments(name: str, folder: Path) -> dict[str, Any]:
         "prepare": {"plan": plan(), "vehicle": agile, **here, "config": ab.FlightConfig()},
         "problem_names": {},
         "read_csv": {"path": saved["csv"], "rate": 100.0},
+        "read_flight_log": {"path": saved["log"], "plan": plan(), "vehicle": "agile-quad"},
         "read_plan": {"path": saved["plan"], "rate": 100.0},
         "read_table": {"path": saved["table"]},
         "read_trajectory": {"path": saved["trajectory"], "rate": 100.0},
@@ -424,6 +425,10 @@ def _files(folder: Path) -> dict[str, Path]:
     files |= {name: folder / f"{name}.npz" for name in ("flight", "trajectory")}
     files["table"] = folder / "table.csv"
     ab.write_table({"a": [1.0]}, files["table"])
+    files["log"] = folder / "log.csv"
+    row = {"x": 0.0, "y": 0.0, "z": 0.0, "qw": 1.0, "qx": 0.0, "qy": 0.0, "qz": 0.0}
+    row |= {f"f{k}": 2.0 for k in range(4)}
+    ab.write_table({"t": [0.0, 0.1, 0.2], **{name: [value] * 3 for name, value in row.items()}}, files["log"])
     files["plugin"] = folder / "plugin.py"
     files["plugin"].write_text("")
     plan().save(files["plan"])

@@ -155,6 +155,7 @@ OWN = {
     "problems": ["--help"],
     "compare": ["--out", "--angle", "--json", "--vehicle"],
     "sweep": ["--runs", "--workers", "--table", "--conditions", "--seed", "--vehicle", "--out", "--json"],
+    "causes": ["--flights", "--conditions", "--seed", "--vehicle", "--angle", "--reserve", "--json"],
     "map": ["--over", "--workers", "--table", "--angle", "--vehicle", "--planner", "--out", "--json"],
     "need": ["--of", "--tolerance", "--workers", "--angle", "--vehicle", "--planner", "--out", "--json"],
     "tune": ["--flights", "--evaluations", "--conditions", "--seed", "--vehicle", "--out", "--time-limit"],
@@ -165,6 +166,7 @@ OWN = {
 }  # fmt: skip
 SHORT = {
     "sweep": {"--runs": "3", "--workers": "1"},
+    "causes": {"--flights": "2"},
     "map": {"--over": "vehicle.mass=0.9", "--workers": "1", "--time-limit": "2"},
     "need": {"--of": "ceiling", "--tolerance": "0.5", "--workers": "1", "--time-limit": "2"},
     "tune": {"--flights": "2", "--evaluations": "2"},
@@ -214,6 +216,7 @@ def _command_line(rng: random.Random) -> list[str]:
             "inspect": ("kept", "kept/flight.npz"),
             "export": ("kept", "kept/line.plan"),
             "compare": ("lien",),
+            "causes": ("half-flip", "line"),
             "map": ("line", "short.toml"),
             "need": ("line", "short.toml"),
             "tune": ("line", "kept"),

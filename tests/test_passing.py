@@ -103,3 +103,12 @@ def test_what_can_prove_nothing_is_refused(settings, named):
 def test_more_flights_than_can_be_flown_are_refused_at_once(flights):
     with pytest.raises(ab.SpecError, match="flights must be 10000000 flights at most"):
         ab.FlightConfig(conditions=WEAK, flights=flights)
+
+
+@pytest.mark.parametrize("name", ["half-flip", "flip-roll"])
+def test_more_thrust_in_a_gate_is_asked_of_the_stage_there_alone(name):
+    problem = ab.load_problem(name)
+    firm = problem.maneuver.with_gate_thrust(problem.gates, 17.0)
+    before, after = (each.stage_sequence(problem.gates, 40.0).stages for each in (problem.maneuver, firm))
+    changed = [b.name for a, b in zip(before, after, strict=True) if a != b]
+    assert changed == ["gate"]

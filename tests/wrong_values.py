@@ -82,7 +82,7 @@ def must_be_refused(door: Door, argument: str, kind: str) -> bool:
     if "Any" in annotation or argument in ("default", "command_default"):
         return False
     right = door.right[argument]
-    if callable(right) and kind == "class":  # which can be called too
+    if kind == "class" and (callable(right) or "Callable" in annotation):  # which can be called too
         return False
     is_number = isinstance(right, int | float | np.ndarray) and not isinstance(right, bool)
     return kind in NEVER or (is_number and kind in (*TEXTS, "True", "truths"))

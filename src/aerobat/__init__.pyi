@@ -32,6 +32,7 @@ from .flatness import Reference, reference
 from .interchange.columns import write_columns
 from .interchange.csv import read_csv, write_csv
 from .interchange.exports import Export, Loss, export
+from .interchange.flight_log import read_flight_log
 from .interchange.read import read_plan, read_trajectory
 from .interchange.robots import import_vehicle
 from .interchange.tables import read_table, write_table
@@ -242,6 +243,7 @@ __all__ = [
     "prepare",
     "problem_names",
     "read_csv",
+    "read_flight_log",
     "read_plan",
     "read_table",
     "read_trajectory",

@@ -21,6 +21,7 @@ COMMANDS = {
     "check": "Prove that a vehicle can fly a trajectory, or say when and why it cannot.",
     "compare": "Plan a maneuver with every planner and put the plans side by side.",
     "sweep": "Fly a maneuver many times as it would really be flown, and count what becomes of it.",
+    "causes": "Measure what each of four causes of error costs a maneuver, alone and all together.",
     "map": "Plan a maneuver over values of two fields, and say where there is a plan and which limits bind.",
     "need": "Find the least thrust-to-weight ratio, the lowest ceiling and the smallest gates with a plan.",
     "tune": "Find controller gains for a vehicle over many flights, and write them to its file.",

@@ -243,6 +243,34 @@ class TuningOptions:
 
 
 @dataclass(frozen=True, kw_only=True)
+class CausesOptions:
+    """Options of a measurement of causes of error."""
+
+    vehicle: Annotated[str | None, Parameter(group=planning)] = None
+    """The vehicle: a name that `aerobat vehicles` lists, or a TOML file. Default: agile-quad."""
+
+    angle: Annotated[float | None, Parameter(group=planning)] = None
+    """The tilt of a half-flip's gate in degrees, -90 to 90, to the right when positive."""
+
+    reserve: Annotated[float, Parameter(group=planning, validator=validators.Number(gte=0, lt=0.5))] = 0.1
+    """Of every limit's range, kept at either end by plans that know the rotors."""
+
+    plugins: Annotated[tuple[Path, ...], Plugins(group=planning)] = ()
+
+    conditions: Annotated[str, Parameter(group=flying)] = "lab"
+    """What varies from flight to flight without the causes: lab, field, or a TOML file."""
+
+    flights: Annotated[int, Parameter(group=flying, validator=validators.Number(gte=1, lte=10**6))] = 1000
+    """How many flights of each trial."""
+
+    seed: Annotated[int, Parameter(group=flying, validator=validators.Number(gte=0))] = 0
+    """The seed of all flights: the same seed, the same flights."""
+
+    json: Annotated[bool, Parameter(group=output, negative="", show_default=False)] = False
+    """Print the measurements as JSON on standard output, and nothing else."""
+
+
+@dataclass(frozen=True, kw_only=True)
 class CheckOptions:
     """Limits that a trajectory is checked for, beyond those of its vehicle's rotors and its problem."""
 

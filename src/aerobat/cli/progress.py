@@ -199,6 +199,26 @@ class NeedProgress(Progress):
         return "; ".join([f"{self._tried} plans tried", *self._last.values()])
 
 
+class CausesProgress(Progress):
+    """Which trial is planned and flown.
+
+    Args:
+        trials: How many there shall be.
+    """
+
+    def __init__(self, trials: int) -> None:
+        self._trials = trials
+        self._begun, self._name = 0, ""
+
+    def begin(self, name: str) -> None:
+        """Another trial's turn."""
+        self._begun, self._name = self._begun + 1, name
+
+    def __str__(self) -> str:
+        """Which cause, and how many trials there are."""
+        return f"{self._name} ({self._begun} of {self._trials})"
+
+
 class FiguresProgress(Progress):
     """Which of the paper's figures is being made, and what is planned or flown for it.
 

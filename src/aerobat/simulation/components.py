@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -14,6 +14,7 @@ from aerobat.kernels.control import Commands, ControllerModel, ControllerState, 
 from aerobat.kernels.control_loops import ReferencePoint
 from aerobat.kernels.motors import Airframe, Motion
 from aerobat.kernels.ops import Ops, PerRotor, Scalar, select_tree
+from aerobat.kernels.quaternions import axes, to_world
 from aerobat.kernels.rigid_body import Body, EnvironmentParameters
 from aerobat.kernels.vectors import subtract
 from aerobat.simulation.loop import Signals
@@ -89,11 +90,24 @@ class TrackingController:
         body, elapsed = signals["observer"].body, signals["clock"].elapsed
         reference: ReferencePoint = inputs or signals["reference"]
         if "disturbance" in signals:
-            thrust = subtract(reference.specific_thrust, signals["disturbance"].force)
-            reference = reference._replace(specific_thrust=thrust)
+            reference = answering(reference, body, signals["disturbance"])
         if not isinstance(delay, tuple):
             body = control.predicted(ops, model, state, body, elapsed, delay)
         return control.step(ops, self.flags, model, state, body, reference, elapsed)
+
+
+def answering(reference: ReferencePoint, body: Body, disturbance: Any) -> ReferencePoint:
+    """The reference, with what is to be thrust and turned against a disturbance in body axes taken off it."""
+    body_axes = axes(body.q_world_body)
+    force, turn = (
+        to_world(body_axes, each) for each in (disturbance.force, disturbance.angular_acceleration)
+    )
+    ahead = reference.ahead._replace(omega_dot=subtract(reference.ahead.omega_dot, turn))
+    return reference._replace(
+        specific_thrust=subtract(reference.specific_thrust, force),
+        omega_dot=subtract(reference.omega_dot, turn),
+        ahead=ahead,
+    )
 
 
 class CommandsOnTheirWay(NamedTuple):

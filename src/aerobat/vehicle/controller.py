@@ -25,9 +25,10 @@ class Controller:
     weak for the attitude loop gets both loops slowed down alike (`gains`). The three switches add to the
     paper's law what its tracking error depends on; with all off it is the paper's law (`paper`).
 
-    The disturbance observer answers forces that the model does not know (drag, lost thrust, gusts) as fast as
-    its filter lets them be seen, where the conditions of a flight have an IMU that feels them; without one,
-    the integral of the position error alone does.
+    The disturbance observer answers forces and moments that the model does not know (drag, gusts, rotors that
+    give more or less than they should) as fast as its filter, and the rotors' lag, let them be seen, where
+    the conditions of a flight have an IMU that feels them; without one, the integrals of the errors alone
+    do. Moments are answered with `moment_feedforward`.
     """
 
     position_gain: NonNegative = 25.0  # [1/s²]
@@ -41,7 +42,7 @@ class Controller:
     attitude_integral_gain: NonNegative = 1000.0  # [1/s³]
     max_attitude_integral: NonNegative = 0.05  # [rad·s]
     lead_time_constant: NonNegative = 0.01  # [s] time constant that the lead leaves of the rotors' lag
-    disturbance_filter: NonNegative = 0.0  # [s] time constant of the disturbance observer; 0 for none
+    disturbance_filter: NonNegative = 0.02  # [s] time constant of the disturbance observer; 0 for none
     moment_feedforward: bool = True  # the moment that the reference asks, J ω' + ω × Jω
     motor_lag_compensation: bool = True  # commands that lead the rotors' lag
     prioritize_tilt: bool = True  # on saturation, give up the yaw moment before roll and pitch
@@ -49,7 +50,12 @@ class Controller:
     @classmethod
     def paper(cls) -> Controller:
         """The paper's own law at the same gains, with body-frame rates but nothing beyond it."""
-        return cls(moment_feedforward=False, motor_lag_compensation=False, prioritize_tilt=False)
+        return cls(
+            disturbance_filter=0.0,
+            moment_feedforward=False,
+            motor_lag_compensation=False,
+            prioritize_tilt=False,
+        )
 
     @property
     def feature_flags(self) -> FeatureFlags:

@@ -13,7 +13,7 @@ from aerobat.cli.runs.folder import FLIGHT, INSPECTION
 from aerobat.cli.runs.saved_plans import named_vehicle
 from aerobat.cli.terminal import print_json
 from aerobat.errors import SpecError
-from aerobat.interchange import read_plan
+from aerobat.interchange import read_flight_log, read_plan
 from aerobat.planning import Plan
 from aerobat.reporting.inspection import inspection_figure
 from aerobat.reporting.page import png
@@ -21,6 +21,8 @@ from aerobat.reporting.report_json import to_json
 from aerobat.simulation import load_flight
 from aerobat.storage import write_whole
 from aerobat.studies.inspection import inspect_flight
+
+CSV = ".csv"  # a log of another system
 
 
 def inspect(log: Path, options: Annotated[InspectOptions, Parameter(name="*")] = InspectOptions()) -> None:
@@ -32,16 +34,20 @@ def inspect(log: Path, options: Annotated[InspectOptions, Parameter(name="*")] =
     Parameters
     ----------
     log
-        A folder that `aerobat fly` wrote, or a flight's .npz file.
+        A folder that `aerobat fly` wrote, a flight's .npz file, or another system's log as a .csv file with
+        columns t, x, y, z, qw, qx, qy, qz and f0, f1, ..., the rotors' thrusts, or u0, u1, ..., commands;
+        see docs/how-to/inspect.md.
     """
     file = log / FLIGHT if os.path.isdir(log) else log
-    flight = load_flight(file)
+    flight = None if file.suffix.lower() == CSV else load_flight(file)
     plan = read_plan(options.plan or file.parent)
     if not isinstance(plan, Plan):
         raise SpecError(
             f"{options.plan or file.parent} holds a path alone; give the flight's .plan file as --plan"
         )
     vehicle = None if options.vehicle is None else named_vehicle(options.vehicle)
+    if flight is None:
+        flight = read_flight_log(file, plan, vehicle)
     found = inspect_flight(flight, plan, vehicle)
     picture = options.figure or file.parent / INSPECTION
     write_whole(picture, png(inspection_figure(found)))

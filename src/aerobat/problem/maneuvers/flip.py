@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import field, replace
 from math import inf
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 
 from aerobat import so3
 from aerobat.arrays import Array
-from aerobat.declaration import Count, PartialVector, Positive
+from aerobat.declaration import Count, PartialVector, Positive, validated
 from aerobat.errors import SpecError
 from aerobat.problem.condition import Condition, Quantity, fixed, free, thrust_in_plane
 from aerobat.problem.gate import Gate, passed_gate
@@ -98,6 +98,16 @@ class Flip(Maneuver):
             passage=PAPER_PASSAGE,
         )
 
+    @validated
+    def with_gate_thrust(self, gates: Sequence[Gate], thrust: Positive) -> Flip:
+        """Return it with a least specific thrust [m/s²] in its gate; itself where it has none."""
+        if not gates and self.gate is None:
+            return self
+        angle_deg = self._angle_deg(passed_gate(gates, self.gate, self.kind))
+        name = "min_inverted_thrust" if _is_inverted(angle_deg) else "min_lateral_thrust"
+        changes: dict[str, Any] = {name: thrust}
+        return replace(self, **changes)
+
     @property
     def turn_axis(self) -> Array:
         """The horizontal unit vector about which the vehicle turns, right-handed, (3,)."""
@@ -142,13 +152,18 @@ class Flip(Maneuver):
 
     def _min_thrust(self, angle_deg: float, max_specific_thrust: float) -> float:
         """The least specific thrust [m/s²] at an angle of the turn: upside down, or sideways."""
-        if abs(angle_deg % 360.0 - 180.0) < 45.0:
+        if _is_inverted(angle_deg):
             return self.min_inverted_thrust or self.INVERTED_FRACTION * max_specific_thrust
         return self.min_lateral_thrust or self.LATERAL_FRACTION * max_specific_thrust
 
     def _direction(self, angle_deg: float) -> Array:
         """The thrust's direction at an angle of the turn, (3,)."""
         return so3.rotate(so3.about_axis(self.turn_axis, np.deg2rad(angle_deg)), UP)
+
+
+def _is_inverted(angle_deg: float) -> bool:
+    """True at an angle of the turns that is upside down rather than sideways."""
+    return abs(angle_deg % 360.0 - 180.0) < 45.0
 
 
 def _wrapped(angle_deg: float) -> float:

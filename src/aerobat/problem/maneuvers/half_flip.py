@@ -17,6 +17,8 @@ from aerobat.problem.maneuvers.maneuver import Maneuver, maneuver
 from aerobat.problem.stage import StageSequence
 from aerobat.so3 import UP
 
+_UPRIGHT = 1e-9  # [-] of a gate's upright across the vertical: rounding
+
 
 @maneuver("half-flip")
 class HalfFlip(Maneuver):
@@ -55,6 +57,13 @@ class HalfFlip(Maneuver):
         """Return the gates at another tilt [rad]."""
         return tuple(gate.tilted(tilt) for gate in gates)
 
+    @validated
+    def with_gate_thrust(self, gates: Sequence[Gate], thrust: Positive) -> HalfFlip:
+        """Return it with a least specific thrust [m/s²] in its gate; itself where that is upright."""
+        up = passed_gate(gates, self.gate, self.kind).up
+        across = float(np.hypot(up[0], up[1]))
+        return self if across < _UPRIGHT else replace(self, min_lateral_thrust=thrust * across)
+
     def _min_thrust(self, gate: Gate, max_specific_thrust: float) -> float:
         """The least thrust along the gate's upright [m/s²]."""
         if gate.up[2] < -1e-9:
@@ -62,7 +71,7 @@ class HalfFlip(Maneuver):
         if self.min_lateral_thrust is None:
             return self.THRUST_FRACTION * max_specific_thrust
         across = float(np.hypot(gate.up[0], gate.up[1]))
-        if across < 1e-9:
+        if across < _UPRIGHT:
             raise SpecError(
                 "maneuver.min_lateral_thrust asks for thrust sideways, which an upright gate has not; tilt it"
             )

@@ -12,7 +12,7 @@ from typing import ClassVar, TypeVar, cast, dataclass_transform
 from pydantic import Field
 
 from aerobat.arrays import Array
-from aerobat.declaration import Angle, Label, Registry, validated
+from aerobat.declaration import Angle, Label, Positive, Registry, validated
 from aerobat.errors import SpecError
 from aerobat.problem.gate import Gate
 from aerobat.problem.stage import StageSequence
@@ -43,6 +43,11 @@ class Maneuver(ABC):
     def with_gate_tilt(self, gates: Sequence[Gate], tilt: Angle) -> tuple[Gate, ...]:
         """Return the gates at another tilt [rad]. Raises SpecError unless a half-flip passes them."""
         raise SpecError(f"only the gate of a half-flip can be tilted, this maneuver is a {self.kind}")
+
+    @validated
+    def with_gate_thrust(self, gates: Sequence[Gate], thrust: Positive) -> Maneuver:
+        """Return it with a least specific thrust [m/s²] in its gate; itself where it asks for none there."""
+        return self
 
     @property
     def turn_axis(self) -> Array | None:

@@ -1,4 +1,4 @@
-"""The loop's component that tells the controller of forces beyond its model: drag, lost thrust, gusts."""
+"""The loop's component that tells the controller of what its model lacks: drag, gusts, rotors' mismatch."""
 
 from __future__ import annotations
 
@@ -8,8 +8,7 @@ from typing import NamedTuple
 from aerobat.kernels import motors, rigid_body
 from aerobat.kernels.control import ControllerModel
 from aerobat.kernels.ops import Ops, Scalar, Vector
-from aerobat.kernels.quaternions import axes, to_world
-from aerobat.kernels.vectors import ZERO, add_scaled, subtract
+from aerobat.kernels.vectors import ZERO, add_scaled, scale, subtract
 from aerobat.simulation.loop import Signals
 
 
@@ -22,16 +21,20 @@ class DisturbanceParameters(NamedTuple):
 
 
 class Disturbance(NamedTuple):
-    """Force over mass [m/s²], world frame, that an accelerometer feels beyond the model's."""
+    """What an IMU feels beyond the model, body axes: most of it, as rotors' mismatch, turns with the body."""
 
-    force: Vector
+    force: Vector  # [m/s²] over mass
+    angular_acceleration: Vector  # [rad/s²]
+    omega_body: Vector  # [rad/s] at the last step
+    has_omega: Scalar  # 1, or 0 before the first step
 
 
 @dataclass(frozen=True)
 class DisturbanceObserver:
-    """The low-passed difference between the specific force that is measured and that of the nominal model.
+    """The low-passed difference between what is measured and the nominal model, of force and of moment.
 
-    The model's is that of the rotors as the controller takes them to be, and of drag at the estimated state.
+    The model's is that of the rotors as the controller takes them to be, of drag at the estimated state, and
+    of the gyroscopic moment; the angular acceleration that is measured is the change of the gyro's rates.
     """
 
     period: int = 1
@@ -42,7 +45,7 @@ class DisturbanceObserver:
         self, ops: Ops, parameters: DisturbanceParameters, inputs: tuple[()], signals: Signals
     ) -> Disturbance:
         """See `Component.init`."""
-        return Disturbance(ZERO)
+        return Disturbance(ZERO, ZERO, ZERO, 0.0)
 
     def step(
         self,
@@ -54,16 +57,25 @@ class DisturbanceObserver:
     ) -> Disturbance:
         """See `Component.step`."""
         model, elapsed = parameters.model, signals["clock"].elapsed
+        mass_properties, rotors = model.airframe
         observer, controller = signals["observer"], signals["controller"]
-        airframe = model.airframe
-        left = motors.decay_factors(ops, airframe.rotors, ops.maximum(elapsed - parameters.delay, 0.0))
-        now = motors.first_order_response(controller.thrusts, controller.commands.thrusts, left)
-        thrust = motors.collective_thrust(airframe.rotors, now)
-        expected = rigid_body.specific_force(
-            airframe.mass_properties, model.environment, observer.body, thrust
+        left = motors.decay_factors(ops, rotors, ops.maximum(elapsed - parameters.delay, 0.0))
+        thrusts = motors.first_order_response(controller.thrusts, controller.commands.thrusts, left)
+        load = motors.wrench(rotors, thrusts)
+        nominal = rigid_body.derivative(mass_properties, model.environment, observer.body, load)
+        specific_force = rigid_body.specific_force(
+            mass_properties, model.environment, observer.body, load.thrust
         )
-        nominal = observer.filter.nominal
-        felt = subtract(signals["imu"].sample.specific_force, nominal.accelerometer_bias)
-        beyond = to_world(axes(nominal.q_world_body), subtract(felt, expected))
+        bias = observer.filter.nominal.accelerometer_bias
+        felt = subtract(signals["imu"].sample.specific_force, bias)
+        omega = observer.body.omega_body
+        turned = scale(1.0 / elapsed, subtract(omega, state.omega_body))
         fraction = elapsed / (parameters.time_constant + elapsed)
-        return Disturbance(add_scaled(state.force, fraction, subtract(beyond, state.force)))
+        force = subtract(subtract(felt, specific_force), state.force)
+        angular = subtract(subtract(turned, nominal.omega_body), state.angular_acceleration)
+        return Disturbance(
+            add_scaled(state.force, fraction, force),
+            add_scaled(state.angular_acceleration, state.has_omega * fraction, angular),
+            omega,
+            1.0,
+        )

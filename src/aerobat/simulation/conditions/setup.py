@@ -142,7 +142,9 @@ def _controller(
     controller = TrackingController(settings.feature_flags, period)
     observer: tuple[Part, ...] = ()
     if settings.disturbance_filter > 0.0 and conditions.imu is not None:
-        times = flights.all(settings.disturbance_filter), flights.all(delay / rate)
+        # a filter faster than the rotors takes their lag's misfit for a disturbance, and unsettles the loop
+        slowest = max(rotor.lag for rotor in nominal.rotors)
+        times = flights.all(max(settings.disturbance_filter, slowest)), flights.all(delay / rate)
         observer = (Part(DisturbanceObserver(period), DisturbanceParameters(model, *times)),)
     if period == 1 and delay == 0:
         return (*observer, Part(controller, ControllerParameters(model, ())))

@@ -19,7 +19,7 @@ from aerobat.planning.tube import Tube
 from aerobat.problem import Problem, as_problem
 from aerobat.studies.passing.causes import standing_in_the_way
 from aerobat.studies.passing.result import Passing, Round
-from aerobat.studies.passing.spread import LEVEL, narrowed, spread_of
+from aerobat.studies.passing.spread import LEVEL, firmer, narrowed, spread_of
 from aerobat.studies.sweep import Share
 from aerobat.studies.sweep.share import CONFIDENCE, percent
 from aerobat.vehicle import Vehicle, as_vehicle
@@ -53,10 +53,11 @@ def plan_to_pass(
     """Plan a problem so that flights under conditions pass with a probability, proven on fresh flights.
 
     The plain plan is flown many times. Where too few flights pass, their spread says which reserve of the
-    rotors' limits to begin with, and by how much to narrow the gates for planning; the smallest reserve of a
-    ladder is sought with which enough of the same flights pass. The plan found is then flown on flights that
-    nothing was learned from: it is returned if the lower end of Clopper and Pearson's interval reaches the
-    probability. A flight passes where nothing goes wrong, as its `Outcome` says.
+    rotors' limits to begin with, by how much to narrow the gates for planning, and how much thrust to ask for
+    in them; the smallest reserve of a ladder is sought with which enough of the same flights pass. The plan
+    found is then flown on flights that nothing was learned from: it is returned if the lower end of Clopper
+    and Pearson's interval reaches the probability. A flight passes where nothing goes wrong, as its `Outcome`
+    says.
 
     Args:
         problem: What is planned, or its name.
@@ -201,13 +202,34 @@ class _Tightening:
         return high, best
 
     def _round(self, steps: int) -> Round | None:
-        """A round with so many steps of reserve; None where there is no such plan."""
+        """A round with so many steps of reserve; None where there is no such plan.
+
+        Where too many flights stray off their attitude in a gate, one more with more thrust there, which
+        stays for the rounds that follow if it is better.
+        """
+        found = self._planned(steps, self._narrowed)
+        if found is None:
+            return None
+        done, scores = found
+        if self.task.is_enough(done.share):
+            return done
+        kept = 0.5 * (1.0 + self.task.probability)  # half of those that may fail
+        firm = firmer(self._narrowed, self.task.vehicle, done.plan, scores, kept)
+        again = None if firm == self._narrowed else self._planned(steps, firm)
+        if again is None or again[0].share.count <= done.share.count:
+            return done
+        self._narrowed = firm
+        return again[0]
+
+    def _planned(self, steps: int, problem: Problem) -> tuple[Round, Scores] | None:
+        """A round with so many steps of reserve through gates as a problem has them, and its scores."""
         reserve = round(self.task.planner.reserve + steps * STEP, 9)
         try:
-            found = self.task.plan(reserve, self._narrowed)
+            found = self.task.plan(reserve, problem)
         except (Infeasible, SpecError):  # no plan, or no such reserve
             return None
-        return self._noted(Round(reserve, found, self.task.share(found, self.training)))
+        scores = self.task.scores(found, self.training)
+        return self._noted(Round(reserve, found, _passed(scores))), scores
 
     def _noted(self, done: Round) -> Round:
         self.rounds.append(done)

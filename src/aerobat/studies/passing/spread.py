@@ -15,6 +15,8 @@ from aerobat.planning import Plan
 from aerobat.planning.passages import require_openings
 from aerobat.problem import Gate, Problem
 from aerobat.simulation import fly
+from aerobat.simulation.passages import Passage
+from aerobat.so3 import UP
 from aerobat.vehicle import Vehicle
 
 LEVEL = 0.95  # of the flights, that keep within a tube
@@ -22,6 +24,8 @@ ROWS_RATE = 100.0  # [1/s] of a tube's rows, at most
 SAMPLED = 200  # flights whose every row is looked at: 50 MB
 MIN_TOLERANCE = 0.1  # of a gate's tolerance, that is left to the plan however far flights stray
 MIN_OPENING = 0.8  # likewise of a gate's opening
+AIM = 0.8  # of a gate's tolerance of attitude, that flights shall keep to after their thrust there is raised
+MAX_GATE_THRUST = 0.6  # of the greatest specific thrust, to which it may be: turning takes the rest
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,6 +87,44 @@ def narrowed(problem: Problem, vehicle: Vehicle, scores: Scores) -> Problem:
     except SpecError:
         return pointed
     return smaller
+
+
+def firmer(problem: Problem, vehicle: Vehicle, plan: Plan, scores: Scores, fraction: float) -> Problem:
+    """The problem with more thrust in the gates than its plan has, where flights stray off their attitude.
+
+    Against a push across the thrust the vehicle leans by their ratio: the more thrust, the less. The problem
+    itself where its maneuver asks for no thrust in its gate, or this is as much as is useful.
+
+    Args:
+        problem: What is planned.
+        vehicle: What flies it.
+        plan: What was planned of it.
+        scores: Of that plan's flights.
+        fraction: Of the flights, that shall keep to the attitude.
+    """
+    needed = [_thrust_needed(plan, passage, fraction) for passage in scores.passages]
+    most = MAX_GATE_THRUST * vehicle.max_specific_thrust
+    thrust = min(max(needed, default=0.0), most)
+    if thrust <= min((_planned_thrust(plan, passage) for passage in scores.passages), default=0.0):
+        return problem
+    return replace(problem, maneuver=problem.maneuver.with_gate_thrust(problem.gates, thrust))
+
+
+def _thrust_needed(plan: Plan, passage: Passage, fraction: float) -> float:
+    """The specific thrust [m/s²] with which flights would keep well to a gate's attitude."""
+    strays, tolerance = np.asarray(passage.attitude_error_deg), np.asarray(passage.attitude_tolerance_deg)
+    crossed = np.isfinite(strays) & np.isfinite(tolerance)
+    if not crossed.any():
+        return 0.0
+    excess = float(np.quantile(strays[crossed] / tolerance[crossed], fraction))
+    return _planned_thrust(plan, passage) * excess / AIM
+
+
+def _planned_thrust(plan: Plan, passage: Passage) -> float:
+    """The specific thrust [m/s²] of a plan as it is to pass a gate."""
+    time = min(float(np.nanmedian(passage.planned)), plan.duration)
+    acceleration = plan.trajectory.evaluate(np.array([time]), 2)[0]
+    return float(np.linalg.norm(acceleration + plan.problem.environment.gravity * UP))
 
 
 def _pointed(gate: Gate, scores: Scores) -> Gate:

@@ -1,0 +1,176 @@
+"""Flights that another system recorded, from a CSV file of documented columns, as inspection takes them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from aerobat import so3
+from aerobat.arrays import Array
+from aerobat.declaration import PathName, validated
+from aerobat.errors import SpecError
+from aerobat.flatness import reference, vehicle_of
+from aerobat.interchange.rows import NAMES, SYNONYMS, has_header, number_table
+from aerobat.planning import Plan
+from aerobat.simulation import Flight, Outcome
+from aerobat.simulation.flight import setpoint_series
+from aerobat.storage import read_whole
+from aerobat.vehicle import Vehicle
+
+MAX_LOG = 2**28  # bytes: an hour at 1 kHz
+FEWEST = 3  # rows, of which rates can be told
+AT_LIMIT = 1e-3  # of a rotor's range, within which a command is at its limit
+ESTIMATED = ("est_x", "est_y", "est_z")
+ESTIMATED_RATES = ("est_vx", "est_vy", "est_vz")
+
+
+@validated
+def read_flight_log(path: PathName, plan: Plan, vehicle: Vehicle | str | None = None) -> Flight:
+    """Read a recorded flight of a plan from a CSV file with a header.
+
+    Columns: `t` [s] on the plan's clock; `x, y, z` [m] and `qw, qx, qy, qz`, the true pose, world ENU and
+    body FLU; of each rotor `f0, f1, ...` [N], its thrust, or `u0, u1, ...` [N], its command, or both. Where
+    they are there, `vx, vy, vz` [m/s] world, `wx, wy, wz` [rad/s] body, and `est_x, ..., est_vz`, position
+    and velocity as the observer had them; rates that are not are told from the pose, thrusts and commands
+    from each other by the rotors' lags. Other columns, and rows outside the plan's time, are left out.
+
+    Args:
+        path: The file.
+        plan: What was flown, whose set-points the flight has.
+        vehicle: The vehicle that it was flown for, or its name, by default the plan's.
+
+    Raises SpecError, naming the line or the column, for what is no such table.
+    """
+    nominal = vehicle_of(plan, vehicle)
+    try:
+        columns = _columns(Path(path), plan.duration)
+        return _flight(columns, plan, nominal)
+    except SpecError as error:
+        raise SpecError(f"flight log {path}: {error}") from None
+
+
+def _columns(path: Path, duration: float) -> dict[str, Array]:
+    """The columns by their names, of the rows within the plan's time."""
+    try:
+        text = read_whole(path, MAX_LOG).decode("utf-8-sig")
+    except UnicodeDecodeError:
+        raise SpecError("it is no text; give a CSV file") from None
+    if not has_header(text):
+        raise SpecError("line 1: it names no columns; a log needs t, x, y, z, qw, qx, qy, qz and f0, f1, ...")
+    words = text.partition("\n")[0].strip().lstrip("#").split(",")
+    header = [SYNONYMS.get(name, name) for name in (word.strip().strip('"').lower() for word in words)]
+    for name in header:
+        if header.count(name) > 1:
+            raise SpecError(f"line 1: there are two columns {name}; rename one")
+    table = number_table(text, 2, (len(header),), f"line 1 names {len(header)} columns")
+    columns = dict(zip(header, table.T, strict=True))
+    for name in (*NAMES["time"], *NAMES["position"], *NAMES["attitude"]):
+        if name not in columns:
+            raise SpecError(f"line 1: there is no column {name}; a log needs t, x, y, z, qw, qx, qy, qz")
+    falling = np.diff(columns["t"]) <= 0.0
+    if falling.any():
+        raise SpecError(f"line {3 + int(np.argmax(falling))}: times, the column t, must rise")
+    flown = (columns["t"] >= 0.0) & (columns["t"] <= duration)
+    if flown.sum() < FEWEST:
+        raise SpecError(
+            f"{flown.sum()} of its rows lie within the plan's time, 0 to {duration:.3f} s; "
+            "let t be 0 where the plan begins"
+        )
+    return {name: column[flown] for name, column in columns.items()}
+
+
+def _flight(columns: Mapping[str, Array], plan: Plan, nominal: Vehicle) -> Flight:
+    times, position = columns["t"], _group(columns, NAMES["position"])
+    attitude = _group(columns, NAMES["attitude"])
+    norms = np.linalg.norm(attitude, axis=1)
+    if not ((norms > 0.5) & (norms < 2.0)).all():
+        raise SpecError("qw, qx, qy, qz must be unit quaternions in every row")
+    q = so3.normalize(attitude)
+    thrusts, commands = _of_rotors(columns, times, nominal)
+    span = nominal.max_thrusts - nominal.min_thrusts
+    margin = np.minimum(commands - nominal.min_thrusts, nominal.max_thrusts - commands)
+    asked = reference(plan, nominal, times=times)
+    series = {
+        "position": position,
+        "velocity": _group(columns, ("vx", "vy", "vz"), _rate(times, position)),
+        "q_world_body": q,
+        "omega_body": _group(columns, NAMES["rates"], _turning(times, q)),
+        "commands": commands,
+        "thrusts": thrusts,
+        "saturated": (margin <= AT_LIMIT * span).any(axis=1),
+        "min_thrusts": nominal.min_thrusts,
+        "max_thrusts": nominal.max_thrusts,
+        "ends": times[-1],
+        **setpoint_series(asked.setpoint),
+    }
+    if all(name in columns for name in ESTIMATED):
+        seen = _group(columns, ESTIMATED)
+        series |= {
+            "observed_position": seen,
+            "observed_velocity": _group(columns, ESTIMATED_RATES, _rate(times, seen)),
+            "observed_q_world_body": q,
+            "since_pose": np.zeros(len(times)),
+        }
+    return Flight(
+        times=times,
+        series=series,
+        vehicles=(nominal.name,),
+        outcomes=(Outcome.COMPLETE,),
+        sentences=("recorded by another system",),
+        engine="log",
+        environment=plan.problem.environment,
+    )
+
+
+def _group(columns: Mapping[str, Array], names: tuple[str, ...], otherwise: Array | None = None) -> Array:
+    """Columns side by side, (T, len(names)), or what stands for them where one is not there."""
+    if otherwise is not None and not all(name in columns for name in names):
+        return otherwise
+    return np.stack([columns[name] for name in names], axis=1)
+
+
+def _of_rotors(columns: Mapping[str, Array], times: Array, nominal: Vehicle) -> tuple[Array, Array]:
+    """Thrusts and commands [N] of every rotor, (T, n) each, the one from the other where it is not there."""
+    count = len(nominal.rotors)
+    given = {}
+    for letter in "fu":
+        names = tuple(f"{letter}{k}" for k in range(count))
+        if all(name in columns for name in names):
+            given[letter] = _group(columns, names)
+        if f"{letter}{count}" in columns:
+            raise SpecError(
+                f"line 1: there is a column {letter}{count}, and {nominal.name} has {count} rotors"
+            )
+    if not given:
+        raise SpecError(
+            f"line 1: there are neither f0 to f{count - 1}, the rotors' thrusts [N], nor u0 to u{count - 1}, "
+            "their commands; one of them tells saturation from what the vehicle's model lacks"
+        )
+    thrusts, commands = given.get("f"), given.get("u")
+    if commands is None:
+        assert thrusts is not None, "one of them was given"
+        led = thrusts + nominal.lags * np.gradient(thrusts, times, axis=0)
+        return thrusts, np.clip(led, nominal.min_thrusts, nominal.max_thrusts)
+    return (_followed(times, commands, nominal.lags) if thrusts is None else thrusts), commands
+
+
+def _followed(times: Array, commands: Array, lags: Array) -> Array:
+    """Thrusts [N] of rotors that follow commands from row to row, by their lags."""
+    left = np.exp(-np.diff(times)[:, None] / np.maximum(lags, 1e-9))
+    thrusts = [commands[0]]
+    for command, remains in zip(commands[:-1], left, strict=True):
+        thrusts.append(command + (thrusts[-1] - command) * remains)
+    return np.array(thrusts)
+
+
+def _rate(times: Array, values: Array) -> Array:
+    return np.asarray(np.gradient(values, times, axis=0))
+
+
+def _turning(times: Array, q: NDArray[np.float64]) -> Array:
+    """The body rates [rad/s] between attitudes, (T, 3), the first one twice."""
+    turns = so3.log(so3.multiply(so3.conjugate(q[:-1]), q[1:])) / np.diff(times)[:, None]
+    return np.concatenate([turns[:1], turns])

@@ -1,0 +1,65 @@
+"""`aerobat causes`: four causes of error measured as Python does, and refused where one cannot be."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+
+import pytest
+
+import aerobat as ab
+from aerobat import cli
+from aerobat.studies.error_causes import error_causes, four_causes
+
+FEW = ("--vehicle", "hexarotor", "--flights", "8", "--seed", "3")
+
+
+def test_the_table_holds_what_python_measures(capsys: pytest.CaptureFixture[str]) -> None:
+    cli.main(["causes", "half-flip", *FEW, "--json"])
+    told = json.loads(capsys.readouterr().out)
+    lab, vehicle = ab.load_dispersion("lab"), ab.load_vehicle("hexarotor")
+    measured = error_causes(
+        "half-flip",
+        vehicle,
+        four_causes(lab, vehicle.controller),
+        planner=ab.Miqp(order=4, reserve=0.1),
+        conditions=lab,
+        flights=8,
+        seed=3,
+    )
+    assert list(told["causes"]) == [result.cause for result in measured.results]
+    assert len(told["causes"]) == 6
+    for result in measured.results:
+        facts = told["causes"][result.cause]
+        assert facts["duration_s"] == result.plan.duration
+        assert facts["cost_m"]["median"] == measured.cost(result.cause).median
+        assert facts["error_m"]["median"] in result.position_error
+    assert told["causes"]["hand-off 5 cm, 2°"]["cost_m"]["median"] > 0.03
+
+
+def test_a_hand_off_is_made_where_conditions_have_none() -> None:
+    lab = ab.load_dispersion("lab")
+    assert lab.motion_capture is not None
+    single = replace(lab, motion_capture=replace(lab.motion_capture, hand_off=None))
+    cause = four_causes(single, ab.Controller())[1]
+    (made,) = cause.changes.values()
+    assert made.translation == 0.05
+    assert made.warp == 0.0
+
+
+@pytest.mark.parametrize(
+    ("arguments", "told"),
+    [
+        (("line",), "has no gate"),
+        (("half-flip", "--conditions", "none"), "no motion capture"),
+        (("half-flip", "--flights", "0"), "flights"),
+        (("half-flip", "--reserve", "0.5"), "reserve"),
+    ],
+)
+def test_what_cannot_be_measured_is_refused_in_a_sentence(
+    arguments: tuple[str, ...], told: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with pytest.raises(SystemExit) as stop:
+        cli.main(["causes", *arguments])
+    assert stop.value.code == 2
+    assert told in capsys.readouterr().err

@@ -1,0 +1,153 @@
+"""Logs of other systems: a planted cause is named from a CSV as from our own log, and what lacks is told."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Iterable
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import aerobat as ab
+from aerobat import cli
+
+POSE = ("t", "x", "y", "z", "qw", "qx", "qy", "qz")
+RATES = ("vx", "vy", "vz", "wx", "wy", "wz")
+SEEN = ("est_x", "est_y", "est_z", "est_vx", "est_vy", "est_vz")
+THRUSTS, COMMANDS = ("f0", "f1", "f2", "f3"), ("u0", "u1", "u2", "u3")
+ROWS = 5  # of our log for one of theirs: 100 Hz
+
+
+@cache
+def plan() -> ab.Plan:
+    return ab.plan("flip-roll", ab.Miqp(order=5), "agile-quad")
+
+
+def under(**conditions: Any) -> ab.Flight:
+    return ab.fly(plan(), conditions=ab.Dispersion(**conditions), seed=1)
+
+
+def weak(**factors: float) -> ab.Vehicle:
+    vehicle = plan().vehicle
+    assert vehicle is not None
+    rotors = (
+        replace(rotor, **{name: factor * getattr(rotor, name) for name, factor in factors.items()})
+        for rotor in vehicle.rotors
+    )
+    return replace(vehicle, rotors=tuple(rotors))
+
+
+def handed_over() -> ab.Flight:
+    lab = ab.load_dispersion("lab")
+    assert lab.motion_capture is not None
+    cameras = replace(lab.motion_capture, hand_off=ab.HandOff(translation=0.15))
+    return under(imu=lab.imu, motion_capture=cameras, control_rate=500.0)
+
+
+PLANTED: dict[str, Callable[[], ab.Flight]] = {
+    "start": lambda: under(start_position=0.05),
+    "vehicle": lambda: under(mass=0.1),
+    "hand-off": handed_over,
+    "saturation": lambda: ab.fly(plan(), weak(max_thrust=0.6)),
+    "gains": lambda: ab.fly(
+        plan(), controller=ab.Controller(attitude_frequency=14.0, moment_feedforward=False)
+    ),
+}
+
+
+def log(path: Path, flight: ab.Flight, names: Iterable[str], every: int = ROWS) -> Path:
+    """Write a flight as another system would, with columns of these names."""
+    blocks = {
+        ("t",): flight.times[:, None],
+        POSE[1:4]: flight.position,
+        POSE[4:]: flight.q_world_body,
+        RATES[:3]: flight.velocity,
+        RATES[3:]: flight.omega_body,
+        THRUSTS: flight.thrusts,
+        COMMANDS: flight.commands,
+    }
+    if flight.is_observed:
+        blocks |= {SEEN[:3]: flight.observed_position, SEEN[3:]: flight.observed_velocity}
+    columns = {name: values[:, k] for group, values in blocks.items() for k, name in enumerate(group)}
+    table = np.column_stack([columns[name] for name in names if name in columns])[::every]
+    header = ",".join(name for name in names if name in columns)
+    np.savetxt(path, table, delimiter=",", header=header, comments="", fmt="%.9g")
+    return path
+
+
+@pytest.mark.parametrize("cause", PLANTED)
+def test_a_planted_cause_is_named_first_from_another_systems_log(cause: str, tmp_path: Path) -> None:
+    flight = PLANTED[cause]()
+    every = 1 if cause == "saturation" else ROWS
+    file = log(tmp_path / "log.csv", flight, (*POSE, *RATES, *THRUSTS, *COMMANDS, *SEEN), every)
+    found = ab.inspect_flight(ab.read_flight_log(file, plan(), flown_by(cause)), plan(), flown_by(cause))
+    assert found.cause == cause
+    assert found.shares[0].error > 0.7 * found.largest
+
+
+def flown_by(cause: str) -> ab.Vehicle | None:
+    """The vehicle whose limits the log's reader knows."""
+    return weak(max_thrust=0.6) if cause == "saturation" else None
+
+
+def test_a_pose_and_thrusts_alone_tell_a_heavy_vehicle(tmp_path: Path) -> None:
+    file = log(tmp_path / "log.csv", PLANTED["vehicle"](), (*POSE, *THRUSTS))
+    assert ab.inspect_flight(ab.read_flight_log(file, plan()), plan()).cause == "vehicle"
+
+
+def test_what_a_log_holds_is_what_is_read_and_what_it_lacks_is_told_from_the_rest(tmp_path: Path) -> None:
+    flight = ab.fly(plan())
+    whole = ab.read_flight_log(
+        log(tmp_path / "whole.csv", flight, (*POSE, *RATES, *THRUSTS, *COMMANDS), 1), plan()
+    )
+    poses = ab.read_flight_log(log(tmp_path / "poses.csv", flight, (*POSE, *COMMANDS), 1), plan())
+    for name in ("position", "velocity", "omega_body", "thrusts", "commands"):
+        rows = slice(len(whole.times))
+        np.testing.assert_allclose(whole.series[name], flight.series[name][rows], atol=1e-6)
+    np.testing.assert_allclose(poses.velocity, whole.velocity, atol=0.05)
+    np.testing.assert_allclose(poses.thrusts[50:], whole.thrusts[50:], atol=0.05)
+    np.testing.assert_allclose(
+        whole.setpoint_position, flight.setpoint_position[: len(whole.times)], atol=1e-9
+    )
+
+
+def test_the_command_takes_a_log_beside_its_plan(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    plan().save(tmp_path / "flip.plan")
+    file = log(tmp_path / "log.csv", PLANTED["start"](), (*POSE, *THRUSTS))
+    cli.main(["inspect", str(file), "--plan", str(tmp_path / "flip.plan"), "--json"])
+    assert json.loads(capsys.readouterr().out)["cause"] == "start"
+    assert (tmp_path / "inspect.png").exists()
+
+
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [
+        ("0,0,0,0,1,0,0,0\n", "it names no columns"),
+        ("t,x,y,z,f0\n0,0,0,0,1\n1,0,0,0,1\n", "there is no column qw"),
+        ("t,t,x\n0,0,0\n1,1,1\n", "there are two columns t"),
+        ("t,x,y,z,qw,qx,qy,qz\n0,0,0,0,1,0,0,0\n0,0,0,0,1,0,0,0\n", "times, the column t, must rise"),
+        ("t,x,y,z,qw,qx,qy,qz\n90,0,0,0,1,0,0,0\n91,0,0,0,1,0,0,0\n", "let t be 0 where the plan begins"),
+        (
+            "t,x,y,z,qw,qx,qy,qz\n0,0,0,0,1,0,0,0\n0.1,0,0,0,1,0,0,0\n0.2,0,0,0,1,0,0,0\n",
+            "neither f0 to f3, the rotors' thrusts",
+        ),
+        (
+            "t,x,y,z,qw,qx,qy,qz\n0,0,0,0,9,0,0,0\n0.1,0,0,0,1,0,0,0\n0.2,0,0,0,1,0,0,0\n",
+            "must be unit quaternions",
+        ),
+        (
+            "t,x,y,z,qw,qx,qy,qz,f0,f1,f2,f3,f4\n0,0,0,0,1,0,0,0,1,1,1,1,1\n0.1,0,0,0,1,0,0,0,1,1,1,1,1\n"
+            "0.2,0,0,0,1,0,0,0,1,1,1,1,1\n",
+            "there is a column f4, and agile-quad has 4 rotors",
+        ),
+    ],
+)
+def test_a_malformed_log_is_refused_in_a_sentence(text: str, told: str, tmp_path: Path) -> None:
+    file = tmp_path / "log.csv"
+    file.write_text(text)
+    with pytest.raises(ab.SpecError, match=told):
+        ab.read_flight_log(file, plan())
