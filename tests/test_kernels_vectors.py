@@ -88,3 +88,11 @@ def test_the_arc_tangent_is_right_to_the_last_digit_but_one() -> None:
     np.testing.assert_allclose(quaternions.atan2(ArrayOps, y, x), np.arctan2(y, x), rtol=5e-16)
     assert quaternions.atan2(FloatOps, 0.0, 1.0) == 0.0
     assert quaternions.atan2(FloatOps, 1.0, 0.0) == pytest.approx(np.pi / 2)
+
+
+@given(SEEDS)
+def test_each_component_is_clipped_to_the_same_range_about_zero(seed: int) -> None:
+    v = 3.0 * np.random.default_rng(seed).normal(size=(COUNT, 3))
+    clipped = each(lambda ops, v: vectors.clip_components(ops, v, 1.5), v)
+    np.testing.assert_array_equal(clipped, np.clip(v, -1.5, 1.5))
+    np.testing.assert_array_equal(vectors.ZERO, np.zeros(3))

@@ -124,6 +124,20 @@ def test_no_sample_exceeds_the_peak_and_the_peak_is_taken(seed, degree, derivati
 
 
 @settings(max_examples=40)
+@given(seed=seeds, degree=st.integers(1, 9), derivative=st.integers(0, 4))
+def test_no_sample_leaves_the_range_of_its_component_and_both_its_ends_are_taken(seed, degree, derivative):
+    trajectory = random_trajectory(seed, degree=degree)
+    lowest, highest = trajectory.component_range(derivative)
+    assert lowest.shape == highest.shape == (3,)
+    sampled = trajectory.on_segments(np.linspace(0.0, 1.0, 401), derivative)
+    slack = 1e-12 * (1 + np.abs(sampled).max())
+    below, above = sampled.min(axis=(0, 1)) - lowest, highest - sampled.max(axis=(0, 1))
+    room = 1e-3 * (highest - lowest) + slack
+    for missed in (below, above):
+        assert (missed >= -slack).all()
+        assert (missed <= room).all()
+
+
 @given(seed=seeds, gravity=st.floats(0.0, 30.0))
 def test_specific_thrust_range_bounds_all_samples(seed, gravity):
     trajectory = random_trajectory(seed)
