@@ -113,6 +113,8 @@ def _subdivided(times: Array, thrust: Array, floor: float) -> tuple[Subintervals
     done = []
     for _ in range(MAX_HALVINGS):
         wide = _leaves_cone(control, floor)
+        if not (done or wide.any()):
+            return pending, control
         done.append((pending[~wide], control[~wide]))
         pending = pending[wide].halves()
         control = np.concatenate([LOWER_HALF @ control[wide], UPPER_HALF @ control[wide]])
