@@ -47,13 +47,17 @@ _Slots = tuple[int, ...] | None
 _End = tuple[Placement, PathPoint]  # a start and the path that a descent from it ends at
 
 
-def shortest(attempts: Attempts, first: float, last: float) -> Judged[Placement] | None:
+def shortest(
+    attempts: Attempts, first: float, last: float, shortens: bool = True
+) -> Judged[Placement] | None:
     """The shortest certified path found, or None.
 
     Args:
         attempts: Made and recorded here.
         first: The scan's smallest dt [s].
         last: The scan's largest dt [s].
+        shortens: Whether a certified path is shortened further, and flown: it need not be where others
+            begin from it.
     """
     scan = _Scan(attempts, first, last)
     starts = scan.starts()
@@ -71,7 +75,7 @@ def shortest(attempts: Attempts, first: float, last: float) -> Judged[Placement]
     for start, path in sorted(ends, key=lambda end: float(end[1].x[-1])):
         judged = attempts.refined(start, partial(finished, path))
         if judged.feasible:
-            return flyable(attempts, _shortened(attempts, judged, known, scan))
+            return flyable(attempts, _shortened(attempts, judged, known, scan)) if shortens else judged
     return _slower(attempts, scan, starts)
 
 
