@@ -56,6 +56,15 @@ def test_without_a_cost_the_first_point_inside_will_do():
     assert result.point.violation <= 1e-9
 
 
+@pytest.mark.parametrize(("reach", "arrives"), [(0.5, True), (0.05, False)])
+def test_a_search_without_a_cost_goes_on_only_where_violations_fall_quickly(reach, arrives):
+    program = Disc([0.0, 0.0, 0.0])
+    program.reach = np.full(3, reach)
+    result = prox_linear(program, program.at(np.array([3.0, 0.0, 9.0])), 80)
+    assert (result.point.violation <= 1e-9) == result.converged == arrives
+    assert arrives or result.steps < 10
+
+
 def test_a_violation_that_is_tolerated_costs_no_further_steps():
     program = Disc([3.0, 4.0, 0.0])
     start = program.at(np.array([-0.601, -0.801, 0.0]))

@@ -42,6 +42,18 @@ def passing(*conditions: Condition, at: object = "free") -> Problem:
     return Problem("passing", at_rest((0.0, 0.0, 0.0)), at_rest((6.0, 0.0, 0.0)), maneuver)
 
 
+@pytest.mark.parametrize("name", ["line", "flip-roll"])
+def test_a_plan_to_begin_from_is_certified_and_found_on_the_way_to_the_shortest(
+    name: str, quad: Vehicle
+) -> None:
+    problem = load_problem(name)
+    first, shortest = (Miqp(shortens=shortens).plan(problem, quad) for shortens in (False, True))
+    assert first.certified
+    assert first.attempts[-1].feasible
+    assert first.duration >= shortest.duration
+    assert len(first.attempts) <= len(shortest.attempts)
+
+
 def test_thirteen_intervals_are_not_called_infeasible_because_bounds_were_tightened_too_far() -> None:
     problem = load_problem(str(CASES / "false-infeasible.toml"))
     found = plan(problem, Miqp(intervals=13, rescue=False), load_vehicle("hexarotor"))

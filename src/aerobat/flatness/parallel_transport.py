@@ -110,9 +110,11 @@ def _subdivided(times: Array, thrust: Array, floor: float) -> tuple[Subintervals
     They are halved until each stays in a cone about its start or below the floor.
     """
     pending, control = Subintervals.whole(len(times) - 1), _hermite(thrust[:-1], thrust[1:], np.diff(times))
-    done = []
+    done: list[tuple[Subintervals, Array]] = []
     for _ in range(MAX_HALVINGS):
         wide = _leaves_cone(control, floor)
+        if not (done or wide.any()):
+            return pending, control
         done.append((pending[~wide], control[~wide]))
         pending = pending[wide].halves()
         control = np.concatenate([LOWER_HALF @ control[wide], UPPER_HALF @ control[wide]])

@@ -23,12 +23,15 @@ _PENALTY = 2.0  # M: of the cost for each unit of violation
 _MAX_PENALTY = 200.0  # for violations that the first penalty leaves,
 _PENALTY_GROWTH = 10.0  # which it grows to by this factor
 _FIRST_PROXIMITY = 1e-3  # μ, in units of the cost
+_FIRST_PROXIMITY_AT_NO_COST = 0.1  # where only a point without violation is sought, which is near
 _MAX_PROXIMITY = 1e3  # steps are too short to lead anywhere beyond
 _MIN_PROXIMITY = 1e-6
 _ACCEPTED = 0.1  # the least fraction of the promised fall that a step is taken for
 _TRUSTED = 0.7  # the fraction beyond which the linearization is good further on
 _LITTLE_GAIN = 3e-4  # of the cost, by a step that was promised little more: the end
 _LITTLE_PROMISED = 1e-3
+_STALLED_STEPS = 5  # in which a search for a point without violation, where nothing else is sought, has to
+_STALLED = 0.7  # lower the violation to this fraction: what is slower seldom arrives
 _SLACK_WEIGHT = 1e-3  # of s², which makes the QP strictly convex
 _FREE_WEIGHT = 1e-6  # of d², likewise, where μ is tiny
 _SOLVED = 1  # DAQP's exit flag
@@ -108,7 +111,8 @@ def prox_linear(
     """Descend from a point; it ends at a local optimum, out of steps or time, or where no step leads on.
 
     Args:
-        program: What is minimized; where its cost is zero, the first point without violation will do.
+        program: What is minimized; where its cost is zero, the first point without violation will do, and
+            the method ends too where violations fall too slowly for that.
         start: Where to begin, feasible or not.
         max_steps: QPs, at most.
         tolerance: A violation that is not worth a greater penalty.
@@ -116,15 +120,18 @@ def prox_linear(
     """
     point = start
     feasible = start if start.violation <= 0.0 else None
-    linearization = point.linearization()
-    proximity = _FIRST_PROXIMITY
+    linearization: Linearization | None = None
+    proximity = _FIRST_PROXIMITY if program.cost.any() else _FIRST_PROXIMITY_AT_NO_COST
     penalty = _PENALTY
+    violations = []  # after each step
     for steps in range(1, max_steps + 1):
         if in_time and out_of_time():
             break
-        if not program.cost.any() and point.violation <= 0.0:
-            return ProxLinearResult(point, True, steps - 1, point)
+        violations.append(point.violation)
+        if not program.cost.any() and (point.violation <= 0.0 or _is_stalled(violations)):
+            return ProxLinearResult(point, point.violation <= 0.0, steps - 1, feasible)
         merit = _merit(program, point, penalty)
+        linearization = linearization or point.linearization()
         step = _step(program, point.x, linearization, proximity, penalty)
         trial = None if step is None else program.at(point.x + step[0])
         if step is None or trial is None:
@@ -137,7 +144,7 @@ def prox_linear(
         if gained > _ACCEPTED * promised and gained > 0.0:
             point = trial
             feasible = point if point.violation <= 0.0 else feasible
-            linearization = point.linearization()
+            linearization = None
             proximity = max(proximity / (4.0 if gained > _TRUSTED * promised else 1.5), _MIN_PROXIMITY)
         else:
             proximity *= 5.0
@@ -148,6 +155,11 @@ def prox_linear(
             penalty *= _PENALTY_GROWTH
             proximity = max(proximity, _FIRST_PROXIMITY) if flat else _FIRST_PROXIMITY
     return ProxLinearResult(point, False, max_steps, feasible)
+
+
+def _is_stalled(violations: list[float]) -> bool:
+    """True where the violation, which never rises, has hardly fallen in the latest steps."""
+    return len(violations) > _STALLED_STEPS and violations[-1] > _STALLED * violations[-1 - _STALLED_STEPS]
 
 
 def _merit(program: SmoothProgram[Any], point: Point, penalty: float) -> float:

@@ -70,6 +70,7 @@ class Miqp(Planner):
     rescue: bool = option(
         True, "Give up where nothing is found, and try no other intervals, order or planner.", off="no-rescue"
     )
+    shortens: bool = True  # further than its first descents lead, and flies what it finds
 
     def plan(
         self, problem: Problem, vehicle: Vehicle | None = None, progress: Progress | None = None
@@ -113,7 +114,7 @@ class Miqp(Planner):
             if leg is not None:
                 attempts.judge(Placement(attempts.solve(first, COURSE_SCAN_NODES), first))
                 raise Infeasible(leg, recorder.attempts)
-            found = shortest(attempts, first, last=max(4.0, 2.0 * first))
+            found = shortest(attempts, first, max(4.0, 2.0 * first), self.shortens)
         if found is None:
             if out_of_time():
                 raise too_short(problem, self.time_limit, recorder.attempts, self._quicker)

@@ -7,7 +7,7 @@ path has them: from there the descent ends at shorter paths than from those that
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import partial
 from itertools import pairwise
 from math import inf
@@ -38,7 +38,8 @@ MAX_STARTS = 6
 FASTER = 1.3  # times as fast through gates, of paths that turn back in them
 SCAN_NODES = 500  # of a program's branch and bound: paths begin at its slots, which need not be the cheapest
 UNSOLVED = 3  # programs without an answer, after others that have one: the longer ones are no better
-SHORTER = (0.94, 0.97, 0.99)  # of the shortest path's duration: those of programs from which others may start
+# of the shortest path's duration: those of programs from which others may start
+SHORTER = (0.8, 0.88, 0.93, 0.96, 0.98, 0.99)
 MAX_SHORTER = 8  # of such starts that lead to a path
 RESERVES = (0.02, 0.05, 0.1, 0.2)  # of the rotors' ranges, for paths that leave the controller too little
 
@@ -46,13 +47,17 @@ _Slots = tuple[int, ...] | None
 _End = tuple[Placement, PathPoint]  # a start and the path that a descent from it ends at
 
 
-def shortest(attempts: Attempts, first: float, last: float) -> Judged[Placement] | None:
+def shortest(
+    attempts: Attempts, first: float, last: float, shortens: bool = True
+) -> Judged[Placement] | None:
     """The shortest certified path found, or None.
 
     Args:
         attempts: Made and recorded here.
         first: The scan's smallest dt [s].
         last: The scan's largest dt [s].
+        shortens: Whether a certified path is shortened further, and flown: it need not be where others
+            begin from it.
     """
     scan = _Scan(attempts, first, last)
     starts = scan.starts()
@@ -70,17 +75,19 @@ def shortest(attempts: Attempts, first: float, last: float) -> Judged[Placement]
     for start, path in sorted(ends, key=lambda end: float(end[1].x[-1])):
         judged = attempts.refined(start, partial(finished, path))
         if judged.feasible:
-            return flyable(attempts, _shortened(attempts, judged, known))
+            return flyable(attempts, _shortened(attempts, judged, known, scan)) if shortens else judged
     return _slower(attempts, scan, starts)
 
 
-def _shortened(attempts: Attempts, judged: Judged[Placement], known: set[_Slots]) -> Judged[Placement]:
+def _shortened(
+    attempts: Attempts, judged: Judged[Placement], known: set[_Slots], scan: _Scan
+) -> Judged[Placement]:
     """The same, or a shorter one from programs shorter than it, as long as there are any that lead to one.
 
     The scan's starts are slower than what they lead to, and have stages where a slower path has them.
     """
     for _ in range(MAX_SHORTER):
-        further = None if out_of_time() else _shorter_than(attempts, judged, known)
+        further = None if out_of_time() else _shorter_than(attempts, judged, known, scan)
         if further is None:
             break
         judged = further
@@ -88,16 +95,20 @@ def _shortened(attempts: Attempts, judged: Judged[Placement], known: set[_Slots]
 
 
 def _shorter_than(
-    attempts: Attempts, judged: Judged[Placement], known: set[_Slots]
+    attempts: Attempts, judged: Judged[Placement], known: set[_Slots], scan: _Scan
 ) -> Judged[Placement] | None:
     """A shorter path, certified, from equal intervals that the vehicle can fly; None where none is found.
 
-    Through slots whose shortest path is known only the nearest program is tried.
+    Through slots whose shortest path is known only the nearest program is tried, and between two programs of
+    the scan with the same such slots none but that is solved.
     """
     duration = judged.solution.duration
     for fraction in SHORTER:
-        start = attempts.placement(fraction * duration / attempts.formulation.chain.intervals, SCAN_NODES)
-        if start.answer.slots in known and fraction != SHORTER[-1]:
+        dt, is_nearest = fraction * duration / attempts.formulation.chain.intervals, fraction == SHORTER[-1]
+        if not is_nearest and scan.slots_around(dt) in known:
+            continue
+        start = attempts.placement(dt, SCAN_NODES)
+        if not is_nearest and start.answer.slots in known:
             continue
         equal = on_equal_intervals(start.path) if start.path else None
         if equal is None:
@@ -120,7 +131,7 @@ def _slower(attempts: Attempts, scan: _Scan, starts: Iterator[Placement]) -> Jud
             continue
         judged = attempts.refined(start, partial(finished, path))
         if judged.feasible:
-            return flyable(attempts, _shortened(attempts, judged, set()))
+            return flyable(attempts, _shortened(attempts, judged, set(), scan))
     return scan.certified()
 
 
@@ -187,12 +198,14 @@ class _Scan:
     first: float  # [s]
     last: float  # [s]
     flown: Placement | None = None  # the answer that the vehicle can fly as it is
+    slots: dict[float, _Slots] = field(default_factory=dict)  # of each program, by its dt
 
     def starts(self) -> Iterator[Placement]:
         """Answers that are not far from what the vehicle can do, each as a path of its program."""
         dt, before, solved, unsolved = self.first, inf, False, 0
         while dt <= self.last and unsolved < UNSOLVED and not self.attempts.is_over:
             placement = self.attempts.placement(dt, SCAN_NODES)
+            self.slots[dt] = placement.answer.slots
             violation = placement.path.violation if placement.path else inf
             self._record(placement, violation)
             if violation <= 0.0:
@@ -204,6 +217,14 @@ class _Scan:
             solved = solved or violation < inf
             unsolved = unsolved + 1 if solved and placement.answer.status == "unknown" else 0
             dt, before = dt * (GROWTH if violation < COARSE else COARSE_GROWTH), violation
+
+    def slots_around(self, dt: float) -> _Slots:
+        """The slots of the programs next to a dt on either side, where they are the same; else None."""
+        below = max((known for known in self.slots if known <= dt), default=None)
+        above = min((known for known in self.slots if known >= dt), default=None)
+        if below is None or above is None or self.slots[below] != self.slots[above]:
+            return None
+        return self.slots[below]
 
     def certified(self) -> Judged[Placement] | None:
         """The answer that the vehicle can fly as it is, certified, or None."""

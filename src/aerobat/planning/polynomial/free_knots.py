@@ -116,8 +116,8 @@ class FreeKnots(Planner):
     ) -> Plan | None:
         """The fastest certified plan from the first start that leads to one; from further ones if it is poor.
 
-        A poor start leads to a poor optimum, or to none; an optimum that is not slow beside what is possible
-        is taken.
+        A poor start leads to a poor optimum, or to none; an optimum from the MIQP's plan is taken, from
+        another start one that is not slow beside what is possible.
         """
         best: Plan | None = None
         on_course = is_course(sequence)
@@ -136,8 +136,9 @@ class FreeKnots(Planner):
             if found is not None and (best is None or found.duration < best.duration):
                 best = found
             taken = start.plan is None or start.plan is self.start
+            near = descent.converged and start.plan is not None and start.plan.planner == "miqp"
             if out_of_time() or (
-                best is not None and (taken or (descent.converged and not _slow(best, vehicle)))
+                best is not None and (taken or near or (descent.converged and not _slow(best, vehicle)))
             ):
                 break
         return best
@@ -194,7 +195,8 @@ class FreeKnots(Planner):
         closed_form: list[Planner] = [MinSnap()] if problem.maneuver.through_points else []
         yield from plans_to_begin_from(closed_form, problem, vehicle)
         for reserve in (self.reserve, 0.0 if self.reserve > 0.0 else FLYING_RESERVE):
-            yield from plans_to_begin_from([Miqp(reserve=reserve, rescue=False)], problem, vehicle)
+            start = Miqp(reserve=reserve, rescue=False, shortens=False)
+            yield from plans_to_begin_from([start], problem, vehicle)
         if not out_of_time():
             yield Miqp().plan(problem)
 

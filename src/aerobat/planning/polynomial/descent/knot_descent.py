@@ -42,7 +42,6 @@ from aerobat.planning.ways import straightened, straighter
 NEAR_ITERATIONS = 50  # of a solve, at most, once a path is certified: what takes longer leads away from it
 ROUNDS = 12  # of solving, at most, from one start
 LITTLE_GAIN = 0.005  # of the duration, from one certified path to the next: the end
-LITTLE_LOSS = 0.02  # of the duration, that certainty between samples costs: the end if the start was near
 LARGE_GAIN = 0.2  # of the duration: the start was far, trust regions confine what follows it
 MIN_RADIUS = 0.2  # a smaller region may hold no path that mends what is exceeded
 SHRINK = 3.0  # by how much the trust region is smaller where a limit is exceeded between samples
@@ -62,11 +61,15 @@ class Strategy:
     backoff: float  # of every limit's range, kept at samples at first
     samples: int  # of a segment at first, at least
     until_free: bool  # what stands at no edge of its trust region counts as near, however far it began
+    little_loss: float  # of the duration, that certainty between samples costs: the end if the start was near
+    must_fall: bool  # from one path gone on from to the next: the duration where samples alone count
     paced: bool = True  # a start that exceeds limits by far is slowed
 
 
-OF_MANEUVERS = Strategy(ROUGH, ROUGH.tolerance, 2.0, 1e-4, MIN_SAMPLES, until_free=False)
-OF_COURSES = Strategy(FINE, ROUGH.tolerance, 3.0, 5e-4, GATE_SAMPLES, until_free=True)
+OF_MANEUVERS = Strategy(
+    ROUGH, ROUGH.tolerance, 2.0, 1e-4, MIN_SAMPLES, False, little_loss=0.1, must_fall=True
+)
+OF_COURSES = Strategy(FINE, ROUGH.tolerance, 3.0, 5e-4, GATE_SAMPLES, True, little_loss=0.02, must_fall=False)
 # of polynomials next to the rigid body's own motion, shorter where it turns sharply
 NEAR_MOTIONS = replace(OF_COURSES, radius=1.0, samples=MIN_SAMPLES, paced=False)
 
@@ -81,6 +84,7 @@ class Descent:
     iterations: int  # of each solve, at most
     strategy: Strategy = OF_MANEUVERS
     best: Judged[Path] | None = None
+    converged: bool = False  # whether a solve has, whose path is certified or no faster than the best
 
     def consider(self, start: Plan, guess: WarmStart) -> None:
         """Keep the path of another planner's plan, as it is, where it is certified."""
@@ -98,11 +102,6 @@ class Descent:
             if (found := self._certified(program, left)) is None or program.little_to_gain(found, before):
                 return
             program.go_on_from(found.solution.source.guess)
-
-    @property
-    def converged(self) -> bool:
-        """True where the best is an optimum, neither the start's path nor one that a solve stopped at."""
-        return self.best is not None and self.best.solution.status == CONVERGED
 
     def through_gates(self, segments: int) -> Plan | None:
         """The plan, or one on straighter ways through the gates whose frames its own flight does not clear.
@@ -160,6 +159,7 @@ class Descent:
         )
         if not found.feasible:
             return None
+        self.converged = self.converged or found.solution.status == CONVERGED
         if self.best is None or found.solution.duration < self.best.solution.duration:
             self.best = found
         return found
@@ -212,6 +212,7 @@ class _Exchange:
         self._backoff = np.tile(self._least_backoff, (segments, 1))
         self._multipliers: Multipliers | None = None
         self._relaxed: float | None = None  # [s] the duration of the first solution near the guess
+        self._relaxed_before: float | None = None  # [s] the same near the guess before
         self._confined = False  # whether the last solution stands at an edge of its trust region
 
     def solve(self) -> Solution[Path]:
@@ -248,13 +249,13 @@ class _Exchange:
         duration, relaxed = found.solution.duration, self._relaxed or 0.0
         near = duration >= (1.0 - LARGE_GAIN) * self._begun
         near = near or (self._descent.strategy.until_free and not self._confined)
-        settled = near and duration <= (1.0 + LITTLE_LOSS) * relaxed
+        settled = near and duration <= (1.0 + self._descent.strategy.little_loss) * relaxed
         return settled or duration >= (1.0 - LITTLE_GAIN) * before
 
     def go_on_from(self, certified: WarmStart) -> None:
         """Begin again from a certified path, in the whole trust region and with the least backoff."""
         self.guess = certified
-        self._relaxed = None
+        self._relaxed_before, self._relaxed = self._relaxed, None
         self._radius = self._descent.strategy.radius
         self._backoff[:] = self._least_backoff
 
@@ -264,10 +265,17 @@ class _Exchange:
         framed = self._descent.framed
         return self._descent.strategy.backoff + framed.limits.of_vehicle(framed.reserve)
 
+    @property
+    def _is_no_faster(self) -> bool:
+        """True where limits at samples alone leave no less time than before the path gone on from."""
+        before, relaxed = self._relaxed_before, self._relaxed
+        return before is not None and relaxed is not None and relaxed >= before
+
     def tighten(self, solution: Solution[Path], certificate: Certificate | None) -> bool:
         """Sample where limits are exceeded, and go on from there in a smaller region.
 
-        A path slower than the best that is certified is given up: tightening only slows it further.
+        A path slower than the best that is certified is given up: tightening only slows it further. So is one
+        near a certified path that was no faster before any tightening.
         """
         descent, path = self._descent, solution.source
         best, framed = descent.best, descent.framed
@@ -276,6 +284,9 @@ class _Exchange:
         solved = path.unsolved <= SOLVED
         converged = solution.status == CONVERGED
         if (solved or converged) and best is not None and solution.duration >= best.solution.duration:
+            descent.converged = descent.converged or converged
+            return False
+        if descent.strategy.must_fall and self._is_no_faster:
             return False
         violation = path.violation
         for finding in () if certificate is None else certificate.findings:
