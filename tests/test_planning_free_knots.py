@@ -190,9 +190,8 @@ def test_bad_input_gets_a_sentence() -> None:
         FreeKnots().plan(Problem("falling", falling, SECTION_V.goal), vehicle("A"))
 
 
-def test_where_no_path_is_faster_than_the_miqp_s_no_other_start_is_tried() -> None:
+def test_where_the_miqp_s_path_leads_to_an_optimum_no_other_start_is_tried() -> None:
     problem = load_problem(str(CASES / "no-faster.toml"))
     found = FreeKnots(reserve=0.03).plan(problem, load_vehicle(str(CASES / "no-faster-vehicle.toml")))
     assert found.certified
-    assert "none faster" in found.rescue
     assert sum(attempt.status == "feasible" for attempt in found.attempts) == 1

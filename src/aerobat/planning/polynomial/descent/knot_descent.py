@@ -9,6 +9,7 @@ it end at a feasible point (Mitsos 2011).
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from math import inf
 
 import numpy as np
 
@@ -268,8 +269,7 @@ class _Exchange:
     @property
     def _is_no_faster(self) -> bool:
         """True where limits at samples alone leave no less time than before the path gone on from."""
-        before, relaxed = self._relaxed_before, self._relaxed
-        return before is not None and relaxed is not None and relaxed >= before
+        return self._relaxed is not None and self._relaxed >= (self._relaxed_before or inf)
 
     def tighten(self, solution: Solution[Path], certificate: Certificate | None) -> bool:
         """Sample where limits are exceeded, and go on from there in a smaller region.
