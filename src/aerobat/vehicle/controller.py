@@ -27,8 +27,8 @@ class Controller:
 
     The disturbance observer answers forces and moments that the model does not know (drag, gusts, rotors that
     give more or less than they should) as fast as its filter, and the rotors' lag, let them be seen, where
-    the conditions of a flight have an IMU that feels them; without one, the integrals of the errors alone
-    do. Moments are answered with `moment_feedforward`.
+    the conditions of a flight have an IMU that feels them; without one, or with rotors that lag by more than
+    50 ms, the integrals of the errors alone do. Moments are answered with `moment_feedforward`.
     """
 
     position_gain: NonNegative = 25.0  # [1/s²]

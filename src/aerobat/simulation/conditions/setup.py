@@ -37,6 +37,7 @@ from aerobat.vehicle.fleet import Fleet
 
 MAX_TICKS = 20  # in a period of the controller, where no IMU says how many
 _LEAST_START_VELOCITY = 0.01  # [m/s] 1σ that the filter reckons with at least
+_SLOWEST_ANSWERED = 0.05  # [s] of rotors' lag: slower ones answer disturbances too late, which costs attitude
 
 
 def dispersed_setup(
@@ -141,9 +142,9 @@ def _controller(
         )
     controller = TrackingController(settings.feature_flags, period)
     observer: tuple[Part, ...] = ()
-    if settings.disturbance_filter > 0.0 and conditions.imu is not None:
+    slowest = max(rotor.lag for rotor in nominal.rotors)
+    if settings.disturbance_filter > 0.0 and conditions.imu is not None and slowest <= _SLOWEST_ANSWERED:
         # a filter faster than the rotors takes their lag's misfit for a disturbance, and unsettles the loop
-        slowest = max(rotor.lag for rotor in nominal.rotors)
         times = flights.all(max(settings.disturbance_filter, slowest)), flights.all(delay / rate)
         observer = (Part(DisturbanceObserver(period), DisturbanceParameters(model, *times)),)
     if period == 1 and delay == 0:
