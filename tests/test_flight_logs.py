@@ -136,6 +136,14 @@ def test_the_command_takes_a_log_beside_its_plan(tmp_path: Path, capsys: pytest.
             "neither f0 to f3, the rotors' thrusts",
         ),
         (
+            "t,x,y,z,qw,qx,qy,qz,f0\n0,0,0,0,1,0,0,0,1\n0.1,0,1e300,0,1,0,0,0,1\n0.2,0,0,0,1,0,0,0,1\n",
+            "line 3: the column y is beyond 1e\\+06; see its unit",
+        ),
+        (
+            "t,x,y,z,qw,qx,qy,qz\n0,0,0,0,1,0,0,0\n1e-300,0,0,0,1,0,0,0\n0.2,0,0,0,1,0,0,0\n",
+            "must rise, by 1e-06 s or more",
+        ),
+        (
             "t,x,y,z,qw,qx,qy,qz\n0,0,0,0,9,0,0,0\n0.1,0,0,0,1,0,0,0\n0.2,0,0,0,1,0,0,0\n",
             "must be unit quaternions",
         ),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from itertools import chain
 from pathlib import Path
 
 import numpy as np
@@ -22,9 +23,13 @@ from aerobat.vehicle import Vehicle
 
 MAX_LOG = 2**28  # bytes: an hour at 1 kHz
 FEWEST = 3  # rows, of which rates can be told
+SHORTEST = 1e-6  # [s] from row to row
+LARGEST = 1e6  # [m], [m/s], [rad/s], [N] of what a multirotor does
 AT_LIMIT = 1e-3  # of a rotor's range, within which a command is at its limit
 ESTIMATED = ("est_x", "est_y", "est_z")
 ESTIMATED_RATES = ("est_vx", "est_vy", "est_vz")
+_GROUPS = tuple(NAMES[name] for name in ("time", "position", "attitude", "velocity", "rates"))
+_KNOWN = frozenset(chain(*_GROUPS, ESTIMATED, ESTIMATED_RATES))  # beside f0, u0 and so on
 
 
 @validated
@@ -70,16 +75,26 @@ def _columns(path: Path, duration: float) -> dict[str, Array]:
     for name in (*NAMES["time"], *NAMES["position"], *NAMES["attitude"]):
         if name not in columns:
             raise SpecError(f"line 1: there is no column {name}; a log needs t, x, y, z, qw, qx, qy, qz")
-    falling = np.diff(columns["t"]) <= 0.0
-    if falling.any():
-        raise SpecError(f"line {3 + int(np.argmax(falling))}: times, the column t, must rise")
+    close = np.diff(columns["t"]) < SHORTEST
+    if close.any():
+        line = 3 + int(np.argmax(close))
+        raise SpecError(f"line {line}: times, the column t, must rise, by {SHORTEST:g} s or more")
     flown = (columns["t"] >= 0.0) & (columns["t"] <= duration)
     if flown.sum() < FEWEST:
         raise SpecError(
             f"{flown.sum()} of its rows lie within the plan's time, 0 to {duration:.3f} s; "
             "let t be 0 where the plan begins"
         )
-    return {name: column[flown] for name, column in columns.items()}
+    used = {name: column[flown] for name, column in columns.items() if _is_known(name)}
+    for name, column in used.items():
+        if np.abs(column).max() > LARGEST:
+            line = 2 + int(np.argmax(np.abs(columns[name]) * flown))
+            raise SpecError(f"line {line}: the column {name} is beyond {LARGEST:g}; see its unit")
+    return used
+
+
+def _is_known(name: str) -> bool:
+    return name in _KNOWN or (name[0] in "fu" and name[1:].isdecimal())
 
 
 def _flight(columns: Mapping[str, Array], plan: Plan, nominal: Vehicle) -> Flight:
