@@ -126,7 +126,7 @@ class Mission(Generic[GoalT_co]):
         self._enter(Phase.APPROACH, now)
 
     def step(
-        self, now: float, seen: Observed, delay: float = 0.0, late: float = 0.0
+        self, now: float, seen: Observed, delay: float, late: float = 0.0
     ) -> PositionGoal | GoalT_co | None:
         """The goal at this time; None where the vehicle is to look after itself: to hold, or to land.
 
