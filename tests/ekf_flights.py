@@ -42,7 +42,7 @@ class Truth:
 def plans() -> tuple[ab.Plan, ...]:
     """Two maneuvers of the hexarotor, quickly planned."""
     names = ("half-flip", "flip-pitch")
-    return tuple(ab.plan(ab.load_problem(name), ab.FreeKnots(), "hexarotor") for name in names)
+    return tuple(ab.plan(ab.load_problem(name), ab.Miqp(), "hexarotor") for name in names)
 
 
 @lru_cache

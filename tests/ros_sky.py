@@ -243,6 +243,11 @@ class Sky:
         is_upright = so3.thrust_axis(self.state.q_world_body)[2] > 0.999
         return is_still and is_upright and not self.vehicle.landed and not self.vehicle.crashed
 
+    @property
+    def stands(self) -> bool:
+        """True of a vehicle that has landed, unhurt, its rotors stopped."""
+        return self.vehicle.landed and not self.vehicle.armed and not self.vehicle.crashed
+
     def send(self, piece: PathPiece) -> None:
         """Send a goal as if the node had."""
         ros = Ros(self.graph)

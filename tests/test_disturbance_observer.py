@@ -75,3 +75,5 @@ def test_flights_without_an_imu_are_flown_as_without_the_observer() -> None:
 def test_the_papers_law_has_no_observer() -> None:
     assert named_controller("paper", ab.Controller()) == ab.Controller.paper()
     assert ab.Controller.paper().disturbance_filter == 0.0
+    own = ab.Controller(disturbance_filter=0.03)
+    assert named_controller("full", own) == own

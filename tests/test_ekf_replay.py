@@ -52,7 +52,7 @@ def assert_consistent(estimates: Estimates) -> None:
     low, high = chi2.ppf([0.0005, 0.9995], 6 * len(nis)) / len(nis)
     assert low < nis.mean() < high
     position, attitude = errors(estimates)
-    assert np.sqrt((position[200:] ** 2).sum(axis=-1).mean()) < 0.002
+    assert np.sqrt((position[200:] ** 2).sum(axis=-1).mean()) < 0.0015
     assert np.degrees(np.sqrt((attitude[200:] ** 2).mean())) < 0.15
 
 
@@ -139,7 +139,7 @@ def test_what_became_of_each_pose_is_told() -> None:
     estimates = estimates_of(replace(log, position=spoilt))
     assert np.flatnonzero(~estimates.accepted).tolist() == [40, 100, 101, 102, 103, len(log.pose_times) - 1]
     np.testing.assert_allclose(estimates.jumps, [log.arrivals[104]], rtol=0, atol=1e-9)
-    assert str(estimates) == "1.629 s with 162 poses, 5 rejected, jumps at 1.050 s"
+    assert str(estimates) == "1.789 s with 178 poses, 5 rejected, jumps at 1.050 s"
 
 
 def test_a_long_log_is_run_in_pieces_that_change_nothing(monkeypatch) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 from math import isfinite, radians
-from typing import Any, Literal
+from typing import Literal
 
 from aerobat.cli.options import (
     ConditionsOptions,
@@ -26,6 +26,7 @@ from aerobat.optimization.deadline import within_time
 from aerobat.planning import (
     Plan,
     Planner,
+    command_settings,
     plan,
     planner_class,
     planner_options,
@@ -167,15 +168,13 @@ def make_planner(options: PlannerOptions, problem: Problem, vehicle: Vehicle, pa
     _check_options(options, name)
     if paper:
         _check_paper(options, name)
-    settings: dict[str, Any] = {"order": 3} if paper else {}
+    settings = command_settings(cls) | ({"order": 3} if paper else {})
     for option in planner_options(cls):
         given = getattr(options, option_name(option.flag))
         if option.type is bool and given:
             settings[option.name] = not option.default
         elif option.type is not bool and given is not None:
             settings[option.name] = given
-        elif option.command_default is not None:
-            settings[option.name] = option.command_default
     return cls(**settings)
 
 

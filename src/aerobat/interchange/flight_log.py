@@ -14,7 +14,8 @@ from aerobat.arrays import Array
 from aerobat.declaration import PathName, validated
 from aerobat.errors import SpecError
 from aerobat.flatness import reference, vehicle_of
-from aerobat.interchange.rows import NAMES, SYNONYMS, has_header, number_table
+from aerobat.interchange.rows import NAMES, has_header, named_columns
+from aerobat.kernels.motors import first_order_response
 from aerobat.planning import Plan
 from aerobat.simulation import Flight, Outcome
 from aerobat.simulation.flight import setpoint_series
@@ -65,16 +66,8 @@ def _columns(path: Path, duration: float) -> dict[str, Array]:
         raise SpecError("it is no text; give a CSV file") from None
     if not has_header(text):
         raise SpecError("line 1: it names no columns; a log needs t, x, y, z, qw, qx, qy, qz and f0, f1, ...")
-    words = text.partition("\n")[0].strip().lstrip("#").split(",")
-    header = [SYNONYMS.get(name, name) for name in (word.strip().strip('"').lower() for word in words)]
-    for name in header:
-        if header.count(name) > 1:
-            raise SpecError(f"line 1: there are two columns {name}; rename one")
-    table = number_table(text, 2, (len(header),), f"line 1 names {len(header)} columns")
-    columns = dict(zip(header, table.T, strict=True))
-    for name in (*NAMES["time"], *NAMES["position"], *NAMES["attitude"]):
-        if name not in columns:
-            raise SpecError(f"line 1: there is no column {name}; a log needs t, x, y, z, qw, qx, qy, qz")
+    needed = (*NAMES["time"], *NAMES["position"], *NAMES["attitude"])
+    columns = named_columns(text, needed, "a log needs t, x, y, z, qw, qx, qy, qz")
     close = np.diff(columns["t"]) < SHORTEST
     if close.any():
         line = 3 + int(np.argmax(close))
@@ -177,7 +170,7 @@ def _followed(times: Array, commands: Array, lags: Array) -> Array:
     left = np.exp(-np.diff(times)[:, None] / np.maximum(lags, 1e-9))
     thrusts = [commands[0]]
     for command, remains in zip(commands[:-1], left, strict=True):
-        thrusts.append(command + (thrusts[-1] - command) * remains)
+        thrusts.append(np.array(first_order_response(thrusts[-1], command, remains)))
     return np.array(thrusts)
 
 

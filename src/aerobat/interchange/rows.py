@@ -96,26 +96,39 @@ def rows_of_columns(text: str, rate: float) -> PathRows:
         text: The file's.
         rate: Rows a second [1/s], where there is no column of time.
     """
-    first = text.partition("\n")[0]
-    header = [word.strip().strip('"').lower() for word in first.strip().lstrip("#").split(",")]
-    header = [SYNONYMS.get(name, name) for name in header]
-    for name in header:
-        if header.count(name) > 1:
-            raise SpecError(f"line 1: there are two columns {name}; rename one")
-    for name in NAMES["position"]:
-        if name not in header:
-            raise SpecError(f"line 1: there is no column {name}; a path needs x, y and z [m], and t [s]")
-    table = number_table(text, 2, (len(header),), f"line 1 names {len(header)} columns")
-    columns = dict(zip(header, table.T, strict=True))
-    times = columns["t"] if "t" in columns else np.arange(len(table)) / rate
+    columns = named_columns(text, NAMES["position"], "a path needs x, y and z [m], and t [s]")
+    rows = len(columns["x"])
+    times = columns["t"] if "t" in columns else np.arange(rows) / rate
     steps = np.diff(times)
     if not (steps > 0).all():
         raise SpecError(f"line {3 + int(np.argmin(steps > 0))}: times, the column t, must rise")
-    knots = np.full((len(table), len(PATH), 3), np.nan)
+    knots = np.full((rows, len(PATH), 3), np.nan)
     for derivative, group in enumerate(PATH):
         if all(name in columns for name in NAMES[group]):
             knots[:, derivative] = np.stack([columns[name] for name in NAMES[group]], axis=1)
     return PathRows(knots, steps, _first_attitude(columns))
+
+
+def named_columns(text: str, needed: Sequence[str], asked: str) -> dict[str, Array]:
+    """The columns of a table with a header by their names, small letters, synonyms by the usual name.
+
+    Raises SpecError, naming the line or the column, for what is no such table.
+
+    Args:
+        text: The file's.
+        needed: The names of columns that must be there.
+        asked: A sentence without its full stop that says so.
+    """
+    words = text.partition("\n")[0].strip().lstrip("#").split(",")
+    header = [SYNONYMS.get(name, name) for name in (word.strip().strip('"').lower() for word in words)]
+    for name in header:
+        if header.count(name) > 1:
+            raise SpecError(f"line 1: there are two columns {name}; rename one")
+    for name in needed:
+        if name not in header:
+            raise SpecError(f"line 1: there is no column {name}; {asked}")
+    table = number_table(text, 2, (len(header),), f"line 1 names {len(header)} columns")
+    return dict(zip(header, table.T, strict=True))
 
 
 def _first_attitude(columns: Mapping[str, Array]) -> Array | None:

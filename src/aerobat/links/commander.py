@@ -198,8 +198,7 @@ class Commander:
         silence = now - self.seen.time
         if silence <= allowed:
             return False
-        self.doing, self._way = Doing.NOTHING, None
-        self._say(f"no news of the vehicle for {silence:.1f} s; it is left to itself")
+        self._leave(f"no news of the vehicle for {silence:.1f} s")
         return True
 
     def _leave_astray(self) -> bool:
@@ -207,8 +206,7 @@ class Commander:
         off = self._off()
         if off <= _ASTRAY:
             return False
-        self.doing, self._way = Doing.NOTHING, None
-        self._say(f"the vehicle is {length(off)} off its goal; it is left to itself")
+        self._leave(f"the vehicle is {length(off)} off its goal")
         return True
 
     @property
@@ -227,13 +225,16 @@ class Commander:
         assert self.seen is not None and self._way is not None, "asked on a way only"  # noqa: PT018
         if now > self._there_by:
             order = "climb" if self.doing is Doing.CLIMBING else "land"
-            self.doing, self._way = Doing.NOTHING, None
-            self._say(f"the vehicle does not {order} as it is told; it is left to itself")
+            self._leave(f"the vehicle does not {order} as it is told")
             return False
         end, here = self._way.path.evaluate(self._way.path.duration), np.array(self.seen.body.position)
         speed = _SPEED if self.doing is Doing.CLIMBING else _DESCENT
         self._go(self.doing, now, rest_to_rest(here, end, speed, _ACCELERATION), self._way.yaw)
         return True
+
+    def _leave(self, reason: str) -> None:
+        self.doing, self._way = Doing.NOTHING, None
+        self._say(f"{reason}; it is left to itself")
 
     def _off(self) -> float:
         """How far the vehicle is off its way [m], when it was seen."""

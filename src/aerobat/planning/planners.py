@@ -114,8 +114,12 @@ def suited_planner(problem: Problem, vehicle: Vehicle | None) -> str:
 def planner_for(problem: Problem, vehicle: Vehicle | None) -> Planner:
     """The planner of that name, as the command line makes it without options: for plans that are flown."""
     cls = planner_class(suited_planner(problem, vehicle))
-    flown = {o.name: o.command_default for o in planner_options(cls) if o.command_default is not None}
-    return cls(**flown)
+    return cls(**command_settings(cls))
+
+
+def command_settings(cls: type[Planner]) -> dict[str, Any]:
+    """The fields that a planner has otherwise on the command line, whose plans are to be flown."""
+    return {o.name: o.command_default for o in planner_options(cls) if o.command_default is not None}
 
 
 def with_evidence(plan: Plan, vehicle: Vehicle | None = None) -> Plan:

@@ -16,7 +16,6 @@ from aerobat.planning.passages import require_openings
 from aerobat.problem import Gate, Problem
 from aerobat.simulation import fly
 from aerobat.simulation.passages import Passage
-from aerobat.so3 import UP
 from aerobat.vehicle import Vehicle
 
 LEVEL = 0.95  # of the flights, that keep within a tube
@@ -124,7 +123,7 @@ def _planned_thrust(plan: Plan, passage: Passage) -> float:
     """The specific thrust [m/s²] of a plan as it is to pass a gate."""
     time = min(float(np.nanmedian(passage.planned)), plan.duration)
     acceleration = plan.trajectory.evaluate(np.array([time]), 2)[0]
-    return float(np.linalg.norm(acceleration + plan.problem.environment.gravity * UP))
+    return float(np.linalg.norm(acceleration + plan.problem.environment.weight))
 
 
 def _pointed(gate: Gate, scores: Scores) -> Gate:
