@@ -14,6 +14,7 @@ from aerobat.errors import SpecError
 from aerobat.planning import (
     FLYABLE_ERROR,
     Flyability,
+    GridSearch,
     PlacedStage,
     own_flight,
     with_certificate,
@@ -157,6 +158,20 @@ def test_the_miqp_passes_faster_through_a_gate_that_its_path_would_turn_back_in(
     assert made.certified
     assert made.flies
     assert ab.score(ab.fly(made), made).outcome is Outcome.THROUGH_GATES
+
+
+def test_a_path_is_hastened_through_a_gate_by_no_more_than_clears_its_frame() -> None:
+    """Equal intervals one percent shorter are not within what the vehicle can do, or touch the frame."""
+    case = random_case(44, 65)
+    made = ab.plan(case.problem, vehicle=case.vehicle)
+    assert made.certified
+    assert made.flies
+    dt = 0.99 * made.duration / made.intervals
+    try:
+        shorter = ab.plan(case.problem, ab.Miqp(search=GridSearch(dt, dt, 1), rescue=False), case.vehicle)
+    except ab.Infeasible:
+        return
+    assert not shorter.flies
 
 
 def test_a_flight_that_diverges_is_no_small_error() -> None:

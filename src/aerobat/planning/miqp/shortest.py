@@ -9,24 +9,20 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from functools import partial
-from itertools import pairwise
 from math import inf
 
 from aerobat.optimization.deadline import out_of_time
 from aerobat.planning.certified_solve import Judged
-from aerobat.planning.flyability import own_flight
 from aerobat.planning.miqp.attempts import Attempts, Placement
+from aerobat.planning.miqp.mended_flight import flyable
 from aerobat.planning.miqp.refinement import (
     Descent,
     PathPoint,
-    PathProgram,
     descent,
     finished,
     on_equal_intervals,
     settled,
 )
-from aerobat.planning.result import OwnFlight
-from aerobat.problem.condition import Condition, Quantity
 
 GROWTH = 1.15  # of dt, from one program to the next
 COARSE_GROWTH = 1.3  # where a path is further off than that
@@ -35,13 +31,11 @@ FAR = 1.3  # of a constraint's range: a path that exceeds it by more is no place
 FALLING = 1.25  # unless the excess falls no faster than by this factor from one program to the next
 STARTS = 2  # that lead to a path
 MAX_STARTS = 6
-FASTER = 1.3  # times as fast through gates, of paths that turn back in them
 SCAN_NODES = 500  # of a program's branch and bound: paths begin at its slots, which need not be the cheapest
 UNSOLVED = 3  # programs without an answer, after others that have one: the longer ones are no better
 # of the shortest path's duration: those of programs from which others may start
 SHORTER = (0.8, 0.88, 0.93, 0.96, 0.98, 0.99)
 MAX_SHORTER = 8  # of such starts that lead to a path
-RESERVES = (0.02, 0.05, 0.1, 0.2)  # of the rotors' ranges, for paths that leave the controller too little
 
 _Slots = tuple[int, ...] | None
 _End = tuple[Placement, PathPoint]  # a start and the path that a descent from it ends at
@@ -138,56 +132,6 @@ def _slower(attempts: Attempts, scan: _Scan, starts: Iterator[Placement]) -> Jud
 def _descent(start: Placement) -> Descent:
     """Where a descent from a start ends."""
     return descent(start.path.program, start.path.x) if start.path else Descent(None, False)
-
-
-def flyable(attempts: Attempts, judged: Judged[Placement]) -> Judged[Placement]:
-    """The same, or where its own flight has a defect a slower one without, if there is.
-
-    A path that lingers in its gate, or turns back there, gets more speed there, any other a reserve for the
-    controller.
-    """
-    best = last = _own_flight(attempts, judged), judged
-    path = judged.solution.source.path
-    program = path.program if path else None
-    for lesser, reserve in pairwise((0.0, *RESERVES)):
-        if path is None or program is None or last[0].flies or out_of_time():
-            break
-        kept = reserve
-        if last[0].lingers:
-            program, kept = _hastened(program), lesser
-        program = replace(program, reserve=max(kept, program.reserve))
-        found = descent(program, path.x).path
-        if found is None:
-            continue
-        slower = attempts.refined(judged.solution.source, partial(finished, found))
-        if slower.feasible:
-            path = found
-            last = _own_flight(attempts, slower), slower
-            best = min(best, last, key=lambda pair: pair[0].rank)
-    return best[1]
-
-
-def _hastened(program: PathProgram) -> PathProgram:
-    """The same with more speed asked of passages."""
-    formulation = program.formulation
-    stages = tuple(
-        stage if stage.gate is None else replace(stage, conditions=tuple(map(_faster, stage.conditions)))
-        for stage in formulation.sequence.stages
-    )
-    sequence = replace(formulation.sequence, stages=stages)
-    return replace(program, formulation=replace(formulation, sequence=sequence))
-
-
-def _faster(condition: Condition) -> Condition:
-    asks_speed = condition.quantity is Quantity.VELOCITY and condition.lower > 0.0 and condition.upper == inf
-    return replace(condition, lower=FASTER * condition.lower) if asks_speed else condition
-
-
-def _own_flight(attempts: Attempts, judged: Judged[Placement]) -> OwnFlight:
-    trajectory, vehicle = judged.solution.trajectory, attempts.vehicle
-    assert vehicle is not None
-    assert trajectory is not None
-    return own_flight(trajectory, vehicle, attempts.formulation.problem, attempts.placed(judged))
 
 
 @dataclass
