@@ -18,15 +18,18 @@ from dataclasses import dataclass, replace
 from math import sqrt
 from typing import TypeVar
 
+import numpy as np
+
 from aerobat.arrays import Array
 from aerobat.certification import PlannedPassage
 from aerobat.optimization.deadline import out_of_time
 from aerobat.planning.result import FLYABLE_ERROR, OwnFlight
+from aerobat.problem.condition import Condition, Quantity
 from aerobat.problem.gate import Gate
 from aerobat.problem.problem import Problem
 from aerobat.problem.stage import Stage
 from aerobat.simulation.passages import PASSAGE_DEPTH
-from aerobat.vehicle import Vehicle
+from aerobat.vehicle import Ellipsoid, Vehicle
 
 Found = TypeVar("Found")
 
@@ -57,6 +60,30 @@ class Way:
     def min_speed(self) -> float:
         """The least speed through the gate [m/s], at which the path does not turn back."""
         return sqrt(2.0 * self.bending * self.reach)
+
+    def conditions(self, position: Array, velocity: Array, thrust: Array, body: Ellipsoid) -> list[Condition]:
+        """What it asks of the velocity [m/s] of a path that crosses the gate much as a known one does.
+
+        Args:
+            position: Of the known one as it crosses [m], world, (3,).
+            velocity: Likewise [m/s].
+            thrust: Along its thrust axis, of any length, likewise.
+            body: What must be clear of the frame.
+        """
+        normal, b3 = self.gate.normal, thrust / np.linalg.norm(thrust)
+        bent = 0.5 * self.bending * self.reach**2 / max(float(normal @ velocity), SLOWEST)
+        offset = position - self.gate.position + body.centre[2] * b3
+        wide, high = body.semi_axes[:2].max(), body.semi_axes[2]
+        asked = [Condition(Quantity.VELOCITY, normal, lower=self.min_speed)]
+        for outward, distance in zip(*self.sides, strict=True):
+            upright = (outward @ b3) ** 2
+            reached = sqrt(wide**2 * (1.0 - upright) + high**2 * upright) + np.hypot(*body.centre[:2])
+            room = (distance - reached - outward @ offset) * normal
+            asked += [
+                Condition(Quantity.VELOCITY, room + ahead * outward, lower=bent)
+                for ahead in (-self.reach, self.reach)
+            ]
+        return asked
 
 
 def ways_through_gates(stages: Sequence[Stage], problem: Problem, vehicle: Vehicle) -> tuple[Way, ...]:
