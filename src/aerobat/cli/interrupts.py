@@ -13,12 +13,18 @@ _noticed: list[int] = []
 def interruptible(afterwards: bool) -> Iterator[None]:
     """Have Ctrl-C raise KeyboardInterrupt and be remembered, even where something swallows the exception.
 
+    What fails once it is remembered fails of it: extensions written in C make other exceptions of this one.
+
     `afterwards`: whether the process goes on when the block ends; if not, Ctrl-C means nothing from there.
     """
     _noticed.clear()
     handler = signal.signal(signal.SIGINT, _notice)
     try:
         yield
+    except Exception:
+        if _noticed:
+            raise KeyboardInterrupt from None
+        raise
     finally:
         signal.signal(signal.SIGINT, handler if afterwards else signal.SIG_IGN)
 

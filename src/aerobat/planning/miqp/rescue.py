@@ -19,7 +19,7 @@ from aerobat.vehicle import Vehicle
 if TYPE_CHECKING:
     from aerobat.planning.miqp.miqp import Miqp
 
-MORE_INTERVALS = (1.3, 1.8)  # times as many
+MORE_INTERVALS = (1.3, 2.0)  # times as many
 A_STAGE = 2  # intervals at least: fewer leave the path of a course no choice
 MANY_INTERVALS = 40  # where that is more still: a narrow window at an end needs intervals on either side
 
