@@ -67,7 +67,8 @@ def test_angular_jerk_is_the_rate_of_angular_acceleration_in_turning_axes(seed: 
     omega, omega_dot = flatness.body_rates(*per_norm(f, 0.0)[:3])
     in_world = rate(lambda t: flatness.body_rates(*per_norm(f, t)[:3])[1])
     expected = in_world - np.cross(omega, omega_dot)
-    found = flatness.angular_jerk(*per_norm(f, 0.0))
+    *rates, found = flatness.turning(*per_norm(f, 0.0))
+    np.testing.assert_array_equal(rates, [omega, omega_dot])
     np.testing.assert_allclose(found, expected, rtol=1e-9, atol=1e-9 * (1 + np.abs(in_world).max()))
 
 
@@ -79,7 +80,8 @@ def test_the_rates_of_moment_and_collective_thrust_are_their_derivatives(seed: i
     inertia = (root @ root.T + np.eye(3)).tolist()
     mass, axial = rng.uniform(0.1, 2.0), rng.normal()
     expected = rate(lambda t: flatness.moment(inertia, at(omega, t, 0), at(omega, t, 1)))
-    found = flatness.moment_rate(inertia, *(at(omega, 0.0, k) for k in range(3)))
+    moment, found = flatness.moment_and_rate(inertia, *(at(omega, 0.0, k) for k in range(3)))
+    np.testing.assert_array_equal(moment, flatness.moment(inertia, at(omega, 0.0, 0), at(omega, 0.0, 1)))
     np.testing.assert_allclose(found, expected, rtol=1e-9, atol=1e-9 * np.abs(expected).max())
 
     def collective(t: complex) -> Any:

@@ -65,6 +65,27 @@ def test_a_search_without_a_cost_goes_on_only_where_violations_fall_quickly(reac
     assert arrives or result.steps < 10
 
 
+class Crescent(Disc):
+    """The same with a bound beside the disc that no point of it meets."""
+
+    def __init__(self):
+        super().__init__([0.0, 0.0, 0.0])
+        self.bounded = (np.array([[1.0, 0.0, 0.0]]), np.array([2.0]), np.array([np.inf]))
+
+
+def test_a_search_gives_up_where_even_the_linearization_leaves_the_violation_and_mending_goes_on():
+    program = Crescent()
+    start = program.at(np.array([2.0, 0.1, 4.0]))
+    search, mending = (prox_linear(program, start, 80, gives_up=gives_up) for gives_up in (True, False))
+    assert not search.converged
+    assert search.steps == 1
+    assert mending.steps > 1
+    disc = Disc([0.0, 0.0, 0.0])
+    near = prox_linear(disc, disc.at(np.array([1.2, 0.1, 1.44])), 80, gives_up=True)
+    assert near.converged
+    assert near.point.violation <= 1e-9
+
+
 def test_a_violation_that_is_tolerated_costs_no_further_steps():
     program = Disc([3.0, 4.0, 0.0])
     start = program.at(np.array([-0.601, -0.801, 0.0]))

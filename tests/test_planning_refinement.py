@@ -14,6 +14,7 @@ from aerobat.planning.certified_solve import certificate_for, tightened
 from aerobat.planning.miqp.miqp import formulate
 from aerobat.planning.miqp.refinement.phases import PhasedChain, Places
 from aerobat.planning.miqp.refinement.rotor_rows import RotorRows
+from aerobat.planning.miqp.shortest import COARSE_GROWTH
 from aerobat.problem import (
     Condition,
     CustomManeuver,
@@ -103,6 +104,13 @@ def test_no_equal_intervals_one_percent_shorter_can_be_flown(name: str, vehicle:
     dt = 0.99 * found.duration / found.intervals
     with pytest.raises(Infeasible):
         plan(problem, Miqp(search=GridSearch(dt, dt, 1), rescue=False), flown_by)
+
+
+@pytest.mark.parametrize("name", ["flip-roll", "half-flip", "line"])
+def test_no_program_is_made_a_step_of_the_scan_shorter_than_any_motion(quad: Vehicle, name: str) -> None:
+    found = plan(load_problem(name), vehicle=quad)
+    assert found.assessment is not None
+    assert min(a.duration for a in found.attempts) >= found.assessment.least_duration / COARSE_GROWTH
 
 
 def test_a_fixed_dt_beyond_what_bounds_per_axis_alone_allow_is_refined(quad: Vehicle) -> None:

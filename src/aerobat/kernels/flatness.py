@@ -48,25 +48,27 @@ def collective(mass: Scalar, axial_drag: Scalar, norm: Scalar, b3: Vector, airsp
     return mass * (norm + axial_drag * dot(b3, airspeed))
 
 
-def angular_jerk(b3: Vector, jerk: Vector, snap: Vector, crackle: Vector) -> Vector:
-    """ω'' [rad/s³] along the body's axes of a body as in `body_rates`; `crackle` is f'''/n.
+def turning(b3: Vector, jerk: Vector, snap: Vector, crackle: Vector) -> tuple[Vector, Vector, Vector]:
+    """Return ω and ω' of `body_rates`, and ω'' [rad/s³] along the body's axes; `crackle` is f'''/n.
 
-    The derivative of the components of ω' in axes that turn with ω, so that a moment's rate is that of its
-    components.
+    ω'' is the derivative of the components of ω' in axes that turn with ω, so that a moment's rate is that of
+    its components.
     """
     omega, omega_dot = body_rates(b3, jerk, snap)
-    along = dot(b3, jerk)
-    along_rate = dot(jerk, jerk) + dot(b3, snap) - 2.0 * along * along
-    turning = add_scaled(cross(b3, crackle), -2.0 * along, cross(b3, snap))
-    world = add(cross(jerk, snap), turning)
-    world = add_scaled(add_scaled(world, -2.0 * along_rate, omega), -2.0 * along, omega_dot)
-    return add_scaled(world, -1.0, cross(omega, omega_dot))
+    world = add(cross(jerk, snap), cross(b3, crackle))
+    world = add_scaled(world, -2.0 * (dot(jerk, jerk) + dot(b3, snap)), omega)
+    world = add_scaled(world, -4.0 * dot(b3, jerk), omega_dot)
+    return omega, omega_dot, add_scaled(world, -1.0, cross(omega, omega_dot))
 
 
-def moment_rate(inertia: Matrix, omega: Vector, omega_dot: Vector, angular_jerk: Vector) -> Vector:
-    """The derivative J ω'' + ω' × J ω + ω × J ω' of `moment` [N·m/s]; body axes."""
-    gyroscopic = add(cross(omega_dot, transform(inertia, omega)), cross(omega, transform(inertia, omega_dot)))
-    return add(transform(inertia, angular_jerk), gyroscopic)
+def moment_and_rate(
+    inertia: Matrix, omega: Vector, omega_dot: Vector, angular_jerk: Vector
+) -> tuple[Vector, Vector]:
+    """Return `moment` and its derivative J ω'' + ω' × J ω + ω × J ω' [N·m/s]; body axes."""
+    momentum, momentum_rate = transform(inertia, omega), transform(inertia, omega_dot)
+    gyroscopic = add(cross(omega_dot, momentum), cross(omega, momentum_rate))
+    rate = add(transform(inertia, angular_jerk), gyroscopic)
+    return add(momentum_rate, cross(omega, momentum)), rate
 
 
 def collective_rate(

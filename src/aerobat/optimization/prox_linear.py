@@ -22,7 +22,7 @@ from aerobat.optimization.deadline import out_of_time
 _PENALTY = 2.0  # M: of the cost for each unit of violation
 _MAX_PENALTY = 200.0  # for violations that the first penalty leaves,
 _PENALTY_GROWTH = 10.0  # which it grows to by this factor
-_FIRST_PROXIMITY = 1e-3  # μ, in units of the cost
+_FIRST_PROXIMITY = 5e-3  # μ, in units of the cost
 _FIRST_PROXIMITY_AT_NO_COST = 0.1  # where only a point without violation is sought, which is near
 _MAX_PROXIMITY = 1e3  # steps are too short to lead anywhere beyond
 _MIN_PROXIMITY = 1e-6
@@ -32,6 +32,7 @@ _LITTLE_GAIN = 3e-4  # of the cost, by a step that was promised little more: the
 _LITTLE_PROMISED = 1e-3
 _STALLED_STEPS = 5  # in which a search for a point without violation, where nothing else is sought, has to
 _STALLED = 0.7  # lower the violation to this fraction: what is slower seldom arrives
+_HOPELESS = 0.5  # of the violation: where even the linearization leaves more, a search seldom arrives either
 _SLACK_WEIGHT = 1e-3  # of s², which makes the QP strictly convex
 _FREE_WEIGHT = 1e-6  # of d², likewise, where μ is tiny
 _SOLVED = 1  # DAQP's exit flag
@@ -106,7 +107,7 @@ def prox_linear(
     start: P,
     max_steps: int = 40,
     tolerance: float = 0.0,
-    in_time: bool = False,
+    gives_up: bool = False,
 ) -> ProxLinearResult[P]:
     """Descend from a point; it ends at a local optimum, out of steps or time, or where no step leads on.
 
@@ -116,7 +117,8 @@ def prox_linear(
         start: Where to begin, feasible or not.
         max_steps: QPs, at most.
         tolerance: A violation that is not worth a greater penalty.
-        in_time: Whether it ends where no time is left, as a descent may and what mends a path may not.
+        gives_up: Whether it ends where no time is left, and where even the linearization leaves much of the
+            violation, as a descent may and what mends a path may not.
     """
     point = start
     feasible = start if start.violation <= 0.0 else None
@@ -125,7 +127,7 @@ def prox_linear(
     penalty = _PENALTY
     violations = []  # after each step
     for steps in range(1, max_steps + 1):
-        if in_time and out_of_time():
+        if gives_up and out_of_time():
             break
         violations.append(point.violation)
         if not program.cost.any() and (point.violation <= 0.0 or _is_stalled(violations)):
@@ -133,6 +135,9 @@ def prox_linear(
         merit = _merit(program, point, penalty)
         linearization = linearization or point.linearization()
         step = _step(program, point.x, linearization, proximity, penalty)
+        hopeless = step is not None and step[1] > _HOPELESS * point.violation
+        if gives_up and hopeless and not program.cost.any():
+            return ProxLinearResult(point, False, steps, feasible)
         trial = None if step is None else program.at(point.x + step[0])
         if step is None or trial is None:
             proximity *= 5.0

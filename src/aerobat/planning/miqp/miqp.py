@@ -13,6 +13,7 @@ from aerobat.errors import Infeasible
 from aerobat.flatness import force_balance
 from aerobat.optimization import AssignmentProgram, solver
 from aerobat.optimization.deadline import out_of_time, within_time
+from aerobat.planning.assessment.lower_bound import least_duration
 from aerobat.planning.certified_solve import Judged
 from aerobat.planning.miqp.attempts import COURSE_SCAN_NODES, Attempts, Placement, default_order, plan_of
 from aerobat.planning.miqp.diagnosis import leg_without_room, why_infeasible
@@ -114,7 +115,9 @@ class Miqp(Planner):
             if leg is not None:
                 attempts.judge(Placement(attempts.solve(first, COURSE_SCAN_NODES), first))
                 raise Infeasible(leg, recorder.attempts)
-            found = shortest(attempts, first, max(4.0, 2.0 * first), self.shortens)
+            least = least_duration(problem, vehicle)
+            last = max(4.0, 2.0 * first, 2.0 * least / self.intervals)
+            found = shortest(attempts, first, last, least, self.shortens)
         if found is None:
             if out_of_time():
                 raise too_short(problem, self.time_limit, recorder.attempts, self._quicker)

@@ -42,7 +42,7 @@ _End = tuple[Placement, PathPoint]  # a start and the path that a descent from i
 
 
 def shortest(
-    attempts: Attempts, first: float, last: float, shortens: bool = True
+    attempts: Attempts, first: float, last: float, least: float, shortens: bool = True
 ) -> Judged[Placement] | None:
     """The shortest certified path found, or None.
 
@@ -50,10 +50,11 @@ def shortest(
         attempts: Made and recorded here.
         first: The scan's smallest dt [s].
         last: The scan's largest dt [s].
+        least: The duration [s] that no motion falls short of: shorter programs are left out.
         shortens: Whether a certified path is shortened further, and flown: it need not be where others
             begin from it.
     """
-    scan = _Scan(attempts, first, last)
+    scan = _Scan(attempts, first, last, least)
     starts = scan.starts()
     ends: list[_End] = []
     known: set[_Slots] = set()  # whose shortest path is known
@@ -99,7 +100,7 @@ def _shorter_than(
     duration = judged.solution.duration
     for fraction in SHORTER:
         dt, is_nearest = fraction * duration / attempts.formulation.chain.intervals, fraction == SHORTER[-1]
-        if not is_nearest and scan.slots_around(dt) in known:
+        if fraction * duration < scan.least or (not is_nearest and scan.slots_around(dt) in known):
             continue
         start = attempts.placement(dt, SCAN_NODES)
         if not is_nearest and start.answer.slots in known:
@@ -141,12 +142,15 @@ class _Scan:
     attempts: Attempts
     first: float  # [s]
     last: float  # [s]
+    least: float  # [s] of all intervals together
     flown: Placement | None = None  # the answer that the vehicle can fly as it is
     slots: dict[float, _Slots] = field(default_factory=dict)  # of each program, by its dt
 
     def starts(self) -> Iterator[Placement]:
         """Answers that are not far from what the vehicle can do, each as a path of its program."""
         dt, before, solved, unsolved = self.first, inf, False, 0
+        while COARSE_GROWTH * dt * self.attempts.formulation.chain.intervals < self.least:
+            dt *= COARSE_GROWTH
         while dt <= self.last and unsolved < UNSOLVED and not self.attempts.is_over:
             placement = self.attempts.placement(dt, SCAN_NODES)
             self.slots[dt] = placement.answer.slots

@@ -40,7 +40,7 @@ def descent(program: PathProgram, start: Array, max_steps: int = MAX_STEPS) -> D
     point = program.at(start)
     if point is None:
         return Descent(None, False)
-    found = prox_linear(program, point, max_steps, TOLERATED, in_time=True)
+    found = prox_linear(program, point, max_steps, TOLERATED, gives_up=True)
     path = found.feasible if found.point.violation > MENDABLE else found.point
     return Descent(path, found.converged and found.steps <= FEW_STEPS)
 

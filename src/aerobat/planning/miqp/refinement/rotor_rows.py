@@ -106,9 +106,8 @@ class RotorRows:
         vectors = [_components(x) for x in (f, f1, f2, crackle + drag * snap, airspeed, acceleration)]
         norm = np.sqrt(dot(vectors[0], vectors[0]))
         b3, *rates = (scale(1.0 / norm, vector) for vector in vectors[:4])
-        omega, omega_dot = kernel.body_rates(b3, rates[0], rates[1])
-        turning = [omega, omega_dot, kernel.angular_jerk(b3, *rates)]
-        rate = np.sqrt(dot(omega, omega) + TINY)
+        turning = kernel.turning(b3, *rates)
+        rate = np.sqrt(dot(turning[0], turning[0]) + TINY)
         return np.stack([*self._wrenches(b3, norm, vectors, turning), norm, rate], axis=-1)
 
     @cached_property
@@ -134,7 +133,7 @@ class RotorRows:
         return weights, np.concatenate([*offsets, other_offsets[:kept]])
 
     def _wrenches(
-        self, b3: Vector, norm: Any, vectors: list[Vector], turning: list[Vector]
+        self, b3: Vector, norm: Any, vectors: list[Vector], turning: tuple[Vector, ...]
     ) -> tuple[Any, ...]:
         """Collective thrust and moment, then their derivatives, (..., m) each.
 
@@ -149,8 +148,7 @@ class RotorRows:
         local = [(*kernel.tilted(b3, vector), 0.0 * norm) for vector in turning]
         thrust = kernel.collective(mass, axial, norm, b3, airspeed)
         thrust_rate = kernel.collective_rate(mass, axial, b3, (norm, f1), (airspeed, acceleration))
-        moment = kernel.moment(inertia, local[0], local[1])
-        moment_rate = kernel.moment_rate(inertia, *local)
+        moment, moment_rate = kernel.moment_and_rate(inertia, *local)
         return thrust, *moment, thrust_rate, *moment_rate
 
 
