@@ -25,8 +25,14 @@ from aerobat.planning.polynomial.descent.stage_constraints import StageConstrain
 from aerobat.planning.warm_start import WarmStart
 
 WARM_ITERATIONS = 25  # where multipliers are known, at most: what takes longer is not near
-# rows are scaled already: MUMPS needs not permute the system's to find pivots, a quarter of its time
-UNPERMUTED = {"mumps_permuting_scaling": 0}
+OPTIONS = {
+    # rows are scaled already: MUMPS needs not permute the system's to find pivots, a quarter of its time
+    "mumps_permuting_scaling": 0,
+    # slacks and multipliers fit the barrier from the start: far fewer iterations than from slacks next to zero
+    "slack_bound_push": 1e-2,
+    "slack_bound_frac": 1e-2,
+    "bound_mult_init_method": "mu-based",
+}
 
 
 @dataclass(frozen=True)
@@ -38,8 +44,8 @@ class Precision:
     warm_barrier: float | None  # the same where multipliers are known; None: they are not used
 
 
-ROUGH = Precision(1e-3, 1e-3, None)  # a path of a few segments comes within a percent
-FINE = Precision(1e-5, 2e-4, 1e-6)  # many samples, each a little short of its limit, add up
+ROUGH = Precision(1e-3, 3e-5, None)  # a path of a few segments comes within a percent
+FINE = Precision(1e-5, 3e-5, 1e-6)  # many samples, each a little short of its limit, add up
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,7 +113,7 @@ class KnotProgram:
             tolerance=precision.tolerance,
             initial_barrier=precision.barrier if multipliers is None else precision.warm_barrier,
             multipliers=None if multipliers is None else multipliers.at(self.samples),
-            options=UNPERMUTED,
+            options=OPTIONS,
         )
 
     @cached_property
