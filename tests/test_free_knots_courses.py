@@ -8,7 +8,6 @@ import pytest
 from aerobat.planning import FreeKnots, MinSnap, Plan
 from aerobat.planning.flyability import own_flight
 from aerobat.planning.polynomial.descent.framed_problem import FramedProblem
-from aerobat.planning.polynomial.descent.knot_program import Multipliers
 from aerobat.planning.polynomial.nearest import nearest_polynomials
 from aerobat.planning.rotor_margin import reserve_shortfalls
 from aerobat.planning.warm_start import WarmStart
@@ -128,12 +127,3 @@ def test_each_limit_is_backed_off_from_by_its_own_excess_and_no_reserve_is_kept_
     for kept, whole in zip(limits.limits(limits.of_vehicle(0.03)), limits.limits(np.zeros(1)), strict=True):
         np.testing.assert_array_equal(kept[~of_vehicle], whole[~of_vehicle])
         assert (kept[of_vehicle] != whole[of_vehicle]).any()
-
-
-def test_multipliers_find_their_rows_among_more_samples() -> None:
-    few, more = np.array([0.0, 0.5, 1.0]), np.array([0.0, 0.2, 0.5, 0.7, 1.0])
-    sampled = (np.arange(6.0).reshape(3, 2), 10.0 + np.arange(6.0).reshape(3, 2))
-    known = Multipliers(np.array([7.0]), (few, few), sampled, np.array([8.0, 9.0]))
-    box, rows = known.at((more, few))
-    assert box.tolist() == [7.0]
-    assert rows.tolist() == [0, 1, 0, 0, 2, 3, 0, 0, 4, 5, 10, 11, 12, 13, 14, 15, 8, 9]
