@@ -245,7 +245,7 @@ class _Exchange:
         return settled or duration >= (1.0 - LITTLE_GAIN) * before
 
     def go_on_from(self, certified: WarmStart) -> None:
-        """Begin again from a certified path, with the least backoff; it is near what can be found."""
+        """Begin again from a certified path, with the least backoff, in a smaller region than at first."""
         self.guess = certified
         self._relaxed_before, self._relaxed = self._relaxed, None
         self._radius = self._descent.strategy.radius / SHRINK
