@@ -92,10 +92,11 @@ class Descent:
         if self.strategy.paced:
             guess = self.framed.paced(guess)
         program, end = _Exchange(self, guess), len(self.recorder.attempts) + ROUNDS
+        before = inf
         while (left := end - len(self.recorder.attempts)) > 0 and not out_of_time():
-            before = program.guess.trajectory.duration
             if (found := self._certified(program, left)) is None or program.little_to_gain(found, before):
                 return
+            before = found.solution.duration
             program.go_on_from(found.solution.source.guess)
 
     def through_gates(self, segments: int) -> Plan | None:
