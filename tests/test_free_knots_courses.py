@@ -8,10 +8,11 @@ import pytest
 from aerobat.planning import FreeKnots, MinSnap, Plan
 from aerobat.planning.flyability import own_flight
 from aerobat.planning.polynomial.descent.framed_problem import FramedProblem
-from aerobat.planning.polynomial.descent.knot_program import Multipliers
 from aerobat.planning.polynomial.nearest import nearest_polynomials
+from aerobat.planning.result import FlownPassage, OwnFlight
 from aerobat.planning.rotor_margin import reserve_shortfalls
 from aerobat.planning.warm_start import WarmStart
+from aerobat.planning.ways import straighter
 from aerobat.problem import Course, Limits, PassGate, Problem, Stage, at_rest, load_problem, tilted_gate
 from aerobat.trajectory import Trajectory
 from aerobat.trajectory.minimum_effort import minimum_effort
@@ -130,10 +131,15 @@ def test_each_limit_is_backed_off_from_by_its_own_excess_and_no_reserve_is_kept_
         assert (kept[of_vehicle] != whole[of_vehicle]).any()
 
 
-def test_multipliers_find_their_rows_among_more_samples() -> None:
-    few, more = np.array([0.0, 0.5, 1.0]), np.array([0.0, 0.2, 0.5, 0.7, 1.0])
-    sampled = (np.arange(6.0).reshape(3, 2), 10.0 + np.arange(6.0).reshape(3, 2))
-    known = Multipliers(np.array([7.0]), (few, few), sampled, np.array([8.0, 9.0]))
-    box, rows = known.at((more, few))
-    assert box.tolist() == [7.0]
-    assert rows.tolist() == [0, 1, 0, 0, 2, 3, 0, 0, 4, 5, 10, 11, 12, 13, 14, 15, 8, 9]
+def test_a_way_is_straightened_by_less_where_the_body_only_touches_the_frame() -> None:
+    problem = load_problem("flip-roll")
+    stages = problem.stages(QUAD.max_specific_thrust, QUAD.body_radius).stages
+
+    def straightened_by(clearance: float) -> float:
+        missed = FlownPassage(problem.gates[0].name, 0.0, None, "hit the frame", clearance)
+        flight = OwnFlight(error=0.0, passages=(missed,))
+        (way,) = straighter((), stages, problem, QUAD, flight)
+        (again,) = straighter((way,), stages, problem, QUAD, flight)
+        return again.bending / way.bending
+
+    assert 1.0 < straightened_by(-0.001) < straightened_by(-0.1)

@@ -39,6 +39,7 @@ FRAME_CLEARANCE = 0.01  # [m] from body to frame
 BENDING = 0.4  # of the largest specific thrust: the acceleration by which a path may bend there, at first
 BENDING_IN_MANEUVER = 0.1  # likewise, where a maneuver bends it as it likes
 MORE_BENDING = 1.6  # times that, where the plan's own flight does not pass
+A_LITTLE_MORE = 1.2  # the same, where it touches the frame by no more than FRAME_CLEARANCE
 
 
 @dataclass(frozen=True, eq=False)
@@ -113,14 +114,15 @@ def straighter(
         flight: With a passage for each stage that names a gate.
     """
     crossing = [k for k, stage in enumerate(stages) if stage.gate is not None]
-    missed = [k for k, flown in zip(crossing, flight.passages, strict=True) if flown.is_missed]
+    missed = {k: flown for k, flown in zip(crossing, flight.passages, strict=True) if flown.is_missed}
     found: dict[int, Way | None] = {way.stage: way for way in ways}
-    for k in missed:
+    for k, flown in missed.items():
         last = found.get(k)
         if last is None:
             found[k] = _way(k, stages, problem, vehicle, BENDING_IN_MANEUVER)
         else:
-            found[k] = replace(last, bending=MORE_BENDING * last.bending)
+            touches = flown.clearance is not None and flown.clearance >= -FRAME_CLEARANCE
+            found[k] = replace(last, bending=(A_LITTLE_MORE if touches else MORE_BENDING) * last.bending)
     return tuple(way for way in found.values() if way is not None)
 
 

@@ -23,8 +23,6 @@ from aerobat.planning.polynomial.descent.knot_program import (
     FINE,
     ROUGH,
     KnotProgram,
-    Multipliers,
-    Precision,
 )
 from aerobat.planning.polynomial.descent.knot_samples import (
     GATE_SAMPLES,
@@ -46,7 +44,6 @@ LITTLE_GAIN = 0.005  # of the duration, from one certified path to the next: the
 LARGE_GAIN = 0.2  # of the duration: the start was far, trust regions confine what follows it
 MIN_RADIUS = 0.2  # a smaller region may hold no path that mends what is exceeded
 SHRINK = 3.0  # by how much the trust region is smaller where a limit is exceeded between samples
-NEAR = 0.05  # the same, where the next solution lies near: with multipliers as first guesses it is soon found
 SOLVED = 1e-3  # the same at samples: more means that the region is too large
 MAX_BACKOFF = 0.02  # that is added at once: where much is exceeded, samples mend most of it
 CONVERGED = "locally optimal"  # the status of such a solution
@@ -56,8 +53,7 @@ CONVERGED = "locally optimal"  # the status of such a solution
 class Strategy:
     """How solves follow each other."""
 
-    precision: Precision
-    first_tolerance: float  # of IPOPT, of the first solve from a start: what it finds is mended anyhow
+    tolerance: float  # of IPOPT; of the first solve from a start ROUGH, as what it finds is mended anyhow
     radius: float  # of the trust region at first, in scaled variables, see KnotVariables
     backoff: float  # of every limit's range, kept at samples at first
     samples: int  # of a segment at first, at least
@@ -67,10 +63,8 @@ class Strategy:
     paced: bool = True  # a start that exceeds limits by far is slowed
 
 
-OF_MANEUVERS = Strategy(
-    ROUGH, ROUGH.tolerance, 2.0, 1e-4, MIN_SAMPLES, False, little_loss=0.1, must_fall=True
-)
-OF_COURSES = Strategy(FINE, ROUGH.tolerance, 3.0, 5e-4, GATE_SAMPLES, True, little_loss=0.02, must_fall=False)
+OF_MANEUVERS = Strategy(ROUGH, 2.0, 1e-4, MIN_SAMPLES, False, little_loss=0.01, must_fall=True)
+OF_COURSES = Strategy(FINE, 3.0, 5e-4, GATE_SAMPLES, True, little_loss=0.02, must_fall=False)
 # of polynomials next to the rigid body's own motion, shorter where it turns sharply
 NEAR_MOTIONS = replace(OF_COURSES, radius=1.0, samples=MIN_SAMPLES, paced=False)
 
@@ -98,10 +92,11 @@ class Descent:
         if self.strategy.paced:
             guess = self.framed.paced(guess)
         program, end = _Exchange(self, guess), len(self.recorder.attempts) + ROUNDS
+        before = inf
         while (left := end - len(self.recorder.attempts)) > 0 and not out_of_time():
-            before = program.guess.trajectory.duration
             if (found := self._certified(program, left)) is None or program.little_to_gain(found, before):
                 return
+            before = found.solution.duration
             program.go_on_from(found.solution.source.guess)
 
     def through_gates(self, segments: int) -> Plan | None:
@@ -209,9 +204,8 @@ class _Exchange:
         self._begun = guess.trajectory.duration
         self._samples = chebyshev_samples(segments, strategy.samples)
         self._radius = strategy.radius
-        self._precision = replace(strategy.precision, tolerance=strategy.first_tolerance)
+        self._tolerance = ROUGH
         self._backoff = np.tile(self._least_backoff, (segments, 1))
-        self._multipliers: Multipliers | None = None
         self._relaxed: float | None = None  # [s] the duration of the first solution near the guess
         self._relaxed_before: float | None = None  # [s] the same near the guess before
         self._confined = False  # whether the last solution stands at an edge of its trust region
@@ -234,13 +228,11 @@ class _Exchange:
         iterations = descent.iterations
         if descent.best is not None:
             iterations = min(iterations, NEAR_ITERATIONS)
-        found, answer, multipliers = program.solve(iterations, self._precision, self._multipliers)
-        self._precision = descent.strategy.precision
+        found, answer = program.solve(iterations, self._tolerance)
+        self._tolerance = descent.strategy.tolerance
         self._confined = variables.is_at_edge(answer.x)
         status = CONVERGED if answer.converged else "unknown"
         path = replace(framed.path(found), unsolved=answer.violation)
-        near = answer.converged and path.violation.worst <= NEAR
-        self._multipliers = multipliers if near else None
         if self._relaxed is None and answer.converged:
             self._relaxed = found.trajectory.duration
         return framed.solution(path, status, answer.iterations, answer.time)
@@ -254,10 +246,10 @@ class _Exchange:
         return settled or duration >= (1.0 - LITTLE_GAIN) * before
 
     def go_on_from(self, certified: WarmStart) -> None:
-        """Begin again from a certified path, in the whole trust region and with the least backoff."""
+        """Begin again from a certified path, with the least backoff, in a smaller region than at first."""
         self.guess = certified
         self._relaxed_before, self._relaxed = self._relaxed, None
-        self._radius = self._descent.strategy.radius
+        self._radius = self._descent.strategy.radius / SHRINK
         self._backoff[:] = self._least_backoff
 
     @property

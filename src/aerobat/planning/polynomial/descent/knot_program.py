@@ -24,49 +24,17 @@ from aerobat.planning.polynomial.descent.path_limits import (
 from aerobat.planning.polynomial.descent.stage_constraints import StageConstraints
 from aerobat.planning.warm_start import WarmStart
 
-WARM_ITERATIONS = 25  # where multipliers are known, at most: what takes longer is not near
-# rows are scaled already: MUMPS needs not permute the system's to find pivots, a quarter of its time
-UNPERMUTED = {"mumps_permuting_scaling": 0}
-
-
-@dataclass(frozen=True)
-class Precision:
-    """How closely a program is solved, whose cost is one."""
-
-    tolerance: float  # of IPOPT
-    barrier: float  # the first barrier parameter
-    warm_barrier: float | None  # the same where multipliers are known; None: they are not used
-
-
-ROUGH = Precision(1e-3, 1e-3, None)  # a path of a few segments comes within a percent
-FINE = Precision(1e-5, 2e-4, 1e-6)  # many samples, each a little short of its limit, add up
-
-
-@dataclass(frozen=True, eq=False)
-class Multipliers:
-    """Of a solution: of the box, of limits at samples, of stages."""
-
-    box: Array  # (n,)
-    samples: Samples
-    sampled: tuple[Array, ...]  # of each segment, (samples, limits)
-    stages: Array
-
-    @classmethod
-    def of(cls, answer: NonlinearResult, samples: Samples, limits: int) -> Multipliers:
-        """Of an answer to a program with so many limits at samples."""
-        box, rows = answer.multipliers
-        ends = np.cumsum([limits * len(s) for s in samples])
-        *sampled, stages = np.split(rows, ends)
-        return cls(box, samples, tuple(each.reshape(-1, limits) for each in sampled), stages)
-
-    def at(self, samples: Samples) -> tuple[Array, Array]:
-        """Of the box, and of a program's rows at these samples, among which are all of its own."""
-        rows = []
-        for own, wanted, known in zip(self.samples, samples, self.sampled, strict=True):
-            each = np.zeros((len(wanted), known.shape[1]))
-            each[np.searchsorted(wanted, own)] = known
-            rows.append(each.ravel())
-        return self.box, np.concatenate([*rows, self.stages])
+ROUGH = 1e-3  # tolerance of IPOPT, the cost being one: a path of a few segments comes within a percent
+FINE = 1e-5  # likewise: many samples, each a little short of its limit, add up
+BARRIER = 1e-4  # the first parameter: some hundred active limits times it are little beside the cost
+OPTIONS = {
+    # rows are scaled already: MUMPS needs not permute the system's to find pivots, a quarter of its time
+    "mumps_permuting_scaling": 0,
+    # slacks and multipliers fit the barrier from the start: half the iterations of slacks next to zero
+    "slack_bound_push": 1e-2,
+    "slack_bound_frac": 1e-2,
+    "bound_mult_init_method": "mu-based",
+}
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,36 +47,22 @@ class KnotProgram:
     stages: StageConstraints
     reserve: Array  # of every limit's range, kept at the samples of each segment, (S, size)
 
-    def solve(
-        self, iterations: int, precision: Precision, multipliers: Multipliers | None = None
-    ) -> tuple[WarmStart, NonlinearResult, Multipliers]:
+    def solve(self, iterations: int, tolerance: float) -> tuple[WarmStart, NonlinearResult]:
         """The solution near the guess, as the next guess. Raises BackendMissing without CasADi.
 
         Args:
             iterations: Of the solver, at most.
-            precision: Of the solver.
-            multipliers: Of a program about this guess or near it, at some of these samples.
+            tolerance: Of the solver.
         """
-        answer = None
-        if multipliers is not None and precision.warm_barrier is not None:
-            answer = self._solved(min(iterations, WARM_ITERATIONS), precision, multipliers)
-        if answer is None or not answer.converged:
-            answer = self._solved(iterations, precision)
-        found = Multipliers.of(answer, self.samples, self.limits.size)
-        return self.variables.read(answer.x), answer, found
-
-    def _solved(
-        self, iterations: int, precision: Precision, multipliers: Multipliers | None = None
-    ) -> NonlinearResult:
-        return solve_nonlinear(
+        answer = solve_nonlinear(
             self.program,
             self.variables.start,
             max_iterations=iterations,
-            tolerance=precision.tolerance,
-            initial_barrier=precision.barrier if multipliers is None else precision.warm_barrier,
-            multipliers=None if multipliers is None else multipliers.at(self.samples),
-            options=UNPERMUTED,
+            tolerance=tolerance,
+            initial_barrier=BARRIER,
+            options=OPTIONS,
         )
+        return self.variables.read(answer.x), answer
 
     @cached_property
     def program(self) -> NonlinearProgram:
