@@ -22,7 +22,7 @@ from aerobat.optimization.deadline import out_of_time
 _PENALTY = 2.0  # M: of the cost for each unit of violation
 _MAX_PENALTY = 200.0  # for violations that the first penalty leaves,
 _PENALTY_GROWTH = 10.0  # which it grows to by this factor
-_FIRST_PROXIMITY = 5e-3  # μ, in units of the cost
+_FIRST_PROXIMITY = 1e-3  # μ, in units of the cost
 _FIRST_PROXIMITY_AT_NO_COST = 0.1  # where only a point without violation is sought, which is near
 _MAX_PROXIMITY = 1e3  # steps are too short to lead anywhere beyond
 _MIN_PROXIMITY = 1e-6
