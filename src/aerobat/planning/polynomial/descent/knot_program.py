@@ -26,7 +26,7 @@ from aerobat.planning.warm_start import WarmStart
 
 ROUGH = 1e-3  # tolerance of IPOPT, the cost being one: a path of a few segments comes within a percent
 FINE = 1e-5  # likewise: many samples, each a little short of its limit, add up
-BARRIER = 1e-4  # the first parameter: some hundred active limits times it are little beside the cost
+BARRIER = 2e-4  # the first parameter: some hundred active limits times it are little beside the cost
 OPTIONS = {
     # rows are scaled already: MUMPS needs not permute the system's to find pivots, a quarter of its time
     "mumps_permuting_scaling": 0,
