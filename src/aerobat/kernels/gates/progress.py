@@ -28,7 +28,6 @@ class GateProgress(NamedTuple):
     """A flight about a gate's plane so far; offsets from the opening's centre as positions."""
 
     latest: Snapshot  # the last crossing in the direction of passage
-    beyond: Scalar  # 1 since that crossing, until it comes back
     crossing: Snapshot  # of those after which it got far enough beyond, the nearest to the planned instant
     backward: Scalar  # [s] the crossing against the direction next to that instant, infinite if there is none
     max_distance: Scalar  # [m] beyond the plane, of ticks in the window; −infinite before it
@@ -39,7 +38,7 @@ class GateProgress(NamedTuple):
 def init(directions: int) -> GateProgress:
     """Progress before the first tick, of a body measured along so many directions."""
     never = Snapshot(inf, ZERO, ZERO, (1.0, 0.0, 0.0, 0.0))
-    return GateProgress(never, 0.0, never, inf, -inf, inf, swath.init(directions))
+    return GateProgress(never, never, inf, -inf, inf, swath.init(directions))
 
 
 def step(
@@ -69,16 +68,14 @@ def step(
     fraction = -before / ops.select(crosses > 0.5, behind - before, 1.0)
     here = between(last, now, fraction)
     latest = select_tree(ops, forward, here, progress.latest)
-    beyond = ops.select(forward, 1.0, ops.select(back, 0.0, progress.beyond))
     off_time = magnitude(ops, latest.time - plane.planned)
     nearer = off_time < magnitude(ops, progress.crossing.time - plane.planned)
-    passed = counted[1] & (beyond > 0.5) & (behind >= plane.depth) & (off_time <= plane.window) & nearer
+    passed = counted[1] & (behind >= plane.depth) & (off_time <= plane.window) & nearer
     back_off_time = magnitude(ops, here.time - plane.planned)
     nearer_back = back_off_time < magnitude(ops, progress.backward - plane.planned)
     in_window = counted[1] & (magnitude(ops, now.time - plane.planned) <= plane.window)
     return GateProgress(
         latest,
-        beyond,
         select_tree(ops, passed, latest, progress.crossing),
         ops.select(back & (back_off_time <= plane.window) & nearer_back, here.time, progress.backward),
         ops.select(in_window, ops.maximum(progress.max_distance, behind), progress.max_distance),
