@@ -140,7 +140,7 @@ def test_a_faster_plan_is_a_start_of_its_own_and_compare_says_so():
 def test_a_plan_keeps_its_starts_in_its_file(tmp_path):
     from aerobat.planning import load_plan
 
-    found = TimeOptimal(intervals=12, starts=2).plan(load_problem("line"), QUAD)
+    found = TimeOptimal(intervals=14, starts=2).plan(load_problem("line"), QUAD)
     found.save(tmp_path / "line.plan")
     assert load_plan(tmp_path / "line.plan").starts == found.starts
     assert len(found.starts) == 2
