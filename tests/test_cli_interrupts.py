@@ -49,6 +49,8 @@ ON_THE_WAY = [
     ("write_columns", 1),
     ("png", 1),
     ("__array__", 1),  # which Matplotlib calls from C++, and takes what it raises for a wrong value
+    ("cb", 1),  # a weak reference's callback to what imports, from which Python can raise nothing
+    ("cb", 100),
     ("end_interrupts", 1),
 ]
 
@@ -117,13 +119,68 @@ def test_an_interrupt_that_is_swallowed_on_the_way_still_ends_the_run(tmp_path: 
     assert [path.name for path in tmp_path.iterdir()] == ["plugin.py"]
 
 
-def test_a_run_within_another_program_leaves_its_signals_as_they_were(tmp_path: Path, monkeypatch) -> None:
+# classes of which Python calls something when an object dies, and takes no exception from it
+CALLED_WHEN_IT_DIES = {
+    "__del__": """
+class Dying:
+    def __del__(self):
+        on_death()
+""",
+    "weakref": """
+import weakref
+class Dying:
+    def __init__(self):
+        self.watch = weakref.finalize(self, on_death)
+""",
+    "in turn": """
+class Inner:
+    def __del__(self):
+        on_death()
+class Dying:
+    def __del__(self):
+        inner = Inner()
+        del inner
+        print("unreachable")
+""",
+}
+
+
+def death_in_a_plugin(dying: str, on_death: str, folder: Path) -> subprocess.CompletedProcess[str]:
+    """A run whose plugin lets an object die, then prints."""
+    plugin = f"import signal\ndef on_death():\n    {on_death}\n{CALLED_WHEN_IT_DIES[dying]}"
+    (folder / "plugin.py").write_text(plugin + "it = Dying()\ndel it\nprint('went on')\n")
+    return subprocess.run(
+        [sys.executable, "-m", "aerobat", "plan", "line", "--import", "plugin.py"],
+        capture_output=True, text=True, cwd=folder,
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("dying", CALLED_WHEN_IT_DIES)
+def test_an_interrupt_that_python_cannot_raise_where_it_comes_is_raised_right_after(
+    dying: str, tmp_path: Path
+) -> None:
+    ended = death_in_a_plugin(dying, "signal.raise_signal(signal.SIGINT)", tmp_path)
+    assert (ended.returncode, ended.stdout, ended.stderr) == (130, "", "aerobat: interrupted\n")
+    assert [path.name for path in tmp_path.iterdir()] == ["plugin.py"]
+
+
+def test_another_exception_that_python_cannot_raise_is_told_as_ever(tmp_path: Path) -> None:
+    ended = death_in_a_plugin("__del__", "raise ValueError('a defect')", tmp_path)
+    assert ended.returncode == 0
+    assert ended.stdout.startswith("went on\n")
+    assert ended.stderr.startswith("Exception ignored in")
+    assert "ValueError: a defect" in ended.stderr
+
+
+def test_a_run_within_another_program_leaves_signals_and_hooks_as_they_were(
+    tmp_path: Path, monkeypatch
+) -> None:
     from aerobat.cli import main
 
     monkeypatch.chdir(tmp_path)
-    before = signal.getsignal(signal.SIGINT)
+    before = signal.getsignal(signal.SIGINT), sys.unraisablehook, sys.getprofile()
     main(["plan", "line", "--order", "5"])
-    assert signal.getsignal(signal.SIGINT) is before
+    assert (signal.getsignal(signal.SIGINT), sys.unraisablehook, sys.getprofile()) == before
 
 
 def test_the_word_is_said_where_standard_error_was_even_if_it_is_led_elsewhere_by_then(

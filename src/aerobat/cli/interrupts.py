@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import signal
-from collections.abc import Iterator
+import sys
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from functools import partial
+from types import FrameType
 
 _noticed: list[int] = []
 
@@ -14,10 +17,13 @@ def interruptible(afterwards: bool) -> Iterator[None]:
     """Have Ctrl-C raise KeyboardInterrupt and be remembered, even where something swallows the exception.
 
     What fails once it is remembered fails of it: extensions written in C make other exceptions of this one.
+    Where Python can raise nothing, as in `__del__` and weak references' callbacks, it is raised right after.
 
     `afterwards`: whether the process goes on when the block ends; if not, Ctrl-C means nothing from there.
     """
     _noticed.clear()
+    hook = sys.unraisablehook
+    sys.unraisablehook = partial(_raise_later, hook)
     handler = signal.signal(signal.SIGINT, _notice)
     try:
         yield
@@ -27,6 +33,7 @@ def interruptible(afterwards: bool) -> Iterator[None]:
         raise
     finally:
         signal.signal(signal.SIGINT, handler if afterwards else signal.SIG_IGN)
+        sys.unraisablehook = hook
 
 
 def end_interrupts() -> None:
@@ -39,3 +46,21 @@ def end_interrupts() -> None:
 def _notice(signum: int, frame: object) -> None:
     _noticed.append(signum)
     raise KeyboardInterrupt
+
+
+def _raise_later(
+    hook: Callable[[sys.UnraisableHookArgs], object], unraisable: sys.UnraisableHookArgs
+) -> None:
+    """Have an interrupt that Python swallowed raised at the next call or return; leave the rest to `hook`.
+
+    The signal cannot be sent again: it would be handled in here, from where nothing can be raised either.
+    """
+    if _noticed and unraisable.exc_type is KeyboardInterrupt:
+        sys.setprofile(_raise_outside)
+    else:
+        hook(unraisable)
+
+
+def _raise_outside(frame: FrameType, event: str, argument: object) -> None:
+    if frame.f_code is not _raise_later.__code__:
+        raise KeyboardInterrupt  # upon which Python calls this no more
