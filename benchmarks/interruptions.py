@@ -49,12 +49,14 @@ def run(command: tuple[str, ...], after: float | None = None, by: int = 0) -> tu
     """
     with tempfile.TemporaryFile() as said:
         began = time.perf_counter()
+        signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})  # what Python calls at a fork swallows it
         child = os.fork()
         if not child:
             os.setpgid(0, 0)
             os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
             os.dup2(said.fileno(), 2)
             try:
+                signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
                 main(command)
             except SystemExit as stop:
                 os._exit(int(stop.code or 0))
@@ -62,6 +64,7 @@ def run(command: tuple[str, ...], after: float | None = None, by: int = 0) -> tu
                 os.write(2, repr(error).encode())
                 os._exit(BEFORE)
             os._exit(0)
+        signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
         with suppress(PermissionError):
             os.setpgid(child, child)
         if after is not None:
