@@ -16,7 +16,7 @@ from aerobat.optimization.deadline import shorter
 from aerobat.optimization.result import AssignmentResult, verified
 
 DIRECT_NODES = 300  # of a direct search, before the sequence is cut in two
-MIN_NODES = 3000  # of all: with fewer no proof comes of a cut
+MIN_NODES = 6000  # of all: with fewer no proof comes of a cut, and the bound is the worse for it
 
 
 class BranchAndBound:

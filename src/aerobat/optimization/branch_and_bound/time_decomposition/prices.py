@@ -11,7 +11,7 @@ from aerobat.optimization.branch_and_bound.null_space import UNBOUNDED, in_units
 from aerobat.optimization.branch_and_bound.time_decomposition.halves import HalfMinimum
 
 OVERSHOOT = 0.5  # of what is missing, aimed at beyond the level: prices at the level come near it slowly
-STIFFNESS = 0.1  # of the mean compliance, added in all directions: other solutions give way in others
+STIFFNESS = 0.03  # of the mean compliance, added in all directions: other solutions give way in others
 
 
 class CuttingPlanes:

@@ -37,11 +37,11 @@ def cut_stage(program: AssignmentProgram) -> int | None:
     dynamics = program.dynamics
     if dynamics is None or program.hessian is not None or program.gradient is not None:
         return None
-    fixes = np.array([(stage.lower[0] == stage.upper[0]).sum() for stage in program.stages])
-    free = np.array([len(stage.slots) > 1 for stage in program.stages])
+    fixes = np.array([(stage.lower[0] == stage.upper[0]).sum() for stage in program.stages], dtype=int)
+    free = np.array([len(stage.slots) > 1 for stage in program.stages], dtype=bool)
     anchors = np.flatnonzero(free & (fixes == fixes.max(initial=0)))
     least = MIN_FIXED * len(dynamics.transition)
-    if len(anchors) < MIN_ANCHORS or fixes.max() < least or not program.is_totally_ordered:
+    if len(anchors) < MIN_ANCHORS or fixes[anchors[0]] < least or not program.is_totally_ordered:
         return None
     before = np.cumsum(free)[anchors]
     return int(anchors[np.abs(2 * before - 1 - free.sum()).argmin()])
