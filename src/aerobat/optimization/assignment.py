@@ -66,6 +66,37 @@ class SlottedStage:
 
 
 @dataclass(frozen=True, eq=False)
+class LinearDynamics:
+    """Variables as the inputs of a linear system, slot after slot: s_k = F s_{k−1} + G x[columns[k]].
+
+    Rows that see later inputs than those of slot k see the inputs up to k through the state s_k alone.
+    Raises SpecError for what does not fit together.
+    """
+
+    transition: Array  # F (r, r)
+    gain: Array  # G (r, i)
+    columns: Indices  # (s, i) of the program's variables, each once
+
+    def __post_init__(self) -> None:
+        """Copy, write-protect and check."""
+        transition = _shared(self.transition, "dynamics: transition", (None, None))
+        columns = _indices(self.columns, "dynamics: columns")
+        if columns.ndim != 2 or len(np.unique(columns)) != columns.size:
+            raise SpecError("dynamics: columns must be a table of distinct variables, one line for each slot")
+        _set(self, transition=transition, columns=columns)
+        _set(self, gain=_shared(self.gain, "dynamics: gain", (len(transition), columns.shape[1])))
+        if transition.shape != (len(transition),) * 2:
+            raise SpecError(f"dynamics: transition must be square, got the shape {transition.shape}")
+
+    def state(self, slot: int) -> Array:
+        """Return the state at the end of a slot per input up to it, (r, (slot + 1) i), in slots' order."""
+        blocks = [self.gain]
+        for _ in range(slot):
+            blocks.append(self.transition @ blocks[-1])
+        return np.concatenate(blocks[::-1], axis=1)
+
+
+@dataclass(frozen=True, eq=False)
 class AssignmentProgram:
     """The whole problem.
 
@@ -83,6 +114,7 @@ class AssignmentProgram:
     hessian: Array | None = None  # H (n, n) symmetric positive definite; None is 2 I: xᵀx is minimized
     gradient: Array | None = None  # f (n,); None is 0
     constant: float = 0.0  # c
+    dynamics: LinearDynamics | None = None  # by which long sequences are cut in two
 
     def __post_init__(self) -> None:
         """Copy, write-protect and check."""
@@ -110,6 +142,11 @@ class AssignmentProgram:
         stages = len(self.stages)
         if any(not 0 <= k < stages for pair in self.precedence for k in pair):
             raise SpecError(f"precedence must name stages 0..{stages - 1}, got {self.precedence}")
+        if self.dynamics is not None and self.dynamics.columns.size != self.num_variables:
+            raise SpecError(
+                f"dynamics: columns must name all {self.num_variables} variables, got "
+                f"{self.dynamics.columns.size}"
+            )
 
     @property
     def num_variables(self) -> int:

@@ -40,12 +40,15 @@ class _Pairing:
 class LazyChildren:
     """Branches that cover all ways to complete a node.
 
-    They choose for the group whose smallest lower bound is the largest and, where that leaves few choices,
-    also for the group that would have the largest then: pairwise bounds come from the node's own solution, so
-    that most QPs in between need not be solved. Candidates are paired when their turn comes.
+    They choose for the group whose lower bounds, at most the cutoff each, are the largest on the average and,
+    where that leaves few choices, also for the group whose smallest bound would be the largest then: pairwise
+    bounds come from the node's own solution, so that most QPs in between need not be solved. Candidates are
+    paired when their turn comes.
     """
 
-    def __init__(self, dual_bounds: DualBounds, solution: QPSolution, lower_bounds: LowerBounds) -> None:
+    def __init__(
+        self, dual_bounds: DualBounds, solution: QPSolution, lower_bounds: LowerBounds, cutoff: float
+    ) -> None:
         """`solution` is the node's; `lower_bounds` have candidates of every group that is left."""
         self.lower_bounds = lower_bounds
         self._dual_bounds = dual_bounds
@@ -53,7 +56,10 @@ class LazyChildren:
         group, value = lower_bounds.group, lower_bounds.value
         self._starts = np.concatenate([[0], (group[1:] != group[:-1]).nonzero()[0] + 1])
         self._spans = [slice(a, b) for a, b in pairwise((*self._starts.tolist(), len(group)))]
-        self._branching_group = int(np.minimum.reduceat(value, self._starts).argmax())
+        self._floor = float(np.minimum.reduceat(value, self._starts).max())  # any completion costs as much
+        sizes = np.diff([*self._starts, len(group)])
+        average = np.add.reduceat(value, self._starts) / sizes
+        self._branching_group = int(average.argmax())
         span = self._spans[self._branching_group]
         self._waiting = (span.start + value[span].argsort(kind="stable")).tolist()
         self._batch = _FIRST_BATCH
@@ -66,7 +72,7 @@ class LazyChildren:
         evaluated = self._evaluated[0][0] if self._evaluated else inf
         if not self._waiting:
             return evaluated
-        return min(evaluated, float(self.lower_bounds.value[self._waiting[0]]))
+        return min(evaluated, max(float(self.lower_bounds.value[self._waiting[0]]), self._floor))
 
     def evaluate_best(self) -> float:
         """Pair candidates until the best branch is known; return its bound."""
@@ -97,7 +103,7 @@ class LazyChildren:
 
     def _push(self, bound: float, pairing: _Pairing) -> None:
         if bound < inf:
-            heappush(self._evaluated, (bound, next(self._ticket), pairing))
+            heappush(self._evaluated, (max(bound, self._floor), next(self._ticket), pairing))
 
     def _evaluate(self, batch: list[int]) -> None:
         candidates = self.lower_bounds.candidates

@@ -46,6 +46,10 @@ class ReducedBounds:
         """Return the cost where ½|y|² is `value`."""
         return self.unit**2 * (self.base_cost + value)
 
+    def value(self, cost: float) -> float:
+        """Return the ½|y|² of a cost, as DAQP writes it: the inverse of `cost`."""
+        return min(cost / self.unit**2 - self.base_cost, UNBOUNDED)
+
 
 @dataclass(frozen=True, eq=False)
 class Block:

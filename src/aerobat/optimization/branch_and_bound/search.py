@@ -58,13 +58,22 @@ class BestFirstSearch:
         qp: LeastDistanceQP,
         bounds: CandidateBounds,
         root: ReducedBounds,
+        cutoff: float = UNBOUNDED,
+        wants_all: bool = False,
     ) -> None:
-        """`bounds` are those of the candidates, `root` those of the rows with no stage assigned."""
+        """`bounds` are those of the candidates, `root` those of the rows with no stage assigned.
+
+        No ½|y|² of `cutoff` or more is looked for. With `wants_all` every assignment below it is: none of
+        them is then the best, they are in `found`, and there are no more unless it `is_unfinished`.
+        """
         self._candidates = candidates
         self._dual_bounds = dual_bounds
         self._qp = qp
         self._bounds = bounds
         self._root = root
+        self._first_cutoff = cutoff
+        self._wants_all = wants_all
+        self.found: list[tuple[float, tuple[int, ...]]] = []  # ½|y|² and candidates
         self._heap: list[tuple[float, int, _Node, LazyChildren | None]] = []
         self._ticket = count()
         self._unresolved = inf  # the smallest bound of a relaxation that the QP solver could not solve
@@ -77,13 +86,18 @@ class BestFirstSearch:
     def bound(self) -> float:
         """The lower bound of ½|y|²; infinite when there is no solution."""
         waiting = self._heap[0][0] if self._heap else inf
-        return min(waiting, self._unresolved, self._cutoff if self.best else inf)
+        return min(waiting, self._unresolved, self._cutoff if self._cutoff < UNBOUNDED else inf)
+
+    @property
+    def is_unfinished(self) -> bool:
+        """True where a limit, or a relaxation without answer, has left something below the cutoff."""
+        return self._improves(self.bound)
 
     @property
     def status(self) -> Status:
         """The cost bounds proven so far."""
         if self.best is not None:
-            return "time_limit" if self._improves(self.bound) else "optimal"
+            return "time_limit" if self.is_unfinished else "optimal"
         return "infeasible" if self.bound == inf else "unknown"
 
     def try_start(self, slots: Mapping[int, int]) -> None:
@@ -112,13 +126,17 @@ class BestFirstSearch:
         pending = tuple(range(len(self._candidates.free_stages)))
         inherited = self._dual_bounds.root_bounds(self._bounds)
         if solution is not None and inherited.covers_all_stages(pending):
-            self._dive(_Node(solution, (), pending, inherited))
+            root = _Node(solution, (), pending, inherited)
+            if self._wants_all:
+                self._push(solution.value, root)
+            else:
+                self._dive(root)
         next_dive = _DIVE_GROWTH * self.nodes
         while self._heap and self._improves(self._heap[0][0]) and not self._is_over:
             node = self._next()
             if node is None:
                 continue
-            if self.nodes >= next_dive:
+            if self.nodes >= next_dive and not self._wants_all:
                 self._dive(node)
                 next_dive = _DIVE_GROWTH * self.nodes
             elif self._heap and node.solution.value > self._heap[0][0]:
@@ -163,17 +181,20 @@ class BestFirstSearch:
     def _children(self, node: _Node) -> LazyChildren | None:
         """Return the node's children; None where its solution is an assignment's, the best so far."""
         if not node.pending:
-            self.best = (node.solution, node.chosen)
+            if self._wants_all:
+                self.found.append((node.solution.value, node.chosen))
+            else:
+                self.best = (node.solution, node.chosen)
             return None
         lower_bounds = node.inherited
         # else a few QPs cost less than their bounds
         if not node.chosen or len(node.pending) > 1 or len(lower_bounds.candidates) > _MAX_INHERITED:
             lower_bounds = self._dual_bounds.single_bounds(node.solution, self._bounds, node.inherited)
-        complete = self._completed(node, lower_bounds)
+        complete = None if self._wants_all else self._completed(node, lower_bounds)
         if complete is not None:
             self.best = (node.solution, complete)
             return None
-        return LazyChildren(self._dual_bounds, node.solution, lower_bounds)
+        return LazyChildren(self._dual_bounds, node.solution, lower_bounds, self._cutoff)
 
     def _child(self, node: _Node, lower_bounds: LowerBounds, branch: Branch) -> _Node | None:
         """Return one child of a node; None where it cannot beat the best."""
@@ -236,7 +257,7 @@ class BestFirstSearch:
 
     @property
     def _cutoff(self) -> float:
-        return UNBOUNDED if self.best is None else self.best[0].value
+        return self._first_cutoff if self.best is None else min(self.best[0].value, self._first_cutoff)
 
     def _improves(self, bound: float) -> bool:
         return bound < self._cutoff - _OPTIMALITY_GAP * (self._cutoff + abs(self._root.base_cost))

@@ -1,4 +1,4 @@
-"""The built-in solver: a convex QP for what no choice touches, an exact search over slots for the rest."""
+"""The built-in solver: a direct search and, where it is long, one that cuts the sequence in two."""
 
 from __future__ import annotations
 
@@ -8,21 +8,15 @@ from math import inf
 from time import perf_counter
 from typing import ClassVar
 
-import numpy as np
-
-from aerobat.arrays import Array, Mask
 from aerobat.optimization.assignment import AssignmentProgram
-from aerobat.optimization.branch_and_bound.candidates import Candidates
-from aerobat.optimization.branch_and_bound.least_distance import LeastDistanceQP, NotConverged
-from aerobat.optimization.branch_and_bound.lower_bounds import DualBounds
-from aerobat.optimization.branch_and_bound.null_space import NullSpace, split_coupled
-from aerobat.optimization.branch_and_bound.search import BestFirstSearch, SearchLimits
+from aerobat.optimization.branch_and_bound.direct_search import NAME, DirectSearch
+from aerobat.optimization.branch_and_bound.search import SearchLimits
+from aerobat.optimization.branch_and_bound.time_decomposition import TimeDecomposition, cut_stage
 from aerobat.optimization.deadline import shorter
-from aerobat.optimization.result import AssignmentResult, Status, verified
+from aerobat.optimization.result import AssignmentResult, verified
 
-_MATRICES = ("rows", "equality", "hessian", "gradient")
-_EQUALITY_TOLERANCE = 1e-12  # bounds closer than this, relative to the larger, make an equality
-_CONTRADICTION_TOLERANCE = 1e-9  # on the same scale, by which a lower bound must exceed the upper one
+DIRECT_NODES = 300  # of a direct search, before the sequence is cut in two
+MIN_NODES = 6000  # of all: with fewer no proof comes of a cut, and the bound is the worse for it
 
 
 class BranchAndBound:
@@ -32,12 +26,14 @@ class BranchAndBound:
     why it is right.
     """
 
-    name: ClassVar[str] = "builtin"
+    name: ClassVar[str] = NAME
     package: ClassVar[str] = "daqp"
     extra: ClassVar[str | None] = None
     uses_start: ClassVar[bool] = True
 
-    _factorization: _Factorization | None = None
+    def __init__(self) -> None:
+        """Begin without factorizations."""
+        self._direct = DirectSearch()
 
     def solve(
         self,
@@ -59,102 +55,12 @@ class BranchAndBound:
     def _claim(
         self, program: AssignmentProgram, limits: SearchLimits, start: Sequence[int] | None
     ) -> AssignmentResult:
-        lower, upper = program.root_bounds
-        larger = np.maximum(np.abs(lower), np.abs(upper))
-        scale = np.where(np.isfinite(larger), larger, 0.0)
-        if (lower - upper > _CONTRADICTION_TOLERANCE * scale).any() or not _is_ordered(program):
-            return _without_solution("infeasible", inf)
-        implicit_equalities = upper - lower <= _EQUALITY_TOLERANCE * scale
-        kept = self._factorization
-        if kept is None or not kept.fits(program, implicit_equalities):
-            kept = _Factorization(program, implicit_equalities)
-            self._factorization = kept
-        try:
-            return kept.claim(program, lower, upper, limits, start)
-        except NotConverged:  # of the independent block: the search deals with its own
-            return _without_solution("unknown", -inf)
-
-
-class _Factorization:
-    """All that depends on the matrices, on which rows are equalities and on the rows of the stages alone."""
-
-    def __init__(self, program: AssignmentProgram, implicit_equalities: Mask) -> None:
-        self._program = program
-        self._implicit_equalities = implicit_equalities
-        stage_rows = [stage.rows.ravel() for stage in program.stages if len(stage.slots) > 1]
-        coupled, independent = split_coupled(
-            program, np.concatenate([np.zeros(0, dtype=np.intp), *stage_rows])
-        )
-        self.coupled = NullSpace(program, coupled, implicit_equalities)
-        self.independent = NullSpace(program, independent, implicit_equalities)
-        self.candidates = Candidates(program, self.coupled)
-        self.dual_bounds = DualBounds(self.candidates, self.coupled.rows)
-        self.coupled_qp = LeastDistanceQP(self.coupled.rows)
-        self.independent_qp = LeastDistanceQP(self.independent.rows)
-
-    def fits(self, program: AssignmentProgram, implicit_equalities: Mask) -> bool:
-        """Tell if another program has the same matrices, and the same rows in the same roles."""
-        own = self._program
-        if own.precedence != program.precedence or len(own.stages) != len(program.stages):
-            return False
-        stages = zip(own.stages, program.stages, strict=True)
-        return (
-            all(getattr(own, name) is getattr(program, name) for name in _MATRICES)
-            and np.array_equal(self._implicit_equalities, implicit_equalities)
-            and all(a.slots == b.slots and np.array_equal(a.rows, b.rows) for a, b in stages)
-        )
-
-    def claim(
-        self,
-        program: AssignmentProgram,
-        lower: Array,
-        upper: Array,
-        limits: SearchLimits,
-        start: Sequence[int] | None,
-    ) -> AssignmentResult:
-        """Solve the independent block, search the coupled one, and put them together.
-
-        `lower` and `upper` (m,) are the root's bounds. Raises NotConverged for the independent block's QP.
-        """
-        root = self.coupled.bounds(program, lower, upper)
-        independent = self.independent.bounds(program, lower, upper)
-        if not (root.consistent and independent.consistent):
-            return _without_solution("infeasible", inf)
-        independent = independent.in_units(independent.min_norm or 1.0)
-        independent_solution = self.independent_qp.solve(independent.lower, independent.upper)
-        if independent_solution is None:
-            return _without_solution("infeasible", inf)
-        bounds = self.candidates.bounds(program, self.coupled, root)
-        root = root.in_units(max(root.min_norm, self.candidates.min_norm(bounds)) or 1.0)
-        bounds = bounds.in_units(root.unit)
-        search = BestFirstSearch(self.candidates, self.dual_bounds, self.coupled_qp, bounds, root)
-        if start is not None:
-            search.try_start({stage: start[stage] for stage in self.candidates.free_stages})
-        search.run(limits)
-        x = slots = None
-        if search.best is not None:
-            solution, chosen = search.best
-            x = np.zeros(program.num_variables)
-            x[self.coupled.columns] = self.coupled.expand(root, solution.y)
-            x[self.independent.columns] = self.independent.expand(independent, independent_solution.y)
-            slots = self.candidates.slots_with(program, chosen)
-        return AssignmentResult(
-            status=search.status,
-            backend=BranchAndBound.name,
-            bound=program.constant + independent.cost(independent_solution.value) + root.cost(search.bound),
-            x=x,
-            slots=slots,
-            nodes=search.nodes,
-        )
-
-
-def _without_solution(status: Status, bound: float) -> AssignmentResult:
-    return AssignmentResult(status=status, backend=BranchAndBound.name, bound=bound)
-
-
-def _is_ordered(program: AssignmentProgram) -> bool:
-    """Tell if the precedence has no cycle and the fixed stages have distinct slots, in order."""
-    fixed = {i: stage.slots[0] for i, stage in enumerate(program.stages) if len(stage.slots) == 1}
-    in_order = all(fixed[i] < fixed[j] for i in fixed for j in fixed if program.precedes[i, j])
-    is_distinct = len(set(fixed.values())) == len(fixed)
-    return in_order and is_distinct and not program.precedes.diagonal().any()
+        stage = cut_stage(program)
+        if stage is None or limits.nodes < MIN_NODES:
+            return self._direct.claim(program, limits, start)
+        first = self._direct.claim(program, replace(limits, nodes=DIRECT_NODES), start)
+        if first.status in ("optimal", "infeasible") or perf_counter() >= limits.deadline:
+            return first
+        if first.slots is None:  # nothing to begin with
+            return self._direct.claim(program, limits, start)
+        return TimeDecomposition(program, stage, first, limits, self._direct).run()

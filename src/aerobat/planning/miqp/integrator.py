@@ -29,6 +29,20 @@ class IntegratorChain:
     intervals: Intervals
 
     @cached_property
+    def transition(self) -> Array:
+        """Effect of the state on that one interval later, normalised, (r, r): Taylor's weights."""
+        taylor = np.zeros((self.order, self.order))
+        for d in range(self.order):
+            for k in range(d, self.order):
+                taylor[d, k] = 1.0 / factorial(k - d)
+        return taylor
+
+    @cached_property
+    def gain(self) -> Array:
+        """Effect of the input over an interval on the state at its end, normalised, (r,)."""
+        return np.array([1.0 / factorial(self.order - d) for d in range(self.order)])
+
+    @cached_property
     def forced(self) -> Array:
         """Effect of the inputs at interval ends, (N, r, N): derivative d at the end of interval n per input.
 

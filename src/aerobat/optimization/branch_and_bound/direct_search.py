@@ -1,0 +1,206 @@
+"""A whole program at once: a QP for what no choice touches, an exact search over slots for the rest."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import inf
+
+import numpy as np
+
+from aerobat.arrays import Array, Mask
+from aerobat.optimization.assignment import AssignmentProgram
+from aerobat.optimization.branch_and_bound.candidates import CandidateBounds, Candidates
+from aerobat.optimization.branch_and_bound.least_distance import LeastDistanceQP, NotConverged
+from aerobat.optimization.branch_and_bound.lower_bounds import DualBounds
+from aerobat.optimization.branch_and_bound.null_space import NullSpace, ReducedBounds, split_coupled
+from aerobat.optimization.branch_and_bound.search import BestFirstSearch, SearchLimits
+from aerobat.optimization.result import AssignmentResult, Status
+
+NAME = "builtin"
+_MATRICES = ("rows", "equality", "hessian", "gradient")
+_EQUALITY_TOLERANCE = 1e-12  # bounds closer than this, relative to the larger, make an equality
+_CONTRADICTION_TOLERANCE = 1e-9  # on the same scale, by which a lower bound must exceed the upper one
+
+
+@dataclass(frozen=True, eq=False)
+class Assignments:
+    """Some that cost less than a cutoff."""
+
+    found: list[tuple[float, tuple[int, ...]]]  # their costs, their slots
+    nodes: int  # QPs solved
+    are_all: bool  # none is missing
+
+
+class DirectSearch:
+    """Searches whole programs, and keeps factorizations for the next with the same matrices.
+
+    Not for several threads at once: give each its own.
+    """
+
+    _factorization: _Factorization | None = None
+
+    def claim(
+        self,
+        program: AssignmentProgram,
+        limits: SearchLimits,
+        start: Sequence[int] | None = None,
+        cutoff: float = inf,
+    ) -> AssignmentResult:
+        """Return the assignment of minimum cost, or what was found within the limits, not yet verified.
+
+        Nothing at least as dear as `cutoff` is looked for; the bound is then no higher than that.
+        """
+        prepared = self._prepared(program)
+        if prepared is None:
+            return _without_solution("infeasible", inf)
+        try:
+            return prepared.claim(program, limits, start, cutoff)
+        except NotConverged:  # of the independent block: the search deals with its own
+            return _without_solution("unknown", -inf)
+
+    def below(self, program: AssignmentProgram, limits: SearchLimits, cutoff: float) -> Assignments:
+        """Return every assignment that costs less than `cutoff`."""
+        prepared = self._prepared(program)
+        if prepared is None:
+            return Assignments([], 0, True)
+        try:
+            return prepared.below(program, limits, cutoff)
+        except NotConverged:
+            return Assignments([], 0, False)
+
+    def _prepared(self, program: AssignmentProgram) -> _Factorization | None:
+        """The factorization, kept from the last program where it fits; None where bounds contradict."""
+        lower, upper = program.root_bounds
+        larger = np.maximum(np.abs(lower), np.abs(upper))
+        scale = np.where(np.isfinite(larger), larger, 0.0)
+        if (lower - upper > _CONTRADICTION_TOLERANCE * scale).any() or not _is_ordered(program):
+            return None
+        implicit_equalities = upper - lower <= _EQUALITY_TOLERANCE * scale
+        kept = self._factorization
+        if kept is None or not kept.fits(program, implicit_equalities):
+            kept = _Factorization(program, implicit_equalities)
+            self._factorization = kept
+        return kept
+
+
+@dataclass(frozen=True, eq=False)
+class _Blocks:
+    """One program in the null space: the block to be searched, and the other, solved."""
+
+    root: ReducedBounds
+    bounds: CandidateBounds
+    independent: ReducedBounds
+    y: Array  # the independent block's solution
+    elsewhere: float  # the cost of all but the block that is searched
+
+
+class _Factorization:
+    """All that depends on the matrices, on which rows are equalities and on the rows of the stages alone."""
+
+    def __init__(self, program: AssignmentProgram, implicit_equalities: Mask) -> None:
+        self._program = program
+        self._implicit_equalities = implicit_equalities
+        stage_rows = [stage.rows.ravel() for stage in program.stages if len(stage.slots) > 1]
+        coupled, independent = split_coupled(
+            program, np.concatenate([np.zeros(0, dtype=np.intp), *stage_rows])
+        )
+        self.coupled = NullSpace(program, coupled, implicit_equalities)
+        self.independent = NullSpace(program, independent, implicit_equalities)
+        self.candidates = Candidates(program, self.coupled)
+        self.dual_bounds = DualBounds(self.candidates, self.coupled.rows)
+        self.coupled_qp = LeastDistanceQP(self.coupled.rows)
+        self.independent_qp = LeastDistanceQP(self.independent.rows)
+
+    def fits(self, program: AssignmentProgram, implicit_equalities: Mask) -> bool:
+        """Tell if another program has the same matrices, and the same rows in the same roles."""
+        own = self._program
+        if own.precedence != program.precedence or len(own.stages) != len(program.stages):
+            return False
+        stages = zip(own.stages, program.stages, strict=True)
+        return (
+            all(getattr(own, name) is getattr(program, name) for name in _MATRICES)
+            and np.array_equal(self._implicit_equalities, implicit_equalities)
+            and all(a.slots == b.slots and np.array_equal(a.rows, b.rows) for a, b in stages)
+        )
+
+    def claim(
+        self,
+        program: AssignmentProgram,
+        limits: SearchLimits,
+        start: Sequence[int] | None,
+        cutoff: float,
+    ) -> AssignmentResult:
+        """Solve the independent block, search the coupled one, and put them together.
+
+        Raises NotConverged for the independent block's QP.
+        """
+        blocks = self._blocks(program)
+        if blocks is None:
+            return _without_solution("infeasible", inf)
+        search = self._search(blocks, cutoff, wants_all=False)
+        if start is not None:
+            search.try_start({stage: start[stage] for stage in self.candidates.free_stages})
+        search.run(limits)
+        x = slots = None
+        if search.best is not None:
+            solution, chosen = search.best
+            x = np.zeros(program.num_variables)
+            x[self.coupled.columns] = self.coupled.expand(blocks.root, solution.y)
+            x[self.independent.columns] = self.independent.expand(blocks.independent, blocks.y)
+            slots = self.candidates.slots_with(program, chosen)
+        return AssignmentResult(
+            status=search.status,
+            backend=NAME,
+            bound=blocks.elsewhere + blocks.root.cost(search.bound),
+            x=x,
+            slots=slots,
+            nodes=search.nodes,
+        )
+
+    def below(self, program: AssignmentProgram, limits: SearchLimits, cutoff: float) -> Assignments:
+        """As `DirectSearch.below`. Raises NotConverged as `claim` does."""
+        blocks = self._blocks(program)
+        if blocks is None:
+            return Assignments([], 0, True)
+        search = self._search(blocks, cutoff, wants_all=True)
+        search.run(limits)
+        found = [
+            (blocks.elsewhere + blocks.root.cost(value), self.candidates.slots_with(program, chosen))
+            for value, chosen in search.found
+        ]
+        return Assignments(found, search.nodes, not search.is_unfinished)
+
+    def _blocks(self, program: AssignmentProgram) -> _Blocks | None:
+        """A program's right-hand sides, the independent block solved; None where it has no solution."""
+        lower, upper = program.root_bounds
+        root = self.coupled.bounds(program, lower, upper)
+        independent = self.independent.bounds(program, lower, upper)
+        if not (root.consistent and independent.consistent):
+            return None
+        independent = independent.in_units(independent.min_norm or 1.0)
+        solution = self.independent_qp.solve(independent.lower, independent.upper)
+        if solution is None:
+            return None
+        bounds = self.candidates.bounds(program, self.coupled, root)
+        root = root.in_units(max(root.min_norm, self.candidates.min_norm(bounds)) or 1.0)
+        elsewhere = program.constant + independent.cost(solution.value)
+        return _Blocks(root, bounds.in_units(root.unit), independent, solution.y, elsewhere)
+
+    def _search(self, blocks: _Blocks, cutoff: float, wants_all: bool) -> BestFirstSearch:
+        value = blocks.root.value(cutoff - blocks.elsewhere)
+        return BestFirstSearch(
+            self.candidates, self.dual_bounds, self.coupled_qp, blocks.bounds, blocks.root, value, wants_all
+        )
+
+
+def _without_solution(status: Status, bound: float) -> AssignmentResult:
+    return AssignmentResult(status=status, backend=NAME, bound=bound)
+
+
+def _is_ordered(program: AssignmentProgram) -> bool:
+    """Tell if the precedence has no cycle and the fixed stages have distinct slots, in order."""
+    fixed = {i: stage.slots[0] for i, stage in enumerate(program.stages) if len(stage.slots) == 1}
+    in_order = all(fixed[i] < fixed[j] for i in fixed for j in fixed if program.precedes[i, j])
+    is_distinct = len(set(fixed.values())) == len(fixed)
+    return in_order and is_distinct and not program.precedes.diagonal().any()
