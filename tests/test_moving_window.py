@@ -134,6 +134,15 @@ def test_a_course_costs_a_fraction_of_what_a_short_search_of_the_whole_finds() -
     assert placed.nodes - short.nodes < 2000
 
 
+@pytest.mark.parametrize("intervals", [28, 34])
+def test_windows_place_seven_points_as_the_search_that_proves_it(intervals: int) -> None:
+    program = formulate(ab.load_problem("race-7"), 4, intervals).program(9.0 / intervals)
+    placed = improved_in_windows(program, solver().solve(program, node_limit=50))
+    proven = solver().solve(program, start=placed.slots)
+    assert proven.status == "optimal"
+    assert placed.cost == pytest.approx(proven.cost, rel=1e-9)
+
+
 def test_where_searches_end_without_an_answer_no_plan_is_denied(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(diagnosis, "_binding", lambda *_: iter(()))
     ended = Attempt(2.0, False, "unknown", "", None, 500, 1.0)

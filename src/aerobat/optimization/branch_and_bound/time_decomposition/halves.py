@@ -14,6 +14,7 @@ from aerobat.optimization.branch_and_bound.direct_search import Assignments, Dir
 from aerobat.optimization.branch_and_bound.search import SearchLimits
 
 ACTIVE_TOLERANCE = 1e-7  # of a row's norm times that of x: rows as near to a bound hold it
+CANCELLATION = 1e-13  # of |shift|², by which |v|² less |shift|² may be wrong
 RANK_TOLERANCE = 1e-9  # singular values of unit rows below are zero
 
 
@@ -57,19 +58,21 @@ class Half:
         shift = self._shift(price)
         program = self._shifted(shift)
         answer = self._search.claim(program, limits, cutoff=cutoff)
+        bound = answer.bound - _rounding(shift)
         if answer.x is None or answer.slots is None:
-            return HalfAnswer(answer.bound, answer.nodes)
+            return HalfAnswer(bound, answer.nodes)
         minimum = HalfMinimum(
             cost=program.cost(answer.x),
             state=self._state @ (answer.x - shift),
             slots=answer.slots,
             compliance=self._compliance(program, answer.x, answer.slots),
         )
-        return HalfAnswer(answer.bound, answer.nodes, minimum)
+        return HalfAnswer(bound, answer.nodes, minimum)
 
     def below(self, price: Array, limits: SearchLimits, cutoff: float) -> Assignments:
         """All assignments that cost less than `cutoff` at a price, as `DirectSearch.below`."""
-        return self._search.below(self._shifted(self._shift(price)), limits, cutoff)
+        shift = self._shift(price)
+        return self._search.below(self._shifted(shift), limits, cutoff + _rounding(shift))
 
     def _compliance(self, program: AssignmentProgram, x: Array, slots: Sequence[int]) -> Array:
         """½ Z P Zᵀ, P the projector on what leaves the rows alone that hold a solution."""
@@ -103,3 +106,7 @@ class Half:
             stages=tuple(stages),
             constant=-float(shift @ shift),
         )
+
+
+def _rounding(shift: Array) -> float:
+    return CANCELLATION * float(shift @ shift)

@@ -9,8 +9,8 @@ import numpy as np
 
 from aerobat.arrays import Array
 from aerobat.optimization.assignment import AssignmentProgram, row_norms
-from aerobat.optimization.branch_and_bound.least_distance import LeastDistanceQP, NotConverged
-from aerobat.optimization.branch_and_bound.null_space import in_units
+from aerobat.optimization.branch_and_bound.least_distance import LeastDistanceQP
+from aerobat.optimization.branch_and_bound.null_space import UNBOUNDED, in_units
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,16 +36,13 @@ class JointQP:
         self._qp = LeastDistanceQP(rows / self._norms[:, None])
 
     def solve(self, slots: Sequence[int], cutoff: float) -> Joint | None:
-        """Return the optimum; None where there is none that costs less than `cutoff`, or none is found."""
+        """Return the optimum; None where there is none that costs less than `cutoff`. Raises NotConverged."""
         target = self._program.target
         lower, upper = (
             in_units(np.concatenate([bound, target]) / self._norms, self._unit)
             for bound in self._program.bounds_for(slots)
         )
-        try:
-            solution = self._qp.solve(lower, upper, cutoff=0.5 * cutoff / self._unit**2)
-        except NotConverged:
-            return None
+        solution = self._qp.solve(lower, upper, cutoff=min(0.5 * cutoff / self._unit**2, UNBOUNDED))
         if solution is None:
             return None
         x = self._unit * solution.y

@@ -1,4 +1,4 @@
-"""An exact search of a sequence cut in two: over the slots of one stage, then over ranges of the others'."""
+"""An exact search of a sequence cut in two: slot after slot of one stage, by prices and lists."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ import numpy as np
 from aerobat.arrays import Array
 from aerobat.optimization.assignment import AssignmentProgram
 from aerobat.optimization.branch_and_bound.direct_search import NAME, DirectSearch
+from aerobat.optimization.branch_and_bound.least_distance import NotConverged
 from aerobat.optimization.branch_and_bound.search import SearchLimits
 from aerobat.optimization.branch_and_bound.time_decomposition.cut import Cut, Timeline
 from aerobat.optimization.branch_and_bound.time_decomposition.halves import HalfAnswer
@@ -19,8 +20,10 @@ from aerobat.optimization.branch_and_bound.time_decomposition.joint import Joint
 from aerobat.optimization.branch_and_bound.time_decomposition.prices import CuttingPlanes
 from aerobat.optimization.result import AssignmentResult
 
-MIN_ANCHORS = 3  # stages that fix most of the state: of fewer, the whole is searched faster
-MIN_FIXED = 0.2  # of the state that an anchor fixes at least: a position, of a chain of five integrators
+MIN_ANCHORS = 3  # stages that confine most of the state: of fewer, the whole is searched faster
+MIN_CONFINED = (
+    0.2  # of the state that an anchor confines at least: a position, of a chain of five integrators
+)
 HALF_NODES = 2000  # of one search of a half
 FIRST_PRICES = 3  # tried for a slot in the first round, while the best may still improve much
 MAX_PRICES = 8  # in a later one
@@ -32,16 +35,19 @@ OPTIMALITY_GAP = 1e-9  # relative, at which a slot is done
 def cut_stage(program: AssignmentProgram) -> int | None:
     """The stage at which a program is best cut in two; None where it is searched as a whole.
 
-    It is one of its anchors, the stages that fix most of the state: that with the most equal halves.
+    It is one of its anchors, the stages that confine most of the state, on both sides: that with the most
+    equal halves.
     """
     dynamics = program.dynamics
     if dynamics is None or program.hessian is not None or program.gradient is not None:
         return None
-    fixes = np.array([(stage.lower[0] == stage.upper[0]).sum() for stage in program.stages], dtype=int)
+    confines = np.array(
+        [np.isfinite(stage.upper[0] - stage.lower[0]).sum() for stage in program.stages], dtype=int
+    )
     free = np.array([len(stage.slots) > 1 for stage in program.stages], dtype=bool)
-    anchors = np.flatnonzero(free & (fixes == fixes.max(initial=0)))
-    least = MIN_FIXED * len(dynamics.transition)
-    if len(anchors) < MIN_ANCHORS or fixes[anchors[0]] < least or not program.is_totally_ordered:
+    anchors = np.flatnonzero(free & (confines == confines.max(initial=0)))
+    least = MIN_CONFINED * len(dynamics.transition)
+    if len(anchors) < MIN_ANCHORS or confines[anchors[0]] < least or not program.is_totally_ordered:
         return None
     before = np.cumsum(free)[anchors]
     return int(anchors[np.abs(2 * before - 1 - free.sum()).argmin()])
@@ -224,9 +230,8 @@ class TimeDecomposition:
         for bound, slots in sorted(pairs):
             if self._reaches_best(bound):
                 break
-            if self._is_over:
+            if self._is_over or not self._try(slots):
                 return
-            self._try(slots)
         part.bound = self._cutoff
 
     def _search(self, part: _Part) -> None:
@@ -242,15 +247,19 @@ class TimeDecomposition:
             self._try(answer.slots)
         part.bound = max(part.bound, answer.bound - constant)
 
-    def _try(self, slots: tuple[int, ...]) -> None:
-        """Take an assignment for the best, where it is."""
+    def _try(self, slots: tuple[int, ...]) -> bool:
+        """Take an assignment for the best, where it is; False where its QP does not converge."""
         if slots in self._tried:
-            return
-        self._tried.add(slots)
+            return True
         self._nodes += 1
-        joint = self._joint_qp.solve(slots, self._cutoff)
+        try:
+            joint = self._joint_qp.solve(slots, self._cutoff)
+        except NotConverged:
+            return False
+        self._tried.add(slots)
         if joint is not None and joint.cost < self._cutoff:
             self._best = joint
+        return True
 
     def _is_done(self, part: _Part) -> bool:
         return self._reaches_best(part.bound)
