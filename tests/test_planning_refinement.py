@@ -1,5 +1,6 @@
 """Plans by the MIQP for a vehicle: what was refused or missed is found, what is returned is proven."""
 
+import sys
 from dataclasses import replace
 from pathlib import Path
 
@@ -27,6 +28,9 @@ from aerobat.problem import (
 )
 from aerobat.trajectory import Trajectory
 from aerobat.vehicle import Vehicle, load_vehicle
+
+sys.path.append(str(Path(__file__).parents[1] / "benchmarks"))
+from random_problems import random_case
 
 CASES = Path(__file__).parent / "cases"
 AXES = np.eye(3)
@@ -137,6 +141,17 @@ def test_a_narrow_window_at_an_end_is_rescued_by_many_intervals(quad: Vehicle) -
     found = plan(passing(aside, still, level, at=(0.9, 0.96)), Miqp(intervals=13), quad)
     assert found.certified
     assert "planned with 40" in found.rescue
+
+
+def test_where_no_path_settles_more_intervals_are_tried_and_the_shorter_plan_says_so() -> None:
+    """The program's own answer takes twice as long as need be."""
+    case = random_case(72, 23)
+    own = plan(case.problem, Miqp(rescue=False), case.vehicle)
+    assert own.bound is not None
+    found = plan(case.problem, Miqp(), case.vehicle)
+    assert found.certified
+    assert found.duration < 0.6 * own.duration
+    assert "no path of miqp with 20 intervals settled; planned with 26" in str(found)
 
 
 def test_a_stage_that_excludes_itself_is_named(quad: Vehicle) -> None:

@@ -21,7 +21,7 @@ from aerobat.planning.miqp.formulation import Formulation
 from aerobat.planning.miqp.integrator import IntegratorChain, Intervals, Order
 from aerobat.planning.miqp.refinement import descent, settled
 from aerobat.planning.miqp.remedies import advice
-from aerobat.planning.miqp.rescue import rescued_plan
+from aerobat.planning.miqp.rescue import rescued_plan, shortened_plan
 from aerobat.planning.miqp.shortest import shortest
 from aerobat.planning.planners import Planner, option, planner
 from aerobat.planning.recorder import Progress, Recorder
@@ -84,7 +84,10 @@ class Miqp(Planner):
         recorder = Recorder(progress)
         with within_time(self.time_limit):
             try:
-                return stopped(self._planned(problem, vehicle, recorder))
+                plan = stopped(self._planned(problem, vehicle, recorder))
+                if vehicle is None or not self.rescue or self.search is not None or plan.bound is None:
+                    return plan
+                return shortened_plan(self, problem, vehicle, plan, recorder)
             except Infeasible as infeasible:
                 if vehicle is None or not self.rescue or not infeasible.attempts:
                     raise

@@ -1,4 +1,4 @@
-"""What else may find a plan where the intervals and the order that were asked for find none."""
+"""What else may find a plan where the intervals and the order asked for find none, or a poor one."""
 
 from __future__ import annotations
 
@@ -48,12 +48,44 @@ def rescued_plan(asked: Miqp, problem: Problem, vehicle: Vehicle, recorder: Reco
     return None
 
 
-def _alternatives(asked: Miqp, first: int, stages: int) -> Iterator[tuple[Planner, str]]:
-    """Planners, and how they plan in words; `first` is the order that is taken where none is asked for."""
+def shortened_plan(asked: Miqp, problem: Problem, vehicle: Vehicle, plan: Plan, recorder: Recorder) -> Plan:
+    """A shorter plan on more intervals, which says so, else the plan: it is a program's own answer.
+
+    Args:
+        asked: The planner that refined no path.
+        problem: What is planned.
+        vehicle: What shall fly it.
+        plan: Its plan.
+        recorder: The attempts so far; those that follow are passed on to its `progress`.
+    """
+    stages = len(problem.stages(vehicle.max_specific_thrust).stages)
+    for intervals in _more_intervals(asked, stages):
+        if out_of_time():
+            break
+        try:
+            found = replace(asked, intervals=intervals, rescue=False).plan(
+                problem, vehicle, recorder.progress
+            )
+        except Infeasible:
+            continue
+        if found.certified and found.duration < plan.duration:
+            attempts = (*recorder.attempts, *found.attempts)
+            wanted = f"no path of miqp with {asked.intervals} intervals settled"
+            return replace(found, attempts=attempts, rescue=f"{wanted}; planned with {intervals}")
+    return plan
+
+
+def _more_intervals(asked: Miqp, stages: int) -> list[int]:
+    """More intervals than were asked for, the fewest first."""
     more = {max(round(factor * asked.intervals), A_STAGE * stages) for factor in MORE_INTERVALS}
     if max(more) * MORE_INTERVALS[0] < MANY_INTERVALS:
         more.add(MANY_INTERVALS)
-    for intervals in sorted(more):
+    return sorted(more)
+
+
+def _alternatives(asked: Miqp, first: int, stages: int) -> Iterator[tuple[Planner, str]]:
+    """Planners, and how they plan in words; `first` is the order that is taken where none is asked for."""
+    for intervals in _more_intervals(asked, stages):
         yield replace(asked, intervals=intervals, rescue=False), f"with {intervals}"
     for order in range(first, max(INPUT_NAMES) + 1):
         if order != (asked.order or first):
