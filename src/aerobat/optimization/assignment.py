@@ -81,12 +81,12 @@ class LinearDynamics:
         """Copy, write-protect and check."""
         transition = _shared(self.transition, "dynamics: transition", (None, None))
         columns = _indices(self.columns, "dynamics: columns")
-        if columns.ndim != 2 or len(np.unique(columns)) != columns.size:
-            raise SpecError("dynamics: columns must be a table of distinct variables, one line for each slot")
-        _set(self, transition=transition, columns=columns)
-        _set(self, gain=_shared(self.gain, "dynamics: gain", (len(transition), columns.shape[1])))
+        if columns.ndim != 2:
+            raise SpecError("dynamics: columns must be a table of variables, one line for each slot")
         if transition.shape != (len(transition),) * 2:
             raise SpecError(f"dynamics: transition must be square, got the shape {transition.shape}")
+        _set(self, transition=transition, columns=columns)
+        _set(self, gain=_shared(self.gain, "dynamics: gain", (len(transition), columns.shape[1])))
 
     def state(self, slot: int) -> Array:
         """Return the state at the end of a slot per input up to it, (r, (slot + 1) i), in slots' order."""
@@ -142,11 +142,12 @@ class AssignmentProgram:
         stages = len(self.stages)
         if any(not 0 <= k < stages for pair in self.precedence for k in pair):
             raise SpecError(f"precedence must name stages 0..{stages - 1}, got {self.precedence}")
-        if self.dynamics is not None and self.dynamics.columns.size != self.num_variables:
-            raise SpecError(
-                f"dynamics: columns must name all {self.num_variables} variables, got "
-                f"{self.dynamics.columns.size}"
-            )
+        variables = np.arange(self.num_variables)
+        if self.dynamics is not None and not np.array_equal(np.sort(self.dynamics.columns, None), variables):
+            raise SpecError(f"dynamics: columns must name all {len(variables)} variables, each once")
+        lines = inf if self.dynamics is None else len(self.dynamics.columns)
+        if any(slot >= lines for stage in self.stages for slot in stage.slots):
+            raise SpecError(f"dynamics: columns must have a line for every slot of the stages, got {lines}")
 
     @property
     def num_variables(self) -> int:
