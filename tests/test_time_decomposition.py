@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Sequence
 from dataclasses import replace
 from itertools import combinations
@@ -22,11 +23,11 @@ from aerobat.optimization.branch_and_bound.time_decomposition import cut_stage
 from aerobat.optimization.branch_and_bound.time_decomposition import search as time_decomposition
 from aerobat.optimization.branch_and_bound.time_decomposition.cut import Cut, Timeline
 from aerobat.optimization.branch_and_bound.time_decomposition.joint import JointQP
-from aerobat.planning.miqp import formulate
 from aerobat.planning.miqp.integrator import IntegratorChain
-from aerobat.problem import CustomManeuver, load_problem
 
-EXAMPLE = Path(__file__).parents[1] / "examples" / "two-flips.toml"
+sys.path.append(str(Path(__file__).parents[1] / "benchmarks"))
+from growth_with_stages import flips
+
 NO_LIMITS = SearchLimits()
 seeds = st.integers(0, 10**6)
 
@@ -187,30 +188,11 @@ def test_three_flips_through_three_free_gates_are_proven_with_a_tenth_of_the_rel
     None
 ):
     """The whole search takes 34572, and ten times as long."""
-    result = solver().solve(three_flips())
+    result = solver().solve(flips(gates=3, intervals=60, duration=6.0))
     assert result.status == "optimal"
     assert result.slots == (13, 16, 19, 29, 35, 36, 38, 41, 44, 46, 47, 57)
     assert result.cost == pytest.approx(0.0866577708, rel=1e-8)
     assert result.nodes < 10000
-
-
-def three_flips() -> AssignmentProgram:
-    """The flips of `examples/two-flips.toml`, three in a row, 5 m apart, in 6 s on 60 intervals."""
-    example = load_problem(EXAMPLE)
-    assert isinstance(example.maneuver, CustomManeuver)
-    apart = np.array([5.0, 0.0, 0.0])
-    first = example.gates[0]
-    gates = tuple(replace(first, name=f"gate {i}", position=first.position + i * apart) for i in range(3))
-    one = example.maneuver.stages[:4]
-    stages = tuple(replace(stage, gate=stage.gate and gate.name) for gate in gates for stage in one)
-    problem = replace(
-        example,
-        goal=replace(example.goal, position=example.goal.position + apart),
-        gates=gates,
-        limits=replace(example.limits, upper=example.limits.upper + apart),
-        maneuver=replace(example.maneuver, stages=stages),
-    )
-    return formulate(problem, 3, 60).program(0.1)
 
 
 def solve_cut(program: AssignmentProgram, node_limit: int | None = None) -> AssignmentResult:

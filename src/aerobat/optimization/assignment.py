@@ -131,6 +131,8 @@ class AssignmentProgram:
             _set(self, gradient=_shared(self.gradient, "gradient", (self.num_variables,)))
         _set(self, stages=tuple(self.stages), precedence=tuple((int(i), int(j)) for i, j in self.precedence))
         self._check_stages()
+        if self.dynamics is not None:
+            self._check_dynamics(self.dynamics.columns)
 
     def _check_stages(self) -> None:
         m = len(self.rows)
@@ -142,11 +144,13 @@ class AssignmentProgram:
         stages = len(self.stages)
         if any(not 0 <= k < stages for pair in self.precedence for k in pair):
             raise SpecError(f"precedence must name stages 0..{stages - 1}, got {self.precedence}")
+
+    def _check_dynamics(self, columns: Indices) -> None:
         variables = np.arange(self.num_variables)
-        if self.dynamics is not None and not np.array_equal(np.sort(self.dynamics.columns, None), variables):
+        if not np.array_equal(np.sort(columns, None), variables):
             raise SpecError(f"dynamics: columns must name all {len(variables)} variables, each once")
-        lines = inf if self.dynamics is None else len(self.dynamics.columns)
-        if any(slot >= lines for stage in self.stages for slot in stage.slots):
+        if any(max(stage.slots) >= len(columns) for stage in self.stages):
+            lines = len(columns)
             raise SpecError(f"dynamics: columns must have a line for every slot of the stages, got {lines}")
 
     @property
@@ -254,6 +258,13 @@ def row_norms(rows: Array) -> Array:
     """Return the Euclidean norm of each row."""
     squares: Array = np.einsum("ij,ij->i", rows, rows)
     return np.sqrt(squares)
+
+
+def unit_rows(matrix: Array) -> tuple[Array, Array]:
+    """Return the norm of each row, 1 for those that are zero, and the rows divided by it."""
+    norms = row_norms(matrix)
+    norms = np.where(norms > 0.0, norms, 1.0)
+    return norms, matrix / norms[:, None]
 
 
 def _relative(residual: Array, rows: Array, x_norm: float, bound: Array) -> float:

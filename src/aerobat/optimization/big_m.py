@@ -7,8 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from aerobat.arrays import Array
-from aerobat.optimization.assignment import AssignmentProgram
+from aerobat.optimization.assignment import AssignmentProgram, unit_rows
 from aerobat.optimization.result import AssignmentResult
 
 StageSlot = tuple[int, int]  # (stage, slot), the key of a binary
@@ -53,8 +52,8 @@ class ScaledProgram:
 
 def scaled(program: AssignmentProgram) -> ScaledProgram:
     """Return the program for solvers whose tolerances are absolute."""
-    norms, rows = _unit_rows(program.rows)
-    equality_norms, equality = _unit_rows(program.equality)
+    norms, rows = unit_rows(program.rows)
+    equality_norms, equality = unit_rows(program.equality)
     target = program.target / equality_norms
     lower, upper = (bound / norms for bound in program.root_bounds)
     fixed = lower == upper
@@ -77,13 +76,6 @@ def scaled(program: AssignmentProgram) -> ScaledProgram:
         constant=program.constant / unit**2,
     )
     return ScaledProgram(scaled_program, float(unit))
-
-
-def _unit_rows(matrix: Array) -> tuple[Array, Array]:
-    """Return the norm of each row, 1 for those that are zero, and the rows divided by it."""
-    norms = np.linalg.norm(matrix, axis=1)
-    norms = np.where(norms > 0.0, norms, 1.0)
-    return norms, matrix / norms[:, None]
 
 
 def binaries(program: AssignmentProgram) -> list[StageSlot]:

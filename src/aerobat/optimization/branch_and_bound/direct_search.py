@@ -51,26 +51,32 @@ class DirectSearch:
 
         Nothing at least as dear as `cutoff` is looked for; the bound is then no higher than that.
         """
-        prepared = self._prepared(program)
+        try:
+            prepared = self._prepared(program)
+        except NotConverged:
+            return _without_solution("unknown", -inf)
         if prepared is None:
             return _without_solution("infeasible", inf)
-        try:
-            return prepared.claim(program, limits, start, cutoff)
-        except NotConverged:  # of the independent block: the search deals with its own
-            return _without_solution("unknown", -inf)
+        factorization, blocks = prepared
+        return factorization.claim(program, blocks, limits, start, cutoff)
 
     def below(self, program: AssignmentProgram, limits: SearchLimits, cutoff: float) -> Assignments:
         """Return every assignment that costs less than `cutoff`."""
-        prepared = self._prepared(program)
-        if prepared is None:
-            return Assignments([], 0, True)
         try:
-            return prepared.below(program, limits, cutoff)
+            prepared = self._prepared(program)
         except NotConverged:
             return Assignments([], 0, False)
+        if prepared is None:
+            return Assignments([], 0, True)
+        factorization, blocks = prepared
+        return factorization.below(program, blocks, limits, cutoff)
 
-    def _prepared(self, program: AssignmentProgram) -> _Factorization | None:
-        """The factorization, kept from the last program where it fits; None where bounds contradict."""
+    def _prepared(self, program: AssignmentProgram) -> tuple[_Factorization, _Blocks] | None:
+        """The factorization, kept from the last program where it fits, and what is to be searched.
+
+        None where there is no solution. Raises NotConverged for the independent block's QP; the search deals
+        with its own.
+        """
         lower, upper = program.root_bounds
         larger = np.maximum(np.abs(lower), np.abs(upper))
         scale = np.where(np.isfinite(larger), larger, 0.0)
@@ -81,7 +87,8 @@ class DirectSearch:
         if kept is None or not kept.fits(program, implicit_equalities):
             kept = _Factorization(program, implicit_equalities)
             self._factorization = kept
-        return kept
+        blocks = kept.blocks(program, lower, upper)
+        return None if blocks is None else (kept, blocks)
 
 
 @dataclass(frozen=True, eq=False)
@@ -127,17 +134,12 @@ class _Factorization:
     def claim(
         self,
         program: AssignmentProgram,
+        blocks: _Blocks,
         limits: SearchLimits,
         start: Sequence[int] | None,
         cutoff: float,
     ) -> AssignmentResult:
-        """Solve the independent block, search the coupled one, and put them together.
-
-        Raises NotConverged for the independent block's QP.
-        """
-        blocks = self._blocks(program)
-        if blocks is None:
-            return _without_solution("infeasible", inf)
+        """Search the coupled block, and put its solution and the independent block's together."""
         search = self._search(blocks, cutoff, wants_all=False)
         if start is not None:
             search.try_start({stage: start[stage] for stage in self.candidates.free_stages})
@@ -158,11 +160,10 @@ class _Factorization:
             nodes=search.nodes,
         )
 
-    def below(self, program: AssignmentProgram, limits: SearchLimits, cutoff: float) -> Assignments:
-        """As `DirectSearch.below`. Raises NotConverged as `claim` does."""
-        blocks = self._blocks(program)
-        if blocks is None:
-            return Assignments([], 0, True)
+    def below(
+        self, program: AssignmentProgram, blocks: _Blocks, limits: SearchLimits, cutoff: float
+    ) -> Assignments:
+        """As `DirectSearch.below`."""
         search = self._search(blocks, cutoff, wants_all=True)
         search.run(limits)
         found = [
@@ -171,9 +172,11 @@ class _Factorization:
         ]
         return Assignments(found, search.nodes, not search.is_unfinished)
 
-    def _blocks(self, program: AssignmentProgram) -> _Blocks | None:
-        """A program's right-hand sides, the independent block solved; None where it has no solution."""
-        lower, upper = program.root_bounds
+    def blocks(self, program: AssignmentProgram, lower: Array, upper: Array) -> _Blocks | None:
+        """Return a program's right-hand sides, the independent block solved; None where it has no solution.
+
+        `lower` and `upper` (m,) are the root's bounds. Raises NotConverged for the independent block's QP.
+        """
         root = self.coupled.bounds(program, lower, upper)
         independent = self.independent.bounds(program, lower, upper)
         if not (root.consistent and independent.consistent):

@@ -40,15 +40,13 @@ class _Pairing:
 class LazyChildren:
     """Branches that cover all ways to complete a node.
 
-    They choose for the group whose lower bounds, at most the cutoff each, are the largest on the average and,
-    where that leaves few choices, also for the group whose smallest bound would be the largest then: pairwise
-    bounds come from the node's own solution, so that most QPs in between need not be solved. Candidates are
-    paired when their turn comes.
+    They choose for the group whose lower bounds are the largest on the average and, where that leaves few
+    choices, also for the group whose smallest bound would be the largest then: pairwise bounds come from the
+    node's own solution, so that most QPs in between need not be solved. Candidates are paired when their turn
+    comes.
     """
 
-    def __init__(
-        self, dual_bounds: DualBounds, solution: QPSolution, lower_bounds: LowerBounds, cutoff: float
-    ) -> None:
+    def __init__(self, dual_bounds: DualBounds, solution: QPSolution, lower_bounds: LowerBounds) -> None:
         """`solution` is the node's; `lower_bounds` have candidates of every group that is left."""
         self.lower_bounds = lower_bounds
         self._dual_bounds = dual_bounds

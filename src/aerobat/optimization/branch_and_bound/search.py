@@ -131,12 +131,12 @@ class BestFirstSearch:
                 self._push(solution.value, root)
             else:
                 self._dive(root)
-        next_dive = _DIVE_GROWTH * self.nodes
+        next_dive = inf if self._wants_all else _DIVE_GROWTH * self.nodes
         while self._heap and self._improves(self._heap[0][0]) and not self._is_over:
             node = self._next()
             if node is None:
                 continue
-            if self.nodes >= next_dive and not self._wants_all:
+            if self.nodes >= next_dive:
                 self._dive(node)
                 next_dive = _DIVE_GROWTH * self.nodes
             elif self._heap and node.solution.value > self._heap[0][0]:
@@ -194,7 +194,7 @@ class BestFirstSearch:
         if complete is not None:
             self.best = (node.solution, complete)
             return None
-        return LazyChildren(self._dual_bounds, node.solution, lower_bounds, self._cutoff)
+        return LazyChildren(self._dual_bounds, node.solution, lower_bounds)
 
     def _child(self, node: _Node, lower_bounds: LowerBounds, branch: Branch) -> _Node | None:
         """Return one child of a node; None where it cannot beat the best."""

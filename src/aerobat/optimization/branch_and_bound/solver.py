@@ -55,8 +55,8 @@ class BranchAndBound:
     def _claim(
         self, program: AssignmentProgram, limits: SearchLimits, start: Sequence[int] | None
     ) -> AssignmentResult:
-        stage = cut_stage(program)
-        if stage is None or limits.nodes < MIN_NODES:
+        stage = cut_stage(program) if limits.nodes >= MIN_NODES else None
+        if stage is None:
             return self._direct.claim(program, limits, start)
         first = self._direct.claim(program, replace(limits, nodes=DIRECT_NODES), start)
         if first.status in ("optimal", "infeasible") or perf_counter() >= limits.deadline:

@@ -30,17 +30,13 @@ class IntegratorChain:
 
     @cached_property
     def transition(self) -> Array:
-        """Effect of the state on that one interval later, normalised, (r, r): Taylor's weights."""
-        taylor = np.zeros((self.order, self.order))
-        for d in range(self.order):
-            for k in range(d, self.order):
-                taylor[d, k] = 1.0 / factorial(k - d)
-        return taylor
+        """Effect of the state on that one interval later, normalised, (r, r)."""
+        return np.asarray(self._taylor(np.ones(1))[0])
 
     @cached_property
     def gain(self) -> Array:
         """Effect of the input over an interval on the state at its end, normalised, (r,)."""
-        return np.array([1.0 / factorial(self.order - d) for d in range(self.order)])
+        return np.asarray(self.forced[0, :, 0])
 
     @cached_property
     def forced(self) -> Array:
@@ -60,13 +56,16 @@ class IntegratorChain:
     def free(self, initial: Array, dt: float) -> Array:
         """Effect of the initial state (r, 3), in SI units, without input, normalised, (N, r, 3)."""
         scaled = initial * self.scales(dt)[:, None]
-        ends = np.arange(1.0, self.intervals + 1)
-        taylor = np.zeros((self.intervals, self.order, self.order))
-        for d in range(self.order):
-            for k in range(d, self.order):
-                taylor[:, d, k] = ends ** (k - d) / factorial(k - d)
-        return np.asarray(taylor @ scaled)
+        return np.asarray(self._taylor(np.arange(1.0, self.intervals + 1)) @ scaled)
 
     def scales(self, dt: float) -> Array:
         """dt^k for every derivative of the state, (r,)."""
         return dt ** np.arange(float(self.order))
+
+    def _taylor(self, elapsed: Array) -> Array:
+        """Effect of the state on that after some times (n,) in intervals, without input, (n, r, r)."""
+        weights = np.zeros((len(elapsed), self.order, self.order))
+        for d in range(self.order):
+            for k in range(d, self.order):
+                weights[:, d, k] = elapsed ** (k - d) / factorial(k - d)
+        return weights

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
+from math import inf
 from typing import TYPE_CHECKING
 
 from aerobat.errors import BackendMissing, Infeasible, SpecError
@@ -33,19 +34,8 @@ def rescued_plan(asked: Miqp, problem: Problem, vehicle: Vehicle, recorder: Reco
         vehicle: What shall fly it.
         recorder: The attempts so far; those that follow are passed on to its `progress`.
     """
-    stages = len(problem.stages(vehicle.max_specific_thrust).stages)
-    for planner, how in _alternatives(asked, default_order(problem, vehicle), stages):
-        if out_of_time():
-            return None
-        try:
-            plan = planner.plan(problem, vehicle, recorder.progress)
-        except (Infeasible, SpecError, BackendMissing):
-            continue
-        if plan.certified:
-            attempts = (*recorder.attempts, *plan.attempts)
-            wanted = f"miqp found none with {asked.intervals} intervals"
-            return replace(plan, attempts=attempts, rescue=f"{wanted}; planned {how}")
-    return None
+    others = _alternatives(asked, problem, vehicle)
+    return _first(others, problem, vehicle, recorder, f"miqp found none with {asked.intervals} intervals")
 
 
 def shortened_plan(asked: Miqp, problem: Problem, vehicle: Vehicle, plan: Plan, recorder: Recorder) -> Plan:
@@ -58,35 +48,38 @@ def shortened_plan(asked: Miqp, problem: Problem, vehicle: Vehicle, plan: Plan, 
         plan: Its plan.
         recorder: The attempts so far; those that follow are passed on to its `progress`.
     """
-    stages = len(problem.stages(vehicle.max_specific_thrust).stages)
-    for intervals in _more_intervals(asked, stages):
+    others = _with_more_intervals(asked, problem, vehicle)
+    failed = f"no path of miqp with {asked.intervals} intervals settled"
+    shorter = _first(others, problem, vehicle, recorder, failed, plan.duration)
+    return plan if shorter is None else shorter
+
+
+def _first(
+    others: Iterator[tuple[Planner, str]],
+    problem: Problem,
+    vehicle: Vehicle,
+    recorder: Recorder,
+    failed: str,
+    shorter_than: float = inf,
+) -> Plan | None:
+    """The first certified plan of some planners, which says what failed; None where none is short enough."""
+    for planner, how in others:
         if out_of_time():
-            break
+            return None
         try:
-            found = replace(asked, intervals=intervals, rescue=False).plan(
-                problem, vehicle, recorder.progress
-            )
-        except Infeasible:
+            plan = planner.plan(problem, vehicle, recorder.progress)
+        except (Infeasible, SpecError, BackendMissing):
             continue
-        if found.certified and found.duration < plan.duration:
-            attempts = (*recorder.attempts, *found.attempts)
-            wanted = f"no path of miqp with {asked.intervals} intervals settled"
-            return replace(found, attempts=attempts, rescue=f"{wanted}; planned with {intervals}")
-    return plan
+        if plan.certified and plan.duration < shorter_than:
+            attempts = (*recorder.attempts, *plan.attempts)
+            return replace(plan, attempts=attempts, rescue=f"{failed}; planned {how}")
+    return None
 
 
-def _more_intervals(asked: Miqp, stages: int) -> list[int]:
-    """More intervals than were asked for, the fewest first."""
-    more = {max(round(factor * asked.intervals), A_STAGE * stages) for factor in MORE_INTERVALS}
-    if max(more) * MORE_INTERVALS[0] < MANY_INTERVALS:
-        more.add(MANY_INTERVALS)
-    return sorted(more)
-
-
-def _alternatives(asked: Miqp, first: int, stages: int) -> Iterator[tuple[Planner, str]]:
-    """Planners, and how they plan in words; `first` is the order that is taken where none is asked for."""
-    for intervals in _more_intervals(asked, stages):
-        yield replace(asked, intervals=intervals, rescue=False), f"with {intervals}"
+def _alternatives(asked: Miqp, problem: Problem, vehicle: Vehicle) -> Iterator[tuple[Planner, str]]:
+    """Planners, and how they plan in words."""
+    yield from _with_more_intervals(asked, problem, vehicle)
+    first = default_order(problem, vehicle)
     for order in range(first, max(INPUT_NAMES) + 1):
         if order != (asked.order or first):
             yield replace(asked, order=order, rescue=False), f"with order {order}"
@@ -95,3 +88,13 @@ def _alternatives(asked: Miqp, first: int, stages: int) -> Iterator[tuple[Planne
     from aerobat.planning.polynomial.free_knots import FreeKnots
 
     yield FreeKnots(reserve=max(FLYING_RESERVE, asked.reserve)), "by free-knots"
+
+
+def _with_more_intervals(asked: Miqp, problem: Problem, vehicle: Vehicle) -> Iterator[tuple[Planner, str]]:
+    """The planner with more intervals than were asked for, the fewest first, and how it plans in words."""
+    stages = len(problem.stages(vehicle.max_specific_thrust).stages)
+    more = {max(round(factor * asked.intervals), A_STAGE * stages) for factor in MORE_INTERVALS}
+    if max(more) * MORE_INTERVALS[0] < MANY_INTERVALS:
+        more.add(MANY_INTERVALS)
+    for intervals in sorted(more):
+        yield replace(asked, intervals=intervals, rescue=False), f"with {intervals}"

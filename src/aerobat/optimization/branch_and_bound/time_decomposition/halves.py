@@ -9,7 +9,7 @@ from math import inf
 import numpy as np
 
 from aerobat.arrays import Array
-from aerobat.optimization.assignment import AssignmentProgram, row_norms
+from aerobat.optimization.assignment import AssignmentProgram, row_norms, unit_rows
 from aerobat.optimization.branch_and_bound.direct_search import Assignments, DirectSearch
 from aerobat.optimization.branch_and_bound.search import SearchLimits
 
@@ -80,9 +80,8 @@ class Half:
         values = program.rows @ x
         room = np.minimum(values - lower, upper - values)
         active = room <= ACTIVE_TOLERANCE * row_norms(program.rows) * np.linalg.norm(x)
-        held = np.concatenate([program.rows[active], program.equality])
-        norms = row_norms(held)[:, None]
-        _, singular, directions = np.linalg.svd(held / np.where(norms > 0.0, norms, 1.0), full_matrices=False)
+        _, held = unit_rows(np.concatenate([program.rows[active], program.equality]))
+        _, singular, directions = np.linalg.svd(held, full_matrices=False)
         directions = directions[singular > RANK_TOLERANCE]
         free = self._state - (self._state @ directions.T) @ directions
         return np.asarray(0.5 * free @ free.T)

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from aerobat.arrays import Array
-from aerobat.optimization.assignment import AssignmentProgram, row_norms
+from aerobat.optimization.assignment import AssignmentProgram, unit_rows
 from aerobat.optimization.branch_and_bound.least_distance import LeastDistanceQP
 from aerobat.optimization.branch_and_bound.null_space import UNBOUNDED, in_units
 
@@ -31,9 +31,8 @@ class JointQP:
         self._program = program
         self._unit = unit
         rows = np.concatenate([program.rows, program.equality])
-        norms = row_norms(rows)
-        self._norms = np.where(norms > 0.0, norms, 1.0)
-        self._qp = LeastDistanceQP(rows / self._norms[:, None])
+        self._norms, rows = unit_rows(rows)
+        self._qp = LeastDistanceQP(rows)
 
     def solve(self, slots: Sequence[int], cutoff: float) -> Joint | None:
         """Return the optimum; None where there is none that costs less than `cutoff`. Raises NotConverged."""

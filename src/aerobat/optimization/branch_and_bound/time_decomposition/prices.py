@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from aerobat.arrays import Array
-from aerobat.optimization.assignment import row_norms
+from aerobat.optimization.assignment import unit_rows
 from aerobat.optimization.branch_and_bound.least_distance import LeastDistanceQP, NotConverged
 from aerobat.optimization.branch_and_bound.null_space import UNBOUNDED, in_units
 from aerobat.optimization.branch_and_bound.time_decomposition.halves import HalfMinimum
@@ -55,14 +55,11 @@ class CuttingPlanes:
 
 def _shortest(rows: Array, lower: Array) -> Array | None:
     """The shortest vector of which rows are at least so much; None where there is none."""
-    norms = row_norms(rows)
-    norms[norms == 0.0] = 1.0
+    norms, rows = unit_rows(rows)
     lower = lower / norms
     unit = float(np.abs(lower).max()) or 1.0
     try:
-        solution = LeastDistanceQP(rows / norms[:, None]).solve(
-            in_units(lower, unit), np.full(len(lower), UNBOUNDED)
-        )
+        solution = LeastDistanceQP(rows).solve(in_units(lower, unit), np.full(len(lower), UNBOUNDED))
     except NotConverged:
         return None
     return None if solution is None else np.asarray(unit * solution.y)

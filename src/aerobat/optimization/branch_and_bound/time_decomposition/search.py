@@ -21,9 +21,7 @@ from aerobat.optimization.branch_and_bound.time_decomposition.prices import Cutt
 from aerobat.optimization.result import AssignmentResult
 
 MIN_ANCHORS = 3  # stages that confine most of the state: of fewer, the whole is searched faster
-MIN_CONFINED = (
-    0.2  # of the state that an anchor confines at least: a position, of a chain of five integrators
-)
+MIN_CONFINED = 0.2  # of the state that an anchor confines: a position, of chains of five integrators
 HALF_NODES = 2000  # of one search of a half
 FIRST_PRICES = 3  # tried for a slot in the first round, while the best may still improve much
 MAX_PRICES = 8  # in a later one
@@ -120,7 +118,7 @@ class TimeDecomposition:
         unresolved = inf
         while self._open and not self._is_done(self._open[0]) and not self._is_over:
             part = heappop(self._open)
-            self._bound(part, MAX_PRICES, inf)
+            self._bound(part, MAX_PRICES, 1.0)
             if not self._is_done(part):
                 self._search(part)
             if not self._is_done(part):
@@ -155,7 +153,7 @@ class TimeDecomposition:
     def _possible_slots(self) -> list[int]:
         """The slots of the stage that is cut at, in order, that have some of all others on either side."""
         stages = self._program.stages
-        first = max((min(stage.slots) for stage in stages[: self._stage]), default=-1)
+        first = max(min(stage.slots) for stage in stages[: self._stage])
         last = min(max(stage.slots) for stage in stages[self._stage + 1 :])
         return sorted(slot for slot in stages[self._stage].slots if first < slot < last)
 
@@ -182,14 +180,14 @@ class TimeDecomposition:
             if before.minimum is None or behind.minimum is None or self._is_over:
                 break
             self._try((*before.minimum.slots, part.slot, *behind.minimum.slots))
-            if self._reaches_best(part.bound / (1.0 - NEAR)):
+            if self._reaches_best(part.bound, NEAR):
                 break
             planes.add(price, before.minimum, behind.minimum)
             price = planes.nearest(known.price, self._cutoff, known.bound)
             if self._cutoff < cutoff:
                 price = self._best_price(cut, known.price)
         part.costate = cut.costate(known.price)
-        if not self._is_done(part) and self._reaches_best(part.bound + near * self._cutoff):
+        if not self._is_done(part) and self._reaches_best(part.bound, near):
             self._list(cut, known, part)
 
     def _best_price(self, cut: Cut, price: Array) -> Array:
@@ -264,8 +262,9 @@ class TimeDecomposition:
     def _is_done(self, part: _Part) -> bool:
         return self._reaches_best(part.bound)
 
-    def _reaches_best(self, bound: float) -> bool:
-        return bound >= self._cutoff * (1.0 - OPTIMALITY_GAP)
+    def _reaches_best(self, bound: float, missing: float = OPTIMALITY_GAP) -> bool:
+        """Tell if a bound misses no more than a fraction of the best cost."""
+        return bound >= self._cutoff * (1.0 - missing)
 
     @property
     def _cutoff(self) -> float:
