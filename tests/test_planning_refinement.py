@@ -15,6 +15,7 @@ from aerobat.planning.certified_solve import certificate_for, tightened
 from aerobat.planning.miqp.miqp import formulate
 from aerobat.planning.miqp.refinement.phases import PhasedChain, Places
 from aerobat.planning.miqp.refinement.rotor_rows import RotorRows
+from aerobat.planning.miqp.rescue import with_more_intervals
 from aerobat.planning.miqp.shortest import COARSE_GROWTH
 from aerobat.problem import (
     Condition,
@@ -152,6 +153,14 @@ def test_where_no_path_settles_more_intervals_are_tried_and_the_shorter_plan_say
     assert found.certified
     assert found.duration < 0.6 * own.duration
     assert "no path of miqp with 20 intervals settled; planned with 26" in str(found)
+
+
+@pytest.mark.parametrize(("asked", "more"), [(20, [26, 40]), (600, [780]), (900, []), (1000, [])])
+def test_no_more_intervals_are_tried_than_may_be_asked_for(
+    asked: int, more: list[int], quad: Vehicle
+) -> None:
+    others = with_more_intervals(Miqp(intervals=asked), load_problem("flip-roll"), quad)
+    assert [planner.intervals for planner, _ in others if isinstance(planner, Miqp)] == more
 
 
 def test_a_stage_that_excludes_itself_is_named(quad: Vehicle) -> None:

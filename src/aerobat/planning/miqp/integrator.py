@@ -18,7 +18,8 @@ from aerobat.declaration import declared
 
 INPUT_NAMES = {3: "jerk", 4: "snap", 5: "crackle"}
 Order = Annotated[int, Field(ge=min(INPUT_NAMES), le=max(INPUT_NAMES))]
-Intervals = Annotated[int, Field(ge=1, le=1000)]  # as many take half a gigabyte of matrices
+MAX_INTERVALS = 1000  # as many take half a gigabyte of matrices
+Intervals = Annotated[int, Field(ge=1, le=MAX_INTERVALS)]
 
 
 @declared

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 from aerobat.errors import BackendMissing, Infeasible, SpecError
 from aerobat.optimization.deadline import out_of_time
 from aerobat.planning.miqp.attempts import default_order
-from aerobat.planning.miqp.integrator import INPUT_NAMES
+from aerobat.planning.miqp.integrator import INPUT_NAMES, MAX_INTERVALS
 from aerobat.planning.planners import Planner
 from aerobat.planning.recorder import Recorder
 from aerobat.planning.result import FLYING_RESERVE, Plan
@@ -48,7 +48,7 @@ def shortened_plan(asked: Miqp, problem: Problem, vehicle: Vehicle, plan: Plan, 
         plan: Its plan.
         recorder: The attempts so far; those that follow are passed on to its `progress`.
     """
-    others = _with_more_intervals(asked, problem, vehicle)
+    others = with_more_intervals(asked, problem, vehicle)
     failed = f"no path of miqp with {asked.intervals} intervals settled"
     shorter = _first(others, problem, vehicle, recorder, failed, plan.duration)
     return plan if shorter is None else shorter
@@ -78,7 +78,7 @@ def _first(
 
 def _alternatives(asked: Miqp, problem: Problem, vehicle: Vehicle) -> Iterator[tuple[Planner, str]]:
     """Planners, and how they plan in words."""
-    yield from _with_more_intervals(asked, problem, vehicle)
+    yield from with_more_intervals(asked, problem, vehicle)
     first = default_order(problem, vehicle)
     for order in range(first, max(INPUT_NAMES) + 1):
         if order != (asked.order or first):
@@ -90,11 +90,11 @@ def _alternatives(asked: Miqp, problem: Problem, vehicle: Vehicle) -> Iterator[t
     yield FreeKnots(reserve=max(FLYING_RESERVE, asked.reserve)), "by free-knots"
 
 
-def _with_more_intervals(asked: Miqp, problem: Problem, vehicle: Vehicle) -> Iterator[tuple[Planner, str]]:
-    """The planner with more intervals than were asked for, the fewest first, and how it plans in words."""
+def with_more_intervals(asked: Miqp, problem: Problem, vehicle: Vehicle) -> Iterator[tuple[Planner, str]]:
+    """Return the planner with more intervals than were asked for, the fewest first, and how in words."""
     stages = len(problem.stages(vehicle.max_specific_thrust).stages)
     more = {max(round(factor * asked.intervals), A_STAGE * stages) for factor in MORE_INTERVALS}
     if max(more) * MORE_INTERVALS[0] < MANY_INTERVALS:
         more.add(MANY_INTERVALS)
-    for intervals in sorted(more):
+    for intervals in sorted(n for n in more if n <= MAX_INTERVALS):
         yield replace(asked, intervals=intervals, rescue=False), f"with {intervals}"
