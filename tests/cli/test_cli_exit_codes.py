@@ -1,0 +1,78 @@
+"""Exit codes say how a run went: all well, not well, bad input, no plan, interrupted."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from aerobat import cli
+from aerobat.cli.entry import ExitCode
+from aerobat.planning import load_plan
+from aerobat.simulation import Outcome
+from command_lines import code
+from places import ROOT
+
+LINE = ("line", "--order", "5")  # its rotor thrusts are continuous: rotors with lag can follow it
+
+
+@pytest.fixture(autouse=True)
+def _elsewhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+
+
+@pytest.mark.parametrize("command", [["fly", *LINE], ["plan", *LINE], ["vehicles"], ["--help"]])
+def test_what_went_well_exits_with_0(command: list[str]) -> None:
+    assert code(*command) == 0
+
+
+def test_a_plan_that_is_not_certified_exits_with_1_and_is_written() -> None:
+    """Order 3, the paper's, has body rates that jump, which no moment can do."""
+    assert code("plan", "line", "--order", "3", "--out", "jerk") == 1
+    assert code("fly", "line", "--order", "3") == 1
+    assert code("check", "jerk") == 1
+    assert Path("jerk/report.json").exists()
+    assert Path("out/line/flight.npz").exists()
+
+
+def test_a_flight_that_went_wrong_exits_with_1_and_is_written(monkeypatch) -> None:
+    from aerobat.evaluation import score
+
+    def missed(*arguments: object):
+        return replace(score(*arguments), outcome=Outcome.MISSED_GATE)
+
+    monkeypatch.setattr("aerobat.cli.commands.fly.score", missed)
+    assert code("fly", *LINE) == 1
+    assert Path("out/line/flight.npz").exists()
+
+
+def test_a_certified_plan_that_does_not_fly_exits_with_1() -> None:
+    code("plan", *LINE)
+    plan = load_plan("out/line/line.plan")
+    assert plan.flyability is not None
+    replace(plan, flyability=replace(plan.flyability, error=0.3)).save("crashing.plan")
+    assert code("plan", "crashing.plan", "--out", "again") == 1
+    assert Path("again/line.plan").exists()
+
+
+def test_bad_input_exits_with_2_and_no_plan_with_3() -> None:
+    assert code("fly", "lime") == 2
+    Path("hard.toml").write_text(
+        'name = "hard"\nstart = { position = [0.0, 0.0, 0.0] }\ngoal = { position = [0.0, 0.0, 0.0] }\n'
+        "gate = { position = [0.0, 0.0, 5.0], tilt_deg = 180.0 }\n"
+        "maneuver = { kind = 'flip', min_inverted_thrust = 45.0 }\n"
+    )
+    assert code("plan", "hard.toml") == 3
+    assert not list(Path().glob("out*"))
+
+
+def test_every_code_is_documented(capsys) -> None:
+    readme = (ROOT / "README.md").read_text()
+    cli.main(["--help"])
+    for text in (readme, capsys.readouterr().out):
+        codes = re.search(r"Exit codes:(.*?)nothing\s*written", " ".join(text.replace("│", "").split()))
+        assert codes is not None
+        told = {int(number) for number in re.findall(r"(?:^|; ?)\s*`?(\d+)`? ", codes[1])}
+        assert told == {each.value for each in ExitCode} - {ExitCode.BROKEN_PIPE}

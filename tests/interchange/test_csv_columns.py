@@ -1,0 +1,163 @@
+"""Tables with a header: what is written is read back, and somebody else's path is flown."""
+
+from __future__ import annotations
+
+import csv
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from aerobat.errors import SpecError
+from aerobat.flatness import reference
+from aerobat.interchange import column_groups, read_csv, read_rows, write_columns
+from aerobat.interchange.columns import ALL
+from aerobat.planning import Miqp, Plan, plan
+from aerobat.problem import load_problem
+from aerobat.simulation import load_flight
+from aerobat.trajectory import Trajectory
+from aerobat.vehicle import load_vehicle
+from command_lines import code
+from suites import examples
+
+
+@pytest.fixture(scope="module")
+def line() -> Plan:
+    return plan(load_problem("line"), Miqp(order=5), load_vehicle("agile-quad"))
+
+
+def test_columns_are_what_the_vehicle_does_by_names_that_any_reader_of_tables_knows(
+    line: Plan, tmp_path: Path
+) -> None:
+    write_columns(line, tmp_path / "plan.csv", rate=50.0)
+    with open(tmp_path / "plan.csv", newline="") as file:
+        rows = list(csv.DictReader(file))
+    header = "t x y z vx vy vz ax ay az jx jy jz qw qx qy qz wx wy wz f0 f1 f2 f3"
+    assert list(rows[0]) == header.split()
+    times = np.array([float(row["t"]) for row in rows])
+    np.testing.assert_array_equal(times, line.trajectory.sample(50.0))
+    found = reference(line.trajectory, line.vehicle, times)
+    for names, expected in (
+        ("qw qx qy qz", found.setpoint.q_world_body),
+        ("wx wy wz", found.setpoint.omega_body),
+        ("f0 f1 f2 f3", found.rotor_thrusts),
+        ("jx jy jz", line.trajectory.evaluate(times, 3)),
+    ):
+        columns = [[float(row[name]) for name in names.split()] for row in rows]
+        np.testing.assert_array_equal(columns, expected)
+
+
+@examples(15)
+@given(seed=st.integers(0, 2**32 - 1), heading=st.floats(-3.1, 3.1), shuffled=st.booleans())
+def test_a_table_comes_back_exactly_at_its_rows_in_any_order_of_columns(
+    seed: int, heading: float, shuffled: bool, line: Plan, tmp_path_factory
+) -> None:
+    path = tmp_path_factory.mktemp("csv") / "plan.csv"
+    rng = np.random.default_rng(seed)
+    still = [[0.0, 0.0, 0.0]] * 3
+    inputs = 40.0 * rng.normal(size=(6, 3))
+    trajectory = Trajectory.from_inputs([rng.normal(size=3), *still], inputs, 0.0937, heading)
+    write_columns(replace(line, trajectory=trajectory), path)
+    if shuffled:
+        table = [row.split(",") for row in path.read_text().splitlines()]
+        order = rng.permutation(len(table[0]))
+        lines = [",".join(row[i] for i in order) for row in table]
+        path.write_text("\n".join(lines) + "\n")
+    back = read_csv(path)
+    times = trajectory.sample(100.0)
+    for k in range(4):
+        np.testing.assert_allclose(
+            back.evaluate(times[:-1], k), trajectory.evaluate(times[:-1], k), rtol=1e-9, atol=1e-10 * 50**k
+        )
+    assert back.heading == pytest.approx(heading, abs=1e-9)
+
+
+def test_positions_alone_give_the_smooth_path_and_a_bound_on_its_error(line: Plan, tmp_path: Path) -> None:
+    """Through every second row it errs by more than through all of them."""
+    path = tmp_path / "positions.csv"
+    write_columns(line, path, ("time", "position"), rate=50.0)
+    rows = read_rows(path)
+    inner = np.linspace(0.1, line.duration - 0.1, 500)
+    error = np.linalg.norm(rows.trajectory.evaluate(inner) - line.trajectory.evaluate(inner), axis=1).max()
+    assert 0.0 < error < rows.fit_error < 1e-3
+
+
+@pytest.mark.parametrize(
+    "header", ["t,x,y,z", "# t,x,y,z", '"t","x","y","z"', "TIME,X,Y,Z", "time,px,py,pz", "t, x, y, z"]
+)
+def test_headers_as_others_write_them_are_understood(header: str, tmp_path: Path) -> None:
+    (tmp_path / "path.csv").write_text(f"{header}\n" + "".join(f"{5 + k / 10},{k},0,1\n" for k in range(6)))
+    path = read_csv(tmp_path / "path.csv")
+    assert path.duration == pytest.approx(0.5)
+    np.testing.assert_allclose(path.evaluate(path.duration), [5.0, 0.0, 1.0], atol=1e-12)
+
+
+@pytest.mark.parametrize(("text", "named"), [("time,sped", "sped"), ("time,time", "twice"), ("", "columns")])
+def test_groups_of_columns_that_are_none_are_refused(text: str, named: str) -> None:
+    with pytest.raises(SpecError, match=named):
+        column_groups(text)
+    assert column_groups("position,time") == ("time", "position")
+    assert column_groups(",".join(ALL)) == ALL
+
+
+def test_somebody_elses_path_is_flown_and_what_is_assumed_is_said(
+    tmp_path: Path, monkeypatch, capsys
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    times = np.linspace(0.0, 4.0, 81)
+    s = times / 4.0
+    along = 3.0 * (35 * s**4 - 84 * s**5 + 70 * s**6 - 20 * s**7)
+    rows = np.column_stack([times, along, 0.5 * along, 1.0 + 0.0 * along])
+    np.savetxt("their path.csv", rows, delimiter=",", header="t,x,y,z")
+    assert code("fly", "their path.csv", "--vehicle", "crazyflie", "--heading", "90", "--json") == 0
+    out, err = capsys.readouterr()
+    assert err.count("\n") == 1
+    assert "holds a path alone" in err
+    assert "without every second row it is off by" in err
+    assert json.loads(out)["plan"]["planner"] == "file"
+    flight = load_flight("out/their-path-crazyflie-flown/flight.npz")
+    np.testing.assert_allclose(flight.states.position[-1], [3.0, 1.5, 1.0], atol=0.02)
+    np.testing.assert_allclose(np.abs(flight.states.q_world_body[0]), np.sqrt([0.5, 0, 0, 0.5]), atol=1e-3)
+    assert code("repeat", "out/their-path-crazyflie-flown") == 0
+
+
+def test_the_papers_bare_layout_is_written_on_demand(tmp_path: Path, monkeypatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert code("plan", "line", "--order", "5", "--columns", "paper") == 0
+    assert np.loadtxt("out/line/plan.csv", delimiter=",").shape[1] == 13
+    assert code("plan", "line", "--order", "5", "--columns", "time, position") == 0
+    assert Path("out/line/plan.csv").read_text().startswith("t,x,y,z\n")
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ("line", "--rate", "50"),
+        ("line", "--heading", "0"),
+        ("line", "--columns", "sped"),
+        ("path.csv", "--order", "5"),
+        ("path.csv", "--rate", "0"),
+        ("wild.csv",),
+        ("nowhere.csv",),
+    ],
+)
+def test_options_and_paths_that_do_not_fit_are_refused(
+    arguments: tuple[str, ...], tmp_path: Path, monkeypatch, capsys
+):
+    monkeypatch.chdir(tmp_path)
+    Path("path.csv").write_text("t,x,y,z\n0,0,0,1\n1,1,0,1\n2,1,0,1\n3,1,0,1\n")
+    Path("wild.csv").write_text("t,x,y,z\n0,0,0,1\n1,1,0,1e30\n2,1,0,1\n3,1,0,1\n4,1,0,1\n")
+    assert code("fly", *arguments) == 2
+    assert capsys.readouterr().err.count("\n") == 1
+    assert not Path("out").exists()
+
+
+def test_columns_that_need_a_vehicle_are_refused_of_a_plan_without_one(tmp_path: Path) -> None:
+    with pytest.raises(SpecError, match="the plan has none; plan for one"):
+        write_columns(plan("line"), tmp_path / "thrusts.csv", ["thrusts"])
+    with pytest.raises(SpecError, match="no group of columns named 'thrust'"):
+        write_columns(plan("line"), tmp_path / "thrusts.csv", ["thrust"])

@@ -1,0 +1,162 @@
+"""The commands over UDP, in processes of their own, by the wall's clock; and what they say to bad input."""
+
+from __future__ import annotations
+
+import json
+import re
+import signal
+import socket
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import aerobat as ab
+from aerobat.links.mavlink import connection
+from aerobat.links.mavlink.connection import LossyConnection, dialect
+from command_lines import run
+from mavlink_sky import SteppedClock, Wire, flip
+from places import SUPPORT
+
+SPEEDS = ("0.3", "0.1", "0.03")  # of the wall's time: a machine that does much else at once keeps up
+
+
+def free_port() -> int:
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+        probe.bind(("127.0.0.1", 0))
+        return int(probe.getsockname()[1])
+
+
+@contextmanager
+def simulated_vehicle(*options: str) -> Iterator[str]:
+    """A vehicle in a process of its own; where it listens."""
+    address = f"udp:127.0.0.1:{free_port()}"
+    command = [
+        sys.executable,
+        "-m",
+        "aerobat",
+        "mavlink-vehicle",
+        "agile-quad",
+        "--listen",
+        address,
+        *options,
+    ]
+    process = subprocess.Popen(command, stderr=subprocess.PIPE, text=True)
+    try:
+        assert process.stderr is not None
+        assert "listens on" in process.stderr.readline()
+        yield address
+        process.send_signal(signal.SIGINT)
+        assert process.wait(20) == 130
+    finally:
+        process.kill()
+        process.communicate()
+
+
+@pytest.fixture(scope="module")
+def plan(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("plans") / "flip.plan"
+    flip().save(path)
+    return path
+
+
+def test_two_processes_fly_the_flip_through_its_gate_over_udp(plan: Path) -> None:
+    """With 1 % of the messages lost and 20 ms of delay, either way.
+
+    A machine that does not keep up gives a flight up, and lands: then it is flown again, slower.
+    """
+    for speed in SPEEDS:
+        report, said = flown(plan, speed)
+        assert report["ended"] == "landed", said
+        if not report["aborted"]:
+            break
+        assert re.search("no news|late|the mode hold", report["aborted"])
+    assert report["aborted"] == "", said
+    assert report["max_position_error_m"] < 0.25
+    (gate,) = report["passages"]
+    assert gate["inside"]
+    assert gate["clearance"] > 0.0
+
+
+def flown(plan: Path, speed: str) -> tuple[dict[str, Any], str]:
+    """What came of a flight in two processes, and what was said of it."""
+    with simulated_vehicle("--loss", "0.01", "--delay", "0.02", "--speed", speed) as address:
+        command = [sys.executable, "-m", "aerobat", "mavlink", str(plan), "--connect", address, "--json"]
+        options = ["--speed", speed, "--origin", "0", "0", "1.5"]
+        done = subprocess.run([*command, *options], capture_output=True, text=True, check=False)
+    assert done.returncode in (0, 1), done.stderr
+    report = json.loads(done.stdout)
+    assert done.returncode == (0 if report["success"] else 1)
+    return report, done.stderr
+
+
+def test_mavsdk_takes_off_goes_somewhere_flies_offboard_and_lands() -> None:
+    """A client that others wrote takes our vehicle for one that it knows."""
+    script = SUPPORT / "mavsdk_flight.py"
+    with simulated_vehicle("--speed", "3") as address:
+        command = [sys.executable, str(script), address.replace("udp:", "udpout://")]
+        done = subprocess.run(command, capture_output=True, text=True, check=False)
+    words = [line for line in done.stdout.splitlines() if "[" not in line]
+    assert words == ["took off", "went there", "flew offboard", "landed"], done.stderr
+
+
+def test_bad_input_ends_in_a_sentence_and_flies_nothing(plan: Path, tmp_path: Path, capsys) -> None:
+    nobody = f"udp:127.0.0.1:{free_port()}"
+    path = tmp_path / "path.csv"
+    ab.write_csv(flip().trajectory, path)
+    for arguments, words in (
+        ([str(plan), "--connect", nobody, "--wait", "0.3"], "no vehicle answers within 0.3 s"),
+        ([str(plan), "--connect", "udp:14540"], "udp:14540 is no address; give udp:HOST:PORT"),
+        ([str(plan), "--connect", "udp:here:port"], "is no address"),
+        ([str(plan), "--connect", "/dev/none"], "neither a device nor an address"),
+        ([str(plan), "--connect", "tcp:127.0.0.1:9"], "cannot open tcp:127.0.0.1:9"),
+        ([str(plan), "--vehicle", "hexarotor"], "certified for agile-quad, not for hexarotor"),
+        ([str(plan), "--origin", "0", "0", "0"], "raise its origin"),
+        ([str(path)], "holds a path alone"),
+        ([str(tmp_path / "none.plan")], "none.plan"),
+        ([str(plan), "--rate", "20"], "--rate"),
+    ):
+        code, _, err = run(capsys, "mavlink", *arguments)
+        assert code == 2, err
+        assert err.count("\n") == 1, err
+        assert words in err
+
+
+def test_a_port_that_is_taken_is_told(capsys) -> None:
+    with socket.socket(socket.AF_INET, socket.SOCK_STREAM) as taken:
+        taken.bind(("127.0.0.1", 0))
+        taken.listen()
+        code, _, err = run(
+            capsys, "mavlink-vehicle", "--listen", f"tcpin:127.0.0.1:{taken.getsockname()[1]}", "--for", "0.1"
+        )
+    assert code == 2
+    assert re.search("cannot open .*: Address already in use", err)
+
+
+def test_without_pymavlink_the_command_that_installs_it_is_told(plan: Path, capsys, monkeypatch) -> None:
+    connection.dialect.cache_clear()
+    monkeypatch.setattr(connection, "find_spec", lambda name: None)
+    code, _, err = run(capsys, "mavlink", str(plan))
+    assert code == 2
+    assert err.endswith('install it with pip install "aerobat[mavlink]"\n')
+
+
+def test_a_link_for_trials_loses_as_many_as_it_shall_and_delays_the_rest_alike() -> None:
+    clock = SteppedClock()
+    near, far = Wire(1, 1), Wire(2, 1)
+    near.other, far.other = far, near
+    lossy = LossyConnection(near, clock, loss=0.2, delay=0.02, seed=3)
+    arrived: list[tuple[int, int]] = []
+    for sent in range(1500):
+        far.send(dialect().MAVLink_timesync_message(sent, 0))
+        arrived += [(message.tc1, clock.steps) for message in lossy.receive()]
+        clock.steps += 1
+    numbers, times = np.array(arrived).T
+    assert (np.diff(numbers) > 0).all()
+    np.testing.assert_allclose(times - numbers, 20, atol=1)  # steps
+    assert len(numbers) / 1480 == pytest.approx(0.8, abs=0.03)

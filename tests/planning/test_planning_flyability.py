@@ -1,0 +1,199 @@
+"""A plan flies itself before it is returned: what its loop of controller and rotors makes of it is said."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import aerobat as ab
+from aerobat.errors import SpecError
+from aerobat.planning import (
+    FLYABLE_ERROR,
+    Flyability,
+    GridSearch,
+    PlacedStage,
+    own_flight,
+    with_certificate,
+    with_flyability,
+)
+from aerobat.planning.flyability import disturbed_flight
+from aerobat.reporting.report_json import report
+from aerobat.simulation import Outcome
+from aerobat.trajectory import Trajectory
+from random_problems import random_case
+
+QUAD = ab.load_vehicle("agile-quad")
+CRAZYFLIE = ab.load_vehicle("crazyflie")
+
+
+@pytest.fixture(scope="module")
+def plan() -> ab.Plan:
+    windy = ab.Environment(gravity=9.7, wind=(1.0, -0.5, 0.2))
+    problem = replace(ab.load_problem("half-flip"), heading=0.4, environment=windy)
+    return ab.plan(problem, vehicle=replace(QUAD, drag_body=(0.1, 0.1, 0.05)))
+
+
+def flyability(plan: ab.Plan) -> Flyability:
+    assert plan.flyability is not None
+    return plan.flyability
+
+
+def sagging() -> ab.Plan:
+    """A plan for rotors of a second of lag, with the certificate of ones that are faster.
+
+    As certificates once were, which knew of no lag.
+    """
+    slow = replace(QUAD, rotors=tuple(replace(rotor, lag=1.0) for rotor in QUAD.rotors))
+    plan = ab.plan(ab.load_problem("half-flip"), ab.Miqp(order=5), QUAD)
+    return with_flyability(replace(plan, vehicle=slow))
+
+
+def test_flyability_is_the_score_of_the_plan_s_own_flight(plan: ab.Plan) -> None:
+    error = ab.score(ab.fly(plan), plan).max_position_error_m
+    assert flyability(plan).error == pytest.approx(error, rel=1e-9)
+    assert plan.vehicle is not None
+    assert (
+        own_flight(plan.trajectory, plan.vehicle, plan.problem, plan.stages).error == flyability(plan).error
+    )
+    assert 0.0 < error < FLYABLE_ERROR
+    assert plan.flies
+
+
+def test_the_reserve_is_what_the_certificate_leaves(plan: ab.Plan) -> None:
+    assert plan.certificate is not None
+    assert plan.vehicle is not None
+    found = flyability(plan)
+    assert found.disturbance == plan.certificate.margin
+    assert found.disturbed_fraction == found.disturbance / plan.vehicle.max_thrusts.max()
+
+
+def test_rotors_that_give_less_let_a_hovering_vehicle_fall_by_as_much_of_gravity() -> None:
+    hover = Trajectory([1.0], [[[0.0, 0.0, 1.0]]])
+    fraction, environment = 0.03, ab.Environment()
+    flight = disturbed_flight(hover, CRAZYFLIE, environment, fraction)
+    velocity, time = flight.states.velocity[1], flight.times[1]
+    assert velocity[2] / time == pytest.approx(-fraction * environment.gravity, rel=1e-3)
+    nominal = disturbed_flight(hover, CRAZYFLIE, environment, 0.0)
+    assert nominal.position_error.max() < 1e-9
+
+
+def test_less_thrust_costs_more_error(plan: ab.Plan) -> None:
+    found = flyability(plan)
+    assert found.error < found.disturbed_error
+    assert plan.vehicle is not None
+    flight = disturbed_flight(
+        plan.trajectory, plan.vehicle, plan.problem.environment, found.disturbed_fraction
+    )
+    assert found.disturbed_error == flight.position_error.max()
+
+
+def test_without_a_reserve_nothing_is_bought(plan: ab.Plan) -> None:
+    heavy = replace(QUAD, mass=2.5 * QUAD.mass)
+    bare = with_flyability(with_certificate(plan, heavy))
+    assert not bare.certified
+    assert flyability(bare).disturbance == flyability(bare).disturbed_fraction == 0.0
+    assert flyability(bare).disturbed_error == flyability(bare).error
+
+
+def test_a_certified_plan_that_does_not_fly_says_so_as_a_defect_of_its_own() -> None:
+    plan = sagging()
+    assert plan.certified
+    assert not plan.flies
+    assert flyability(plan).error > FLYABLE_ERROR
+    for text in (str(plan), str(report(plan)["plan"]["flyability"]["sentence"])):
+        assert "a defect of the plan, not of the flight" in text
+        assert text.count("keep more reserve for the controller, or take another planner") == 1
+    assert report(plan)["plan"]["flyability"]["flies"] is False
+
+
+def test_a_plan_whose_flight_does_not_hold_the_gate_s_attitude_says_so(plan: ab.Plan, tmp_path: Path) -> None:
+    """Its gate, asked later to be passed more exactly than it was planned."""
+    (gate,) = plan.problem.gates
+    stricter = replace(plan.problem, gates=(replace(gate, attitude_tolerance=np.deg2rad(0.2)),))
+    strict = with_flyability(replace(plan, problem=stricter))
+    (passage,) = flyability(strict).passages
+    (scored,) = ab.score(ab.fly(strict), strict).passages
+    assert passage.attitude_error is not None
+    assert np.rad2deg(passage.attitude_error) == pytest.approx(scored.attitude_error_deg)
+    assert scored.attitude_error_deg > 0.2
+    assert not strict.flies
+    sentence = f"its own flight passed gate 'gate' {scored.attitude_error_deg:.1f}° off the attitude asked"
+    assert sentence in str(strict)
+    assert "0.2° allowed, a defect of the plan" in str(strict)
+    (facts,) = report(strict)["plan"]["flyability"]["passages"]
+    assert facts["failure"] == passage.failure
+    assert facts["attitude_error_deg"] == pytest.approx(scored.attitude_error_deg)
+    assert facts["attitude_tolerance_deg"] == pytest.approx(0.2)
+    strict.save(tmp_path / "strict.plan")
+    assert ab.load_plan(tmp_path / "strict.plan").flyability == strict.flyability
+
+
+def test_a_plan_that_only_looks_through_its_gate_does_not_fly() -> None:
+    """Into the plane by 4 cm and back: that passes no gate, says the score, and so says the plan."""
+    s = np.polynomial.Polynomial([0, 0, 0, 10, -15, 6]).coef
+    there, back = np.outer(s, [1.04, 0.0, 0.0]), np.outer(s, [-1.04, 0.0, 0.0])
+    back[0, 0] = 1.04
+    path = Trajectory([2.0, 2.0], [there, back])
+    gate = ab.tilted_gate((1.0, 0.0, 0.0))
+    crossing = np.polynomial.Polynomial([-1.0, *(1.04 * s[1:])]).roots()
+    time = 2.0 * next(root.real for root in crossing if abs(root.imag) < 1e-9 and 0.0 < root.real < 1.0)
+    problem = ab.Problem("look", ab.at_rest((0, 0, 0)), ab.at_rest((0, 0, 0)), gates=(gate,))
+    looking = ab.Plan(problem, path, "by hand", stages=(PlacedStage("gate", 0, time, "gate"),), vehicle=QUAD)
+    found = with_flyability(looking)
+    assert flyability(found).error < FLYABLE_ERROR
+    assert not found.flies
+    assert ab.score(ab.fly(found), found).outcome is Outcome.STOPPED_IN_GATE
+    assert "its own flight stopped in gate 'gate', 3.9 cm beyond its plane" in str(found)
+
+
+def test_the_miqp_passes_faster_through_a_gate_that_its_path_would_turn_back_in() -> None:
+    case = random_case(0, 147, ("flip", "half-flip"))
+    made = ab.plan(case.problem, vehicle=case.vehicle)
+    assert made.certified
+    assert made.flies
+    assert ab.score(ab.fly(made), made).outcome is Outcome.THROUGH_GATES
+
+
+@pytest.mark.parametrize(
+    ("seed", "k"), [(44, 65), (44, 129)]
+)  # as shortened, they come into the gate along its plane
+def test_the_miqp_goes_straight_through_a_gate_whose_frame_it_would_touch_and_loses_no_time(
+    seed: int, k: int
+) -> None:
+    """Equal intervals one percent shorter are not within what the vehicle can do, or touch the frame."""
+    case = random_case(seed, k)
+    made = ab.plan(case.problem, vehicle=case.vehicle)
+    assert made.certified
+    assert made.flies
+    dt = 0.99 * made.duration / made.intervals
+    try:
+        shorter = ab.plan(case.problem, ab.Miqp(search=GridSearch(dt, dt, 1), rescue=False), case.vehicle)
+    except ab.Infeasible:
+        return
+    assert not shorter.flies
+
+
+def test_a_flight_that_diverges_is_no_small_error() -> None:
+    """It is lost, wherever it was last."""
+    away = Trajectory([1.0], [[[0.0, 0.0, 0.0], [0.0, 0.0, 0.0], [90.0, 0.0, 0.0]]])
+    assert own_flight(away, QUAD, ab.load_problem("line"), ()).error >= 5.0
+
+
+def test_flyability_survives_the_plan_s_file(plan: ab.Plan, tmp_path: Path) -> None:
+    plan.save(tmp_path / "half.plan")
+    assert ab.load_plan(tmp_path / "half.plan").flyability == plan.flyability
+
+
+def test_a_certificate_for_another_vehicle_takes_the_old_one_s_flights_away(plan: ab.Plan) -> None:
+    assert with_certificate(plan, CRAZYFLIE).flyability is None
+    assert not with_certificate(plan, CRAZYFLIE).flies
+
+
+def test_a_plan_without_a_vehicle_flies_nothing() -> None:
+    plan = ab.plan(ab.load_problem("line"))
+    assert plan.flyability is None
+    with pytest.raises(SpecError, match="plan it for one"):
+        with_flyability(plan)

@@ -1,0 +1,271 @@
+"""Plans by the MIQP for a vehicle: what was refused or missed is found, what is returned is proven."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from aerobat.errors import Infeasible
+from aerobat.flatness import force_balance, reference
+from aerobat.optimization import solver
+from aerobat.planning import GridSearch, Miqp, plan
+from aerobat.planning.certified_solve import certificate_for, tightened
+from aerobat.planning.miqp.miqp import formulate
+from aerobat.planning.miqp.refinement.phases import PhasedChain, Places
+from aerobat.planning.miqp.refinement.rotor_rows import RotorRows
+from aerobat.planning.miqp.rescue import with_more_intervals
+from aerobat.planning.miqp.shortest import COARSE_GROWTH
+from aerobat.problem import (
+    Condition,
+    CustomManeuver,
+    Limits,
+    Problem,
+    Quantity,
+    Stage,
+    at_rest,
+    load_problem,
+)
+from aerobat.trajectory import Trajectory
+from aerobat.vehicle import Vehicle, load_vehicle
+from places import CASES
+from random_problems import random_case
+
+AXES = np.eye(3)
+
+
+@pytest.fixture(scope="module")
+def quad() -> Vehicle:
+    return load_vehicle("agile-quad")
+
+
+def passing(*conditions: Condition, at: object = "free") -> Problem:
+    """From rest to rest 6 m on, with one stage on the way."""
+    maneuver = CustomManeuver((Stage("mid", conditions, at=at),))
+    return Problem("passing", at_rest((0.0, 0.0, 0.0)), at_rest((6.0, 0.0, 0.0)), maneuver)
+
+
+@pytest.mark.parametrize("name", ["line", "flip-roll"])
+def test_a_plan_to_begin_from_is_certified_and_found_on_the_way_to_the_shortest(
+    name: str, quad: Vehicle
+) -> None:
+    problem = load_problem(name)
+    first, shortest = (Miqp(shortens=shortens).plan(problem, quad) for shortens in (False, True))
+    assert first.certified
+    assert first.attempts[-1].feasible
+    assert first.duration >= shortest.duration
+    assert len(first.attempts) <= len(shortest.attempts)
+
+
+def test_thirteen_intervals_are_not_called_infeasible_because_bounds_were_tightened_too_far() -> None:
+    problem = load_problem(str(CASES / "false-infeasible.toml"))
+    found = plan(problem, Miqp(intervals=13, rescue=False), load_vehicle("hexarotor"))
+    assert found.certified
+    assert found.intervals == 13
+
+
+def test_a_flip_too_fast_for_its_limits_is_refuted_by_the_candidates_of_one_stage(quad: Vehicle) -> None:
+    """Not by all pairs of them, of which there are four times as many."""
+    problem, intervals = load_problem("flip-roll"), 20
+    program = formulate(problem, 5, intervals, quad).program(0.05)
+    result = solver("builtin").solve(program)
+    assert result.status == "infeasible"
+    assert result.nodes <= intervals
+
+
+def test_a_path_along_the_floor_is_certified_and_its_proof_is_its_own(quad: Vehicle) -> None:
+    found = plan(load_problem(str(CASES / "floor.toml")), vehicle=quad)
+    assert found.certified
+    proof = certificate_for(found.trajectory, found.problem, quad, found.stages)
+    assert proof.findings == found.certificate.findings
+
+
+def test_a_bound_at_zero_is_tightened_by_more_than_what_is_exceeded() -> None:
+    floor = Limits(lower=(-np.inf, -np.inf, 0.0))
+    sinking = Trajectory([1.0], np.array([[[0.0, 0.0, 0.0], [0.0, 0.0, -1e-3]]]))
+    assert tightened(floor, floor, sinking, 1).lower[2] > 1.01e-3
+
+
+def test_more_intervals_are_no_slower(quad: Vehicle) -> None:
+    problem = load_problem("flip-roll")
+    few, many = (plan(problem, Miqp(intervals=n, rescue=False), quad) for n in (20, 30))
+    assert many.duration <= 1.01 * few.duration
+
+
+@pytest.mark.parametrize(
+    ("name", "vehicle"),
+    [
+        ("half-flip", "agile-quad"),
+        ("line", "agile-quad"),
+        (str(CASES / "slow-start-flip.toml"), "hexarotor"),
+    ],
+)
+def test_no_equal_intervals_one_percent_shorter_can_be_flown(name: str, vehicle: str) -> None:
+    problem, flown_by = load_problem(name), load_vehicle(vehicle)
+    found = plan(problem, vehicle=flown_by)
+    dt = 0.99 * found.duration / found.intervals
+    with pytest.raises(Infeasible):
+        plan(problem, Miqp(search=GridSearch(dt, dt, 1), rescue=False), flown_by)
+
+
+@pytest.mark.parametrize("name", ["flip-roll", "half-flip", "line"])
+def test_no_program_is_made_a_step_of_the_scan_shorter_than_any_motion(quad: Vehicle, name: str) -> None:
+    found = plan(load_problem(name), vehicle=quad)
+    assert found.assessment is not None
+    assert min(a.duration for a in found.attempts) >= found.assessment.least_duration / COARSE_GROWTH
+
+
+def test_a_fixed_dt_beyond_what_bounds_per_axis_alone_allow_is_refined(quad: Vehicle) -> None:
+    problem, dt = load_problem("half-flip"), 0.121
+    found = plan(problem, Miqp(search=GridSearch(dt, dt, 1), rescue=False), quad)
+    assert found.certified
+    assert found.dt == dt
+    assert found.duration == pytest.approx(20 * dt)
+
+
+def test_what_too_few_intervals_miss_is_rescued_and_said(quad: Vehicle) -> None:
+    problem = load_problem("flip-roll")
+    with pytest.raises(Infeasible):
+        plan(problem, Miqp(intervals=7, rescue=False), quad)
+    found = plan(problem, Miqp(intervals=7), quad)
+    assert found.certified
+    assert "miqp found none with 7 intervals; planned" in str(found)
+
+
+def test_a_narrow_window_at_an_end_is_rescued_by_many_intervals(quad: Vehicle) -> None:
+    """With 13 intervals one is left after the window, with 23 two: too few for three conditions and rest."""
+    aside = Condition(Quantity.POSITION, AXES[1], 0.2, 0.2)
+    still, level = (Condition(q, AXES[1], 0.0, 0.0) for q in (Quantity.VELOCITY, Quantity.SPECIFIC_THRUST))
+    found = plan(passing(aside, still, level, at=(0.9, 0.96)), Miqp(intervals=13), quad)
+    assert found.certified
+    assert "planned with 40" in found.rescue
+
+
+def test_where_no_path_settles_more_intervals_are_tried_and_the_shorter_plan_says_so() -> None:
+    """The program's own answer takes twice as long as need be."""
+    case = random_case(72, 23)
+    own = plan(case.problem, Miqp(rescue=False), case.vehicle)
+    assert own.bound is not None
+    found = plan(case.problem, Miqp(), case.vehicle)
+    assert found.certified
+    assert found.duration < 0.6 * own.duration
+    assert "no path of miqp with 20 intervals settled; planned with 26" in str(found)
+
+
+@pytest.mark.parametrize(("asked", "more"), [(20, [26, 40]), (600, [780]), (900, []), (1000, [])])
+def test_no_more_intervals_are_tried_than_may_be_asked_for(
+    asked: int, more: list[int], quad: Vehicle
+) -> None:
+    others = with_more_intervals(Miqp(intervals=asked), load_problem("flip-roll"), quad)
+    assert [planner.intervals for planner, _ in others if isinstance(planner, Miqp)] == more
+
+
+def test_a_stage_that_excludes_itself_is_named(quad: Vehicle) -> None:
+    x = Condition(Quantity.POSITION, AXES[0], 3.0, 3.0), Condition(Quantity.POSITION, AXES[0], upper=2.0)
+    with pytest.raises(Infeasible, match="conditions of the stage 'mid' exclude each other"):
+        plan(passing(*x), vehicle=quad)
+
+
+@pytest.mark.parametrize("search", [None, GridSearch(0.12, 0.12, 1)])
+def test_conditions_on_thrust_count_drag(search: GridSearch | None, quad: Vehicle) -> None:
+    dragged = replace(quad, drag_body=np.array([0.3, 0.3, 0.2]))
+    lean = Condition(Quantity.SPECIFIC_THRUST, (1.0, 0.0, -0.5), 0.0, 0.0)
+    problem = passing(lean, Condition(Quantity.POSITION, AXES[0], 3.0, 3.0))
+    found = plan(problem, Miqp(search=search), dragged)
+    at = np.array([found.trajectory.evaluate(found.stages[0].time, k) for k in range(3)])
+    bound = lean.bound(force_balance(problem.environment, dragged))
+    assert np.abs(at[1] @ AXES[0]) > 1.0
+    assert bound.value(at) == pytest.approx(0.0, abs=1e-7)
+
+
+def test_a_stage_holds_at_its_fraction_of_the_duration(quad: Vehicle) -> None:
+    found = plan(passing(Condition(Quantity.POSITION, AXES[0], 2.0, 2.0), at=0.37), vehicle=quad)
+    assert found.stages[0].time == pytest.approx(0.37 * found.duration, rel=1e-9)
+    assert found.trajectory.evaluate(found.stages[0].time)[0] == pytest.approx(2.0, abs=1e-7)
+
+
+def test_a_stage_holds_within_its_window(quad: Vehicle) -> None:
+    found = plan(passing(Condition(Quantity.POSITION, AXES[0], 2.0, 2.0), at=(0.6, 0.8)), vehicle=quad)
+    assert 0.6 - 1e-9 <= found.stages[0].time / found.duration <= 0.8 + 1e-9
+
+
+def random_chain(rng: np.random.Generator) -> tuple[PhasedChain, np.ndarray]:
+    chain = PhasedChain(rng.normal(size=(5, 3)), (3, 4, 2))
+    ratios = np.array([0.8, 1.1, 1.1])
+    return chain, np.concatenate([rng.normal(size=27), ratios, [np.log(0.2)]])
+
+
+def test_samples_of_a_chain_are_those_of_its_trajectory() -> None:
+    chain, x = random_chain(np.random.default_rng(0))
+    samples = chain.samples(x, Places.even(9, 3))
+    trajectory = chain.trajectory(x, 0.0)
+    for k in range(6):
+        expected = trajectory.on_segments(np.linspace(0, 1, 4), k).reshape(-1, 3)
+        np.testing.assert_allclose(samples.derivatives[:, k], expected, atol=1e-9 * np.abs(expected).max())
+
+
+def test_slopes_of_samples_are_their_differences() -> None:
+    chain, x = random_chain(np.random.default_rng(1))
+    places = Places.even(9, 3)
+    samples = chain.samples(x, places)
+    weights = np.random.default_rng(2).normal(size=(len(places.interval), 6, 3))
+    rows = samples.rows(np.arange(len(places.interval)), weights)
+    for j in range(len(x)):
+        ahead, behind = (chain.samples(x + h * np.eye(len(x))[j], places).derivatives for h in (1e-6, -1e-6))
+        expected = np.sum(weights * (ahead - behind), axis=(1, 2)) / 2e-6
+        np.testing.assert_allclose(rows[:, j], expected, rtol=1e-5, atol=1e-5 * np.abs(rows).max())
+
+
+@pytest.fixture(scope="module")
+def flown(quad: Vehicle) -> Trajectory:
+    return plan(load_problem("flip-roll"), vehicle=quad).trajectory
+
+
+def sampled(flown: Trajectory, craft: Vehicle, times: np.ndarray) -> tuple[RotorRows, np.ndarray, np.ndarray]:
+    rows = RotorRows(craft, load_problem("flip-roll").environment, 0.0)
+    derivatives = np.stack([flown.evaluate(times, k) for k in range(6)], axis=1)
+    return rows, derivatives, rows.frames(times, derivatives)
+
+
+def test_rotor_rows_are_thrusts_and_commands_as_flatness_has_them(flown: Trajectory, quad: Vehicle) -> None:
+    dragged = replace(quad, drag_body=np.array([0.2, 0.2, 0.1]))
+    times = flown.knots[:-1] + 0.3 * flown.durations
+    rows, derivatives, frames = sampled(flown, dragged, times)
+    values = rows.values(derivatives, frames)
+    here, ahead, behind = (
+        reference(flown, dragged, times + h, environment=rows.environment).rotor_thrusts
+        for h in (0.0, 1e-5, -1e-5)
+    )
+    span = dragged.max_thrusts - dragged.min_thrusts
+    command = here + dragged.lags * (ahead - behind) / 2e-5
+    np.testing.assert_allclose(values[:, 4:8], (here - dragged.max_thrusts) / span, atol=1e-6)
+    np.testing.assert_allclose(values[:, 12:16], (command - dragged.max_thrusts) / span, atol=1e-4)
+
+
+def test_slopes_of_rotor_rows_are_their_differences(flown: Trajectory, quad: Vehicle) -> None:
+    times = flown.knots[2:6] + 0.4 * flown.durations[2:6]
+    rows, derivatives, frames = sampled(flown, quad, times)
+    place, column = np.nonzero(np.ones(rows.values(derivatives, frames).shape))
+    slopes = rows.slopes(derivatives, frames, place, column)
+    rng = np.random.default_rng(0)
+    step = rng.normal(size=derivatives.shape) * np.abs(derivatives).max(axis=(0, 2))[:, None]
+    ahead, behind = (rows.values(derivatives + h * step, frames) for h in (1e-6, -1e-6))
+    expected = (ahead - behind) / 2e-6
+    found = np.sum(slopes * step[place], axis=(1, 2)).reshape(expected.shape)
+    np.testing.assert_allclose(found, expected, rtol=1e-4, atol=1e-5 * np.abs(expected).max())
+
+
+def test_a_reserve_is_kept_for_the_controller_and_costs_time(quad: Vehicle) -> None:
+    """Of each rotor's range, thrusts and commands, all but what lies between the places it is held at."""
+    problem = load_problem("half-flip")
+    plain, kept = (Miqp(reserve=reserve).plan(problem, quad) for reserve in (0.0, 0.05))
+    assert kept.certificate is not None
+    assert kept.certificate.margin >= 0.04 * quad.max_thrusts.max()
+    assert plain.certificate is not None
+    assert plain.certificate.margin < 0.01 * quad.max_thrusts.max()
+    assert plain.duration < kept.duration < 1.1 * plain.duration
+
+
+def test_a_hop_straight_up_is_planned_without_a_word_of_arithmetic() -> None:
+    """Trials of it point their thrust straight down, against the frame that they are seen in."""
+    hop = replace(load_problem("line"), start=at_rest((0.0, 0.0, 0.0)), goal=at_rest((0.0, 0.0, 1.0)))
+    assert Miqp(order=4).plan(hop, load_vehicle("agile-quad")).certified

@@ -1,0 +1,351 @@
+"""Whole pages: they show plan and flight, labelled, without one text over another."""
+
+import subprocess
+import sys
+from dataclasses import replace
+
+import matplotlib
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from matplotlib.collections import PolyCollection
+from matplotlib.colors import to_rgba
+from matplotlib.quiver import Quiver, QuiverKey
+
+import aerobat as ab
+from aerobat import so3
+from aerobat.planning import PlacedStage
+from aerobat.reporting.figures import draw, report_figure
+from aerobat.reporting.page import png
+from aerobat.reporting.panels import path as path_panel
+from aerobat.reporting.panels.keyframes import maneuver_plane, plan_keyframes
+from aerobat.reporting.scene.glyphs import gate_bars
+from aerobat.reporting.style import BLUE, RED, SKY, YELLOW
+from reporting_cases import PROBLEMS, batch_of, planned, require_legible, simulated, two_flips
+
+pytestmark = pytest.mark.filterwarnings("error")  # drawing warns of nothing
+YELLOW_RGBA = to_rgba(YELLOW)
+CASES = [(problem, "agile-quad") for problem in PROBLEMS] + [
+    ("flip-roll", "hexarotor"),
+    ("half-flip", "crazyflie"),
+    ("section-v", "section-v"),
+]
+
+
+def page(problem, vehicle="agile-quad"):
+    return report_figure(planned(problem, vehicle), ab.load_vehicle(vehicle), simulated(problem, vehicle))
+
+
+def pages(problem, vehicle):
+    plan, body, flight = planned(problem, vehicle), ab.load_vehicle(vehicle), simulated(problem, vehicle)
+    return [report_figure(plan, body, flight), report_figure(plan, body), draw(flight, plan), draw(flight)]
+
+
+def panel_of(figure, quantity):
+    return next(axes for axes in figure.axes if axes.get_ylabel().startswith(quantity))
+
+
+def stages_panel(figure):
+    return next(axes for axes in figure.axes if axes.get_ylabel() == "z [m]")
+
+
+@pytest.mark.parametrize(("problem", "vehicle"), CASES)
+def test_no_text_lies_over_another_or_beyond_the_page(problem, vehicle, monkeypatch):
+    shown = pages(problem, vehicle)
+    for figure in shown if problem == "line" else shown[:1]:
+        require_legible(figure, monkeypatch)
+
+
+@pytest.mark.parametrize("problem", PROBLEMS)
+def test_every_axis_says_its_quantity_and_unit(problem):
+    for figure in pages(problem, "agile-quad"):
+        for axes in figure.axes:
+            if not axes.axison:
+                assert {f"{name} [m]" for name in "xyz"} <= {text.get_text() for text in axes.texts}
+                continue
+            assert "[" in axes.get_ylabel()
+            numbers = axes.xaxis.get_tick_params()["labelbottom"]
+            assert not numbers or "[" in axes.get_xlabel()
+
+
+def test_a_page_is_a_picture_1600_pixels_wide():
+    content = png(page("flip-roll"))
+    assert content.startswith(b"\x89PNG")
+    assert 1600 <= int.from_bytes(content[16:20], "big") <= 1620
+
+
+def test_drawn_errors_are_those_of_the_flight():
+    flight = simulated("half-flip")
+    figure = page("half-flip")
+    distance = np.linalg.norm(flight.states.position - flight.setpoint.flat.position, axis=1)
+    position = panel_of(figure, "position error")
+    unit = {"[m]": 1.0, "[cm]": 1e-2}[position.get_ylabel().split()[-1]]
+    times, drawn = position.get_lines()[0].get_data()
+    np.testing.assert_allclose(times, flight.times)
+    np.testing.assert_allclose(unit * np.asarray(drawn), distance, rtol=1e-12)
+    relative = so3.multiply(so3.conjugate(flight.setpoint.q_world_body), flight.states.q_world_body)
+    angle = 2 * np.arctan2(np.linalg.norm(relative[:, 1:], axis=1), np.abs(relative[:, 0]))
+    drawn = panel_of(figure, "attitude error").get_lines()[0].get_ydata()
+    np.testing.assert_allclose(drawn, np.rad2deg(angle), atol=1e-6)
+
+
+@pytest.mark.parametrize("vehicle", ["agile-quad", "hexarotor"])
+def test_rotor_thrusts_are_drawn_with_the_vehicle_s_limits(vehicle):
+    flight, body = simulated("flip-roll", vehicle), ab.load_vehicle(vehicle)
+    lines = panel_of(page("flip-roll", vehicle), "rotor thrust").get_lines()
+    rotors, limits = lines[: len(body.rotors)], lines[len(body.rotors) :]
+    for i, line in enumerate(rotors):
+        np.testing.assert_allclose(line.get_ydata(), flight.thrusts[:, i])
+    assert {line.get_ydata()[0] for line in limits} == {
+        *body.min_thrusts.tolist(),
+        *body.max_thrusts.tolist(),
+    }
+    assert all(line.get_linestyle() == "--" for line in limits)
+
+
+def test_stages_are_marked_at_their_times_in_every_timeline():
+    plan = planned("flip-roll")
+    figure = page("flip-roll")
+    for quantity in ("position error", "attitude error", "specific thrust", "rotor thrust"):
+        marks = panel_of(figure, quantity).collections[0].get_segments()
+        np.testing.assert_allclose([mark[0][0] for mark in marks], [stage.time for stage in plan.stages])
+
+
+@pytest.mark.parametrize("problem", PROBLEMS)
+def test_arrows_are_the_specific_thrust_at_the_scale_of_their_keys(problem):
+    plan, vehicle = planned(problem), ab.load_vehicle("agile-quad")
+    axes = stages_panel(page(problem))
+    quivers = {q.get_facecolor()[0].tobytes(): q for q in axes.collections if isinstance(q, Quiver)}
+    keys = {key.Q: key for key in axes.get_children() if isinstance(key, QuiverKey)}
+    reference = plan_keyframes(plan, vehicle)
+    plane = maneuver_plane(plan, reference.thrust)
+    for colour, column in ((SKY, 0), (BLUE, 1)):
+        quiver = quivers[np.array(to_rgba(colour)).tobytes()]
+        value = float(keys[quiver].label.split()[-2])
+        drawn = (quiver.U, quiver.V)[column] * value / keys[quiver].U
+        expected = plane.camera.project(reference.thrust)[:, column]
+        for place, thrust in zip(quiver.get_offsets(), drawn, strict=True):
+            k = np.linalg.norm(plane.camera.project(reference.position) - place, axis=1).argmin()
+            assert thrust == pytest.approx(expected[k], abs=1e-6)
+
+
+def pixels_of(figure, colour):
+    """How many pixels of a page are of a colour, or of one that nobody tells from it."""
+    figure.canvas.draw()
+    picture = np.asarray(figure.canvas.buffer_rgba())[..., :3].astype(int)
+    return int((np.abs(picture - 255 * np.array(to_rgba(colour)[:3])).max(axis=-1) < 12).sum())
+
+
+@pytest.mark.parametrize("problem", PROBLEMS)
+def test_nothing_is_red_where_nothing_is_wrong(problem):
+    assert all(pixels_of(figure, RED) == 0 for figure in pages(problem, "agile-quad"))
+    assert pixels_of(page(problem), BLUE) > 100
+
+
+def test_stages_may_come_in_any_order():
+    plan = planned("flip-roll")
+    disordered = replace(plan, stages=plan.stages[::-1])
+    one, other = (
+        stages_panel(report_figure(p, ab.load_vehicle("agile-quad"))).texts for p in (plan, disordered)
+    )
+    assert sorted(text.get_text() for text in one) == sorted(text.get_text() for text in other)
+
+
+def test_a_hover_is_drawn_like_any_other_plan():
+    spot = ab.at_rest([1.0, 2.0, 3.0])
+    hover = replace(ab.load_problem("line"), start=spot, goal=spot)
+    vehicle = ab.load_vehicle("agile-quad")
+    plan = ab.plan(hover, vehicle=vehicle)
+    assert png(report_figure(plan, vehicle, ab.fly(plan.trajectory, vehicle)))
+
+
+def test_all_stages_are_drawn_where_they_are_planned():
+    plan = planned("flip-pitch")
+    axes = stages_panel(page("flip-pitch"))
+    assert axes.get_xlabel() == "x [m]"
+    assert axes.get_aspect() == "auto"
+    assert {stage.name for stage in plan.stages} <= {text.get_text() for text in axes.texts}
+    quiver = next(q for q in axes.collections if isinstance(q, Quiver))
+    expected = [plan.trajectory.evaluate(stage.time)[[0, 2]] for stage in plan.stages]
+    np.testing.assert_allclose(quiver.get_offsets(), expected, atol=1e-9)
+    size = axes.figure.get_size_inches() * axes.get_position().size
+    assert np.ptp(axes.get_xlim()) / size[0] == pytest.approx(np.ptp(axes.get_ylim()) / size[1])
+
+
+@given(st.floats(-720.0, 720.0))
+def test_the_plane_of_a_flip_is_square_to_its_axis(axis_deg):
+    plan = planned("flip-roll")
+    plan = replace(plan, problem=replace(plan.problem, maneuver=ab.Flip(axis_deg=axis_deg)))
+    plane = maneuver_plane(plan, np.zeros((3, 3)))
+    axis = np.array([np.cos(np.deg2rad(axis_deg)), np.sin(np.deg2rad(axis_deg)), 0.0])
+    lateral, up = plane.camera.screen
+    np.testing.assert_allclose([lateral @ axis, up[2]], [0.0, 1.0], atol=1e-9)
+
+
+@given(st.floats(-180.0, 180.0), st.integers(0, 1000))
+def test_any_other_plane_is_where_the_thrust_moves_most(heading_deg, seed):
+    rng = np.random.default_rng(seed)
+    along = np.array([np.cos(np.deg2rad(heading_deg)), np.sin(np.deg2rad(heading_deg)), 0.0])
+    thrust = np.outer(rng.uniform(-20, 20, 6), along) + rng.uniform(-0.1, 0.1, (6, 3))
+    plane = maneuver_plane(planned("line"), thrust)
+    assert abs(plane.camera.screen[0] @ along) > np.cos(np.deg2rad(9.0))
+
+
+def test_vehicles_along_the_path_stand_as_the_flight_stood(monkeypatch):
+    painted = []
+    monkeypatch.setattr(path_panel, "draw_depth_sorted", lambda axes, shapes, camera: painted.extend(shapes))
+    flight, gate = simulated("flip-roll"), planned("flip-roll").problem.gates[0]
+    page("flip-roll")
+    axes = [shape.points for shape in painted if len(shape.points) == 2 and shape.width == 0.9]
+    assert len(axes) >= 10
+    times = []
+    for foot, tip in axes:
+        k = np.linalg.norm(flight.states.position - foot, axis=1).argmin()
+        np.testing.assert_allclose(foot, flight.states.position[k])
+        upward = so3.thrust_axis(flight.states.q_world_body[k])
+        np.testing.assert_allclose((tip - foot) / np.linalg.norm(tip - foot), upward, atol=1e-9)
+        times.append(flight.times[k])
+    steps = np.diff(times) / (planned("flip-roll").duration / path_panel.POSES)
+    np.testing.assert_allclose(steps, np.round(steps), atol=0.1)  # whole steps, to a row of the flight
+    assert min(np.linalg.norm(foot - gate.position) for foot, _ in axes) < 0.05  # one of them in the gate
+
+
+def test_a_batch_of_flights_is_drawn_whole():
+    batch = batch_of("flip-roll", 7)
+    figure = draw(batch, planned("flip-roll"))
+    assert any("7 flights" in text.get_text() for text in figure.texts)
+    axes = panel_of(figure, "position error")
+    bundle = next(c for c in axes.collections if len(c.get_segments()) == 7)
+    unit = {"[m]": 1.0, "[cm]": 1e-2}[axes.get_ylabel().split()[-1]]
+    distances = np.linalg.norm(batch.states.position - batch.setpoint.flat.position, axis=-1)
+    for segment, distance in zip(bundle.get_segments(), distances, strict=True):
+        np.testing.assert_allclose(unit * segment[:, 1], distance, rtol=1e-12)
+
+
+def test_a_flight_that_went_astray_does_not_shrink_the_picture():
+    flight = simulated("flip-roll")
+    position = flight.states.position.copy()
+    position[len(position) // 2 :] += 1000.0
+    stray = replace(flight, series={**flight.series, "position": position})
+    ordinary, lost = (draw(f, planned("flip-roll")).axes[0].get_ylim() for f in (flight, stray))
+    assert np.ptp(lost) < 2.0 * np.ptp(ordinary)
+
+
+def test_a_flight_can_be_drawn_alone_when_its_vehicle_is_a_preset():
+    assert draw(simulated("line")).texts[0].get_text() == "flight of agile-quad"
+    stranger = replace(simulated("line"), vehicles=("my-own",))
+    with pytest.raises(ab.SpecError, match="my-own"):
+        draw(stranger)
+    assert draw(stranger, vehicle=ab.load_vehicle("agile-quad")).axes
+
+
+def test_the_reader_s_own_matplotlib_settings_change_nothing():
+    plain = page("line")
+    with matplotlib.rc_context({"font.size": 30.0, "axes.labelsize": 30.0, "lines.linewidth": 9.0}):
+        before = dict(matplotlib.rcParams)
+        styled = page("line")
+        assert dict(matplotlib.rcParams) == before
+    for one, other in zip(plain.axes, styled.axes, strict=True):
+        assert one.yaxis.label.get_size() == other.yaxis.label.get_size()
+        assert [line.get_linewidth() for line in one.lines] == [line.get_linewidth() for line in other.lines]
+
+
+def test_the_same_data_give_the_same_picture():
+    assert png(draw(simulated("line"))) == png(draw(simulated("line")))
+
+
+def test_drawing_never_imports_pyplot(tmp_path):
+    simulated("line").save(tmp_path / "flight.npz")
+    code = (
+        "import sys, aerobat as ab, aerobat.reporting.figures\n"
+        "assert 'matplotlib' not in sys.modules\n"
+        "ab.draw(ab.load_flight('flight.npz')).savefig('flight.png')\n"
+        "assert 'matplotlib.pyplot' not in sys.modules"
+    )
+    subprocess.run([sys.executable, "-c", code], check=True, cwd=tmp_path)
+
+
+def two_flips_page():
+    plan, flight = two_flips()
+    return report_figure(plan, ab.load_vehicle("agile-quad"), flight)
+
+
+def test_stages_are_numbered_where_their_names_have_no_room(monkeypatch):
+    plan, _ = two_flips()
+    figure = two_flips_page()
+    shown = {text.get_text() for text in panel_of(figure, "position error").texts}
+    assert {str(k) for k in range(1, 9)} <= shown
+    assert not {stage.name for stage in plan.stages} & shown
+    require_legible(figure, monkeypatch)
+
+
+@pytest.mark.parametrize("count", [12, 19, 40])
+def test_a_course_of_many_stages_is_legible(count, monkeypatch):
+    """Of very many some are drawn and numbered, all are marked."""
+    plan = planned("flip-roll-translation")
+    times = np.linspace(0.0, plan.duration, count + 2)[1:-1].tolist()
+    stages = tuple(PlacedStage(f"waypoint {k}", k, time) for k, time in enumerate(times, 1))
+    figure = report_figure(replace(plan, stages=stages), ab.load_vehicle("agile-quad"))
+    require_legible(figure, monkeypatch)
+    assert any(f"11 of {count} in order" in text.get_text() for axes in figure.axes for text in axes.texts)
+
+
+def test_every_gate_is_drawn_inside_the_picture_with_a_vehicle_in_it(monkeypatch):
+    calls = []
+    monkeypatch.setattr(path_panel, "draw_depth_sorted", lambda *call: calls.append(call))
+    plan, flight = two_flips()
+    draw(flight, plan)
+    [(axes, shapes, camera)] = calls
+    assert len(plan.problem.gates) == 2
+    drawn = np.concatenate([shape.points for shape in shapes])
+    low, high = np.array([axes.get_xlim(), axes.get_ylim()]).T
+    for gate in plan.problem.gates:
+        for corner in np.concatenate(gate_bars(gate)).reshape(-1, 3):
+            assert np.linalg.norm(drawn - corner, axis=1).min() < 1e-9
+            assert (camera.project(corner) > low).all()
+            assert (camera.project(corner) < high).all()
+        assert np.linalg.norm(drawn - gate.position, axis=1).min() < 0.05  # the foot of a thrust axis
+
+
+def test_every_passage_of_a_gate_is_marked_in_every_timeline():
+    plan, _ = two_flips()
+    passages = [stage.time for stage in plan.stages if stage.gate is not None]
+    assert len(passages) == 2
+    figure = two_flips_page()
+    for quantity in ("position error", "attitude error", "specific thrust", "rotor thrust"):
+        marks = panel_of(figure, quantity).collections[0]
+        colours = marks.get_colors()
+        times = [
+            s[0][0] for s, c in zip(marks.get_segments(), colours, strict=True) if (c == YELLOW_RGBA).all()
+        ]
+        np.testing.assert_allclose(times, passages)
+
+
+def test_stages_that_would_cover_each_other_follow_one_another():
+    plan, _ = two_flips()
+    axes = next(a for a in two_flips_page().axes if a.get_ylabel().startswith("stages in order"))
+    quiver = next(q for q in axes.collections if isinstance(q, Quiver))
+    per_metre = axes.figure.get_size_inches()[1] * axes.get_position().height / np.ptp(axes.get_ylim())
+    assert len(quiver.get_offsets()) == len(plan.stages)
+    assert (-np.diff(quiver.get_offsets()[:, 1]) * per_metre > 0.5).all()  # [in] downward in their order
+    gates = [c for c in axes.collections if isinstance(c, PolyCollection) and c.get_zorder() == 1.5]
+    centres = [np.mean([p.vertices.mean(axis=0) for p in gate.get_paths()], axis=0) for gate in gates]
+    passed = [place for place, s in zip(quiver.get_offsets(), plan.stages, strict=True) if s.gate is not None]
+    np.testing.assert_allclose(centres, passed, atol=0.05)
+
+
+def test_stages_in_a_row_are_each_shown_in_the_plane_of_their_thrust():
+    plan, _ = two_flips()
+    vehicle = ab.load_vehicle("agile-quad")
+    axes = next(a for a in two_flips_page().axes if a.get_ylabel().startswith("stages in order"))
+    quivers = {q.get_facecolor()[0].tobytes(): q for q in axes.collections if isinstance(q, Quiver)}
+    level, upward = (quivers[np.array(to_rgba(colour)).tobytes()] for colour in (SKY, BLUE))
+    keys = {key.Q: key for key in axes.get_children() if isinstance(key, QuiverKey)}
+    scale = float(keys[level].label.split()[-2]) / keys[level].U
+    thrust = plan_keyframes(plan, vehicle).thrust
+    across = np.linalg.norm(thrust[:, :2], axis=1)
+    shown = across > 0.1 * np.linalg.norm(thrust, axis=1)  # a vertical one lies in any plane
+    assert shown.sum() >= 4
+    np.testing.assert_allclose(np.abs(scale * level.U)[shown], across[shown], rtol=0.01)
+    np.testing.assert_allclose(scale * upward.V, thrust[:, 2], atol=1e-9)

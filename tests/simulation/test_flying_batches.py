@@ -1,0 +1,174 @@
+"""One and many, floats and arrays: the same flights; noise and outcomes."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from aerobat import so3
+from aerobat.control import Controller
+from aerobat.engines import BYTECODE, FLOATS, NUMPY, choose
+from aerobat.environment import Dispersion
+from aerobat.errors import BackendMissing, SpecError
+from aerobat.simulation import Outcome, fly
+from aerobat.states import BodyState
+from aerobat.trajectory import Trajectory
+from aerobat.vehicle import load_vehicle
+from looping_flights import HEXA, QUAD, assert_same, loops, near, one
+
+EXACT = ("floats", "bytecode", "numpy", "compiled", "jax")  # in float64
+AT_REST = Trajectory(np.array([1.0]), np.zeros((1, 1, 3)))
+
+
+@pytest.mark.parametrize("vehicle", [QUAD, HEXA], ids=["4 rotors", "6 rotors"])
+@pytest.mark.parametrize("engine", ["bytecode", "numpy", "compiled", "jax"])
+def test_engines_agree_with_floats_to_rounding_over_3000_steps(engine: str, vehicle) -> None:
+    flights = [fly(loops(6.0), vehicle, engine=name) for name in ("floats", engine)]
+    assert len(flights[0].times) == 3001
+    assert [flight.engine for flight in flights] == ["floats", engine]
+    assert_same(*flights, atol=1e-12)
+
+
+@pytest.mark.parametrize("engine", EXACT)
+def test_each_vehicle_of_a_batch_flies_as_it_would_alone(engine: str) -> None:
+    """Different vehicles and starts, all in one call."""
+    rng = np.random.default_rng(3)
+    vehicles = [replace(HEXA, name=f"no. {k}", mass=HEXA.mass * rng.uniform(0.9, 1.1)) for k in range(4)]
+    starts = near(4)
+    batch = fly(loops(4.0), vehicles, start=starts, engine=engine)
+    assert batch.states.position.shape == (4, 2001, 3)
+    for k, vehicle in enumerate(vehicles):
+        alone = fly(loops(4.0), vehicle, start=one(starts, k), engine="floats")
+        # XLA rounds by the size of a batch
+        assert_same(batch[k], alone, atol=1e-10 if engine == "jax" else 1e-12)
+
+
+def test_bytecode_flies_as_floats_do_to_the_last_bit() -> None:
+    plain, traced = (fly(loops(1.0), HEXA, start=near(3), engine=name) for name in ("floats", "bytecode"))
+    assert_same(plain, traced, atol=0.0)
+
+
+def test_one_vehicle_takes_many_starts() -> None:
+    starts = near(3)
+    batch = fly(AT_REST, QUAD, start=starts)
+    assert batch.vehicles == ("agile-quad",) * 3
+    for k in range(3):
+        assert_same(batch[k], fly(AT_REST, QUAD, start=one(starts, k)))
+
+
+def test_quadrotors_of_any_size_fly_in_one_batch() -> None:
+    crazyflie = replace(load_vehicle("crazyflie"), drag_body=np.zeros(3))
+    batch = fly(loops(6.0), [QUAD, crazyflie])
+    assert batch.outcomes == (Outcome.COMPLETE, Outcome.COMPLETE)
+    assert_same(batch[1], fly(loops(6.0), crazyflie))
+    np.testing.assert_array_equal(batch.max_thrusts, [QUAD.max_thrusts, crazyflie.max_thrusts])
+
+
+def test_flights_are_flown_by_what_is_fastest_for_so_many_ticks(monkeypatch) -> None:
+    assert choose("auto", 1, 200) is FLOATS
+    assert choose("auto", 2, 1000) is BYTECODE
+    assert choose("auto", 100, 1000).name == "compiled"
+    assert fly(AT_REST, QUAD).engine == "bytecode"
+    assert fly(AT_REST, [QUAD] * 30).engine == "compiled"
+    monkeypatch.setattr("aerobat.engines.find_spec", lambda name: None)
+    assert choose("auto", 1, 10_000) is BYTECODE
+    assert choose("auto", 100, 1000) is NUMPY
+    for engine, extra in (("compiled", "fast"), ("jax", "jax")):
+        with pytest.raises(BackendMissing, match=rf'pip install "aerobat\[{extra}\]"'):
+            choose(engine, 1, 1000)
+
+
+@pytest.mark.parametrize("engine", EXACT)
+def test_divergence_is_an_outcome_and_ends_the_flight(engine: str) -> None:
+    spinning = BodyState(
+        np.zeros(3), np.array([20.0, 0.0, 0.0]), so3.exp([2.5, 0, 0]), np.array([30.0, 5.0, 0.0])
+    )
+    flight = fly(loops(3.0), HEXA, start=spinning, engine=engine)
+    error = np.linalg.norm(flight.states.position - flight.setpoint.flat.position, axis=-1)
+    assert flight.outcome is Outcome.DIVERGED
+    assert flight.sentences[0] == f"diverged at {flight.times[-1]:.2f} s: position error above 5 m"
+    assert flight.times[-1] == flight.ends < 3.0
+    assert error[-1] > 5.0 >= error[:-1].max()
+
+
+def test_a_state_that_is_no_number_any_more_ends_the_flight_before_it() -> None:
+    wild = BodyState(np.zeros(3), np.zeros(3), so3.IDENTITY, np.array([1e200, 1e200, 0.0]))
+    flight = fly(AT_REST, HEXA, start=wild)
+    assert flight.outcome is Outcome.STATE_NOT_FINITE
+    assert flight.sentences[0] == "diverged at 0.00 s: its state is no longer a number"
+    assert len(flight.times) == 1
+
+
+def test_in_a_batch_a_diverged_vehicle_stays_where_it_ended() -> None:
+    starts = BodyState(
+        np.zeros((2, 3)),
+        np.zeros((2, 3)),
+        np.stack([so3.IDENTITY] * 2),
+        np.array([[0, 0, 0], [1e200, 1e200, 0]]),
+    )
+    batch = fly(AT_REST, HEXA, start=starts)
+    assert batch.outcomes[0] is Outcome.COMPLETE
+    assert batch.outcomes[1] is Outcome.STATE_NOT_FINITE
+    assert (batch.states.position[1] == batch.states.position[1, 0]).all()
+    assert batch[0].outcome is Outcome.COMPLETE
+    assert len(batch[0].times) == 501
+    assert len(batch[1].times) == 1
+
+
+def test_the_last_step_may_be_shorter_and_the_flight_ends_with_the_trajectory() -> None:
+    flight = fly(loops(4.0007), QUAD)
+    assert flight.times[-1] == pytest.approx(4.0007, abs=1e-12)
+    assert np.diff(flight.times)[-1] == pytest.approx(0.0007, abs=1e-12)
+    np.testing.assert_allclose(flight.states.position[-1], np.zeros(3), atol=0.005)
+
+
+def test_a_slow_controller_does_not_coarsen_the_physics() -> None:
+    falling = BodyState(np.zeros(3), np.zeros(3), so3.IDENTITY, np.array([4.0, -3.0, 2.0]))
+    slow, fast = (fly(AT_REST, QUAD, start=falling, rate=rate) for rate in (250.0, 500.0))
+    assert np.abs(slow.states.position - fast.states.position[::2]).max() < 0.01
+
+
+@pytest.mark.parametrize(
+    ("arguments", "sentence"),
+    [
+        ({"vehicle": []}, "vehicle must be at least one"),
+        ({"vehicle": [QUAD, HEXA]}, "need as many rotors"),
+        ({"nominal": HEXA}, "need as many rotors"),
+        ({"vehicle": [QUAD, replace(QUAD, drag_body=np.ones(3))]}, "differ in drag per mass"),
+        (
+            {"engine": "abacus"},
+            "engine must be one of auto, floats, bytecode, numpy, compiled, jax, jax-float32",
+        ),
+        ({"rate": 0.0}, r"^FlightConfig\.rate must be 1 or more, got "),
+        ({"rate": np.nan}, r"^FlightConfig\.rate must be a finite number"),
+        ({"seed": -1}, "seed must be"),
+        ({"conditions": "lap"}, "conditions"),
+        ({"conditions": 3}, "conditions must be a Dispersion or the name of one"),
+        ({"conditions": "lab", "flights": 0}, "flights must be a whole number"),
+        ({"conditions": "lab", "flights": range(-2, 1)}, "flights must be a whole number"),
+        ({"flights": 3}, "flights are drawn from conditions"),
+        ({"conditions": "lab", "start": near(1)}, "start comes of the conditions"),
+        ({"conditions": "lab", "nominal": QUAD}, "nominal comes of the conditions"),
+        ({"conditions": "lab", "vehicle": [QUAD] * 2}, "vehicle must be one where there are conditions"),
+        ({"conditions": Dispersion(computation_delay=0.003)}, "computation_delay must be at most a period"),
+        ({"vehicle": [QUAD] * 2, "start": near(3)}, "start must carry one leading axis of 2"),
+        ({"start": replace(near(3), velocity=np.zeros((2, 3)))}, "same leading axis of 3"),
+        ({"start": one(replace(near(1), q_world_body=np.array([[2.0, 0, 0, 0]])), 0)}, "unit quaternion"),
+        (
+            {"start": one(replace(near(1), position=np.full((1, 3), np.nan)), 0)},
+            "start.position must be numbers",
+        ),
+    ],
+)
+def test_arguments_that_do_not_fit_are_refused_in_one_sentence(arguments: dict, sentence: str) -> None:
+    with pytest.raises(SpecError, match=sentence) as caught:
+        fly(**{"plan": AT_REST, "vehicle": QUAD, **arguments})
+    assert "\n" not in str(caught.value)
+
+
+def test_a_controller_of_its_own_is_flown() -> None:
+    loose = fly(
+        loops(3.0), QUAD, start=one(near(1), 0), controller=Controller(position_gain=4.0, velocity_gain=3.0)
+    )
+    tight = fly(loops(3.0), QUAD, start=one(near(1), 0))
+    assert np.abs(loose.states.position - tight.states.position).max() > 0.01

@@ -1,0 +1,256 @@
+"""A map's cells are what plans of their own are; the least that is needed is planned, and less is refused."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, replace
+from functools import cache
+from math import radians
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+import aerobat as ab
+from aerobat.planning import without_advice
+from aerobat.reporting.feasibility.table import requirements_report
+from aerobat.studies.feasibility import Feasibility
+from suites import examples
+
+ANGLES, SPEEDS = (0.0, 70.0), (5.0, 10.0, 12.0)
+
+
+@cache
+def half_flips(workers: int = 1) -> ab.FeasibilityMap:
+    return ab.feasibility_map("half-flip", {"angle": ANGLES, "speed": SPEEDS}, workers=workers)
+
+
+def half_flip(angle: float, speed: float) -> ab.Problem:
+    """The problem of a cell, made by hand."""
+    problem = ab.load_problem("half-flip")
+    gates = (problem.gates[0].tilted(radians(angle)),)
+    return replace(problem, gates=gates, maneuver=ab.HalfFlip(passage=ab.GatePassage(speed=speed)))
+
+
+@pytest.mark.parametrize("number", range(len(ANGLES) * len(SPEEDS)))
+def test_a_cell_is_the_plan_of_its_problem(number: int) -> None:
+    cell = half_flips().cells[number]
+    assert cell.values == (ANGLES[number // len(SPEEDS)], SPEEDS[number % len(SPEEDS)])
+    try:
+        with without_advice():
+            plan = ab.plan(half_flip(*cell.values), vehicle="agile-quad")
+    except ab.Infeasible:
+        assert cell.feasibility is Feasibility.REFUSED
+        assert cell.duration is None
+        return
+    assert cell.is_planned == (plan.certified and plan.flies)
+    assert cell.duration == plan.duration
+    assert plan.certificate is not None
+    assert cell.sentence == plan.certificate.why
+    assert cell.reserve is not None
+    kept = cell.reserve * ab.load_vehicle("agile-quad").max_thrusts[0]  # whose least thrust is 0
+    assert kept == pytest.approx(plan.certificate.margin)
+
+
+def test_a_limit_that_binds_makes_the_plan_longer_and_one_that_does_not_changes_nothing() -> None:
+    for speed in SPEEDS[:2]:
+        cell = next(each for each in half_flips().cells if each.values == (0.0, speed))
+        problem = half_flip(0.0, speed)
+        freed = ab.plan(replace(problem, limits=ab.Limits()), vehicle="agile-quad").duration
+        assert cell.duration is not None
+        if "limits.velocity" in cell.limits:
+            assert freed < 0.9 * cell.duration
+        else:
+            assert freed == pytest.approx(cell.duration)
+    assert "limits.velocity" in half_flips().cells[1].limits
+    assert "max_thrust" in half_flips().cells[0].limits
+
+
+def test_processes_change_no_cell() -> None:
+    assert half_flips(workers=2) == half_flips()
+
+
+def test_an_executor_that_is_handed_in_plans() -> None:
+    over = {"goal.position.x": [1.0, 2.0]}
+    with ThreadPoolExecutor(1) as executor:
+        found = ab.feasibility_map("line", over, executor=executor)
+    assert found == ab.feasibility_map("line", over, workers=1)
+
+
+def test_a_map_counts_its_cells_and_has_a_row_for_each() -> None:
+    found = half_flips()
+    assert sum(found.counts.values()) == len(found.cells) == 6
+    assert found.counts[Feasibility.REFUSED] == 2
+    assert str(found) == "half-flip on agile-quad over angle and speed: 4 planned, 2 refused at sight"
+    table = found.table
+    np.testing.assert_array_equal(table["angle"], np.repeat(ANGLES, 3))
+    np.testing.assert_array_equal(table["speed"], np.tile(SPEEDS, 2))
+    np.testing.assert_array_equal(np.isnan(table["duration_s"]), table["feasibility"] != "planned")
+    frame = ab.to_dataframe(found)
+    assert list(frame.columns) == list(table)
+
+
+class Refusing(ab.Planner):
+    """Tries once and finds nothing."""
+
+    def plan(self, problem: ab.Problem, vehicle: ab.Vehicle | None = None, progress: Any = None) -> ab.Plan:
+        raise ab.Infeasible("the thrust of rotor 3 is beyond its limit", ["one attempt"])
+
+
+def test_what_the_planner_does_not_find_is_no_plan_and_names_its_limit() -> None:
+    (cell,) = ab.feasibility_map("line", {"vehicle.mass": [0.9]}, planner=Refusing(), workers=1).cells
+    assert (cell.feasibility, cell.limits) == (Feasibility.NO_PLAN, ("rotors",))
+    assert cell.sentence == "the thrust of rotor 3 is beyond its limit"
+
+
+def test_without_time_there_is_no_answer() -> None:
+    over = {"vehicle.mass": [0.9]}
+    (cell,) = ab.feasibility_map("line", over, planner=Refusing(), time_limit=0.0, workers=1).cells
+    assert cell.feasibility is Feasibility.NO_ANSWER
+
+
+def test_what_contradicts_something_else_is_refused_in_its_cell_alone() -> None:
+    over = {"limits.upper.z": [3.0, 4.0], "vehicle.thrust_to_weight": [0.9, 4.0]}
+    cells = ab.feasibility_map("half-flip", over, workers=1).cells
+    assert [cell.is_planned for cell in cells] == [False, False, False, True]
+    assert "gates[0].position: its z component, 3.5 m, lies outside the limits" in cells[0].sentence
+    assert "rotors cannot lift agile-quad" in cells[2].sentence
+    assert cells[2].limits == ("rotors",)
+
+
+@cache
+def line() -> ab.Plan:
+    """A plan that is certified and flies."""
+    return ab.plan("line", vehicle="agile-quad")
+
+
+@dataclass(frozen=True)
+class Threshold(ab.Planner):
+    """Has the plan of a line where a number of the scenario is large enough."""
+
+    number: Callable[[ab.Problem, ab.Vehicle], float]
+    least: float
+
+    def plan(self, problem: ab.Problem, vehicle: ab.Vehicle | None = None, progress: Any = None) -> ab.Plan:
+        assert vehicle is not None
+        if self.number(problem, vehicle) < self.least:
+            raise ab.Infeasible("it is too little", ["one attempt"])
+        return line()
+
+
+def ceiling(problem: ab.Problem, vehicle: ab.Vehicle) -> float:
+    return float(problem.limits.upper[2])
+
+
+def width(problem: ab.Problem, vehicle: ab.Vehicle) -> float:
+    return problem.gates[0].width / ab.load_problem("half-flip").gates[0].width
+
+
+def strength(problem: ab.Problem, vehicle: ab.Vehicle) -> float:
+    return vehicle.thrust_to_weight
+
+
+@examples(20)
+@given(
+    case=st.sampled_from(
+        [
+            ("thrust-to-weight", strength, "line", 1.05, 15.0),
+            ("ceiling", ceiling, "line", 1.0, 30.0),
+            ("gate", width, "half-flip", 0.6, 6.0),
+        ]
+    ),
+    part=st.floats(0.0, 1.0),
+    tolerance=st.floats(0.02, 0.2),
+)
+def test_bisection_comes_to_the_threshold_from_either_side(
+    case: tuple[str, Any, str, float, float], part: float, tolerance: float
+) -> None:
+    """A ceiling's height counts from the line, which is at zero."""
+    quantity, number, problem, low, high = case
+    least = low + part * (high - low)
+    (found,) = ab.min_requirements(
+        problem,
+        of=[quantity],
+        planner=Threshold(number, least),
+        tolerance=tolerance,
+        workers=1,
+    )
+    assert found.value is not None
+    assert found.refused < least * (1 + 1e-9)
+    assert least * (1 - 1e-9) <= found.value
+    assert found.value - found.refused <= tolerance * max(found.value, 1.0) * (1 + 1e-9)
+    assert found.plan == line()
+    assert found.refusal == "it is too little"
+
+
+def test_where_only_no_ceiling_suffices_that_is_the_answer() -> None:
+    unbounded = Threshold(ceiling, np.inf)
+    (found,) = ab.min_requirements("line", of=["ceiling"], planner=unbounded, workers=1)
+    assert found.value == np.inf
+    assert found.plan == line()
+    assert str(found).startswith("ceiling: no limit, planned in")
+    report = requirements_report("line", "agile-quad", [found])
+    assert report["requirements"][0]["least"] is None
+
+
+def test_what_no_strength_suffices_for_is_infeasible_and_says_so() -> None:
+    with pytest.raises(ab.Infeasible, match=r"thrust-to-weight: none will do, 25.06 neither"):
+        ab.min_requirements("line", of=["thrust-to-weight"], planner=Refusing(), workers=1)
+
+
+def test_the_smallest_gate_and_the_lowest_ceiling_have_plans_and_less_is_refused() -> None:
+    tried: list[tuple[str, float, bool]] = []
+    found = ab.min_requirements(
+        "half-flip",
+        of=["gate", "ceiling"],
+        tolerance=0.05,
+        workers=2,
+        progress=lambda *trial: tried.append(trial),
+    )
+    problem = ab.load_problem("half-flip")
+    gate, lowest = found
+    for each in found:
+        assert each.plan is not None
+        assert each.plan.certified
+        assert each.plan.flies
+        mine = [trial for trial in tried if trial[0] == each.quantity]
+        assert len(mine) == each.trials
+        assert (each.quantity, each.value, True) in mine
+        assert (each.quantity, each.refused, False) in mine
+    assert gate.plan is not None
+    assert gate.value is not None
+    assert gate.plan.problem.gates[0].width == gate.value * problem.gates[0].width
+    smaller = replace(
+        problem.gates[0],
+        width=gate.refused * problem.gates[0].width,
+        height=gate.refused * problem.gates[0].height,
+    )
+    problem = replace(problem, gates=(smaller,))
+    if gate.feasibility is Feasibility.REFUSED:
+        with pytest.raises(ab.SpecError, match="widen the opening"):
+            ab.plan(problem, vehicle="agile-quad")
+    else:
+        assert not ab.plan(problem, vehicle="agile-quad").flies
+    assert lowest.plan is not None
+    assert lowest.value is not None
+    assert lowest.plan.trajectory.component_range(0)[1][2] <= lowest.value + 1e-9
+    assert lowest.refused < lowest.value <= 1.05 * lowest.refused
+
+
+@pytest.mark.parametrize(
+    ("problem", "of", "said"),
+    [
+        ("line", ["gate"], "'line' has no gate that could be smaller"),
+        ("line", ["weight"], "no quantity named 'weight'"),
+        ("line", ["celing"], "did you mean 'ceiling'?"),
+        ("line", ["ceiling", "ceiling"], "ceiling is named twice"),
+        ("line", [], "of must name one quantity or more"),
+    ],
+)
+def test_quantities_that_are_none_are_refused(problem: str, of: list[str], said: str) -> None:
+    with pytest.raises(ab.SpecError) as refused:
+        ab.min_requirements(problem, of=of, workers=1)
+    assert said in str(refused.value)

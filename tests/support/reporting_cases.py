@@ -1,0 +1,73 @@
+"""What tests of figures share: plans and flights, each made once, and what makes a page legible."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import lru_cache
+from itertools import combinations
+
+import matplotlib
+import numpy as np
+import pytest
+from matplotlib.figure import Figure
+from matplotlib.transforms import Bbox
+
+import aerobat as ab
+
+PROBLEMS = ("flip-roll", "flip-roll-translation", "flip-pitch", "half-flip", "line")
+
+
+@lru_cache
+def planned(problem: str, vehicle: str = "agile-quad") -> ab.Plan:
+    """A rotor-feasible plan for one of the shipped problems."""
+    return ab.plan(ab.load_problem(problem), vehicle=ab.load_vehicle(vehicle))
+
+
+@lru_cache
+def simulated(problem: str, vehicle: str = "agile-quad") -> ab.Flight:
+    """A flight of that plan, at a rate that keeps tests short."""
+    return ab.fly(planned(problem, vehicle).trajectory, ab.load_vehicle(vehicle), rate=200.0)
+
+
+@lru_cache
+def two_flips() -> tuple[ab.Plan, ab.Flight]:
+    """A plan through two gates, and its flight."""
+    plan = ab.plan(
+        ab.load_problem("examples/two-flips.toml"), ab.Miqp(order=4), ab.load_vehicle("agile-quad")
+    )
+    return plan, ab.fly(plan.trajectory, ab.load_vehicle("agile-quad"), rate=200.0)
+
+
+def require_legible(figure: Figure, monkeypatch: pytest.MonkeyPatch) -> None:
+    """No text of a page lies over another one or beyond the page."""
+    texts = texts_of(figure, monkeypatch)
+    assert len(texts) > 20
+    for name, box in texts:
+        assert box.min.min() >= 0, name
+        assert (box.max <= figure.bbox.max).all(), name
+    for (one, a), (other, b) in combinations(texts, 2):
+        across, up = np.minimum(a.max, b.max) - np.maximum(a.min, b.min)
+        assert across < 2 or up < 4, (one, other)  # pixels; boxes reach a little beyond their letters
+
+
+def texts_of(figure: Figure, monkeypatch: pytest.MonkeyPatch) -> list[tuple[str, Bbox]]:
+    """Every text that is really drawn, with its box in pixels."""
+    drawn = []
+
+    def draw_and_note(text, renderer):  # type: ignore[no-untyped-def]
+        if text.get_visible() and text.get_text().strip():
+            drawn.append((text.get_text(), text.get_window_extent(renderer)))
+        draw_text(text, renderer)
+
+    draw_text = matplotlib.text.Text.draw
+    monkeypatch.setattr(matplotlib.text.Text, "draw", draw_and_note)
+    figure.canvas.draw()
+    monkeypatch.undo()
+    return drawn
+
+
+def batch_of(problem, count):
+    """As many flights as `count`, each of a vehicle a little heavier than the one before."""
+    quad = ab.load_vehicle("agile-quad")
+    heavier = [replace(quad, mass=(1.0 + 0.01 * k) * quad.mass) for k in range(count)]
+    return ab.fly(planned(problem).trajectory, heavier, rate=200.0)

@@ -1,0 +1,64 @@
+"""The two suites: the default one of a few minutes, and the full one, which `--full` runs."""
+
+from __future__ import annotations
+
+import os
+import shutil
+from collections.abc import Callable
+from typing import Any
+
+from hypothesis import HealthCheck, settings
+
+FAST, FULL = "fast", "full"
+SHARE = 4  # the default suite draws one in so many of the examples that the full one draws
+FEWEST = 5  # examples of a law in the default suite
+
+# each group of tests that the default suite leaves out, and what its tests are
+GROUPS = {
+    "slow": "takes more than two seconds of the processor",
+    "process": "starts processes of its own, sends them signals, or fills their terminals",
+    "browser": "opens pages in a browser; needs Chromium, Chrome or Edge",
+    "peer": "compares with programs that others wrote, at length",
+    "ros": "flies a session with a real ROS; needs the interpreters of ROS_PYTHONS",
+    "docs": "runs the documentation, its tutorials and its site",
+}
+BROWSERS = ("chromium", "google-chrome", "msedge")
+ROS_PYTHONS = {name: f"AEROBAT_{name.upper()}_PYTHON" for name in ("ros1", "ros2")}
+
+
+def register_profiles() -> None:
+    """Register Hypothesis's profiles: the same examples on every run, and no deadline."""
+    common: dict[str, Any] = {
+        "derandomize": True,
+        "deadline": None,
+        "suppress_health_check": [HealthCheck.too_slow],
+    }
+    settings.register_profile(FAST, max_examples=100 // SHARE, **common)
+    settings.register_profile(FULL, max_examples=100, **common)
+
+
+def examples(count: int) -> Callable[[Any], Any]:
+    """Return the settings of a law that draws `count` examples in the full suite."""
+    is_full = settings.get_current_profile_name() == FULL
+    return settings(max_examples=count if is_full else min(count, max(FEWEST, count // SHARE)))
+
+
+def browser() -> str | None:
+    """Return the path of the system's browser, or None where it has none."""
+    return next((path for name in BROWSERS if (path := shutil.which(name))), None)
+
+
+def missing(group: str) -> str | None:
+    """Return a sentence on how to get the part of the system that a group needs, None where it is there."""
+    if group == "browser" and browser() is None:
+        return (
+            f"no browser was found on the PATH ({', '.join(BROWSERS)}); "
+            "install one, as with `apt-get install chromium`, or leave the browser's tests out"
+        )
+    unset = [name for name in ROS_PYTHONS.values() if not os.path.isfile(os.environ.get(name, ""))]
+    if group == "ros" and unset:
+        return (
+            f"sessions with ROS need an interpreter that has it and Aerobat, named by {' and '.join(unset)}; "
+            ".ci/run shows how to make both, or leave the tests with ROS out"
+        )
+    return None
