@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from math import inf
 from threading import Thread
 from types import SimpleNamespace
 
@@ -69,11 +70,13 @@ class Late:
         self.origin, self.now = 7 * SECOND, 7 * SECOND
         self.jumps = jumps  # [ns] after which tick
         self.ticks: list[float] = []
+        self.patience = inf  # [s] the least with which was waited
 
     def time(self) -> int:
         return self.now
 
-    def work_until(self, instant: int) -> None:
+    def work_until(self, instant: int, patience: float = inf) -> None:
+        self.patience = min(self.patience, patience)
         self.now = max(self.now, instant)
 
     def tick(self, now: float) -> None:
@@ -86,6 +89,29 @@ def test_a_few_ticks_that_were_missed_are_made_up_for_and_of_many_the_last() -> 
     run(node, node, 100.0, 1.0)  # type: ignore[arg-type]
     numbers = [round(100.0 * now) for now in node.ticks]
     assert numbers == [*range(21), *range(70, 100)]
+    assert node.patience < 0.1  # where time stands still until this node goes on
+
+
+def test_calls_are_done_for_no_longer_than_patience_where_time_stands_still() -> None:
+    done: list[str] = []
+    calls = Calls()
+    calls.put(lambda: done.append("what waited"))
+    calls.work_until(1, lambda: 0, patience=0.02)
+    assert done == ["what waited"]
+
+
+def test_a_clock_that_waits_tells_its_time_again_and_one_that_runs_does_not() -> None:
+    wall, told = Wall(), []
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(middleware, "time", wall)
+        clock = PacedClock(1.0)
+        clock.tell_again = lambda: told.append(wall.now)
+        clock.wait_at(5 * SECOND + SECOND)
+        for _ in range(150):  # a second until it waits, and half a second of waiting
+            wall.now += 0.01
+            clock.time()
+    assert 4 <= len(told) <= 6
+    assert min(told) > 0.99
 
 
 def test_whoever_still_waits_is_answered_when_the_node_ends() -> None:

@@ -34,6 +34,8 @@ from aerobat.links.ros.middleware import Middleware
 
 SPEED = "1"  # times the wall's, at most
 ANSWERED = 60.0  # [s] of the wall, for which a plan may take on a busy machine
+ANSWERED_AT_ONCE = 10.0  # [s] of the wall, for which any other order may take there
+PLANNED = ("/aerobat/flip", "/aerobat/window")
 LONG = 30.0  # [s] of the vehicle's time, for a take-off or a landing
 TRIES = 4  # of either
 LONG_ENOUGH = 30.0  # [s] of goals
@@ -166,7 +168,7 @@ def ros2_services(node: Any) -> Ask:
         for _ in range(TRIES):  # a server that was killed is known for a while, and may have been asked
             assert client.wait_for_service(ANSWERED), service
             answered = client.call_async(Trigger.Request())
-            end = time.monotonic() + ANSWERED
+            end = time.monotonic() + (ANSWERED if service in PLANNED else ANSWERED_AT_ONCE)
             while not answered.done() and time.monotonic() < end:
                 time.sleep(0.05)
             if answered.done():

@@ -100,7 +100,7 @@ class Ros:
     def offer(self, service: str, take: Callable[[Answer], None]) -> None:
         self._graph.services[service] = take
 
-    def work_until(self, instant: int) -> None:
+    def work_until(self, instant: int, patience: float = np.inf) -> None:
         raise AssertionError("nothing waits here")
 
     def close(self) -> None:

@@ -20,6 +20,7 @@ NEWEST = 5  # messages of which not every one counts
 
 _PATIENCE = 5.0  # [s] of the wall, for which a clock waits
 _FIRST_TIME = 20.0  # [s] of the wall, for which somebody who tells the time is waited for
+_TOLD_AGAIN = 0.1  # [s] of the wall, after which a clock that waits tells its time once more
 _MAX_STEP = 0.01  # [s] between two looks at a clock that waits, its own process' being held up among it
 _MAX_WAIT, _MIN_WAIT = 0.005, 0.0002  # [s] between looks at a clock that may run at another pace than ours
 
@@ -33,14 +34,16 @@ def message_class(kind: str) -> Any:
 class PacedClock:
     """A clock that others follow, `speed` times as fast as the wall's; at first it shows the same.
 
-    It waits for who is late, itself among them, so that a flight is the same on a busy machine.
+    It waits for who is late, itself among them, so that a flight is the same on a busy machine. While it
+    waits it has its last time told again: who is late may have missed the message by which to go on.
     """
 
     def __init__(self, speed: float) -> None:
+        self.tell_again: Callable[[], None] = lambda: None  # sends the last time to others
         self._speed = speed
         self._began = time.time_ns()
         self._elapsed = 0.0  # [ns] of this clock
-        self._looked = self._asked = time.monotonic()
+        self._looked = self._asked = self._told = time.monotonic()
         self._end = inf  # [ns] of `_elapsed`, to be waited at
 
     def time(self) -> int:
@@ -51,6 +54,9 @@ class PacedClock:
         waits = wall - self._asked < _PATIENCE
         self._elapsed = min(further, max(self._end, self._elapsed)) if waits else further
         self._looked = wall
+        if self._elapsed < further and wall - self._told > _TOLD_AGAIN:
+            self._told = wall
+            self.tell_again()
         return self._began + round(self._elapsed)
 
     def wait_at(self, instant: int) -> None:
@@ -77,8 +83,8 @@ class Middleware(Protocol):
     def offer(self, service: str, take: Callable[[Answer], None]) -> None:
         """Offer a service of std_srvs/Trigger; what takes a request answers it, now or later."""
 
-    def work_until(self, instant: int) -> None:
-        """Do what comes until a time [ns]: messages and requests are taken here."""
+    def work_until(self, instant: int, patience: float = inf) -> None:
+        """Do what comes, messages and requests, until a time [ns] or for so long [s] of the wall."""
 
     def close(self) -> None:
         """Leave."""
@@ -121,11 +127,12 @@ class Calls:
             self._unanswered.discard(answered)
             answered.set_result((success, sentence))
 
-    def work_until(self, instant: int, clock: Callable[[], int]) -> None:
-        """Do calls until a time [ns] of a clock, those that wait already in any case."""
+    def work_until(self, instant: int, clock: Callable[[], int], patience: float = inf) -> None:
+        """Do calls, those that wait in any case, until a time [ns] or for so long [s] of the wall."""
+        end = time.monotonic() + patience
         for _ in range(self._waiting.qsize()):
             self._waiting.get()()
-        while (left := (instant - clock()) / NANOSECONDS) > 0.0:
+        while (left := (instant - clock()) / NANOSECONDS) > 0.0 and time.monotonic() < end:
             try:
                 call = self._waiting.get(timeout=min(max(left, _MIN_WAIT), _MAX_WAIT))
             except Empty:

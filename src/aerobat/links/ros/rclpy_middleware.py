@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from importlib import import_module
+from math import inf
 from threading import Thread
 from typing import Any
 
@@ -91,9 +92,9 @@ class RclpyMiddleware:
 
         self._waiting.create_service(trigger, service, respond, callback_group=self._services)
 
-    def work_until(self, instant: int) -> None:
+    def work_until(self, instant: int, patience: float = inf) -> None:
         """See `Middleware.work_until`."""
-        self._calls.work_until(instant, self.time)
+        self._calls.work_until(instant, self.time, patience)
 
     def close(self) -> None:
         """See `Middleware.close`."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from importlib import import_module
+from math import inf
 from typing import Any
 
 from aerobat.errors import BackendMissing, SpecError
@@ -83,9 +84,9 @@ class RospyMiddleware:
 
         self._rospy.Service(service, srv.Trigger, respond)
 
-    def work_until(self, instant: int) -> None:
+    def work_until(self, instant: int, patience: float = inf) -> None:
         """See `Middleware.work_until`."""
-        self._calls.work_until(instant, self.time)
+        self._calls.work_until(instant, self.time, patience)
 
     def close(self) -> None:
         """See `Middleware.close`."""

@@ -16,7 +16,8 @@ RVIZ = {
     "RclpyMiddleware": f"rviz2 -d {_FOLDER / 'ros2.rviz'}",
 }
 _MADE_UP_FOR = 5  # ticks that were missed and are done at once
-_CATCHING_UP = 5_000_000  # [ns] after more, in which messages are taken that a tick would count as lost
+_CATCHING_UP = 0.005  # [s] after more, in which messages are taken that a tick would count as lost;
+# of the wall too, for a clock may stand still until this very node goes on
 
 
 class Node(Protocol):
@@ -43,7 +44,7 @@ def run(node: Node, ros: Middleware, rate: float, seconds: float = inf) -> None:
         node.tick(tick * period / NANOSECONDS)
         present = (ros.time() - node.origin) // period
         if present - tick > _MADE_UP_FOR:
-            ros.work_until(ros.time() + _CATCHING_UP)
+            ros.work_until(ros.time() + round(_CATCHING_UP * NANOSECONDS), _CATCHING_UP)
             tick = present
         else:
             tick += 1

@@ -56,7 +56,10 @@ class VehicleNode:
         self._period, self._due = 1.0 / rate, 0.0
         self._send_odometry = ros.publisher(odometry, topics.KIND_OF_ODOMETRY)
         self._clock = clock
-        self._send_clock = None if clock is None else ros.publisher(topics.CLOCK, topics.KIND_OF_CLOCK)
+        self._told = self.origin  # [ns] the last time that was told
+        if clock is not None:
+            self._send_clock = ros.publisher(topics.CLOCK, topics.KIND_OF_CLOCK)
+            clock.tell_again = self._tell_time
         self._refused = ""  # the last reason, so that it is told once
         ros.subscribe(goal, topics.KIND_OF_GOAL, self._take_goal)
 
@@ -70,9 +73,13 @@ class VehicleNode:
             stamp = self._stamp(self.vehicle.time)
             self._send_odometry(self._messages.odometry(stamp, self.vehicle.state))
             self._due = max(self._due + self._period, now)
-            if self._send_clock is not None:
-                time = self._messages.time("Time", self._stamp(now))
-                self._send_clock(self._messages.make(topics.KIND_OF_CLOCK, clock=time))
+            if self._clock is not None:
+                self._told = self._stamp(now)
+                self._tell_time()
+
+    def _tell_time(self) -> None:
+        time = self._messages.time("Time", self._told)
+        self._send_clock(self._messages.make(topics.KIND_OF_CLOCK, clock=time))
 
     def _stamp(self, time: float) -> int:
         return self.origin + round(time * NANOSECONDS)
