@@ -7,7 +7,7 @@ from collections.abc import Callable
 from concurrent.futures import Future
 from importlib import import_module
 from math import inf
-from queue import Empty, SimpleQueue
+from queue import Empty, Queue
 from typing import Any, Protocol, TypeAlias
 
 from aerobat.errors import SpecError
@@ -103,7 +103,8 @@ class Calls:
     """Calls that the threads of ROS ask for, done by the thread that `work`s."""
 
     def __init__(self) -> None:
-        self._waiting: SimpleQueue[Callable[[], None]] = SimpleQueue()
+        # no SimpleQueue: its `get` may wait for ever where a busy machine lets a short timeout pass within it
+        self._waiting: Queue[Callable[[], None]] = Queue()
         self._unanswered: set[Future[tuple[bool, str]]] = set()
 
     def put(self, call: Callable[[], None]) -> None:
