@@ -76,13 +76,13 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=0)
     asked = parser.parse_args()
     with tempfile.TemporaryDirectory() as folder:
-        tree = _copy(Path(folder))
+        tree = copied_tree(Path(folder))
         for name in asked.rooms or rooms:
             _mutate(rooms[name], tree, asked.sample, asked.seed)
 
 
-def _copy(folder: Path) -> Path:
-    """What git knows and does not ignore, as it stands."""
+def copied_tree(folder: Path) -> Path:
+    """Copy what git knows and does not ignore, as it stands, to a folder."""
     command = ["git", "ls-files", "--cached", "--others", "--exclude-standard"]
     listed = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True).stdout
     for name in listed.splitlines():
@@ -109,20 +109,25 @@ def _mutate(room: Room, tree: Path, count: int, seed: int) -> None:
         _report(room, db, total)
 
 
-def _sample(db: WorkDB, tree: Path, count: int, seed: int) -> int:
-    """Skip all but so many mutants that are worth a run; return how many these are drawn from."""
+def worthy(db: WorkDB, tree: Path) -> list[tuple[MutationSpec, str]]:
+    """Return the mutations that are worth a run, each with its job, in a fixed order."""
     mutations = sorted(((item.mutations[0], item.job_id) for item in db.work_items), key=_place_of)
-    left_alone = {path: _left_alone(tree / path) for path in {one.module_path for one, _ in mutations}}
-    worthy = [
-        job
+    spans = {path: _left_alone(tree / path) for path in {one.module_path for one, _ in mutations}}
+    return [
+        (one, job)
         for one, job in mutations
         if OPERATORS.fullmatch(one.operator_name)
-        and not any(start <= one.start_pos < end for start, end in left_alone[one.module_path])
+        and not any(start <= one.start_pos < end for start, end in spans[one.module_path])
     ]
-    random.Random(seed).shuffle(worthy)
-    rest = {job for _, job in mutations} - set(worthy[:count])
+
+
+def _sample(db: WorkDB, tree: Path, count: int, seed: int) -> int:
+    """Skip all but so many mutants that are worth a run; return how many these are drawn from."""
+    jobs = [job for _, job in worthy(db, tree)]
+    random.Random(seed).shuffle(jobs)
+    rest = {item.job_id for item in db.work_items} - set(jobs[:count])
     db.set_multiple_results(rest, WorkResult(WorkerOutcome.SKIPPED))
-    return len(worthy)
+    return len(jobs)
 
 
 def _place_of(mutation: tuple[MutationSpec, str]) -> tuple[str, Place, str, int]:
@@ -132,7 +137,7 @@ def _place_of(mutation: tuple[MutationSpec, str]) -> tuple[str, Place, str, int]
 
 
 def _left_alone(path: Path) -> list[tuple[Place, Place]]:
-    """Where types, decorators and `strict=` stand."""
+    """Return where types, decorators and `strict=` stand."""
     spans = []
     for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
         parts = [getattr(node, "annotation", None), getattr(node, "returns", None)]

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import os
 import signal
-from collections.abc import Iterator
+from collections.abc import Generator, Iterator
 
 import pytest
 from _pytest.mark.expression import Expression
 from hypothesis import settings
 
+import budget
 from aerobat.planning.planners import PLANNERS
 from aerobat.problem.maneuvers.maneuver import MANEUVERS
 from suites import FAST, FULL, GROUPS, missing, register_profiles
@@ -19,12 +20,14 @@ os.environ["AEROBAT_PROGRESS"] = "1e6"
 # ffmpeg is started without a fork of Python's own, which JAX's threads, of other tests, may lock up
 os.environ["IMAGEIO_FFMPEG_NO_PREVENT_SIGINT"] = "1"
 
+SPENT = pytest.StashKey[float]()  # [s] of the processor, by a test with its fixtures
 register_profiles()
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
-    """Add the option of the full suite."""
+    """Add the options of the two suites."""
     parser.addoption("--full", action="store_true", help=f"Run all tests: {', '.join(GROUPS)} too.")
+    parser.addoption("--no-budget", action="store_true", help="Let any test take long, as beside other work.")
 
 
 def pytest_configure(config: pytest.Config) -> None:
@@ -41,6 +44,35 @@ def pytest_configure(config: pytest.Config) -> None:
         sentence = missing(group)
         if sentence and chosen.evaluate(lambda name, group=group, **_: name == group):
             raise pytest.UsageError(sentence)
+
+
+@pytest.hookimpl(wrapper=True, tryfirst=True)
+def pytest_runtest_setup(item: pytest.Item) -> Generator[None, None, None]:
+    """Begin to count a test's time of the processor; fail a test whose part of the system is not there."""
+    item.stash[SPENT] = -budget.processor_seconds()
+    for group in GROUPS:
+        if item.get_closest_marker(group) and (sentence := missing(group)):
+            pytest.fail(sentence, pytrace=False)
+    return (yield)
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_makereport(
+    item: pytest.Item,
+) -> Generator[None, pytest.TestReport, pytest.TestReport]:
+    """Fail a test that takes long and belongs to no group."""
+    report = yield
+    options = item.config.option
+    is_judged = not (options.full or options.no_budget) and budget.is_measured()
+    if is_judged and report.when == "call" and report.passed:
+        spent = item.stash[SPENT] + budget.processor_seconds()
+        if spent > budget.limit() and not any(item.get_closest_marker(name) for name in GROUPS):
+            report.outcome = "failed"
+            report.longrepr = (
+                f"{item.nodeid} took {spent:.1f} s of the processor, more than {budget.limit():.1f} s. "
+                "Shorten it, or mark it slow."
+            )
+    return report
 
 
 @pytest.fixture(autouse=True)

@@ -22,9 +22,10 @@ VEHICLE = load_vehicle("agile-quad")
 STENCIL = 1e-6  # of a command's size: what differences of samples are good for
 
 
-def test_dense_sampling_of_commands_never_refutes_a_certificate_nor_shows_a_refusal_needless():
+@pytest.mark.parametrize("seeds", [range(6, 10), pytest.param(range(10, 26), marks=pytest.mark.slow)])
+def test_dense_sampling_of_commands_never_refutes_a_certificate_nor_shows_a_refusal_needless(seeds):
     accepted = 0
-    for seed in range(40):
+    for seed in seeds:
         flight = random_flight(seed, lags=True)
         certificate = certify(flight.trajectory, flight.vehicle, flight.environment)
         found = sampled(flight, 10_000)
@@ -36,10 +37,10 @@ def test_dense_sampling_of_commands_never_refutes_a_certificate_nor_shows_a_refu
             assert certificate.certified, (seed, certificate.why)
         assert not certificate.discontinuities
         assert certified_margin(flight, certificate) <= found.margin + 3e-4, seed
-    assert 10 < accepted < 30
+    assert 0.25 < accepted / len(seeds) < 0.75
 
 
-@pytest.mark.parametrize("seed", range(10))
+@pytest.mark.parametrize("seed", [*range(3), *(pytest.param(k, marks=pytest.mark.slow) for k in range(3, 6))])
 def test_commands_are_enclosed_tightly_and_taken_where_they_are_said_to_be(seed):
     flight = random_flight(seed, lags=True)
     certificate = certify(flight.trajectory, flight.vehicle, flight.environment)

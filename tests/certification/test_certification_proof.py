@@ -55,9 +55,10 @@ def extremes_of(flight: Flight, times: np.ndarray) -> dict[tuple[str, Side], np.
     return series
 
 
-def test_dense_sampling_never_refutes_a_certificate_nor_shows_that_a_refusal_was_needless():
+@pytest.mark.parametrize("seeds", [range(10), pytest.param(range(10, 30), marks=pytest.mark.slow)])
+def test_dense_sampling_never_refutes_a_certificate_nor_shows_that_a_refusal_was_needless(seeds):
     accepted = 0
-    for seed in range(40):
+    for seed in seeds:
         flight = random_flight(seed)
         certificate, found = certificate_of(flight), sampled(flight, 20_000)
         accepted += certificate.certified
@@ -67,7 +68,7 @@ def test_dense_sampling_never_refutes_a_certificate_nor_shows_that_a_refusal_was
         if found.margin >= 0.01 and found.determined:
             assert certificate.certified, (seed, certificate.why)
         assert certified_margin(flight, certificate) <= found.margin + 1e-5, seed
-    assert 10 < accepted < 30
+    assert 0.25 < accepted / len(seeds) < 0.75
 
 
 @pytest.mark.parametrize("seed", range(8))

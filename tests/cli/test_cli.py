@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -11,11 +12,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from aerobat.interchange import write_columns
 from aerobat.interchange.csv import read_csv
 from aerobat.problem import problem_names
 from aerobat.simulation import load_flight
 from aerobat.vehicle import vehicle_names
-from command_lines import run
+from command_lines import code, run, without_pictures
+from shared_plans import shared_plan
 
 PLAN_KEYS = {
     "planner", "order", "intervals", "dt_s", "duration_s", "cost", "backend", "nodes", "solve_time_s",
@@ -27,6 +30,35 @@ FLIGHT_KEYS = {
 }  # fmt: skip
 
 PAPERS = ("flip-roll", "flip-roll-translation", "flip-pitch", "half-flip", "line", "section-v")
+
+
+MARS = """
+name = "mars"
+heading_deg = 90.0
+start = { position = [0.0, 0.0, 0.0] }
+goal = { position = [3.0, 0.0, 0.0] }
+environment = { gravity = 3.7, wind = [0.0, 1.0, 0.0] }
+maneuver = { kind = "line" }
+limits = { velocity = 2.5 }
+"""
+
+
+@pytest.fixture
+def unpictured(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Reports without their pictures, which take longer than flights."""
+    without_pictures(monkeypatch)
+
+
+@pytest.fixture(scope="module")
+def mars(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The folder of a flight on another planet, of a vehicle that `check` does not assume by itself."""
+    folder = tmp_path_factory.mktemp("mars")
+    problem = folder / "mars.toml"
+    problem.write_text(MARS)
+    with pytest.MonkeyPatch.context() as patch:
+        without_pictures(patch)
+        assert code("fly", problem, "--vehicle", "crazyflie", "--out", folder / "run") == 0
+    return folder / "run"
 
 
 @pytest.fixture(autouse=True)
@@ -57,10 +89,13 @@ def test_fly_writes_the_plan_the_flight_the_picture_and_the_report(capsys) -> No
     assert read_csv(folder / "plan.csv").duration == pytest.approx(report["plan"]["duration_s"])
     assert load_flight(folder / "flight.npz").times[-1] == pytest.approx(report["plan"]["duration_s"])
     assert (folder / "report.png").read_bytes().startswith(b"\x89PNG")
-    for word in ("planner", "stages", "rotors", "position error", "gate", "saturated"):
+    for word in ("planner", "stages", "rotors", "position error", "gate", "saturated", "flyability"):
         assert word in out
+    assert "the reserve left" in out
+    assert re.search(r"controller +full", out)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("problem", [*PAPERS, "power-loop"])
 def test_json_is_the_report_and_nothing_else(problem: str, capsys) -> None:
     code, out, err = run(capsys, "fly", problem, "--json", "--out", "here")
@@ -68,14 +103,21 @@ def test_json_is_the_report_and_nothing_else(problem: str, capsys) -> None:
     assert json.loads(out) == json.loads(Path("here/report.json").read_text())
 
 
+@pytest.mark.usefixtures("unpictured")
 def test_plan_stops_after_planning(capsys) -> None:
-    code, out, _ = run(capsys, "plan", "half-flip", "--json")
-    assert code == 0
-    assert "flight" not in json.loads(out)
+    code, out, err = run(capsys, "plan", "half-flip", "--json")
+    assert (code, err) == (0, "")
+    report = json.loads(out)
+    assert report == json.loads(Path("out/half-flip/report.json").read_text())
+    assert "flight" not in report
+    flyability = report["plan"]["flyability"]
+    assert flyability["flies"] is True
+    assert 0.0 < flyability["error_m"] < flyability["disturbed_error_m"] < 0.05
     written = sorted(p.name for p in Path("out/half-flip").iterdir())
     assert written == ["half-flip.plan", "plan.csv", "report.json", "report.png", "run.toml"]
 
 
+@pytest.mark.slow
 def test_paper_mode_prints_the_known_optimum(capsys) -> None:
     _, out, _ = run(capsys, "fly", "flip-roll", "--paper", "--json")
     report = json.loads(out)
@@ -83,31 +125,28 @@ def test_paper_mode_prints_the_known_optimum(capsys) -> None:
     assert (report["plan"]["order"], report["plan"]["dt_s"]) == (3, 0.1)
     assert report["vehicle"] == "hexarotor"
     assert report["flight"]["max_position_error_m"] < 0.05
+    assert report["flight"]["controller"] == "full"
 
 
-def test_the_papers_own_law_flies_where_it_is_asked_for_and_the_full_one_elsewhere(capsys) -> None:
+@pytest.mark.usefixtures("unpictured")
+def test_the_papers_own_law_flies_where_it_is_asked_for(capsys) -> None:
     """As the paper's half-flip goes with nothing beyond its law: 98 cm and 124° off."""
-    flights = {}
-    for options in ((), ("--controller", "paper")):
-        _, out, _ = run(capsys, "fly", "half-flip", "--paper", *options, "--json")
-        flight = json.loads(out)["flight"]
-        flights[flight["controller"]] = flight
-    assert flights["full"]["max_position_error_m"] < 0.03
-    assert flights["paper"]["max_position_error_m"] == pytest.approx(0.985, abs=0.005)
-    assert flights["paper"]["max_attitude_error_deg"] == pytest.approx(124.3, abs=0.5)
+    _, out, _ = run(capsys, "fly", "half-flip", "--paper", "--controller", "paper", "--json")
+    report = json.loads(out)
+    assert (report["vehicle"], report["plan"]["order"]) == ("hexarotor", 3)
+    flight = report["flight"]
+    assert flight["controller"] == "paper"
+    assert flight["max_position_error_m"] == pytest.approx(0.985, abs=0.005)
+    assert flight["max_attitude_error_deg"] == pytest.approx(124.3, abs=0.5)
 
 
-def test_every_report_says_how_the_plan_flew_and_which_controller_did(capsys) -> None:
-    _, out, _ = run(capsys, "fly", "half-flip")
-    assert "flyability" in out
-    assert "the reserve left" in out
-    assert re.search(r"controller +full", out)
-    _, out, _ = run(capsys, "plan", "half-flip", "--json")
-    flyability = json.loads(out)["plan"]["flyability"]
-    assert flyability["flies"] is True
-    assert 0.0 < flyability["error_m"] < flyability["disturbed_error_m"] < 0.05
+@pytest.mark.slow
+def test_the_full_law_flies_the_papers_half_flip_as_it_was_planned(capsys) -> None:
+    _, out, _ = run(capsys, "fly", "half-flip", "--paper", "--json")
+    assert json.loads(out)["flight"]["max_position_error_m"] < 0.03
 
 
+@pytest.mark.usefixtures("unpictured")
 def test_the_gates_tilt_is_what_angle_says(capsys) -> None:
     _, out, _ = run(capsys, "fly", "half-flip", "--angle", "40", "--json")
     flight = load_flight("out/half-flip-40deg/flight.npz")
@@ -164,6 +203,7 @@ def test_nothing_heavy_is_imported_before_it_is_needed() -> None:
     assert done.stdout.strip() == "[]"
 
 
+@pytest.mark.process
 def test_the_main_job_needs_neither_pyplot_nor_scipy() -> None:
     probe = (
         "import sys\nfrom aerobat.cli import main\nmain(['fly', 'line', '--json'])\n"
@@ -173,69 +213,61 @@ def test_the_main_job_needs_neither_pyplot_nor_scipy() -> None:
     assert done.stderr.strip() == "[]"
 
 
-MARS = """
-name = "mars"
-heading_deg = 90.0
-start = { position = [0.0, 0.0, 0.0] }
-goal = { position = [3.0, 0.0, 0.0] }
-environment = { gravity = 3.7, wind = [0.0, 1.0, 0.0] }
-maneuver = { kind = "line" }
-limits = { velocity = 2.5 }
-"""
-
-
-def test_check_judges_what_was_planned_not_what_it_would_assume(capsys) -> None:
+def test_check_judges_what_was_planned_not_what_it_would_assume(mars: Path, capsys) -> None:
     """The plan's own vehicle, heading, gravity, wind and limits: the certificate is the plan's."""
-    Path("mars.toml").write_text(MARS)
-    run(capsys, "plan", "mars.toml", "--vehicle", "crazyflie")
-    planned = json.loads(Path("out/mars-crazyflie/report.json").read_text())["plan"]["certificate"]
-    code, out, err = run(capsys, "check", "out/mars-crazyflie", "--json")
+    planned = json.loads((mars / "report.json").read_text())["plan"]["certificate"]
+    code, out, err = run(capsys, "check", mars, "--json")
     assert (code, err) == (0, "")
     assert json.loads(out) == planned
-    code, out, _ = run(capsys, "check", "out/mars-crazyflie/mars.plan", "--vehicle", "hexarotor", "--json")
+    code, out, _ = run(capsys, "check", mars / "mars.plan", "--vehicle", "hexarotor", "--json")
     assert json.loads(out) != planned
 
 
-def test_check_says_what_it_assumes_of_a_file_that_holds_no_more_than_a_path(capsys) -> None:
-    Path("mars.toml").write_text(MARS)
-    run(capsys, "plan", "mars.toml")
-    _, out, _ = run(capsys, "check", "out/mars/plan.csv")
+def test_check_says_what_it_assumes_of_a_file_that_holds_no_more_than_a_path(mars: Path, capsys) -> None:
+    _, out, _ = run(capsys, "check", mars / "plan.csv")
     assert "assumed" in out
     assert "gravity 9.81 m/s²" in out
-    assert "assumed" not in run(capsys, "check", "out/mars")[1]
+    assert "assumed" not in run(capsys, "check", mars)[1]
 
 
-def test_a_saved_plan_is_flown_as_it_is(capsys) -> None:
-    Path("mars.toml").write_text(MARS)
-    run(capsys, "fly", "mars.toml")
-    code, _, err = run(capsys, "fly", "out/mars/mars.plan", "--out", "again")
+@pytest.mark.usefixtures("unpictured")
+def test_a_saved_plan_is_flown_as_it_is(mars: Path, capsys) -> None:
+    code, _, err = run(capsys, "fly", mars / "mars.plan", "--out", "again")
     assert (code, err) == (0, "")
-    first, again = (load_flight(Path(folder) / "flight.npz") for folder in ("out/mars", "again"))
+    first, again = (load_flight(folder / "flight.npz") for folder in (mars, Path("again")))
     np.testing.assert_array_equal(first.states.q_world_body, again.states.q_world_body)
-    code, _, err = run(capsys, "fly", "out/mars/mars.plan", "--order", "5")
+    code, _, err = run(capsys, "fly", mars / "mars.plan", "--order", "5")
     assert code == 2
     assert "--order plans anew" in err
-    code, _, err = run(capsys, "fly", "out/mars/mars.plan", "--angle", "0")
+    code, _, err = run(capsys, "fly", mars / "mars.plan", "--angle", "0")
     assert code == 2
     assert "--angle plans anew" in err
 
 
-def test_a_folder_that_cannot_be_filled_leaves_the_earlier_run_whole(capsys, monkeypatch) -> None:
-    run(capsys, "fly", "line")
-    before = {path.name: path.read_bytes() for path in Path("out/line").iterdir()}
+@pytest.mark.usefixtures("unpictured")
+def test_a_folder_that_cannot_be_filled_leaves_the_earlier_run_whole(mars: Path, capsys, monkeypatch) -> None:
+    shutil.copytree(mars, "out/mars")
+    before = {path.name: path.read_bytes() for path in Path("out/mars").iterdir()}
 
     def fail(*_: object) -> bytes:
         raise OSError(28, "No space left on device")
 
     monkeypatch.setattr("aerobat.cli.runs.folder.write_record", fail)
-    code, _, err = run(capsys, "fly", "line", "--order", "5")
+    code, _, err = run(capsys, "fly", "out/mars", "--out", "out/mars")
     assert code == 2
-    assert err == "aerobat: cannot write out/line: No space left on device\n"
-    assert {path.name: path.read_bytes() for path in Path("out/line").iterdir()} == before
-    assert [path.name for path in Path("out").iterdir()] == ["line"]
+    assert err == "aerobat: cannot write out/mars: No space left on device\n"
+    assert {path.name: path.read_bytes() for path in Path("out/mars").iterdir()} == before
+    assert [path.name for path in Path("out").iterdir()] == ["mars"]
 
 
-@pytest.mark.parametrize("command", [["problems"], ["plan", "line", "--json"], ["fly", "--help"]])
+@pytest.mark.parametrize(
+    "command",
+    [
+        ["problems"],
+        pytest.param(["plan", "line", "--json"], marks=pytest.mark.process),
+        pytest.param(["fly", "--help"], marks=pytest.mark.process),
+    ],
+)
 def test_a_reader_that_has_enough_ends_a_command_without_a_word(command: list[str], tmp_path: Path) -> None:
     """As `aerobat ... | head` does: the pipe is closed before anything is read."""
     process = subprocess.Popen(
@@ -250,8 +282,8 @@ def test_a_reader_that_has_enough_ends_a_command_without_a_word(command: list[st
 
 
 def test_check_says_commands_rates_and_gates_in_words_and_in_numbers(capsys) -> None:
-    run(capsys, "plan", "half-flip", "--order", "5")
-    code, out, err = run(capsys, "check", "out/half-flip")
+    shared_plan("half-flip").save("half-flip.plan")
+    code, out, err = run(capsys, "check", "half-flip.plan")
     assert (code, err) == (0, "")
     rows = out.splitlines()
     assert (
@@ -261,7 +293,7 @@ def test_check_says_commands_rates_and_gates_in_words_and_in_numbers(capsys) -> 
     assert any(row.startswith("body rate") and "15 rad/s" in row for row in rows)
     assert any(row.startswith("specific thrust along") and "0 m/s²" in row for row in rows)
     assert any(row.startswith("gate 'gate'") and "holds" in row for row in rows)
-    findings = json.loads(run(capsys, "check", "out/half-flip", "--json")[1])["findings"]
+    findings = json.loads(run(capsys, "check", "half-flip.plan", "--json")[1])["findings"]
     assert {f["quantity"] for f in findings if f["gate"] == "gate"} >= {
         "attitude",
         "speed through",
@@ -272,8 +304,8 @@ def test_check_says_commands_rates_and_gates_in_words_and_in_numbers(capsys) -> 
 
 
 def test_check_names_the_vehicle_that_it_assumes_of_a_bare_path(capsys) -> None:
-    run(capsys, "plan", "line", "--order", "5")
+    write_columns(shared_plan("line"), "plan.csv")
     for options, assumed in (([], True), (["--vehicle", "agile-quad"], False)):
-        out = " ".join(run(capsys, "check", "out/line/plan.csv", *options)[1].split())
+        out = " ".join(run(capsys, "check", "plan.csv", *options)[1].split())
         assert "no limits, stages or gates of a problem" in out
         assert ("the vehicle agile-quad" in out) is assumed

@@ -8,33 +8,38 @@ from pathlib import Path
 
 import pytest
 
+import aerobat as ab
 from aerobat import cli
 from aerobat.cli.entry import ExitCode
-from aerobat.planning import load_plan
 from aerobat.simulation import Outcome
-from command_lines import code
+from command_lines import code, without_pictures
 from places import ROOT
+from shared_plans import shared_plan
 
-LINE = ("line", "--order", "5")  # its rotor thrusts are continuous: rotors with lag can follow it
+JERK = ab.Miqp(order=3)  # the paper's, whose body rates jump, which no moment can do
 
 
 @pytest.fixture(autouse=True)
 def _elsewhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
+    without_pictures(monkeypatch)
 
 
-@pytest.mark.parametrize("command", [["fly", *LINE], ["plan", *LINE], ["vehicles"], ["--help"]])
+@pytest.mark.parametrize("command", [["fly", "line.plan"], ["check", "line.plan"], ["vehicles"], ["--help"]])
 def test_what_went_well_exits_with_0(command: list[str]) -> None:
+    shared_plan("line").save("line.plan")
     assert code(*command) == 0
 
 
-def test_a_plan_that_is_not_certified_exits_with_1_and_is_written() -> None:
-    """Order 3, the paper's, has body rates that jump, which no moment can do."""
-    assert code("plan", "line", "--order", "3", "--out", "jerk") == 1
-    assert code("fly", "line", "--order", "3") == 1
-    assert code("check", "jerk") == 1
-    assert Path("jerk/report.json").exists()
-    assert Path("out/line/flight.npz").exists()
+@pytest.mark.parametrize(
+    ("command", "written"),
+    [pytest.param("plan", "report.json", marks=pytest.mark.slow), ("fly", "flight.npz"), ("check", "")],
+)
+def test_a_plan_that_is_not_certified_exits_with_1_and_is_written(command: str, written: str) -> None:
+    shared_plan("line", planner=JERK).save("jerk.plan")
+    options = ["--out", "jerk"] if written else []
+    assert code(command, "jerk.plan", *options) == 1
+    assert not written or Path("jerk", written).exists()
 
 
 def test_a_flight_that_went_wrong_exits_with_1_and_is_written(monkeypatch) -> None:
@@ -44,13 +49,13 @@ def test_a_flight_that_went_wrong_exits_with_1_and_is_written(monkeypatch) -> No
         return replace(score(*arguments), outcome=Outcome.MISSED_GATE)
 
     monkeypatch.setattr("aerobat.cli.commands.fly.score", missed)
-    assert code("fly", *LINE) == 1
-    assert Path("out/line/flight.npz").exists()
+    shared_plan("line").save("line.plan")
+    assert code("fly", "line.plan", "--out", "missed") == 1
+    assert Path("missed/flight.npz").exists()
 
 
 def test_a_certified_plan_that_does_not_fly_exits_with_1() -> None:
-    code("plan", *LINE)
-    plan = load_plan("out/line/line.plan")
+    plan = shared_plan("line")
     assert plan.flyability is not None
     replace(plan, flyability=replace(plan.flyability, error=0.3)).save("crashing.plan")
     assert code("plan", "crashing.plan", "--out", "again") == 1

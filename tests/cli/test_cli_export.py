@@ -11,13 +11,15 @@ import pytest
 import aerobat as ab
 from aerobat import cli
 from aerobat.interchange.exports import FORMATS
+from shared_plans import shared_plan
 
 
 @pytest.fixture(scope="module")
 def kept(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The folder of a run."""
     folder = tmp_path_factory.mktemp("runs") / "line"
-    cli.main(["plan", "line", "--order", "5", "--out", str(folder)])
+    folder.mkdir()
+    shared_plan("line").save(folder / "line.plan")
     return folder
 
 

@@ -6,6 +6,8 @@ import sys
 import sysconfig
 from pathlib import Path
 
+import pytest
+
 HOSTILE = (*sys.stdlib_module_names, "sitecustomize", "numpy", "matplotlib", "PIL", "llvmlite", "aerobat")
 WATCHED = """
 import sys, matplotlib.font_manager  # at its first use ever, matplotlib asks the system for its fonts
@@ -16,6 +18,9 @@ from aerobat.cli import main
 main(["fly", "line", "--json"])
 assert not started, started
 """
+
+
+pytestmark = pytest.mark.process
 
 
 def test_no_code_of_the_working_folder_runs(tmp_path: Path) -> None:

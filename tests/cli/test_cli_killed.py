@@ -52,10 +52,8 @@ for function, nth in json.loads(sys.argv[1]):
 """
 INSTANTS = [  # a function on the way, and which of its calls
     ["whole_folder", 1],
-    ["save", 1],
     ["write_columns", 1],
     ["write_record", 1],
-    ["_sync", 1],
     ["_sync", 6],
     ["end_interrupts", 1],
     ["_exchange", 1],
@@ -65,6 +63,7 @@ INSTANTS = [  # a function on the way, and which of its calls
 ]
 
 
+@pytest.mark.process
 @pytest.mark.skipif(sys.platform != "linux", reason="two folders change places at once on Linux")
 def test_killed_at_any_instant_a_folder_holds_the_old_run_or_the_new_one_whole(tmp_path: Path) -> None:
     done = subprocess.run(

@@ -15,13 +15,14 @@ from pathlib import Path
 import pytest
 
 from aerobat import cli
-from reporting_cases import planned
+from aerobat.viewer.live.view_live import LiveView
+from shared_plans import shared_plan
 
 
 @pytest.fixture
 def served(tmp_path: Path) -> Iterator[tuple[subprocess.Popen[str], str]]:
     """The command as a process of its own, and the address that it says."""
-    planned("line").save(tmp_path / "line.plan")
+    shared_plan("line").save(tmp_path / "line.plan")
     command = [sys.executable, "-m", "aerobat", "view", "--live", "line.plan", "--no-browser", "--json"]
     process = subprocess.Popen(
         command, cwd=tmp_path, text=True, stdout=subprocess.PIPE, stderr=subprocess.PIPE
@@ -41,6 +42,25 @@ def ask(address: str, number: int, values: dict[str, float]) -> dict[str, dict[s
         return json.load(answer)
 
 
+def test_it_serves_until_an_interrupt_which_is_no_failure(tmp_path: Path, monkeypatch, capsys) -> None:
+    shared_plan("line").save(tmp_path / "line.plan")
+    read: list[tuple[str, bytes]] = []
+
+    def read_and_interrupt(view: LiveView) -> None:
+        with urllib.request.urlopen(view.address) as page:
+            read.append((view.address, page.read()))
+        signal.raise_signal(signal.SIGINT)
+
+    monkeypatch.setattr(LiveView, "wait", read_and_interrupt)
+    cli.main(["view", "--live", str(tmp_path / "line.plan"), "--no-browser", "--json"])
+    ((address, page),) = read
+    assert json.loads(capsys.readouterr().out) == {"address": address}
+    assert b"line \xc2\xb7 agile-quad" in page
+    with pytest.raises(OSError, match="refused"):
+        urllib.request.urlopen(address)
+
+
+@pytest.mark.process
 def test_it_answers_until_an_interrupt_which_ends_it_well(served) -> None:
     process, address = served
     assert address.startswith("http://127.0.0.1:")
@@ -54,6 +74,7 @@ def test_it_answers_until_an_interrupt_which_ends_it_well(served) -> None:
     assert process.returncode == 0
 
 
+@pytest.mark.process
 def test_an_interrupt_while_something_is_planned_ends_it_too(served) -> None:
     process, address = served
     assert ask(address, 1, {})["verdict"]["is_well"]

@@ -71,6 +71,7 @@ def test_a_period_that_is_none_is_refused(text: str, monkeypatch: pytest.MonkeyP
         period()
 
 
+@pytest.mark.process
 def test_in_a_pipe_lines_come_while_a_solver_runs_and_standard_output_has_none(tmp_path: Path) -> None:
     """As often as can be: which of them come depends on the machine, that some do does not."""
     done = subprocess.run(

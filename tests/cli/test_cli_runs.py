@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 import tomllib
 from dataclasses import replace
 from pathlib import Path
@@ -12,11 +13,12 @@ import tomli_w
 
 from aerobat.cli.runs.record import RunRecord, read_record
 from aerobat.interchange import read_trajectory
-from aerobat.planning import Miqp, load_plan
+from aerobat.planning import MinSnap, Miqp, load_plan
 from aerobat.problem import load_problem
 from aerobat.simulation import load_flight
 from aerobat.vehicle import load_vehicle
-from command_lines import code
+from command_lines import code, without_pictures
+from shared_plans import shared_plan
 
 RUNS = {
     "a flight under conditions": ("fly", "line", "--conditions", "lab", "--seed", "7", "--order", "5"),
@@ -44,15 +46,27 @@ maneuver = { kind = "line" }
 """
 
 
+@pytest.fixture(scope="module")
+def kept(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The folder of a run."""
+    folder = tmp_path_factory.mktemp("runs") / "kept"
+    with pytest.MonkeyPatch.context() as patch:
+        without_pictures(patch)
+        assert code("plan", "line", "--planner", "min-snap", "--out", folder) == 0
+    return folder
+
+
 @pytest.fixture(autouse=True)
 def _elsewhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     from aerobat.vehicle import write_vehicle
 
     monkeypatch.chdir(tmp_path)
+    without_pictures(monkeypatch)
     Path("mine.toml").write_text(MINE)
     write_vehicle(replace(load_vehicle("agile-quad"), name="heavy", mass=1.1), "heavy.toml")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("run", RUNS)
 def test_a_run_repeated_from_its_folder_alone_gives_the_same_bits(run: str, capsys) -> None:
     well = code(*RUNS[run], "--out", "first")
@@ -71,21 +85,30 @@ def test_a_run_repeated_from_its_folder_alone_gives_the_same_bits(run: str, caps
 
 
 def test_a_saved_plan_that_was_flown_is_flown_again_not_planned(capsys) -> None:
-    code("plan", "line", "--order", "5")
-    assert code("fly", "out/line", "--conditions", "lab") == 0
-    assert code("repeat", "out/line-flown-lab") == 0
+    shared_plan("line").save("line.plan")
+    Path("weak.toml").write_text("mass = 0.03\n")
+    assert code("fly", "line.plan", "--conditions", "weak.toml") == 0
+    assert code("repeat", "out/line-flown-weak") == 0
     assert "the same as" in capsys.readouterr().err
 
 
+def test_what_is_planned_anew_from_a_folder_alone_is_the_same_bit_by_bit(kept: Path, capsys) -> None:
+    assert code("repeat", kept, "--out", "again") == 0
+    assert capsys.readouterr().err == f"aerobat: the same as in {kept}/, bit for bit\n"
+    first, again = (read_trajectory(folder) for folder in (kept, "again"))
+    np.testing.assert_array_equal(first.coefficients, again.coefficients)
+    assert (kept / "run.toml").read_text() == Path("again/run.toml").read_text()
+
+
 def test_a_comparison_is_repeated_too(capsys, monkeypatch) -> None:
-    monkeypatch.setattr("aerobat.studies.compare.registered_planners", lambda: {"miqp": Miqp})
+    monkeypatch.setattr("aerobat.studies.compare.registered_planners", lambda: {"min-snap": MinSnap})
     assert code("compare", "line") == 0
     assert code("repeat", "out/line-compare") == 0
     assert "the same as in out/line-compare/" in capsys.readouterr().err
 
 
-def test_a_repetition_that_comes_to_something_else_says_what_and_exits_with_1(capsys) -> None:
-    code("fly", "line", "--order", "5")
+def test_a_repetition_that_comes_to_something_else_says_what_and_exits_with_1(kept: Path, capsys) -> None:
+    shutil.copytree(kept, "out/line")
     record = tomllib.loads(Path("out/line/run.toml").read_text())
     record["problem"]["goal"]["position"] = [8.0, 0.0, 0.0]
     record["versions"]["numpy"] = "1.0"
@@ -123,18 +146,20 @@ def test_a_folders_name_holds_nothing_that_leads_elsewhere() -> None:
     assert ":" not in record.folder.name
 
 
-def test_an_earlier_run_that_is_replaced_is_said_and_leaves_nothing_behind(capsys) -> None:
-    code("fly", "line", "--order", "5")
-    assert capsys.readouterr().out.endswith("written to out/line/\n")
-    code("plan", "line", "--order", "5")
+def test_an_earlier_run_that_is_replaced_is_said_and_leaves_nothing_behind(kept: Path, capsys) -> None:
+    shared_plan("line").save("line.plan")
+    shutil.copytree(kept, "out/line")
+    Path("out/line/flight.npz").write_bytes(b"of an earlier flight")
+    code("plan", "line.plan", "--out", "out/line")
     assert capsys.readouterr().out.endswith("written to out/line/, in the place of an earlier run\n")
     assert not Path("out/line/flight.npz").exists()
 
 
 def test_check_judges_a_folder_for_the_vehicle_that_flew(capsys) -> None:
-    code("fly", "line", "--vehicle", "heavy.toml", "--order", "5")
+    shared_plan("line").save("line.plan")
+    code("fly", "line.plan", "--vehicle", "heavy.toml", "--out", "out/line-heavy")
     capsys.readouterr()
-    assert code("check", "out/line-heavy") == 0
+    assert code("check", "out/line-heavy") == 1  # the plan is for a lighter one
     assert "heavy" in capsys.readouterr().out
     assert load_plan("out/line-heavy/line.plan").vehicle == read_record(Path("out/line-heavy")).vehicle
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import signal
 import subprocess
 import sys
 from pathlib import Path
@@ -14,7 +15,9 @@ import pytest
 import aerobat as ab
 from aerobat.cli.progress import SweepProgress
 from aerobat.interchange import read_table
+from aerobat.studies.sweep.kept import KeptChunks
 from command_lines import code
+from shared_plans import shared_plan
 
 SPREAD = "mass = 0.03\nlag = 0.2\nstart_position = 0.02\n"  # quick to compile
 RUNS = 60  # a chunk and a part of another
@@ -24,11 +27,12 @@ RUNS = 60  # a chunk and a part of another
 def _elsewhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     Path("spread.toml").write_text(SPREAD)
+    shared_plan("half-flip").save("half-flip.plan")
 
 
-def swept(*more: str) -> int:
-    options = ("--runs", str(RUNS), "--conditions", "spread.toml", "--seed", "7", "--workers", "1")
-    return code("sweep", "half-flip", *options, *more)
+def swept(*more: str, what: str = "half-flip.plan", seed: int = 7) -> int:
+    options = ("--runs", str(RUNS), "--conditions", "spread.toml", "--seed", str(seed), "--workers", "1")
+    return code("sweep", what, *options, *more)
 
 
 def test_a_sweep_writes_a_row_a_flight_and_counts_what_became_of_them(capsys) -> None:
@@ -69,38 +73,53 @@ def test_a_repeated_sweep_comes_to_the_same_bits(capsys) -> None:
         np.testing.assert_array_equal(column, many[name][:3])
 
 
-# is interrupted when the first flights are kept
-INTERRUPTED = """
+# is killed when the first flights are kept
+KILLED = """
 import os, signal, sys
 from aerobat.cli import main
 from aerobat.studies.sweep.kept import KeptChunks
 
 write = KeptChunks.write
-def write_and_interrupt(self, *chunk):
+def write_and_die(self, *chunk):
     write(self, *chunk)
-    os.kill(os.getpid(), getattr(signal, sys.argv[1]))
-KeptChunks.write = write_and_interrupt
-main(sys.argv[2:])
+    os.kill(os.getpid(), signal.SIGKILL)
+KeptChunks.write = write_and_die
+main(sys.argv[1:])
 """
 
 
-@pytest.mark.parametrize("ended_by", ["SIGINT", "SIGKILL"])
-def test_the_same_command_goes_on_with_the_flights_that_are_kept(ended_by: str, capsys) -> None:
-    assert swept("--out", "whole") == 0
+def test_the_same_command_goes_on_where_an_interrupt_ended_it(monkeypatch, capsys) -> None:
+    assert swept("--out", "whole", what="half-flip") == 0  # planned here, there from a file
+    write = KeptChunks.write
+
+    def write_and_interrupt(*chunk: object) -> None:
+        write(*chunk)
+        signal.raise_signal(signal.SIGINT)
+
+    capsys.readouterr()
+    with monkeypatch.context() as patch:
+        patch.setattr(KeptChunks, "write", write_and_interrupt)
+        assert swept("--out", "there/broken") == 130
+    assert capsys.readouterr().err.splitlines() == [
+        "aerobat: 50 of 60 flights are kept: the same command goes on from there",
+        "aerobat: interrupted",
+    ]
+    assert [path.name for path in Path("there").iterdir()] == ["broken-unfinished"]
+    assert swept("--out", "there/broken", seed=8) == 2
+    assert "keeps flights of another sweep (seed)" in capsys.readouterr().err
+    assert swept("--out", "there/broken") == 0
+    assert [path.name for path in Path("there").iterdir()] == ["broken"]
+    assert Path("there/broken/flights.csv").read_bytes() == Path("whole/flights.csv").read_bytes()
+
+
+@pytest.mark.process
+def test_the_same_command_goes_on_with_the_flights_that_are_kept(capsys) -> None:
+    assert swept("--out", "whole", what="half-flip") == 0
     command = ("sweep", "half-flip", "--conditions", "spread.toml", "--seed", "7", "--out", "there/broken")
     ended = subprocess.run(
-        [sys.executable, "-c", INTERRUPTED, ended_by, *command, "--runs", str(RUNS)],
-        capture_output=True,
-        text=True,
-        env=os.environ,
+        [sys.executable, "-c", KILLED, *command, "--runs", str(RUNS)], capture_output=True, env=os.environ
     )
-    if ended_by == "SIGINT":
-        assert ended.returncode == 130
-        told = [line for line in ended.stderr.splitlines() if "flown" not in line]
-        assert told == [
-            "aerobat: 50 of 60 flights are kept: the same command goes on from there",
-            "aerobat: interrupted",
-        ]
+    assert ended.returncode == -signal.SIGKILL
     assert [path.name for path in Path("there").iterdir()] == ["broken-unfinished"]
     kept = ab.load_plan("there/broken-unfinished/sweep.plan")
     assert code(*command[:-1], "there/broken", "--runs", "60", "--order", "4") == 2  # another plan
@@ -131,14 +150,15 @@ def test_what_makes_no_sense_is_refused_before_anything_is_planned(arguments, na
     err = capsys.readouterr().err
     assert named in err
     assert err.count("\n") == 1
-    assert sorted(path.name for path in Path().iterdir()) == ["mine", "spread.toml"]
+    assert sorted(path.name for path in Path().iterdir()) == ["half-flip.plan", "mine", "spread.toml"]
 
 
 def test_a_sweep_that_cannot_be_flown_leaves_nothing(capsys) -> None:
     Path("nowhere.toml").write_text("computation_delay = 1.0\n")
-    assert code("sweep", "line", "--conditions", "nowhere.toml", "--runs", "3") == 2
+    assert code("sweep", "half-flip.plan", "--conditions", "nowhere.toml", "--runs", "3") == 2
     assert "computation_delay" in capsys.readouterr().err
-    assert not [path for path in Path().rglob("*") if path.suffix != ".toml" and path.name != "out"]
+    left = {path.name for path in Path().rglob("*") if path.suffix != ".toml"}
+    assert left <= {"half-flip.plan", "out"}
 
 
 def test_progress_tells_how_many_how_well_and_how_long_still() -> None:

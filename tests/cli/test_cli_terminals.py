@@ -1,7 +1,11 @@
-"""Any terminal will do, of few characters, full or closed: a run says what it can, and ends as it should."""
+"""Any terminal will do, of few characters, full or closed: a run says what it can, and ends as it should.
+
+Streams of a process are what they are from its beginning; most of what is done with them is done in this one.
+"""
 
 from __future__ import annotations
 
+import io
 import json
 import os
 import subprocess
@@ -10,82 +14,125 @@ from pathlib import Path
 
 import pytest
 
+from command_lines import code
+from shared_plans import shared_plan
 
-def shell(command: str, folder: Path, **environment: str) -> subprocess.CompletedProcess[bytes]:
+FULL = Path("/dev/full")
+has_full = pytest.mark.skipif(not FULL.exists(), reason="the system has no full device")
+TOLD = "aerobat: cannot write to standard output: No space left on device\n"
+
+
+@pytest.fixture(autouse=True)
+def _elsewhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    shared_plan("line").save("line.plan")
+
+
+def of_ascii(name: str, monkeypatch: pytest.MonkeyPatch) -> io.BytesIO:
+    """What is written to a standard stream of ASCII from now on."""
+    written = io.BytesIO()
+    monkeypatch.setattr(sys, name, io.TextIOWrapper(written, encoding="ascii", write_through=True))
+    return written
+
+
+@pytest.mark.parametrize("command", ["plan line.plan", "vehicles", "problems", "plan --help"])
+def test_a_terminal_of_ascii_gets_ascii(command: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    written = of_ascii("stdout", monkeypatch)
+    assert code(*command.split()) == 0
+    text = written.getvalue().decode("ascii")
+    assert "\\u" not in text
+    assert len(text) > 100
+
+
+def test_in_ascii_json_says_what_it_says_elsewhere(monkeypatch: pytest.MonkeyPatch) -> None:
+    Path("環.toml").write_text(
+        'name = "環 loop"\nstart = { position = [0.0, 0.0, 0.0] }\ngoal = { position = [3.0, 0.0, 0.0] }\n'
+        'maneuver = { kind = "line" }\n',
+        encoding="utf-8",
+    )
+    written = of_ascii("stdout", monkeypatch)
+    assert code("plan", "環.toml", "--planner", "min-snap", "--json", "--out", "here") == 0
+    assert json.loads(written.getvalue().decode("ascii"))["problem"] == "環 loop"
+
+
+def test_a_sentence_of_an_error_is_in_ascii_too(monkeypatch: pytest.MonkeyPatch, capsys) -> None:
+    written = of_ascii("stderr", monkeypatch)
+    assert code("plan", "環.toml") == 2
+    assert capsys.readouterr().out == ""
+    assert written.getvalue().isascii()
+    assert written.getvalue().count(b"\n") == 1
+
+
+@has_full
+@pytest.mark.parametrize("command", ["check line.plan --json", "vehicles", "--help"])
+def test_a_full_standard_output_is_told(command: str, monkeypatch: pytest.MonkeyPatch, capsys) -> None:
+    with FULL.open("w", encoding="utf-8") as full:
+        monkeypatch.setattr(sys, "stdout", full)
+        assert code(*command.split()) == 2
+    assert capsys.readouterr().err == TOLD
+
+
+@has_full
+def test_a_full_standard_error_changes_no_exit_code(monkeypatch: pytest.MonkeyPatch) -> None:
+    with FULL.open("w", encoding="utf-8") as full:
+        monkeypatch.setattr(sys, "stderr", full)
+        assert code("plan", "lime") == 2
+
+
+@pytest.mark.parametrize(("command", "ended"), [("check line.plan", 0), ("plan lime", 2)])
+def test_streams_that_are_not_there_change_no_exit_code(
+    command: str, ended: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for name in ("stdin", "stdout", "stderr"):
+        monkeypatch.setattr(sys, name, None)
+    assert code(*command.split()) == ended
+
+
+def shell(command: str, **environment: str) -> subprocess.CompletedProcess[bytes]:
     """A command of the shell, in which `aerobat` is this one."""
     return subprocess.run(
         ["sh", "-c", f'aerobat() {{ "{sys.executable}" -m aerobat "$@"; }}\n{command}'],
-        cwd=folder,
         capture_output=True,
         env={**os.environ, **environment},
     )
 
 
-@pytest.mark.parametrize("command", ["plan line --order 5", "vehicles", "problems", "plan --help"])
-def test_a_terminal_of_ascii_gets_ascii(command: str, tmp_path: Path) -> None:
-    ended = shell(f"aerobat {command}", tmp_path, PYTHONIOENCODING="ascii")
-    assert (ended.returncode, ended.stderr) == (0, b"")
-    text = ended.stdout.decode("ascii")
-    assert "\\u" not in text
-    assert len(text) > 100
-
-
-def test_in_ascii_json_says_what_it_says_elsewhere(tmp_path: Path) -> None:
-    (tmp_path / "環.toml").write_text(
-        'name = "環 loop"\nstart = { position = [0.0, 0.0, 0.0] }\ngoal = { position = [3.0, 0.0, 0.0] }\n'
-        'maneuver = { kind = "line" }\n',
-        encoding="utf-8",
-    )
-    ended = shell("aerobat plan 環.toml --order 5 --json --out here", tmp_path, PYTHONIOENCODING="ascii")
-    assert (ended.returncode, ended.stderr) == (0, b"")
-    assert json.loads(ended.stdout.decode("ascii"))["problem"] == "環 loop"
-
-
-def test_a_sentence_of_an_error_is_in_ascii_too(tmp_path: Path) -> None:
-    ended = shell("aerobat plan 環.toml", tmp_path, PYTHONIOENCODING="ascii")
+@pytest.mark.process
+def test_a_process_whose_terminal_has_ascii_alone_writes_ascii() -> None:
+    ended = shell("aerobat plan line.plan; aerobat plan 環.toml", PYTHONIOENCODING="ascii")
     assert ended.returncode == 2
-    assert ended.stdout == b""
+    assert len(ended.stdout.decode("ascii")) > 100
     assert ended.stderr.isascii()
     assert ended.stderr.count(b"\n") == 1
 
 
-@pytest.mark.skipif(not Path("/dev/full").exists(), reason="the system has no full device")
+@has_full
+@pytest.mark.process
+@pytest.mark.parametrize("command", ["plan line.plan", "--help"])
+def test_a_process_whose_standard_output_is_full_tells_it_once(command: str) -> None:
+    ended = shell(f"aerobat {command} > /dev/full")
+    assert (ended.returncode, ended.stderr.decode()) == (2, TOLD)
+
+
+@has_full
+@pytest.mark.process
+def test_a_process_whose_standard_error_is_full_ends_with_the_code_of_its_run() -> None:
+    assert shell("aerobat plan lime 2> /dev/full").returncode == 2
+
+
+@pytest.mark.process
 @pytest.mark.parametrize(
-    "command", ["plan line --order 5", "plan line --order 5 --json", "vehicles", "--help"]
+    ("closed", "command", "code"),
+    [
+        *((closed, "plan line.plan --out kept", 0) for closed in (">&-", "2>&-", "<&-", "<&- >&- 2>&-")),
+        *((closed, "plan lime", 2) for closed in ("2>&-", "<&- >&- 2>&-")),
+    ],
 )
-def test_a_full_standard_output_is_told(command: str, tmp_path: Path) -> None:
-    ended = shell(f"aerobat {command} > /dev/full", tmp_path)
-    assert ended.returncode == 2
-    assert ended.stderr == b"aerobat: cannot write to standard output: No space left on device\n"
-
-
-@pytest.mark.skipif(not Path("/dev/full").exists(), reason="the system has no full device")
-@pytest.mark.parametrize(("command", "code"), [("plan lime", 2), ("plan line --order 5", 0)])
-def test_a_full_standard_error_changes_no_exit_code(command: str, code: int, tmp_path: Path) -> None:
-    assert shell(f"aerobat {command} 2> /dev/full", tmp_path).returncode == code
-
-
-@pytest.mark.parametrize("closed", [">&-", "2>&-", "<&-", ">&- 2>&-", "<&- >&- 2>&-"])
-@pytest.mark.parametrize(("command", "code"), [("plan line --order 5", 0), ("plan lime", 2)])
-def test_closed_streams_change_no_exit_code(closed: str, command: str, code: int, tmp_path: Path) -> None:
-    ended = shell(f"aerobat {command} {closed}", tmp_path)
+def test_closed_streams_change_no_exit_code(closed: str, command: str, code: int) -> None:
+    ended = shell(f"aerobat {command} {closed}")
     assert ended.returncode == code, ended.stderr
     assert b"Traceback" not in ended.stderr
     assert ended.stdout == b"" or code == 0
     if code == 0:
-        report = json.loads((tmp_path / "out/line/report.json").read_text())
+        report = json.loads(Path("kept/report.json").read_text())
         assert report["problem"] == "line"
-
-
-@pytest.mark.parametrize("intervals", ["10000", "3000"])
-def test_a_program_too_large_for_any_memory_is_refused_in_words(intervals, tmp_path: Path) -> None:
-    ended = subprocess.run(
-        [sys.executable, "-m", "aerobat", "plan", "line", "--intervals", intervals],
-        capture_output=True,
-        text=True,
-        cwd=tmp_path,
-    )
-    assert (ended.returncode, ended.stdout) == (2, "")
-    assert "intervals" in ended.stderr
-    assert ended.stderr.count("\n") == 1
-    assert not list(tmp_path.iterdir())

@@ -13,6 +13,7 @@ import aerobat as ab
 from aerobat import cli
 from aerobat.cli.progress import TuningProgress
 from aerobat.studies.tune import TUNED
+from shared_plans import shared_plan
 
 FEW = ("--conditions", "weak.toml", "--flights", "10", "--evaluations")
 
@@ -25,11 +26,12 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     halved = replace(usual, **{name: 0.5 * getattr(usual, name) for name in TUNED})
     ab.write_vehicle(replace(ab.load_vehicle("agile-quad"), name="slow", controller=halved), "slow.toml")
     ab.write_dispersion(ab.Dispersion(mass=0.03, start_position=0.02), "weak.toml")
+    shared_plan("half-flip").save("half-flip.plan")
     return tmp_path
 
 
 def test_better_gains_are_written_and_flown_by(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    cli.main(["tune", "half-flip", "--vehicle", "slow.toml", *FEW, "20", "--json"])
+    cli.main(["tune", "half-flip.plan", "--vehicle", "slow.toml", *FEW, "20", "--json"])
     facts = json.loads(capsys.readouterr().out)
     assert facts["better"]
     assert facts["fresh"]["after"]["cost_m"] < facts["fresh"]["before"]["cost_m"]
@@ -42,7 +44,7 @@ def test_better_gains_are_written_and_flown_by(folder: Path, capsys: pytest.Capt
 
 
 def test_gains_that_are_no_better_are_not_written(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    command = ["tune", "half-flip", "--vehicle", "slow.toml", *FEW, "1", "--out", "x.toml"]
+    command = ["tune", "half-flip.plan", "--vehicle", "slow.toml", *FEW, "1", "--out", "x.toml"]
     with pytest.raises(SystemExit) as stop:
         cli.main(command)
     assert stop.value.code == 1

@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 
 from aerobat import cli
-from reporting_cases import planned
+from command_lines import without_pictures
+from shared_plans import shared_plan
 from viewer_cases import dispersed, header
 
 
@@ -18,13 +19,17 @@ from viewer_cases import dispersed, header
 def kept(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The folder of a run."""
     folder = tmp_path_factory.mktemp("runs") / "line"
-    cli.main(["fly", "line", "--order", "5", "--out", str(folder)])
+    shared_plan("line").save(folder.parent / "line.plan")
+    with pytest.MonkeyPatch.context() as patch:
+        without_pictures(patch)
+        cli.main(["fly", str(folder.parent / "line.plan"), "--out", str(folder)])
     return folder
 
 
 @pytest.fixture
-def run(kept: Path, tmp_path: Path) -> Path:
+def run(kept: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """A copy of it to work on."""
+    without_pictures(monkeypatch)
     shutil.copytree(kept, tmp_path / "line")
     return tmp_path / "line"
 
@@ -48,8 +53,9 @@ def test_the_page_of_a_run_joins_its_folder_and_goes_with_it(run: Path, name: st
     shown = header((run / "replay.html").read_text(encoding="utf-8"))
     assert shown["title"] == "line · agile-quad"
     assert shown["curves"][0]["name"] == ("speed" if name == "line.plan" else "position error")
-    cli.main(["fly", "line", "--order", "5", "--out", str(run)])  # takes the folder's place as a whole
-    assert not (run / "replay.html").exists()
+    if not name:
+        cli.main(["plan", str(run), "--out", str(run)])  # takes the folder's place as a whole
+        assert not (run / "replay.html").exists()
 
 
 def test_the_page_of_another_file_lies_beside_it(run: Path, tmp_path: Path) -> None:
@@ -61,7 +67,7 @@ def test_the_page_of_another_file_lies_beside_it(run: Path, tmp_path: Path) -> N
     batch = header((tmp_path / "batch.html").read_text(encoding="utf-8"))
     assert len(batch["tracks"]) == 50
     assert not batch["gates"]
-    planned("flip-roll").save(tmp_path / "mine.plan")  # of which it is
+    shared_plan("flip-roll").save(tmp_path / "mine.plan")  # of which it is
     cli.main(["view", str(tmp_path / "batch.npz"), "--html", str(tmp_path / "x" / "y.html")])
     assert header((tmp_path / "x" / "y.html").read_text(encoding="utf-8"))["gates"]
 
@@ -76,7 +82,7 @@ def test_machines_are_told_what_was_written(run: Path, capsys: pytest.CaptureFix
 
 def test_a_part_that_a_killed_view_left_does_not_keep_the_next_run_out(run: Path) -> None:
     (run / ".replay.999999999.aerobat-part.html").write_text("half a page")
-    cli.main(["fly", "line", "--order", "5", "--out", str(run)])
+    cli.main(["plan", str(run), "--out", str(run)])
     assert not list(run.glob(".*"))
 
 
@@ -106,7 +112,9 @@ def test_what_cannot_be_shown_is_refused_in_a_sentence(run: Path, capsys: pytest
 def test_of_a_sweep_its_own_first_flights_are_shown(run: Path, tmp_path: Path, capsys) -> None:
     """The errors that the page is told are those of the sweep's table."""
     swept = tmp_path / "swept"
-    cli.main(["sweep", str(run), "--runs", "3", "--seed", "5", "--workers", "1", "--out", str(swept)])
+    (tmp_path / "weak.toml").write_text("mass = 0.03\n")
+    flights = ["--conditions", str(tmp_path / "weak.toml"), "--runs", "3", "--seed", "5", "--workers", "1"]
+    cli.main(["sweep", str(run), *flights, "--out", str(swept)])
     capsys.readouterr()
     cli.main(["view", str(swept), "--json"])
     told = json.loads(capsys.readouterr().out)["flights"]

@@ -80,7 +80,7 @@ def test_turned_about_the_vertical_everything_turns(angle: float) -> None:
 
 
 @pytest.mark.parametrize("name", ["agile-quad", "hexarotor", "crazyflie"])
-@pytest.mark.parametrize("tilt_deg", [45, 90, 135, 180])
+@pytest.mark.parametrize("tilt_deg", [*(pytest.param(d, marks=pytest.mark.slow) for d in (45, 135)), 90, 180])
 def test_thrown_into_the_air_in_any_attitude_it_comes_back(name: str, tilt_deg: int) -> None:
     q = so3.about_axis([0.8, 0.6, 0.0], np.deg2rad(tilt_deg))
     flight = fly(hover(6.0), load_vehicle(name), start=start_at(q=q))

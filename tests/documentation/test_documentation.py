@@ -1,5 +1,6 @@
 """The documentation runs: Python blocks, the first command and its output; its links lead somewhere."""
 
+import ast
 import os
 import re
 import subprocess
@@ -9,6 +10,7 @@ from pathlib import Path
 
 import pytest
 
+import aerobat as ab
 from places import ROOT, TESTS
 
 GENERATED = ROOT / "docs" / "generated"  # by a build of the site
@@ -60,6 +62,17 @@ def without_numbers(text: str) -> list[str]:
 @pytest.mark.parametrize(
     "page", [page for page in PAGES if blocks(page, "python")], ids=lambda page: page.name
 )
+def test_python_blocks_are_python_and_name_what_there_is(page: Path) -> None:
+    for block in blocks(page, "python"):
+        for node in ast.walk(ast.parse(block)):
+            if isinstance(node, ast.Attribute) and isinstance(node.value, ast.Name) and node.value.id == "ab":
+                assert node.attr in ab.__all__, f"ab.{node.attr}"
+
+
+@pytest.mark.docs
+@pytest.mark.parametrize(
+    "page", [page for page in PAGES if blocks(page, "python")], ids=lambda page: page.name
+)
 def test_python_blocks_run_as_they_stand(page: Path, tmp_path: Path) -> None:
     """Each in a process of its own; those of one page share a folder, for one may read another's file."""
     for block in blocks(page, "python"):
@@ -76,6 +89,7 @@ def test_toml_blocks_are_toml(page: Path) -> None:
         assert tomllib.loads(block)
 
 
+@pytest.mark.docs
 def test_the_first_command_prints_what_the_readme_shows(tmp_path: Path) -> None:
     commands, printed = blocks(ROOT / "README.md", "")[:2]
     install, command = commands.strip().splitlines()[0].split(" && ")

@@ -18,6 +18,7 @@ def texts(notebook):
     ]
 
 
+@pytest.mark.docs
 @pytest.mark.parametrize("path", TUTORIALS, ids=lambda path: path.stem)
 def test_a_tutorial_runs_from_top_to_bottom_and_shows_pictures_and_sentences(path, tmp_path):
     kept = nbformat.read(path, as_version=4)

@@ -13,6 +13,7 @@ from aerobat.engines import NUMPY, choose, run_whole
 from aerobat.engines.duals import Dual, DualOps, differentiated, dual
 from aerobat.engines.floats import FloatOps
 from aerobat.engines.numpy import ArrayOps
+from suites import examples
 
 jax = pytest.importorskip("jax")
 import jax.numpy as jnp  # noqa: E402 - after what it needs
@@ -77,6 +78,7 @@ def richardson(function: Callable[[float], float], h: float) -> float:
     return (4 * narrow - wide) / 3
 
 
+@examples(40)
 @given(program=programs(SMOOTH + KINKED), seed=st.integers(0, 1000))
 def test_slopes_are_those_of_jax(program: Any, seed: int) -> None:
     at, along = drawn(seed)
@@ -125,7 +127,9 @@ def grow(ops: Any, rate: Any, carry: Any, push: Any) -> Any:
     return (x, ops.select(x > 2.0, True, ever)), (x, ops.select(ever, 0.0, x))
 
 
-@pytest.mark.parametrize("engine", ["floats", "bytecode", "numpy", "compiled", "jax"])
+@pytest.mark.parametrize(
+    "engine", ["floats", "bytecode", "numpy", "compiled", pytest.param("jax", marks=pytest.mark.slow)]
+)
 def test_a_loop_carries_slopes_along(engine: str) -> None:
     """x_n = a^n has the slope n a^(n-1), whatever runs the loop."""
     rate, ticks = np.array([0.9, 1.0, 1.01, 1.02, 1.1]), 50

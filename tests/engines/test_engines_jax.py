@@ -6,10 +6,6 @@ import numpy as np
 import pytest
 
 from aerobat.engines import FLOATS, Engine, run_whole
-from aerobat.planning import Miqp, plan
-from aerobat.problem import load_problem
-from aerobat.simulation import fly
-from aerobat.vehicle import load_vehicle
 
 jax = pytest.importorskip("jax")
 from aerobat.engines.jax import ENGINE, SINGLE  # noqa: E402 - after what it needs
@@ -60,15 +56,6 @@ def test_all_arithmetic_agrees_with_floats_in_either_precision(engine: Engine, a
     assert 0 < found.beyond.sum() < found.beyond.size
 
 
-def test_a_flip_with_a_thousand_steps_a_second_agrees_with_floats() -> None:
-    quad, problem = load_vehicle("agile-quad"), load_problem("flip-roll")
-    flip = plan(problem, Miqp(order=4), quad).trajectory
-    floats, exact = (fly(flip, quad, rate=1500.0, engine=name) for name in ("floats", "jax"))
-    assert len(floats.times) > TICKS
-    for name, value in vars(floats.states).items():
-        np.testing.assert_allclose(getattr(exact.states, name), value, rtol=0, atol=1e-12)
-
-
 @pytest.mark.parametrize("set_to", [False, True])
 def test_the_precision_that_jax_is_set_to_is_neither_used_nor_changed(set_to: bool) -> None:
     exact, single = swung(ENGINE), swung(SINGLE)
@@ -79,6 +66,7 @@ def test_the_precision_that_jax_is_set_to_is_neither_used_nor_changed(set_to: bo
         assert jax.numpy.ones(1).dtype == (np.float64 if set_to else np.float32)
 
 
+@pytest.mark.slow
 def test_loops_of_the_same_operations_are_compiled_once(caplog) -> None:
     """Other numbers, closures and a few ticks more change nothing; another operation does."""
 

@@ -15,6 +15,7 @@ from aerobat.engines.pytree import tree_leaves, tree_map
 from suites import examples
 
 FAST = ("floats", "bytecode", "numpy", "compiled")  # to be ready
+XLA = tuple(pytest.param(name, marks=pytest.mark.slow) for name in ENGINE_NAMES if name not in FAST)
 VEHICLES, TICKS = 21, 1003
 
 
@@ -84,7 +85,7 @@ def assert_same(a: Any, b: Any) -> None:
 
 
 @pytest.mark.parametrize("vehicles", [1, VEHICLES])
-@pytest.mark.parametrize("engine", ENGINE_NAMES)
+@pytest.mark.parametrize("engine", [*FAST, *XLA])
 def test_one_scan_chunks_of_any_size_and_single_steps_give_the_same_bits(engine: str, vehicles: int) -> None:
     inputs = drawn(vehicles=vehicles)
     loop = loop_of(engine, inputs)
@@ -107,7 +108,7 @@ def test_any_cuts_give_the_same_bits(cuts: list[int], engine: str) -> None:
 
 
 @pytest.mark.parametrize("vehicles", [1, VEHICLES])
-@pytest.mark.parametrize("engine", ENGINE_NAMES)
+@pytest.mark.parametrize("engine", [*FAST, *XLA])
 def test_held_inputs_give_the_bits_of_inputs_told_at_every_tick(engine: str, vehicles: int) -> None:
     """Where they change, how often, in which order, and how the ticks are cut: all the same."""
     rng = np.random.default_rng(2)
@@ -174,7 +175,7 @@ def test_coded_inputs_give_the_bits_of_the_numbers_that_they_stand_for(engine: s
     assert_same(*ends)
 
 
-@pytest.mark.parametrize("engine", ENGINE_NAMES)
+@pytest.mark.parametrize("engine", [*FAST, *XLA])
 def test_a_pickled_carry_goes_on_in_another_loop_as_if_nothing_had_happened(engine: str) -> None:
     inputs = drawn(200)
     end, rows = in_chunks(loop_of(engine, inputs), inputs, [0, 200])
@@ -184,7 +185,7 @@ def test_a_pickled_carry_goes_on_in_another_loop_as_if_nothing_had_happened(engi
     assert_same(rest, tree_map(lambda leaf: leaf[:, 90:], rows))
 
 
-@pytest.mark.parametrize("engine", ENGINE_NAMES)
+@pytest.mark.parametrize("engine", [*FAST, *XLA])
 def test_branches_of_a_carry_do_not_know_of_each_other(engine: str) -> None:
     inputs = drawn(200)
     loop = loop_of(engine, inputs)
@@ -215,7 +216,7 @@ def test_inputs_that_are_overwritten_after_a_scan_leave_its_carry_alone(engine: 
     np.testing.assert_array_equal(carry, last)
 
 
-@pytest.mark.parametrize("engine", ENGINE_NAMES)
+@pytest.mark.parametrize("engine", [*FAST, *XLA])
 @pytest.mark.parametrize("log_stride", [1, 2, 7, 199, 200, 1000])
 def test_logged_are_the_first_tick_each_so_many_after_it_and_the_last(engine: str, log_stride: int) -> None:
     inputs = drawn(200, 3)

@@ -4,6 +4,7 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
+import pytest
 from scipy.stats import chi2
 
 import aerobat as ab
@@ -13,7 +14,7 @@ from aerobat.engines.components import from_components
 from aerobat.engines.pytree import tree_stack
 from aerobat.kernels.ekf.covariance import unpack
 from aerobat.simulation import prepare
-from ekf_flights import CONVERGED, STRIDE, plans
+from ekf_flights import CONVERGED, STRIDE, planned
 
 LATENCY = 10  # ticks of `lab`
 
@@ -48,22 +49,28 @@ def fused_errors(plan: ab.Plan, conditions: ab.Dispersion, flights: range) -> tu
     return error[:, poses], covariance[:, poses], state.nis[:, poses]
 
 
-def test_in_a_hundred_flips_errors_are_as_large_as_the_filter_says_and_small() -> None:
+@pytest.mark.parametrize(
+    ("numbers", "flights"), [((0,), 3), pytest.param((0, 1), 50, marks=pytest.mark.slow)]
+)
+def test_errors_in_flips_are_as_large_as_the_filter_says_and_small(
+    numbers: tuple[int, ...], flights: int
+) -> None:
     """`lab` without what no filter reckons with: outliers, dropouts and a second camera system."""
     lab = ab.load_dispersion("lab")
     assert lab.motion_capture is not None
     capture = replace(lab.motion_capture, dropout=0.0, outlier=0.0, hand_off=None)
     conditions = replace(lab, motion_capture=capture)
     runs = [
-        fused_errors(plan, conditions, range(50 * k, 50 * k + 50))  # no two with the same draw
-        for k, plan in enumerate(plans())
+        fused_errors(planned(k), conditions, range(50 * k, 50 * k + flights))  # no two with the same draw
+        for k in numbers
     ]
     poses = min(run[0].shape[1] for run in runs)
     error, covariance, nis = (np.concatenate([run[k][:, :poses] for run in runs]) for k in range(3))
     nees = np.einsum("nti,nti->nt", error, np.linalg.solve(covariance, error[..., None])[..., 0])
-    assert len(nees) == 100
+    count = len(nees)
+    assert count == len(numbers) * flights
     for values, freedoms in ((nees, 15), (nis, 6)):
-        low, high = chi2.ppf([0.025, 0.975], 100 * freedoms) / 100.0
+        low, high = chi2.ppf([0.025, 0.975], count * freedoms) / count
         assert low < values.mean() < high
         at_each_pose = values.mean(axis=0)
         # nearly all of the instants, which hang together: the filter is a little more modest than it need be

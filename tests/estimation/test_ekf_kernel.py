@@ -381,7 +381,9 @@ def test_the_series_of_the_quaternion_is_exact_for_small_rotations_and_near_for_
     np.testing.assert_allclose(exp_of_small(triple(phi)), so3.exp(phi), rtol=0, atol=near)
 
 
-@pytest.mark.parametrize("engine", ["bytecode", "numpy", "compiled"])
+@pytest.mark.parametrize(
+    "engine", ["bytecode", *(pytest.param(name, marks=pytest.mark.slow) for name in ("numpy", "compiled"))]
+)
 def test_engines_agree_on_poses_outliers_and_a_jump(engine: str) -> None:
     parameters, inputs = measured_hover()
     init, step = filter_loop(2)
@@ -395,6 +397,7 @@ def test_engines_agree_on_poses_outliers_and_a_jump(engine: str) -> None:
         np.testing.assert_allclose(one, other, rtol=1e-9, atol=1e-12)
 
 
+@pytest.mark.slow
 def test_on_arrays_of_jax_the_numbers_are_those_of_floats() -> None:
     """Operation by operation: XLA takes a minute to compile so many."""
     parameters, inputs = measured_hover(latency=1)

@@ -11,14 +11,19 @@ from aerobat import so3
 from aerobat.arrays import Array
 from aerobat.errors import SpecError
 from aerobat.estimation import Ekf, Estimates, SensorLog, estimate
-from ekf_flights import RATE, STRIDE, filtered, flips, measured
+from ekf_flights import RATE, STRIDE, Truth, filtered, flips, measured
 
 KNOWN_START = Ekf(start_velocity=0.0)
 
 
+def true_flips() -> Truth:
+    """A few flips, of which one is looked at."""
+    return flips(1, 2)
+
+
 def log_of(latency: float = 0.010, **changes: Any) -> SensorLog:
     """What one vehicle's sensors have shown in a flip."""
-    seen = measured(flips()[1])
+    seen = measured(true_flips())
     exposures = np.arange(seen.position.shape[1]) * STRIDE / RATE
     arrays = {
         "imu_times": np.arange(1, seen.omega.shape[1] + 1) / RATE,
@@ -33,12 +38,12 @@ def log_of(latency: float = 0.010, **changes: Any) -> SensorLog:
 
 
 def estimates_of(log: SensorLog) -> Estimates:
-    return estimate(log, KNOWN_START, start_velocity=flips()[1].velocity[0, 0])
+    return estimate(log, KNOWN_START, start_velocity=true_flips().velocity[0, 0])
 
 
 def errors(estimates: Estimates) -> tuple[Array, Array]:
     """Vectors to the truth [m], and angles [rad]."""
-    truth = flips()[1]
+    truth = true_flips()
     at = np.round(estimates.times * RATE).astype(int)
     return (
         truth.position[0, at] - estimates.position,
@@ -57,7 +62,7 @@ def assert_consistent(estimates: Estimates) -> None:
 
 
 def test_a_replayed_log_gives_what_the_filter_had_on_board() -> None:
-    log, truth = log_of(), flips()[1]
+    log, truth = log_of(), true_flips()
     on_board = filtered(truth, measured(truth), settings=KNOWN_START).states
     again = estimates_of(log)
     np.testing.assert_array_equal(again.times, log.imu_times)
@@ -87,7 +92,7 @@ def test_poses_between_samples_that_arrive_out_of_order_are_fused_as_well() -> N
     log = log_of()
     pairs = len(log.imu_times) // 2
     odd = 5 + STRIDE * np.arange(160)
-    truth, rng = flips()[1], np.random.default_rng(2)
+    truth, rng = true_flips(), np.random.default_rng(2)
     exposures = odd / RATE
     turns = so3.exp(Ekf().attitude_noise * rng.normal(size=(160, 3)))
     mixed = SensorLog(

@@ -163,7 +163,7 @@ def _turns(gate: ab.Gate) -> tuple[Array, Array]:
 
 
 @given(seeds)
-@examples(300)
+@examples(40)
 def test_a_path_that_bends_no_more_than_its_way_through_a_gate_clears_the_frame_and_does_not_turn_back(
     seed: int,
 ) -> None:
@@ -180,12 +180,12 @@ def test_a_path_that_bends_no_more_than_its_way_through_a_gate_clears_the_frame_
         asked = way.conditions(gate.position + offset, speed * along, thrust, body)
         return all(condition.direction @ (speed * along) >= condition.lower for condition in asked)
 
-    asked = [speed for speed in np.geomspace(0.3, 100.0, 200) if is_asked(speed)]
-    assume(asked)
-    velocity = asked[0] * along
+    slowest = next((speed for speed in np.geomspace(0.3, 100.0, 80) if is_asked(speed)), None)
+    assume(slowest)
+    velocity = slowest * along
     for side in (gate.lateral, -gate.lateral, gate.up, -gate.up):
         passage = Motion(gate, body, offset, velocity, way.bending * side, one.attitude, np.zeros(3)).passage(
-            20 * RATE
+            5 * RATE
         )
         assert passage.clearance > 0.0
     slowed = Motion(gate, body, offset, velocity, -way.bending * gate.normal, one.attitude, np.zeros(3))
@@ -228,18 +228,18 @@ def test_contact_is_said_with_its_edge_and_its_instant() -> None:
     assert unknown["clearance"] is unknown["closest_edge"] is unknown["needed_width"] is None
 
 
-def test_in_a_batch_each_vehicle_has_its_own_body() -> None:
+@pytest.mark.parametrize("engine", ["bytecode", "compiled", pytest.param("numpy", marks=pytest.mark.slow)])
+def test_in_a_batch_each_vehicle_has_its_own_body(engine: str) -> None:
     path, problem = cruise()
     bodies = [ab.Ellipsoid((0.25, 0.25, height)) for height in (0.05, 0.1, 0.2)]
     vehicles = [replace(QUAD, body=body) for body in bodies]
-    for engine in ("numpy", "compiled"):
-        scores = ab.score_flights(path, vehicles, problem=problem, engine=engine)
-        np.testing.assert_allclose(scores.passages[0].clearance, [0.1, 0.05, -0.05], atol=1e-6)
-        for k, vehicle in enumerate(vehicles):
-            alone = ab.score(ab.fly(path, vehicle), problem).passages[0]
-            assert np.isnan(alone.clearance)
-            alone = ab.score(ab.fly(path, vehicle), problem, vehicle).passages[0]
-            assert scores[k].passages[0].clearance == pytest.approx(alone.clearance, abs=1e-12)
+    scores = ab.score_flights(path, vehicles, problem=problem, engine=engine)
+    np.testing.assert_allclose(scores.passages[0].clearance, [0.1, 0.05, -0.05], atol=1e-6)
+    for k, vehicle in enumerate(vehicles):
+        flight = ab.fly(path, vehicle)
+        assert np.isnan(ab.score(flight, problem).passages[0].clearance)
+        alone = ab.score(flight, problem, vehicle).passages[0]
+        assert scores[k].passages[0].clearance == pytest.approx(alone.clearance, abs=1e-12)
 
 
 @given(seeds)
@@ -266,6 +266,7 @@ def test_a_plan_whose_own_flight_touches_the_frame_does_not_fly_and_says_where()
     assert report(plan)["plan"]["flyability"]["passages"][0]["clearance_m"] == pytest.approx(clearance)
 
 
+@pytest.mark.slow
 def test_a_flip_that_would_slide_along_its_gate_s_plane_is_planned_straighter_through_it() -> None:
     """It would be half in the plane for 0.4 s, 1.6 m below the opening at first."""
     case = random_case(0, 42, ("flip", "half-flip"))

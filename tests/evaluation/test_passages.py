@@ -15,8 +15,9 @@ from aerobat.problem.condition import Attitude
 from aerobat.simulation import Outcome
 from aerobat.simulation.passages import PASSAGE_DEPTH
 from gate_motions import CRUISE, SPEED
-from score_cases import EXACT, QUAD, assert_same
+from score_cases import QUAD, assert_same
 from score_cases import near as starts_near
+from shared_plans import shared_plan
 
 AT = np.array([4.0, 0.0, 1.0])  # where the gate is
 UP = np.array([0.0, 0.0, 1.0])
@@ -186,7 +187,8 @@ PATHS = {
     ("path", "engine"),
     [
         *((path, "bytecode") for path in PATHS),
-        *(("twice", engine) for engine in EXACT if engine != "bytecode"),
+        ("twice", "compiled"),
+        *(pytest.param("twice", engine, marks=pytest.mark.slow) for engine in ("floats", "numpy")),
     ],
 )
 def test_passages_are_the_same_from_a_log_and_as_they_are_flown(path: str, engine: str) -> None:
@@ -195,9 +197,10 @@ def test_passages_are_the_same_from_a_log_and_as_they_are_flown(path: str, engin
     assert_same(scored[0], ab.score(ab.fly(PATHS[path], QUAD), problem, QUAD), 1e-9)
 
 
+@pytest.mark.slow
 def test_flights_that_end_in_any_way_are_scored_alike() -> None:
-    flip = ab.plan(ab.load_problem("flip-roll-translation"), vehicle=QUAD)
-    starts = starts_near(60, 1.5)
+    flip = shared_plan("flip-roll-translation")
+    starts = starts_near(30, 1.5)
     logged = ab.fly(flip, start=starts, engine="compiled")
     scores = ab.score_flights(flip, start=starts, engine="compiled")
     for k, score in enumerate(scores):

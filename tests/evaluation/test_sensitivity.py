@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import fields, replace
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -17,6 +18,7 @@ from aerobat.evaluation import Sensitivity, score_flights, sensitivity
 from aerobat.problem import load_problem
 from aerobat.simulation import fly
 from aerobat.states import BodyState
+from aerobat.trajectory import Trajectory
 from aerobat.vehicle import Vehicle, load_vehicle
 from looping_flights import loops, near, one
 
@@ -37,6 +39,10 @@ START = BodyState(
 )
 TIGHT = Controller(max_feedback=0.5, max_integral=0.005, max_attitude_integral=0.0005)  # all limits are met
 PARTS = ("mean_square_position_error", "mean_square_attitude_error", "final_square_position_error")
+
+
+def slow(*values: Any) -> Any:
+    return pytest.param(*values, marks=pytest.mark.slow)
 
 
 def flown(vehicle: Vehicle | list[Vehicle] = QUAD, **options: Any) -> Array:
@@ -102,18 +108,26 @@ def test_gains_have_slopes_on_weak_rotors_too(name: str, max_bandwidth: float) -
     assert_slopes(np.array(got), changed, 1e-3, rtol=1e-9)
 
 
-def test_slopes_in_mass_drag_and_inertia(everything: Sensitivity) -> None:
-    def changed(name: str, change: Any) -> Callable[[Array], Array]:
-        return lambda moves: flown([replace(QUAD, **{name: getattr(QUAD, name) + h * change}) for h in moves])
+def changed(name: str, change: Any) -> Callable[[Array], Array]:
+    """Errors of vehicles that are changed by so much of it."""
+    return lambda moves: flown([replace(QUAD, **{name: getattr(QUAD, name) + h * change}) for h in moves])
 
+
+def test_slopes_in_mass(everything: Sensitivity) -> None:
     assert_slopes(listed(everything, "mass"), changed("mass", 1.0), 1e-6)
-    for axis, slopes in zip(np.eye(3), listed(everything, "drag_body").T, strict=True):
-        assert_slopes(slopes, changed("drag_body", axis), 1e-5)
-    for i, j in ((0, 0), (1, 1), (2, 2), (0, 1), (1, 2)):
-        change = np.zeros((3, 3))
-        change[i, j] = change[j, i] = np.trace(QUAD.inertia)
-        slopes = np.sum(listed(everything, "inertia") * change, axis=(1, 2))
-        assert_slopes(slopes, changed("inertia", change), 1e-5)
+
+
+@pytest.mark.parametrize("axis", [1, slow(0), slow(2)])
+def test_slopes_in_drag(axis: int, everything: Sensitivity) -> None:
+    assert_slopes(listed(everything, "drag_body")[:, axis], changed("drag_body", np.eye(3)[axis]), 1e-5)
+
+
+@pytest.mark.parametrize(("i", "j"), [(1, 2), *(slow(*pair) for pair in ((0, 0), (1, 1), (2, 2), (0, 1)))])
+def test_slopes_in_inertia(i: int, j: int, everything: Sensitivity) -> None:
+    change = np.zeros((3, 3))
+    change[i, j] = change[j, i] = np.trace(QUAD.inertia)
+    slopes = np.sum(listed(everything, "inertia") * change, axis=(1, 2))
+    assert_slopes(slopes, changed("inertia", change), 1e-5)
 
 
 def retrofitted(vehicle: Vehicle, name: str, change: Array) -> Vehicle:
@@ -122,7 +136,7 @@ def retrofitted(vehicle: Vehicle, name: str, change: Array) -> Vehicle:
     return replace(vehicle, rotors=tuple(replace(r, **{name: getattr(r, name) + x}) for r, x in pairs))
 
 
-@pytest.mark.parametrize("name", ROTORS)
+@pytest.mark.parametrize("name", ["lag", "position_body", *map(slow, ROTORS[1:4])])
 def test_slopes_in_the_rotors(name: str, everything: Sensitivity) -> None:
     got = listed(everything, f"rotors.{name}")
     along = np.random.default_rng(1).uniform(0.5, 1.0, got.shape[1:]) * 0.01
@@ -131,7 +145,7 @@ def test_slopes_in_the_rotors(name: str, everything: Sensitivity) -> None:
     assert_slopes(slopes, lambda moves: flown([retrofitted(QUAD, name, h * along) for h in moves]), step)
 
 
-@pytest.mark.parametrize("name", ["position", "velocity", "omega_body", "attitude"])
+@pytest.mark.parametrize("name", ["attitude", *map(slow, ("position", "velocity", "omega_body"))])
 def test_slopes_in_the_start(name: str, everything: Sensitivity) -> None:
     along = np.random.default_rng(2).normal(size=3)
 
@@ -147,14 +161,16 @@ def test_slopes_in_the_start(name: str, everything: Sensitivity) -> None:
     assert_slopes(listed(everything, f"start.{name}") @ along, flights, 1e-5)
 
 
+@pytest.mark.slow
 def test_slopes_of_a_scored_flight_in_five_gains() -> None:
     """As a user would check: the mean squared error of score_flights(), one gain after another."""
     line, controller = load_problem("line"), Controller()
-    got = sensitivity(PATH, FIVE, QUAD, start=START).mean_square_position_error
+    got = sensitivity(PATH, FIVE, QUAD, start=START, rate=200.0).mean_square_position_error
+    options = {"rate": 200.0, "engine": "compiled"}
 
     def scored(name: str, factor: float) -> float:
         changed = replace(controller, **{name: factor * getattr(controller, name)})
-        scores = score_flights(PATH, QUAD, problem=line, start=START, controller=changed, engine="compiled")
+        scores = score_flights(PATH, QUAD, problem=line, start=START, controller=changed, **options)
         return float(scores.rms_position_error_m[0]) ** 2
 
     for name in FIVE:
@@ -163,24 +179,38 @@ def test_slopes_of_a_scored_flight_in_five_gains() -> None:
         assert slope == pytest.approx(wanted, rel=1e-7), name
 
 
-@pytest.mark.parametrize("engine", ["numpy", "compiled"])
-def test_engines_agree(engine: str) -> None:
-    names = ("position_gain", "mass", "start.attitude")
-    options = {"nominal": NOMINAL, "start": START, "rate": 200.0}
-    wanted = sensitivity(loops(1.0), names, QUAD, engine="floats", **options)
-    got = sensitivity(loops(1.0), names, QUAD, engine=engine, **options)
+@cache
+def slopes_by(engine: str, names: tuple[str, ...], seconds: float) -> Sensitivity:
+    return sensitivity(loops(seconds), names, QUAD, engine=engine, nominal=NOMINAL, start=START, rate=200.0)
+
+
+IN_ALL = ("position_gain", "mass", "start.attitude")
+
+
+@pytest.mark.parametrize(
+    ("engine", "names", "seconds"),
+    [
+        ("bytecode", ("position_gain", "mass"), 0.3),
+        *(slow(engine, IN_ALL, 1.0) for engine in ("numpy", "compiled")),
+    ],
+)
+def test_engines_agree(engine: str, names: tuple[str, ...], seconds: float) -> None:
+    wanted, got = (slopes_by(each, names, seconds) for each in ("floats", engine))
     for name in names:
         np.testing.assert_allclose(listed(got, name), listed(wanted, name), rtol=1e-9, atol=1e-13)
 
 
-def test_each_of_a_batch_has_the_slopes_that_it_has_alone() -> None:
+@pytest.mark.parametrize(
+    ("engine", "path"), [("bytecode", Trajectory([0.1], np.zeros((1, 1, 3)))), slow("compiled", PATH)]
+)
+def test_each_of_a_batch_has_the_slopes_that_it_has_alone(engine: str, path: Trajectory) -> None:
     names, starts = ("velocity_gain", "inertia", "rotors.lag"), near(3)
     vehicles = [replace(QUAD, mass=QUAD.mass * (1.0 + 0.02 * k)) for k in range(3)]
-    options = {"nominal": NOMINAL, "rate": RATE, "engine": "compiled"}
-    together = sensitivity(PATH, names, vehicles, start=starts, **options)
+    options = {"nominal": NOMINAL, "rate": RATE, "engine": engine}
+    together = sensitivity(path, names, vehicles, start=starts, **options)
     assert together.mean_square_position_error.slopes["inertia"].shape == (3, 3, 3)
     for k in range(3):
-        alone = sensitivity(PATH, names, vehicles[k], start=one(starts, k), **options)
+        alone = sensitivity(path, names, vehicles[k], start=one(starts, k), **options)
         for name in names:
             np.testing.assert_array_equal(listed(together, name)[:, k], listed(alone, name))
 
@@ -211,8 +241,8 @@ def test_a_vehicle_that_diverges_has_no_final_error() -> None:
     assert np.isnan(lost.final_square_position_error.value)
 
 
-def test_answers_cannot_be_written_to() -> None:
-    answer = sensitivity(loops(0.5), "inertia", QUAD).mean_square_position_error
+def test_answers_cannot_be_written_to(everything: Sensitivity) -> None:
+    answer = everything.mean_square_position_error
     with pytest.raises(ValueError, match="read-only"):
         answer.slopes["inertia"][0, 0] = 1.0
 

@@ -61,10 +61,11 @@ def test_free_fall_holds_the_attitude_for_its_whole_span():
     np.testing.assert_array_equal(whole.setpoint.q_world_body, [[1, 0, 0, 0]] * len(whole.times))
 
 
-def test_ten_thousand_random_trajectories_have_no_nan_and_report_zero_thrust():
+@pytest.mark.parametrize("hundreds", [10, pytest.param(90, marks=pytest.mark.slow)])
+def test_thousands_of_random_trajectories_have_no_nan_and_report_zero_thrust(hundreds):
     # back to back, a hundred at a time, three segments each; every fifth passes exactly through zero thrust
-    rng = np.random.default_rng(0)
-    for _ in range(100):
+    rng = np.random.default_rng(hundreds)
+    for _ in range(hundreds):
         coefficients = rng.normal(size=(100, 3, 6, 3)) * np.exp(rng.uniform(-4, 4, (100, 1, 1, 1)))
         durations = rng.uniform(0.05, 1.0, (100, 3))
         zero_at = rng.uniform(0.2, 0.8, (20, 1))
@@ -77,8 +78,7 @@ def test_ten_thousand_random_trajectories_have_no_nan_and_report_zero_thrust():
         found = reference(
             trajectory,
             VEHICLE,
-            times=rng.uniform(0, trajectory.duration, 500).cumsum() % 1 * 0
-            + np.sort(rng.uniform(0, trajectory.duration, 500)),
+            times=np.sort(rng.uniform(0, trajectory.duration, 500)),
         )
         setpoint = found.setpoint
         for array in (

@@ -13,7 +13,7 @@ from aerobat import so3
 VEHICLE = ab.load_vehicle("agile-quad")
 
 
-@pytest.mark.parametrize("heading_deg", [90.0, -135.0])
+@pytest.mark.parametrize("heading_deg", [pytest.param(90.0, marks=pytest.mark.slow), -135.0])
 def test_a_plan_is_flown_at_its_heading(heading_deg: float) -> None:
     heading = np.deg2rad(heading_deg)
     plan = ab.plan(replace(ab.load_problem("line"), heading=heading), vehicle=VEHICLE)

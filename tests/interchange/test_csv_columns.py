@@ -14,20 +14,19 @@ from hypothesis import strategies as st
 
 from aerobat.errors import SpecError
 from aerobat.flatness import reference
-from aerobat.interchange import column_groups, read_csv, read_rows, write_columns
+from aerobat.interchange import column_groups, read_csv, read_rows, write_columns, write_csv
 from aerobat.interchange.columns import ALL
-from aerobat.planning import Miqp, Plan, plan
-from aerobat.problem import load_problem
+from aerobat.planning import Miqp, Plan
 from aerobat.simulation import load_flight
 from aerobat.trajectory import Trajectory
-from aerobat.vehicle import load_vehicle
-from command_lines import code
+from command_lines import code, without_pictures
+from shared_plans import shared_plan
 from suites import examples
 
 
 @pytest.fixture(scope="module")
 def line() -> Plan:
-    return plan(load_problem("line"), Miqp(order=5), load_vehicle("agile-quad"))
+    return shared_plan("line", planner=Miqp(order=5))
 
 
 def test_columns_are_what_the_vehicle_does_by_names_that_any_reader_of_tables_knows(
@@ -108,6 +107,7 @@ def test_somebody_elses_path_is_flown_and_what_is_assumed_is_said(
     tmp_path: Path, monkeypatch, capsys
 ) -> None:
     monkeypatch.chdir(tmp_path)
+    without_pictures(monkeypatch)
     times = np.linspace(0.0, 4.0, 81)
     s = times / 4.0
     along = 3.0 * (35 * s**4 - 84 * s**5 + 70 * s**6 - 20 * s**7)
@@ -122,15 +122,26 @@ def test_somebody_elses_path_is_flown_and_what_is_assumed_is_said(
     flight = load_flight("out/their-path-crazyflie-flown/flight.npz")
     np.testing.assert_allclose(flight.states.position[-1], [3.0, 1.5, 1.0], atol=0.02)
     np.testing.assert_allclose(np.abs(flight.states.q_world_body[0]), np.sqrt([0.5, 0, 0, 0.5]), atol=1e-3)
-    assert code("repeat", "out/their-path-crazyflie-flown") == 0
+
+
+@pytest.mark.slow
+def test_the_flight_of_somebody_elses_path_is_repeated(tmp_path: Path, monkeypatch, capsys) -> None:
+    monkeypatch.chdir(tmp_path)
+    without_pictures(monkeypatch)
+    write_csv(shared_plan("line"), "path.csv")
+    assert code("fly", "path.csv", "--out", "flown") == code("repeat", "flown")
+    assert "the same as in flown/, bit for bit" in capsys.readouterr().err
 
 
 def test_the_papers_bare_layout_is_written_on_demand(tmp_path: Path, monkeypatch) -> None:
     monkeypatch.chdir(tmp_path)
-    assert code("plan", "line", "--order", "5", "--columns", "paper") == 0
-    assert np.loadtxt("out/line/plan.csv", delimiter=",").shape[1] == 13
-    assert code("plan", "line", "--order", "5", "--columns", "time, position") == 0
-    assert Path("out/line/plan.csv").read_text().startswith("t,x,y,z\n")
+    without_pictures(monkeypatch)
+    shared_plan("line").save("line.plan")
+    assert code("plan", "line.plan", "--columns", "paper", "--out", "kept") == 0
+    assert np.loadtxt("kept/plan.csv", delimiter=",").shape[1] == 13
+    columns = column_groups("time, position")
+    write_columns(shared_plan("line"), "chosen.csv", columns)
+    assert Path("chosen.csv").read_text().startswith("t,x,y,z\n")
 
 
 @pytest.mark.parametrize(
@@ -149,6 +160,7 @@ def test_options_and_paths_that_do_not_fit_are_refused(
     arguments: tuple[str, ...], tmp_path: Path, monkeypatch, capsys
 ):
     monkeypatch.chdir(tmp_path)
+    without_pictures(monkeypatch)
     Path("path.csv").write_text("t,x,y,z\n0,0,0,1\n1,1,0,1\n2,1,0,1\n3,1,0,1\n")
     Path("wild.csv").write_text("t,x,y,z\n0,0,0,1\n1,1,0,1e30\n2,1,0,1\n3,1,0,1\n4,1,0,1\n")
     assert code("fly", *arguments) == 2
@@ -158,6 +170,6 @@ def test_options_and_paths_that_do_not_fit_are_refused(
 
 def test_columns_that_need_a_vehicle_are_refused_of_a_plan_without_one(tmp_path: Path) -> None:
     with pytest.raises(SpecError, match="the plan has none; plan for one"):
-        write_columns(plan("line"), tmp_path / "thrusts.csv", ["thrusts"])
+        write_columns(shared_plan("line", None), tmp_path / "thrusts.csv", ["thrusts"])
     with pytest.raises(SpecError, match="no group of columns named 'thrust'"):
-        write_columns(plan("line"), tmp_path / "thrusts.csv", ["thrust"])
+        write_columns(shared_plan("line", None), tmp_path / "thrusts.csv", ["thrust"])

@@ -20,6 +20,7 @@ import aerobat as ab
 from aerobat.interchange.exports import FORMATS
 from aerobat.interchange.exports.loss import HELD, peak_difference
 from export_readers import READERS, bag_messages
+from shared_plans import shared_plan
 from suites import examples
 
 SUFFIXES = {name: form.suffix for name, form in FORMATS.items()}
@@ -28,7 +29,7 @@ SUFFIXES = {name: form.suffix for name, form in FORMATS.items()}
 @pytest.fixture(scope="module")
 def flip() -> ab.Plan:
     """A flip with translation, its heading turned, for a vehicle with drag."""
-    found = ab.plan("flip-roll-translation", vehicle="hexarotor")
+    found = shared_plan("flip-roll-translation", "hexarotor")
     vehicle = replace(found.vehicle, drag_body=(0.3, 0.3, 0.1))
     return replace(found, vehicle=vehicle, trajectory=replace(found.trajectory, heading=0.7))
 

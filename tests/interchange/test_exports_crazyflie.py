@@ -16,6 +16,7 @@ from aerobat.interchange.exports.crazyflie import MAX_PIECES, PIECE
 from aerobat.interchange.exports.heading import fit_yaw
 from aerobat.interchange.exports.loss import peak_difference
 from aerobat.interchange.exports.refit import refit
+from shared_plans import shared_plan
 from suites import examples
 
 MEMORY = 4096  # bytes
@@ -30,7 +31,7 @@ PACKED = (
 @pytest.fixture(scope="module")
 def flip() -> ab.Plan:
     """The flip with translation."""
-    return ab.plan("flip-roll-translation", vehicle="agile-quad")
+    return shared_plan("flip-roll-translation")
 
 
 def evaluated(path: Path, times: np.ndarray) -> tuple[np.ndarray, np.ndarray, Rotation, Rotation]:
@@ -119,7 +120,7 @@ def test_yaw_is_fitted_where_a_piece_ends_with_the_thrust_all_but_along_the_head
 
 
 def test_a_flip_about_the_bodys_own_x_loses_no_heading(tmp_path: Path) -> None:
-    made = ab.export(ab.plan("flip-roll", vehicle="agile-quad"), tmp_path / "flip", "crazyflie")
+    made = ab.export(shared_plan("flip-roll"), tmp_path / "flip", "crazyflie")
     assert made.loss.attitude < np.deg2rad(0.01)
 
 

@@ -14,6 +14,7 @@ import pytest
 
 import aerobat as ab
 from aerobat import cli
+from shared_plans import shared_plan
 
 POSE = ("t", "x", "y", "z", "qw", "qx", "qy", "qz")
 RATES = ("vx", "vy", "vz", "wx", "wy", "wz")
@@ -24,7 +25,7 @@ ROWS = 5  # of our log for one of theirs: 100 Hz
 
 @cache
 def plan() -> ab.Plan:
-    return ab.plan("flip-roll", ab.Miqp(order=5), "agile-quad")
+    return shared_plan("flip-roll", planner=ab.Miqp(order=5))
 
 
 def under(**conditions: Any) -> ab.Flight:

@@ -18,6 +18,7 @@ from aerobat import so3
 from aerobat.interchange import flight_package
 from aerobat.interchange.flight_package import read_flight_package
 from places import CASES, ROOT
+from shared_plans import shared_plan
 
 SCHEMA = ROOT / "docs" / "plan.schema.json"
 EARLIER = CASES / "plans" / "revision-0.plan"  # written before there were revisions
@@ -39,7 +40,7 @@ print(setpoints.position[1].tolist())
 @pytest.fixture(scope="module")
 def windy() -> ab.Plan:
     """A half-flip in wind, with drag and a heading, not what it was planned for."""
-    plan = ab.plan("half-flip", vehicle="agile-quad")
+    plan = shared_plan("half-flip")
     environment = ab.Environment(gravity=9.7, wind=(1.0, -2.0, 0.5))
     return replace(
         plan,

@@ -11,6 +11,7 @@ from pyulog.ulog2csv import convert_ulog2csv
 
 import aerobat as ab
 from aerobat.interchange.exports.px4 import ATTITUDE, PATH, RATES
+from shared_plans import shared_plan
 
 # the messages of PX4 1.15, as msg/*.msg of PX4/PX4-Autopilot define them, beginning with the timestamp
 DEFINITIONS = {
@@ -41,7 +42,7 @@ def log_of(tables: dict[str, pd.DataFrame]) -> bytes:
 
 def test_tables_are_those_that_ulog2csv_writes_of_the_same_messages(tmp_path: Path) -> None:
     """Its names in its order, and the same numbers; flags, which plans have none of, it adds at the end."""
-    ab.export(ab.plan("flip-roll", vehicle="agile-quad"), tmp_path / "ours", "px4")
+    ab.export(shared_plan("flip-roll"), tmp_path / "ours", "px4")
     ours = {file: pd.read_csv(tmp_path / "ours" / file) for file in DEFINITIONS}
     (tmp_path / "flight.ulg").write_bytes(log_of(ours))
     convert_ulog2csv(str(tmp_path / "flight.ulg"), None, None, ",", None, None, False)

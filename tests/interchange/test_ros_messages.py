@@ -21,6 +21,7 @@ from aerobat.links.ros import topics
 from aerobat.links.ros.run import RVIZ
 from aerobat.states import BodyState
 from ros_sky import BEGAN, Graph, Ros
+from shared_plans import shared_plan
 
 
 def random_goal(rng: np.random.Generator) -> PathGoal:
@@ -118,7 +119,7 @@ def fields(message: Any, path: str = "") -> dict[str, Any]:
 
 def test_what_rviz_2_is_sent_is_what_rviz_shows_field_by_field() -> None:
     """RViz 2 was not run; of what it takes besides, meshes and textures, it gets none."""
-    plan = ab.plan("half-flip", vehicle="agile-quad")
+    plan = shared_plan("half-flip")
     found = ab.reference(plan, rate=50.0)
     rviz, rviz2 = (
         fields([*shown.lines(found), *(disc for _, discs in shown.snapshots(0.3) for disc in discs)])

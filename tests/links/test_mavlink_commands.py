@@ -65,6 +65,7 @@ def plan(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
+@pytest.mark.process
 def test_two_processes_fly_the_flip_through_its_gate_over_udp(plan: Path) -> None:
     """With 1 % of the messages lost and 20 ms of delay, either way.
 
@@ -95,6 +96,8 @@ def flown(plan: Path, speed: str) -> tuple[dict[str, Any], str]:
     return report, done.stderr
 
 
+@pytest.mark.peer
+@pytest.mark.process
 def test_mavsdk_takes_off_goes_somewhere_flies_offboard_and_lands() -> None:
     """A client that others wrote takes our vehicle for one that it knows."""
     script = SUPPORT / "mavsdk_flight.py"
@@ -105,26 +108,31 @@ def test_mavsdk_takes_off_goes_somewhere_flies_offboard_and_lands() -> None:
     assert words == ["took off", "went there", "flew offboard", "landed"], done.stderr
 
 
-def test_bad_input_ends_in_a_sentence_and_flies_nothing(plan: Path, tmp_path: Path, capsys) -> None:
-    nobody = f"udp:127.0.0.1:{free_port()}"
-    path = tmp_path / "path.csv"
-    ab.write_csv(flip().trajectory, path)
-    for arguments, words in (
-        ([str(plan), "--connect", nobody, "--wait", "0.3"], "no vehicle answers within 0.3 s"),
-        ([str(plan), "--connect", "udp:14540"], "udp:14540 is no address; give udp:HOST:PORT"),
-        ([str(plan), "--connect", "udp:here:port"], "is no address"),
-        ([str(plan), "--connect", "/dev/none"], "neither a device nor an address"),
-        ([str(plan), "--connect", "tcp:127.0.0.1:9"], "cannot open tcp:127.0.0.1:9"),
-        ([str(plan), "--vehicle", "hexarotor"], "certified for agile-quad, not for hexarotor"),
-        ([str(plan), "--origin", "0", "0", "0"], "raise its origin"),
-        ([str(path)], "holds a path alone"),
-        ([str(tmp_path / "none.plan")], "none.plan"),
-        ([str(plan), "--rate", "20"], "--rate"),
-    ):
-        code, _, err = run(capsys, "mavlink", *arguments)
-        assert code == 2, err
-        assert err.count("\n") == 1, err
-        assert words in err
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (("PLAN", "--connect", "NOBODY", "--wait", "0.3"), "no vehicle answers within 0.3 s"),
+        (("PLAN", "--connect", "udp:14540"), "udp:14540 is no address; give udp:HOST:PORT"),
+        (("PLAN", "--connect", "udp:here:port"), "is no address"),
+        (("PLAN", "--connect", "/dev/none"), "neither a device nor an address"),
+        (("PLAN", "--connect", "tcp:127.0.0.1:9"), "cannot open tcp:127.0.0.1:9"),
+        (("PLAN", "--vehicle", "hexarotor"), "certified for agile-quad, not for hexarotor"),
+        (("PLAN", "--origin", "0", "0", "0"), "raise its origin"),
+        (("path.csv",), "holds a path alone"),
+        (("none.plan",), "none.plan"),
+        (("PLAN", "--rate", "20"), "--rate"),
+    ],
+)
+def test_bad_input_ends_in_a_sentence_and_flies_nothing(
+    arguments: tuple[str, ...], words: str, plan: Path, tmp_path: Path, monkeypatch, capsys
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    ab.write_csv(flip().trajectory, "path.csv")
+    meant = {"PLAN": str(plan), "NOBODY": f"udp:127.0.0.1:{free_port()}"}
+    code, _, err = run(capsys, "mavlink", *(meant.get(each, each) for each in arguments))
+    assert code == 2, err
+    assert err.count("\n") == 1, err
+    assert words in err
 
 
 def test_a_port_that_is_taken_is_told(capsys) -> None:

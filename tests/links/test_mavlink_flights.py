@@ -15,7 +15,17 @@ from aerobat.links.mission import MissionSettings, Phase, require_flyable
 from mavlink_sky import ORIGIN, Sky, flip, over_a_link
 
 
-@pytest.mark.parametrize(("loss", "delay", "bound"), [(0.01, 0.02, 0.04), (0.05, 0.03, 0.06)])
+def test_the_phases_follow_each_other_and_are_told() -> None:
+    sky = over_a_link()
+    sky.run(lambda: sky.client.mission.phase is Phase.HOLD)
+    expected = ["armed", "going to the plan's start", "coming to rest there", "flying the plan"]
+    assert sky.said[1:5] == expected
+
+
+@pytest.mark.parametrize(
+    ("loss", "delay", "bound"),
+    [(0.01, 0.02, 0.04), pytest.param(0.05, 0.03, 0.06, marks=pytest.mark.slow)],
+)
 def test_a_flip_goes_through_its_gate_over_a_link_that_loses_and_delays(
     loss: float, delay: float, bound: float
 ) -> None:
@@ -35,7 +45,7 @@ def test_a_flip_goes_through_its_gate_over_a_link_that_loses_and_delays(
     np.testing.assert_allclose(sky.position[:2], 0.0, atol=0.1)
 
 
-@pytest.mark.parametrize("instant", [0.3, 0.8, 1.06, 1.4, 1.7])
+@pytest.mark.parametrize("instant", [1.06, *(pytest.param(t, marks=pytest.mark.slow) for t in (0.3, 1.7))])
 def test_a_client_killed_at_any_instant_of_the_flip_leaves_a_hover(instant: float) -> None:
     sky = over_a_link()
     sky.run_into_the_plan(instant)
@@ -49,6 +59,16 @@ def test_a_client_killed_at_any_instant_of_the_flip_leaves_a_hover(instant: floa
     assert abs(sky.vehicle.state.q_world_body[0]) == pytest.approx(1.0, abs=1e-3)
 
 
+def test_without_news_of_the_vehicle_the_plan_is_given_up() -> None:
+    sky = over_a_link()
+    sky.run_into_the_plan(1.1)
+    sky.cable.receives = False
+    sky.run(lambda: sky.client.stage is Stage.RECOVERING)
+    assert sky.since_begin < 2.0
+    assert "no news of the vehicle" in sky.client.report().aborted
+
+
+@pytest.mark.slow
 @pytest.mark.parametrize("cut", ["receives", "sends", "both"])
 def test_a_link_that_is_cut_in_mid_flip_gives_it_up_and_lands_once_it_is_back(cut: str) -> None:
     sky = over_a_link()
@@ -67,6 +87,7 @@ def test_a_link_that_is_cut_in_mid_flip_gives_it_up_and_lands_once_it_is_back(cu
     assert expected in report.aborted
 
 
+@pytest.mark.slow
 def test_a_link_that_stays_cut_is_left_to_the_vehicles_own_failsafe() -> None:
     sky = over_a_link()
     sky.run_into_the_plan(0.9)
@@ -77,6 +98,7 @@ def test_a_link_that_stays_cut_is_left_to_the_vehicles_own_failsafe() -> None:
     assert "failsafe" in sky.said[-1]
 
 
+@pytest.mark.slow
 def test_a_set_point_that_is_late_gives_the_plan_up() -> None:
     """Earlier than the vehicle would by itself."""
     sky = over_a_link(settings=MissionSettings(max_lateness=0.05))
@@ -90,6 +112,14 @@ def test_a_set_point_that_is_late_gives_the_plan_up() -> None:
     assert not sky.vehicle.crashed
 
 
+def test_an_error_over_its_bound_is_told_and_the_vehicle_brought_to_rest() -> None:
+    sky = over_a_link(settings=MissionSettings(max_error=0.005))
+    sky.run(lambda: sky.client.mission.phase is not Phase.MANEUVER)
+    assert "off its path" in sky.client.report().aborted
+    assert sky.client.stage is Stage.RECOVERING
+
+
+@pytest.mark.slow
 def test_an_error_over_its_bound_gives_the_plan_up() -> None:
     """Of a vehicle with a drag that its plan knows nothing of."""
     own = flip().vehicle
@@ -166,10 +196,3 @@ def test_a_plan_that_begins_in_motion_is_refused() -> None:
     moving = ab.Trajectory([1.0], [[[0.0, 0.0, 0.0], [1.0, 0.0, 0.0]]])
     with pytest.raises(SpecError, match="begins in motion"):
         require_flyable(replace(plan, trajectory=moving), ORIGIN)
-
-
-def test_the_phases_follow_each_other_and_are_told() -> None:
-    sky = over_a_link()
-    sky.run(lambda: sky.client.mission.phase is Phase.HOLD)
-    expected = ["armed", "going to the plan's start", "coming to rest there", "flying the plan"]
-    assert sky.said[1:5] == expected

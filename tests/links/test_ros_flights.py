@@ -22,9 +22,81 @@ from ros_sky import Sky, aloft, at_the_flips_begin
 MORE = 0.02  # [m] that a flight by topics may be off more than one in process
 
 
+def test_what_cannot_be_done_now_is_answered_in_a_sentence() -> None:
+    sky = Sky()
+    for service, words in (
+        ("takeoff", "nothing was heard of the vehicle"),
+        ("hold", "have it take off first"),
+        ("flip", "nothing was heard"),
+    ):
+        reply = sky.call(service)
+        assert reply.success is False
+        assert words in reply.sentence
+    sky.run_for(0.1)
+    assert "stands on the ground" in sky.call("flip").sentence
+    assert "stands on the ground" in sky.call("land").sentence
+    assert sky.call("takeoff").success
+    sky.run_for(0.5)
+    assert "climbing already" in sky.call("takeoff").sentence
+    assert "is climbing; wait until it hovers" in sky.call("line").sentence
+
+
+def test_goals_that_begin_elsewhere_or_are_malformed_move_nothing() -> None:
+    sky = aloft()
+    sky.node_lives = False
+    sky.run_for(2.0)
+    piece = sky.goals[-1]
+    stays = sky.position
+    assert sky.vehicle.mode is Mode.HOLD
+    far = piece._replace(
+        stamp=sky.now,
+        begin=piece.begin._replace(position=piece.begin.position + 2.0),
+        end=piece.end._replace(position=piece.end.position + 2.0),
+    )
+    broken = piece._replace(stamp=sky.now, begin=piece.begin._replace(velocity=np.full(3, np.nan)))
+    for wrong, words in ((far, "goals begin where the vehicle is"), (broken, "not finite")):
+        sky.vehicle_node._refused = ""
+        sky.send(wrong)
+        sky.run_for(0.1)
+        assert words in sky.said[-1]
+        assert sky.vehicle.mode is Mode.HOLD
+    np.testing.assert_allclose(sky.position, stays, atol=1e-3)
+
+
+def test_what_has_no_plan_is_answered_with_the_reason_and_the_vehicle_hovers_on() -> None:
+    sky = aloft()
+    problem, planner = sky.node._maneuvers["flip"]
+    demanding = replace(problem, maneuver=replace(problem.maneuver, min_inverted_thrust=45.0))
+    sky.node._maneuvers = {"flip": (demanding, planner)}
+    reply = sky.call("flip")
+    assert reply.success is False
+    assert "asks 45 m/s² inverted, agile-quad gives 32" in reply.sentence
+    sky.run_for(1.0)
+    assert sky.hovers
+
+
 @pytest.mark.parametrize(
-    ("vehicle", "generation", "service"),
-    [("agile-quad", 1, "flip"), ("agile-quad", 2, "window"), ("hexarotor", 2, "flip_trans")],
+    ("pause", "told"),
+    [
+        (0.12, "aborted: a set-point was 0.1"),
+        pytest.param(0.07, "set-points were up to 80 ms late", marks=pytest.mark.slow),
+    ],
+)
+def test_set_points_that_were_late_are_told_and_too_late_they_end_it(pause: float, told: str) -> None:
+    sky = at_the_flips_begin()
+    sky.run_into_the_plan(0.3)
+    sky.node_lives = False
+    sky.run_for(pause)
+    sky.node_lives = True
+    sky.run(lambda: bool(sky.reports))
+    assert told in sky.reports[0]
+    sky.run_for(3.0)
+    assert sky.hovers
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("vehicle", "generation", "service"), [("agile-quad", 1, "flip"), ("hexarotor", 2, "flip_trans")]
 )
 def test_a_flight_by_topics_tracks_as_in_process(vehicle: str, generation: int, service: str) -> None:
     """And ends in a hover, told of, from where it lands."""
@@ -64,6 +136,7 @@ def test_goals_come_one_a_period_and_each_goes_on_where_the_one_before_ends() ->
     assert steps.max() < 0.01 * max(speeds) + 0.01
 
 
+@pytest.mark.slow
 def test_a_vehicle_that_hears_of_goals_late_takes_off_all_the_same() -> None:
     sky = Sky()
     sky.run_for(0.1)
@@ -83,6 +156,7 @@ def test_a_vehicle_that_hears_of_goals_late_takes_off_all_the_same() -> None:
     assert sky.position[2] == pytest.approx(3.0, abs=0.01)
 
 
+@pytest.mark.slow
 def test_a_pause_of_goals_and_odometry_in_a_climb_ends_up_there_too() -> None:
     sky = Sky()
     sky.run_for(0.1)
@@ -97,6 +171,7 @@ def test_a_pause_of_goals_and_odometry_in_a_climb_ends_up_there_too() -> None:
     assert sky.position[2] == pytest.approx(3.0, abs=0.01)
 
 
+@pytest.mark.process
 def test_nothing_is_imported_while_a_vehicle_waits_for_goals() -> None:
     """An import takes longer than the silence after which a vehicle leaves its client."""
     script = SUPPORT / "flight_of_imports.py"
@@ -104,6 +179,7 @@ def test_nothing_is_imported_while_a_vehicle_waits_for_goals() -> None:
     assert not done.stdout.split()
 
 
+@pytest.mark.slow
 def test_a_vehicle_that_hears_late_of_a_landings_goals_lands_all_the_same() -> None:
     """As one does for which a node that has just begun is still unknown."""
     sky = aloft()
@@ -117,6 +193,7 @@ def test_a_vehicle_that_hears_late_of_a_landings_goals_lands_all_the_same() -> N
     assert sky.stands
 
 
+@pytest.mark.slow
 def test_a_vehicle_that_never_lands_is_left_to_itself() -> None:
     sky = aloft()
     sky.graph.cut.add(topics.GOAL)
@@ -127,6 +204,7 @@ def test_a_vehicle_that_never_lands_is_left_to_itself() -> None:
     assert sky.hovers
 
 
+@pytest.mark.slow
 def test_a_vehicle_that_never_takes_off_is_left_to_itself() -> None:
     sky = Sky()
     sky.run_for(0.1)
@@ -153,21 +231,7 @@ def test_of_goals_that_a_pause_of_the_vehicle_holds_up_each_counts_at_its_time()
     assert sky.reports[0].startswith("flown within")
 
 
-@pytest.mark.parametrize(
-    ("pause", "told"), [(0.07, "set-points were up to 80 ms late"), (0.12, "aborted: a set-point was 0.1")]
-)
-def test_set_points_that_were_late_are_told_and_too_late_they_end_it(pause: float, told: str) -> None:
-    sky = at_the_flips_begin()
-    sky.run_into_the_plan(0.3)
-    sky.node_lives = False
-    sky.run_for(pause)
-    sky.node_lives = True
-    sky.run(lambda: bool(sky.reports))
-    assert told in sky.reports[0]
-    sky.run_for(3.0)
-    assert sky.hovers
-
-
+@pytest.mark.slow
 def test_a_maneuver_begins_where_the_odometry_sees_the_vehicle() -> None:
     """A line takes it ten metres off, and there the next one begins, its gate moved along."""
     sky = aloft()
@@ -189,6 +253,7 @@ def test_a_maneuver_begins_where_the_odometry_sees_the_vehicle() -> None:
     np.testing.assert_allclose(middle, start + 5.5 * so3.UP, atol=1e-6)
 
 
+@pytest.mark.slow
 def test_in_the_world_gate_and_goal_stay_where_their_problem_has_them() -> None:
     sky = Sky(settings=NodeSettings(in_world=True, takeoff_height=3.5))
     problem, planner = sky.node._maneuvers["window"]
@@ -207,7 +272,7 @@ def test_in_the_world_gate_and_goal_stay_where_their_problem_has_them() -> None:
     np.testing.assert_allclose(middle, problem.gates[0].position, atol=1e-9)
 
 
-@pytest.mark.parametrize("instant", [0.2, 0.8, 1.2, 1.5, 1.9])
+@pytest.mark.parametrize("instant", [1.2, *(pytest.param(t, marks=pytest.mark.slow) for t in (0.2, 1.9))])
 def test_a_node_killed_at_any_instant_of_the_flip_leaves_a_hover(instant: float) -> None:
     sky = at_the_flips_begin()
     sky.run_into_the_plan(instant)
@@ -221,6 +286,7 @@ def test_a_node_killed_at_any_instant_of_the_flip_leaves_a_hover(instant: float)
     assert min(sky.heights[-1500:]) > min(expected, 3.0) - 0.3
 
 
+@pytest.mark.slow
 def test_a_vehicle_off_its_path_is_brought_to_a_hover() -> None:
     """One with a drag that its plan knows nothing of."""
     own = ab.load_vehicle("agile-quad")
@@ -238,6 +304,7 @@ def test_a_vehicle_off_its_path_is_brought_to_a_hover() -> None:
     assert sky.call("land").success
 
 
+@pytest.mark.slow
 def test_without_odometry_goals_stop_and_the_vehicle_hovers_by_itself() -> None:
     sky = at_the_flips_begin()
     sky.run_into_the_plan(1.0)
@@ -257,6 +324,7 @@ def test_without_odometry_goals_stop_and_the_vehicle_hovers_by_itself() -> None:
     assert not sky.vehicle.crashed
 
 
+@pytest.mark.slow
 def test_hold_gives_a_maneuver_up_at_once() -> None:
     sky = at_the_flips_begin()
     sky.run_into_the_plan(1.2)
@@ -265,56 +333,3 @@ def test_hold_gives_a_maneuver_up_at_once() -> None:
     sky.run_for(5.0)
     assert sky.hovers
     assert "hold was called" in sky.reports[0]
-
-
-def test_what_cannot_be_done_now_is_answered_in_a_sentence() -> None:
-    sky = Sky()
-    for service, words in (
-        ("takeoff", "nothing was heard of the vehicle"),
-        ("hold", "have it take off first"),
-        ("flip", "nothing was heard"),
-    ):
-        reply = sky.call(service)
-        assert reply.success is False
-        assert words in reply.sentence
-    sky.run_for(0.1)
-    assert "stands on the ground" in sky.call("flip").sentence
-    assert "stands on the ground" in sky.call("land").sentence
-    assert sky.call("takeoff").success
-    sky.run_for(0.5)
-    assert "climbing already" in sky.call("takeoff").sentence
-    assert "is climbing; wait until it hovers" in sky.call("line").sentence
-
-
-def test_what_has_no_plan_is_answered_with_the_reason_and_the_vehicle_hovers_on() -> None:
-    sky = aloft()
-    problem, planner = sky.node._maneuvers["flip"]
-    narrow = replace(problem, limits=ab.Limits(acceleration=5.0))
-    sky.node._maneuvers = {"flip": (narrow, planner)}
-    reply = sky.call("flip")
-    assert reply.success is False
-    assert "acceleration" in reply.sentence
-    sky.run_for(1.0)
-    assert sky.hovers
-
-
-def test_goals_that_begin_elsewhere_or_are_malformed_move_nothing() -> None:
-    sky = aloft()
-    sky.node_lives = False
-    sky.run_for(2.0)
-    piece = sky.goals[-1]
-    stays = sky.position
-    assert sky.vehicle.mode is Mode.HOLD
-    far = piece._replace(
-        stamp=sky.now,
-        begin=piece.begin._replace(position=piece.begin.position + 2.0),
-        end=piece.end._replace(position=piece.end.position + 2.0),
-    )
-    broken = piece._replace(stamp=sky.now, begin=piece.begin._replace(velocity=np.full(3, np.nan)))
-    for wrong, words in ((far, "goals begin where the vehicle is"), (broken, "not finite")):
-        sky.vehicle_node._refused = ""
-        sky.send(wrong)
-        sky.run_for(0.1)
-        assert words in sky.said[-1]
-        assert sky.vehicle.mode is Mode.HOLD
-    np.testing.assert_allclose(sky.position, stays, atol=1e-3)

@@ -27,7 +27,9 @@ def test_flips_have_the_known_optimum(maneuver: Maneuver, cost: float, backend: 
 
 
 @pytest.mark.parametrize("maneuver", [FLIP_ROLL, FLIP_PITCH, FLIP_TRANSLATION])
-@pytest.mark.parametrize(("intervals", "max_nodes"), [(20, 8), (40, 8), (80, 30), (160, 60)])
+@pytest.mark.parametrize(
+    ("intervals", "max_nodes"), [(20, 8), (40, 8), (80, 30), pytest.param(160, 60, marks=pytest.mark.slow)]
+)
 def test_a_flip_is_proven_optimal_with_few_relaxations(
     maneuver: Maneuver, intervals: int, max_nodes: int
 ) -> None:
@@ -47,14 +49,15 @@ def test_the_half_flip_is_infeasible_at_the_first_dt_and_has_the_known_optimum_a
 
 
 def test_scip_agrees_on_a_short_flip() -> None:
-    program = flip(FLIP_ROLL, intervals=10, dt=0.3)
+    program = flip(FLIP_ROLL, intervals=7, dt=0.45)
     result, ours = solver("scip").solve(program), solver().solve(program)
     assert (result.status, ours.status) == ("optimal", "optimal")
     assert result.cost == pytest.approx(ours.cost, rel=1e-6)
 
 
+@pytest.mark.peer
 def test_scip_agrees_on_a_cost_with_hessian_and_gradient() -> None:
-    flat = flip(FLIP_ROLL, intervals=8, dt=0.4)
+    flat = flip(FLIP_ROLL, intervals=7, dt=0.45)
     rng = np.random.default_rng(0)
     root = rng.normal(size=(flat.num_variables, 2))
     hessian = np.eye(flat.num_variables) + 0.1 * root @ root.T
@@ -88,10 +91,11 @@ def answers(seed: int) -> tuple[tuple[str, float], tuple[str, float]]:
     return (ours.status, ours.cost), (theirs.status, theirs.cost)
 
 
-SEEDS = range(200)
+SEEDS = range(25)
+MORE = range(25, 75)
 
 
-@pytest.mark.parametrize("seed", SEEDS)
+@pytest.mark.parametrize("seed", [*SEEDS, *(pytest.param(seed, marks=pytest.mark.peer) for seed in MORE)])
 def test_gurobi_agrees_on_random_flips(seed: int) -> None:
     (status, cost), (their_status, their_cost) = answers(seed)
     assert status == their_status
@@ -100,5 +104,5 @@ def test_gurobi_agrees_on_random_flips(seed: int) -> None:
 
 def test_random_flips_are_of_both_kinds() -> None:
     statuses = [answers(seed)[0][0] for seed in SEEDS]
-    assert 40 <= statuses.count("infeasible") <= 160
+    assert 5 <= statuses.count("infeasible") <= 20
     assert statuses.count("optimal") + statuses.count("infeasible") == len(SEEDS)

@@ -181,6 +181,7 @@ def test_sequences_without_dynamics_without_an_order_or_of_few_anchors_are_searc
     assert cut_stage(chain_program(1, anchors=2)) is None
 
 
+@pytest.mark.slow
 def test_three_flips_through_three_free_gates_are_proven_with_a_tenth_of_the_relaxations_of_the_whole() -> (
     None
 ):

@@ -1,7 +1,7 @@
 """A plan beside what is possible and usual: what is poor, goes astray, dives or spins too fast says so."""
 
-import json
 from dataclasses import replace
+from functools import cache
 from math import cos, radians, sin
 
 import numpy as np
@@ -9,7 +9,6 @@ import pytest
 from rich.console import Console
 
 import aerobat as ab
-from aerobat.cli.entry import main
 from aerobat.planning import Plan, with_assessment, with_second_opinion
 from aerobat.planning.miqp.remedies import advice
 from aerobat.planning.rotor_margin import RotorMargin
@@ -18,9 +17,16 @@ from aerobat.reporting.report_json import report
 from aerobat.reporting.style import RED
 from aerobat.reporting.tables import summary_table
 from aerobat.vehicle import Rotor
+from shared_plans import shared_plan
 
 QUAD = ab.load_vehicle("agile-quad")
 LINE = ab.Problem("line", ab.at_rest((0.0, 0.0, 1.0)), ab.at_rest((4.0, 0.0, 1.0)))
+
+
+@cache
+def line() -> Plan:
+    """The plan of LINE."""
+    return ab.plan(LINE, vehicle=QUAD)
 
 
 def nimble(drag_body: tuple[float, float, float]) -> ab.Vehicle:
@@ -62,6 +68,7 @@ def along(positions: list[tuple[float, float, float]], duration: float = 4.0) ->
     return with_assessment(Plan(LINE, path, "by hand", vehicle=QUAD))
 
 
+@pytest.mark.slow
 def test_a_half_flip_on_the_papers_vehicle_is_proven_near_the_best() -> None:
     """It once took 8.48 s, where time-optimal takes 1.93, and nothing hinted at it."""
     found = ab.plan(ab.load_problem("half-flip"), vehicle=ab.load_vehicle("section-v"))
@@ -70,10 +77,10 @@ def test_a_half_flip_on_the_papers_vehicle_is_proven_near_the_best() -> None:
     assert found.assessment.warnings == ()
 
 
-@pytest.mark.parametrize("drag", [0.0, 0.3])
-def test_a_double_flip_that_is_poor_says_so_and_names_what_does_better(drag: float) -> None:
+@pytest.mark.slow
+def test_a_double_flip_that_is_poor_says_so_and_names_what_does_better() -> None:
     pytest.importorskip("casadi")
-    found = with_second_opinion(ab.plan(double_flip(), vehicle=nimble((drag, drag, drag / 2))))
+    found = with_second_opinion(ab.plan(double_flip(), vehicle=nimble((0.3, 0.3, 0.15))))
     assessment = found.assessment
     assert assessment is not None
     assert assessment.opinion is not None
@@ -83,8 +90,19 @@ def test_a_double_flip_that_is_poor_says_so_and_names_what_does_better(drag: flo
     assert f"{assessment.opinion.duration:.3f} s ({assessment.opinion.options})" in str(found)
 
 
+def test_a_line_that_takes_twice_the_time_it_need_says_so_and_names_what_does_better() -> None:
+    pytest.importorskip("casadi")
+    found = with_second_opinion(along([(0.0, 0.0, 1.0), (2.0, 0.0, 1.0), (4.0, 0.0, 1.0)]))
+    assert found.assessment is not None
+    assert found.assessment.opinion is not None
+    assert found.assessment.opinion.duration is not None
+    assert found.assessment.opinion.duration < found.duration / 2.0
+    assert str(found.assessment).startswith("poor: ")
+    assert f"{found.assessment.opinion.duration:.3f} s ({found.assessment.opinion.options})" in str(found)
+
+
 def test_a_plan_that_is_proven_near_the_best_is_given_no_second_opinion() -> None:
-    found = ab.plan(ab.load_problem("line"), vehicle=QUAD)
+    found = shared_plan("line")
     assert with_second_opinion(found) is found
 
 
@@ -106,7 +124,7 @@ def test_a_dive_is_told_unless_a_ground_bounds_it() -> None:
 
 
 def test_rates_beyond_common_gyroscopes_are_told_unless_the_vehicle_bounds_them() -> None:
-    found = ab.plan(LINE, vehicle=QUAD).assessment
+    found = line().assessment
     assert found is not None
     fast = replace(found, max_body_rate=radians(2070.0))
     assert fast.warnings == ()  # within what the vehicle itself allows, which the certificate is about
@@ -115,7 +133,7 @@ def test_rates_beyond_common_gyroscopes_are_told_unless_the_vehicle_bounds_them(
 
 
 def test_the_room_is_the_box_that_samples_of_the_path_fill() -> None:
-    found = ab.plan(ab.load_problem("flip-roll"), vehicle=QUAD)
+    found = shared_plan("flip-roll")
     assert found.assessment is not None
     positions = found.trajectory.evaluate(np.linspace(0.0, found.duration, 4001))
     np.testing.assert_allclose(found.assessment.room.lower, positions.min(axis=0), atol=1e-5)
@@ -141,21 +159,21 @@ def test_table_and_report_tell_the_assessment_and_the_table_its_warnings_in_red(
     assert "dives" in told["warnings"][0]
 
 
-def test_the_command_line_tells_how_near_a_plan_is_to_what_is_possible(tmp_path, capsys) -> None:
-    main(["plan", "line", "--json", "--out", str(tmp_path / "out")])
-    told = json.loads(capsys.readouterr().out)["plan"]["assessment"]
+def test_a_report_tells_how_near_a_plan_is_to_what_is_possible() -> None:
+    told = report(line())["plan"]["assessment"]
     assert told["sentence"].startswith(f"at most {told['ratio']:.2f} times the shortest possible")
 
 
 def test_equal_rows_of_a_comparison_say_so() -> None:
-    first, second = ab.compare(LINE, QUAD, [("one", ab.Miqp()), ("two", ab.Miqp())]).entries
+    planner = ab.Miqp(intervals=8)
+    first, second = ab.compare(LINE, QUAD, [("one", planner), ("two", planner)]).entries
     assert (first.note, second.note) == ("", "the same path as one's")
 
 
-@pytest.mark.parametrize("iterations", [8, 20])
+@pytest.mark.parametrize("iterations", [8, pytest.param(12, marks=pytest.mark.slow)])
 def test_free_knots_say_what_they_return_in_place_of_so_many_segments(iterations: int) -> None:
     pytest.importorskip("casadi")
-    start = ab.plan(LINE, vehicle=QUAD)
+    start = line()
     found = ab.plan(LINE, ab.FreeKnots(segments=6, start=start, iterations=iterations), QUAD)
     assert bool(found.rescue) == (found.intervals != 6)
     if found.duration == start.duration:
@@ -164,18 +182,26 @@ def test_free_knots_say_what_they_return_in_place_of_so_many_segments(iterations
         assert f"none faster with 6 segments; planned with {found.intervals}" in str(found)
 
 
-def test_advice_is_given_only_of_changes_that_were_followed_with_success() -> None:
-    """A line has no gate to move nearer; a vehicle too weak for a flip is helped by stronger rotors."""
-    weak = replace(QUAD, rotors=tuple(replace(r, max_thrust=2.2) for r in QUAD.rotors))
-    flip, asked = ab.load_problem("flip-roll"), ab.Miqp(intervals=12, rescue=False)
+def with_rotors_of(max_thrust: float) -> ab.Vehicle:
+    return replace(QUAD, rotors=tuple(replace(r, max_thrust=max_thrust) for r in QUAD.rotors))
+
+
+@pytest.mark.slow
+def test_a_vehicle_too_weak_for_a_flip_is_advised_nothing_that_was_not_followed() -> None:
+    """To move the gate nearer, for one."""
     with pytest.raises(ab.Infeasible) as refusal:
-        ab.plan(flip, asked, weak)
+        ab.plan(ab.load_problem("flip-roll"), ab.Miqp(intervals=12, rescue=False), with_rotors_of(2.2))
     assert "stronger" not in str(refusal.value)
     assert "gate" not in str(refusal.value)
-    told = advice(asked, flip, weak)
+
+
+@pytest.mark.slow
+def test_advice_is_given_only_of_changes_that_were_followed_with_success() -> None:
+    """A vehicle too weak for a flip is helped by stronger rotors."""
+    flip, asked = ab.load_problem("flip-roll"), ab.Miqp(intervals=10, rescue=False)
+    told = advice(asked, flip, with_rotors_of(2.2))
     assert "it is planned with 1.5 times the max_thrust" in told
-    strong = replace(weak, rotors=tuple(replace(r, max_thrust=3.3) for r in weak.rotors))
-    assert ab.plan(flip, asked, strong).certified
+    assert ab.plan(flip, asked, with_rotors_of(3.3)).certified
     assert "limits.velocity" not in told
 
 

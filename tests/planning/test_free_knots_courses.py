@@ -56,6 +56,7 @@ def assert_through_every_ball(plan: Plan) -> None:
         assert distance > 0.9 * stage.ball.radius  # corners are cut
 
 
+@pytest.mark.slow
 def test_the_published_course_with_lag_and_reserve_is_near_the_least_time_and_snap_does_not_jump() -> None:
     plan = planned(load_problem("split-s-19"), QUAD, reserve=0.03)
     assert plan.certified
@@ -67,16 +68,18 @@ def test_the_published_course_with_lag_and_reserve_is_near_the_least_time_and_sn
     assert_smooth(plan, 5)
 
 
-def test_tilted_gates_are_passed_with_the_whole_body_anywhere_or_upright_as_asked() -> None:
+@pytest.mark.slow
+@pytest.mark.parametrize("count", [2, 4])
+def test_tilted_gates_are_passed_with_the_whole_body_anywhere_or_upright_as_asked(count: int) -> None:
     """None was planned: the start passed them from any side, and samples missed how sharply bodies turn."""
     places = ((3.0, 0.0, 1.5), (6.0, 3.0, 2.5), (3.0, 7.0, 3.5), (-1.0, 5.0, 2.0))
     attitudes = ((0.0, 20.0, 0.0), (90.0, 0.0, 60.0), (180.0, -20.0, -120.0), (250.0, 10.0, 0.0))
     gates = tuple(
         tilted_gate(place, *np.radians(attitude).tolist(), 1.2, 0.9, f"gate {number}")
-        for number, (place, attitude) in enumerate(zip(places, attitudes, strict=True), 1)
+        for number, (place, attitude) in enumerate(zip(places[:count], attitudes, strict=False), 1)
     )
     free = PassGate("gate 1", crossing_point="free", margin=0.1)
-    asked = (free, PassGate("gate 2", upright=True), replace(free, gate="gate 3"), PassGate("gate 4"))
+    asked = (free, PassGate("gate 2", upright=True), replace(free, gate="gate 3"), PassGate("gate 4"))[:count]
     start, goal = at_rest((0.0, 0.0, 1.5)), at_rest((-1.0, 0.0, 2.0))
     plan = planned(Problem("tilted", start, goal, Course(asked), gates), JERKY)
     assert plan.certified
@@ -86,8 +89,8 @@ def test_tilted_gates_are_passed_with_the_whole_body_anywhere_or_upright_as_aske
         plan.trajectory.evaluate(placed.time) - gate.position
         for placed, gate in zip(plan.stages, gates, strict=True)
     ]
-    assert min(np.linalg.norm(offsets[k]) for k in (0, 2)) > 0.05  # no one's centre is asked
-    assert max(np.linalg.norm(offsets[k]) for k in (1, 3)) < 1e-5
+    assert min(np.linalg.norm(offset) for offset in offsets[0::2]) > 0.05  # no one's centre is asked
+    assert max(np.linalg.norm(offset) for offset in offsets[1::2]) < 1e-5
     flight = own_flight(plan.trajectory, JERKY, plan.problem, plan.stages)
     assert all(passage.clearance is not None and passage.clearance > 0.0 for passage in flight.passages)
 

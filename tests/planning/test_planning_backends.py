@@ -1,4 +1,4 @@
-"""All built-in problems by every back-end and order: the same assignment, or a word that it took too long."""
+"""Built-in problems by every back-end and order: the same assignment, or a word that it took too long."""
 
 from __future__ import annotations
 
@@ -10,11 +10,17 @@ from aerobat.planning import Miqp, plan
 from aerobat.planning.miqp.miqp import formulate
 from aerobat.problem import load_problem
 
-PAPERS = ("flip-roll", "flip-roll-translation", "flip-pitch", "half-flip", "line", "section-v")
+SHORT = ("half-flip", "line", "section-v")
+LONG = (("flip-roll", 3), ("flip-roll-translation", 4), ("flip-roll", 5), ("split-s", 5))  # many stages
 
 
-@pytest.mark.parametrize("order", [3, 4, 5])
-@pytest.mark.parametrize("name", [*PAPERS, "split-s"])
+@pytest.mark.parametrize(
+    ("name", "order"),
+    [
+        *((name, order) for name in SHORT for order in (3, 4, 5)),
+        *(pytest.param(*case, marks=pytest.mark.peer) for case in LONG),
+    ],
+)
 def test_gurobi_finds_what_the_built_in_search_finds(name: str, order: int) -> None:
     pytest.importorskip("gurobipy")
     problem = load_problem(name)
@@ -27,8 +33,10 @@ def test_gurobi_finds_what_the_built_in_search_finds(name: str, order: int) -> N
     assert found.cost == pytest.approx(exact.cost, rel=1e-3)
 
 
-@pytest.mark.parametrize("order", [3, 4])
-@pytest.mark.parametrize("name", ["line", "half-flip"])
+@pytest.mark.parametrize(
+    ("name", "order"),
+    [("line", 3), ("line", 4), ("half-flip", 3), pytest.param("half-flip", 4, marks=pytest.mark.peer)],
+)
 def test_scip_finds_what_the_built_in_search_finds(name: str, order: int) -> None:
     pytest.importorskip("pyscipopt")
     problem = load_problem(name)

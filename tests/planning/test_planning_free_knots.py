@@ -1,6 +1,7 @@
 """Laws of the free-knots planner: always certified, never slower than its start, near the least time."""
 
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -11,7 +12,19 @@ from aerobat.planning.certified_solve import certificate_for
 from aerobat.planning.polynomial.descent.knot_samples import refit
 from aerobat.planning.polynomial.free_knots import FreeKnots
 from aerobat.planning.polynomial.min_snap import TimeScaling
-from aerobat.problem import EndState, Limits, Problem, Waypoint, Waypoints, load_problem
+from aerobat.problem import (
+    Condition,
+    CustomManeuver,
+    EndState,
+    Limits,
+    Problem,
+    Quantity,
+    Stage,
+    Waypoint,
+    Waypoints,
+    at_rest,
+    load_problem,
+)
 from aerobat.states import STANDARD_GRAVITY
 from aerobat.vehicle import Vehicle, load_vehicle
 from places import CASES
@@ -44,25 +57,28 @@ def margin(plan: Plan) -> float:
     return plan.margin.margin
 
 
-@pytest.fixture(scope="module")
-def plans() -> dict[str, Plan]:
-    return {name: FreeKnots(segments=2).plan(SECTION_V, vehicle(name)) for name in SETS}
+@cache
+def planned(name: str) -> Plan:
+    return FreeKnots(segments=2).plan(SECTION_V, vehicle(name))
 
 
-@pytest.mark.parametrize("name", SETS)
-def test_two_segments_are_certified_and_within_an_eighth_of_the_least_time(
-    name: str, plans: dict[str, Plan]
-) -> None:
-    plan = plans[name]
+each_set = pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=pytest.mark.slow) if name in "ADE" else name for name in SETS]
+)
+
+
+@each_set
+def test_two_segments_are_certified_and_within_an_eighth_of_the_least_time(name: str) -> None:
+    plan = planned(name)
     assert certificate_for(plan.trajectory, SECTION_V, vehicle(name)).certified
     assert certified(plan)
     assert plan.trajectory.coefficients.shape == (2, 10, 3)
     assert plan.duration / SETS[name][2] < 1.12
 
 
-@pytest.mark.parametrize("name", SETS)
-def test_ends_are_met_and_body_rates_continuous(name: str, plans: dict[str, Plan]) -> None:
-    trajectory = plans[name].trajectory
+@each_set
+def test_ends_are_met_and_body_rates_continuous(name: str) -> None:
+    trajectory = planned(name).trajectory
     for time, state in ((0.0, SECTION_V.start), (trajectory.duration, SECTION_V.goal)):
         for k, given in enumerate(state.derivatives(3)):
             np.testing.assert_allclose(trajectory.evaluate(time, k), given, atol=1e-8)
@@ -71,10 +87,10 @@ def test_ends_are_met_and_body_rates_continuous(name: str, plans: dict[str, Plan
         assert trajectory.jumps(k).max() < 1e-6
 
 
-@pytest.mark.parametrize("name", SETS)
-def test_waypoint_is_passed(name: str, plans: dict[str, Plan]) -> None:
-    (stage,) = plans[name].stages
-    assert plans[name].trajectory.evaluate(stage.time)[2] == pytest.approx(-2.0, abs=1e-5)
+@each_set
+def test_waypoint_is_passed(name: str) -> None:
+    (stage,) = planned(name).stages
+    assert planned(name).trajectory.evaluate(stage.time)[2] == pytest.approx(-2.0, abs=1e-5)
 
 
 def test_still_ends_have_no_jerk() -> None:
@@ -83,30 +99,32 @@ def test_still_ends_have_no_jerk() -> None:
         np.testing.assert_allclose(trajectory.evaluate(time, 3), 0.0, atol=1e-7)
 
 
-def test_reserve_leaves_the_rotors_more_at_the_cost_of_time(plans: dict[str, Plan]) -> None:
+def test_reserve_leaves_the_rotors_more_at_the_cost_of_time() -> None:
     plan = FreeKnots(segments=2, reserve=0.05).plan(SECTION_V, vehicle("B"))
     assert certified(plan)
-    assert margin(plan) > 2.0 * margin(plans["B"])
-    assert plan.duration > plans["B"].duration
+    assert margin(plan) > 2.0 * margin(planned("B"))
+    assert plan.duration > planned("B").duration
 
 
-def test_more_segments_are_faster(plans: dict[str, Plan]) -> None:
-    plan = FreeKnots(segments=4, start=plans["E"]).plan(SECTION_V, vehicle("E"))
+@pytest.mark.slow
+def test_more_segments_are_faster() -> None:
+    plan = FreeKnots(segments=4, start=planned("E")).plan(SECTION_V, vehicle("E"))
     assert certified(plan)
-    assert plan.duration < plans["E"].duration
+    assert plan.duration < planned("E").duration
 
 
-def test_limits_of_the_problem_hold_everywhere(plans: dict[str, Plan]) -> None:
+@pytest.mark.slow
+def test_limits_of_the_problem_hold_everywhere() -> None:
     limits = Limits(velocity=4.5, acceleration=9.0)
-    slower = FreeKnots(segments=2).plan(replace(SECTION_V, limits=limits), vehicle("A"))
+    slower = FreeKnots(segments=2).plan(replace(SECTION_V, limits=limits), vehicle("E"))
     assert np.abs(slower.trajectory.component_range(1)).max() <= 4.5 + 1e-9
     assert np.abs(slower.trajectory.component_range(2)).max() <= 9.0 + 1e-9
     assert slower.status == "locally optimal"
-    assert slower.duration > plans["A"].duration
+    assert slower.duration > planned("E").duration
 
 
-@pytest.mark.parametrize("seed", range(2))
-def test_random_starts_end_certified(seed: int, plans: dict[str, Plan]) -> None:
+@pytest.mark.parametrize("seed", [0, pytest.param(1, marks=pytest.mark.slow)])
+def test_random_starts_end_certified(seed: int) -> None:
     rng = np.random.default_rng(seed)
     first, second = rng.uniform(0.2, 3.0, 2).tolist()
     waypoints = Waypoints((Waypoint(position=np.array([np.nan, np.nan, -2.0]), time=first),), first + second)
@@ -126,8 +144,23 @@ def test_stopped_solver_leaves_the_certified_start() -> None:
     assert plan.attempts
 
 
-def test_stages_of_a_flip_hold() -> None:
-    problem, quad = load_problem("flip-roll"), load_vehicle("agile-quad")
+LEAN = Stage(
+    "lean",
+    (
+        Condition(Quantity.SPECIFIC_THRUST, (1.0, 0.0, -0.5), 0.0, 0.0),
+        Condition(Quantity.POSITION, (1.0, 0.0, 0.0), 3.0, 3.0),
+    ),
+)
+LEANING = Problem("leaning", at_rest(np.zeros(3)), at_rest((6.0, 0.0, 0.0)), CustomManeuver((LEAN,)))
+
+
+@pytest.mark.parametrize(
+    "problem",
+    [LEANING, pytest.param(load_problem("flip-roll"), marks=pytest.mark.slow)],
+    ids=["lean", "flip"],
+)
+def test_stages_hold(problem: Problem) -> None:
+    quad = load_vehicle("agile-quad")
     plan = FreeKnots().plan(problem, quad)
     assert certified(plan)
     assert plan.status == "locally optimal"
@@ -142,8 +175,8 @@ def test_stages_of_a_flip_hold() -> None:
             assert condition.lower - 1e-3 <= along <= condition.upper + 1e-3
 
 
-def test_cutting_keeps_a_path_of_degree_nine(plans: dict[str, Plan]) -> None:
-    whole = plans["D"].trajectory
+def test_cutting_keeps_a_path_of_degree_nine() -> None:
+    whole = planned("B").trajectory
     times = np.linspace(0.0, whole.duration, 101)
     for k in range(4):
         np.testing.assert_allclose(
@@ -151,6 +184,7 @@ def test_cutting_keeps_a_path_of_degree_nine(plans: dict[str, Plan]) -> None:
         )
 
 
+@pytest.mark.slow
 def test_a_poor_start_is_no_excuse_for_a_plan_slower_than_the_miqp_s() -> None:
     """The closed form through these waypoints takes 12.6 s; the optimum near it 2.4, four segments' 10.3."""
     problem, vehicle = (
@@ -162,6 +196,7 @@ def test_a_poor_start_is_no_excuse_for_a_plan_slower_than_the_miqp_s() -> None:
     assert found.duration <= Miqp(reserve=0.03).plan(problem, vehicle).duration
 
 
+@pytest.mark.slow
 def test_a_start_that_leads_to_no_optimum_gives_way_to_another() -> None:
     """A Crazyflie's flip came to 2.914 s, the start's own path, and with a reserve of 3 % to 2.613 s."""
     found = FreeKnots().plan(load_problem("flip-roll"), load_vehicle("crazyflie"))
@@ -189,6 +224,7 @@ def test_bad_input_gets_a_sentence() -> None:
         FreeKnots().plan(Problem("falling", falling, SECTION_V.goal), vehicle("A"))
 
 
+@pytest.mark.slow
 def test_where_the_miqp_s_path_leads_to_an_optimum_no_other_start_is_tried() -> None:
     problem = load_problem(str(CASES / "no-faster.toml"))
     found = FreeKnots(reserve=0.03).plan(problem, load_vehicle(str(CASES / "no-faster-vehicle.toml")))

@@ -32,10 +32,6 @@ def test_the_half_flip_is_infeasible_at_the_grids_first_step_and_known_at_its_se
     assert found.cost == pytest.approx(HALF_FLIP, rel=1e-6)
 
 
-def test_scip_agrees_on_the_flip() -> None:
-    assert in_paper("flip-roll", "scip").cost == pytest.approx(AT_100_MS["flip-roll"], rel=1e-6)
-
-
 @pytest.mark.parametrize("name", ["flip-roll", "flip-roll-translation", "half-flip", "line"])
 def test_a_plan_meets_its_ends_and_the_papers_bounds(name: str) -> None:
     found = in_paper(name)

@@ -29,6 +29,7 @@ from aerobat.trajectory import Trajectory
 from aerobat.vehicle import Vehicle, load_vehicle
 from places import CASES
 from random_problems import random_case
+from shared_plans import shared_plan
 
 AXES = np.eye(3)
 
@@ -44,7 +45,7 @@ def passing(*conditions: Condition, at: object = "free") -> Problem:
     return Problem("passing", at_rest((0.0, 0.0, 0.0)), at_rest((6.0, 0.0, 0.0)), maneuver)
 
 
-@pytest.mark.parametrize("name", ["line", "flip-roll"])
+@pytest.mark.parametrize("name", ["line", pytest.param("flip-roll", marks=pytest.mark.slow)])
 def test_a_plan_to_begin_from_is_certified_and_found_on_the_way_to_the_shortest(
     name: str, quad: Vehicle
 ) -> None:
@@ -85,6 +86,7 @@ def test_a_bound_at_zero_is_tightened_by_more_than_what_is_exceeded() -> None:
     assert tightened(floor, floor, sinking, 1).lower[2] > 1.01e-3
 
 
+@pytest.mark.slow
 def test_more_intervals_are_no_slower(quad: Vehicle) -> None:
     problem = load_problem("flip-roll")
     few, many = (plan(problem, Miqp(intervals=n, rescue=False), quad) for n in (20, 30))
@@ -96,20 +98,20 @@ def test_more_intervals_are_no_slower(quad: Vehicle) -> None:
     [
         ("half-flip", "agile-quad"),
         ("line", "agile-quad"),
-        (str(CASES / "slow-start-flip.toml"), "hexarotor"),
+        pytest.param(str(CASES / "slow-start-flip.toml"), "hexarotor", marks=pytest.mark.slow),
     ],
 )
 def test_no_equal_intervals_one_percent_shorter_can_be_flown(name: str, vehicle: str) -> None:
     problem, flown_by = load_problem(name), load_vehicle(vehicle)
-    found = plan(problem, vehicle=flown_by)
+    found = shared_plan(name, vehicle)
     dt = 0.99 * found.duration / found.intervals
     with pytest.raises(Infeasible):
         plan(problem, Miqp(search=GridSearch(dt, dt, 1), rescue=False), flown_by)
 
 
 @pytest.mark.parametrize("name", ["flip-roll", "half-flip", "line"])
-def test_no_program_is_made_a_step_of_the_scan_shorter_than_any_motion(quad: Vehicle, name: str) -> None:
-    found = plan(load_problem(name), vehicle=quad)
+def test_no_program_is_made_a_step_of_the_scan_shorter_than_any_motion(name: str) -> None:
+    found = shared_plan(name)
     assert found.assessment is not None
     assert min(a.duration for a in found.attempts) >= found.assessment.least_duration / COARSE_GROWTH
 
@@ -131,6 +133,7 @@ def test_what_too_few_intervals_miss_is_rescued_and_said(quad: Vehicle) -> None:
     assert "miqp found none with 7 intervals; planned" in str(found)
 
 
+@pytest.mark.slow
 def test_a_narrow_window_at_an_end_is_rescued_by_many_intervals(quad: Vehicle) -> None:
     """With 13 intervals one is left after the window, with 23 two: too few for three conditions and rest."""
     aside = Condition(Quantity.POSITION, AXES[1], 0.2, 0.2)
@@ -140,6 +143,7 @@ def test_a_narrow_window_at_an_end_is_rescued_by_many_intervals(quad: Vehicle) -
     assert "planned with 40" in found.rescue
 
 
+@pytest.mark.slow
 def test_where_no_path_settles_more_intervals_are_tried_and_the_shorter_plan_says_so() -> None:
     """The program's own answer takes twice as long as need be."""
     case = random_case(72, 23)
@@ -216,8 +220,8 @@ def test_slopes_of_samples_are_their_differences() -> None:
 
 
 @pytest.fixture(scope="module")
-def flown(quad: Vehicle) -> Trajectory:
-    return plan(load_problem("flip-roll"), vehicle=quad).trajectory
+def flown() -> Trajectory:
+    return shared_plan("flip-roll").trajectory
 
 
 def sampled(flown: Trajectory, craft: Vehicle, times: np.ndarray) -> tuple[RotorRows, np.ndarray, np.ndarray]:
@@ -254,6 +258,7 @@ def test_slopes_of_rotor_rows_are_their_differences(flown: Trajectory, quad: Veh
     np.testing.assert_allclose(found, expected, rtol=1e-4, atol=1e-5 * np.abs(expected).max())
 
 
+@pytest.mark.slow
 def test_a_reserve_is_kept_for_the_controller_and_costs_time(quad: Vehicle) -> None:
     """Of each rotor's range, thrusts and commands, all but what lies between the places it is held at."""
     problem = load_problem("half-flip")
@@ -265,6 +270,7 @@ def test_a_reserve_is_kept_for_the_controller_and_costs_time(quad: Vehicle) -> N
     assert plain.duration < kept.duration < 1.1 * plain.duration
 
 
+@pytest.mark.slow
 def test_a_hop_straight_up_is_planned_without_a_word_of_arithmetic() -> None:
     """Trials of it point their thrust straight down, against the frame that they are seen in."""
     hop = replace(load_problem("line"), start=at_rest((0.0, 0.0, 0.0)), goal=at_rest((0.0, 0.0, 1.0)))

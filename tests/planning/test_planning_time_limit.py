@@ -52,10 +52,11 @@ def planned(planner: Planner) -> Plan | None:
 @pytest.mark.parametrize(
     ("planner", "ticks"),
     [
-        (Miqp, (0, 2, 7, 20, 40, 60, 80, 100)),
+        (Miqp, (0, 7, 20, 40, 60, 100)),
         (MinSnap, (0, 2, 4, 7, 11, 20)),
-        (FreeKnots, (0, 4, 12, 22, 50)),
-        (TimeOptimal, (0, 60, 200, 300)),
+        (FreeKnots, (0, 4, 12, 16)),
+        pytest.param(FreeKnots, (0, 12, 22, 50), marks=pytest.mark.slow),
+        pytest.param(TimeOptimal, (0, 60, 200), marks=pytest.mark.slow),
     ],
 )
 def test_a_limit_yields_the_best_so_far_certified_or_says_that_there_is_none(
@@ -74,10 +75,16 @@ def test_a_limit_yields_the_best_so_far_certified_or_says_that_there_is_none(
     assert durations == sorted(durations, reverse=True)  # and no slower
 
 
-def test_a_plan_that_a_limit_ended_says_so_and_one_in_time_is_the_same_as_without() -> None:
-    limited = [planned(Miqp(time_limit=1000.0 * ticks)) for ticks in (30, 50, 70)]
-    assert {found.status for found in limited if found is not None} == {"time_limit"}
-    unlimited, in_time = (plan(SECTION_V, Miqp(time_limit=limit), QUAD) for limit in (None, 1e9))
+def test_a_plan_that_a_limit_ended_says_so() -> None:
+    limited = planned(Miqp(time_limit=50_000.0))
+    assert limited is not None
+    assert limited.status == "time_limit"
+
+
+def test_a_plan_in_time_is_the_same_as_without_a_limit() -> None:
+    unlimited, in_time = (
+        plan(SECTION_V, Miqp(intervals=12, time_limit=limit), QUAD) for limit in (None, 1e9)
+    )
     assert in_time.status == unlimited.status == "locally optimal"
     assert in_time.trajectory.coefficients.tobytes() == unlimited.trajectory.coefficients.tobytes()
 
@@ -105,7 +112,10 @@ def test_what_a_limit_left_of_a_comparison_says_how_far_from_the_shortest_possib
     assert dict(plan_facts(found))["cost"].endswith(told)
 
 
-def test_what_is_left_of_a_limit_is_all_that_a_second_opinion_has(tmp_path, monkeypatch, capsys) -> None:
+@pytest.mark.slow
+def test_what_is_left_of_a_command_s_limit_is_all_that_a_second_opinion_has(
+    tmp_path, monkeypatch, capsys
+) -> None:
     monkeypatch.chdir(tmp_path)
     left: list[float | None] = []
 
@@ -117,6 +127,9 @@ def test_what_is_left_of_a_limit_is_all_that_a_second_opinion_has(tmp_path, monk
     cli.main(["plan", "line", "--planner", "min-snap", "--time-limit", "1e9", "--json"])
     assert left[0] is not None
     assert left[0] < 1e9
+
+
+def test_where_nothing_is_left_of_a_limit_there_is_no_second_opinion() -> None:
     found = plan(load_problem("line"), MinSnap(), "agile-quad")
     assert found.assessment is not None
     poor = replace(found, assessment=replace(found.assessment, least_duration=0.1))

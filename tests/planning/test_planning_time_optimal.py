@@ -2,6 +2,7 @@
 
 import importlib.util
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -29,32 +30,46 @@ from rigid_body_replay import replayed
 QUAD = load_vehicle("agile-quad")
 
 
-def section_v(max_thrust: float, inertia: float) -> Vehicle:
+# rotors up to [N], inertia [kg·m²], duration [s] of the planar problem by multiple shooting of the rigid body
+SETS = {
+    "A": (18.0, 0.12, 1.842),
+    "B": (6.5, 0.12, 2.342),
+    "D": (18.0, 0.012, 1.134),
+    "E": (6.5, 0.012, 1.942),
+}
+
+
+def section_v(name: str) -> Vehicle:
     """The vehicle of Section V with rotors from 0 N."""
+    max_thrust, inertia, _ = SETS[name]
     vehicle = load_vehicle("section-v")
     rotors = tuple(replace(rotor, min_thrust=0.0, max_thrust=max_thrust) for rotor in vehicle.rotors)
     return replace(vehicle, inertia=inertia * np.eye(3), rotors=rotors)
 
 
+@cache
+def planar(name: str, intervals: int = 60, reserve: float = 0.0) -> Plan:
+    planner = TimeOptimal(intervals, reserve, starts=1, planar=True)
+    return planner.plan(load_problem("section-v"), section_v(name))
+
+
 @pytest.fixture(scope="module")
 def flip() -> Plan:
-    return TimeOptimal(starts=2).plan(load_problem("flip-roll"), QUAD)
+    return TimeOptimal(intervals=24, starts=1).plan(load_problem("flip-roll"), QUAD)
 
 
 @pytest.fixture(scope="module")
 def half_flip() -> Plan:
-    return TimeOptimal(intervals=40, starts=2).plan(load_problem("half-flip"), QUAD)
+    return TimeOptimal(intervals=12, starts=1).plan(load_problem("half-flip"), QUAD)
 
 
 @pytest.mark.parametrize(
-    ("max_thrust", "inertia", "least"),
-    [(18.0, 0.12, 1.842), (6.5, 0.12, 2.342), (18.0, 0.012, 1.134), (6.5, 0.012, 1.942)],
-    ids=["A", "B", "D", "E"],
+    "name", [pytest.param(name, marks=pytest.mark.slow) if name in "ADE" else name for name in SETS]
 )
-def test_section_v_takes_its_least_time_and_a_rigid_body_without_control_arrives(max_thrust, inertia, least):
-    """Least times of the planar problem by multiple shooting of the rigid body; feed-forward alone after."""
-    vehicle, problem = section_v(max_thrust, inertia), load_problem("section-v")
-    found = TimeOptimal(planar=True, starts=2).plan(problem, vehicle)
+def test_section_v_takes_its_least_time_and_a_rigid_body_without_control_arrives(name):
+    """Feed-forward alone."""
+    vehicle, problem, least = section_v(name), load_problem("section-v"), SETS[name][2]
+    found = planar(name)
     assert found.duration == pytest.approx(least, rel=5e-3)
     assert found.certificate.certified
     assert np.ptp(found.trajectory.coefficients[..., 1]) < 5e-5
@@ -64,26 +79,31 @@ def test_section_v_takes_its_least_time_and_a_rigid_body_without_control_arrives
     assert np.linalg.norm(velocity) < 1e-3
 
 
+@pytest.mark.slow
 def test_in_space_there_is_a_faster_way_than_in_the_plane():
-    vehicle = section_v(18.0, 0.012)
+    vehicle = section_v("D")
     in_space = TimeOptimal(intervals=40).plan(load_problem("section-v"), vehicle)
     assert in_space.duration < 1.11
 
 
+@pytest.mark.slow
 def test_a_maneuver_that_lies_in_no_plane_is_planned_in_space():
     bent = Waypoints((Waypoint(position=(1.0, 1.0, 0.0)),))
     problem = Problem("bent", at_rest((0, 0, 0)), at_rest((2, 0, 0)), bent)
-    found = TimeOptimal(intervals=20, starts=1).plan(problem, QUAD)
+    found = TimeOptimal(intervals=8, starts=1).plan(problem, QUAD)
     assert found.trajectory.evaluate(found.stages[0].time) == pytest.approx([1.0, 1.0, 0.0], abs=1e-6)
 
 
-def test_more_intervals_change_little(half_flip):
-    coarser = TimeOptimal(intervals=28, starts=2).plan(half_flip.problem, QUAD)
-    assert coarser.trajectory.segments < half_flip.trajectory.segments
-    assert coarser.duration == pytest.approx(half_flip.duration, rel=0.015)
+@pytest.mark.slow
+def test_more_intervals_change_little():
+    assert planar("B", 20).trajectory.segments < planar("B").trajectory.segments
+    assert planar("B", 20).duration == pytest.approx(planar("B").duration, rel=0.015)
 
 
-@pytest.mark.parametrize("name", ["flip", "half_flip"])
+each_flip = pytest.mark.parametrize("name", [pytest.param("flip", marks=pytest.mark.slow), "half_flip"])
+
+
+@each_flip
 def test_a_flip_is_certified_and_flown_within_2_cm(name, request):
     found = request.getfixturevalue(name)
     assert found.certified
@@ -92,7 +112,7 @@ def test_a_flip_is_certified_and_flown_within_2_cm(name, request):
     assert np.linalg.norm(flown.states.position - flown.setpoint.flat.position, axis=-1).max() < 0.02
 
 
-@pytest.mark.parametrize("name", ["flip", "half_flip"])
+@each_flip
 def test_every_stage_holds_where_it_is_said_to(name, request):
     found = request.getfixturevalue(name)
     course = found.problem.stages(QUAD.max_specific_thrust)
@@ -121,34 +141,37 @@ def test_the_half_flip_passes_its_gate_squarely_and_banked_as_the_gate_is(half_f
     assert thrust @ gate.up > np.cos(gate.attitude_tolerance / 2) * np.linalg.norm(thrust) - 1e-6
 
 
-def test_lagging_rotors_can_follow(flip):
+def test_lagging_rotors_can_follow(half_flip):
     """Thrust is continuous, and at both ends that of hovering."""
     weight = np.array([0.0, 0.0, STANDARD_GRAVITY])
-    thrust = np.linalg.norm(flip.trajectory.on_segments([0.0, 1.0], 2) + weight, axis=-1)
+    thrust = np.linalg.norm(half_flip.trajectory.on_segments([0.0, 1.0], 2) + weight, axis=-1)
     assert thrust[1:, 0] == pytest.approx(thrust[:-1, 1], abs=1e-6)
     assert thrust[[0, -1], [0, 1]] == pytest.approx(STANDARD_GRAVITY, abs=1e-6)
 
 
+@pytest.mark.slow
 def test_limits_hold_between_nodes_and_cost_time():
     limits = Limits(upper=np.array([np.inf, np.inf, 0.05]), velocity=5.0, acceleration=20.0, jerk=150.0)
     free = Problem("dash", at_rest((0, 0, 0)), at_rest((4, 0, 0)))
-    bound = TimeOptimal(intervals=20, starts=1).plan(replace(free, limits=limits), QUAD)
+    bound = TimeOptimal(intervals=8, starts=1).plan(replace(free, limits=limits), QUAD)
     for derivative in range(4):
         (lower, upper), (least, most) = limits.of(derivative), bound.trajectory.component_range(derivative)
         assert (lower - 1e-9 <= least).all()
         assert (most <= upper + 1e-9).all()
     assert bound.certificate.certified
-    assert bound.duration > TimeOptimal(intervals=20, starts=1).plan(free, QUAD).duration
+    assert bound.duration > TimeOptimal(intervals=8, starts=1).plan(free, QUAD).duration
 
 
+@pytest.mark.slow
 def test_who_would_come_into_a_gate_along_its_plane_flies_straighter_through_it():
     gate = tilted_gate((1.5, 1.0, 0.0), heading=np.radians(60.0))
     problem = Problem("aside", at_rest((0.0, 0.0, 0.0)), at_rest((3.0, 0.0, 0.0)), Line(), (gate,))
-    found = plan(problem, TimeOptimal(reserve=0.03, starts=1, intervals=24), "hexarotor")
+    found = plan(problem, TimeOptimal(reserve=0.03, starts=1, intervals=12), "hexarotor")
     assert found.flies, found.flyability
     assert found.flyability.passages[0].clearance > 0.0
 
 
+@pytest.mark.slow
 def test_ends_in_motion_are_met():
     start = EndState(np.zeros(3), np.array([2.0, 0.0, 0.0]), np.array([0.0, 1.0, 0.0]))
     goal = EndState(np.array([6.0, 1.0, 1.0]), np.array([0.0, -1.0, 0.0]))
@@ -158,12 +181,11 @@ def test_ends_in_motion_are_met():
             assert path.evaluate(end, derivative) == pytest.approx(value, abs=1e-5)
 
 
+@pytest.mark.slow
 def test_a_reserve_is_kept_from_every_rotors_limits_and_costs_time():
-    vehicle, problem = section_v(18.0, 0.12), load_problem("section-v")
-    planners = [TimeOptimal(20, reserve, starts=1, planar=True) for reserve in (0.0, 0.05)]
-    plans = [planner.plan(problem, vehicle) for planner in planners]
-    assert plans[1].margin.margin > 0.04 * 18.0
-    assert plans[1].duration > plans[0].duration
+    kept = planar("B", 20, 0.05)
+    assert kept.margin.margin > 0.04 * SETS["B"][0]
+    assert kept.duration > planar("B", 20).duration
 
 
 def test_what_cannot_be_asked_is_refused():

@@ -26,7 +26,11 @@ FIGURES = (
     ab.KnifeEdgePass(PLACE),
     ab.InvertedPass(PLACE),
 )
-PRESETS = tuple(figure.kind for figure in FIGURES)
+SEARCHED = ("power-loop", "immelmann", "split-s", "matty-flip", "corkscrew")  # which take longer
+PRESETS = tuple(
+    pytest.param(figure.kind, marks=pytest.mark.slow) if figure.kind in SEARCHED else figure.kind
+    for figure in FIGURES
+)
 figures = st.sampled_from(FIGURES)
 headings = st.floats(-np.pi, np.pi)
 Asked = list[tuple[str, Quantity, np.ndarray, float, float]]

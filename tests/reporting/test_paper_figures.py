@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from functools import cache, partial
 from pathlib import Path
 
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 
 from aerobat import cli
 from aerobat.errors import SpecError
@@ -30,11 +32,14 @@ def drawn(number: int) -> PaperFigure:
     return paper_figure(number)
 
 
-@pytest.mark.parametrize("number", [2, 3, 5, 6, 8, 9, 10])
+@pytest.mark.parametrize(
+    "number", [2, *(pytest.param(number, marks=pytest.mark.slow) for number in (3, 5, 6, 8, 9, 10))]
+)
 def test_no_text_lies_over_another_or_beyond_the_page(number: int, monkeypatch: pytest.MonkeyPatch) -> None:
     require_legible(drawn(number).figure, monkeypatch)
 
 
+@pytest.mark.slow
 def test_the_same_runs_give_the_same_bytes() -> None:
     first = drawn(3)
     maneuver_flights.cache_clear()
@@ -44,6 +49,7 @@ def test_the_same_runs_give_the_same_bytes() -> None:
     assert again.pdf == first.pdf
 
 
+@pytest.mark.slow
 def test_the_search_on_times_comes_to_the_paper_s_times_and_only_then_within_the_limits() -> None:
     search = time_search()
     for iteration, times in PAPER_TIMES.items():
@@ -65,6 +71,7 @@ def test_intervals_that_are_drawn_meet_and_have_constant_jerk() -> None:
     assert np.abs(jerk).max() <= 200.0 + 1e-6
 
 
+@pytest.mark.slow
 def test_errors_that_are_told_are_those_of_the_flights() -> None:
     flights = maneuver_flights("half-flip")
     caption = drawn(5).caption
@@ -76,12 +83,14 @@ def test_errors_that_are_told_are_those_of_the_flights() -> None:
 
 def test_a_figure_that_is_drawn_anew_leaves_the_others_on_the_page(tmp_path: Path) -> None:
     page = tmp_path / "figures.md"
-    write_figures([drawn(3)], tmp_path)
+    second = replace(drawn(2), figure=Figure())
+    third = replace(second, caption=replace(second.caption, number=3, title="Another"))
+    write_figures([third], tmp_path)
     alone = page.read_text(encoding="utf-8")
-    write_figures([drawn(2)], tmp_path)
+    write_figures([second], tmp_path)
     both = page.read_text(encoding="utf-8")
     assert both.replace(both[both.index("## Fig. 2 ") : both.index("## Fig. 3 ")], "") == alone
-    write_figures([drawn(2)], tmp_path)
+    write_figures([second], tmp_path)
     assert page.read_text(encoding="utf-8") == both
 
 
@@ -94,12 +103,19 @@ def test_a_page_of_somebody_else_s_is_left_alone(tmp_path: Path) -> None:
     assert page.read_text(encoding="utf-8") == "# Mine\n"
 
 
-def test_the_command_writes_what_it_names(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    cli.main(["figures", "3", "2", "2", "--out", str(tmp_path / "deep" / "figures"), "--json"])
+@pytest.mark.parametrize(
+    ("named", "written"), [("2 2", [2]), pytest.param("3 2 2", [2, 3], marks=pytest.mark.slow)]
+)
+def test_the_command_writes_what_it_names(
+    named: str, written: list[int], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    cli.main(["figures", *named.split(), "--out", str(tmp_path / "deep" / "figures"), "--json"])
     facts = json.loads(capsys.readouterr().out)
-    assert [each["figure"] for each in facts["figures"]] == [2, 3]
+    assert [each["figure"] for each in facts["figures"]] == written
     assert sorted(map(str, (tmp_path / "deep" / "figures").iterdir())) == sorted(facts["files"])
     assert facts["figures"][0]["here"] == drawn(2).caption.here
+    png, pdf = ((tmp_path / "deep" / "figures" / f"fig-2.{kind}").read_bytes() for kind in ("png", "pdf"))
+    assert (png, pdf) == (drawn(2).png, drawn(2).pdf)  # of the same run, drawn another time
 
 
 @pytest.mark.parametrize("number", ["4", "-1", "11"])

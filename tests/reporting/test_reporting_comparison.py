@@ -11,7 +11,8 @@ from rich.console import Console
 import aerobat as ab
 from aerobat.reporting.comparison import comparison_rows, comparison_table
 from aerobat.studies.compare import Comparison, Entry
-from reporting_cases import planned, require_legible, simulated
+from reporting_cases import require_legible, simulated
+from shared_plans import shared_plan
 
 pytestmark = pytest.mark.filterwarnings("error")  # drawing warns of nothing
 KEYS = [
@@ -33,7 +34,7 @@ def section_v():
 
 
 def flip():
-    plan, flight, vehicle = planned("flip-roll"), simulated("flip-roll"), ab.load_vehicle("agile-quad")
+    plan, flight, vehicle = shared_plan("flip-roll"), simulated("flip-roll"), ab.load_vehicle("agile-quad")
     entry = Entry("miqp", plan, flight, ab.score(flight, plan.problem, vehicle), 0.1, "through the gate")
     return Comparison(plan.problem, vehicle, (entry, NONE))
 

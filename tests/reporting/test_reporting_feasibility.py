@@ -48,7 +48,10 @@ def shown(found: ab.FeasibilityMap, width: int = 200) -> str:
     return console.file.getvalue()
 
 
-@pytest.mark.parametrize(("rows", "columns"), [(10, 10), (3, 2), (16, 24), (1, 5), (1, 50), (2, 1)])
+@pytest.mark.parametrize(
+    ("rows", "columns"),
+    [(10, 10), (3, 2), pytest.param(16, 24, marks=pytest.mark.slow), (1, 5), (1, 50), (2, 1)],
+)
 def test_a_page_is_legible_however_many_cells_there_are(rows: int, columns: int, monkeypatch) -> None:
     figure = ab.map_figure(made(rows, columns))
     if rows * columns > 6:

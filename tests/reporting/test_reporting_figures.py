@@ -3,6 +3,7 @@
 import subprocess
 import sys
 from dataclasses import replace
+from functools import lru_cache
 
 import matplotlib
 import numpy as np
@@ -22,24 +23,39 @@ from aerobat.reporting.panels import path as path_panel
 from aerobat.reporting.panels.keyframes import maneuver_plane, plan_keyframes
 from aerobat.reporting.scene.glyphs import gate_bars
 from aerobat.reporting.style import BLUE, RED, SKY, YELLOW
-from reporting_cases import PROBLEMS, batch_of, planned, require_legible, simulated, two_flips
+from reporting_cases import PROBLEMS, batch_of, require_legible, simulated, two_flips
+from shared_plans import shared_plan
 
 pytestmark = pytest.mark.filterwarnings("error")  # drawing warns of nothing
 YELLOW_RGBA = to_rgba(YELLOW)
-CASES = [(problem, "agile-quad") for problem in PROBLEMS] + [
-    ("flip-roll", "hexarotor"),
-    ("half-flip", "crazyflie"),
-    ("section-v", "section-v"),
+OTHERS = [("flip-roll", "hexarotor", 0), ("half-flip", "crazyflie", 0), ("section-v", "section-v", 0)]
+# the report of every problem, and all pages of the one without a gate; most of them in the full suite
+PAGES = [
+    ("flip-roll", "agile-quad", 0),
+    *(
+        pytest.param(*page, marks=pytest.mark.slow)
+        for page in (
+            *((problem, "agile-quad", 0) for problem in PROBLEMS[1:]),
+            *(("line", "agile-quad", number) for number in (1, 2, 3)),
+        )
+    ),
 ]
 
 
 def page(problem, vehicle="agile-quad"):
-    return report_figure(planned(problem, vehicle), ab.load_vehicle(vehicle), simulated(problem, vehicle))
+    return report_figure(shared_plan(problem, vehicle), ab.load_vehicle(vehicle), simulated(problem, vehicle))
 
 
-def pages(problem, vehicle):
-    plan, body, flight = planned(problem, vehicle), ab.load_vehicle(vehicle), simulated(problem, vehicle)
-    return [report_figure(plan, body, flight), report_figure(plan, body), draw(flight, plan), draw(flight)]
+@lru_cache
+def shared_page(problem, vehicle="agile-quad", number=0):
+    """One of the pages of a plan and its flight, which no test changes: reports first, drawings then."""
+    plan, body, flight = shared_plan(problem, vehicle), ab.load_vehicle(vehicle), simulated(problem, vehicle)
+    return (
+        lambda: report_figure(plan, body, flight),
+        lambda: report_figure(plan, body),
+        lambda: draw(flight, plan),
+        lambda: draw(flight),
+    )[number]()
 
 
 def panel_of(figure, quantity):
@@ -50,34 +66,34 @@ def stages_panel(figure):
     return next(axes for axes in figure.axes if axes.get_ylabel() == "z [m]")
 
 
-@pytest.mark.parametrize(("problem", "vehicle"), CASES)
-def test_no_text_lies_over_another_or_beyond_the_page(problem, vehicle, monkeypatch):
-    shown = pages(problem, vehicle)
-    for figure in shown if problem == "line" else shown[:1]:
-        require_legible(figure, monkeypatch)
+@pytest.mark.parametrize(
+    ("problem", "vehicle", "number"),
+    [*PAGES, *(pytest.param(*page, marks=pytest.mark.slow) for page in OTHERS)],
+)
+def test_no_text_lies_over_another_or_beyond_the_page(problem, vehicle, number, monkeypatch):
+    require_legible(shared_page(problem, vehicle, number), monkeypatch)
 
 
-@pytest.mark.parametrize("problem", PROBLEMS)
-def test_every_axis_says_its_quantity_and_unit(problem):
-    for figure in pages(problem, "agile-quad"):
-        for axes in figure.axes:
-            if not axes.axison:
-                assert {f"{name} [m]" for name in "xyz"} <= {text.get_text() for text in axes.texts}
-                continue
-            assert "[" in axes.get_ylabel()
-            numbers = axes.xaxis.get_tick_params()["labelbottom"]
-            assert not numbers or "[" in axes.get_xlabel()
+@pytest.mark.parametrize(("problem", "vehicle", "number"), PAGES)
+def test_every_axis_says_its_quantity_and_unit(problem, vehicle, number):
+    for axes in shared_page(problem, vehicle, number).axes:
+        if not axes.axison:
+            assert {f"{name} [m]" for name in "xyz"} <= {text.get_text() for text in axes.texts}
+            continue
+        assert "[" in axes.get_ylabel()
+        numbers = axes.xaxis.get_tick_params()["labelbottom"]
+        assert not numbers or "[" in axes.get_xlabel()
 
 
 def test_a_page_is_a_picture_1600_pixels_wide():
-    content = png(page("flip-roll"))
+    content = png(shared_page("flip-roll"))
     assert content.startswith(b"\x89PNG")
     assert 1600 <= int.from_bytes(content[16:20], "big") <= 1620
 
 
 def test_drawn_errors_are_those_of_the_flight():
-    flight = simulated("half-flip")
-    figure = page("half-flip")
+    flight = simulated("flip-roll")
+    figure = shared_page("flip-roll")
     distance = np.linalg.norm(flight.states.position - flight.setpoint.flat.position, axis=1)
     position = panel_of(figure, "position error")
     unit = {"[m]": 1.0, "[cm]": 1e-2}[position.get_ylabel().split()[-1]]
@@ -90,10 +106,10 @@ def test_drawn_errors_are_those_of_the_flight():
     np.testing.assert_allclose(drawn, np.rad2deg(angle), atol=1e-6)
 
 
-@pytest.mark.parametrize("vehicle", ["agile-quad", "hexarotor"])
+@pytest.mark.parametrize("vehicle", ["agile-quad", pytest.param("hexarotor", marks=pytest.mark.slow)])
 def test_rotor_thrusts_are_drawn_with_the_vehicle_s_limits(vehicle):
     flight, body = simulated("flip-roll", vehicle), ab.load_vehicle(vehicle)
-    lines = panel_of(page("flip-roll", vehicle), "rotor thrust").get_lines()
+    lines = panel_of(shared_page("flip-roll", vehicle), "rotor thrust").get_lines()
     rotors, limits = lines[: len(body.rotors)], lines[len(body.rotors) :]
     for i, line in enumerate(rotors):
         np.testing.assert_allclose(line.get_ydata(), flight.thrusts[:, i])
@@ -105,17 +121,19 @@ def test_rotor_thrusts_are_drawn_with_the_vehicle_s_limits(vehicle):
 
 
 def test_stages_are_marked_at_their_times_in_every_timeline():
-    plan = planned("flip-roll")
-    figure = page("flip-roll")
+    plan = shared_plan("flip-roll")
+    figure = shared_page("flip-roll")
     for quantity in ("position error", "attitude error", "specific thrust", "rotor thrust"):
         marks = panel_of(figure, quantity).collections[0].get_segments()
         np.testing.assert_allclose([mark[0][0] for mark in marks], [stage.time for stage in plan.stages])
 
 
-@pytest.mark.parametrize("problem", PROBLEMS)
+@pytest.mark.parametrize(
+    "problem", [PROBLEMS[0], *(pytest.param(name, marks=pytest.mark.slow) for name in PROBLEMS[1:])]
+)
 def test_arrows_are_the_specific_thrust_at_the_scale_of_their_keys(problem):
-    plan, vehicle = planned(problem), ab.load_vehicle("agile-quad")
-    axes = stages_panel(page(problem))
+    plan, vehicle = shared_plan(problem), ab.load_vehicle("agile-quad")
+    axes = stages_panel(shared_page(problem))
     quivers = {q.get_facecolor()[0].tobytes(): q for q in axes.collections if isinstance(q, Quiver)}
     keys = {key.Q: key for key in axes.get_children() if isinstance(key, QuiverKey)}
     reference = plan_keyframes(plan, vehicle)
@@ -130,21 +148,22 @@ def test_arrows_are_the_specific_thrust_at_the_scale_of_their_keys(problem):
             assert thrust == pytest.approx(expected[k], abs=1e-6)
 
 
-def pixels_of(figure, colour):
-    """How many pixels of a page are of a colour, or of one that nobody tells from it."""
-    figure.canvas.draw()
-    picture = np.asarray(figure.canvas.buffer_rgba())[..., :3].astype(int)
+def pixels_of(picture, colour):
+    """How many pixels are of a colour, or of one that nobody tells from it."""
     return int((np.abs(picture - 255 * np.array(to_rgba(colour)[:3])).max(axis=-1) < 12).sum())
 
 
-@pytest.mark.parametrize("problem", PROBLEMS)
-def test_nothing_is_red_where_nothing_is_wrong(problem):
-    assert all(pixels_of(figure, RED) == 0 for figure in pages(problem, "agile-quad"))
-    assert pixels_of(page(problem), BLUE) > 100
+@pytest.mark.parametrize(("problem", "vehicle", "number"), PAGES)
+def test_nothing_is_red_where_nothing_is_wrong(problem, vehicle, number):
+    canvas = shared_page(problem, vehicle, number).canvas
+    canvas.draw()
+    picture = np.asarray(canvas.buffer_rgba())[..., :3].astype(int)
+    assert pixels_of(picture, RED) == 0
+    assert number > 0 or pixels_of(picture, BLUE) > 100
 
 
 def test_stages_may_come_in_any_order():
-    plan = planned("flip-roll")
+    plan = shared_plan("flip-roll")
     disordered = replace(plan, stages=plan.stages[::-1])
     one, other = (
         stages_panel(report_figure(p, ab.load_vehicle("agile-quad"))).texts for p in (plan, disordered)
@@ -156,13 +175,13 @@ def test_a_hover_is_drawn_like_any_other_plan():
     spot = ab.at_rest([1.0, 2.0, 3.0])
     hover = replace(ab.load_problem("line"), start=spot, goal=spot)
     vehicle = ab.load_vehicle("agile-quad")
-    plan = ab.plan(hover, vehicle=vehicle)
+    plan = ab.plan(hover, ab.MinSnap(), vehicle)
     assert png(report_figure(plan, vehicle, ab.fly(plan.trajectory, vehicle)))
 
 
 def test_all_stages_are_drawn_where_they_are_planned():
-    plan = planned("flip-pitch")
-    axes = stages_panel(page("flip-pitch"))
+    plan = shared_plan("flip-pitch")
+    axes = stages_panel(shared_page("flip-pitch"))
     assert axes.get_xlabel() == "x [m]"
     assert axes.get_aspect() == "auto"
     assert {stage.name for stage in plan.stages} <= {text.get_text() for text in axes.texts}
@@ -175,7 +194,7 @@ def test_all_stages_are_drawn_where_they_are_planned():
 
 @given(st.floats(-720.0, 720.0))
 def test_the_plane_of_a_flip_is_square_to_its_axis(axis_deg):
-    plan = planned("flip-roll")
+    plan = shared_plan("flip-roll")
     plan = replace(plan, problem=replace(plan.problem, maneuver=ab.Flip(axis_deg=axis_deg)))
     plane = maneuver_plane(plan, np.zeros((3, 3)))
     axis = np.array([np.cos(np.deg2rad(axis_deg)), np.sin(np.deg2rad(axis_deg)), 0.0])
@@ -188,14 +207,14 @@ def test_any_other_plane_is_where_the_thrust_moves_most(heading_deg, seed):
     rng = np.random.default_rng(seed)
     along = np.array([np.cos(np.deg2rad(heading_deg)), np.sin(np.deg2rad(heading_deg)), 0.0])
     thrust = np.outer(rng.uniform(-20, 20, 6), along) + rng.uniform(-0.1, 0.1, (6, 3))
-    plane = maneuver_plane(planned("line"), thrust)
+    plane = maneuver_plane(shared_plan("line"), thrust)
     assert abs(plane.camera.screen[0] @ along) > np.cos(np.deg2rad(9.0))
 
 
 def test_vehicles_along_the_path_stand_as_the_flight_stood(monkeypatch):
     painted = []
     monkeypatch.setattr(path_panel, "draw_depth_sorted", lambda axes, shapes, camera: painted.extend(shapes))
-    flight, gate = simulated("flip-roll"), planned("flip-roll").problem.gates[0]
+    flight, gate = simulated("flip-roll"), shared_plan("flip-roll").problem.gates[0]
     page("flip-roll")
     axes = [shape.points for shape in painted if len(shape.points) == 2 and shape.width == 0.9]
     assert len(axes) >= 10
@@ -206,14 +225,14 @@ def test_vehicles_along_the_path_stand_as_the_flight_stood(monkeypatch):
         upward = so3.thrust_axis(flight.states.q_world_body[k])
         np.testing.assert_allclose((tip - foot) / np.linalg.norm(tip - foot), upward, atol=1e-9)
         times.append(flight.times[k])
-    steps = np.diff(times) / (planned("flip-roll").duration / path_panel.POSES)
+    steps = np.diff(times) / (shared_plan("flip-roll").duration / path_panel.POSES)
     np.testing.assert_allclose(steps, np.round(steps), atol=0.1)  # whole steps, to a row of the flight
     assert min(np.linalg.norm(foot - gate.position) for foot, _ in axes) < 0.05  # one of them in the gate
 
 
 def test_a_batch_of_flights_is_drawn_whole():
     batch = batch_of("flip-roll", 7)
-    figure = draw(batch, planned("flip-roll"))
+    figure = draw(batch, shared_plan("flip-roll"))
     assert any("7 flights" in text.get_text() for text in figure.texts)
     axes = panel_of(figure, "position error")
     bundle = next(c for c in axes.collections if len(c.get_segments()) == 7)
@@ -228,7 +247,7 @@ def test_a_flight_that_went_astray_does_not_shrink_the_picture():
     position = flight.states.position.copy()
     position[len(position) // 2 :] += 1000.0
     stray = replace(flight, series={**flight.series, "position": position})
-    ordinary, lost = (draw(f, planned("flip-roll")).axes[0].get_ylim() for f in (flight, stray))
+    ordinary, lost = (draw(f, shared_plan("flip-roll")).axes[0].get_ylim() for f in (flight, stray))
     assert np.ptp(lost) < 2.0 * np.ptp(ordinary)
 
 
@@ -255,6 +274,7 @@ def test_the_same_data_give_the_same_picture():
     assert png(draw(simulated("line"))) == png(draw(simulated("line")))
 
 
+@pytest.mark.process
 def test_drawing_never_imports_pyplot(tmp_path):
     simulated("line").save(tmp_path / "flight.npz")
     code = (
@@ -266,6 +286,7 @@ def test_drawing_never_imports_pyplot(tmp_path):
     subprocess.run([sys.executable, "-c", code], check=True, cwd=tmp_path)
 
 
+@lru_cache
 def two_flips_page():
     plan, flight = two_flips()
     return report_figure(plan, ab.load_vehicle("agile-quad"), flight)
@@ -280,10 +301,10 @@ def test_stages_are_numbered_where_their_names_have_no_room(monkeypatch):
     require_legible(figure, monkeypatch)
 
 
-@pytest.mark.parametrize("count", [12, 19, 40])
+@pytest.mark.parametrize("count", [12, *(pytest.param(n, marks=pytest.mark.slow) for n in (19, 40))])
 def test_a_course_of_many_stages_is_legible(count, monkeypatch):
     """Of very many some are drawn and numbered, all are marked."""
-    plan = planned("flip-roll-translation")
+    plan = shared_plan("flip-roll-translation")
     times = np.linspace(0.0, plan.duration, count + 2)[1:-1].tolist()
     stages = tuple(PlacedStage(f"waypoint {k}", k, time) for k, time in enumerate(times, 1))
     figure = report_figure(replace(plan, stages=stages), ab.load_vehicle("agile-quad"))

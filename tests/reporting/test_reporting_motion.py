@@ -14,15 +14,16 @@ import aerobat as ab
 from aerobat import cli
 from aerobat.reporting.motion.picture import MovingPicture, subject_of
 from aerobat.reporting.motion.video import FPS, HOLD, frame_times
-from reporting_cases import planned, simulated
+from reporting_cases import simulated
+from shared_plans import shared_plan
 
 RATES = {"gif": 100 / 3, "mp4": FPS}  # a GIF counts in hundredths of a second
 
 
-@pytest.mark.parametrize("suffix", ["gif", "mp4"])
+@pytest.mark.parametrize("suffix", ["gif", pytest.param("mp4", marks=pytest.mark.slow)])
 def test_a_video_lasts_as_long_as_the_flight_at_its_speed_and_shows_it(tmp_path: Path, suffix: str) -> None:
     told: list[tuple[int, int]] = []
-    flight, plan = simulated("half-flip"), planned("half-flip")
+    flight, plan = simulated("half-flip"), shared_plan("half-flip")
     file = tmp_path / f"half.{suffix}"
     ab.write_video(flight, file, plan, speed=2.0, progress=lambda *counts: told.append(counts))
     frames, seconds = imageio_ffmpeg.count_frames_and_secs(str(file))
@@ -44,7 +45,7 @@ def test_frames_are_evenly_spaced_and_the_last_one_stays() -> None:
 
 def test_a_picture_depends_on_its_instant_alone() -> None:
     """Nothing of the pictures before it is left in one, and what stands still stands still."""
-    subject = subject_of(simulated("flip-roll"), planned("flip-roll"), None)
+    subject = subject_of(simulated("flip-roll"), shared_plan("flip-roll"), None)
     picture = MovingPicture(subject, dpi=60)
     first, middle, again = (picture.at(t) for t in (0.3, 1.0, 0.3))
     assert first.shape == (picture.size[1], picture.size[0], 3)
@@ -55,14 +56,14 @@ def test_a_picture_depends_on_its_instant_alone() -> None:
 
 @pytest.mark.parametrize("kind", ["a plan", "a batch"])
 def test_plans_and_batches_move_too(kind: str) -> None:
-    plan = planned("half-flip")
+    plan = shared_plan("half-flip")
     shown = plan if kind == "a plan" else ab.fly(plan, ["agile-quad"] * 3, rate=200.0)
     picture = MovingPicture(subject_of(shown, plan, None), dpi=60)
     assert (picture.at(0.2) != picture.at(0.8)).any()
 
 
 def test_what_cannot_be_a_video_is_refused_and_nothing_is_written(tmp_path: Path, monkeypatch) -> None:
-    plan = planned("line")
+    plan = shared_plan("line")
     with pytest.raises(ab.SpecError, match=r"neither \.mp4 nor \.gif"):
         ab.write_video(plan, tmp_path / "video.avi")
     with pytest.raises(ab.SpecError, match="vehicle is missing"):
@@ -74,9 +75,9 @@ def test_what_cannot_be_a_video_is_refused_and_nothing_is_written(tmp_path: Path
 
 
 def test_the_command_writes_a_video_and_a_page_where_both_are_named(tmp_path: Path, capsys) -> None:
-    planned("line").save(tmp_path / "line.plan")
+    shared_plan("line").save(tmp_path / "line.plan")
     video, page = tmp_path / "line.gif", tmp_path / "page.html"
-    command = ["view", str(tmp_path / "line.plan"), "--video", str(video), "--speed", "8"]
+    command = ["view", str(tmp_path / "line.plan"), "--video", str(video), "--speed", "20"]
     cli.main(command)
     assert not list(tmp_path.glob("*.html"))
     assert capsys.readouterr().out.endswith(f"written to {video}\n")

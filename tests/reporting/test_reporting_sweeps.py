@@ -16,6 +16,7 @@ from aerobat.reporting.sweeps.figure import crossings
 from aerobat.reporting.sweeps.table import sweep_report
 from aerobat.studies.sweep.result import ErrorBand
 from reporting_cases import require_legible
+from shared_plans import shared_plan
 
 pytestmark = pytest.mark.filterwarnings("error")  # drawing warns of nothing
 RUNS = 60
@@ -25,12 +26,12 @@ ROUGH = ab.Dispersion(mass=0.1, rotor=0.08, start_position=0.3, start_velocity=0
 @cache
 def rough() -> ab.Sweep:
     """Flights of which some fail."""
-    return ab.sweep(ab.plan("half-flip", vehicle="agile-quad"), ROUGH, RUNS, 3, workers=1)
+    return ab.sweep(shared_plan("half-flip"), ROUGH, RUNS, 3, workers=1)
 
 
 @cache
 def without_a_gate() -> ab.Sweep:
-    return ab.sweep(ab.plan("line", vehicle="agile-quad"), ROUGH, 5, 3, workers=1)
+    return ab.sweep(shared_plan("line"), ROUGH, 5, 3, workers=1)
 
 
 def lost(sweep: ab.Sweep) -> ab.Sweep:
@@ -43,7 +44,9 @@ def lost(sweep: ab.Sweep) -> ab.Sweep:
     return replace(sweep, table=columns)
 
 
-@pytest.mark.parametrize("make", [rough, without_a_gate, lambda: lost(rough())])
+@pytest.mark.parametrize(
+    "make", [rough, pytest.param(without_a_gate, marks=pytest.mark.slow), lambda: lost(rough())]
+)
 def test_a_page_is_legible_whatever_becomes_of_the_flights(make, monkeypatch) -> None:
     require_legible(ab.sweep_figure(make()), monkeypatch)
 

@@ -8,7 +8,8 @@ import pytest
 import aerobat as ab
 from aerobat.reporting.panels.signals import at_limit, fit_to_limits, wrench_limits
 from aerobat.vehicle import wrench
-from reporting_cases import batch_of, planned, require_legible, simulated
+from reporting_cases import batch_of, require_legible, simulated
+from shared_plans import shared_plan
 
 pytestmark = pytest.mark.filterwarnings("error")  # drawing warns of nothing
 VEHICLE = ab.load_vehicle("section-v")
@@ -23,6 +24,7 @@ def section_v(stop_after=None):
     return plan, ab.fly(plan.trajectory, VEHICLE)
 
 
+@lru_cache
 def page_of(stop_after=None):
     plan, flight = section_v(stop_after)
     return ab.tracking_figure(plan, VEHICLE, flight), plan, flight
@@ -51,7 +53,7 @@ def shaded(axes):
     return np.array([[box.x0, box.x1] for box in boxes]).reshape(-1, 2)
 
 
-@pytest.mark.parametrize("stop_after", [None, 6])
+@pytest.mark.parametrize("stop_after", [6, pytest.param(None, marks=pytest.mark.slow)])
 def test_no_text_of_section_v_lies_over_another_or_beyond_the_page(stop_after, monkeypatch):
     require_legible(page_of(stop_after)[0], monkeypatch)
 
@@ -60,13 +62,14 @@ def test_no_text_of_section_v_lies_over_another_or_beyond_the_page(stop_after, m
     ("problem", "vehicle"),
     [
         ("flip-roll", "agile-quad"),
-        ("half-flip", "agile-quad"),
-        ("line", "agile-quad"),
-        ("flip-roll", "hexarotor"),
+        *(
+            pytest.param(*case, marks=pytest.mark.slow)
+            for case in (("half-flip", "agile-quad"), ("line", "agile-quad"), ("flip-roll", "hexarotor"))
+        ),
     ],
 )
 def test_no_text_lies_over_another_or_beyond_the_page(problem, vehicle, monkeypatch):
-    plan, flight = planned(problem, vehicle), simulated(problem, vehicle)
+    plan, flight = shared_plan(problem, vehicle), simulated(problem, vehicle)
     require_legible(ab.tracking_figure(plan, ab.load_vehicle(vehicle), flight), monkeypatch)
 
 
@@ -171,7 +174,7 @@ def test_waypoints_are_marked_on_the_path():
 
 
 def test_an_axis_stretched_far_beyond_its_limits_is_cut_off_and_says_so():
-    axes = page_of()[0].axes[-1]
+    axes = page_of.__wrapped__()[0].axes[-1]  # a page of its own, for it is changed
     fit_to_limits(axes, (0.0, 10.0), np.array([-4000.0, 4000.0]))
     assert axes.get_ylim() == pytest.approx((-12.4, 22.4))
     assert "cut off: −4000 to 4000" in {text.get_text() for text in axes.texts}
@@ -179,4 +182,4 @@ def test_an_axis_stretched_far_beyond_its_limits_is_cut_off_and_says_so():
 
 def test_a_batch_is_refused_in_a_sentence():
     with pytest.raises(ab.SpecError, match=r"flight\[k\]"):
-        ab.tracking_figure(planned("line"), ab.load_vehicle("agile-quad"), batch_of("line", 2))
+        ab.tracking_figure(shared_plan("line"), ab.load_vehicle("agile-quad"), batch_of("line", 2))

@@ -67,7 +67,9 @@ def held_rows(engine: str) -> list[np.ndarray]:
     return tree_leaves(rows_of(setup, everything, TICKS))
 
 
-@pytest.mark.parametrize("engine", ["bytecode", "numpy", "compiled", "jax"])
+@pytest.mark.parametrize(
+    "engine", ["bytecode", "numpy", "compiled", pytest.param("jax", marks=pytest.mark.slow)]
+)
 def test_engines_agree_with_floats_on_all_that_sensors_and_disturbances_show(engine: str) -> None:
     for one, other in zip(held_rows("floats"), held_rows(engine), strict=True):
         np.testing.assert_allclose(one, other, rtol=1e-12, atol=1e-12)
@@ -108,7 +110,9 @@ def test_wind_weak_rotors_and_an_empty_battery_each_change_a_flight() -> None:
         {"battery": Battery(endurance=0.5, sag=0.8)},
     )
     still, *others = (
-        rows_of(dispersed_setup(loops(1.0), HEXA, each, drawn(each, HEXA, 2)), position)
+        rows_of(
+            dispersed_setup(loops(1.0), HEXA, each, drawn(each, HEXA, 1), engine="bytecode"), position, 700
+        )
         for each in (Dispersion(), *(Dispersion(**change) for change in changes))
     )
     for other in others:

@@ -72,7 +72,9 @@ def test_commands_that_come_a_period_late_cost_nothing_where_the_model_is_right(
     assert errors[1] < errors[0] + 2e-4
 
 
-@pytest.mark.parametrize("name", ab.dispersion_names())
+@pytest.mark.parametrize(
+    "name", [pytest.param(n, marks=pytest.mark.slow) if n == "field" else n for n in ab.dispersion_names()]
+)
 def test_all_conditions_that_come_along_can_be_flown_in(name: str, line: ab.Plan) -> None:
     assert ab.score_flights(line, conditions=name, flights=3).is_finite.all()
 

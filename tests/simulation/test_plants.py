@@ -1,6 +1,8 @@
 """Plants: the same controller in physics that others wrote, which agree with ours, and feel gates."""
 
+from collections.abc import Callable
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -12,15 +14,27 @@ from aerobat.simulation.outcome import Outcome
 from aerobat.simulation.plants import PLANTS
 from aerobat.simulation.plants.mujoco import Mujoco
 from aerobat.simulation.plants.rotorpy import RotorPy, rotorpy_vehicle
+from shared_plans import shared_plan
 
 ORDER_4 = ab.Miqp(order=4)
+AT_LENGTH = pytest.mark.peer
 
 
-@pytest.mark.parametrize("vehicle", ["agile-quad", "hexarotor"])
-@pytest.mark.parametrize("name", ["line", "flip-roll", "flip-pitch", "flip-roll-translation", "half-flip"])
+@AT_LENGTH
+@pytest.mark.parametrize(
+    ("name", "vehicle"),
+    [
+        ("line", "hexarotor"),
+        ("flip-roll", "hexarotor"),
+        ("flip-pitch", "hexarotor"),
+        ("half-flip", "hexarotor"),
+        ("half-flip", "agile-quad"),
+        ("flip-roll-translation", "agile-quad"),
+    ],
+)
 def test_mujoco_flies_every_maneuver_as_our_simulation_does(name: str, vehicle: str) -> None:
     """To a tenth of a micrometre: a free body, four or six rotors with a lag, no contact with the gate."""
-    plan = ab.plan(name, ORDER_4, vehicle)
+    plan = shared_plan(name, vehicle, ORDER_4)
     own, other = ab.fly(plan), ab.fly(plan, plant="mujoco")
     np.testing.assert_allclose(other.position, own.position, rtol=0, atol=1e-7)
     np.testing.assert_allclose(other.thrusts, own.thrusts, rtol=0, atol=1e-5)
@@ -28,25 +42,50 @@ def test_mujoco_flies_every_maneuver_as_our_simulation_does(name: str, vehicle: 
     assert ab.score(other, plan).outcome is ab.score(own, plan).outcome
 
 
+def test_mujoco_flies_a_curve_as_our_simulation_does() -> None:
+    """Level at first, and turning: off the path."""
+    start = ab.BodyState([0.02, 0.0, 1.0], [3.0, 0.0, 0.0], [1.0, 0.0, 0.0, 0.0], [1.0, -2.0, 0.5])
+    own, other = (ab.fly(dash(), "hexarotor", start=start, plant=plant) for plant in (None, "mujoco"))
+    assert own.position_error.max() > 0.02
+    np.testing.assert_allclose(other.position, own.position, rtol=0, atol=1e-7)
+    np.testing.assert_allclose(other.thrusts, own.thrusts, rtol=0, atol=1e-5)
+    assert other.first_contact[0] is Contact.NOTHING
+
+
 def through_the_gate() -> ab.Plan:
-    return ab.plan("half-flip", ORDER_4, "agile-quad")
+    return shared_plan("half-flip", "agile-quad", ORDER_4)
 
 
-def test_drag_wind_and_full_inertia_are_the_same_in_mujoco() -> None:
-    """Its drag is held for a step of a millisecond, hence a tenth of a millimetre."""
+def dash() -> ab.Trajectory:
+    """A short curve, at 3 m/s and 6 m/s²."""
+    return ab.Trajectory([0.3], [[[0.0, 0.0, 1.0], [0.9, 0.0, 0.0], [0.0, 0.3, 0.0]]])
+
+
+PATHS = pytest.mark.parametrize(
+    "path", [dash, pytest.param(through_the_gate, marks=AT_LENGTH)], ids=["dash", "half-flip"]
+)
+
+
+@PATHS
+def test_drag_wind_and_full_inertia_are_the_same_in_mujoco(path: Callable[[], Any]) -> None:
+    """Its drag, unknown to the controller, is held for a step of a millisecond, hence 0.1 mm."""
+    known = ab.load_vehicle("agile-quad")
     vehicle = replace(
-        ab.load_vehicle("agile-quad"),
+        known,
         drag_body=np.array([0.2, 0.25, 0.1]),
         inertia=[[0.0025, 2e-4, -1e-4], [2e-4, 0.0021, 1e-4], [-1e-4, 1e-4, 0.0043]],
     )
     windy = ab.Environment(wind=(1.0, -2.0, 0.5))
-    plan = through_the_gate()
-    flights = [ab.fly(plan.trajectory, vehicle, environment=windy, plant=plant) for plant in (None, "mujoco")]
+    flights = [
+        ab.fly(path(), vehicle, environment=windy, nominal=known, plant=plant) for plant in (None, "mujoco")
+    ]
     assert flights[0].position_error.max() > 1e-3
     np.testing.assert_allclose(flights[1].position, flights[0].position, rtol=0, atol=1e-4)
 
 
-@pytest.mark.parametrize("aside", [(0.3, 0.0), (0.0, 0.3)], ids=["lateral", "up"])
+@pytest.mark.parametrize(
+    "aside", [(0.3, 0.0), pytest.param((0.0, 0.3), marks=AT_LENGTH)], ids=["lateral", "up"]
+)
 def test_a_gate_that_was_moved_is_touched_where_geometry_says(aside: tuple[float, float]) -> None:
     """By 0.3 m to a side the ellipsoid meets a bar: felt by MuJoCo, told of our own flight by its score."""
     plan = through_the_gate()
@@ -60,28 +99,31 @@ def test_a_gate_that_was_moved_is_touched_where_geometry_says(aside: tuple[float
     assert contact is Contact.GATE
     assert time == pytest.approx(judged.passages[0].time, abs=0.05)
     assert ab.score(felt, elsewhere).outcome is Outcome.TOUCHED_GATE
-    assert ab.fly(elsewhere, plant=Mujoco(contacts=False)).first_contact[0] is Contact.NOTHING
 
 
 def test_a_vehicle_that_comes_down_touches_the_ground_and_one_that_takes_off_does_not() -> None:
     """What stands there at first has come to none."""
     vehicle, flat = ab.load_vehicle("agile-quad"), ab.Environment(ground=0.0)
     height = float(vehicle.bounding_ellipsoid.semi_axes[2])
-    rise = ab.Trajectory([1.0], [[[0.0, 0.0, 0.99 * height], [0.0, 0.0, 0.0], [0.0, 0.0, 3.0]]])
+    rise = ab.Trajectory([0.3], [[[0.0, 0.0, 0.99 * height], [0.0, 0.0, 0.0], [0.0, 0.0, 0.27]]])
     rising = ab.fly(rise, vehicle, environment=flat, plant="mujoco")
     assert rising.contact[0] == Contact.GROUND
     assert rising.first_contact[0] is Contact.NOTHING
-    descent = ab.Trajectory([1.0], [[[0.0, 0.0, 0.5], [0.0, 0.0, -1.0]]])
-    contact, time = ab.fly(descent, vehicle, environment=flat, plant="mujoco").first_contact
-    assert contact is Contact.GROUND
-    assert time == pytest.approx(0.5 - height, abs=0.02)
+    descent = ab.Trajectory([0.3], [[[0.0, 0.0, 0.15], [0.0, 0.0, -0.3]]])
+    felt, unfelt = (
+        ab.fly(descent, vehicle, environment=flat, plant=plant).first_contact
+        for plant in ("mujoco", Mujoco(contacts=False))
+    )
+    assert felt[0] is Contact.GROUND
+    assert felt[1] == pytest.approx(0.15 - height, abs=0.02)
+    assert unfelt[0] is Contact.NOTHING
 
 
-def test_conditions_are_the_same_in_mujoco() -> None:
+@PATHS
+def test_conditions_are_the_same_in_mujoco(path: Callable[[], Any]) -> None:
     """Sensors, filter, delays, gusts, battery and the vehicle that was drawn: flight 3 of seed 1."""
-    plan = through_the_gate()
     own, other = (
-        ab.fly(plan, conditions="lab", seed=1, flights=range(3, 4), plant=plant)[0]
+        ab.fly(path(), "agile-quad", conditions="lab", seed=1, flights=range(3, 4), plant=plant)[0]
         for plant in (None, "mujoco")
     )
     np.testing.assert_allclose(other.position, own.position, rtol=0, atol=2e-3)
@@ -89,14 +131,20 @@ def test_conditions_are_the_same_in_mujoco() -> None:
     assert own.position_error.max() > 0.01
 
 
+def test_rotorpy_flies_a_curve_on_its_model_of_our_vehicle_to_millimetres() -> None:
+    """The speeds of its rotors lag, not their thrusts."""
+    assert 0.0 < ab.fly(dash(), "agile-quad", plant="rotorpy").position_error.max() < 0.005
+
+
+@AT_LENGTH
 def test_rotorpy_flies_our_plan_on_its_model_of_our_vehicle() -> None:
-    """The speeds of its rotors lag, not their thrusts: millimetres."""
-    plan = ab.plan("flip-roll", ORDER_4, "agile-quad")
+    plan = shared_plan("flip-roll", "agile-quad", ORDER_4)
     flight = ab.fly(plan, plant="rotorpy")
     assert flight.position_error.max() < 0.005
     assert ab.score(flight, plan).outcome is Outcome.THROUGH_GATES
 
 
+@AT_LENGTH
 def test_rotorpys_own_controller_follows_our_plan_in_rotorpys_own_simulation() -> None:
     """Its `simulate` takes the plan as one of its trajectories; a slow line, upright."""
     from rotorpy.controllers.quadrotor_control import SE3Control
@@ -120,6 +168,7 @@ def test_rotorpys_own_controller_follows_our_plan_in_rotorpys_own_simulation() -
     np.testing.assert_array_equal(wanted.target(99.0)["target_pos"], wanted.update(plan.duration)["x"])
 
 
+@AT_LENGTH
 def test_rotorpys_hummingbird_flips_with_its_own_aerodynamics() -> None:
     """Lift that its airspeed brings, which no model of ours knows: further off, through the gate yet."""
     vehicle = rotorpy_vehicle("hummingbird")
@@ -161,7 +210,7 @@ def test_plants_are_known_by_name() -> None:
 
 
 def test_a_flight_that_felt_contact_is_saved_and_loaded_whole(tmp_path) -> None:
-    flight = ab.fly(through_the_gate(), plant="mujoco")
+    flight = ab.fly(dash(), "agile-quad", plant="mujoco")
     flight.save(tmp_path / "flight.npz")
     assert ab.load_flight(tmp_path / "flight.npz") == flight
     assert flight.engine == "mujoco"

@@ -11,48 +11,51 @@ import pytest
 
 import aerobat as ab
 from aerobat.reporting.report_json import report, to_json
+from shared_plans import shared_plan
 
 LOW = -0.7  # [m] a ground so near under the flip that there is a point of no return
 
 
 @pytest.fixture(scope="module")
 def flip() -> ab.Plan:
-    return ab.plan("flip-roll", vehicle="agile-quad")
+    return shared_plan("flip-roll")
 
 
-def test_a_thousand_instants_outside_the_span_of_no_return_all_reach_a_hover_above_the_ground(
-    flip: ab.Plan,
+@pytest.mark.parametrize("count", [200, pytest.param(1000, marks=pytest.mark.slow)])
+def test_any_instants_outside_the_span_of_no_return_all_reach_a_hover_above_the_ground(
+    flip: ab.Plan, count: int
 ) -> None:
     announced = ab.recoveries(flip, ground=LOW)
     spans = announced.no_return
     assert spans
     assert all(1.2 < span.start < span.end < 1.9 for span in spans)  # on the way down
     assert f"but not from {spans[0].start:.2f} to {spans[0].end:.2f} s" in str(announced)
-    instants = np.sort(np.random.default_rng(5).uniform(0.0, flip.duration, 1000))
+    instants = np.sort(np.random.default_rng(5).uniform(0.0, flip.duration, count))
     found = ab.recoveries(flip, times=instants, ground=LOW)
     outside = np.all([(instants <= span.start) | (instants >= span.end) for span in spans], axis=0)
-    assert outside.sum() > 700
+    assert outside.sum() > 0.7 * count
     assert found.possible[outside].all()
     assert not found.possible.all()
 
 
 @pytest.mark.parametrize(
-    ("problem", "vehicle"),
+    ("problem", "vehicle", "instants"),
     [
-        ("half-flip", "section-v"),
-        ("power-loop", "hexarotor"),
-        ("split-s", "crazyflie"),
+        ("line", "crazyflie", 100),
+        pytest.param("half-flip", "section-v", 400, marks=pytest.mark.slow),
+        pytest.param("power-loop", "hexarotor", 400, marks=pytest.mark.slow),
+        pytest.param("split-s", "crazyflie", 400, marks=pytest.mark.slow),
     ],
 )
-def test_whoever_flies_whatever_a_thousand_instants_keep_what_is_announced(
-    problem: str, vehicle: str
+def test_whoever_flies_whatever_any_instants_keep_what_is_announced(
+    problem: str, vehicle: str, instants: int
 ) -> None:
-    plan = ab.plan(problem, vehicle=vehicle)
+    plan = shared_plan(problem, vehicle)
     announced = ab.recoveries(plan)
     assert announced.possible.all()
     assert announced.ground is None
-    instants = np.sort(np.random.default_rng(6).uniform(0.0, plan.duration, 1000))
-    found = ab.recoveries(plan, times=instants)
+    times = np.sort(np.random.default_rng(6).uniform(0.0, plan.duration, instants))
+    found = ab.recoveries(plan, times=times)
     assert found.possible.all()
     # between the instants of the plan's own, up to 1/200 s away, a recovery takes another turn at times
     assert found.lowest.min() > announced.lowest.min() - 0.3

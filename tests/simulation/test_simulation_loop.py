@@ -34,23 +34,32 @@ def assert_equal(a: Any, b: Any) -> None:
         np.testing.assert_array_equal(x, y)
 
 
-@pytest.mark.parametrize(("vehicles", "observer_period"), [(QUAD, 7), ([QUAD] * 6, 1)], ids=["one", "six"])
-@pytest.mark.parametrize("engine", ENGINE_NAMES)
-def test_stepped_cut_and_resumed_a_flight_is_the_same_to_the_last_bit(
-    engine: str, vehicles: Any, observer_period: int
-) -> None:
+FLEETS = {"one": (QUAD, 7), "six": ([QUAD] * 6, 1)}  # vehicles and the period of their observers
+AT_ONCE = [name for name in ENGINE_NAMES if not name.startswith("jax")]
+
+
+@pytest.mark.parametrize(
+    ("engine", "fleet"),
+    [
+        *((engine, fleet) for fleet in FLEETS for engine in AT_ONCE),
+        pytest.param("jax", "one", marks=pytest.mark.slow),  # in float32 too: test_engines_stepping.py
+    ],
+)
+def test_stepped_cut_and_resumed_a_flight_is_the_same_to_the_last_bit(engine: str, fleet: str) -> None:
+    vehicles, observer_period = FLEETS[fleet]
     setup = with_observer_period(flight_of(engine, vehicles), observer_period)
-    loop, ticks = setup.compile(), 40
+    # XLA compiles a scan of up to 16 ticks, and of up to 8: whole and in parts
+    loop, (kept_at, cut, ticks) = setup.compile(), (20, 33, 40) if engine in AT_ONCE else (5, 9, 12)
     whole, rows = loop.scan(loop.init(setup.first_tick), setup.inputs(0, ticks))
     carry = loop.init(setup.first_tick)
-    for tick in range(20):
+    for tick in range(kept_at):
         carry, row = loop.step(carry, setup.tick(tick))
         assert_equal(row, tree_map(lambda leaf, k=tick: leaf[:, k], rows))
     kept = pickle.loads(pickle.dumps(carry))
     again = with_observer_period(flight_of(engine, vehicles), observer_period).compile()
-    carry, row = again.scan(kept, setup.inputs(20, 33))
-    assert_equal(row, tree_map(lambda leaf: leaf[:, 20:33], rows))
-    carry, _ = loop.scan(carry, setup.inputs(33, ticks))
+    carry, row = again.scan(kept, setup.inputs(kept_at, cut))
+    assert_equal(row, tree_map(lambda leaf: leaf[:, kept_at:cut], rows))
+    carry, _ = loop.scan(carry, setup.inputs(cut, ticks))
     assert_equal(carry, whole)
 
 
@@ -69,15 +78,24 @@ def test_a_flight_branched_in_the_air_goes_both_ways() -> None:
     assert_equal(calm, loop.scan(carry, rest)[1])
 
 
-@pytest.mark.parametrize("log_rate", [None, 100.0, 3.125])
-def test_neither_blocks_of_references_nor_chunks_of_noise_change_a_flight(monkeypatch, log_rate) -> None:
-    options = {"conditions": "lab", "flights": 3, "seed": 3, "log_rate": log_rate, "engine": "compiled"}
-    whole = fly(loops(2.0), HEXA, **options)
-    monkeypatch.setattr("aerobat.simulation.setup._VEHICLE_TICKS", 3 * 37)
-    assert_same(fly(loops(2.0), HEXA, **options), whole)
+@pytest.mark.parametrize(
+    ("engine", "log_rate"),
+    [
+        ("bytecode", 100.0),
+        *(pytest.param("compiled", rate, marks=pytest.mark.slow) for rate in (None, 100.0, 3.125)),
+    ],
+)
+def test_neither_blocks_of_references_nor_chunks_of_noise_change_a_flight(
+    monkeypatch, engine: str, log_rate: float | None
+) -> None:
+    flights, path = (3, loops(2.0)) if engine == "compiled" else (1, loops(1.0))
+    options = {"conditions": "lab", "flights": flights, "seed": 3, "log_rate": log_rate, "engine": engine}
+    whole = fly(path, HEXA, **options)
+    monkeypatch.setattr("aerobat.simulation.setup._VEHICLE_TICKS", flights * 37)
+    assert_same(fly(path, HEXA, **options), whole)
     for module in ("setup", "reference_source"):
         monkeypatch.setattr(f"aerobat.simulation.{module}.BLOCK", 130)
-    assert_same(fly(loops(2.0), HEXA, **options), whole, atol=1e-12)
+    assert_same(fly(path, HEXA, **options), whole, atol=1e-12)
 
 
 @dataclass(frozen=True)
@@ -115,7 +133,9 @@ def log(signals: Any) -> Any:
     return signals["slow"], signals["plant"], signals["follower"]
 
 
-@pytest.mark.parametrize("engine", ["floats", "bytecode", "numpy", "compiled", "jax"])
+@pytest.mark.parametrize(
+    "engine", ["floats", "bytecode", "numpy", "compiled", pytest.param("jax", marks=pytest.mark.slow)]
+)
 def test_a_component_steps_at_its_own_period_and_holds_between(engine: str) -> None:
     """And one without feedthrough is seen a tick later, wherever in the order it stands."""
     components = (Counter(4, "slow"), Counter(1, "plant", feedthrough=False), Follower("plant"))

@@ -17,16 +17,16 @@ from hypothesis import strategies as st
 import aerobat as ab
 from aerobat import cli, so3
 from aerobat.simulation.flight import SERIES
+from shared_plans import shared_plan
 from suites import examples
 
 PLANS = (("flip-roll", "agile-quad"), ("half-flip", "hexarotor"))
 SEEDS = (1, 2, 3)
 
 
-@cache
 def planned(number: int) -> ab.Plan:
     problem, vehicle = PLANS[number]
-    return ab.plan(ab.load_problem(problem), ab.Miqp(order=5), vehicle)
+    return shared_plan(problem, vehicle, ab.Miqp(order=5))
 
 
 def under(plan: ab.Plan, seed: int, **conditions: Any) -> ab.Flight:
@@ -65,9 +65,15 @@ PLANTED: dict[str, Callable[[ab.Plan, int], ab.Flight]] = {
 }
 
 
-@pytest.mark.parametrize("seed", SEEDS)
-@pytest.mark.parametrize("number", range(len(PLANS)))
-@pytest.mark.parametrize("cause", PLANTED)
+@pytest.mark.parametrize(
+    ("cause", "number", "seed"),
+    [
+        pytest.param(cause, number, seed, marks=() if (number, seed) == (0, 1) else pytest.mark.slow)
+        for cause in PLANTED
+        for number in range(len(PLANS))
+        for seed in SEEDS
+    ],
+)
 def test_a_planted_cause_is_named_first_and_explains_most_of_the_error(
     cause: str, number: int, seed: int
 ) -> None:
@@ -80,7 +86,7 @@ def test_a_planted_cause_is_named_first_and_explains_most_of_the_error(
     assert sum(share.error for share in found.shares) == pytest.approx(found.largest, abs=1e-4)
 
 
-@pytest.mark.parametrize("number", range(len(PLANS)))
+@pytest.mark.parametrize("number", [0, pytest.param(1, marks=pytest.mark.slow)])
 def test_a_flight_without_causes_is_told_to_be_without(number: int) -> None:
     found = ab.inspect_flight(ab.fly(planned(number)), planned(number))
     assert found.cause is None
@@ -88,7 +94,13 @@ def test_a_flight_without_causes_is_told_to_be_without(number: int) -> None:
     assert all(abs(share.error) < 1e-3 for share in found.shares)
 
 
-@pytest.mark.parametrize(("rate", "delay"), [(500.0, 0.002), (100.0, 0.004), (100.0, 0.01), (50.0, 0.02)])
+@pytest.mark.parametrize(
+    ("rate", "delay"),
+    [
+        (100.0, 0.004),
+        *(pytest.param(*c, marks=pytest.mark.slow) for c in ((500.0, 0.002), (100.0, 0.01), (50.0, 0.02))),
+    ],
+)
 def test_the_delay_of_commands_is_read_off_the_rotors(rate: float, delay: float) -> None:
     lab = ab.load_dispersion("lab")
     sensors: dict[str, Any] = {"imu": lab.imu, "motion_capture": lab.motion_capture}
@@ -116,6 +128,11 @@ def strayed(number: int) -> ab.Flight:
     return under(planned(number), 1, start_position=0.02, mass=0.05)
 
 
+@cache
+def strayed_as_found(number: int) -> ab.Inspection:
+    return ab.inspect_flight(strayed(number), planned(number))
+
+
 @examples(10)
 @given(
     number=st.integers(0, 1),
@@ -128,7 +145,7 @@ def test_other_axes_and_another_clock_change_no_share(
 ) -> None:
     flight, plan = strayed(number), planned(number)
     there = ab.inspect_flight(moved(flight, yaw, np.array(by), later), plan)
-    here = ab.inspect_flight(flight, plan)
+    here = strayed_as_found(number)
     for name, errors in here.errors.items():
         sizes = [np.linalg.norm(series, axis=1) for series in (errors, there.errors[name])]
         np.testing.assert_allclose(*sizes, atol=1e-6)

@@ -40,14 +40,18 @@ def whole(conditions: ab.Dispersion = SPREAD) -> Sweep:
     return sweep(hop(), conditions, RUNS, SEED, workers=1)
 
 
-@pytest.mark.parametrize("workers", [1, 2])
-@pytest.mark.parametrize("batch", [7, CHUNK])
-def test_neither_batches_nor_processes_change_a_bit(workers: int, batch: int) -> None:
+def test_batches_change_no_bit() -> None:
+    assert sweep(hop(), SPREAD, RUNS, SEED, workers=1, batch=7) == whole()
+
+
+@pytest.mark.process
+def test_neither_batches_nor_processes_change_a_bit_of_flights_that_are_observed() -> None:
     lab = ab.load_dispersion("lab")
-    assert sweep(hop(), lab, RUNS, SEED, workers=workers, batch=batch) == whole(lab)
+    for workers in (1, 2):
+        assert sweep(hop(), lab, RUNS, SEED, workers=workers, batch=7) == whole(lab)
 
 
-@pytest.mark.parametrize("engine", ["numpy", "compiled"])
+@pytest.mark.parametrize("engine", [pytest.param("numpy", marks=pytest.mark.slow), "compiled"])
 def test_a_batch_of_one_flies_as_it_does_among_others(engine: str) -> None:
     few, many = (sweep(hop(), SPREAD, 3, SEED, workers=1, batch=batch, engine=engine) for batch in (1, 3))
     assert few == many
@@ -161,6 +165,7 @@ if __name__ == "__main__":
 """
 
 
+@pytest.mark.process
 @pytest.mark.skipif(sys.platform == "win32", reason="there processes are ended otherwise")
 @pytest.mark.parametrize("ended_by", ["SIGKILL", "SIGINT"])
 def test_a_sweep_that_is_killed_leaves_no_process_and_goes_on_where_it_stopped(
@@ -195,6 +200,8 @@ def test_an_executor_can_be_handed_in() -> None:
         assert sweep(hop(), SPREAD, RUNS, SEED, executor=executor) == whole()
 
 
+@pytest.mark.peer
+@pytest.mark.process
 def test_dask_flies_the_same_flights_on_two_workers() -> None:
     distributed = pytest.importorskip("distributed")
     options = {"n_workers": 2, "threads_per_worker": 1, "host": "127.0.0.1", "dashboard_address": None}

@@ -10,15 +10,15 @@ import pytest
 import aerobat as ab
 from aerobat.control import Controller, named_controller
 from aerobat.studies.tune import MAX_FACTOR, TUNED
+from shared_plans import shared_plan
 
 WEAK = ab.Dispersion(name="weak", mass=0.03, rotor=0.03, lag=0.1, start_position=0.02, start_velocity=0.02)
 FLIGHTS = 20
 HALVED = replace(Controller(), **{name: 0.5 * getattr(Controller(), name) for name in TUNED})
 
 
-@cache
-def half_flip(vehicle: str = "agile-quad") -> ab.Plan:
-    return ab.plan("half-flip", ab.Miqp(order=4, reserve=0.15), vehicle)
+def half_flip() -> ab.Plan:
+    return shared_plan("half-flip", "agile-quad", ab.Miqp(order=4, reserve=0.15))
 
 
 @cache
@@ -29,7 +29,7 @@ def detuned() -> ab.Vehicle:
 @cache
 def found() -> ab.Tuning:
     """Gains found for a vehicle whose own were halved."""
-    return ab.tune(half_flip(), WEAK, FLIGHTS, vehicle=detuned(), evaluations=60)
+    return ab.tune(half_flip(), WEAK, FLIGHTS, vehicle=detuned(), evaluations=32)
 
 
 def test_gains_that_were_halved_are_brought_back_to_what_the_usual_ones_give() -> None:
@@ -40,7 +40,7 @@ def test_gains_that_were_halved_are_brought_back_to_what_the_usual_ones_give() -
     assert found().is_better
 
 
-@pytest.mark.parametrize("evaluations", [1, 3, 8])
+@pytest.mark.parametrize("evaluations", [1, 3, pytest.param(8, marks=pytest.mark.slow)])
 def test_no_search_is_worse_than_the_start_on_its_own_flights(evaluations: int) -> None:
     tuning = ab.tune(half_flip(), WEAK, FLIGHTS, vehicle=detuned(), evaluations=evaluations)
     before, after = tuning.training
@@ -50,7 +50,7 @@ def test_no_search_is_worse_than_the_start_on_its_own_flights(evaluations: int) 
 
 def test_a_seed_gives_the_same_gains_to_the_last_bit() -> None:
     first, again, other = (
-        ab.tune(half_flip(), WEAK, FLIGHTS, seed, vehicle=detuned(), evaluations=9) for seed in (3, 3, 4)
+        ab.tune(half_flip(), WEAK, FLIGHTS, seed, vehicle=detuned(), evaluations=5) for seed in (3, 3, 4)
     )
     assert first == again
     assert first.training[0] != other.training[0]
@@ -73,7 +73,7 @@ def test_gains_are_judged_on_flights_that_the_search_has_not_flown() -> None:
 
 def test_gains_stay_within_their_factor_and_others_as_they_are() -> None:
     tuning = ab.tune(
-        half_flip(), WEAK, FLIGHTS, vehicle=detuned(), gains=["attitude_frequency"], evaluations=20
+        half_flip(), WEAK, FLIGHTS, vehicle=detuned(), gains=["attitude_frequency"], evaluations=10
     )
     ratio = tuning.controller.attitude_frequency / HALVED.attitude_frequency
     assert 1.0 < ratio <= MAX_FACTOR
@@ -98,7 +98,7 @@ def test_a_lost_flight_weighs_more_than_any_error() -> None:
 
 
 def test_several_plans_count_alike() -> None:
-    line = ab.plan("line", ab.Miqp(order=4, reserve=0.1), "agile-quad")
+    line = shared_plan("line", "agile-quad", ab.Miqp(order=4, reserve=0.1))
     both, *each = (
         ab.tune(plans, WEAK, FLIGHTS, vehicle=detuned(), evaluations=1).training[0].cost
         for plans in ([half_flip(), line], half_flip(), line)
@@ -194,7 +194,7 @@ def test_a_controller_in_a_file_is_checked_as_every_field(tmp_path: Path) -> Non
 
 
 def test_a_sweep_is_flown_by_its_vehicles_controller() -> None:
-    own = ab.sweep(half_flip(), WEAK, 3, vehicle=detuned(), workers=1)
-    named = ab.sweep(half_flip(), WEAK, 3, controller=HALVED, workers=1)
+    own = ab.sweep(half_flip(), WEAK, 3, vehicle=detuned(), workers=1, engine="bytecode")
+    named = ab.sweep(half_flip(), WEAK, 3, controller=HALVED, workers=1, engine="bytecode")
     for name, column in named.table.items():
         np.testing.assert_array_equal(own.table[name], column)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import io
-import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
@@ -11,6 +10,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from PIL import Image
 from playwright.sync_api import Browser, Page, sync_playwright
+
+from suites import browser
 
 LAPTOP, PHONE = (1280, 720), (390, 844)
 PATIENCE = 120_000  # [ms] on a busy machine; nothing waits longer than it takes
@@ -77,9 +78,7 @@ class Seen:
 @contextmanager
 def open_browser() -> Iterator[Browser]:
     """The system's Chromium, else Chrome or Edge."""
-    path = shutil.which("chromium") or shutil.which("google-chrome") or shutil.which("msedge")
     with sync_playwright() as tools:
-        launch = tools.chromium.launch
-        found = launch(executable_path=path, args=FLAGS) if path else launch(channel="chrome", args=FLAGS)
+        found = tools.chromium.launch(executable_path=browser(), args=FLAGS)
         yield found
         found.close()

@@ -1,4 +1,4 @@
-"""Command lines as tests run them: in this process, ending in an exit code."""
+"""Command lines as tests run them: in this process, ending in an exit code, with or without pictures."""
 
 from __future__ import annotations
 
@@ -20,3 +20,9 @@ def run(capsys: pytest.CaptureFixture[str], *arguments: object) -> tuple[int, st
     """Exit code, standard output and standard error."""
     ended = code(*arguments)
     return ended, *capsys.readouterr()
+
+
+def without_pictures(patch: pytest.MonkeyPatch) -> None:
+    """Have reports of plans and flights come with an empty picture, for tests of something else."""
+    patch.setattr("aerobat.cli.runs.folder.report_figure", lambda *_: None)
+    patch.setattr("aerobat.cli.runs.folder.png", lambda _: b"")

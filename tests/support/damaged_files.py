@@ -20,7 +20,7 @@ import time
 import tomllib
 import warnings
 from collections.abc import Callable, Iterator
-from contextlib import chdir, redirect_stdout, suppress
+from contextlib import chdir, suppress
 from importlib.resources import files
 from itertools import cycle, islice
 from pathlib import Path
@@ -29,12 +29,13 @@ from typing import Any
 import numpy as np
 import tomli_w
 
-from aerobat import cli
 from aerobat.environment import dispersion_names
+from aerobat.interchange import write_columns
 from aerobat.planning import registered_planners
 from aerobat.problem import problem_names
 from aerobat.vehicle import vehicle_names
 from random_command_lines import faults
+from shared_plans import shared_plan
 
 NUMBERS = (0, -1, 1e300, -1e300, 1e-300, 1e-7, 1e17, 1e29, float("nan"), float("inf"), 3, 2**70)
 VALUES = (*NUMBERS, "", "text\nof two lines", True, [], {}, [1.0], [[1.0, 2.0], [3.0]], None)
@@ -179,9 +180,9 @@ def planning_lines(rng: random.Random) -> Iterator[list[str]]:
 
 def checking_lines(rng: random.Random) -> Iterator[list[str]]:
     """Write a damaged plan or CSV file, and yield a command line that reads it, without end."""
-    with redirect_stdout(io.StringIO()), suppress(SystemExit):
-        cli.main(["plan", "half-flip", "--planner", "min-snap", "--out", "kept"])
-    whole = {"plan": Path("kept/half-flip.plan").read_bytes(), "csv": Path("kept/plan.csv").read_bytes()}
+    shared_plan("half-flip", planner="min-snap").save("whole.plan")
+    write_columns(shared_plan("half-flip", planner="min-snap"), "whole.csv")
+    whole = {kind: Path(f"whole.{kind}").read_bytes() for kind in ("plan", "csv")}
     drawn = {"plan": plan_files(whole["plan"], rng), "csv": csv_files(whole["csv"], rng)}
     while True:
         kind = rng.choice(["plan", "csv"])

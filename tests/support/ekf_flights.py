@@ -20,6 +20,7 @@ from aerobat.kernels.ekf import EkfState, ImuSample, Pose
 from aerobat.kernels.ekf.covariance import unpack
 from aerobat.simulation import fly
 from aerobat.states import BodyState
+from shared_plans import shared_plan
 
 RATE = 1000  # [1/s] of the IMU
 STRIDE = 10  # samples from one pose to the next
@@ -38,33 +39,31 @@ class Truth:
     specific_force: Array  # [m/s²] means over the intervals, body axes, (N, T, 3)
 
 
-@lru_cache
-def plans() -> tuple[ab.Plan, ...]:
-    """Two maneuvers of the hexarotor, quickly planned."""
-    names = ("half-flip", "flip-pitch")
-    return tuple(ab.plan(ab.load_problem(name), ab.Miqp(), "hexarotor") for name in names)
+NAMES = ("half-flip", "flip-pitch")
+
+
+def planned(number: int) -> ab.Plan:
+    """One of two maneuvers of the hexarotor, quickly planned."""
+    return shared_plan(NAMES[number], "hexarotor", ab.Miqp())
 
 
 @lru_cache
-def flips(count: int = 50, seed: int = 0) -> tuple[Truth, ...]:
-    """Flights of two plans by many vehicles, none like another, each from a start of its own."""
-    hexarotor = ab.load_vehicle("hexarotor")
-    rng = np.random.default_rng(seed)
-    truths = []
-    for plan in plans():
-        factors = rng.uniform(0.95, 1.05, count)
-        vehicles = [replace(hexarotor, name=f"{k}", mass=hexarotor.mass * f) for k, f in enumerate(factors)]
-        scatter = [s * rng.normal(size=(count, 3)) for s in (0.02, 0.05, 0.03, 0.1)]
-        first = ab.reference(plan, times=[0.0]).setpoint
-        start = BodyState(
-            first.flat.position + scatter[0],
-            first.flat.velocity + scatter[1],
-            so3.multiply(first.q_world_body, so3.exp(scatter[2])),
-            first.omega_body + scatter[3],
-        )
-        flight = fly(plan, vehicles, start=start, rate=2.0 * RATE, nominal=hexarotor)
-        truths.append(seen(flight, np.array([v.mass for v in vehicles]), hexarotor.drag_body))
-    return tuple(truths)
+def flips(number: int, count: int) -> Truth:
+    """Flights of a plan by many vehicles, none like another, each from a start of its own."""
+    hexarotor, plan = ab.load_vehicle("hexarotor"), planned(number)
+    rng = np.random.default_rng(number)
+    factors = rng.uniform(0.95, 1.05, count)
+    vehicles = [replace(hexarotor, name=f"{k}", mass=hexarotor.mass * f) for k, f in enumerate(factors)]
+    scatter = [s * rng.normal(size=(count, 3)) for s in (0.02, 0.05, 0.03, 0.1)]
+    first = ab.reference(plan, times=[0.0]).setpoint
+    start = BodyState(
+        first.flat.position + scatter[0],
+        first.flat.velocity + scatter[1],
+        so3.multiply(first.q_world_body, so3.exp(scatter[2])),
+        first.omega_body + scatter[3],
+    )
+    flight = fly(plan, vehicles, start=start, rate=2.0 * RATE, nominal=hexarotor)
+    return seen(flight, np.array([v.mass for v in vehicles]), hexarotor.drag_body)
 
 
 def seen(flight: ab.Flight, masses: Array, drag_body: Array) -> Truth:

@@ -16,16 +16,16 @@ from aerobat.links.mavlink.client import Client, ClientSettings
 from aerobat.links.mavlink.connection import LossyConnection, dialect
 from aerobat.links.mavlink.front_end import FrontEnd
 from aerobat.links.mission import MissionSettings, Phase
+from shared_plans import shared_plan
 
 STEP = 0.001  # [s]
 VEHICLE_STEPS, CLIENT_STEPS = 4, 5  # between ticks of either end: 250 and 200 a second
 ORIGIN = np.array([0.0, 0.0, 3.0])
 
 
-@cache
 def flip() -> ab.Plan:
     """The flip in roll by the agile quadrotor, all its thrust in use."""
-    return ab.plan("flip-roll", vehicle="agile-quad")
+    return shared_plan("flip-roll")
 
 
 @cache

@@ -148,10 +148,16 @@ def _closed(*args: Any, **kwargs: Any) -> None:
 
 def _arguments(name: str, folder: Path) -> dict[str, Any]:
     """The arguments of a public function."""
+    return _calls(folder)[name]
+
+
+@cache
+def _calls(folder: Path) -> dict[str, dict[str, Any]]:
+    """The arguments of all public functions."""
     agile = ab.load_vehicle("agile-quad")
     here = {"environment": ab.Environment()}
     saved = _files(folder)
-    calls: dict[str, dict[str, Any]] = {
+    return {
         "at_rest": {"position": (0.0, 0.0, 1.0)},
         "certify": {"trajectory": plan().trajectory, "vehicle": agile, **here, "envelope": ab.Envelope()},
         "compare": {
@@ -308,7 +314,6 @@ def _arguments(name: str, folder: Path) -> dict[str, Any]:
         "write_table": {"table": {"a": [1.0]}, "path": folder / "saved-table.csv"},
         "write_vehicle": {"vehicle": agile, "path": folder / "saved.toml"},
     }
-    return calls[name]
 
 
 @cache
@@ -439,6 +444,7 @@ def _files(folder: Path) -> dict[str, Path]:
     return files
 
 
+@cache
 def instance(cls: type) -> Any:
     """A value of a public class."""
     made = {

@@ -18,11 +18,12 @@ import warnings
 from collections.abc import Iterator
 from pathlib import Path
 
+import pytest
+
 from aerobat import cli
 from aerobat.interchange import write_columns
-from aerobat.planning import Miqp, plan
-from aerobat.problem import load_problem
-from aerobat.vehicle import load_vehicle
+from command_lines import without_pictures
+from shared_plans import shared_plan
 
 SLOW = 20.0  # [s]
 CODES = {0, 1, 2, 3}  # what a run may come to that nobody interrupts
@@ -189,10 +190,16 @@ def fill(folder: Path) -> None:
         "maneuver = { kind = 'line' }\n"
     )
     (folder / "short.csv").write_text("t,x,y,z\n0,0,0,1\n1,1,0,1\n2,1,0,1\n")
-    made = plan(load_problem("line"), Miqp(order=5), load_vehicle("agile-quad"))
-    write_columns(made, folder / "path.csv", rate=50.0)
-    with contextlib.redirect_stdout(io.StringIO()), contextlib.chdir(folder):
-        cli.main(["fly", "line", "--order", "5", "--out", "kept"])
+    write_columns(shared_plan("line"), folder / "path.csv", rate=50.0)
+    shared_plan("line").save(folder / "line.plan")
+    with (
+        contextlib.redirect_stdout(io.StringIO()),
+        contextlib.chdir(folder),
+        pytest.MonkeyPatch.context() as patch,
+    ):
+        without_pictures(patch)
+        cli.main(["fly", "line.plan", "--out", "kept"])
+    (folder / "line.plan").unlink()
 
 
 def command_lines(count: int, seed: int) -> Iterator[list[str]]:

@@ -13,20 +13,15 @@ from matplotlib.figure import Figure
 from matplotlib.transforms import Bbox
 
 import aerobat as ab
+from shared_plans import shared_plan
 
 PROBLEMS = ("flip-roll", "flip-roll-translation", "flip-pitch", "half-flip", "line")
 
 
 @lru_cache
-def planned(problem: str, vehicle: str = "agile-quad") -> ab.Plan:
-    """A rotor-feasible plan for one of the shipped problems."""
-    return ab.plan(ab.load_problem(problem), vehicle=ab.load_vehicle(vehicle))
-
-
-@lru_cache
 def simulated(problem: str, vehicle: str = "agile-quad") -> ab.Flight:
     """A flight of that plan, at a rate that keeps tests short."""
-    return ab.fly(planned(problem, vehicle).trajectory, ab.load_vehicle(vehicle), rate=200.0)
+    return ab.fly(shared_plan(problem, vehicle).trajectory, ab.load_vehicle(vehicle), rate=200.0)
 
 
 @lru_cache
@@ -70,4 +65,4 @@ def batch_of(problem, count):
     """As many flights as `count`, each of a vehicle a little heavier than the one before."""
     quad = ab.load_vehicle("agile-quad")
     heavier = [replace(quad, mass=(1.0 + 0.01 * k) * quad.mass) for k in range(count)]
-    return ab.fly(planned(problem).trajectory, heavier, rate=200.0)
+    return ab.fly(shared_plan(problem).trajectory, heavier, rate=200.0)

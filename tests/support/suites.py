@@ -1,4 +1,4 @@
-"""The two suites: the default one of a few minutes, and the full one, which `--full` runs."""
+"""The two suites of tests: the default one of two minutes, and the full one, which `--full` runs."""
 
 from __future__ import annotations
 
@@ -22,7 +22,14 @@ GROUPS = {
     "ros": "flies a session with a real ROS; needs the interpreters of ROS_PYTHONS",
     "docs": "runs the documentation, its tutorials and its site",
 }
-BROWSERS = ("chromium", "google-chrome", "msedge")
+BROWSERS = (
+    "chromium",
+    "google-chrome",
+    "msedge",
+    "/Applications/Google Chrome.app/Contents/MacOS/Google Chrome",
+    r"C:\Program Files\Google\Chrome\Application\chrome.exe",
+    r"C:\Program Files (x86)\Microsoft\Edge\Application\msedge.exe",
+)
 ROS_PYTHONS = {name: f"AEROBAT_{name.upper()}_PYTHON" for name in ("ros1", "ros2")}
 
 
@@ -52,8 +59,8 @@ def missing(group: str) -> str | None:
     """Return a sentence on how to get the part of the system that a group needs, None where it is there."""
     if group == "browser" and browser() is None:
         return (
-            f"no browser was found on the PATH ({', '.join(BROWSERS)}); "
-            "install one, as with `apt-get install chromium`, or leave the browser's tests out"
+            "no browser was found, neither Chromium nor Chrome nor Edge; install one, as with "
+            "`apt-get install chromium`, or leave the browser's tests out"
         )
     unset = [name for name in ROS_PYTHONS.values() if not os.path.isfile(os.environ.get(name, ""))]
     if group == "ros" and unset:

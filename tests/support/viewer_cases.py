@@ -12,7 +12,8 @@ from typing import Any
 import numpy as np
 
 import aerobat as ab
-from reporting_cases import planned, simulated
+from reporting_cases import simulated
+from shared_plans import shared_plan
 
 NUMBERS = {"f4": np.float32, "i2": np.int16}
 
@@ -23,7 +24,7 @@ def dispersed(count: int = 50) -> ab.Flight:
     agile = ab.load_vehicle("agile-quad")
     masses = agile.mass * np.linspace(0.9, 1.35, count)
     fleet = [replace(agile, mass=float(mass)) for mass in masses]
-    return ab.fly(planned("flip-roll"), fleet, rate=200.0)
+    return ab.fly(shared_plan("flip-roll"), fleet, rate=200.0)
 
 
 def header(page: str) -> dict[str, Any]:
@@ -45,4 +46,4 @@ def array(page: str, place: dict[str, Any]) -> np.ndarray:
 
 def flip() -> tuple[ab.Flight, ab.Plan]:
     """The flip in roll through a gate, flown."""
-    return simulated("flip-roll"), planned("flip-roll")
+    return simulated("flip-roll"), shared_plan("flip-roll")

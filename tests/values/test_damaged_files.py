@@ -32,6 +32,13 @@ from random_command_lines import faults
 QUAD = load_vehicle("agile-quad")
 
 
+def parts(few: int, all: int) -> Any:
+    """Some of the files that a test damages for the default suite, all others for the full one."""
+    return pytest.mark.parametrize(
+        ("begin", "end"), [(0, few), pytest.param(few, all, marks=pytest.mark.slow)]
+    )
+
+
 def in_a_sentence(read: Callable[[], Any]) -> Any:
     """What is read, or None where that is refused in one sentence; a warning is a failure."""
     with warnings.catch_warnings():
@@ -60,52 +67,59 @@ def judged(found: Plan | Trajectory) -> None:
     certify(trajectory, QUAD, Environment())
 
 
-def test_five_hundred_damaged_plan_files_end_in_a_sentence_or_are_judged(plan_file, tmp_path) -> None:
+@parts(100, 500)
+def test_damaged_plan_files_end_in_a_sentence_or_are_judged(begin, end, plan_file, tmp_path) -> None:
     path = tmp_path / "damaged.plan"
-    for content in islice(plan_files(plan_file.read_bytes(), random.Random(1)), 500):
+    for content in islice(plan_files(plan_file.read_bytes(), random.Random(1)), begin, end):
         path.write_bytes(content)
         found = in_a_sentence(lambda: read_plan(path))
         if found is not None:
             in_a_sentence(lambda found=found: judged(found))
 
 
-def test_two_hundred_flight_files_of_lying_arrays_end_in_a_sentence_or_are_read(tmp_path) -> None:
+@parts(50, 200)
+def test_flight_files_of_lying_arrays_end_in_a_sentence_or_are_read(begin, end, tmp_path) -> None:
     rng = random.Random(5)
     path = tmp_path / "lying.npz"
     fly(Trajectory([0.1], np.zeros((1, 8, 3))), QUAD).save(path)
     content = dict(np.load(path))
-    for _ in range(200):
+    for name, lie in islice(iter(lambda: (rng.choice(list(content)), lying_array(rng)), None), begin, end):
         with path.open("wb") as file:
-            np.savez(file, **content | {rng.choice(list(content)): lying_array(rng)})
+            np.savez(file, **content | {name: lie})
         found = in_a_sentence(lambda: load_flight(path))
         if found is not None:
             in_a_sentence(lambda found=found: found[0] if found.is_batch else found.ends)
 
 
-def test_two_hundred_damaged_csv_files_end_in_a_sentence_or_are_judged(plan_file, tmp_path) -> None:
+@parts(20, 120)
+def test_damaged_csv_files_end_in_a_sentence_or_are_judged(begin, end, plan_file, tmp_path) -> None:
     path = tmp_path / "path.csv"
     write_csv(load_plan(plan_file).trajectory, path, rate=10.0)
-    for content in islice(csv_files(path.read_bytes(), random.Random(3)), 200):
+    for content in islice(csv_files(path.read_bytes(), random.Random(3)), begin, end):
         path.write_bytes(content)
         found = in_a_sentence(lambda: read_plan(path))
         if found is not None:
             in_a_sentence(lambda found=found: judged(found))
 
 
+@parts(200, 500)
 @pytest.mark.parametrize(
     ("load", "room"),
     [(load_vehicle, "vehicle"), (load_problem, "problem"), (load_dispersion, "environment")],
 )
-def test_five_hundred_mutated_documents_end_in_a_sentence_or_are_read(load, room, tmp_path) -> None:
+def test_mutated_documents_end_in_a_sentence_or_are_read(load, room, begin, end, tmp_path) -> None:
     path = tmp_path / "mutated.toml"
-    for content in islice(documents(room, random.Random(4)), 500):
+    for content in islice(documents(room, random.Random(4)), begin, end):
         path.write_bytes(content)
         in_a_sentence(lambda: load(path))
 
 
-def test_commands_that_read_damaged_files_end_in_a_sentence_or_a_judgement(tmp_path, monkeypatch) -> None:
+@parts(10, 40)
+def test_commands_that_read_damaged_files_end_in_a_sentence_or_a_judgement(
+    begin, end, tmp_path, monkeypatch
+) -> None:
     monkeypatch.chdir(tmp_path)
-    for line in islice(checking_lines(random.Random(6)), 40):
+    for line in islice(checking_lines(random.Random(6)), begin, end):
         assert faults(line) == [], line
 
 

@@ -1,12 +1,8 @@
-"""A new maneuver and a new planner, written as a user would, outside the package: a file each, known by name.
-
-Each command runs in a process of its own, for what is registered is registered in all of a process.
-"""
+"""A maneuver and a planner of one's own, written as a user would: a file each, known by their names."""
 
 from __future__ import annotations
 
 import json
-import os
 import subprocess
 import sys
 from pathlib import Path
@@ -14,6 +10,7 @@ from pathlib import Path
 import pytest
 
 import aerobat as ab
+from command_lines import run, without_pictures
 
 MANEUVER = '''
 from collections.abc import Sequence
@@ -66,64 +63,74 @@ class Straight:
 '''
 
 
-@pytest.fixture
-def folder(tmp_path: Path) -> Path:
+OURS = ("--import", "my_planner.py", "--planner", "mine")
+
+
+@pytest.fixture(autouse=True)
+def _folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A user's folder with a maneuver, a problem that asks for it, and a planner."""
+    monkeypatch.chdir(tmp_path)
+    without_pictures(monkeypatch)
+    for name, value in {"COLUMNS": "200", "MPLBACKEND": "agg", "PYTHONUTF8": "1"}.items():
+        monkeypatch.setenv(name, value)
     for name, text in {"my_maneuver.py": MANEUVER, "mine.toml": PROBLEM, "my_planner.py": PLANNER}.items():
-        (tmp_path / name).write_text(text, encoding="utf-8")
-    return tmp_path
+        Path(name).write_text(text, encoding="utf-8")
 
 
-def aerobat(folder: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
-    """The command, run in that folder."""
-    return subprocess.run(
-        [sys.executable, "-m", "aerobat", *arguments],
-        cwd=folder,
-        env={**os.environ, "COLUMNS": "200", "MPLBACKEND": "agg", "PYTHONUTF8": "1"},
-        capture_output=True,
-        encoding="utf-8",
-        check=False,
-    )
-
-
-def test_a_maneuver_of_ones_own_is_known_to_problem_files_by_its_name(folder: Path) -> None:
-    done = aerobat(folder, "fly", "mine.toml", "--import", "my_maneuver.py", "--json")
-    assert (done.returncode, done.stderr) == (0, "")
-    report = json.loads(done.stdout)
+def test_a_maneuver_of_ones_own_is_known_to_problem_files_by_its_name(capsys) -> None:
+    code, out, err = run(capsys, "fly", "mine.toml", "--import", "my_maneuver.py", "--json")
+    assert (code, err) == (0, "")
+    report = json.loads(out)
     assert report["plan"]["certificate"]["certified"] is True
     assert report["flight"]["outcome"] == "through_gates"
-    again = aerobat(folder, "check", "out/mine/mine.plan", "--import", "my_maneuver.py")
-    assert (again.returncode, again.stderr) == (0, "")
 
 
-def test_without_its_file_a_maneuver_is_unknown_in_one_sentence(folder: Path) -> None:
-    done = aerobat(folder, "plan", "mine.toml")
-    assert done.returncode == 2
-    assert done.stderr.count("\n") == 1
-    assert "maneuver.kind must be one of" in done.stderr
-    assert not (folder / "out").exists()
+def test_without_its_file_a_maneuver_is_unknown_in_one_sentence(capsys) -> None:
+    code, _, err = run(capsys, "plan", "mine.toml")
+    assert code == 2
+    assert err.count("\n") == 1
+    assert "maneuver.kind must be one of" in err
+    assert not Path("out").exists()
 
 
-def test_a_planner_of_ones_own_is_called_by_its_name_with_its_options(folder: Path) -> None:
-    ours = ("--import", "my_planner.py", "--planner", "mine")
-    done = aerobat(folder, "plan", "line", *ours, "--my-option", "3")
-    assert (done.returncode, done.stderr) == (0, "")
-    plan = ab.load_plan(folder / "out/line-mine/line.plan")
+def aerobat(*arguments: str) -> tuple[int, str, str]:
+    """What the command comes to in a process of its own, in which options are made but once."""
+    done = subprocess.run(
+        [sys.executable, "-m", "aerobat", *arguments], capture_output=True, encoding="utf-8", check=False
+    )
+    return done.returncode, done.stdout, done.stderr
+
+
+@pytest.mark.process
+def test_a_plan_for_a_maneuver_of_ones_own_is_read_by_another_process_that_knows_it() -> None:
+    mine = ("--import", "my_maneuver.py")
+    for arguments in (("plan", "mine.toml"), ("check", "out/mine/mine.plan")):
+        code, _, err = aerobat(*arguments, *mine)
+        assert (code, err) == (0, "")
+
+
+@pytest.mark.process
+def test_a_planner_of_ones_own_is_called_by_its_name_with_its_options() -> None:
+    code, _, err = aerobat("plan", "line", *OURS, "--my-option", "3")
+    assert (code, err) == (0, "")
+    plan = ab.load_plan("out/line-mine/line.plan")
     assert (plan.planner, plan.duration) == ("mine", 3.0)
     assert plan.certified  # by plan(), for a planner that knows nothing of certificates
 
 
-def test_help_lists_a_planner_of_ones_own_and_its_options(folder: Path) -> None:
-    done = aerobat(folder, "plan", "--help", "--import", "my_planner.py")
-    text = " ".join(done.stdout.replace("│", " ").split())
-    assert done.returncode == 0
+@pytest.mark.process
+def test_help_lists_a_planner_of_ones_own_and_its_options() -> None:
+    code, out, _ = aerobat("plan", "--help", "--import", "my_planner.py")
+    text = " ".join(out.replace("│", " ").split())
+    assert code == 0
     assert "mine, One polynomial from start to goal" in text
     assert "--my-option" in text
     assert "mine: The duration in seconds. Default: 2.0." in text
-    assert "--my-option" not in aerobat(folder, "plan", "--help").stdout
+    assert "--my-option" not in aerobat("plan", "--help")[1]
 
 
-def test_an_option_of_one_planner_is_refused_by_another(folder: Path) -> None:
-    done = aerobat(folder, "plan", "line", "--import", "my_planner.py", "--my-option", "3")
-    assert done.returncode == 2
-    assert done.stderr == "aerobat: --my-option is for --planner mine, not miqp; leave one of them out\n"
+@pytest.mark.process
+def test_an_option_of_one_planner_is_refused_by_another() -> None:
+    code, _, err = aerobat("plan", "line", "--import", "my_planner.py", "--my-option", "3")
+    assert code == 2
+    assert err == "aerobat: --my-option is for --planner mine, not miqp; leave one of them out\n"

@@ -109,6 +109,7 @@ def test_a_class_that_plans_nothing_is_no_planner() -> None:
     assert "idle" not in ab.registered_planners()
 
 
+@pytest.mark.process
 def test_a_planner_without_a_word_about_itself_leaves_the_help_whole() -> None:
     code = (
         "import aerobat as ab; ab.planner('mute')(type('Mute', (), {'plan': lambda self, *_: None}));"

@@ -82,6 +82,7 @@ def test_a_place_that_is_no_folder_is_refused_in_one_sentence(tmp_path: Path) ->
         written(tmp_path / "run", "new")
 
 
+@pytest.mark.process
 @pytest.mark.skipif(sys.platform != "linux", reason="two folders change places at once on Linux")
 def test_killed_at_any_instant_it_is_the_old_run_or_the_new_one_and_the_next_run_clears_up(
     tmp_path: Path,

@@ -359,6 +359,7 @@ def test_what_the_annotated_example_says_instead_is_as_good() -> None:
         np.testing.assert_allclose(other.allocation, racer.allocation, rtol=0, atol=5e-4)
 
 
+@pytest.mark.slow
 def test_a_maneuver_is_flown_by_the_annotated_example() -> None:
     found = plan(load_problem("flip-roll"), vehicle=load_vehicle(ANNOTATED))
     assert found.certificate.certified

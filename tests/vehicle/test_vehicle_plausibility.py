@@ -80,7 +80,9 @@ def test_a_suspicion_is_told_on_standard_error_and_in_the_report_and_refuses_not
     suspicious, _, _ = MISTYPED["propeller of five"]
     write_vehicle(suspicious, "mine.toml")
     with suppress(SystemExit):
-        cli.main(["plan", "line", "--order", "5", "--vehicle", "mine.toml", "--json"])
+        cli.main(
+            ["plan", "line", "--planner", "min-snap", "--vehicle", "mine.toml", "--out", "out/line", "--json"]
+        )
     out, err = capsys.readouterr()
     (doubt,) = implausibilities(suspicious)
     assert json.loads(out)["warnings"] == [doubt]

@@ -17,7 +17,7 @@ from aerobat.viewer.live.desk import Desk
 from aerobat.viewer.live.replan import FLIGHTS, Answer, Overtaken, Replanner, Verdict
 from aerobat.viewer.live.sliders import Setting, sliders_of
 from aerobat.viewer.live.view_live import LiveView
-from reporting_cases import planned
+from shared_plans import shared_plan
 
 JSON = {"Content-Type": "application/json"}
 FINE = Answer(Verdict("Feasible", "fine", True))
@@ -26,7 +26,7 @@ FINE = Answer(Verdict("Feasible", "fine", True))
 @pytest.fixture(scope="module")
 def replanner() -> Replanner:
     """The half-flip's."""
-    plan = planned("half-flip")
+    plan = shared_plan("half-flip")
     assert plan.vehicle is not None
     begun = Setting(plan.problem, ab.Miqp(), plan.vehicle, ab.load_dispersion("lab"))
     return Replanner(begun, sliders_of(begun, plan))
@@ -34,7 +34,7 @@ def replanner() -> Replanner:
 
 @pytest.fixture(scope="module")
 def live() -> Iterator[LiveView]:
-    with ab.view_live(planned("line"), browser=False) as view:
+    with ab.view_live(shared_plan("line"), browser=False) as view:
         yield view
 
 
@@ -187,13 +187,13 @@ def test_a_port_that_is_taken_is_named(live: LiveView) -> None:
     with socket.create_server(("127.0.0.1", 0)) as taken:
         port = taken.getsockname()[1]
         with pytest.raises(ab.SpecError, match=f"port {port} cannot be served"):
-            ab.view_live(planned("line"), port=port, browser=False)
+            ab.view_live(shared_plan("line"), port=port, browser=False)
 
 
 def test_a_plan_is_begun_with_as_it_is_and_an_infeasible_problem_with_its_sentence() -> None:
     with pytest.raises(ab.Infeasible, match="agile-quad gives"):
         ab.view_live(demanding(ab.load_problem("half-flip")), browser=False)
-    with ab.view_live(planned("line"), browser=False) as view:
+    with ab.view_live(shared_plan("line"), browser=False) as view:
         assert view._repr_html_().count(view.address) == 1
         assert repr(view) == f"LiveView({view.address})"
     with pytest.raises(ConnectionRefusedError, match="refused"):

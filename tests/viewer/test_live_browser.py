@@ -12,7 +12,9 @@ from playwright.sync_api import Browser
 import aerobat as ab
 from aerobat.viewer.live.view_live import LiveView
 from browsers import LAPTOP, PHONE, Seen, open_browser
-from reporting_cases import planned
+from shared_plans import shared_plan
+
+pytestmark = pytest.mark.browser
 
 
 @pytest.fixture(scope="module")
@@ -23,7 +25,7 @@ def browser() -> Iterator[Browser]:
 
 @pytest.fixture(scope="module")
 def live() -> Iterator[LiveView]:
-    with ab.view_live(planned("half-flip"), ab.Miqp(), browser=False) as view:
+    with ab.view_live(shared_plan("half-flip"), ab.Miqp(), browser=False) as view:
         yield view
 
 
@@ -159,7 +161,7 @@ def test_dispersed_flights_are_shown_together(show) -> None:
 
 def test_a_server_that_is_gone_is_said(browser: Browser) -> None:
     page = browser.new_page()
-    with ab.view_live(planned("line"), browser=False) as view:
+    with ab.view_live(shared_plan("line"), browser=False) as view:
         seen = Seen.watching(page)
         page.goto(view.address)
         seen.until("window.live && replay.frames > 0")

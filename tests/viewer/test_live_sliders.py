@@ -14,20 +14,20 @@ from hypothesis import strategies as st
 import aerobat as ab
 from aerobat.states import STANDARD_GRAVITY
 from aerobat.viewer.live.sliders import Setting, Slider, moved, sliders_of
-from reporting_cases import planned
+from shared_plans import shared_plan
 
 NAMES = ("flip-roll", "half-flip", "line", "flip-roll-translation")
 
 
 def setting(name: str) -> Setting:
-    plan = planned(name)
+    plan = shared_plan(name)
     assert plan.vehicle is not None
     return Setting(plan.problem, ab.Miqp(), plan.vehicle, ab.load_dispersion("lab"))
 
 
 @lru_cache
 def sliders(name: str) -> dict[str, Slider]:
-    return {slider.key: slider for slider in sliders_of(setting(name), planned(name))}
+    return {slider.key: slider for slider in sliders_of(setting(name), shared_plan(name))}
 
 
 def value(setting: Setting, key: str) -> float:

@@ -10,8 +10,10 @@ from playwright.sync_api import Browser
 
 import aerobat as ab
 from browsers import LAPTOP, PATIENCE, PHONE, Seen, open_browser, wait
-from reporting_cases import planned
+from shared_plans import shared_plan
 from viewer_cases import dispersed, flip
+
+pytestmark = pytest.mark.browser
 
 
 @pytest.fixture(scope="module")
@@ -197,7 +199,7 @@ def test_a_dragged_camera_turns_and_a_followed_vehicle_stays_in_the_middle(lapto
 
 
 def test_of_many_flights_the_failed_ones_are_marked_and_each_can_be_chosen(show) -> None:
-    plan = planned("flip-roll")
+    plan = shared_plan("flip-roll")
     seen = show(ab.view(dispersed(), plan))
     failed = [track.failed for track in ab.view(dispersed(), plan).scene.tracks]
     options = seen.page.locator("#flight option").all_inner_texts()
@@ -229,7 +231,7 @@ def test_without_webgl_a_sentence_says_so_and_the_plots_still_show_the_flight(br
 def test_a_notebook_frame_holds_the_page(browser: Browser) -> None:
     page = browser.new_page()
     page.set_default_timeout(PATIENCE)
-    page.set_content(f"<h1>a notebook</h1>{ab.view(planned('half-flip'))._repr_html_()}")
+    page.set_content(f"<h1>a notebook</h1>{ab.view(shared_plan('half-flip'))._repr_html_()}")
     frame = page.frame_locator("iframe")
     assert frame.locator("h1").inner_text() == "half-flip · agile-quad"
     assert frame.locator(".plot h2 span").all_inner_texts() == [

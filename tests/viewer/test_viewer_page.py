@@ -13,7 +13,7 @@ import pytest
 import aerobat as ab
 from aerobat.reporting.style import BLUE, INK, RED, SKY, YELLOW
 from aerobat.viewer.document import PAGE, SCRIPTS
-from reporting_cases import planned
+from shared_plans import shared_plan
 from viewer_cases import array, dispersed, flip, header
 
 MAX_BYTES = 3_000_000
@@ -70,7 +70,7 @@ def test_a_notebook_shows_the_page_in_a_frame_of_its_own() -> None:
 
 
 def test_an_earlier_replay_is_replaced_and_nothing_else(tmp_path: Path) -> None:
-    plan = planned("line")
+    plan = shared_plan("line")
     ab.write_replay(plan, tmp_path / "page.html")
     ab.write_replay(dispersed(), tmp_path / "page.html")
     assert header((tmp_path / "page.html").read_text(encoding="utf-8"))["title"].startswith(

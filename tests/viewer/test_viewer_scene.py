@@ -12,7 +12,8 @@ from hypothesis import strategies as st
 
 import aerobat as ab
 from aerobat.viewer.scene import MAX_FLIGHTS, MAX_POSES, MAX_ROWS, plan_fits, scene_of, shown_rows
-from reporting_cases import planned, simulated
+from reporting_cases import simulated
+from shared_plans import shared_plan
 from viewer_cases import dispersed, flip
 
 
@@ -70,7 +71,7 @@ def test_a_minute_at_a_thousand_rows_a_second_is_thinned_says_so_and_hides_no_er
 
 
 def test_a_batch_tells_which_flights_failed_as_each_would_be_judged_alone() -> None:
-    flight, plan = dispersed(), planned("flip-roll")
+    flight, plan = dispersed(), shared_plan("flip-roll")
     scene = scene_of(flight, plan)
     judged = [ab.score(flight[k], plan) for k in range(50)]
     assert [track.sentence for track in scene.tracks] == [score.sentence for score in judged]
@@ -84,8 +85,8 @@ def test_a_batch_tells_which_flights_failed_as_each_would_be_judged_alone() -> N
 def test_a_vehicle_that_diverged_stays_where_it_ended() -> None:
     agile = ab.load_vehicle("agile-quad")
     heavy = replace(agile, mass=3.0 * agile.mass)
-    flight = ab.fly(planned("flip-roll"), [agile, heavy], rate=200.0)
-    track = scene_of(flight, planned("flip-roll")).tracks[1]
+    flight = ab.fly(shared_plan("flip-roll"), [agile, heavy], rate=200.0)
+    track = scene_of(flight, shared_plan("flip-roll")).tracks[1]
     assert track.failed
     assert track.end < flight.times[-1]
     after = scene_of(flight).times >= track.end
@@ -93,7 +94,7 @@ def test_a_vehicle_that_diverged_stays_where_it_ended() -> None:
 
 
 def test_of_too_many_flights_the_first_are_shown_and_this_is_said() -> None:
-    plan = planned("line")
+    plan = shared_plan("line")
     batch = ab.fly(plan, ["agile-quad"] * (MAX_FLIGHTS + 3), rate=100.0, log_rate=10.0)
     scene = scene_of(batch, plan)
     assert len(scene.tracks) == MAX_FLIGHTS
@@ -101,7 +102,7 @@ def test_of_too_many_flights_the_first_are_shown_and_this_is_said() -> None:
 
 
 def test_a_plan_without_a_flight_shows_what_is_asked_of_its_vehicle() -> None:
-    plan = planned("half-flip")
+    plan = shared_plan("half-flip")
     scene = scene_of(plan)
     asked = ab.reference(plan, times=scene.times)
     np.testing.assert_array_equal(scene.tracks[0].thrusts, asked.rotor_thrusts)
@@ -113,8 +114,8 @@ def test_a_plan_without_a_flight_shows_what_is_asked_of_its_vehicle() -> None:
     ("shown", "sentence"),
     [
         (lambda: first(dispersed(), 0), "the batch holds no flights"),
-        (lambda: replace(planned("line"), vehicle=None), "vehicle is missing"),
-        (lambda: ab.fly(planned("line"), "agile-quad", rate=200.0), "hexarotor has 6"),
+        (lambda: replace(shared_plan("line"), vehicle=None), "vehicle is missing"),
+        (lambda: ab.fly(shared_plan("line"), "agile-quad", rate=200.0), "hexarotor has 6"),
     ],
     ids=["an empty batch", "no vehicle", "another vehicle"],
 )
@@ -125,6 +126,6 @@ def test_where_there_is_nothing_to_show_one_sentence_says_so(shown, sentence) ->
 
 
 def test_a_plan_fits_its_own_flights_alone() -> None:
-    assert plan_fits(planned("half-flip"), simulated("half-flip"))
-    assert not plan_fits(planned("flip-roll"), simulated("half-flip"))
-    assert not plan_fits(planned("half-flip"), simulated("line"))
+    assert plan_fits(shared_plan("half-flip"), simulated("half-flip"))
+    assert not plan_fits(shared_plan("flip-roll"), simulated("half-flip"))
+    assert not plan_fits(shared_plan("half-flip"), simulated("line"))

@@ -1,0 +1,21 @@
+"""Plans and flights that many tests look at, each made once in a process."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import aerobat as ab
+
+
+@cache
+def shared_plan(
+    problem: str, vehicle: str | None = "agile-quad", planner: ab.Planner | str | None = None
+) -> ab.Plan:
+    """Return the plan of a built-in problem by a planner, by default the suited one."""
+    return ab.plan(ab.load_problem(problem), planner, None if vehicle is None else ab.load_vehicle(vehicle))
+
+
+@cache
+def shared_flight(problem: str, vehicle: str = "agile-quad") -> ab.Flight:
+    """Return the flight of such a plan, by default settings, nothing unknown."""
+    return ab.fly(shared_plan(problem, vehicle))
