@@ -29,7 +29,6 @@ RC: dict[str, Any] = {
     "font.size": NORMAL,
     "mathtext.fontset": "dejavusans",
     "text.usetex": False,
-    "text.hinting": "none",  # letters where they belong, as in print; hinting takes a sixth of the drawing
     "text.color": INK,
     "figure.facecolor": "white",
     "axes.facecolor": "white",
