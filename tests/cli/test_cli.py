@@ -14,6 +14,7 @@ import pytest
 
 from aerobat.interchange import write_columns
 from aerobat.interchange.csv import read_csv
+from aerobat.planning import load_plan
 from aerobat.problem import problem_names
 from aerobat.simulation import load_flight
 from aerobat.vehicle import vehicle_names
@@ -118,6 +119,61 @@ def test_plan_stops_after_planning(capsys) -> None:
 
 
 @pytest.mark.slow
+def test_what_takes_seconds_to_know_is_told_where_it_is_asked_for(capsys) -> None:
+    """By --explain, and by check of the plan; the plan and the numbers of its flight are the same."""
+    code, out, _ = run(capsys, "fly", "line", "--json", "--out", "plain")
+    assert code == 0
+    plain = json.loads(out)
+    assert plain["plan"]["recoveries"] is None
+    assert load_plan("plain/line.plan").recoveries is None
+    code, out, _ = run(capsys, "fly", "line", "--json", "--explain", "--out", "explained")
+    assert code == 0
+    explained = json.loads(out)
+    recoveries = explained["plan"]["recoveries"]
+    assert recoveries["sentence"].startswith("given up at any instant it hovers within")
+    assert load_plan("explained/line.plan").recoveries is not None
+    assert explained["flight"] == plain["flight"]
+    assert explained["plan"]["assessment"] == plain["plan"]["assessment"]
+    code, out, _ = run(capsys, "check", "plain", "--json")
+    assert code == 0
+    assert json.loads(out)["recoveries"] == recoveries
+    code, out, _ = run(capsys, "check", "plain")
+    assert code == 0
+    assert recoveries["sentence"] in " ".join(out.split())
+    code, out, _ = run(capsys, "repeat", "plain", "--explain")
+    assert code == 0
+    assert "recovery" in out
+    assert "recovery" not in run(capsys, "repeat", "plain")[1]
+
+
+@pytest.mark.slow
+def test_a_plan_that_takes_suspiciously_long_says_so_and_what_to_give(capsys) -> None:
+    words = ("plan", "section-v", "--vehicle", "section-v", "--planner", "min-snap")
+    code, out, _ = run(capsys, *words)
+    assert code == 0
+    told = "suspicious: --explain asks for a second opinion, --planner free-knots plans anew"
+    assert told in " ".join(out.split())
+    written = json.loads(Path("out/section-v-section-v-min-snap/report.json").read_text())
+    assessed = written["plan"]["assessment"]
+    assert (assessed["suspicious"], assessed["second_opinion"]) == (True, None)
+    code, out, _ = run(capsys, *words, "--explain", "--json")
+    assert code == 0
+    assert json.loads(out)["plan"]["assessment"]["second_opinion"]["duration"] < 2.1  # of 3.1 s
+
+
+def test_check_judges_a_plan_of_what_cannot_hover_all_the_same(capsys) -> None:
+    """The exit code is the proof's; of the way back it is told that there is none."""
+    run(capsys, "plan", "line")
+    text = run(capsys, "vehicles", "agile-quad")[1]
+    Path("heavy.toml").write_text(re.sub(r"(?m)^mass = .*$", "mass = 20.0", text, count=1))
+    code, out, _ = run(capsys, "check", "out/line", "--vehicle", "heavy.toml", "--json")
+    assert code == 1
+    facts = json.loads(out)
+    assert not facts["certified"]
+    assert facts["recoveries"]["sentence"] == "from no instant does it come back to a hover"
+
+
+@pytest.mark.slow
 def test_paper_mode_prints_the_known_optimum(capsys) -> None:
     _, out, _ = run(capsys, "fly", "flip-roll", "--paper", "--json")
     report = json.loads(out)
@@ -213,14 +269,30 @@ def test_the_main_job_needs_neither_pyplot_nor_scipy() -> None:
     assert done.stderr.strip() == "[]"
 
 
+@pytest.mark.process
+def test_a_command_imports_what_it_needs() -> None:
+    """No other command, no study, no sensors; of maneuvers and of planners' workings its own."""
+    others = [
+        "cli.commands.sweep", "studies", "viewer", "links", "simulation.conditions",
+        "interchange.robots.description", "problem.maneuvers.course", "problem.maneuvers.waypoints",
+        "planning.time_optimal.race", "planning.polynomial.descent.knot_descent",
+    ]  # fmt: skip
+    probe = (
+        "import sys\nfrom aerobat.cli import main\nmain(['fly', 'line', '--json'])\n"
+        f"print([m for m in {others} if 'aerobat.' + m in sys.modules], file=sys.stderr)"
+    )
+    done = subprocess.run([sys.executable, "-c", probe], capture_output=True, text=True, check=True)
+    assert done.stderr.strip() == "[]"
+
+
 def test_check_judges_what_was_planned_not_what_it_would_assume(mars: Path, capsys) -> None:
     """The plan's own vehicle, heading, gravity, wind and limits: the certificate is the plan's."""
     planned = json.loads((mars / "report.json").read_text())["plan"]["certificate"]
     code, out, err = run(capsys, "check", mars, "--json")
     assert (code, err) == (0, "")
-    assert json.loads(out) == planned
+    assert json.loads(out).items() >= planned.items()
     code, out, _ = run(capsys, "check", mars / "mars.plan", "--vehicle", "hexarotor", "--json")
-    assert json.loads(out) != planned
+    assert json.loads(out)["findings"] != planned["findings"]
 
 
 def test_check_says_what_it_assumes_of_a_file_that_holds_no_more_than_a_path(mars: Path, capsys) -> None:
@@ -289,7 +361,7 @@ def test_check_says_commands_rates_and_gates_in_words_and_in_numbers(capsys) -> 
     assert (
         sum(row.startswith("rotor ") for row in rows) == 4
     )  # of thrusts and of commands, nearest each limit
-    assert sum(" command " in row for row in rows[:-2]) == 2
+    assert sum(row.startswith("rotor ") and " command " in row for row in rows) == 2
     assert any(row.startswith("body rate") and "15 rad/s" in row for row in rows)
     assert any(row.startswith("specific thrust along") and "0 m/s²" in row for row in rows)
     assert any(row.startswith("gate 'gate'") and "holds" in row for row in rows)

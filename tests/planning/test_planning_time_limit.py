@@ -123,8 +123,11 @@ def test_what_is_left_of_a_command_s_limit_is_all_that_a_second_opinion_has(
         left.append(deadline.time_left())
         return plan
 
-    monkeypatch.setattr("aerobat.cli.tasks.with_second_opinion", opinion)
-    cli.main(["plan", "line", "--planner", "min-snap", "--time-limit", "1e9", "--json"])
+    monkeypatch.setattr("aerobat.cli.tasks.with_explanation", opinion)
+    arguments = ["plan", "line", "--planner", "min-snap", "--time-limit", "1e9", "--json"]
+    cli.main(arguments)
+    assert not left  # unless it is asked for
+    cli.main([*arguments, "--explain"])
     assert left[0] is not None
     assert left[0] < 1e9
 

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import atexit
-import gc
 from collections.abc import Iterator, Sequence
 from itertools import pairwise
 
@@ -63,8 +61,6 @@ for name, help in COMMANDS.items():
 
 def run(arguments: Sequence[str]) -> ExitCode:
     """Run the command that `arguments` name. Raises SpecError for those that make no sense."""
-    gc.set_threshold(100_000, 50, 50)  # a short process need not look for cyclic garbage often,
-    atexit.register(gc.freeze)  # and least of all when it ends: a tenth of the main job
     try:
         _import_plugins(arguments)
         code = app(arguments, exit_on_error=False, print_error=False, result_action="return_value")

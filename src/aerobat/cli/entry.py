@@ -5,6 +5,9 @@ Little is imported here, so that Ctrl-C and broken terminals are provided for wh
 
 from __future__ import annotations
 
+import atexit
+import gc
+import os
 import sys
 from collections.abc import Sequence
 from enum import IntEnum
@@ -44,6 +47,10 @@ def main(arguments: Sequence[str] | None = None) -> None:
 
 def _run(arguments: Sequence[str]) -> ExitCode:
     """Run a command, and say in a sentence why where it comes to no end of its own."""
+    # matrices are small: a pool of threads takes longer to begin than all of them
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    gc.set_threshold(500_000, 10, 10)  # a short process need not look for cyclic garbage,
+    atexit.register(gc.freeze)  # and least of all when it ends: a tenth of the main job
     try:
         from aerobat.cli.app import run
 

@@ -42,7 +42,16 @@ class OutputOptions:
 
 
 @dataclass(frozen=True, kw_only=True)
-class RepeatOptions(OutputOptions):
+class ExplainingOptions:
+    """Options of a report on a plan."""
+
+    explain: Annotated[bool, Parameter(group=output, negative="", show_default=False)] = False
+    """Find out and report what takes seconds to know, too: the recoveries to a hover from all along the plan,
+    and of a plan that takes suspiciously long another planner's second opinion."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class RepeatOptions(OutputOptions, ExplainingOptions):
     """Options of a run that is repeated."""
 
     plugins: Annotated[tuple[Path, ...], Plugins(group=planning)] = ()

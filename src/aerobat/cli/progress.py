@@ -9,12 +9,14 @@ from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager
 from math import inf, isfinite
 from time import perf_counter
-from typing import TypeVar
+from typing import TYPE_CHECKING, TypeVar
 
 from aerobat.cli.terminal import say
 from aerobat.errors import SpecError
 from aerobat.planning import Attempt
-from aerobat.studies.passing import Round
+
+if TYPE_CHECKING:
+    from aerobat.studies.passing import Round
 
 PERIOD = 5.0  # [s] between lines in a pipe, unless the environment says otherwise
 VARIABLE = "AEROBAT_PROGRESS"

@@ -32,10 +32,9 @@ from aerobat.planning import (
     planner_options,
     suited_planner,
     with_evidence,
-    with_second_opinion,
+    with_explanation,
 )
 from aerobat.problem import Problem, load_problem
-from aerobat.studies.passing import plan_to_pass
 from aerobat.vehicle import Vehicle
 
 
@@ -54,6 +53,7 @@ def planned(
     command: Literal["fly", "plan", "sweep"],
     flight: FlightSettings = FlightSettings(),
     make: Callable[[RunRecord], Plan] | None = None,
+    explain: bool = False,
 ) -> tuple[Plan, RunRecord]:
     """The plan that a command names, certified for its vehicle, and what it takes to make it again.
 
@@ -63,6 +63,7 @@ def planned(
         command: That plans.
         flight: How the plan is flown.
         make: The way from a record to a plan, by default planning.
+        explain: Whether what takes seconds to know is found out too.
     """
     source, columns = plan_source(name), column_groups(options.columns)
     if source is not None:
@@ -78,7 +79,7 @@ def planned(
             flight=flight,
             columns=columns,
         )
-        return plan, record
+        return with_explanation(plan) if explain else plan, record
     for flag, value in (("--rate", options.rate), ("--heading", options.heading)):
         if value is not None:
             raise SpecError(f"{flag} is for a CSV file, not for the problem '{name}'; leave it out")
@@ -94,7 +95,7 @@ def planned(
         columns=columns,
         plugins=tuple(map(str, options.plugins)),
     )
-    return (make or plan_of)(record), record
+    return plan_of(record, explain) if make is None else make(record), record
 
 
 def flight_settings(
@@ -113,19 +114,20 @@ def flight_settings(
     return FlightSettings(controller, conditions, options.seed, plant=plant, probability=options.probability)
 
 
-def plan_of(record: RunRecord) -> Plan:
-    """The plan of a run, made anew."""
+def plan_of(record: RunRecord, explain: bool = False) -> Plan:
+    """The plan of a run, made anew; explained on request, in what is left of its time."""
     assert record.planner is not None, "a plan that came from a file is not made"
     limit = getattr(record.planner, "time_limit", None)
     if record.flight.probability is not None:
-        return _plan_that_passes(record)
+        found = _plan_that_passes(record)
+        return with_explanation(found) if explain else found
     with planning_progress(record.planner_name) as progress, within_time(limit):
-        if not record.paper:
+        if record.paper:  # without a vehicle; whether this one can fly it is told all the same
+            found = plan(record.problem, record.planner, progress=progress.record)
+            found = with_evidence(found, record.vehicle)
+        else:
             found = plan(record.problem, record.planner, record.vehicle, progress.record)
-            return with_second_opinion(found, progress.record)
-        # the paper plans without a vehicle; whether this one can fly it is told all the same
-        found = plan(record.problem, record.planner, progress=progress.record)
-        return with_evidence(found, record.vehicle)
+        return with_explanation(found, progress.record) if explain else found
 
 
 def _plan_that_passes(record: RunRecord) -> Plan:
@@ -138,6 +140,8 @@ def _plan_that_passes(record: RunRecord) -> Plan:
         raise SpecError("--pass keeps a reserve, the paper none; leave out --pass or --paper")
     if flight.controller != "full":
         raise SpecError(f"--pass plans for --controller full, not {flight.controller}; leave one of them out")
+    from aerobat.studies.passing import plan_to_pass
+
     with showing(PassingProgress(record.planner_name)) as progress:
         return plan_to_pass(
             record.problem,

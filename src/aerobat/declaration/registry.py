@@ -86,6 +86,8 @@ class Registry(Generic[T]):
         if "kind" not in value:
             raise FieldError("kind", "is missing; add it")
         kind = value["kind"]
+        if isinstance(kind, str):
+            self._import_own(kind)
         if not isinstance(kind, str) or (kind not in self._classes and kind not in tuple(self)):
             known = ", ".join(map(repr, self))
             raise FieldError("kind", f"must be one of {known}, got {shown(kind)}")

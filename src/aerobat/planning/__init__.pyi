@@ -1,4 +1,4 @@
-from .assessment.assess import with_assessment, with_second_opinion
+from .assessment.assess import with_assessment, with_explanation, with_second_opinion
 from .assessment.assessment import Assessment, Box, SecondOpinion
 from .assessment.lower_bound import least_duration
 from .certified_solve import Judged, Solution, certified_solve, with_certificate
@@ -76,6 +76,7 @@ __all__ = [
     "with_assessment",
     "with_certificate",
     "with_evidence",
+    "with_explanation",
     "with_flyability",
     "with_recoveries",
     "with_second_opinion",

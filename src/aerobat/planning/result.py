@@ -176,6 +176,13 @@ class Plan:
         return None if self.certificate is None else RotorMargin.of(self.certificate)
 
     @property
+    def wants_second_opinion(self) -> bool:
+        """True if it is suspicious and no other planner was asked yet; one that a limit ended has no time."""
+        found = self.assessment
+        is_open = self.planner != "time-optimal" and self.status != "time_limit"
+        return found is not None and found.suspicious and found.opinion is None and is_open
+
+    @property
     def spread(self) -> float | None:
         """By how much more the slowest start came to than the fastest [-]; None of fewer than two."""
         return self.starts[-1] / self.starts[0] - 1.0 if len(self.starts) > 1 else None

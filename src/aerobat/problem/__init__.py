@@ -1,79 +1,9 @@
-"""What is wanted: gates, maneuvers as lists of stages, problems. No optimization happens here."""
+"""What is wanted: gates, maneuvers as lists of stages, problems. No optimization happens here.
 
-from aerobat.problem.ball import Ball
-from aerobat.problem.condition import Attitude, Condition, ForceBalance, LinearBound, Quantity
-from aerobat.problem.end_state import EndState, at_rest
-from aerobat.problem.files import as_problem, load_problem, problem_names, write_problem
-from aerobat.problem.gate import Gate, tilted_gate
-from aerobat.problem.maneuvers import (
-    BarrelRoll,
-    Corkscrew,
-    Course,
-    CustomManeuver,
-    Figure,
-    Flip,
-    GatePassage,
-    HalfFlip,
-    Hold,
-    Immelmann,
-    InvertedPass,
-    KnifeEdgePass,
-    Line,
-    Maneuver,
-    MattyFlip,
-    PassGate,
-    PassWaypoint,
-    PowerLoop,
-    SplitS,
-    Waypoint,
-    Waypoints,
-    maneuver,
-    registered_maneuvers,
-)
-from aerobat.problem.problem import PAPER_LIMITS, Limits, Problem
-from aerobat.problem.stage import Stage, StageSequence
+The public names stand in `__init__.pyi`; each is imported when first used: no maneuver waits
+for others.
+"""
 
-__all__ = [
-    "PAPER_LIMITS",
-    "Attitude",
-    "Ball",
-    "BarrelRoll",
-    "Condition",
-    "Corkscrew",
-    "Course",
-    "CustomManeuver",
-    "EndState",
-    "Figure",
-    "Flip",
-    "ForceBalance",
-    "Gate",
-    "GatePassage",
-    "HalfFlip",
-    "Hold",
-    "Immelmann",
-    "InvertedPass",
-    "KnifeEdgePass",
-    "Limits",
-    "Line",
-    "LinearBound",
-    "Maneuver",
-    "MattyFlip",
-    "PassGate",
-    "PassWaypoint",
-    "PowerLoop",
-    "Problem",
-    "Quantity",
-    "SplitS",
-    "Stage",
-    "StageSequence",
-    "Waypoint",
-    "Waypoints",
-    "as_problem",
-    "at_rest",
-    "load_problem",
-    "maneuver",
-    "problem_names",
-    "registered_maneuvers",
-    "tilted_gate",
-    "write_problem",
-]
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

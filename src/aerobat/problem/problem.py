@@ -35,7 +35,8 @@ from aerobat.errors import SpecError
 from aerobat.problem.condition import Condition, ForceBalance, Quantity
 from aerobat.problem.end_state import EndState
 from aerobat.problem.gate import Gate, named_gate
-from aerobat.problem.maneuvers import MANEUVERS, Line, Maneuver
+from aerobat.problem.maneuvers.line import Line
+from aerobat.problem.maneuvers.maneuver import MANEUVERS, Maneuver
 from aerobat.problem.stage import StageSequence
 
 DERIVATIVES = ("position", "velocity", "acceleration", "jerk", "snap", "crackle")

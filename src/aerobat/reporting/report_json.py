@@ -57,6 +57,14 @@ def _flight(score: Score) -> dict[str, Any]:
     return facts
 
 
+def evidence_facts(plan: Plan | None) -> dict[str, Any]:
+    """The parts of a report that are known of a plan beside its proof; None of no plan."""
+    return {
+        "recoveries": plan and plan.recoveries and _recoveries(plan.recoveries),
+        "assessment": plan and plan.assessment and _assessment(plan.assessment),
+    }
+
+
 def passage_facts(passage: Passage) -> dict[str, Any]:
     """A passage; what is not known or not limited is None."""
     return _known(asdict(passage))
@@ -105,6 +113,7 @@ def _assessment(found: Assessment) -> dict[str, Any]:
     return {
         "least_duration_s": found.least_duration,
         "ratio": None if found.ratio == inf else found.ratio,
+        "suspicious": found.suspicious,
         "poor": found.poor,
         "second_opinion": found.opinion and asdict(found.opinion),
         "room_m": [list(found.room.lower), list(found.room.upper)],
@@ -183,7 +192,6 @@ def _plan(plan: Plan) -> dict[str, Any]:
         "rotor_feasible": plan.certificate and plan.certificate.certified,
         "certificate": plan.certificate and plan.certificate.record(),
         "flyability": plan.flyability and _flyability(plan.flyability),
-        "recoveries": plan.recoveries and _recoveries(plan.recoveries),
-        "assessment": plan.assessment and _assessment(plan.assessment),
+        **evidence_facts(plan),
         "tube": plan.tube and _tube(plan.tube, plan.duration),
     }

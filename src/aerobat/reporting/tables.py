@@ -53,8 +53,15 @@ def facts_table(title: str, facts: Mapping[str, Iterable[Fact]]) -> Table:
     table.add_column()
     for heading, rows in facts.items():
         for i, (name, fact) in enumerate(rows):
-            table.add_row(heading if i == 0 else "", name, fact)
+            told = Text(fact) if isinstance(fact, str) else fact  # none of its brackets taken for markup
+            table.add_row(heading if i == 0 else "", name, told)
     return table
+
+
+def evidence_table(plan: Plan) -> Table:
+    """The facts of a plan beside its proof, a fact a row: its recoveries, and its assessment."""
+    assessed = () if plan.assessment is None else _assessment_facts(plan, plan.assessment)
+    return facts_table("", {"beside the proof": [*_recovery_facts(plan), *assessed]})
 
 
 def vehicles_table(vehicles: Iterable[Vehicle]) -> Table:
@@ -161,12 +168,16 @@ def plan_facts(plan: Plan) -> Iterable[Fact]:
         yield "proof", ("" if plan.certificate.certified else "not certified: ") + plan.certificate.why
     if plan.flyability is not None:
         yield "flyability", str(plan.flyability)
-    if plan.recoveries is not None:
-        yield "recovery", str(plan.recoveries)
+    yield from _recovery_facts(plan)
     if plan.tube is not None:
         yield from _tube_facts(plan.tube, plan.duration)
     if plan.assessment is not None:
-        yield from _assessment_facts(plan.assessment)
+        yield from _assessment_facts(plan, plan.assessment)
+
+
+def _recovery_facts(plan: Plan) -> Iterable[Fact]:
+    if plan.recoveries is not None:
+        yield "recovery", str(plan.recoveries)
 
 
 def _tube_facts(tube: Tube, duration: float) -> Iterable[Fact]:
@@ -190,15 +201,21 @@ def _tube_facts(tube: Tube, duration: float) -> Iterable[Fact]:
     )
 
 
-def _assessment_facts(found: Assessment) -> Iterable[Fact]:
+def _assessment_facts(plan: Plan, found: Assessment) -> Iterable[Fact]:
     """Rows about what is possible and about room and rates; warnings in red."""
     if not found.poor:
-        yield "possible", found.sentence
+        yield "possible", found.sentence + (f"; {_suspicion(plan)}" if plan.wants_second_opinion else "")
     angles = ((found.max_tilt, "° of tilt"), (found.max_body_rate, "°/s"))
     turned = [f"{degrees(angle):.0f}{unit}" for angle, unit in angles if angle is not None]
     yield "reaches", ", ".join([str(found.room), f"{found.max_speed:.1f} m/s", *turned])
     for warning in found.warnings:
         yield "warning", Text(warning, style="red")
+
+
+def _suspicion(plan: Plan) -> str:
+    """The remedies for not knowing whether a plan need take so long."""
+    another = "" if plan.planner == "free-knots" else ", --planner free-knots plans anew"
+    return f"suspicious: --explain asks for a second opinion{another}"
 
 
 def _optimality(plan: Plan) -> str:

@@ -25,7 +25,6 @@ from aerobat.simulation.components import (
     StateObserver,
     TrackingController,
 )
-from aerobat.simulation.conditions.setup import dispersed_setup
 from aerobat.simulation.config import FlightConfig
 from aerobat.simulation.reference_source import ReferenceSource
 from aerobat.simulation.setup import FlightSetup, Part
@@ -61,6 +60,8 @@ def prepare(
     config = replace(config, **changes)
     environment = environment_of(plan, environment)
     if config.conditions is not None:
+        from aerobat.simulation.conditions.setup import dispersed_setup  # sensors, wind, a filter
+
         return dispersed_setup(plan, _one_vehicle(plan, vehicle), environment, config, config.conditions)
     flying, nominal = _broadcast_vehicles(_vehicles(plan, vehicle), config)
     is_fleet = isinstance(vehicle, Sequence) and not isinstance(vehicle, str)

@@ -9,18 +9,20 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from aerobat.certification import Envelope, certify
+from aerobat.certification import Certificate, Envelope, certify
 from aerobat.cli.entry import ExitCode
 from aerobat.cli.options import CheckOptions
 from aerobat.cli.runs.record import default_vehicle
 from aerobat.cli.runs.saved_plans import named_vehicle
 from aerobat.cli.terminal import print_json
 from aerobat.environment import Environment
+from aerobat.errors import SpecError
 from aerobat.interchange import read_plan
-from aerobat.planning import Plan
+from aerobat.planning import Plan, with_explanation
 from aerobat.planning.certified_solve import envelope_for
-from aerobat.reporting.report_json import to_json
-from aerobat.reporting.tables import certificate_table, print_table
+from aerobat.reporting.report_json import evidence_facts, to_json
+from aerobat.reporting.tables import certificate_table, evidence_table, print_table
+from aerobat.trajectory import Trajectory
 from aerobat.vehicle import Vehicle, load_vehicle
 
 
@@ -31,7 +33,9 @@ def check(plan: Path, options: Annotated[CheckOptions, Parameter(name="*")] = Ch
     limits are given, speed, tilt and moments. It does not sample: between any two instants it bounds what
     happens. Of a .plan file it judges what was planned: its vehicle, its environment, its heading, its
     problem's limits, what its maneuver asks throughout, and each gate as it is passed; other files hold only
-    the path, and what is assumed is said. Exits with 0 only if all is proven.
+    the path, and what is assumed is said. Beside the proof it tells of a .plan file how a vehicle that gives
+    it up comes back to a hover, how near the plan is to the shortest possible, and of one that takes
+    suspiciously long another planner's second opinion. Exits with 0 only if all is proven.
 
     Parameters
     ----------
@@ -55,13 +59,38 @@ def check(plan: Path, options: Annotated[CheckOptions, Parameter(name="*")] = Ch
         moment=options.max_moment or inf,
     )
     certificate = certify(trajectory, vehicle, environment, envelope)
+    explained = _explained(found, trajectory, vehicle, certificate) if isinstance(found, Plan) else None
     if options.json:
-        print_json(to_json(certificate.record()))
-    else:
-        print_table(certificate_table(certificate, f"{plan} · {vehicle.name}"))
-        if not isinstance(found, Plan):
-            print(_assumed(options, vehicle, environment))
+        print_json(to_json(certificate.record() | evidence_facts(explained)))
+        return _judgement(certificate)
+    print_table(certificate_table(certificate, f"{plan} · {vehicle.name}"))
+    if not isinstance(found, Plan):
+        print(_assumed(options, vehicle, environment))
+    elif explained is not None:
+        print_table(evidence_table(explained))
+    return _judgement(certificate)
+
+
+def _judgement(certificate: Certificate) -> ExitCode:
     return ExitCode.WELL if certificate.certified else ExitCode.NOT_WELL
+
+
+def _explained(plan: Plan, trajectory: Trajectory, vehicle: Vehicle, certificate: Certificate) -> Plan | None:
+    """The plan, of this path and vehicle, with all that is told of one; None where it cannot be known."""
+    if (plan.trajectory, plan.vehicle) != (trajectory, vehicle):
+        plan = replace(
+            plan,
+            trajectory=trajectory,
+            vehicle=vehicle,
+            certificate=certificate,
+            flyability=None,
+            recoveries=None,
+            assessment=None,
+        )
+    try:
+        return with_explanation(plan)
+    except SpecError:  # the vehicle cannot hover, say
+        return None
 
 
 def _assumed(options: CheckOptions, vehicle: Vehicle, environment: Environment) -> str:

@@ -7,7 +7,7 @@ from typing import Annotated
 from cyclopts import Parameter
 
 from aerobat.cli.entry import ExitCode
-from aerobat.cli.options import FlyingOptions, PlanningOptions
+from aerobat.cli.options import ExplainingOptions, FlyingOptions, PlanningOptions
 from aerobat.cli.runs.folder import Flown, finish
 from aerobat.cli.runs.record import FlightSettings
 from aerobat.cli.tasks import flight_settings, planned
@@ -22,6 +22,7 @@ def fly(
     problem: str,
     options: Annotated[PlanningOptions, Parameter(name="*")] = PlanningOptions(),
     flying: Annotated[FlyingOptions, Parameter(name="*")] = FlyingOptions(),
+    explaining: Annotated[ExplainingOptions, Parameter(name="*")] = ExplainingOptions(),
 ) -> ExitCode:
     """Plan a maneuver, fly it in simulation, and report.
 
@@ -39,7 +40,7 @@ def fly(
     named_controller(flying.controller)  # refused before anything is planned
     as_plant(flying.plant)
     settings = flight_settings(flying, flying.controller, flying.plant)
-    plan, record = planned(problem, options, "fly", settings)
+    plan, record = planned(problem, options, "fly", settings, explain=explaining.explain)
     return finish(plan, record, options, flown(plan, settings))
 
 

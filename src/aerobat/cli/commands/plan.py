@@ -7,7 +7,7 @@ from typing import Annotated
 from cyclopts import Parameter
 
 from aerobat.cli.entry import ExitCode
-from aerobat.cli.options import ConditionsOptions, PlanningOptions
+from aerobat.cli.options import ConditionsOptions, ExplainingOptions, PlanningOptions
 from aerobat.cli.runs.folder import finish
 from aerobat.cli.runs.record import FlightSettings
 from aerobat.cli.tasks import flight_settings, planned
@@ -18,6 +18,7 @@ def plan(
     problem: str,
     options: Annotated[PlanningOptions, Parameter(name="*")] = PlanningOptions(),
     passing: Annotated[ConditionsOptions, Parameter(name="*")] = ConditionsOptions(),
+    explaining: Annotated[ExplainingOptions, Parameter(name="*")] = ExplainingOptions(),
 ) -> ExitCode:
     """Plan a maneuver and stop there.
 
@@ -34,5 +35,5 @@ def plan(
         settings = flight_settings(passing)
     elif passing.conditions is not None or passing.seed:
         raise SpecError("--conditions and --seed are for --pass, or for `aerobat fly`; leave them out")
-    found, record = planned(problem, options, "plan", settings)
+    found, record = planned(problem, options, "plan", settings, explain=explaining.explain)
     return finish(found, record, options)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -24,7 +24,7 @@ from aerobat.cli.tasks import plan_of
 from aerobat.cli.terminal import say
 from aerobat.errors import SpecError
 from aerobat.interchange import read_plan, read_table
-from aerobat.planning import Plan
+from aerobat.planning import Plan, with_explanation
 from aerobat.reporting.comparison import comparison_rows
 from aerobat.reporting.feasibility.table import requirements_report
 from aerobat.reporting.report_json import to_json
@@ -50,7 +50,7 @@ def repeat(
     """
     record = read_record(folder)
     out = options.out or folder.with_name(f"{folder.resolve().name}-repeated")
-    options = RepeatOptions(out=out, json=options.json)
+    options = replace(options, out=out)
     if record.command == "compare":
         return _repeat_comparison(folder, record, options)
     if record.command == "sweep":
@@ -60,7 +60,10 @@ def repeat(
     if record.command == "need":
         return _repeat_need(folder, record, options)
     old = _Run.read(folder, record)
-    plan = old.plan if record.planner is None else plan_of(record)
+    if record.planner is not None:
+        plan = plan_of(record, options.explain)
+    else:
+        plan = with_explanation(old.plan) if options.explain else old.plan
     again = flown(plan, record.flight) if record.command == "fly" else None
     code = finish(plan, record, options, again)
     return _told(folder, record, old.difference(_Run(plan, again.flight if again else None)), code)

@@ -12,7 +12,7 @@ from aerobat.cli.runs.saved_plans import named_vehicle
 from aerobat.cli.terminal import say
 from aerobat.documents import in_document
 from aerobat.errors import SpecError
-from aerobat.interchange.robots.description import SUFFIXES, read_robot_description
+from aerobat.interchange.robots import SUFFIXES, read_robot_description
 from aerobat.reporting.tables import print_table, vehicles_table
 from aerobat.storage import write_whole
 from aerobat.vehicle import load_vehicle, vehicle_names, vehicle_text

@@ -17,9 +17,9 @@ from aerobat.cli.runs.record import RECORD, RunRecord, write_record
 from aerobat.cli.terminal import print_json
 from aerobat.evaluation import Score
 from aerobat.interchange.columns import write_columns
-from aerobat.planning import Plan, with_recoveries
+from aerobat.planning import Plan
 from aerobat.reporting.figures import report_figure
-from aerobat.reporting.page import png
+from aerobat.reporting.page import import_undocumented, png
 from aerobat.reporting.report_json import report, to_json
 from aerobat.reporting.tables import print_table, summary_table
 from aerobat.simulation import Flight
@@ -111,11 +111,11 @@ def finish(plan: Plan, record: RunRecord, options: OutputOptions, flown: Flown |
         options: Where to write, and in what form to say it.
         flown: The plan's flight, if it was flown.
     """
-    plan = with_recoveries(plan)
     assert plan.vehicle is not None, "a command plans for a vehicle"
     flight, score = (flown.flight, flown.score) if flown else (None, None)
     by = (flown.controller, flown.plant) if flown else ()
     facts = to_json(report(plan, score, plan.vehicle.name, *by))
+    import_undocumented()
     picture = png(report_figure(plan, plan.vehicle, flight, score))
 
     def write(staging: Path) -> None:

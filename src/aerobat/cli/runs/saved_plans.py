@@ -13,7 +13,7 @@ from aerobat.cli.runs.record import default_vehicle
 from aerobat.cli.terminal import say
 from aerobat.errors import SpecError
 from aerobat.interchange import read_plan, read_rows
-from aerobat.interchange.robots.description import SUFFIXES, import_vehicle
+from aerobat.interchange.robots import SUFFIXES
 from aerobat.planning import Plan, with_assessment, with_evidence, with_flyability
 from aerobat.problem import EndState, Problem, problem_names
 from aerobat.trajectory import Trajectory
@@ -54,7 +54,12 @@ def read_saved_plan(path: Path, options: PlanningOptions) -> Plan:
 
 def named_vehicle(name: str) -> Vehicle:
     """The vehicle of that name or file, a robot's among them; what it hardly can be is told, and no more."""
-    vehicle = import_vehicle(name) if name.endswith(SUFFIXES) else load_vehicle(name)
+    if name.endswith(SUFFIXES):
+        from aerobat.interchange.robots import import_vehicle
+
+        vehicle = import_vehicle(name)
+    else:
+        vehicle = load_vehicle(name)
     for doubt in implausibilities(vehicle):
         say(f"warning: vehicle '{vehicle.name}': {doubt}")
     return vehicle

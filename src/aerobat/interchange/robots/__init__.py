@@ -1,5 +1,8 @@
-"""Robot descriptions, URDF and SDF, read as vehicles."""
+"""Robot descriptions, URDF and SDF, read as vehicles.
 
-from aerobat.interchange.robots.description import VehicleDescription, import_vehicle, read_robot_description
+The public names stand in `__init__.pyi`; each is imported when first used: a suffix takes no reader.
+"""
 
-__all__ = ["VehicleDescription", "import_vehicle", "read_robot_description"]
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

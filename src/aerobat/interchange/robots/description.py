@@ -29,7 +29,6 @@ from aerobat.interchange.robots.urdf import read_urdf
 from aerobat.states import STANDARD_GRAVITY
 from aerobat.vehicle import Vehicle
 
-SUFFIXES = (".urdf", ".sdf", ".xml")
 READERS = {"robot": read_urdf, "sdf": read_sdf}  # by the root's name
 ROTOR_NAME = re.compile("rotor|prop", re.IGNORECASE)
 MAX_TILT_DEG = 0.5  # of a rotor's axis, beyond what is rounding in a file

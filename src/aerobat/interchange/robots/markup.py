@@ -21,6 +21,7 @@ from aerobat.errors import SpecError
 if TYPE_CHECKING:
     from xml.etree.ElementTree import Element
 
+SUFFIXES = (".urdf", ".sdf", ".xml")  # of files that describe robots
 SIGNS = {  # of files from which others are made, and the remedy
     "xacro:": "a xacro macro; expand it first: xacro FILE > FILE.urdf",
     "{{": "a template; let its program write the file first",

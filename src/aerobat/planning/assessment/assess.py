@@ -14,7 +14,7 @@ from aerobat.errors import BackendMissing, Infeasible, SpecError
 from aerobat.optimization.deadline import out_of_time, within_time
 from aerobat.planning.assessment.assessment import Assessment, Box, Point, SecondOpinion
 from aerobat.planning.assessment.lower_bound import least_duration
-from aerobat.planning.flyability import with_flyability
+from aerobat.planning.flyability import with_flyability, with_recoveries
 from aerobat.planning.recorder import Progress
 from aerobat.planning.result import FLYING_RESERVE, Plan
 from aerobat.problem.problem import Problem
@@ -47,11 +47,23 @@ def with_second_opinion(plan: Plan, progress: Progress | None = None) -> Plan:
     plan = plan if plan.assessment is not None else with_assessment(plan)
     assessment = plan.assessment
     assert assessment is not None
-    if not assessment.suspicious or plan.planner == "time-optimal" or plan.status == "time_limit":
+    if not plan.wants_second_opinion:
         return plan
     with within_time(OPINION_TIME):
         opinion = _second_opinion(plan, progress)
     return replace(plan, assessment=replace(assessment, opinion=opinion))
+
+
+def with_explanation(plan: Plan, progress: Progress | None = None) -> Plan:
+    """The plan with what takes seconds to know: a second opinion, where it wants one, and its recoveries.
+
+    Raises SpecError without a vehicle.
+
+    Args:
+        plan: For a vehicle.
+        progress: Called with every attempt of the second opinion as it ends.
+    """
+    return with_recoveries(with_second_opinion(plan, progress))
 
 
 def _second_opinion(plan: Plan, progress: Progress | None) -> SecondOpinion:

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import chain
-from typing import Annotated, ClassVar
+from typing import TYPE_CHECKING, Annotated, ClassVar
 
 from pydantic import Field
 
@@ -22,26 +22,19 @@ from aerobat.planning.assessment.lower_bound import least_duration
 from aerobat.planning.courses import is_course
 from aerobat.planning.miqp import Miqp
 from aerobat.planning.planners import Planner, option, planner
-from aerobat.planning.polynomial.descent.framed_problem import FramedProblem
-from aerobat.planning.polynomial.descent.knot_descent import (
-    NEAR_MOTIONS,
-    OF_COURSES,
-    OF_MANEUVERS,
-    Descent,
-    Strategy,
-)
 from aerobat.planning.polynomial.knots import start_along_normals
 from aerobat.planning.polynomial.min_snap import MinSnap
-from aerobat.planning.polynomial.nearest import nearest_polynomials
 from aerobat.planning.recorder import Progress, Recorder
 from aerobat.planning.result import FLYING_RESERVE, Plan
 from aerobat.planning.time_limit import TIME_LIMIT, stopped, too_short
-from aerobat.planning.time_optimal.race import coarse_motion
 from aerobat.planning.warm_start import Reserve, WarmStart, plans_to_begin_from, require_attitudes
 from aerobat.planning.ways import ways_through_gates
 from aerobat.problem.problem import Problem
 from aerobat.problem.stage import StageSequence
 from aerobat.vehicle import Vehicle
+
+if TYPE_CHECKING:  # what it takes to plan is imported then: the options are those of every command that plans
+    from aerobat.planning.polynomial.descent.knot_descent import Descent, Strategy
 
 MAX_SEGMENTS = 24  # a judgement: more gain next to nothing, and a solve takes longer with each
 LEG_SEGMENTS = 2  # of a course's leg, where that makes no more than MAX_COURSE_SEGMENTS, else one
@@ -152,6 +145,9 @@ class FreeKnots(Planner):
         recorder: Recorder,
     ) -> Descent:
         """The descent from a start."""
+        from aerobat.planning.polynomial.descent.framed_problem import FramedProblem
+        from aerobat.planning.polynomial.descent.knot_descent import Descent
+
         if is_course(sequence):
             iterations = COURSE_ITERATIONS
             ways = ways_through_gates(start.guess.stages, problem, vehicle)
@@ -167,6 +163,10 @@ class FreeKnots(Planner):
 
         Without lag thrusts jump in such a motion: smooth polynomials begin nearer at the closed form.
         """
+        from aerobat.planning.polynomial.descent.knot_descent import NEAR_MOTIONS, OF_COURSES
+        from aerobat.planning.polynomial.nearest import nearest_polynomials
+        from aerobat.planning.time_optimal.race import coarse_motion
+
         legs = len(sequence.stages) + 1
         allowed = FIT * vehicle.max_specific_thrust
         motion = None if self.start is None else WarmStart.of(self.start, sequence)
@@ -185,6 +185,8 @@ class FreeKnots(Planner):
         self, problem: Problem, vehicle: Vehicle, sequence: StageSequence, recorder: Recorder
     ) -> Iterator[_Start]:
         """Where to begin elsewhere: at plans, the best first."""
+        from aerobat.planning.polynomial.descent.knot_descent import OF_MANEUVERS
+
         numbers = tuple(sorted({min(COARSE, self.segments), self.segments}))
         given = () if self.start is None else (self.start,)
         for plan in chain(given, self._plans(problem, vehicle)):

@@ -16,12 +16,12 @@ from aerobat.planning.result import OwnFlight
 from aerobat.planning.time_optimal.collocated_program import CollocatedProgram, SolvedMotion
 from aerobat.planning.time_optimal.optimal_control.elements import Elements
 from aerobat.planning.time_optimal.starts import Start, starts
+from aerobat.planning.time_optimal.time_optimal import MIN_INTERVALS
 from aerobat.planning.warm_start import WarmStart
 from aerobat.planning.ways import Way, straightened, straighter
 from aerobat.problem.problem import Problem
 from aerobat.vehicle import Vehicle
 
-MIN_INTERVALS = 4  # of a phase
 COARSE_INTERVALS = 24  # in all, of first solves, whose durations come a few percent too long
 COARSE_MIN_INTERVALS = 2  # of a phase
 COARSE_ITERATIONS = 150  # at most: what takes longer is no start

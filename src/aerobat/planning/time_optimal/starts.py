@@ -22,7 +22,7 @@ from aerobat.planning.time_optimal.optimal_control.collocation import Collocated
 from aerobat.planning.warm_start import WarmStart
 from aerobat.planning.ways import Way, ways_through_gates
 from aerobat.problem.end_state import at_rest
-from aerobat.problem.maneuvers import Line
+from aerobat.problem.maneuvers.line import Line
 from aerobat.problem.problem import Problem
 from aerobat.problem.stage import Stage, StageSequence
 from aerobat.so3 import UP

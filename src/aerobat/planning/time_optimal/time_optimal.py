@@ -11,7 +11,7 @@ fine one, and the fastest that is certified is kept.
 from __future__ import annotations
 
 from dataclasses import field, replace
-from typing import Annotated, ClassVar
+from typing import TYPE_CHECKING, Annotated, ClassVar
 
 import numpy as np
 from pydantic import Field
@@ -20,21 +20,23 @@ from aerobat.declaration import AS_IT_IS, Count, NonNegative
 from aerobat.errors import Infeasible, SpecError
 from aerobat.optimization.deadline import out_of_time, within_time
 from aerobat.optimization.nonlinear import import_casadi
-from aerobat.planning.certified_solve import Judged
 from aerobat.planning.miqp import Miqp
 from aerobat.planning.planners import Planner, option, planner
 from aerobat.planning.recorder import Progress, Recorder
 from aerobat.planning.result import FLYING_RESERVE, Plan
 from aerobat.planning.rotor_margin import reserve_shortfalls
 from aerobat.planning.time_limit import TIME_LIMIT, stopped, too_short
-from aerobat.planning.time_optimal.collocated_program import SolvedMotion
-from aerobat.planning.time_optimal.optimal_control.collocation import BOUNDED_DERIVATIVES
-from aerobat.planning.time_optimal.race import MIN_INTERVALS, Race, with_smoother
-from aerobat.planning.time_optimal.starts import Starts, starts
 from aerobat.planning.warm_start import Reserve, require_attitudes
 from aerobat.problem.problem import Problem
 from aerobat.vehicle import Vehicle
 
+if TYPE_CHECKING:  # what it takes to plan is imported then: the options are those of every command that plans
+    from aerobat.planning.certified_solve import Judged
+    from aerobat.planning.time_optimal.collocated_program import SolvedMotion
+    from aerobat.planning.time_optimal.race import Race
+    from aerobat.planning.time_optimal.starts import Starts
+
+MIN_INTERVALS = 4  # of a phase
 SMOOTHING_LAG = 0.005  # [s] that rotors without lag are given, where thrusts that jump lead nowhere
 
 
@@ -79,6 +81,10 @@ class TimeOptimal(Planner):
         Raises SpecError without a vehicle and for input that makes no sense, Infeasible when no motion is
         found that can be certified, BackendMissing without CasADi.
         """
+        from aerobat.planning.time_optimal.optimal_control.collocation import BOUNDED_DERIVATIVES
+        from aerobat.planning.time_optimal.race import Race, with_smoother
+        from aerobat.planning.time_optimal.starts import starts
+
         vehicle = require_attitudes("time-optimal", problem, vehicle)
         if np.isfinite(problem.path_limits.of(BOUNDED_DERIVATIVES)[1]).any():
             raise SpecError(

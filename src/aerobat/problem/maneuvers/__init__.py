@@ -1,49 +1,8 @@
-"""Maneuvers, one file each; a new one is a file and a line here."""
+"""Maneuvers, one file each; a new one is a file, a line in `__init__.pyi` and one in `maneuver.MANEUVERS`.
 
-from aerobat.problem.maneuvers.course import Course
-from aerobat.problem.maneuvers.custom import CustomManeuver
-from aerobat.problem.maneuvers.elements import Hold, PassGate, PassWaypoint
-from aerobat.problem.maneuvers.figures import (
-    BarrelRoll,
-    Corkscrew,
-    Figure,
-    Immelmann,
-    InvertedPass,
-    KnifeEdgePass,
-    MattyFlip,
-    PowerLoop,
-    SplitS,
-)
-from aerobat.problem.maneuvers.flip import Flip
-from aerobat.problem.maneuvers.gate_passage import GatePassage
-from aerobat.problem.maneuvers.half_flip import HalfFlip
-from aerobat.problem.maneuvers.line import Line
-from aerobat.problem.maneuvers.maneuver import MANEUVERS, Maneuver, maneuver, registered_maneuvers
-from aerobat.problem.maneuvers.waypoints import Waypoint, Waypoints
+The public names stand in `__init__.pyi`; each is imported when first used: no maneuver waits for another.
+"""
 
-__all__ = [
-    "MANEUVERS",
-    "BarrelRoll",
-    "Corkscrew",
-    "Course",
-    "CustomManeuver",
-    "Figure",
-    "Flip",
-    "GatePassage",
-    "HalfFlip",
-    "Hold",
-    "Immelmann",
-    "InvertedPass",
-    "KnifeEdgePass",
-    "Line",
-    "Maneuver",
-    "MattyFlip",
-    "PassGate",
-    "PassWaypoint",
-    "PowerLoop",
-    "SplitS",
-    "Waypoint",
-    "Waypoints",
-    "maneuver",
-    "registered_maneuvers",
-]
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

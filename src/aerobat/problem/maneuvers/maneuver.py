@@ -90,7 +90,30 @@ def in_sequence(words: Iterable[str]) -> str:
 
 M = TypeVar("M", bound=Maneuver)
 
-MANEUVERS: Registry[Maneuver] = Registry(Maneuver, "maneuver", "aerobat.maneuvers")  # type: ignore[type-abstract]
+MANEUVERS: Registry[Maneuver] = Registry(
+    Maneuver,  # type: ignore[type-abstract]
+    "maneuver",
+    "aerobat.maneuvers",
+    {
+        "barrel-roll": "aerobat.problem.maneuvers.figures.rolls",
+        "corkscrew": "aerobat.problem.maneuvers.figures.rolls",
+        "course": "aerobat.problem.maneuvers.course",
+        "flip": "aerobat.problem.maneuvers.flip",
+        "gate": "aerobat.problem.maneuvers.elements",
+        "half-flip": "aerobat.problem.maneuvers.half_flip",
+        "hold": "aerobat.problem.maneuvers.elements",
+        "immelmann": "aerobat.problem.maneuvers.figures.loops",
+        "inverted-pass": "aerobat.problem.maneuvers.figures.passes",
+        "knife-edge-pass": "aerobat.problem.maneuvers.figures.passes",
+        "line": "aerobat.problem.maneuvers.line",
+        "matty-flip": "aerobat.problem.maneuvers.figures.loops",
+        "power-loop": "aerobat.problem.maneuvers.figures.loops",
+        "split-s": "aerobat.problem.maneuvers.figures.loops",
+        "stages": "aerobat.problem.maneuvers.custom",
+        "waypoint": "aerobat.problem.maneuvers.elements",
+        "waypoints": "aerobat.problem.maneuvers.waypoints",
+    },
+)
 
 
 @validated

@@ -1,6 +1,8 @@
-"""Plans that pass with the probability asked: plan, fly, tighten, and prove it on fresh flights."""
+"""Plans that pass with the probability asked: plan, fly, tighten, and prove it on fresh flights.
 
-from aerobat.studies.passing.passing import plan_to_pass
-from aerobat.studies.passing.result import Passing, Round
+The public names stand in `__init__.pyi`; each is imported when first used: showing rounds takes no flights.
+"""
 
-__all__ = ["Passing", "Round", "plan_to_pass"]
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -1,18 +1,8 @@
-"""Figures of aerobatics, each of them an element of courses and a maneuver of its own."""
+"""Figures of aerobatics, each of them an element of courses and a maneuver of its own.
 
-from aerobat.problem.maneuvers.figures.figure import Figure
-from aerobat.problem.maneuvers.figures.loops import Immelmann, MattyFlip, PowerLoop, SplitS
-from aerobat.problem.maneuvers.figures.passes import InvertedPass, KnifeEdgePass
-from aerobat.problem.maneuvers.figures.rolls import BarrelRoll, Corkscrew
+The public names stand in `__init__.pyi`; each is imported when first used: no figure waits for another.
+"""
 
-__all__ = [
-    "BarrelRoll",
-    "Corkscrew",
-    "Figure",
-    "Immelmann",
-    "InvertedPass",
-    "KnifeEdgePass",
-    "MattyFlip",
-    "PowerLoop",
-    "SplitS",
-]
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
