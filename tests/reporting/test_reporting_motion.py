@@ -25,9 +25,9 @@ def test_a_video_lasts_as_long_as_the_flight_at_its_speed_and_shows_it(tmp_path:
     told: list[tuple[int, int]] = []
     flight, plan = simulated("half-flip"), shared_plan("half-flip")
     file = tmp_path / f"half.{suffix}"
-    ab.write_video(flight, file, plan, speed=2.0, progress=lambda *counts: told.append(counts))
+    ab.write_video(flight, file, plan, speed=3.0, progress=lambda *counts: told.append(counts))
     frames, seconds = imageio_ffmpeg.count_frames_and_secs(str(file))
-    expected = len(frame_times(float(flight.times[-1]), 2.0))
+    expected = len(frame_times(float(flight.times[-1]), 3.0))
     assert frames == pytest.approx(expected, abs=1)
     assert seconds == pytest.approx(expected / RATES[suffix], rel=0.12)
     assert told == [(k + 1, expected) for k in range(expected)]

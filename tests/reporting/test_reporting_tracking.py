@@ -53,7 +53,8 @@ def shaded(axes):
     return np.array([[box.x0, box.x1] for box in boxes]).reshape(-1, 2)
 
 
-@pytest.mark.parametrize("stop_after", [6, pytest.param(None, marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("stop_after", [None, 6])
 def test_no_text_of_section_v_lies_over_another_or_beyond_the_page(stop_after, monkeypatch):
     require_legible(page_of(stop_after)[0], monkeypatch)
 

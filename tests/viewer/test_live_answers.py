@@ -28,7 +28,7 @@ def replanner() -> Replanner:
     """The half-flip's."""
     plan = shared_plan("half-flip")
     assert plan.vehicle is not None
-    begun = Setting(plan.problem, ab.Miqp(), plan.vehicle, ab.load_dispersion("lab"))
+    begun = Setting(plan.problem, ab.Miqp(), plan.vehicle, ab.Dispersion(mass=0.2))
     return Replanner(begun, sliders_of(begun, plan))
 
 
