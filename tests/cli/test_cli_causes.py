@@ -9,6 +9,8 @@ import pytest
 
 import aerobat as ab
 from aerobat import cli
+from aerobat.reporting.error_causes import error_causes_report
+from aerobat.reporting.report_json import to_json
 from aerobat.studies.error_causes import error_causes, four_causes
 from public_calls import cruise
 
@@ -52,6 +54,21 @@ def test_what_the_command_says_is_measured_and_told(
     assert {name: facts["cost_m"]["median"] for name, facts in told.items()} == {
         result.cause: found.cost(result.cause).median for result in found.results
     }
+
+
+def test_bounds_that_few_flights_cannot_give_are_null_in_json() -> None:
+    """Two flights vouch for no interval of a median: its ends are infinite, which JSON has no word for."""
+    found = error_causes(
+        cruise().problem,
+        "agile-quad",
+        [ab.Cause("late", {"conditions.control_rate": 200.0})],
+        planner=ab.MinSnap(),
+        conditions=ab.Dispersion(mass=0.01, control_rate=100.0),
+        flights=2,
+    )
+    told = json.loads(to_json(error_causes_report(found)))
+    assert told["causes"]["late"]["cost_m"]["low"] is None
+    assert told["causes"]["late"]["cost_m"]["median"] == found.cost("late").median
 
 
 @pytest.mark.slow

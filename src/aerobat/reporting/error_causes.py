@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from math import isfinite
 from typing import Any
 
 import numpy as np
@@ -68,20 +69,25 @@ def error_causes_report(measured: ErrorCauses) -> dict[str, Any]:
 
 
 def _facts(measured: ErrorCauses, result: TrialResult) -> dict[str, Any]:
-    """What one trial came to: medians over its flights, unless it says otherwise."""
+    """Return one trial's numbers: medians over its flights, unless a name says otherwise."""
     cost = measured.cost(result.cause)
     return {
         "duration_s": result.plan.duration,
         "error_m": {
-            "median": _quantile(result.position_error, 0.5),
-            "95": _quantile(result.position_error, 0.95),
+            "median": _known(_quantile(result.position_error, 0.5)),
+            "95": _known(_quantile(result.position_error, 0.95)),
         },
-        "cost_m": {"median": cost.median, "low": cost.low, "high": cost.high},
-        "gate_error_m": _quantile(result.gate_error, 0.5),
-        "gate_attitude_error_deg": _quantile(result.gate_attitude_error, 0.5),
+        "cost_m": {name: _known(getattr(cost, name)) for name in ("median", "low", "high")},
+        "gate_error_m": _known(_quantile(result.gate_error, 0.5)),
+        "gate_attitude_error_deg": _known(_quantile(result.gate_attitude_error, 0.5)),
         "saturated_fraction": float(result.scores.saturated_fraction.mean()),
         "success": float(result.scores.succeeded.mean()),
     }
+
+
+def _known(number: float) -> float | None:
+    """Return a number, or None for an infinite one: no gate was crossed, or flights are too few."""
+    return number if isfinite(number) else None
 
 
 def _quantile(errors: Any, level: float) -> float:
