@@ -134,3 +134,12 @@ def test_an_option_of_one_planner_is_refused_by_another() -> None:
     code, _, err = aerobat("plan", "line", "--import", "my_planner.py", "--my-option", "3")
     assert code == 2
     assert err == "aerobat: --my-option is for --planner mine, not miqp; leave one of them out\n"
+
+
+def test_a_plugin_leaves_no_bytecode_beside_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(sys, "dont_write_bytecode", False)
+    file = tmp_path / "alone" / "plugin.py"
+    file.parent.mkdir()
+    file.write_text("")
+    ab.import_plugin(file)
+    assert list(file.parent.iterdir()) == [file]

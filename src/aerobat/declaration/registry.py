@@ -6,6 +6,7 @@ import os
 import sys
 from collections.abc import Iterator, Mapping
 from importlib import import_module
+from importlib.machinery import SourceFileLoader
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any, Generic, TypeVar
@@ -116,6 +117,13 @@ def imported_plugins() -> tuple[str, ...]:
     return tuple(path for _, path in found if path is not None)
 
 
+class _PluginLoader(SourceFileLoader):
+    """Loader of a user's file that keeps no byte-code beside it: a command that is refused writes nothing."""
+
+    def set_data(self, path: str, data: Any, *, _mode: int = 0) -> None:
+        """Write nothing."""
+
+
 @validated
 def import_plugin(path: PathName) -> None:
     """Run a user's Python file, which registers maneuvers and planners of its own, once.
@@ -129,15 +137,15 @@ def import_plugin(path: PathName) -> None:
     name = _PLUGIN + hashlib.sha256(os.fsencode(file)).hexdigest()[:16]
     if name in sys.modules:
         return
-    spec = importlib.util.spec_from_file_location(name, file) if file.suffix == ".py" else None
-    if spec is None or spec.loader is None or not file.is_file():
+    loader = _PluginLoader(name, str(file))
+    spec = importlib.util.spec_from_file_location(name, file, loader=loader)
+    if spec is None or file.suffix != ".py" or not file.is_file():
         raise SpecError(f"plugin {path}: there is no such Python file; give the path of a .py file")
     module = importlib.util.module_from_spec(spec)
     sys.modules[name] = module  # before it runs: annotations are looked up there
-    loader = spec.loader
     try:
         _import(lambda: loader.exec_module(module), f"plugin {path}")
-    except SpecError:
+    except BaseException:  # an interrupt among them
         del sys.modules[name]
         raise
 
