@@ -17,18 +17,23 @@ from public_calls import cruise
 FEW = ("--vehicle", "hexarotor", "--flights", "8", "--seed", "3")
 
 
-def test_what_the_command_says_is_measured_and_told(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    """Of a study that takes less time than the one asked for."""
-    found = error_causes(
+def quick_study(flights: int) -> ab.ErrorCauses:
+    """Measure one cause of a cruise, planned in closed form."""
+    return error_causes(
         cruise().problem,
         "agile-quad",
         [ab.Cause("late", {"conditions.control_rate": 200.0})],
         planner=ab.MinSnap(),
         conditions=ab.Dispersion(mass=0.01, control_rate=100.0),
-        flights=8,
+        flights=flights,
     )
+
+
+def test_what_the_command_says_is_measured_and_told(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Of a study that takes less time than the one asked for."""
+    found = quick_study(flights=8)
     asked = []
     monkeypatch.setattr(
         "aerobat.cli.commands.causes.error_causes",
@@ -58,14 +63,7 @@ def test_what_the_command_says_is_measured_and_told(
 
 def test_bounds_that_few_flights_cannot_give_are_null_in_json() -> None:
     """Two flights vouch for no interval of a median: its ends are infinite, which JSON has no word for."""
-    found = error_causes(
-        cruise().problem,
-        "agile-quad",
-        [ab.Cause("late", {"conditions.control_rate": 200.0})],
-        planner=ab.MinSnap(),
-        conditions=ab.Dispersion(mass=0.01, control_rate=100.0),
-        flights=2,
-    )
+    found = quick_study(flights=2)
     told = json.loads(to_json(error_causes_report(found)))
     assert told["causes"]["late"]["cost_m"]["low"] is None
     assert told["causes"]["late"]["cost_m"]["median"] == found.cost("late").median
