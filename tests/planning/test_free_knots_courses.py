@@ -124,8 +124,8 @@ def test_each_limit_is_backed_off_from_by_its_own_excess_and_no_reserve_is_kept_
     path = minimum_effort(np.stack([[[100.0 + x, 0.0, 100.0], *np.zeros((3, 3))] for x in (0, 2)]), [3.0])
     framed = FramedProblem.of(problem, QUAD, problem.stages(40.0), WarmStart(path, (), ()), 0.03)
     limits = framed.limits
-    of_vehicle = np.arange(limits.size) < len(limits.rotors.names)
-    beyond = np.array([name == "position x" for name in limits.names])
+    of_vehicle = np.array([limit.has_reserve for limit in limits.all])
+    beyond = np.array([limit.name == "position x" for limit in limits.all])
     (excess,) = framed.path(WarmStart(path, (), ())).violation.excess
     assert (excess[beyond] > 0.0).all()
     assert (excess[~beyond] <= 0.0).all()

@@ -6,13 +6,12 @@ import numpy as np
 import pytest
 
 from aerobat.errors import Infeasible
-from aerobat.flatness import force_balance, reference
+from aerobat.flatness import force_balance
 from aerobat.optimization import solver
 from aerobat.planning import GridSearch, Miqp, plan
 from aerobat.planning.certified_solve import certificate_for, tightened
 from aerobat.planning.miqp.miqp import formulate
 from aerobat.planning.miqp.refinement.phases import PhasedChain, Places
-from aerobat.planning.miqp.refinement.rotor_rows import RotorRows
 from aerobat.planning.miqp.rescue import with_more_intervals
 from aerobat.planning.miqp.shortest import COARSE_GROWTH
 from aerobat.problem import (
@@ -222,40 +221,6 @@ def test_slopes_of_samples_are_their_differences() -> None:
 @pytest.fixture(scope="module")
 def flown() -> Trajectory:
     return shared_plan("flip-roll").trajectory
-
-
-def sampled(flown: Trajectory, craft: Vehicle, times: np.ndarray) -> tuple[RotorRows, np.ndarray, np.ndarray]:
-    rows = RotorRows(craft, load_problem("flip-roll").environment, 0.0)
-    derivatives = np.stack([flown.evaluate(times, k) for k in range(6)], axis=1)
-    return rows, derivatives, rows.frames(times, derivatives)
-
-
-def test_rotor_rows_are_thrusts_and_commands_as_flatness_has_them(flown: Trajectory, quad: Vehicle) -> None:
-    dragged = replace(quad, drag_body=np.array([0.2, 0.2, 0.1]))
-    times = flown.knots[:-1] + 0.3 * flown.durations
-    rows, derivatives, frames = sampled(flown, dragged, times)
-    values = rows.values(derivatives, frames)
-    here, ahead, behind = (
-        reference(flown, dragged, times + h, environment=rows.environment).rotor_thrusts
-        for h in (0.0, 1e-5, -1e-5)
-    )
-    span = dragged.max_thrusts - dragged.min_thrusts
-    command = here + dragged.lags * (ahead - behind) / 2e-5
-    np.testing.assert_allclose(values[:, 4:8], (here - dragged.max_thrusts) / span, atol=1e-6)
-    np.testing.assert_allclose(values[:, 12:16], (command - dragged.max_thrusts) / span, atol=1e-4)
-
-
-def test_slopes_of_rotor_rows_are_their_differences(flown: Trajectory, quad: Vehicle) -> None:
-    times = flown.knots[2:6] + 0.4 * flown.durations[2:6]
-    rows, derivatives, frames = sampled(flown, quad, times)
-    place, column = np.nonzero(np.ones(rows.values(derivatives, frames).shape))
-    slopes = rows.slopes(derivatives, frames, place, column)
-    rng = np.random.default_rng(0)
-    step = rng.normal(size=derivatives.shape) * np.abs(derivatives).max(axis=(0, 2))[:, None]
-    ahead, behind = (rows.values(derivatives + h * step, frames) for h in (1e-6, -1e-6))
-    expected = (ahead - behind) / 2e-6
-    found = np.sum(slopes * step[place], axis=(1, 2)).reshape(expected.shape)
-    np.testing.assert_allclose(found, expected, rtol=1e-4, atol=1e-5 * np.abs(expected).max())
 
 
 @pytest.mark.slow

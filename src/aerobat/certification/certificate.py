@@ -45,6 +45,9 @@ class Finding:
     verdict: Verdict
     gate: str | None = None  # passed at that time
     waypoint: str | None = None  # met at that time
+    rotor: int | None = None  # whose thrust or command it is about
+    field: str = ""  # of the vehicle or the problem, that the limit comes from: "max_thrust", "limits.jerk"
+    size: float | None = None  # of the range between its limits, of which reserves are fractions
 
     @property
     def place(self) -> str | None:
@@ -143,7 +146,7 @@ class Certificate:
 
         Of those that are violated if any is.
         """
-        rotors = [finding for finding in self.findings if finding.quantity.startswith("rotor ")]
+        rotors = [finding for finding in self.findings if finding.rotor is not None]
         violated = [finding for finding in rotors if finding.verdict is Verdict.VIOLATED]
         return min(violated or rotors, key=_margin, default=None)
 

@@ -7,7 +7,9 @@ beside this file says why that is a proof.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
+from math import acos, inf
 
 import numpy as np
 
@@ -25,6 +27,7 @@ from aerobat.certification.enclosure.queries import (
     angle,
     both_sides,
     root,
+    within,
 )
 from aerobat.certification.envelope import Envelope
 from aerobat.certification.path.kinematics import kinematic_findings
@@ -35,6 +38,8 @@ from aerobat.declaration import validated
 from aerobat.environment import Environment
 from aerobat.flatness import Planned, environment_of, vehicle_of
 from aerobat.flatness.references import UNDETERMINED, force_balance
+from aerobat.limits import Limit, limits_along
+from aerobat.limits.quantity import BODY_RATE, UPRIGHT, WRENCH, WRENCH_RATE
 from aerobat.trajectory import Trajectory, as_trajectory
 from aerobat.trajectory.subintervals import Subintervals
 from aerobat.vehicle import Vehicle
@@ -76,15 +81,20 @@ def certify(
     vehicle = vehicle_of(trajectory, vehicle).without_dead_rotors()
     environment = environment_of(trajectory, environment)
     trajectory = as_trajectory(trajectory)
+    limits = limits_along(vehicle, environment, envelope.limits, envelope.conditions)
+    on_measures = [limit for limit in limits if limit.is_proven and not limit.quantity.is_of_path]
     curve = ThrustCurve.of(trajectory, vehicle, environment, INTERPOLATION_DEGREE)
     floor = UNDETERMINED * environment.gravity
     found = subdivide(curve, floor)
-    series = interpolated(curve, found.pieces, everywhere=not found.vanishing) if len(found.pieces) else None
     findings: list[Finding] = []
-    if series is not None:
-        findings += series.answers(_queries(vehicle, envelope))
+    series = None
+    if len(found.pieces):
+        derived = [limit for limit in on_measures if not _is_stated(limit)]
+        series = interpolated(curve, found.pieces, everywhere=not found.vanishing, derived=derived)
+        findings += series.answers(_queries(vehicle, envelope, on_measures))
     balance = force_balance(environment, vehicle)
-    findings += kinematic_findings(trajectory, envelope, balance)
+    on_path = (limit for limit in limits if limit.quantity.is_of_path)
+    findings += kinematic_findings(trajectory, envelope.speed, on_path)
     findings += passage_findings(trajectory, envelope.passages, balance)
     findings += waypoint_findings(trajectory, envelope.waypoints)
     jumps = discontinuities(curve, floor, series)
@@ -93,31 +103,54 @@ def certify(
     return Certificate(tuple(findings), found.vanishing, jumps)
 
 
-def _queries(vehicle: Vehicle, envelope: Envelope) -> list[ExtremumQuery]:
-    """The extrema of the columns of `quantities.values` that a certificate states."""
+def _is_stated(limit: Limit) -> bool:
+    """True of limits on what a certificate states anyway: plain thrusts of rotors, tilt and body rate."""
+    used = np.flatnonzero(limit.quantity.measured)
+    is_thrust = limit.rotor is not None and used.max() < WRENCH.stop
+    return is_thrust or used.tolist() in ([UPRIGHT], [BODY_RATE])
+
+
+def _queries(vehicle: Vehicle, envelope: Envelope, limits: Sequence[Limit]) -> list[ExtremumQuery]:
+    """The extrema that a certificate states, of the columns of `interpolated`.
+
+    Args:
+        vehicle: What flies, with n rotors.
+        envelope: What it shall stay within beside `limits`.
+        limits: On measures, those of the rotors among them.
+    """
     count = len(vehicle.rotors)
-    low, high = vehicle.min_thrusts, vehicle.max_thrusts
-    body_rate = min(envelope.body_rate, vehicle.max_body_rate)
-    rotors = [query for i in range(count) for query in both_sides(f"rotor {i}", "N", i, low[i], high[i])]
-    commands = [
-        query
-        for i in np.flatnonzero(vehicle.lags)
-        for query in both_sides(f"rotor {i} command", "N", count + 4 + int(i), low[i], high[i])
-    ]
+    thrusts = [limit for limit in limits if limit.rotor is not None and _is_stated(limit)]
+    derived = [limit for limit in limits if not _is_stated(limit)]
+    low, high = (sum(ends) for ends in zip(*((limit.lower, limit.upper) for limit in thrusts), strict=True))
+    tilt = ExtremumQuery("tilt", "rad", Side.MAX, envelope.tilt, count + 1, -1, angle)
+    rate = ExtremumQuery("body rate", "rad/s", Side.MAX, envelope.body_rate, count + 2, 1, root)
     return [
-        *rotors,
-        *commands,
-        *both_sides("thrust", "N", count, low.sum(), high.sum()),
-        ExtremumQuery("tilt", "rad", Side.MAX, envelope.tilt, count + 1, -1, angle),
-        ExtremumQuery("body rate", "rad/s", Side.MAX, body_rate, count + 2, 1, root),
+        *(query for i, limit in enumerate(thrusts) for query in within(limit, i)),
+        *(query for i, limit in enumerate(derived, count + 4) for query in within(limit, i)),
+        *both_sides("thrust", "N", count, low, high),
+        _nearest(tilt, [(acos(limit.lower), limit) for limit in limits if _is_of(limit, UPRIGHT)]),
+        _nearest(rate, [(limit.upper, limit) for limit in limits if _is_of(limit, BODY_RATE)]),
         ExtremumQuery("moment", "N·m", Side.MAX, envelope.moment, count + 3, 1, root),
     ]
 
 
-def interpolated(curve: ThrustCurve, pieces: Subintervals, everywhere: bool) -> ChebyshevSeries:
+def _is_of(limit: Limit, measure: int) -> bool:
+    return np.flatnonzero(limit.quantity.measured).tolist() == [measure]
+
+
+def _nearest(query: ExtremumQuery, limits: Sequence[tuple[float, Limit]]) -> ExtremumQuery:
+    """The query with the least of its own limit and of others, each with what it is an end of."""
+    least, source = min(limits, key=lambda pair: pair[0], default=(inf, None))
+    return query if query.limit <= least else replace(query, limit=least, source=source)
+
+
+def interpolated(
+    curve: ThrustCurve, pieces: Subintervals, everywhere: bool, derived: Sequence[Limit] = ()
+) -> ChebyshevSeries:
     """All quantities along pieces that follow each other, in the frame that is carried along them.
 
-    The columns of `quantities.values`, and behind them the commands of the rotors where any has a lag.
+    The columns of `quantities.values`, and behind them what derived limits are about, such as the commands of
+    rotors that lag.
     """
     vehicle, basis = curve.vehicle, curve.basis
     values = curve.on(pieces)
@@ -133,34 +166,54 @@ def interpolated(curve: ThrustCurve, pieces: Subintervals, everywhere: bool) -> 
     columns = basis.analysis @ quantities.values(vehicle, values, omega, omega_dot)
     scale = quantities.scales(vehicle)
     found = ChebyshevSeries(curve.trajectory, pieces, columns, error, scale, TIGHTNESS, everywhere)
-    if not vehicle.lags.any():
+    if not derived:
         return found
     # what is interpolated is off by so much, and its derivative by what that makes of it
     noise = bound.rounding + own_error * bound.per_radian + SUMMATION_ROUNDING * np.abs(columns).sum(axis=1)
     rate_error = bound.rate_remainder + (angle_error - own_error) * bound.rate_per_radian
     rate_error += 2 / seconds[:, None] * basis.steepening * noise
-    return _with_commands(found, rate_error, vehicle, basis)
+    return _with_derived(found, rate_error, vehicle, basis, derived)
 
 
-def _with_commands(
-    found: ChebyshevSeries, rate_error: Array, vehicle: Vehicle, basis: chebyshev.Basis
+def _with_derived(
+    found: ChebyshevSeries,
+    rate_error: Array,
+    vehicle: Vehicle,
+    basis: chebyshev.Basis,
+    derived: Sequence[Limit],
 ) -> ChebyshevSeries:
-    """The series with the commands f + τ f' of all rotors behind them.
+    """The series with what limits on wrenches and their derivatives are about behind them.
+
+    A wrench is what the rotors' thrusts make, so that whatever is linear in it is linear in them.
 
     Args:
-        found: The thrusts f among others.
+        found: The thrusts of n rotors first, the cosine of the tilt behind them and their sum.
         rate_error: Of the derivatives of its series [1/s], (P, Q).
         vehicle: What flies, with n rotors.
         basis: Of interpolation.
+        derived: D limits.
     """
     count = len(vehicle.rotors)
-    thrusts = found.series[..., :count]
+    thrusts, upright = found.series[..., :count], found.series[..., count + 1, None]
     per_second = 2 / found.pieces.seconds(found.trajectory)[:, None, None]
-    commands = thrusts + vehicle.lags * per_second * (basis.derivative @ thrusts)
-    error = found.error[:, :count] + vehicle.lags * rate_error[:, :count]
+    plain, rates = np.array([_on_rotors(limit, vehicle) for limit in derived]).transpose(1, 2, 0)  # (n, D)
+    tilting = np.array([limit.quantity.measured[UPRIGHT] for limit in derived])
+    series = thrusts @ plain + per_second * (basis.derivative @ thrusts) @ rates + upright * tilting
+    error = found.error[:, :count] @ np.abs(plain) + rate_error[:, :count] @ np.abs(rates)
+    error += found.error[:, count + 1, None] * np.abs(tilting)
     return replace(
         found,
-        series=np.concatenate([found.series, commands], axis=-1),
+        series=np.concatenate([found.series, series], axis=-1),
         error=np.concatenate([found.error, error], axis=-1),
-        scale=np.concatenate([found.scale, found.scale[:count]]),
+        scale=np.concatenate([found.scale, [limit.size for limit in derived]]),
     )
+
+
+def _on_rotors(limit: Limit, vehicle: Vehicle) -> tuple[Array, Array]:
+    """A limit's weights on the rotors' thrusts and on their derivatives, (n,) each."""
+    wrench, rate = limit.quantity.measured[WRENCH], limit.quantity.measured[WRENCH_RATE]
+    if limit.rotor is None:
+        return wrench @ vehicle.allocation, rate @ vehicle.allocation
+    own = np.eye(len(vehicle.rotors))[limit.rotor]
+    share = float(np.linalg.norm(wrench))
+    return own, float(np.linalg.norm(rate)) / share * own

@@ -41,13 +41,15 @@ class RotorMargin:
         if certificate.worst is None:
             return None
         low, high = (_closest(certificate, side) for side in (Side.MIN, Side.MAX))
+        assert low.rotor is not None
+        assert high.rotor is not None
         return cls(
             min_thrust=low.value,
             min_time=low.time,
-            min_rotor=_rotor(low),
+            min_rotor=low.rotor,
             max_thrust=high.value,
             max_time=high.time,
-            max_rotor=_rotor(high),
+            max_rotor=high.rotor,
             low_margin=_margin(low),
             high_margin=_margin(high),
         )
@@ -119,21 +121,14 @@ def reserve_shortfalls(certificate: Certificate, reserve: float) -> list[Reserve
     """
     if reserve <= 0.0:
         return []
-    pairs = zip(*(rotor_findings(certificate, side) for side in (Side.MIN, Side.MAX)), strict=True)
-    found = []
-    for low, high in pairs:
-        assert low.limit is not None
-        assert high.limit is not None
-        for finding in (low, high):
-            kept = _margin(finding) / (high.limit - low.limit)
-            if kept < reserve:
-                found.append(ReserveShortfall(finding, reserve, kept))
+    kept = [(finding, _margin(finding) / _size(finding)) for finding in rotor_findings(certificate)]
+    found = [ReserveShortfall(finding, reserve, part) for finding, part in kept if part < reserve]
     return sorted(found, key=lambda shortfall: shortfall.kept)
 
 
-def rotor_findings(certificate: Certificate, side: Side) -> list[Finding]:
-    """Findings of a certificate about each rotor's thrust, and its command if it lags, on one side."""
-    return [f for f in certificate.findings if f.quantity.startswith("rotor ") and f.side is side]
+def rotor_findings(certificate: Certificate, side: Side | None = None) -> list[Finding]:
+    """Findings of a certificate about each rotor's thrust, and its command if it lags, on one side or all."""
+    return [f for f in certificate.findings if f.rotor is not None and side in (None, f.side)]
 
 
 def _closest(certificate: Certificate, side: Side) -> Finding:
@@ -145,5 +140,6 @@ def _margin(finding: Finding) -> float:
     return inf if finding.margin is None else finding.margin
 
 
-def _rotor(finding: Finding) -> int:
-    return int(finding.quantity.split()[1])
+def _size(finding: Finding) -> float:
+    assert finding.size is not None, "a finding about a rotor's limit has its size"
+    return finding.size

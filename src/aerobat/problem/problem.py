@@ -22,6 +22,7 @@ from aerobat.declaration import (
     NonNegative,
     PerAxis,
     Positive,
+    TiltLimit,
     declared,
     from_table,
     in_degrees,
@@ -51,9 +52,10 @@ def _unbounded() -> Array:
 
 @declared
 class Limits:
-    """Bounds per axis, at the interval ends as in the paper's (1); infinite where nothing is asked.
+    """Bounds on a path, per axis as in the paper's (1), and on its tilt; infinite where nothing is asked.
 
-    `lower` and `upper` bound the position; the others bound the magnitude of each component of a derivative.
+    `lower` and `upper` bound the position, `max_tilt` the attitude; the others bound the magnitude of each
+    component of a derivative.
     """
 
     lower: Corner = field(default_factory=lambda: -_unbounded())  # [m] corner of the volume allowed
@@ -63,6 +65,18 @@ class Limits:
     jerk: PerAxis = field(default_factory=_unbounded)  # [m/s³] largest magnitude
     snap: PerAxis = field(default_factory=_unbounded)  # [m/s⁴] largest magnitude
     crackle: PerAxis = field(default_factory=_unbounded)  # [m/s⁵] largest magnitude
+    max_tilt: TiltLimit = np.inf  # [rad] largest angle between the thrust axis and the vertical
+
+    SHORTHANDS: ClassVar[Mapping[str, str]] = {"max_tilt_deg": "[deg] `max_tilt` in degrees"}
+
+    @classmethod
+    def expand(cls, table: dict[str, Any]) -> dict[str, Any]:
+        """Replace `max_tilt_deg`."""
+        return in_radians(table, "max_tilt")
+
+    def abbreviate(self, table: dict[str, Any]) -> dict[str, Any]:
+        """Write the tilt in degrees where that says exactly the same."""
+        return in_degrees(table, "max_tilt")
 
     def __post_init__(self) -> None:
         """Check."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterable, Mapping
 from itertools import groupby
 from math import degrees, isinf, isnan
@@ -110,7 +109,7 @@ def _nearest_rotors(findings: Iterable[Finding]) -> Iterable[Finding]:
     """The findings, of all rotors' thrusts and commands those with the smallest margin on either side."""
     nearest: dict[tuple[str, Side], Finding] = {}
     for finding in findings:
-        key = re.sub(r"^rotor \d+", "rotor", finding.quantity), finding.side
+        key = finding.quantity.removeprefix(f"rotor {finding.rotor}"), finding.side
         known = nearest.setdefault(key, finding)
         if (finding.margin or 0.0) < (known.margin or 0.0):
             nearest[key] = finding

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from aerobat.arrays import Array
 from aerobat.certification.certificate import Finding, Side, Verdict
 from aerobat.certification.enclosure.extrema import SeriesBatch, enclose_maximum
+from aerobat.limits import Limit
 from aerobat.trajectory import Trajectory
 from aerobat.trajectory.subintervals import Subintervals
 
@@ -29,6 +30,7 @@ class ExtremumQuery:
     sign: int
     read: Callable[[float], float]  # from the greatest value of sign times function to what people read
     slack: float = 0.0  # beyond the limit by so much it counts as met
+    source: Limit | None = None  # what the limit is an end of
 
     def answer(self, reached: float, bound: float, time: float, everywhere: bool) -> Finding:
         """The finding for a proven enclosure of the greatest value.
@@ -47,7 +49,11 @@ class ExtremumQuery:
             verdict = Verdict.HOLDS
         elif inwards * (limit - value) < -self.slack:
             verdict = Verdict.VIOLATED
-        return Finding(self.quantity, self.unit, self.side, value, bound, time, limit, verdict)
+        found = Finding(self.quantity, self.unit, self.side, value, bound, time, limit, verdict)
+        if self.source is None:
+            return found
+        field = self.source.fields[self.side is Side.MAX]
+        return replace(found, rotor=self.source.rotor, field=field, size=self.source.size)
 
 
 @dataclass(frozen=True)
@@ -93,6 +99,12 @@ def both_sides(quantity: str, unit: str, column: int, lower: float, upper: float
         ExtremumQuery(quantity, unit, Side.MIN, float(lower), column, -1, _negated),
         ExtremumQuery(quantity, unit, Side.MAX, float(upper), column, 1, _plain),
     ]
+
+
+def within(limit: Limit, column: int) -> list[ExtremumQuery]:
+    """Queries about the ends that a limit has, of a function."""
+    sides = both_sides(limit.name, limit.unit, column, limit.lower, limit.upper)
+    return [replace(side, source=limit) for side in sides if math.isfinite(side.limit)]
 
 
 def root(value: float) -> float:

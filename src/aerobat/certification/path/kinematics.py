@@ -1,18 +1,18 @@
-"""Speed, derivatives per axis, conditions: polynomials, so that interpolation is exact but for rounding."""
+"""Speed and limits on the path: polynomials, so that interpolation is exact but for rounding."""
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from aerobat.arrays import AXES, Array
+from aerobat.arrays import Array
 from aerobat.certification.certificate import Finding, Side
 from aerobat.certification.enclosure import chebyshev
-from aerobat.certification.enclosure.queries import ChebyshevSeries, ExtremumQuery, both_sides, root
-from aerobat.certification.envelope import Envelope
-from aerobat.problem.condition import Condition, ForceBalance, Quantity
-from aerobat.problem.problem import DERIVATIVES, UNITS, Limits
+from aerobat.certification.enclosure.queries import ChebyshevSeries, ExtremumQuery, root, within
+from aerobat.limits import Limit
+from aerobat.problem.problem import DERIVATIVES
 from aerobat.trajectory import Trajectory, polynomial
 from aerobat.trajectory.subintervals import Subintervals
 
@@ -60,11 +60,10 @@ class PolynomialColumn:
     queries: list[ExtremumQuery]  # whichever column they name
 
 
-def kinematic_findings(trajectory: Trajectory, envelope: Envelope, balance: ForceBalance) -> list[Finding]:
-    """The largest speed, and the extrema of all that `envelope.limits` and `envelope.conditions` bound."""
+def kinematic_findings(trajectory: Trajectory, speed: float, limits: Iterable[Limit]) -> list[Finding]:
+    """The largest speed, beside its limit [m/s], and the extrema of what limits on the path are about."""
     curve = PolynomialCurve.of(trajectory)
-    columns = [_speed(curve, envelope.speed), *_components(curve, envelope.limits)]
-    columns += [_bounded(curve, condition, balance) for condition in envelope.conditions]
+    columns = [_speed(curve, speed), *(_linear(curve, limit) for limit in limits)]
     queries = [
         replace(query, column=place) for place, column in enumerate(columns) for query in column.queries
     ]
@@ -82,33 +81,15 @@ def _speed(curve: PolynomialCurve, limit: float) -> PolynomialColumn:
     return PolynomialColumn(squared, (2 * np.sqrt(magnitude) + off) * off, [lenient])
 
 
-def _components(curve: PolynomialCurve, limits: Limits) -> list[PolynomialColumn]:
-    """Every derivative and axis with a limit."""
-    columns = []
-    for k, name in enumerate(DERIVATIVES):
-        lower, upper = limits.of(k)
-        values = curve.derivatives[:, :, k]
-        for axis in np.flatnonzero(np.isfinite(lower) | np.isfinite(upper)):
-            sides = both_sides(f"{name} {AXES[axis]}", UNITS[k], 0, lower[axis], upper[axis])
-            error = chebyshev.EVALUATION_ROUNDING * curve.sums[:, k, axis]
-            queries = [_lenient(side, float(np.abs(values).max())) for side in sides]
-            columns.append(PolynomialColumn(values[..., axis], error, queries))
-    return columns
-
-
-def _bounded(curve: PolynomialCurve, condition: Condition, balance: ForceBalance) -> PolynomialColumn:
-    """What a condition bounds, asked on the sides where it does."""
-    bound = condition.bound(balance)
-    state = curve.derivatives[:, :, :3]
-    summed = np.sum(np.abs(bound.weights) * curve.sums[:, :3], axis=(1, 2)) + abs(bound.constant)
-    quantity, unit = condition.quantity, UNITS[condition.quantity.derivative]
-    vectors = state[:, :, quantity.derivative]
-    if quantity is Quantity.SPECIFIC_THRUST:
-        vectors = balance.specific_thrust(state[:, :, 1], vectors)
-    largest = float(np.abs(vectors).max() * np.linalg.norm(condition.direction))
-    sides = both_sides(condition.name, unit, 0, condition.lower, condition.upper)
-    queries = [_lenient(side, largest) for side in sides if np.isfinite(side.limit)]
-    return PolynomialColumn(bound.value(state), chebyshev.EVALUATION_ROUNDING * summed, queries)
+def _linear(curve: PolynomialCurve, limit: Limit) -> PolynomialColumn:
+    """What a limit on the path is about."""
+    quantity = limit.quantity
+    values = np.einsum("snka,ka->sn", curve.derivatives, quantity.path) + quantity.constant
+    summed = np.sum(np.abs(quantity.path) * curve.sums, axis=(1, 2)) + abs(quantity.constant)
+    vectors = np.abs(curve.derivatives).max(axis=(0, 1, 3))
+    largest = float(vectors @ np.linalg.norm(quantity.path, axis=1)) + abs(quantity.constant)
+    queries = [_lenient(side, largest) for side in within(limit, 0)]
+    return PolynomialColumn(values, chebyshev.EVALUATION_ROUNDING * summed, queries)
 
 
 def _lenient(query: ExtremumQuery, largest: float) -> ExtremumQuery:

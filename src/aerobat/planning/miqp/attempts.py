@@ -227,11 +227,8 @@ class _Refined:
 
     def _excess(self, certificate: Certificate) -> float:
         """The largest that a certificate refutes, or misses of the reserve, as a fraction of its range."""
-        vehicle = self.attempts.vehicle
-        assert vehicle is not None
-        spans = {"N": float((vehicle.max_thrusts - vehicle.min_thrusts).min())}
         refuted = (f for f in certificate.findings if f.verdict is Verdict.VIOLATED and f.limit is not None)
-        beyond = [-(f.margin or 0.0) / spans.get(f.unit, max(abs(f.limit or 0.0), 1.0)) for f in refuted]
+        beyond = [-(f.margin or 0.0) / (f.size or max(abs(f.limit or 0.0), 1.0)) for f in refuted]
         missed = [shortfall.size for shortfall in reserve_shortfalls(certificate, self.attempts.reserve)]
         return max([*beyond, *missed], default=0.0)
 

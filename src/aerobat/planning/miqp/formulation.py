@@ -16,14 +16,14 @@ import numpy as np
 
 from aerobat.arrays import Array, Indices, frozen
 from aerobat.errors import SpecError
+from aerobat.limits import Limit, limits_along
 from aerobat.optimization import AssignmentProgram, LinearDynamics, SlottedStage
 from aerobat.planning.miqp.integrator import INPUT_NAMES, IntegratorChain
 from aerobat.problem.condition import Condition, ForceBalance, Quantity
 from aerobat.problem.end_state import VELOCITY
-from aerobat.problem.problem import DERIVATIVES, Limits, Problem
+from aerobat.problem.problem import DERIVATIVES, Problem
 from aerobat.problem.stage import Stage, StageSequence
-
-UNIT_AXES = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+from aerobat.vehicle import Vehicle
 
 
 @dataclass(frozen=True)
@@ -54,6 +54,7 @@ class Formulation:
     sequence: StageSequence
     chain: IntegratorChain
     balance: ForceBalance  # what specific thrust works against
+    vehicle: Vehicle | None = None  # that shall fly it
 
     def __post_init__(self) -> None:
         """Check."""
@@ -76,6 +77,13 @@ class Formulation:
                     f"limits.{DERIVATIVES[derivative]} cannot be held when the input is "
                     f"{INPUT_NAMES[self.chain.order]}; plan with --order {derivative} or drop it"
                 )
+
+    @cached_property
+    def limits(self) -> tuple[Limit, ...]:
+        """Everything that holds all along a path."""
+        problem = self.problem
+        conditions = self.sequence.path_constraints
+        return limits_along(self.vehicle, problem.environment, problem.path_limits, conditions)
 
     def program(self, dt: float) -> AssignmentProgram:
         """The program at one dt [s]; without drag its matrices are the same arrays for all dt."""
@@ -137,7 +145,7 @@ class Formulation:
     def _rows(self) -> dict[Row, tuple[float, float]]:
         """Every row that limits or stages speak of, with the limits in SI units."""
         rows: dict[Row, tuple[float, float]] = {}
-        for row, lower, upper in (*self._limit_rows(self.problem.path_limits), *self._path_rows()):
+        for row, lower, upper in self._limit_rows():
             low, high = rows.get(row, (-inf, inf))
             rows[row] = (max(low, lower), min(high, upper))
         for stage in self.sequence.stages:
@@ -146,19 +154,19 @@ class Formulation:
                     rows.setdefault(self._row(condition, interval), (-inf, inf))
         return rows
 
-    def _limit_rows(self, bounds: Limits) -> Iterable[tuple[Row, float, float]]:
-        for derivative in range(self.chain.order + 1):
-            at_goal = derivative == VELOCITY and self.problem.goal.free_velocity
-            intervals = self.chain.intervals - (derivative != self.chain.order and not at_goal)
-            for axis, low, high in zip(UNIT_AXES, *bounds.of(derivative), strict=True):
-                if low > -inf or high < inf:
-                    for interval in range(intervals):
-                        yield Row(interval, derivative, axis), float(low), float(high)
-
-    def _path_rows(self) -> Iterable[tuple[Row, float, float]]:
-        for condition in self.sequence.path_constraints:
-            for interval in range(self.chain.intervals - 1):
-                yield self._row(condition, interval), *condition.bound(self.balance).limits
+    def _limit_rows(self) -> Iterable[tuple[Row, float, float]]:
+        """What holds all along, as far as it is linear; the vehicle's limits are left to the refinement."""
+        for limit in self.limits:
+            for linear in limit.linear:
+                *_, derivative = linear.quantity.derivatives
+                at_goal = derivative == VELOCITY and self.problem.goal.free_velocity
+                intervals = self.chain.intervals - (derivative != self.chain.order and not at_goal)
+                x, y, z = linear.quantity.path[derivative].tolist()
+                drag = self.balance.drag if len(linear.quantity.derivatives) > 1 else 0.0
+                lower, upper = linear.ends
+                for interval in range(intervals):
+                    row = Row(interval, derivative, (x, y, z), drag)
+                    yield row, linear.size * lower, linear.size * upper
 
     @cached_property
     def _derivatives(self) -> Array:

@@ -164,7 +164,7 @@ def formulate(problem: Problem, order: int, intervals: int, vehicle: Vehicle | N
         _check_thrust(sequence, vehicle)
     balance = force_balance(problem.environment, vehicle)
     _check_stages(sequence, balance)
-    return Formulation(problem, sequence, IntegratorChain(order, intervals), balance)
+    return Formulation(problem, sequence, IntegratorChain(order, intervals), balance, vehicle)
 
 
 def _check_stages(sequence: StageSequence, balance: ForceBalance) -> None:

@@ -26,7 +26,6 @@ from aerobat.planning.time_optimal.starts import Start, initial_motion
 from aerobat.planning.warm_start import WarmStart
 from aerobat.trajectory import Trajectory
 
-THRUST_FLOOR = 0.02  # of the largest collective thrust: more, and the attitude stays determined
 # times the reserve, of the largest collective thrust, at least: feedback turns a small thrust by a lot
 THRUST_RESERVE = 3.0
 WARM_BARRIER = 1e-6  # the first barrier parameter of a solve that starts from a solution
@@ -173,7 +172,7 @@ class CollocatedProgram:
 
 def optimal_control(elements: Elements, start: Start, reserve: float) -> OptimalControl:
     """The optimal control through the stages in the order of a start, a reserve kept from rotors' limits."""
-    floor = max(THRUST_FLOOR, THRUST_RESERVE * reserve) * elements.vehicle.max_specific_thrust
+    floor = max(elements.bounds.floor.lower, THRUST_RESERVE * reserve * elements.vehicle.max_specific_thrust)
     boundary = FixedEnds(elements) if elements.problem.ends else ClosedLap(elements)
     return OptimalControl(
         elements=elements,

@@ -13,18 +13,18 @@ from functools import cached_property
 import numpy as np
 
 from aerobat.arrays import Array, Indices, Mask
+from aerobat.limits.path_condition import limit_of
 from aerobat.optimization.prox_linear import Linearization
 from aerobat.planning.miqp.formulation import Formulation
-from aerobat.planning.miqp.refinement.path_rows import PathRows, of_conditions
+from aerobat.planning.miqp.refinement.limit_rows import LimitRows, stage_rows
 from aerobat.planning.miqp.refinement.phases import DERIVATIVES, PhasedChain, Places, Samples
-from aerobat.planning.miqp.refinement.rotor_rows import RotorRows
 from aerobat.trajectory import Trajectory
 from aerobat.vehicle import Vehicle
 
 PARTS = 4  # of each interval, at whose ends constraints are held
 NEAR = 0.15  # of a constraint's range: nearer ones are rows of a step
-ROTOR_BACKOFF = 2e-4  # of a rotor's range, which the certificate can tell
-ROTOR_SLACK = 0.5 * ROTOR_BACKOFF  # of that, by which a path may miss it
+RESERVE_BACKOFF = 2e-4  # of the vehicle's limits' ranges, which the certificate can tell
+RESERVE_SLACK = 0.5 * RESERVE_BACKOFF  # of that, by which a path may miss it
 EXCESS_FACTOR = 1.2  # backoff for each unit of excess between places
 EXCESS_BACKOFF = 1e-4  # and so much more, for what moves while it is made up for
 NEGLIGIBLE = 5e-10  # of a constraint's range
@@ -43,7 +43,7 @@ class PathProgram:
     equal: bool  # intervals all of the same length, or phases each of their own
     scale_of_input: float  # a normalised input that counts
     held: bool = False  # times as they are: any path within all constraints will do
-    reserve: float = ROTOR_BACKOFF  # of what the vehicle can do, kept everywhere
+    reserve: float = RESERVE_BACKOFF  # of what the vehicle can do, kept everywhere
     backoff: Array = field(default_factory=lambda: np.zeros(0))  # of each interval and constraint, (N, c)
 
     @cached_property
@@ -126,17 +126,10 @@ class PathProgram:
         return Places.even(self.chain.intervals, PARTS)
 
     @cached_property
-    def rotors(self) -> RotorRows:
-        """What the vehicle can do."""
+    def limits(self) -> LimitRows:
+        """What holds all along."""
         problem = self.formulation.problem
-        return RotorRows(self.vehicle, problem.environment, problem.heading)
-
-    @cached_property
-    def path(self) -> PathRows:
-        """Limits, and what holds throughout."""
-        problem, sequence = self.formulation.problem, self.formulation.sequence
-        balance = self.formulation.balance
-        return PathRows.of(problem.path_limits, self.chain.order, sequence.path_constraints, balance)
+        return LimitRows(self.formulation.limits, self.vehicle, problem.environment, problem.heading)
 
     @cached_property
     def _instants(self) -> Places:
@@ -155,7 +148,7 @@ class PathProgram:
         for i, stage in enumerate(self.formulation.sequence.stages, 1):
             for condition in stage.conditions:
                 equal = condition.lower == condition.upper
-                rows = list(of_conditions((condition,), balance))
+                rows = list(stage_rows(limit_of(condition, balance)))
                 found += [(i, *row, equal) for row in (rows[:1] if equal else rows)]
         return (
             np.array([row[0] for row in found], dtype=np.intp),
@@ -195,26 +188,24 @@ class PathPoint:
 
     @cached_property
     def violation(self) -> float:
-        """The largest excess, as a fraction of its constraint's range, a trifle of what rows aim at aside."""
-        count = self.program.rotors.count
-        rotors = self._values[:, :count].max(initial=-1.0) - ROTOR_SLACK
-        others = max(self._values[:, count:].max(initial=-1.0), self._stage_values.max(initial=-1.0))
-        return float(max(rotors, others - NEGLIGIBLE))
+        """The largest excess, as a fraction of its limit's size, a trifle of what rows aim at aside."""
+        kept = self.program.limits.has_reserve
+        reserved = self._values[:, kept].max(initial=-1.0) - RESERVE_SLACK
+        others = max(self._values[:, ~kept].max(initial=-1.0), self._stage_values.max(initial=-1.0))
+        return float(max(reserved, others - NEGLIGIBLE))
 
     @property
     def excess_sentence(self) -> str:
-        """Which constraint is exceeded most, by how much and when."""
+        """Which limit is exceeded most, by how much and when."""
         place, column = np.unravel_index(int(self._values.argmax()), self._values.shape)
-        rotors, path = self.program.rotors, self.program.path
-        name = [*rotors.names[: rotors.count], *path.names][column]
-        excess, time = 100.0 * float(self._values[place, column]), float(self._samples.times[place])
-        return f"{name} beyond its limit by {excess:.3g} % of its range at {time:.2f} s"
+        limit, _ = self.program.limits.sides[column]
+        return limit.exceeded(float(self._values[place, column]), float(self._samples.times[place]))
 
     def linearization(self) -> Linearization:
         """The constraints near the path."""
         program = self.program
         place, column = np.nonzero(self._values > -NEAR)
-        weights = self._slopes(place, column)
+        weights = program.limits.slopes(self._samples.derivatives, self._frames, place, column)
         values = self._values[place, column]
         at, stage_weights, _, equal = program._stage_rows
         rows = [self._samples.rows(place, weights), self._instants.rows(at[~equal], stage_weights[~equal])]
@@ -231,9 +222,9 @@ class PathPoint:
         """By how much constraints, the reserve counted, are exceeded in each interval at places, (N, c)."""
         chain = self.program.chain
         samples = chain.samples(self.x, Places.even(chain.intervals, parts))
-        frames = self.program.rotors.frames(samples.times, samples.derivatives)
-        values = self._constraints(samples, frames)
-        values[:, : self.program.rotors.count] += self.program.reserve - ROTOR_BACKOFF
+        limits = self.program.limits
+        values = limits.values(samples.derivatives, limits.frames(samples.times, samples.derivatives))
+        values[:, limits.has_reserve] += self.program.reserve - RESERVE_BACKOFF
         worst = values.reshape(chain.intervals, parts + 1, -1).max(axis=1)
         return np.where(worst > NEGLIGIBLE, worst, 0.0)
 
@@ -244,9 +235,7 @@ class PathPoint:
         """
         values = self._values.reshape(self.program.chain.intervals, PARTS + 1, -1)
         near = np.asarray(values.max(axis=1) > -margin, dtype=float)
-        path = len(self.program.path.bounds)
-        if path:
-            near[[0, -1], -path:] = 0.0
+        near[np.ix_(np.array([0, len(near) - 1]), np.flatnonzero(self.program.limits.of_path))] = 0.0
         return near
 
     @cached_property
@@ -259,14 +248,14 @@ class PathPoint:
 
     @cached_property
     def _frames(self) -> Array:
-        return self.program.rotors.frames(self._samples.times, self._samples.derivatives)
+        return self.program.limits.frames(self._samples.times, self._samples.derivatives)
 
     @cached_property
     def _values(self) -> Array:
         """The constraints at places, backed off, (m, c)."""
         program = self.program
-        values = self._constraints(self._samples, self._frames)
-        values[:, : program.rotors.count] += program.reserve
+        values = program.limits.values(self._samples.derivatives, self._frames)
+        values[:, program.limits.has_reserve] += program.reserve
         return values + program.backoff[program.places.interval] if program.backoff.size else values
 
     @cached_property
@@ -275,20 +264,6 @@ class PathPoint:
         at, weights, bounds, equal = self.program._stage_rows
         values = np.sum(weights * self._instants.derivatives[at], axis=(1, 2)) - bounds
         return np.asarray(values[~equal])
-
-    def _constraints(self, samples: Samples, frames: Array) -> Array:
-        rotors = self.program.rotors.values(samples.derivatives, frames)
-        return np.concatenate([rotors, self.program.path.values(samples.derivatives)], axis=1)
-
-    def _slopes(self, place: Indices, column: Indices) -> Array:
-        """Of constraints by the derivatives at their places, (q, 6, 3)."""
-        path = self.program.path.weights
-        of_path = column >= self.program.rotors.count
-        slopes = np.empty((len(place), DERIVATIVES, 3))
-        slopes[of_path] = path[column[of_path] - self.program.rotors.count]
-        at, columns = place[~of_path], column[~of_path]
-        slopes[~of_path] = self.program.rotors.slopes(self._samples.derivatives, self._frames, at, columns)
-        return slopes
 
 
 def _sizes(rows: Array) -> Array:

@@ -7,11 +7,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from aerobat.flatness import force_balance
+from aerobat.limits import limits_along
+from aerobat.limits.path_condition import limit_of
 from aerobat.planning.certified_solve import Solution
 from aerobat.planning.polynomial.descent.knot_samples import ConstraintViolation
 from aerobat.planning.polynomial.descent.knot_variables import Frame
-from aerobat.planning.polynomial.descent.path_limits import PathLimits, bound_scale, path_bounds
-from aerobat.planning.polynomial.descent.rotor_constraints import RotorConstraints
+from aerobat.planning.polynomial.descent.path_limits import PathLimits
+from aerobat.planning.polynomial.descent.symbolic_measures import SymbolicMeasures
 from aerobat.planning.result import Plan
 from aerobat.planning.warm_start import WarmStart
 from aerobat.planning.ways import Way
@@ -71,8 +73,9 @@ class FramedProblem:
         environment = problem.environment
         frame = Frame.around(guess, environment.wind)
         balance = force_balance(environment, vehicle)
-        rotors = RotorConstraints(vehicle, frame.axes, environment, problem.heading)
-        limits = PathLimits(rotors, frame.origin, path_bounds(problem, sequence, balance))
+        measures = SymbolicMeasures(vehicle, frame.axes, environment, problem.heading)
+        along = limits_along(vehicle, environment, problem.path_limits, sequence.path_constraints)
+        limits = PathLimits.of(measures, frame.origin, along)
         return cls(problem, vehicle, frame, limits, balance, reserve, ways)
 
     def path(self, guess: WarmStart, start: Plan | None = None) -> Path:
@@ -110,9 +113,8 @@ class FramedProblem:
         for stage, time in zip(guess.stages, guess.times, strict=True):
             flat = np.array([guess.trajectory.evaluate(time, k) for k in range(3)])
             for condition in stage.conditions:
-                bound = condition.bound(self.balance)
-                excess = float(bound.excess(flat))
-                if excess > RELATIVE_STAGE_TOLERANCE * bound_scale(bound):
+                excess = float(condition.bound(self.balance).excess(flat))
+                if excess > RELATIVE_STAGE_TOLERANCE * limit_of(condition, self.balance).size:
                     return f"the stage '{stage.name}' is missed by {excess:.2g} in SI units"
             ball = stage.ball
             if ball is not None and (distance := float(np.linalg.norm(flat[0] - ball.centre))) > ball.radius:

@@ -149,6 +149,6 @@ class KnotProgram:
             for reserve, s in zip(self.reserve, self.samples, strict=True)
         ]
         lower, upper = np.concatenate(own, axis=1)
-        linear = slice(self.limits.size - len(self.limits.bounds), None)
+        linear = slice(self.limits.size - len(self.limits.of_path), None)
         lower[[0, -1], linear], upper[[0, -1], linear] = -inf, inf
         return lower.ravel(), upper.ravel()

@@ -8,6 +8,7 @@ from math import ceil
 import numpy as np
 
 from aerobat.arrays import Array
+from aerobat.limits import Limit
 from aerobat.planning.polynomial.descent.path_limits import END_ORDER, PathLimits, Samples
 from aerobat.trajectory import Trajectory, polynomial
 
@@ -26,7 +27,7 @@ class ConstraintViolation:
     """By how much a trajectory exceeds limits, where, and which most."""
 
     excess: Array  # in each segment, as a fraction of each limit's range; negative: it holds, (S, size)
-    limit: str  # the name of the one that is exceeded most
+    limit: Limit  # that is exceeded most
     time: float  # [s] when
     peaks: Samples  # normalised times in each segment at which a limit is exceeded more than beside them
 
@@ -39,11 +40,12 @@ class ConstraintViolation:
         neighbours = np.pad(values, ((0, 0), (0, 0), (1, 1)), constant_values=-np.inf)
         peaks = (values > 0.0) & (values >= neighbours[..., :-2]) & (values >= neighbours[..., 2:])
         segment, row, place = np.unravel_index(np.argmax(values), values.shape)
-        alike = np.equal.outer(np.array(limits.names), np.array(limits.names))  # rotors, which trade
+        kinds = np.array([_kind(limit) for limit in limits.all])
+        alike = np.equal.outer(kinds, kinds)
         excess = np.where(alike, values.max(axis=2)[:, None], -np.inf).max(axis=-1)
         return cls(
             excess=excess,
-            limit=limits.names[row],
+            limit=limits.all[row],
             time=float(trajectory.knots[segment] + s[place] * trajectory.durations[segment]),
             peaks=tuple(s[p.any(axis=0)] for p in peaks),
         )
@@ -62,7 +64,7 @@ class ConstraintViolation:
 
     def __str__(self) -> str:
         """One sentence without its full stop."""
-        return f"{self.limit}: exceeded by {100.0 * self.worst:.2g} % of the range at {self.time:.3f} s"
+        return self.limit.exceeded(self.worst, self.time)
 
     def add_counterexample(self, trajectory: Trajectory, time: float) -> ConstraintViolation:
         """The same, and a time [s] at which a limit is exceeded where all seemed well."""
@@ -103,6 +105,11 @@ def refit(trajectory: Trajectory, segments: int) -> Trajectory:
     ends = np.stack([trajectory.evaluate(inside, k) for k in range(END_ORDER)], axis=2)
     ends *= (durations[:, None] ** np.arange(END_ORDER))[..., None]
     return Trajectory(durations, polynomial.hermite(ends[0], ends[1]), trajectory.heading)
+
+
+def _kind(limit: Limit) -> str:
+    """A name that rotors share, which trade what they exceed."""
+    return limit.name if limit.rotor is None else "rotors"
 
 
 def _chebyshev(count: int) -> Array:

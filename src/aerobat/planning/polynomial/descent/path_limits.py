@@ -8,6 +8,7 @@ sparse second derivatives, sought without it, take four times as long.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from math import inf, perm
@@ -15,36 +16,46 @@ from typing import Any
 
 import numpy as np
 
-from aerobat.arrays import AXES, Array
+from aerobat.arrays import Array
+from aerobat.limits import Limit
+from aerobat.limits.quantity import WRENCH_RATE
 from aerobat.optimization.nonlinear import import_casadi
-from aerobat.planning.polynomial.descent.rotor_constraints import RotorConstraints
-from aerobat.problem.condition import ForceBalance, LinearBound
-from aerobat.problem.problem import DERIVATIVES, Problem
-from aerobat.problem.stage import StageSequence
+from aerobat.planning.polynomial.descent.symbolic_measures import SymbolicMeasures
 from aerobat.trajectory import Trajectory, polynomial
 
 END_ORDER = 5  # derivatives at either end of a segment that make its polynomial: position to snap
 POLYNOMIAL_DEGREE = 2 * END_ORDER - 1
 TO_COEFFICIENTS = polynomial.hermite(np.eye(2 * END_ORDER)[:END_ORDER], np.eye(2 * END_ORDER)[END_ORDER:])
 ORDERS = np.tile(np.arange(END_ORDER), 2)  # of the derivatives at both ends
-MIN_SCALE = 1e-3  # in SI units: a bound next to zero has no size of its own
 
 Samples = tuple[Array, ...]  # normalised times in each segment, rising
 
 
 @dataclass(frozen=True, eq=False)
 class PathLimits:
-    """Values at a sample with their limits, each divided by its range: rotors, body rate, linear bounds."""
+    """Values at a sample with their limits, each divided by its size: on measures, then on the path."""
 
-    rotors: RotorConstraints
+    measures: SymbolicMeasures
     origin: Array  # [m] of the frame of motion, world, (3,)
-    bounds: tuple[tuple[str, LinearBound], ...]  # each with its name
+    of_measures: tuple[Limit, ...]
+    of_path: tuple[Limit, ...]
+
+    @classmethod
+    def of(cls, measures: SymbolicMeasures, origin: Array, limits: Sequence[Limit]) -> PathLimits:
+        """Return the limits that are not implied by others and differ here."""
+        held = [limit for limit in limits if not limit.is_implied]
+        measured = measures.distinct([limit for limit in held if not limit.quantity.is_of_path])
+        return cls(measures, origin, measured, tuple(limit for limit in held if limit.quantity.is_of_path))
+
+    @property
+    def all(self) -> tuple[Limit, ...]:
+        """The limits, one a value."""
+        return (*self.of_measures, *self.of_path)
 
     def limits(self, reserve: Array) -> tuple[Array, Array]:
         """The least and the most of every value, less a reserve where it has a range, (size,) all."""
-        ends = np.array([scaled(bound) for _, bound in self.bounds]).reshape(-1, 2).T
-        lower, upper = np.concatenate([self.rotors.limits, ends], axis=1)
-        has_range = np.append(self.rotors.has_range, np.ones(len(self.bounds), dtype=bool))
+        lower, upper = np.array([_ends(limit) for limit in self.all]).reshape(-1, 2).T
+        has_range = [limit.has_reserve or limit.quantity.is_of_path for limit in self.all]
         kept = np.where(has_range, reserve, 0.0)
         return lower + kept, upper - kept
 
@@ -53,19 +64,14 @@ class PathLimits:
 
         A part of a coordinate's range is no distance to keep: it would depend on where the origin is.
         """
-        return np.where(np.arange(self.size) < len(self.rotors.names), reserve, 0.0)
+        return np.where([limit.has_reserve for limit in self.all], reserve, 0.0)
 
     def frames(self, trajectory: Trajectory, samples: Samples) -> list[Array]:
         """The rotors' frames at samples of every segment, (9, n) or (3, n) each."""
         segments = zip(trajectory.knots, trajectory.durations, samples, strict=False)
         times = np.concatenate([start + duration * s for start, duration, s in segments])
-        frames = self.rotors.frames(trajectory, np.minimum(times, trajectory.duration))
+        frames = self.measures.frames(trajectory, np.minimum(times, trajectory.duration))
         return np.split(frames, np.cumsum([len(s) for s in samples])[:-1], axis=1)
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """The limits' names, one a value."""
-        return (*self.rotors.names, *(name for name, _ in self.bounds))
 
     def excess(self, trajectory: Trajectory, samples: Samples, reserve: float = 0.0) -> Array:
         """By how much a trajectory exceeds limits at as many samples of each segment, (S, size, n).
@@ -82,7 +88,7 @@ class PathLimits:
                 - np.where(ORDERS == 0, 1.0, 0.0)[:, None] * self.origin
             )
             mapped = self.values.map("values", "serial", len(s), [0, 1], [])
-            values = np.array(mapped(inside @ self.rotors.axes, trajectory.durations[i], self.at(s), frame))
+            values = np.array(mapped(inside @ self.measures.axes, trajectory.durations[i], self.at(s), frame))
             found.append(np.maximum(lower - values, values - upper))
         return np.array(found)
 
@@ -131,18 +137,19 @@ class PathLimits:
     @property
     def size(self) -> int:
         """The number of values."""
-        return len(self.rotors.limits[0]) + len(self.bounds)
+        return len(self.all)
 
     @property
     def dimensions(self) -> int:
         """d, of the frame of motion."""
-        return int(self.rotors.axes.shape[1])
+        return int(self.measures.axes.shape[1])
 
     @cached_property
     def _derivatives(self) -> tuple[int, ...]:
         """The derivatives of position that any value depends on."""
-        bounded = {k for _, bound in self.bounds for k in bound.derivatives}
-        return tuple(sorted({1, 2, 3, 4} | ({5} if self.rotors.lags else set()) | bounded))
+        bounded = {k for limit in self.of_path for k in limit.quantity.derivatives}
+        late = any(limit.quantity.measured[WRENCH_RATE].any() for limit in self.of_measures)
+        return tuple(sorted({1, 2, 3, 4} | ({5} if late else set()) | bounded))
 
     @cached_property
     def _inputs(self) -> tuple[Any, Any, Any, Any]:
@@ -152,7 +159,7 @@ class PathLimits:
             ca.SX.sym("E", 2 * END_ORDER, self.dimensions),
             ca.SX.sym("T"),
             ca.SX.sym("G", len(self._derivatives), 2 * END_ORDER),
-            ca.SX.sym("frame", self.rotors.frame_size),
+            ca.SX.sym("frame", self.measures.frame_size),
         )
 
     @cached_property
@@ -195,29 +202,13 @@ class PathLimits:
         """The values, a column, of the derivatives at a sample, row after row."""
         ca, d = import_casadi(), self.dimensions
         rows = {k: motion[i * d : (i + 1) * d] for i, k in enumerate(self._derivatives)}
-        values = [self.rotors.values([rows.get(k) for k in range(1, 6)], frame)]
-        for _, bound in self.bounds:
-            along = bound.weights @ self.rotors.axes
-            value = sum(ca.dot(ca.DM(along[k]), rows[k]) for k in bound.derivatives)
-            values.append((value + float(bound.weights[0] @ self.origin)) / bound_scale(bound))
+        values = [self.measures.values(self.of_measures, [rows.get(k) for k in range(1, 6)], frame)]
+        for limit in self.of_path:
+            quantity = limit.quantity
+            along = quantity.path @ self.measures.axes
+            value = sum(ca.dot(ca.DM(along[k]), rows[k]) for k in quantity.derivatives)
+            values.append((value + float(quantity.path[0] @ self.origin)) / limit.size)
         return ca.vertcat(*values)
-
-
-def path_bounds(
-    problem: Problem, sequence: StageSequence, balance: ForceBalance
-) -> tuple[tuple[str, LinearBound], ...]:
-    """Bounds along the whole path with their names: the problem's limits, what its sequence asks always.
-
-    Limits' weights (6, 3) have a row for each derivative, position to crackle.
-    """
-    bounds = []
-    for k, quantity in enumerate(DERIVATIVES):
-        for axis, direction, low, high in zip(AXES, np.eye(3), *problem.path_limits.of(k), strict=True):
-            if low > -inf or high < inf:
-                weights = np.outer(np.eye(len(DERIVATIVES))[k], direction)
-                bounds.append((f"{quantity} {axis}", LinearBound(weights, 0.0, float(low), float(high))))
-    asked = ((condition.name, condition.bound(balance)) for condition in sequence.path_constraints)
-    return (*bounds, *asked)
 
 
 def powers(s: Array, derivative: int) -> Array:
@@ -226,12 +217,9 @@ def powers(s: Array, derivative: int) -> Array:
     return np.stack(columns, axis=-1)
 
 
-def bound_scale(bound: LinearBound) -> float:
-    """The size by which a bound's value is divided."""
-    return bound.scale if bound.scale > MIN_SCALE else 1.0
-
-
-def scaled(bound: LinearBound) -> tuple[float, float]:
-    """A bound's limits, of the weighted derivatives alone, divided by its scale."""
-    lower, upper = bound.limits
-    return lower / bound_scale(bound), upper / bound_scale(bound)
+def _ends(limit: Limit) -> tuple[float, float]:
+    """The ends of a limit over its size; of a magnitude, whose square is held, their squares."""
+    lower, upper = limit.ends
+    if limit.quantity.magnitude is None:
+        return lower, upper
+    return lower**2 if lower > 0.0 else -inf, upper**2

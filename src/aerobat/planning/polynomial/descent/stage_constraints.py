@@ -11,6 +11,8 @@ from typing import Any
 import numpy as np
 
 from aerobat.arrays import Array
+from aerobat.limits import Limit
+from aerobat.limits.path_condition import limit_of
 from aerobat.optimization.nonlinear import import_casadi
 from aerobat.planning.polynomial.descent.knot_variables import KnotVariables
 from aerobat.planning.polynomial.descent.path_limits import (
@@ -18,12 +20,10 @@ from aerobat.planning.polynomial.descent.path_limits import (
     POLYNOMIAL_DEGREE,
     TO_COEFFICIENTS,
     PathLimits,
-    bound_scale,
-    scaled,
 )
 from aerobat.planning.ways import SLOWEST, Way
 from aerobat.problem.ball import Ball
-from aerobat.problem.condition import ForceBalance, LinearBound
+from aerobat.problem.condition import ForceBalance
 
 BALL_SHARE = 1.0 - 1e-5  # of a ball's squared radius: rounding has the rest
 NORMAL = 1e-9  # what a direction has of a plane that it is normal to
@@ -64,7 +64,7 @@ class StageConstraints:
         for j, stage in enumerate(variables.guess.stages):
             place = self._place(j, x)
             for condition in stage.conditions:
-                yield from self._held(condition.bound(self.balance), place)
+                yield from self._held(limit_of(condition, self.balance), place)
             if stage.ball is not None:
                 yield self._met(stage.ball, place)
             if j in ways:
@@ -96,7 +96,7 @@ class StageConstraints:
 
     def _world(self, place: _Place, order: int) -> Any:
         """A derivative of position at a place in the world frame, (3,)."""
-        ca, axes = import_casadi(), self.limits.rotors.axes
+        ca, axes = import_casadi(), self.limits.measures.axes
         vector = ca.DM(axes) @ place.derivative(order).T
         return vector + ca.DM(self.limits.origin) if order == 0 else vector
 
@@ -105,15 +105,16 @@ class StageConstraints:
         ca = import_casadi()
         return ca.sumsqr(self._world(place, 0) - ca.DM(ball.centre)) / ball.radius**2, -inf, BALL_SHARE
 
-    def _held(self, bound: LinearBound, place: _Place) -> Iterator[Row]:
-        """A bound; nothing where no variable matters."""
-        ca, axes = import_casadi(), self.limits.rotors.axes
-        value = float(bound.weights[0] @ self.limits.origin)
-        along = {k: bound.weights[k] @ axes for k in bound.derivatives}
+    def _held(self, limit: Limit, place: _Place) -> Iterator[Row]:
+        """A limit that holds there; nothing where no variable matters."""
+        ca, axes = import_casadi(), self.limits.measures.axes
+        quantity = limit.quantity
+        value = float(quantity.path[0] @ self.limits.origin)
+        along = {k: quantity.path[k] @ axes for k in quantity.derivatives}
         found = {k: weights for k, weights in along.items() if np.abs(weights).max() >= NORMAL}
         if found:
             value += sum(place.derivative(k) @ ca.DM(weights) for k, weights in found.items())
-            yield value / bound_scale(bound), *scaled(bound)
+            yield value / limit.size, *limit.ends
 
     def _clear(self, way: Way, place: _Place) -> Iterator[Row]:
         """The room of the body on a way through a gate, and its speed: see `ways`."""

@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 from math import inf
 
 import numpy as np
 
+from aerobat import so3
 from aerobat.arrays import Array
-from aerobat.flatness import force_balance, reference
+from aerobat.flatness import reference
+from aerobat.limits import MEASURES, Limit, limits_along
+from aerobat.limits.quantity import BODY_RATE, SPECIFIC_THRUST, UPRIGHT, WRENCH, WRENCH_RATE
 from aerobat.planning.time_optimal.optimal_control.collocation import BOUNDED_DERIVATIVES
-from aerobat.problem.condition import LinearBound
 from aerobat.problem.problem import Problem
 from aerobat.trajectory import Trajectory
 from aerobat.vehicle import Vehicle
@@ -34,79 +37,82 @@ MAX_BACKOFF = 0.9  # of a range, from both ends together: more leaves nothing
 
 
 @dataclass(frozen=True, eq=False)
-class PathBound:
-    """lower ≤ Σ weights[k] · p⁽ᵏ⁾ ≤ upper all along, SI units, world frame."""
-
-    weights: Array  # (5, 3), a row for position and each derivative up to snap
-    lower: float
-    upper: float
-    size: float  # of what is bounded
-
-    @classmethod
-    def of(cls, bound: LinearBound) -> PathBound:
-        """A condition's."""
-        weights = np.vstack([bound.weights, np.zeros((BOUNDED_DERIVATIVES - len(bound.weights), 3))])
-        return cls(weights, *bound.limits, bound.scale)
-
-    @property
-    def order(self) -> int:
-        """The highest derivative that counts."""
-        return int(np.flatnonzero(self.weights.any(axis=1)).max())
-
-
-@dataclass(frozen=True, eq=False)
 class Bounds:
-    """Bounds of path, rotors and body rate, M quantities in this order."""
+    """Limits along the whole motion, M of them in this order: on the path, on measures, on the body rate.
+
+    The floor under the specific thrust is not among the M: it bounds an input.
+    """
 
     vehicle: Vehicle
     problem: Problem
-    path: tuple[PathBound, ...]
+    path: tuple[Limit, ...]
+    driven: tuple[Limit, ...]  # by the inputs: rotors and whatever else is no magnitude
+    rate: Limit | None
+    floor: Limit  # under the specific thrust
 
     @classmethod
     def of(cls, problem: Problem, vehicle: Vehicle) -> Bounds:
-        """A vehicle's, those of a problem's limits and of what its maneuver asks throughout, drag counted."""
-        balance = force_balance(problem.environment, vehicle)
-        constraints = problem.stages(vehicle.max_specific_thrust).path_constraints
-        path = [PathBound.of(condition.bound(balance)) for condition in constraints]
-        for derivative in range(BOUNDED_DERIVATIVES):
-            for axis, (lower, upper) in enumerate(zip(*problem.path_limits.of(derivative), strict=True)):
-                if np.isfinite([lower, upper]).any():
-                    weights = np.zeros((BOUNDED_DERIVATIVES, 3))
-                    weights[derivative, axis] = 1.0
-                    path.append(PathBound(weights, lower, upper, _size(lower, upper)))
-        return cls(vehicle, problem, tuple(path))
+        """Return a vehicle's, those of a problem's limits and of what its maneuver asks throughout."""
+        conditions = problem.stages(vehicle.max_specific_thrust).path_constraints
+        limits = limits_along(vehicle, problem.environment, problem.path_limits, conditions)
+        held = [limit for limit in limits if not limit.is_implied]
+        plain = [limit for limit in held if limit.quantity.magnitude is None]
+        return cls(
+            vehicle,
+            problem,
+            path=tuple(limit for limit in plain if limit.quantity.is_of_path),
+            driven=tuple(limit for limit in plain if not limit.quantity.is_of_path),
+            rate=next((limit for limit in held if limit.quantity.magnitude == BODY_RATE), None),
+            floor=next(limit for limit in held if limit.quantity.magnitude == SPECIFIC_THRUST),
+        )
 
     @property
     def lower(self) -> Array:
-        """Lower ends, (M,)."""
-        return np.array([*(b.lower for b in self.path), *self.vehicle.min_thrusts, -inf])
+        """Lower ends less what is constant, (M,)."""
+        return np.array([*(limit.size * limit.ends[0] for limit in (*self.path, *self.driven)), -inf])
 
     @property
     def upper(self) -> Array:
-        """Upper ends, (M,)."""
-        return np.array(
-            [*(b.upper for b in self.path), *self.vehicle.max_thrusts, self.vehicle.max_body_rate]
-        )
+        """Upper ends less what is constant, (M,)."""
+        ends = (limit.size * limit.ends[1] for limit in (*self.path, *self.driven))
+        return np.array([*ends, inf if self.rate is None else self.rate.upper])
 
     @property
     def sizes(self) -> Array:
         """The size of each, (M,)."""
-        rate = self.vehicle.max_body_rate
-        ranges = self.vehicle.max_thrusts - self.vehicle.min_thrusts
-        return np.array([*(b.size for b in self.path), *ranges, rate if rate < inf else 1.0])
+        sizes = (limit.size for limit in (*self.path, *self.driven))
+        return np.array([*sizes, 1.0 if self.rate is None else self.rate.size])
+
+    @property
+    def kept(self) -> Array:
+        """The sizes of those from whose ends a reserve is kept by rotors, else 0, (M,)."""
+        return np.where(
+            [limit.rotor is not None for limit in (*self.path, *self.driven)] + [False], self.sizes, 0.0
+        )
+
+    @cached_property
+    def weights(self) -> Array:
+        """Weights of the driven ones on the measures, (D, 11)."""
+        return np.array([limit.quantity.measured for limit in self.driven]).reshape(-1, MEASURES)
 
     def along(self, trajectory: Trajectory) -> Array:
         """The quantities at the looks of each interval, (K, looks, M)."""
-        vehicle, times = self.vehicle, trajectory.knots[:-1, None] + LOOKS * trajectory.durations[:, None]
+        times = trajectory.knots[:-1, None] + LOOKS * trajectory.durations[:, None]
         derivatives = np.stack([trajectory.on_segments(LOOKS, k) for k in range(BOUNDED_DERIVATIVES)], axis=2)
-        path = [np.sum(bound.weights * derivatives, axis=(-2, -1)) for bound in self.path]
-        flat = reference(trajectory, vehicle, times.ravel(), environment=self.problem.environment)
-        thrusts = flat.rotor_thrusts.reshape(*times.shape, -1)
-        changes = np.einsum("ij,kjn->kin", DIFFERENTIATION, thrusts) / trajectory.durations[:, None, None]
+        path = [
+            np.sum(limit.quantity.path[:BOUNDED_DERIVATIVES] * derivatives, axis=(-2, -1))
+            for limit in self.path
+        ]
+        flat = reference(trajectory, self.vehicle, times.ravel(), environment=self.problem.environment)
+        measures = np.zeros((*times.shape, MEASURES))
+        wrench = flat.setpoint.wrench
+        measures[..., WRENCH.start] = wrench.thrust.reshape(times.shape)
+        measures[..., WRENCH.start + 1 : WRENCH.stop] = wrench.moment_body.reshape(*times.shape, 3)
+        changes = np.einsum("ij,kjn->kin", DIFFERENTIATION, measures[..., WRENCH])
+        measures[..., WRENCH_RATE] = changes / trajectory.durations[:, None, None]
+        measures[..., UPRIGHT] = so3.thrust_axis(flat.setpoint.q_world_body)[:, 2].reshape(times.shape)
         rate = np.linalg.norm(flat.setpoint.omega_body, axis=-1).reshape(*times.shape, 1)
-        return np.concatenate(
-            [*(p[..., None] for p in path), thrusts + vehicle.lags * changes, rate], axis=-1
-        )
+        return np.concatenate([*(p[..., None] for p in path), measures @ self.weights.T, rate], axis=-1)
 
 
 @dataclass(frozen=True, eq=False)
@@ -133,9 +139,7 @@ class Backoff:
             trajectory: The motion's.
             reserve: Of each rotor's range.
         """
-        values, kept = bounds.along(trajectory), np.zeros_like(bounds.sizes)
-        rotors = slice(len(bounds.path), -1)
-        kept[rotors] = reserve * bounds.sizes[rotors]
+        values, kept = bounds.along(trajectory), reserve * bounds.kept
         low = _raised(self.low, bounds.lower + kept + _largest(-values), bounds.sizes)
         high = _raised(self.high, _largest(values) - (bounds.upper - kept), bounds.sizes)
         unchanged = (low == self.low).all() and (high == self.high).all()
@@ -161,9 +165,3 @@ def _raised(backoff: Array, excess: Array, sizes: Array) -> Array:
     """
     more = OVERSHOOT * np.maximum(excess, 0.0) + BACKOFF * sizes + np.where(excess > 0.0, backoff, 0.0)
     return backoff + np.where(excess > -NEAR * sizes, more, 0.0)
-
-
-def _size(lower: float, upper: float) -> float:
-    if np.isfinite([lower, upper]).all():
-        return upper - lower
-    return max(abs(lower) if lower > -inf else abs(upper), 1.0)

@@ -12,9 +12,11 @@ import numpy as np
 
 from aerobat.arrays import Array
 from aerobat.flatness import force_balance
+from aerobat.limits import Limit
+from aerobat.limits.path_condition import limit_of
 from aerobat.optimization.nonlinear import import_casadi
 from aerobat.optimization.separable import ElementFunction
-from aerobat.planning.time_optimal.optimal_control.bounds import Bounds, PathBound
+from aerobat.planning.time_optimal.optimal_control.bounds import Bounds
 from aerobat.planning.time_optimal.optimal_control.collocation import STATE_SCALE, IntervalSide, Mesh
 from aerobat.planning.time_optimal.optimal_control.zero_yaw_rate_body import (
     INPUTS,
@@ -70,16 +72,17 @@ class Elements:
     @property
     def rate_scale(self) -> float:
         """The size of body rates [rad/s]."""
-        return min(self.vehicle.max_body_rate, RATE_SCALE)
+        return RATE_SCALE if self.bounds.rate is None else min(self.bounds.rate.size, RATE_SCALE)
 
     @property
     def bounds_rate(self) -> bool:
         """True where the vehicle's body rate has a bound."""
-        return self.vehicle.max_body_rate < inf
+        return self.bounds.rate is not None
 
-    def has_one_value(self, bound: PathBound) -> bool:
-        """True where a bound's quantity cannot jump at a node."""
-        return bound.order < 2 or (bound.order == 2 and self.continuous)
+    def has_one_value(self, limit: Limit) -> bool:
+        """True where a linear limit's quantity cannot jump at a node."""
+        *_, order = limit.quantity.derivatives
+        return order < 2 or (order == 2 and self.continuous)
 
     @cached_property
     def sides(self) -> tuple[ElementFunction, ElementFunction]:
@@ -93,15 +96,14 @@ class Elements:
 
     def _side(self, last: int) -> ElementFunction:
         ca, side = import_casadi(), IntervalSide(self.body, self.input_scale, last)
-        thrusts, commands = self.body.rotors(side.state, side.input, side.slope)
         path = self.bounds.path
         between = [_weighted(b, side.between(s)) for s in BETWEEN for b in path]
         jumping = [_weighted(b, side.here()) for b in path if not self.has_one_value(b)]
-        rotors = commands if self.continuous else thrusts
+        driven = self.body.driven(self.bounds.weights)(side.state, side.input, side.slope)
         turning = []
         if self.bounds_rate and not last:
             turning = [ca.sumsqr(side.body_rate(s)) / self.rate_scale**2 for s in BETWEEN]
-        values = ca.vertcat(side.defect(), *between, rotors, *jumping, *turning)
+        values = ca.vertcat(side.defect(), *between, driven, *jumping, *turning)
         return ElementFunction(ca.Function("side", [side.unknowns, side.fraction], [values]))
 
     @cached_property
@@ -121,13 +123,13 @@ class Elements:
         balance = force_balance(self.problem.environment, self.vehicle)
         values, ends = [], []
         for condition in conditions:
-            bound = PathBound.of(condition.bound(balance))
+            limit = limit_of(condition, balance)
             if is_of_direction(condition):
                 values.append(ca.dot(ca.DM(condition.direction), node.thrust_axis))
                 ends.append((condition.lower, condition.upper))
             else:
-                values.append(_weighted(bound, node.derivatives))
-                ends.append((bound.lower, bound.upper))
+                values.append(_weighted(limit, node.derivatives))
+                ends.append((limit.size * limit.ends[0], limit.size * limit.ends[1]))
         lower, upper = np.array(ends).T
         return node.function(ca.vertcat(*values)), lower, upper
 
@@ -216,7 +218,7 @@ class _Node:
         return ElementFunction(ca.Function("node", [self.unknowns, ca.SX.sym("none", 0)], [values]))
 
 
-def _weighted(bound: PathBound, derivatives: Iterable[Any]) -> Any:
-    """A bound's quantity of derivatives of position in symbols."""
-    ca, pairs = import_casadi(), zip(bound.weights, derivatives, strict=False)
+def _weighted(limit: Limit, derivatives: Iterable[Any]) -> Any:
+    """A linear limit's quantity of derivatives of position in symbols, less what is constant."""
+    ca, pairs = import_casadi(), zip(limit.quantity.path, derivatives, strict=False)
     return sum(ca.dot(ca.DM(weights), values) for weights, values in pairs if weights.any())

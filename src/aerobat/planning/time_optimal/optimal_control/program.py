@@ -79,7 +79,7 @@ class OptimalControl:
         elements, bounds = self.elements, self.elements.bounds
         path = len(bounds.path)
         lower, upper = bounds.lower + backoff.low, bounds.upper - backoff.high
-        kept = self.reserve * bounds.sizes[path:-1]
+        kept = self.reserve * bounds.kept[path:-1]
         jumping = [i for i, bound in enumerate(bounds.path) if not elements.has_one_value(bound)]
         still, between = np.zeros((mesh.total, STATES)), len(BETWEEN)
         shared = rows.reserve(

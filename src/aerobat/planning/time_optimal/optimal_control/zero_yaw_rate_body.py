@@ -16,13 +16,13 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
+from aerobat.arrays import Array
 from aerobat.environment import Environment
 from aerobat.flatness import axial_drag, lateral_drag
 from aerobat.kernels.flatness import collective, moment
 from aerobat.kernels.quaternions import axes, quaternion_rate
 from aerobat.optimization.nonlinear import import_casadi
 from aerobat.vehicle import Vehicle
-from aerobat.vehicle.allocation import mixer
 
 STATES = 12
 INPUTS = 3
@@ -46,13 +46,13 @@ class ZeroYawRateBody:
         second = self._along(first)
         return self._function("derivatives", [first, second, self._along(second)])
 
-    @cached_property
-    def rotors(self) -> Any:
-        """(x, u, u') -> the rotors' least-norm thrusts [N], and their commands f + τ f' [N], each (n,)."""
+    def driven(self, weights: Array) -> Any:
+        """(x, u, u') -> weights (D, 11) times the measures that limits are linear in, (D,)."""
         ca = import_casadi()
-        thrusts = ca.DM(mixer(self.vehicle)) @ self._wrench()
-        commands = thrusts + ca.DM(self.vehicle.lags) * self._along(thrusts)
-        return self._function("rotors", [thrusts, commands])
+        wrench, (*_, b3) = self._wrench(), axes(_scalars(self._x[ATTITUDE]))
+        speed = ca.norm_2(ca.vertcat(*self._omega))
+        measures = ca.vertcat(wrench, self._along(wrench), self._symbols[1][0], speed, b3[2])
+        return self._function("driven", [ca.sparsify(ca.DM(weights)) @ measures])
 
     @cached_property
     def axes(self) -> Any:

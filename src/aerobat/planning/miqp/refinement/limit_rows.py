@@ -1,20 +1,23 @@
-"""What a vehicle can do along a path, and its slopes: rotor thrusts, their commands, thrust and body rate.
+"""Limits along a path as constraints with their slopes: what the refinement of the search's paths holds.
 
-In body axes that are carried with the thrust axis by the smallest rotation from those of the path as it is:
-exact where the path is met, and exact to first order beside it. Slopes come from a complex step, which knows
-no cancellation (Squire and Trapp, "Using complex variables to estimate derivatives of real functions", 1998).
+Measures are taken in body axes that are carried with the thrust axis by the smallest rotation from those of
+the path as it is: exact where the path is met, and exact to first order beside it. Slopes come from a complex
+step, which knows no cancellation (Squire and Trapp, "Using complex variables to estimate derivatives of real
+functions", 1998).
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
+from math import isfinite
 from typing import Any
 
 import numpy as np
 
 from aerobat import so3
-from aerobat.arrays import Array, Indices
+from aerobat.arrays import Array, Indices, Mask
 from aerobat.environment import Environment
 from aerobat.flatness import axial_drag, lateral_drag
 from aerobat.flatness.parallel_transport import frames
@@ -22,34 +25,43 @@ from aerobat.flatness.references import UNDETERMINED, specific_thrust
 from aerobat.kernels import flatness as kernel
 from aerobat.kernels.ops import Vector
 from aerobat.kernels.vectors import dot, scale
-from aerobat.vehicle import Vehicle, mixer
+from aerobat.limits import MEASURES, Limit
+from aerobat.so3 import UP
+from aerobat.vehicle import Vehicle
 
-MIN_THRUST = 0.05  # of gravity: specific thrust is kept above, lest the attitude be undetermined
 COMPLEX_STEP = 1e-20
 TINY = 1e-18  # [rad²/s²] beside the square of a rate, which a body at rest has with a slope
-MOVING = slice(1, 6)  # velocity to crackle: what thrusts depend on
+MOVING = slice(1, 6)  # velocity to crackle: what measures depend on
 
 
 @dataclass(frozen=True, eq=False)
-class RotorRows:
-    """A vehicle's limits as constraints c ≤ 0 on a path's derivatives, each as a fraction of its range."""
+class LimitRows:
+    """Constraints c ≤ 0 on a path's derivatives, each as a fraction of its limit's size."""
 
+    limits: tuple[Limit, ...]
     vehicle: Vehicle
     environment: Environment
     heading: float  # [rad]
 
-    @property
-    def names(self) -> tuple[str, ...]:
-        """Of the constraints, each in a few words."""
-        rotors = range(len(self.vehicle.rotors))
-        kinds = ["thrust", "command"] if self.vehicle.lags.any() else ["thrust"]
-        sides = (f"the {kind} of rotor {i} is" for kind in kinds for _ in ("low", "high") for i in rotors)
-        return (*sides, "the collective thrust is next to nothing,", "the body rate is")
+    @cached_property
+    def sides(self) -> tuple[tuple[Limit, float], ...]:
+        """The limit of each constraint, with -1 for its lower end and 1 for its upper one."""
+        return tuple(
+            (limit, sign)
+            for limit in self.limits
+            for sign, end in zip((-1.0, 1.0), limit.ends, strict=True)
+            if isfinite(end)
+        )
 
-    @property
-    def count(self) -> int:
-        """The number of constraints."""
-        return len(self._linear[1])
+    @cached_property
+    def of_path(self) -> Mask:
+        """Which constraints are linear in the path's derivatives, (c,)."""
+        return np.array([limit.quantity.is_of_path for limit, _ in self.sides], dtype=bool)
+
+    @cached_property
+    def has_reserve(self) -> Mask:
+        """Which constraints a reserve for the controller is kept from, (c,)."""
+        return np.array([limit.has_reserve for limit, _ in self.sides], dtype=bool)
 
     def frames(self, times: Array, derivatives: Array) -> Array:
         """Body axes in the world, as columns, (m, 3, 3), along a path's derivatives (m, 6, 3)."""
@@ -61,9 +73,11 @@ class RotorRows:
 
     def values(self, derivatives: Array, frames: Array) -> Array:
         """The constraints at derivatives (m, 6, 3), (m, c), infinite where thrust is against its frame."""
-        weights, offsets = self._linear
         with np.errstate(divide="ignore", invalid="ignore"):
-            values = self._demands(self._moving(derivatives) @ frames, frames) @ weights.T + offsets
+            measures = self._measures(self._moving(derivatives) @ frames, frames)
+            values = measures @ self._measured.T
+        values[:, self.of_path] = np.einsum("mka,cka->mc", derivatives, self._path[self.of_path])
+        values -= self._bounds
         return np.where(np.isnan(values), np.inf, values)
 
     def slopes(self, derivatives: Array, frames: Array, place: Indices, column: Indices) -> Array:
@@ -75,18 +89,38 @@ class RotorRows:
             place: Where each of the constraints is looked at, (q,).
             column: Which one it is, (q,).
         """
+        slopes = self._path[column]
+        of_measures = ~self.of_path[column]
+        place, column = place[of_measures], column[of_measures]
         looked_at = np.zeros(len(frames), dtype=bool)
         looked_at[place] = True
         frames = frames[looked_at]
         local = self._moving(derivatives[looked_at]) @ frames
         directions = np.eye(15).reshape(15, 1, 5, 3)
-        demands = self._demands(local + 1j * COMPLEX_STEP * directions, frames)
-        by_local = np.moveaxis(demands.imag / COMPLEX_STEP, 0, -1).reshape(*demands.shape[1:], 5, 3)
-        by_world = (by_local @ np.swapaxes(frames, -1, -2)[:, None]).reshape(*demands.shape[1:], 15)
-        slopes = np.zeros((len(place), 6, 3))
+        measures = self._measures(local + 1j * COMPLEX_STEP * directions, frames)
+        by_local = np.moveaxis(measures.imag / COMPLEX_STEP, 0, -1).reshape(*measures.shape[1:], 5, 3)
+        by_world = (by_local @ np.swapaxes(frames, -1, -2)[:, None]).reshape(*measures.shape[1:], 15)
         index = looked_at.cumsum()[place] - 1
-        slopes[:, MOVING] = (self._linear[0][column, None] @ by_world[index]).reshape(len(place), 5, 3)
+        along = (self._measured[column, None] @ by_world[index]).reshape(len(place), 5, 3)
+        slopes[np.flatnonzero(of_measures)[:, None], np.arange(6)[MOVING]] = along
         return slopes
+
+    @cached_property
+    def _measured(self) -> Array:
+        """Weights on the measures, (c, 11)."""
+        rows = [sign / limit.size * limit.quantity.measured for limit, sign in self.sides]
+        return np.array(rows).reshape(-1, MEASURES)
+
+    @cached_property
+    def _path(self) -> Array:
+        """Weights on the path's derivatives, (c, 6, 3)."""
+        rows = [sign / limit.size * limit.quantity.path for limit, sign in self.sides]
+        return np.array(rows).reshape(-1, 6, 3)
+
+    @cached_property
+    def _bounds(self) -> Array:
+        """The ends that weighted values keep below, (c,)."""
+        return np.array([sign * limit.ends[int(sign > 0.0)] for limit, sign in self.sides])
 
     def _moving(self, derivatives: Array) -> Array:
         """Airspeed, acceleration, jerk, snap and crackle, (m, 5, 3)."""
@@ -94,11 +128,8 @@ class RotorRows:
         moving[:, 0] -= self.environment.wind
         return moving
 
-    def _demands(self, moving: Any, frames: Array) -> Any:
-        """What constraints are linear in, of airspeed to crackle in body axes (..., m, 5, 3), (..., m, 10).
-
-        Collective thrust and moment, their derivatives, the specific thrust and the body rate.
-        """
+    def _measures(self, moving: Any, frames: Array) -> Any:
+        """The measures of airspeed to crackle in body axes (..., m, 5, 3), (..., m, 11)."""
         drag = lateral_drag(self.vehicle)
         airspeed, acceleration, jerk, snap, crackle = np.moveaxis(moving, -2, 0)
         weight = self.environment.weight @ frames
@@ -108,29 +139,8 @@ class RotorRows:
         b3, *rates = (scale(1.0 / norm, vector) for vector in vectors[:4])
         turning = kernel.turning(b3, *rates)
         rate = np.sqrt(dot(turning[0], turning[0]) + TINY)
-        return np.stack([*self._wrenches(b3, norm, vectors, turning), norm, rate], axis=-1)
-
-    @cached_property
-    def _linear(self) -> tuple[Array, Array]:
-        """Weights (c, 10) and offsets (c,) of the constraints, of what they are linear in."""
-        vehicle, inverse = self.vehicle, mixer(self.vehicle)
-        low, high = vehicle.min_thrusts, vehicle.max_thrusts
-        span = high - low
-        thrusts = np.concatenate([inverse, np.zeros_like(inverse)], axis=1) / span[:, None]
-        commands = np.concatenate([inverse, vehicle.lags[:, None] * inverse], axis=1) / span[:, None]
-        rotors = [-thrusts, thrusts]
-        offsets = [low / span, -high / span]
-        if vehicle.lags.any():
-            rotors += [-commands, commands]
-            offsets *= 2
-        others = np.diag([-1.0 / self.environment.gravity, 1.0 / vehicle.max_body_rate])
-        other_offsets = np.array([MIN_THRUST, -1.0])
-        kept = 1 + np.isfinite(vehicle.max_body_rate)
-        rows = np.concatenate(rotors)
-        weights = np.zeros((len(rows) + kept, 10))
-        weights[: len(rows), :8] = rows
-        weights[len(rows) :, 8:] = others[:kept]
-        return weights, np.concatenate([*offsets, other_offsets[:kept]])
+        upright = dot(b3, _components(UP @ frames))
+        return np.stack([*self._wrenches(b3, norm, vectors, turning), norm, rate, upright], axis=-1)
 
     def _wrenches(
         self, b3: Vector, norm: Any, vectors: list[Vector], turning: tuple[Vector, ...]
@@ -150,6 +160,13 @@ class RotorRows:
         thrust_rate = kernel.collective_rate(mass, axial, b3, (norm, f1), (airspeed, acceleration))
         moment, moment_rate = kernel.moment_and_rate(inertia, *local)
         return thrust, *moment, thrust_rate, *moment_rate
+
+
+def stage_rows(limit: Limit) -> Iterator[tuple[Array, float]]:
+    """Yield a linear limit's sides as weights (6, 3) and the bound that they keep below."""
+    for sign, end in zip((-1.0, 1.0), limit.ends, strict=True):
+        if isfinite(end):
+            yield sign / limit.size * limit.quantity.path, sign * end
 
 
 def _components(vectors: Any) -> Vector:

@@ -1,4 +1,4 @@
-"""Rotor commands and body rates along a polynomial path, in CasADi's symbols, by `kernels.flatness`.
+"""What limits are linear in along a polynomial path, in CasADi's symbols, by `kernels.flatness`.
 
 In a vertical plane the body turns about one axis of its own. In space its axes are those of a guess, carried
 from the guess's thrust direction to the new one by the smallest rotation: exact where the guess is met.
@@ -6,36 +6,36 @@ from the guess's thrust direction to the new one by the smallest rotation: exact
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from math import inf
 from typing import Any
 
 import numpy as np
 
 from aerobat import so3
-from aerobat.arrays import Array, Mask
+from aerobat.arrays import Array
 from aerobat.environment import Environment
 from aerobat.flatness import axial_drag, lateral_drag, reference
 from aerobat.kernels import flatness as kernel
 from aerobat.kernels.ops import Vector
 from aerobat.kernels.quaternions import to_body
 from aerobat.kernels.vectors import dot, scale
+from aerobat.limits import Limit
+from aerobat.limits.quantity import BODY_RATE, SPECIFIC_THRUST, WRENCH, WRENCH_RATE
 from aerobat.optimization.nonlinear import import_casadi
 from aerobat.so3 import UP
 from aerobat.trajectory import Trajectory
 from aerobat.vehicle import Vehicle
-from aerobat.vehicle.allocation import mixer
 
-ROTOR_DIFFERENCE = 1e-9  # relative differences between rotors that mean nothing
-THRUST_FLOOR = 0.02  # of gravity, the least specific thrust: more, and the attitude stays determined
+SAME = 1e-9  # relative differences between limits that mean nothing
 
 
 @dataclass(frozen=True, eq=False)
-class RotorConstraints:
-    """Commands f + τ f′ of a vehicle's rotors, each as a part of its range, 0 to 1; |f|², and |ω|².
+class SymbolicMeasures:
+    """The measures that limits are linear in, of a vehicle's motion along axes.
 
-    The last two are over gravity's and over the largest body rate's square, where there is one.
+    In a vertical plane collective thrust, angular acceleration and squared rate make the wrench.
     """
 
     vehicle: Vehicle
@@ -48,30 +48,16 @@ class RotorConstraints:
         """The number of components of a frame."""
         return 3 if self._planar else 9
 
-    @property
-    def lags(self) -> bool:
-        """Whether thrusts follow their commands late, so that crackle counts."""
-        return bool(self.vehicle.lags.any())
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """The limits' names, one a value."""
-        rotors = ["rotor commands" if self.lags else "rotor thrusts"] * len(self._thrusts_from)
-        return (*rotors, "least thrust", *(["body rate"] if self._rate_is_limited else []))
-
-    @property
-    def limits(self) -> tuple[Array, Array]:
-        """The least and the most of every value, (size,) each."""
-        count = len(self._thrusts_from)
-        rate = [1.0] if self._rate_is_limited else []
-        lower = [*np.zeros(count), THRUST_FLOOR**2, *(-inf for _ in rate)]
-        return np.array(lower), np.array([*np.ones(count), inf, *rate])
-
-    @property
-    def has_range(self) -> Mask:
-        """Whether a value has a range of which a part can be kept: not the floor of thrust, (size,)."""
-        lower, upper = self.limits
-        return np.asarray((lower == 0.0) | (upper < inf))
+    def distinct(self, limits: Sequence[Limit]) -> tuple[Limit, ...]:
+        """Return limits on measures without those that are the same here: rotors that turn a plane alike."""
+        rows = []
+        for limit in limits:
+            wrench, rate, others = np.split(limit.quantity.measured, [WRENCH.stop, WRENCH_RATE.stop])
+            rows.append([*(wrench @ self._to_wrench), *(rate @ self._to_wrench), *others, *limit.ends])
+        table = np.nan_to_num(np.array(rows).reshape(len(limits), -1), posinf=0.0, neginf=0.0)
+        scaled = np.round(table / np.maximum(np.abs(table).max(axis=0, initial=0.0), SAME) / SAME)
+        first = np.sort(np.unique(scaled, axis=0, return_index=True)[1])
+        return tuple(limits[i] for i in first)
 
     def frames(self, trajectory: Trajectory, times: Array) -> Array:
         """Body axes in the world along a trajectory, (9, n): x, y and z; or the axis of turning, (3, n)."""
@@ -80,14 +66,21 @@ class RotorConstraints:
         q = reference(trajectory, self.vehicle, times, environment=self.environment).setpoint.q_world_body
         return np.swapaxes(so3.axes(q), -1, -2).reshape(len(times), 9).T
 
-    def values(self, motion: list[Any], frame: Any) -> Any:
-        """The values, a column, of velocity to crackle (d,) each and the frame."""
+    def values(self, limits: Sequence[Limit], motion: list[Any], frame: Any) -> Any:
+        """Return the quantities of limits over their sizes, magnitudes squared, a column.
+
+        Args:
+            limits: Of measures.
+            motion: Velocity to crackle, (d,) each.
+            frame: The body axes of the guess.
+        """
         ca = import_casadi()
         v, a, j, s, crackle = motion
         airspeed = v - ca.DM(self.environment.wind @ self.axes)
         weight = ca.DM(self.environment.weight @ self.axes)
         thrusts = kernel.specific_thrust(weight, lateral_drag(self.vehicle), airspeed, a, j, s)
-        f, jerk, snap, airspeed = (self._local(vector, frame) for vector in (*thrusts, airspeed))
+        vectors = (*thrusts, airspeed, ca.DM(UP @ self.axes))
+        f, jerk, snap, airspeed, up = (self._local(vector, frame) for vector in vectors)
         squared = dot(f, f)
         n = ca.sqrt(squared)
         b3 = scale(1 / n, f)
@@ -98,23 +91,27 @@ class RotorConstraints:
         else:
             body = ((*kernel.tilted(b3, rate), 0.0) for rate in (omega, omega_dot))
             turning = ca.vertcat(*kernel.moment(self.vehicle.inertia.tolist(), *body))
-        rotors = ca.DM(self._thrusts_from[:, :-3]) @ ca.vertcat(collective, turning)
-        low, high, lag = self._thrusts_from[:, -3:].T
-        if self.lags:
-            rates = ca.jtimes(rotors, ca.vertcat(v, a, j, s), ca.vertcat(a, j, s, crackle))
-            rotors += lag * rates
-        values = [(rotors - low) / (high - low), squared / self.environment.gravity**2]
-        if self._rate_is_limited:
-            values.append(dot(omega, omega) / self.vehicle.max_body_rate**2)
+        loads = ca.vertcat(collective, turning)
+        rates = ca.SX(*loads.shape)
+        if any(limit.quantity.measured[WRENCH_RATE].any() for limit in limits):
+            rates = ca.jtimes(loads, ca.vertcat(v, a, j, s), ca.vertcat(a, j, s, crackle))
+        to_wrench = ca.sparsify(ca.DM(self._to_wrench))
+        measures = ca.vertcat(
+            to_wrench @ loads, to_wrench @ rates, n, ca.sqrt(dot(omega, omega)), dot(b3, up)
+        )
+        squares = {SPECIFIC_THRUST: squared, BODY_RATE: dot(omega, omega)}
+        values = []
+        for limit in limits:
+            magnitude, weights = limit.quantity.magnitude, limit.quantity.measured / limit.size
+            if magnitude is not None:
+                values.append(weights[magnitude] ** 2 * squares[magnitude])
+            else:
+                values.append(ca.dot(ca.sparsify(ca.DM(weights)), measures))
         return ca.vertcat(*values)
 
     @property
     def _planar(self) -> bool:
         return int(self.axes.shape[1]) == 2
-
-    @property
-    def _rate_is_limited(self) -> bool:
-        return self.vehicle.max_body_rate < inf
 
     @cached_property
     def _turning_axis(self) -> Array:
@@ -124,20 +121,13 @@ class RotorConstraints:
         )
 
     @cached_property
-    def _thrusts_from(self) -> Array:
-        """Rotors that differ: thrust from collective thrust and moment, its limits [N] and lag [s], (r, 7).
-
-        In a plane, from collective thrust, angular acceleration and squared rate, (r, 6).
-        """
-        vehicle, mix = self.vehicle, mixer(self.vehicle)
-        own = [vehicle.min_thrusts[:, None], vehicle.max_thrusts[:, None], vehicle.lags[:, None]]
+    def _to_wrench(self) -> Array:
+        """The map from what makes the wrench to the wrench, (4, 4); in a plane (4, 3)."""
         if not self._planar:
-            return np.hstack([mix, *own])
-        axis = self._turning_axis
-        moments = np.stack([vehicle.inertia @ axis, np.cross(axis, vehicle.inertia @ axis)], axis=1)
-        rows = np.hstack([mix[:, :1], mix[:, 1:] @ moments, *own])
-        scaled = np.round(rows / np.maximum(np.abs(rows).max(axis=0), ROTOR_DIFFERENCE) / ROTOR_DIFFERENCE)
-        return np.asarray(rows[np.sort(np.unique(scaled, axis=0, return_index=True)[1])])
+            return np.eye(4)
+        axis, inertia = self._turning_axis, self.vehicle.inertia
+        moments = np.stack([inertia @ axis, np.cross(axis, inertia @ axis)], axis=1)
+        return np.vstack([[1.0, 0.0, 0.0], np.hstack([np.zeros((3, 1)), moments])])
 
     def _local(self, vector: Any, frame: Any) -> Vector:
         """Components of a vector in the guess's body axes; in a plane in its own, the third across it."""

@@ -1,0 +1,38 @@
+"""All limits along a path, by family: the register of limits."""
+
+from __future__ import annotations
+
+from aerobat.environment import Environment
+from aerobat.limits import body_rate, box, path_condition, rotor_command, rotor_thrust, thrust_floor, tilt
+from aerobat.limits.limit import Asked, Limit
+from aerobat.problem import Condition, Limits
+from aerobat.vehicle import Vehicle
+
+FAMILIES = (
+    rotor_thrust.limits,
+    rotor_command.limits,
+    thrust_floor.limits,
+    body_rate.limits,
+    box.limits,
+    path_condition.limits,
+    tilt.limits,
+)
+NO_LIMITS = Limits()
+
+
+def limits_along(
+    vehicle: Vehicle | None,
+    environment: Environment,
+    limits: Limits = NO_LIMITS,
+    conditions: tuple[Condition, ...] = (),
+) -> tuple[Limit, ...]:
+    """Return everything that must hold all along a path.
+
+    Args:
+        vehicle: What flies it; without one, rotors and body rates have no limits and there is no drag.
+        environment: Gravity, wind and ground.
+        limits: The bounds per axis of a problem, its ground among them.
+        conditions: What a maneuver asks throughout.
+    """
+    asked = Asked(vehicle, environment, limits, conditions)
+    return tuple(limit for family in FAMILIES for limit in family(asked))

@@ -1,0 +1,93 @@
+"""A limit: a quantity along a path, the interval that it must stay in, and the fields that say so."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from math import inf
+
+import numpy as np
+
+from aerobat.arrays import Array
+from aerobat.environment import Environment
+from aerobat.flatness import force_balance
+from aerobat.limits.quantity import PathQuantity
+from aerobat.problem import Condition, Limits
+from aerobat.problem.condition import ForceBalance
+from aerobat.vehicle import Vehicle
+
+SMALLEST_SIZE = 1e-3  # in SI units: a bound next to zero has no size of its own
+
+
+@dataclass(frozen=True, eq=False)
+class Limit:
+    """lower ≤ quantity ≤ upper, all along a path; infinite where one side is open.
+
+    Where an optimizer cannot take it as it is, `search` says it once more: limits linear in a path's
+    derivatives that together imply it, for programs that know nothing else. It has none by itself where it is
+    not linear.
+    """
+
+    name: str  # in sentences and certificates: "rotor 3 command", "velocity x"
+    unit: str
+    quantity: PathQuantity
+    lower: float
+    upper: float
+    fields: tuple[str, str]  # that the lower and the upper end come from: "max_thrust", "limits.velocity"
+    size: float  # of its range, of which reserves and excesses are fractions
+    rotor: int | None = None  # whose it is
+    has_reserve: bool = False  # whether a reserve for the controller is kept from its ends
+    is_implied: bool = False  # whether others imply it along a whole path: an optimizer may leave it out
+    is_proven: bool = True  # whether a certificate states it; else it guards what planners do between
+    search: tuple[Limit, ...] = ()
+
+    @cached_property
+    def linear(self) -> tuple[Limit, ...]:
+        """What it is to programs that are linear in a path's derivatives."""
+        return (self,) if self.quantity.is_of_path else self.search
+
+    @property
+    def ends(self) -> tuple[float, float]:
+        """Its ends less the quantity's constant, as fractions of its size."""
+        return (self.lower - self.quantity.constant) / self.size, (
+            self.upper - self.quantity.constant
+        ) / self.size
+
+    def exceeded(self, excess: float, time: float) -> str:
+        """Return a sentence without its full stop about an excess, a fraction of its size, at a time [s]."""
+        return f"{self.name} is beyond its limit by {100.0 * excess:.3g} % of its range at {time:.2f} s"
+
+
+@dataclass(frozen=True, eq=False)
+class Asked:
+    """All that asks for limits: a vehicle, an environment, and what a problem asks of the whole path."""
+
+    vehicle: Vehicle | None  # None: no vehicle in particular
+    environment: Environment
+    limits: Limits
+    conditions: tuple[Condition, ...]
+
+    @cached_property
+    def balance(self) -> ForceBalance:
+        """The balance of thrust, acceleration and drag."""
+        return force_balance(self.environment, self.vehicle)
+
+
+def size_of(lower: float, upper: float) -> float:
+    """Return the size of an interval: its length, or where one side is open what the other end says."""
+    if -inf < lower < upper < inf:
+        return upper - lower
+    largest = max((abs(end) for end in (lower, upper) if abs(end) < inf), default=0.0)
+    return largest if largest > SMALLEST_SIZE else 1.0
+
+
+def stacked(limits: tuple[Limit, ...]) -> tuple[Array, Array, Array, Array]:
+    """Return weights on the measures (c, 11) and on the path (c, 6, 3), lower and upper ends (c,).
+
+    All of them are divided by the limits' sizes.
+    """
+    sizes = np.array([limit.size for limit in limits])
+    measured = np.array([limit.quantity.measured for limit in limits]).reshape(len(limits), -1)
+    path = np.array([limit.quantity.path for limit in limits]).reshape(len(limits), 6, 3)
+    lower, upper = np.array([limit.ends for limit in limits]).reshape(-1, 2).T
+    return measured / sizes[:, None], path / sizes[:, None, None], lower, upper

@@ -1,0 +1,31 @@
+"""The thrust of every rotor, within what it gives."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from aerobat.limits.limit import Asked, Limit
+from aerobat.limits.quantity import PathQuantity
+from aerobat.vehicle import mixer
+
+FIELDS = ("min_thrust", "max_thrust")
+
+
+def limits(asked: Asked) -> Iterator[Limit]:
+    """Yield a limit for each rotor. Where it lags, its command's limits imply it."""
+    vehicle = asked.vehicle
+    if vehicle is None:
+        return
+    for i, (rotor, share) in enumerate(zip(vehicle.rotors, mixer(vehicle), strict=True)):
+        yield Limit(
+            name=f"rotor {i}",
+            unit="N",
+            quantity=PathQuantity.of_wrench(share),
+            lower=rotor.min_thrust,
+            upper=rotor.max_thrust,
+            fields=FIELDS,
+            size=rotor.max_thrust - rotor.min_thrust,
+            rotor=i,
+            has_reserve=True,
+            is_implied=rotor.lag > 0.0,
+        )
