@@ -88,7 +88,7 @@ def seam(trajectory: Trajectory, vehicle: Vehicle, environment: Environment) -> 
         ("position", "m", state.flat.position, np.ptp(trajectory.on_segments([0.0]), axis=0)),
         ("velocity", "m/s", state.flat.velocity, trajectory.peak(1).value),
         ("body rate", "rad/s", state.omega_body, max(1.0, float(np.abs(state.omega_body).max()))),
-        ("rotor thrusts", "N", flat.rotor_thrusts * (vehicle.lags > 0.0), vehicle.max_thrusts),
+        ("rotor thrusts", "N", flat.rotor_thrusts * (vehicle.lags > 0.0), vehicle.thrust_ranges),
     )
     jumps = [("attitude", "rad", float(so3.angle_between(*state.q_world_body)), 1.0)]
     for name, unit, ends, size in checks:
@@ -131,7 +131,7 @@ def _thrust_tolerances(curve: ThrustCurve, ends: Array, min_thrust: Array) -> Ar
     real = MagnitudeBounds(thrust, np.ones_like(thrust), omega, snap / min_thrust + 2 * omega**2)
     errors = first_order(real, min_thrust, speed, np.stack(off, axis=-1), curve.vehicle)
     rounding = quantities.errors(curve.vehicle, real, errors)[:, : len(curve.vehicle.rotors)]
-    return np.maximum(rounding, COMMAND_RESOLUTION * (curve.vehicle.max_thrusts - curve.vehicle.min_thrusts))
+    return np.maximum(rounding, COMMAND_RESOLUTION * curve.vehicle.thrust_ranges)
 
 
 def _jump(ends: Array) -> Array:

@@ -60,7 +60,7 @@ def errors(vehicle: Vehicle, magnitudes: MagnitudeBounds, of: MagnitudeBounds) -
 @lru_cache(maxsize=128)
 def scales(vehicle: Vehicle) -> Array:
     """Magnitudes that count as large, (n + 4,): the rotors' ranges and the moments that use them up."""
-    ranges = vehicle.max_thrusts - vehicle.min_thrusts
+    ranges = vehicle.thrust_ranges
     moment = float((ranges / np.linalg.norm(mixer(vehicle)[:, 1:], axis=1)).max())
     return frozen([*ranges, ranges.sum(), 0.01, 1.0, moment**2], "scales")
 

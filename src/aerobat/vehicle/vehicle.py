@@ -121,6 +121,11 @@ class Vehicle:
         return frozen([rotor.max_thrust for rotor in self.rotors], "max_thrust")
 
     @cached_property
+    def thrust_ranges(self) -> Array:
+        """What lies between the rotors' limits [N], (n,)."""
+        return frozen(self.max_thrusts - self.min_thrusts, "thrust_ranges")
+
+    @cached_property
     def lags(self) -> Array:
         """The rotors' time constants [s], (n,)."""
         return frozen([rotor.lag for rotor in self.rotors], "lag")

@@ -92,11 +92,7 @@ class Attempts:
             failure: Why the vehicle cannot follow it, where that is known without a certificate.
             excess: By how much, as a fraction of a constraint's range, negative.
         """
-        span = (
-            0.0
-            if self.vehicle is None
-            else float(np.ptp([*self.vehicle.min_thrusts, *self.vehicle.max_thrusts]))
-        )
+        span = 0.0 if self.vehicle is None else float(self.vehicle.thrust_ranges.max())
         return self._certified(_Answered(self, placement, failure, excess * span or None), 1)
 
     def refined(self, start: Placement, find: Callable[[], PathPoint | None]) -> Judged[Placement]:

@@ -98,7 +98,7 @@ def stretched_path(problem: Problem, vehicle: Vehicle, sequence: StageSequence, 
     still = np.zeros((len(sequence.stages), 3))
     fixed = fixed_at_knots(problem, unhurried(sequence), order, balance, still)
     durations = first_times(problem, fixed, vehicle.max_specific_thrust)
-    allowed = -EXCEEDED * float((vehicle.max_thrusts - vehicle.min_thrusts).max())
+    allowed = -EXCEEDED * float(vehicle.thrust_ranges.max())
 
     def path(steps: int) -> Trajectory:
         return minimum_effort(fixed, durations * PACE**steps, heading=problem.heading)

@@ -56,7 +56,7 @@ def spread_of(plan: Plan, vehicle: Vehicle, conditions: Dispersion, seed: int, f
     batch = fly(plan, vehicle, conditions=conditions, seed=seed, flights=flights[:SAMPLED])
     spacing = float(batch.times[1] - batch.times[0]) if len(batch.times) > 1 else 1.0
     rows = slice(None, None, max(1, round(1.0 / (ROWS_RATE * spacing))))
-    span = vehicle.max_thrusts - vehicle.min_thrusts
+    span = vehicle.thrust_ranges
     commands = batch.commands[:, rows]
     margins = np.minimum(commands - vehicle.min_thrusts, vehicle.max_thrusts - commands) / span
     departures = np.abs(commands - np.median(commands, axis=0)) / span

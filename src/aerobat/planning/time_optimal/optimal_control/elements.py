@@ -66,7 +66,7 @@ class Elements:
     def input_scale(self) -> Array:
         """The size of the inputs [m/s², rad/s², rad/s²], (3,)."""
         vehicle = self.vehicle
-        spread = np.abs(vehicle.allocation[:INPUTS]) @ (vehicle.max_thrusts - vehicle.min_thrusts) / 2
+        spread = np.abs(vehicle.allocation[:INPUTS]) @ vehicle.thrust_ranges / 2
         return np.asarray(spread / [vehicle.mass, vehicle.inertia[0, 0], vehicle.inertia[1, 1]])
 
     @property
