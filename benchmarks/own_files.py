@@ -79,7 +79,12 @@ class Case:
 def random_files(seed: int, case: int) -> Case:
     """The files of a case, the same whenever they are drawn."""
     pen = Pen(seed, case)
-    return Case(_problem(pen, pen.one_of(*KINDS), case), _vehicle(pen))
+    found = Case(_problem(pen, pen.one_of(*KINDS), case), _vehicle(pen))
+    if pen.chance(0.1):  # drawn last: earlier draws stay as they were
+        tilt = pen.number(0.5, 2.5)
+        ceiling = pen.one_of({"max_tilt": tilt}, {"max_tilt_deg": round(np.degrees(tilt), 1)})
+        found.problem["limits"] = found.problem.get("limits", {}) | ceiling
+    return found
 
 
 def _vehicle(pen: Pen) -> Table:

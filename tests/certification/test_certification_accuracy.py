@@ -210,8 +210,8 @@ def test_of_a_hover_all_is_known_but_for_rounding() -> None:
 def gaps(certificate: Certificate, vehicle: Vehicle) -> np.ndarray:
     """Between what is proven and what is reached, in ranges of the rotors."""
     ranges = vehicle.max_thrusts - vehicle.min_thrusts
-    rotors = [f for f in certificate.findings if f.quantity.startswith("rotor ")]
-    return np.array([abs(f.bound - f.value) / ranges[int(f.quantity.split()[1])] for f in rotors])
+    rotors = [f for f in certificate.findings if f.rotor is not None]
+    return np.array([abs(f.bound - f.value) / ranges[f.rotor] for f in rotors])
 
 
 @pytest.mark.parametrize("seed", [0, 2, 6, 8])

@@ -102,10 +102,8 @@ def test_a_rotor_nearer_to_its_limit_than_can_be_told_is_said_to_be():
         [1.0], [[[0, 0, 0], [0, 0, 0], [0, 0, (4 * full / WEIGHT - 1) * STANDARD_GRAVITY / 2]]]
     )
     certificate = certify(climb, VEHICLE)
-    expected = (
-        f"cannot decide: rotor 0 rises to {full:.4g} N at 0.000 s, nearer to its limit than can be told"
-    )
-    assert (certificate.certified, certificate.why) == (False, expected)
+    why = f"thrust of rotor 0 rises to {full:.4g} N at 0.000 s, nearer to its limit than can be told"
+    assert (certificate.certified, certificate.why) == (False, f"cannot decide: {why}")
 
 
 @pytest.mark.parametrize("vehicle", ["agile-quad", "hexarotor", "crazyflie", "section-v"])
@@ -220,6 +218,6 @@ def test_all_numbers_of_a_certificate_are_finite(duration, coefficient):
 def test_a_finding_is_nearer_than_can_be_told_only_where_its_bound_is_beyond_the_limit(value, off, limit):
     """Undecided it may be elsewhere, too: where no attitude is determined."""
     bound = value + off
-    said = str(Finding("thrust", "N", Side.MAX, value, bound, 1.0, limit, Verdict.UNDECIDED))
+    said = str(Finding("collective thrust", "N", Side.MAX, value, bound, 1.0, limit, Verdict.UNDECIDED))
     assert ("nearer to its limit than can be told" in said) == (bound > limit)
     assert ("within its limit" in said) == (bound <= limit)

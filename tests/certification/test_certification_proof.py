@@ -48,8 +48,8 @@ def extremes_of(flight: Flight, times: np.ndarray) -> dict[tuple[str, Side], np.
         ("moment", most): np.linalg.norm(setpoint.wrench.moment_body, axis=1),
     }
     for side in Side:
-        series["thrust", side] = setpoint.wrench.thrust
-        series |= {(f"rotor {i}", side): rotor for i, rotor in enumerate(found.rotor_thrusts.T)}
+        series["collective thrust", side] = setpoint.wrench.thrust
+        series |= {(f"thrust of rotor {i}", side): rotor for i, rotor in enumerate(found.rotor_thrusts.T)}
         series |= {(f"position {axis}", side): setpoint.flat.position[:, k] for k, axis in enumerate("xyz")}
         series |= {(f"jerk {axis}", side): setpoint.flat.jerk[:, k] for k, axis in enumerate("xyz")}
     return series
@@ -77,7 +77,7 @@ def test_each_extreme_is_taken_where_it_is_said_to_be_and_never_passed(seed):
     far = Limits(lower=[-1e6] * 3, upper=[1e6] * 3, jerk=1e6)
     certificate = certificate_of(flight, Envelope(limits=far))
     samples = extremes_of(flight, np.linspace(0, flight.trajectory.duration, 20_001))
-    named = {(finding.quantity, finding.side): finding for finding in certificate.findings}
+    named = {(finding.name, finding.side): finding for finding in certificate.findings}
     assert named.keys() == samples.keys()
     for key, finding in named.items():
         outwards = 1 if finding.side is Side.MAX else -1
@@ -178,10 +178,10 @@ def test_a_hover_has_exactly_its_margin(heading):
     hover = certify(Trajectory([1.0], np.zeros((1, 1, 3)), heading), VEHICLE)
     assert hover.certified
     assert hover.margin == pytest.approx(VEHICLE.mass * STANDARD_GRAVITY / 4, abs=1e-9)
-    most = {finding.quantity: finding.bound for finding in hover.findings if finding.side is Side.MAX}
+    most = {finding.name: finding.bound for finding in hover.findings if finding.side is Side.MAX}
     assert most["speed"] == most["body rate"] == most["moment"] == 0.0
     assert most["tilt"] < 1e-6
-    assert hover.why.startswith("certified: rotor ")
+    assert hover.why.startswith("certified: thrust of rotor ")
 
 
 def test_inverted_flight_is_certified_where_it_holds():
@@ -202,7 +202,7 @@ def test_vanishing_thrust_leaves_the_attitude_and_so_the_question_open(first, la
     assert [(s.start, s.end) for s in certificate.undetermined] == [
         (pytest.approx(s.start, abs=1e-6), pytest.approx(s.end, abs=1e-6)) for s in expected
     ]
-    assert all(f.verdict is not Verdict.HOLDS for f in certificate.findings if f.quantity.startswith("rotor"))
+    assert all(f.verdict is not Verdict.HOLDS for f in certificate.findings if f.rotor is not None)
 
 
 def test_a_violation_counts_even_where_thrust_vanishes_elsewhere():
@@ -292,11 +292,11 @@ def test_the_example_of_section_v_has_the_published_extremes(iteration, thrust, 
     certificate = certify(
         minimum_effort(given, [0.5 + shift, 1.5]), load_vehicle("section-v"), Environment(gravity=9.80665)
     )
-    values = {(finding.quantity, finding.side): finding.value for finding in certificate.findings}
-    found = [values["thrust", Side.MIN], values["thrust", Side.MAX]]
+    values = {(finding.name, finding.side): finding.value for finding in certificate.findings}
+    found = [values["collective thrust", Side.MIN], values["collective thrust", Side.MAX]]
     found += [values["moment", Side.MAX], values["body rate", Side.MAX]]
-    found += [min(values[f"rotor {i}", Side.MIN] for i in range(4))]
-    found += [max(values[f"rotor {i}", Side.MAX] for i in range(4))]
+    found += [min(values[f"thrust of rotor {i}", Side.MIN] for i in range(4))]
+    found += [max(values[f"thrust of rotor {i}", Side.MAX] for i in range(4))]
     printed = np.array([*thrust, moment, rate, *rotors])
     half_digits = np.array([0.06, 0.06, 0.006, 0.06, 0.006, 0.006])
     assert (np.abs(found - printed) <= np.maximum(half_digits, 6e-3 * np.abs(printed))).all()

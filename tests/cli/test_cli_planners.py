@@ -81,7 +81,7 @@ def test_check_refuses_by_limit_time_and_size(capsys) -> None:
     shared_plan("flip-roll").save("flip-roll.plan")
     code, out, _ = run(capsys, "check", "flip-roll.plan", "--vehicle", "crazyflie")
     assert code == 1
-    assert "not certified: rotor" in " ".join(out.split())
+    assert "not certified: command of rotor" in " ".join(out.split())
     for limit, quantity in (
         ("--max-speed=3", "speed"),
         ("--max-tilt=90", "tilt"),

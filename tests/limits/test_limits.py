@@ -60,7 +60,7 @@ def by_flatness(flown: Trajectory, craft: Vehicle, times: np.ndarray, limit: Lim
     here, ahead, behind = (reference(flown, craft, times + h, environment=WIND) for h in (0.0, 1e-6, -1e-6))
     if limit.rotor is not None:
         thrust = here.rotor_thrusts[:, limit.rotor]
-        if not limit.name.endswith("command"):
+        if limit.name == "thrust":
             return thrust
         rate = (ahead.rotor_thrusts - behind.rotor_thrusts)[:, limit.rotor] / 2e-6
         return np.asarray(thrust + craft.rotors[limit.rotor].lag * rate)
@@ -130,7 +130,9 @@ def test_a_certificate_states_every_limit_as_far_as_samples_reach_and_little_fur
             ends = [(Side.MAX, np.arccos(limit.lower), np.arccos(values.min()))]
         for side, end, reached in ends:
             if np.isfinite(end):
-                (finding,) = (f for f in findings if (f.quantity, f.side) == (limit.name, side))
+                (finding,) = (
+                    f for f in findings if (f.quantity, f.side, f.rotor) == (limit.name, side, limit.rotor)
+                )
                 assert (finding.rotor, finding.size) == (limit.rotor, limit.size)
                 assert finding.limit == pytest.approx(end)
                 assert finding.field == limit.fields[side is Side.MAX]

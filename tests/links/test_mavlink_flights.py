@@ -184,7 +184,7 @@ def test_what_is_not_proven_for_its_vehicle_is_refused() -> None:
         ((bare, ORIGIN, None), "for no vehicle"),
         ((plan, ORIGIN, "hexarotor"), "certified for agile-quad, not for hexarotor"),
         ((unproven, ORIGIN, None), "not certified for agile-quad .it was never checked"),
-        ((refuted, ORIGIN, None), "not certified for agile-quad .rotor"),
+        ((refuted, ORIGIN, None), "not certified for agile-quad .command of rotor"),
         ((plan, np.zeros(3), None), "raise its origin"),
     ):
         with pytest.raises(SpecError, match=words):

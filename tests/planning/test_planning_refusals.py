@@ -65,4 +65,4 @@ def test_a_reserve_that_leaves_too_little_to_hover_is_what_the_advice_names() ->
 def test_the_limit_that_a_path_exceeds_is_named() -> None:
     """It was "a limit or condition on the path"."""
     found = Miqp().plan(replace(LINE, limits=Limits(jerk=2.0)), QUAD)
-    assert any(attempt.outcome.startswith("jerk x is beyond its limit") for attempt in found.attempts)
+    assert any(attempt.outcome.startswith("the jerk x is beyond its limit") for attempt in found.attempts)

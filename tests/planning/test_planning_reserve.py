@@ -22,11 +22,11 @@ def kept(certificate: Certificate | None) -> float:
     limits: dict[str, list[float]] = {}
     margins: dict[str, float] = {}
     for finding in certificate.findings:
-        if finding.quantity.startswith("rotor "):
+        if finding.rotor is not None:
             assert finding.limit is not None
             assert finding.margin is not None
-            limits.setdefault(finding.quantity, []).append(finding.limit)
-            margins[finding.quantity] = min(finding.margin, margins.get(finding.quantity, finding.margin))
+            limits.setdefault(finding.name, []).append(finding.limit)
+            margins[finding.name] = min(finding.margin, margins.get(finding.name, finding.margin))
     return min(margins[name] / (max(ends) - min(ends)) for name, ends in limits.items())
 
 

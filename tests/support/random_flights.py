@@ -166,5 +166,5 @@ def commands(flight: Flight, times: np.ndarray) -> np.ndarray:
 def certified_margin(flight: Flight, certificate: Certificate) -> float:
     """The margin that a certificate states, in ranges of that rotor."""
     low, high = flight.vehicle.min_thrusts, flight.vehicle.max_thrusts
-    rotors = [f for f in certificate.findings if f.quantity.startswith("rotor ")]
-    return min(f.margin / (high - low)[int(f.quantity.split()[1])] for f in rotors)
+    rotors = [f for f in certificate.findings if f.rotor is not None]
+    return min(f.margin / (high - low)[f.rotor] for f in rotors)

@@ -34,8 +34,9 @@ class Finding:
     same.
     """
 
-    # "speed", "tilt", "thrust", "body rate", "moment", "rotor 0", "rotor 0 command", "velocity x", ...
-    quantity: str
+    quantity: (
+        str  # "thrust" and "command" of a rotor, "collective thrust", "tilt", "speed", "velocity x", ...
+    )
     unit: str
     side: Side
     value: float  # reached at `time`
@@ -48,6 +49,11 @@ class Finding:
     rotor: int | None = None  # whose thrust or command it is about
     field: str = ""  # of the vehicle or the problem, that the limit comes from: "max_thrust", "limits.jerk"
     size: float | None = None  # of the range between its limits, of which reserves are fractions
+
+    @property
+    def name(self) -> str:
+        """The quantity in words, with its rotor."""
+        return self.quantity if self.rotor is None else f"{self.quantity} of rotor {self.rotor}"
 
     @property
     def place(self) -> str | None:
@@ -68,7 +74,7 @@ class Finding:
     def __str__(self) -> str:
         """One sentence without its full stop."""
         change = "rises" if self.side is Side.MAX else "falls"
-        reached = f"{self.quantity} {change} to {self.shown(self.value)} at {self.time:.3f} s"
+        reached = f"{self.name} {change} to {self.shown(self.value)} at {self.time:.3f} s"
         if self.place is not None:
             reached = f"{self.place} {self.quantity} {self._of_limit} at {self.time:.3f} s"
         margin = self.margin

@@ -127,7 +127,7 @@ def _queries(vehicle: Vehicle, envelope: Envelope, limits: Sequence[Limit]) -> l
     return [
         *(query for i, limit in enumerate(thrusts) for query in within(limit, i)),
         *(query for i, limit in enumerate(derived, count + 4) for query in within(limit, i)),
-        *both_sides("thrust", "N", count, low, high),
+        *both_sides("collective thrust", "N", count, low, high),
         _nearest(tilt, [(acos(limit.lower), limit) for limit in limits if _is_of(limit, UPRIGHT)]),
         _nearest(rate, [(limit.upper, limit) for limit in limits if _is_of(limit, BODY_RATE)]),
         ExtremumQuery("moment", "N·m", Side.MAX, envelope.moment, count + 3, 1, root),

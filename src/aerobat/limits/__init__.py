@@ -1,11 +1,11 @@
 """Limits along a path, each said once: a quantity, the interval that it must stay in, and who asks for it.
 
-A family of limits is one file with one function, registered in `limits_along`: the mixed-integer search, both
-refinements, the look between samples and the certificate read its limits and nothing else.
+A family of limits is one file with one function, registered in `along.FAMILIES` or by `register_limits`: the
+mixed-integer search, the refinements, the look between samples and the certificate hold its limits.
 """
 
-from aerobat.limits.along import limits_along
+from aerobat.limits.along import limits_along, register_limits
 from aerobat.limits.limit import Asked, Limit
 from aerobat.limits.quantity import MEASURES, PathQuantity
 
-__all__ = ["MEASURES", "Asked", "Limit", "PathQuantity", "limits_along"]
+__all__ = ["MEASURES", "Asked", "Limit", "PathQuantity", "limits_along", "register_limits"]

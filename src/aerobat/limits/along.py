@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator
+
 from aerobat.environment import Environment
 from aerobat.limits import body_rate, box, path_condition, rotor_command, rotor_thrust, thrust_floor, tilt
 from aerobat.limits.limit import Asked, Limit
 from aerobat.problem import Condition, Limits
 from aerobat.vehicle import Vehicle
 
-FAMILIES = (
+Family = Callable[[Asked], Iterator[Limit]]
+
+FAMILIES: list[Family] = [
     rotor_thrust.limits,
     rotor_command.limits,
     thrust_floor.limits,
@@ -16,8 +20,18 @@ FAMILIES = (
     box.limits,
     path_condition.limits,
     tilt.limits,
-)
+]
 NO_LIMITS = Limits()
+
+
+def register_limits(family: Family) -> Family:
+    """Register a function that yields limits, as a decorator: every planner and certificate holds them.
+
+    Args:
+        family: Of what is asked, the vehicle and the problem's limits, to the limits that follow from it.
+    """
+    FAMILIES.append(family)
+    return family
 
 
 def limits_along(

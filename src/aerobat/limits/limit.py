@@ -28,7 +28,7 @@ class Limit:
     not linear.
     """
 
-    name: str  # in sentences and certificates: "rotor 3 command", "velocity x"
+    name: str  # of the quantity in certificates: "command", "velocity x"
     unit: str
     quantity: PathQuantity
     lower: float
@@ -55,7 +55,8 @@ class Limit:
 
     def exceeded(self, excess: float, time: float) -> str:
         """Return a sentence without its full stop about an excess, a fraction of its size, at a time [s]."""
-        return f"{self.name} is beyond its limit by {100.0 * excess:.3g} % of its range at {time:.2f} s"
+        name = self.name if self.rotor is None else f"{self.name} of rotor {self.rotor}"
+        return f"the {name} is beyond its limit by {100.0 * excess:.3g} % of its range at {time:.2f} s"
 
 
 @dataclass(frozen=True, eq=False)

@@ -17,4 +17,4 @@ def limits(asked: Asked) -> Iterator[Limit]:
         if lag > 0.0:
             share = thrust.quantity.measured[WRENCH]
             command = PathQuantity.of_wrench(share, lag * share)
-            yield replace(thrust, name=f"{thrust.name} command", quantity=command, is_implied=False)
+            yield replace(thrust, name="command", quantity=command, is_implied=False)

@@ -18,7 +18,7 @@ def limits(asked: Asked) -> Iterator[Limit]:
         return
     for i, (rotor, share) in enumerate(zip(vehicle.rotors, mixer(vehicle), strict=True)):
         yield Limit(
-            name=f"rotor {i}",
+            name="thrust",
             unit="N",
             quantity=PathQuantity.of_wrench(share),
             lower=rotor.min_thrust,

@@ -109,7 +109,7 @@ class ReserveShortfall:
     def __str__(self) -> str:
         """One sentence without its full stop."""
         return (
-            f"{self.finding.quantity} keeps {100.0 * self.kept:.3g} % of its range at "
+            f"the {self.finding.name} keeps {100.0 * self.kept:.3g} % of its range at "
             f"{self.finding.time:.3f} s, {100.0 * self.reserve:.3g} % are asked in reserve"
         )
 

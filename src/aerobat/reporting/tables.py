@@ -109,7 +109,7 @@ def _nearest_rotors(findings: Iterable[Finding]) -> Iterable[Finding]:
     """The findings, of all rotors' thrusts and commands those with the smallest margin on either side."""
     nearest: dict[tuple[str, Side], Finding] = {}
     for finding in findings:
-        key = finding.quantity.removeprefix(f"rotor {finding.rotor}"), finding.side
+        key = finding.quantity, finding.side
         known = nearest.setdefault(key, finding)
         if (finding.margin or 0.0) < (known.margin or 0.0):
             nearest[key] = finding
@@ -130,7 +130,7 @@ def _passage_rows(findings: Iterable[Finding]) -> Iterable[tuple[str, ...]]:
 
 def _finding_row(finding: Finding) -> tuple[str, ...]:
     return (
-        finding.quantity if finding.place is None else f"{finding.place} {finding.quantity}",
+        finding.name if finding.place is None else f"{finding.place} {finding.name}",
         f"{finding.side.value} {finding.shown(finding.value)}",
         f"{finding.time:.3f} s",
         "–" if finding.limit is None else finding.shown(finding.limit),

@@ -158,7 +158,10 @@ def peak_angles(attitude: Array, other: Array) -> tuple[float, float]:
 
 def _peak(angles: Array, turned: Array) -> float:
     """The largest angle that may be, by samples (n, m) and the turns from each to the next (n, m - 1)."""
-    between = (angles[:, :-1] + angles[:, 1:] + turned) / 2.0  # it changes by no more than is turned
+    between = (angles[:, :-1] + angles[:, 1:] + turned) / 2.0  # it changes by no more than is turned,
+    rise = np.abs(np.diff(angles, 2, axis=1)) / 8.0  # or rises and falls between samples, as a parabola does
+    rise = np.pad(rise, ((0, 0), (1, 1)), mode="edge")  # (n, m)
+    between += np.maximum(rise[:, :-1], rise[:, 1:])
     return float(min(between.max(), np.pi))
 
 
