@@ -7,7 +7,7 @@ from math import isfinite
 from pathlib import Path
 from typing import Any
 
-from aerobat.planning.plan_file import FORMAT, FRAMES, REVISION, evidence_adapter
+from aerobat.planning.plan_file import FORMAT, FRAMES, REVISION, facts_adapter
 
 SCHEMA = Path(__file__).parent / "plan.schema.json"
 FILES = "as in its file, where what is usual may be left out: see files.md"
@@ -16,7 +16,7 @@ NUMBERS = {"type": "array", "items": {"type": "number"}, "minItems": 3, "maxItem
 
 def schema() -> str:
     """The whole file."""
-    evidence = in_short(evidence_adapter().json_schema(mode="serialization"))
+    evidence = in_short(facts_adapter().json_schema(mode="serialization"))
     definitions = evidence.pop("$defs")
     environment = {
         "type": "object",

@@ -10,7 +10,7 @@ from aerobat.certification import Certificate, Envelope, Finding, PlannedPassage
 from aerobat.certification.envelope import CROSSING_SPEED
 from aerobat.evaluation import score
 from aerobat.flatness import reference
-from aerobat.planning import Miqp, Plan, load_plan, plan, with_certificate
+from aerobat.planning import Miqp, Plan, load_plan, plan
 from aerobat.problem import (
     Condition,
     CustomManeuver,
@@ -62,7 +62,7 @@ def test_a_plan_is_certified_with_its_passage_and_check_says_the_same(flip, tmp_
     assert {finding.gate for finding in found.values()} == {"gate"}
     assert {finding.time for finding in found.values()} == {flip.stages[2].time}
     assert all(finding.verdict is Verdict.HOLDS for finding in found.values())
-    assert flip.certificate == with_certificate(flip, VEHICLE).certificate
+    assert flip.certificate == flip.for_vehicle(VEHICLE).certificate
     flip.save(tmp_path / "flip.plan")
     assert load_plan(tmp_path / "flip.plan").certificate == flip.certificate
 
@@ -99,7 +99,7 @@ def test_each_finding_is_what_flatness_says_at_that_instant(seed):
 
 def test_a_plan_whose_gate_is_elsewhere_then_is_not_certified(flip):
     late = replace(flip, stages=tuple(replace(s, time=s.time + 0.1) for s in flip.stages))
-    certificate = with_certificate(late, VEHICLE).certificate
+    certificate = late.for_vehicle(VEHICLE).certificate
     assert not certificate.certified
     violated = [f.quantity for f in certificate.findings if f.verdict is Verdict.VIOLATED]
     assert violated[0] == "off plane"
@@ -111,7 +111,7 @@ def test_a_plan_that_passes_the_gate_tilted_is_not_certified():
     fast = plan(load_problem("half-flip"), Miqp(order=5), VEHICLE)
     slow = Trajectory(1.3 * fast.trajectory.durations, fast.trajectory.coefficients)
     stages = tuple(replace(s, time=1.3 * s.time) for s in fast.stages)
-    certificate = with_certificate(replace(fast, trajectory=slow, stages=stages), VEHICLE).certificate
+    certificate = replace(fast, trajectory=slow, stages=stages).for_vehicle(VEHICLE).certificate
     (violated,) = (f for f in certificate.findings if f.verdict is Verdict.VIOLATED)
     assert (violated.quantity, violated.unit, violated.limit) == ("attitude", "rad", np.deg2rad(5.0))
     assert certificate.why == str(violated)

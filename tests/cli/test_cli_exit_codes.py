@@ -55,11 +55,13 @@ def test_a_flight_that_went_wrong_exits_with_1_and_is_written(monkeypatch) -> No
 
 
 def test_a_certified_plan_that_does_not_fly_exits_with_1() -> None:
-    plan = shared_plan("line")
-    assert plan.flyability is not None
-    replace(plan, flyability=replace(plan.flyability, error=0.3)).save("crashing.plan")
+    slow = replace(ab.Controller.paper(), attitude_frequency=12.0)
+    plan = shared_plan("half-flip").for_vehicle(replace(ab.load_vehicle("agile-quad"), controller=slow))
+    assert plan.certified
+    assert not plan.flies
+    plan.save("crashing.plan")
     assert code("plan", "crashing.plan", "--out", "again") == 1
-    assert Path("again/line.plan").exists()
+    assert Path("again/half-flip.plan").exists()
 
 
 def test_bad_input_exits_with_2_and_no_plan_with_3() -> None:

@@ -14,7 +14,7 @@ import aerobat as ab
 from aerobat import so3
 from aerobat.arrays import Array
 from aerobat.certification import PlannedPassage
-from aerobat.planning import PlacedStage, with_flyability
+from aerobat.planning import PlacedStage
 from aerobat.planning.ways import Way
 from aerobat.reporting.report_json import report
 from aerobat.simulation import Outcome
@@ -255,7 +255,7 @@ def test_a_plan_whose_own_flight_touches_the_frame_does_not_fly_and_says_where()
     stages = (ab.Stage("gate", gate="gate"),)
     problem = replace(problem, maneuver=ab.CustomManeuver(stages))
     placed = (PlacedStage("gate", 0, 0.5, "gate"),)
-    plan = with_flyability(ab.Plan(problem, path, "by hand", stages=placed, vehicle=QUAD))
+    plan = ab.Plan(problem, path, "by hand", stages=placed, vehicle=QUAD)
     assert plan.flyability is not None
     assert not plan.flies
     assert plan.flyability.lingers

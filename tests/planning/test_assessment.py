@@ -9,7 +9,7 @@ import pytest
 from rich.console import Console
 
 import aerobat as ab
-from aerobat.planning import Plan, with_assessment, with_second_opinion
+from aerobat.planning import Plan, with_second_opinion
 from aerobat.planning.miqp.remedies import advice
 from aerobat.planning.rotor_margin import RotorMargin
 from aerobat.reporting.figures import report_figure
@@ -65,7 +65,7 @@ def along(positions: list[tuple[float, float, float]], duration: float = 4.0) ->
             if value is not None:
                 values[i, k] = value
     path = ab.minimum_effort(values, np.full(len(positions) - 1, duration / (len(positions) - 1)))
-    return with_assessment(Plan(LINE, path, "by hand", vehicle=QUAD))
+    return Plan(LINE, path, "by hand", vehicle=QUAD)
 
 
 @pytest.mark.slow
@@ -118,7 +118,7 @@ def test_a_dive_is_told_unless_a_ground_bounds_it() -> None:
     found = along([(0.0, 0.0, 1.0), (2.0, 0.0, -1.5), (4.0, 0.0, 1.0)])
     assert "dives 2.5 m below start, goal, gates and stages, to z = -1.50 m" in str(found)
     bounded = replace(LINE, environment=ab.Environment(ground=-2.0))
-    told = with_assessment(replace(found, problem=bounded)).assessment
+    told = replace(found, problem=bounded).assessment
     assert told is not None
     assert told.warnings == ()
 

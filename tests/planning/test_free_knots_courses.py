@@ -6,10 +6,9 @@ import numpy as np
 import pytest
 
 from aerobat.planning import FreeKnots, MinSnap, Plan
-from aerobat.planning.flyability import own_flight
+from aerobat.planning.flyability import FlownPassage, OwnFlight, own_flight
 from aerobat.planning.polynomial.descent.framed_problem import FramedProblem
 from aerobat.planning.polynomial.nearest import nearest_polynomials
-from aerobat.planning.result import FlownPassage, OwnFlight
 from aerobat.planning.rotor_margin import reserve_shortfalls
 from aerobat.planning.warm_start import WarmStart
 from aerobat.planning.ways import straighter

@@ -3,16 +3,23 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Iterator
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 import aerobat as ab
 from aerobat.errors import SpecError
-from aerobat.planning.certified_solve import envelope_for
+from aerobat.planning.evidence import envelope_for
+from aerobat.planning.plan_file import digest_of
 from aerobat.storage import read_arrays
+from suites import examples
 
 VEHICLE = ab.load_vehicle("agile-quad")
 WINDY = replace(
@@ -66,6 +73,45 @@ def test_a_plan_without_a_vehicle_survives_too(tmp_path: Path) -> None:
     assert str(again) == str(bare)
 
 
+def numbers(value: Any) -> Iterator[tuple[Any, Any]]:
+    """Yield every number in a document, however deep, by its container and its key there."""
+    for key, inner in value.items() if isinstance(value, dict) else enumerate(value):
+        if isinstance(inner, dict | list):
+            yield from numbers(inner)
+        elif isinstance(inner, int | float) and not isinstance(inner, bool):
+            yield value, key
+
+
+@given(place=st.integers(0, 10**9), factor=st.floats(0.5, 1.7), forged=st.booleans())
+@examples(60)
+def test_a_file_with_any_one_number_changed_is_refused_or_proven_anew(
+    plan: ab.Plan, place: int, factor: float, forged: bool, tmp_path_factory: pytest.TempPathFactory
+) -> None:
+    """Its path, its vehicle, its problem, its evidence; with the digest as it was, or made anew."""
+    path = tmp_path_factory.mktemp("changed") / "half.plan"
+    plan.save(path)
+    content = read_arrays(path, "plan")
+    digest = content.pop("digest")
+    document = json.loads(content["document"].tobytes())
+    coefficients = content["coefficients"].copy()
+    found = [*numbers(document), *((coefficients, index) for index in np.ndindex(coefficients.shape))]
+    container, key = found[place % len(found)]
+    container[key] = float(container[key] or 0.01) * factor + 1e-3
+    text = np.frombuffer(json.dumps(document).encode(), np.uint8)
+    content |= {"coefficients": coefficients, "document": text}
+    np.savez(path.open("wb"), **content, digest=digest_of(content) if forged else digest)
+    if not forged:
+        with pytest.raises(SpecError, match="changed after it was written"):
+            ab.load_plan(path)
+        return
+    with suppress(SpecError):  # a number that makes no sense there
+        again = ab.load_plan(path)
+        assert again.vehicle is not None
+        envelope = envelope_for(again.problem, again.vehicle, again.stages)
+        proven = ab.certify(again.trajectory, again.vehicle, again.problem.environment, envelope)
+        assert again.certificate == proven
+
+
 def spoilt(path: Path, **changes: object) -> Path:
     content = read_arrays(path, "plan")
     document = json.loads(content["document"].tobytes())
@@ -78,7 +124,8 @@ def spoilt(path: Path, **changes: object) -> Path:
             document[key] = value
     if "document" not in changes:
         content["document"] = np.frombuffer(json.dumps(document).encode(), dtype=np.uint8)
-    np.savez(path.open("wb"), **content)
+    del content["digest"]
+    np.savez(path.open("wb"), **content, digest=digest_of(content))
     return path
 
 

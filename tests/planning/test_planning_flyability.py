@@ -16,14 +16,15 @@ from aerobat.planning import (
     GridSearch,
     PlacedStage,
     own_flight,
-    with_certificate,
-    with_flyability,
+    with_second_opinion,
 )
+from aerobat.planning.evidence import envelope_for
 from aerobat.planning.flyability import disturbed_flight
 from aerobat.reporting.report_json import report
 from aerobat.simulation import Outcome
 from aerobat.trajectory import Trajectory
 from random_problems import random_case
+from shared_plans import shared_plan
 
 QUAD = ab.load_vehicle("agile-quad")
 CRAZYFLIE = ab.load_vehicle("crazyflie")
@@ -42,13 +43,9 @@ def flyability(plan: ab.Plan) -> Flyability:
 
 
 def sagging() -> ab.Plan:
-    """A plan for rotors of a second of lag, with the certificate of ones that are faster.
-
-    As certificates once were, which knew of no lag.
-    """
-    slow = replace(QUAD, rotors=tuple(replace(rotor, lag=1.0) for rotor in QUAD.rotors))
-    plan = ab.plan(ab.load_problem("half-flip"), ab.Miqp(order=5), QUAD)
-    return with_flyability(replace(plan, vehicle=slow))
+    """A plan for a vehicle whose controller is too slow for it, of which the certificate knows nothing."""
+    slow = replace(ab.Controller.paper(), attitude_frequency=12.0)
+    return shared_plan("half-flip").for_vehicle(replace(QUAD, controller=slow))
 
 
 def test_flyability_is_the_score_of_the_plan_s_own_flight(plan: ab.Plan) -> None:
@@ -92,7 +89,7 @@ def test_less_thrust_costs_more_error(plan: ab.Plan) -> None:
 
 def test_without_a_reserve_nothing_is_bought(plan: ab.Plan) -> None:
     heavy = replace(QUAD, mass=2.5 * QUAD.mass)
-    bare = with_flyability(with_certificate(plan, heavy))
+    bare = plan.for_vehicle(heavy)
     assert not bare.certified
     assert flyability(bare).disturbance == flyability(bare).disturbed_fraction == 0.0
     assert flyability(bare).disturbed_error == flyability(bare).error
@@ -113,7 +110,7 @@ def test_a_plan_whose_flight_does_not_hold_the_gate_s_attitude_says_so(plan: ab.
     """Its gate, asked later to be passed more exactly than it was planned."""
     (gate,) = plan.problem.gates
     stricter = replace(plan.problem, gates=(replace(gate, attitude_tolerance=np.deg2rad(0.2)),))
-    strict = with_flyability(replace(plan, problem=stricter))
+    strict = replace(plan, problem=stricter)
     (passage,) = flyability(strict).passages
     (scored,) = ab.score(ab.fly(strict), strict).passages
     assert passage.attitude_error is not None
@@ -142,7 +139,7 @@ def test_a_plan_that_only_looks_through_its_gate_does_not_fly() -> None:
     time = 2.0 * next(root.real for root in crossing if abs(root.imag) < 1e-9 and 0.0 < root.real < 1.0)
     problem = ab.Problem("look", ab.at_rest((0, 0, 0)), ab.at_rest((0, 0, 0)), gates=(gate,))
     looking = ab.Plan(problem, path, "by hand", stages=(PlacedStage("gate", 0, time, "gate"),), vehicle=QUAD)
-    found = with_flyability(looking)
+    found = looking
     assert flyability(found).error < FLYABLE_ERROR
     assert not found.flies
     assert ab.score(ab.fly(found), found).outcome is Outcome.STOPPED_IN_GATE
@@ -184,13 +181,21 @@ def test_flyability_survives_the_plan_s_file(plan: ab.Plan, tmp_path: Path) -> N
     assert ab.load_plan(tmp_path / "half.plan").flyability == plan.flyability
 
 
-def test_a_certificate_for_another_vehicle_takes_the_old_one_s_flights_away(plan: ab.Plan) -> None:
-    assert with_certificate(plan, CRAZYFLIE).flyability is None
-    assert not with_certificate(plan, CRAZYFLIE).flies
+def test_the_evidence_is_that_of_the_plan_s_own_vehicle_and_path(plan: ab.Plan) -> None:
+    assert plan.flies
+    assert not plan.for_vehicle(CRAZYFLIE).flies
+    assert replace(plan, vehicle=CRAZYFLIE).certificate == ab.certify(
+        plan.trajectory,
+        CRAZYFLIE,
+        plan.problem.environment,
+        envelope_for(plan.problem, CRAZYFLIE, plan.stages),
+    )
+    slower = replace(plan.trajectory, durations=1.1 * plan.trajectory.durations)
+    assert replace(plan, trajectory=slower).certificate != plan.certificate
 
 
 def test_a_plan_without_a_vehicle_flies_nothing() -> None:
     plan = ab.plan(ab.load_problem("line"))
     assert plan.flyability is None
     with pytest.raises(SpecError, match="plan it for one"):
-        with_flyability(plan)
+        with_second_opinion(plan)

@@ -8,7 +8,7 @@ import pytest
 
 from aerobat.errors import SpecError
 from aerobat.planning import MinSnap, Miqp, Plan
-from aerobat.planning.certified_solve import certificate_for
+from aerobat.planning.evidence import Evidence
 from aerobat.planning.polynomial.descent.knot_samples import refit
 from aerobat.planning.polynomial.free_knots import FreeKnots
 from aerobat.planning.polynomial.min_snap import TimeScaling
@@ -70,7 +70,7 @@ each_set = pytest.mark.parametrize(
 @each_set
 def test_two_segments_are_certified_and_within_an_eighth_of_the_least_time(name: str) -> None:
     plan = planned(name)
-    assert certificate_for(plan.trajectory, SECTION_V, vehicle(name)).certified
+    assert Evidence(SECTION_V, vehicle(name), plan.trajectory).certificate.certified
     assert certified(plan)
     assert plan.trajectory.coefficients.shape == (2, 10, 3)
     assert plan.duration / SETS[name][2] < 1.12

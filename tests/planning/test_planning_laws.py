@@ -21,7 +21,7 @@ from aerobat.planning import (
     planner_options,
     registered_planners,
 )
-from aerobat.planning.certified_solve import envelope_for
+from aerobat.planning.evidence import envelope_for
 from aerobat.problem import EndState, Limits, Problem, Waypoint, Waypoints, at_rest, load_problem
 from aerobat.vehicle import load_vehicle
 

@@ -9,7 +9,8 @@ from aerobat.errors import Infeasible
 from aerobat.flatness import force_balance
 from aerobat.optimization import solver
 from aerobat.planning import GridSearch, Miqp, plan
-from aerobat.planning.certified_solve import certificate_for, tightened
+from aerobat.planning.certified_solve import tightened
+from aerobat.planning.evidence import Evidence
 from aerobat.planning.miqp.miqp import formulate
 from aerobat.planning.miqp.refinement.phases import PhasedChain, Places
 from aerobat.planning.miqp.rescue import with_more_intervals
@@ -75,7 +76,7 @@ def test_a_flip_too_fast_for_its_limits_is_refuted_by_the_candidates_of_one_stag
 def test_a_path_along_the_floor_is_certified_and_its_proof_is_its_own(quad: Vehicle) -> None:
     found = plan(load_problem(str(CASES / "floor.toml")), vehicle=quad)
     assert found.certified
-    proof = certificate_for(found.trajectory, found.problem, quad, found.stages)
+    proof = Evidence(found.problem, quad, found.trajectory, found.stages).certificate
     assert proof.findings == found.certificate.findings
 
 

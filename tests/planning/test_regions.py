@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from aerobat.certification import Verdict
 from aerobat.errors import SpecError
-from aerobat.planning import FreeKnots, MinSnap, Miqp, Plan, TimeOptimal, with_certificate
+from aerobat.planning import FreeKnots, MinSnap, Miqp, Plan, TimeOptimal
 from aerobat.problem import (
     Ball,
     GatePassage,
@@ -116,7 +116,7 @@ def test_the_true_ball_is_used_in_full_by_time_optimal_and_costs_nothing_to_wide
 def test_a_plan_that_misses_a_ball_is_not_certified():
     plan = MinSnap().plan(COURSE, QUAD)
     moved = (replace(COURSE.maneuver.waypoints[0], position=(3.0, 1.4, 1.5)), *COURSE.maneuver.waypoints[1:])
-    elsewhere = with_certificate(replace(plan, problem=replace(COURSE, maneuver=Waypoints(moved))), QUAD)
+    elsewhere = replace(plan, problem=replace(COURSE, maneuver=Waypoints(moved)))
     (wrong,) = (f for f in elsewhere.certificate.findings if f.verdict is Verdict.VIOLATED)
     assert str(wrong) == f"'waypoint 1' distance 0.4 m of 0.3 m at {wrong.time:.3f} s, 0.1 m above its limit"
 

@@ -31,7 +31,6 @@ from aerobat.planning import (
     planner_class,
     planner_options,
     suited_planner,
-    with_evidence,
     with_explanation,
 )
 from aerobat.problem import Problem, load_problem
@@ -124,7 +123,7 @@ def plan_of(record: RunRecord, explain: bool = False) -> Plan:
     with planning_progress(record.planner_name) as progress, within_time(limit):
         if record.paper:  # without a vehicle; whether this one can fly it is told all the same
             found = plan(record.problem, record.planner, progress=progress.record)
-            found = with_evidence(found, record.vehicle)
+            found = found.for_vehicle(record.vehicle)
         else:
             found = plan(record.problem, record.planner, record.vehicle, progress.record)
         return with_explanation(found, progress.record) if explain else found

@@ -9,6 +9,7 @@ docs/flight-package.md. Units are SI, the world is ENU, the body FLU, quaternion
 
 from __future__ import annotations
 
+import hashlib
 import json
 import os
 from dataclasses import dataclass
@@ -55,7 +56,7 @@ class FlightPackage:
 
     @property
     def certified(self) -> bool:
-        """True if it is proven that the vehicle can fly it within all limits."""
+        """True if the file says that the vehicle is proven to fly it within all limits."""
         certificate = self.document["evidence"]["certificate"]
         if certificate is None or certificate["undetermined"] or certificate["discontinuities"]:
             return False
@@ -130,14 +131,28 @@ class FlightPackage:
 
 
 def read_flight_package(path: str | os.PathLike[str]) -> FlightPackage:
-    """The plan in a .plan file. Raises ValueError for another format, OSError where there is no file."""
+    """The plan in a .plan file.
+
+    Raises ValueError for another format and for a file that was changed after it was written, OSError where
+    there is no file.
+    """
     with np.load(path, allow_pickle=False) as file:
         content = dict(file)
     found = str(content.get("format", "something else"))
     if found != FORMAT:
         raise ValueError(f"{path} holds {found}, not {FORMAT}")
+    if "digest" in content and str(content.pop("digest")) != _digest(content):
+        raise ValueError(f"{path} was changed after it was written")
     document = json.loads(content["document"].tobytes())
     return FlightPackage(content["durations"], content["coefficients"], float(content["heading"]), document)
+
+
+def _digest(content: dict[str, Any]) -> str:
+    """The SHA-256 of arrays and their names, in the order of these."""
+    found = hashlib.sha256()
+    for name in sorted(content):
+        found.update(name.encode() + np.ascontiguousarray(content[name]).tobytes())
+    return found.hexdigest()
 
 
 def _directions(thrust: Array, floor: float) -> Array:

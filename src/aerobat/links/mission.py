@@ -251,10 +251,11 @@ def require_flyable(plan: Plan, offset: Array, vehicle_name: str | None = None) 
         raise SpecError(
             f"{label} is certified for {name}, not for {vehicle_name}; plan it for the one that is there"
         )
-    if plan.certificate is None or not plan.certificate.certified:
-        why = "it was never checked" if plan.certificate is None else plan.certificate.why
-        raise SpecError(f"{label} is not certified for {name} ({why}); plan it within its limits")
-    if plan.flyability is not None and not plan.flies:
+    if not plan.certified:
+        raise SpecError(
+            f"{label} is not certified for {name} ({plan.certificate}); plan it within its limits"
+        )
+    if not plan.flies:
         raise SpecError(f"{label} is {plan.flyability}; plan it again with a reserve")
     for time, at_end, remedy in (
         (0.0, "begins", "plan it from a hover, where a link can begin it"),

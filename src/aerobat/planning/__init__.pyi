@@ -1,12 +1,11 @@
-from .assessment.assess import with_assessment, with_explanation, with_second_opinion
 from .assessment.assessment import Assessment, Box, SecondOpinion
 from .assessment.lower_bound import least_duration
-from .certified_solve import Judged, Solution, certified_solve, with_certificate
-from .flyability import nominal_flight, own_flight, with_flyability, with_recoveries
+from .certified_solve import Judged, Solution, certified_solve
+from .evidence import Evidence
+from .flyability import FLYABLE_ERROR, FlownPassage, Flyability, OwnFlight, nominal_flight, own_flight
 from .miqp import Miqp
 from .miqp.remedies import without_advice
-from .passages import planned_passages, planned_waypoints
-from .plan_file import load_plan
+from .passages import PlacedStage, planned_passages, planned_waypoints
 from .planners import (
     Planner,
     PlannerOption,
@@ -20,14 +19,14 @@ from .planners import (
     planner_options,
     registered_planners,
     suited_planner,
-    with_evidence,
 )
 from .polynomial.free_knots import FreeKnots
 from .polynomial.min_snap import MinSnap, TimeScaling
 from .recorder import Attempt, Recorder
-from .result import FLYABLE_ERROR, FlownPassage, Flyability, OwnFlight, PlacedStage, Plan
+from .result import Plan, load_plan
 from .rotor_margin import RotorMargin
 from .search import BisectionSearch, GridSearch
+from .second_opinion import with_explanation, with_recoveries, with_second_opinion
 from .time_optimal.time_optimal import TimeOptimal
 from .tube import Tube
 
@@ -37,6 +36,7 @@ __all__ = [
     "Attempt",
     "BisectionSearch",
     "Box",
+    "Evidence",
     "FlownPassage",
     "Flyability",
     "FreeKnots",
@@ -73,11 +73,7 @@ __all__ = [
     "planner_options",
     "registered_planners",
     "suited_planner",
-    "with_assessment",
-    "with_certificate",
-    "with_evidence",
     "with_explanation",
-    "with_flyability",
     "with_recoveries",
     "with_second_opinion",
     "without_advice",

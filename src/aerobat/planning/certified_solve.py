@@ -6,20 +6,17 @@ its certificate over continuous time, which therefore is always that of the traj
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Generic, Protocol, TypeVar
 
 import numpy as np
 
 from aerobat.arrays import Array
-from aerobat.certification import Certificate, Envelope, certify
-from aerobat.certification.path.passages import passage_findings, waypoint_findings
+from aerobat.certification import Certificate
 from aerobat.errors import SpecError
-from aerobat.flatness.references import force_balance
-from aerobat.planning.passages import planned_passages, planned_waypoints
+from aerobat.planning.evidence import Evidence
 from aerobat.planning.recorder import Attempt, Recorder
-from aerobat.planning.result import PlacedStage, Plan
+from aerobat.planning.result import Plan
 from aerobat.planning.rotor_margin import reserve_shortfalls, sampled_margin
 from aerobat.problem.problem import Limits, Problem
 from aerobat.trajectory import Trajectory
@@ -69,8 +66,13 @@ class Judged(Generic[Detail]):
     problem: Problem
     vehicle: Vehicle | None
     solution: Solution[Detail]
-    certificate: Certificate | None
+    evidence: Evidence | None  # for the solution's path, where there is a vehicle
     feasible: bool
+
+    @property
+    def certificate(self) -> Certificate | None:
+        """The certificate of the solution's path; None without a vehicle."""
+        return None if self.evidence is None else self.evidence.certificate
 
     def plan(self, recorder: Recorder, **facts: Any) -> Plan:
         """The plan of it; `facts` are the fields of Plan that the planner alone knows."""
@@ -83,19 +85,9 @@ class Judged(Generic[Detail]):
             dt=self.solution.dt,
             attempts=tuple(recorder.attempts),
             vehicle=self.vehicle,
-            certificate=self.certificate,
             **facts,
         )
-        if self.vehicle is None:
-            return plan
-        if self.certificate is None:
-            return with_certificate(plan, self.vehicle)
-        passages = planned_passages(plan.stages, self.problem)
-        findings = passage_findings(
-            trajectory, passages, force_balance(self.problem.environment, self.vehicle)
-        )
-        findings += waypoint_findings(trajectory, planned_waypoints(plan.stages, self.problem))
-        return replace(plan, certificate=self.certificate.with_passages(findings))
+        return plan if self.evidence is None else replace(plan, evidence=self.evidence.at(plan.stages))
 
 
 def certified_solve(
@@ -138,42 +130,6 @@ def refuted_by_samples(
     return replace(solution, failure=str(sampled), margin=sampled.margin)
 
 
-def certificate_for(
-    trajectory: Trajectory, problem: Problem, vehicle: Vehicle, stages: Sequence[PlacedStage] = ()
-) -> Certificate:
-    """The certificate of a trajectory for the vehicle's limits and the problem's, over continuous time.
-
-    Args:
-        trajectory: What is judged.
-        problem: What its maneuver asks throughout is among the limits.
-        vehicle: What flies it.
-        stages: Where they are placed: the gates among them are passed then.
-    """
-    return certify(trajectory, vehicle, problem.environment, envelope_for(problem, vehicle, stages))
-
-
-def envelope_for(problem: Problem, vehicle: Vehicle, stages: Sequence[PlacedStage] = ()) -> Envelope:
-    """The limits of a problem for a vehicle, with the gates that are passed at placed stages."""
-    sequence = problem.stages(vehicle.max_specific_thrust)
-    return Envelope(
-        limits=problem.path_limits,
-        conditions=sequence.path_constraints,
-        passages=planned_passages(stages, problem),
-        waypoints=planned_waypoints(stages, problem),
-        closed=sequence.closed,
-    )
-
-
-def with_certificate(plan: Plan, vehicle: Vehicle) -> Plan:
-    """The plan with the certificate of a vehicle, whichever it was made for; not flown nor assessed yet.
-
-    Raises SpecError for a vehicle that its dead rotors leave without control.
-    """
-    vehicle = vehicle.without_dead_rotors()
-    certificate = certificate_for(plan.trajectory, plan.problem, vehicle, plan.stages)
-    return replace(plan, vehicle=vehicle, certificate=certificate, flyability=None, assessment=None)
-
-
 def tightened(bounds: Limits, limits: Limits, trajectory: Trajectory, derivatives: int) -> Limits | None:
     """Bounds tighter by as much as a trajectory exceeds the limits; None where that leaves nothing.
 
@@ -212,9 +168,10 @@ def _judged(
     jumps: bool,
     reserve: float,
 ) -> Judged[Detail]:
-    certificate = None
+    evidence = certificate = None
     if solution.trajectory is not None and solution.failure is None and vehicle is not None:
-        certificate = certificate_for(solution.trajectory, problem, vehicle)
+        evidence = Evidence(problem, vehicle, solution.trajectory)
+        certificate = evidence.certificate
     outcome = solution.failure
     if certificate is not None:
         within = replace(certificate, discontinuities=()) if jumps else certificate
@@ -237,4 +194,4 @@ def _judged(
             margin=margin,
         )
     )
-    return Judged(problem, vehicle, solution, certificate, feasible)
+    return Judged(problem, vehicle, solution, evidence, feasible)

@@ -11,21 +11,111 @@ nominal flight is judged at the gates as scores judge flights, their frames incl
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from math import isinf, isnan, radians
 
 from aerobat.environment import Environment
-from aerobat.errors import SpecError
-from aerobat.planning.passages import planned_passages
-from aerobat.planning.result import FlownPassage, Flyability, OwnFlight, PlacedStage, Plan
+from aerobat.planning.passages import PlacedStage, planned_passages
 from aerobat.problem.problem import Problem
 from aerobat.simulation import Flight, FlightConfig, Outcome, fly
-from aerobat.simulation.autopilot import UndeterminedAttitude, recoveries
-from aerobat.simulation.outcome import DIVERGENCE_RADIUS
+from aerobat.simulation.outcome import DIVERGENCE_RADIUS, length
 from aerobat.simulation.passages import Passage, flown_passages
 from aerobat.trajectory import Trajectory
 from aerobat.vehicle import Vehicle
+
+FLYABLE_ERROR = 0.05  # [m] that a plan's own flight may leave its path by, a frame's usual clearance
+
+
+@dataclass(frozen=True)
+class FlownPassage:
+    """A gate in a plan's own flight."""
+
+    gate: str
+    attitude_error: float | None  # [rad] between the thrust axis and where it shall point; None: not crossed
+    attitude_tolerance: float | None  # [rad] that is allowed; None where no attitude is asked
+    failure: str = ""  # what went wrong, in words; empty where it was passed as asked
+    clearance: float | None = None  # [m] the least between body and frame; None: not crossed
+
+    @property
+    def is_missed(self) -> bool:
+        """True where the gate is not crossed, or not as far as counts, or its frame is touched."""
+        return bool(self.failure) and (self.clearance is None or self.clearance < 0.0)
+
+
+@dataclass(frozen=True, kw_only=True)
+class OwnFlight:
+    """A plan's own nominal flight: the simulated closed loop, nothing unknown."""
+
+    error: float  # [m] the largest position error, 5 m or more where it diverges
+    passages: tuple[FlownPassage, ...] = ()  # the planned ones, in their order
+
+    @property
+    def flies(self) -> bool:
+        """True if it stays within FLYABLE_ERROR of the path and passes the gates as they ask."""
+        return not self.defects
+
+    @property
+    def lingers(self) -> bool:
+        """True if it does not pass the plane of a gate, or not as far as counts, or touches the frame."""
+        return any(passage.is_missed for passage in self.passages)
+
+    @property
+    def wants_reserve(self) -> bool:
+        """True if it has a defect that more reserve for the controller may mend: any but a gate missed."""
+        return len(self.defects) > sum(passage.is_missed for passage in self.passages)
+
+    @property
+    def rank(self) -> tuple[int, float]:
+        """The number of defects, and the error [m]: the better of two flights has the lesser."""
+        return len(self.defects), self.error
+
+    @property
+    def defects(self) -> tuple[str, ...]:
+        """All that it does wrong, in words."""
+        failed = tuple(passage.failure for passage in self.passages if passage.failure)
+        if self.error <= FLYABLE_ERROR:
+            return failed
+        allowed = f"{100 * FLYABLE_ERROR:g} cm at most allowed"
+        return (f"leaves the path by {length(self.error)}, {allowed}", *failed)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Flyability(OwnFlight):
+    """A plan's own flights: the nominal one, and one with the reserve used up.
+
+    The disturbance is the largest that the rotors' reserve buys at every instant: all rotors give less than
+    commanded by a fraction of it, of which no rotor's limit need take notice.
+    """
+
+    disturbance: float  # [N] by which every rotor may miss its thrust; 0 where nothing is left
+    disturbed_fraction: float  # [-] the same over the largest thrust of a rotor
+    disturbed_error: float  # [m] the largest position error where all rotors give less by that fraction
+
+    @property
+    def remedy(self) -> str:
+        """What may mend its defects, in words; empty where there are none."""
+        found = []
+        if self.lingers:
+            found.append("ask more speed of the passage or widen the opening")
+        if self.wants_reserve:
+            found.append("keep more reserve for the controller")
+        return ", ".join([*found, "or take another planner"]) if found else ""
+
+    def __str__(self) -> str:
+        """The finding in a sentence without its full stop."""
+        if self.defects:
+            found = " and ".join(self.defects)
+            return (
+                f"not flyable: its own flight {found}, a defect of the plan, not of the flight; {self.remedy}"
+            )
+        if not self.disturbance:
+            return f"flies within {length(self.error)}, with no reserve left"
+        return (
+            f"flies within {length(self.error)}; the reserve left, {self.disturbance:.2g} N, is "
+            f"{100 * self.disturbed_fraction:.2g} % of a rotor's thrust: with as much less from all rotors "
+            f"within {length(self.disturbed_error)}"
+        )
 
 
 def own_flight(
@@ -61,37 +151,33 @@ def _flown(passage: Passage) -> FlownPassage:
     )
 
 
-def with_flyability(plan: Plan) -> Plan:
-    """The plan for a vehicle with the findings of its own flights. Raises SpecError without a vehicle."""
-    if plan.vehicle is None:
-        raise SpecError("a plan without a vehicle has no flight of its own; plan it for one")
-    disturbance = max(plan.certificate.margin or 0.0, 0.0) if plan.certificate else 0.0
-    fraction = disturbance / float(plan.vehicle.max_thrusts.max())
-    nominal = own_flight(plan.trajectory, plan.vehicle, plan.problem, plan.stages)
-    disturbed = disturbed_flight(plan.trajectory, plan.vehicle, plan.problem.environment, fraction)
-    return replace(
-        plan,
-        flyability=Flyability(
-            error=nominal.error,
-            passages=nominal.passages,
-            disturbance=disturbance,
-            disturbed_fraction=fraction,
-            disturbed_error=_largest_error(disturbed),
-        ),
-    )
+def own_flights(
+    trajectory: Trajectory,
+    vehicle: Vehicle,
+    problem: Problem,
+    stages: Sequence[PlacedStage],
+    margin: float,
+) -> Flyability:
+    """Fly a path twice: nominally, and with the rotors' reserve used up.
 
-
-def with_recoveries(plan: Plan) -> Plan:
-    """The plan for a vehicle with its recoveries to a hover; without where its attitude is undetermined.
-
-    Raises SpecError without a vehicle.
+    Args:
+        trajectory: What is flown.
+        vehicle: What flies it.
+        problem: Its environment is where, its stages say what is asked of gates.
+        stages: Where they are placed.
+        margin: Of the rotors, proven [N]: the reserve.
     """
-    if plan.recoveries is not None:
-        return plan
-    try:
-        return replace(plan, recoveries=recoveries(plan))
-    except UndeterminedAttitude:
-        return plan
+    disturbance = max(margin, 0.0)
+    fraction = disturbance / float(vehicle.max_thrusts.max())
+    nominal = own_flight(trajectory, vehicle, problem, stages)
+    disturbed = disturbed_flight(trajectory, vehicle, problem.environment, fraction)
+    return Flyability(
+        error=nominal.error,
+        passages=nominal.passages,
+        disturbance=disturbance,
+        disturbed_fraction=fraction,
+        disturbed_error=_largest_error(disturbed),
+    )
 
 
 @lru_cache(maxsize=2)

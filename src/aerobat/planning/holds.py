@@ -19,9 +19,9 @@ from aerobat.declaration import AS_IT_IS, declared
 from aerobat.errors import SpecError
 from aerobat.flatness import reference
 from aerobat.optimization.deadline import within_time
-from aerobat.planning.certified_solve import with_certificate
+from aerobat.planning.passages import PlacedStage
 from aerobat.planning.recorder import Progress
-from aerobat.planning.result import PlacedStage, Plan
+from aerobat.planning.result import Plan
 from aerobat.problem import Gate, Maneuver, Problem, Stage, StageSequence, at_rest
 from aerobat.trajectory import Trajectory
 from aerobat.vehicle import Vehicle
@@ -51,7 +51,7 @@ def between_holds(method: PlanMethod[P]) -> PlanMethod[P]:
                 found.append(each)
                 heading = heading if vehicle is None else _heading_at_end(each, vehicle)
         joined = _joined(problem, found)
-        return joined if vehicle is None else with_certificate(joined, vehicle)
+        return joined if vehicle is None else joined.for_vehicle(vehicle)
 
     return plan
 

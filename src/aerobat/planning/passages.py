@@ -6,18 +6,28 @@ And, before anything is searched, the openings of gates beside the vehicle that 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
 from aerobat.arrays import Array
 from aerobat.certification import PlannedPassage, PlannedWaypoint
 from aerobat.errors import SpecError
-from aerobat.planning.result import PlacedStage
 from aerobat.problem.gate import Gate
 from aerobat.problem.problem import Problem
 from aerobat.problem.stage import Stage
 from aerobat.simulation.outcome import length
 from aerobat.vehicle import Vehicle
+
+
+@dataclass(frozen=True)
+class PlacedStage:
+    """Where a stage ended up."""
+
+    name: str
+    interval: int  # counted from 0; the stage holds at its end
+    time: float  # [s]
+    gate: str | None = None  # the name of the gate that is passed there
 
 
 def planned_passages(stages: Sequence[PlacedStage], problem: Problem) -> tuple[PlannedPassage, ...]:

@@ -4,27 +4,34 @@ A .plan file is a NumPy .npz archive without pickles. Its arrays `durations` (S,
 (S, degree + 1, 3) and `heading` are the trajectory's, bit for bit; `document` holds, as UTF-8 JSON, the rest:
 the problem and the vehicle as the tables of their files, the environment in full, how the plan was made, its
 stages, attempts, certificate, flyability, recoveries, assessment and tube, frames, and which version of
-Aerobat wrote it.
+Aerobat wrote it. `digest` is the SHA-256 of all of that.
+
+A file proves nothing: a plan that is read has its certificate, flyability and assessment worked out anew.
+Results that take seconds are taken from the file only where the digest says that nothing was changed.
 
 Schema and version rules are in docs/flight-package.md. `interchange.flight_package` reads it by NumPy alone.
 """
 
 from __future__ import annotations
 
+import hashlib
 import json
-from dataclasses import dataclass, fields
+from collections.abc import Mapping
+from dataclasses import dataclass
 from importlib.metadata import version
 from typing import Any
 
 import numpy as np
 
+from aerobat.arrays import Array
 from aerobat.certification import Certificate
-from aerobat.declaration import PathName, from_table, to_table, validated
+from aerobat.declaration import PathName, from_table, to_table
 from aerobat.environment import Environment
 from aerobat.errors import SpecError
-from aerobat.planning.assessment.assessment import Assessment
+from aerobat.planning.assessment.assessment import Assessment, SecondOpinion
+from aerobat.planning.flyability import Flyability
+from aerobat.planning.passages import PlacedStage
 from aerobat.planning.recorder import Attempt
-from aerobat.planning.result import Flyability, PlacedStage, Plan
 from aerobat.planning.tube import Tube
 from aerobat.problem.problem import Problem
 from aerobat.simulation.autopilot import Recoveries
@@ -34,6 +41,8 @@ from aerobat.vehicle import Vehicle
 
 FORMAT = "aerobat-plan-1"  # another number where something goes, or means something else
 REVISION = 4  # of it: one more wherever something is added
+WORKED_OUT = {"certificate", "flyability", "assessment"}  # from a plan's path whenever they are read
+ASKED_FOR = {"recoveries", "opinion", "tube"}  # results that take seconds
 FRAMES = {
     "world": "ENU: x east, y north, z up [m]",
     "body": "FLU: x forward, y left, z up, thrust along +z",
@@ -43,8 +52,8 @@ FRAMES = {
 
 
 @dataclass(frozen=True)
-class _Evidence:
-    """Content of a document beside problem and vehicle: the fields of Plan of those names."""
+class Facts:
+    """Content of a document beside problem and vehicle, as Plan names it."""
 
     planner: str
     order: int | None
@@ -63,50 +72,66 @@ class _Evidence:
     rescue: str = ""
     starts: tuple[float, ...] = ()
     tube: Tube | None = None
+    opinion: SecondOpinion | None = None
 
 
-def save_plan(plan: Plan, path: PathName) -> None:
-    """Write a plan with its problem, vehicle and certificate, whole or not at all.
+def write_plan_file(
+    path: PathName, problem: Problem, trajectory: Trajectory, vehicle: Vehicle | None, facts: Facts
+) -> None:
+    """Write a plan whole or not at all.
 
     Raises SpecError when the file cannot be written, or for a maneuver that is not registered.
+
+    Args:
+        path: Of the file.
+        problem: What is planned.
+        trajectory: The path.
+        vehicle: What flies it.
+        facts: Everything else.
     """
-    evidence = _Evidence(**{field.name: getattr(plan, field.name) for field in fields(_Evidence)})
     document = {
         "revision": REVISION,
         "aerobat": version("aerobat"),
         "frames": FRAMES,
-        "environment": _in_full(plan.problem.environment),
-        "problem": to_table(plan.problem),
-        "vehicle": None if plan.vehicle is None else to_table(plan.vehicle),
-        "evidence": evidence_adapter().dump_python(evidence, mode="json"),
+        "environment": _in_full(problem.environment),
+        "problem": to_table(problem),
+        "vehicle": None if vehicle is None else to_table(vehicle),
+        "evidence": facts_adapter().dump_python(facts, mode="json"),
+    }
+    content: dict[str, Any] = {
+        "format": np.asarray(FORMAT),
+        "durations": trajectory.durations,
+        "coefficients": trajectory.coefficients,
+        "heading": np.asarray(trajectory.heading),
+        "document": np.frombuffer(json.dumps(document).encode(), dtype=np.uint8),
     }
     with whole_file(path) as temporary, temporary.open("wb") as file:
-        np.savez(
-            file,
-            format=FORMAT,
-            durations=plan.trajectory.durations,
-            coefficients=plan.trajectory.coefficients,
-            heading=plan.trajectory.heading,
-            document=np.frombuffer(json.dumps(document).encode(), dtype=np.uint8),
-        )
+        np.savez(file, **content, digest=digest_of(content))
 
 
-@validated
-def load_plan(path: PathName) -> Plan:
-    """Read what `Plan.save` wrote, exactly. Raises SpecError, one sentence, for any other file."""
+def read_plan_file(path: PathName) -> tuple[Problem, Trajectory, Vehicle | None, dict[str, Any]]:
+    """Read a plan's problem, trajectory, vehicle, and the facts that are not worked out anew, by their names.
+
+    Revisions before 4 have no digest: their recoveries and tubes are left out.
+    Raises SpecError, one sentence, for another file, a damaged or a changed one.
+    """
     content = read_arrays(path, "plan")
     found = format_of(content)
     if found != FORMAT:
         raise SpecError(f"plan file {path}: it holds {found}, not {FORMAT}; plan again and save that")
+    digest = content.pop("digest", None)
+    if digest is not None and str(digest) != digest_of(content):
+        raise SpecError(f"plan file {path}: it was changed after it was written; plan again and save that")
+    left_out = WORKED_OUT if digest is not None else WORKED_OUT | ASKED_FOR
     try:
         document = json.loads(content["document"].tobytes())
-        evidence: _Evidence = evidence_adapter().validate_python(document["evidence"])
+        facts: Facts = facts_adapter().validate_python(document["evidence"])
         vehicle = document["vehicle"]
-        return Plan(
-            problem=from_table(Problem, document["problem"]),
-            trajectory=Trajectory(content["durations"], content["coefficients"], float(content["heading"])),
-            vehicle=None if vehicle is None else from_table(Vehicle, vehicle),
-            **vars(evidence),
+        return (
+            from_table(Problem, document["problem"]),
+            Trajectory(content["durations"], content["coefficients"], float(content["heading"])),
+            None if vehicle is None else from_table(Vehicle, vehicle),
+            {name: value for name, value in vars(facts).items() if name not in left_out},
         )
     except KeyError as error:
         raise SpecError(f"plan file {path}: it has no {error.args[0]!r}; save it again") from None
@@ -122,8 +147,16 @@ def _in_full(environment: Environment) -> dict[str, Any]:
     return {"gravity": environment.gravity, "wind": wind, "ground": environment.ground}
 
 
-def evidence_adapter() -> Any:
-    """Read, write and describe a document's evidence, a pydantic TypeAdapter."""
+def digest_of(content: Mapping[str, Array]) -> str:
+    """Return the SHA-256 of arrays, in the order of their names."""
+    found = hashlib.sha256()
+    for name in sorted(content):
+        found.update(name.encode() + np.ascontiguousarray(content[name]).tobytes())
+    return found.hexdigest()
+
+
+def facts_adapter() -> Any:
+    """Read, write and describe what a document holds under `evidence`, a pydantic TypeAdapter."""
     from pydantic import TypeAdapter
 
-    return TypeAdapter(_Evidence)
+    return TypeAdapter(Facts)

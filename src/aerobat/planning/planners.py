@@ -18,10 +18,7 @@ from pydantic import Field
 from aerobat.declaration import Label, Registry, shown, validated
 from aerobat.errors import SpecError
 from aerobat.optimization.nonlinear import has_casadi
-from aerobat.planning.assessment.assess import with_assessment
-from aerobat.planning.certified_solve import with_certificate
 from aerobat.planning.courses import is_course, on_open_courses
-from aerobat.planning.flyability import with_flyability
 from aerobat.planning.holds import between_holds
 from aerobat.planning.passages import require_openings
 from aerobat.planning.recorder import Progress
@@ -90,9 +87,7 @@ def plan(
         require_openings(problem, vehicle)
     method = planner_for(problem, vehicle) if planner is None else as_planner(planner)
     found = method.plan(problem, vehicle, progress)
-    if vehicle is None:
-        return found
-    return with_evidence(found, None if found.certificate is not None else vehicle)
+    return found if vehicle is None or found.vehicle is not None else found.for_vehicle(vehicle)
 
 
 def suited_planner(problem: Problem, vehicle: Vehicle | None) -> str:
@@ -120,17 +115,6 @@ def planner_for(problem: Problem, vehicle: Vehicle | None) -> Planner:
 def command_settings(cls: type[Planner]) -> dict[str, Any]:
     """The fields that a planner has otherwise on the command line, whose plans are to be flown."""
     return {o.name: o.command_default for o in planner_options(cls) if o.command_default is not None}
-
-
-def with_evidence(plan: Plan, vehicle: Vehicle | None = None) -> Plan:
-    """The plan with all that is told of one: its certificate, its own flight, its assessment.
-
-    Args:
-        plan: What is judged.
-        vehicle: What it shall be certified for anew; None where its certificate stands.
-    """
-    certified = plan if vehicle is None else with_certificate(plan, vehicle)
-    return with_assessment(with_flyability(certified))
 
 
 def as_planner(planner: Planner | str) -> Planner:

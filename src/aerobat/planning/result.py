@@ -2,128 +2,27 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
 from aerobat.certification import Certificate
 from aerobat.declaration import PathName, by_value, in_notebooks, short, validated
-from aerobat.planning.assessment.assessment import Assessment
+from aerobat.planning.assessment.assessment import Assessment, SecondOpinion
+from aerobat.planning.evidence import Evidence
+from aerobat.planning.flyability import Flyability
+from aerobat.planning.passages import PlacedStage
 from aerobat.planning.recorder import Attempt
 from aerobat.planning.rotor_margin import RotorMargin
 from aerobat.planning.tube import Tube
 from aerobat.problem.problem import Problem
 from aerobat.simulation.autopilot import Recoveries
-from aerobat.simulation.outcome import length
 from aerobat.trajectory import Trajectory
 from aerobat.vehicle import Vehicle
-
-
-@dataclass(frozen=True)
-class PlacedStage:
-    """Where a stage ended up."""
-
-    name: str
-    interval: int  # counted from 0; the stage holds at its end
-    time: float  # [s]
-    gate: str | None = None  # the name of the gate that is passed there
-
 
 # of every limit's range, kept from either end for the controller by planners that use all of it, where a
 # plan shall be flown: rotors without lag leave it nothing otherwise
 FLYING_RESERVE = 0.03
-FLYABLE_ERROR = 0.05  # [m] that a plan's own flight may leave its path by, a frame's usual clearance
-
-
-@dataclass(frozen=True)
-class FlownPassage:
-    """A gate in a plan's own flight."""
-
-    gate: str
-    attitude_error: float | None  # [rad] between the thrust axis and where it shall point; None: not crossed
-    attitude_tolerance: float | None  # [rad] that is allowed; None where no attitude is asked
-    failure: str = ""  # what went wrong, in words; empty where it was passed as asked
-    clearance: float | None = None  # [m] the least between body and frame; None: not crossed
-
-    @property
-    def is_missed(self) -> bool:
-        """True where the gate is not crossed, or not as far as counts, or its frame is touched."""
-        return bool(self.failure) and (self.clearance is None or self.clearance < 0.0)
-
-
-@dataclass(frozen=True, kw_only=True)
-class OwnFlight:
-    """A plan's own nominal flight: the simulated closed loop, nothing unknown."""
-
-    error: float  # [m] the largest position error, 5 m or more where it diverges
-    passages: tuple[FlownPassage, ...] = ()  # the planned ones, in their order
-
-    @property
-    def flies(self) -> bool:
-        """True if it stays within FLYABLE_ERROR of the path and passes the gates as they ask."""
-        return not self.defects
-
-    @property
-    def lingers(self) -> bool:
-        """True if it does not pass the plane of a gate, or not as far as counts, or touches the frame."""
-        return any(passage.is_missed for passage in self.passages)
-
-    @property
-    def wants_reserve(self) -> bool:
-        """True if it has a defect that more reserve for the controller may mend: any but a gate missed."""
-        return len(self.defects) > sum(passage.is_missed for passage in self.passages)
-
-    @property
-    def rank(self) -> tuple[int, float]:
-        """The number of defects, and the error [m]: the better of two flights has the lesser."""
-        return len(self.defects), self.error
-
-    @property
-    def defects(self) -> tuple[str, ...]:
-        """All that it does wrong, in words."""
-        failed = tuple(passage.failure for passage in self.passages if passage.failure)
-        if self.error <= FLYABLE_ERROR:
-            return failed
-        allowed = f"{100 * FLYABLE_ERROR:g} cm at most allowed"
-        return (f"leaves the path by {length(self.error)}, {allowed}", *failed)
-
-
-@dataclass(frozen=True, kw_only=True)
-class Flyability(OwnFlight):
-    """A plan's own flights: the nominal one, and one with the reserve used up.
-
-    The disturbance is the largest that the rotors' reserve buys at every instant: all rotors give less than
-    commanded by a fraction of it, of which no rotor's limit need take notice.
-    """
-
-    disturbance: float  # [N] by which every rotor may miss its thrust; 0 where nothing is left
-    disturbed_fraction: float  # [-] the same over the largest thrust of a rotor
-    disturbed_error: float  # [m] the largest position error where all rotors give less by that fraction
-
-    @property
-    def remedy(self) -> str:
-        """What may mend its defects, in words; empty where there are none."""
-        found = []
-        if self.lingers:
-            found.append("ask more speed of the passage or widen the opening")
-        if self.wants_reserve:
-            found.append("keep more reserve for the controller")
-        return ", ".join([*found, "or take another planner"]) if found else ""
-
-    def __str__(self) -> str:
-        """The finding in a sentence without its full stop."""
-        if self.defects:
-            found = " and ".join(self.defects)
-            return (
-                f"not flyable: its own flight {found}, a defect of the plan, not of the flight; {self.remedy}"
-            )
-        if not self.disturbance:
-            return f"flies within {length(self.error)}, with no reserve left"
-        return (
-            f"flies within {length(self.error)}; the reserve left, {self.disturbance:.2g} N, is "
-            f"{100 * self.disturbed_fraction:.2g} % of a rotor's thrust: with as much less from all rotors "
-            f"within {length(self.disturbed_error)}"
-        )
 
 
 @validated
@@ -147,13 +46,44 @@ class Plan:
     bound: float | None = None  # the cost of any solution at this dt is at least this, proven
     gap: float | None = None  # (cost − bound) / cost
     vehicle: Vehicle | None = None  # what it was planned or certified for
-    certificate: Certificate | None = None  # for the vehicle, over continuous time
-    flyability: Flyability | None = None  # of the vehicle's own flight, simulated
     recoveries: Recoveries | None = None  # to a hover, from instants all along it; None where none is known
-    assessment: Assessment | None = None  # beside what is possible and usual, for the vehicle
+    opinion: SecondOpinion | None = None  # of another planner, where one was asked
     rescue: str = ""  # what found it, where what was asked for found nothing
     starts: tuple[float, ...] = ()  # [s] that first, coarse solves from several starts came to, rising
     tube: Tube | None = None  # of its flights, where it was tightened until they pass
+    evidence: Evidence | None = None  # for its own path, vehicle and stages; None without a vehicle
+
+    def __post_init__(self) -> None:
+        own = None
+        if self.vehicle is not None:
+            own = Evidence(self.problem, self.vehicle, self.trajectory, self.stages)
+        if self.evidence != own:  # that of another path, before `replace`
+            object.__setattr__(self, "evidence", own)
+
+    @property
+    def certificate(self) -> Certificate | None:
+        """The proof for the vehicle, over continuous time; None without a vehicle."""
+        return None if self.evidence is None else self.evidence.certificate
+
+    @property
+    def flyability(self) -> Flyability | None:
+        """The findings of the vehicle's own flights, simulated; None without a vehicle."""
+        return None if self.evidence is None else self.evidence.flyability
+
+    @property
+    def assessment(self) -> Assessment | None:
+        """The plan beside what is possible and usual for the vehicle; None without one."""
+        if self.evidence is None:
+            return None
+        return replace(self.evidence.assessment, opinion=self.opinion)
+
+    def for_vehicle(self, vehicle: Vehicle) -> Plan:
+        """Return the plan as one for another vehicle, without what was found out for its own.
+
+        Raises SpecError for a vehicle that its dead rotors leave without control.
+        """
+        vehicle = vehicle.without_dead_rotors()
+        return replace(self, vehicle=vehicle, recoveries=None, opinion=None, tube=None)
 
     @property
     def duration(self) -> float:
@@ -180,7 +110,7 @@ class Plan:
         """True if it is suspicious and no other planner was asked yet; one that a limit ended has no time."""
         found = self.assessment
         is_open = self.planner != "time-optimal" and self.status != "time_limit"
-        return found is not None and found.suspicious and found.opinion is None and is_open
+        return found is not None and found.suspicious and self.opinion is None and is_open
 
     @property
     def spread(self) -> float | None:
@@ -228,9 +158,10 @@ class Plan:
 
         Raises SpecError when the file cannot be written.
         """
-        from aerobat.planning.plan_file import save_plan
+        from aerobat.planning.plan_file import Facts, write_plan_file
 
-        save_plan(self, path)
+        facts = Facts(**{field.name: getattr(self, field.name) for field in fields(Facts)})
+        write_plan_file(path, self.problem, self.trajectory, self.vehicle, facts)
 
     def __str__(self) -> str:
         """One line for people."""
@@ -248,3 +179,15 @@ class Plan:
             f"{self.problem.name}: {self.duration:.3f} s in {self.intervals} intervals{dt}, {self.status} by "
             f"{self.planner}{backend}; {stages}{margin}{proof}{flown}{given_up}{assessed}{rescue}{tube}"
         )
+
+
+@validated
+def load_plan(path: PathName) -> Plan:
+    """Read what `Plan.save` wrote, exactly; its proof and its own flights are worked out anew.
+
+    Raises SpecError, one sentence, for any other file, a damaged or a changed one.
+    """
+    from aerobat.planning.plan_file import read_plan_file
+
+    problem, trajectory, vehicle, facts = read_plan_file(path)
+    return Plan(problem, trajectory, vehicle=vehicle, **facts)

@@ -23,7 +23,7 @@ import numpy as np
 from aerobat.arrays import Array
 from aerobat.certification import PlannedPassage
 from aerobat.optimization.deadline import out_of_time
-from aerobat.planning.result import FLYABLE_ERROR, OwnFlight
+from aerobat.planning.flyability import FLYABLE_ERROR, OwnFlight
 from aerobat.problem.condition import Condition, Quantity
 from aerobat.problem.gate import Gate
 from aerobat.problem.problem import Problem

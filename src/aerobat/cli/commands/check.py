@@ -19,7 +19,7 @@ from aerobat.environment import Environment
 from aerobat.errors import SpecError
 from aerobat.interchange import read_plan
 from aerobat.planning import Plan, with_explanation
-from aerobat.planning.certified_solve import envelope_for
+from aerobat.planning.evidence import envelope_for
 from aerobat.reporting.report_json import evidence_facts, to_json
 from aerobat.reporting.tables import certificate_table, evidence_table, print_table
 from aerobat.trajectory import Trajectory
@@ -59,7 +59,7 @@ def check(plan: Path, options: Annotated[CheckOptions, Parameter(name="*")] = Ch
         moment=options.max_moment or inf,
     )
     certificate = certify(trajectory, vehicle, environment, envelope)
-    explained = _explained(found, trajectory, vehicle, certificate) if isinstance(found, Plan) else None
+    explained = _explained(found, trajectory, vehicle) if isinstance(found, Plan) else None
     if options.json:
         print_json(to_json(certificate.record() | evidence_facts(explained)))
         return _judgement(certificate)
@@ -75,18 +75,10 @@ def _judgement(certificate: Certificate) -> ExitCode:
     return ExitCode.WELL if certificate.certified else ExitCode.NOT_WELL
 
 
-def _explained(plan: Plan, trajectory: Trajectory, vehicle: Vehicle, certificate: Certificate) -> Plan | None:
+def _explained(plan: Plan, trajectory: Trajectory, vehicle: Vehicle) -> Plan | None:
     """The plan, of this path and vehicle, with all that is told of one; None where it cannot be known."""
     if (plan.trajectory, plan.vehicle) != (trajectory, vehicle):
-        plan = replace(
-            plan,
-            trajectory=trajectory,
-            vehicle=vehicle,
-            certificate=certificate,
-            flyability=None,
-            recoveries=None,
-            assessment=None,
-        )
+        plan = replace(plan, trajectory=trajectory).for_vehicle(vehicle)
     try:
         return with_explanation(plan)
     except SpecError:  # the vehicle cannot hover, say

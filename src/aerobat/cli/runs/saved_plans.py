@@ -14,7 +14,7 @@ from aerobat.cli.terminal import say
 from aerobat.errors import SpecError
 from aerobat.interchange import read_plan, read_rows
 from aerobat.interchange.robots import SUFFIXES
-from aerobat.planning import Plan, with_assessment, with_evidence, with_flyability
+from aerobat.planning import Plan
 from aerobat.problem import EndState, Problem, problem_names
 from aerobat.trajectory import Trajectory
 from aerobat.vehicle import Vehicle, implausibilities, load_vehicle
@@ -47,9 +47,8 @@ def read_saved_plan(path: Path, options: PlanningOptions) -> Plan:
         if is_given(getattr(options, name)):
             raise SpecError(f"--{name} is for a CSV file, but {path} is a whole plan; leave it out")
     if options.vehicle is not None or found.vehicle is None:
-        return with_evidence(found, named_vehicle(options.vehicle or default_vehicle()))
-    found = found if found.flyability is not None else with_flyability(found)
-    return found if found.assessment is not None else with_assessment(found)
+        return found.for_vehicle(named_vehicle(options.vehicle or default_vehicle()))
+    return found
 
 
 def named_vehicle(name: str) -> Vehicle:
@@ -77,8 +76,9 @@ def _plan_of_path(path: Path, trajectory: Trajectory, options: PlanningOptions) 
     name = re.sub(r"[^\w .-]|^\W+", "-", path.stem).lstrip(" .-") or MADE_BY
     problem = Problem(name=name, start=start, goal=goal, heading=trajectory.heading)
     vehicle.require_hover(problem.environment.gravity)
-    plan = Plan(problem=problem, trajectory=trajectory, planner=MADE_BY, status="as it is")
-    plan = with_evidence(plan, vehicle)  # whatever is wrong with the path is the one thing to be said then
+    plan = Plan(problem=problem, trajectory=trajectory, planner=MADE_BY, status="as it is").for_vehicle(
+        vehicle
+    )
     say(f"{path} holds a path alone; assumed: {', '.join(_assumed(path, vehicle, problem, options))}")
     return plan
 

@@ -17,8 +17,9 @@ from aerobat.planning.miqp.diagnosis import NOT_CONVERGED, OUT_OF_TIME
 from aerobat.planning.miqp.formulation import Formulation
 from aerobat.planning.miqp.integrator import INPUT_NAMES
 from aerobat.planning.miqp.refinement import PathPoint, PathProgram, settled
+from aerobat.planning.passages import PlacedStage
 from aerobat.planning.recorder import Recorder
-from aerobat.planning.result import PlacedStage, Plan
+from aerobat.planning.result import Plan
 from aerobat.planning.rotor_margin import reserve_shortfalls
 from aerobat.problem.problem import Problem
 from aerobat.trajectory import Trajectory

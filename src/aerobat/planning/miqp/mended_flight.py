@@ -8,10 +8,9 @@ from functools import partial
 
 from aerobat.optimization.deadline import out_of_time
 from aerobat.planning.certified_solve import Judged
-from aerobat.planning.flyability import own_flight
+from aerobat.planning.flyability import OwnFlight, own_flight
 from aerobat.planning.miqp.attempts import Attempts, Placement
 from aerobat.planning.miqp.refinement import PathProgram, descent, finished
-from aerobat.planning.result import OwnFlight
 from aerobat.planning.ways import Way, straightened, straighter
 from aerobat.problem.stage import Stage
 

@@ -17,10 +17,11 @@ from aerobat.errors import Infeasible, SpecError
 from aerobat.flatness import force_balance
 from aerobat.optimization.deadline import out_of_time, within_time
 from aerobat.planning.certified_solve import Judged, Solution, certified_solve, refuted_by_samples
+from aerobat.planning.passages import PlacedStage
 from aerobat.planning.planners import Planner, option, planner
 from aerobat.planning.polynomial.knots import first_times, fixed_at_knots, unhurried, violated_stage
 from aerobat.planning.recorder import Progress, Recorder
-from aerobat.planning.result import PlacedStage, Plan
+from aerobat.planning.result import Plan
 from aerobat.planning.search import BisectionSearch, GridSearch, Search
 from aerobat.planning.time_limit import TIME_LIMIT, stopped, too_short
 from aerobat.problem.problem import Problem

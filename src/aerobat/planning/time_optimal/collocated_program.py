@@ -11,7 +11,7 @@ from aerobat.certification import Certificate
 from aerobat.optimization.deadline import out_of_time
 from aerobat.optimization.nonlinear import NonlinearResult, solve_nonlinear
 from aerobat.planning.certified_solve import Solution
-from aerobat.planning.result import PlacedStage
+from aerobat.planning.passages import PlacedStage
 from aerobat.planning.time_optimal.optimal_control.boundary import ClosedLap, FixedEnds
 from aerobat.planning.time_optimal.optimal_control.bounds import Backoff
 from aerobat.planning.time_optimal.optimal_control.collocation import (

@@ -9,10 +9,9 @@ from functools import cached_property
 from aerobat.optimization.deadline import out_of_time, time_left, within_time
 from aerobat.planning.certified_solve import Judged, certified_solve
 from aerobat.planning.courses import is_course
-from aerobat.planning.flyability import own_flight
+from aerobat.planning.flyability import OwnFlight, own_flight
 from aerobat.planning.miqp import Miqp
 from aerobat.planning.recorder import Attempt, Recorder
-from aerobat.planning.result import OwnFlight
 from aerobat.planning.time_optimal.collocated_program import CollocatedProgram, SolvedMotion
 from aerobat.planning.time_optimal.optimal_control.elements import Elements
 from aerobat.planning.time_optimal.starts import Start, starts

@@ -14,7 +14,7 @@ from aerobat.environment import Dispersion, as_dispersion
 from aerobat.errors import Infeasible, SpecError
 from aerobat.evaluation import Scores, score_flights
 from aerobat.evaluation.opening import Probability
-from aerobat.planning import Attempt, Plan, Planner, as_planner, plan, with_evidence
+from aerobat.planning import Attempt, Plan, Planner, as_planner, plan
 from aerobat.planning.tube import Tube
 from aerobat.problem import Problem, as_problem
 from aerobat.studies.passing.causes import standing_in_the_way
@@ -117,9 +117,7 @@ class _Task:
     def plan(self, reserve: float, problem: Problem) -> Plan:
         """The plan with a reserve, and through gates as `problem` has them, judged by the task's own."""
         found = plan(problem, replace(self.planner, reserve=reserve), self.vehicle, self.progress)
-        if problem == self.problem:
-            return found
-        return with_evidence(replace(found, problem=self.problem), found.vehicle)
+        return replace(found, problem=self.problem)
 
     def scores(self, found: Plan, flights: range, conditions: Dispersion | None = None) -> Scores:
         """Scores of flights of a plan, by default under the task's conditions."""

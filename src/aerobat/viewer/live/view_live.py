@@ -11,7 +11,7 @@ from pydantic import Field
 
 from aerobat.declaration import validated
 from aerobat.environment import Dispersion, as_dispersion
-from aerobat.planning import Plan, Planner, as_planner, planner_for, registered_planners, with_evidence
+from aerobat.planning import Plan, Planner, as_planner, planner_for, registered_planners
 from aerobat.problem import Problem, as_problem
 from aerobat.vehicle import Vehicle, as_vehicle
 from aerobat.viewer.document import document
@@ -117,7 +117,7 @@ def _begun(
         setting = Setting(problem, method, flyer, conditions)
         return setting, Replanner(setting, ()).plan(setting)
     flyer = as_vehicle(vehicle or shown.vehicle or VEHICLE)
-    plan = shown if flyer == shown.vehicle and shown.certificate else with_evidence(shown, flyer)
+    plan = shown if flyer == shown.vehicle else shown.for_vehicle(flyer)
     own = _planner_of(shown, flyer) if planner is None else as_planner(planner)
     return Setting(shown.problem, own, flyer, conditions), plan
 

@@ -17,7 +17,8 @@ from aerobat.arrays import Array
 from aerobat.certification import Certificate, Verdict
 from aerobat.optimization.deadline import out_of_time
 from aerobat.planning.certified_solve import Judged, Solution, certified_solve
-from aerobat.planning.flyability import own_flight
+from aerobat.planning.flyability import OwnFlight, own_flight
+from aerobat.planning.passages import PlacedStage
 from aerobat.planning.polynomial.descent.framed_problem import TRUSTED, FramedProblem, Path
 from aerobat.planning.polynomial.descent.knot_program import (
     FINE,
@@ -33,7 +34,7 @@ from aerobat.planning.polynomial.descent.knot_samples import (
 from aerobat.planning.polynomial.descent.knot_variables import KnotVariables
 from aerobat.planning.polynomial.descent.stage_constraints import StageConstraints
 from aerobat.planning.recorder import Recorder
-from aerobat.planning.result import OwnFlight, PlacedStage, Plan
+from aerobat.planning.result import Plan
 from aerobat.planning.rotor_margin import reserve_shortfalls
 from aerobat.planning.warm_start import WarmStart
 from aerobat.planning.ways import straightened, straighter
