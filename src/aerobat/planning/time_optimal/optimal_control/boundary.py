@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from math import cos, inf, sin
-from typing import Any, Protocol
+from typing import Protocol
 
 import numpy as np
 
@@ -13,7 +13,7 @@ from aerobat import so3
 from aerobat.arrays import Array
 from aerobat.flatness import force_balance, reference
 from aerobat.kernels.quaternions import conjugate, multiply
-from aerobat.optimization.nonlinear import import_casadi
+from aerobat.optimization.nonlinear import components, import_casadi
 from aerobat.optimization.separable import ElementFunction
 from aerobat.planning.time_optimal.optimal_control.collocation import STATE_SCALE, CollocatedMotion, Mesh
 from aerobat.planning.time_optimal.optimal_control.elements import Elements, weighted_sum
@@ -182,7 +182,7 @@ class ClosedLap:
         z = ca.SX.sym("z", 2 * (STATES + INPUTS))
         first, last = z[: STATES + INPUTS], z[STATES + INPUTS :]
         apart = last - first
-        turn = multiply(conjugate(_scalars(first[ATTITUDE])), _scalars(last[ATTITUDE]))[1:]
+        turn = multiply(conjugate(components(first[ATTITUDE])), components(last[ATTITUDE]))[1:]
         values = ca.vertcat(apart[: ATTITUDE.start], *turn, apart[ATTITUDE.stop :])
         return ElementFunction(ca.Function("apart", [z, ca.SX.sym("none", 0)], [values]))
 
@@ -207,7 +207,3 @@ class ClosedLap:
         turned = cos(half) * q[3] - sin(half) * q[0]
         values = ca.vertcat(ca.sumsqr(q), turned)
         return ElementFunction(ca.Function("start", [z, ca.SX.sym("none", 0)], [values]))
-
-
-def _scalars(column: Any) -> tuple[Any, ...]:
-    return tuple(column[i] for i in range(column.numel()))
