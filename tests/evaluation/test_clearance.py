@@ -14,8 +14,9 @@ import aerobat as ab
 from aerobat import so3
 from aerobat.arrays import Array
 from aerobat.certification import PlannedPassage
+from aerobat.engines.floats import FloatOps
+from aerobat.limits.body_in_gate import BodyInGate, extent_of_attitude, extent_of_thrust
 from aerobat.planning import PlacedStage
-from aerobat.planning.ways import Way
 from aerobat.reporting.report_json import report
 from aerobat.simulation import Outcome
 from aerobat.simulation.passages import PASSAGE_DEPTH, passages
@@ -172,13 +173,14 @@ def test_a_path_that_bends_no_more_than_its_way_through_a_gate_clears_the_frame_
     wide, _, high = one.body.semi_axes
     body, size = ab.Ellipsoid((wide, wide, high)), 2.0 * max(wide, high) + rng.uniform(0.1, 0.3)
     gate, offset = replace(one.gate, width=size, height=size), 0.4 * one.offset
-    way = Way(gate, 0, PASSAGE_DEPTH + max(wide, high), rng.uniform(0.1, 8.0))
+    way = BodyInGate(gate, 0, PASSAGE_DEPTH + max(wide, high), rng.uniform(0.1, 8.0))
     thrust = so3.rotate(one.attitude, np.array([0.0, 0.0, 1.0]))
+    extent = extent_of_thrust(FloatOps, body, tuple(thrust.tolist()))
     along = one.velocity / np.linalg.norm(one.velocity)
 
     def is_asked(speed: float) -> bool:
-        asked = way.conditions(gate.position + offset, speed * along, thrust, body)
-        return all(condition.direction @ (speed * along) >= condition.lower for condition in asked)
+        position, velocity = (gate.position + offset).tolist(), (speed * along).tolist()
+        return min(way.opening.room(FloatOps, position, velocity, extent)) >= 0.0
 
     slowest = next((speed for speed in np.geomspace(0.3, 100.0, 80) if is_asked(speed)), None)
     assume(slowest)
@@ -191,6 +193,28 @@ def test_a_path_that_bends_no_more_than_its_way_through_a_gate_clears_the_frame_
     slowed = Motion(gate, body, offset, velocity, -way.bending * gate.normal, one.attitude, np.zeros(3))
     times = np.arange(0.0, 5.0, 1e-3)
     assert ((slowed.states(times)[0] - gate.position) @ gate.normal).max() > 0.999 * way.reach
+
+
+@given(seeds)
+@examples(30)
+def test_a_body_turned_about_its_thrust_reaches_as_far_as_it_does_in_some_attitude_and_no_farther(
+    seed: int,
+) -> None:
+    rng = np.random.default_rng(seed)
+    body = ab.Ellipsoid(rng.uniform(0.05, 0.3, 3), rng.uniform(-0.05, 0.05, 3))
+    attitude, outward = so3.exp(rng.normal(size=3)), rng.normal(size=3)
+    outward = tuple((outward / np.linalg.norm(outward)).tolist())
+    x, y, z = np.moveaxis(so3.axes(attitude), -1, 0).tolist()
+    own = extent_of_attitude(FloatOps, body, (x, y, z))(outward)
+    surface = rng.normal(size=(20_000, 3))
+    surface /= np.linalg.norm(surface, axis=1, keepdims=True)
+    points = so3.rotate(attitude, body.centre + body.semi_axes * surface)
+    assert own == pytest.approx((points @ outward).max(), abs=2e-3)
+    assert own <= extent_of_thrust(FloatOps, body, tuple(2.0 * np.array(z)))(outward) + 1e-12
+    round_body = ab.Ellipsoid((0.2, 0.2, 0.05), (0.0, 0.0, 0.03))
+    assert extent_of_thrust(FloatOps, round_body, tuple(z))(outward) == pytest.approx(
+        extent_of_attitude(FloatOps, round_body, (x, y, z))(outward)
+    )
 
 
 def test_who_slides_along_the_plane_into_the_opening_has_hit_the_frame() -> None:

@@ -7,11 +7,11 @@ import pytest
 
 from aerobat.planning import FreeKnots, MinSnap, Plan
 from aerobat.planning.flyability import FlownPassage, OwnFlight, own_flight
+from aerobat.planning.gate_clearance import more_direct
 from aerobat.planning.polynomial.descent.framed_problem import FramedProblem
 from aerobat.planning.polynomial.nearest import nearest_polynomials
 from aerobat.planning.rotor_margin import reserve_shortfalls
 from aerobat.planning.warm_start import WarmStart
-from aerobat.planning.ways import straighter
 from aerobat.problem import Course, Limits, PassGate, Problem, Stage, at_rest, load_problem, tilted_gate
 from aerobat.trajectory import Trajectory
 from aerobat.trajectory.minimum_effort import minimum_effort
@@ -133,15 +133,15 @@ def test_each_limit_is_backed_off_from_by_its_own_excess_and_no_reserve_is_kept_
         assert (kept[of_vehicle] != whole[of_vehicle]).any()
 
 
-def test_a_way_is_straightened_by_less_where_the_body_only_touches_the_frame() -> None:
+def test_a_path_is_made_more_direct_by_less_where_the_body_only_touches_the_frame() -> None:
     problem = load_problem("flip-roll")
     stages = problem.stages(QUAD.max_specific_thrust, QUAD.body_radius).stages
 
-    def straightened_by(clearance: float) -> float:
+    def raised_by(clearance: float) -> float:
         missed = FlownPassage(problem.gates[0].name, 0.0, None, "hit the frame", clearance)
         flight = OwnFlight(error=0.0, passages=(missed,))
-        (way,) = straighter((), stages, problem, QUAD, flight)
-        (again,) = straighter((way,), stages, problem, QUAD, flight)
-        return again.bending / way.bending
+        (body,) = more_direct((), stages, problem, QUAD, flight)
+        (again,) = more_direct((body,), stages, problem, QUAD, flight)
+        return again.bending / body.bending
 
-    assert 1.0 < straightened_by(-0.001) < straightened_by(-0.1)
+    assert 1.0 < raised_by(-0.001) < raised_by(-0.1)

@@ -21,7 +21,9 @@ from aerobat.planning import (
     planner_options,
     registered_planners,
 )
+from aerobat.planning.certified_solve import Solution, certified_solve
 from aerobat.planning.evidence import envelope_for
+from aerobat.planning.recorder import Recorder
 from aerobat.problem import EndState, Limits, Problem, Waypoint, Waypoints, at_rest, load_problem
 from aerobat.vehicle import load_vehicle
 
@@ -65,12 +67,54 @@ def test_every_registered_planner_is_held_to_these_laws() -> None:
 @pytest.mark.parametrize("name", PLANNERS)
 def test_a_plans_certificate_is_its_trajectorys_in_the_problems_environment(name: str, world: str) -> None:
     found, problem = planned(name, world), WORLDS[world]
-    envelope = ab.Envelope(limits=problem.path_limits)
+    envelope = ab.Envelope(limits=problem.path_limits, **problem.ends)
     assert found.certificate == ab.certify(found.trajectory, QUAD, problem.environment, envelope)
     assert found.certified
     assert found.vehicle == QUAD
     assert found.planner == name
     assert found.attempts[-1].margin == pytest.approx(found.certificate.margin) or len(found.attempts) > 1
+
+
+ELSEWHERE = {
+    "position": {"position": (0.0, 0.01, 1.0)},
+    "velocity": {"velocity": (0.0, 0.0, 0.1)},
+    "acceleration": {"acceleration": (0.0, 0.0, 0.1)},
+}
+
+
+@pytest.mark.parametrize("quantity", ELSEWHERE)
+@pytest.mark.parametrize("end", ["start", "goal"])
+def test_a_plan_that_misses_what_an_end_asks_is_not_certified(end: str, quantity: str) -> None:
+    found = planned("min-snap", "limits")
+    asked = replace(getattr(STEP, end), **ELSEWHERE[quantity])
+    missed = replace(found, problem=replace(found.problem, **{end: asked}))
+    (violated,) = (f for f in missed.certificate.findings if f.verdict is Verdict.VIOLATED)
+    assert (violated.end, violated.quantity) == (end, f"{quantity} error")
+    assert missed.certificate.why.startswith(f"{end} {quantity} error ")
+    assert not missed.certified
+
+
+def test_a_goal_of_any_velocity_and_attitude_asks_for_its_place_alone() -> None:
+    found = planned("min-snap", "limits")
+    passing = EndState(STEP.goal.position, acceleration=(0.0, 0.0, 0.1), free_velocity=True)
+    assert replace(found, problem=replace(found.problem, goal=passing)).certified
+
+
+def test_a_solution_that_ignores_its_ends_is_no_plan_whichever_program_it_is_of() -> None:
+    class Moved:
+        """A path that ends a centimetre from the goal, flyable all along."""
+
+        def solve(self) -> Solution[None]:
+            ends = np.array([STEP.start.derivatives(5), STEP.goal.derivatives(5)])
+            ends[1, 0, 1] += 0.01
+            return Solution(None, 3.0, ab.minimum_effort(ends, [3.0]), "optimal", 1, 0.0)
+
+        def tighten(self, solution: Solution[None], certificate: ab.Certificate | None) -> bool:
+            return False
+
+    judged = certified_solve(Moved(), STEP, QUAD, recorder := Recorder(None))
+    assert not judged.feasible
+    assert recorder.attempts[-1].outcome.startswith("goal position error 0.01 m of 0 m at 3.000 s")
 
 
 @pytest.mark.parametrize("name", PLANNERS)
@@ -113,9 +157,8 @@ def test_a_plan_in_wind_asks_other_thrusts_than_in_calm_air(name: str) -> None:
         pytest.importorskip("casadi")
     found = plan(WINDY, PLANNERS[name], draggy)
     assert found.certified
-    assert found.certificate == ab.certify(
-        found.trajectory, draggy, WINDY.environment, ab.Envelope(limits=WINDY.path_limits)
-    )
+    envelope = ab.Envelope(limits=WINDY.path_limits, **WINDY.ends)
+    assert found.certificate == ab.certify(found.trajectory, draggy, WINDY.environment, envelope)
     calm = ab.certify(found.trajectory, draggy)
     assert calm.margin != pytest.approx(found.certificate.margin, abs=1e-4)
 
@@ -138,9 +181,8 @@ def test_the_certificate_returned_is_that_of_the_last_round_of_tightening() -> N
     limits = Limits(lower=(-20.0, -20.0, 0.0), upper=(20.0, 20.0, 20.0))
     floor = Problem("floor", start, goal, ab.CustomManeuver((middle,)), limits=limits)
     found = plan(floor, vehicle=QUAD)
-    assert found.certificate == ab.certify(
-        found.trajectory, QUAD, floor.environment, ab.Envelope(limits=limits)
-    )
+    envelope = ab.Envelope(limits=limits, **floor.ends)
+    assert found.certificate == ab.certify(found.trajectory, QUAD, floor.environment, envelope)
     assert found.certified
 
 
@@ -189,7 +231,8 @@ def test_a_users_planner_is_one_registered_class_and_gets_its_certificate() -> N
 
     assert registered_planners()["straight"] is Straight
     found = plan(STEP, "straight", QUAD)
-    assert found.certificate == ab.certify(found.trajectory, QUAD, STEP.environment)
+    envelope = ab.Envelope(**STEP.ends)
+    assert found.certificate == ab.certify(found.trajectory, QUAD, STEP.environment, envelope)
     assert found.certified
     assert str(found)
     (pace,) = planner_options(Straight)

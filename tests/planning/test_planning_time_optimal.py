@@ -9,6 +9,7 @@ import pytest
 
 from aerobat.errors import BackendMissing, Infeasible, SpecError
 from aerobat.planning import Plan, plan
+from aerobat.planning.time_optimal.optimal_control.collocation import Mesh
 from aerobat.planning.time_optimal.time_optimal import TimeOptimal
 from aerobat.problem import (
     EndState,
@@ -25,6 +26,7 @@ from aerobat.problem import (
 from aerobat.simulation import fly
 from aerobat.states import STANDARD_GRAVITY
 from aerobat.vehicle import Vehicle, load_vehicle
+from random_flights import with_lags
 from rigid_body_replay import replayed
 
 QUAD = load_vehicle("agile-quad")
@@ -72,7 +74,7 @@ def test_section_v_takes_its_least_time_and_a_rigid_body_without_control_arrives
     found = planar(name)
     assert found.duration == pytest.approx(least, rel=5e-3)
     assert found.certificate.certified
-    assert np.ptp(found.trajectory.coefficients[..., 1]) < 5e-5
+    assert np.abs(np.array(found.trajectory.component_range(0))[:, 1]).max() < 1e-5
     assert found.trajectory.evaluate(found.stages[0].time)[2] == pytest.approx(-2.0, abs=1e-6)
     position, velocity = replayed(found.trajectory, vehicle, problem.environment)
     assert np.linalg.norm(position - problem.goal.position) < 1e-3
@@ -179,6 +181,25 @@ def test_ends_in_motion_are_met():
     for end, state in ((0.0, start), (path.duration, goal)):
         for derivative, value in enumerate(state.derivatives(3)):
             assert path.evaluate(end, derivative) == pytest.approx(value, abs=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("name", "intervals"), [("line", 8), pytest.param("half-flip", 60, marks=pytest.mark.slow)]
+)
+def test_rotors_without_lag_begin_and_end_with_the_acceleration_that_is_asked(name, intervals):
+    """Thrust may jump in an instant, but not before the first: 22 m/s² were certified at rest."""
+    problem = load_problem(name)
+    path = TimeOptimal(intervals, starts=1).plan(problem, with_lags(QUAD, 0.0)).trajectory
+    for end, state in ((0.0, problem.start), (path.duration, problem.goal)):
+        assert path.evaluate(end, 2) == pytest.approx(state.acceleration, abs=1e-5)
+
+
+@pytest.mark.parametrize("continuous", [True, False])
+def test_the_end_intervals_are_short_where_thrust_jumps(continuous):
+    mesh = Mesh.even((2, 5), continuous, np.ones(3))
+    assert np.bincount(mesh.phase_of, mesh.fractions) == pytest.approx([1.0, 1.0])
+    assert (mesh.fractions[0] < 0.8 * mesh.fractions[1]) is not continuous
+    assert (mesh.fractions[-1] < 0.8 * mesh.fractions[-2]) is not continuous
 
 
 @pytest.mark.slow

@@ -151,7 +151,7 @@ def test_a_backoff_leaves_rotors_a_range_beside_the_reserve():
 
 
 def test_a_refined_mesh_covers_its_phases_and_is_finer_where_the_body_turns():
-    even = Mesh.even((4, 6), False, np.ones(3))
+    even = Mesh.even((4, 6), True, np.ones(3))
     starts = np.zeros((3, 10))
     starts[1, 7] = 100.0  # turns in the second phase's fourth interval
     motion = CollocatedMotion(np.array([1.0, 3.0]), np.zeros((12, 11)), starts, starts)

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
 from enum import StrEnum
 from math import degrees
+from typing import Literal
 
 from aerobat.declaration import by_value, in_notebooks, short, validated
 from aerobat.flatness import TimeInterval
@@ -30,8 +31,8 @@ class Side(StrEnum):
 class Finding:
     """The minimum or the maximum of one quantity, enclosed between `value` and `bound`.
 
-    Where it names a `gate` or a `waypoint`, it is about that instant alone, and `value` and `bound` are the
-    same.
+    Where it names a `gate`, a `waypoint` or an `end`, it is about that instant alone, and `value` and `bound`
+    are the same.
     """
 
     quantity: (
@@ -49,6 +50,7 @@ class Finding:
     rotor: int | None = None  # whose thrust or command it is about
     field: str = ""  # of the vehicle or the problem, that the limit comes from: "max_thrust", "limits.jerk"
     size: float | None = None  # of the range between its limits, of which reserves are fractions
+    end: Literal["start", "goal"] | None = None  # of the path, at that time
 
     @property
     def name(self) -> str:
@@ -57,10 +59,10 @@ class Finding:
 
     @property
     def place(self) -> str | None:
-        """The gate or waypoint that it is about, in words; None where it is about the whole path."""
+        """The gate, waypoint or end that it is about, in words; None where it is about the whole path."""
         if self.gate is not None:
             return f"gate '{self.gate}'"
-        return None if self.waypoint is None else f"'{self.waypoint}'"
+        return self.end if self.waypoint is None else f"'{self.waypoint}'"
 
     @property
     def margin(self) -> float | None:
@@ -183,7 +185,7 @@ class Certificate:
 
     def with_passages(self, passages: Sequence[Finding]) -> Certificate:
         """The same with the findings about passages through gates and about waypoints."""
-        others = tuple(finding for finding in self.findings if finding.place is None)
+        others = tuple(f for f in self.findings if f.gate is None and f.waypoint is None)
         return replace(self, findings=(*others, *passages))
 
     def record(self) -> dict[str, object]:

@@ -30,6 +30,7 @@ from aerobat.certification.enclosure.queries import (
     within,
 )
 from aerobat.certification.envelope import Envelope
+from aerobat.certification.path.ends import end_findings
 from aerobat.certification.path.kinematics import kinematic_findings
 from aerobat.certification.path.passages import passage_findings, waypoint_findings
 from aerobat.certification.subdivision import subdivide
@@ -95,6 +96,7 @@ def certify(
     balance = force_balance(environment, vehicle)
     on_path = (limit for limit in limits if limit.quantity.is_of_path)
     findings += kinematic_findings(trajectory, envelope.speed, on_path)
+    findings += end_findings(trajectory, envelope.start, envelope.goal)
     findings += passage_findings(trajectory, envelope.passages, balance)
     findings += waypoint_findings(trajectory, envelope.waypoints)
     jumps = discontinuities(curve, floor, series)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from aerobat.declaration import Count, Label, Limit, NonNegative, Number, TiltLimit, UnitVector, declared
-from aerobat.problem import Ball, Condition, Gate, Limits, Quantity, Stage
+from aerobat.problem import Ball, Condition, EndState, Gate, Limits, Quantity, Stage
 from aerobat.problem.stage import PARALLEL
 
 CROSSING_SPEED = 1e-3  # [m/s] a path that is slower in the gate's plane does not cross it
@@ -56,7 +56,8 @@ class Envelope:
     """Limits over continuous time; infinite where there is none.
 
     `limits` bounds position and its derivatives per axis, as a problem does; `conditions` hold throughout,
-    and `passages` and `waypoints` at their instants. What is `closed` goes on from its end as from its start.
+    `passages` and `waypoints` at their instants, `start` and `goal` where the path begins and ends. What is
+    `closed` goes on from its end as from its start.
     """
 
     speed: Limit = np.inf  # [m/s] |v|
@@ -67,4 +68,6 @@ class Envelope:
     conditions: tuple[Condition, ...] = ()
     passages: tuple[PlannedPassage, ...] = ()
     waypoints: tuple[PlannedWaypoint, ...] = ()
+    start: EndState | None = None
+    goal: EndState | None = None
     closed: bool = False

@@ -67,6 +67,20 @@ def import_casadi() -> Any:
     return import_module("casadi")
 
 
+def components(column: Any) -> tuple[Any, ...]:
+    """Return the components of a column of CasADi's symbols, as kernels take them."""
+    return tuple(column[i] for i in range(column.numel()))
+
+
+class SymbolicOps:
+    """The arithmetic of kernels on CasADi's symbols."""
+
+    def __init__(self) -> None:
+        ca = import_casadi()
+        self.sqrt, self.exp = ca.sqrt, ca.exp
+        self.minimum, self.maximum, self.select = ca.fmin, ca.fmax, ca.if_else
+
+
 @dataclass(frozen=True, eq=False)
 class NonlinearProgram:
     """Minimize f(x) subject to lower ≤ g(x) ≤ upper and x_min ≤ x ≤ x_max.

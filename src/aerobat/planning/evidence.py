@@ -66,5 +66,7 @@ def envelope_for(problem: Problem, vehicle: Vehicle, stages: Sequence[PlacedStag
         conditions=sequence.path_constraints,
         passages=planned_passages(stages, problem),
         waypoints=planned_waypoints(stages, problem),
+        start=problem.ends.get("start"),
+        goal=problem.ends.get("goal"),
         closed=sequence.closed,
     )

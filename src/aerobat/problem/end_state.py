@@ -51,6 +51,11 @@ class EndState:
         """The derivatives below `order` that it fixes, of position among them, whole numbers from 0."""
         return np.array([k for k in range(order) if k != VELOCITY or not self.free_velocity])
 
+    @property
+    def asked(self) -> Array:
+        """The derivatives of position, up to acceleration, that a motion must have there: whole numbers."""
+        return self.fixed(2 if self.leaves_attitude_free else 3)
+
     @validated
     def derivatives(self, order: Annotated[int, Field(ge=1, le=100)]) -> Array:
         """Position and its derivatives below `order`, (order, 3)."""

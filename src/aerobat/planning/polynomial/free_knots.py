@@ -20,6 +20,7 @@ from aerobat.optimization.nonlinear import import_casadi
 from aerobat.planning.assessment.assessment import SUSPICIOUS
 from aerobat.planning.assessment.lower_bound import least_duration
 from aerobat.planning.courses import is_course
+from aerobat.planning.gate_clearance import bodies_in_gates
 from aerobat.planning.miqp import Miqp
 from aerobat.planning.planners import Planner, option, planner
 from aerobat.planning.polynomial.knots import start_along_normals
@@ -28,7 +29,6 @@ from aerobat.planning.recorder import Progress, Recorder
 from aerobat.planning.result import FLYING_RESERVE, Plan
 from aerobat.planning.time_limit import TIME_LIMIT, stopped, too_short
 from aerobat.planning.warm_start import Reserve, WarmStart, plans_to_begin_from, require_attitudes
-from aerobat.planning.ways import ways_through_gates
 from aerobat.problem.problem import Problem
 from aerobat.problem.stage import StageSequence
 from aerobat.vehicle import Vehicle
@@ -107,15 +107,45 @@ class FreeKnots(Planner):
     def _planned(
         self, problem: Problem, vehicle: Vehicle, sequence: StageSequence, recorder: Recorder
     ) -> Plan | None:
+        """The fastest certified plan; where its flight hits a frame, one with room in all gates at first.
+
+        A long course has that room at once.
+        """
+        on_course = is_course(sequence)
+        starts = self._on_course if on_course else self._on_maneuver
+        task = problem, vehicle, sequence, recorder
+        found, clears = self._best(starts(*task), *task)
+        if found is None or clears or on_course or out_of_time():
+            return found
+        again, clears = self._best(self._on_course(*task), *task)
+        return again if clears else found
+
+    def _best(
+        self,
+        starts: Iterator[_Start],
+        problem: Problem,
+        vehicle: Vehicle,
+        sequence: StageSequence,
+        recorder: Recorder,
+    ) -> tuple[Plan | None, bool]:
         """The fastest certified plan from the first start that leads to one; from further ones if it is poor.
 
         A poor start leads to a poor optimum, or to none; an optimum from the MIQP's plan is taken, from
         another start one that is not slow beside what is possible.
+
+        Args:
+            starts: Where to begin.
+            problem: What is planned.
+            vehicle: What flies it.
+            sequence: The problem's stages for it.
+            recorder: Keeps an attempt a solve.
+
+        Returns:
+            The plan, and whether its own flight passes all gates.
         """
         best: Plan | None = None
-        on_course = is_course(sequence)
-        starts = self._on_course if on_course else self._on_maneuver
-        for start in starts(problem, vehicle, sequence, recorder):
+        clears = False
+        for start in starts:
             numbers = start.numbers
             descent = self._descent(problem, vehicle, sequence, start, recorder)
             if start.plan is not None:
@@ -123,18 +153,18 @@ class FreeKnots(Planner):
             for segments in numbers:
                 if not out_of_time():
                     descent.run(start.guess, segments)
-            if descent.best is None and not (on_course or out_of_time()):
+            if descent.best is None and not (start.on_course or out_of_time()):
                 descent.run(start.guess, 2 * numbers[-1])
-            found = descent.through_gates(numbers[-1])
-            if found is not None and (best is None or found.duration < best.duration):
-                best = found
+            found, passes = descent.through_gates(numbers[-1])
+            if found is not None and (best is None or (passes, -found.duration) > (clears, -best.duration)):
+                best, clears = found, passes
             taken = start.plan is None or start.plan is self.start
             near = descent.converged and start.plan is not None and start.plan.planner == "miqp"
             if out_of_time() or (
                 best is not None and (taken or near or (descent.converged and not _slow(best, vehicle)))
             ):
                 break
-        return best
+        return best, clears
 
     def _descent(
         self,
@@ -148,12 +178,12 @@ class FreeKnots(Planner):
         from aerobat.planning.polynomial.descent.framed_problem import FramedProblem
         from aerobat.planning.polynomial.descent.knot_descent import Descent
 
-        if is_course(sequence):
+        if start.on_course:
             iterations = COURSE_ITERATIONS
-            ways = ways_through_gates(start.guess.stages, problem, vehicle)
+            in_gates = bodies_in_gates(start.guess.stages, problem, vehicle)
         else:
-            iterations, ways = self.iterations, ()
-        framed = FramedProblem.of(problem, vehicle, sequence, start.guess, self.reserve, ways)
+            iterations, in_gates = self.iterations, ()
+        framed = FramedProblem.of(problem, vehicle, sequence, start.guess, self.reserve, in_gates)
         return Descent(framed, recorder, self.still_ends, iterations, start.strategy)
 
     def _on_course(
@@ -175,11 +205,11 @@ class FreeKnots(Planner):
         if motion is not None:
             guess = nearest_polynomials(motion, allowed, MAX_LEG_SEGMENTS * legs)
             number = max(self.segments, guess.trajectory.segments)
-            yield _Start(self.start, guess, (number,), NEAR_MOTIONS)
+            yield _Start(self.start, guess, (number,), NEAR_MOTIONS, on_course=True)
         of_leg = LEG_SEGMENTS if LEG_SEGMENTS * legs <= MAX_COURSE_SEGMENTS else 1
         for order in START_ORDERS:
             guess = start_along_normals(problem, vehicle, sequence, order)
-            yield _Start(None, guess, (max(self.segments, of_leg * legs),), OF_COURSES)
+            yield _Start(None, guess, (max(self.segments, of_leg * legs),), OF_COURSES, on_course=True)
 
     def _on_maneuver(
         self, problem: Problem, vehicle: Vehicle, sequence: StageSequence, recorder: Recorder
@@ -211,6 +241,7 @@ class _Start:
     guess: WarmStart
     numbers: tuple[int, ...]  # of segments, to begin with and in the end
     strategy: Strategy
+    on_course: bool = False  # with room in all gates from the start
 
 
 def _slow(plan: Plan, vehicle: Vehicle) -> bool:

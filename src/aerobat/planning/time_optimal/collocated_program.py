@@ -178,7 +178,7 @@ def optimal_control(elements: Elements, start: Start, reserve: float) -> Optimal
         elements=elements,
         boundary=boundary,
         stages=start.guess.stages,
-        ways=start.ways,
+        in_gates=start.in_gates,
         min_thrust=boundary.thrust_floor(floor),
         reserve=reserve,
     )

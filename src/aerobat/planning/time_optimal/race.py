@@ -6,10 +6,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
+from aerobat.limits.body_in_gate import BodyInGate
 from aerobat.optimization.deadline import out_of_time, time_left, within_time
 from aerobat.planning.certified_solve import Judged, certified_solve
 from aerobat.planning.courses import is_course
 from aerobat.planning.flyability import OwnFlight, own_flight
+from aerobat.planning.gate_clearance import cleared, more_direct
 from aerobat.planning.miqp import Miqp
 from aerobat.planning.recorder import Attempt, Recorder
 from aerobat.planning.time_optimal.collocated_program import CollocatedProgram, SolvedMotion
@@ -17,7 +19,6 @@ from aerobat.planning.time_optimal.optimal_control.elements import Elements
 from aerobat.planning.time_optimal.starts import Start, starts
 from aerobat.planning.time_optimal.time_optimal import MIN_INTERVALS
 from aerobat.planning.warm_start import WarmStart
-from aerobat.planning.ways import Way, straightened, straighter
 from aerobat.problem.problem import Problem
 from aerobat.vehicle import Vehicle
 
@@ -81,11 +82,11 @@ class Race:
         return best or next(filter(None, map(self._certified, others)), None)
 
     def flyable(self, found: Judged[SolvedMotion]) -> Judged[SolvedMotion]:
-        """What was found, with ways so straight and so much more reserve that its own flight has no defect.
+        """What was found, so direct through gates and with so much reserve that its flight has no defect.
 
         Where no reserve is wanted it stays as it is, and where none is enough the best is returned.
         """
-        best, reserve = straightened(found, self._own_flight, self._straighter), self.reserve
+        best, reserve = cleared(found, self._own_flight, self._more_direct), self.reserve
         found = best[1]
         for _ in range(RESERVE_RAISES if reserve > 0.0 else 0):
             if not best[0].wants_reserve or out_of_time():
@@ -98,14 +99,14 @@ class Race:
                 best = min(best, (self._own_flight(found), found), key=lambda pair: pair[0].rank)
         return best[1]
 
-    def _straighter(self, found: Judged[SolvedMotion], flight: OwnFlight) -> Judged[SolvedMotion] | None:
-        """What is found on straighter ways through the gates that a flight did not pass, if anything is."""
+    def _more_direct(self, found: Judged[SolvedMotion], flight: OwnFlight) -> Judged[SolvedMotion] | None:
+        """What is found with more room in the gates that a flight did not pass, if anything is."""
         solved = found.solution.source
-        before, control = solved.program.start.ways, solved.program.control
-        ways = straighter(before, control.stages, self.problem, self.vehicle, flight)
-        if ways == before:
+        before, control = solved.program.start.in_gates, solved.program.control
+        in_gates = more_direct(before, control.stages, self.problem, self.vehicle, flight)
+        if in_gates == before:
             return None
-        return self._certified(self._fine(control.elements, solved, self.reserve, ways))
+        return self._certified(self._fine(control.elements, solved, self.reserve, in_gates))
 
     def _coarse(self, starts: Sequence[Start], body: Vehicle) -> list[CollocatedProgram]:
         """Fine programs from where coarse ones end, the fastest first."""
@@ -143,10 +144,10 @@ class Race:
         elements: Elements,
         solved: SolvedMotion,
         reserve: float,
-        ways: tuple[Way, ...] | None = None,
+        in_gates: tuple[BodyInGate, ...] | None = None,
     ) -> CollocatedProgram:
-        """The program on the fine mesh from a motion, its ways through gates the same or others."""
-        start = solved.start if ways is None else replace(solved.start, ways=ways)
+        """The program on the fine mesh from a motion, with the same room in gates or another."""
+        start = solved.start if in_gates is None else replace(solved.start, in_gates=in_gates)
         if not self.on_course:
             mesh = elements.mesh(start.guess.allocate_intervals(self.intervals, MIN_INTERVALS))
             return CollocatedProgram(elements, start, reserve, mesh, self.iterations)

@@ -12,7 +12,9 @@ from aerobat import so3
 from aerobat.arrays import Array
 from aerobat.errors import Infeasible
 from aerobat.flatness import force_balance, reference
+from aerobat.limits.body_in_gate import BodyInGate
 from aerobat.planning.courses import is_course
+from aerobat.planning.gate_clearance import bodies_in_gates
 from aerobat.planning.miqp import Miqp
 from aerobat.planning.planners import Planner
 from aerobat.planning.polynomial.knots import path_along_normals, start_along_normals
@@ -20,7 +22,6 @@ from aerobat.planning.polynomial.min_snap import MinSnap
 from aerobat.planning.result import Plan
 from aerobat.planning.time_optimal.optimal_control.collocation import CollocatedMotion, Mesh
 from aerobat.planning.warm_start import WarmStart
-from aerobat.planning.ways import Way, ways_through_gates
 from aerobat.problem.end_state import at_rest
 from aerobat.problem.maneuvers.line import Line
 from aerobat.problem.problem import Problem
@@ -46,7 +47,7 @@ class Start:
     plane: Array | None  # the normal of the plane that is kept, (3,)
     aside: Array  # [m] by which positions are moved halfway, less before and after, (3,)
     origin: str
-    ways: tuple[Way, ...] = ()  # of the body through gates, among the stages of `guess`
+    in_gates: tuple[BodyInGate, ...] = ()  # those that the stages of `guess` cross
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,13 +75,13 @@ def starts(
         Infeasible: A stage asks more thrust than the vehicle has.
     """
     sequence = problem.stages(vehicle.max_specific_thrust, vehicle.body_radius)
-    ways = ways_through_gates(sequence.stages, problem, vehicle) if is_course(sequence) else ()
+    in_gates = bodies_in_gates(sequence.stages, problem, vehicle) if is_course(sequence) else ()
     if sequence.closed:
         laps = [
             (flying_lap(problem, vehicle, sequence, order), f"minimum {ORDERS[order]}") for order in (3, 4)
         ]
         found = tuple(islice(in_space(_variations(laps, False)), count))
-        return Starts(tuple(replace(start, ways=ways) for start in found), ())
+        return Starts(tuple(replace(start, in_gates=in_gates) for start in found), ())
     if is_course(sequence):
         plans = [] if first is None else [(first, f"{first.planner}'s plan")]
         paths = [
@@ -93,7 +94,7 @@ def starts(
         sources = list(_sources(plans, sequence))
     own = tuple(plan for plan, _ in plans if plan.certified and plan.vehicle == vehicle)
     motions = islice(_variations(sources, planar), count)
-    return Starts(tuple(replace(start, ways=ways) for start in motions), own)
+    return Starts(tuple(replace(start, in_gates=in_gates) for start in motions), own)
 
 
 def flying_lap(problem: Problem, vehicle: Vehicle, sequence: StageSequence, order: int) -> WarmStart:

@@ -13,11 +13,13 @@ from functools import cached_property
 import numpy as np
 
 from aerobat.arrays import Array, Indices, Mask
+from aerobat.limits.body_in_gate import BodyInGate
 from aerobat.limits.path_condition import limit_of
 from aerobat.optimization.prox_linear import Linearization
 from aerobat.planning.miqp.formulation import Formulation
 from aerobat.planning.miqp.refinement.limit_rows import LimitRows, stage_rows
 from aerobat.planning.miqp.refinement.phases import DERIVATIVES, PhasedChain, Places, Samples
+from aerobat.planning.miqp.refinement.room_rows import RoomRows
 from aerobat.trajectory import Trajectory
 from aerobat.vehicle import Vehicle
 
@@ -28,6 +30,7 @@ RESERVE_SLACK = 0.5 * RESERVE_BACKOFF  # of that, by which a path may miss it
 EXCESS_FACTOR = 1.2  # backoff for each unit of excess between places
 EXCESS_BACKOFF = 1e-4  # and so much more, for what moves while it is made up for
 NEGLIGIBLE = 5e-10  # of a constraint's range
+STAGE_BACKOFF = 2e-7  # of the range of what a stage asks: QPs miss long rows by a quarter of that
 REACH = 0.15  # of the mean interval and of each phase's, in one step
 MIN_RATIO = 0.3  # of an interval to the mean
 RATIO_SCALE = 0.3  # change of a ratio that counts as much as a whole unit of ln h
@@ -45,6 +48,7 @@ class PathProgram:
     held: bool = False  # times as they are: any path within all constraints will do
     reserve: float = RESERVE_BACKOFF  # of what the vehicle can do, kept everywhere
     backoff: Array = field(default_factory=lambda: np.zeros(0))  # of each interval and constraint, (N, c)
+    in_gates: tuple[BodyInGate, ...] = ()  # that the stages cross
 
     @cached_property
     def chain(self) -> PhasedChain:
@@ -132,6 +136,11 @@ class PathProgram:
         return LimitRows(self.formulation.limits, self.vehicle, problem.environment, problem.heading)
 
     @cached_property
+    def room(self) -> RoomRows:
+        """The body's room in gates."""
+        return RoomRows(self.in_gates, self.vehicle.bounding_ellipsoid, self.formulation.balance)
+
+    @cached_property
     def _instants(self) -> Places:
         """The goal, then the stages."""
         ends = np.array([self.chain.intervals - 1, *self.slots], dtype=np.intp)
@@ -208,11 +217,16 @@ class PathPoint:
         weights = program.limits.slopes(self._samples.derivatives, self._frames, place, column)
         values = self._values[place, column]
         at, stage_weights, _, equal = program._stage_rows
-        rows = [self._samples.rows(place, weights), self._instants.rows(at[~equal], stage_weights[~equal])]
+        crossing, room = program.room.slopes(self._instants.derivatives[1:])
+        rows = [
+            self._samples.rows(place, weights),
+            self._instants.rows(at[~equal], stage_weights[~equal]),
+            self._instants.rows(crossing + 1, room),
+        ]
         equality = self._instants.rows(*program._met[:2])
         size = _sizes(equality[:, : 3 * program.chain.intervals])
         return Linearization(
-            values=np.concatenate([values, self._stage_values]),
+            values=np.concatenate([values, self._stage_values + STAGE_BACKOFF]),
             rows=np.concatenate(rows),
             residual=_residual(self._instants, *program._met) / size,
             equality=equality / size[:, None],
@@ -260,10 +274,11 @@ class PathPoint:
 
     @cached_property
     def _stage_values(self) -> Array:
-        """Inequalities of stages."""
+        """Inequalities of stages, and the room in the gates that they cross."""
         at, weights, bounds, equal = self.program._stage_rows
-        values = np.sum(weights * self._instants.derivatives[at], axis=(1, 2)) - bounds
-        return np.asarray(values[~equal])
+        derivatives = self._instants.derivatives
+        values = np.sum(weights * derivatives[at], axis=(1, 2)) - bounds
+        return np.concatenate([values[~equal], self.program.room.values(derivatives[1:])])
 
 
 def _sizes(rows: Array) -> Array:

@@ -8,6 +8,7 @@ import numpy as np
 
 from aerobat.flatness import force_balance
 from aerobat.limits import limits_along
+from aerobat.limits.body_in_gate import BodyInGate
 from aerobat.limits.path_condition import limit_of
 from aerobat.planning.certified_solve import Solution
 from aerobat.planning.polynomial.descent.knot_samples import ConstraintViolation
@@ -16,7 +17,6 @@ from aerobat.planning.polynomial.descent.path_limits import PathLimits
 from aerobat.planning.polynomial.descent.symbolic_measures import SymbolicMeasures
 from aerobat.planning.result import Plan
 from aerobat.planning.warm_start import WarmStart
-from aerobat.planning.ways import Way
 from aerobat.problem.condition import ForceBalance
 from aerobat.problem.problem import Problem
 from aerobat.problem.stage import StageSequence
@@ -48,7 +48,7 @@ class FramedProblem:
     limits: PathLimits
     balance: ForceBalance
     reserve: float  # of the range of each of the vehicle's limits, proven of rotors
-    ways: tuple[Way, ...] = ()  # of the body through gates, among the stages of the start
+    in_gates: tuple[BodyInGate, ...] = ()  # those that the stages of the start cross
 
     @classmethod
     def of(
@@ -58,7 +58,7 @@ class FramedProblem:
         sequence: StageSequence,
         guess: WarmStart,
         reserve: float,
-        ways: tuple[Way, ...] = (),
+        in_gates: tuple[BodyInGate, ...] = (),
     ) -> FramedProblem:
         """Of a guess, in whose vertical plane all stays if it has one.
 
@@ -68,7 +68,7 @@ class FramedProblem:
             sequence: The problem's stages for it.
             guess: Where to begin.
             reserve: Of the range of each of the vehicle's limits, kept from either of its ends.
-            ways: Of the body through gates that the guess's stages cross.
+            in_gates: The body's room in gates that the guess's stages cross.
         """
         environment = problem.environment
         frame = Frame.around(guess, environment.wind)
@@ -76,7 +76,7 @@ class FramedProblem:
         measures = SymbolicMeasures(vehicle, frame.axes, environment, problem.heading)
         along = limits_along(vehicle, environment, problem.path_limits, sequence.path_constraints)
         limits = PathLimits.of(measures, frame.origin, along)
-        return cls(problem, vehicle, frame, limits, balance, reserve, ways)
+        return cls(problem, vehicle, frame, limits, balance, reserve, in_gates)
 
     def path(self, guess: WarmStart, start: Plan | None = None) -> Path:
         """A guess, looked at densely."""

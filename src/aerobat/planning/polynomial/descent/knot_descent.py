@@ -18,6 +18,7 @@ from aerobat.certification import Certificate, Verdict
 from aerobat.optimization.deadline import out_of_time
 from aerobat.planning.certified_solve import Judged, Solution, certified_solve
 from aerobat.planning.flyability import OwnFlight, own_flight
+from aerobat.planning.gate_clearance import cleared, more_direct
 from aerobat.planning.passages import PlacedStage
 from aerobat.planning.polynomial.descent.framed_problem import TRUSTED, FramedProblem, Path
 from aerobat.planning.polynomial.descent.knot_program import (
@@ -37,7 +38,6 @@ from aerobat.planning.recorder import Recorder
 from aerobat.planning.result import Plan
 from aerobat.planning.rotor_margin import reserve_shortfalls
 from aerobat.planning.warm_start import WarmStart
-from aerobat.planning.ways import straightened, straighter
 
 NEAR_ITERATIONS = 50  # of a solve, at most, once a path is certified: what takes longer leads away from it
 ROUNDS = 12  # of solving, at most, from one start
@@ -100,28 +100,29 @@ class Descent:
             before = found.solution.duration
             program.go_on_from(found.solution.source.guess)
 
-    def through_gates(self, segments: int) -> Plan | None:
-        """The plan, or one on straighter ways through the gates whose frames its own flight does not clear.
+    def through_gates(self, segments: int) -> tuple[Plan | None, bool]:
+        """The plan, or a more direct one through the gates whose frames its own flight does not clear.
 
-        Only of a flight that keeps to its path: where it leaves it, the path is not what misses them.
+        Only of a flight that keeps to its path: where it leaves it, the path is not what misses them. With
+        it, whether its own flight passes all gates.
         """
         if self.best is None or not self.framed.problem.gates:
-            return self.plan(segments)
-        _, descent = straightened(self, Descent._own_flight, Descent._on_straighter_ways)
-        return descent.plan(segments)
+            return self.plan(segments), True
+        flight, descent = cleared(self, Descent._own_flight, Descent._more_direct)
+        return descent.plan(segments), not flight.lingers
 
     def _own_flight(self) -> OwnFlight:
         """The flight of the best path."""
         path, framed = self._best_path, self.framed
         return own_flight(path.trajectory, framed.vehicle, framed.problem, _placed(path))
 
-    def _on_straighter_ways(self, flight: OwnFlight) -> Descent | None:
-        """The descent from its best path, straighter through the gates that its own flight did not pass."""
+    def _more_direct(self, flight: OwnFlight) -> Descent | None:
+        """The descent from its best path, more direct through the gates that its own flight did not pass."""
         framed, guess = self.framed, self._best_path
-        ways = straighter(framed.ways, guess.stages, framed.problem, framed.vehicle, flight)
-        if ways == framed.ways:
+        in_gates = more_direct(framed.in_gates, guess.stages, framed.problem, framed.vehicle, flight)
+        if in_gates == framed.in_gates:
             return None
-        again = replace(self, framed=replace(framed, ways=ways), best=None)
+        again = replace(self, framed=replace(framed, in_gates=in_gates), best=None)
         again.run(guess, guess.trajectory.segments)
         return None if again.best is None else again
 
@@ -224,7 +225,7 @@ class _Exchange:
             radius=self._radius,
             still_ends=descent.still_ends,
         )
-        stages = StageConstraints(variables, framed.limits, framed.balance, framed.ways)
+        stages = StageConstraints(variables, framed.limits, framed.balance, framed.in_gates)
         program = KnotProgram(variables, framed.limits, self._samples, stages, self._backoff)
         iterations = descent.iterations
         if descent.best is not None:

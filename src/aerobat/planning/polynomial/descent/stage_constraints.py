@@ -12,8 +12,9 @@ import numpy as np
 
 from aerobat.arrays import Array
 from aerobat.limits import Limit
+from aerobat.limits.body_in_gate import BodyInGate, extent_of_thrust
 from aerobat.limits.path_condition import limit_of
-from aerobat.optimization.nonlinear import import_casadi
+from aerobat.optimization.nonlinear import SymbolicOps, components, import_casadi
 from aerobat.planning.polynomial.descent.knot_variables import KnotVariables
 from aerobat.planning.polynomial.descent.path_limits import (
     ORDERS,
@@ -21,7 +22,6 @@ from aerobat.planning.polynomial.descent.path_limits import (
     TO_COEFFICIENTS,
     PathLimits,
 )
-from aerobat.planning.ways import SLOWEST, Way
 from aerobat.problem.ball import Ball
 from aerobat.problem.condition import ForceBalance
 
@@ -33,7 +33,7 @@ Row = tuple[Any, float, float]  # a value, the least and the most that it may be
 
 @dataclass(frozen=True, eq=False)
 class StageConstraints:
-    """Conditions and balls of stages, each at its place, their order and windows, and ways through gates.
+    """Conditions and balls of stages, each at its place, their order and windows, and room in gates.
 
     A body that passes a gate is taken as one of revolution about its thrust, which encloses it.
     """
@@ -41,7 +41,7 @@ class StageConstraints:
     variables: KnotVariables
     limits: PathLimits
     balance: ForceBalance  # that conditions on thrust are about
-    ways: tuple[Way, ...] = ()
+    in_gates: tuple[BodyInGate, ...] = ()
 
     def functions(self) -> tuple[Any, Any, Any, tuple[Array, Array]]:
         """Values as a function of x, their Jacobian, their product's Hessian, their limits."""
@@ -60,15 +60,15 @@ class StageConstraints:
 
     def _at_places(self, x: Any) -> Iterator[Row]:
         """What holds at the stages."""
-        variables, ways = self.variables, {way.stage: way for way in self.ways}
+        variables, in_gates = self.variables, {body.stage: body for body in self.in_gates}
         for j, stage in enumerate(variables.guess.stages):
             place = self._place(j, x)
             for condition in stage.conditions:
                 yield from self._held(limit_of(condition, self.balance), place)
             if stage.ball is not None:
                 yield self._met(stage.ball, place)
-            if j in ways:
-                yield from self._clear(ways[j], place)
+            if j in in_gates:
+                yield from self._clear(in_gates[j], place)
 
     def _place(self, stage: int, x: Any) -> _Place:
         ca, variables = import_casadi(), self.variables
@@ -116,25 +116,14 @@ class StageConstraints:
             value += sum(place.derivative(k) @ ca.DM(weights) for k, weights in found.items())
             yield value / limit.size, *limit.ends
 
-    def _clear(self, way: Way, place: _Place) -> Iterator[Row]:
-        """The room of the body on a way through a gate, and its speed: see `ways`."""
-        ca, body = import_casadi(), self.variables.vehicle.bounding_ellipsoid
+    def _clear(self, body: BodyInGate, place: _Place) -> Iterator[Row]:
+        """The room of the body in a gate."""
+        ca, ops = import_casadi(), SymbolicOps()
         position, velocity, acceleration = (self._world(place, k) for k in range(3))
         thrust = acceleration + self.balance.drag * velocity + ca.DM(self.balance.constant)
-        b3 = thrust / ca.norm_2(thrust)
-        through = ca.dot(ca.DM(way.gate.normal), velocity)
-        bent = way.bending * way.reach**2 / 2.0 / ca.fmax(through, SLOWEST)
-        offset = position - ca.DM(way.gate.position) + float(body.centre[2]) * b3
-        wide, high = max(body.semi_axes[:2]), body.semi_axes[2]
-        aside = float(np.hypot(*body.centre[:2]))
-        for outward, distance in zip(*way.sides, strict=True):
-            axis = ca.DM(outward)
-            upright = ca.dot(axis, b3) ** 2
-            reached = ca.sqrt(wide**2 * (1.0 - upright) + high**2 * upright) + aside
-            room = (distance - reached - ca.dot(axis, offset)) * through - bent
-            for ahead in (-way.reach, way.reach):
-                yield room + ahead * ca.dot(axis, velocity), 0.0, inf
-        yield through, way.min_speed, inf
+        extent = extent_of_thrust(ops, self.variables.vehicle.bounding_ellipsoid, components(thrust))
+        for value in body.opening.room(ops, components(position), components(velocity), extent):
+            yield value, 0.0, inf
 
 
 @dataclass(frozen=True, eq=False)

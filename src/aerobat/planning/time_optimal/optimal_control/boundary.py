@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from math import cos, inf, sin
-from typing import Any, Protocol
+from typing import Protocol
 
 import numpy as np
 
@@ -13,7 +13,7 @@ from aerobat import so3
 from aerobat.arrays import Array
 from aerobat.flatness import force_balance, reference
 from aerobat.kernels.quaternions import conjugate, multiply
-from aerobat.optimization.nonlinear import import_casadi
+from aerobat.optimization.nonlinear import components, import_casadi
 from aerobat.optimization.separable import ElementFunction
 from aerobat.planning.time_optimal.optimal_control.collocation import STATE_SCALE, CollocatedMotion, Mesh
 from aerobat.planning.time_optimal.optimal_control.elements import Elements, weighted_sum
@@ -78,6 +78,11 @@ class End:
         thrust = balance.specific_thrust(state.velocity, state.acceleration)
         return cls(state.position, state.velocity, thrust, state.leaves_attitude_free, state.free_velocity)
 
+    @property
+    def inputs(self) -> tuple[float, float, float]:
+        """The inputs there: the specific thrust, and no angular acceleration."""
+        return float(np.linalg.norm(self.thrust)), 0.0, 0.0
+
 
 @dataclass(frozen=True, eq=False)
 class FixedEnds:
@@ -97,7 +102,7 @@ class FixedEnds:
         return End.of(self.elements.problem.goal, self.elements)
 
     def fix(self, motion: CollocatedMotion, continuous: bool) -> None:
-        """Write the states, the start's attitude, and with lag the inputs, into a bound on all unknowns."""
+        """Write states, the start's attitude, thrusts, and with lag moments into a bound on all unknowns."""
         for node, end in ((0, self.start), (-1, self.goal)):
             motion.states[POSITION, node] = end.position
             if not end.free_velocity:
@@ -107,10 +112,10 @@ class FixedEnds:
         upright = so3.smallest_rotation(UP, self.start.thrust / np.linalg.norm(self.start.thrust))
         heading = so3.about_axis(UP, np.array(self.elements.problem.heading))
         motion.states[ATTITUDE, 0] = so3.multiply(upright, heading)
-        if continuous:
-            motion.starts[:, 0] = np.linalg.norm(self.start.thrust), 0.0, 0.0
-            if not self.goal.free_attitude:
-                motion.ends[:, -1] = np.linalg.norm(self.goal.thrust), 0.0, 0.0
+        fixed = INPUTS if continuous else 1
+        motion.starts[:fixed, 0] = self.start.inputs[:fixed]
+        if not self.goal.free_attitude:
+            motion.ends[:fixed, -1] = self.goal.inputs[:fixed]
 
     def hold(self, rows: Rows, mesh: Mesh) -> None:
         """Add that the thrust points where the goal says."""
@@ -177,7 +182,7 @@ class ClosedLap:
         z = ca.SX.sym("z", 2 * (STATES + INPUTS))
         first, last = z[: STATES + INPUTS], z[STATES + INPUTS :]
         apart = last - first
-        turn = multiply(conjugate(_scalars(first[ATTITUDE])), _scalars(last[ATTITUDE]))[1:]
+        turn = multiply(conjugate(components(first[ATTITUDE])), components(last[ATTITUDE]))[1:]
         values = ca.vertcat(apart[: ATTITUDE.start], *turn, apart[ATTITUDE.stop :])
         return ElementFunction(ca.Function("apart", [z, ca.SX.sym("none", 0)], [values]))
 
@@ -202,7 +207,3 @@ class ClosedLap:
         turned = cos(half) * q[3] - sin(half) * q[0]
         values = ca.vertcat(ca.sumsqr(q), turned)
         return ElementFunction(ca.Function("start", [z, ca.SX.sym("none", 0)], [values]))
-
-
-def _scalars(column: Any) -> tuple[Any, ...]:
-    return tuple(column[i] for i in range(column.numel()))

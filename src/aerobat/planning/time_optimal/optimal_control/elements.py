@@ -12,13 +12,16 @@ import numpy as np
 
 from aerobat.arrays import Array
 from aerobat.flatness import force_balance
+from aerobat.kernels.quaternions import axes
 from aerobat.limits import Limit
+from aerobat.limits.body_in_gate import Opening, extent_of_attitude
 from aerobat.limits.path_condition import limit_of
-from aerobat.optimization.nonlinear import import_casadi
+from aerobat.optimization.nonlinear import SymbolicOps, components, import_casadi
 from aerobat.optimization.separable import ElementFunction
 from aerobat.planning.time_optimal.optimal_control.bounds import Bounds
 from aerobat.planning.time_optimal.optimal_control.collocation import STATE_SCALE, IntervalSide, Mesh
 from aerobat.planning.time_optimal.optimal_control.zero_yaw_rate_body import (
+    ATTITUDE,
     INPUTS,
     POSITION,
     RATES,
@@ -26,7 +29,6 @@ from aerobat.planning.time_optimal.optimal_control.zero_yaw_rate_body import (
     VELOCITY,
     ZeroYawRateBody,
 )
-from aerobat.planning.ways import SLOWEST
 from aerobat.problem.condition import Condition, Quantity
 from aerobat.problem.problem import Problem
 from aerobat.vehicle import Vehicle
@@ -141,35 +143,15 @@ class Elements:
         distance = (z * STATE_SCALE[POSITION] - ball[:3]) / ball[3]
         return ElementFunction(ca.Function("distance", [z, ball], [ca.sumsqr(distance)]))
 
-    def room_ahead(self, sides: int) -> ElementFunction:
-        """Room [m²/s] at each side before and behind a gate, times the speed through it; that speed.
-
-        By the gate's place and normal (6,), the outward normals of its sides (3 sides,) and their distances
-        (sides,), how far before and behind, and the acceleration by which the path may bend there.
-        """
-        ca, z = import_casadi(), import_casadi().SX.sym("z", STATES)
-        way = ca.SX.sym("way", 8 + 4 * sides)
-        place, normal, outward, distances, ahead, bending = ca.vertsplit(
-            way, np.cumsum([0, 3, 3, 3 * sides, sides, 1, 1]).tolist()
-        )
-        velocity = z[VELOCITY] * STATE_SCALE[VELOCITY]
-        through, values = ca.dot(normal, velocity), []
-        bent = bending * ahead**2 / 2.0 / ca.fmax(through, SLOWEST)
-        for k in range(sides):
-            axis = outward[3 * k : 3 * k + 3]
-            height, reach = self._reached(z, place, axis)
-            across = ahead * ca.dot(axis, velocity)
-            room = (distances[k] - reach - height) * through - bent
-            values += [room - across, room + across]
-        return ElementFunction(ca.Function("room", [z, way], [ca.vertcat(*values, through)]))
-
-    def _reached(self, z: Any, place: Any, direction: Any) -> tuple[Any, Any]:
-        """Of the body in a scaled state, its centre's distance from a place along a direction, its reach."""
-        ca, body = import_casadi(), self.vehicle.bounding_ellipsoid
+    def room_in_gate(self, parameters: int) -> ElementFunction:
+        """The values of `Opening.room` of a scaled state, by so many parameters of an opening."""
+        ca, ops = import_casadi(), SymbolicOps()
+        z, opening = ca.SX.sym("z", STATES), ca.SX.sym("opening", parameters)
         state = z * STATE_SCALE
-        along = self.body.axes(state).T @ direction
-        height = ca.dot(direction, state[POSITION] - place) + ca.dot(ca.DM(body.centre), along)
-        return height, ca.norm_2(ca.DM(body.semi_axes) * along)
+        position, velocity, attitude = (components(state[part]) for part in (POSITION, VELOCITY, ATTITUDE))
+        extent = extent_of_attitude(ops, self.vehicle.bounding_ellipsoid, axes(attitude))
+        values = Opening.of_parameters(components(opening)).room(ops, position, velocity, extent)
+        return ElementFunction(ca.Function("room", [z, opening], [ca.vertcat(*values)]))
 
     @cached_property
     def goal_thrust(self) -> ElementFunction:

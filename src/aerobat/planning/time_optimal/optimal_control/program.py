@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from aerobat.arrays import Array, Indices
+from aerobat.limits.body_in_gate import BodyInGate
 from aerobat.optimization.nonlinear import NonlinearProgram
 from aerobat.optimization.separable import (
     Element,
@@ -27,7 +28,6 @@ from aerobat.planning.time_optimal.optimal_control.elements import (
 )
 from aerobat.planning.time_optimal.optimal_control.rows import Rows, repeated
 from aerobat.planning.time_optimal.optimal_control.zero_yaw_rate_body import INPUTS, POSITION, STATES
-from aerobat.planning.ways import Way
 from aerobat.problem.condition import Condition
 from aerobat.problem.stage import Stage
 
@@ -50,7 +50,7 @@ class OptimalControl:
     elements: Elements
     boundary: Boundary
     stages: tuple[Stage, ...]  # (P - 1,)
-    ways: tuple[Way, ...]  # through the gates that are among them
+    in_gates: tuple[BodyInGate, ...]  # among them
     min_thrust: float  # [m/s²] specific thrust at least, which keeps the attitude determined
     reserve: float  # of each rotor's range, kept from either of its ends
 
@@ -61,8 +61,8 @@ class OptimalControl:
         self._hold_nodes(rows, mesh, backoff)
         for index, stage in enumerate(self.stages):
             self._hold_stage(rows, mesh, index, stage)
-        for way in self.ways:
-            self._hold_way(rows, mesh, way)
+        for body in self.in_gates:
+            self._hold_room(rows, mesh, body)
         self.boundary.hold(rows, mesh)
         lower, upper = (mesh.pack(motion) for motion in self._box(mesh))
         return separable_program(
@@ -130,15 +130,12 @@ class OptimalControl:
             if 0.0 < fraction < 1.0 and (fraction == earliest or latest > earliest):
                 rows.hold(weighted_sum(len(phases)), phases[None], low, high, before - fraction)
 
-    def _hold_way(self, rows: Rows, mesh: Mesh, way: Way) -> None:
-        """The room of the body on a way through a gate, and its speed, at the stage that crosses it."""
-        node = int(np.cumsum(mesh.intervals)[way.stage])
-        outward, left = way.sides
-        gate = np.concatenate([way.gate.position, way.gate.normal])
-        parameters = np.concatenate([gate, outward.ravel(), left, [way.reach, way.bending]])
-        lower = np.append(np.zeros(2 * len(left)), way.min_speed)
-        there = mesh.states[node : node + 1]
-        rows.hold(self.elements.room_ahead(len(left)), there, lower, np.full(len(lower), inf), parameters)
+    def _hold_room(self, rows: Rows, mesh: Mesh, body: BodyInGate) -> None:
+        """The room of the body in a gate, at the stage that crosses it."""
+        node, parameters = int(np.cumsum(mesh.intervals)[body.stage]), body.parameters
+        function = self.elements.room_in_gate(len(parameters))
+        free = np.full(function.value.numel_out(), inf)
+        rows.hold(function, mesh.states[node : node + 1], np.zeros(len(free)), free, parameters)
 
     def _squared_rates(self, rates: Array) -> Array:
         return np.asarray((rates / self.elements.rate_scale) ** 2)

@@ -21,7 +21,7 @@ from aerobat.environment import Environment
 from aerobat.flatness import axial_drag, lateral_drag
 from aerobat.kernels.flatness import collective, moment
 from aerobat.kernels.quaternions import axes, quaternion_rate
-from aerobat.optimization.nonlinear import import_casadi
+from aerobat.optimization.nonlinear import components, import_casadi
 from aerobat.vehicle import Vehicle
 
 STATES = 12
@@ -49,7 +49,7 @@ class ZeroYawRateBody:
     def driven(self, weights: Array) -> Any:
         """(x, u, u') -> weights (D, 11) times the measures that limits are linear in, (D,)."""
         ca = import_casadi()
-        wrench, (*_, b3) = self._wrench(), axes(_scalars(self._x[ATTITUDE]))
+        wrench, (*_, b3) = self._wrench(), axes(components(self._x[ATTITUDE]))
         speed = ca.norm_2(ca.vertcat(*self._omega))
         measures = ca.vertcat(wrench, self._along(wrench), self._symbols[1][0], speed, b3[2])
         return self._function("driven", [ca.sparsify(ca.DM(weights)) @ measures])
@@ -58,7 +58,7 @@ class ZeroYawRateBody:
     def axes(self) -> Any:
         """x -> the body axes in the world as columns, (3, 3)."""
         ca = import_casadi()
-        columns = [ca.vertcat(*axis) for axis in axes(_scalars(self._x[ATTITUDE]))]
+        columns = [ca.vertcat(*axis) for axis in axes(components(self._x[ATTITUDE]))]
         return ca.Function("axes", [self._x], [ca.horzcat(*columns)])
 
     @cached_property
@@ -72,7 +72,7 @@ class ZeroYawRateBody:
 
     @cached_property
     def _omega(self) -> tuple[Any, Any, float]:
-        wx, wy = _scalars(self._x[RATES])
+        wx, wy = components(self._x[RATES])
         return wx, wy, 0.0
 
     @cached_property
@@ -82,17 +82,17 @@ class ZeroYawRateBody:
     def _rate(self) -> Any:
         """x'."""
         ca, u = import_casadi(), self._symbols[1]
-        *_, b3 = axes(_scalars(self._x[ATTITUDE]))
+        *_, b3 = axes(components(self._x[ATTITUDE]))
         drag = lateral_drag(self.vehicle) * self._airspeed
         acceleration = u[0] * ca.vertcat(*b3) - ca.DM(self.environment.weight) - drag
-        turning = quaternion_rate(_scalars(self._x[ATTITUDE]), self._omega)
+        turning = quaternion_rate(components(self._x[ATTITUDE]), self._omega)
         return ca.vertcat(self._x[VELOCITY], acceleration, *turning, u[1:])
 
     def _wrench(self) -> Any:
         """Collective thrust [N] and moments [N·m], (4,)."""
-        n, *turning = _scalars(self._symbols[1])
-        *_, b3 = axes(_scalars(self._x[ATTITUDE]))
-        airspeed = _scalars(self._airspeed)
+        n, *turning = components(self._symbols[1])
+        *_, b3 = axes(components(self._x[ATTITUDE]))
+        airspeed = components(self._airspeed)
         thrust = collective(self.vehicle.mass, axial_drag(self.vehicle), n, b3, airspeed)
         moments = moment(self.vehicle.inertia.tolist(), self._omega, (*turning, 0.0))
         return import_casadi().vertcat(thrust, *moments)
@@ -105,7 +105,3 @@ class ZeroYawRateBody:
 
     def _function(self, name: str, outputs: list[Any]) -> Any:
         return import_casadi().Function(name, list(self._symbols), outputs)
-
-
-def _scalars(column: Any) -> tuple[Any, ...]:
-    return tuple(column[i] for i in range(column.numel()))

@@ -1,0 +1,33 @@
+"""Where a path begins and ends, beside the states that are asked of it there."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+import numpy as np
+
+from aerobat.certification.certificate import Finding, Side, Verdict
+from aerobat.problem import EndState
+from aerobat.problem.problem import DERIVATIVES, UNITS
+from aerobat.trajectory import Trajectory
+
+END_TOLERANCE = 1e-5  # in SI units, by which an end may miss its state: what solvers leave adds up to it
+
+
+def end_findings(trajectory: Trajectory, start: EndState | None, goal: EndState | None) -> list[Finding]:
+    """Return how far a path is from each derivative that its ends ask for; nothing of an end left out."""
+    found = [] if start is None else _findings(trajectory, "start", start, 0.0)
+    return found if goal is None else found + _findings(trajectory, "goal", goal, trajectory.duration)
+
+
+def _findings(
+    trajectory: Trajectory, end: Literal["start", "goal"], state: EndState, time: float
+) -> list[Finding]:
+    found = []
+    for derivative in state.asked.tolist():
+        reached = trajectory.evaluate(time, derivative)
+        error = float(np.linalg.norm(reached - state.derivatives(3)[derivative]))
+        verdict = Verdict.HOLDS if error <= END_TOLERANCE else Verdict.VIOLATED
+        quantity, unit = f"{DERIVATIVES[derivative]} error", UNITS[derivative]
+        found.append(Finding(quantity, unit, Side.MAX, error, error, time, 0.0, verdict, end=end))
+    return found

@@ -1,0 +1,144 @@
+"""The body's room in a gate: clear of the frame from before the plane until it is behind it.
+
+A stage asks where the centre of mass is at one instant. The body is about the plane for a while, and passes
+the opening if it flies on much as it flies there. With v_n along the normal and v_a outward across a
+side of the opening, d its reach and more before and behind the plane, s what it reaches outward as it is
+turned, and r the room that is left to that side from where it crosses, |path − straight line| ≤ ½ a (d/v_n)²:
+
+    (r − s) v_n ± d v_a ≥ ½ a d²/v_n    on all sides    and    v_n ≥ √(2 a d),
+
+so that it does not turn back. The body is an ellipsoid with its semi-axes on the diagonal of D and the
+attitude R, so that s = |D Rᵀ e| along e. Where only the thrust axis is known, the ellipsoid of revolution
+about that axis is taken, which encloses the body however it is turned.
+
+The values are written in components once, for whoever evaluates them: floats, complex steps, CasADi's
+symbols.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from math import hypot, sqrt
+from typing import NamedTuple, TypeAlias
+
+import numpy as np
+
+from aerobat.arrays import Array
+from aerobat.kernels.ops import Axes, Ops, Scalar, Vector
+from aerobat.kernels.vectors import dot, subtract
+from aerobat.problem.gate import Gate
+from aerobat.vehicle import Ellipsoid
+
+SLOWEST = 0.5  # [m/s] through a gate, below which no more room is asked: far less than what is asked there
+FRAME_CLEARANCE = 0.01  # [m] from body to frame
+
+Extent: TypeAlias = Callable[[Vector], Scalar]  # [m] that a body reaches from its centre of mass, outward
+
+
+class Opening(NamedTuple):
+    """An opening and the motion through it that is foreseen, in numbers or in symbols."""
+
+    place: Vector  # [m] of the gate
+    normal: Vector  # direction of passage
+    outward: tuple[Vector, ...]  # normals of its K sides
+    distances: tuple[Scalar, ...]  # [m] of the sides from the place
+    reach: Scalar  # [m] before and behind the plane, over which the room counts
+    bending: Scalar  # [m/s²] across a straight line, at most
+
+    @classmethod
+    def of_parameters(cls, parameters: Sequence[Scalar]) -> Opening:
+        """The opening of 8 + 4 K numbers in the order of its fields."""
+        vectors = [(parameters[k], parameters[k + 1], parameters[k + 2]) for k in range(0, 6, 3)]
+        sides = (len(parameters) - 8) // 4
+        outward = tuple(
+            (parameters[k], parameters[k + 1], parameters[k + 2]) for k in range(6, 6 + 3 * sides, 3)
+        )
+        distances = tuple(parameters[6 + 3 * sides + k] for k in range(sides))
+        return cls(vectors[0], vectors[1], outward, distances, parameters[-2], parameters[-1])
+
+    def room(self, ops: Ops, position: Vector, velocity: Vector, extent: Extent) -> Iterator[Scalar]:
+        """Yield 2 K + 1 values that are at least zero where the body passes clear of the frame.
+
+        The room [m²/s] on each side, before and behind the plane, and the speed to spare [m/s].
+
+        Args:
+            ops: The arithmetic of the arguments.
+            position: Of the centre of mass as it crosses the plane [m].
+            velocity: Likewise [m/s].
+            extent: Of the body, in its attitude there.
+        """
+        through, offset = dot(self.normal, velocity), subtract(position, self.place)
+        bent = self.bending * self.reach**2 / 2.0 / ops.maximum(through, SLOWEST)
+        for outward, distance in zip(self.outward, self.distances, strict=True):
+            room = (distance - extent(outward) - dot(outward, offset)) * through - bent
+            across = self.reach * dot(outward, velocity)
+            yield room - across
+            yield room + across
+        yield through - ops.sqrt(2.0 * self.bending * self.reach)
+
+
+@dataclass(frozen=True, eq=False)
+class BodyInGate:
+    """A body's room in the gate that a stage crosses."""
+
+    gate: Gate
+    stage: int
+    reach: float  # [m] before and behind the plane, over which it counts
+    bending: float  # [m/s²] across a straight line, at most
+
+    @property
+    def min_speed(self) -> float:
+        """The least speed through the gate [m/s], at which the path does not turn back."""
+        return sqrt(2.0 * self.bending * self.reach)
+
+    @property
+    def parameters(self) -> Array:
+        """The numbers of its opening, (8 + 4 K,)."""
+        normals, distances = self.gate.opening.sides
+        outward = normals @ self.gate.plane_axes
+        place = np.concatenate([self.gate.position, self.gate.normal])
+        ahead = [self.reach, self.bending]
+        return np.concatenate([place, outward.ravel(), distances - FRAME_CLEARANCE, ahead])
+
+    @property
+    def opening(self) -> Opening:
+        """Its opening in numbers."""
+        return Opening.of_parameters(self.parameters.tolist())
+
+
+def extent_of_attitude(ops: Ops, body: Ellipsoid, axes: Axes) -> Extent:
+    """Return the extent of a body whose attitude is known.
+
+    Args:
+        ops: The arithmetic of the axes.
+        body: The ellipsoid about the vehicle.
+        axes: Its body axes in the world.
+    """
+    centre, semi_axes = body.centre.tolist(), body.semi_axes.tolist()
+
+    def extent(outward: Vector) -> Scalar:
+        along = [dot(axis, outward) for axis in axes]
+        reached = sum((size * part) ** 2 for size, part in zip(semi_axes, along, strict=True))
+        return sum(at * part for at, part in zip(centre, along, strict=True)) + ops.sqrt(reached)
+
+    return extent
+
+
+def extent_of_thrust(ops: Ops, body: Ellipsoid, thrust: Vector) -> Extent:
+    """Return the extent of a body that is turned about its thrust axis in whichever way.
+
+    Args:
+        ops: The arithmetic of the thrust.
+        body: The ellipsoid about the vehicle.
+        thrust: Along its thrust axis, of any length.
+    """
+    x, y, up = body.centre.tolist()
+    wide, high = float(body.semi_axes[:2].max()), float(body.semi_axes[2])
+    size = ops.sqrt(dot(thrust, thrust))
+
+    def extent(outward: Vector) -> Scalar:
+        along = dot(thrust, outward) / size
+        return up * along + hypot(x, y) + ops.sqrt(wide**2 * (1.0 - along**2) + high**2 * along**2)
+
+    return extent
