@@ -16,7 +16,6 @@ from aerobat.arrays import Array
 from aerobat.certification import Certificate, Envelope, certify
 from aerobat.certification.path.passages import passage_findings, waypoint_findings
 from aerobat.errors import SpecError
-from aerobat.flatness.references import force_balance
 from aerobat.planning.passages import planned_passages, planned_waypoints
 from aerobat.planning.recorder import Attempt, Recorder
 from aerobat.planning.result import PlacedStage, Plan
@@ -91,9 +90,7 @@ class Judged(Generic[Detail]):
         if self.certificate is None:
             return with_certificate(plan, self.vehicle)
         passages = planned_passages(plan.stages, self.problem)
-        findings = passage_findings(
-            trajectory, passages, force_balance(self.problem.environment, self.vehicle)
-        )
+        findings = passage_findings(trajectory, passages, self.vehicle, self.problem.environment)
         findings += waypoint_findings(trajectory, planned_waypoints(plan.stages, self.problem))
         return replace(plan, certificate=self.certificate.with_passages(findings))
 

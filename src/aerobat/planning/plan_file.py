@@ -33,7 +33,7 @@ from aerobat.trajectory import Trajectory
 from aerobat.vehicle import Vehicle
 
 FORMAT = "aerobat-plan-1"  # another number where something goes, or means something else
-REVISION = 3  # of it: one more wherever something is added
+REVISION = 4  # of it: one more wherever something is added
 FRAMES = {
     "world": "ENU: x east, y north, z up [m]",
     "body": "FLU: x forward, y left, z up, thrust along +z",
