@@ -48,6 +48,11 @@ class UnequalDrag:
         return cls(vehicle.drag_body / vehicle.mass, environment.wind, environment.weight)
 
     @property
+    def mean(self) -> float:
+        """Of drag along body x and y [1/s]."""
+        return float(self.coefficients[:2].mean())
+
+    @property
     def difference(self) -> float:
         """By how much drag along body x exceeds the mean [1/s]."""
         return float(self.coefficients[0] - self.coefficients[1]) / 2
@@ -164,7 +169,7 @@ def body_motion(q: Array, flat: FlatState, drag: UnequalDrag, balance: Array) ->
     """
     airspeed = flat.velocity - drag.wind
     kappa = drag.counted(balance, airspeed)
-    mean = float(drag.coefficients[:2].mean())
+    mean = drag.mean
     world = (airspeed, flat.acceleration, flat.jerk, flat.acceleration + drag.weight, flat.snap)
     air, accelerated, jerk, thrust, snap = (_components(so3.unrotate(q, vector)) for vector in world)
     motion = ((thrust, air), (jerk, accelerated), (snap, jerk))
@@ -192,7 +197,7 @@ class _Local:
     def of(
         cls, drag: UnequalDrag, airspeed: Array, acceleration: Array, jerk: Array, q_mean: Array
     ) -> _Local:
-        mean = float(drag.coefficients[:2].mean())
+        mean = drag.mean
         thrust = acceleration + drag.weight + mean * airspeed
         vectors = (jerk + mean * acceleration, airspeed, acceleration)
         parts = []

@@ -14,9 +14,12 @@ Vectors below are in body axes and come with their derivatives in the world: α,
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from typing import NamedTuple
 
-from aerobat.kernels.ops import Axes, Scalar, Vector
-from aerobat.kernels.vectors import cross, dot, scale
+from aerobat.kernels import flatness
+from aerobat.kernels.ops import Axes, Matrix, Scalar, Vector
+from aerobat.kernels.quaternions import to_body
+from aerobat.kernels.vectors import add, add_scaled, cross, dot, scale
 
 
 def nearest_axes(sqrt: Callable[[Scalar], Scalar], alpha: Vector, beta: Vector) -> Axes:
@@ -97,3 +100,54 @@ def frame_spin(thrust: tuple[Scalar, Vector], alpha: tuple[Vector, Vector], body
     b1, _, b3 = body
     pitch = dot(b1, alpha[1]) / dot(b3, alpha[0])
     return -1.0 * (change[1] / norm * b1[2] + pitch * b3[1]) / b1[0]
+
+
+class Airframe(NamedTuple):
+    """What of a vehicle counts here."""
+
+    mass: Scalar  # [kg]
+    drag: Vector  # [1/s] over the mass, along body x, y and z
+    inertia: Matrix  # [kg·m²]
+
+
+class Motion(NamedTuple):
+    """A motion at one instant, in axes that the body's are near to."""
+
+    weight: Vector  # [m/s²] g e3
+    airspeed: Vector  # [m/s]
+    acceleration: Vector  # [m/s²]
+    jerk: Vector  # [m/s³]
+    snap: Vector  # [m/s⁴]
+    crackle: Vector  # [m/s⁵]
+
+
+class Demand(NamedTuple):
+    """What a motion asks of a vehicle."""
+
+    wrench: tuple[Scalar, Scalar, Scalar, Scalar]  # collective thrust [N] and moment [N·m], body axes
+    rate: tuple[Scalar, Scalar, Scalar, Scalar]  # their derivatives
+    specific_thrust: Scalar  # [m/s²] along b3, what drag asks across it counted
+    omega: Vector  # [rad/s] body axes
+    b3: Vector  # in the axes of the motion
+
+
+def demand(sqrt: Callable[[Scalar], Scalar], airframe: Airframe, motion: Motion) -> Demand:
+    """Return what a motion asks; exact where the body has the axes that the motion is given in.
+
+    Beside it the body's axes are `nearest_axes`, which is exact to first order but for the angle about b3.
+    """
+    lifted = add(motion.acceleration, motion.weight), motion.jerk, motion.snap, motion.crackle
+    dragged = motion.airspeed, motion.acceleration, motion.jerk, motion.snap
+    alpha, beta, gamma = (
+        [add_scaled(x, coefficient, below) for x, below in zip(lifted, dragged, strict=True)]
+        for coefficient in airframe.drag
+    )
+    body = nearest_axes(sqrt, alpha[0], beta[0])
+    alpha, beta, gamma = ([to_body(body, vector) for vector in each] for each in (alpha, beta, gamma))
+    inverse = 1.0 / alpha[0][2], 1.0 / beta[0][2]
+    omega, omega_dot = body_rates(inverse, alpha, beta)
+    jerk = angular_jerk(inverse, alpha, beta, omega, omega_dot)
+    thrust, thrust_rate = collective(airframe.mass, gamma[:2], omega)
+    moment, moment_rate = flatness.moment_and_rate(airframe.inertia, omega, omega_dot, jerk)
+    along = 0.5 * (alpha[0][2] + beta[0][2])
+    return Demand((thrust, *moment), (thrust_rate, *moment_rate), along, omega, body[2])
