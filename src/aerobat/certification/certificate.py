@@ -141,6 +141,7 @@ class Certificate:
     findings: tuple[Finding, ...]
     undetermined: tuple[TimeInterval, ...]  # where thrust vanishes, and with it the attitude
     discontinuities: tuple[Discontinuity, ...]
+    too_unequal: float | None = None  # [s] from then on it is drag unequal along x and y that leaves it open
 
     @property
     def certified(self) -> bool:
@@ -175,6 +176,11 @@ class Certificate:
             return str(self.discontinuities[0])
         if violated:
             return str(self.worst if self.worst in violated else violated[0])
+        if self.too_unequal is not None:
+            return (
+                f"cannot decide: at {self.too_unequal:.3f} s thrust is too small beside what unequal "
+                "drag along body x and y adds; keep more thrust there, or set drag_body[1] to drag_body[0]"
+            )
         if self.undetermined:
             at = f"{self.undetermined[0].start:.3f} s"
             return f"cannot decide: thrust reaches zero at {at}, where no attitude is determined"
@@ -197,6 +203,7 @@ class Certificate:
             "findings": [{**asdict(finding), "margin": finding.margin} for finding in self.findings],
             "undetermined": [asdict(span) for span in self.undetermined],
             "discontinuities": [asdict(jump) for jump in self.discontinuities],
+            "too_unequal": self.too_unequal,
         }
 
     def __str__(self) -> str:

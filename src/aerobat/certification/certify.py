@@ -33,14 +33,16 @@ from aerobat.certification.envelope import Envelope
 from aerobat.certification.path.ends import end_findings
 from aerobat.certification.path.kinematics import kinematic_findings
 from aerobat.certification.path.passages import passage_findings, waypoint_findings
-from aerobat.certification.subdivision import subdivide
+from aerobat.certification.subdivision import Subdivision, subdivide
 from aerobat.certification.thrust_curve import ThrustCurve
+from aerobat.certification.unequal_drag import interpolated_with_unequal_drag
 from aerobat.declaration import validated
 from aerobat.environment import Environment
-from aerobat.flatness import Planned, environment_of, vehicle_of
-from aerobat.flatness.references import UNDETERMINED, force_balance
+from aerobat.flatness import Planned, TimeInterval, environment_of, has_unequal_drag, vehicle_of
+from aerobat.flatness.references import UNDETERMINED
 from aerobat.limits import Limit, limits_along
 from aerobat.limits.quantity import BODY_RATE, UPRIGHT, WRENCH, WRENCH_RATE
+from aerobat.problem import Condition, Quantity
 from aerobat.trajectory import Trajectory, as_trajectory
 from aerobat.trajectory.subintervals import Subintervals
 from aerobat.vehicle import Vehicle
@@ -84,25 +86,45 @@ def certify(
     trajectory = as_trajectory(trajectory)
     limits = limits_along(vehicle, environment, envelope.limits, envelope.conditions)
     on_measures = [limit for limit in limits if limit.is_proven and not limit.quantity.is_of_path]
+    on_path = [limit for limit in limits if limit.quantity.is_of_path]
     curve = ThrustCurve.of(trajectory, vehicle, environment, INTERPOLATION_DEGREE)
     floor = UNDETERMINED * environment.gravity
     found = subdivide(curve, floor)
     findings: list[Finding] = []
-    series = None
-    if len(found.pieces):
-        derived = [limit for limit in on_measures if not _is_stated(limit)]
-        series = interpolated(curve, found.pieces, everywhere=not found.vanishing, derived=derived)
-        findings += series.answers(_queries(vehicle, envelope, on_measures))
-    balance = force_balance(environment, vehicle)
-    on_path = (limit for limit in limits if limit.quantity.is_of_path)
-    findings += kinematic_findings(trajectory, envelope.speed, on_path)
+    unequal = has_unequal_drag(vehicle)
+    on_thrust = [limit for limit in on_path if unequal and _is_of_thrust(limit, envelope.conditions)]
+    series, lost = _series(curve, found, [x for x in on_measures if not _is_stated(x)], on_thrust)
+    if series is not None:
+        queries = _queries(vehicle, envelope, on_measures)
+        first = series.series.shape[-1] - len(on_thrust)
+        queries += [query for i, limit in enumerate(on_thrust, first) for query in within(limit, i)]
+        findings += series.answers(queries)
+    findings += kinematic_findings(trajectory, envelope.speed, [x for x in on_path if x not in on_thrust])
     findings += end_findings(trajectory, envelope.start, envelope.goal)
-    findings += passage_findings(trajectory, envelope.passages, balance)
+    findings += passage_findings(trajectory, envelope.passages, vehicle, environment)
     findings += waypoint_findings(trajectory, envelope.waypoints)
     jumps = discontinuities(curve, floor, series)
     if envelope.closed:
         jumps += seam(trajectory, vehicle, environment)
-    return Certificate(tuple(findings), found.vanishing, jumps)
+    too_unequal = next((span.start for span in lost), None)
+    return Certificate(tuple(findings), found.vanishing + lost, jumps, too_unequal)
+
+
+def _series(
+    curve: ThrustCurve, found: Subdivision, derived: Sequence[Limit], on_thrust: Sequence[Limit]
+) -> tuple[ChebyshevSeries | None, tuple[TimeInterval, ...]]:
+    """All quantities along the pieces, if there are any, and where unequal drag leaves the attitude open."""
+    whole = not found.vanishing
+    if not len(found.pieces):
+        return None, ()
+    if has_unequal_drag(curve.vehicle):
+        return interpolated_with_unequal_drag(curve, found.pieces, whole, TIGHTNESS, derived, on_thrust)
+    return interpolated(curve, found.pieces, whole, derived), ()
+
+
+def _is_of_thrust(limit: Limit, conditions: Sequence[Condition]) -> bool:
+    """True of what conditions on the specific thrust ask, of unequal drag not linear in the path."""
+    return limit.name in {x.name for x in conditions if x.quantity is Quantity.SPECIFIC_THRUST}
 
 
 def _is_stated(limit: Limit) -> bool:

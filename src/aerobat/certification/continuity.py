@@ -18,7 +18,8 @@ from aerobat.certification.enclosure.queries import ChebyshevSeries
 from aerobat.certification.quantities import MagnitudeBounds
 from aerobat.certification.thrust_curve import ThrustCurve
 from aerobat.environment import Environment
-from aerobat.flatness import reference
+from aerobat.flatness import has_unequal_drag, reference
+from aerobat.flatness.unequal_drag import UnequalDrag
 from aerobat.trajectory import Trajectory
 from aerobat.vehicle import Vehicle
 
@@ -51,6 +52,8 @@ def discontinuities(
     inverse = 1 / np.maximum(n, floor)
     b3 = f * inverse
     db3 = (df - b3 * np.sum(b3 * df, axis=-1, keepdims=True)) * inverse
+    if has_unequal_drag(curve.vehicle):
+        b3, db3 = _unequal_directions(curve, ends)
     min_thrust = np.maximum(np.minimum(n[1:, 0, 0], n[:-1, 1, 0]), floor)
     turn = _tolerance(trajectory, f, 2) / min_thrust
     speeds = np.linalg.norm(db3, axis=-1)
@@ -70,6 +73,30 @@ def discontinuities(
             time = float(trajectory.knots[knot + 1])
             jumps.setdefault(int(knot), Discontinuity(name, unit, float(norm[knot]), time))
     return tuple(jumps[knot] for knot in sorted(jumps))
+
+
+def _unequal_directions(curve: ThrustCurve, ends: Array) -> tuple[Array, Array]:
+    """The thrust axis and its derivative by what both sides of a knot ask in one attitude, (S, 2, 3) each.
+
+    With drag that differs along body x and y, in that body's axes b3 = (α_x/α_z, β_y/β_z, 1) to first order
+    and b3' = (α'_x/α_z, β'_y/β_z, 0).
+
+    Args:
+        curve: What is flown.
+        ends: v, f, f', f'' at both ends of segments, (S, 2, 4, 3).
+    """
+    drag = UnequalDrag.of(curve.vehicle, curve.environment)
+    found = reference(curve.trajectory, curve.vehicle, curve.trajectory.knots, environment=curve.environment)
+    q = found.setpoint.q_world_body
+    axes = so3.axes(np.stack([q[:-1], q[1:]], axis=1))  # (S, 2, 3, 3)
+    airspeed, thrust, change = np.moveaxis(ends[:, :, :3], 2, 0)
+    acceleration = thrust - drag.weight - drag.mean * airspeed
+    body = np.stack([thrust, airspeed, change, acceleration], axis=2) @ axes
+    alpha, beta = (body[:, :, [0, 2]] + sign * drag.difference * body[:, :, [1, 3]] for sign in (1.0, -1.0))
+    across = np.stack([alpha[..., 0] / alpha[:, :, :1, 2], beta[..., 1] / beta[:, :, :1, 2]], axis=-1)
+    local = np.concatenate([across, np.broadcast_to([[1.0], [0.0]], (*across.shape[:2], 2, 1))], axis=-1)
+    b3, db3 = np.moveaxis(local @ np.swapaxes(axes, -1, -2), 2, 0)
+    return b3, db3
 
 
 def seam(trajectory: Trajectory, vehicle: Vehicle, environment: Environment) -> tuple[Discontinuity, ...]:

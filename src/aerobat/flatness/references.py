@@ -2,7 +2,7 @@
 
 The equations are those of `kernels.flatness`; `parallel_transport` carries the attitude along. Linear drag
 with coefficients d across and d_z along the body's z keeps the vehicle flat (Faessler, Franchi, Scaramuzza,
-RA-L 2018); of unequal ones across the mean is taken.
+RA-L 2018). With unequal ones across, d is their mean, and `unequal_drag` turns the frame to the body's own.
 """
 
 from __future__ import annotations
@@ -19,6 +19,15 @@ from aerobat.environment import Environment
 from aerobat.errors import SpecError
 from aerobat.flatness.flyable import Planned, environment_of, vehicle_of
 from aerobat.flatness.parallel_transport import Frames, TimeInterval, frames
+from aerobat.flatness.unequal_drag import (
+    FrameAngle,
+    UnequalDrag,
+    body_attitudes,
+    body_motion,
+    node_times,
+    resolved_pieces,
+    trajectory_through,
+)
 from aerobat.kernels import flatness as kernel
 from aerobat.problem.condition import ForceBalance
 from aerobat.states import FlatState, Setpoint, Wrench
@@ -76,18 +85,11 @@ def reference(
     trajectory = as_trajectory(trajectory)
     times = _rising(trajectory.sample(rate) if rate is not None else times)
     flat = trajectory.flat(times)
-    # both sides of every knot join the times, which show the later side, and what quintics need between
-    inner = _nodes_for_quintics(trajectory, vehicle)
-    parts = [1.0, 0.0, *inner]
-    curve = [_thrust_on_segments(trajectory, vehicle, environment, s) for s in parts]
-    thrust = np.concatenate([*curve, _thrust(flat, vehicle, environment)])
-    joining = np.concatenate([trajectory.knots[:-1] + s * trajectory.durations for s in parts])
-    joining[: trajectory.segments] = trajectory.knots[1:]
-    nodes = np.concatenate([joining, times])
-    order = np.argsort(nodes, kind="stable")
-    path = _frames(nodes[order], thrust[order], environment, trajectory.heading)
-    at = path.samples[np.argsort(order)[len(joining) :]]
-    return _assembled(times, flat, path, at, vehicle, environment)
+    if not has_unequal_drag(vehicle):
+        path, at = _mean_frames(trajectory, vehicle, environment, times)
+        return _assembled(times, flat, path, at, vehicle, environment, None)
+    path, at, turned = _turned_frames(trajectory, vehicle, environment, times)
+    return _assembled(times, flat, path, at, vehicle, environment, turned.at(times))
 
 
 @validated
@@ -117,7 +119,14 @@ def reference_of(
     if any(series.ndim != 2 for series in vars(flat).values()):
         raise SpecError("the flat states must be one series, with a row for each time and no further axes")
     path = _frames(times, _thrust(flat, vehicle, environment), environment, heading)
-    return _assembled(times, flat, path, path.samples, vehicle, environment)
+    angle = None
+    if has_unequal_drag(vehicle):
+        angle = np.zeros(len(times))
+        if times[-1] > times[0]:
+            trajectory = trajectory_through(times, flat, heading)
+            *_, turned = _turned_frames(trajectory, vehicle, environment, times[:0])
+            angle = turned.at(times - times[0])
+    return _assembled(times, flat, path, path.samples, vehicle, environment, angle)
 
 
 def body_rates(thrust: Array, q_world_body: Array, determined: NDArray[np.bool_]) -> tuple[Array, Array]:
@@ -184,6 +193,11 @@ def axial_drag(vehicle: Vehicle) -> float:
     return float(vehicle.drag_body[2]) / vehicle.mass - lateral_drag(vehicle)
 
 
+def has_unequal_drag(vehicle: Vehicle) -> bool:
+    """True if drag along body x differs from that along body y, so that the attitude is not the mean's."""
+    return bool(vehicle.drag_body[0] != vehicle.drag_body[1])
+
+
 def force_balance(environment: Environment, vehicle: Vehicle | None = None) -> ForceBalance:
     """What thrust works against in an environment; without a vehicle there is no drag."""
     drag = 0.0 if vehicle is None else lateral_drag(vehicle)
@@ -199,6 +213,37 @@ def _nodes_for_quintics(trajectory: Trajectory, vehicle: Vehicle) -> list[float]
     """Normalised times within each segment between which the thrust is all but a quintic, if it is none."""
     degree = trajectory.degree - (1 if lateral_drag(vehicle) > 0.0 else 2)
     return [] if degree <= QUINTIC else np.linspace(0.0, 1.0, PARTS + 1)[1:-1].tolist()
+
+
+def _mean_frames(
+    trajectory: Trajectory, vehicle: Vehicle, environment: Environment, times: Array
+) -> tuple[Frames, NDArray[np.intp]]:
+    """The frames along the mean-drag thrust, and where among their nodes some times (T,) are."""
+    flat = trajectory.flat(times)
+    # both sides of every knot join the times, which show the later side, and what quintics need between
+    inner = _nodes_for_quintics(trajectory, vehicle)
+    parts = [1.0, 0.0, *inner]
+    curve = [_thrust_on_segments(trajectory, vehicle, environment, s) for s in parts]
+    thrust = np.concatenate([*curve, _thrust(flat, vehicle, environment)])
+    joining = np.concatenate([trajectory.knots[:-1] + s * trajectory.durations for s in parts])
+    joining[: trajectory.segments] = trajectory.knots[1:]
+    nodes = np.concatenate([joining, times])
+    order = np.argsort(nodes, kind="stable")
+    path = _frames(nodes[order], thrust[order], environment, trajectory.heading)
+    return path, path.samples[np.argsort(order)[len(joining) :]]
+
+
+def _turned_frames(
+    trajectory: Trajectory, vehicle: Vehicle, environment: Environment, times: Array
+) -> tuple[Frames, NDArray[np.intp], FrameAngle]:
+    """The same, and the angle between the frames of mean and of unequal drag."""
+    drag = UnequalDrag.of(vehicle, environment)
+    pieces = resolved_pieces(trajectory, drag)
+    nodes = node_times(trajectory, pieces)
+    path, at = _mean_frames(trajectory, vehicle, environment, np.append(times, nodes))
+    at, between = np.split(at, [len(times)])
+    q = path.q_world_body[between].reshape(*nodes.shape, 4)
+    return path, at, FrameAngle.along(trajectory, drag, pieces, q)
 
 
 def _thrust_on_segments(
@@ -220,10 +265,35 @@ def _assembled(
     nodes: NDArray[np.intp],
     vehicle: Vehicle,
     environment: Environment,
+    angle: Array | None,
 ) -> Reference:
-    thrust, q = _thrust(flat, vehicle, environment), path.q_world_body[nodes]
-    omega, omega_dot = body_rates(thrust, q, path.determined[nodes])
-    wrench = wrench_for(thrust, flat.velocity - environment.wind, omega, omega_dot, vehicle)
+    """The reference at `nodes` of a path of frames.
+
+    Args:
+        times: [s], (T,).
+        flat: The motion then.
+        path: Frames along the mean-drag thrust.
+        nodes: Where the times are among them, (T,).
+        vehicle: What flies.
+        environment: Where.
+        angle: From these frames to those of unequal drag [rad], (T,); None of equal drag.
+    """
+    thrust, q, determined = (
+        _thrust(flat, vehicle, environment),
+        path.q_world_body[nodes],
+        path.determined[nodes],
+    )
+    airspeed = flat.velocity - environment.wind
+    if angle is None:
+        omega, omega_dot = body_rates(thrust, q, determined)
+        wrench = wrench_for(thrust, airspeed, omega, omega_dot, vehicle)
+    else:
+        drag, balance = UnequalDrag.of(vehicle, environment), thrust[:, 0]
+        q = np.where(determined[:, None], body_attitudes(q, angle, flat, drag, balance), q)
+        omega, omega_dot, specific = body_motion(q, flat, drag, balance)
+        omega, omega_dot = (np.where(determined[:, None], rate, 0.0) for rate in (omega, omega_dot))
+        moment = kernel.moment(vehicle.inertia.tolist(), _components(omega), _components(omega_dot))
+        wrench = Wrench(vehicle.mass * specific, np.stack(moment, axis=-1))
     setpoint = Setpoint(flat, q, omega, omega_dot, wrench)
     rotors = rotor_thrusts(vehicle, wrench)
     for array in (*vars(flat).values(), q, omega, omega_dot, wrench.thrust, wrench.moment_body, rotors):

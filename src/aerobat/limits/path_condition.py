@@ -1,14 +1,21 @@
-"""What a maneuver asks throughout: position, velocity, acceleration or specific thrust along a direction."""
+"""What a maneuver asks throughout: position, velocity, acceleration or specific thrust along a direction.
+
+Drag that differs along body x and y makes the specific thrust nonlinear in the path, and programs hold that
+of the mean drag. Thrust that never points down is held as it is beside that, as a bound on the tilt.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
+from math import inf
 
 import numpy as np
 
+from aerobat.flatness import has_unequal_drag
 from aerobat.limits.limit import SMALLEST_SIZE, Asked, Limit
-from aerobat.limits.quantity import PATH_SHAPE, PathQuantity
-from aerobat.problem.condition import Condition, ForceBalance
+from aerobat.limits.quantity import PATH_SHAPE, UPRIGHT, PathQuantity
+from aerobat.problem.condition import Condition, ForceBalance, Quantity
 from aerobat.problem.problem import UNITS
 
 FIELD = "path_constraints"  # of the maneuver
@@ -17,7 +24,18 @@ FIELD = "path_constraints"  # of the maneuver
 def limits(asked: Asked) -> Iterator[Limit]:
     """Yield a limit for each condition."""
     for condition in asked.conditions:
-        yield limit_of(condition, asked.balance)
+        limit = limit_of(condition, asked.balance)
+        yield limit
+        if asked.vehicle is not None and has_unequal_drag(asked.vehicle) and _is_upright(condition):
+            upright = PathQuantity.of_measure(UPRIGHT)
+            yield replace(limit, quantity=upright, size=1.0, is_proven=False)
+
+
+def _is_upright(condition: Condition) -> bool:
+    """True of what asks of the specific thrust no more than to point upwards."""
+    x, y, z = condition.direction.tolist()
+    asks_sign = condition.lower == 0.0 and condition.upper == inf
+    return condition.quantity is Quantity.SPECIFIC_THRUST and x == y == 0.0 < z and asks_sign
 
 
 def limit_of(condition: Condition, balance: ForceBalance) -> Limit:

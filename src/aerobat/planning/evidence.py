@@ -12,7 +12,6 @@ from functools import cached_property
 
 from aerobat.certification import Certificate, Envelope, certify
 from aerobat.certification.path.passages import passage_findings, waypoint_findings
-from aerobat.flatness.references import force_balance
 from aerobat.planning.assessment.assess import assessment
 from aerobat.planning.assessment.assessment import Assessment
 from aerobat.planning.flyability import Flyability, own_flights
@@ -51,8 +50,8 @@ class Evidence:
     def at(self, stages: Sequence[PlacedStage]) -> Evidence:
         """Return the evidence for the same path with its stages placed; what is proven along it is kept."""
         placed = replace(self, stages=tuple(stages))
-        balance = force_balance(self.problem.environment, self.vehicle)
-        findings = passage_findings(self.trajectory, planned_passages(stages, self.problem), balance)
+        passages = planned_passages(stages, self.problem)
+        findings = passage_findings(self.trajectory, passages, self.vehicle, self.problem.environment)
         findings += waypoint_findings(self.trajectory, planned_waypoints(stages, self.problem))
         vars(placed)["certificate"] = self.certificate.with_passages(findings)
         return placed

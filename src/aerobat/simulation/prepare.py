@@ -15,7 +15,7 @@ from aerobat.declaration import validated
 from aerobat.engines.pytree import tree_map
 from aerobat.environment import Environment
 from aerobat.errors import SpecError
-from aerobat.flatness import Planned, environment_of, lateral_drag, vehicle_of
+from aerobat.flatness import Planned, environment_of, vehicle_of
 from aerobat.kernels.rigid_body import Body
 from aerobat.simulation.bodies import bodies
 from aerobat.simulation.components import (
@@ -132,7 +132,8 @@ def _broadcast_vehicles(flying: list[Vehicle], config: FlightConfig) -> tuple[li
         raise SpecError(
             "vehicle: all vehicles of one flight, and the nominal one, need as many rotors; fly others apart"
         )
-    if config.nominal is None and len({lateral_drag(each) for each in flying}) > 1:
+    drags = {tuple((each.drag_body[:2] / each.mass).tolist()) for each in flying}
+    if config.nominal is None and len(drags) > 1:
         raise SpecError(
             "vehicle: vehicles that differ in drag per mass need different attitudes; fly them apart, "
             "or give one nominal vehicle for all"

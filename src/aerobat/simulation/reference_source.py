@@ -10,7 +10,7 @@ from aerobat.arrays import Array
 from aerobat.engines.components import components
 from aerobat.engines.pytree import Tree, tree_map
 from aerobat.environment import Environment
-from aerobat.flatness import axial_drag, force_balance, reference
+from aerobat.flatness import axial_drag, force_balance, has_unequal_drag, reference
 from aerobat.kernels.control_loops import Lookahead, ReferencePoint
 from aerobat.simulation.flight import setpoint_rows
 from aerobat.simulation.loop import Clock, Due
@@ -155,6 +155,8 @@ def reference_points(
 
 def _specific_collective(setpoint: Setpoint, environment: Environment, vehicle: Vehicle) -> Array:
     """Collective thrust over mass [m/s²], (ticks,): without drag the same for vehicles of any mass."""
+    if has_unequal_drag(vehicle):
+        return setpoint.wrench.thrust / vehicle.mass
     flat = setpoint.flat
     thrust = force_balance(environment, vehicle).specific_thrust(flat.velocity, flat.acceleration)
     airspeed = flat.velocity - environment.wind

@@ -10,24 +10,33 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from aerobat import so3
 from aerobat.arrays import Array
 from aerobat.certification.certificate import Finding, Side, Verdict
 from aerobat.certification.envelope import PlannedPassage, PlannedWaypoint
+from aerobat.environment import Environment
+from aerobat.flatness import force_balance, has_unequal_drag, reference
 from aerobat.flatness.references import UNDETERMINED
-from aerobat.problem.condition import ForceBalance
 from aerobat.trajectory import Trajectory
+from aerobat.vehicle import Vehicle
 
 PASSAGE_TOLERANCE = 1e-6  # [m, m/s, rad] by which a passage may miss what is asked: what solvers leave
 PLANE_DISTANCE = 1e-3  # [m] from the gate's plane, within which a path is said to be in it
 
 
 def passage_findings(
-    trajectory: Trajectory, passages: Sequence[PlannedPassage], balance: ForceBalance
+    trajectory: Trajectory, passages: Sequence[PlannedPassage], vehicle: Vehicle, environment: Environment
 ) -> list[Finding]:
-    """The findings about each passage: in the gate's plane, through it, inside the opening, attitude."""
-    return [
-        finding for passage in passages for finding in _Instant.of(trajectory, passage, balance).findings()
-    ]
+    """The findings about each passage: in the gate's plane, through it, inside the opening, attitude.
+
+    Args:
+        trajectory: The path.
+        passages: Where it passes gates.
+        vehicle: What flies; its drag counts.
+        environment: Its gravity and wind count.
+    """
+    instants = [_Instant.of(trajectory, passage, vehicle, environment) for passage in passages]
+    return [finding for instant in instants for finding in instant.findings()]
 
 
 def waypoint_findings(trajectory: Trajectory, waypoints: Sequence[PlannedWaypoint]) -> list[Finding]:
@@ -64,12 +73,18 @@ class _Instant:
     floor: float  # [m/s²] of |thrust|, below which no attitude is determined
 
     @classmethod
-    def of(cls, trajectory: Trajectory, passage: PlannedPassage, balance: ForceBalance) -> _Instant:
-        """The state on a trajectory."""
+    def of(
+        cls, trajectory: Trajectory, passage: PlannedPassage, vehicle: Vehicle, environment: Environment
+    ) -> _Instant:
+        """The state of a vehicle on a trajectory."""
         time = np.array([min(passage.time, trajectory.duration)])
         position, velocity, acceleration = (trajectory.evaluate(time, k)[0] for k in range(3))
-        thrust = balance.specific_thrust(velocity, acceleration)
-        floor = UNDETERMINED * balance.gravity
+        thrust = force_balance(environment, vehicle).specific_thrust(velocity, acceleration)
+        if has_unequal_drag(vehicle):
+            found = reference(trajectory, vehicle, time, environment=environment)
+            axis = so3.thrust_axis(found.setpoint.q_world_body[0])
+            thrust = (axis @ thrust) * axis
+        floor = UNDETERMINED * environment.gravity
         return cls(passage, position - passage.gate.position, velocity, thrust, floor)
 
     def findings(self) -> list[Finding]:

@@ -19,14 +19,16 @@ import numpy as np
 from aerobat import so3
 from aerobat.arrays import Array, Indices, Mask
 from aerobat.environment import Environment
-from aerobat.flatness import axial_drag, lateral_drag
+from aerobat.flatness import axial_drag, has_unequal_drag, lateral_drag, reference_of
 from aerobat.flatness.parallel_transport import frames
 from aerobat.flatness.references import UNDETERMINED, specific_thrust
 from aerobat.kernels import flatness as kernel
+from aerobat.kernels import unequal_drag
 from aerobat.kernels.ops import Vector
 from aerobat.kernels.vectors import dot, scale
 from aerobat.limits import MEASURES, Limit
 from aerobat.so3 import UP
+from aerobat.states import FlatState
 from aerobat.vehicle import Vehicle
 
 COMPLEX_STEP = 1e-20
@@ -65,7 +67,11 @@ class LimitRows:
 
     def frames(self, times: Array, derivatives: Array) -> Array:
         """Body axes in the world, as columns, (m, 3, 3), along a path's derivatives (m, 6, 3)."""
-        velocity, acceleration, jerk, snap = np.moveaxis(derivatives[:, 1:5], 1, 0)
+        position, velocity, acceleration, jerk, snap = np.moveaxis(derivatives[:, :5], 1, 0)
+        if has_unequal_drag(self.vehicle):
+            flat = FlatState(position, velocity, acceleration, jerk, snap)
+            found = reference_of(times, flat, self.vehicle, self.environment, self.heading)
+            return so3.axes(found.setpoint.q_world_body)
         airspeed = velocity - self.environment.wind
         thrust = specific_thrust(self.vehicle, self.environment, airspeed, acceleration, jerk, snap)
         path = frames(times, thrust, UNDETERMINED * self.environment.gravity, self.heading)
@@ -130,6 +136,8 @@ class LimitRows:
 
     def _measures(self, moving: Any, frames: Array) -> Any:
         """The measures of airspeed to crackle in body axes (..., m, 5, 3), (..., m, 11)."""
+        if has_unequal_drag(self.vehicle):
+            return self._unequal_measures(moving, frames)
         drag = lateral_drag(self.vehicle)
         airspeed, acceleration, jerk, snap, crackle = np.moveaxis(moving, -2, 0)
         weight = self.environment.weight @ frames
@@ -141,6 +149,17 @@ class LimitRows:
         rate = np.sqrt(dot(turning[0], turning[0]) + TINY)
         upright = dot(b3, _components(UP @ frames))
         return np.stack([*self._wrenches(b3, norm, vectors, turning), norm, rate, upright], axis=-1)
+
+    def _unequal_measures(self, moving: Any, frames: Array) -> Any:
+        """The same, of drag that differs along body x and y."""
+        vectors = [_components(x) for x in (self.environment.weight @ frames, *np.moveaxis(moving, -2, 0))]
+        vehicle = self.vehicle
+        drag = tuple((vehicle.drag_body / vehicle.mass).tolist())
+        airframe = unequal_drag.Airframe(vehicle.mass, drag, vehicle.inertia.tolist())
+        asked = unequal_drag.demand(np.sqrt, airframe, unequal_drag.Motion(*vectors))
+        rate = np.sqrt(dot(asked.omega, asked.omega) + TINY)
+        upright = dot(asked.b3, _components(UP @ frames))
+        return np.stack([*asked.wrench, *asked.rate, asked.specific_thrust, rate, upright], axis=-1)
 
     def _wrenches(
         self, b3: Vector, norm: Any, vectors: list[Vector], turning: tuple[Vector, ...]

@@ -71,7 +71,7 @@ class FramedProblem:
             in_gates: The body's room in gates that the guess's stages cross.
         """
         environment = problem.environment
-        frame = Frame.around(guess, environment.wind)
+        frame = Frame.around(guess, environment.wind, vehicle)
         balance = force_balance(environment, vehicle)
         measures = SymbolicMeasures(vehicle, frame.axes, environment, problem.heading)
         along = limits_along(vehicle, environment, problem.path_limits, sequence.path_constraints)

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from aerobat.arrays import Array
-from aerobat.flatness import force_balance, lateral_drag
+from aerobat.flatness import force_balance, has_unequal_drag, lateral_drag
 from aerobat.planning.polynomial.descent.path_limits import (
     END_ORDER,
     ORDERS,
@@ -38,10 +38,10 @@ class Frame:
     axes: Array  # orthonormal columns, (3, d); in a plane the second is up
 
     @classmethod
-    def around(cls, guess: WarmStart, wind: Array) -> Frame:
-        """The vertical plane that guess and wind [m/s] stay in, where they stay in one; else all of space."""
+    def around(cls, guess: WarmStart, wind: Array, vehicle: Vehicle) -> Frame:
+        """The vertical plane that guess, wind [m/s] and body stay in, where they stay in one; else space."""
         normal = guess.plane()
-        if normal is None or normal @ wind != 0.0:
+        if normal is None or normal @ wind != 0.0 or has_unequal_drag(vehicle):
             return cls(np.zeros(3), np.eye(3))
         start = guess.trajectory.coefficients[0, 0]
         return cls(normal * (normal @ start), np.stack([np.cross(normal, UP), UP], axis=1))

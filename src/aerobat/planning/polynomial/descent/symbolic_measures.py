@@ -16,8 +16,9 @@ import numpy as np
 from aerobat import so3
 from aerobat.arrays import Array
 from aerobat.environment import Environment
-from aerobat.flatness import axial_drag, lateral_drag, reference
+from aerobat.flatness import axial_drag, has_unequal_drag, lateral_drag, reference
 from aerobat.kernels import flatness as kernel
+from aerobat.kernels import unequal_drag
 from aerobat.kernels.ops import Vector
 from aerobat.kernels.quaternions import to_body
 from aerobat.kernels.vectors import dot, scale
@@ -35,7 +36,8 @@ SAME = 1e-9  # relative differences between limits that mean nothing
 class SymbolicMeasures:
     """The measures that limits are linear in, of a vehicle's motion along axes.
 
-    In a vertical plane collective thrust, angular acceleration and squared rate make the wrench.
+    In a vertical plane collective thrust, angular acceleration and squared rate make the wrench. Drag that
+    differs along body x and y turns a body out of such a plane: then motion has three axes.
     """
 
     vehicle: Vehicle
@@ -77,6 +79,8 @@ class SymbolicMeasures:
         ca = import_casadi()
         v, a, j, s, crackle = motion
         airspeed = v - ca.DM(self.environment.wind @ self.axes)
+        if has_unequal_drag(self.vehicle):
+            return self._unequal_values(limits, [airspeed, a, j, s, crackle], frame)
         weight = ca.DM(self.environment.weight @ self.axes)
         thrusts = kernel.specific_thrust(weight, lateral_drag(self.vehicle), airspeed, a, j, s)
         vectors = (*thrusts, airspeed, ca.DM(UP @ self.axes))
@@ -100,6 +104,23 @@ class SymbolicMeasures:
             to_wrench @ loads, to_wrench @ rates, n, ca.sqrt(dot(omega, omega)), dot(b3, up)
         )
         squares = {SPECIFIC_THRUST: squared, BODY_RATE: dot(omega, omega)}
+        return self._weighted(limits, measures, squares)
+
+    def _unequal_values(self, limits: Sequence[Limit], motion: list[Any], frame: Any) -> Any:
+        """The same in space, of drag that differs along body x and y, from the airspeed to crackle."""
+        ca, vehicle = import_casadi(), self.vehicle
+        vectors = (ca.DM(self.environment.weight @ self.axes), *motion, ca.DM(UP @ self.axes))
+        *local, up = (self._local(vector, frame) for vector in vectors)
+        drag = tuple((vehicle.drag_body / vehicle.mass).tolist())
+        airframe = unequal_drag.Airframe(vehicle.mass, drag, vehicle.inertia.tolist())
+        asked = unequal_drag.demand(ca.sqrt, airframe, unequal_drag.Motion(*local))
+        squares = {SPECIFIC_THRUST: asked.specific_thrust**2, BODY_RATE: dot(asked.omega, asked.omega)}
+        plain = asked.specific_thrust, ca.sqrt(squares[BODY_RATE]), dot(asked.b3, up)
+        return self._weighted(limits, ca.vertcat(*asked.wrench, *asked.rate, *plain), squares)
+
+    def _weighted(self, limits: Sequence[Limit], measures: Any, squares: dict[int, Any]) -> Any:
+        """What limits weigh of measures over their sizes, magnitudes by their squares."""
+        ca = import_casadi()
         values = []
         for limit in limits:
             magnitude, weights = limit.quantity.magnitude, limit.quantity.measured / limit.size

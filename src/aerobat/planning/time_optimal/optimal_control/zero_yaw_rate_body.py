@@ -2,9 +2,9 @@
 
 Its state is x = (p, v, q, ω_x, ω_y), its input u = (n, ω'_x, ω'_y): the norm of the specific thrust f [m/s²]
 and angular accelerations about the body's x and y [rad/s²]. With w the velocity relative to the air and the
-drag d across the thrust axis, d_z along it,
+drag d + δ along b1, d − δ along b2 and d_z along b3,
 
-    p' = v    v' = n b3 − g e3 − (d/m) w    q' = ½ q ⊗ (0, ω)
+    p' = v    v' = n b3 − g e3 − (d w + δ (b1·w b1 − b2·w b2))/m    q' = ½ q ⊗ (0, ω)
 
 and the rotors bear T = m n + (d_z − d) b3·w and the moments that ω_z = 0 needs, M = J ω' + ω × J ω. Flatness
 and the controller carry the attitude in the same way, without spin, and count drag in the same way.
@@ -18,9 +18,10 @@ from typing import Any
 
 from aerobat.arrays import Array
 from aerobat.environment import Environment
-from aerobat.flatness import axial_drag, lateral_drag
+from aerobat.flatness import axial_drag, has_unequal_drag, lateral_drag
 from aerobat.kernels.flatness import collective, moment
 from aerobat.kernels.quaternions import axes, quaternion_rate
+from aerobat.kernels.vectors import dot
 from aerobat.optimization.nonlinear import components, import_casadi
 from aerobat.vehicle import Vehicle
 
@@ -31,10 +32,7 @@ POSITION, VELOCITY, ATTITUDE, RATES = slice(0, 3), slice(3, 6), slice(6, 10), sl
 
 @dataclass(frozen=True, eq=False)
 class ZeroYawRateBody:
-    """A vehicle's equations of motion with ω_z = 0, as CasADi functions of x, u and the input's slope u'.
-
-    Drag across the thrust axis is the same in all directions, as flatness has it.
-    """
+    """A vehicle's equations of motion with ω_z = 0, as CasADi functions of x, u and the input's slope u'."""
 
     vehicle: Vehicle
     environment: Environment
@@ -82,8 +80,12 @@ class ZeroYawRateBody:
     def _rate(self) -> Any:
         """x'."""
         ca, u = import_casadi(), self._symbols[1]
-        *_, b3 = axes(components(self._x[ATTITUDE]))
+        b1, b2, b3 = axes(components(self._x[ATTITUDE]))
         drag = lateral_drag(self.vehicle) * self._airspeed
+        if has_unequal_drag(self.vehicle):
+            more = float(self.vehicle.drag_body[0]) / self.vehicle.mass - lateral_drag(self.vehicle)
+            along = (ca.vertcat(*axis) * dot(axis, components(self._airspeed)) for axis in (b1, b2))
+            drag += more * (next(along) - next(along))
         acceleration = u[0] * ca.vertcat(*b3) - ca.DM(self.environment.weight) - drag
         turning = quaternion_rate(components(self._x[ATTITUDE]), self._omega)
         return ca.vertcat(self._x[VELOCITY], acceleration, *turning, u[1:])

@@ -1,0 +1,315 @@
+"""The certified quantities of a vehicle whose drag along its x differs from that along its y.
+
+Its attitude R solves a differential equation (`kernels.unequal_drag`). On each piece the quaternion of
+`flatness.reference` is replaced by a polynomial, which solves that equation but for defects: these are
+polynomials too, and bound how far R is. All quantities are rational functions of polynomials then, whose
+interpolation is proven by their bounds in complex time. DERIVATION.md, section 8, has the details.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
+
+import numpy as np
+from numpy.polynomial import chebyshev as series_of
+
+from aerobat.arrays import Array, Mask
+from aerobat.certification import quantities
+from aerobat.certification.enclosure import chebyshev
+from aerobat.certification.enclosure.bounded import Bounded, Polynomials
+from aerobat.certification.enclosure.queries import ChebyshevSeries
+from aerobat.certification.subdivision import MAX_COMMAND_REMAINDER, MAX_REMAINDER, MIN_DURATION
+from aerobat.certification.thrust_curve import ThrustCurve
+from aerobat.flatness import TimeInterval, reference
+from aerobat.kernels import flatness
+from aerobat.kernels import unequal_drag as kernel
+from aerobat.kernels.ops import Scalar, Vector
+from aerobat.kernels.vectors import dot
+from aerobat.limits import Limit
+from aerobat.limits.quantity import UPRIGHT, WRENCH, WRENCH_RATE
+from aerobat.so3 import UP
+from aerobat.trajectory import polynomial
+from aerobat.trajectory.subintervals import Subintervals
+from aerobat.vehicle import mixer
+
+QUATERNION_DEGREE = 14
+RHO = np.array([1.0, 1.4, 1.6, 1.8, 2.0, 2.3])
+HALVINGS = 8  # of pieces that the mean drag is content with
+LARGEST_ERROR = 1e-3  # [rad] of attitude: first-order errors, taken twice, hold far beyond
+
+
+def interpolated_with_unequal_drag(
+    curve: ThrustCurve,
+    pieces: Subintervals,
+    everywhere: bool,
+    tightness: float,
+    derived: Sequence[Limit],
+    on_thrust: Sequence[Limit],
+) -> tuple[ChebyshevSeries | None, tuple[TimeInterval, ...]]:
+    """Return the series of `certify.interpolated`, and where no attitude is determined.
+
+    Args:
+        curve: What is flown.
+        pieces: In their order, on which quantities of the mean drag are interpolated accurately.
+        everywhere: Whether they make up the whole trajectory.
+        tightness: Of enclosures.
+        derived: Limits on measures, behind what a certificate states anyway.
+        on_thrust: Conditions on the specific thrust, behind those.
+    """
+    pieces = pieces.halves()
+    for _ in range(HALVINGS):
+        pieces = pieces[pieces.order()]
+        motion = _Motion.of(curve, pieces)
+        with np.errstate(invalid="ignore", over="ignore"):
+            columns = motion.columns(derived, on_thrust)
+        rough = _is_rough(columns, motion, derived) & (pieces.seconds(curve.trajectory) > MIN_DURATION)
+        if not rough.any():
+            break
+        pieces = Subintervals.joined([pieces[~rough], pieces[rough].halves()])
+    with np.errstate(invalid="ignore"):
+        error = np.stack([_remainder(x, motion) + motion.basis.lebesgue * x.error for x in columns], axis=1)
+    values = np.stack([x.values for x in columns], axis=-1)
+    proven = np.isfinite(error).all(axis=1) & np.isfinite(values).all(axis=(1, 2))
+    count = len(pieces) if proven.all() else int(np.argmin(proven))
+    lost = _from(curve, motion.pieces, count)
+    if count == 0:
+        return None, lost
+    scale = [*quantities.scales(curve.vehicle), *(limit.size for limit in (*derived, *on_thrust))]
+    found = ChebyshevSeries(
+        curve.trajectory,
+        motion.pieces[:count],
+        motion.basis.analysis @ values[:count],
+        error[:count],
+        np.array(scale),
+        tightness,
+        everywhere and not lost,
+    )
+    return found, lost
+
+
+@dataclass(frozen=True, eq=False)
+class _Motion:
+    """A motion on pieces, at the nodes of a basis for products of it with two quaternions."""
+
+    curve: ThrustCurve
+    pieces: Subintervals
+    basis: chebyshev.Basis
+    world: Array  # airspeed to crackle, (P, N, 5, 3)
+    sums: Array  # of absolute values that they are evaluated from, (P, 5)
+    attitude: Array  # coefficients of a quaternion, next to a unit one, (P, QUATERNION_DEGREE + 1, 4)
+    start: Array  # the quaternion at the trajectory's start, (4,)
+
+    @classmethod
+    def of(cls, curve: ThrustCurve, pieces: Subintervals) -> _Motion:
+        """The motion of a vehicle, and the attitude of its reference."""
+        trajectory = curve.trajectory
+        basis = chebyshev.basis(2 * QUATERNION_DEGREE + max(trajectory.degree, 1))
+        s = pieces.start[:, None] + pieces.length[:, None] * (1 + basis.nodes) / 2
+        world, sums = [], []
+        for k in range(1, 6):
+            rates = polynomial.differentiate(trajectory.coefficients, k)[pieces.interval]
+            per_second = trajectory.durations[pieces.interval] ** -float(k)
+            world.append(polynomial.evaluate(rates[:, None], s) * per_second[:, None, None])
+            sums.append(np.linalg.norm(rates, axis=-1).sum(axis=1) * per_second)
+        wind = curve.environment.wind
+        world[0] = world[0] - wind
+        sums[0] = sums[0] + np.linalg.norm(wind)
+        nodes, analysis = _guess_nodes()
+        inside = pieces.start[:, None] + pieces.length[:, None] * (1 + nodes) / 2
+        times = trajectory.knots[pieces.interval, None] + inside * trajectory.durations[pieces.interval, None]
+        times = np.append(0.0, times)
+        found = reference(trajectory, curve.vehicle, times, environment=curve.environment)
+        start, q = np.split(found.setpoint.q_world_body, [1])
+        attitude = analysis @ q.reshape(len(pieces), -1, 4)
+        return cls(curve, pieces, basis, np.stack(world, axis=2), np.stack(sums, axis=1), attitude, start[0])
+
+    @cached_property
+    def drag(self) -> Array:
+        """Coefficients over the mass [1/s], (3,)."""
+        return np.asarray(self.curve.vehicle.drag_body / self.curve.vehicle.mass)
+
+    @cached_property
+    def quaternion(self) -> tuple[Array, Array, Array, Array]:
+        """The components of the polynomial at the nodes, (P, N) each."""
+        w, x, y, z = np.moveaxis(self._at_nodes @ self.attitude, -1, 0)
+        return w, x, y, z
+
+    @cached_property
+    def _at_nodes(self) -> Array:
+        return np.asarray(series_of.chebvander(self.basis.nodes, QUATERNION_DEGREE))
+
+    def polynomials(self, values: Array) -> Polynomials:
+        """Polynomials of the basis's degree, of these values (P, N)."""
+        return Polynomials(values, self.basis, RHO)
+
+    @cached_property
+    def squared(self) -> Polynomials:
+        """The quaternion's square norm, next to 1."""
+        w, x, y, z = self.quaternion
+        return self.polynomials(w * w + x * x + y * y + z * z)
+
+    @cached_property
+    def per_square(self) -> Bounded:
+        """Its inverse."""
+        return self.squared.bounded().inverse(self.squared.least())
+
+    def turned(self, world: Array) -> list[Array]:
+        """World vectors (P, N, 3) or (3,) in body axes, times `squared`: polynomials, (P, N) each."""
+        w, x, y, z = self.quaternion
+        a, b, c = np.moveaxis(world, -1, 0)
+        return [
+            (w * w + x * x - y * y - z * z) * a + 2 * (x * y + w * z) * b + 2 * (x * z - w * y) * c,
+            2 * (x * y - w * z) * a + (w * w - x * x + y * y - z * z) * b + 2 * (y * z + w * x) * c,
+            2 * (x * z + w * y) * a + 2 * (y * z - w * x) * b + (w * w - x * x - y * y + z * z) * c,
+        ]
+
+    def dragged(self, coefficient: float, k: int) -> tuple[Array, Array]:
+        """The k-th derivative of a + g e3 + c v at the nodes, (P, N, 3), and its rounding, (P,)."""
+        weight = self.curve.environment.weight if k == 0 else np.zeros(3)
+        vector = self.world[:, :, k + 1] + weight + coefficient * self.world[:, :, k]
+        summed = self.sums[:, k + 1] + np.linalg.norm(weight) + coefficient * self.sums[:, k]
+        return vector, chebyshev.EVALUATION_ROUNDING * summed
+
+    def body(self, world: Array, rounding: Array) -> Vector:
+        """A world vector in body axes, off by its rounding and by the attitude's error."""
+        size = np.linalg.norm(np.abs(self.polynomials_of(world)), axis=-1)
+        off = rounding + self.attitude_error * size
+        x, y, z = (
+            self.polynomials(component).bounded() * self.per_square for component in self.turned(world)
+        )
+        return x.with_error(off), y.with_error(off), z.with_error(off)
+
+    def polynomials_of(self, world: Array) -> Array:
+        """What the components of a world vector do not exceed on the pieces, (P, 3)."""
+        return np.stack([self.polynomials(world[..., i]).bound()[:, 0] for i in range(3)], axis=-1)
+
+    @cached_property
+    def attitude_error(self) -> Array:
+        """The largest angle [rad] between the polynomial's attitude and R, (P,); infinite if unknown.
+
+        With the rotation θ between them in body axes and the defects ε₁ = b1·α, ε₂ = b2·β and σ = ω_z,
+        θ_y = (ε₁ + θ_z α_y)/α_z, θ_x = (θ_z β_x − ε₂)/β_z and |θ_z'| ≤ |σ| + |ω| |(θ_x, θ_y)| to first order.
+        """
+        square = self.squared.least()[:, 0]
+
+        def sup(values: Array) -> Array:
+            return np.asarray(self.polynomials(values).bound()[:, 0] / square)
+
+        least, defect, slope, rate = [], [], [], []
+        for axis, coefficient in enumerate(self.drag[:2].tolist()):
+            (zeroth, off), (first, off_first) = (self.dragged(coefficient, k) for k in (0, 1))
+            parts = self.turned(zeroth)
+            least.append(self.polynomials(parts[2]).least()[:, 0] / self.squared.bound()[:, 0] - off)
+            defect.append(sup(parts[axis]) + off)
+            slope.append(sup(parts[1 - axis]) + off)
+            rate.append(sup(self.turned(first)[axis]) + off_first)
+        with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+            lowest = np.where(np.minimum(*least) > 0.0, np.minimum(*least), 0.0)
+            tilt = np.hypot(*defect) / lowest  # without any spin
+            lever = np.hypot(*slope) / lowest  # of an angle about the thrust
+            omega = 1.01 * np.hypot(*rate) / lowest
+            seconds = self.pieces.seconds(self.curve.trajectory)
+            driven = seconds * (sup(self._spin) + omega * tilt)
+            grown = np.exp(seconds * omega * lever)
+            angle, largest = 0.0, []
+            for handed, more, growth in zip(self._handed_over, driven, grown, strict=True):
+                angle = 2 * growth * (angle / 2 + handed + more)
+                largest.append(angle)
+            found = 2 * tilt + np.array(largest) * (1 + lever)
+        return np.where(found < LARGEST_ERROR, found, np.inf)
+
+    @cached_property
+    def _spin(self) -> Array:
+        """ω_z times `squared` at the nodes [rad/s], (P, N)."""
+        seconds = self.pieces.seconds(self.curve.trajectory)[:, None]
+        slopes = np.asarray(series_of.chebder(self.attitude, axis=1))
+        dw, dx, dy, dz = np.moveaxis(self._at_nodes[:, :-1] @ slopes, -1, 0) * 2 / seconds
+        w, x, y, z = self.quaternion
+        return np.asarray(2 * (w * dz - x * dy + y * dx - z * dw))
+
+    @cached_property
+    def _handed_over(self) -> Array:
+        """The angle [rad] between the attitudes of a piece's start and of what it goes on from, (P,)."""
+        ends = series_of.chebvander(np.array([-1.0, 1.0]), QUATERNION_DEGREE) @ self.attitude
+        before = np.concatenate([self.start[None], ends[:-1, 1]])
+        after = ends[:, 0]
+        before, after = (q / np.linalg.norm(q, axis=-1, keepdims=True) for q in (before, after))
+        sine = np.minimum(np.linalg.norm(after - before, axis=-1), np.linalg.norm(after + before, axis=-1))
+        return np.asarray(4 * np.arcsin(np.minimum(sine / 2, 1.0)))
+
+    def columns(self, derived: Sequence[Limit], on_thrust: Sequence[Limit]) -> list[Bounded]:
+        """The quantities of `quantities.values`, and what limits are about."""
+        vehicle = self.curve.vehicle
+        cx, cy, cz = self.drag.tolist()
+        rated = any(limit.quantity.measured[WRENCH_RATE].any() for limit in derived)
+        alpha, beta = ([self.body(*self.dragged(c, k)) for k in range(4 if rated else 3)] for c in (cx, cy))
+        gamma = [self.body(*self.dragged(cz, k)) for k in range(2)]
+        inverse = self._inverse(cx, alpha[0][2]), self._inverse(cy, beta[0][2])
+        omega, omega_dot = kernel.body_rates(inverse, alpha, beta)
+        thrust, thrust_rate = kernel.collective(vehicle.mass, gamma, omega)
+        inertia, rate = vehicle.inertia.tolist(), (thrust_rate, 0.0, 0.0, 0.0)
+        moment = flatness.moment(inertia, omega, omega_dot)
+        if rated:
+            jerk = kernel.angular_jerk(inverse, alpha, beta, omega, omega_dot)
+            rate = (thrust_rate, *flatness.moment_and_rate(inertia, omega, omega_dot, jerk)[1])
+        upright, wrench = self.axis(UP), (thrust, *moment)
+        found = [_weighted(share, wrench) for share in mixer(vehicle)]
+        found += [thrust, upright, dot(omega, omega), dot(moment, moment)]
+        for limit in derived:
+            measured = limit.quantity.measured
+            weights = [*measured[WRENCH], *measured[WRENCH_RATE], measured[UPRIGHT]]
+            found.append(_weighted(weights, (*wrench, *rate, upright)))
+        along = 0.5 * (alpha[0][2] + beta[0][2])
+        return found + [along * self.axis(limit.quantity.path[2]) for limit in on_thrust]
+
+    def axis(self, direction: Array) -> Bounded:
+        """The component of the thrust axis along a direction (3,)."""
+        off = self.attitude_error * float(np.linalg.norm(direction))
+        along = self.polynomials(self.turned(direction)[2]).bounded() * self.per_square
+        return along.with_error(off)
+
+    def _inverse(self, coefficient: float, along: Bounded) -> Bounded:
+        """1/α_z or 1/β_z; `along` is what it is the inverse of."""
+        whole = self.polynomials(self.turned(self.dragged(coefficient, 0)[0])[2])
+        least = whole.least() / self.squared.bound()
+        return along.inverse(least)
+
+
+def _weighted(weights: Sequence[float], terms: Sequence[Scalar]) -> Bounded:
+    """The sum of weights times terms."""
+    nothing: Bounded = 0.0 * terms[0]
+    return sum((float(w) * term for w, term in zip(weights, terms, strict=True) if w != 0.0), nothing)
+
+
+def _remainder(column: Bounded, motion: _Motion) -> Array:
+    """Between a quantity and its interpolant, at most, rounding aside, (P,)."""
+    decay, _ = chebyshev.tails(motion.basis.degree, RHO[1:])
+    return np.asarray((column.bound[:, 1:] * decay).min(axis=1))
+
+
+def _is_rough(columns: Sequence[Bounded], motion: _Motion, derived: Sequence[Limit]) -> Mask:
+    """Tell on which pieces interpolation leaves more open than it may, (P,)."""
+    scales = [*quantities.scales(motion.curve.vehicle), *(limit.size for limit in derived)]
+    rough = np.zeros(len(motion.pieces), dtype=bool)
+    for i, (column, scale) in enumerate(zip(columns, scales, strict=False)):
+        part = MAX_REMAINDER if i < len(scales) - len(derived) else MAX_COMMAND_REMAINDER
+        size = np.maximum(scale, column.bound[:, 0])
+        rough |= ~(_remainder(column, motion) <= part * size)
+    return rough
+
+
+def _from(curve: ThrustCurve, pieces: Subintervals, count: int) -> tuple[TimeInterval, ...]:
+    """The time from the start of the piece behind the first `count` on, if there is one."""
+    if count == len(pieces):
+        return ()
+    start = pieces[count : count + 1].times(curve.trajectory, np.array([-1.0]))
+    return (TimeInterval(float(start[0]), float(curve.trajectory.duration)),)
+
+
+@lru_cache(maxsize=1)
+def _guess_nodes() -> tuple[Array, Array]:
+    """Chebyshev points inside a piece, so that none is at a knot, and the matrix to coefficients."""
+    nodes = series_of.chebpts1(QUATERNION_DEGREE + 1)
+    return np.asarray(nodes), np.asarray(np.linalg.inv(series_of.chebvander(nodes, QUATERNION_DEGREE)))

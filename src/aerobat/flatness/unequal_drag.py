@@ -1,0 +1,265 @@
+"""The attitude of a vehicle whose drag along its x differs from that along its y.
+
+Its thrust axis is off from that of the mean drag, and by how much depends on the body's angle ψ about it. The
+angle is counted from the frame that `parallel_transport` carries along the mean-drag thrust. Its rate follows
+from ω_z = 0 (`kernels.unequal_drag`) and is integrated by Picard's iteration on Chebyshev series.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+from numpy.polynomial import chebyshev
+from numpy.typing import NDArray
+
+from aerobat import so3
+from aerobat.arrays import Array
+from aerobat.environment import Environment
+from aerobat.kernels import unequal_drag as kernel
+from aerobat.kernels.ops import Axes, Vector
+from aerobat.kernels.vectors import add_scaled
+from aerobat.so3 import UP
+from aerobat.states import FlatState
+from aerobat.trajectory import Trajectory, polynomial
+from aerobat.trajectory.subintervals import Subintervals
+from aerobat.vehicle import Vehicle
+
+NODES = 20  # of a piece
+RESOLVED = 1e-10  # of its size, the last terms of what is singular where no attitude is determined
+SHORTEST = 2.0**-12  # of a segment: no piece is cut further
+ROUNDS = 100  # of Picard's iteration, whose errors fall as those of the exponential series
+SETTLED = 1e-14  # [rad]
+LARGEST_PART = 0.5  # of the mean-drag thrust, what the difference in drag may add to it
+
+
+@dataclass(frozen=True)
+class UnequalDrag:
+    """Drag coefficients over the mass, and the environment that they act in."""
+
+    coefficients: Array  # [1/s] along body x, y and z, (3,)
+    wind: Array  # [m/s]
+    weight: Array  # [m/s²]
+
+    @classmethod
+    def of(cls, vehicle: Vehicle, environment: Environment) -> UnequalDrag:
+        """Of a vehicle."""
+        return cls(vehicle.drag_body / vehicle.mass, environment.wind, environment.weight)
+
+    @property
+    def mean(self) -> float:
+        """Of drag along body x and y [1/s]."""
+        return float(self.coefficients[:2].mean())
+
+    @property
+    def difference(self) -> float:
+        """By how much drag along body x exceeds the mean [1/s]."""
+        return float(self.coefficients[0] - self.coefficients[1]) / 2
+
+    def part(self, thrust: Array, airspeed: Array) -> Array:
+        """What the difference in drag may add to mean-drag thrusts (..., 3), as a fraction of them, (...)."""
+        size = np.maximum(np.linalg.norm(thrust, axis=-1), np.finfo(float).tiny)
+        return np.asarray(abs(self.difference) * np.linalg.norm(airspeed, axis=-1) / size)
+
+    def counted(self, thrust: Array, airspeed: Array) -> Array:
+        """`difference`, less where it would add more than LARGEST_PART to mean-drag thrusts, (...)."""
+        part = self.part(thrust, airspeed)
+        return np.asarray(self.difference * LARGEST_PART / np.maximum(part, LARGEST_PART))
+
+
+def resolved_pieces(trajectory: Trajectory, drag: UnequalDrag) -> Subintervals:
+    """Halve segments until series of NODES terms resolve what an attitude is made of, in order."""
+    pending, done = Subintervals.whole(trajectory.segments), []
+    while len(pending):
+        motion = motion_on(trajectory, pending, nodes(), 2)
+        airspeed, thrust = motion[:, :, 0] - drag.wind, motion[:, :, 1] + drag.weight
+        singular = [1 / np.sum((thrust + c * airspeed) ** 2, axis=-1) for c in drag.coefficients[:2]]
+        series = np.abs(np.stack(singular, axis=1) @ analysis().T)
+        rough = (series[..., -2:].max(axis=(1, 2)) > RESOLVED * series[..., 0].max(axis=1)) & (
+            pending.length > SHORTEST
+        )
+        done.append(pending[~rough])
+        pending = pending[rough].halves()
+    pieces = Subintervals.joined(done)
+    return pieces[pieces.order()]
+
+
+def trajectory_through(times: Array, flat: FlatState, heading: float) -> Trajectory:
+    """Return a trajectory from zero with velocity to snap of a series that spans time, at its times (T,)."""
+    moves = np.diff(times) > 0.0
+    durations = np.diff(times)[moves]
+    rates = np.stack([flat.velocity, flat.acceleration, flat.jerk, flat.snap], axis=1)
+    scale = durations[:, None, None] ** np.arange(4)[:, None]
+    velocity = polynomial.hermite(scale * rates[:-1][moves], scale * rates[1:][moves])
+    position = durations[:, None, None] * velocity / np.arange(1, 9)[:, None]
+    return Trajectory(durations, np.concatenate([0.0 * position[:, :1], position], axis=1), heading)
+
+
+@dataclass(frozen=True)
+class FrameAngle:
+    """The angle ψ [rad] from the frame of the mean drag to the one that the body's axes are nearest to."""
+
+    starts: Array  # [s] of the pieces, (P,)
+    seconds: Array  # [s] that they take, (P,)
+    series: Array  # of ψ on them, (P, NODES + 1)
+
+    @classmethod
+    def along(
+        cls, trajectory: Trajectory, drag: UnequalDrag, pieces: Subintervals, q_mean: Array
+    ) -> FrameAngle:
+        """Integrate ψ' along pieces.
+
+        Args:
+            trajectory: The path.
+            drag: Of the vehicle.
+            pieces: In their order.
+            q_mean: The frame of the mean drag at their nodes, (P, NODES, 4).
+        """
+        velocity, acceleration, jerk = np.moveaxis(motion_on(trajectory, pieces, nodes(), 3), 2, 0)
+        local = _Local.of(drag, velocity - drag.wind, acceleration, jerk, q_mean)
+        seconds = pieces.seconds(trajectory)
+        angle = np.zeros(local.norm.shape)
+        for _ in range(ROUNDS):
+            rate = local.spin(angle)
+            series = chebyshev.chebint(rate @ analysis().T, lbnd=-1, axis=1) * seconds[:, None] / 2
+            series[1:, 0] += np.cumsum(series.sum(axis=1))[:-1]
+            last, angle = angle, series @ chebyshev.chebvander(nodes(), NODES).T
+            if np.abs(angle - last).max() <= SETTLED * max(1.0, np.abs(angle).max()):
+                break
+        return cls(pieces.times(trajectory, np.full(len(pieces), -1.0)), seconds, series)
+
+    def at(self, times: Array) -> Array:
+        """ψ at times [s], (T,)."""
+        piece = np.maximum(np.searchsorted(self.starts, times, side="right") - 1, 0)
+        position = 2 * (times - self.starts[piece]) / self.seconds[piece] - 1
+        return np.asarray(chebyshev.chebval(position, self.series[piece].T, tensor=False))
+
+
+def body_attitudes(q_mean: Array, angle: Array, flat: FlatState, drag: UnequalDrag, balance: Array) -> Array:
+    """Attitudes (..., 4) of the body.
+
+    Args:
+        q_mean: The frame of the mean drag, (..., 4).
+        angle: ψ [rad], (...).
+        flat: The motion, (...).
+        drag: Of the vehicle.
+        balance: Mean-drag specific thrust, world [m/s²], (..., 3).
+    """
+    near = so3.multiply(q_mean, so3.about_axis(UP, angle))
+    airspeed = flat.velocity - drag.wind
+    kappa = drag.counted(balance, airspeed)
+    thrust, air = (_components(so3.unrotate(near, vector)) for vector in (balance, airspeed))
+    (xx, xy, xz), (yx, yy, yz), (zx, zy, zz) = kernel.nearest_axes(
+        np.sqrt, add_scaled(thrust, kappa, air), add_scaled(thrust, -kappa, air)
+    )
+    # the body's axes are within a right angle of these: the quaternion's first component is large
+    q = np.stack([1 + xx + yy + zz, yz - zy, zx - xz, xy - yx], axis=-1)
+    return so3.multiply(near, so3.normalize(q))
+
+
+def body_motion(q: Array, flat: FlatState, drag: UnequalDrag, balance: Array) -> tuple[Array, Array, Array]:
+    """Body rates [rad/s], their derivatives [rad/s²], body axes, and specific collective thrust [m/s²].
+
+    Args:
+        q: Attitudes of the body, (..., 4).
+        flat: The motion, (...).
+        drag: Of the vehicle.
+        balance: Mean-drag specific thrust, world [m/s²], (..., 3).
+    """
+    airspeed = flat.velocity - drag.wind
+    kappa = drag.counted(balance, airspeed)
+    mean = drag.mean
+    world = (airspeed, flat.acceleration, flat.jerk, flat.acceleration + drag.weight, flat.snap)
+    air, accelerated, jerk, thrust, snap = (_components(so3.unrotate(q, vector)) for vector in world)
+    motion = ((thrust, air), (jerk, accelerated), (snap, jerk))
+    alpha = [add_scaled(x, mean + kappa, below) for x, below in motion]
+    beta = [add_scaled(x, mean - kappa, below) for x, below in motion]
+    rates = kernel.body_rates((1.0 / alpha[0][2], 1.0 / beta[0][2]), alpha, beta)
+    omega, omega_dot = (np.stack([x, y, np.zeros_like(x)], axis=-1) for x, y, _ in rates)
+    return omega, omega_dot, thrust[2] + drag.coefficients[2] * air[2]
+
+
+@dataclass(frozen=True)
+class _Local:
+    """A motion in the frame of the mean drag, z along its thrust; across it x + i y. All (P, N)."""
+
+    difference: Array
+    norm: Array  # of the thrust
+    rising: Array  # its derivative along itself
+    turning: NDArray[np.complex128]  # its derivative across itself
+    air: NDArray[np.complex128]
+    air_along: Array
+    accelerated: NDArray[np.complex128]
+    accelerated_along: Array
+
+    @classmethod
+    def of(
+        cls, drag: UnequalDrag, airspeed: Array, acceleration: Array, jerk: Array, q_mean: Array
+    ) -> _Local:
+        mean = drag.mean
+        thrust = acceleration + drag.weight + mean * airspeed
+        vectors = (jerk + mean * acceleration, airspeed, acceleration)
+        parts = []
+        for x, y, z in (_components(so3.unrotate(q_mean, vector)) for vector in vectors):
+            parts += [x + 1j * y, z]
+        across, rising, air, air_along, accelerated, accelerated_along = parts
+        norm = np.maximum(np.linalg.norm(thrust, axis=-1), np.finfo(float).tiny)
+        kappa = drag.counted(thrust, airspeed)
+        return cls(kappa, norm, rising, across, air, air_along, accelerated, accelerated_along)
+
+    def spin(self, angle: Array) -> Array:
+        """ψ' [rad/s] at angles ψ."""
+        back = np.exp(-1j * angle)
+        change, air, accelerated = (
+            _vector(back * across, along)
+            for across, along in (
+                (self.turning, self.rising),
+                (self.air, self.air_along),
+                (self.accelerated, self.accelerated_along),
+            )
+        )
+        thrust = (0.0, 0.0, self.norm)
+        alpha, beta = (add_scaled(thrust, sign * self.difference, air) for sign in (1.0, -1.0))
+        body: Axes = kernel.nearest_axes(np.sqrt, alpha, beta)
+        rising = add_scaled(change, self.difference, accelerated)
+        return np.asarray(kernel.frame_spin((self.norm, change), (alpha, rising), body))
+
+
+def motion_on(trajectory: Trajectory, pieces: Subintervals, at: Array, orders: int) -> Array:
+    """Velocity and so on, `orders` derivatives, at positions in [-1, 1] on pieces, (P, N, orders, 3)."""
+    s = pieces.start[:, None] + pieces.length[:, None] * (1 + at) / 2
+    found = []
+    for k in range(1, orders + 1):
+        rates = polynomial.differentiate(trajectory.coefficients, k)[pieces.interval, None]
+        values = polynomial.evaluate(rates, s)
+        found.append(values / trajectory.durations[pieces.interval, None, None] ** k)
+    return np.stack(found, axis=2)
+
+
+def node_times(trajectory: Trajectory, pieces: Subintervals) -> Array:
+    """Times [s] of the nodes of pieces, (P, NODES)."""
+    s = pieces.start[:, None] + pieces.length[:, None] * (1 + nodes()) / 2
+    return np.asarray(
+        trajectory.knots[pieces.interval, None] + s * trajectory.durations[pieces.interval, None]
+    )
+
+
+@lru_cache(maxsize=1)
+def nodes() -> Array:
+    """Chebyshev points inside a piece, so that none is at a knot, (NODES,)."""
+    return np.asarray(chebyshev.chebpts1(NODES))
+
+
+@lru_cache(maxsize=1)
+def analysis() -> Array:
+    """The matrix from values at the nodes to Chebyshev coefficients, (NODES, NODES)."""
+    return np.asarray(np.linalg.inv(chebyshev.chebvander(nodes(), NODES - 1)))
+
+
+def _vector(across: NDArray[np.complex128], along: Array) -> Vector:
+    return across.real, across.imag, along
+
+
+def _components(vectors: Array) -> Vector:
+    return vectors[..., 0], vectors[..., 1], vectors[..., 2]

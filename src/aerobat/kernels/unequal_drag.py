@@ -1,0 +1,153 @@
+"""Flatness of a body whose drag along its x differs from that along its y, in scalar components.
+
+With the airspeed v, the drag per mass c in body axes and h = a + g e3, thrust is along b3 alone where
+
+    b1·α = 0,   b2·β = 0,     α = h + c_x v,   β = h + c_y v.
+
+Both leave one angle open. The body never spins about b3: b1' = −ω_y b3, b2' = ω_x b3, and in body axes
+
+    ω_x = −β'_y/β_z,   ω_y = α'_x/α_z,   ω_z = 0,   T = m γ_z,     γ = h + c_z v.
+
+Vectors below are in body axes and come with their derivatives in the world: α, α', α'', …
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import NamedTuple
+
+from aerobat.kernels import flatness
+from aerobat.kernels.ops import Axes, Matrix, Scalar, Vector
+from aerobat.kernels.quaternions import to_body
+from aerobat.kernels.vectors import add, add_scaled, cross, dot, scale
+
+
+def nearest_axes(sqrt: Callable[[Scalar], Scalar], alpha: Vector, beta: Vector) -> Axes:
+    """Return b1, b2 and b3 with b1·α = b2·β = 0 and b1 across y, in axes that the body's are near to."""
+    x, _, z = alpha
+    shrink = 1.0 / sqrt(x * x + z * z)
+    b1 = (z * shrink, 0.0 * z, -x * shrink)
+    b2 = cross(beta, b1)
+    b2 = scale(1.0 / sqrt(dot(b2, b2)), b2)
+    return b1, b2, cross(b1, b2)
+
+
+def body_rates(
+    inverse: tuple[Scalar, Scalar], alpha: Sequence[Vector], beta: Sequence[Vector]
+) -> tuple[Vector, Vector]:
+    """Return ω [rad/s] and ω' [rad/s²].
+
+    Args:
+        inverse: 1/α_z and 1/β_z.
+        alpha: α, α', α''.
+        beta: β, β', β''.
+    """
+    per_alpha, per_beta = inverse
+    wx, wy = -1.0 * beta[1][1] * per_beta, alpha[1][0] * per_alpha
+    both = wx * wy
+    dwx = -1.0 * (beta[2][1] + 2.0 * wx * beta[1][2] + both * beta[0][0]) * per_beta
+    dwy = (alpha[2][0] - 2.0 * wy * alpha[1][2] + both * alpha[0][1]) * per_alpha
+    return (wx, wy, 0.0), (dwx, dwy, 0.0)
+
+
+def angular_jerk(
+    inverse: tuple[Scalar, Scalar],
+    alpha: Sequence[Vector],
+    beta: Sequence[Vector],
+    omega: Vector,
+    omega_dot: Vector,
+) -> Vector:
+    """Return ω'' [rad/s³].
+
+    Args:
+        inverse: 1/α_z and 1/β_z.
+        alpha: α to α'''.
+        beta: β to β'''.
+        omega: ω.
+        omega_dot: ω'.
+    """
+    per_alpha, per_beta = inverse
+    (wx, wy, _), (dwx, dwy, _) = omega, omega_dot
+    both, change = wx * wy, dwx * wy + wx * dwy
+    rising_beta = beta[1][2] + wy * beta[0][0]  # β_z'
+    rising_alpha = alpha[1][2] - wx * alpha[0][1]  # α_z'
+    x = beta[3][1] + wx * beta[2][2] + 2.0 * dwx * beta[1][2]
+    x = x + 2.0 * wx * (beta[2][2] - wx * beta[1][1] + wy * beta[1][0])
+    x = x + change * beta[0][0] + both * (beta[1][0] - wy * beta[0][2]) + dwx * rising_beta
+    y = alpha[3][0] - wy * alpha[2][2] - 2.0 * dwy * alpha[1][2]
+    y = y - 2.0 * wy * (alpha[2][2] - wx * alpha[1][1] + wy * alpha[1][0])
+    y = y + change * alpha[0][1] + both * (alpha[1][1] + wx * alpha[0][2]) - dwy * rising_alpha
+    return -1.0 * x * per_beta, y * per_alpha, 0.0
+
+
+def collective(mass: Scalar, gamma: Sequence[Vector], omega: Vector) -> tuple[Scalar, Scalar]:
+    """Return the collective thrust [N] and its derivative [N/s]; `gamma` is γ, γ'."""
+    now, change = gamma
+    return mass * now[2], mass * (change[2] - omega[0] * now[1] + omega[1] * now[0])
+
+
+def frame_spin(thrust: tuple[Scalar, Vector], alpha: tuple[Vector, Vector], body: Axes) -> Scalar:
+    """Return the rate [rad/s] at which axes on the mean-drag thrust turn about it beside a body of no spin.
+
+    Those axes are x, y and z here, z along the mean-drag specific thrust, and b1 stays across y.
+
+    Args:
+        thrust: Norm of the mean-drag specific thrust, and its derivative.
+        alpha: α and α'.
+        body: b1, b2 and b3 as of `nearest_axes`.
+    """
+    norm, change = thrust
+    b1, _, b3 = body
+    pitch = dot(b1, alpha[1]) / dot(b3, alpha[0])
+    return -1.0 * (change[1] / norm * b1[2] + pitch * b3[1]) / b1[0]
+
+
+class Airframe(NamedTuple):
+    """What of a vehicle counts here."""
+
+    mass: Scalar  # [kg]
+    drag: Vector  # [1/s] over the mass, along body x, y and z
+    inertia: Matrix  # [kg·m²]
+
+
+class Motion(NamedTuple):
+    """A motion at one instant, in axes that the body's are near to."""
+
+    weight: Vector  # [m/s²] g e3
+    airspeed: Vector  # [m/s]
+    acceleration: Vector  # [m/s²]
+    jerk: Vector  # [m/s³]
+    snap: Vector  # [m/s⁴]
+    crackle: Vector  # [m/s⁵]
+
+
+class Demand(NamedTuple):
+    """What a motion asks of a vehicle."""
+
+    wrench: tuple[Scalar, Scalar, Scalar, Scalar]  # collective thrust [N] and moment [N·m], body axes
+    rate: tuple[Scalar, Scalar, Scalar, Scalar]  # their derivatives
+    specific_thrust: Scalar  # [m/s²] along b3, what drag asks across it counted
+    omega: Vector  # [rad/s] body axes
+    b3: Vector  # in the axes of the motion
+
+
+def demand(sqrt: Callable[[Scalar], Scalar], airframe: Airframe, motion: Motion) -> Demand:
+    """Return what a motion asks; exact where the body has the axes that the motion is given in.
+
+    Beside it the body's axes are `nearest_axes`, which is exact to first order but for the angle about b3.
+    """
+    lifted = add(motion.acceleration, motion.weight), motion.jerk, motion.snap, motion.crackle
+    dragged = motion.airspeed, motion.acceleration, motion.jerk, motion.snap
+    alpha, beta, gamma = (
+        [add_scaled(x, coefficient, below) for x, below in zip(lifted, dragged, strict=True)]
+        for coefficient in airframe.drag
+    )
+    body = nearest_axes(sqrt, alpha[0], beta[0])
+    alpha, beta, gamma = ([to_body(body, vector) for vector in each] for each in (alpha, beta, gamma))
+    inverse = 1.0 / alpha[0][2], 1.0 / beta[0][2]
+    omega, omega_dot = body_rates(inverse, alpha, beta)
+    jerk = angular_jerk(inverse, alpha, beta, omega, omega_dot)
+    thrust, thrust_rate = collective(airframe.mass, gamma[:2], omega)
+    moment, moment_rate = flatness.moment_and_rate(airframe.inertia, omega, omega_dot, jerk)
+    along = 0.5 * (alpha[0][2] + beta[0][2])
+    return Demand((thrust, *moment), (thrust_rate, *moment_rate), along, omega, body[2])
