@@ -17,6 +17,7 @@ from aerobat.certification.quantities import MagnitudeBounds
 from aerobat.certification.subdivision import subdivide
 from aerobat.certification.thrust_curve import ThrustCurve
 from aerobat.environment import Environment
+from aerobat.kernels import flatness as kernel
 from aerobat.trajectory import Trajectory
 from aerobat.trajectory.subintervals import Subintervals
 from aerobat.vehicle import Vehicle, load_vehicle
@@ -162,6 +163,40 @@ def test_quantities_are_as_large_and_as_far_off_as_what_they_are_made_of_allows(
     assert (found <= errors * (1 + 1e-4) + 1e-12 * bounds).all()
     rotors = len(vehicle.rotors)
     assert (found[:rotors] > 0.05 * errors[:rotors]).all()
+
+
+@pytest.mark.parametrize(
+    ("sizes", "part", "omega", "omega_dot"),
+    [
+        ((1.0, 0.0), 0, 1 / 2, 1 / 6),  # the thrust's own error, beside what its derivatives turn
+        ((3.0, 0.0), 0, 1 / 2, 1 / 6),
+        ((0.0, 3.0), 0, None, 1 / 2),
+        ((1.0, 0.0), 1, 1.0, 1 / 2),
+        ((3.0, 1.0), 1, 1.0, 1 / 2),
+        ((0.0, 3.0), 2, None, 1.0),
+    ],
+)
+def test_errors_of_the_thrust_do_to_body_rates_what_is_said_and_reach_a_known_fraction_of_it(
+    sizes: tuple[float, float], part: int, omega: float | None, omega_dot: float
+) -> None:
+    """Of any direction, as are the derivatives f' and f'' of these sizes of a thrust of 1 m/s²."""
+    rng = np.random.default_rng(0)
+    unit = rng.normal(size=(6, 3, 100_000))
+    unit /= np.linalg.norm(unit, axis=1, keepdims=True)
+    off = np.zeros((1, 4))
+    off[0, part + 1] = 1e-6
+    one, (jerk, snap) = np.ones(1), (np.full(1, size) for size in sizes)
+    real = MagnitudeBounds(one, one, jerk, snap + 2 * jerk**2)
+    said = interpolation_error.first_order(real, one, one, off, VEHICLE)
+    before = unit[:3] * np.array([1.0, *sizes])[:, None, None]
+    changes = []
+    for thrust in (before, before + off[0, 1:, None, None] * unit[3:]):
+        n = np.linalg.norm(thrust[0], axis=0)
+        changes.append(np.array(kernel.body_rates(*(tuple(each / n) for each in thrust))))
+    reached = np.linalg.norm(changes[1] - changes[0], axis=1).max(axis=1)
+    if omega is not None:
+        assert reached[0] == pytest.approx(omega * said.omega[0], rel=0.04)
+    assert reached[1] == pytest.approx(omega_dot * said.omega_dot[0], rel=0.04)
 
 
 def test_errors_of_series_are_what_the_derivation_adds_up() -> None:

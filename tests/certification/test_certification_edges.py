@@ -145,6 +145,17 @@ def test_free_fall_in_the_middle_leaves_the_question_open_and_names_the_time():
     assert not certificate.certified
 
 
+@pytest.mark.parametrize("lag", [0.0, 0.02])
+def test_a_fall_from_start_to_end_leaves_the_question_open(lag):
+    falling = np.zeros((2, 3, 3))
+    falling[:, 2, 2] = -STANDARD_GRAVITY / 2
+    falling[1, :2, 2] = -STANDARD_GRAVITY / 2, -STANDARD_GRAVITY
+    certificate = certify(Trajectory([1.0, 1.0], falling), with_lags(VEHICLE, lag))
+    assert certificate.why.startswith("cannot decide: thrust reaches zero")
+    assert [(span.start, span.end) for span in certificate.undetermined] == [(0.0, 2.0)]
+    assert certificate.discontinuities == ()
+
+
 def test_thrust_just_above_nothing_is_decided():
     g = STANDARD_GRAVITY
     falling = Trajectory([1.0], [[[0, 0, 0], [0, 0, 0], [0, 0, -0.998 * g / 2]]])

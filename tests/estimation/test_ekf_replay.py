@@ -11,6 +11,7 @@ from aerobat import so3
 from aerobat.arrays import Array
 from aerobat.errors import SpecError
 from aerobat.estimation import Ekf, Estimates, SensorLog, estimate
+from aerobat.estimation.sensor_log import MAX_AGE
 from ekf_flights import RATE, STRIDE, Truth, filtered, flips, measured
 
 KNOWN_START = Ekf(start_velocity=0.0)
@@ -228,6 +229,16 @@ def test_a_wrong_log_is_refused_in_a_sentence(changes: dict[str, Any], sentence:
     with pytest.raises(SpecError) as caught:
         small_log(**changes)
     assert str(caught.value) == sentence
+
+
+def test_poses_may_arrive_at_once_or_as_late_as_the_limit() -> None:
+    arrivals = [0.0, 0.03 + 0.5 * MAX_AGE, 0.06 + np.nextafter(MAX_AGE, 0.0)]
+    assert small_log(arrival_times=arrivals).arrivals.tolist() == arrivals
+    latest = [MAX_AGE, *arrivals[1:]]
+    assert small_log(arrival_times=latest).arrivals.tolist() == latest
+    for too_late in (-1e-9, np.nextafter(MAX_AGE, 1.0)):
+        with pytest.raises(SpecError, match="set both to one clock"):
+            small_log(arrival_times=[too_late, *arrivals[1:]])
 
 
 def test_a_log_whose_clocks_have_nothing_in_common_is_refused() -> None:

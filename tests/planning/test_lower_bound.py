@@ -136,6 +136,26 @@ def test_what_is_asked_on_the_way_never_shortens_it() -> None:
         before = after
 
 
+def test_a_condition_that_follows_from_others_never_lengthens_it() -> None:
+    """A place fixed along three axes that are those of nothing else, and once more along their diagonal."""
+    place, axes = (
+        np.array([4.0, 1.0, 0.5]),
+        np.array([[2.0, -1.0, 2.0], [2.0, 2.0, -1.0], [-1.0, 2.0, 2.0]]) / 3,
+    )
+    fixed = [
+        ab.Condition("position", tuple(along), float(along @ place), float(along @ place))
+        for along in (*axes, axes.sum(axis=0) / sqrt(3.0))
+    ]
+    ends = ab.at_rest((0.0, 0.0, 0.0)), ab.at_rest((0.0, 0.0, 0.0))
+    three, four = (
+        least_duration(
+            ab.Problem("there", *ends, ab.CustomManeuver((ab.Stage("there", tuple(fixed[:count])),))), QUAD
+        )
+        for count in (3, 4)
+    )
+    assert 1.0 < four <= three
+
+
 def test_stages_in_no_order_count_one_at_a_time() -> None:
     stages = tuple(
         ab.Stage(f"x = {x:g}", (ab.Condition("position", (1.0, 0.0, 0.0), x, x),)) for x in (4.0, -4.0)

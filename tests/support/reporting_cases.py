@@ -13,6 +13,7 @@ from matplotlib.figure import Figure
 from matplotlib.transforms import Bbox
 
 import aerobat as ab
+from aerobat.reporting.page import house_style
 from shared_plans import shared_plan
 
 PROBLEMS = ("flip-roll", "flip-roll-translation", "flip-pitch", "half-flip", "line")
@@ -46,7 +47,7 @@ def require_legible(figure: Figure, monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def texts_of(figure: Figure, monkeypatch: pytest.MonkeyPatch) -> list[tuple[str, Bbox]]:
-    """Every text that is really drawn, with its box in pixels."""
+    """Every text that is really drawn, as in files, with its box in pixels."""
     drawn = []
 
     def draw_and_note(text, renderer):  # type: ignore[no-untyped-def]
@@ -56,7 +57,8 @@ def texts_of(figure: Figure, monkeypatch: pytest.MonkeyPatch) -> list[tuple[str,
 
     draw_text = matplotlib.text.Text.draw
     monkeypatch.setattr(matplotlib.text.Text, "draw", draw_and_note)
-    figure.canvas.draw()
+    with house_style():
+        figure.canvas.draw()
     monkeypatch.undo()
     return drawn
 

@@ -8,7 +8,7 @@ from typing import Annotated
 
 from cyclopts import Group, Parameter, validators
 
-from aerobat.cli.options import PlanningOptions, ViewOptions
+from aerobat.cli.options import POSITIVE, PlanningOptions, Plugins, output
 from aerobat.cli.tasks import planned
 from aerobat.cli.terminal import open_in_browser, print_json
 from aerobat.environment import load_dispersion
@@ -18,6 +18,34 @@ from aerobat.viewer.live.view_live import view_live
 
 PROBLEM = "flip-roll"  # where nobody names one
 serving = Group("Live", sort_key=4)
+
+
+@dataclass(frozen=True, kw_only=True)
+class ViewOptions:
+    """What a replay shows, and where it goes."""
+
+    html: Annotated[Path | None, Parameter(group=output)] = None
+    """The file to write; an earlier replay is replaced. Default: replay.html in the folder of a run, or
+    beside another file, named after it."""
+
+    video: Annotated[Path | None, Parameter(group=output)] = None
+    """A video instead, to FILE.mp4 or FILE.gif, 30 frames a second; beside the page if --html is given too.
+    Needs aerobat[viewer]."""
+
+    speed: Annotated[float, Parameter(group=output, validator=POSITIVE)] = 0.5
+    """How fast time goes in the video, 1 as it was flown."""
+
+    vehicle: Annotated[str | None, Parameter(group=output)] = None
+    """The vehicle: a name that `aerobat vehicles` lists, or a TOML file. Default: the plan's, else the preset
+    of the flight's name."""
+
+    plugins: Annotated[tuple[Path, ...], Plugins(group=output)] = ()
+
+    open: Annotated[bool, Parameter(group=output, negative="", show_default=False)] = False
+    """Open the page in the browser."""
+
+    json: Annotated[bool, Parameter(group=output, negative="", show_default=False)] = False
+    """Print what was written as JSON on standard output, and nothing else."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field, make_dataclass
 from functools import partial
 from inspect import getdoc
 from pathlib import Path
-from typing import Annotated, Any, Literal, TypeVar
+from typing import Annotated, Any, TypeVar
 
 from cyclopts import Group, Parameter, validators
 
@@ -51,13 +51,6 @@ class ExplainingOptions:
 
 
 @dataclass(frozen=True, kw_only=True)
-class RepeatOptions(OutputOptions, ExplainingOptions):
-    """Options of a run that is repeated."""
-
-    plugins: Annotated[tuple[Path, ...], Plugins(group=planning)] = ()
-
-
-@dataclass(frozen=True, kw_only=True)
 class TaskOptions(OutputOptions):
     """The problem's and the vehicle's options, and where results go."""
 
@@ -69,14 +62,6 @@ class TaskOptions(OutputOptions):
     """The tilt of a half-flip's gate in degrees, -90 to 90, to the right when positive."""
 
     plugins: Annotated[tuple[Path, ...], Plugins(group=planning)] = ()
-
-
-@dataclass(frozen=True, kw_only=True)
-class CompareOptions(TaskOptions):
-    """Options of a comparison."""
-
-    time_limit: Annotated[float | None, Parameter(group=planning, validator=validators.Number(gte=0))] = None
-    """Seconds for each planner; the best plan that it finds by then is taken, and said to be that."""
 
 
 def offered_options() -> dict[str, dict[str, PlannerOption]]:
@@ -101,7 +86,8 @@ def is_given(value: Any) -> bool:
 def _with_planner_options(cls: Options) -> Options:
     """The class with a field for each option that some planner offers, None where it was not given."""
     fields = [_field(flag, offers) for flag, offers in offered_options().items()]
-    made: Any = make_dataclass(cls.__name__, fields, bases=(cls,), frozen=True, kw_only=True)
+    own = {"__doc__": cls.__doc__}  # else its signature is written out, in milliseconds
+    made: Any = make_dataclass(cls.__name__, fields, bases=(cls,), namespace=own, frozen=True, kw_only=True)
     made.__module__ = cls.__module__  # else it seems to be one of Python's own types
     return made  # type: ignore[no-any-return]
 
@@ -187,187 +173,3 @@ class FlyingOptions(ConditionsOptions):
     plant: Annotated[str | None, Parameter(group=flying)] = None
     """Another simulator's physics in place of the built-in: mujoco, in which a gate that is touched is felt,
     or rotorpy."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class SweepingOptions:
-    """Options of many flights."""
-
-    runs: Annotated[int, Parameter(group=flying, validator=validators.Number(gte=1, lte=10**7))] = 1000
-    """How many flights."""
-
-    conditions: Annotated[str, Parameter(group=flying)] = "lab"
-    """What varies from flight to flight, disturbs and is measured how: none, lab, field, or a TOML file."""
-
-    controller: Annotated[str, Parameter(group=flying)] = "full"
-    """The control law, at the gains of the vehicle's file: full, or paper."""
-
-    seed: Annotated[int, Parameter(group=flying, validator=validators.Number(gte=0))] = 0
-    """The seed of all flights: the same seed, the same flights."""
-
-    workers: Annotated[int | None, Parameter(group=flying, validator=validators.Number(gte=1, lte=4096))] = (
-        None
-    )
-    """How many processes fly; the flights are the same for any number. Default: one a core."""
-
-    table: Annotated[Literal["csv", "parquet"], Parameter(group=output)] = "csv"
-    """The form of the table, flights.csv or flights.parquet; the latter needs aerobat[parquet]."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class TuningOptions:
-    """Options of a search for gains."""
-
-    vehicle: Annotated[str | None, Parameter(group=planning)] = None
-    """The vehicle whose gains are sought: a name that `aerobat vehicles` lists, or a TOML file. Default: that
-    of a .plan file, else agile-quad."""
-
-    angle: Annotated[float | None, Parameter(group=planning)] = None
-    """The tilt of a half-flip's gate in degrees, -90 to 90, to the right when positive."""
-
-    plugins: Annotated[tuple[Path, ...], Plugins(group=planning)] = ()
-
-    conditions: Annotated[str, Parameter(group=flying)] = "lab"
-    """What varies from flight to flight, disturbs and is measured how: none, lab, field, or a TOML file."""
-
-    flights: Annotated[int, Parameter(group=flying, validator=validators.Number(gte=2, lte=100_000))] = 200
-    """How many flights of each maneuver each set of gains is tried on, and how many others judge the best."""
-
-    seed: Annotated[int, Parameter(group=flying, validator=validators.Number(gte=0))] = 0
-    """The seed of all flights: the same seed, the same gains, unless --time-limit ends the search."""
-
-    evaluations: Annotated[
-        int, Parameter(group=limiting, validator=validators.Number(gte=1, lte=100_000))
-    ] = 150
-    """How many sets of gains may be tried."""
-
-    time_limit: Annotated[float | None, Parameter(group=limiting, validator=validators.Number(gte=0))] = None
-    """Seconds of the search; the best gains by then are judged."""
-
-    out: Annotated[Path | None, Parameter(group=output)] = None
-    """The vehicle's file to write; an earlier one is replaced. Default: out/VEHICLE-tuned.toml."""
-
-    json: Annotated[bool, Parameter(group=output, negative="", show_default=False)] = False
-    """Print before and after as JSON on standard output, and nothing else."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class CausesOptions:
-    """Options of a measurement of causes of error."""
-
-    vehicle: Annotated[str | None, Parameter(group=planning)] = None
-    """The vehicle: a name that `aerobat vehicles` lists, or a TOML file. Default: agile-quad."""
-
-    angle: Annotated[float | None, Parameter(group=planning)] = None
-    """The tilt of a half-flip's gate in degrees, -90 to 90, to the right when positive."""
-
-    reserve: Annotated[float, Parameter(group=planning, validator=validators.Number(gte=0, lt=0.5))] = 0.1
-    """Of every limit's range, kept at either end by plans that know the rotors."""
-
-    plugins: Annotated[tuple[Path, ...], Plugins(group=planning)] = ()
-
-    conditions: Annotated[str, Parameter(group=flying)] = "lab"
-    """What varies from flight to flight without the causes: lab, field, or a TOML file."""
-
-    flights: Annotated[int, Parameter(group=flying, validator=validators.Number(gte=1, lte=10**6))] = 1000
-    """How many flights of each trial."""
-
-    seed: Annotated[int, Parameter(group=flying, validator=validators.Number(gte=0))] = 0
-    """The seed of all flights: the same seed, the same flights."""
-
-    json: Annotated[bool, Parameter(group=output, negative="", show_default=False)] = False
-    """Print the measurements as JSON on standard output, and nothing else."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class CheckOptions:
-    """Limits that a trajectory is checked for, beyond those of its vehicle's rotors and its problem."""
-
-    vehicle: Annotated[str | None, Parameter(group=limiting)] = None
-    """The vehicle: a name that `aerobat vehicles` lists, or a TOML file. Default: the plan's, else
-    agile-quad."""
-
-    heading: Annotated[float | None, Parameter(group=limiting)] = None
-    """The heading at the start in degrees, carried along the path without spin. Default: the file's own, of a
-    CSV file 0."""
-
-    rate: Annotated[float, Parameter(group=limiting, validator=POSITIVE)] = 100.0
-    """Rows a second of a CSV file without times."""
-
-    max_speed: Annotated[float | None, Parameter(group=limiting, validator=POSITIVE)] = None
-    """The greatest speed allowed, m/s."""
-
-    max_tilt: Annotated[float | None, Parameter(group=limiting, validator=POSITIVE)] = None
-    """The greatest tilt allowed, degrees from upright."""
-
-    max_rate: Annotated[float | None, Parameter(group=limiting, validator=POSITIVE)] = None
-    """The greatest body rate allowed, degrees a second."""
-
-    plugins: Annotated[tuple[Path, ...], Plugins(group=limiting)] = ()
-
-    max_moment: Annotated[float | None, Parameter(group=limiting, validator=POSITIVE)] = None
-    """The greatest moment allowed, N m."""
-
-    json: Annotated[bool, Parameter(group=output, negative="", show_default=False)] = False
-    """Print the certificate as JSON on standard output, and nothing else."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class ViewOptions:
-    """What a replay shows, and where it goes."""
-
-    html: Annotated[Path | None, Parameter(group=output)] = None
-    """The file to write; an earlier replay is replaced. Default: replay.html in the folder of a run, or
-    beside another file, named after it."""
-
-    video: Annotated[Path | None, Parameter(group=output)] = None
-    """A video instead, to FILE.mp4 or FILE.gif, 30 frames a second; beside the page if --html is given too.
-    Needs aerobat[viewer]."""
-
-    speed: Annotated[float, Parameter(group=output, validator=POSITIVE)] = 0.5
-    """How fast time goes in the video, 1 as it was flown."""
-
-    vehicle: Annotated[str | None, Parameter(group=output)] = None
-    """The vehicle: a name that `aerobat vehicles` lists, or a TOML file. Default: the plan's, else the preset
-    of the flight's name."""
-
-    plugins: Annotated[tuple[Path, ...], Plugins(group=output)] = ()
-
-    open: Annotated[bool, Parameter(group=output, negative="", show_default=False)] = False
-    """Open the page in the browser."""
-
-    json: Annotated[bool, Parameter(group=output, negative="", show_default=False)] = False
-    """Print what was written as JSON on standard output, and nothing else."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class ExportOptions:
-    """What a plan is exported to, and where."""
-
-    to: Annotated[
-        Literal["csv", "crazyflie", "ros1-bag", "ros2-bag", "mcap", "px4", "blender"], Parameter(group=output)
-    ]
-    """The format."""
-
-    out: Annotated[Path | None, Parameter(group=output)] = None
-    """The file, or of crazyflie, px4 and ros2-bag the folder; an earlier export is replaced. Default:
-    in out/, named after the plan's file or folder."""
-
-    rate: Annotated[float | None, Parameter(group=output, validator=POSITIVE)] = None
-    """Rows, messages or keys a second. Default: 100, of px4 250; crazyflie has none."""
-
-    plugins: Annotated[tuple[Path, ...], Plugins(group=output)] = ()
-
-    json: Annotated[bool, Parameter(group=output, negative="", show_default=False)] = False
-    """Print what was written and lost as JSON on standard output, and nothing else."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class FiguresOptions:
-    """Where the paper's figures go."""
-
-    out: Annotated[Path, Parameter(group=output)] = Path("docs") / "figures"
-    """The folder to write to; figures of these numbers in it are replaced."""
-
-    json: Annotated[bool, Parameter(group=output, negative="", show_default=False)] = False
-    """Print captions and files as JSON on standard output, and nothing else."""

@@ -27,6 +27,7 @@ RC: dict[str, Any] = {
     "font.family": "sans-serif",
     "font.sans-serif": ["DejaVu Sans"],
     "font.size": NORMAL,
+    "text.hinting": "none",  # as their font has letters: 140 dots an inch need no fitting
     "mathtext.fontset": "dejavusans",
     "text.usetex": False,
     "text.color": INK,

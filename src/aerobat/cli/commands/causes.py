@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+from pathlib import Path
 from typing import Annotated
 
-from cyclopts import Parameter
+from cyclopts import Parameter, validators
 
-from aerobat.cli.options import CausesOptions, TaskOptions
+from aerobat.cli.options import Plugins, TaskOptions, flying, output, planning
 from aerobat.cli.progress import CausesProgress, showing
 from aerobat.cli.tasks import read_task
 from aerobat.cli.terminal import print_json
@@ -18,6 +20,34 @@ from aerobat.reporting.tables import print_table
 from aerobat.studies.error_causes import error_causes, four_causes
 
 ORDER = 4  # snap as the input, with which jerk is compared
+
+
+@dataclass(frozen=True, kw_only=True)
+class CausesOptions:
+    """Options of a measurement of causes of error."""
+
+    vehicle: Annotated[str | None, Parameter(group=planning)] = None
+    """The vehicle: a name that `aerobat vehicles` lists, or a TOML file. Default: agile-quad."""
+
+    angle: Annotated[float | None, Parameter(group=planning)] = None
+    """The tilt of a half-flip's gate in degrees, -90 to 90, to the right when positive."""
+
+    reserve: Annotated[float, Parameter(group=planning, validator=validators.Number(gte=0, lt=0.5))] = 0.1
+    """Of every limit's range, kept at either end by plans that know the rotors."""
+
+    plugins: Annotated[tuple[Path, ...], Plugins(group=planning)] = ()
+
+    conditions: Annotated[str, Parameter(group=flying)] = "lab"
+    """What varies from flight to flight without the causes: lab, field, or a TOML file."""
+
+    flights: Annotated[int, Parameter(group=flying, validator=validators.Number(gte=1, lte=10**6))] = 1000
+    """How many flights of each trial."""
+
+    seed: Annotated[int, Parameter(group=flying, validator=validators.Number(gte=0))] = 0
+    """The seed of all flights: the same seed, the same flights."""
+
+    json: Annotated[bool, Parameter(group=output, negative="", show_default=False)] = False
+    """Print the measurements as JSON on standard output, and nothing else."""
 
 
 def causes(problem: str, options: Annotated[CausesOptions, Parameter(name="*")] = CausesOptions()) -> None:

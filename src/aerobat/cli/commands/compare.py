@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
 
-from cyclopts import Parameter
+from cyclopts import Parameter, validators
 
-from aerobat.cli.options import CompareOptions, OutputOptions
+from aerobat.cli.options import OutputOptions, TaskOptions, planning
 from aerobat.cli.progress import planning_progress
 from aerobat.cli.runs.folder import written
 from aerobat.cli.runs.record import RunRecord
@@ -19,6 +20,14 @@ from aerobat.studies.compare import Comparison
 from aerobat.studies.compare import compare as compare_planners
 
 COMPARISON = "compare.json"
+
+
+@dataclass(frozen=True, kw_only=True)
+class CompareOptions(TaskOptions):
+    """Options of a comparison."""
+
+    time_limit: Annotated[float | None, Parameter(group=planning, validator=validators.Number(gte=0))] = None
+    """Seconds for each planner; the best plan that it finds by then is taken, and said to be that."""
 
 
 def compare(problem: str, options: Annotated[CompareOptions, Parameter(name="*")] = CompareOptions()) -> None:

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 from cyclopts import Parameter
 
-from aerobat.cli.options import ExportOptions
+from aerobat.cli.options import POSITIVE, Plugins, output
 from aerobat.cli.terminal import print_json
 from aerobat.errors import SpecError
 from aerobat.interchange import read_plan
@@ -15,6 +16,28 @@ from aerobat.interchange.exports import FORMATS
 from aerobat.interchange.exports import export as export_plan
 from aerobat.planning import Plan
 from aerobat.reporting.report_json import to_json
+
+
+@dataclass(frozen=True, kw_only=True)
+class ExportOptions:
+    """What a plan is exported to, and where."""
+
+    to: Annotated[
+        Literal["csv", "crazyflie", "ros1-bag", "ros2-bag", "mcap", "px4", "blender"], Parameter(group=output)
+    ]
+    """The format."""
+
+    out: Annotated[Path | None, Parameter(group=output)] = None
+    """The file, or of crazyflie, px4 and ros2-bag the folder; an earlier export is replaced. Default:
+    in out/, named after the plan's file or folder."""
+
+    rate: Annotated[float | None, Parameter(group=output, validator=POSITIVE)] = None
+    """Rows, messages or keys a second. Default: 100, of px4 250; crazyflie has none."""
+
+    plugins: Annotated[tuple[Path, ...], Plugins(group=output)] = ()
+
+    json: Annotated[bool, Parameter(group=output, negative="", show_default=False)] = False
+    """Print what was written and lost as JSON on standard output, and nothing else."""
 
 
 def export(plan: Path, options: Annotated[ExportOptions, Parameter(name="*")]) -> None:

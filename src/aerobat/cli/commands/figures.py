@@ -2,17 +2,30 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+from pathlib import Path
 from typing import Annotated
 
 from cyclopts import Parameter
 
 from aerobat.cli.interrupts import end_interrupts
-from aerobat.cli.options import FiguresOptions
+from aerobat.cli.options import output
 from aerobat.cli.progress import FiguresProgress, showing
 from aerobat.cli.terminal import print_json
 from aerobat.reporting.paper.figures import FIGURES, paper_figure, require_known
 from aerobat.reporting.paper.files import require_own_page, write_figures
 from aerobat.reporting.report_json import to_json
+
+
+@dataclass(frozen=True, kw_only=True)
+class FiguresOptions:
+    """Where the paper's figures go."""
+
+    out: Annotated[Path, Parameter(group=output)] = Path("docs") / "figures"
+    """The folder to write to; figures of these numbers in it are replaced."""
+
+    json: Annotated[bool, Parameter(group=output, negative="", show_default=False)] = False
+    """Print captions and files as JSON on standard output, and nothing else."""
 
 
 def figures(

@@ -17,7 +17,7 @@ from aerobat.cli.commands.map import finish_map, map_of
 from aerobat.cli.commands.need import NEED, finish_need, need_of
 from aerobat.cli.commands.sweep import finish_sweep, sweep_of, table_name
 from aerobat.cli.entry import ExitCode
-from aerobat.cli.options import RepeatOptions
+from aerobat.cli.options import ExplainingOptions, OutputOptions, Plugins, planning
 from aerobat.cli.runs.folder import FLIGHT, finish
 from aerobat.cli.runs.record import RunRecord, read_record, versions_now
 from aerobat.cli.tasks import plan_of
@@ -31,6 +31,13 @@ from aerobat.reporting.report_json import to_json
 from aerobat.simulation import Flight, load_flight
 
 SAME = ("planner", "duration_s")  # of a comparison's rows: times of the clock are not
+
+
+@dataclass(frozen=True, kw_only=True)
+class RepeatOptions(OutputOptions, ExplainingOptions):
+    """Options of a run that is repeated."""
+
+    plugins: Annotated[tuple[Path, ...], Plugins(group=planning)] = ()
 
 
 def repeat(

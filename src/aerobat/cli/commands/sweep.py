@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
-from cyclopts import Parameter
+from cyclopts import Parameter, validators
 
-from aerobat.cli.options import OutputOptions, PlanningOptions, SweepingOptions
+from aerobat.cli.options import OutputOptions, PlanningOptions, flying, output
 from aerobat.cli.progress import SweepProgress, showing
 from aerobat.cli.runs.folder import is_of_a_run, written
 from aerobat.cli.runs.record import FlightSettings, RunRecord
@@ -25,6 +26,31 @@ from aerobat.reporting.sweeps.table import sweep_report, sweep_table
 from aerobat.storage import require_replaceable
 from aerobat.studies.sweep import Sweep
 from aerobat.studies.sweep import sweep as sweep_plan
+
+
+@dataclass(frozen=True, kw_only=True)
+class SweepingOptions:
+    """Options of many flights."""
+
+    runs: Annotated[int, Parameter(group=flying, validator=validators.Number(gte=1, lte=10**7))] = 1000
+    """How many flights."""
+
+    conditions: Annotated[str, Parameter(group=flying)] = "lab"
+    """What varies from flight to flight, disturbs and is measured how: none, lab, field, or a TOML file."""
+
+    controller: Annotated[str, Parameter(group=flying)] = "full"
+    """The control law, at the gains of the vehicle's file: full, or paper."""
+
+    seed: Annotated[int, Parameter(group=flying, validator=validators.Number(gte=0))] = 0
+    """The seed of all flights: the same seed, the same flights."""
+
+    workers: Annotated[int | None, Parameter(group=flying, validator=validators.Number(gte=1, lte=4096))] = (
+        None
+    )
+    """How many processes fly; the flights are the same for any number. Default: one a core."""
+
+    table: Annotated[Literal["csv", "parquet"], Parameter(group=output)] = "csv"
+    """The form of the table, flights.csv or flights.parquet; the latter needs aerobat[parquet]."""
 
 
 def sweep(

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
 
-from cyclopts import Parameter
+from cyclopts import Parameter, validators
 
 from aerobat.cli.entry import ExitCode
 from aerobat.cli.interrupts import end_interrupts
-from aerobat.cli.options import PlanningOptions, TuningOptions
+from aerobat.cli.options import PlanningOptions, Plugins, flying, limiting, output, planning
 from aerobat.cli.progress import TuningProgress, showing
 from aerobat.cli.tasks import planned
 from aerobat.cli.terminal import print_json, say
@@ -20,6 +21,43 @@ from aerobat.reporting.sweeps.tuning import tuning_report, tuning_table
 from aerobat.reporting.tables import print_table
 from aerobat.studies.tune import tune as tune_gains
 from aerobat.vehicle import write_vehicle
+
+
+@dataclass(frozen=True, kw_only=True)
+class TuningOptions:
+    """Options of a search for gains."""
+
+    vehicle: Annotated[str | None, Parameter(group=planning)] = None
+    """The vehicle whose gains are sought: a name that `aerobat vehicles` lists, or a TOML file. Default: that
+    of a .plan file, else agile-quad."""
+
+    angle: Annotated[float | None, Parameter(group=planning)] = None
+    """The tilt of a half-flip's gate in degrees, -90 to 90, to the right when positive."""
+
+    plugins: Annotated[tuple[Path, ...], Plugins(group=planning)] = ()
+
+    conditions: Annotated[str, Parameter(group=flying)] = "lab"
+    """What varies from flight to flight, disturbs and is measured how: none, lab, field, or a TOML file."""
+
+    flights: Annotated[int, Parameter(group=flying, validator=validators.Number(gte=2, lte=100_000))] = 200
+    """How many flights of each maneuver each set of gains is tried on, and how many others judge the best."""
+
+    seed: Annotated[int, Parameter(group=flying, validator=validators.Number(gte=0))] = 0
+    """The seed of all flights: the same seed, the same gains, unless --time-limit ends the search."""
+
+    evaluations: Annotated[
+        int, Parameter(group=limiting, validator=validators.Number(gte=1, lte=100_000))
+    ] = 150
+    """How many sets of gains may be tried."""
+
+    time_limit: Annotated[float | None, Parameter(group=limiting, validator=validators.Number(gte=0))] = None
+    """Seconds of the search; the best gains by then are judged."""
+
+    out: Annotated[Path | None, Parameter(group=output)] = None
+    """The vehicle's file to write; an earlier one is replaced. Default: out/VEHICLE-tuned.toml."""
+
+    json: Annotated[bool, Parameter(group=output, negative="", show_default=False)] = False
+    """Print before and after as JSON on standard output, and nothing else."""
 
 
 def tune(

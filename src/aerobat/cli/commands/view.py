@@ -9,8 +9,7 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from aerobat.cli.live import LiveOptions, serve
-from aerobat.cli.options import ViewOptions
+from aerobat.cli.live import LiveOptions, ViewOptions, serve
 from aerobat.cli.progress import DrawingProgress, showing
 from aerobat.cli.runs.folder import FLIGHT, REPLAY
 from aerobat.cli.runs.record import RECORD, RunRecord, read_record
