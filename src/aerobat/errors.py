@@ -19,14 +19,35 @@ class OutOfRange(SpecError, IndexError):
 
 
 class Infeasible(AerobatError):
-    """No plan satisfies the problem: the message says which bound binds and what would free it.
+    """No plan was found: the message says which bound binds, and what to do next.
 
-    `attempts` holds every duration that was tried, with its outcome.
+    `attempts` holds every duration that was tried, with its outcome; it is empty where the problem was
+    refused at once. `sentence` is the message without its remedy.
+
+    Args:
+        sentence: Which bound binds.
+        attempts: The evidence.
+        remedy: What to do next, said only where something was attempted; empty where the sentence says it.
     """
 
-    def __init__(self, message: str, attempts: Sequence[Any] = ()) -> None:
-        super().__init__(message)
+    def __init__(
+        self,
+        sentence: str,
+        attempts: Sequence[Any] = (),
+        remedy: str = "ab.why(problem, vehicle=...) tries changes that would help",
+    ) -> None:
+        super().__init__(sentence)
+        self.sentence = sentence
         self.attempts = tuple(attempts)
+        self.remedy = remedy if attempts else ""
+
+    def with_remedy(self, remedy: str) -> str:
+        """The sentence with another remedy, where there is one at all."""
+        return f"{self.sentence}; {remedy}" if self.remedy else self.sentence
+
+    def __str__(self) -> str:
+        """The sentence with its remedy."""
+        return self.with_remedy(self.remedy)
 
 
 class BackendMissing(AerobatError):

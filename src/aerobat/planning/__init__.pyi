@@ -4,7 +4,6 @@ from .assessment.lower_bound import least_duration
 from .certified_solve import Judged, Solution, certified_solve, with_certificate
 from .flyability import nominal_flight, own_flight, with_flyability, with_recoveries
 from .miqp import Miqp
-from .miqp.remedies import without_advice
 from .passages import planned_passages, planned_waypoints
 from .plan_file import load_plan
 from .planners import (
@@ -80,5 +79,4 @@ __all__ = [
     "with_flyability",
     "with_recoveries",
     "with_second_opinion",
-    "without_advice",
 ]

@@ -1,7 +1,4 @@
-"""Why nothing feasible was found: which bound binds, and what would free it.
-
-Nothing is advised that was not tried.
-"""
+"""Why nothing feasible was found: which bound binds, by a few relaxed programs in half a second at most."""
 
 from __future__ import annotations
 
