@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 
@@ -25,21 +25,28 @@ class Infeasible(AerobatError):
     refused at once. `sentence` is the message without its remedy.
 
     Args:
-        sentence: Which bound binds.
+        sentence: Which bound binds; or what finds that out, in up to a second, once it is asked for.
         attempts: The evidence.
         remedy: What to do next, said only where something was attempted; empty where the sentence says it.
     """
 
     def __init__(
         self,
-        sentence: str,
+        sentence: str | Callable[[], str],
         attempts: Sequence[Any] = (),
         remedy: str = "ab.why(problem, vehicle=...) tries changes that would help",
     ) -> None:
         super().__init__(sentence)
-        self.sentence = sentence
+        self._sentence = sentence
         self.attempts = tuple(attempts)
         self.remedy = remedy if attempts else ""
+
+    @property
+    def sentence(self) -> str:
+        """Which bound binds, in a sentence without its full stop."""
+        if callable(self._sentence):
+            self._sentence = self._sentence()
+        return self._sentence
 
     def with_remedy(self, remedy: str) -> str:
         """The sentence with another remedy, where there is one at all."""
@@ -48,6 +55,10 @@ class Infeasible(AerobatError):
     def __str__(self) -> str:
         """The sentence with its remedy."""
         return self.with_remedy(self.remedy)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Pickled with its sentence found out."""
+        return type(self), (self.sentence, self.attempts, self.remedy)
 
 
 class BackendMissing(AerobatError):

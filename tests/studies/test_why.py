@@ -11,7 +11,8 @@ import pytest
 import aerobat as ab
 from aerobat.planning import registered_planners
 from aerobat.states import STANDARD_GRAVITY
-from aerobat.studies.why import remedies
+from aerobat.studies.why import Task, remedies
+from aerobat.studies.why.changes import changes
 from shared_plans import shared_plan
 
 QUAD = ab.load_vehicle("agile-quad")
@@ -35,6 +36,22 @@ def test_a_limit_that_binds_is_named_and_the_problem_is_planned_without_it_alone
     again = ab.plan(remedy.plan.problem, vehicle=remedy.plan.vehicle)
     assert again.duration == remedy.plan.duration
     assert str(found).endswith(f"'line' is planned {WITHOUT_LIMIT} (by miqp in {again.duration:.3f} s)")
+
+
+def test_every_limit_of_problem_and_vehicle_is_a_change_to_be_tried() -> None:
+    limits = ab.Limits(
+        lower=[-9, -9, -9], velocity=9.0, acceleration=9.0, jerk=9.0, snap=9.0, crackle=9.0, max_tilt=1.0
+    )
+    late = ab.GatePassage(at=0.5, speed=1.0)
+    problem = replace(ab.load_problem("half-flip"), limits=limits, maneuver=ab.HalfFlip(passage=late))
+    problem = replace(problem, environment=ab.Environment(ground=-3.0))
+    idle = replace(QUAD, rotors=tuple(replace(rotor, min_thrust=0.1) for rotor in QUAD.rotors))
+    task = Task(problem, idle, ab.Miqp(reserve=0.1))
+    found = changes(task)
+    for change in found:
+        changed = change.apply(task)
+        assert (changed.problem, changed.vehicle, changed.planner) != (problem, idle, task.planner)
+    assert len({change.words for change in found}) == len(found) == 15
 
 
 def test_a_problem_that_has_a_plan_needs_no_change() -> None:

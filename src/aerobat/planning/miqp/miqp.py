@@ -121,7 +121,9 @@ class Miqp(Planner):
         if found is None:
             if out_of_time():
                 raise too_short(problem, self.time_limit, recorder.attempts, self._quicker)
-            raise Infeasible(why_infeasible(formulation, recorder.attempts, vehicle), recorder.attempts)
+            attempts_made = tuple(recorder.attempts)
+            why = partial(why_infeasible, formulation, attempts_made, vehicle)
+            raise Infeasible(why, attempts_made)
         return plan_of(attempts, found, self.backend)
 
 

@@ -58,12 +58,18 @@ def _of_limits(task: Task) -> Iterator[Change]:
         if np.isfinite(np.concatenate(task.problem.limits.of(derivative))).any():
             key = "limits.lower and limits.upper" if derivative == 0 else f"limits.{name}"
             yield Change(f"without {key}", partial(_without_limit, derivative))
+    if np.isfinite(task.problem.limits.max_tilt):
+        yield Change("without limits.max_tilt", _without_tilt_limit)
     if task.problem.environment.ground is not None:
         yield Change("without environment.ground", _without_ground)
 
 
 def _without_limit(derivative: int, task: Task) -> Task:
     return _with_problem(task, limits=task.problem.limits.without(derivative))
+
+
+def _without_tilt_limit(task: Task) -> Task:
+    return _with_problem(task, limits=replace(task.problem.limits, max_tilt=np.inf))
 
 
 def _without_ground(task: Task) -> Task:
