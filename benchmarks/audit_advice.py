@@ -5,22 +5,24 @@ from __future__ import annotations
 import re
 from collections.abc import Callable
 from dataclasses import replace
-from functools import partial, reduce
+from functools import partial
 
+from aerobat.errors import Infeasible
+from aerobat.optimization.deadline import processor, within_time
 from aerobat.planning import Miqp, plan
-from aerobat.planning.miqp.remedies import Change, Task, changes
 from aerobat.problem import Gate
+from aerobat.studies.why import Remedy, Task, explained
 from audit_measures import Attempted, attempted
 from random_problems import Case
 
 FREES = "free their problem"
 FREES_TOGETHER = "free it by several changes together"
+OTHERS = "name another planner, which plans it as it is"
 LIFTS = "lift what refused it at sight"
 NOTHING = "say that nothing tried helps"
 WRONG = "advice in vain"  # the start of what is said of advice that does not help
 PATIENCE = 20.0  # [s] of the processor, for following a piece of advice
-TOGETHER = "nor with one change alone"
-NONE = "find none, nor "
+ADVICE_PATIENCE = 240.0  # [s] of the processor, for the advice
 MORE = 1.01  # times what a refusal says is needed
 
 SIZES = re.compile(r"gate '(.*)' is .* takes ([\d.]+) cm by ([\d.]+) cm")
@@ -30,25 +32,26 @@ WINDOW = "widen its `at`, or use more intervals"
 
 def followed(case: Case, asked: Miqp, message: str) -> str:
     """What following a refusal's advice led to."""
-    task = Task(asked, case.problem, case.vehicle)
+    task = Task(case.problem, case.vehicle, asked)
     eased = _at_sight(task, message)
     if eased is not None:
         return LIFTS if _planned(eased).message != message else f"{WRONG}, the same is said again"
-    said = message.rpartition("; it is planned ")
-    if not said[1]:
-        return NOTHING if NONE in message else f"{WRONG}, there is none"
-    named = [change for change in changes(task) if change.words in said[2]]
-    together = TOGETHER in said[0]
-    for alternative in [named] if together else [[change] for change in named]:
-        made = _planned(reduce(_after, alternative, task))
+    with within_time(ADVICE_PATIENCE, processor):
+        found = explained(Infeasible(message, ["attempts"]), task)
+    for remedy in found.remedies:
+        made = _again(remedy)
         if made.plan is None or not made.plan.certified:
-            words = " and ".join(change.words for change in alternative)
-            return f"{WRONG}, {words}: {made.status}"
-    return FREES_TOGETHER if together else FREES
+            return f"{WRONG}, {remedy}: {made.status}"
+    if not found.remedies:
+        return NOTHING
+    most = max(len(remedy.changes) for remedy in found.remedies)
+    return OTHERS if most == 0 else FREES if most == 1 else FREES_TOGETHER
 
 
-def _after(task: Task, change: Change) -> Task:
-    return change.apply(task)
+def _again(remedy: Remedy) -> Attempted:
+    """The problem as it was changed, planned anew by the planner that is named."""
+    found = remedy.plan
+    return attempted(partial(plan, found.problem, found.planner, found.vehicle), PATIENCE)
 
 
 def _planned(task: Task) -> Attempted:
@@ -57,6 +60,7 @@ def _planned(task: Task) -> Attempted:
 
 def _at_sight(task: Task, message: str) -> Task | None:
     """The task after what a refusal without any attempt asks for; None for other refusals."""
+    assert task.vehicle is not None
     if sizes := SIZES.search(message):
         across, upward = (MORE * float(size) / 100.0 for size in sizes.groups()[1:])
         return _with_gates(task, sizes[1], partial(replace, width=across, height=upward))
@@ -64,7 +68,7 @@ def _at_sight(task: Task, message: str) -> Task | None:
         factor = MORE * float(thrusts[1]) / float(thrusts[2])
         rotors = tuple(replace(r, max_thrust=factor * r.max_thrust) for r in task.vehicle.rotors)
         return replace(task, vehicle=replace(task.vehicle, rotors=rotors))
-    return replace(task, planner=replace(task.planner, intervals=40)) if WINDOW in message else None
+    return replace(task, planner=Miqp(intervals=40)) if WINDOW in message else None
 
 
 def _with_gates(task: Task, name: str, change: Callable[[Gate], Gate]) -> Task:

@@ -111,6 +111,7 @@ from .studies.inspection import ErrorShare, Inspection, inspect_flight
 from .studies.passing import Passing, plan_to_pass
 from .studies.sweep import Share, Sweep, sweep
 from .studies.tune import Tuning, tune
+from .studies.why import Remedy, Why, why
 from .trajectory import ContinuityRule, Trajectory, load_trajectory, minimum_effort, save_trajectory
 from .vehicle import Ellipsoid, Rotor, Vehicle, implausibilities, load_vehicle, vehicle_names, write_vehicle
 from .viewer.live.view_live import LiveView, view_live
@@ -188,6 +189,7 @@ __all__ = [
     "Quantity",
     "Recoveries",
     "Reference",
+    "Remedy",
     "Replay",
     "Requirement",
     "Rotor",
@@ -209,6 +211,7 @@ __all__ = [
     "Vehicle",
     "Waypoint",
     "Waypoints",
+    "Why",
     "Wrench",
     "at_rest",
     "certify",
@@ -265,6 +268,7 @@ __all__ = [
     "vehicle_names",
     "view",
     "view_live",
+    "why",
     "with_second_opinion",
     "write_columns",
     "write_csv",

@@ -7,6 +7,7 @@ import re
 import shutil
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -15,7 +16,15 @@ import pytest
 from aerobat.interchange import write_columns
 from aerobat.interchange.csv import read_csv
 from aerobat.planning import load_plan
-from aerobat.problem import problem_names
+from aerobat.problem import (
+    GatePassage,
+    Limits,
+    Line,
+    load_problem,
+    problem_names,
+    tilted_gate,
+    write_problem,
+)
 from aerobat.simulation import load_flight
 from aerobat.vehicle import vehicle_names
 from command_lines import code, run, without_pictures
@@ -235,6 +244,24 @@ def test_an_infeasible_problem_ends_with_its_sentence_and_nothing_written(capsys
         "aerobat: the stage 'gate' asks 45 m/s² inverted, agile-quad gives 32.4; "
         "lower what it asks or take a stronger vehicle\n"
     )
+    assert not Path("out").exists()
+
+
+def test_a_refusal_says_how_to_ask_for_advice_and_is_followed_by_it_when_asked(capsys) -> None:
+    """On standard error alone, with nothing written."""
+    gated = replace(load_problem("line"), gates=(tilted_gate((5.0, 0.0, 0.0)),))
+    write_problem(replace(gated, limits=Limits(velocity=0.6)), "slow.toml")
+    late = Line(GatePassage(at=(0.93, 0.97)))
+    write_problem(replace(gated, maneuver=late), "late.toml")
+    code, out, err = run(capsys, "plan", "slow.toml", "--explain")
+    assert (code, out) == (3, "")
+    refusal, advice = err.splitlines()
+    assert "'line' is proven to have no plan" in refusal
+    assert advice.startswith("aerobat: 'line' is planned without limits.velocity (by miqp in ")
+    code, out, err = run(capsys, "plan", "late.toml", "--no-rescue")
+    assert (code, out) == (3, "")
+    assert err.endswith("; add --explain to `aerobat plan` to try changes that would help\n")
+    assert "ab.why" not in err
     assert not Path("out").exists()
 
 

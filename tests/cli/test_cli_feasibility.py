@@ -13,7 +13,7 @@ import pytest
 
 import aerobat as ab
 from aerobat import cli
-from aerobat.cli.progress import MapProgress, NeedProgress
+from aerobat.cli.progress import MapProgress, NeedProgress, WhyProgress
 from aerobat.interchange import read_table
 
 MAP = ("map", "half-flip", "--over", "angle=0:90:90", "--over", "speed=4:12:8")
@@ -182,3 +182,7 @@ def test_progress_says_how_many_and_how_long_still() -> None:
     need.record("gate", 0.5, False)
     need.record("ceiling", 3.5, False)
     assert str(need) == "3 plans tried; ceiling 3.5 refused; gate 0.5 refused"
+    why = WhyProgress()
+    why.record("without limits.velocity", True)
+    why.record("with min_thrust 0", False)
+    assert str(why) == "2 changes tried, 1 would help; with min_thrust 0: no plan"

@@ -10,7 +10,6 @@ from rich.console import Console
 
 import aerobat as ab
 from aerobat.planning import Plan, with_second_opinion
-from aerobat.planning.miqp.remedies import advice
 from aerobat.planning.rotor_margin import RotorMargin
 from aerobat.reporting.figures import report_figure
 from aerobat.reporting.report_json import report
@@ -193,16 +192,6 @@ def test_a_vehicle_too_weak_for_a_flip_is_advised_nothing_that_was_not_followed(
         ab.plan(ab.load_problem("flip-roll"), ab.Miqp(intervals=12, rescue=False), with_rotors_of(2.2))
     assert "stronger" not in str(refusal.value)
     assert "gate" not in str(refusal.value)
-
-
-@pytest.mark.slow
-def test_advice_is_given_only_of_changes_that_were_followed_with_success() -> None:
-    """A vehicle too weak for a flip is helped by stronger rotors."""
-    flip, asked = ab.load_problem("flip-roll"), ab.Miqp(intervals=10, rescue=False)
-    told = advice(asked, flip, with_rotors_of(2.2))
-    assert "it is planned with 1.5 times the max_thrust" in told
-    assert ab.plan(flip, asked, with_rotors_of(3.3)).certified
-    assert "limits.velocity" not in told
 
 
 @pytest.mark.parametrize("thrust", [-3e-3, -1e-5, 1e-4])

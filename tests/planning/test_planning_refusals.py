@@ -1,65 +1,102 @@
-"""What a refusal advises is true: followed, and in that way alone, the problem is planned."""
+"""A problem is refused once other planners were asked too, and says whether that is proven."""
 
 from __future__ import annotations
 
+import pickle
 from dataclasses import replace
-from functools import cache
+from typing import Any
 
 import pytest
 
 from aerobat.errors import Infeasible
-from aerobat.planning import Miqp, Plan, plan
-from aerobat.planning.miqp.remedies import advice
-from aerobat.problem import GatePassage, Limits, Line, Problem, at_rest, load_problem, tilted_gate
-from aerobat.states import STANDARD_GRAVITY
-from aerobat.vehicle import load_vehicle
+from aerobat.planning import FreeKnots, Miqp, TimeOptimal, plan
+from aerobat.planning.miqp import rescue
+from aerobat.planning.time_optimal.starts import starts
+from aerobat.problem import GatePassage, Limits, Line, load_problem, tilted_gate
+from aerobat.studies.feasibility import min_requirements
+from aerobat.vehicle import Vehicle, load_vehicle
 
 QUAD = load_vehicle("agile-quad")
 LINE = replace(load_problem("line"), gates=(tilted_gate((5.0, 0.0, 0.0)),))
 SLOW = Limits(velocity=0.6)  # [m/s], slower than a gate is passed
 NEXT_TO_THE_END = Line(GatePassage(at=(0.93, 0.97)))  # of the duration, where few intervals follow
-CHANGES = ("without limits.velocity", "with its stages at any time")
 
 
-@cache
-def followed() -> Plan:
-    """The plan without the limit, with its stages at any time: as any of the advice has it."""
-    return plan(replace(LINE, limits=Limits()), vehicle=QUAD)
+def of_thrust_to_weight(ratio: float) -> Vehicle:
+    """The quadrotor with rotors so strong."""
+    factor = ratio / QUAD.thrust_to_weight
+    rotors = tuple(replace(rotor, max_thrust=factor * rotor.max_thrust) for rotor in QUAD.rotors)
+    return replace(QUAD, rotors=rotors)
 
 
-def said(problem: Problem) -> str:
-    """The advice of the refusal of a problem."""
+@pytest.mark.parametrize("planner", ["miqp", "min-snap", "free-knots", "time-optimal"])
+def test_what_contradicts_itself_is_refused_as_proven_before_anything_is_tried(planner: str) -> None:
+    with pytest.raises(Infeasible, match="'line' is proven to have no plan") as refusal:
+        plan(replace(LINE, limits=SLOW), planner, QUAD)
+    assert "limits.velocity (0.6 m/s)" in str(refusal.value)
+    assert refusal.value.attempts == ()
+
+
+def test_a_refusal_names_the_bound_who_was_asked_and_that_it_is_not_proven(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    asked: list[str] = []
+
+    def refuse(self: Any, *_: Any) -> None:
+        asked.append(type(self).__name__)
+        raise Infeasible("refused")
+
+    for planner in (FreeKnots, TimeOptimal):
+        monkeypatch.setattr(planner, "plan", refuse)
     with pytest.raises(Infeasible) as refusal:
-        plan(problem, vehicle=QUAD)
-    return str(refusal.value).rpartition("; it is planned ")[2]
+        plan(replace(LINE, maneuver=NEXT_TO_THE_END), vehicle=QUAD)
+    assert set(asked) == {"FreeKnots", "TimeOptimal"}
+    said = str(refusal.value)
+    assert "binds" in said or "at best" in said
+    assert "not proven, but none was found" in said
+    assert all(way in said for way in ("by time-optimal", "by free-knots", "with 26 intervals"))
+    assert said.endswith("; ab.why(problem, vehicle=...) tries changes that would help")
 
 
-@pytest.mark.parametrize(
-    ("problem", "advised"),
-    [
-        (replace(LINE, limits=SLOW), CHANGES[0]),
-        (replace(LINE, maneuver=NEXT_TO_THE_END), CHANGES[1]),
-        pytest.param(
-            replace(LINE, limits=SLOW, maneuver=NEXT_TO_THE_END),
-            " and ".join(CHANGES),
-            marks=pytest.mark.slow,
-        ),
-    ],
-    ids=["a limit", "a window", "both together"],
-)
-def test_a_problem_without_a_plan_is_planned_as_its_refusal_advises(problem: Problem, advised: str) -> None:
-    """Where no program had a solution, more intervals were advised, with which there was no plan either."""
-    assert said(problem) == advised
-    assert followed().certified
+def test_ways_for_which_there_is_no_time_are_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(rescue, "RESCUE_TIME", 0.0)
+    with pytest.raises(Infeasible, match=r"0 s were too few to plan with .*, by time-optimal, .*free-knots"):
+        plan(replace(LINE, maneuver=NEXT_TO_THE_END), vehicle=QUAD)
+
+
+def test_a_refusal_stays_what_it_is_from_process_to_process() -> None:
+    refusal = Infeasible("it is too little", ["one attempt"])
+    again = pickle.loads(pickle.dumps(refusal))
+    assert (str(again), again.attempts, again.sentence) == (
+        str(refusal),
+        ("one attempt",),
+        "it is too little",
+    )
 
 
 @pytest.mark.slow
-def test_a_reserve_that_leaves_too_little_to_hover_is_what_the_advice_names() -> None:
-    hop = replace(LINE, gates=(), goal=at_rest((0.5, 0.0, 0.0)))
-    heavy = replace(QUAD, mass=0.9 * float(QUAD.max_thrusts.sum()) / STANDARD_GRAVITY)
-    asked = Miqp(order=4, intervals=8, reserve=0.2)
-    assert "; it is planned without reserve" in advice(asked, hop, heavy)
-    assert replace(asked, reserve=0.0).plan(hop, heavy).duration > 0.0
+@pytest.mark.parametrize("ratio", [1.10, 1.05])
+def test_what_rotors_just_can_is_planned_by_whichever_planner_finds_it(ratio: float) -> None:
+    """It was refused after 24 s, and 1.5 times the thrust were advised."""
+    found = plan(load_problem("half-flip"), vehicle=of_thrust_to_weight(ratio))
+    assert found.certified
+    assert found.flies
+    assert "planned by time-optimal" in found.rescue
+
+
+@pytest.mark.slow
+def test_what_is_needed_is_what_any_planner_needs() -> None:
+    """It was 1.147, the least of the MIQP alone."""
+    (found,) = min_requirements("half-flip", "agile-quad", ["thrust-to-weight"], workers=1)
+    assert found.value is not None
+    assert found.value <= 1.06
+
+
+def test_where_no_program_has_a_path_time_optimal_begins_at_closed_forms() -> None:
+    """It ended in an IndexError."""
+    problem = replace(LINE, maneuver=NEXT_TO_THE_END)
+    begun = starts(problem, QUAD, Miqp(), planar=False, count=2, first=None)
+    assert [start.origin for start in begun.motions] == ["minimum jerk, in a plane", "minimum jerk"]
 
 
 def test_the_limit_that_a_path_exceeds_is_named() -> None:

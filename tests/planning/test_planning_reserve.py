@@ -9,7 +9,7 @@ import pytest
 from aerobat.certification import Certificate
 from aerobat.errors import Infeasible
 from aerobat.planning import FreeKnots, Miqp, Planner, TimeOptimal
-from aerobat.planning.miqp.rescue import rescued_plan
+from aerobat.planning.miqp.rescue import Rescue
 from aerobat.planning.recorder import Recorder
 from aerobat.planning.rotor_margin import reserve_shortfalls
 from aerobat.problem import load_problem
@@ -58,10 +58,10 @@ def test_every_rescue_is_asked_to_keep_what_was_asked(monkeypatch: pytest.Monkey
         asked.append(self.reserve)
         raise Infeasible("refused")
 
-    for planner in (Miqp, FreeKnots):
+    for planner in (Miqp, FreeKnots, TimeOptimal):
         monkeypatch.setattr(planner, "plan", refuse)
     problem, vehicle = load_problem("flip-roll"), load_vehicle("crazyflie")
-    assert rescued_plan(Miqp(reserve=0.34), problem, vehicle, Recorder(None)) is None
+    assert Rescue(Miqp(reserve=0.34), problem, vehicle, Recorder(None)).plan() is None
     assert asked
     assert min(asked) == 0.34
 

@@ -15,7 +15,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import aerobat as ab
-from aerobat.planning import without_advice
 from aerobat.reporting.feasibility.table import requirements_report
 from aerobat.studies.feasibility import Feasibility
 from aerobat.studies.feasibility.feasibility_map import Cell
@@ -60,8 +59,7 @@ def test_a_cell_is_the_plan_of_its_problem(angle: float, speed: float) -> None:
     cells = (upright(),) if speed == NEAR_ITS_LIMIT else half_flips().cells
     (cell,) = (each for each in cells if each.values == (angle, speed))
     try:
-        with without_advice():
-            plan = ab.plan(half_flip(*cell.values), vehicle="agile-quad")
+        plan = ab.plan(half_flip(*cell.values), vehicle="agile-quad")
     except ab.Infeasible:
         assert cell.feasibility is Feasibility.REFUSED
         assert cell.duration is None

@@ -66,6 +66,10 @@ def ignored_counts(done: int, well: int) -> None:
     pass
 
 
+def ignored_change(words: str, helps: bool) -> None:
+    pass
+
+
 def ignored_trial(quantity: str, value: float, planned: bool) -> None:
     pass
 
@@ -116,10 +120,12 @@ RESULTS = (
     "Share",
     "Sweep",
     "Recoveries",
+    "Remedy",
     "Requirement",
     "Reference",
     "Replay",
     "Tuning",
+    "Why",
 )  # made by no user
 NOT_CALLED = ("AerobatError", "BackendMissing", "Infeasible", "SpecError", "Maneuver", "Planner")
 ENUMS = ("ContinuityRule", "Outcome", "Quantity", "TimeScaling")
@@ -284,6 +290,12 @@ def _calls(folder: Path) -> dict[str, dict[str, Any]]:
             "conditions": ab.Dispersion(),
             "port": 0,
             "browser": False,
+        },
+        "why": {
+            "problem": plan().problem,
+            "planner": ab.MinSnap(),
+            "vehicle": agile,
+            "progress": ignored_change,
         },
         "with_second_opinion": {"plan": plan(), "progress": ignored},
         "tune": _tuned(),
@@ -484,6 +496,7 @@ def instance(cls: type) -> Any:
         ab.Plan: plan,
         ab.PowerLoop: lambda: ab.PowerLoop((0.0, 0.0, 1.0)),
         ab.Problem: lambda: ab.load_problem("half-flip"),
+        ab.Remedy: lambda: ab.Remedy(("without reserve",), plan()),
         ab.Requirement: lambda: ab.min_requirements(**NEED)[0],
         ab.Rotor: lambda: ab.load_vehicle("agile-quad").rotors[0],
         ab.SensorLog: _log,
@@ -495,6 +508,7 @@ def instance(cls: type) -> Any:
         ab.Vehicle: lambda: ab.load_vehicle("agile-quad"),
         ab.Waypoint: lambda: ab.Waypoint((0.0, 0.0, 1.0)),
         ab.Waypoints: lambda: ab.Waypoints((ab.Waypoint((0.0, 0.0, 1.0)),)),
+        ab.Why: lambda: ab.Why("short", "it is too little", (), (instance(ab.Remedy),), ("without reserve",)),
         ab.Wrench: lambda: flight().setpoint.wrench,
         ab.Recoveries: lambda: ab.recoveries(plan(), times=[0.0, 0.1], ground=-5.0),
         ab.Reference: lambda: ab.reference(plan(), times=[0.0, 0.1]),

@@ -16,6 +16,8 @@ from aerobat.cli.interrupts import interruptible
 from aerobat.cli.terminal import discard, provide_streams, say
 from aerobat.errors import AerobatError, Infeasible
 
+EXPLAIN = "add --explain to `aerobat plan` to try changes that would help"
+
 
 class ExitCode(IntEnum):
     """What a run came to, for scripts."""
@@ -60,7 +62,7 @@ def _run(arguments: Sequence[str]) -> ExitCode:
         discard(sys.stdout)
         return ExitCode.BROKEN_PIPE
     except Infeasible as error:
-        say(str(error))
+        say(error.with_remedy(EXPLAIN))
         return ExitCode.NO_PLAN
     except AerobatError as error:
         say(str(error))

@@ -47,7 +47,8 @@ class ExplainingOptions:
 
     explain: Annotated[bool, Parameter(group=output, negative="", show_default=False)] = False
     """Find out and report what takes seconds to know, too: the recoveries to a hover from all along the plan,
-    and of a plan that takes suspiciously long another planner's second opinion."""
+    of a plan that takes suspiciously long another planner's second opinion, and where there is no plan the
+    changes with which there is one."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -201,6 +201,24 @@ class NeedProgress(Progress):
         return "; ".join([f"{self._tried} plans tried", *self._last.values()])
 
 
+class WhyProgress(Progress):
+    """The changes that were tried where there is no plan."""
+
+    def __init__(self) -> None:
+        self._tried = self._helpful = 0
+        self._last = ""
+
+    def record(self, change: str, helps: bool) -> None:
+        """Take note of a change that was tried."""
+        self._tried += 1
+        self._helpful += helps
+        self._last = f"; {change}: {'planned' if helps else 'no plan'}"
+
+    def __str__(self) -> str:
+        """How many were tried, how many help, and the last."""
+        return f"{self._tried} changes tried, {self._helpful} would help{self._last}"
+
+
 class CausesProgress(Progress):
     """Which trial is planned and flown.
 

@@ -16,11 +16,12 @@ from aerobat.cli.options import (
     offered_options,
     option_name,
 )
-from aerobat.cli.progress import PassingProgress, planning_progress, showing
+from aerobat.cli.progress import PassingProgress, WhyProgress, planning_progress, showing
 from aerobat.cli.runs.record import FlightSettings, RunRecord, default_vehicle
 from aerobat.cli.runs.saved_plans import named_vehicle, plan_source, read_saved_plan
+from aerobat.cli.terminal import say
 from aerobat.environment import load_dispersion
-from aerobat.errors import SpecError
+from aerobat.errors import Infeasible, SpecError
 from aerobat.interchange import column_groups
 from aerobat.optimization.deadline import within_time
 from aerobat.planning import (
@@ -114,12 +115,37 @@ def flight_settings(
 
 
 def plan_of(record: RunRecord, explain: bool = False) -> Plan:
-    """The plan of a run, made anew; explained on request, in what is left of its time."""
+    """The plan of a run, made anew; explained on request, in what is left of its time.
+
+    Raises Infeasible where there is none; on request with the changes that would help, once it is said that
+    there is none.
+    """
     assert record.planner is not None, "a plan that came from a file is not made"
-    limit = getattr(record.planner, "time_limit", None)
     if record.flight.probability is not None:
         found = _plan_that_passes(record)
         return with_explanation(found) if explain else found
+    try:
+        return _plan_made(record, explain)
+    except Infeasible as refusal:
+        if not explain:
+            raise
+        say(refusal.sentence)
+        raise Infeasible(_advice(record, refusal)) from None
+
+
+def _advice(record: RunRecord, refusal: Infeasible) -> str:
+    """The changes with which a problem that was refused is planned."""
+    from aerobat.studies.why import Task, explained
+
+    task = Task(record.problem, None if record.paper else record.vehicle, record.planner)
+    with showing(WhyProgress()) as progress:
+        return explained(refusal, task, progress.record).advice
+
+
+def _plan_made(record: RunRecord, explain: bool) -> Plan:
+    """The plan that the run's planner finds."""
+    assert record.planner is not None, "a plan that came from a file is not made"
+    limit = getattr(record.planner, "time_limit", None)
     with planning_progress(record.planner_name) as progress, within_time(limit):
         if record.paper:  # without a vehicle; whether this one can fly it is told all the same
             found = plan(record.problem, record.planner, progress=progress.record)

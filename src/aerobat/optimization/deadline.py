@@ -2,33 +2,61 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
-from math import inf
 from time import perf_counter as clock
+from time import thread_time
 
-_deadline: ContextVar[float] = ContextVar("deadline", default=inf)  # [s] of the clock
+Clock = Callable[[], float]
+
+
+def wall() -> float:
+    """The time as people wait [s]."""
+    return clock()
+
+
+def processor() -> float:
+    """The processor's time for this thread [s], which passes with work alone, however busy the machine is."""
+    return thread_time()
+
+
+_deadlines: ContextVar[tuple[tuple[Clock, float], ...]] = ContextVar("deadlines", default=())
 
 
 @contextmanager
-def within_time(limit: float | None) -> Iterator[None]:
+def within_time(limit: float | None, by: Clock = wall) -> Iterator[None]:
     """Give all that runs in the block so much time [s], or what an outer block has left; None adds no limit.
 
     Solvers end early by themselves; what calls them again and again asks `out_of_time`.
     """
-    end = inf if limit is None else clock() + limit
-    token = _deadline.set(min(end, _deadline.get()))
+    added = () if limit is None else ((by, by() + limit),)
+    with _within((*_deadlines.get(), *added)):
+        yield
+
+
+@contextmanager
+def within_share(fraction: float) -> Iterator[None]:
+    """Give all that runs in the block a fraction of the time that is left; without a limit there is none."""
+    begun = ((by, by(), end) for by, end in _deadlines.get())
+    with _within(tuple((by, now + fraction * max(end - now, 0.0)) for by, now, end in begun)):
+        yield
+
+
+@contextmanager
+def _within(deadlines: tuple[tuple[Clock, float], ...]) -> Iterator[None]:
+    token = _deadlines.set(deadlines)
     try:
         yield
     finally:
-        _deadline.reset(token)
+        _deadlines.reset(token)
 
 
-def time_left() -> float | None:
-    """The time that is left [s], zero where it is over; None without a limit."""
-    end = _deadline.get()
-    return None if end == inf else max(end - clock(), 0.0)
+def time_left(*clocks: Clock) -> float | None:
+    """The time left [s] by some clocks, by default all; zero where it is over, None without a limit."""
+    lefts = (end - by() for by, end in _deadlines.get() if by in clocks or not clocks)
+    left = min(lefts, default=None)
+    return None if left is None else max(left, 0.0)
 
 
 def out_of_time() -> bool:
@@ -36,7 +64,7 @@ def out_of_time() -> bool:
     return time_left() == 0.0
 
 
-def shorter(limit: float | None) -> float | None:
+def shorter(limit: float | None, *clocks: Clock) -> float | None:
     """The shorter of a solver's own limit [s] and the time that is left; None where there is neither."""
-    limits = [each for each in (limit, time_left()) if each is not None]
+    limits = [each for each in (limit, time_left(*clocks)) if each is not None]
     return min(limits, default=None)

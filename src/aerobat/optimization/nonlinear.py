@@ -20,7 +20,7 @@ from numpy.typing import ArrayLike
 
 from aerobat.arrays import Array, frozen, frozen_bounds
 from aerobat.errors import BackendMissing, SpecError
-from aerobat.optimization.deadline import shorter
+from aerobat.optimization.deadline import processor, shorter, time_left, wall
 from aerobat.optimization.interrupts import interrupts_kept
 
 _WARM = {
@@ -176,8 +176,10 @@ def solve_nonlinear(
     settings: dict[str, Any] = {**_OPTIONS, "ipopt.max_iter": max_iterations, "ipopt.tol": tolerance}
     settings |= program.derivatives
     settings |= {f"ipopt.{name}": value for name, value in options.items()}
-    if (limit := shorter(time_limit)) is not None:
+    if (limit := shorter(time_limit, wall)) is not None:
         settings["ipopt.max_wall_time"] = max(limit, _SHORTEST)
+    if (limit := time_left(processor)) is not None:
+        settings["ipopt.max_cpu_time"] = max(limit, _SHORTEST)
     if not exact_hessian:
         settings["ipopt.hessian_approximation"] = "limited-memory"
     if initial_barrier is not None:

@@ -4,7 +4,6 @@ from .certified_solve import Judged, Solution, certified_solve
 from .evidence import Evidence
 from .flyability import FLYABLE_ERROR, FlownPassage, Flyability, OwnFlight, nominal_flight, own_flight
 from .miqp import Miqp
-from .miqp.remedies import without_advice
 from .passages import PlacedStage, planned_passages, planned_waypoints
 from .planners import (
     Planner,
@@ -76,5 +75,4 @@ __all__ = [
     "with_explanation",
     "with_recoveries",
     "with_second_opinion",
-    "without_advice",
 ]

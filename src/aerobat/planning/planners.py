@@ -16,8 +16,9 @@ from typing import Any, Protocol, TypeVar, cast, dataclass_transform, get_type_h
 from pydantic import Field
 
 from aerobat.declaration import Label, Registry, shown, validated
-from aerobat.errors import SpecError
+from aerobat.errors import Infeasible, SpecError
 from aerobat.optimization.nonlinear import has_casadi
+from aerobat.planning.assessment.contradiction import contradiction
 from aerobat.planning.courses import is_course, on_open_courses
 from aerobat.planning.holds import between_holds
 from aerobat.planning.passages import require_openings
@@ -85,9 +86,17 @@ def plan(
         vehicle = vehicle.without_dead_rotors()
         vehicle.require_hover(problem.environment.gravity)
         require_openings(problem, vehicle)
+        _require_consistency(problem, vehicle)
     method = planner_for(problem, vehicle) if planner is None else as_planner(planner)
     found = method.plan(problem, vehicle, progress)
     return found if vehicle is None or found.vehicle is not None else found.for_vehicle(vehicle)
+
+
+def _require_consistency(problem: Problem, vehicle: Vehicle) -> None:
+    """Refuse what is proven to have no plan, in milliseconds and whichever the planner."""
+    found = contradiction(problem, vehicle)
+    if found is not None:
+        raise Infeasible(f"'{problem.name}' is proven to have no plan: {found.sentence}")
 
 
 def suited_planner(problem: Problem, vehicle: Vehicle | None) -> str:

@@ -49,4 +49,5 @@ def too_short(
     return Infeasible(
         f"no plan of '{problem.name}' was found in {given}; allow more with --time-limit, or {remedy}",
         tuple(attempts),
+        remedy="",
     )

@@ -174,7 +174,8 @@ def _entry(
     try:
         found = plan(problem, planner, vehicle, progress)
     except (Infeasible, BackendMissing) as error:
-        return Entry(name, None, None, None, perf_counter() - started, str(error))
+        outcome = error.sentence if isinstance(error, Infeasible) else str(error)
+        return Entry(name, None, None, None, perf_counter() - started, outcome)
     spent = perf_counter() - started
     flight = fly(found, vehicle)
     flown = score(flight, found, vehicle)

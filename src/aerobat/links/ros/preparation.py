@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from aerobat.arrays import Array
-from aerobat.errors import AerobatError, SpecError
+from aerobat.errors import AerobatError, Infeasible, SpecError
 from aerobat.links.goals import Observed
 from aerobat.links.mission import require_flyable
 from aerobat.links.report import LinkReport, link_report
@@ -55,6 +55,8 @@ def prepare(request: Request) -> Prepared | str:
     """The plan from where the vehicle hovers, or a sentence that says why there is none."""
     try:
         return _prepared(request)
+    except Infeasible as error:
+        return error.sentence
     except AerobatError as error:
         return str(error)
 

@@ -1,7 +1,4 @@
-"""Why nothing feasible was found: which bound binds, and what would free it.
-
-Nothing is advised that was not tried.
-"""
+"""Why nothing feasible was found: which bound binds, by a few relaxed programs in a second at most."""
 
 from __future__ import annotations
 
@@ -12,6 +9,7 @@ from math import ceil, inf
 import numpy as np
 
 from aerobat.optimization import evenly_spread, solver
+from aerobat.optimization.deadline import out_of_time, processor, within_time
 from aerobat.planning.courses import is_placed_in_windows
 from aerobat.planning.miqp.formulation import Formulation
 from aerobat.planning.recorder import Attempt
@@ -22,6 +20,7 @@ from aerobat.vehicle import Vehicle
 OUT_OF_TIME = "no solution was found in time"
 NOT_CONVERGED = "the solver did not converge"
 MORE_INTERVALS = (1.3, 1.8, 2.5)  # times as many as there are that are tried, or as there are stages
+DIAGNOSIS_TIME = 1.0  # [s] of the processor, for all relaxed problems together
 PROBES = 4  # durations at which a relaxed problem is tried
 
 
@@ -33,7 +32,10 @@ def why_infeasible(formulation: Formulation, attempts: Sequence[Attempt], vehicl
     if solved and vehicle is not None:
         best = max(solved, key=lambda a: -inf if a.margin is None else a.margin).outcome
         return f"{said} that {vehicle.name} can fly: at best, {best}"
-    binding = list(_binding(formulation, tried))
+    with within_time(DIAGNOSIS_TIME, processor):
+        binding = list(_binding(formulation, tried))
+        if out_of_time() and not binding:
+            return f"{said}; which bound binds is not known"
     unanswered = sum(a.status == "unknown" for a in attempts)
     if not binding and unanswered:
         return (

@@ -20,8 +20,7 @@ from aerobat.planning.miqp.diagnosis import leg_without_room, why_infeasible
 from aerobat.planning.miqp.formulation import Formulation
 from aerobat.planning.miqp.integrator import IntegratorChain, Intervals, Order
 from aerobat.planning.miqp.refinement import descent, settled
-from aerobat.planning.miqp.remedies import advice
-from aerobat.planning.miqp.rescue import rescued_plan, shortened_plan
+from aerobat.planning.miqp.rescue import Rescue
 from aerobat.planning.miqp.shortest import shortest
 from aerobat.planning.planners import Planner, option, planner
 from aerobat.planning.recorder import Progress, Recorder
@@ -87,17 +86,15 @@ class Miqp(Planner):
                 plan = stopped(self._planned(problem, vehicle, recorder))
                 if vehicle is None or not self.rescue or self.search is not None or plan.bound is None:
                     return plan
-                return shortened_plan(self, problem, vehicle, plan, recorder)
+                return Rescue(self, problem, vehicle, recorder).shortened(plan)
             except Infeasible as infeasible:
-                if vehicle is None or not self.rescue or not infeasible.attempts:
+                if vehicle is None or not self.rescue or not infeasible.attempts or out_of_time():
                     raise
-                rescued = rescued_plan(self, problem, vehicle, recorder)
+                rescue = Rescue(self, problem, vehicle, recorder)
+                rescued = rescue.plan()
                 if rescued is not None:
                     return rescued
-                if out_of_time():
-                    raise
-                advised = f"{infeasible}; {advice(self, problem, vehicle)}"
-                raise Infeasible(advised, infeasible.attempts) from None
+                raise Infeasible(f"{infeasible.sentence}; {rescue}", infeasible.attempts) from None
 
     @property
     def _quicker(self) -> str:
@@ -124,7 +121,9 @@ class Miqp(Planner):
         if found is None:
             if out_of_time():
                 raise too_short(problem, self.time_limit, recorder.attempts, self._quicker)
-            raise Infeasible(why_infeasible(formulation, recorder.attempts, vehicle), recorder.attempts)
+            attempts_made = tuple(recorder.attempts)
+            why = partial(why_infeasible, formulation, attempts_made, vehicle)
+            raise Infeasible(why, attempts_made)
         return plan_of(attempts, found, self.backend)
 
 

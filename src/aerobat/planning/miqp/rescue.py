@@ -1,19 +1,23 @@
-"""What else may find a plan where the intervals and the order asked for find none, or a poor one."""
+"""What else may find a plan where the intervals and the order asked for find none, or a poor one.
+
+A problem is not refused before other settings and planners are asked, within RESCUE_TIME.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import replace
+from dataclasses import dataclass, field, fields, replace
 from math import inf
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, cast
 
 from aerobat.errors import BackendMissing, Infeasible, SpecError
-from aerobat.optimization.deadline import out_of_time
+from aerobat.optimization.deadline import out_of_time, processor, within_share, within_time
 from aerobat.planning.miqp.attempts import default_order
 from aerobat.planning.miqp.integrator import INPUT_NAMES, MAX_INTERVALS
-from aerobat.planning.planners import Planner
+from aerobat.planning.planners import Planner, command_settings, planner_class
 from aerobat.planning.recorder import Recorder
-from aerobat.planning.result import FLYING_RESERVE, Plan
+from aerobat.planning.result import Plan
+from aerobat.planning.rotor_margin import reserve_shortfalls
 from aerobat.problem.problem import Problem
 from aerobat.vehicle import Vehicle
 
@@ -23,71 +27,156 @@ if TYPE_CHECKING:
 MORE_INTERVALS = (1.3, 2.0)  # times as many
 A_STAGE = 2  # intervals at least: fewer leave the path of a course no choice
 MANY_INTERVALS = 40  # where that is more still: a narrow window at an end needs intervals on either side
+# [s] of the processor for all other ways together, so that refusals take 5 s (benchmarks/audit.py)
+RESCUE_TIME = 4.0
+ONE_WAY = 0.75  # of the time that is left, for one way, so that the next has some
+MOTION = "time-optimal"  # the planner of rigid bodies' motions, which others come near at best
+MOTIONS = 2  # that time-optimal starts from: further ones make motions faster, but seldom find the first
 
 
-def rescued_plan(asked: Miqp, problem: Problem, vehicle: Vehicle, recorder: Recorder) -> Plan | None:
-    """The first plan that another setting or planner finds, which says so; None where all fail.
+@dataclass
+class Rescue:
+    """The search for a plan by other ways than one that found none."""
 
-    Args:
-        asked: The planner that found none.
-        problem: What is planned.
-        vehicle: What shall fly it.
-        recorder: The attempts so far; those that follow are passed on to its `progress`.
-    """
-    others = _alternatives(asked, problem, vehicle)
-    return _first(others, problem, vehicle, recorder, f"miqp found none with {asked.intervals} intervals")
+    asked: Miqp
+    problem: Problem
+    vehicle: Vehicle
+    recorder: Recorder  # whose attempts come first; those that follow are passed on to its `progress`
+    failed: list[str] = field(default_factory=list)  # ways that find none
+    unanswered: list[str] = field(default_factory=list)  # ways for which there was too little time
+    missing: list[str] = field(default_factory=list)  # ways whose solver is not installed
 
+    def plan(self) -> Plan | None:
+        """The first certified plan that another way finds, which says so; None where all fail."""
+        with within_time(RESCUE_TIME, processor):
+            found = self._first(self._ways(), f"miqp found none with {self.asked.intervals} intervals")
+        return self._with_reserve(found) if found is not None and found.planner == MOTION else found
 
-def shortened_plan(asked: Miqp, problem: Problem, vehicle: Vehicle, plan: Plan, recorder: Recorder) -> Plan:
-    """A shorter plan on more intervals, which says so, else the plan: it is a program's own answer.
+    def shortened(self, plan: Plan) -> Plan:
+        """A shorter plan on more intervals, which says so, else the plan: it is a program's own answer."""
+        ways = with_more_intervals(self.asked, self.problem, self.vehicle)
+        failed = f"no path of miqp with {self.asked.intervals} intervals settled"
+        return self._first(ways, failed, plan.duration, share=1.0) or plan
 
-    Args:
-        asked: The planner that refined no path.
-        problem: What is planned.
-        vehicle: What shall fly it.
-        plan: Its plan.
-        recorder: The attempts so far; those that follow are passed on to its `progress`.
-    """
-    others = with_more_intervals(asked, problem, vehicle)
-    failed = f"no path of miqp with {asked.intervals} intervals settled"
-    shorter = _first(others, problem, vehicle, recorder, failed, plan.duration)
-    return plan if shorter is None else shorter
+    def __str__(self) -> str:
+        """The ways that were tried in vain, in a part of a sentence."""
+        said = ["not proven"]
+        if self.failed:
+            said.append(f"but none was found {', '.join(self.failed)}")
+        if self.unanswered:
+            said.append(f"{RESCUE_TIME:g} s were too few to plan {', '.join(self.unanswered)}")
+        if self.missing:
+            said.append(f"and the extra casadi is not installed to plan {', '.join(self.missing)}")
+        return ", ".join(said)
 
+    def _first(
+        self,
+        ways: Iterator[tuple[Planner, str]],
+        failed: str,
+        shorter_than: float = inf,
+        share: float = ONE_WAY,
+    ) -> Plan | None:
+        """The first certified plan of several ways, which says what failed; None where none is short enough.
 
-def _first(
-    others: Iterator[tuple[Planner, str]],
-    problem: Problem,
-    vehicle: Vehicle,
-    recorder: Recorder,
-    failed: str,
-    shorter_than: float = inf,
-) -> Plan | None:
-    """The first certified plan of some planners, which says what failed; None where none is short enough."""
-    for planner, how in others:
+        Args:
+            ways: Planners, and how they plan in words.
+            failed: Why they are asked.
+            shorter_than: The duration that a plan must fall short of [s].
+            share: Of the time that is left, for each.
+        """
+        for planner, how in ways:
+            with within_share(share):
+                plan = self._planned(planner, how)
+            if plan is not None and self._is_wanted(plan) and plan.duration < shorter_than:
+                attempts = (*self.recorder.attempts, *plan.attempts)
+                return replace(plan, attempts=attempts, rescue=f"{failed}; planned {how}")
+        return None
+
+    def _is_wanted(self, plan: Plan) -> bool:
+        """True for a certified plan that keeps the reserve that is asked."""
+        certificate = plan.certificate
+        return (
+            certificate is not None
+            and plan.certified
+            and not reserve_shortfalls(certificate, self.asked.reserve)
+        )
+
+    def _planned(self, planner: Planner, how: str) -> Plan | None:
+        """The plan of one way; None where there is none, which is noted."""
         if out_of_time():
+            self.unanswered.append(how)
             return None
         try:
-            plan = planner.plan(problem, vehicle, recorder.progress)
-        except (Infeasible, SpecError, BackendMissing):
-            continue
-        if plan.certified and plan.duration < shorter_than:
-            attempts = (*recorder.attempts, *plan.attempts)
-            return replace(plan, attempts=attempts, rescue=f"{failed}; planned {how}")
-    return None
+            return planner.plan(self.problem, self.vehicle, self.recorder.progress)
+        except BackendMissing:
+            self.missing.append(how)
+        except Infeasible:
+            (self.unanswered if out_of_time() else self.failed).append(how)
+        except SpecError:
+            pass  # the planner does not take such problems
+        return None
+
+    def _ways(self) -> Iterator[tuple[Planner, str]]:
+        """Planners, and how they plan in words, the likeliest first.
+
+        Where programs have solutions, but none that the vehicle can fly, that is a motion of the rigid body;
+        where they have none, more intervals.
+        """
+        more = with_more_intervals(self.asked, self.problem, self.vehicle)
+        if any(attempt.cost is not None for attempt in self.recorder.attempts):
+            yield self._motion(self._path_without_rotors()), f"by {MOTION}"
+            yield from more
+        else:
+            yield from more
+            yield self._motion(None), f"by {MOTION}"
+        yield from self._others()
+
+    def _motion(self, start: Plan | None) -> Planner:
+        """Time-optimal, quickly, with no reserve but the one that is asked: that tells soonest of none."""
+        cls: Any = planner_class(MOTION)
+        guess = replace(self.asked, rescue=False)
+        return cast(Planner, cls(reserve=self.asked.reserve, starts=MOTIONS, guess=guess, start=start))
+
+    def _path_without_rotors(self) -> Plan | None:
+        """The MIQP's plan for no vehicle."""
+        try:
+            return replace(self.asked, rescue=False).plan(self.problem)
+        except Infeasible:
+            return None
+
+    def _with_reserve(self, motion: Plan) -> Plan:
+        """A time-optimal motion again with a reserve to fly by, or itself where there is none."""
+        again = self._planned(keeping(self.asked.reserve, MOTION, start=motion, starts=1), f"by {MOTION}")
+        if again is None or not self._is_wanted(again):
+            return motion
+        return replace(again, attempts=(*motion.attempts, *again.attempts), rescue=motion.rescue)
+
+    def _others(self) -> Iterator[tuple[Planner, str]]:
+        """The ways that seldom find what those before them do not."""
+        first = default_order(self.problem, self.vehicle)
+        for order in range(first, max(INPUT_NAMES) + 1):
+            if order != (self.asked.order or first):
+                yield replace(self.asked, order=order, rescue=False), f"with order {order}"
+        if self.asked.search is not None:
+            yield replace(self.asked, search=None, rescue=False), "with intervals that differ"
+        if self.problem.maneuver.through_points:
+            yield keeping(self.asked.reserve, "min-snap"), "by min-snap"
+        yield keeping(self.asked.reserve, "free-knots"), "by free-knots"
 
 
-def _alternatives(asked: Miqp, problem: Problem, vehicle: Vehicle) -> Iterator[tuple[Planner, str]]:
-    """Planners, and how they plan in words."""
-    yield from with_more_intervals(asked, problem, vehicle)
-    first = default_order(problem, vehicle)
-    for order in range(first, max(INPUT_NAMES) + 1):
-        if order != (asked.order or first):
-            yield replace(asked, order=order, rescue=False), f"with order {order}"
-    if asked.search is not None:
-        yield replace(asked, search=None, rescue=False), "with intervals that differ"
-    from aerobat.planning.polynomial.free_knots import FreeKnots
+def keeping(reserve: float, name: str, **others: Any) -> Planner:
+    """The registered planner as the command line makes it, asked to keep a reserve at least, if it can.
 
-    yield FreeKnots(reserve=max(FLYING_RESERVE, asked.reserve)), "by free-knots"
+    Args:
+        reserve: Of each rotor's range.
+        name: The planner's.
+        **others: Of its fields.
+    """
+    cls: Any = planner_class(name)
+    settings = command_settings(cls) | others
+    if "reserve" in (f.name for f in fields(cls)):
+        settings["reserve"] = max(reserve, settings.get("reserve", 0.0))
+    return cast(Planner, cls(**settings))
 
 
 def with_more_intervals(asked: Miqp, problem: Problem, vehicle: Vehicle) -> Iterator[tuple[Planner, str]]:
@@ -97,4 +186,4 @@ def with_more_intervals(asked: Miqp, problem: Problem, vehicle: Vehicle) -> Iter
     if max(more) * MORE_INTERVALS[0] < MANY_INTERVALS:
         more.add(MANY_INTERVALS)
     for intervals in sorted(n for n in more if n <= MAX_INTERVALS):
-        yield replace(asked, intervals=intervals, rescue=False), f"with {intervals}"
+        yield replace(asked, intervals=intervals, rescue=False), f"with {intervals} intervals"

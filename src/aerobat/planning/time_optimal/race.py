@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 from aerobat.limits.body_in_gate import BodyInGate
-from aerobat.optimization.deadline import out_of_time, time_left, within_time
+from aerobat.optimization.deadline import out_of_time, within_share
 from aerobat.planning.certified_solve import Judged, certified_solve
 from aerobat.planning.courses import is_course
 from aerobat.planning.flyability import OwnFlight, own_flight
@@ -68,9 +68,9 @@ class Race:
             starts: Where to begin.
             body: The vehicle, or one much like it that is easier to plan for.
         """
-        with within_time(_part(COARSE_TIME)):
+        with within_share(COARSE_TIME):
             finalists, others = _finalists(self._coarse(starts, body))
-        with within_time(_part(AHEAD_TIME)):
+        with within_share(AHEAD_TIME):
             for program in finalists:
                 program.solve_ahead()
         best: Judged[SolvedMotion] | None = None
@@ -199,12 +199,6 @@ def coarse_motion(problem: Problem, vehicle: Vehicle, recorder: Recorder, reserv
     race = Race(problem, vehicle, recorder, MIN_INTERVALS, COURSE_COARSE_ITERATIONS, reserve)
     begun = starts(problem, vehicle, Miqp(), planar=False, count=COURSE_STARTS, first=None)
     return next((program.start.guess for program in race._coarse(begun.motions, vehicle)), None)
-
-
-def _part(fraction: float) -> float | None:
-    """A fraction of the time that is left [s]; None without a limit."""
-    left = time_left()
-    return None if left is None else fraction * left
 
 
 def _finalists(

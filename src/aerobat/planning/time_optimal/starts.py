@@ -84,14 +84,10 @@ def starts(
         return Starts(tuple(replace(start, in_gates=in_gates) for start in found), ())
     if is_course(sequence):
         plans = [] if first is None else [(first, f"{first.planner}'s plan")]
-        paths = [
-            (start_along_normals(problem, vehicle, sequence, order), f"minimum {ORDERS[order]}")
-            for order in (3, 4)
-        ]
-        sources = [*_sources(plans, sequence), *paths]
+        sources = [*_sources(plans, sequence), *_closed_forms(problem, vehicle, sequence)]
     else:
-        plans = list(_plans(problem, vehicle, guess, first))
-        sources = list(_sources(plans, sequence))
+        plans = list(islice(_plans(problem, vehicle, guess, first), count))
+        sources = list(_sources(plans, sequence)) or list(_closed_forms(problem, vehicle, sequence))
     own = tuple(plan for plan, _ in plans if plan.certified and plan.vehicle == vehicle)
     motions = islice(_variations(sources, planar), count)
     return Starts(tuple(replace(start, in_gates=in_gates) for start in motions), own)
@@ -131,6 +127,14 @@ def in_space(starts: Iterator[Start]) -> Iterator[Start]:
     return (start for start in starts if start.plane is None)
 
 
+def _closed_forms(
+    problem: Problem, vehicle: Vehicle, sequence: StageSequence
+) -> Iterator[tuple[WarmStart, str]]:
+    """Minimum-effort paths through the stages, stretched until rotors nearly follow them."""
+    for order in (3, 4):
+        yield start_along_normals(problem, vehicle, sequence, order), f"minimum {ORDERS[order]}"
+
+
 def _sources(plans: Sequence[tuple[Plan, str]], sequence: StageSequence) -> Iterator[tuple[WarmStart, str]]:
     """Plans as starts; those that know no rotors also slower."""
     for plan, origin in plans:
@@ -144,7 +148,7 @@ def _plans(problem: Problem, vehicle: Vehicle, guess: Miqp, first: Plan | None) 
     """Plans with their origins, the likeliest first."""
     if first is not None:
         yield first, f"{first.planner}'s plan"
-    for planner, rotors, origin in _planners(problem, guess):
+    for planner, rotors, origin in _planners(problem, guess, first):
         try:
             yield planner.plan(problem, vehicle if rotors else None), origin
         except Infeasible as infeasible:
@@ -152,9 +156,14 @@ def _plans(problem: Problem, vehicle: Vehicle, guess: Miqp, first: Plan | None) 
                 raise
 
 
-def _planners(problem: Problem, guess: Miqp) -> Iterator[tuple[Planner, bool, str]]:
-    guess = replace(guess, rescue=False)  # by free knots, which begin where this planner can itself
-    yield guess, True, "miqp's plan"
+def _planners(problem: Problem, guess: Miqp, first: Plan | None) -> Iterator[tuple[Planner, bool, str]]:
+    """Planners, whether they plan for the rotors, and what their plans are called.
+
+    Where a plan is given to begin with, the MIQP plans for no rotors: that takes longer than all others.
+    """
+    guess = replace(guess, rescue=False)  # by others, which begin where this planner can itself
+    if first is None:
+        yield guess, True, "miqp's plan"
     if problem.maneuver.through_points:
         yield MinSnap(), True, "min-snap's plan"
     yield guess, False, "miqp's plan without a vehicle"

@@ -87,4 +87,4 @@ def _planned(cause: str, problem: Problem, planner: Planner, vehicle: Vehicle | 
     try:
         return plan(problem, planner, vehicle)
     except Infeasible as infeasible:
-        raise Infeasible(f"with '{cause}': {infeasible}", infeasible.attempts) from None
+        raise Infeasible(f"with '{cause}': {infeasible.sentence}", infeasible.attempts) from None

@@ -9,7 +9,7 @@ from typing import Protocol
 
 from aerobat.errors import Infeasible, SpecError
 from aerobat.optimization.deadline import out_of_time, within_time
-from aerobat.planning import Plan, Planner, plan, without_advice
+from aerobat.planning import Plan, Planner, plan
 from aerobat.planning.assessment.contradiction import contradiction
 from aerobat.studies.feasibility.binding import binding_limits, limits_in
 from aerobat.studies.feasibility.fields import Scenario
@@ -75,13 +75,15 @@ def probe(task: Task, values: Sequence[float]) -> Probe:
 
 
 def _planned(scenario: Scenario, task: Task) -> Probe:
-    with within_time(task.time_limit), without_advice():
+    with within_time(task.time_limit):
         try:
             found = plan(scenario.problem, task.planner, scenario.vehicle)
         except Infeasible as error:
             reason = Feasibility.NO_PLAN if error.attempts else Feasibility.REFUSED
             return Probe(
-                Feasibility.NO_ANSWER if out_of_time() else reason, str(error), limits_in(str(error))
+                Feasibility.NO_ANSWER if out_of_time() else reason,
+                error.sentence,
+                limits_in(error.sentence),
             )
     assert found.certificate is not None, "a plan for a vehicle is certified"
     assert found.flyability is not None, "and flown"

@@ -277,6 +277,7 @@ class _Tightening:
             f"{percent(task.probability)} %: under {task.conditions.name} {share} pass at best, with a "
             f"reserve of {best.reserve:g}{why}; ask for less, or better that",
             [attempt for done in self.rounds for attempt in done.plan.attempts],
+            remedy="",
         )
 
 

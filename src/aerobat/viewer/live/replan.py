@@ -62,9 +62,9 @@ class Replanner:
             planned = self.plan(setting, is_overtaken)
             return judged(planned, flown(planned, setting))
         except Infeasible as error:
-            return Answer(Verdict("Infeasible", _sentence(error), False))
+            return Answer(Verdict("Infeasible", _capitalized(error.sentence), False))
         except AerobatError as error:
-            return Answer(Verdict("Refused", _sentence(error), False))
+            return Answer(Verdict("Refused", _capitalized(str(error)), False))
 
     def plan(self, setting: Setting, is_overtaken: Callable[[], bool] = lambda: False) -> Plan:
         """The setting's plan, however it is flown."""
@@ -117,6 +117,5 @@ def _planned(setting: Setting, is_overtaken: Callable[[], bool]) -> Plan:
     return replace(found, attempts=())  # nobody looks at them here
 
 
-def _sentence(error: AerobatError) -> str:
-    text = str(error)
+def _capitalized(text: str) -> str:
     return text[:1].upper() + text[1:]

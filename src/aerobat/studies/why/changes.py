@@ -1,0 +1,132 @@
+"""Changes that may make a problem plannable: less asked of path, vehicle, stages or reserve."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from aerobat.planning import Planner
+from aerobat.planning.miqp.miqp import ASSUMED_THRUST_TO_WEIGHT
+from aerobat.problem.problem import DERIVATIVES, Problem
+from aerobat.problem.stage import Stage
+from aerobat.studies.why.eased_stages import at_any_time, eased, with_half_the_thrust
+from aerobat.vehicle import Vehicle
+
+STRONGER = 1.5  # times the rotors' largest thrusts
+
+
+@dataclass(frozen=True, eq=False)
+class Task:
+    """A problem, the vehicle for it if there is one, and how to plan."""
+
+    problem: Problem
+    vehicle: Vehicle | None
+    planner: Planner | None  # None for the one that suits the problem
+
+    @property
+    def reserve(self) -> float:
+        """The fraction of the rotors' ranges that the planner is asked to keep; zero where it keeps none."""
+        return float(getattr(self.planner, "reserve", 0.0))
+
+    @property
+    def max_specific_thrust(self) -> float:
+        """The vehicle's, by which stages ask, or what is assumed without one [m/s²]."""
+        if self.vehicle is None:
+            return ASSUMED_THRUST_TO_WEIGHT * self.problem.environment.gravity
+        return self.vehicle.max_specific_thrust
+
+
+@dataclass(frozen=True)
+class Change:
+    """A change that may help, in words, each of which is a value to be changed in a file or a call."""
+
+    words: str
+    apply: Callable[[Task], Task]
+
+
+def changes(task: Task) -> list[Change]:
+    """The changes that a task leaves room for."""
+    return [*_of_limits(task), *_of_reserve(task), *_of_vehicle(task), *_of_stages(task)]
+
+
+def _of_limits(task: Task) -> Iterator[Change]:
+    for derivative, name in enumerate(DERIVATIVES):
+        if np.isfinite(np.concatenate(task.problem.limits.of(derivative))).any():
+            key = "limits.lower and limits.upper" if derivative == 0 else f"limits.{name}"
+            yield Change(f"without {key}", partial(_without_limit, derivative))
+    if np.isfinite(task.problem.limits.max_tilt):
+        yield Change("without limits.max_tilt", _without_tilt_limit)
+    if task.problem.environment.ground is not None:
+        yield Change("without environment.ground", _without_ground)
+
+
+def _without_limit(derivative: int, task: Task) -> Task:
+    return _with_problem(task, limits=task.problem.limits.without(derivative))
+
+
+def _without_tilt_limit(task: Task) -> Task:
+    return _with_problem(task, limits=replace(task.problem.limits, max_tilt=np.inf))
+
+
+def _without_ground(task: Task) -> Task:
+    return _with_problem(task, environment=replace(task.problem.environment, ground=None))
+
+
+def _with_problem(task: Task, **changed: Any) -> Task:
+    return replace(task, problem=replace(task.problem, **changed))
+
+
+def _of_reserve(task: Task) -> Iterator[Change]:
+    if task.reserve > 0.0:
+        yield Change("without reserve", _without_reserve)
+
+
+def _without_reserve(task: Task) -> Task:
+    planner: Any = task.planner
+    return replace(task, planner=replace(planner, reserve=0.0))
+
+
+def _of_vehicle(task: Task) -> Iterator[Change]:
+    vehicle = task.vehicle
+    if vehicle is None:
+        return
+    yield Change(f"with {STRONGER:g} times the max_thrust", _with_stronger_rotors)
+    if (vehicle.min_thrusts > 0.0).any():
+        yield Change("with min_thrust 0", partial(_with_rotors, {"min_thrust": 0.0}))
+    if vehicle.lags.any():
+        yield Change("with rotors without lag", partial(_with_rotors, {"lag": 0.0}))
+    if np.isfinite(vehicle.max_body_rate):
+        yield Change("without max_body_rate", _without_rate_limit)
+
+
+def _with_stronger_rotors(task: Task) -> Task:
+    assert task.vehicle is not None
+    rotors = (replace(rotor, max_thrust=STRONGER * rotor.max_thrust) for rotor in task.vehicle.rotors)
+    return replace(task, vehicle=replace(task.vehicle, rotors=tuple(rotors)))
+
+
+def _with_rotors(changed: Mapping[str, Any], task: Task) -> Task:
+    assert task.vehicle is not None
+    rotors = (replace(rotor, **changed) for rotor in task.vehicle.rotors)
+    return replace(task, vehicle=replace(task.vehicle, rotors=tuple(rotors)))
+
+
+def _without_rate_limit(task: Task) -> Task:
+    assert task.vehicle is not None
+    return replace(task, vehicle=replace(task.vehicle, max_body_rate=np.inf))
+
+
+def _of_stages(task: Task) -> Iterator[Change]:
+    stages = task.problem.stages(task.max_specific_thrust).stages
+    if any(stage.at != "free" for stage in stages):
+        yield Change("with its stages at any time", partial(_with_stages, at_any_time))
+    if any(condition.min_thrust > 0.0 for stage in stages for condition in stage.conditions):
+        yield Change("with half the thrust that its stages ask", partial(_with_stages, with_half_the_thrust))
+
+
+def _with_stages(ease: Callable[[Stage], Stage], task: Task) -> Task:
+    return replace(task, problem=eased(task.problem, task.max_specific_thrust, ease))

@@ -1,0 +1,194 @@
+"""why(): which bound keeps a problem from being planned, and what was changed when it was planned.
+
+Nothing is advised that was not tried: each remedy comes with its plan.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from functools import reduce
+
+from aerobat.declaration import by_value, short, validated
+from aerobat.errors import BackendMissing, Infeasible, SpecError
+from aerobat.optimization.deadline import out_of_time, processor, within_time
+from aerobat.planning import Plan, Planner, as_planner, plan, registered_planners, suited_planner
+from aerobat.planning.miqp.rescue import MOTION, keeping
+from aerobat.problem import Problem, as_problem
+from aerobat.studies.feasibility.binding import limits_in
+from aerobat.studies.feasibility.probe import TIME_LIMIT
+from aerobat.studies.why.changes import Change, Task, changes
+from aerobat.vehicle import Vehicle, as_vehicle
+
+# [s] of the processor for the plan of each change: twice what a refusal takes
+CHANGE_TIME = 10.0
+Tried = Callable[[str, bool], None]
+
+
+@short
+@by_value
+@dataclass(frozen=True, eq=False, repr=False)
+class Remedy:
+    """Changes with which a problem is planned, and the plan."""
+
+    changes: tuple[str, ...]  # in words, all of them together; none where another planner is enough
+    plan: Plan
+
+    def __str__(self) -> str:
+        """What is changed, and who plans it."""
+        return f"{_told(self.changes)} (by {self.plan.planner} in {self.plan.duration:.3f} s)"
+
+
+@short
+@by_value
+@dataclass(frozen=True, eq=False, repr=False)
+class Why:
+    """Why a problem has no plan, and what helps."""
+
+    problem: str  # its name
+    refusal: str  # a sentence that names the bound that binds; empty where there is a plan
+    limits: tuple[str, ...]  # that it names, by their fields
+    remedies: tuple[Remedy, ...]  # each by itself enough
+    tried: tuple[str, ...]  # changes, each alone
+
+    @property
+    def advice(self) -> str:
+        """What helps, in a sentence without its full stop."""
+        if self.remedies:
+            return f"'{self.problem}' is planned {', or '.join(map(str, self.remedies))}"
+        if not self.tried:
+            return f"'{self.problem}' leaves nothing to change that might help"
+        return f"'{self.problem}' is not planned {', '.join(self.tried)}, nor with all of that together"
+
+    def __str__(self) -> str:
+        """Which bound binds, and what helps."""
+        return "; ".join(filter(None, (self.refusal, self.advice)))
+
+
+@validated
+def why(
+    problem: Problem | str,
+    planner: Planner | str | None = None,
+    vehicle: Vehicle | str | None = None,
+    progress: Tried | None = None,
+) -> Why:
+    """Find out why a problem has no plan, and with which changes it has one.
+
+    Changes are tried one at a time: without each limit, with stronger rotors, with stages at any time, and so
+    on. Where none is enough alone, the fewest of all of them together are sought. Each is planned by
+    `planner`, by the planner that suits the problem, and by all other registered ones, until one has a plan
+    that is certified and flies, or 10 s of the processor are over. All of that takes up to minutes.
+
+    Args:
+        problem: What is to be planned, or its name.
+        planner: How to plan, or a registered name; left out, the planner that suits the problem.
+        vehicle: What shall fly it, or its name.
+        progress: Called with each change, and whether it helps, as they are tried.
+
+    Raises:
+        SpecError: The input makes no sense, as where a vehicle does not fit through its gate.
+    """
+    chosen = None if planner is None else as_planner(planner)
+    flown_by = None if vehicle is None else as_vehicle(vehicle)
+    task = Task(as_problem(problem), flown_by, chosen)
+    try:
+        found = plan(task.problem, task.planner, task.vehicle)
+    except Infeasible as refusal:
+        return explained(refusal, task, progress)
+    return Why(task.problem.name, "", (), (Remedy((), found),), ())
+
+
+def explained(refusal: Infeasible, task: Task, progress: Tried | None = None) -> Why:
+    """The explanation of a refusal that was met.
+
+    Args:
+        refusal: Of the task by its planner.
+        task: What was refused.
+        progress: Called with each change, and whether it helps, as they are tried.
+    """
+    search = _Search(task, progress or (lambda words, helps: None))
+    name, sentence, is_proven = task.problem.name, refusal.sentence, not refusal.attempts
+    found = (None if is_proven else search.by_others()) or search.by_changes()
+    return Why(name, sentence, limits_in(sentence), tuple(found), tuple(search.tried))
+
+
+class _Search:
+    """The search for changes with which a task is planned."""
+
+    def __init__(self, task: Task, progress: Tried) -> None:
+        self.task, self.progress = task, progress
+        self.tried: list[str] = []
+
+    def by_others(self) -> list[Remedy]:
+        """The plan of another planner, with nothing changed, if there is one."""
+        found = self._remedy([])
+        return [] if found is None else [found]
+
+    def by_changes(self) -> list[Remedy]:
+        """Each change that is enough alone; where there is none, the fewest together."""
+        found = changes(self.task)
+        alone = []
+        for change in found:
+            if out_of_time():
+                break
+            self.tried.append(change.words)
+            alone.append(self._remedy([change]))
+        helpful = [each for each in alone if each is not None]
+        return helpful or (self._fewest(found) if len(found) > 1 else [])
+
+    def _fewest(self, found: list[Change]) -> list[Remedy]:
+        """The fewest changes that are enough together, none of which can be left out."""
+        best = self._remedy(found)
+        kept = found if best is not None else []
+        for change in list(kept):
+            fewer = [each for each in kept if each is not change]
+            again = self._remedy(fewer) if len(fewer) > 1 and not out_of_time() else None
+            if again is not None:
+                kept, best = fewer, again
+        return [] if best is None else [best]
+
+    def _remedy(self, several: list[Change]) -> Remedy | None:
+        """The plan with several changes; None where there is none."""
+        changed = reduce(lambda task, change: change.apply(task), several, self.task)
+        planners = _planners(changed, refused=not several)
+        with within_time(CHANGE_TIME if several else TIME_LIMIT, processor):
+            found = next(filter(None, (_planned(changed, planner) for planner in planners)), None)
+        words = tuple(change.words for change in several)
+        self.progress(_told(words), found is not None)
+        return None if found is None else Remedy(words, found)
+
+
+def _planners(task: Task, refused: bool) -> Iterator[Planner]:
+    """The planners to ask: the task's, the one that suits it, all others, each to keep the task's reserve.
+
+    Args:
+        task: What is planned; without a vehicle only miqp holds the problem's limits.
+        refused: Whether the task's own planner refused it already.
+    """
+    suits = suited_planner(task.problem, task.vehicle)
+    suited = keeping(task.reserve, suits)
+    asked = suited if task.planner is None else task.planner
+    if not refused:
+        yield asked
+    if suited != asked:
+        yield suited
+    others = [name for name, cls in registered_planners().items() if cls not in (type(asked), type(suited))]
+    for name in sorted(others, key=lambda name: name != MOTION) if task.vehicle is not None else ():
+        yield keeping(task.reserve, name)
+
+
+def _planned(task: Task, planner: Planner) -> Plan | None:
+    """The planner's plan, certified for the vehicle and flown as it should be; None where there is none."""
+    if out_of_time():
+        return None
+    try:
+        found = plan(task.problem, planner, task.vehicle)
+    except (Infeasible, SpecError, BackendMissing):
+        return None
+    flies = task.vehicle is None or (found.certified and found.flies)
+    return found if flies else None
+
+
+def _told(changes: tuple[str, ...]) -> str:
+    """Changes together, in words."""
+    return " and ".join(changes) or "as it is"
