@@ -10,7 +10,7 @@ import pytest
 
 import aerobat as ab
 from aerobat import cli
-from aerobat.cli.entry import ExitCode
+from aerobat.cli.exit_code import ExitCode
 from aerobat.simulation import Outcome
 from command_lines import code, without_pictures
 from places import ROOT

@@ -7,7 +7,7 @@ from itertools import pairwise
 
 from cyclopts import App, CycloptsError
 
-from aerobat.cli.entry import ExitCode
+from aerobat.cli.exit_code import ExitCode
 from aerobat.errors import SpecError
 
 IMPORT_FLAG = "--import"

@@ -10,24 +10,13 @@ import gc
 import os
 import sys
 from collections.abc import Sequence
-from enum import IntEnum
 
+from aerobat.cli.exit_code import ExitCode
 from aerobat.cli.interrupts import interruptible
 from aerobat.cli.terminal import discard, provide_streams, say
 from aerobat.errors import AerobatError, Infeasible
 
 EXPLAIN = "add --explain to `aerobat plan` to try changes that would help"
-
-
-class ExitCode(IntEnum):
-    """What a run came to, for scripts."""
-
-    WELL = 0
-    NOT_WELL = 1  # not certified, or not flown as it should be
-    BAD_INPUT = 2
-    NO_PLAN = 3
-    INTERRUPTED = 130  # as shells say it, and the next
-    BROKEN_PIPE = 141
 
 
 def main(arguments: Sequence[str] | None = None) -> None:

@@ -10,7 +10,7 @@ from typing import Annotated
 from cyclopts import Parameter
 
 from aerobat.certification import Certificate, Envelope, certify
-from aerobat.cli.entry import ExitCode
+from aerobat.cli.exit_code import ExitCode
 from aerobat.cli.options import POSITIVE, Plugins, limiting, output
 from aerobat.cli.runs.record import default_vehicle
 from aerobat.cli.runs.saved_plans import named_vehicle

@@ -9,7 +9,7 @@ import numpy as np
 from cyclopts import Parameter
 
 from aerobat.arrays import Array
-from aerobat.cli.entry import ExitCode
+from aerobat.cli.exit_code import ExitCode
 from aerobat.cli.link_options import MavlinkOptions
 from aerobat.cli.terminal import print_json, say
 from aerobat.errors import SpecError

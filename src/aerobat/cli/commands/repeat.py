@@ -16,7 +16,7 @@ from aerobat.cli.commands.fly import flown
 from aerobat.cli.commands.map import finish_map, map_of
 from aerobat.cli.commands.need import NEED, finish_need, need_of
 from aerobat.cli.commands.sweep import finish_sweep, sweep_of, table_name
-from aerobat.cli.entry import ExitCode
+from aerobat.cli.exit_code import ExitCode
 from aerobat.cli.options import ExplainingOptions, OutputOptions, Plugins, planning
 from aerobat.cli.runs.folder import FLIGHT, finish
 from aerobat.cli.runs.record import RunRecord, read_record, versions_now

@@ -8,7 +8,7 @@ from typing import Annotated
 
 from cyclopts import Parameter, validators
 
-from aerobat.cli.entry import ExitCode
+from aerobat.cli.exit_code import ExitCode
 from aerobat.cli.interrupts import end_interrupts
 from aerobat.cli.options import PlanningOptions, Plugins, flying, limiting, output, planning
 from aerobat.cli.progress import TuningProgress, showing

@@ -10,7 +10,7 @@ from pathlib import Path
 
 from rich.table import Table
 
-from aerobat.cli.entry import ExitCode
+from aerobat.cli.exit_code import ExitCode
 from aerobat.cli.interrupts import end_interrupts
 from aerobat.cli.options import OutputOptions
 from aerobat.cli.runs.record import RECORD, RunRecord, write_record

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, field, fields, replace
 from math import inf
-from typing import TYPE_CHECKING, Any, cast
+from typing import Any, cast
 
 from aerobat.errors import BackendMissing, Infeasible, SpecError
 from aerobat.optimization.deadline import out_of_time, processor, within_share, within_time
@@ -20,9 +20,6 @@ from aerobat.planning.result import Plan
 from aerobat.planning.rotor_margin import reserve_shortfalls
 from aerobat.problem.problem import Problem
 from aerobat.vehicle import Vehicle
-
-if TYPE_CHECKING:
-    from aerobat.planning.miqp.miqp import Miqp
 
 MORE_INTERVALS = (1.3, 2.0)  # times as many
 A_STAGE = 2  # intervals at least: fewer leave the path of a course no choice
@@ -38,7 +35,7 @@ MOTIONS = 2  # that time-optimal starts from: further ones make motions faster, 
 class Rescue:
     """The search for a plan by other ways than one that found none."""
 
-    asked: Miqp
+    asked: Any  # a Miqp, whose own module asks this one
     problem: Problem
     vehicle: Vehicle
     recorder: Recorder  # whose attempts come first; those that follow are passed on to its `progress`
@@ -140,7 +137,7 @@ class Rescue:
     def _path_without_rotors(self) -> Plan | None:
         """The MIQP's plan for no vehicle."""
         try:
-            return replace(self.asked, rescue=False).plan(self.problem)
+            return cast(Plan, replace(self.asked, rescue=False).plan(self.problem))
         except Infeasible:
             return None
 
@@ -179,7 +176,7 @@ def keeping(reserve: float, name: str, **others: Any) -> Planner:
     return cast(Planner, cls(**settings))
 
 
-def with_more_intervals(asked: Miqp, problem: Problem, vehicle: Vehicle) -> Iterator[tuple[Planner, str]]:
+def with_more_intervals(asked: Any, problem: Problem, vehicle: Vehicle) -> Iterator[tuple[Planner, str]]:
     """Return the planner with more intervals than were asked for, the fewest first, and how in words."""
     stages = len(problem.stages(vehicle.max_specific_thrust).stages)
     more = {max(round(factor * asked.intervals), A_STAGE * stages) for factor in MORE_INTERVALS}

@@ -17,8 +17,7 @@ from aerobat.planning.recorder import Attempt, Recorder
 from aerobat.planning.time_optimal.collocated_program import CollocatedProgram, SolvedMotion
 from aerobat.planning.time_optimal.optimal_control.elements import Elements
 from aerobat.planning.time_optimal.starts import Start, starts
-from aerobat.planning.time_optimal.time_optimal import MIN_INTERVALS
-from aerobat.planning.warm_start import WarmStart
+from aerobat.planning.warm_start import MIN_INTERVALS, WarmStart
 from aerobat.problem.problem import Problem
 from aerobat.vehicle import Vehicle
 

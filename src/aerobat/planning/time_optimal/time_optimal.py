@@ -26,7 +26,7 @@ from aerobat.planning.recorder import Progress, Recorder
 from aerobat.planning.result import FLYING_RESERVE, Plan
 from aerobat.planning.rotor_margin import reserve_shortfalls
 from aerobat.planning.time_limit import TIME_LIMIT, stopped, too_short
-from aerobat.planning.warm_start import Reserve, require_attitudes
+from aerobat.planning.warm_start import MIN_INTERVALS, Reserve, require_attitudes
 from aerobat.problem.problem import Problem
 from aerobat.vehicle import Vehicle
 
@@ -36,7 +36,6 @@ if TYPE_CHECKING:  # what it takes to plan is imported then: the options are tho
     from aerobat.planning.time_optimal.race import Race
     from aerobat.planning.time_optimal.starts import Starts
 
-MIN_INTERVALS = 4  # of a phase
 SMOOTHING_LAG = 0.005  # [s] that rotors without lag are given, where thrusts that jump lead nowhere
 
 

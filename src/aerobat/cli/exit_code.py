@@ -1,0 +1,16 @@
+"""What a run comes to, for scripts."""
+
+from __future__ import annotations
+
+from enum import IntEnum
+
+
+class ExitCode(IntEnum):
+    """What a run came to, for scripts."""
+
+    WELL = 0
+    NOT_WELL = 1  # not certified, or not flown as it should be
+    BAD_INPUT = 2
+    NO_PLAN = 3
+    INTERRUPTED = 130  # as shells say it, and the next
+    BROKEN_PIPE = 141
