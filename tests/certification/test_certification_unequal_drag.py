@@ -14,8 +14,9 @@ from aerobat.errors import Infeasible
 from aerobat.flatness import reference, reference_of
 from aerobat.problem import Condition
 from aerobat.trajectory import Trajectory
+from aerobat.trajectory.polynomial import hermite
 from exact_drag import Exact, exact
-from random_flights import Flight, random_flight
+from random_flights import Flight, random_flight, with_lags
 from suites import examples
 
 QUAD = ab.load_vehicle("agile-quad")
@@ -155,3 +156,24 @@ def test_a_series_of_states_has_the_references_of_its_path(seed):
     ).setpoint
     assert so3.angle_between(path.q_world_body, again.q_world_body).max() < 1e-9
     np.testing.assert_allclose(path.omega_body, again.omega_body, atol=1e-8)
+
+
+@pytest.mark.parametrize("drag", [(0.3, 0.3, 0.1), (0.4, 0.2, 0.1)])
+def test_jerk_may_jump_along_the_vehicles_thrust_axis_and_no_other(drag):
+    vehicle = with_lags(replace(QUAD, drag_body=QUAD.mass * np.array(drag)), 0.0)
+    states = np.random.default_rng(1).normal(size=(3, 4, 3)) * np.array([1.0, 5.0, 4.0, 5.0])[:, None]
+
+    def path(jump: np.ndarray) -> Trajectory:
+        begin = states[:-1].copy()
+        begin[1, 3] += jump
+        return Trajectory([1.0, 1.0], hermite(begin, states[1:]))
+
+    smooth = path(np.zeros(3))
+    own = so3.thrust_axis(reference(smooth, vehicle, [1.0]).setpoint.q_world_body[0])
+    drag_over_mass = 0.3 * smooth.evaluate(1.0, 1)
+    mean = smooth.evaluate(1.0, 2) + 9.81 * UP + drag_over_mass
+    along_own, along_mean = (
+        certify(path(20.0 * axis / np.linalg.norm(axis)), vehicle).discontinuities for axis in (own, mean)
+    )
+    assert along_own == ()
+    assert [jump.quantity for jump in along_mean] == ([] if drag[0] == drag[1] else ["body rate"])

@@ -21,7 +21,9 @@ from typing import Any
 
 import numpy as np
 
+from aerobat import so3
 from aerobat.arrays import Array, Indices
+from aerobat.flatness import has_unequal_drag, reference
 from aerobat.optimization.nonlinear import import_casadi
 from aerobat.planning.time_optimal.optimal_control.zero_yaw_rate_body import (
     INPUTS,
@@ -262,9 +264,38 @@ def trajectory_of(body: ZeroYawRateBody, mesh: Mesh, motion: CollocatedMotion, h
         for state, u in sides
         for k, rate in enumerate(columns(state, u, slope))
     ]
+    trajectory = _integrated(motion, durations, ends, heading)
+    if has_unequal_drag(body.vehicle):
+        _join_body_rates(body, trajectory, ends)
+        trajectory = _integrated(motion, durations, ends, heading)
+    return trajectory
+
+
+def _join_body_rates(body: ZeroYawRateBody, trajectory: Trajectory, ends: list[Array]) -> None:
+    """Leave of the jumps of jerk between intervals what is along the thrust: only there may it jump.
+
+    With unequal drag the thrust axis depends on the body's angle about it, which the path's own attitude and
+    the motion's, of which the jumps are, have in common but for the error of collocation.
+
+    Args:
+        body: The equations of motion.
+        trajectory: What `ends` make.
+        ends: Acceleration, jerk and snap at both ends of intervals, times powers of durations, (3, K).
+    """
+    found = reference(trajectory, body.vehicle, trajectory.knots, environment=body.environment)
+    b3 = so3.thrust_axis(found.setpoint.q_world_body[1:-1]).T
+    before, after = ends[4][:, :-1], ends[1][:, 1:]
+    jump = after / trajectory.durations[1:] - before / trajectory.durations[:-1]
+    across = jump - b3 * np.sum(b3 * jump, axis=0)
+    before += across / 2 * trajectory.durations[:-1]
+    after -= across / 2 * trajectory.durations[1:]
+
+
+def _integrated(motion: CollocatedMotion, durations: Array, ends: list[Array], heading: float) -> Trajectory:
+    """The trajectory with these accelerations, jerks and snaps at the ends of intervals."""
     quintics = np.einsum("ij,jdk->kid", QUINTIC, ends) * durations[:, None, None] ** 2
     twice = (np.arange(1, 7) * np.arange(2, 8))[:, None]
-    coefficients = np.concatenate([np.zeros((mesh.total, 2, 3)), quintics / twice], axis=1)
+    coefficients = np.concatenate([np.zeros((len(durations), 2, 3)), quintics / twice], axis=1)
     position, velocity = motion.states[POSITION, 0], motion.states[VELOCITY, 0]
     for piece, h in zip(coefficients, durations.tolist(), strict=True):
         piece[:2] = position, h * velocity
