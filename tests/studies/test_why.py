@@ -10,15 +10,13 @@ import pytest
 
 import aerobat as ab
 from aerobat.planning import registered_planners
-from aerobat.states import STANDARD_GRAVITY
-from aerobat.studies.why import Task, remedies
+from aerobat.studies.why import Task, explained, remedies
 from aerobat.studies.why.changes import changes
 from shared_plans import shared_plan
 
 QUAD = ab.load_vehicle("agile-quad")
 LINE = replace(ab.load_problem("line"), gates=(ab.tilted_gate((5.0, 0.0, 0.0)),))
 SLOW = replace(LINE, limits=ab.Limits(velocity=0.6))  # [m/s], slower than a gate is passed
-LATE = replace(LINE, maneuver=ab.Line(ab.GatePassage(at=(0.93, 0.97))))  # where few intervals follow
 WITHOUT_LIMIT, WITHOUT_RATE = "without limits.velocity", "without max_body_rate"
 
 
@@ -116,20 +114,19 @@ def test_every_registered_planner_is_asked_and_keeps_the_reserve(monkeypatch: py
 
 @pytest.mark.slow
 def test_what_one_planner_finds_no_plan_for_another_may_plan_as_it_is() -> None:
-    """A refusal advised to pass the gate at any time; time-optimal passes it as it is asked to."""
-    found = ab.why(LATE, ab.Miqp(rescue=False), QUAD)
+    """A refusal advised 1.5 times the thrust."""
+    weak = replace(QUAD, rotors=tuple(replace(rotor, max_thrust=2.2) for rotor in QUAD.rotors))
+    found = ab.why("flip-roll", ab.Miqp(intervals=10, rescue=False), weak)
     (remedy,) = found.remedies
-    assert remedy.changes == ()
-    assert remedy.plan.planner == "time-optimal"
-    (gate,) = remedy.plan.stages
-    assert 0.93 <= gate.time / remedy.plan.duration <= 0.97
+    assert (remedy.changes, remedy.plan.planner) == ((), "time-optimal")
+    assert ab.plan("flip-roll", "time-optimal", weak).certified
 
 
-@pytest.mark.slow
-def test_a_reserve_that_leaves_too_little_to_hover_is_what_is_named() -> None:
-    hop = replace(LINE, gates=(), goal=ab.at_rest((0.5, 0.0, 0.0)))
-    heavy = replace(QUAD, mass=0.9 * float(QUAD.max_thrusts.sum()) / STANDARD_GRAVITY)
-    found = ab.why(hop, ab.Miqp(order=4, intervals=8, reserve=0.2), heavy)
-    helpful = {remedy.changes for remedy in found.remedies}
-    assert ("without reserve",) in helpful
-    assert () not in helpful
+def test_a_plan_that_keeps_less_than_the_reserve_helps_only_without_it(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """A closed form, which keeps none, was advised to who asked for a reserve."""
+    monkeypatch.setattr(remedies, "plan", Pretending())
+    task = Task(ab.load_problem("line"), QUAD, ab.Miqp(reserve=0.45))
+    found = explained(ab.Infeasible("it is too little", ["one attempt"]), task)
+    assert [remedy.changes for remedy in found.remedies] == [("without reserve",)]

@@ -84,19 +84,10 @@ class Rescue:
         for planner, how in ways:
             with within_share(share):
                 plan = self._planned(planner, how)
-            if plan is not None and self._is_wanted(plan) and plan.duration < shorter_than:
+            if plan is not None and keeps(plan, self.asked.reserve) and plan.duration < shorter_than:
                 attempts = (*self.recorder.attempts, *plan.attempts)
                 return replace(plan, attempts=attempts, rescue=f"{failed}; planned {how}")
         return None
-
-    def _is_wanted(self, plan: Plan) -> bool:
-        """True for a certified plan that keeps the reserve that is asked."""
-        certificate = plan.certificate
-        return (
-            certificate is not None
-            and plan.certified
-            and not reserve_shortfalls(certificate, self.asked.reserve)
-        )
 
     def _planned(self, planner: Planner, how: str) -> Plan | None:
         """The plan of one way; None where there is none, which is noted."""
@@ -144,7 +135,7 @@ class Rescue:
     def _with_reserve(self, motion: Plan) -> Plan:
         """A time-optimal motion again with a reserve to fly by, or itself where there is none."""
         again = self._planned(keeping(self.asked.reserve, MOTION, start=motion, starts=1), f"by {MOTION}")
-        if again is None or not self._is_wanted(again):
+        if again is None or not keeps(again, self.asked.reserve):
             return motion
         return replace(again, attempts=(*motion.attempts, *again.attempts), rescue=motion.rescue)
 
@@ -159,6 +150,12 @@ class Rescue:
         if self.problem.maneuver.through_points:
             yield keeping(self.asked.reserve, "min-snap"), "by min-snap"
         yield keeping(self.asked.reserve, "free-knots"), "by free-knots"
+
+
+def keeps(plan: Plan, reserve: float) -> bool:
+    """True for a certified plan whose rotors keep a fraction of their ranges."""
+    certificate = plan.certificate
+    return certificate is not None and plan.certified and not reserve_shortfalls(certificate, reserve)
 
 
 def keeping(reserve: float, name: str, **others: Any) -> Planner:

@@ -13,7 +13,7 @@ from aerobat.declaration import by_value, short, validated
 from aerobat.errors import BackendMissing, Infeasible, SpecError
 from aerobat.optimization.deadline import out_of_time, processor, within_time
 from aerobat.planning import Plan, Planner, as_planner, plan, registered_planners, suited_planner
-from aerobat.planning.miqp.rescue import MOTION, keeping
+from aerobat.planning.miqp.rescue import MOTION, keeping, keeps
 from aerobat.problem import Problem, as_problem
 from aerobat.studies.feasibility.binding import limits_in
 from aerobat.studies.feasibility.probe import TIME_LIMIT
@@ -178,15 +178,19 @@ def _planners(task: Task, refused: bool) -> Iterator[Planner]:
 
 
 def _planned(task: Task, planner: Planner) -> Plan | None:
-    """The planner's plan, certified for the vehicle and flown as it should be; None where there is none."""
+    """The planner's plan; None where there is none.
+
+    For a vehicle, it is certified, keeps the task's reserve and flies as it should.
+    """
     if out_of_time():
         return None
     try:
         found = plan(task.problem, planner, task.vehicle)
     except (Infeasible, SpecError, BackendMissing):
         return None
-    flies = task.vehicle is None or (found.certified and found.flies)
-    return found if flies else None
+    if task.vehicle is None:
+        return found
+    return found if keeps(found, task.reserve) and found.flies else None
 
 
 def _told(changes: tuple[str, ...]) -> str:
