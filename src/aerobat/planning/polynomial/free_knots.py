@@ -15,6 +15,7 @@ from pydantic import Field
 
 from aerobat.declaration import AS_IT_IS, Count, NonNegative
 from aerobat.errors import Infeasible
+from aerobat.limits.body_in_gate import BodyInGate
 from aerobat.optimization.deadline import out_of_time, within_time
 from aerobat.optimization.nonlinear import import_casadi
 from aerobat.planning.assessment.assessment import SUSPICIOUS
@@ -109,15 +110,19 @@ class FreeKnots(Planner):
     ) -> Plan | None:
         """The fastest certified plan; where its flight hits a frame, one with room in all gates at first.
 
-        A long course has that room at once.
+        A long course has room in most of them at once.
         """
-        on_course = is_course(sequence)
-        starts = self._on_course if on_course else self._on_maneuver
+        most, every = (
+            bodies_in_gates(sequence.stages, problem, vehicle, everywhere) for everywhere in (False, True)
+        )
         task = problem, vehicle, sequence, recorder
-        found, clears = self._best(starts(*task), *task)
-        if found is None or clears or on_course or out_of_time():
+        on_course = is_course(sequence)
+        starts = self._on_course(*task, most) if on_course else self._on_maneuver(*task)
+        found, clears = self._best(starts, *task)
+        has_no_other = len(most) == len(every) if on_course else not sequence.ordered
+        if found is None or clears or has_no_other or out_of_time():
             return found
-        again, clears = self._best(self._on_course(*task), *task)
+        again, clears = self._best(self._on_course(*task, every), *task)
         return again if clears else found
 
     def _best(
@@ -178,20 +183,28 @@ class FreeKnots(Planner):
         from aerobat.planning.polynomial.descent.framed_problem import FramedProblem
         from aerobat.planning.polynomial.descent.knot_descent import Descent
 
-        if start.on_course:
-            iterations = COURSE_ITERATIONS
-            in_gates = bodies_in_gates(start.guess.stages, problem, vehicle)
-        else:
-            iterations, in_gates = self.iterations, ()
-        framed = FramedProblem.of(problem, vehicle, sequence, start.guess, self.reserve, in_gates)
+        iterations = COURSE_ITERATIONS if start.on_course else self.iterations
+        framed = FramedProblem.of(problem, vehicle, sequence, start.guess, self.reserve, start.in_gates)
         return Descent(framed, recorder, self.still_ends, iterations, start.strategy)
 
     def _on_course(
-        self, problem: Problem, vehicle: Vehicle, sequence: StageSequence, recorder: Recorder
+        self,
+        problem: Problem,
+        vehicle: Vehicle,
+        sequence: StageSequence,
+        recorder: Recorder,
+        in_gates: tuple[BodyInGate, ...],
     ) -> Iterator[_Start]:
         """Where to begin on a course: near a motion of the rigid body, given or its own; at closed forms.
 
         Without lag thrusts jump in such a motion: smooth polynomials begin nearer at the closed form.
+
+        Args:
+            problem: What is planned.
+            vehicle: What flies it.
+            sequence: The problem's stages for it.
+            recorder: Keeps an attempt a solve.
+            in_gates: The body's room in gates, from the start.
         """
         from aerobat.planning.polynomial.descent.knot_descent import NEAR_MOTIONS, OF_COURSES
         from aerobat.planning.polynomial.nearest import nearest_polynomials
@@ -201,15 +214,15 @@ class FreeKnots(Planner):
         allowed = FIT * vehicle.max_specific_thrust
         motion = None if self.start is None else WarmStart.of(self.start, sequence)
         if motion is None and vehicle.lags.any():
-            motion = coarse_motion(problem, vehicle, recorder, self.reserve)
+            motion = coarse_motion(problem, vehicle, recorder, self.reserve, in_gates)
         if motion is not None:
             guess = nearest_polynomials(motion, allowed, MAX_LEG_SEGMENTS * legs)
             number = max(self.segments, guess.trajectory.segments)
-            yield _Start(self.start, guess, (number,), NEAR_MOTIONS, on_course=True)
+            yield _Start(self.start, guess, (number,), NEAR_MOTIONS, True, in_gates)
         of_leg = LEG_SEGMENTS if LEG_SEGMENTS * legs <= MAX_COURSE_SEGMENTS else 1
         for order in START_ORDERS:
             guess = start_along_normals(problem, vehicle, sequence, order)
-            yield _Start(None, guess, (max(self.segments, of_leg * legs),), OF_COURSES, on_course=True)
+            yield _Start(None, guess, (max(self.segments, of_leg * legs),), OF_COURSES, True, in_gates)
 
     def _on_maneuver(
         self, problem: Problem, vehicle: Vehicle, sequence: StageSequence, recorder: Recorder
@@ -241,7 +254,8 @@ class _Start:
     guess: WarmStart
     numbers: tuple[int, ...]  # of segments, to begin with and in the end
     strategy: Strategy
-    on_course: bool = False  # with room in all gates from the start
+    on_course: bool = False
+    in_gates: tuple[BodyInGate, ...] = ()  # the body's room in them, from the start
 
 
 def _slow(plan: Plan, vehicle: Vehicle) -> bool:

@@ -186,7 +186,13 @@ class Race:
         self.recorder.record(attempt)
 
 
-def coarse_motion(problem: Problem, vehicle: Vehicle, recorder: Recorder, reserve: float) -> WarmStart | None:
+def coarse_motion(
+    problem: Problem,
+    vehicle: Vehicle,
+    recorder: Recorder,
+    reserve: float,
+    in_gates: tuple[BodyInGate, ...],
+) -> WarmStart | None:
     """A course's fastest motion on a coarse mesh, within limits at its nodes; None where none is found.
 
     Args:
@@ -194,10 +200,12 @@ def coarse_motion(problem: Problem, vehicle: Vehicle, recorder: Recorder, reserv
         vehicle: What flies it.
         recorder: Keeps an attempt a solve.
         reserve: Of each rotor's range, kept from either of its ends.
+        in_gates: The body's room in gates.
     """
     race = Race(problem, vehicle, recorder, MIN_INTERVALS, COURSE_COARSE_ITERATIONS, reserve)
     begun = starts(problem, vehicle, Miqp(), planar=False, count=COURSE_STARTS, first=None)
-    return next((program.start.guess for program in race._coarse(begun.motions, vehicle)), None)
+    motions = [replace(start, in_gates=in_gates) for start in begun.motions]
+    return next((program.start.guess for program in race._coarse(motions, vehicle)), None)
 
 
 def _finalists(
