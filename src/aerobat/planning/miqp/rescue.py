@@ -26,6 +26,8 @@ A_STAGE = 2  # intervals at least: fewer leave the path of a course no choice
 MANY_INTERVALS = 40  # where that is more still: a narrow window at an end needs intervals on either side
 # [s] of the processor for all other ways together, so that refusals take 5 s (benchmarks/audit.py)
 RESCUE_TIME = 4.0
+# [s] of the processor more, where time-optimal has found a motion on a coarse mesh: there most likely is one
+PROMISING_TIME = 15.0
 ONE_WAY = 0.75  # of the time that is left, for one way, so that the next has some
 MOTION = "time-optimal"  # the planner of rigid bodies' motions, which others come near at best
 MOTIONS = 2  # that time-optimal starts from: further ones make motions faster, but seldom find the first
@@ -42,12 +44,22 @@ class Rescue:
     failed: list[str] = field(default_factory=list)  # ways that find none
     unanswered: list[str] = field(default_factory=list)  # ways for which there was too little time
     missing: list[str] = field(default_factory=list)  # ways whose solver is not installed
+    is_promising: bool = (
+        False  # whether a motion was found on a coarse mesh, and no time was left for a fine one
+    )
 
     def plan(self) -> Plan | None:
         """The first certified plan that another way finds, which says so; None where all fail."""
         with within_time(RESCUE_TIME, processor):
-            found = self._first(self._ways(), f"miqp found none with {self.asked.intervals} intervals")
+            found = self._first(self._ways(), self._none_found)
+        if found is None and self.is_promising:
+            with within_time(PROMISING_TIME, processor):
+                found = self._first(iter([self._motion_from_all()]), self._none_found)
         return self._with_reserve(found) if found is not None and found.planner == MOTION else found
+
+    @property
+    def _none_found(self) -> str:
+        return f"miqp found none with {self.asked.intervals} intervals"
 
     def shortened(self, plan: Plan) -> Plan:
         """A shorter plan on more intervals, which says so, else the plan: it is a program's own answer."""
@@ -98,8 +110,10 @@ class Rescue:
             return planner.plan(self.problem, self.vehicle, self.recorder.progress)
         except BackendMissing:
             self.missing.append(how)
-        except Infeasible:
+        except Infeasible as refusal:
             (self.unanswered if out_of_time() else self.failed).append(how)
+            is_motion = isinstance(planner, planner_class(MOTION))
+            self.is_promising |= is_motion and any(each.cost is not None for each in refusal.attempts)
         except SpecError:
             pass  # the planner does not take such problems
         return None
@@ -112,12 +126,16 @@ class Rescue:
         """
         more = with_more_intervals(self.asked, self.problem, self.vehicle)
         if any(attempt.cost is not None for attempt in self.recorder.attempts):
-            yield self._motion(self._path_without_rotors()), f"by {MOTION}"
+            yield self._motion_from_all()
             yield from more
         else:
             yield from more
             yield self._motion(None), f"by {MOTION}"
         yield from self._others()
+
+    def _motion_from_all(self) -> tuple[Planner, str]:
+        """Time-optimal, from the path without rotors among others."""
+        return self._motion(self._path_without_rotors()), f"by {MOTION}"
 
     def _motion(self, start: Plan | None) -> Planner:
         """Time-optimal, quickly, with no reserve but the one that is asked: that tells soonest of none."""
