@@ -40,12 +40,17 @@ def least_duration(problem: Problem, vehicle: Vehicle) -> float:
     sequence = problem.stages(vehicle.max_specific_thrust, vehicle.body_radius)
     lines = [_Line.of(problem, vehicle, sequence, n) for n in _directions(problem, sequence)]
 
+    # [1/s] times the airspeed, what drag unequal along body x and y moves thrust by from that of their mean
+    across = abs(float(vehicle.drag_body[0] - vehicle.drag_body[1])) / 2.0 / vehicle.mass
+
     def moving(duration: float) -> float:
-        thrust = _max_thrust(problem, vehicle, duration)
-        return max(line.least_time(thrust) for line in lines)
+        speed = _max_airspeed(problem, vehicle, duration)
+        thrust = vehicle.max_specific_thrust + (abs(axial_drag(vehicle)) + across) * speed
+        return max(line.least_time(thrust, across * speed) for line in lines)
 
     longest = moving(0.0)
-    shortest = longest if axial_drag(vehicle) == 0.0 else _least_consistent(moving, longest)
+    equal = axial_drag(vehicle) == across == 0.0
+    shortest = longest if equal else _least_consistent(moving, longest)
     rests = sum(stage.hold for stage in sequence.stages)
     return rests + max(shortest, _turning_time(problem, vehicle, sequence))
 
@@ -62,20 +67,17 @@ def _least_consistent(least: Callable[[float], float], longest: float) -> float:
     return shortest
 
 
-def _max_thrust(problem: Problem, vehicle: Vehicle, duration: float) -> float:
-    """The largest |f| [m/s²] within a duration.
+def _max_airspeed(problem: Problem, vehicle: Vehicle, duration: float) -> float:
+    """The largest airspeed [m/s] within a duration, which adds to |f| where drag differs by the body's axes.
 
-    Where drag along the thrust axis differs from that across it, the airspeed adds to it. Drag only ever
-    slows, so that in the duration no more airspeed is gained than thrust and weight give. Of a closed lap,
-    whose velocity is zero on average, each component is zero somewhere, as in a start at rest.
+    Drag only ever slows, so that in the duration no more airspeed is gained than thrust and weight give. Of a
+    closed lap, whose velocity is zero on average, each component is zero somewhere, as in a start at rest.
     """
-    environment, drag = problem.environment, abs(axial_drag(vehicle))
-    if drag == 0.0:
-        return vehicle.max_specific_thrust
+    environment = problem.environment
     pull = vehicle.max_specific_thrust + environment.gravity
     gained = float(np.linalg.norm(problem.start.velocity - environment.wind)) + pull * duration
     limited = float(np.linalg.norm(problem.limits.velocity) + np.linalg.norm(environment.wind))
-    return vehicle.max_specific_thrust + drag * min(gained, limited)
+    return min(gained, limited)
 
 
 def _directions(problem: Problem, sequence: StageSequence) -> Iterator[Array]:
@@ -157,13 +159,15 @@ class _Line:
             max_speed=float(np.abs(direction[crossed]) @ speeds),
         )
 
-    def least_time(self, max_thrust: float) -> float:
+    def least_time(self, max_thrust: float, slack: float) -> float:
         """The longest of the least times [s] by way of places that have to be met one after another.
+
+        Bounds on the thrust that hold throughout give way by `slack` [m/s²].
 
         Of stages in no order only one at a time counts; of a closed lap every way from a place back to it.
         """
-        forward = min(max_thrust, self.upper) - self.constant
-        backward = min(max_thrust, -self.lower) + self.constant
+        forward = min(max_thrust, self.upper + slack) - self.constant
+        backward = min(max_thrust, slack - self.lower) + self.constant
         up = DampedPoint(forward, backward, self.damping, self.max_speed)
         down = DampedPoint(backward, forward, self.damping, self.max_speed)
         return max((_longest(course, up, down) for course in self._courses()), default=0.0)
