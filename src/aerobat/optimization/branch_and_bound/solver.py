@@ -1,4 +1,11 @@
-"""The built-in solver: a direct search and, where it is long, one that cuts the sequence in two."""
+"""The built-in solver: a direct search and, where a proof takes long, one that cuts the sequence in two.
+
+The cut search serves proofs. Programs reach it whose stages have an order, three of which confine a
+position, and of which the optimum is asked without a limit of nodes: those of `plan(problem)` without a
+vehicle, and those of `Miqp(search=...)`. The scan of `Miqp` for a vehicle ends each search after a few
+hundred nodes, because its paths begin at slots that need not be the cheapest. Stages of more than three
+places go in windows (`moving_window`), and those of `--paper` have no order.
+"""
 
 from __future__ import annotations
 
@@ -15,6 +22,7 @@ from aerobat.optimization.branch_and_bound.time_decomposition import TimeDecompo
 from aerobat.optimization.deadline import shorter
 from aerobat.optimization.result import AssignmentResult, verified
 
+# chosen on three free gates by benchmarks/growth_with_stages.py; docs/benchmarks.md has the counts
 DIRECT_NODES = 300  # of a direct search, before the sequence is cut in two
 MIN_NODES = 6000  # of all: with fewer no proof comes of a cut, and the bound is the worse for it
 
