@@ -190,6 +190,7 @@ def test_what_is_not_proven_for_its_vehicle_is_refused() -> None:
 def test_a_plan_that_begins_in_motion_is_refused() -> None:
     plan = flip()
     moving = ab.Trajectory([1.0], [[[0.0, 0.0, 0.0], [1.0, 0.0, 0.0]]])
-    plan = replace(plan, problem=ab.load_problem("line"), stages=())
+    ends = (ab.EndState((x, 0.0, 0.0), velocity=(1.0, 0.0, 0.0)) for x in (0.0, 1.0))
+    plan = replace(plan, problem=ab.Problem("moving", *ends), stages=())
     with pytest.raises(SpecError, match="begins in motion"):
         require_flyable(replace(plan, trajectory=moving), ORIGIN)
