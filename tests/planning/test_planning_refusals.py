@@ -74,6 +74,20 @@ def test_a_refusal_stays_what_it_is_from_process_to_process() -> None:
     )
 
 
+def test_why_there_is_no_plan_is_found_out_once_and_only_where_it_is_read() -> None:
+    asked: list[str] = []
+
+    def diagnosis() -> str:
+        asked.append("once")
+        return "it is too little"
+
+    refusal = Infeasible(diagnosis, ["one attempt"])
+    assert not asked
+    assert str(refusal).startswith("it is too little; ")
+    assert pickle.loads(pickle.dumps(refusal)).sentence == refusal.sentence
+    assert asked == ["once"]
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("ratio", [1.10, 1.05])
 def test_what_rotors_just_can_is_planned_by_whichever_planner_finds_it(ratio: float) -> None:

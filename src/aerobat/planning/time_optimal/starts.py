@@ -86,7 +86,7 @@ def starts(
         plans = [] if first is None else [(first, f"{first.planner}'s plan")]
         sources = [*_sources(plans, sequence), *_closed_forms(problem, vehicle, sequence)]
     else:
-        plans = list(islice(_plans(problem, vehicle, guess, first), count))
+        plans = list(_plans(problem, vehicle, guess, first))
         sources = list(_sources(plans, sequence)) or list(_closed_forms(problem, vehicle, sequence))
     own = tuple(plan for plan, _ in plans if plan.certified and plan.vehicle == vehicle)
     motions = islice(_variations(sources, planar), count)
