@@ -15,6 +15,8 @@ from aerobat.environment import Environment
 from aerobat.trajectory import Trajectory
 from aerobat.vehicle import Vehicle, mixer
 
+EDGE = 3  # samples at either end of a segment, where differences of differences are one-sided
+
 
 @dataclass(frozen=True)
 class Exact:
@@ -35,7 +37,7 @@ def exact(
 ) -> Exact:
     """The motion of a vehicle that begins with the attitude `start`, at about `count` samples.
 
-    Each segment has samples of its own, so that differences know no jumps.
+    Each segment has samples of its own, so that differences know no jumps; its very ends are left out.
     """
     parts, attitude = [], so3.axes(start).ravel()
     for begin, duration, coefficients in zip(
@@ -47,7 +49,8 @@ def exact(
             path.rate, (0.0, duration), attitude, method="DOP853", dense_output=True, rtol=1e-10, atol=1e-11
         )
         attitude = solved.y[:, -1]
-        parts.append((begin + times, *path.loads(times, solved.sol(times).T.reshape(-1, 3, 3))))
+        rows = begin + times, *path.loads(times, solved.sol(times).T.reshape(-1, 3, 3))
+        parts.append(tuple(row[EDGE:-EDGE] for row in rows))
     return Exact(*(np.concatenate(field) for field in zip(*parts, strict=True)))
 
 
