@@ -54,6 +54,7 @@ def test_a_map_writes_a_row_a_cell_which_is_what_plan_says(capsys) -> None:
     assert ab.plan(ab.load_problem(problem_file), vehicle="agile-quad").duration == planned[2]
 
 
+@pytest.mark.slow
 def test_a_repeated_map_comes_to_the_same_bits(capsys) -> None:
     quick = ("--planner", "min-snap", "--workers", "1")
     assert code("map", "line", "--over", "goal.position.x=1:3:2", "--out", "map", *quick) == 0
