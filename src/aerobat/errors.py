@@ -2,12 +2,39 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from typing import Any
+
+
+class Reason(str):
+    """A sentence about something that was not met, with the limits that it is about.
+
+    Args:
+        sentence: For people.
+        limits: The fields of the vehicle or the problem that say what was not met, or its stage or gate.
+    """
+
+    limits: tuple[str, ...]
+
+    def __new__(cls, sentence: str, limits: Iterable[str] = ()) -> Reason:
+        """Make one."""
+        made = super().__new__(cls, sentence)
+        made.limits = tuple(dict.fromkeys(filter(None, limits)))
+        return made
+
+
+def limits_of(sentence: object) -> tuple[str, ...]:
+    """Return the limits that a sentence is about; none where it does not say."""
+    return sentence.limits if isinstance(sentence, Reason) else ()
 
 
 class AerobatError(Exception):
     """Any failure that Aerobat foresees; its message is one clear sentence."""
+
+    @property
+    def limits(self) -> tuple[str, ...]:
+        """The limits that the message is about, by their fields; none where it does not say."""
+        return limits_of(self.args[0] if self.args else "")
 
 
 class SpecError(AerobatError, ValueError):
@@ -47,6 +74,11 @@ class Infeasible(AerobatError):
         if callable(self._sentence):
             self._sentence = self._sentence()
         return self._sentence
+
+    @property
+    def limits(self) -> tuple[str, ...]:
+        """The limits that bind, by their fields; none where that is not known."""
+        return limits_of(self.sentence)
 
     def with_remedy(self, remedy: str) -> str:
         """The sentence with another remedy, where there is one at all."""

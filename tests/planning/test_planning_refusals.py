@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from aerobat.errors import Infeasible
-from aerobat.planning import FreeKnots, Miqp, TimeOptimal, plan
+from aerobat.planning import FreeKnots, MinSnap, Miqp, Planner, TimeOptimal, plan
 from aerobat.planning.miqp import rescue
 from aerobat.planning.time_optimal.starts import starts
 from aerobat.problem import GatePassage, Limits, Line, load_problem, tilted_gate
@@ -34,7 +34,20 @@ def test_what_contradicts_itself_is_refused_as_proven_before_anything_is_tried(p
     with pytest.raises(Infeasible, match="'line' is proven to have no plan") as refusal:
         plan(replace(LINE, limits=SLOW), planner, QUAD)
     assert "limits.velocity (0.6 m/s)" in str(refusal.value)
+    assert refusal.value.limits == ("limits.velocity",)
     assert refusal.value.attempts == ()
+
+
+@pytest.mark.parametrize("planner", [Miqp(rescue=False), MinSnap()])
+def test_a_refusal_holds_the_limits_that_bind_as_data_and_in_other_processes_too(planner: Planner) -> None:
+    weak = of_thrust_to_weight(1.02)
+    with pytest.raises(Infeasible) as refusal:
+        plan("half-flip", planner, weak)
+    (limit, *_) = refusal.value.limits
+    assert limit in ("max_thrust", "min_thrust", "stage 'gate'")
+    again = pickle.loads(pickle.dumps(refusal.value))
+    assert (again.limits, again.sentence) == (refusal.value.limits, refusal.value.sentence)
+    assert isinstance(refusal.value.attempts[-1].outcome, str)
 
 
 def test_a_refusal_names_the_bound_who_was_asked_and_that_it_is_not_proven(

@@ -15,6 +15,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import aerobat as ab
+from aerobat.errors import Reason
 from aerobat.reporting.feasibility.table import requirements_report
 from aerobat.studies.feasibility import Feasibility
 from aerobat.studies.feasibility.feasibility_map import Cell
@@ -122,13 +123,13 @@ class Refusing(ab.Planner):
     """Tries once and finds nothing."""
 
     def plan(self, problem: ab.Problem, vehicle: ab.Vehicle | None = None, progress: Any = None) -> ab.Plan:
-        raise ab.Infeasible("the thrust of rotor 3 is beyond its limit", ["one attempt"])
+        raise ab.Infeasible(Reason("rotor 3 is beyond its limit", ("max_thrust",)), ["one attempt"])
 
 
 def test_what_the_planner_does_not_find_is_no_plan_and_names_its_limit() -> None:
     (cell,) = ab.feasibility_map("line", {"vehicle.mass": [0.9]}, planner=Refusing(), workers=1).cells
-    assert (cell.feasibility, cell.limits) == (Feasibility.NO_PLAN, ("rotors",))
-    assert cell.sentence == "the thrust of rotor 3 is beyond its limit"
+    assert (cell.feasibility, cell.limits) == (Feasibility.NO_PLAN, ("max_thrust",))
+    assert cell.sentence == "rotor 3 is beyond its limit"
 
 
 def test_without_time_there_is_no_answer() -> None:
@@ -143,7 +144,7 @@ def test_what_contradicts_something_else_is_refused_in_its_cell_alone() -> None:
     assert [cell.is_planned for cell in cells] == [False, False, False, True]
     assert "gates[0].position: its z component, 3.5 m, lies outside the limits" in cells[0].sentence
     assert "rotors cannot lift agile-quad" in cells[2].sentence
-    assert cells[2].limits == ("rotors",)
+    assert cells[2].limits == ("max_thrust",)
 
 
 @cache

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import aerobat as ab
+from aerobat.errors import Reason
 from aerobat.planning import registered_planners
 from aerobat.studies.why import Task, explained, remedies
 from aerobat.studies.why.changes import changes
@@ -79,7 +80,7 @@ class Pretending:
         }
         if all(changed.get(words, False) for words in self.needed):
             return shared_plan("line")
-        raise ab.Infeasible("the body rate is beyond its limit", ["one attempt"])
+        raise ab.Infeasible(Reason("it turns too fast", ("max_body_rate",)), ["one attempt"])
 
 
 def test_where_no_change_is_enough_alone_the_fewest_together_are_told(

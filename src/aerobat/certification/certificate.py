@@ -9,6 +9,7 @@ from math import degrees
 from typing import Literal
 
 from aerobat.declaration import by_value, in_notebooks, short, validated
+from aerobat.errors import Reason
 from aerobat.flatness import TimeInterval
 
 
@@ -63,6 +64,11 @@ class Finding:
         if self.gate is not None:
             return f"gate '{self.gate}'"
         return self.end if self.waypoint is None else f"'{self.waypoint}'"
+
+    @property
+    def reason(self) -> Reason:
+        """The finding in one sentence, with its limit: a field, or the place that it is about."""
+        return Reason(str(self), (self.field or self.place or "",))
 
     @property
     def margin(self) -> float | None:
@@ -175,7 +181,7 @@ class Certificate:
         if self.discontinuities:
             return str(self.discontinuities[0])
         if violated:
-            return str(self.worst if self.worst in violated else violated[0])
+            return (self.worst if self.worst in violated else violated[0]).reason
         if self.too_unequal is not None:
             return (
                 f"cannot decide: at {self.too_unequal:.3f} s thrust is too small beside what unequal "
@@ -186,7 +192,7 @@ class Certificate:
             return f"cannot decide: thrust reaches zero at {at}, where no attitude is determined"
         for finding in self.findings:
             if finding.verdict is Verdict.UNDECIDED:
-                return f"cannot decide: {finding}"
+                return Reason(f"cannot decide: {finding}", finding.reason.limits)
         return f"certified: {self.worst}"
 
     def with_passages(self, passages: Sequence[Finding]) -> Certificate:

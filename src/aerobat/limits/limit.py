@@ -10,6 +10,7 @@ import numpy as np
 
 from aerobat.arrays import Array
 from aerobat.environment import Environment
+from aerobat.errors import Reason
 from aerobat.flatness import force_balance
 from aerobat.limits.quantity import PathQuantity
 from aerobat.problem import Condition, Limits
@@ -53,10 +54,11 @@ class Limit:
             self.upper - self.quantity.constant
         ) / self.size
 
-    def exceeded(self, excess: float, time: float) -> str:
+    def exceeded(self, excess: float, time: float) -> Reason:
         """Return a sentence without its full stop about an excess, a fraction of its size, at a time [s]."""
         name = self.name if self.rotor is None else f"{self.name} of rotor {self.rotor}"
-        return f"the {name} is beyond its limit by {100.0 * excess:.3g} % of its range at {time:.2f} s"
+        sentence = f"the {name} is beyond its limit by {100.0 * excess:.3g} % of its range at {time:.2f} s"
+        return Reason(sentence, self.fields)
 
 
 @dataclass(frozen=True, eq=False)

@@ -127,7 +127,7 @@ def refuted_by_samples(
     sampled = sampled_margin(solution.trajectory, vehicle, problem.environment)
     if sampled.margin >= 0.0:
         return solution
-    return replace(solution, failure=str(sampled), margin=sampled.margin)
+    return replace(solution, failure=sampled.reason, margin=sampled.margin)
 
 
 def tightened(bounds: Limits, limits: Limits, trajectory: Trajectory, derivatives: int) -> Limits | None:
@@ -178,7 +178,7 @@ def _judged(
         outcome = None if within.certified else certificate.why
         shortfalls = reserve_shortfalls(certificate, reserve)
         if outcome is None and shortfalls:
-            outcome = str(shortfalls[0])
+            outcome = shortfalls[0].reason
     feasible = outcome is None
     margin = solution.margin if certificate is None else certificate.margin
     recorder.record(

@@ -12,7 +12,7 @@ import numpy as np
 
 from aerobat.arrays import Array
 from aerobat.certification import PlannedPassage, PlannedWaypoint
-from aerobat.errors import SpecError
+from aerobat.errors import Reason, SpecError
 from aerobat.problem.gate import Gate
 from aerobat.problem.problem import Problem
 from aerobat.problem.stage import Stage
@@ -87,11 +87,12 @@ def _require(gate: Gate, stage: Stage, vehicle: Vehicle) -> None:
     if not fits:
         width, height = gate.opening.size
         kind = gate.opening.kind
-        raise SpecError(
+        sentence = (
             f"gate '{gate.name}' is {kind}{length(width)} wide and {length(height)} high, but the body "
             f"of {vehicle.name} takes {length(need[0])} by {length(need[1])}, {how}; widen the opening, or "
             "take a smaller vehicle"
         )
+        raise SpecError(Reason(sentence, (f"gate '{gate.name}'",)))
 
 
 def _least_section(gate: Gate, thrust_axis: Array, semi_axes: Array) -> Array:

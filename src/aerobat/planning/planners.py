@@ -16,7 +16,7 @@ from typing import Any, Protocol, TypeVar, cast, dataclass_transform, get_type_h
 from pydantic import Field
 
 from aerobat.declaration import Label, Registry, shown, validated
-from aerobat.errors import Infeasible, SpecError
+from aerobat.errors import Infeasible, Reason, SpecError
 from aerobat.optimization.nonlinear import has_casadi
 from aerobat.planning.assessment.contradiction import contradiction
 from aerobat.planning.courses import is_course, on_open_courses
@@ -96,7 +96,8 @@ def _require_consistency(problem: Problem, vehicle: Vehicle) -> None:
     """Refuse what is proven to have no plan, in milliseconds and whichever the planner."""
     found = contradiction(problem, vehicle)
     if found is not None:
-        raise Infeasible(f"'{problem.name}' is proven to have no plan: {found.sentence}")
+        sentence = f"'{problem.name}' is proven to have no plan: {found.sentence}"
+        raise Infeasible(Reason(sentence, found.limits or (f"stage '{found.stage}'",)))
 
 
 def suited_planner(problem: Problem, vehicle: Vehicle | None) -> str:

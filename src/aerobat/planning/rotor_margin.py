@@ -9,6 +9,7 @@ import numpy as np
 
 from aerobat.certification import Certificate, Finding, Side
 from aerobat.environment import Environment
+from aerobat.errors import Reason
 from aerobat.flatness import reference
 from aerobat.simulation.outcome import digits
 from aerobat.trajectory import Trajectory
@@ -58,6 +59,11 @@ class RotorMargin:
     def margin(self) -> float:
         """The distance to the nearest limit [N], negative: beyond it by so much."""
         return min(self.low_margin, self.high_margin)
+
+    @property
+    def reason(self) -> Reason:
+        """The outcome in a few words, with the nearest limit."""
+        return Reason(str(self), ("min_thrust" if self.low_margin < self.high_margin else "max_thrust",))
 
     def __str__(self) -> str:
         """The outcome in a few words."""
@@ -112,6 +118,11 @@ class ReserveShortfall:
             f"the {self.finding.name} keeps {100.0 * self.kept:.3g} % of its range at "
             f"{self.finding.time:.3f} s, {100.0 * self.reserve:.3g} % are asked in reserve"
         )
+
+    @property
+    def reason(self) -> Reason:
+        """The sentence with the limit that the reserve is kept from."""
+        return Reason(str(self), (self.finding.field, "reserve"))
 
 
 def reserve_shortfalls(certificate: Certificate, reserve: float) -> list[ReserveShortfall]:

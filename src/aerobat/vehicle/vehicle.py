@@ -24,7 +24,7 @@ from aerobat.declaration import (
     validated,
     within_field,
 )
-from aerobat.errors import SpecError
+from aerobat.errors import Reason, SpecError
 from aerobat.states import STANDARD_GRAVITY
 from aerobat.vehicle.controller import Controller
 from aerobat.vehicle.ellipsoid import ENCLOSING, Ellipsoid, about_rotors
@@ -212,17 +212,21 @@ class Vehicle:
         weight = self.mass * gravity
         total = self.max_thrusts.sum()
         if total <= weight:
-            raise SpecError(
+            sentence = (
                 f"rotors cannot lift {self.name}: their max_thrust adds up to {total:.4g} N, its weight is "
                 f"{weight:.4g} N; raise max_thrust or lower mass"
             )
+            raise SpecError(Reason(sentence, ("max_thrust",)))
         hover = weight * self.mixer[:, 0]
         wrong = (hover < self.min_thrusts) | (hover > self.max_thrusts)
         if wrong.any():
             i = int(np.argmax(wrong))
-            raise SpecError(
+            sentence = (
                 f"rotors cannot hold a level hover: it takes {hover[i]:.4g} N of rotors[{i}], which gives "
                 f"{self.min_thrusts[i]:.4g} to {self.max_thrusts[i]:.4g} N; check position_body, spin, limits"
+            )
+            raise SpecError(
+                Reason(sentence, ("min_thrust" if hover[i] < self.min_thrusts[i] else "max_thrust",))
             )
 
     def _rank(self) -> int:

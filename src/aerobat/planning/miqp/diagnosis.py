@@ -8,6 +8,8 @@ from math import ceil, inf
 
 import numpy as np
 
+from aerobat.errors import Reason, limits_of
+from aerobat.limits.path_condition import FIELD
 from aerobat.optimization import evenly_spread, solver
 from aerobat.optimization.deadline import out_of_time, processor, within_time
 from aerobat.planning.courses import is_placed_in_windows
@@ -31,9 +33,10 @@ def why_infeasible(formulation: Formulation, attempts: Sequence[Attempt], vehicl
     solved = [a for a in attempts if a.cost is not None]
     if solved and vehicle is not None:
         best = max(solved, key=lambda a: -inf if a.margin is None else a.margin).outcome
-        return f"{said} that {vehicle.name} can fly: at best, {best}"
+        return Reason(f"{said} that {vehicle.name} can fly: at best, {best}", limits_of(best))
     with within_time(DIAGNOSIS_TIME, processor):
-        binding = list(_binding(formulation, tried))
+        found = list(_binding(formulation, tried))
+        binding = [name for name, _ in found]
         if out_of_time() and not binding:
             return f"{said}; which bound binds is not known"
     unanswered = sum(a.status == "unknown" for a in attempts)
@@ -48,7 +51,8 @@ def why_infeasible(formulation: Formulation, attempts: Sequence[Attempt], vehicl
             f"{said}: its stages, goal and limits exclude each other, and dropping any one of them does not "
             "help"
         )
-    return f"{said}: {' or '.join(binding)} binds; without it the program has a solution"
+    limits = (field for _, field in found)
+    return Reason(f"{said}: {' or '.join(binding)} binds; without it the program has a solution", limits)
 
 
 def leg_without_room(formulation: Formulation, dt: float) -> str | None:
@@ -95,34 +99,30 @@ def _told(stages: Sequence[Stage], number: int) -> str:
     return f"'{stage.name}'" + (f" of lap {stage.lap}" if stages[-1].lap > 1 else "")
 
 
-def _binding(formulation: Formulation, dts: Sequence[float]) -> Iterator[str]:
-    """Each bound whose removal, alone, makes some duration feasible."""
+def _binding(formulation: Formulation, dts: Sequence[float]) -> Iterator[tuple[str, str]]:
+    """Each bound whose removal, alone, makes some duration feasible, in words and by its field."""
     probes = np.unique(np.quantile(dts, np.linspace(0.0, 1.0, PROBES), method="nearest"))
-    for name, relaxed in _relaxations(formulation):
+    for name, field, relaxed in _relaxations(formulation):
         search = solver("builtin")
         if any(search.solve(relaxed.program(float(dt))).x is not None for dt in probes):
-            yield name
+            yield name, field
 
 
-def _relaxations(formulation: Formulation) -> Iterator[tuple[str, Formulation]]:
+def _relaxations(formulation: Formulation) -> Iterator[tuple[str, str, Formulation]]:
+    """Yield each bound in words, by its field, and the problem without it."""
     problem, sequence = formulation.problem, formulation.sequence
     for derivative in range(formulation.chain.order + 1):
         bound = problem.path_limits.of(derivative)[1]
         if np.isfinite(np.concatenate(problem.path_limits.of(derivative))).any():
-            name = f"limits.{DERIVATIVES[derivative]} ({np.min(bound):g} {UNITS[derivative]})"
-            if derivative == 0:
-                name = "the volume between limits.lower and limits.upper"
-            yield (
-                name,
-                replace(
-                    formulation, problem=replace(problem, limits=problem.path_limits.without(derivative))
-                ),
-            )
+            field = f"limits.{DERIVATIVES[derivative]}" if derivative else "limits.lower and limits.upper"
+            name = f"{field} ({np.min(bound):g} {UNITS[derivative]})"
+            name = name if derivative else f"the volume between {field}"
+            without = replace(problem, limits=problem.path_limits.without(derivative))
+            yield name, field, replace(formulation, problem=without)
     for i, stage in enumerate(sequence.stages):
         others = sequence.stages[:i] + sequence.stages[i + 1 :]
-        yield f"the stage '{stage.name}'", replace(formulation, sequence=replace(sequence, stages=others))
+        name, fewer = f"stage '{stage.name}'", replace(sequence, stages=others)
+        yield f"the {name}", name, replace(formulation, sequence=fewer)
     if sequence.path_constraints:
-        yield (
-            "what holds at every interval",
-            replace(formulation, sequence=replace(sequence, path_constraints=())),
-        )
+        relaxed = replace(formulation, sequence=replace(sequence, path_constraints=()))
+        yield "what holds at every interval", FIELD, relaxed

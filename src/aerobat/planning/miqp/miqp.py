@@ -9,7 +9,7 @@ from typing import Annotated, Literal
 import numpy as np
 
 from aerobat.declaration import AS_IT_IS, NonNegative
-from aerobat.errors import Infeasible
+from aerobat.errors import Infeasible, Reason
 from aerobat.flatness import force_balance
 from aerobat.optimization import AssignmentProgram, solver
 from aerobat.optimization.deadline import out_of_time, within_time
@@ -94,7 +94,8 @@ class Miqp(Planner):
                 rescued = rescue.plan()
                 if rescued is not None:
                     return rescued
-                raise Infeasible(f"{infeasible.sentence}; {rescue}", infeasible.attempts) from None
+                why = Reason(f"{infeasible.sentence}; {rescue}", infeasible.limits)
+                raise Infeasible(why, infeasible.attempts) from None
 
     @property
     def _quicker(self) -> str:
@@ -180,10 +181,11 @@ def _check_stages(sequence: StageSequence, balance: ForceBalance) -> None:
             upper=np.array([bound.limits[1] for bound in bounds]),
         )
         if solver("builtin").solve(instant).status == "infeasible":
-            raise Infeasible(
+            sentence = (
                 f"the conditions of the stage '{stage.name}' exclude each other: no position, velocity and "
                 "acceleration satisfies them all; change or drop one of them"
             )
+            raise Infeasible(Reason(sentence, (f"stage '{stage.name}'",)))
 
 
 def _check_thrust(sequence: StageSequence, vehicle: Vehicle) -> None:
@@ -193,10 +195,11 @@ def _check_thrust(sequence: StageSequence, vehicle: Vehicle) -> None:
             thrust = condition.min_thrust
             if thrust > vehicle.max_specific_thrust:
                 where = "inverted" if condition.direction[2] < -0.99 else "along its attitude"
-                raise Infeasible(
+                sentence = (
                     f"the stage '{stage.name}' asks {thrust:.3g} m/s² {where}, {vehicle.name} gives "
                     f"{vehicle.max_specific_thrust:.3g}; lower what it asks or take a stronger vehicle"
                 )
+                raise Infeasible(Reason(sentence, (f"stage '{stage.name}'",)))
 
 
 def duration_lower_bound(problem: Problem, vehicle: Vehicle) -> float:

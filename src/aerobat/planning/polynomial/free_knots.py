@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Annotated, ClassVar
 from pydantic import Field
 
 from aerobat.declaration import AS_IT_IS, Count, NonNegative
-from aerobat.errors import Infeasible
+from aerobat.errors import Infeasible, Reason, limits_of
 from aerobat.limits.body_in_gate import BodyInGate
 from aerobat.optimization.deadline import out_of_time, within_time
 from aerobat.optimization.nonlinear import import_casadi
@@ -99,11 +99,12 @@ class FreeKnots(Planner):
                 return stopped(found)
             if out_of_time():
                 raise too_short(problem, self.time_limit, recorder.attempts)
-        raise Infeasible(
+        last = recorder.attempts[-1].outcome
+        sentence = (
             f"no polynomials are certified to fly '{problem.name}' with {vehicle.name}: at the last attempt "
-            f"{recorder.attempts[-1].outcome}; widen what binds there, or give other --segments",
-            recorder.attempts,
+            f"{last}; widen what binds there, or give other --segments"
         )
+        raise Infeasible(Reason(sentence, limits_of(last)), recorder.attempts)
 
     def _planned(
         self, problem: Problem, vehicle: Vehicle, sequence: StageSequence, recorder: Recorder

@@ -10,6 +10,7 @@ from math import sqrt
 import numpy as np
 
 from aerobat.arrays import Array
+from aerobat.errors import Reason
 from aerobat.flatness import force_balance
 from aerobat.planning.rotor_margin import sampled_margin
 from aerobat.planning.warm_start import WarmStart
@@ -147,7 +148,7 @@ def start_along_normals(problem: Problem, vehicle: Vehicle, sequence: StageSeque
     return WarmStart(path, sequence.stages, tuple(path.knots[1:-1].tolist()))
 
 
-def violated_stage(sequence: StageSequence, trajectory: Trajectory, balance: ForceBalance) -> str | None:
+def violated_stage(sequence: StageSequence, trajectory: Trajectory, balance: ForceBalance) -> Reason | None:
     """The first stage that a trajectory with a knot a stage misses, in a sentence; or None."""
     values = [trajectory.evaluate(trajectory.knots[1:-1], k) for k in range(3)]
     fractions = trajectory.knots[1:-1] / trajectory.duration
@@ -156,16 +157,13 @@ def violated_stage(sequence: StageSequence, trajectory: Trajectory, balance: For
             bound = condition.bound(balance)
             value = float(bound.value(flat))
             if bound.excess(flat) > STAGE_TOLERANCE:
-                return (
-                    f"the stage '{stage.name}' asks {condition.name} {condition.range}, "
-                    f"the closed form gives {value:.4g}"
-                )
+                given = f"{condition.name} {condition.range}, the closed form gives {value:.4g}"
+                return Reason(f"the stage '{stage.name}' asks {given}", (f"stage '{stage.name}'",))
         earliest, latest = stage.window
         if not earliest - STAGE_TOLERANCE <= fraction <= latest + STAGE_TOLERANCE:
-            return (
-                f"the stage '{stage.name}' asks to be passed between {earliest:.4g} and {latest:.4g} of the "
-                f"duration, the closed form passes it at {fraction:.4g}"
-            )
+            given = f"between {earliest:.4g} and {latest:.4g} of the duration, the closed form passes it"
+            sentence = f"the stage '{stage.name}' asks to be passed {given} at {fraction:.4g}"
+            return Reason(sentence, (f"stage '{stage.name}'",))
     return None
 
 

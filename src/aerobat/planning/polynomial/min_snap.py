@@ -13,7 +13,7 @@ from pydantic import Field, Strict
 from aerobat.arrays import Array
 from aerobat.certification import Certificate
 from aerobat.declaration import AS_IT_IS, Count, NonNegative
-from aerobat.errors import Infeasible, SpecError
+from aerobat.errors import Infeasible, Reason, SpecError, limits_of
 from aerobat.flatness import force_balance
 from aerobat.optimization.deadline import out_of_time, within_time
 from aerobat.planning.certified_solve import Judged, Solution, certified_solve, refuted_by_samples
@@ -141,7 +141,7 @@ class _Planning:
             )
         return durations
 
-    def why_infeasible(self) -> str:
+    def why_infeasible(self) -> Reason:
         """One sentence, from the last attempt, the slowest, and the last that its stages let pass."""
         attempts = self.recorder.attempts
         longest = max(attempts, key=lambda attempt: attempt.duration)
@@ -154,10 +154,11 @@ class _Planning:
             if self.scaling is TimeScaling.FIRST
             else "give the waypoints other times or fix fewer components, or take the planner free-knots"
         )
-        return (
+        sentence = (
             f"'{self.problem.name}' has no closed-form path that flies at any duration from {shortest:.3g} "
             f"to {longest.duration:.3g} s: {before}at the last, {longest.outcome}; {remedy}"
         )
+        return Reason(sentence, limits_of(longest.outcome))
 
     def result(self, found: Judged[None]) -> Plan:
         """The plan of what the search settled on."""

@@ -17,7 +17,7 @@ import numpy as np
 from pydantic import Field
 
 from aerobat.declaration import AS_IT_IS, Count, NonNegative
-from aerobat.errors import Infeasible, SpecError
+from aerobat.errors import Infeasible, Reason, SpecError, limits_of
 from aerobat.optimization.deadline import out_of_time, within_time
 from aerobat.optimization.nonlinear import import_casadi
 from aerobat.planning.miqp import Miqp
@@ -101,11 +101,12 @@ class TimeOptimal(Planner):
                     return stopped(_best_so_far(own, begun, race, self.time_limit))
                 if own is not None:
                     return own
-        raise Infeasible(
+        last = attempts[-1].outcome
+        sentence = (
             f"no motion of '{problem.name}' was found that {vehicle.name} can do: at the last attempt "
-            f"{attempts[-1].outcome}; ask less of its stages and limits, or give more intervals",
-            attempts,
+            f"{last}; ask less of its stages and limits, or give more intervals"
         )
+        raise Infeasible(Reason(sentence, limits_of(last)), attempts)
 
 
 def _best_so_far(own: Plan | None, begun: Starts, race: Race, limit: float | None) -> Plan:

@@ -1,29 +1,15 @@
-"""The limit that binds, by the name of its field: of a plan by its certificate, of a refusal by its words."""
+"""The limits that a certified plan comes nearest to, by the names of their fields."""
 
 from __future__ import annotations
 
-import re
 from math import inf
 
 from aerobat.certification import Finding
-from aerobat.limits.path_condition import FIELD as THROUGHOUT
 from aerobat.planning import Plan
 from aerobat.planning.rotor_margin import reserve_shortfalls
-from aerobat.problem.problem import DERIVATIVES, UNITS
+from aerobat.problem.problem import UNITS
 
 AS_NEAR = 0.01  # of a limit's size: closer than plans that use all of it come to tell apart
-WORDS = (  # of sentences, the first that is there, and the limit that they are about
-    (r"limits\.(lower and limits\.upper|\w+)", r"limits.\1"),
-    (rf"\b({'|'.join(DERIVATIVES[1:])}) [xyz]\b", r"limits.\1"),
-    (r"\bposition [xyz]\b", "limits.lower and limits.upper"),
-    (r"\bbody rate\b", "max_body_rate"),
-    (r"\brotor|\bhover\b", "rotors"),
-    (r"\breserve\b", "reserve"),
-    (r"\bspecific thrust\b|what holds at every interval", THROUGHOUT),
-    (r"\bthe body of\b|\bframe\b", "gate"),
-    (r"(stage '[^']*')", r"\1"),
-    (r"(gate '[^']*')", r"\1"),
-)
 
 
 def binding_limits(plan: Plan) -> tuple[str, ...]:
@@ -49,15 +35,6 @@ def least_reserve(plan: Plan) -> float | None:
     if plan.certificate is None or plan.certificate.worst is None:
         return None
     return reserve_shortfalls(plan.certificate, 1.0)[0].kept
-
-
-def limits_in(sentence: str) -> tuple[str, ...]:
-    """The limit that a refusal is about; none where it names none that is known."""
-    for pattern, name in WORDS:
-        found = re.search(pattern, sentence)
-        if found:
-            return (found.expand(name),)
-    return ()
 
 
 def _size(finding: Finding, plan: Plan) -> float:

@@ -7,11 +7,11 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import Protocol
 
-from aerobat.errors import Infeasible, SpecError
+from aerobat.errors import Infeasible, SpecError, limits_of
 from aerobat.optimization.deadline import out_of_time, within_time
 from aerobat.planning import Plan, Planner, plan
 from aerobat.planning.assessment.contradiction import contradiction
-from aerobat.studies.feasibility.binding import binding_limits, limits_in
+from aerobat.studies.feasibility.binding import binding_limits
 from aerobat.studies.feasibility.fields import Scenario
 
 TIME_LIMIT = 30.0  # [s] of planning, where no other is given: most scenarios take one
@@ -71,7 +71,7 @@ def probe(task: Task, values: Sequence[float]) -> Probe:
             return Probe(Feasibility.REFUSED, found.sentence, limits)
         return _planned(scenario, task)
     except SpecError as error:
-        return Probe(Feasibility.REFUSED, str(error), limits_in(str(error)))
+        return Probe(Feasibility.REFUSED, str(error), error.limits)
 
 
 def _planned(scenario: Scenario, task: Task) -> Probe:
@@ -80,18 +80,13 @@ def _planned(scenario: Scenario, task: Task) -> Probe:
             found = plan(scenario.problem, task.planner, scenario.vehicle)
         except Infeasible as error:
             reason = Feasibility.NO_PLAN if error.attempts else Feasibility.REFUSED
-            return Probe(
-                Feasibility.NO_ANSWER if out_of_time() else reason,
-                error.sentence,
-                limits_in(error.sentence),
-            )
+            return Probe(Feasibility.NO_ANSWER if out_of_time() else reason, error.sentence, error.limits)
     assert found.certificate is not None, "a plan for a vehicle is certified"
     assert found.flyability is not None, "and flown"
     if found.certified and found.flies:
         return Probe(Feasibility.PLANNED, found.certificate.why, binding_limits(found), found)
-    why = (
-        f"its own flight {' and '.join(found.flyability.defects)}"
-        if found.certified
-        else found.certificate.why
-    )
-    return Probe(Feasibility.NOT_FLYABLE, why, limits_in(why), found)
+    if not found.certified:
+        return Probe(Feasibility.NOT_FLYABLE, found.certificate.why, limits_of(found.certificate.why), found)
+    why = f"its own flight {' and '.join(found.flyability.defects)}"
+    gates = (f"gate '{passage.gate}'" for passage in found.flyability.passages if passage.failure)
+    return Probe(Feasibility.NOT_FLYABLE, why, tuple(gates), found)

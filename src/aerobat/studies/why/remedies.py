@@ -15,7 +15,6 @@ from aerobat.optimization.deadline import out_of_time, processor, within_time
 from aerobat.planning import Plan, Planner, as_planner, plan, registered_planners, suited_planner
 from aerobat.planning.miqp.rescue import MOTION, keeping, keeps
 from aerobat.problem import Problem, as_problem
-from aerobat.studies.feasibility.binding import limits_in
 from aerobat.studies.feasibility.probe import TIME_LIMIT
 from aerobat.studies.why.changes import Change, Task, changes
 from aerobat.vehicle import Vehicle, as_vehicle
@@ -109,7 +108,7 @@ def explained(refusal: Infeasible, task: Task, progress: Tried | None = None) ->
     search = _Search(task, progress or (lambda words, helps: None))
     name, sentence, is_proven = task.problem.name, refusal.sentence, not refusal.attempts
     found = (None if is_proven else search.by_others()) or search.by_changes()
-    return Why(name, sentence, limits_in(sentence), tuple(found), tuple(search.tried))
+    return Why(name, sentence, refusal.limits, tuple(found), tuple(search.tried))
 
 
 class _Search:

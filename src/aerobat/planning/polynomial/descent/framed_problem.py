@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from aerobat.errors import Reason
 from aerobat.flatness import force_balance
 from aerobat.limits import limits_along
 from aerobat.limits.body_in_gate import BodyInGate
@@ -87,7 +88,8 @@ class FramedProblem:
         trajectory = path.guess.trajectory
         failure = self._missed_stage(path.guess)
         if failure is None and path.violation.worst > 0.0:
-            failure = f"{path.violation}{path.guess.leg_at(path.violation.time)}"
+            reason = path.violation.reason
+            failure = Reason(f"{reason}{path.guess.leg_at(path.violation.time)}", reason.limits)
         return Solution(
             source=path,
             duration=trajectory.duration,
@@ -108,18 +110,22 @@ class FramedProblem:
             violations.append(self.path(slower[-1]).violation.worst)
         return slower[int(np.argmin(violations))]
 
-    def _missed_stage(self, guess: WarmStart) -> str | None:
+    def _missed_stage(self, guess: WarmStart) -> Reason | None:
         """The first stage that a guess misses, in a sentence; or None."""
         for stage, time in zip(guess.stages, guess.times, strict=True):
+            where = (f"stage '{stage.name}'",)
             flat = np.array([guess.trajectory.evaluate(time, k) for k in range(3)])
             for condition in stage.conditions:
                 excess = float(condition.bound(self.balance).excess(flat))
                 if excess > RELATIVE_STAGE_TOLERANCE * limit_of(condition, self.balance).size:
-                    return f"the stage '{stage.name}' is missed by {excess:.2g} in SI units"
+                    return Reason(f"the stage '{stage.name}' is missed by {excess:.2g} in SI units", where)
             ball = stage.ball
             if ball is not None and (distance := float(np.linalg.norm(flat[0] - ball.centre))) > ball.radius:
-                return f"the stage '{stage.name}' is missed by {distance - ball.radius:.2g} m"
+                return Reason(f"the stage '{stage.name}' is missed by {distance - ball.radius:.2g} m", where)
             fraction, (earliest, latest) = time / guess.trajectory.duration, stage.window
             if max(earliest - fraction, fraction - latest) > RELATIVE_STAGE_TOLERANCE:
-                return f"the stage '{stage.name}' is passed at {fraction:.3g} of the duration, not when asked"
+                return Reason(
+                    f"the stage '{stage.name}' is passed at {fraction:.3g} of the duration, not when asked",
+                    where,
+                )
         return None

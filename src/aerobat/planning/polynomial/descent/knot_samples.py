@@ -8,6 +8,7 @@ from math import ceil
 import numpy as np
 
 from aerobat.arrays import Array
+from aerobat.errors import Reason
 from aerobat.limits import Limit
 from aerobat.planning.polynomial.descent.path_limits import END_ORDER, PathLimits, Samples
 from aerobat.trajectory import Trajectory, polynomial
@@ -62,7 +63,8 @@ class ConstraintViolation:
         windows = np.lib.stride_tricks.sliding_window_view(beside, 2 * NEARBY + 1, axis=0)
         return np.asarray(windows.max(axis=-1))
 
-    def __str__(self) -> str:
+    @property
+    def reason(self) -> Reason:
         """One sentence without its full stop."""
         return self.limit.exceeded(self.worst, self.time)
 
