@@ -127,6 +127,21 @@ def command_settings(cls: type[Planner]) -> dict[str, Any]:
     return {o.name: o.command_default for o in planner_options(cls) if o.command_default is not None}
 
 
+def planner_with_reserve(name: str, reserve: float, **others: Any) -> Planner:
+    """Return the planner as the command line makes it, asked to keep a reserve at least, if it can.
+
+    Args:
+        name: Its registered name.
+        reserve: Of each rotor's range.
+        **others: Of its fields.
+    """
+    cls: Any = planner_class(name)
+    settings = command_settings(cls) | others
+    if "reserve" in (f.name for f in fields(cls)):
+        settings["reserve"] = max(reserve, settings.get("reserve", 0.0))
+    return cast(Planner, cls(**settings))
+
+
 def as_planner(planner: Planner | str) -> Planner:
     """The planner, of itself or of its registered name, with its defaults.
 

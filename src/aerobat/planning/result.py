@@ -13,7 +13,7 @@ from aerobat.planning.evidence import Evidence
 from aerobat.planning.flyability import Flyability
 from aerobat.planning.passages import PlacedStage
 from aerobat.planning.recorder import Attempt
-from aerobat.planning.rotor_margin import RotorMargin
+from aerobat.planning.rotor_margin import RotorMargin, reserve_shortfalls
 from aerobat.planning.tube import Tube
 from aerobat.problem.problem import Problem
 from aerobat.simulation.autopilot import Recoveries
@@ -99,6 +99,11 @@ class Plan:
     def flies(self) -> bool:
         """True if its vehicle, simulated, keeps to it within FLYABLE_ERROR and passes its gates as asked."""
         return self.flyability is not None and self.flyability.flies
+
+    def keeps(self, reserve: float) -> bool:
+        """Return True for a certified plan whose rotors keep a fraction `reserve` of their ranges."""
+        certificate = self.certificate
+        return certificate is not None and self.certified and not reserve_shortfalls(certificate, reserve)
 
     @property
     def margin(self) -> RotorMargin | None:

@@ -11,9 +11,8 @@ from aerobat.declaration import NonNegative, by_value, in_notebooks, short, vali
 from aerobat.errors import BackendMissing, Infeasible, SpecError
 from aerobat.evaluation.score import Score, score
 from aerobat.optimization.deadline import out_of_time, within_time
-from aerobat.planning import Attempt, Plan, Planner, as_planner, plan, registered_planners
+from aerobat.planning import Attempt, Plan, Planner, TimeOptimal, as_planner, plan, registered_planners
 from aerobat.planning.time_limit import best_by_limit
-from aerobat.planning.time_optimal import TimeOptimal
 from aerobat.problem import Problem, as_problem
 from aerobat.simulation import Flight, fly
 from aerobat.vehicle import Vehicle, as_vehicle

@@ -25,6 +25,9 @@ from aerobat.problem.problem import DERIVATIVES, Problem
 from aerobat.problem.stage import Stage, StageSequence
 from aerobat.vehicle import Vehicle
 
+# without a vehicle, stages that ask a fraction of its thrust assume what a hexarotor in the paper's class has
+ASSUMED_THRUST_TO_WEIGHT = 5.0
+
 
 @dataclass(frozen=True)
 class Row:

@@ -17,7 +17,7 @@ from aerobat.planning.assessment.lower_bound import least_duration
 from aerobat.planning.certified_solve import Judged
 from aerobat.planning.miqp.attempts import COURSE_SCAN_NODES, Attempts, Placement, default_order, plan_of
 from aerobat.planning.miqp.diagnosis import leg_without_room, why_infeasible
-from aerobat.planning.miqp.formulation import Formulation
+from aerobat.planning.miqp.formulation import ASSUMED_THRUST_TO_WEIGHT, Formulation
 from aerobat.planning.miqp.integrator import IntegratorChain, Intervals, Order
 from aerobat.planning.miqp.refinement import descent, settled
 from aerobat.planning.miqp.rescue import Rescue
@@ -32,9 +32,6 @@ from aerobat.problem.condition import ForceBalance
 from aerobat.problem.problem import Problem
 from aerobat.problem.stage import StageSequence
 from aerobat.vehicle import Vehicle
-
-# without a vehicle, stages that ask a fraction of its thrust assume what a hexarotor in the paper's class has
-ASSUMED_THRUST_TO_WEIGHT = 5.0
 
 
 @planner("miqp")

@@ -6,7 +6,7 @@ A problem is not refused before other settings and planners are asked, within RE
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, field, replace
 from math import inf
 from typing import Any, cast
 
@@ -14,10 +14,9 @@ from aerobat.errors import BackendMissing, Infeasible, SpecError
 from aerobat.optimization.deadline import out_of_time, processor, within_share, within_time
 from aerobat.planning.miqp.attempts import default_order
 from aerobat.planning.miqp.integrator import INPUT_NAMES, MAX_INTERVALS
-from aerobat.planning.planners import Planner, command_settings, planner_class
+from aerobat.planning.planners import Planner, planner_class, planner_with_reserve
 from aerobat.planning.recorder import Recorder
 from aerobat.planning.result import Plan
-from aerobat.planning.rotor_margin import reserve_shortfalls
 from aerobat.problem.problem import Problem
 from aerobat.vehicle import Vehicle
 
@@ -96,7 +95,7 @@ class Rescue:
         for planner, how in ways:
             with within_share(share):
                 plan = self._planned(planner, how)
-            if plan is not None and keeps(plan, self.asked.reserve) and plan.duration < shorter_than:
+            if plan is not None and plan.keeps(self.asked.reserve) and plan.duration < shorter_than:
                 attempts = (*self.recorder.attempts, *plan.attempts)
                 return replace(plan, attempts=attempts, rescue=f"{failed}; planned {how}")
         return None
@@ -152,8 +151,10 @@ class Rescue:
 
     def _with_reserve(self, motion: Plan) -> Plan:
         """A time-optimal motion again with a reserve to fly by, or itself where there is none."""
-        again = self._planned(keeping(self.asked.reserve, MOTION, start=motion, starts=1), f"by {MOTION}")
-        if again is None or not keeps(again, self.asked.reserve):
+        again = self._planned(
+            planner_with_reserve(MOTION, self.asked.reserve, start=motion, starts=1), f"by {MOTION}"
+        )
+        if again is None or not again.keeps(self.asked.reserve):
             return motion
         return replace(again, attempts=(*motion.attempts, *again.attempts), rescue=motion.rescue)
 
@@ -166,29 +167,8 @@ class Rescue:
         if self.asked.search is not None:
             yield replace(self.asked, search=None, rescue=False), "with intervals that differ"
         if self.problem.maneuver.through_points:
-            yield keeping(self.asked.reserve, "min-snap"), "by min-snap"
-        yield keeping(self.asked.reserve, "free-knots"), "by free-knots"
-
-
-def keeps(plan: Plan, reserve: float) -> bool:
-    """True for a certified plan whose rotors keep a fraction of their ranges."""
-    certificate = plan.certificate
-    return certificate is not None and plan.certified and not reserve_shortfalls(certificate, reserve)
-
-
-def keeping(reserve: float, name: str, **others: Any) -> Planner:
-    """The registered planner as the command line makes it, asked to keep a reserve at least, if it can.
-
-    Args:
-        reserve: Of each rotor's range.
-        name: The planner's.
-        **others: Of its fields.
-    """
-    cls: Any = planner_class(name)
-    settings = command_settings(cls) | others
-    if "reserve" in (f.name for f in fields(cls)):
-        settings["reserve"] = max(reserve, settings.get("reserve", 0.0))
-    return cast(Planner, cls(**settings))
+            yield planner_with_reserve("min-snap", self.asked.reserve), "by min-snap"
+        yield planner_with_reserve("free-knots", self.asked.reserve), "by free-knots"
 
 
 def with_more_intervals(asked: Any, problem: Problem, vehicle: Vehicle) -> Iterator[tuple[Planner, str]]:

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from aerobat.planning import Planner
-from aerobat.planning.miqp.miqp import ASSUMED_THRUST_TO_WEIGHT
+from aerobat.planning.miqp.formulation import ASSUMED_THRUST_TO_WEIGHT
 from aerobat.problem.problem import DERIVATIVES, Problem
 from aerobat.problem.stage import Stage
 from aerobat.studies.why.eased_stages import at_any_time, eased, with_half_the_thrust

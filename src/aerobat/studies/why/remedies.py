@@ -13,7 +13,7 @@ from aerobat.declaration import by_value, short, validated
 from aerobat.errors import BackendMissing, Infeasible, SpecError
 from aerobat.optimization.deadline import out_of_time, processor, within_time
 from aerobat.planning import Plan, Planner, as_planner, plan, registered_planners, suited_planner
-from aerobat.planning.miqp.rescue import MOTION, keeping, keeps
+from aerobat.planning.planners import planner_with_reserve
 from aerobat.problem import Problem, as_problem
 from aerobat.studies.feasibility.probe import TIME_LIMIT
 from aerobat.studies.why.changes import Change, Task, changes
@@ -165,15 +165,15 @@ def _planners(task: Task, refused: bool) -> Iterator[Planner]:
         refused: Whether the task's own planner refused it already.
     """
     suits = suited_planner(task.problem, task.vehicle)
-    suited = keeping(task.reserve, suits)
+    suited = planner_with_reserve(suits, task.reserve)
     asked = suited if task.planner is None else task.planner
     if not refused:
         yield asked
     if suited != asked:
         yield suited
     others = [name for name, cls in registered_planners().items() if cls not in (type(asked), type(suited))]
-    for name in sorted(others, key=lambda name: name != MOTION) if task.vehicle is not None else ():
-        yield keeping(task.reserve, name)
+    for name in sorted(others, key=lambda name: name != "time-optimal") if task.vehicle is not None else ():
+        yield planner_with_reserve(name, task.reserve)
 
 
 def _planned(task: Task, planner: Planner) -> Plan | None:
@@ -189,7 +189,7 @@ def _planned(task: Task, planner: Planner) -> Plan | None:
         return None
     if task.vehicle is None:
         return found
-    return found if keeps(found, task.reserve) and found.flies else None
+    return found if found.keeps(task.reserve) and found.flies else None
 
 
 def _told(changes: tuple[str, ...]) -> str:
