@@ -42,6 +42,14 @@ def test_a_plan_that_is_not_certified_exits_with_1_and_is_written(command: str, 
     assert not written or Path("jerk", written).exists()
 
 
+def test_an_export_of_a_plan_that_is_not_certified_warns_and_exits_with_1(capsys) -> None:
+    for plan, expected in ((shared_plan("line", planner=JERK), 1), (shared_plan("line"), 0)):
+        plan.save("line.plan")
+        assert code("export", "line.plan", "--to", "csv", "--out", "line.csv") == expected
+        assert Path("line.csv").exists()
+        assert ("warning: the plan is not certified for agile-quad" in capsys.readouterr().err) == expected
+
+
 def test_a_flight_that_went_wrong_exits_with_1_and_is_written(monkeypatch) -> None:
     from aerobat.evaluation import score
 

@@ -8,8 +8,9 @@ from typing import Annotated, Literal
 
 from cyclopts import Parameter
 
+from aerobat.cli.exit_code import ExitCode
 from aerobat.cli.options import POSITIVE, Plugins, output
-from aerobat.cli.terminal import print_json
+from aerobat.cli.terminal import print_json, say
 from aerobat.errors import SpecError
 from aerobat.interchange import read_plan
 from aerobat.interchange.exports import FORMATS
@@ -40,10 +41,11 @@ class ExportOptions:
     """Print what was written and lost as JSON on standard output, and nothing else."""
 
 
-def export(plan: Path, options: Annotated[ExportOptions, Parameter(name="*")]) -> None:
+def export(plan: Path, options: Annotated[ExportOptions, Parameter(name="*")]) -> ExitCode:
     """Write a plan as another system reads it, and say what that lost.
 
     The loss is the largest difference of position, velocity and attitude from the plan over continuous time.
+    A plan that is not certified for its vehicle is written all the same, with a warning and exit code 1.
 
     --to csv         a table of path, attitude, rates and thrusts
     --to crazyflie   pieces for the Crazyflie's memory, and the CSV that Crazyswarm reads (a folder)
@@ -65,7 +67,11 @@ def export(plan: Path, options: Annotated[ExportOptions, Parameter(name="*")]) -
     if options.json:
         facts = {"format": made.format, "files": list(map(str, made.files)), "loss": made.loss.record()}
         print_json(to_json(facts))
-        return
-    for file in made.files:
-        print(f"written to {file}")
-    print(made.loss)
+    else:
+        for file in made.files:
+            print(f"written to {file}")
+        print(made.loss)
+    if found.vehicle is None or found.certified:
+        return ExitCode.WELL
+    say(f"warning: the plan is not certified for {found.vehicle.name}: {found.certificate}")
+    return ExitCode.NOT_WELL
