@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -13,6 +14,11 @@ Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 Indices = NDArray[np.intp]
 AXES = "xyz"  # the names of a vector's components
+
+
+def xyz(vectors: Any) -> tuple[Any, Any, Any]:
+    """Return the components of vectors (..., 3), as kernels take them."""
+    return vectors[..., 0], vectors[..., 1], vectors[..., 2]
 
 
 def frozen(value: ArrayLike, name: str, shape: Sequence[int | None] | None = None) -> Array:

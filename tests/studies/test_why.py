@@ -11,7 +11,7 @@ import pytest
 import aerobat as ab
 from aerobat.errors import Reason
 from aerobat.planning import registered_planners
-from aerobat.studies.why import Task, explained, remedies
+from aerobat.studies.why import Request, explained, remedies
 from aerobat.studies.why.changes import changes
 from shared_plans import shared_plan
 
@@ -45,7 +45,7 @@ def test_every_limit_of_problem_and_vehicle_is_a_change_to_be_tried() -> None:
     problem = replace(ab.load_problem("half-flip"), limits=limits, maneuver=ab.HalfFlip(passage=late))
     problem = replace(problem, environment=ab.Environment(ground=-3.0))
     idle = replace(QUAD, rotors=tuple(replace(rotor, min_thrust=0.1) for rotor in QUAD.rotors))
-    task = Task(problem, idle, ab.Miqp(reserve=0.1))
+    task = Request(problem, idle, ab.Miqp(reserve=0.1))
     found = changes(task)
     for change in found:
         changed = change.apply(task)
@@ -128,6 +128,6 @@ def test_a_plan_that_keeps_less_than_the_reserve_helps_only_without_it(
 ) -> None:
     """A closed form, which keeps none, was advised to who asked for a reserve."""
     monkeypatch.setattr(remedies, "plan", Pretending())
-    task = Task(ab.load_problem("line"), QUAD, ab.Miqp(reserve=0.45))
+    task = Request(ab.load_problem("line"), QUAD, ab.Miqp(reserve=0.45))
     found = explained(ab.Infeasible("it is too little", ["one attempt"]), task)
     assert [remedy.changes for remedy in found.remedies] == [("without reserve",)]

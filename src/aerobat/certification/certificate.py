@@ -11,6 +11,7 @@ from typing import Literal
 from aerobat.declaration import by_value, in_notebooks, short, validated
 from aerobat.errors import Reason
 from aerobat.flatness import TimeInterval
+from aerobat.limits.limit import quantity_name
 
 
 class Verdict(StrEnum):
@@ -36,9 +37,7 @@ class Finding:
     are the same.
     """
 
-    quantity: (
-        str  # "thrust" and "command" of a rotor, "collective thrust", "tilt", "speed", "velocity x", ...
-    )
+    quantity: str  # "thrust" or "command" of a rotor, "collective thrust", "tilt", "velocity x", ...
     unit: str
     side: Side
     value: float  # reached at `time`
@@ -56,7 +55,7 @@ class Finding:
     @property
     def name(self) -> str:
         """The quantity in words, with its rotor."""
-        return self.quantity if self.rotor is None else f"{self.quantity} of rotor {self.rotor}"
+        return quantity_name(self.quantity, self.rotor)
 
     @property
     def place(self) -> str | None:

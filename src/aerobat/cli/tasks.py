@@ -135,9 +135,9 @@ def plan_of(record: RunRecord, explain: bool = False) -> Plan:
 
 def _advice(record: RunRecord, refusal: Infeasible) -> str:
     """The changes with which a problem that was refused is planned."""
-    from aerobat.studies.why import Task, explained
+    from aerobat.studies.why import Request, explained
 
-    task = Task(record.problem, None if record.paper else record.vehicle, record.planner)
+    task = Request(record.problem, None if record.paper else record.vehicle, record.planner)
     with showing(WhyProgress()) as progress:
         return explained(refusal, task, progress.record).advice
 

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from aerobat import so3
-from aerobat.arrays import Array, frozen
+from aerobat.arrays import Array, frozen, xyz
 from aerobat.declaration import Angle, Positive, by_value, short, validated
 from aerobat.environment import Environment
 from aerobat.errors import SpecError
@@ -136,7 +136,7 @@ def body_rates(thrust: Array, q_world_body: Array, determined: NDArray[np.bool_]
     """
     n = np.where(determined, np.linalg.norm(thrust[..., 0, :], axis=-1), np.inf)
     turning = so3.unrotate(q_world_body[..., None, :], thrust[..., 1:, :]) / n[..., None, None]
-    jerk, snap = (_components(turning[..., k, :]) for k in (0, 1))
+    jerk, snap = (xyz(turning[..., k, :]) for k in (0, 1))
     omega, omega_dot = kernel.body_rates((0.0, 0.0, 1.0), jerk, snap)
     return np.stack(omega, axis=-1), np.stack(omega_dot, axis=-1)
 
@@ -153,9 +153,9 @@ def wrench_for(thrust: Array, airspeed: Array, omega: Array, omega_dot: Array, v
     """
     f = thrust[..., 0, :]
     n = np.linalg.norm(f, axis=-1)
-    b3 = _components(f / np.where(n > 0.0, n, 1.0)[..., None])
-    moment = kernel.moment(vehicle.inertia.tolist(), _components(omega), _components(omega_dot))
-    collective = kernel.collective(vehicle.mass, axial_drag(vehicle), n, b3, _components(airspeed))
+    b3 = xyz(f / np.where(n > 0.0, n, 1.0)[..., None])
+    moment = kernel.moment(vehicle.inertia.tolist(), xyz(omega), xyz(omega_dot))
+    collective = kernel.collective(vehicle.mass, axial_drag(vehicle), n, b3, xyz(airspeed))
     return Wrench(collective, np.stack(moment, axis=-1))
 
 
@@ -292,7 +292,7 @@ def _assembled(
         q = np.where(determined[:, None], body_attitudes(q, angle, flat, drag, balance), q)
         omega, omega_dot, specific = body_motion(q, flat, drag, balance)
         omega, omega_dot = (np.where(determined[:, None], rate, 0.0) for rate in (omega, omega_dot))
-        moment = kernel.moment(vehicle.inertia.tolist(), _components(omega), _components(omega_dot))
+        moment = kernel.moment(vehicle.inertia.tolist(), xyz(omega), xyz(omega_dot))
         wrench = Wrench(vehicle.mass * specific, np.stack(moment, axis=-1))
     setpoint = Setpoint(flat, q, omega, omega_dot, wrench)
     rotors = rotor_thrusts(vehicle, wrench)
@@ -306,8 +306,3 @@ def _rising(times: ArrayLike | None) -> Array:
     if series.ndim != 1 or series.size == 0 or (np.diff(series) < 0).any():
         raise SpecError("times must be a list of at least one number of seconds, none before the last")
     return series
-
-
-def _components(vectors: Array) -> tuple[Array, Array, Array]:
-    x, y, z = np.moveaxis(vectors, -1, 0)
-    return x, y, z

@@ -15,7 +15,7 @@ from numpy.polynomial import chebyshev
 from numpy.typing import NDArray
 
 from aerobat import so3
-from aerobat.arrays import Array
+from aerobat.arrays import Array, xyz
 from aerobat.environment import Environment
 from aerobat.kernels import unequal_drag as kernel
 from aerobat.kernels.ops import Axes, Vector
@@ -149,7 +149,7 @@ def body_attitudes(q_mean: Array, angle: Array, flat: FlatState, drag: UnequalDr
     near = so3.multiply(q_mean, so3.about_axis(UP, angle))
     airspeed = flat.velocity - drag.wind
     kappa = drag.counted(balance, airspeed)
-    thrust, air = (_components(so3.unrotate(near, vector)) for vector in (balance, airspeed))
+    thrust, air = (xyz(so3.unrotate(near, vector)) for vector in (balance, airspeed))
     (xx, xy, xz), (yx, yy, yz), (zx, zy, zz) = kernel.nearest_axes(
         np.sqrt, add_scaled(thrust, kappa, air), add_scaled(thrust, -kappa, air)
     )
@@ -171,7 +171,7 @@ def body_motion(q: Array, flat: FlatState, drag: UnequalDrag, balance: Array) ->
     kappa = drag.counted(balance, airspeed)
     mean = drag.mean
     world = (airspeed, flat.acceleration, flat.jerk, flat.acceleration + drag.weight, flat.snap)
-    air, accelerated, jerk, thrust, snap = (_components(so3.unrotate(q, vector)) for vector in world)
+    air, accelerated, jerk, thrust, snap = (xyz(so3.unrotate(q, vector)) for vector in world)
     motion = ((thrust, air), (jerk, accelerated), (snap, jerk))
     alpha = [add_scaled(x, mean + kappa, below) for x, below in motion]
     beta = [add_scaled(x, mean - kappa, below) for x, below in motion]
@@ -201,7 +201,7 @@ class _Local:
         thrust = acceleration + drag.weight + mean * airspeed
         vectors = (jerk + mean * acceleration, airspeed, acceleration)
         parts = []
-        for x, y, z in (_components(so3.unrotate(q_mean, vector)) for vector in vectors):
+        for x, y, z in (xyz(so3.unrotate(q_mean, vector)) for vector in vectors):
             parts += [x + 1j * y, z]
         across, rising, air, air_along, accelerated, accelerated_along = parts
         norm = np.maximum(np.linalg.norm(thrust, axis=-1), np.finfo(float).tiny)
@@ -259,7 +259,3 @@ def analysis() -> Array:
 
 def _vector(across: NDArray[np.complex128], along: Array) -> Vector:
     return across.real, across.imag, along
-
-
-def _components(vectors: Array) -> Vector:
-    return vectors[..., 0], vectors[..., 1], vectors[..., 2]

@@ -102,7 +102,7 @@ def frame_spin(thrust: tuple[Scalar, Vector], alpha: tuple[Vector, Vector], body
     return -1.0 * (change[1] / norm * b1[2] + pitch * b3[1]) / b1[0]
 
 
-class Airframe(NamedTuple):
+class DraggedBody(NamedTuple):
     """What of a vehicle counts here."""
 
     mass: Scalar  # [kg]
@@ -110,7 +110,7 @@ class Airframe(NamedTuple):
     inertia: Matrix  # [kg·m²]
 
 
-class Motion(NamedTuple):
+class BodyMotion(NamedTuple):
     """A motion at one instant, in axes that the body's are near to."""
 
     weight: Vector  # [m/s²] g e3
@@ -131,7 +131,7 @@ class Demand(NamedTuple):
     b3: Vector  # in the axes of the motion
 
 
-def demand(sqrt: Callable[[Scalar], Scalar], airframe: Airframe, motion: Motion) -> Demand:
+def demand(sqrt: Callable[[Scalar], Scalar], airframe: DraggedBody, motion: BodyMotion) -> Demand:
     """Return what a motion asks; exact where the body has the axes that the motion is given in.
 
     Beside it the body's axes are `nearest_axes`, which is exact to first order but for the angle about b3.

@@ -36,7 +36,7 @@ FRAME_CLEARANCE = 0.01  # [m] from body to frame
 Extent: TypeAlias = Callable[[Vector], Scalar]  # [m] that a body reaches from its centre of mass, outward
 
 
-class Opening(NamedTuple):
+class OpeningAhead(NamedTuple):
     """An opening and the motion through it that is foreseen, in numbers or in symbols."""
 
     place: Vector  # [m] of the gate
@@ -47,7 +47,7 @@ class Opening(NamedTuple):
     bending: Scalar  # [m/s²] across a straight line, at most
 
     @classmethod
-    def of_parameters(cls, parameters: Sequence[Scalar]) -> Opening:
+    def of_parameters(cls, parameters: Sequence[Scalar]) -> OpeningAhead:
         """The opening of 8 + 4 K numbers in the order of its fields."""
         vectors = [(parameters[k], parameters[k + 1], parameters[k + 2]) for k in range(0, 6, 3)]
         sides = (len(parameters) - 8) // 4
@@ -102,9 +102,9 @@ class BodyInGate:
         return np.concatenate([place, outward.ravel(), distances - FRAME_CLEARANCE, ahead])
 
     @property
-    def opening(self) -> Opening:
+    def opening(self) -> OpeningAhead:
         """Its opening in numbers."""
-        return Opening.of_parameters(self.parameters.tolist())
+        return OpeningAhead.of_parameters(self.parameters.tolist())
 
 
 def extent_of_attitude(ops: Ops, body: Ellipsoid, axes: Axes) -> Extent:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from math import inf
@@ -54,11 +55,17 @@ class Limit:
             self.upper - self.quantity.constant
         ) / self.size
 
-    def exceeded(self, excess: float, time: float) -> Reason:
-        """Return a sentence without its full stop about an excess, a fraction of its size, at a time [s]."""
-        name = self.name if self.rotor is None else f"{self.name} of rotor {self.rotor}"
+    def exceeded(self, excess: float, time: float, fields: Sequence[str] = ()) -> Reason:
+        """Return a sentence without its full stop about an excess.
+
+        Args:
+            excess: A fraction of its size.
+            time: [s].
+            fields: Of the end that is exceeded; by default those of both.
+        """
+        name = quantity_name(self.name, self.rotor)
         sentence = f"the {name} is beyond its limit by {100.0 * excess:.3g} % of its range at {time:.2f} s"
-        return Reason(sentence, self.fields)
+        return Reason(sentence, fields or self.fields)
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,6 +81,11 @@ class Asked:
     def balance(self) -> ForceBalance:
         """The balance of thrust, acceleration and drag."""
         return force_balance(self.environment, self.vehicle)
+
+
+def quantity_name(quantity: str, rotor: int | None) -> str:
+    """Return a quantity in words, with its rotor if it is one's."""
+    return quantity if rotor is None else f"{quantity} of rotor {rotor}"
 
 
 def size_of(lower: float, upper: float) -> float:

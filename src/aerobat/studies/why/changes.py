@@ -20,7 +20,7 @@ STRONGER = 1.5  # times the rotors' largest thrusts
 
 
 @dataclass(frozen=True, eq=False)
-class Task:
+class Request:
     """A problem, the vehicle for it if there is one, and how to plan."""
 
     problem: Problem
@@ -45,15 +45,15 @@ class Change:
     """A change that may help, in words, each of which is a value to be changed in a file or a call."""
 
     words: str
-    apply: Callable[[Task], Task]
+    apply: Callable[[Request], Request]
 
 
-def changes(task: Task) -> list[Change]:
+def changes(task: Request) -> list[Change]:
     """The changes that a task leaves room for."""
     return [*_of_limits(task), *_of_reserve(task), *_of_vehicle(task), *_of_stages(task)]
 
 
-def _of_limits(task: Task) -> Iterator[Change]:
+def _of_limits(task: Request) -> Iterator[Change]:
     for derivative, name in enumerate(DERIVATIVES):
         if np.isfinite(np.concatenate(task.problem.limits.of(derivative))).any():
             key = "limits.lower and limits.upper" if derivative == 0 else f"limits.{name}"
@@ -64,33 +64,33 @@ def _of_limits(task: Task) -> Iterator[Change]:
         yield Change("without environment.ground", _without_ground)
 
 
-def _without_limit(derivative: int, task: Task) -> Task:
+def _without_limit(derivative: int, task: Request) -> Request:
     return _with_problem(task, limits=task.problem.limits.without(derivative))
 
 
-def _without_tilt_limit(task: Task) -> Task:
+def _without_tilt_limit(task: Request) -> Request:
     return _with_problem(task, limits=replace(task.problem.limits, max_tilt=np.inf))
 
 
-def _without_ground(task: Task) -> Task:
+def _without_ground(task: Request) -> Request:
     return _with_problem(task, environment=replace(task.problem.environment, ground=None))
 
 
-def _with_problem(task: Task, **changed: Any) -> Task:
+def _with_problem(task: Request, **changed: Any) -> Request:
     return replace(task, problem=replace(task.problem, **changed))
 
 
-def _of_reserve(task: Task) -> Iterator[Change]:
+def _of_reserve(task: Request) -> Iterator[Change]:
     if task.reserve > 0.0:
         yield Change("without reserve", _without_reserve)
 
 
-def _without_reserve(task: Task) -> Task:
+def _without_reserve(task: Request) -> Request:
     planner: Any = task.planner
     return replace(task, planner=replace(planner, reserve=0.0))
 
 
-def _of_vehicle(task: Task) -> Iterator[Change]:
+def _of_vehicle(task: Request) -> Iterator[Change]:
     vehicle = task.vehicle
     if vehicle is None:
         return
@@ -103,24 +103,24 @@ def _of_vehicle(task: Task) -> Iterator[Change]:
         yield Change("without max_body_rate", _without_rate_limit)
 
 
-def _with_stronger_rotors(task: Task) -> Task:
+def _with_stronger_rotors(task: Request) -> Request:
     assert task.vehicle is not None
     rotors = (replace(rotor, max_thrust=STRONGER * rotor.max_thrust) for rotor in task.vehicle.rotors)
     return replace(task, vehicle=replace(task.vehicle, rotors=tuple(rotors)))
 
 
-def _with_rotors(changed: Mapping[str, Any], task: Task) -> Task:
+def _with_rotors(changed: Mapping[str, Any], task: Request) -> Request:
     assert task.vehicle is not None
     rotors = (replace(rotor, **changed) for rotor in task.vehicle.rotors)
     return replace(task, vehicle=replace(task.vehicle, rotors=tuple(rotors)))
 
 
-def _without_rate_limit(task: Task) -> Task:
+def _without_rate_limit(task: Request) -> Request:
     assert task.vehicle is not None
     return replace(task, vehicle=replace(task.vehicle, max_body_rate=np.inf))
 
 
-def _of_stages(task: Task) -> Iterator[Change]:
+def _of_stages(task: Request) -> Iterator[Change]:
     stages = task.problem.stages(task.max_specific_thrust).stages
     if any(stage.at != "free" for stage in stages):
         yield Change("with its stages at any time", partial(_with_stages, at_any_time))
@@ -128,5 +128,5 @@ def _of_stages(task: Task) -> Iterator[Change]:
         yield Change("with half the thrust that its stages ask", partial(_with_stages, with_half_the_thrust))
 
 
-def _with_stages(ease: Callable[[Stage], Stage], task: Task) -> Task:
+def _with_stages(ease: Callable[[Stage], Stage], task: Request) -> Request:
     return replace(task, problem=eased(task.problem, task.max_specific_thrust, ease))

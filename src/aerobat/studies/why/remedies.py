@@ -16,7 +16,7 @@ from aerobat.planning import Plan, Planner, as_planner, plan, registered_planner
 from aerobat.planning.planners import planner_with_reserve
 from aerobat.problem import Problem, as_problem
 from aerobat.studies.feasibility.probe import TIME_LIMIT
-from aerobat.studies.why.changes import Change, Task, changes
+from aerobat.studies.why.changes import Change, Request, changes
 from aerobat.vehicle import Vehicle, as_vehicle
 
 # [s] of the processor for the plan of each change: twice what a refusal takes
@@ -89,7 +89,7 @@ def why(
     """
     chosen = None if planner is None else as_planner(planner)
     flown_by = None if vehicle is None else as_vehicle(vehicle)
-    task = Task(as_problem(problem), flown_by, chosen)
+    task = Request(as_problem(problem), flown_by, chosen)
     try:
         found = plan(task.problem, task.planner, task.vehicle)
     except Infeasible as refusal:
@@ -97,7 +97,7 @@ def why(
     return Why(task.problem.name, "", (), (Remedy((), found),), ())
 
 
-def explained(refusal: Infeasible, task: Task, progress: Tried | None = None) -> Why:
+def explained(refusal: Infeasible, task: Request, progress: Tried | None = None) -> Why:
     """The explanation of a refusal that was met.
 
     Args:
@@ -105,16 +105,16 @@ def explained(refusal: Infeasible, task: Task, progress: Tried | None = None) ->
         task: What was refused.
         progress: Called with each change, and whether it helps, as they are tried.
     """
-    search = _Search(task, progress or (lambda words, helps: None))
+    search = _RemedySearch(task, progress or (lambda words, helps: None))
     name, sentence, is_proven = task.problem.name, refusal.sentence, not refusal.attempts
     found = (None if is_proven else search.by_others()) or search.by_changes()
     return Why(name, sentence, refusal.limits, tuple(found), tuple(search.tried))
 
 
-class _Search:
+class _RemedySearch:
     """The search for changes with which a task is planned."""
 
-    def __init__(self, task: Task, progress: Tried) -> None:
+    def __init__(self, task: Request, progress: Tried) -> None:
         self.task, self.progress = task, progress
         self.tried: list[str] = []
 
@@ -157,7 +157,7 @@ class _Search:
         return None if found is None else Remedy(words, found)
 
 
-def _planners(task: Task, refused: bool) -> Iterator[Planner]:
+def _planners(task: Request, refused: bool) -> Iterator[Planner]:
     """The planners to ask: the task's, the one that suits it, all others, each to keep the task's reserve.
 
     Args:
@@ -176,7 +176,7 @@ def _planners(task: Task, refused: bool) -> Iterator[Planner]:
         yield planner_with_reserve(name, task.reserve)
 
 
-def _planned(task: Task, planner: Planner) -> Plan | None:
+def _planned(task: Request, planner: Planner) -> Plan | None:
     """The planner's plan; None where there is none.
 
     For a vehicle, it is certified, keeps the task's reserve and flies as it should.

@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from aerobat import so3
-from aerobat.arrays import Array, Indices, Mask
+from aerobat.arrays import Array, Indices, Mask, xyz
 from aerobat.environment import Environment
 from aerobat.flatness import axial_drag, has_unequal_drag, lateral_drag, reference_of
 from aerobat.flatness.parallel_transport import frames
@@ -142,23 +142,23 @@ class LimitRows:
         airspeed, acceleration, jerk, snap, crackle = np.moveaxis(moving, -2, 0)
         weight = self.environment.weight @ frames
         f, f1, f2 = kernel.specific_thrust(weight, drag, airspeed, acceleration, jerk, snap)
-        vectors = [_components(x) for x in (f, f1, f2, crackle + drag * snap, airspeed, acceleration)]
+        vectors = [xyz(x) for x in (f, f1, f2, crackle + drag * snap, airspeed, acceleration)]
         norm = np.sqrt(dot(vectors[0], vectors[0]))
         b3, *rates = (scale(1.0 / norm, vector) for vector in vectors[:4])
         turning = kernel.turning(b3, *rates)
         rate = np.sqrt(dot(turning[0], turning[0]) + TINY)
-        upright = dot(b3, _components(UP @ frames))
+        upright = dot(b3, xyz(UP @ frames))
         return np.stack([*self._wrenches(b3, norm, vectors, turning), norm, rate, upright], axis=-1)
 
     def _unequal_measures(self, moving: Any, frames: Array) -> Any:
         """The same, of drag that differs along body x and y."""
-        vectors = [_components(x) for x in (self.environment.weight @ frames, *np.moveaxis(moving, -2, 0))]
+        vectors = [xyz(x) for x in (self.environment.weight @ frames, *np.moveaxis(moving, -2, 0))]
         vehicle = self.vehicle
         drag = tuple((vehicle.drag_body / vehicle.mass).tolist())
-        airframe = unequal_drag.Airframe(vehicle.mass, drag, vehicle.inertia.tolist())
-        asked = unequal_drag.demand(np.sqrt, airframe, unequal_drag.Motion(*vectors))
+        airframe = unequal_drag.DraggedBody(vehicle.mass, drag, vehicle.inertia.tolist())
+        asked = unequal_drag.demand(np.sqrt, airframe, unequal_drag.BodyMotion(*vectors))
         rate = np.sqrt(dot(asked.omega, asked.omega) + TINY)
-        upright = dot(asked.b3, _components(UP @ frames))
+        upright = dot(asked.b3, xyz(UP @ frames))
         return np.stack([*asked.wrench, *asked.rate, asked.specific_thrust, rate, upright], axis=-1)
 
     def _wrenches(
@@ -186,7 +186,3 @@ def stage_rows(limit: Limit) -> Iterator[tuple[Array, float]]:
     for sign, end in zip((-1.0, 1.0), limit.ends, strict=True):
         if isfinite(end):
             yield sign / limit.size * limit.quantity.path, sign * end
-
-
-def _components(vectors: Any) -> Vector:
-    return vectors[..., 0], vectors[..., 1], vectors[..., 2]

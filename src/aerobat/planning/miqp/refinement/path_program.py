@@ -207,8 +207,9 @@ class PathPoint:
     def excess_sentence(self) -> str:
         """Which limit is exceeded most, by how much and when."""
         place, column = np.unravel_index(int(self._values.argmax()), self._values.shape)
-        limit, _ = self.program.limits.sides[column]
-        return limit.exceeded(float(self._values[place, column]), float(self._samples.times[place]))
+        limit, sign = self.program.limits.sides[column]
+        excess, time = float(self._values[place, column]), float(self._samples.times[place])
+        return limit.exceeded(excess, time, (limit.fields[sign > 0.0],))
 
     def linearization(self) -> Linearization:
         """The constraints near the path."""

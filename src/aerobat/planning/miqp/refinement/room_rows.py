@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from aerobat.arrays import Array, Indices
+from aerobat.arrays import Array, Indices, xyz
 from aerobat.engines.numpy import ArrayOps
 from aerobat.limits.body_in_gate import BodyInGate, extent_of_thrust
 from aerobat.planning.miqp.refinement.limit_rows import COMPLEX_STEP
@@ -49,12 +49,8 @@ class RoomRows:
         """What is missing of the room in one gate, at derivatives (..., 6, 3)."""
         position, velocity, acceleration = np.moveaxis(derivatives[..., :KNOWN, :], -2, 0)
         thrust = acceleration + self.balance.drag * velocity + self.balance.constant
-        extent = extent_of_thrust(ArrayOps, self.body, _components(thrust))
-        room = body.opening.room(ArrayOps, _components(position), _components(velocity), extent)
+        extent = extent_of_thrust(ArrayOps, self.body, xyz(thrust))
+        room = body.opening.room(ArrayOps, xyz(position), xyz(velocity), extent)
         *sides, speed = room
         yield from (-side / (body.gate.opening.inradius * body.min_speed) for side in sides)
         yield -speed / body.min_speed
-
-
-def _components(vectors: Any) -> tuple[Any, Any, Any]:
-    return vectors[..., 0], vectors[..., 1], vectors[..., 2]

@@ -112,8 +112,8 @@ class SymbolicMeasures:
         vectors = (ca.DM(self.environment.weight @ self.axes), *motion, ca.DM(UP @ self.axes))
         *local, up = (self._local(vector, frame) for vector in vectors)
         drag = tuple((vehicle.drag_body / vehicle.mass).tolist())
-        airframe = unequal_drag.Airframe(vehicle.mass, drag, vehicle.inertia.tolist())
-        asked = unequal_drag.demand(ca.sqrt, airframe, unequal_drag.Motion(*local))
+        airframe = unequal_drag.DraggedBody(vehicle.mass, drag, vehicle.inertia.tolist())
+        asked = unequal_drag.demand(ca.sqrt, airframe, unequal_drag.BodyMotion(*local))
         squares = {SPECIFIC_THRUST: asked.specific_thrust**2, BODY_RATE: dot(asked.omega, asked.omega)}
         plain = asked.specific_thrust, ca.sqrt(squares[BODY_RATE]), dot(asked.b3, up)
         return self._weighted(limits, ca.vertcat(*asked.wrench, *asked.rate, *plain), squares)

@@ -14,7 +14,7 @@ from aerobat.arrays import Array
 from aerobat.flatness import force_balance
 from aerobat.kernels.quaternions import axes
 from aerobat.limits import Limit
-from aerobat.limits.body_in_gate import Opening, extent_of_attitude
+from aerobat.limits.body_in_gate import OpeningAhead, extent_of_attitude
 from aerobat.limits.path_condition import limit_of
 from aerobat.optimization.nonlinear import SymbolicOps, components, import_casadi
 from aerobat.optimization.separable import ElementFunction
@@ -144,13 +144,13 @@ class Elements:
         return ElementFunction(ca.Function("distance", [z, ball], [ca.sumsqr(distance)]))
 
     def room_in_gate(self, parameters: int) -> ElementFunction:
-        """The values of `Opening.room` of a scaled state, by so many parameters of an opening."""
+        """The values of `OpeningAhead.room` of a scaled state, by so many parameters of an opening."""
         ca, ops = import_casadi(), SymbolicOps()
         z, opening = ca.SX.sym("z", STATES), ca.SX.sym("opening", parameters)
         state = z * STATE_SCALE
         position, velocity, attitude = (components(state[part]) for part in (POSITION, VELOCITY, ATTITUDE))
         extent = extent_of_attitude(ops, self.vehicle.bounding_ellipsoid, axes(attitude))
-        values = Opening.of_parameters(components(opening)).room(ops, position, velocity, extent)
+        values = OpeningAhead.of_parameters(components(opening)).room(ops, position, velocity, extent)
         return ElementFunction(ca.Function("room", [z, opening], [ca.vertcat(*values)]))
 
     @cached_property
