@@ -22,30 +22,41 @@ from numpy.typing import NDArray
 from aerobat.errors import SpecError
 
 
+class CannotWrite(SpecError):
+    """A place cannot be written: the message names it as it was given, and the system's reason."""
+
+    def __init__(self, path: str | os.PathLike[str], reason: OSError) -> None:
+        super().__init__(f"cannot write {path}: {reason.strerror or reason}")
+        self.reason = reason
+
+
 @contextmanager
 def whole_file(path: str | os.PathLike[str]) -> Iterator[Path]:
     """A temporary path beside `path`, renamed to it when the block ends well, removed when it does not.
 
-    What killed processes have left in that folder is removed. Missing parent folders are made. Raises
-    SpecError when the place cannot be written.
+    A file that is replaced keeps its mode, and a link to it stays. What killed processes have left in that
+    folder is removed. Missing parent folders are made. Raises CannotWrite when the place cannot be written.
     """
-    target = Path(path)
     try:
+        target = Path(os.path.realpath(path))
+        if target.exists() and not (target.is_file() or target.is_dir()):
+            raise OSError("it is a pipe or a device, not a file")
         target.parent.mkdir(parents=True, exist_ok=True)
         _remove_abandoned(target.parent)
         suffix = f".{os.getpid()}{_STAGING}{target.suffix}"
         handle, name = tempfile.mkstemp(dir=target.parent, prefix=f".{target.stem}.", suffix=suffix)
         os.close(handle)
     except OSError as error:
-        raise SpecError(f"cannot write {target}: {error.strerror or error}") from None
+        raise CannotWrite(path, error) from None
     temporary = Path(name)
     try:
         yield temporary
-        temporary.chmod(0o666 & ~_umask())
         _sync(temporary)
+        temporary.chmod(0o666 & ~_umask())
+        _keep_mode(temporary, target)
         temporary.replace(target)
     except OSError as error:
-        raise SpecError(f"cannot write {target}: {error.strerror or error}") from None
+        raise CannotWrite(path, error) from None
     finally:
         temporary.unlink(missing_ok=True)
 
@@ -55,16 +66,16 @@ def whole_folder(path: str | os.PathLike[str], is_ours: Callable[[str], bool]) -
     """Yield an empty folder that takes the place of `path`, as one, when the block ends well.
 
     Whatever ends it, at `path` is either what was there before or all of the new, never a mixture, and no
-    parent is left that was made for nothing. What killed processes have left in its parent is removed. Raises
-    SpecError when the place cannot be written, and for a folder that holds anything whose name is not ours:
-    that is somebody's work.
+    parent is left that was made for nothing. What is replaced keeps its mode, and a link to the folder stays.
+    What killed processes have left in its parent is removed. Raises CannotWrite when the place cannot be
+    written, and SpecError for a folder that holds anything whose name is not ours: that is somebody's work.
 
     Args:
         path: The folder to make or to replace; missing parents are made.
         is_ours: Whether a file of this name may be replaced.
     """
-    target = Path(os.path.abspath(path))
     try:
+        target = Path(os.path.realpath(path))
         require_replaceable(path, is_ours)
         made = [parent for parent in target.parents if not parent.exists()]
         target.parent.mkdir(parents=True, exist_ok=True)
@@ -73,17 +84,20 @@ def whole_folder(path: str | os.PathLike[str], is_ours: Callable[[str], bool]) -
         shutil.rmtree(staging, ignore_errors=True)
         staging.mkdir()
     except OSError as error:
-        raise SpecError(f"cannot write {path}: {error.strerror or error}") from None
+        raise CannotWrite(path, error) from None
     try:
         yield staging
         for written in (*staging.iterdir(), staging):
             _sync(written)
+            _keep_mode(written, target / written.relative_to(staging))
         if target.exists():
             _exchange(staging, target)
         else:
             staging.rename(target)
+    except CannotWrite as error:  # of a file in it
+        raise CannotWrite(path, error.reason) from None
     except OSError as error:
-        raise SpecError(f"cannot write {path}: {error.strerror or error}") from None
+        raise CannotWrite(path, error) from None
     finally:
         shutil.rmtree(staging, ignore_errors=True)
         if not target.exists():
@@ -97,18 +111,18 @@ def require_replaceable(path: str | os.PathLike[str], is_ours: Callable[[str], b
 
     What killed processes have left in it is removed.
     """
-    target = Path(os.path.abspath(path))
     try:
+        target = Path(os.path.realpath(path))
         _remove_abandoned(target)  # of files that were being written into it
         foreign = sorted(name for name in _entries(target) if not is_ours(name))
     except OSError as error:
-        raise SpecError(f"cannot write {path}: {error.strerror or error}") from None
+        raise CannotWrite(path, error) from None
     if foreign:
         raise SpecError(f"{path}/ holds {foreign[0]}, which no run wrote; give a folder of its own")
 
 
 def write_whole(path: str | os.PathLike[str], content: str | bytes) -> None:
-    """Write a file's whole content, or nothing. Raises SpecError when the place cannot be written."""
+    """Write a file's whole content, or nothing. Raises CannotWrite when the place cannot be written."""
     with whole_file(path) as temporary:
         temporary.write_bytes(content.encode() if isinstance(content, str) else content)
 
@@ -188,6 +202,12 @@ def _exchange(a: Path, b: Path) -> None:
     b.rename(aside)
     a.rename(b)
     aside.rename(a)
+
+
+def _keep_mode(made: Path, replaced: Path) -> None:
+    """Give what was made the mode of what it takes the place of, where there is such."""
+    with suppress(FileNotFoundError):
+        made.chmod(stat.S_IMODE(replaced.stat().st_mode))
 
 
 def _sync(path: Path) -> None:

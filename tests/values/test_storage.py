@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import random
 import signal
@@ -80,6 +81,55 @@ def test_a_place_that_is_no_folder_is_refused_in_one_sentence(tmp_path: Path) ->
     (tmp_path / "run").write_text("a file")
     with pytest.raises(SpecError, match="cannot write"):
         written(tmp_path / "run", "new")
+
+
+def test_a_link_to_a_folder_or_a_file_stays_and_what_it_names_is_replaced(tmp_path: Path) -> None:
+    written(tmp_path / "real" / "run", "old")
+    (tmp_path / "link").symlink_to(tmp_path / "real" / "run")
+    written(tmp_path / "link", "new")
+    write_whole(tmp_path / "real" / "file", "old")
+    (tmp_path / "to-file").symlink_to(tmp_path / "real" / "file")
+    write_whole(tmp_path / "to-file", "new")
+    assert contents(tmp_path / "real" / "run") == {(name, "new") for name in NAMES}
+    assert (tmp_path / "real" / "file").read_text() == "new"
+    assert (tmp_path / "link").is_symlink()
+    assert (tmp_path / "to-file").is_symlink()
+    assert sorted(os.listdir(tmp_path)) == ["link", "real", "to-file"]
+    assert sorted(os.listdir(tmp_path / "real")) == ["file", "run"]
+
+
+def test_a_message_about_a_full_disk_names_the_folder_that_was_asked_for(tmp_path: Path, monkeypatch) -> None:
+    def fail(self: Path, content: bytes) -> int:
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(self))
+
+    monkeypatch.setattr(Path, "write_bytes", fail)
+    target = tmp_path / "run"
+    with pytest.raises(SpecError) as refused, whole_folder(target, ours) as staging:
+        write_whole(staging / "part-0", "new")
+    assert str(refused.value) == f"cannot write {target}: No space left on device"
+    assert os.listdir(tmp_path) == []
+
+
+@pytest.mark.skipif(os.name != "posix", reason="modes are of such systems")
+@pytest.mark.parametrize("mode", [0o600, 0o440, 0o755])
+def test_what_is_replaced_keeps_its_mode(tmp_path: Path, mode: int) -> None:
+    write_whole(tmp_path / "file", "old")
+    written(tmp_path / "run", "old")
+    kept = tmp_path / "file", tmp_path / "run" / "part-0", tmp_path / "run"
+    for path, bits in zip(kept, (mode, mode, 0o700), strict=True):
+        path.chmod(bits)
+    write_whole(tmp_path / "file", "new")
+    written(tmp_path / "run", "new")
+    assert (tmp_path / "file").read_text() == "new"
+    assert [path.stat().st_mode & 0o777 for path in kept] == [mode, mode, 0o700]
+
+
+@pytest.mark.skipif(os.name != "posix", reason="no such files there")
+def test_a_pipe_or_a_device_is_not_replaced_by_a_file(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "pipe")
+    with pytest.raises(SpecError, match=r"cannot write .*pipe: it is a pipe or a device"):
+        write_whole(tmp_path / "pipe", "new")
+    assert (tmp_path / "pipe").is_fifo()
 
 
 @pytest.mark.process
