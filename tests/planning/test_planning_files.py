@@ -18,6 +18,7 @@ import aerobat as ab
 from aerobat.errors import SpecError
 from aerobat.planning.evidence import envelope_for
 from aerobat.planning.plan_file import digest_of
+from aerobat.simulation.autopilot import Recoveries
 from aerobat.storage import read_arrays
 from suites import examples
 
@@ -127,6 +128,20 @@ def spoilt(path: Path, **changes: object) -> Path:
     del content["digest"]
     np.savez(path.open("wb"), **content, digest=digest_of(content))
     return path
+
+
+@pytest.mark.parametrize("series", ["times", "heights", "lowest", "durations"])
+@pytest.mark.parametrize("length", [0, 3])
+def test_recoveries_of_unequal_lengths_are_refused(
+    plan: ab.Plan, series: str, length: int, tmp_path: Path
+) -> None:
+    whole = Recoveries(*np.ones((4, 5)), reaction=0.1, ground=None)
+    replace(plan, recoveries=whole).save(tmp_path / "half.plan")
+    document = json.loads(read_arrays(tmp_path / "half.plan", "plan")["document"].tobytes())
+    evidence = document["evidence"]
+    del evidence["recoveries"][series][length:]
+    with pytest.raises(SpecError, match="it is damaged"):
+        ab.load_plan(spoilt(tmp_path / "half.plan", evidence=evidence))
 
 
 @pytest.mark.parametrize(

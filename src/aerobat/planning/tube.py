@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from aerobat.errors import SpecError
 from aerobat.simulation.outcome import length
 
 
@@ -29,6 +30,14 @@ class Tube:
     passed: int  # of `flights`
     flights: int  # fresh ones: none of them told how to tighten
     lower_bound: float  # [-] of the probability of passing, at 95 % confidence
+
+    def __post_init__(self) -> None:
+        """Check that there is one of each for every time."""
+        series = self.position_error, self.attitude_error, self.rotor_margin
+        if not self.times or any(len(values) != len(self.times) for values in series):
+            raise SpecError(
+                "a tube needs an error in position and attitude and a margin for each of its times"
+            )
 
     @property
     def max_position_error(self) -> float:

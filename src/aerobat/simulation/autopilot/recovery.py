@@ -65,6 +65,13 @@ class Recoveries:
     reaction: float  # [s] for which the last command is kept before each
     ground: float | None  # [m] below which there is none; None: no ground
 
+    def __post_init__(self) -> None:
+        """Check that there is one of each for every instant."""
+        if not len(self.times) == len(self.heights) == len(self.lowest) == len(self.durations) > 0:
+            raise SpecError(
+                "recoveries need a height, a lowest height and a duration for each of their times"
+            )
+
     @property
     def height_lost(self) -> Array:
         """How far below the instant's height it comes [m], (T,)."""
