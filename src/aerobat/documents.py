@@ -20,7 +20,11 @@ if TYPE_CHECKING:
 
 T = TypeVar("T")
 
-MAX_DOCUMENT = 2**24  # bytes: a hundred thousand waypoints
+MAX_DOCUMENT = 2**22  # bytes: twenty thousand waypoints
+_UNREADABLE = {  # at which the parser of TOML takes gigabytes or minutes; no document has any such
+    "a number of a thousand digits": re.compile(r"(?<![0-9A-Fa-f_])[0-9A-Fa-f_]{1000}"),
+    "a key of a hundred parts": re.compile(r"(?<![\w\"'-])(?:[\w\"'-]++[ \t]*+\.[ \t]*+){100}"),
+}
 _NUMBERS = re.compile(r"\[\n((?:\s*[-+\w.]+,\n)+)\s*\]")  # a list of numbers, each on a line of its own
 
 
@@ -92,10 +96,13 @@ def within(prefix: str) -> Iterator[None]:
         raise SpecError(f"{prefix}{error}") from None
 
 
-def read_text(path: Document) -> str:
-    """A file's text. Raises SpecError, one sentence without the file's name, where it cannot be read."""
+def read_text(path: Document, max_size: int = MAX_DOCUMENT) -> str:
+    """A file's text of at most `max_size` bytes.
+
+    Raises SpecError, one sentence without the file's name, where it cannot be read.
+    """
     try:
-        content = read_whole(path, MAX_DOCUMENT) if isinstance(path, Path) else path.read_bytes()
+        content = read_whole(path, max_size) if isinstance(path, Path) else path.read_bytes()
         return content.decode("utf-8-sig")
     except FileNotFoundError:
         raise SpecError("there is no such file; check the path") from None
@@ -116,9 +123,13 @@ def _reason(error: Exception) -> str:
 def _parse(text: str) -> dict[str, Any]:
     import tomllib
 
+    for what, sign in _UNREADABLE.items():
+        if found := sign.search(text):
+            line = text.count("\n", 0, found.start()) + 1
+            raise SpecError(f"this is not a TOML file that can be read: line {line} holds {what}")
     try:
         return tomllib.loads(text)
     except RecursionError:
         raise SpecError("this is not a TOML file that can be read: it nests too deeply") from None
-    except ValueError as error:  # TOMLDecodeError, or an integer with thousands of digits
+    except ValueError as error:
         raise SpecError(f"this is not valid TOML: {error}") from None

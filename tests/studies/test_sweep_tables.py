@@ -12,6 +12,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from aerobat.documents import MAX_DOCUMENT
 from aerobat.errors import BackendMissing, SpecError
 from aerobat.interchange import read_table, write_table
 from suites import examples
@@ -45,6 +46,13 @@ def test_a_table_is_read_back_as_it_was_written(
     for name, column in table.items():
         assert found[name].dtype.kind == column.dtype.kind
         np.testing.assert_array_equal(found[name], column)
+
+
+def test_a_table_longer_than_documents_may_be_is_read_back(tmp_path: Path) -> None:
+    table = {"flight": np.arange(250_000) + 10**17}
+    write_table(table, tmp_path / "long.csv")
+    assert (tmp_path / "long.csv").stat().st_size > MAX_DOCUMENT
+    np.testing.assert_array_equal(read_table(tmp_path / "long.csv")["flight"], table["flight"])
 
 
 @pytest.mark.parametrize("content", [b"", b"a,b\n", b"a,b\n1\n", b"a,a\n1,2\n", b"\xff\xfe", b"PAR1"])

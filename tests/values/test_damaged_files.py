@@ -163,6 +163,23 @@ def test_what_unpacks_to_more_than_is_read_is_refused(tmp_path, monkeypatch) -> 
         load_plan(path)
 
 
+@pytest.mark.parametrize(
+    ("text", "what"),
+    [
+        ("mass = " + "9" * 10**6, "a number of a thousand digits"),
+        ("mass = 0x" + "f" * 10**6, "a number of a thousand digits"),
+        ("mass = 0." + "1_" * 10**6, "a number of a thousand digits"),
+        ("a." * 20_000 + "b = 1", "a key of a hundred parts"),
+        ("\"a\" . 'b' ." * 20_000 + "b = 1", "a key of a hundred parts"),
+    ],
+)
+def test_what_a_parser_takes_gigabytes_for_is_refused_before_it_is_parsed(text, what, tmp_path, monkeypatch):
+    monkeypatch.setattr("tomllib.loads", lambda text: pytest.fail("it was parsed"))
+    (tmp_path / "huge.toml").write_text(f"name = 'huge'\n{text}\n")
+    with pytest.raises(SpecError, match=f"line 2 holds {what}"):
+        load_vehicle(tmp_path / "huge.toml")
+
+
 READERS = (load_plan, load_trajectory, load_flight, read_plan, load_vehicle, load_problem)
 
 

@@ -18,6 +18,7 @@ from aerobat.errors import BackendMissing, SpecError
 from aerobat.storage import whole_file, write_whole
 
 CSV, PARQUET = ".csv", ".parquet"
+MAX_TABLE = 2**28  # bytes: half a million flights
 
 
 @validated
@@ -50,7 +51,7 @@ def read_table(path: PathName) -> dict[str, NDArray[Any]]:
     """
     with in_document(Path(path), "table"):
         if _suffix(path) == CSV:
-            return _from_csv(read_text(Path(path)))
+            return _from_csv(read_text(Path(path), MAX_TABLE))
         parquet = _parquet()
         try:
             columns = parquet.read_table(path)
