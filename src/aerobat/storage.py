@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ctypes
 import errno
+import hashlib
 import io
 import os
 import re
@@ -145,10 +146,22 @@ def read_whole(path: str | os.PathLike[str], max_size: int) -> bytes:
         return file.read()
 
 
-def read_arrays(path: str | os.PathLike[str], what: str) -> dict[str, NDArray[Any]]:
-    """The arrays of an .npz file that holds a `what`. Raises SpecError, one sentence, for any other file."""
+def read_arrays(
+    path: str | os.PathLike[str], what: str, max_size: int | None = None
+) -> dict[str, NDArray[Any]]:
+    """The arrays of an .npz file that holds a `what`.
+
+    Raises SpecError, one sentence, for any other file; before it is unpacked, where that would take much more
+    memory than the file has bytes.
+
+    Args:
+        path: The file.
+        what: What it should hold, in a word.
+        max_size: Bytes, packed or not, by default MAX_ARRAYS.
+    """
+    limit = max_size or MAX_ARRAYS
     try:
-        content = read_whole(path, MAX_ARRAYS)
+        content = read_whole(path, limit)
     except FileNotFoundError:
         raise SpecError(f"{what} file {path}: there is no such file; check the path") from None
     except SpecError as error:
@@ -156,15 +169,18 @@ def read_arrays(path: str | os.PathLike[str], what: str) -> dict[str, NDArray[An
     except (OSError, ValueError) as error:
         reason = error.strerror if isinstance(error, OSError) and error.strerror else error
         raise SpecError(f"{what} file {path}: it cannot be read ({reason})") from None
-    try:
-        with zipfile.ZipFile(io.BytesIO(content)) as archive:
-            unpacked = sum(entry.file_size for entry in archive.infolist())
-        if unpacked <= MAX_ARRAYS:  # else it is small only as it is packed
-            with np.load(io.BytesIO(content), allow_pickle=False) as file:
-                return dict(file)
-    except Exception:  # zlib, lzma, struct, tokenize, memory: a damaged archive can end in anything
-        pass
-    raise SpecError(f"{what} file {path}: it is not a whole .npz file of a {what}; save it again")
+    arrays = _unpacked(content, min(limit, SMALL_ARRAYS + MAX_EXPANSION * len(content)))
+    if arrays is None:
+        raise SpecError(f"{what} file {path}: it is not a whole .npz file of a {what}; save it again")
+    return arrays
+
+
+def digest_of(content: Mapping[str, NDArray[Any]]) -> str:
+    """Return the SHA-256 of all arrays but a `digest`, in the order of their names."""
+    found = hashlib.sha256()
+    for name in sorted(content.keys() - {"digest"}):
+        found.update(name.encode() + np.ascontiguousarray(content[name]).tobytes())
+    return found.hexdigest()
 
 
 def format_of(content: Mapping[str, NDArray[Any]]) -> str:
@@ -175,10 +191,26 @@ def format_of(content: Mapping[str, NDArray[Any]]) -> str:
     return str(named)[:40]
 
 
-MAX_ARRAYS = 2**31  # bytes of an .npz file, packed or not: hours of flight at 500 Hz
+MAX_ARRAYS = 2**27  # bytes of an .npz file, packed or not: a path of an hour at 100 rows a second
+SMALL_ARRAYS = 2**26  # bytes that any file may unpack to; beyond,
+MAX_EXPANSION = 10  # times its size: numbers hardly shrink
+MAX_ENTRIES = 5000  # of an archive: ten for each of 500 gates
 _STAGING = ".aerobat-part"
 _ABANDONED = re.compile(r"\..*\.(\d{1,9})" + re.escape(_STAGING) + ".*")  # its process
 _AT_FDCWD, _RENAME_SWAP = -100, 2  # of renameat2(2) and renamex_np(2)
+
+
+def _unpacked(content: bytes, max_size: int) -> dict[str, NDArray[Any]] | None:
+    """The arrays of an archive; None for a damaged one, and for one that unpacks to more bytes."""
+    try:
+        with zipfile.ZipFile(io.BytesIO(content)) as archive:
+            sizes = [entry.file_size for entry in archive.infolist()]
+        if len(sizes) <= MAX_ENTRIES and sum(sizes) <= max_size:
+            with np.load(io.BytesIO(content), allow_pickle=False) as file:
+                return dict(file)
+    except Exception:  # zlib, lzma, struct, tokenize, memory: a damaged archive can end in anything
+        pass
+    return None
 
 
 def _entries(folder: Path) -> list[str]:

@@ -17,7 +17,7 @@ import aerobat as ab
 from aerobat import so3
 from aerobat.interchange import flight_package
 from aerobat.interchange.flight_package import read_flight_package
-from aerobat.planning.plan_file import digest_of
+from aerobat.storage import digest_of
 from places import CASES, ROOT
 from shared_plans import shared_plan
 

@@ -17,9 +17,8 @@ from hypothesis import strategies as st
 import aerobat as ab
 from aerobat.errors import SpecError
 from aerobat.planning.evidence import envelope_for
-from aerobat.planning.plan_file import digest_of
 from aerobat.simulation.autopilot import Recoveries
-from aerobat.storage import read_arrays
+from aerobat.storage import digest_of, read_arrays
 from suites import examples
 
 VEHICLE = ab.load_vehicle("agile-quad")

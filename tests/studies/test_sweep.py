@@ -19,6 +19,7 @@ from hypothesis import strategies as st
 from scipy.stats import binomtest
 
 import aerobat as ab
+from aerobat.storage import read_arrays
 from aerobat.studies.sweep import Share, Sweep, sweep
 from aerobat.studies.sweep.flights import CHUNK
 
@@ -147,6 +148,18 @@ def test_kept_flights_that_are_damaged_are_flown_again(tmp_path: Path, damage: b
         np.savez(file, something=np.zeros(3))
     else:
         file.write_bytes(damage)
+    assert sweep(hop(), "none", 3, SEED, workers=1, keep=kept) == first
+
+
+@pytest.mark.parametrize("number", [np.nan, 1e9])
+def test_kept_flights_of_which_a_number_was_changed_are_flown_again(tmp_path: Path, number: float) -> None:
+    kept = tmp_path / "kept"
+    first = sweep(hop(), "none", 3, SEED, workers=1, keep=kept)
+    (file,) = kept.glob("*.npz")
+    content = read_arrays(file, "sweep")
+    changed = next(name for name, column in content.items() if column.dtype.kind == "f")
+    content[changed].flat[0] = number
+    np.savez(file, **content)
     assert sweep(hop(), "none", 3, SEED, workers=1, keep=kept) == first
 
 

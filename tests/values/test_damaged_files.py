@@ -150,17 +150,23 @@ def test_archives_that_are_no_plans_are_refused(plan_file, tmp_path) -> None:
                 read(path)
 
 
-def test_what_unpacks_to_more_than_is_read_is_refused(tmp_path, monkeypatch) -> None:
-    monkeypatch.setattr("aerobat.storage.MAX_ARRAYS", 2**20)
+def packed(entries: int, size: int) -> bytes:
+    """An archive of zeros, a thousandth of their size."""
+    archive = io.BytesIO()
+    with zipfile.ZipFile(archive, "w", zipfile.ZIP_DEFLATED, compresslevel=1) as made:
+        for k in range(entries):
+            made.writestr(f"{k}.npy", bytes(size))
+    return archive.getvalue()
+
+
+@pytest.mark.parametrize(("entries", "size"), [(20, 2**22), (6000, 0)])
+def test_what_unpacks_to_much_more_than_the_file_is_refused_before(entries, size, tmp_path, monkeypatch):
+    monkeypatch.setattr(np, "load", lambda *_, **__: pytest.fail("it was unpacked"))
     path = tmp_path / "bomb.plan"
-    with (
-        zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED, compresslevel=1) as made,
-        made.open("format.npy", "w", force_zip64=True) as entry,
-    ):
-        for _ in range(3):
-            entry.write(bytes(2**20))
-    with pytest.raises(SpecError, match="is not a whole"):
-        load_plan(path)
+    path.write_bytes(packed(entries, size))
+    for read in (load_plan, load_trajectory, load_flight):
+        with pytest.raises(SpecError, match="is not a whole"):
+            read(path)
 
 
 @pytest.mark.parametrize(

@@ -14,16 +14,13 @@ Schema and version rules are in docs/flight-package.md. `interchange.flight_pack
 
 from __future__ import annotations
 
-import hashlib
 import json
-from collections.abc import Mapping
 from dataclasses import dataclass
 from importlib.metadata import version
 from typing import Any
 
 import numpy as np
 
-from aerobat.arrays import Array
 from aerobat.certification import Certificate
 from aerobat.declaration import PathName, from_table, to_table
 from aerobat.environment import Environment
@@ -35,7 +32,7 @@ from aerobat.planning.recorder import Attempt
 from aerobat.planning.tube import Tube
 from aerobat.problem.problem import Problem
 from aerobat.simulation.autopilot import Recoveries
-from aerobat.storage import format_of, read_arrays, whole_file
+from aerobat.storage import digest_of, format_of, read_arrays, whole_file
 from aerobat.trajectory import Trajectory
 from aerobat.vehicle import Vehicle
 
@@ -43,6 +40,7 @@ FORMAT = "aerobat-plan-1"  # another number where something goes, or means somet
 REVISION = 4  # of it: one more wherever something is added
 WORKED_OUT = {"certificate", "flyability", "assessment"}  # from a plan's path whenever they are read
 ASKED_FOR = {"recoveries", "opinion", "tube"}  # results that take seconds
+MAX_EVIDENCE = 2**23  # bytes of a document: that of twenty gates has some hundred thousand
 FRAMES = {
     "world": "ENU: x east, y north, z up [m]",
     "body": "FLU: x forward, y left, z up, thrust along +z",
@@ -119,12 +117,14 @@ def read_plan_file(path: PathName) -> tuple[Problem, Trajectory, Vehicle | None,
     found = format_of(content)
     if found != FORMAT:
         raise SpecError(f"plan file {path}: it holds {found}, not {FORMAT}; plan again and save that")
-    digest = content.pop("digest", None)
-    if digest is not None and str(digest) != digest_of(content):
+    if "digest" in content and str(content["digest"]) != digest_of(content):
         raise SpecError(f"plan file {path}: it was changed after it was written; plan again and save that")
-    left_out = WORKED_OUT if digest is not None else WORKED_OUT | ASKED_FOR
+    left_out = WORKED_OUT if "digest" in content else WORKED_OUT | ASKED_FOR
     try:
-        document = json.loads(content["document"].tobytes())
+        text = content["document"].tobytes()
+        if len(text) > MAX_EVIDENCE:
+            raise SpecError(f"its document has {len(text)} bytes, more than {MAX_EVIDENCE}; save it again")
+        document = json.loads(text)
         facts: Facts = facts_adapter().validate_python(document["evidence"])
         vehicle = document["vehicle"]
         return (
@@ -145,14 +145,6 @@ def _in_full(environment: Environment) -> dict[str, Any]:
     """Its table with what is left out of problems' files, where it is as usual."""
     wind = environment.wind.tolist()
     return {"gravity": environment.gravity, "wind": wind, "ground": environment.ground}
-
-
-def digest_of(content: Mapping[str, Array]) -> str:
-    """Return the SHA-256 of arrays, in the order of their names."""
-    found = hashlib.sha256()
-    for name in sorted(content):
-        found.update(name.encode() + np.ascontiguousarray(content[name]).tobytes())
-    return found.hexdigest()
 
 
 def facts_adapter() -> Any:

@@ -22,6 +22,7 @@ from aerobat.states import BodyState, FlatState, Setpoint, Wrench
 from aerobat.storage import format_of, read_arrays, whole_file
 
 _FORMAT = "aerobat-flight-2"
+MAX_FLIGHT = 2**31  # bytes of a file: hours at 500 Hz
 _ROTORS = -1  # in a shape: as many as the vehicles have
 
 
@@ -223,7 +224,7 @@ class Flight:
 @validated
 def load_flight(path: PathName) -> Flight:
     """Read a flight that `Flight.save` wrote. Raises SpecError, one sentence, for any other file."""
-    content = read_arrays(path, "flight")
+    content = read_arrays(path, "flight", MAX_FLIGHT)
     try:
         if format_of(content) != _FORMAT:
             raise SpecError(f"it holds {format_of(content)}, not {_FORMAT}; fly it again")

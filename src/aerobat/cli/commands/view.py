@@ -22,6 +22,7 @@ from aerobat.planning import Plan
 from aerobat.reporting.motion.video import write_video
 from aerobat.reporting.report_json import to_json
 from aerobat.simulation import Flight, load_flight
+from aerobat.simulation.flight import MAX_FLIGHT
 from aerobat.simulation.fly import fly as simulate
 from aerobat.storage import format_of, read_arrays
 from aerobat.viewer.replay import Replay, require_replaceable, save_replay
@@ -125,7 +126,7 @@ def _first_flights(plan: Plan, record: RunRecord) -> Flight:
 
 
 def _holds_flight(file: Path) -> bool:
-    return format_of(read_arrays(file, "flight")).startswith("aerobat-flight")
+    return format_of(read_arrays(file, "flight", MAX_FLIGHT)).startswith("aerobat-flight")
 
 
 def _plan_beside(file: Path, flight: Flight) -> Plan | None:

@@ -16,7 +16,7 @@ from aerobat.documents import read_text
 from aerobat.errors import SpecError
 from aerobat.planning import Plan
 from aerobat.provenance import installed_versions
-from aerobat.storage import read_arrays, whole_file, write_whole
+from aerobat.storage import digest_of, read_arrays, whole_file, write_whole
 from aerobat.studies.sweep.flights import CHUNK, SAMPLED, STRIDE, Chunk, SweepTask
 
 FINGERPRINT = "fingerprint.json"
@@ -53,9 +53,11 @@ class KeptChunks:
         return cls(folder)
 
     def read(self, begin: int, end: int) -> Chunk | None:
-        """Finished flights; None where there are none, or none that can be read."""
+        """Finished flights; None where there are none, or none as they were kept."""
         try:
             arrays = read_arrays(self._path(begin, end), "sweep")
+            if str(arrays["digest"]) != digest_of(arrays):
+                return None
             names = arrays["names"].tolist()
             columns = {name: arrays[f"column_{k}"] for k, name in enumerate(names)}
             return Chunk(columns, *(arrays[name] for name in _OVER_TIME))
@@ -64,10 +66,11 @@ class KeptChunks:
 
     def write(self, begin: int, end: int, chunk: Chunk) -> None:
         """Keep finished flights."""
-        arrays: dict[str, Any] = {name: getattr(chunk, name) for name in _OVER_TIME}
+        arrays: dict[str, Any] = {"names": np.array(list(chunk.columns))}
+        arrays |= {name: getattr(chunk, name) for name in _OVER_TIME}
         arrays |= {f"column_{k}": column for k, column in enumerate(chunk.columns.values())}
         with whole_file(self._path(begin, end)) as temporary, temporary.open("wb") as file:
-            np.savez(file, names=list(chunk.columns), **arrays)
+            np.savez(file, **arrays, digest=digest_of(arrays))
 
     def remove(self) -> None:
         """Remove the folder, as its flights are kept elsewhere by now."""
