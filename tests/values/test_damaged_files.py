@@ -8,6 +8,7 @@ import random
 import warnings
 import zipfile
 from collections.abc import Callable
+from contextlib import suppress
 from itertools import islice
 from pathlib import Path
 from typing import Any
@@ -21,6 +22,7 @@ from aerobat.environment import Environment, load_dispersion
 from aerobat.errors import SpecError
 from aerobat.interchange import read_plan
 from aerobat.interchange.csv import write_csv
+from aerobat.interchange.flight_package import read_flight_package
 from aerobat.planning import Plan, load_plan
 from aerobat.problem import load_problem
 from aerobat.simulation import fly, load_flight
@@ -75,6 +77,20 @@ def test_damaged_plan_files_end_in_a_sentence_or_are_judged(begin, end, plan_fil
         found = in_a_sentence(lambda: read_plan(path))
         if found is not None:
             in_a_sentence(lambda found=found: judged(found))
+
+
+@parts(100, 700)
+def test_the_reader_to_copy_raises_value_errors_alone_or_has_every_setpoint(
+    begin, end, plan_file, tmp_path
+) -> None:
+    path = tmp_path / "damaged.plan"
+    for content in islice(plan_files(plan_file.read_bytes(), random.Random(2)), begin, end):
+        path.write_bytes(content)
+        with suppress(ValueError, OSError), np.errstate(all="ignore"):
+            package = read_flight_package(path)
+            assert package.certified in (True, False)
+            if package.duration < 10.0 and package.document["vehicle"]:
+                assert package.setpoints([0.0]).thrust.shape == (1,)
 
 
 @parts(50, 200)
@@ -164,8 +180,8 @@ def test_what_unpacks_to_much_more_than_the_file_is_refused_before(entries, size
     monkeypatch.setattr(np, "load", lambda *_, **__: pytest.fail("it was unpacked"))
     path = tmp_path / "bomb.plan"
     path.write_bytes(packed(entries, size))
-    for read in (load_plan, load_trajectory, load_flight):
-        with pytest.raises(SpecError, match="is not a whole"):
+    for read in (load_plan, load_trajectory, load_flight, read_flight_package):
+        with pytest.raises(ValueError, match="is not a whole"):
             read(path)
 
 

@@ -12,6 +12,7 @@ from __future__ import annotations
 import hashlib
 import json
 import os
+import zipfile
 from dataclasses import dataclass
 from math import factorial
 from typing import Any
@@ -21,6 +22,8 @@ from numpy.typing import ArrayLike, NDArray
 
 Array = NDArray[np.float64]
 FORMAT = "aerobat-plan-1"
+MAX_SIZE = 2**26  # bytes of all arrays, unpacked: a path of half an hour at 100 segments a second
+MAX_ARRAYS = 100
 GRAVITY = 9.81  # [m/s²] of files that say nothing of it
 STEP = 5e-4  # [s] by which the attitude is carried along: in a flip that errs by 1e-4°
 UNDETERMINED = 1e-3  # of gravity: less thrust has no direction, and the attitude stays as it was
@@ -109,9 +112,8 @@ class FlightPackage:
     @property
     def _environment(self) -> dict[str, Any]:
         """Of files of revision 0, the problem's, where what is usual is left out."""
-        found = self.document.get("environment", self.document["problem"].get("environment", {}))
-        assert isinstance(found, dict)
-        return found
+        usual: dict[str, Any] = self.document["problem"].get("environment", {})
+        return self.document.get("environment", usual)
 
     def _specific_thrust(self, times: Array, across: float) -> Array:
         """Thrust per mass [m/s²], drag across it counted, (T, 3)."""
@@ -133,18 +135,54 @@ class FlightPackage:
 def read_flight_package(path: str | os.PathLike[str]) -> FlightPackage:
     """The plan in a .plan file.
 
-    Raises ValueError for another format and for a file that was changed after it was written, OSError where
-    there is no file.
+    Raises ValueError for another format, for a damaged file and for one that was changed after it was
+    written, OSError where there is no file.
     """
-    with np.load(path, allow_pickle=False) as file:
-        content = dict(file)
+    content = _arrays(path)
     found = str(content.get("format", "something else"))
     if found != FORMAT:
-        raise ValueError(f"{path} holds {found}, not {FORMAT}")
+        raise ValueError(f"{path} holds {found[:40]}, not {FORMAT}")
     if "digest" in content and str(content.pop("digest")) != _digest(content):
         raise ValueError(f"{path} was changed after it was written")
-    document = json.loads(content["document"].tobytes())
-    return FlightPackage(content["durations"], content["coefficients"], float(content["heading"]), document)
+    try:
+        document = json.loads(content["document"].tobytes())
+        heading = float(content["heading"])
+        package = FlightPackage(content["durations"], content["coefficients"], heading, document)
+        _require_whole(package)
+    except (ArithmeticError, AttributeError, LookupError, RecursionError, TypeError, ValueError):
+        raise ValueError(f"{path} is damaged") from None
+    return package
+
+
+def _arrays(path: str | os.PathLike[str]) -> dict[str, Any]:
+    """The arrays of an .npz file. Raises ValueError, before it is unpacked, for one that is too large."""
+    try:
+        with zipfile.ZipFile(path) as archive:
+            sizes = [entry.file_size for entry in archive.infolist()]
+        if len(sizes) <= MAX_ARRAYS and sum(sizes) <= MAX_SIZE:
+            with np.load(path, allow_pickle=False) as file:
+                return dict(file)
+    except OSError:
+        raise
+    except Exception:  # zlib, struct, tokenize, memory: a damaged archive can end in anything
+        pass
+    raise ValueError(f"{path} is not a whole .npz file of a plan")
+
+
+def _require_whole(package: FlightPackage) -> None:
+    """Refuse arrays that are no path, and a document without what is asked of it. Raises as it comes."""
+    durations, coefficients, vehicle = package.durations, package.coefficients, package.document["vehicle"]
+    segments, powers, axes = coefficients.shape
+    shapes = [durations.shape == (segments,), axes == 3, package.wind.shape == (3,)]
+    numbers = [durations, coefficients, package.heading, package.gravity, package.wind]
+    if vehicle is not None:
+        drag = vehicle.get("drag_body", [0.0, 0.0, 0.0])
+        shapes.append(len(drag) == 3)
+        numbers += [1.0 / vehicle["mass"], drag]
+    is_finite = all(np.isfinite(each).all() for each in numbers)
+    if not (segments and powers and all(shapes) and is_finite and (durations > 0.0).all()):
+        raise ValueError("no path, or no vehicle")
+    _ = package.certified  # reads its whole certificate
 
 
 def _digest(content: dict[str, Any]) -> str:
