@@ -145,6 +145,24 @@ def test_a_pose_relative_to_another_is_that_one_and_then_this(tmp_path: Path) ->
     np.testing.assert_allclose(found, [0.13, -0.22, 0.023], atol=1e-12)
 
 
+def test_an_axis_is_that_of_the_frame_it_is_given_in(tmp_path: Path) -> None:
+    """A joint that lies on its side in its child's frame turns about its own x, which points up."""
+    lying = IRIS.replace(
+        '<joint name="rotor_0_joint" type="revolute">',
+        '<joint name="rotor_0_joint" type="revolute"><pose degrees="true">0 0 0 0 -90 0</pose>',
+    )
+    path = tmp_path / "lying.sdf"
+    for axis in (
+        "<xyz>1 0 0</xyz>",
+        '<xyz expressed_in="__model__">0 0 1</xyz>',
+        "<xyz>0 0 1</xyz><use_parent_model_frame>1</use_parent_model_frame>",
+    ):
+        path.write_text(lying.replace("<xyz>0 0 1</xyz>", axis, 1), encoding="utf-8")
+        assert import_vehicle(path).mass == pytest.approx(1.535)
+    path.write_text(lying, encoding="utf-8")
+    assert "the rotor 'rotor_0' is tilted by 90°" in complaint(lambda: import_vehicle(path))
+
+
 MALFORMED = {
     "empty": (IRIS, IRIS, "", "this is not valid XML: no element found"),
     "cut off": (IRIS, "</model>\n</sdf>", "", "this is not valid XML: "),
@@ -188,6 +206,60 @@ MALFORMED = {
         "0.13 -0.22 0.023 0 0 0",
         "0 0 0 0 0.3 0",
         "the rotor 'rotor_0' is tilted by 17.2°",
+    ),
+    "a rotor that turns about another axis": (
+        IRIS,
+        "<axis><xyz>0 0 1</xyz></axis>",
+        "<axis><xyz>0 1 1</xyz></axis>",
+        "the rotor 'rotor_0' is tilted by 45°",
+    ),
+    "an axis of another frame": (
+        IRIS,
+        "<axis><xyz>0 0 1</xyz></axis>",
+        '<axis><xyz expressed_in="x">0 0 1</xyz></axis>',
+        "a pose is relative to 'x', which is not",
+    ),
+    "an axis without numbers": (
+        IRIS,
+        "<axis><xyz>0 0 1</xyz></axis>",
+        "<axis><xyz>nan 0 1</xyz></axis>",
+        "joint 'rotor_0_joint': axis must be 3 finite numbers",
+    ),
+    "an axis without direction": (
+        IRIS,
+        "<axis><xyz>0 0 1</xyz></axis>",
+        "<axis><xyz>0 0 0</xyz></axis>",
+        "joint 'rotor_0_joint': axis must have a direction, got '0 0 0'",
+    ),
+    "a joint about another axis": (
+        CRAZYFLIE,
+        'type="fixed"><parent link="base_link"/><child link="prop3_link"/>',
+        'type="continuous"><axis xyz="1 0 0"/><parent link="base_link"/><child link="prop3_link"/>',
+        "the rotor 'prop3_link' is tilted by 90°",
+    ),
+    "a base that is not weighed": (
+        CRAZYFLIE,
+        '<mass value="0.027"/>',
+        "",
+        "link 'base_link': its <inertial> has no <mass>",
+    ),
+    "a mass without a value": (
+        CRAZYFLIE,
+        '<mass value="0.027"/>',
+        "<mass/>",
+        "link 'base_link': its <inertial> has no <mass>",
+    ),
+    "a model that is not weighed": (
+        IRIS,
+        "<mass>1.5</mass>",
+        "",
+        "link 'base_link': its <inertial> has no <mass>",
+    ),
+    "a crowd": (
+        IRIS,
+        "</model>",
+        "".join(f'<link name="part{k}"/>' for k in range(1000)) + "</model>",
+        "it has more than 1000 links, joints and frames",
     ),
     "a lost frame": (
         IRIS,

@@ -113,7 +113,8 @@ class FlightPackage:
     def _environment(self) -> dict[str, Any]:
         """Of files of revision 0, the problem's, where what is usual is left out."""
         usual: dict[str, Any] = self.document["problem"].get("environment", {})
-        return self.document.get("environment", usual)
+        found: dict[str, Any] = self.document.get("environment", usual)
+        return found
 
     def _specific_thrust(self, times: Array, across: float) -> Array:
         """Thrust per mass [m/s²], drag across it counted, (T, 3)."""
@@ -174,7 +175,7 @@ def _require_whole(package: FlightPackage) -> None:
     durations, coefficients, vehicle = package.durations, package.coefficients, package.document["vehicle"]
     segments, powers, axes = coefficients.shape
     shapes = [durations.shape == (segments,), axes == 3, package.wind.shape == (3,)]
-    numbers = [durations, coefficients, package.heading, package.gravity, package.wind]
+    numbers: list[Any] = [durations, coefficients, package.heading, package.gravity, package.wind]
     if vehicle is not None:
         drag = vehicle.get("drag_body", [0.0, 0.0, 0.0])
         shapes.append(len(drag) == 3)

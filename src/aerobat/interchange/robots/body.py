@@ -46,6 +46,7 @@ class Link:
     centre: Array  # [m] of its mass, (3,)
     inertia: Array  # [kg·m²] about that centre, the model's axes, (3, 3)
     radius: float | None  # [m] of what collides around its z axis
+    axis: Array | None  # about which its joint lets it turn, the model's axes, (3,); None where none is given
 
 
 @dataclass(frozen=True)
@@ -72,7 +73,15 @@ class Robot:
     notes: tuple[str, ...]
 
 
-def link_of(name: str, pose: Pose, inertial: Pose, mass: float, moments: Array, radius: float | None) -> Link:
+def link_of(
+    name: str,
+    pose: Pose,
+    inertial: Pose,
+    mass: float,
+    moments: Array,
+    radius: float | None,
+    axis: Array | None,
+) -> Link:
     """A link of what its file says. Raises SpecError for a mass below zero.
 
     Args:
@@ -82,13 +91,14 @@ def link_of(name: str, pose: Pose, inertial: Pose, mass: float, moments: Array, 
         mass: [kg].
         moments: ixx, iyy, izz, ixy, ixz, iyz [kg·m²], (6,).
         radius: [m] of what collides.
+        axis: about which its joint lets it turn, the model's axes, (3,).
     """
     if mass < 0.0:
         raise SpecError(f"link '{name}': mass must be 0 or more, got {mass:g} kg")
     xx, yy, zz, xy, xz, yz = moments
     at = pose.then(inertial)
     inertia = at.rotation @ np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]) @ at.rotation.T
-    return Link(name, pose, mass, at.origin, (inertia + inertia.T) / 2, radius)
+    return Link(name, pose, mass, at.origin, (inertia + inertia.T) / 2, radius, axis)
 
 
 def merged(links: Iterable[Link]) -> tuple[float, Array, Array]:

@@ -1,7 +1,8 @@
 """Vehicles from robot descriptions, URDF and SDF, with what is lost on the way.
 
 All links together are one rigid body, joints at zero, turning rotors included: their angular momentum is
-lost. A rotor is at its link's centre of mass and pushes along the body's +z; tilted ones are refused. Of
+lost. A rotor is at its link's centre of mass, pushes along the body's +z and turns about it; tilted ones, and
+joints about another axis, are refused. Of
 Gazebo's motor models the largest thrust motorConstant · maxRotVelocity², momentConstant and turningDirection
 are kept; of the two time constants of the speed the slower one, as the lag of the thrust; of the drag of the
 rotors, rotorDragCoefficient, its slope in hover. Lost are rollingMomentCoefficient, what other plugins do,
@@ -124,9 +125,11 @@ def _rotor_links(robot: Robot, motors: dict[str, Motor]) -> Sequence[Link]:
         raise SpecError("it has no motor model, and no link is named after a rotor or a propeller")
     for link in found:
         tilt = degrees(acos(np.clip(link.pose.rotation[2, 2], -1.0, 1.0)))
-        if tilt > MAX_TILT_DEG:
+        turned = 0.0 if link.axis is None else degrees(acos(np.clip(abs(link.axis[2]), 0.0, 1.0)))
+        if not max(tilt, turned) <= MAX_TILT_DEG:
             raise SpecError(
-                f"the rotor '{link.name}' is tilted by {tilt:.3g}°; all must push along the body's +z"
+                f"the rotor '{link.name}' is tilted by {max(tilt, turned):.3g}°; all must push along the "
+                "body's +z and turn about it"
             )
     return found
 

@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from xml.etree.ElementTree import Element
 
 SUFFIXES = (".urdf", ".sdf", ".xml")  # of files that describe robots
+MAX_ELEMENTS = 1000  # in a chain of so many, poses take two seconds
 SIGNS = {  # of files from which others are made, and the remedy
     "xacro:": "a xacro macro; expand it first: xacro FILE > FILE.urdf",
     "{{": "a template; let its program write the file first",
@@ -60,6 +61,17 @@ def numbers(text: str | None, count: int, what: str) -> Array:
     return np.array(found)
 
 
+def direction(text: str | None, what: str) -> Array | None:
+    """The unit vector (3,) along three numbers; None for no text. Raises SpecError, naming `what`."""
+    if not (text or "").split():
+        return None
+    vector = numbers(text, 3, what)
+    if not vector.any():
+        raise SpecError(f"{what} must have a direction, got {' '.join((text or '').split())[:60]!r}")
+    scaled = vector / np.abs(vector).max()
+    return np.asarray(scaled / np.linalg.norm(scaled))
+
+
 def child_number(element: Element, tag: str, what: str) -> float:
     """The number in a child element, 0 where there is none."""
     return float(numbers(element.findtext(tag), 1, f"{what}: {tag}")[0])
@@ -81,13 +93,18 @@ def collision_radius(link: Element, name: str, text_of: Callable[[Element, str],
 
 
 def by_name(elements: Iterable[Element]) -> dict[str, Element]:
-    """Elements by their names. Raises SpecError where one has none, or two of a kind have the same."""
+    """Elements by their names.
+
+    Raises SpecError where one has none, two of a kind have the same, or there are more than a robot has.
+    """
     found: dict[str, Element] = {}
     for element in elements:
         name = name_of(element, element.tag)
         if name in found:
             raise SpecError(f"two of its elements are named '{name}', a {element.tag} among them; rename one")
         found[name] = element
+        if len(found) > MAX_ELEMENTS:
+            raise SpecError(f"it has more than {MAX_ELEMENTS} links, joints and frames; join those that hold")
     return found
 
 

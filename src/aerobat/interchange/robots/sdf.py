@@ -7,12 +7,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from aerobat.arrays import Array
 from aerobat.errors import SpecError
 from aerobat.interchange.robots.body import IDENTITY, MOMENTS, Link, Pose, Robot, link_of
 from aerobat.interchange.robots.markup import (
     by_name,
     child_number,
     collision_radius,
+    direction,
     name_of,
     numbers,
     parse_xml,
@@ -38,13 +40,14 @@ def read_sdf(root: Element, path: Path) -> Robot:
     model = models[0]
     parts = [model, *_merged(model, path)]
     frames = by_name(each for part in parts for tag in FRAMES for each in part.findall(tag))
+    axes = _axes(frames)
     elements = [each for part in parts for each in part.findall("link")]
     links, notes = [], []
     for element in elements:
         name = name_of(element, "link")
         if element.find("inertial") is None:
             notes.append(f"link '{name}' has no <inertial>: taken as massless, by Gazebo as 1 kg")
-        links.append(_link(name, element, _pose_of(name, frames)))
+        links.append(_link(name, element, _pose_of(name, frames), axes.get(name)))
     inner = [name_of(each, "model") for each in model.findall("model")]
     inner += [_uri(each) for each in model.findall("include") if not _is_merged(each)]
     notes += [f"'{name}', a model within the model, is left out" for name in inner]
@@ -82,16 +85,35 @@ def _uri(include: Element) -> str:
     return (include.findtext("uri") or "").strip()
 
 
-def _link(name: str, element: Element, pose: Pose) -> Link:
+def _axes(frames: dict[str, Element]) -> dict[str, Array]:
+    """The axes, in the model's frame, of the joints that turn, by the links that these turn."""
+    found = {}
+    for name, joint in frames.items():
+        axis = joint.find("axis") if joint.tag == "joint" and joint.get("type") != "fixed" else None
+        given = None if axis is None else direction(axis.findtext("xyz"), f"joint '{name}': axis")
+        if axis is None or given is None:
+            continue
+        frame = axis.find("xyz[@expressed_in]")
+        reference = name if frame is None else frame.get("expressed_in", name)
+        if (axis.findtext("use_parent_model_frame") or "").strip() in ("true", "1"):  # of SDF 1.4 to 1.6
+            reference = MODEL_FRAME
+        child = (joint.findtext("child") or "").strip()
+        found[child] = _pose_of(reference, frames).rotation @ given
+    return found
+
+
+def _link(name: str, element: Element, pose: Pose, axis: Array | None) -> Link:
     radius = collision_radius(element, name, lambda each, key: each.findtext(key))
     inertial = element.find("inertial")
     if inertial is None:
-        return link_of(name, pose, IDENTITY, 0.0, np.zeros(6), radius)
+        return link_of(name, pose, IDENTITY, 0.0, np.zeros(6), radius, axis)
     inertia = inertial.find("inertia")
     what = f"link '{name}'"
+    if not (inertial.findtext("mass") or "").strip():
+        raise SpecError(f"{what}: its <inertial> has no <mass>; give it in kg")
     moments = [0.0 if inertia is None else child_number(inertia, key, what) for key in MOMENTS]
     mass = child_number(inertial, "mass", what)
-    return link_of(name, pose, _pose(inertial, what), mass, np.array(moments), radius)
+    return link_of(name, pose, _pose(inertial, what), mass, np.array(moments), radius, axis)
 
 
 def _pose(element: Element, what: str) -> Pose:

@@ -10,7 +10,7 @@ import numpy as np
 from aerobat.arrays import Array
 from aerobat.errors import SpecError
 from aerobat.interchange.robots.body import IDENTITY, MOMENTS, Link, Pose, Robot, link_of
-from aerobat.interchange.robots.markup import by_name, collision_radius, name_of, numbers
+from aerobat.interchange.robots.markup import by_name, collision_radius, direction, name_of, numbers
 from aerobat.interchange.robots.motors import read_motors
 
 if TYPE_CHECKING:
@@ -25,10 +25,16 @@ def read_urdf(root: Element, path: Path) -> Robot:
     """
     elements = by_name(root.findall("link"))
     poses = _poses(root, elements)
-    links = tuple(_link(name, element, poses[name]) for name, element in elements.items())
+    joints = {_end(joint, "child"): joint for joint in by_name(root.findall("joint")).values()}
+    links = tuple(_link(name, each, poses[name], joints.get(name)) for name, each in elements.items())
     defaults = _properties(root.find("properties"), links)
-    children = {name_of(j, "joint"): _end(j, "child") for j in root.findall("joint")}
-    return Robot(root.get("name") or path.stem, links, read_motors(root, children), defaults, ())
+    children = {name_of(joint, "joint"): child for child, joint in joints.items()}
+    notes = tuple(
+        f"link '{name}' has no <inertial>: taken as massless"
+        for name, each in elements.items()
+        if each.find("inertial") is None
+    )
+    return Robot(root.get("name") or path.stem, links, read_motors(root, children), defaults, notes)
 
 
 def _poses(root: Element, links: dict[str, Element]) -> dict[str, Pose]:
@@ -65,12 +71,15 @@ def _follow(name: str, above: dict[str, tuple[str, Pose]], poses: dict[str, Pose
         poses[child] = poses[parent].then(joint)
 
 
-def _link(name: str, element: Element, pose: Pose) -> Link:
+def _link(name: str, element: Element, pose: Pose, joint: Element | None) -> Link:
     radius = collision_radius(element, name, lambda each, key: each.get(key))
+    axis = None if joint is None else _axis(joint, pose)
     inertial = element.find("inertial")
     if inertial is None:
-        return link_of(name, pose, IDENTITY, 0.0, np.zeros(6), radius)
+        return link_of(name, pose, IDENTITY, 0.0, np.zeros(6), radius, axis)
     mass, inertia = inertial.find("mass"), inertial.find("inertia")
+    if mass is None or not mass.get("value", "").strip():
+        raise SpecError(f"link '{name}': its <inertial> has no <mass>; give its value in kg")
     moments = [_attribute(inertia, key, f"link '{name}': inertia") for key in MOMENTS]
     return link_of(
         name,
@@ -79,7 +88,17 @@ def _link(name: str, element: Element, pose: Pose) -> Link:
         _attribute(mass, "value", f"link '{name}': mass"),
         np.array(moments),
         radius,
+        axis,
     )
+
+
+def _axis(joint: Element, pose: Pose) -> Array | None:
+    """The axis of a joint that turns, whose frame is that of its child, at `pose` in the first link's."""
+    axis = joint.find("axis")
+    if axis is None or joint.get("type") == "fixed":
+        return None
+    found = direction(axis.get("xyz"), f"joint '{joint.get('name')}': axis")
+    return None if found is None else pose.rotation @ found
 
 
 def _origin(element: Element, what: str) -> Pose:
