@@ -149,8 +149,8 @@ centre of mass and rotors of a robot's description; `--vehicle iris.sdf` flies i
 Without motor models rotors are the links named after rotors or propellers, and what is missing, most often
 `spin`, `max_thrust`, `torque_coefficient` and `lag`, is told and left to be added. Lost are the angular
 momentum of turning rotors, `rollingMomentCoefficient`, other plugins, sensors, and models that are included
-but not merged. Rotors that do not push along the body's +z and turn about it, an `<inertial>` without `<mass>`, xacro
-macros and templates are refused.
+but not merged. Rotors that do not push along the body's +z and turn about it, an `<inertial>` without
+`<mass>`, xacro macros and templates are refused.
 """
 CONDITIONS = """
 What a flight meets that its plan and its controller do not know of. `none`, `lab` (the paper's flight space)

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import json
 import signal
+import socket
 import subprocess
 import sys
 import threading
 import urllib.request
 from collections.abc import Iterator
-from contextlib import suppress
+from contextlib import ExitStack, suppress
 from pathlib import Path
 
 import pytest
@@ -89,6 +90,35 @@ def test_an_interrupt_while_something_is_planned_ends_it_too(served) -> None:
     _, said = process.communicate()
     asked.join()
     assert (process.returncode, said) == (0, "")
+
+
+@pytest.mark.process
+@pytest.mark.skipif(sys.platform != "linux", reason="limits and lists of open files are of Linux")
+def test_200_clients_are_answered_beside_500_silent_connections_by_a_process_of_128_files(served) -> None:
+    import resource
+
+    process, address = served
+    resource.prlimit(process.pid, resource.RLIMIT_NOFILE, (128, 128))
+    host, port = address.removeprefix("http://").rstrip("/").split(":")
+    well: list[object] = []
+
+    def asking(k: int) -> None:
+        body = json.dumps({"page": f"page {k}", "number": 1, "values": {}}).encode()
+        question = urllib.request.Request(f"{address}plan", body, {"Content-Type": "application/json"})
+        with urllib.request.urlopen(question, timeout=20.0) as answer:
+            well.append(json.load(answer)["verdict"]["is_well"])
+
+    with ExitStack() as stack:
+        for k in range(500):
+            silent = stack.enter_context(socket.create_connection((host, int(port))))
+            silent.sendall((b"", b"POST /pl", b"GET / HTTP/1.1\r\nHost")[k % 3])
+        clients = [threading.Thread(target=asking, args=(k,)) for k in range(200)]
+        for client in clients:
+            client.start()
+        for client in clients:
+            client.join()
+    assert well == [True] * 200
+    assert len(list(Path(f"/proc/{process.pid}/fd").iterdir())) < 128
 
 
 @pytest.mark.parametrize(

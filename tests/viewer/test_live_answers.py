@@ -2,19 +2,22 @@
 
 from __future__ import annotations
 
+import errno
 import http.client
 import json
+import os
 import socket
 import threading
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import closing
+from contextlib import ExitStack, closing
 from dataclasses import replace
 
 import pytest
 
 import aerobat as ab
-from aerobat.viewer.live.desk import Desk
+from aerobat.viewer.live.desk import MAX_PAGES, Desk
 from aerobat.viewer.live.replan import FLIGHTS, Answer, Overtaken, Replanner, Verdict
+from aerobat.viewer.live.server import GRACE
 from aerobat.viewer.live.sliders import Setting, sliders_of
 from aerobat.viewer.live.view_live import LiveView
 from shared_plans import shared_plan
@@ -128,7 +131,8 @@ def test_the_last_question_of_each_page_is_answered_in_whichever_order_they_come
 
     def put(page: str, number: int) -> threading.Thread:
         def asking() -> None:
-            answers[page, number] = desk.ask(page, number, {"page": ord(page), "number": number})
+            values = {"page": ord(page), "number": number}
+            answers[page, number] = desk.ask(page, number, values, never)
 
         asked = threading.Thread(target=asking)
         asked.start()
@@ -145,7 +149,16 @@ def test_the_last_question_of_each_page_is_answered_in_whichever_order_they_come
     assert answers == {("a", 1): None, ("b", 1): FINE, ("a", 3): None, ("a", 4): FINE}
     assert seen == [(ord("b"), 1), (ord("a"), 4)]
     desk.close()
-    assert desk.ask("a", 5, {}) is None
+    assert desk.ask("a", 5, {}, never) is None
+
+
+def test_a_question_that_nobody_waits_for_is_not_answered_and_pages_are_forgotten() -> None:
+    desk = Desk(lambda values, is_overtaken: FINE)
+    assert desk.ask("gone", 1, {}, lambda: True) is None
+    for k in range(MAX_PAGES + 10):
+        assert desk.ask(f"page {k}", 1, {}, never) == FINE
+    assert len(desk._last) == MAX_PAGES
+    desk.close()
 
 
 def test_the_page_is_served_to_this_machine_alone_and_to_pages_of_no_other_place(live: LiveView) -> None:
@@ -167,7 +180,69 @@ def test_the_page_is_served_to_this_machine_alone_and_to_pages_of_no_other_place
     ):
         assert ask(live, body)[0] == 400
     assert ask(live, b'{"page": "a", "number": 1, "values": {"x": NaN}}')[0] == 400
-    assert ask(live, b"", headers={**JSON, "Content-Length": "999999999"})[0] == 411
+    for content in (b"[" * 50_000, b'{"page": "a", "number": 1, "values": {"x": 1%s}}' % (b"0" * 400)):
+        assert ask(live, content)[0] == 400
+    assert ask(live, {"page": "a" * 1000, "number": 1, "values": {}})[0] == 400
+    for size, status in (("9" * 9, 413), ("9" * 5000, 413), ("-1", 411), ("", 411)):
+        assert ask(live, b"", headers={**JSON, "Content-Length": size})[0] == status
+    assert ask(live, bytes(500_000))[0] == 413, "the answer is heard before the connection is closed"
+
+
+def test_who_hangs_up_while_something_is_planned_is_planned_for_no_more(live: LiveView, monkeypatch) -> None:
+    begun, ended, pause = threading.Event(), threading.Event(), threading.Event()
+
+    def answering(values: Mapping[str, float], is_overtaken: Callable[[], bool]) -> Answer:
+        begun.set()
+        while not is_overtaken():
+            pause.wait(0.001)
+        ended.set()
+        raise Overtaken
+
+    monkeypatch.setattr(live._server.desk, "_answering", answering)
+    content = b'{"page": "gone", "number": 1, "values": {}}'
+    with socket.create_connection(live._server.server_address) as client:
+        head = f"POST /plan HTTP/1.1\r\nHost: {live.address[7:-1]}\r\nContent-Type: application/json\r\n"
+        client.sendall(f"{head}Content-Length: {len(content)}\r\n\r\n".encode() + content)
+        assert begun.wait(10.0)
+        assert not ended.wait(0.05), "it still waits"
+    assert ended.wait(10.0)
+
+
+def test_many_clients_are_answered_beside_many_connections_that_say_nothing(live: LiveView) -> None:
+    """As of a browser's connections that are opened ahead, and of programs that hang."""
+    address = live._server.server_address
+    with ExitStack() as stack:
+        for k in range(200):
+            silent = stack.enter_context(socket.create_connection(address))
+            silent.sendall(b"POST /plan" if k % 2 else b"")
+        found: list[int] = []
+        clients = [
+            threading.Thread(target=lambda k=k: found.append(ask(live, {"page": f"{k}"})[0]))
+            for k in range(50)
+        ]
+        for client in clients:
+            client.start()
+        for client in clients:
+            client.join(10.0)
+    assert found == [400] * 50
+
+
+def test_a_connection_that_says_nothing_is_closed_after_a_while(live: LiveView, monkeypatch) -> None:
+    monkeypatch.setattr("aerobat.viewer.live.server.PATIENCE", 0.05)
+    with socket.create_connection(live._server.server_address, timeout=10.0) as silent:
+        assert silent.recv(1) == b""
+
+
+def test_a_process_with_too_many_open_files_tries_again_after_a_pause(live: LiveView, monkeypatch) -> None:
+    def accept(server: object) -> None:
+        raise OSError(errno.EMFILE, os.strerror(errno.EMFILE))
+
+    pauses: list[float] = []
+    monkeypatch.setattr("socketserver.TCPServer.get_request", accept)
+    monkeypatch.setattr("aerobat.viewer.live.server.time.sleep", pauses.append)
+    with pytest.raises(OSError, match="Too many open files"):
+        live._server.get_request()
+    assert pauses == [GRACE]
 
 
 def test_a_failure_of_our_own_is_told_and_the_page_lives_on(live: LiveView, monkeypatch, capsys) -> None:

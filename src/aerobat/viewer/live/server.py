@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 import json
+import socket
+import threading
+import time
 import traceback
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from http import HTTPStatus
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
-from math import isfinite
+from math import inf, isfinite
 from typing import Any
 from urllib.parse import urlsplit
 
@@ -17,42 +21,106 @@ from aerobat.viewer.live.desk import Desk
 from aerobat.viewer.live.replan import Answer, Verdict
 
 HOST = "127.0.0.1"
+MAX_CONNECTIONS = 64  # at a time, each with a thread: half of the files that the smallest shells let be open
+MAX_WAITING = 1024  # connections beyond, which the system keeps until there is room
+GRACE = 0.1  # [s] for the first line of a question, and for the rest, where others wait for the place
+PATIENCE = 10.0  # [s] for both where nobody waits, and for taking the answer
 MAX_QUESTION = 100_000  # bytes: a few numbers for each gate
+MAX_NAME = 100  # letters of a page's name for itself
 JSON = "application/json"
 HTML = "text/html; charset=utf-8"
 BROKEN = Verdict("Broken", "Aerobat failed at this, which is its fault; the terminal says where.", False)
 
 
 class LiveServer(ThreadingHTTPServer):
-    """Serves one page, and hands its questions to a desk."""
+    """Serves one page, and hands its questions to a desk.
+
+    A connection is for one question. Those that send none are closed after a while, and at once where others
+    want their place.
+    """
 
     daemon_threads = True
+    request_queue_size = MAX_WAITING
 
     def __init__(self, port: int, page: str, desk: Desk) -> None:
+        self.page = page.encode()
+        self.desk = desk
+        self._kept_until: dict[socket.socket, float] = {}  # [s] of the clock, where others want the place
+        self._changed = threading.Condition()
         try:
             super().__init__((HOST, port), _Handler)
         except (OSError, OverflowError) as error:
             reason = getattr(error, "strerror", None) or error
             raise SpecError(f"port {port} cannot be served: {reason}; name another, or none") from None
-        self.page = page.encode()
-        self.desk = desk
 
     @property
     def hosts(self) -> tuple[str, ...]:
         """The names by which a browser on this machine may call it."""
         return tuple(f"{name}:{self.server_port}" for name in (HOST, "localhost"))
 
+    def get_request(self) -> tuple[socket.socket, Any]:
+        """Accept a connection; where the process has too many open files, not at once again."""
+        try:
+            return super().get_request()
+        except OSError:
+            time.sleep(GRACE)
+            raise
+
+    def process_request(self, request: Any, client_address: Any) -> None:
+        """Give a connection a thread of its own once there is room for it."""
+        with self._changed:
+            while len(self._kept_until) >= MAX_CONNECTIONS:
+                self._close_silent(0.0)
+                self._changed.wait(GRACE / 4)
+            self._kept_until[request] = inf
+        super().process_request(request, client_address)
+
+    def shutdown_request(self, request: Any) -> None:
+        """Close a connection, and let the next one come."""
+        super().shutdown_request(request)
+        with self._changed:
+            self._kept_until.pop(request, None)
+            self._changed.notify()
+
+    def service_actions(self) -> None:
+        """Close connections that have been silent for too long, now and then."""
+        with self._changed:
+            self._close_silent(PATIENCE)
+
+    def keep(self, request: socket.socket, duration: float) -> None:
+        """Keep a connection for so long [s] from now on, whoever wants its place."""
+        with self._changed:
+            self._kept_until[request] = time.monotonic() + duration
+
     def handle_error(self, request: Any, client_address: Any) -> None:
         """Say nothing of a page that was closed, or went on to another question, before its answer came."""
+
+    def _close_silent(self, patience: float) -> None:
+        """End all connections that are kept no longer, so much [s] later; their threads see that and end."""
+        now = time.monotonic()
+        for request, until in list(self._kept_until.items()):
+            if now > until + patience:
+                del self._kept_until[request]
+                with suppress(OSError):
+                    request.shutdown(socket.SHUT_RDWR)
 
 
 class _Handler(BaseHTTPRequestHandler):
     """One connection of a page."""
 
     server: LiveServer
-    protocol_version = "HTTP/1.1"  # a connection that stays takes several questions
+    timeout = PATIENCE
+
+    def setup(self) -> None:
+        super().setup()
+        self.server.keep(self.connection, GRACE)
+
+    def parse_request(self) -> bool:
+        self.server.keep(self.connection, GRACE)
+        return super().parse_request()
 
     def do_GET(self) -> None:
+        self.server.keep(self.connection, inf)
         if not self._is_own_host():
             return
         if urlsplit(self.path).path == "/":
@@ -65,17 +133,20 @@ class _Handler(BaseHTTPRequestHandler):
         if not self._is_own_host():
             return
         size = self.headers.get("Content-Length", "")
-        if not size.isdecimal() or int(size) > MAX_QUESTION:
-            self.close_connection = True
-            self._send(HTTPStatus.LENGTH_REQUIRED, JSON)
+        if not (size.isascii() and size.isdigit()):
+            self._refuse(HTTPStatus.LENGTH_REQUIRED)
+            return
+        if len(size) > len(str(MAX_QUESTION)) or int(size) > MAX_QUESTION:
+            self._refuse(HTTPStatus.REQUEST_ENTITY_TOO_LARGE)
             return
         content = self.rfile.read(int(size))
+        self.server.keep(self.connection, inf)
         try:
             # a page of another place cannot send this type without asking, which is not answered
             if self.headers.get_content_type() != JSON:
                 raise ValueError("not JSON")
             question = _question(json.loads(content))
-        except ValueError:
+        except (ValueError, OverflowError, RecursionError):
             self._send(HTTPStatus.BAD_REQUEST, JSON)
             return
         answer = self._answer(question)
@@ -87,18 +158,37 @@ class _Handler(BaseHTTPRequestHandler):
 
     def _answer(self, question: _Question) -> Answer | None:
         try:
-            return self.server.desk.ask(question.page, question.number, question.values)
+            return self.server.desk.ask(question.page, question.number, question.values, self._has_hung_up)
         except Exception:
             traceback.print_exc()
             return Answer(BROKEN)
+
+    def _has_hung_up(self) -> bool:
+        """True once nobody waits for the answer any more."""
+        try:
+            self.connection.setblocking(False)
+            return not self.connection.recv(1, socket.MSG_PEEK)
+        except BlockingIOError:
+            return False
+        except OSError:
+            return True
+        finally:
+            with suppress(OSError):
+                self.connection.settimeout(PATIENCE)
 
     def _is_own_host(self) -> bool:
         """True where the browser means this machine, whatever name some page gave it; else it is told no."""
         if self.headers.get("Host") in self.server.hosts:
             return True
-        self.close_connection = True
-        self._send(HTTPStatus.FORBIDDEN, HTML)
+        self._refuse(HTTPStatus.FORBIDDEN)
         return False
+
+    def _refuse(self, status: HTTPStatus) -> None:
+        """Answer a question that is not read. The rest of it is thrown away, or it would cut the answer."""
+        self._send(status, JSON)
+        self.connection.shutdown(socket.SHUT_WR)
+        while self.rfile.read1(MAX_QUESTION):
+            pass
 
     def _send(self, status: HTTPStatus, kind: str, content: bytes = b"") -> None:
         self.send_response(status)
@@ -121,7 +211,7 @@ class _Question:
 def _question(content: Any) -> _Question:
     """The question that a page sends. Raises ValueError for anything else."""
     match content:
-        case {"page": str(page), "number": int(number), "values": dict(values)}:
+        case {"page": str(page), "number": int(number), "values": dict(values)} if len(page) <= MAX_NAME:
             numbers = {str(key): float(value) for key, value in values.items() if _is_number(value)}
             if len(numbers) == len(values):
                 return _Question(page, number, numbers)
