@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -88,21 +89,24 @@ main(sys.argv[1:])
 """
 
 
-def test_the_same_command_goes_on_where_an_interrupt_ended_it(monkeypatch, capsys) -> None:
+@pytest.mark.parametrize(
+    ("ended_by", "code", "word"), [("SIGINT", 130, "interrupted"), ("SIGTERM", 143, "terminated")]
+)
+def test_the_same_command_goes_on_where_a_signal_ended_it(ended_by, code, word, monkeypatch, capsys) -> None:
     assert swept("--out", "whole", what="half-flip") == 0  # planned here, there from a file
     write = KeptChunks.write
 
     def write_and_interrupt(*chunk: object) -> None:
         write(*chunk)
-        signal.raise_signal(signal.SIGINT)
+        signal.raise_signal(getattr(signal, ended_by))
 
     capsys.readouterr()
     with monkeypatch.context() as patch:
         patch.setattr(KeptChunks, "write", write_and_interrupt)
-        assert swept("--out", "there/broken") == 130
+        assert swept("--out", "there/broken") == code
     assert capsys.readouterr().err.splitlines() == [
         "aerobat: 50 of 60 flights are kept: the same command goes on from there",
-        "aerobat: interrupted",
+        f"aerobat: {word}",
     ]
     assert [path.name for path in Path("there").iterdir()] == ["broken-unfinished"]
     assert swept("--out", "there/broken", seed=8) == 2
@@ -128,6 +132,41 @@ def test_the_same_command_goes_on_with_the_flights_that_are_kept(capsys) -> None
     assert [path.name for path in Path("there").iterdir()] == ["broken"]
     assert Path("there/broken/flights.csv").read_bytes() == Path("whole/flights.csv").read_bytes()
     assert ab.load_plan("there/broken/half-flip.plan") == kept
+
+
+# a worker is killed when it begins with the third chunk
+KILLED_WORKER = """
+import os, signal, sys
+from aerobat.cli import main
+from aerobat.studies.sweep import flights, sweep
+
+whole = flights.fly_chunk
+def fly_chunk(task, begin, end):
+    if begin == 100:
+        os.kill(os.getpid(), signal.SIGKILL)
+    return whole(task, begin, end)
+fly_chunk.__module__ = flights.__name__
+flights.fly_chunk = sys.modules["aerobat.studies.sweep.sweep"].fly_chunk = fly_chunk
+main(sys.argv[1:])
+"""
+
+
+@pytest.mark.process
+@pytest.mark.skipif(sys.platform != "linux", reason="elsewhere a worker is no copy of what was changed")
+def test_after_a_worker_was_killed_the_flights_that_are_kept_are_counted() -> None:
+    options = ("--conditions", "spread.toml", "--runs", "150", "--workers", "2", "--out", "out")
+    ended = subprocess.run(
+        [sys.executable, "-c", KILLED_WORKER, "sweep", "half-flip.plan", *options],
+        capture_output=True,
+        text=True,
+    )
+    assert ended.returncode == 2
+    kept, killed = ended.stderr.splitlines()[-2:]
+    assert re.fullmatch(r"aerobat: \d+ of 150 flights are kept: the same command goes on from there", kept)
+    assert killed == (
+        "aerobat: a worker process was killed or has ended by itself; "
+        "where memory is short, take fewer workers"
+    )
 
 
 @pytest.mark.parametrize(

@@ -1,6 +1,6 @@
 """The beginning and the end of a run: each way in which it can go has an exit code and a sentence.
 
-Little is imported here, so that Ctrl-C and broken terminals are provided for when the rest is.
+Little is imported here, so that signals and broken terminals are provided for when the rest is.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ import sys
 from collections.abc import Sequence
 
 from aerobat.cli.exit_code import ExitCode
-from aerobat.cli.interrupts import interruptible
+from aerobat.cli.interrupts import interrupted_by, interruptible
 from aerobat.cli.terminal import discard, provide_streams, say
 from aerobat.errors import AerobatError, Infeasible
 
@@ -24,14 +24,15 @@ def main(arguments: Sequence[str] | None = None) -> None:
 
     Whatever is foreseen ends in one sentence on standard error, and an exit code.
     """
-    code, errors = ExitCode.INTERRUPTED, sys.stderr
+    errors = sys.stderr
     try:
         with interruptible(afterwards=arguments is not None):
             provide_streams()
             code = _run(sys.argv[1:] if arguments is None else arguments)
     except KeyboardInterrupt:
         sys.stderr = errors or sys.stderr  # a solver may have been interrupted while it was led elsewhere
-        say("interrupted")
+        code = interrupted_by()
+        say(code.name.lower())
     if code is not ExitCode.WELL:
         sys.exit(code)
 

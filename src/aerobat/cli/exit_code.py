@@ -12,5 +12,6 @@ class ExitCode(IntEnum):
     NOT_WELL = 1  # not certified, or not flown as it should be
     BAD_INPUT = 2
     NO_PLAN = 3
-    INTERRUPTED = 130  # as shells say it, and the next
+    INTERRUPTED = 130  # as shells say it, and the next two
     BROKEN_PIPE = 141
+    TERMINATED = 143

@@ -1,4 +1,4 @@
-"""Ctrl-C from a run's first instant to the one from which nothing takes it back."""
+"""Ctrl-C and SIGTERM from a run's first instant to the one from which nothing takes it back."""
 
 from __future__ import annotations
 
@@ -9,22 +9,25 @@ from contextlib import contextmanager
 from functools import partial
 from types import FrameType
 
+from aerobat.cli.exit_code import ExitCode
+
+_SIGNALS = (signal.SIGINT, signal.SIGTERM)
 _noticed: list[int] = []
 
 
 @contextmanager
 def interruptible(afterwards: bool) -> Iterator[None]:
-    """Have Ctrl-C raise KeyboardInterrupt and be remembered, even where something swallows the exception.
+    """Have either raise KeyboardInterrupt and be remembered, even where something swallows the exception.
 
     What fails once it is remembered fails of it: extensions written in C make other exceptions of this one.
     Where Python can raise nothing, as in `__del__` and weak references' callbacks, it is raised right after.
 
-    `afterwards`: whether the process goes on when the block ends; if not, Ctrl-C means nothing from there.
+    `afterwards`: whether the process goes on when the block ends; if not, they mean nothing from there.
     """
     _noticed.clear()
     hook = sys.unraisablehook
     sys.unraisablehook = partial(_raise_later, hook)
-    handler = signal.signal(signal.SIGINT, _notice)
+    handlers = {number: signal.signal(number, _notice) for number in _SIGNALS}
     try:
         yield
     except Exception:
@@ -32,15 +35,22 @@ def interruptible(afterwards: bool) -> Iterator[None]:
             raise KeyboardInterrupt from None
         raise
     finally:
-        signal.signal(signal.SIGINT, handler if afterwards else signal.SIG_IGN)
+        for number, handler in handlers.items():
+            signal.signal(number, handler or signal.SIG_DFL if afterwards else signal.SIG_IGN)
         sys.unraisablehook = hook
 
 
 def end_interrupts() -> None:
     """Let nothing interrupt what follows. Raises KeyboardInterrupt where something has before."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    for number in _SIGNALS:
+        signal.signal(number, signal.SIG_IGN)
     if _noticed:
         raise KeyboardInterrupt
+
+
+def interrupted_by() -> ExitCode:
+    """Return what a run that was interrupted comes to, by the signal that did it."""
+    return ExitCode.TERMINATED if signal.SIGTERM in _noticed else ExitCode.INTERRUPTED
 
 
 def _notice(signum: int, frame: object) -> None:

@@ -24,6 +24,10 @@ from aerobat.errors import SpecError
 Workers = Annotated[int, Field(ge=1, le=4096, description="whole number from 1 to 4096")]
 
 
+class WorkerEnded(SpecError):
+    """A process that plans or flies was killed, or ended by itself."""
+
+
 class InProcess(Executor):
     """Does what is submitted at once, in this process."""
 
@@ -46,7 +50,7 @@ def workers(count: int, forked: bool) -> Iterator[Executor]:
     """So many processes; one is this process.
 
     An exception in the block, Ctrl-C among them, ends them at once, as does the death of this process: each
-    watches one end of a pipe. Raises SpecError where they end by themselves.
+    watches one end of a pipe. Raises WorkerEnded where one is killed or ends by itself.
 
     Args:
         count: how many.
@@ -70,9 +74,10 @@ def workers(count: int, forked: bool) -> Iterator[Executor]:
             yield pool
         pool.shutdown()
     except BrokenProcessPool:
-        raise SpecError(
-            "a worker process has ended by itself: where memory is short, take fewer workers; a script on "
-            'Windows or macOS calls it below `if __name__ == "__main__":`, or with workers=1'
+        below = 'a script calls it below `if __name__ == "__main__":`, or with workers=1'
+        raise WorkerEnded(
+            "a worker process was killed or has ended by itself; where memory is short, take fewer workers"
+            + ("" if context.get_start_method() == "fork" else f"; {below}")
         ) from None
     finally:
         held.close()
@@ -83,6 +88,7 @@ def workers(count: int, forked: bool) -> Iterator[Executor]:
 def _begin(watched: Connection, held: Connection, plugins: tuple[str, ...]) -> None:
     """Begin a worker: interrupts are for the process that it works for, whose end is the worker's."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    signal.signal(signal.SIGTERM, signal.SIG_DFL)  # which a copy of the process would handle as that does
     held.close()
     threading.Thread(target=_end_with, args=(watched,), daemon=True).start()
     for path in plugins:

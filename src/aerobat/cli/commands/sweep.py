@@ -26,6 +26,7 @@ from aerobat.reporting.sweeps.table import sweep_report, sweep_table
 from aerobat.storage import require_replaceable
 from aerobat.studies.sweep import Sweep
 from aerobat.studies.sweep import sweep as sweep_plan
+from aerobat.studies.workers import WorkerEnded
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -124,7 +125,7 @@ def sweep_of(plan: Plan, record: RunRecord, options: OutputOptions, workers: int
     except BaseException as error:
         if not unfinished.finished:
             unfinished.remove()
-        elif isinstance(error, KeyboardInterrupt):
+        elif isinstance(error, KeyboardInterrupt | WorkerEnded):
             kept = f"{unfinished.finished} of {flight.runs} flights are kept"
             say(f"{kept}: the same command goes on from there")
         raise
