@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import re
 from collections.abc import Iterator, Mapping
@@ -21,6 +22,7 @@ if TYPE_CHECKING:
 T = TypeVar("T")
 
 MAX_DOCUMENT = 2**22  # bytes: twenty thousand waypoints
+MAX_SENTENCE = 300  # letters
 _UNREADABLE = {  # at which the parser of TOML takes gigabytes or minutes; no document has any such
     "a number of a thousand digits": re.compile(r"(?<![0-9A-Fa-f_])[0-9A-Fa-f_]{1000}"),
     "a key of a hundred parts": re.compile(r"(?<![\w\"'-])(?:[\w\"'-]++[ \t]*+\.[ \t]*+){100}"),
@@ -93,7 +95,10 @@ def within(prefix: str) -> Iterator[None]:
     try:
         yield
     except SpecError as error:
-        raise SpecError(f"{prefix}{error}") from None
+        sentence = str(error)
+        if len(sentence) > MAX_SENTENCE:  # with a name out of the document, which may be of any length
+            sentence = sentence[:MAX_SENTENCE] + "..."
+        raise SpecError(f"{prefix}{sentence}") from None
 
 
 def read_text(path: Document, max_size: int = MAX_DOCUMENT) -> str:
@@ -114,6 +119,14 @@ def read_text(path: Document, max_size: int = MAX_DOCUMENT) -> str:
         raise
     except (OSError, ValueError) as error:
         raise SpecError(f"cannot be read: {_reason(error)}") from None
+
+
+def read_json(path: Path) -> Any:
+    """What a JSON file holds. Raises SpecError, one sentence without the file's name, where it holds none."""
+    try:
+        return json.loads(read_text(path))
+    except (ValueError, RecursionError) as error:
+        raise error if isinstance(error, SpecError) else SpecError("it is no JSON; write it again") from None
 
 
 def _reason(error: Exception) -> str:

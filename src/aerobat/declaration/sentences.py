@@ -46,9 +46,14 @@ class UnknownKey(FieldError):
 def unknown_key(key: str, known: Iterable[str]) -> UnknownKey:
     """The error that says no field has this key, and which known one is closest."""
     known = tuple(known)
-    guess = closest(key, known)
+    guess = closest(key[:_LONGEST], known)
     remedy = f"did you mean {guess!r}?" if guess else f"known keys are {', '.join(known)}"
-    return UnknownKey(key if key.isprintable() else repr(key), f"is not a known key; {remedy}")
+    return UnknownKey(_key(key), f"is not a known key; {remedy}")
+
+
+def _key(key: str) -> str:
+    """A key as an error names it: as it is, unless that is no line, or a long one."""
+    return key if key.isprintable() and len(key) <= _LONGEST else shown(key)
 
 
 def unknown_name(kind: str, name: str, known: Iterable[str]) -> SpecError:
@@ -129,7 +134,7 @@ def _complaint(detail: Any) -> FieldError:
 def _dotted(location: Sequence[str | int]) -> str:
     name = ""
     for part in location:
-        name += f"[{part}]" if isinstance(part, int) else f".{part}" if name else part
+        name += f"[{part}]" if isinstance(part, int) else f".{_key(part)}" if name else _key(part)
     return name
 
 

@@ -142,7 +142,9 @@ def read_flight_package(path: str | os.PathLike[str]) -> FlightPackage:
     content = _arrays(path)
     found = str(content.get("format", "something else"))
     if found != FORMAT:
-        raise ValueError(f"{path} holds {found[:40]}, not {FORMAT}")
+        raise ValueError(
+            f"{path} holds {found[:40] if found.isprintable() else 'something else'}, not {FORMAT}"
+        )
     if "digest" in content and str(content.pop("digest")) != _digest(content):
         raise ValueError(f"{path} was changed after it was written")
     try:

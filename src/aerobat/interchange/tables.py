@@ -19,6 +19,7 @@ from aerobat.storage import whole_file, write_whole
 
 CSV, PARQUET = ".csv", ".parquet"
 MAX_TABLE = 2**28  # bytes: half a million flights
+MAX_CELLS = MAX_TABLE // 8
 
 
 @validated
@@ -52,14 +53,7 @@ def read_table(path: PathName) -> dict[str, NDArray[Any]]:
     with in_document(Path(path), "table"):
         if _suffix(path) == CSV:
             return _from_csv(read_text(Path(path), MAX_TABLE))
-        parquet = _parquet()
-        try:
-            columns = parquet.read_table(path)
-            return {name: np.array(columns.column(name).to_pylist()) for name in columns.column_names}
-        except FileNotFoundError:
-            raise SpecError("there is no such file; check the path") from None
-        except (OSError, ValueError):  # Arrow's own errors are ValueErrors
-            raise SpecError("it is not a whole Parquet file; write it again") from None
+        return _from_parquet(Path(path))
 
 
 def require_writable(path: PathName) -> None:
@@ -100,6 +94,24 @@ def _parquet() -> ModuleType:
 
 def _storable(column: NDArray[Any]) -> Any:
     return column.tolist() if column.dtype.kind == "U" else column
+
+
+def _from_parquet(path: Path) -> dict[str, NDArray[Any]]:
+    parquet = _parquet()
+    from pyarrow import ArrowException
+
+    try:
+        with parquet.ParquetFile(path) as file:
+            if file.metadata.num_rows * file.metadata.num_columns > MAX_CELLS:
+                raise SpecError(f"it has more than {MAX_CELLS} cells; read it by pyarrow")
+            columns = file.read()
+        return {name: np.array(columns.column(name).to_pylist()) for name in columns.column_names}
+    except FileNotFoundError:
+        raise SpecError("there is no such file; check the path") from None
+    except SpecError:
+        raise
+    except (ArrowException, OSError, ValueError):
+        raise SpecError("it is not a whole Parquet file; write it again") from None
 
 
 def _from_csv(text: str) -> dict[str, NDArray[Any]]:

@@ -27,6 +27,7 @@ from aerobat.declaration import (
     from_table,
     in_degrees,
     in_radians,
+    shown,
     to_table,
     validated,
     within_field,
@@ -116,7 +117,7 @@ PAPER_LIMITS = Limits(velocity=10.0, acceleration=90.0, jerk=200.0)  # the autho
 
 def _file_name(name: str) -> str:
     if not re.fullmatch(r"\w[\w .-]*", name):
-        raise FieldError("", f"must be letters, digits, spaces, points and dashes, got {name!r}")
+        raise FieldError("", f"must be letters, digits, spaces, points and dashes, got {shown(name)}")
     return name
 
 

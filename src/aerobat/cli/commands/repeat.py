@@ -22,6 +22,7 @@ from aerobat.cli.runs.folder import FLIGHT, finish
 from aerobat.cli.runs.record import RunRecord, read_record, versions_now
 from aerobat.cli.tasks import plan_of
 from aerobat.cli.terminal import say
+from aerobat.documents import read_json
 from aerobat.errors import SpecError
 from aerobat.interchange import read_plan, read_table
 from aerobat.planning import Plan, with_explanation
@@ -78,8 +79,8 @@ def repeat(
 
 def _repeat_comparison(folder: Path, record: RunRecord, options: RepeatOptions) -> ExitCode:
     try:
-        old = [[row[name] for name in SAME] for row in json.loads((folder / COMPARISON).read_bytes())]
-    except (OSError, ValueError, TypeError, KeyError):
+        old = [[row[name] for name in SAME] for row in read_json(folder / COMPARISON)]
+    except (SpecError, TypeError, KeyError):
         raise SpecError(f"{folder}/ has no {COMPARISON} that can be read; compare anew") from None
     comparison = comparison_of(record)
     rows = [[row[name] for name in SAME] for row in comparison_rows(comparison)]
@@ -106,8 +107,8 @@ def _repeat_map(folder: Path, record: RunRecord, options: RepeatOptions) -> Exit
 
 def _repeat_need(folder: Path, record: RunRecord, options: RepeatOptions) -> ExitCode:
     try:
-        old = json.loads((folder / NEED).read_bytes())
-    except (OSError, ValueError):
+        old = read_json(folder / NEED)
+    except SpecError:
         raise SpecError(f"{folder}/ has no {NEED} that can be read; search anew") from None
     found = need_of(record)
     finish_need(found, record, options)

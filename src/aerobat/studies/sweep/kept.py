@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from aerobat.declaration import to_table
-from aerobat.documents import read_text
+from aerobat.documents import read_json
 from aerobat.errors import SpecError
 from aerobat.planning import Plan
 from aerobat.provenance import installed_versions
@@ -43,9 +43,9 @@ class KeptChunks:
             write_whole(path, json.dumps(own, indent=2) + "\n")
             return cls(folder)
         try:
-            found = json.loads(read_text(path))
+            found = read_json(path)
             differing = [key for key in own if found[key] != own[key]]
-        except (SpecError, ValueError, KeyError, TypeError):
+        except (SpecError, KeyError, TypeError):
             raise SpecError(f"{folder}/ keeps no flights of a sweep; name a folder of its own") from None
         if differing:
             others = " and ".join(differing)
@@ -58,11 +58,11 @@ class KeptChunks:
             arrays = read_arrays(self._path(begin, end), "sweep")
             if str(arrays["digest"]) != digest_of(arrays):
                 return None
-            names = arrays["names"].tolist()
-            columns = {name: arrays[f"column_{k}"] for k, name in enumerate(names)}
-            return Chunk(columns, *(arrays[name] for name in _OVER_TIME))
-        except (SpecError, KeyError):
+            columns = {str(name): arrays[f"column_{k}"] for k, name in enumerate(arrays["names"])}
+            found = Chunk(columns, *(arrays[name] for name in _OVER_TIME))
+        except (SpecError, KeyError, TypeError):
             return None
+        return found if all(column.shape == (end - begin,) for column in columns.values()) else None
 
     def write(self, begin: int, end: int, chunk: Chunk) -> None:
         """Keep finished flights."""
