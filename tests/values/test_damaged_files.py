@@ -18,6 +18,7 @@ import tomli_w
 from aerobat.errors import SpecError
 from aerobat.interchange import read_plan
 from aerobat.interchange.flight_package import read_flight_package
+from aerobat.interchange.rows import MAX_ROWS
 from aerobat.planning import Plan, load_plan
 from aerobat.problem import load_problem
 from aerobat.simulation import load_flight
@@ -138,6 +139,27 @@ def test_what_a_parser_takes_gigabytes_for_is_refused_before_it_is_parsed(text, 
     (tmp_path / "huge.toml").write_text(f"name = 'huge'\n{text}\n")
     with pytest.raises(SpecError, match=f"line 2 holds {what}"):
         load_vehicle(tmp_path / "huge.toml")
+
+
+@pytest.mark.parametrize(
+    ("text", "what"),
+    [
+        ("x," * 10**6 + "y\n1,1\n", "line 1 has 1000001 numbers"),
+        ("1," * 10**6 + "1\n1,1\n", "line 1 has 1000001 numbers"),
+        ("\n" * (MAX_ROWS + 1), "more than 2000000 lines"),
+    ],
+    ids=["header", "row", "rows"],
+)
+def test_tables_that_no_path_has_are_refused_before_they_are_cut_into_words(
+    text, what, tmp_path, monkeypatch
+) -> None:
+    def cut(line: str, number: int) -> list[float]:
+        pytest.fail("it was cut")
+
+    monkeypatch.setattr("aerobat.interchange.rows._numbers", cut)
+    (tmp_path / "long.csv").write_text(text)
+    with pytest.raises(SpecError, match=what):
+        read_plan(tmp_path / "long.csv")
 
 
 WITHOUT_END = (load_plan, load_trajectory, load_flight, read_plan, load_vehicle, load_problem)

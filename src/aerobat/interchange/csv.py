@@ -21,7 +21,7 @@ from aerobat.trajectory import Carrier, Trajectory, as_trajectory
 from aerobat.trajectory.piecewise import MAX_DURATION
 
 CSV_COLUMNS = 12
-MAX_CSV = 2**28  # bytes: some hours at 100 Hz
+MAX_CSV = 2**27  # bytes: an hour and a half at 100 Hz
 SAME_TIME = 1e-12  # [s], a step this near to a period is one
 
 

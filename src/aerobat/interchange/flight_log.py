@@ -22,7 +22,7 @@ from aerobat.simulation.flight import setpoint_series
 from aerobat.storage import read_whole
 from aerobat.vehicle import Vehicle
 
-MAX_LOG = 2**28  # bytes: an hour at 1 kHz
+MAX_LOG = 2**27  # bytes: ten minutes at 1 kHz
 FEWEST = 3  # rows, of which rates can be told
 SHORTEST = 1e-6  # [s] from row to row
 LARGEST = 1e6  # [m], [m/s], [rad/s], [N] of what a multirotor does

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from array import array
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -29,6 +30,8 @@ NAMES: Mapping[str, tuple[str, ...]] = {  # of columns, by groups
 }
 PATH = ("position", "velocity", "acceleration", "jerk")
 SYNONYMS = {"time": "t", "time_s": "t", "px": "x", "py": "y", "pz": "z"}
+MAX_ROWS = 2_000_000  # five hours at 100 Hz, half an hour at 1 kHz
+MAX_COLUMNS = 1000
 FEWEST = 5  # rows, of which every second can be left out
 
 
@@ -83,7 +86,8 @@ class PathRows:
 
 def has_header(text: str) -> bool:
     """True if a file's first line names columns and holds no numbers."""
-    words = text.partition("\n")[0].strip().lstrip("#").split(",")
+    first = text.partition("\n")[0].strip().lstrip("#")
+    words = first.split(",", MAX_COLUMNS)  # the last one of more is no identifier
     return all(word.strip().strip('"').isidentifier() and not _is_number(word) for word in words)
 
 
@@ -152,20 +156,23 @@ def number_table(text: str, first: int, counts: Sequence[int], asked: str) -> Ar
         counts: The numbers of columns that may be.
         asked: A sentence without its full stop that says so.
     """
+    if text.count("\n") > MAX_ROWS:
+        raise SpecError(f"it has more than {MAX_ROWS} lines; give the part that is a path's")
     lines = text.splitlines()[first - 1 :]
     if len(lines) > 1 and not text.endswith("\n"):
         raise SpecError(f"line {first - 1 + len(lines)} is cut off, it has no line end")
-    rows: list[list[float]] = []
+    width = lines[0].count(",") + 1 if lines else 0
+    values = array("d")
     for number, line in enumerate(lines, first):
-        row = _numbers(line, number)
-        if len(row) not in counts:
-            raise SpecError(f"line {number} has {len(row)} numbers, {asked}")
-        if rows and len(row) != len(rows[0]):
-            raise SpecError(f"line {number} has {len(row)} numbers, line {first} has {len(rows[0])}")
-        rows.append(row)
-    if len(rows) < 2:
-        raise SpecError(f"a trajectory needs at least two lines of numbers, got {len(rows)}")
-    return np.array(rows)
+        found = line.count(",") + 1
+        if found not in counts:
+            raise SpecError(f"line {number} has {found} numbers, {asked}")
+        if found != width:
+            raise SpecError(f"line {number} has {found} numbers, line {first} has {width}")
+        values.extend(_numbers(line, number))
+    if len(lines) < 2:
+        raise SpecError(f"a trajectory needs at least two lines of numbers, got {len(lines)}")
+    return np.array(values).reshape(len(lines), width)
 
 
 def _numbers(line: str, number: int) -> list[float]:
