@@ -33,6 +33,7 @@ from aerobat.environment import dispersion_names
 from aerobat.interchange import write_columns
 from aerobat.planning import registered_planners
 from aerobat.problem import problem_names
+from aerobat.storage import digest_of
 from aerobat.vehicle import vehicle_names
 from random_command_lines import faults
 from shared_plans import shared_plan
@@ -139,6 +140,37 @@ def plan_files(whole: bytes, rng: random.Random) -> Iterator[bytes]:
         archive = io.BytesIO()
         np.savez(archive, **changed)
         yield archive.getvalue()
+
+
+def numbers(value: Any) -> Iterator[tuple[Any, Any]]:
+    """Yield every number in a document, however deep, by its container and its key there."""
+    for key, inner in value.items() if isinstance(value, dict) else enumerate(value):
+        if isinstance(inner, dict | list):
+            yield from numbers(inner)
+        elif isinstance(inner, int | float) and not isinstance(inner, bool):
+            yield value, key
+
+
+def change_one_number(path: Path, rng: random.Random) -> bool:
+    """Change any number of a plan's file: of its path, vehicle, environment, problem or evidence.
+
+    True if its digest is made anew.
+    """
+    content = dict(np.load(path))
+    digest = content.pop("digest")
+    document = json.loads(content["document"].tobytes())
+    arrays = [content["coefficients"], content["durations"]]
+    parts = [list(numbers(part)) for part in (document, *document.values()) if isinstance(part, dict)]
+    parts += [[(array, index) for index in np.ndindex(array.shape)] for array in arrays]
+    container, key = rng.choice(rng.choice([part for part in parts if part]))
+    value = float(container[key])
+    others = (value * rng.uniform(0.5, 1.7) + 1e-3, -value - 1e-9, value + 2.0, value + 1e-6, *NUMBERS)
+    container[key] = rng.choice([other for other in others if other != value])
+    content["document"] = np.frombuffer(json.dumps(document).encode(), np.uint8)
+    is_forged = rng.random() < 0.5
+    with path.open("wb") as file:
+        np.savez(file, **content, digest=digest_of(content) if is_forged else digest)
+    return is_forged
 
 
 def csv_files(whole: bytes, rng: random.Random) -> Iterator[bytes]:
