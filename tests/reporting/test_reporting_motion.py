@@ -74,6 +74,24 @@ def test_what_cannot_be_a_video_is_refused_and_nothing_is_written(tmp_path: Path
     assert not list(tmp_path.iterdir())
 
 
+@pytest.mark.skipif(sys.platform == "win32", reason="no such limit there")
+@pytest.mark.parametrize("suffix", ["gif", pytest.param("mp4", marks=pytest.mark.slow)])
+def test_a_video_that_finds_no_room_is_not_written_and_said_in_a_sentence(
+    tmp_path: Path, suffix: str, capfd
+) -> None:
+    import resource
+
+    limits = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (8192, limits[1]))  # as a full disk, for FFmpeg too
+    try:
+        with pytest.raises(ab.SpecError, match=r"cannot write .*: FFmpeg wrote \d+ of \d+ frames; see if"):
+            ab.write_video(simulated("half-flip"), tmp_path / f"v.{suffix}", speed=6.0)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, limits)
+    assert not list(tmp_path.iterdir())
+    assert capfd.readouterr() == ("", "")
+
+
 def test_the_command_writes_a_video_and_a_page_where_both_are_named(tmp_path: Path, capsys) -> None:
     shared_plan("line").save(tmp_path / "line.plan")
     video, page = tmp_path / "line.gif", tmp_path / "page.html"

@@ -59,6 +59,7 @@ def write_video(
     picture = MovingPicture(subject, DPI[suffix])
     with whole_file(path) as temporary:
         _encode(encoder, picture.size, temporary, suffix, _frames(picture, times, progress))
+        _require_whole(encoder, temporary, len(times))
 
 
 def frame_times(duration: float, speed: float) -> NDArray[np.float64]:
@@ -91,15 +92,27 @@ def _encode(
         fps=FPS,
         quality=None,
         macro_block_size=1,
-        ffmpeg_log_level="error",
+        ffmpeg_log_level="quiet",  # what was not written is told afterwards
         **ENCODING[suffix],
     )
     writer.send(None)
     try:
         for frame in frames:
             writer.send(np.ascontiguousarray(frame))
+    except OSError:  # of a pipe to a program that has ended; `_require_whole` says so
+        pass
     finally:
         writer.close()
+
+
+def _require_whole(encoder: Any, file: Path, frames: int) -> None:
+    """Refuse a file with fewer frames. Raises OSError: FFmpeg ends in many ways, and none is an exception."""
+    try:
+        found = encoder.count_frames_and_secs(str(file))[0]
+    except RuntimeError:  # no video at all
+        found = 0
+    if found < frames - 1:  # a GIF counts time in hundredths of a second, and may have one less
+        raise OSError(f"FFmpeg wrote {found} of {frames} frames; see if the disk is full")
 
 
 def _encoder() -> Any:
