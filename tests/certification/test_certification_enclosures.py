@@ -8,16 +8,19 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.polynomial import chebyshev as npcheb
 
-from aerobat.certification import quantities
+from aerobat.certification import certify, quantities
 from aerobat.certification.attitude import ThrustDirectionRates
 from aerobat.certification.certify import interpolated
-from aerobat.certification.enclosure import chebyshev, interpolation_error
-from aerobat.certification.enclosure.extrema import SeriesBatch, enclose_maximum
+from aerobat.certification.enclosure import chebyshev, extrema, interpolation_error
+from aerobat.certification.enclosure.extrema import MAX_OPEN, SeriesBatch, enclose_maximum
 from aerobat.certification.thrust_curve import ThrustCurve
 from aerobat.environment import Environment
+from aerobat.interchange.rows import PathRows
 from aerobat.kernels import flatness
 from aerobat.trajectory.subintervals import Subintervals
+from aerobat.vehicle import load_vehicle
 from random_flights import random_flight
+from shared_plans import shared_plan
 from suites import examples
 
 seeds = st.integers(0, 2**32 - 1)
@@ -45,6 +48,24 @@ def test_the_greatest_value_of_series_is_enclosed_tightly_and_found(seed, degree
         assert own[member]
         taken = npcheb.chebval(found.position[g], coefficients[member]) - error[member]
         assert taken == pytest.approx(found.min[g], abs=1e-12)
+
+
+def test_a_path_with_one_number_far_too_large_takes_no_more_intervals_than_others(monkeypatch):
+    """As of a file of rows that somebody mistyped: it took minutes and gigabytes."""
+    path = shared_plan("half-flip", planner="min-snap").trajectory
+    times = np.arange(0.0, path.duration, 0.05)
+    rows = np.stack([path.evaluate(times, derivative) for derivative in range(4)], axis=1)
+    rows[30, 0, 0] *= 1e4
+    first, whole = [], extrema._parabola
+
+    def parabola(coefficients, flat):
+        first.append(len(coefficients))
+        assert len(coefficients) <= 2 * (MAX_OPEN + first[0])
+        return whole(coefficients, flat)
+
+    monkeypatch.setattr(extrema, "_parabola", parabola)
+    mistyped = PathRows(rows, np.diff(times)).trajectory
+    assert not certify(mistyped, load_vehicle("agile-quad")).certified
 
 
 @given(value=st.floats(-5, 5), count=st.integers(1, 9))

@@ -16,6 +16,7 @@ from aerobat.certification.enclosure import chebyshev
 from aerobat.trajectory.subintervals import Subintervals
 
 MAX_HALVINGS = 50
+MAX_OPEN = 50_000  # intervals at a time beside those at first; no flight is known to need a tenth of it
 
 
 @dataclass(frozen=True)
@@ -23,7 +24,7 @@ class SeriesBatch:
     """Series that approximate functions, each of one of G groups whose greatest value is wanted.
 
     The ends of an enclosure come as near to one another as `tightness` says: of the group's scale or of its
-    greatest value, whichever is larger, errors aside.
+    greatest value, whichever is larger, errors aside; less near where that takes too many intervals.
     """
 
     coefficients: Array  # (N, K + 1)
@@ -60,8 +61,8 @@ def enclose_maximum(batch: SeriesBatch) -> Enclosure:
         _improve(found, pending, group, vertex, value, slack)
         tolerance = batch.tightness * np.maximum(batch.scale, np.abs(found.min))[group]
         open_ = (upper > found.min[group] + tolerance) & (tail > tolerance / 4)
-        if halving == MAX_HALVINGS - 1:
-            open_[:] = False
+        if halving == MAX_HALVINGS - 1 or open_.sum() > MAX_OPEN + len(batch.group):
+            open_[:] = False  # their bounds hold, if not tightly
         np.maximum.at(found.max, group[~open_], upper[~open_])
         if not open_.any():
             break
