@@ -19,6 +19,7 @@ from aerobat.declaration import (
     Vector3,
     declared,
     from_table,
+    shown,
     to_table,
     unit,
     unknown_name,
@@ -220,3 +221,7 @@ def test_the_page_on_files_says_what_the_declarations_say() -> None:
         6,
         3,
     }  # keys, imports
+
+
+def test_a_number_too_long_to_be_printed_is_shown_in_words() -> None:
+    assert shown(16**5000) == "a huge number"

@@ -162,8 +162,10 @@ MALFORMED: dict[str, tuple[Callable[[], Any], str]] = {
         lambda: f"mass = {'[' * 5000}{']' * 5000}",
         "this is not a TOML file that can be read: it nests too deeply",
     ),
-    "thousands of digits": (lambda: f"mass = {'9' * 5000}", "this is not valid TOML: "),
-    "huge hexadecimal": (lambda: f"mass = 0x{'f' * 5000}", "mass must be a number, got a huge number"),
+    "thousands of digits": (
+        lambda: f"mass = {'9' * 5000}",
+        "this is not a TOML file that can be read: line 1",
+    ),
     "huge integer": (put("mass", value=10**400), "mass must be a number, got 1000"),
     "no mass": (without("mass"), "mass is missing; add it"),
     "mass misspelt": (renamed("mass", "mas"), "mas is not a known key; did you mean 'mass'?"),
