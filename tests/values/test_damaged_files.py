@@ -47,7 +47,7 @@ def plan_file(tmp_path_factory) -> Path:
     return path
 
 
-@parts(24, 300)
+@parts(24, 120)
 @pytest.mark.parametrize("name", READERS)
 def test_whatever_a_file_holds_its_reader_ends_in_what_it_says_or_in_one_sentence(
     name, begin, end, tmp_path

@@ -166,6 +166,10 @@ MALFORMED: dict[str, tuple[Callable[[], Any], str]] = {
         lambda: f"mass = {'9' * 5000}",
         "this is not a TOML file that can be read: line 1",
     ),
+    "a body without length": (
+        put("body", value={"semi_axes": [1e-300, 1.0, 1.0]}),
+        "body must enclose rotors[0] with its propeller; inf times",
+    ),
     "huge integer": (put("mass", value=10**400), "mass must be a number, got 1000"),
     "no mass": (without("mass"), "mass is missing; add it"),
     "mass misspelt": (renamed("mass", "mas"), "mas is not a known key; did you mean 'mass'?"),

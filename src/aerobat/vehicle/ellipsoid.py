@@ -45,7 +45,8 @@ class Ellipsoid:
 
     def sticking_out(self, rotor: Rotor) -> float:
         """The scale [-] by which it would enclose a rotor with its propeller, about its centre."""
-        return float(np.linalg.norm((_rim(rotor) - self.centre) / self.semi_axes, axis=-1).max())
+        with np.errstate(over="ignore"):  # of an ellipsoid as flat as none, infinite
+            return float(np.linalg.norm((_rim(rotor) - self.centre) / self.semi_axes, axis=-1).max())
 
 
 def about_rotors(rotors: Sequence[Rotor]) -> Ellipsoid:
