@@ -156,11 +156,11 @@ def predicted(
         model: the nominal vehicle.
         state: after the last step.
         body: as it is now.
-        elapsed: since the last step [s], no less than the delay.
+        elapsed: since the last step [s]; a path's last step may be shorter than the delay.
         delay: [s].
     """
     rotors = model.airframe.rotors
-    left = motors.decay_factors(ops, rotors, elapsed - delay)
+    left = motors.decay_factors(ops, rotors, ops.maximum(elapsed - delay, 0.0))
     now = motors.first_order_response(state.thrusts, state.commands.thrusts, left)
     motion = motors.Motion(body, now)
     return motors.advance(ops, model.airframe, model.environment, motion, state.commands.thrusts, delay).body
