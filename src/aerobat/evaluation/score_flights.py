@@ -206,7 +206,8 @@ def _plane(passage: PlannedPassage, vehicles: int) -> GatePlane:
     gate = passage.gate
     directions = plane_directions(gate)
     place = components(gate.position), components(gate.normal)
-    plane = GatePlane(*place, directions, passage.time, PASSAGE_WINDOW, PASSAGE_DEPTH)
+    radius = gate.opening.circumradius
+    plane = GatePlane(*place, directions, radius, passage.time, PASSAGE_WINDOW, PASSAGE_DEPTH)
     spread: GatePlane = tree_map(lambda leaf: np.full(vehicles, leaf), plane)
     return spread
 
