@@ -29,6 +29,7 @@ from .maneuvers import (
 from .maneuvers.maneuver import maneuver, registered_maneuvers
 from .problem import PAPER_LIMITS, Limits, Problem
 from .stage import Stage, StageSequence
+from .tolerance import Tolerance
 
 __all__ = [
     "PAPER_LIMITS",
@@ -63,6 +64,7 @@ __all__ = [
     "SplitS",
     "Stage",
     "StageSequence",
+    "Tolerance",
     "Waypoint",
     "Waypoints",
     "as_problem",

@@ -39,6 +39,7 @@ from aerobat.problem.gate import Gate, named_gate
 from aerobat.problem.maneuvers.line import Line
 from aerobat.problem.maneuvers.maneuver import MANEUVERS, Maneuver
 from aerobat.problem.stage import StageSequence
+from aerobat.problem.tolerance import Tolerance
 
 DERIVATIVES = ("position", "velocity", "acceleration", "jerk", "snap", "crackle")
 UNITS = ("m", "m/s", "m/s²", "m/s³", "m/s⁴", "m/s⁵")
@@ -136,6 +137,7 @@ class Problem:
     limits: Limits = field(default_factory=Limits)  # bounds on the path
     heading: Angle = 0.0  # [rad] about the thrust axis at the start, carried along without spin
     environment: Environment = field(default_factory=Environment)  # where it is flown
+    tolerance: Tolerance = Tolerance()  # how exactly flights keep to it beside gates and radii
     description: str = ""  # what it is, for people
 
     SHORTHANDS: ClassVar[Mapping[str, str]] = {

@@ -240,13 +240,17 @@ def flight_facts(score: Score, controller: str | None = None, plant: str | None 
     several = bool(score.laps)
     for passage in score.passages:
         yield _of_lap(passage.gate, passage.lap, several), _passed(passage)
-    for waypoint in score.waypoints:
+    for waypoint in (*score.waypoints, *score.places):
         met = (
             f"{length(waypoint.miss)} from it, {length(waypoint.radius)} allowed, "
             f"at {waypoint.speed:.2f} m/s at {waypoint.time:.2f} s"
         )
         missed = "not reached" if isnan(waypoint.time) else met
         yield _of_lap(waypoint.waypoint, waypoint.lap, several), missed
+    for attitude in score.attitudes:
+        angle = f"{attitude.angle_deg:.2f}° of {attitude.tolerance_deg:.3g}° allowed"
+        turned = "not reached" if isnan(attitude.time) else f"{angle}, at {attitude.time:.2f} s"
+        yield _of_lap(attitude.stage, attitude.lap, several), turned
     for lap in score.laps:
         split = "not flown" if isnan(lap.duration) else f"{lap.duration:.3f} s, until {lap.end:.3f} s"
         yield f"lap {lap.lap}", split
