@@ -139,7 +139,7 @@ def test_what_takes_seconds_to_know_is_told_where_it_is_asked_for(capsys) -> Non
     assert code == 0
     explained = json.loads(out)
     recoveries = explained["plan"]["recoveries"]
-    assert recoveries["sentence"].startswith("given up at any instant it hovers within")
+    assert recoveries["sentence"].startswith("given up at any of ")
     assert load_plan("explained/line.plan").recoveries is not None
     assert explained["flight"] == plain["flight"]
     assert explained["plan"]["assessment"] == plain["plan"]["assessment"]
