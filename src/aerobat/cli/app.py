@@ -8,9 +8,8 @@ from itertools import pairwise
 from cyclopts import App, CycloptsError
 
 from aerobat.cli.exit_code import ExitCode
+from aerobat.cli.failures import IMPORT_FLAG
 from aerobat.errors import SpecError
-
-IMPORT_FLAG = "--import"
 
 # each is one file and one function of this name, imported when it is asked for
 COMMANDS = {
@@ -50,7 +49,8 @@ app = App(
     wrong or the output cannot be written (one sentence says where); 3 no plan was found (one sentence says
     which bound binds, and with --explain another which changes would help); 130 interrupted, with nothing
     written. A sweep that was flown ends with 0, whatever became of its flights; an interrupted one keeps
-    those that are finished, and the same command goes on from there.
+    those that are finished, and the same command goes on from there. With --json an error is
+    {"error": {"kind", "message", "field"}} on standard output. --traceback shows where a plugin fails.
     """,
     suppress_keyboard_interrupt=False,
 )

@@ -12,11 +12,10 @@ import sys
 from collections.abc import Sequence
 
 from aerobat.cli.exit_code import ExitCode
+from aerobat.cli.failures import INTERRUPTED, TRACEBACK_FLAG, foreseen, of_plugins
 from aerobat.cli.interrupts import interruptible
 from aerobat.cli.terminal import discard, provide_streams, say
 from aerobat.errors import AerobatError, Infeasible
-
-EXPLAIN = "add --explain to `aerobat plan` to try changes that would help"
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
@@ -25,13 +24,14 @@ def main(arguments: Sequence[str] | None = None) -> None:
     Whatever is foreseen ends in one sentence on standard error, and an exit code.
     """
     code, errors = ExitCode.INTERRUPTED, sys.stderr
+    tokens = sys.argv[1:] if arguments is None else arguments
     try:
         with interruptible(afterwards=arguments is not None):
             provide_streams()
-            code = _run(sys.argv[1:] if arguments is None else arguments)
+            code = _run(tokens)
     except KeyboardInterrupt:
         sys.stderr = errors or sys.stderr  # a solver may have been interrupted while it was led elsewhere
-        say("interrupted")
+        INTERRUPTED.tell(tokens)
     if code is not ExitCode.WELL:
         sys.exit(code)
 
@@ -45,21 +45,27 @@ def _run(arguments: Sequence[str]) -> ExitCode:
     try:
         from aerobat.cli.app import run
 
-        code = run(arguments)
+        code = run([token for token in arguments if token != TRACEBACK_FLAG])
         sys.stdout.flush()
     except BrokenPipeError:  # whoever read has enough
         discard(sys.stdout)
         return ExitCode.BROKEN_PIPE
-    except Infeasible as error:
-        say(error.with_remedy(EXPLAIN))
-        return ExitCode.NO_PLAN
     except AerobatError as error:
-        say(str(error))
-        return ExitCode.BAD_INPUT
-    except OSError as error:
-        if error.filename is not None:  # of a file, which is nobody's fault but ours
-            raise
-        discard(sys.stdout)
-        say(f"cannot write to standard output: {error.strerror or error}")
-        return ExitCode.BAD_INPUT
+        foreseen(error).tell(arguments)
+        return ExitCode.NO_PLAN if isinstance(error, Infeasible) else ExitCode.BAD_INPUT
+    except (Exception, SystemExit) as error:
+        return _unforeseen(error, arguments)
     return code
+
+
+def _unforeseen(error: BaseException, arguments: Sequence[str]) -> ExitCode:
+    """Say why a plugin failed, or that nothing can be written; raise what is a defect of ours."""
+    failure = None if TRACEBACK_FLAG in arguments else of_plugins(error, arguments)
+    if failure is not None:
+        failure.tell(arguments)
+        return ExitCode.BAD_INPUT
+    if not isinstance(error, OSError) or error.filename is not None:  # of a file, which is nobody's but ours
+        raise error
+    discard(sys.stdout)
+    say(f"cannot write to standard output: {error.strerror or error}")
+    return ExitCode.BAD_INPUT

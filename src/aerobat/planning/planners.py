@@ -88,7 +88,10 @@ def plan(
         require_openings(problem, vehicle)
         _require_consistency(problem, vehicle)
     method = planner_for(problem, vehicle) if planner is None else as_planner(planner)
-    found = method.plan(problem, vehicle, progress)
+    found: Any = method.plan(problem, vehicle, progress)
+    if not isinstance(found, Plan):
+        name = getattr(method, "kind", type(method).__name__)
+        raise SpecError(f"planner '{name}' returned {shown(found)} from plan(), not a Plan")
     return found if vehicle is None or found.vehicle is not None else found.for_vehicle(vehicle)
 
 

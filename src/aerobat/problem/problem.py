@@ -27,12 +27,13 @@ from aerobat.declaration import (
     from_table,
     in_degrees,
     in_radians,
+    shown,
     to_table,
     validated,
     within_field,
 )
 from aerobat.environment import Environment
-from aerobat.errors import SpecError
+from aerobat.errors import OwnCodeError, SpecError
 from aerobat.problem.condition import Condition, ForceBalance, Quantity
 from aerobat.problem.end_state import EndState
 from aerobat.problem.gate import Gate, named_gate
@@ -322,7 +323,15 @@ def _explicit_stages(
     body_radius: float,
 ) -> StageSequence:
     """As `Problem.stages`, kept: planner, certificate and score each ask for the same."""
-    sequence = maneuver.stage_sequence(gates, max_specific_thrust)
+    try:
+        sequence: Any = maneuver.stage_sequence(gates, max_specific_thrust)
+    except SpecError:
+        raise
+    except (ValueError, AssertionError) as error:
+        raise OwnCodeError(f"maneuver '{maneuver.kind}': {error!r}") from error
+    if not isinstance(sequence, StageSequence):
+        complaint = f"returned {shown(sequence)} from stage_sequence(), not a StageSequence"
+        raise SpecError(f"maneuver '{maneuver.kind}' {complaint}")
     stages = (
         s.explicit(None if s.gate is None else named_gate(gates, s.gate), body_radius)
         for s in sequence.stages
