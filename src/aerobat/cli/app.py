@@ -33,8 +33,8 @@ COMMANDS = {
     "ros2": "Fly maneuvers on demand as a node of ROS 2: services in, goals out.",
     "ros2-vehicle": "Simulate a vehicle that is a node of ROS 2.",
     "repeat": "Do a run again from its folder, and say if it came to the same.",
-    "vehicles": "List the built-in vehicles, or print one as a file to begin one's own with.",
-    "problems": "List the built-in problems.",
+    "vehicles": "List the built-in vehicles, say what one is and what looks wrong, or write its file.",
+    "problems": "List the built-in problems, or print one as a file to begin one's own with.",
 }
 
 app = App(

@@ -1,7 +1,7 @@
 from .ball import Ball
 from .condition import Attitude, Condition, ForceBalance, LinearBound, Quantity
 from .end_state import EndState, at_rest
-from .files import as_problem, load_problem, problem_names, write_problem
+from .files import as_problem, load_problem, problem_names, problem_text, write_problem
 from .gate import Gate, tilted_gate
 from .maneuvers import (
     BarrelRoll,
@@ -72,6 +72,7 @@ __all__ = [
     "load_problem",
     "maneuver",
     "problem_names",
+    "problem_text",
     "registered_maneuvers",
     "tilted_gate",
     "write_problem",
