@@ -45,7 +45,7 @@ from aerobat.declaration.sentences import (
     within_field,
 )
 from aerobat.declaration.tables import from_table, to_table
-from aerobat.declaration.validated import validated
+from aerobat.declaration.validated import suggest_for, validated
 from aerobat.declaration.values import by_value, short
 
 __all__ = [
@@ -86,6 +86,7 @@ __all__ = [
     "number",
     "short",
     "shown",
+    "suggest_for",
     "to_table",
     "unit",
     "unknown_key",

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import Any
+from typing import Unpack
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,7 +28,7 @@ from aerobat.kernels.ops import Ops
 from aerobat.kernels.running_metrics import MetricsInput, MetricsParameters, RunningMetrics
 from aerobat.planning import Plan
 from aerobat.problem import Problem, as_problem
-from aerobat.simulation.config import FlightConfig
+from aerobat.simulation.config import FlightChanges, FlightConfig
 from aerobat.simulation.loop import Signals
 from aerobat.simulation.outcome import DIVERGENCE_RADIUS, TOUCHDOWN
 from aerobat.simulation.passages import PASSAGE_DEPTH, PASSAGE_WINDOW, plane_directions
@@ -92,7 +92,7 @@ def score_flights(
     problem: Problem | str | None = None,
     environment: Environment | None = None,
     config: FlightConfig = FlightConfig(),  # noqa: B008 - frozen
-    **changes: Any,
+    **changes: Unpack[FlightChanges],
 ) -> Scores:
     """Fly as `fly` does with the same arguments, and score each flight as it is flown; nothing is logged.
 
@@ -107,7 +107,7 @@ def score_flights(
     Raises SpecError for arguments that do not fit together, BackendMissing for an engine that is not
     installed.
     """
-    return score_over_time(plan, vehicles, problem, environment, replace(config, **changes))[0]
+    return score_over_time(plan, vehicles, problem, environment, config.changed(changes))[0]
 
 
 @dataclass(frozen=True, eq=False)

@@ -20,7 +20,7 @@ from aerobat.errors import SpecError
 from aerobat.evaluation.opening import Probability
 from aerobat.interchange.columns import ALL
 from aerobat.planning import Planner, command_settings, planner_options
-from aerobat.planning.planners import PLANNERS
+from aerobat.planning.planners import DEFAULT_VEHICLE, PLANNERS
 from aerobat.problem import Problem
 from aerobat.provenance import installed_versions
 from aerobat.vehicle import Vehicle
@@ -163,7 +163,7 @@ def _in_a_name(value: Any) -> str:
 
 def default_vehicle(paper: bool = False) -> str:
     """The name of the vehicle that is taken where none is given."""
-    return "hexarotor" if paper else "agile-quad"
+    return "hexarotor" if paper else DEFAULT_VEHICLE
 
 
 def write_record(record: RunRecord, folder: Path) -> None:

@@ -37,7 +37,7 @@ class ManeuverFlights:
 
 def printed_plan(name: str) -> Plan:
     """The plan of a built-in problem by the program as printed, with the reference code's parameters."""
-    return plan(load_problem(name).as_in_paper(), Miqp(order=JERK))
+    return plan(load_problem(name).as_in_paper(), Miqp(order=JERK), vehicle=None)
 
 
 @cache  # two figures show it, or three
