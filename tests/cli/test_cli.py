@@ -225,6 +225,34 @@ def test_the_gates_tilt_is_what_angle_says(capsys) -> None:
     )  # the gate's tolerance
 
 
+def test_without_arguments_three_lines_say_what_to_type_first(capsys) -> None:
+    code, out, err = run(capsys)
+    assert (code, err) == (0, "")
+    first, *lines = out.splitlines()
+    assert first.endswith("To begin with, type:")
+    assert [line.split("  ")[1] for line in lines] == [
+        "aerobat fly flip-roll", "aerobat problems", "aerobat --help",
+    ]  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("command", "said"),
+    [
+        ("sweep", "--runs --flights"),
+        ("causes", "--runs --flights"),
+        ("tune", "--runs --flights"),
+        ("repeat", "Default: FOLDER-repeated"),
+        ("figures", "[default: out/figures]"),
+        ("fly", "or one of your own that --import brings in"),
+    ],
+)
+def test_help_tells_what_the_command_does(command: str, said: str, capsys, monkeypatch) -> None:
+    monkeypatch.setenv("COLUMNS", "200")
+    code, out, _ = run(capsys, command, "--help")
+    assert code == 0
+    assert said in " ".join(out.replace("│", " ").split())
+
+
 def test_what_there_is_is_listed(capsys) -> None:
     _, out, _ = run(capsys, "vehicles")
     assert all(name in out for name in vehicle_names())

@@ -59,8 +59,17 @@ for name, help in COMMANDS.items():
     app.command(f"aerobat.cli.commands.{place}:{place}", name=name, help=help)
 
 
+START = """Plan, fly and prove aggressive maneuvers for multirotors. To begin with, type:
+  aerobat fly flip-roll        plans a flip, flies it in simulation, says how it went; all in out/flip-roll/
+  aerobat problems             what else there is to fly, and `aerobat vehicles` by whom
+  aerobat --help               all commands"""
+
+
 def run(arguments: Sequence[str]) -> ExitCode:
     """Run the command that `arguments` name. Raises SpecError for those that make no sense."""
+    if not arguments:
+        print(START)
+        return ExitCode.WELL
     try:
         _import_plugins(arguments)
         code = app(arguments, exit_on_error=False, print_error=False, result_action="return_value")

@@ -29,6 +29,12 @@ Plugins = partial(
 Options = TypeVar("Options", bound=type[Any])
 
 
+def how_many(least: int, most: int) -> Parameter:
+    """The option of a number of flights, by the same names in every command."""
+    flights = validators.Number(gte=least, lte=most)
+    return Parameter(name=("--runs", "--flights"), group=flying, validator=flights)
+
+
 @dataclass(frozen=True, kw_only=True)
 class OutputOptions:
     """Where results go."""
@@ -173,4 +179,4 @@ class FlyingOptions(ConditionsOptions):
 
     plant: Annotated[str | None, Parameter(group=flying)] = None
     """Another simulator's physics in place of the built-in: mujoco, in which a gate that is touched is felt,
-    or rotorpy."""
+    rotorpy, or one of your own that --import brings in."""

@@ -8,7 +8,7 @@ from typing import Annotated, Literal
 
 from cyclopts import Parameter, validators
 
-from aerobat.cli.options import OutputOptions, PlanningOptions, flying, output
+from aerobat.cli.options import OutputOptions, PlanningOptions, flying, how_many, output
 from aerobat.cli.progress import SweepProgress, showing
 from aerobat.cli.runs.folder import is_of_a_run, written
 from aerobat.cli.runs.record import FlightSettings, RunRecord
@@ -32,7 +32,7 @@ from aerobat.studies.sweep import sweep as sweep_plan
 class SweepingOptions:
     """Options of many flights."""
 
-    runs: Annotated[int, Parameter(group=flying, validator=validators.Number(gte=1, lte=10**7))] = 1000
+    runs: Annotated[int, how_many(1, 10**7)] = 1000
     """How many flights."""
 
     conditions: Annotated[str, Parameter(group=flying)] = "lab"
