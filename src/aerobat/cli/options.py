@@ -174,8 +174,9 @@ class FlyingOptions(ConditionsOptions):
     """Options of the flight."""
 
     controller: Annotated[str, Parameter(group=flying)] = "full"
-    """The control law, at the gains of the vehicle's file: full, or paper, the paper's own without moment
-    feed-forward, motor-lag compensation and tilt before yaw."""
+    """The control law: full, or paper, the paper's own without moment feed-forward, motor-lag compensation
+    and tilt before yaw, both at the gains of the vehicle's file; lee, lqr, indi; or one of your own that
+    --import brings in."""
 
     plant: Annotated[str | None, Parameter(group=flying)] = None
     """Another simulator's physics in place of the built-in: mujoco, in which a gate that is touched is felt,

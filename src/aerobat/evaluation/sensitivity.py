@@ -127,6 +127,8 @@ def sensitivity(
     """
     names = _known((of,) if isinstance(of, str) else tuple(of))
     config = config.changed(changes)
+    if config.law is not None:
+        raise SpecError("controller is a law, of whose gains there are no slopes; leave it out")
     if config.conditions is not None:
         raise SpecError("conditions draw what flies, which leaves no slopes; leave them out, or sweep")
     setup = with_metrics(prepare(plan, vehicle, environment=environment, config=config))

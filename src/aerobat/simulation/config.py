@@ -8,13 +8,13 @@ from typing import Annotated, Any, TypedDict
 
 from pydantic import Field, PlainValidator
 
+from aerobat.control import ControlLaw, Controller, as_controller, named_controller
 from aerobat.declaration import AS_IT_IS, FieldError, Seed, declared, shown
 from aerobat.environment import Dispersion, as_dispersion
 from aerobat.errors import SpecError
 from aerobat.simulation.plants import Plant, as_plant
 from aerobat.states import BodyState
 from aerobat.vehicle import Vehicle
-from aerobat.vehicle.controller import Controller, named_controller
 
 ControlRate = Annotated[float, Field(ge=1, le=1e6, description="number from 1 to 1e6")]
 MAX_FLIGHTS = 10_000_000  # under conditions
@@ -27,15 +27,6 @@ def _conditions(value: Any) -> Dispersion | None:
     if isinstance(value, str):
         return as_dispersion(value)
     raise FieldError("", f"must be a Dispersion or the name of one, got {shown(value)}")
-
-
-def _controller(value: Any) -> Controller | str | None:
-    if value is None or isinstance(value, Controller):
-        return value
-    if not isinstance(value, str):
-        raise FieldError("", f"must be a Controller or the name of one, got {shown(value)}")
-    named_controller(value)
-    return value
 
 
 def _flights(value: Any) -> range | None:
@@ -52,7 +43,7 @@ def _flights(value: Any) -> range | None:
 class FlightChanges(TypedDict, total=False):
     """Fields of FlightConfig that replace those of a given one; each as FlightConfig has it, or a name."""
 
-    controller: Controller | str | None
+    controller: Controller | ControlLaw | str | None
     rate: float
     conditions: Dispersion | str | None
     seed: int
@@ -72,8 +63,8 @@ class FlightConfig:
     which they draw, and say, themselves.
     """
 
-    # what tracks the path, by default the nominal vehicle's; or full or paper, the law at that one's gains
-    controller: Annotated[Controller | str | None, PlainValidator(_controller)] = None
+    # what tracks the path, by default the nominal vehicle's: settings, a law, or a name: full, paper, lee, …
+    controller: Annotated[Controller | ControlLaw | str | None, PlainValidator(as_controller)] = None
     rate: ControlRate = 500.0  # [1/s] of the controller, unless conditions say it
     # as it would really be flown: what varies, disturbs, and is measured how; left out, as planned
     conditions: Annotated[Dispersion | None, PlainValidator(_conditions)] = None
@@ -111,8 +102,14 @@ class FlightConfig:
         fields: Any = changes
         return replace(self, **fields)
 
+    @property
+    def law(self) -> ControlLaw | None:
+        """The control law asked for, in place of the tracking controller."""
+        found = named_controller(self.controller) if isinstance(self.controller, str) else self.controller
+        return found if isinstance(found, ControlLaw) else None
+
     def controller_of(self, nominal: Sequence[Vehicle]) -> Controller:
-        """The controller asked for, or that of the nominal vehicles.
+        """The settings asked for, or those of the nominal vehicles.
 
         Raises SpecError for vehicles with more than one.
         """
@@ -123,7 +120,8 @@ class FlightConfig:
                 "controller: these vehicles have different ones; give one for all, or fly them apart"
             )
         own = nominal[0].controller
-        return own if self.controller is None else named_controller(self.controller, own)
+        named = named_controller(self.controller, own) if isinstance(self.controller, str) else own
+        return named if isinstance(named, Controller) else own
 
     @property
     def rows_rate(self) -> float:

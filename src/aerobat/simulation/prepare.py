@@ -22,9 +22,9 @@ from aerobat.simulation.components import (
     PlantParameters,
     RigidBodyPlant,
     StateObserver,
-    TrackingController,
 )
 from aerobat.simulation.config import FlightChanges, FlightConfig
+from aerobat.simulation.law_controller import flown_by
 from aerobat.simulation.reference_source import ReferenceSource
 from aerobat.simulation.setup import FlightSetup, Part
 from aerobat.states import BodyState
@@ -81,7 +81,7 @@ def prepare(
         start=_start(config.start, reference, len(fleet)),
         parts=(
             Part(StateObserver()),
-            Part(TrackingController(controller.feature_flags), ControllerParameters(model, ())),
+            Part(flown_by(config.law, controller), ControllerParameters(model, ())),
             Part(RigidBodyPlant.for_rate(config.rate), plant),
         ),
         reference=reference,

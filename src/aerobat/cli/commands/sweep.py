@@ -39,7 +39,8 @@ class SweepingOptions:
     """What varies from flight to flight, disturbs and is measured how: none, lab, field, or a TOML file."""
 
     controller: Annotated[str, Parameter(group=flying)] = "full"
-    """The control law, at the gains of the vehicle's file: full, or paper."""
+    """The control law: full, or paper, at the gains of the vehicle's file; lee, lqr, indi; or one of your own
+    that --import brings in."""
 
     seed: Annotated[int, Parameter(group=flying, validator=validators.Number(gte=0))] = 0
     """The seed of all flights: the same seed, the same flights."""
