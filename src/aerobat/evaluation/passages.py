@@ -26,6 +26,8 @@ from aerobat.simulation.outcome import length
 from aerobat.simulation.passages import PASSAGE_WINDOW, PlannedAttitude
 from aerobat.so3 import thrust_axis
 
+GOAL = "the goal"  # the name of a path's end among what is come to
+
 
 class Asked(NamedTuple):
     """Passages of gates, waypoints and other stages, each in the order of the stages."""
@@ -87,7 +89,7 @@ def _goal(problem: Problem, path: SampledPath) -> Iterator[PlannedWaypoint]:
     """The end of the path; a closed course has none."""
     if problem.ends:
         ball = Ball(path.position[-1], problem.tolerance.position)
-        yield PlannedWaypoint("the goal", ball, float(path.times[-1]))
+        yield PlannedWaypoint(GOAL, ball, float(path.times[-1]))
 
 
 def _attitudes(goal: Problem | Plan, path: SampledPath) -> tuple[PlannedAttitude, ...]:
