@@ -84,6 +84,10 @@ def random_files(seed: int, case: int) -> Case:
         tilt = pen.number(0.5, 2.5)
         ceiling = pen.one_of({"max_tilt": tilt}, {"max_tilt_deg": round(np.degrees(tilt), 1)})
         found.problem["limits"] = found.problem.get("limits", {}) | ceiling
+    if pen.chance(0.1):
+        angle = pen.number(0.05, 0.5)
+        tilt = pen.one_of({"attitude": angle}, {"attitude_deg": round(np.degrees(angle), 1)})
+        found.problem["tolerance"] = {"position": pen.size(0.02, 1.0)} | tilt
     return found
 
 

@@ -44,7 +44,7 @@ def plans() -> Iterator[tuple[ab.Vehicle, ab.Problem, ab.Plan, str]]:
                 yield vehicle, problem, ab.plan(problem, ab.Miqp(order=order), vehicle), f"order {order}"
     for problem in map(ab.load_problem, PROBLEMS):
         paper = problem.as_in_paper()
-        yield vehicle, paper, ab.plan(paper, ab.Miqp(order=3)), "paper"
+        yield vehicle, paper, ab.plan(paper, ab.Miqp(order=3), vehicle=None), "paper"
 
 
 if __name__ == "__main__":

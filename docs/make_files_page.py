@@ -33,6 +33,7 @@ from aerobat.problem import (
     Maneuver,
     Problem,
     Stage,
+    Tolerance,
     Waypoint,
     registered_maneuvers,
 )
@@ -47,6 +48,7 @@ PLACES = {  # where each class stands in a file
     Gate: "`[[gates]]`, or `[gate]` for a single one",
     Limits: "`[limits]`, at the ends of intervals and, planned with a vehicle, between them",
     Environment: "`[environment]`",
+    Tolerance: "`[tolerance]`: what a flight keeps to that went well, where no gate or radius says it",
     GatePassage: "`[maneuver.passage]`",
     Stage: "`[[maneuver.stages]]`",
     Attitude: "`attitude` of a stage: where the thrust points, its drag counted",
@@ -176,7 +178,7 @@ def page() -> str:
     by_hand = PAGE.read_text(encoding="utf-8").partition(WRITTEN)[2]
     parts = [INTRODUCTION, "## Problem (`aerobat fly problem.toml`)\n", preset("problem", "flip-roll")]
     parts += [table(Problem)]
-    parts += [section(cls) for cls in (EndState, Gate, Limits, Environment)]
+    parts += [section(cls) for cls in (EndState, Gate, Limits, Environment, Tolerance)]
     parts += ["### Maneuvers\n", "`[maneuver]` has a `kind`, and what that kind takes:\n"]
     parts += [kind(name, cls) for name, cls in registered_maneuvers().items() if of_package(cls)]
     parts += [section(Figure), section(GatePassage), section(Stage), section(Ball), section(Attitude)]

@@ -5,6 +5,22 @@ value that can be saved, replayed and tested alone. The public names stand in `_
 when it is first used, so that a command waits for nothing that it does not need.
 """
 
+from typing import Any
+
 import lazy_loader
 
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
+_imported, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
+
+
+def __getattr__(name: str) -> Any:
+    """Import a public name. Raises AttributeError with the closest one for a name that there is not."""
+    try:
+        return _imported(name)
+    except AttributeError:
+        if name.startswith("_"):
+            raise
+        from difflib import get_close_matches  # only once something is wrong
+
+        guess = get_close_matches(name, __all__, n=1)
+        hint = f"; did you mean {guess[0]!r}?" if guess else ""
+        raise AttributeError(f"aerobat has no {name!r}{hint}", name=name) from None

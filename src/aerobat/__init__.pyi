@@ -1,5 +1,5 @@
 from .certification import Certificate, Envelope, certify
-from .control import Controller
+from .control import ControlLaw, Controller, controller
 from .declaration import import_plugin
 from .environment import (
     Battery,
@@ -132,6 +132,7 @@ __all__ = [
     "Comparison",
     "Condition",
     "ContinuityRule",
+    "ControlLaw",
     "Controller",
     "Corkscrew",
     "Course",
@@ -217,6 +218,7 @@ __all__ = [
     "certify",
     "compare",
     "comparison_figure",
+    "controller",
     "dispersion_names",
     "draw",
     "error_causes",

@@ -93,5 +93,12 @@ class Infeasible(AerobatError):
         return type(self), (self.sentence, self.attempts, self.remedy)
 
 
+class OwnCodeError(Exception):
+    """Code of one's own failed, with the error that is this one's cause.
+
+    Checks take a ValueError or an AssertionError for a complaint about a field; this error passes them.
+    """
+
+
 class BackendMissing(AerobatError):
     """A solver was asked for by name and is not installed: the message gives the install command."""

@@ -36,7 +36,7 @@ def code(*arguments: str) -> int:
 def test_a_map_writes_a_row_a_cell_which_is_what_plan_says(capsys) -> None:
     assert code(*MAP, "--json", "--workers", "1") == 0
     facts = json.loads(capsys.readouterr().out)
-    folder = Path("out/half-flip-map")
+    folder = Path("out/half-flip-map-angle-0-90-90-speed-4-12-8")
     assert {path.name for path in folder.iterdir()} == {"map.csv", "map.json", "map.png", "run.toml"}
     assert facts == json.loads((folder / "map.json").read_bytes())
     table = read_table(folder / "map.csv")
@@ -81,7 +81,7 @@ def test_what_is_needed_is_written_with_its_plans_and_repeated(capsys) -> None:
     assert code(*NEED) == 0
     shown = capsys.readouterr().out
     assert "of its size" in shown
-    folder = Path("out/half-flip-need")
+    folder = Path("out/half-flip-need-gate-ceiling-tolerance-0.2")
     plans = {f"half-flip-{quantity}.plan" for quantity in ("gate", "ceiling")}
     assert {path.name for path in folder.iterdir()} == {"need.json", "run.toml", *plans}
     facts = json.loads((folder / "need.json").read_bytes())
@@ -141,7 +141,7 @@ def test_what_nothing_suffices_for_ends_with_its_own_code(capsys) -> None:
     assert "'line' has no plan on agile-quad" in capsys.readouterr().err
     assert code("map", *arguments, "--over", "vehicle.mass=0.9,1") == 0
     assert capsys.readouterr().out.count("no plan") == 2
-    assert [path.name for path in Path("out").iterdir()] == ["line-stuck-map"]
+    assert [path.name for path in Path("out").iterdir()] == ["line-stuck-map-vehicle.mass-0.9-1"]
 
 
 # is interrupted when the first plan is there

@@ -6,14 +6,16 @@ import shutil
 import tomllib
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 import tomli_w
 
-from aerobat.cli.runs.record import RunRecord, read_record
+from aerobat.cli.runs.record import FlightSettings, RunRecord, read_record
+from aerobat.environment import load_dispersion
 from aerobat.interchange import read_trajectory
-from aerobat.planning import MinSnap, Miqp, load_plan
+from aerobat.planning import MinSnap, Miqp, Planner, command_settings, load_plan, planner_class
 from aerobat.problem import load_problem
 from aerobat.simulation import load_flight
 from aerobat.vehicle import load_vehicle
@@ -120,14 +122,45 @@ def test_a_repetition_that_comes_to_something_else_says_what_and_exits_with_1(ke
     assert err.endswith("(other versions of numpy)\n")
 
 
+def as_the_command_has_it(planner: str, **options: Any) -> Planner:
+    cls: Any = planner_class(planner)
+    return cls(**command_settings(cls) | options)
+
+
+@pytest.mark.parametrize(
+    ("options", "ending"),
+    [
+        ({}, ""),
+        ({"order": 4}, "-order-4"),
+        ({"intervals": 30, "reserve": 0.1}, "-intervals-30-reserve-0.1"),
+        ({"time_limit": 2.5}, "-time-limit-2.5"),
+    ],
+)
+def test_a_folders_name_holds_the_planners_options_that_are_not_default(
+    options: dict[str, Any], ending: str
+) -> None:
+    planner = as_the_command_has_it("miqp", **options)
+    line, quad = load_problem("line"), load_vehicle("agile-quad")
+    record = RunRecord(command="fly", problem=line, vehicle=quad, planner=planner)
+    assert record.folder == Path(f"out/line{ending}")
+
+
+def test_a_folders_name_holds_how_it_is_flown_where_that_is_not_default() -> None:
+    line, quad, planner = load_problem("line"), load_vehicle("agile-quad"), as_the_command_has_it("miqp")
+    settings = FlightSettings("paper", load_dispersion("lab"), seed=3, plant="mujoco")
+    record = RunRecord(command="fly", problem=line, vehicle=quad, planner=planner, flight=settings)
+    assert record.folder == Path("out/line-lab-seed-3-paper-mujoco")
+    far = replace(record, over=tuple(f"gate.width={k}:{k + 1}:0.01" for k in range(40)))
+    assert len(far.folder.name) < 255
+    assert far.folder != replace(far, over=far.over[:-1]).folder
+
+
 def test_runs_that_differ_in_more_than_settings_have_folders_of_their_own() -> None:
     problem, quad, other = load_problem("half-flip"), load_vehicle("agile-quad"), load_vehicle("crazyflie")
-    from aerobat.planning import planner_class
-
     folders = [
         RunRecord(
-            command=command, problem=problem, vehicle=vehicle, planner=planner and planner_class(planner)(),
-            angle=angle, paper=paper,
+            command=command, problem=problem, vehicle=vehicle,
+            planner=planner and as_the_command_has_it(planner), angle=angle, paper=paper,
         ).folder
         for command in ("fly", "compare")
         for planner in (("miqp", "min-snap", "free-knots", None) if command == "fly" else (None,))

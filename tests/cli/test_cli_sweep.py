@@ -39,7 +39,7 @@ def swept(*more: str, what: str = "half-flip.plan", seed: int = 7) -> int:
 def test_a_sweep_writes_a_row_a_flight_and_counts_what_became_of_them(capsys) -> None:
     assert swept("--json") == 0
     facts = json.loads(capsys.readouterr().out)
-    folder = Path("out/half-flip-sweep-spread")
+    folder = Path("out/half-flip-sweep-spread-seed-7")
     assert {path.name for path in folder.iterdir()} == {
         "flights.csv", "half-flip.plan", "run.toml", "sweep.json", "sweep.png",
     }  # fmt: skip
@@ -60,11 +60,11 @@ def test_a_repeated_sweep_comes_to_the_same_bits(capsys) -> None:
     assert swept("--table", "parquet") == 0
     shown = capsys.readouterr().out
     assert "went well" in shown
-    assert shown.endswith("written to out/half-flip-sweep-spread/\n")
+    assert shown.endswith("written to out/half-flip-sweep-spread-seed-7-parquet/\n")
     Path("spread.toml").unlink()  # the folder holds its contents
-    assert code("repeat", "out/half-flip-sweep-spread") == 0
-    assert "the same as in out/half-flip-sweep-spread/, bit for bit" in capsys.readouterr().err
-    plan = "out/half-flip-sweep-spread"  # whose plan is swept again as it is
+    assert code("repeat", "out/half-flip-sweep-spread-seed-7-parquet") == 0
+    assert "the same as in out/half-flip-sweep-spread-seed-7-parquet/, bit for bit" in capsys.readouterr().err
+    plan = "out/half-flip-sweep-spread-seed-7-parquet"  # whose plan is swept again as it is
     Path("spread.toml").write_text(SPREAD)
     assert (
         code("sweep", plan, "--runs", "3", "--conditions", "spread.toml", "--seed", "7", "--out", "few") == 0

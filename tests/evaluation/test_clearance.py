@@ -217,24 +217,48 @@ def test_a_body_turned_about_its_thrust_reaches_as_far_as_it_does_in_some_attitu
     )
 
 
+def upright_passage(gate: ab.Gate, body: ab.Ellipsoid, times: Array, position: list[Array]) -> ab.Passage:
+    """The passage of a body that is moved without turning."""
+    states = np.column_stack(position), np.zeros((len(times), 3)), np.tile(so3.IDENTITY, (len(times), 1))
+    planned = PlannedPassage(gate, CROSSING, gate.up)
+    return passages(planned, gate_progress(planned, times, states, body), np.array([np.nan])).of_flight(0)
+
+
 def test_who_slides_along_the_plane_into_the_opening_has_hit_the_frame() -> None:
     """Up along the plane, half of the body in it, and through the centre: the lower edge was in the way."""
-    gate = ab.tilted_gate((0.0, 0.0, 0.0))
-    times = np.arange(0.0, 1.0, 1 / RATE)
-    late = np.maximum(times - CROSSING, 0.0)
-    position = np.column_stack(
-        [-0.1 + 0.4 * np.maximum(times - 0.25, 0.0), 0 * times, np.minimum(2 * times - 1, 0)]
-    )
-    position[:, 0] += late
-    velocity, attitude = np.zeros((len(times), 3)), np.tile(so3.IDENTITY, (len(times), 1))
-    planned = PlannedPassage(gate, CROSSING, gate.up)
-    progress = gate_progress(planned, times, (position, velocity, attitude), QUAD.bounding_ellipsoid)
-    passage = passages(planned, progress, np.array([np.nan])).of_flight(0)
+    gate, times = ab.tilted_gate((0.0, 0.0, 0.0)), np.arange(0.0, 1.0, 1 / RATE)
+    beyond = -0.1 + 0.4 * np.maximum(times - 0.25, 0.0) + np.maximum(times - CROSSING, 0.0)
+    along = np.minimum(2 * times - 1, 0)
+    passage = upright_passage(gate, QUAD.bounding_ellipsoid, times, [beyond, 0 * times, along])
     assert passage.miss < 0.01
     assert passage.closest_edge == "lower"
     assert passage.closest_time < CROSSING - 0.2
     assert passage.failure is not None
     assert passage.failure[0] is Outcome.HIT_FRAME
+
+
+def test_a_start_in_a_gate_s_plane_three_metres_beside_it_is_no_hit_of_its_frame() -> None:
+    """The small body leaves the plane there, passes the frame 4 cm before it, and then goes through."""
+    gate = ab.tilted_gate((0.0, 0.0, 0.0))
+    times, corners = np.linspace(0.0, 1.0, 501), [0.0, 0.1, 0.45, 0.55, 1.0]
+    beyond = np.interp(times, corners, [0.0, -0.04, -0.04, 0.04, 0.4])
+    left = np.interp(times, corners, [3.0, 3.0, 0.0, 0.0, 0.0])
+    passage = upright_passage(gate, ab.Ellipsoid([0.02] * 3), times, [beyond, left, 0.0 * times])
+    assert passage.inside
+    assert passage.failure is None
+    assert passage.clearance == pytest.approx(gate.height / 2 - 0.02)
+
+
+def test_how_far_beside_a_gate_a_body_came_into_its_plane_is_not_how_far_it_hit_the_frame() -> None:
+    gate, times = ab.tilted_gate((0.0, 0.0, 0.0)), np.linspace(0.0, 1.0, 501)
+    beyond = np.interp(times, [0.0, CROSSING, 1.0], [-0.1, 0.0, 1.0])
+    along = np.interp(times, [0.0, CROSSING, 1.0], [-3.0, 0.0, 0.0])
+    passage = upright_passage(gate, QUAD.bounding_ellipsoid, times, [beyond, 0.0 * times, along])
+    assert passage.failure is not None
+    assert passage.failure[0] is Outcome.HIT_FRAME
+    extent = QUAD.bounding_ellipsoid.semi_axes.max() + np.linalg.norm(QUAD.bounding_ellipsoid.centre)
+    assert -passage.clearance < 2.0 * extent + np.hypot(gate.width, gate.height) / 2 - gate.height / 2
+    assert passage.closest_time > 0.25
 
 
 def test_contact_is_said_with_its_edge_and_its_instant() -> None:

@@ -79,6 +79,7 @@ def tick_by_tick(
         components(gate.position),
         components(gate.normal),
         directions,
+        gate.opening.circumradius,
         planned.time,
         PASSAGE_WINDOW,
         PASSAGE_DEPTH,
@@ -106,6 +107,7 @@ def _snapshot(planned: PlannedPassage, states: tuple[Array, Array, Array], k: in
     "opening",
     [
         pytest.param(OPENINGS[0], id="rectangle"),
+        pytest.param({"width": 0.1, "height": 0.2}, id="slot"),  # which most flights are far beside of
         pytest.param(OPENINGS[1], id="circle", marks=pytest.mark.slow),
         pytest.param(OPENINGS[2], id="pentagon", marks=pytest.mark.slow),
     ],

@@ -78,7 +78,7 @@ def test_the_least_time_to_a_goal_left_free_is_less_than_to_one_that_is_given() 
 def test_a_goal_s_free_velocity_keeps_within_the_limits() -> None:
     limits = ab.Limits(velocity=3.0, acceleration=20.0)
     line = ab.Problem("line", ab.at_rest((0.0, 0.0, 1.0)), PASSED, limits=limits)
-    plan = ab.plan(line, ab.Miqp(order=4))
+    plan = ab.plan(line, ab.Miqp(order=4), vehicle=None)
     assert np.abs(plan.trajectory.evaluate(plan.duration, 1)).max() <= 3.0 + 1e-9
     assert plan.duration >= 9.0 / 3.0
 

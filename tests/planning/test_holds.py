@@ -39,12 +39,12 @@ def test_a_plan_rests_where_and_as_long_as_is_asked(planner) -> None:
 def test_a_plan_that_rests_is_those_of_its_parts_joined() -> None:
     """Without a vehicle, in whose path nothing but place and time is handed on."""
     planner = ab.Miqp(order=4)
-    whole = ab.plan(PROBLEM, planner)
+    whole = ab.plan(PROBLEM, planner, vehicle=None)
     first = replace(PROBLEM, name="first", goal=ab.at_rest(PLACE), maneuver=ab.PassGate("red"))
     second = replace(
         PROBLEM, name="second", start=ab.at_rest(PLACE), maneuver=ab.Course((COURSE.elements[2],)), gates=()
     )
-    one, other = ab.plan(first, planner), ab.plan(second, planner)
+    one, other = ab.plan(first, planner, vehicle=None), ab.plan(second, planner, vehicle=None)
     assert whole.duration == pytest.approx(one.duration + 0.75 + other.duration, rel=1e-9)
     late = whole.trajectory.evaluate(one.duration + 0.75 + np.linspace(0.0, other.duration, 20))
     assert np.allclose(late, other.trajectory.evaluate(np.linspace(0.0, other.duration, 20)), atol=1e-6)
@@ -73,4 +73,4 @@ def test_what_cannot_rest_is_refused() -> None:
     still = ab.Course((ab.Hold((0.0, 0.0, 0.0), 0.5),))
     nowhere = ab.Problem("still", ab.at_rest((0.0, 0.0, 0.0)), ab.at_rest((0.0, 0.0, 0.0)), still)
     with pytest.raises(SpecError, match="nothing moves between the rests"):
-        ab.plan(nowhere, ab.Miqp(order=4))
+        ab.plan(nowhere, ab.Miqp(order=4), vehicle=None)

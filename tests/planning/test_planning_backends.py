@@ -24,7 +24,7 @@ LONG = (("flip-roll", 3), ("flip-roll-translation", 4), ("flip-roll", 5), ("spli
 def test_gurobi_finds_what_the_built_in_search_finds(name: str, order: int) -> None:
     pytest.importorskip("gurobipy")
     problem = load_problem(name)
-    own = plan(problem, Miqp(order=order))
+    own = plan(problem, Miqp(order=order), vehicle=None)
     program = formulate(problem, order, 20).program(own.dt)
     exact = solver("builtin").solve(program)
     found = solver("gurobi").solve(program, time_limit=60.0)
@@ -40,7 +40,9 @@ def test_gurobi_finds_what_the_built_in_search_finds(name: str, order: int) -> N
 def test_scip_finds_what_the_built_in_search_finds(name: str, order: int) -> None:
     pytest.importorskip("pyscipopt")
     problem = load_problem(name)
-    program = formulate(problem, order, 8).program(plan(problem, Miqp(order=order, intervals=8)).dt)
+    program = formulate(problem, order, 8).program(
+        plan(problem, Miqp(order=order, intervals=8), vehicle=None).dt
+    )
     exact, found = solver("builtin").solve(program), solver("scip").solve(program)
     assert found.backend == "scip"
     assert found.cost == pytest.approx(exact.cost, rel=1e-3)
@@ -53,4 +55,4 @@ def test_a_backend_that_is_too_slow_is_not_told_as_a_maneuver_that_cannot_be(
     if backend == "scip":
         pytest.importorskip("pyscipopt")
     with pytest.raises(Infeasible, match=f"no plan of 'flip-roll' was found in 0 s.*--time-limit.*{remedy}"):
-        plan(load_problem("flip-roll"), Miqp(backend=backend, time_limit=0.0))
+        plan(load_problem("flip-roll"), Miqp(backend=backend, time_limit=0.0), vehicle=None)

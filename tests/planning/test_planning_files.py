@@ -66,7 +66,7 @@ def test_what_is_flown_from_the_file_is_what_was_planned(plan: ab.Plan, tmp_path
 
 
 def test_a_plan_without_a_vehicle_survives_too(tmp_path: Path) -> None:
-    bare = ab.plan(ab.load_problem("line"))
+    bare = ab.plan(ab.load_problem("line"), vehicle=None)
     bare.save(tmp_path / "line.plan")
     again = ab.load_plan(tmp_path / "line.plan")
     assert again.vehicle is None

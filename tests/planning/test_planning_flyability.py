@@ -195,7 +195,7 @@ def test_the_evidence_is_that_of_the_plan_s_own_vehicle_and_path(plan: ab.Plan) 
 
 
 def test_a_plan_without_a_vehicle_flies_nothing() -> None:
-    plan = ab.plan(ab.load_problem("line"))
+    plan = ab.plan(ab.load_problem("line"), vehicle=None)
     assert plan.flyability is None
     with pytest.raises(SpecError, match="plan it for one"):
         with_second_opinion(plan)

@@ -13,7 +13,7 @@ HALF_FLIP = 14713.1747
 
 
 def in_paper(name: str, backend: str = "builtin") -> Plan:
-    return plan(load_problem(name).as_in_paper(), Miqp(order=3, backend=backend))
+    return plan(load_problem(name).as_in_paper(), Miqp(order=3, backend=backend), vehicle=None)
 
 
 @pytest.mark.parametrize("name", AT_100_MS)
@@ -66,7 +66,7 @@ def test_every_stage_holds_where_the_plan_says(name: str) -> None:
 
 def test_the_first_feasible_of_another_grid_is_taken() -> None:
     problem = load_problem("flip-roll").as_in_paper()
-    found = plan(problem, Miqp(order=3, search=GridSearch(0.05, 0.2, 16)))
+    found = plan(problem, Miqp(order=3, search=GridSearch(0.05, 0.2, 16)), vehicle=None)
     assert [a.feasible for a in found.attempts][:-1] == [False] * (len(found.attempts) - 1)
     assert found.attempts[-1].feasible
 
@@ -75,6 +75,6 @@ def test_the_first_feasible_of_another_grid_is_taken() -> None:
 @pytest.mark.parametrize("intervals", [8, 15, 20])
 def test_the_papers_gate_is_passed_at_the_end_of_interval_n_over_2(order: int, intervals: int) -> None:
     problem = replace(load_problem("half-flip").as_in_paper(), limits=Limits(velocity=10.0))
-    found = plan(problem, Miqp(order=order, intervals=intervals))
+    found = plan(problem, Miqp(order=order, intervals=intervals), vehicle=None)
     passed = found.trajectory.evaluate((intervals // 2 + 1) * found.dt)
     np.testing.assert_allclose(passed, problem.gates[0].position, atol=1e-5)

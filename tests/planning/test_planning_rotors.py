@@ -122,19 +122,19 @@ def test_a_gate_that_asks_more_thrust_than_there_is_says_both_numbers(quad: Vehi
 def test_the_limit_that_binds_is_named() -> None:
     problem = replace(load_problem("line"), limits=Limits(velocity=0.1))
     with pytest.raises(Infeasible, match=r"limits.velocity \(0.1 m/s\) binds") as failure:
-        plan(problem, Miqp(search=BisectionSearch(0.05, 0.5)))
+        plan(problem, Miqp(search=BisectionSearch(0.05, 0.5)), vehicle=None)
     assert len(failure.value.attempts) > 3
     assert not any(a.feasible for a in failure.value.attempts)
 
 
 def test_running_out_of_time_is_not_called_infeasible() -> None:
     with pytest.raises(Infeasible, match=r"was found in 0 s; allow more with --time-limit") as failure:
-        plan(load_problem("flip-roll"), Miqp(search=BisectionSearch(0.1, 0.12), time_limit=0.0))
+        plan(load_problem("flip-roll"), Miqp(search=BisectionSearch(0.1, 0.12), time_limit=0.0), vehicle=None)
     assert {a.status for a in failure.value.attempts} == {"unknown"}
 
 
 def test_an_optimal_plan_reports_its_bound() -> None:
-    found = plan(load_problem("flip-roll").as_in_paper(), Miqp(order=3))
+    found = plan(load_problem("flip-roll").as_in_paper(), Miqp(order=3), vehicle=None)
     assert found.status == "optimal"
     assert found.bound == pytest.approx(found.cost, rel=1e-9)
     assert found.gap < 1e-9
@@ -157,12 +157,12 @@ def test_a_vehicle_too_weak_for_the_maneuver_is_told_which_rotor_lacks_what() ->
 @pytest.mark.parametrize("intervals", [2, 3, 4])
 def test_too_few_intervals_for_the_stages_is_a_sentence(intervals: int) -> None:
     with pytest.raises(SpecError, match="intervals"):
-        plan(load_problem("flip-roll").as_in_paper(), Miqp(order=3, intervals=intervals))
+        plan(load_problem("flip-roll").as_in_paper(), Miqp(order=3, intervals=intervals), vehicle=None)
 
 
 def test_two_intervals_suffice_for_nothing_to_do() -> None:
     still = Problem("still", at_rest((1.0, 2.0, 3.0)), at_rest((1.0, 2.0, 3.0)))
-    found = plan(still, Miqp(intervals=2))
+    found = plan(still, Miqp(intervals=2), vehicle=None)
     assert found.cost == pytest.approx(0.0, abs=1e-12)
 
 

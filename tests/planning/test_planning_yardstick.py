@@ -140,7 +140,7 @@ def test_a_faster_plan_is_a_start_of_its_own_and_compare_says_so():
     assert entry.plan.duration <= 1.005 * other.plan.duration
     assert entry.plan.planner == "time-optimal"
     assert entry.note == (
-        f"begun again from other's {other.plan.duration:.3f} s; {alone.duration:.3f} s alone"
+        f"begun again from the plan of {other.plan.duration:.3f} s by other; {alone.duration:.3f} s alone"
     )
 
 

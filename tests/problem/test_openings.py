@@ -284,7 +284,7 @@ def test_every_planner_passes_round_and_triangular_openings_off_their_centres(
 @pytest.mark.parametrize("engine", [pytest.param("numpy", marks=pytest.mark.slow), "compiled"])
 def test_all_engines_judge_round_and_polygonal_openings_alike(engine: str) -> None:
     problem = through("round", "triangle")
-    path = ab.plan(problem, ab.Miqp(order=4)).trajectory
+    path = ab.plan(problem, ab.Miqp(order=4), vehicle=None).trajectory
     one = ab.score(ab.fly(path, QUAD), problem, QUAD)
     scores = ab.score_flights(path, [QUAD, QUAD], problem=problem, engine=engine)
     for found, expected in zip(scores.passages, one.passages, strict=True):

@@ -242,7 +242,7 @@ def test_a_maneuver_of_a_users_file_is_known_by_name_checked_planned_and_written
     ab.import_plugin(tmp_path / "zoom.py")  # once is enough, twice is no harm
     assert "zoom" in ab.registered_maneuvers()
     problem = ab.load_problem(tmp_path / "zooming.toml")
-    planned = ab.plan(problem, ab.Miqp(intervals=10))
+    planned = ab.plan(problem, ab.Miqp(intervals=10), vehicle=None)
     assert planned.trajectory.evaluate(np.array([planned.stages[0].time]), 1)[0, 2] >= 4.0 - 1e-6
     ab.write_problem(problem, tmp_path / "again.toml")
     assert ab.load_problem(tmp_path / "again.toml") == problem

@@ -15,12 +15,14 @@ from aerobat.engines.engine import expanded
 from aerobat.engines.pytree import tree_leaves
 from aerobat.environment import Battery, Dispersion, Gusts, HandOff, Imu, MotionCapture, load_dispersion
 from aerobat.kernels.motors import Motion
+from aerobat.simulation import Outcome, fly
 from aerobat.simulation.components import log_row
 from aerobat.simulation.conditions.draw import draw_flights
 from aerobat.simulation.conditions.random_source import RandomSource
 from aerobat.simulation.setup import Part
+from aerobat.trajectory import Trajectory
 from dispersed_loops import dispersed_setup, drawn, rows_of
-from looping_flights import HEXA, loops
+from looping_flights import HEXA, assert_same, loops
 from suites import examples
 
 SEAM = HandOff((0.3, 0.0, 0.0), (1.0, 0.0, 0.0), 0.05, 0.03, 0.01)
@@ -57,6 +59,18 @@ class HeldPlant:
 
     def step(self, ops: Any, thrusts: Any, motion: Motion, inputs: Any, signals: Any) -> Motion:
         return motion
+
+
+def test_a_last_tick_shorter_than_the_delay_of_rotors_without_lag_is_flown_alike_by_all_engines() -> None:
+    gentle = loops(0.2015)
+    path = Trajectory(gentle.durations, 0.02 * gentle.coefficients)
+    flights = [
+        fly(path, "section-v", conditions=LAB, flights=1, engine=engine)
+        for engine in ("floats", "bytecode", "compiled")
+    ]
+    for flight in flights:
+        assert flight.outcomes == (Outcome.COMPLETE,)
+        assert_same(flight, flights[0], atol=1e-9)
 
 
 @cache

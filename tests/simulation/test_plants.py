@@ -154,7 +154,7 @@ def test_rotorpys_own_controller_follows_our_plan_in_rotorpys_own_simulation() -
 
     limits = ab.Limits(velocity=1.0, acceleration=1.0, jerk=3.0)
     line = ab.Problem("line", ab.at_rest((0.0, 0.0, 1.0)), ab.at_rest((1.0, 0.5, 1.5)), limits=limits)
-    plan = ab.plan(line, ab.Miqp(order=4))
+    plan = ab.plan(line, ab.Miqp(order=4), vehicle=None)
     wanted = FlatOutputs(plan)
     hover = np.full(4, np.sqrt(quad_params["mass"] * 9.81 / (4 * quad_params["k_eta"])))
     rest = {"v": np.zeros(3), "q": np.array([0.0, 0.0, 0.0, 1.0]), "w": np.zeros(3), "wind": np.zeros(3)}

@@ -61,6 +61,13 @@ def test_whoever_flies_whatever_any_instants_keep_what_is_announced(
     assert found.lowest.min() > announced.lowest.min() - 0.3
 
 
+def test_the_sentence_tells_the_instants_that_were_flown_and_the_time_to_notice(flip: ab.Plan) -> None:
+    some = ab.recoveries(flip, times=[0.1, 0.2, 0.25], reaction=0.3)
+    told = "given up at any of 3 instants, 100 ms apart at most, and noticed 0.3 s later, it hovers within "
+    assert str(some).startswith(told)
+    assert "given up at 0.10 s and noticed 0.1 s later" in str(ab.recoveries(flip, times=[0.1]))
+
+
 def test_a_vehicle_that_flies_to_pieces_is_told_by_numbers_and_never_hovers(flip: ab.Plan) -> None:
     assert flip.vehicle is not None
     inertia = np.diag([*np.diag(flip.vehicle.inertia)[:2], 1e-300])

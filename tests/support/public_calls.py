@@ -127,7 +127,15 @@ RESULTS = (
     "Tuning",
     "Why",
 )  # made by no user
-NOT_CALLED = ("AerobatError", "BackendMissing", "Infeasible", "SpecError", "Maneuver", "Planner")
+NOT_CALLED = (
+    "AerobatError",
+    "BackendMissing",
+    "Infeasible",
+    "SpecError",
+    "Maneuver",
+    "Planner",
+    "ControlLaw",
+)
 ENUMS = ("ContinuityRule", "Outcome", "Quantity", "TimeScaling")
 
 
@@ -204,6 +212,7 @@ def _calls(folder: Path) -> dict[str, dict[str, Any]]:
         "load_trajectory": {"path": saved["trajectory"]},
         "import_vehicle": {"path": CASES / "robots" / "iris.sdf"},
         "load_vehicle": {"name_or_path": "agile-quad"},
+        "controller": {"name": "x"},
         "maneuver": {"kind": "x"},
         "minimum_effort": {
             "fixed": np.zeros((2, 3, 3)),

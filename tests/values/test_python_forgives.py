@@ -19,7 +19,7 @@ QUAD = ab.load_vehicle("agile-quad")
 
 
 def test_a_problem_a_planner_and_a_vehicle_go_by_their_names() -> None:
-    assert ab.plan("line").trajectory == ab.plan(LINE, "miqp").trajectory
+    assert ab.plan("line").trajectory == ab.plan(LINE, None, QUAD).trajectory
     with pytest.raises(ab.Infeasible, match="nothing to be found"):
         ab.plan("line", NoPlan(), "agile-quad")
     with pytest.raises(ab.Infeasible, match="no planner finds a plan for 'line' on agile-quad"):
@@ -29,6 +29,28 @@ def test_a_problem_a_planner_and_a_vehicle_go_by_their_names() -> None:
     assert ab.score(flight(), "line", "agile-quad").outcome is ab.Outcome.COMPLETE
     assert len(ab.score_flights(plan(), "agile-quad", problem="line", rate=100.0)) == 1
     assert ab.certify(plan().trajectory, "agile-quad") == ab.certify(plan())
+
+
+def test_a_problem_is_planned_for_the_vehicle_that_the_command_line_takes() -> None:
+    assert ab.plan("line").vehicle == QUAD
+    assert ab.plan("line").certified
+    assert ab.plan("line", vehicle=None).vehicle is None
+
+
+def test_a_flight_takes_the_name_of_a_control_law_at_the_gains_of_its_vehicle() -> None:
+    mine = dataclasses.replace(QUAD, controller=dataclasses.replace(QUAD.controller, position_gain=20.0))
+    law = ab.Controller.paper()
+    flown, named = (
+        ab.fly(plan(), mine, rate=100.0, engine="floats", controller=controller)
+        for controller in (dataclasses.replace(law, position_gain=20.0), "paper")
+    )
+    assert flown == named
+    assert named != ab.fly(plan(), mine, rate=100.0, engine="floats")
+
+
+def test_a_misspelt_public_name_is_answered_by_the_closest() -> None:
+    with pytest.raises(AttributeError, match="aerobat has no 'plam'; did you mean 'plan'"):
+        ab.plam  # noqa: B018
 
 
 def test_a_plan_stands_for_its_trajectory_its_vehicle_and_its_environment(tmp_path: Any) -> None:
@@ -55,6 +77,27 @@ def test_a_plan_is_drawn_without_a_flight_and_a_flight_with_the_vehicle_of_its_p
 
 
 MEANT: dict[str, tuple[Callable[[], Any], str]] = {
+    "a problem's name for the plan": (
+        lambda: ab.fly("half-flip"),
+        "fly: plan must be a plan or a Trajectory, got 'half-flip'; plan it first, as ab.plan('half-flip')",
+    ),
+    "conditions for the vehicle": (
+        lambda: ab.fly(plan(), "lab"),
+        "'lab' are conditions, not a vehicle; give conditions='lab'",
+    ),
+    "a planner's option for plan()": (
+        lambda: ab.plan("line", intervals=30),  # type: ignore[call-arg]
+        "plan: got an unexpected keyword argument 'intervals'; intervals is an option of planners (miqp, "
+        "time-optimal), say planner=ab.Miqp(intervals=...)",
+    ),
+    "a misspelt argument": (
+        lambda: ab.plan("line", vehicel="agile-quad"),  # type: ignore[call-arg]
+        "plan: got an unexpected keyword argument 'vehicel'; did you mean vehicle?",
+    ),
+    "a controller that nobody knows": (
+        lambda: ab.fly(plan(), controller="papr"),
+        "FlightConfig.controller: no controller named 'papr'; did you mean 'paper'? Known: ",
+    ),
     "a vehicle for the planner": (
         lambda: ab.plan(LINE, QUAD),
         "plan: planner must be a Planner or a name, got a Vehicle; did you mean vehicle=...?",

@@ -71,7 +71,7 @@ def test_no_limit_is_infinite_and_a_limit_is_positive() -> None:
 
 
 def test_a_settings_field_that_does_not_exist_is_named_with_the_one_that_was_meant() -> None:
-    plan = ab.plan(ab.load_problem("line"), ab.Miqp(intervals=10))
+    plan = ab.plan(ab.load_problem("line"), ab.Miqp(intervals=10), vehicle=None)
     said = complaint(lambda: ab.fly(plan, ab.load_vehicle("agile-quad"), sead=1))
     assert said == "FlightConfig.sead is not a known key; did you mean 'seed'?"
 
@@ -97,7 +97,7 @@ def test_a_planner_is_declared_and_registered_in_one_line_or_over_a_dataclass() 
     for cls in (Stepwise, Plain):
         made = ab.planner(f"settings-{cls.__name__.lower()}")(cls)
         assert ab.registered_planners()[made.kind] is made  # type: ignore[attr-defined]
-        assert ab.plan(ab.load_problem("line"), made(steps=10)).planner == "miqp"
+        assert ab.plan(ab.load_problem("line"), made(steps=10), vehicle=None).planner == "miqp"
         assert complaint(lambda: made(steps="3")).endswith(".steps must be a whole number, got '3'")  # noqa: B023
 
 

@@ -81,7 +81,11 @@ def test_a_rotors_own_keys_win_over_whatever_the_defaults_say_by_other_keys() ->
     ("defaults", "first", "complaint"),
     [
         ({"max_rpm": 7000}, {}, "rotors[0].k_f is missing; max_rpm says nothing without it"),
-        ({"k_f": 1e-5, "max_rpm": 7000}, {}, "rotors[0].min_thrust is missing; add it there or"),
+        (
+            {"k_f": 1e-5, "max_rpm": 7000},
+            {},
+            "rotors[0].min_thrust and torque_coefficient are missing; add them there or",
+        ),
         ({"k_f": -1e-5, "max_rpm": 7000}, {}, "rotor_defaults.k_f must be 0 or more, got -1e-05"),
         ({"k_f": 0, "max_rpm": 7000}, {}, "rotor_defaults.k_f must be positive, got 0"),
         ({"k_f": "x", "max_rpm": 7000}, {}, "rotor_defaults.k_f must be a number, got 'x'"),

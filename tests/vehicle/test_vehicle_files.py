@@ -152,7 +152,7 @@ def renamed(old: str, new: str) -> Callable[[], dict[str, Any]]:
 
 
 MALFORMED: dict[str, tuple[Callable[[], Any], str]] = {
-    "empty": (lambda: b"", "mass is missing; add it"),
+    "empty": (lambda: b"", "mass, inertia and rotors are missing; add them"),
     "not UTF-8": (lambda: b'description = "\xff\xfe"', "byte 15 is not UTF-8 text"),
     "not TOML": (lambda: "mass: 0.85\n", "this is not valid TOML: "),
     "truncated": (lambda: AGILE_QUAD[: AGILE_QUAD.index("0.85")], "this is not valid TOML: "),

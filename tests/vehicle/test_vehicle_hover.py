@@ -82,7 +82,7 @@ def test_a_failure_that_leaves_too_little_is_refused_with_what_remains(
 ) -> None:
     failed = with_dead(LAYOUTS[layout], *dead)
     problem = load_problem("line")
-    path = plan(problem).trajectory
+    path = plan(problem, vehicle=None).trajectory
     for use in (
         lambda: plan(problem, vehicle=failed),
         lambda: certify(path, failed),

@@ -60,8 +60,8 @@ def test_the_triangle_inequality_is_checked_in_any_axes(seed: int) -> None:
         ({"drag_body": [0.1, -0.1, 0.1]}, "drag_body must not be negative"),
         ({"rotors": QUAD.rotors[:3]}, "rotors must be 4 or more, got 3"),
         ({"rotors": (*QUAD.rotors[:3], "rotor")}, r"rotors\[3\] must be a Rotor"),
-        ({"rotors": QUAD.rotors[:1] * 4}, "rotors must give .* rank 1"),
-        ({"rotors": [dataclasses.replace(r, spin=1) for r in QUAD.rotors]}, "rotors must give .* rank 3"),
+        ({"rotors": QUAD.rotors[:1] * 4}, "rotors must give .* cannot roll or pitch"),
+        ({"rotors": [dataclasses.replace(r, spin=1) for r in QUAD.rotors]}, "rotors must give .* spin alike"),
         ({"rotors": [shifted(rotor) for rotor in QUAD.rotors]}, "rotors cannot hold a level hover"),
     ],
 )

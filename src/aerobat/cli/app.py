@@ -8,9 +8,8 @@ from itertools import pairwise
 from cyclopts import App, CycloptsError
 
 from aerobat.cli.exit_code import ExitCode
+from aerobat.cli.failures import IMPORT_FLAG
 from aerobat.errors import SpecError
-
-IMPORT_FLAG = "--import"
 
 # each is one file and one function of this name, imported when it is asked for
 COMMANDS = {
@@ -34,8 +33,8 @@ COMMANDS = {
     "ros2": "Fly maneuvers on demand as a node of ROS 2: services in, goals out.",
     "ros2-vehicle": "Simulate a vehicle that is a node of ROS 2.",
     "repeat": "Do a run again from its folder, and say if it came to the same.",
-    "vehicles": "List the built-in vehicles, or print one as a file to begin one's own with.",
-    "problems": "List the built-in problems.",
+    "vehicles": "List the built-in vehicles, say what one is and what looks wrong, or write its file.",
+    "problems": "List the built-in problems, or print one as a file to begin one's own with.",
 }
 
 app = App(
@@ -50,7 +49,9 @@ app = App(
     wrong or the output cannot be written (one sentence says where); 3 no plan was found (one sentence says
     which bound binds, and with --explain another which changes would help); 130 interrupted; 143
     terminated; then with nothing written. A sweep that was flown ends with 0, whatever became of its flights;
-    one that was interrupted keeps those that are finished, and the same command goes on from there.
+    one that was interrupted keeps those that are finished, and the same command goes on from there. With
+    --json an error is {"error": {"kind", "message", "field"}} on standard output. --traceback shows where a
+    plugin fails.
     """,
     suppress_keyboard_interrupt=False,
 )
@@ -59,8 +60,17 @@ for name, help in COMMANDS.items():
     app.command(f"aerobat.cli.commands.{place}:{place}", name=name, help=help)
 
 
+START = """Plan, fly and prove aggressive maneuvers for multirotors. To begin with, type:
+  aerobat fly flip-roll        plans a flip, flies it in simulation, says how it went; all in out/flip-roll/
+  aerobat problems             what else there is to fly, and `aerobat vehicles` by whom
+  aerobat --help               all commands"""
+
+
 def run(arguments: Sequence[str]) -> ExitCode:
     """Run the command that `arguments` name. Raises SpecError for those that make no sense."""
+    if not arguments:
+        print(START)
+        return ExitCode.WELL
     try:
         _import_plugins(arguments)
         code = app(arguments, exit_on_error=False, print_error=False, result_action="return_value")

@@ -12,11 +12,10 @@ import sys
 from collections.abc import Sequence
 
 from aerobat.cli.exit_code import ExitCode
-from aerobat.cli.interrupts import interrupted_by, interruptible
-from aerobat.cli.terminal import discard, provide_streams, say
+from aerobat.cli.failures import TRACEBACK_FLAG, foreseen, of_plugins, stopped_by
+from aerobat.cli.interrupts import REPORTED, interrupted_by, interruptible, is_interrupted
+from aerobat.cli.terminal import discard, is_broken, provide_streams, say
 from aerobat.errors import AerobatError, Infeasible
-
-EXPLAIN = "add --explain to `aerobat plan` to try changes that would help"
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
@@ -25,14 +24,15 @@ def main(arguments: Sequence[str] | None = None) -> None:
     Whatever is foreseen ends in one sentence on standard error, and an exit code.
     """
     errors = sys.stderr
+    tokens = sys.argv[1:] if arguments is None else arguments
     try:
         with interruptible(afterwards=arguments is not None):
             provide_streams()
-            code = _run(sys.argv[1:] if arguments is None else arguments)
-    except KeyboardInterrupt:
+            code = _run(tokens)
+    except KeyboardInterrupt as interrupt:
         sys.stderr = errors or sys.stderr  # a solver may have been interrupted while it was led elsewhere
         code = interrupted_by()
-        say(code.name.lower())
+        stopped_by(code).tell([] if REPORTED in interrupt.args else tokens)
     if code is not ExitCode.WELL:
         sys.exit(code)
 
@@ -46,21 +46,31 @@ def _run(arguments: Sequence[str]) -> ExitCode:
     try:
         from aerobat.cli.app import run
 
-        code = run(arguments)
+        code = run([token for token in arguments if token != TRACEBACK_FLAG])
         sys.stdout.flush()
-    except BrokenPipeError:  # whoever read has enough
-        discard(sys.stdout)
-        return ExitCode.BROKEN_PIPE
-    except Infeasible as error:
-        say(error.with_remedy(EXPLAIN))
-        return ExitCode.NO_PLAN
     except AerobatError as error:
-        say(str(error))
-        return ExitCode.BAD_INPUT
-    except OSError as error:
-        if error.filename is not None:  # of a file, which is nobody's fault but ours
-            raise
+        foreseen(error).tell(arguments)
+        return ExitCode.NO_PLAN if isinstance(error, Infeasible) else ExitCode.BAD_INPUT
+    except (Exception, SystemExit) as error:
+        return _unforeseen(error, arguments)
+    return code
+
+
+def _unforeseen(error: BaseException, arguments: Sequence[str]) -> ExitCode:
+    """Say why a plugin failed, or what the operating system refused; raise what is a defect of ours."""
+    if isinstance(error, OSError) and error.filename is None and is_broken(sys.stdout):
         discard(sys.stdout)
+        if isinstance(error, BrokenPipeError):  # whoever read has enough
+            return ExitCode.BROKEN_PIPE
         say(f"cannot write to standard output: {error.strerror or error}")
         return ExitCode.BAD_INPUT
-    return code
+    if is_interrupted():  # and what was raised was taken for another error
+        raise error
+    failure = None if TRACEBACK_FLAG in arguments else of_plugins(error, arguments)
+    if failure is not None:
+        failure.tell(arguments)
+        return ExitCode.BAD_INPUT
+    if not isinstance(error, OSError) or error.filename is not None:  # of a file, which is nobody's but ours
+        raise error
+    say(f"the operating system refused: {error.strerror or error}")
+    return ExitCode.BAD_INPUT

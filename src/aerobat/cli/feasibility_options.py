@@ -8,6 +8,7 @@ from typing import Annotated, Literal
 from cyclopts import Parameter, validators
 
 from aerobat.cli.options import PlannerOptions, output, planning
+from aerobat.cli.runs.record import DEFAULT_TOLERANCE
 
 Workers = Annotated[int | None, Parameter(group=planning, validator=validators.Number(gte=1, lte=4096))]
 
@@ -39,7 +40,7 @@ class NeedOptions(PlannerOptions):
     """What the least is sought of, once or more often. Default: all that the problem has."""
 
     tolerance: Annotated[float, Parameter(group=planning, validator=validators.Number(gte=1e-4, lte=0.5))] = (
-        0.01
+        DEFAULT_TOLERANCE
     )
     """Between an answer and the refusal beside it, as a part of the answer."""
 

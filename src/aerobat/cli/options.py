@@ -29,6 +29,12 @@ Plugins = partial(
 Options = TypeVar("Options", bound=type[Any])
 
 
+def how_many(least: int, most: int) -> Parameter:
+    """The option of a number of flights, by the same names in every command."""
+    flights = validators.Number(gte=least, lte=most)
+    return Parameter(name=("--runs", "--flights"), group=flying, validator=flights)
+
+
 @dataclass(frozen=True, kw_only=True)
 class OutputOptions:
     """Where results go."""
@@ -168,9 +174,10 @@ class FlyingOptions(ConditionsOptions):
     """Options of the flight."""
 
     controller: Annotated[str, Parameter(group=flying)] = "full"
-    """The control law, at the gains of the vehicle's file: full, or paper, the paper's own without moment
-    feed-forward, motor-lag compensation and tilt before yaw."""
+    """The control law: full, or paper, the paper's own without moment feed-forward, motor-lag compensation
+    and tilt before yaw, both at the gains of the vehicle's file; lee, lqr, indi; or one of your own that
+    --import brings in."""
 
     plant: Annotated[str | None, Parameter(group=flying)] = None
     """Another simulator's physics in place of the built-in: mujoco, in which a gate that is touched is felt,
-    or rotorpy."""
+    rotorpy, or one of your own that --import brings in."""

@@ -148,7 +148,7 @@ def _plan_made(record: RunRecord, explain: bool) -> Plan:
     limit = getattr(record.planner, "time_limit", None)
     with planning_progress(record.planner_name) as progress, within_time(limit):
         if record.paper:  # without a vehicle; whether this one can fly it is told all the same
-            found = plan(record.problem, record.planner, progress=progress.record)
+            found = plan(record.problem, record.planner, progress=progress.record, vehicle=None)
             found = found.for_vehicle(record.vehicle)
         else:
             found = plan(record.problem, record.planner, record.vehicle, progress.record)

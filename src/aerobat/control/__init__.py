@@ -1,5 +1,22 @@
-"""The tracking controller's settings, and the numbers that follow from them for a vehicle."""
+"""The tracking controller's settings, the numbers that follow from them, and control laws of one's own."""
 
-from aerobat.vehicle.controller import CONTROLLERS, Controller, named_controller
+from aerobat.control.law import (
+    CONTROL_LAWS,
+    ControlLaw,
+    Seen,
+    as_controller,
+    controller,
+    named_controller,
+)
+from aerobat.vehicle.controller import CONTROLLERS, Controller
 
-__all__ = ["CONTROLLERS", "Controller", "named_controller"]
+__all__ = [
+    "CONTROLLERS",
+    "CONTROL_LAWS",
+    "ControlLaw",
+    "Controller",
+    "Seen",
+    "as_controller",
+    "controller",
+    "named_controller",
+]

@@ -36,9 +36,16 @@ from aerobat.declaration.field_types import (
 )
 from aerobat.declaration.notebooks import in_notebooks
 from aerobat.declaration.registry import Registry, import_plugin
-from aerobat.declaration.sentences import FieldError, shown, unknown_key, unknown_name, within_field
+from aerobat.declaration.sentences import (
+    FieldError,
+    missing_fields,
+    shown,
+    unknown_key,
+    unknown_name,
+    within_field,
+)
 from aerobat.declaration.tables import from_table, to_table
-from aerobat.declaration.validated import validated
+from aerobat.declaration.validated import suggest_for, validated
 from aerobat.declaration.values import by_value, short
 
 __all__ = [
@@ -75,9 +82,11 @@ __all__ = [
     "in_degrees",
     "in_notebooks",
     "in_radians",
+    "missing_fields",
     "number",
     "short",
     "shown",
+    "suggest_for",
     "to_table",
     "unit",
     "unknown_key",

@@ -91,7 +91,8 @@ class Registry(Generic[T]):
             self._import_own(kind)
         if not isinstance(kind, str) or (kind not in self._classes and kind not in tuple(self)):
             known = ", ".join(map(repr, self))
-            raise FieldError("kind", f"must be one of {known}, got {shown(kind)}")
+            others = f"; a {self._noun} of your own needs --import FILE.py" if isinstance(kind, str) else ""
+            raise FieldError("kind", f"must be one of {known}, got {shown(kind)}{others}")
         return from_table(self[kind], {key: each for key, each in value.items() if key != "kind"})
 
     def _import_own(self, name: str) -> None:

@@ -25,7 +25,7 @@ class FieldError(SpecError):
     """
 
     def __init__(self, field: str, complaint: str) -> None:
-        separator = "" if complaint.startswith(":") or not field else " "
+        separator = "" if complaint.startswith((":", ",")) or not field else " "
         super().__init__((field + separator + complaint).removeprefix(": "))
         self.field = field
         self.complaint = complaint
@@ -111,9 +111,24 @@ _COMPLETE = {"missing", "too_short", "too_long"}  # their sentence needs no "got
 
 
 def first_complaint(error: ValidationError) -> FieldError:
-    """The first of pydantic's errors as one about its field; an unknown key comes before others."""
+    """The first of pydantic's errors as one about its field; an unknown key comes before others.
+
+    Where the first is a missing field, all are named that are missing.
+    """
     found = [_complaint(detail) for detail in error.errors(include_url=False)]
-    return next((each for each in found if isinstance(each, UnknownKey)), found[0])
+    unknown = next((each for each in found if isinstance(each, UnknownKey)), None)
+    if unknown is None and found[0].complaint == _COMPLAINTS["missing"]:
+        return missing_fields([each.field for each in found if each.complaint == _COMPLAINTS["missing"]])
+    return unknown or found[0]
+
+
+def missing_fields(names: Sequence[str], where: str = "") -> FieldError:
+    """The error that says which fields are missing, and where to add them."""
+    if len(names) == 1:
+        return FieldError(names[0], f"is missing; add it{where}")
+    others = "".join(f", {name}" for name in names[1:-1]) + f" and {names[-1]}"
+    complaint = f"{others} are missing; add them{where}"
+    return FieldError(names[0], complaint if complaint.startswith(",") else complaint[1:])
 
 
 def _complaint(detail: Any) -> FieldError:

@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from enum import Enum
 from typing import Any, TypeVar
 
 import numpy as np
 
 from aerobat.arrays import Array
-from aerobat.declaration.sentences import FieldError, shown, unknown_key
+from aerobat.declaration.sentences import FieldError, UnknownKey, one_of, shown, unknown_key
 from aerobat.declaration.values import is_default
 from aerobat.errors import SpecError
+
+PAPER_THRUST = ("eps", "ε")  # begins names of least specific thrusts, as the paper has them
 
 T = TypeVar("T")
 
@@ -28,11 +30,19 @@ def from_table(cls: type[T], table: Mapping[str, Any]) -> T:
     known = [*(field.name for field in dataclasses.fields(declaration)), *getattr(cls, "SHORTHANDS", ())]
     for key in table:
         if key not in known:
-            raise unknown_key(str(key), known)
+            raise _unknown(str(key), known)
     values = dict(table)
     value = cls.__new__(cls)
     declaration.__checked_init__(value, declaration.expand(values) if hasattr(cls, "expand") else values)
     return value
+
+
+def _unknown(key: str, known: Sequence[str]) -> UnknownKey:
+    """The error about a key that no field has; the paper's ε is told by its names here."""
+    thrusts = [name for name in known if name.startswith("min_") and name.endswith("thrust")]
+    if thrusts and key.lower().startswith(PAPER_THRUST):
+        return UnknownKey(key, f"is not a known key; the paper's ε is {one_of(thrusts)} here")
+    return unknown_key(key, known)
 
 
 def to_table(value: Any) -> dict[str, Any]:

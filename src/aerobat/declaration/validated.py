@@ -19,10 +19,11 @@ from pydantic import TypeAdapter, ValidationError
 
 from aerobat.arrays import numbers
 from aerobat.declaration.declared import CONFIG, plain
-from aerobat.declaration.sentences import FieldError, first_complaint, one_of, shown, with_article
+from aerobat.declaration.sentences import FieldError, closest, first_complaint, one_of, shown, with_article
 from aerobat.errors import SpecError
 
 F = TypeVar("F", bound=Callable[..., Any])
+Suggest = Callable[[str], str]  # of an argument that a function has not, what was meant; "" where unknown
 Check = Callable[[Any], Any]  # the value to go on with; raises FieldError
 
 _NUMBERS = (bool, int, float, complex)  # of which Python takes one for another
@@ -40,6 +41,19 @@ def validated(function: F) -> F:
         return function
     name = function.__qualname__.rpartition("<locals>.")[2]
     return cast(F, _checked(function, name, function))
+
+
+_SUGGESTIONS: dict[Any, Suggest] = {}
+
+
+def suggest_for(function: Callable[..., Any], suggest: Suggest) -> None:
+    """Let a validated function's error about an argument that it has not say what was meant.
+
+    Args:
+        function: The validated function.
+        suggest: Of the argument's name, the suggestion; empty where there is none.
+    """
+    _SUGGESTIONS[inspect.unwrap(function)] = suggest
 
 
 def _checked(function: Callable[..., Any], name: str, annotated: Any) -> Callable[..., Any]:
@@ -61,6 +75,7 @@ class _Arguments:
 
     def __init__(self, function: Callable[..., Any], name: str, annotated: Any) -> None:
         self._name = name
+        self._function = function
         self._signature = inspect.signature(function)
         parameters = self._signature.parameters.values()
         self._names = [p.name for p in parameters if p.name != "self"]
@@ -74,8 +89,7 @@ class _Arguments:
         try:
             bound = self._signature.bind(*args, **kwargs)
         except TypeError as error:
-            known = ", ".join(self._names) or "nothing"
-            raise SpecError(f"{self._name}: {error}; it takes {known}") from None
+            raise SpecError(f"{self._name}: {error}; {self._takes(kwargs)}") from None
         for name, check in self._checks.items():
             if name not in bound.arguments:
                 continue
@@ -89,8 +103,20 @@ class _Arguments:
                 raise SpecError(f"{self._name}: {error.inside(name)}{hint}") from None
         return bound
 
+    def _takes(self, kwargs: Mapping[str, Any]) -> str:
+        """What was meant by an argument that there is not, or else what there is."""
+        strange = next((name for name in kwargs if name not in self._names), "")
+        suggest = _SUGGESTIONS.get(self._function)
+        suggestion = suggest(strange) if strange and suggest else ""
+        guess = closest(strange, self._names)
+        if not suggestion and guess:
+            suggestion = f"did you mean {guess}?"
+        return suggestion or f"it takes {', '.join(self._names) or 'nothing'}"
+
     def _meant(self, value: Any, wrong: str) -> str:
-        """The argument that would take the value."""
+        """The argument that would take the value; of a plan that is but named, how to make it."""
+        if isinstance(value, str) and wrong == "plan":
+            return f"; plan it first, as ab.plan({shown(value)})"
         if isinstance(value, str | NoneType):
             return ""
         others = (name for name, classes in self._classes.items() if name != wrong)

@@ -1,32 +1,57 @@
-"""Passages that flights are judged by: a plan's, or a problem's where the set-points come nearest."""
+"""Criteria that flights are judged by: a plan's passages, or a problem's where the set-points come nearest.
+
+Gates and waypoints say themselves how exactly they are to be passed. The goal, other stages, and the whole
+path where there is no gate or waypoint, are kept to the problem's tolerance.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from itertools import pairwise
+from math import degrees, inf
 from typing import NamedTuple
 
 import numpy as np
 
 from aerobat.arrays import Array
 from aerobat.certification import PlannedPassage, PlannedWaypoint
+from aerobat.declaration import unit
 from aerobat.planning import Plan, planned_passages, planned_waypoints
+from aerobat.planning.passages import other_stages
+from aerobat.problem.ball import Ball
+from aerobat.problem.condition import Quantity
 from aerobat.problem.problem import Problem
 from aerobat.problem.stage import Stage
-from aerobat.simulation.passages import PASSAGE_WINDOW
+from aerobat.simulation.outcome import length
+from aerobat.simulation.passages import PASSAGE_WINDOW, PlannedAttitude
+from aerobat.so3 import thrust_axis
+
+GOAL = "the goal"  # the name of a path's end among what is come to
 
 
 class Asked(NamedTuple):
-    """Passages of gates and waypoints, each in the order of the stages."""
+    """Passages of gates, waypoints and other stages, each in the order of the stages."""
 
     gates: tuple[PlannedPassage, ...]
     waypoints: tuple[PlannedWaypoint, ...]
     lap_begin: float = 0.0  # [s] when the first lap begins
+    places: tuple[PlannedWaypoint, ...] = ()  # of other stages that say where they are, and the goal
+    attitudes: tuple[PlannedAttitude, ...] = ()  # of other stages
+    path_radius: float = inf  # [m] by which the path may be left
 
 
 NOTHING_ASKED = Asked((), ())
 
 
-def passages_asked(goal: Problem | Plan, times: Array, position: Array) -> Asked:
+class SampledPath(NamedTuple):
+    """The set-points of a path."""
+
+    times: Array  # [s], (T,)
+    position: Array  # [m], (T, 3)
+    q_world_body: Array  # (T, 4)
+
+
+def passages_asked(goal: Problem | Plan, path: SampledPath) -> Asked:
     """The passages in the order of the stages, of all gates where no stage names one or has a ball.
 
     The first lap begins with the path; a closed one's with the last passage, a whole round before that.
@@ -36,14 +61,73 @@ def passages_asked(goal: Problem | Plan, times: Array, position: Array) -> Asked
 
     Args:
         goal: the problem, or a plan for it.
-        times: of the set-points [s], (T,).
-        position: of the set-points [m], (T, 3).
+        path: its set-points.
     """
-    asked = _asked(goal, times, position)
+    asked = _asked(goal, path.times, path.position)
     problem = goal.problem if isinstance(goal, Plan) else goal
+    asked = asked._replace(
+        places=(*_places(goal, path), *_goal(problem, path)),
+        attitudes=_attitudes(goal, path),
+        path_radius=problem.tolerance.position if asked == NOTHING_ASKED else inf,
+    )
     passed = [gate.time for gate in asked.gates] + [waypoint.time for waypoint in asked.waypoints]
     latest = max(passed, default=0.0)
-    return asked if problem.ends else asked._replace(lap_begin=latest - float(times[-1]))
+    return asked if problem.ends else asked._replace(lap_begin=latest - float(path.times[-1]))
+
+
+def _places(goal: Problem | Plan, path: SampledPath) -> Iterator[PlannedWaypoint]:
+    """Where a plan's other stages are, of those that say anything of it."""
+    if isinstance(goal, Plan):
+        for place, stage in other_stages(goal.stages, goal.problem):
+            if stage.where:
+                centre = _between(path, path.position, place.time)
+                ball = Ball(centre, goal.problem.tolerance.position)
+                yield PlannedWaypoint(place.name, ball, place.time, stage.lap)
+
+
+def _goal(problem: Problem, path: SampledPath) -> Iterator[PlannedWaypoint]:
+    """The end of the path; a closed course has none."""
+    if problem.ends:
+        ball = Ball(path.position[-1], problem.tolerance.position)
+        yield PlannedWaypoint(GOAL, ball, float(path.times[-1]))
+
+
+def _attitudes(goal: Problem | Plan, path: SampledPath) -> tuple[PlannedAttitude, ...]:
+    """The attitudes of a plan's other stages, of those that ask for one."""
+    if not isinstance(goal, Plan):
+        return ()
+    axes = thrust_axis(path.q_world_body)
+    tolerance = goal.problem.tolerance.attitude
+    return tuple(
+        PlannedAttitude(place.name, unit(_between(path, axes, place.time)), place.time, tolerance, stage.lap)
+        for place, stage in other_stages(goal.stages, goal.problem)
+        if _asks_attitude(stage)
+    )
+
+
+def _asks_attitude(stage: Stage) -> bool:
+    """True for an attitude, and for a thrust without a component along some direction."""
+    across = (c.quantity is Quantity.SPECIFIC_THRUST and c.lower == c.upper for c in stage.conditions)
+    return stage.attitude is not None or any(across)
+
+
+def _between(path: SampledPath, values: Array, time: float) -> Array:
+    """The value (3,) at a time [s], straight between the set-points' values (T, 3)."""
+    return np.array([np.interp(time, path.times, component) for component in values.T])
+
+
+def criterion(problem: Problem) -> str:
+    """What a flight keeps to that went well, in words."""
+    stages = problem.stages(1.0).stages
+    tolerance = problem.tolerance
+    passed = [
+        *(["gates as asked"] if problem.gates else []),
+        *(["waypoints within their radius"] if any(stage.ball for stage in stages) else []),
+    ]
+    within = "the goal and the places of other stages" if passed else "the whole path"
+    angle = f"{degrees(tolerance.attitude):.3g}°"
+    kept = f"{within} within {length(tolerance.position)}, attitudes of stages within {angle}"
+    return ", ".join([*passed, kept])
 
 
 def _asked(goal: Problem | Plan, times: Array, position: Array) -> Asked:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, fields, replace
+from math import inf, isinf
+from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +14,7 @@ from aerobat import so3
 from aerobat.arrays import Array
 from aerobat.declaration import by_value, in_notebooks, short, shown, validated
 from aerobat.errors import OutOfRange, SpecError
-from aerobat.evaluation.passages import Asked, passages_asked
+from aerobat.evaluation.passages import Asked, SampledPath, passages_asked
 from aerobat.kernels.running_metrics import RunningMetrics
 from aerobat.planning import Plan
 from aerobat.problem import Problem, as_problem
@@ -21,14 +23,18 @@ from aerobat.simulation.flight import Flight
 from aerobat.simulation.outcome import TOUCHDOWN, Outcome, counted, length
 from aerobat.simulation.passages import (
     Passage,
+    StageAttitude,
     WaypointPassage,
+    flown_attitudes,
     flown_passages,
     flown_waypoints,
     passages,
+    stage_attitudes,
     waypoint_passages,
 )
 from aerobat.vehicle import Vehicle, as_vehicle
 
+Event: TypeAlias = tuple[float, Outcome, dict[str, object]]  # when [s], what, and its numbers
 COASTING = 0.1  # [s] without a pose: several periods of any motion capture
 
 
@@ -78,6 +84,8 @@ class Score:
     observer: ObserverScore | None = None  # of a filter, where a logged flight had one
     waypoints: tuple[WaypointPassage, ...] = ()  # one for each ball, in the order of the stages
     lap_begin_s: float = 0.0  # when the first lap begins; a closed course's before the flight
+    places: tuple[WaypointPassage, ...] = ()  # other stages that say where they are, then the goal
+    attitudes: tuple[StageAttitude, ...] = ()  # of other stages, in their order
 
     @property
     def laps(self) -> tuple[LapTime, ...]:
@@ -120,11 +128,16 @@ class Scores:
     ground_time: Array  # [s] when a vehicle was below ground first, NaN if never
     contact: Array  # what it came to touch first, by the codes of Contact, where its plant felt that
     contact_time: Array  # [s] when, NaN if never
+    off_path_time: Array  # [s] when a vehicle had left its path first, NaN if never
+    path_radius_m: float = inf  # by which the path may be left
     lap_begin_s: float = 0.0  # when the first lap begins; a closed course's before the flight
+    places: tuple[WaypointPassage, ...] = ()  # other stages that say where they are, then the goal
+    attitudes: tuple[StageAttitude, ...] = ()  # of other stages, in their order
 
     def __post_init__(self) -> None:
         """Write-protect."""
-        parts = (part for one in (*self.passages, *self.waypoints) for part in vars(one).values())
+        judged = (*self.passages, *self.waypoints, *self.places, *self.attitudes)
+        parts = (part for one in judged for part in vars(one).values())
         for value in (*vars(self).values(), *parts):
             if isinstance(value, np.ndarray):
                 value.flags.writeable = False
@@ -137,18 +150,19 @@ class Scores:
         """The score of one flight."""
         if not -len(self) <= k < len(self):
             raise OutOfRange(f"there are {len(self)} flights, no flight {shown(k)}; count from 0")
-        passed = tuple(passage.of_flight(k) for passage in self.passages)
-        met = tuple(waypoint.of_flight(k) for waypoint in self.waypoints)
-        outcome, sentence = self._outcome(k, passed, met)
-        return Score(
+        found = Score(
             **{field.name: float(getattr(self, field.name)[k]) for field in fields(self)[:5]},
-            passages=passed,
-            outcome=outcome,
-            sentence=sentence,
+            passages=tuple(passage.of_flight(k) for passage in self.passages),
+            outcome=Outcome.COMPLETE,
+            sentence="",
             observer=None,
-            waypoints=met,
+            waypoints=tuple(waypoint.of_flight(k) for waypoint in self.waypoints),
             lap_begin_s=self.lap_begin_s,
+            places=tuple(place.of_flight(k) for place in self.places),
+            attitudes=tuple(attitude.of_flight(k) for attitude in self.attitudes),
         )
+        outcome, sentence = self._outcome(k, found)
+        return replace(found, outcome=outcome, sentence=sentence)
 
     def __iter__(self) -> Iterator[Score]:
         return (self[k] for k in range(len(self)))
@@ -168,39 +182,62 @@ class Scores:
         """Outcome of each flight."""
         return tuple(score.outcome for score in self)
 
-    def _outcome(
-        self, k: int, passed: tuple[Passage, ...], met: tuple[WaypointPassage, ...]
-    ) -> tuple[Outcome, str]:
-        """The first thing that went wrong, else through all gates, else flown to the end."""
-        found: list[tuple[float, Outcome, dict[str, object]]] = []
-        if np.isfinite(self.stop[k]):
-            outcome = Outcome.DIVERGED if self.is_finite[k] else Outcome.STATE_NOT_FINITE
-            found.append((float(self.stop[k]), outcome, {}))
-        if np.isfinite(self.ground_time[k]):
-            found.append((float(self.ground_time[k]), Outcome.HIT_GROUND, {}))
-        if np.isfinite(self.contact_time[k]):
-            at_gate = self.contact[k] == Contact.GATE
-            outcome = Outcome.TOUCHED_GATE if at_gate else Outcome.TOUCHED_GROUND
-            found.append((float(self.contact_time[k]), outcome, {}))
-        for passage in passed:
-            label = "the gate" if len(passed) == 1 else f"gate '{passage.gate}'"
-            if passage.failure is not None:
-                outcome, time, numbers = passage.failure
-                found.append((time, outcome, {"gate": label, **numbers}))
-        found += [
-            (time, outcome, numbers) for outcome, time, numbers in (w.failure for w in met if w.failure)
+    def _outcome(self, k: int, score: Score) -> tuple[Outcome, str]:
+        """The first thing that went wrong, else through all gates, else flown to the end.
+
+        What gates, waypoints, the ground and the plant say comes before what is kept to a tolerance.
+        """
+        passed = score.passages
+        found = [*self._endings(k), *_failures(passed, score.waypoints)] or [
+            *_failures((), (*score.places, *score.attitudes)),
+            *self._departure(k),
         ]
         if found:
             time, outcome, numbers = min(found, key=lambda event: event[0])
             return outcome, outcome.sentence(time=time, **numbers)
-        error = length(float(self.max_position_error_m[k]))
+        error = length(score.max_position_error_m)
         if not passed:
-            return Outcome.COMPLETE, Outcome.COMPLETE.sentence(error=error)
+            allowed = "" if isinf(self.path_radius_m) else f", {length(self.path_radius_m)} allowed"
+            return Outcome.COMPLETE, Outcome.COMPLETE.sentence(error=error) + allowed
         worst = max(passed, key=lambda passage: passage.miss)
         several = "both" if len(passed) == 2 else f"all {len(passed)}"
         gates = "the gate" if len(passed) == 1 else f"{several} gates, the worst"
         numbers = {"gate": gates, "speed": worst.speed, "miss": length(worst.miss), "error": error}
         return Outcome.THROUGH_GATES, Outcome.THROUGH_GATES.sentence(**numbers)
+
+    def _endings(self, k: int) -> Iterator[Event]:
+        """The divergence of a flight, and what it touched."""
+        if np.isfinite(self.stop[k]):
+            outcome = Outcome.DIVERGED if self.is_finite[k] else Outcome.STATE_NOT_FINITE
+            yield float(self.stop[k]), outcome, {}
+        if np.isfinite(self.ground_time[k]):
+            yield float(self.ground_time[k]), Outcome.HIT_GROUND, {}
+        if np.isfinite(self.contact_time[k]):
+            at_gate = self.contact[k] == Contact.GATE
+            outcome = Outcome.TOUCHED_GATE if at_gate else Outcome.TOUCHED_GROUND
+            yield float(self.contact_time[k]), outcome, {}
+
+    def _departure(self, k: int) -> Iterator[Event]:
+        """When a flight left its path, if it did."""
+        if np.isfinite(self.off_path_time[k]):
+            error = length(float(self.max_position_error_m[k]))
+            numbers = {"allowed": length(self.path_radius_m), "error": error}
+            yield float(self.off_path_time[k]), Outcome.OFF_PATH, {**numbers}
+
+
+def _failures(
+    passed: tuple[Passage, ...], others: tuple[WaypointPassage | StageAttitude, ...]
+) -> Iterator[Event]:
+    """What went wrong at gates, and at waypoints and other stages."""
+    for passage in passed:
+        label = "the gate" if len(passed) == 1 else f"gate '{passage.gate}'"
+        if passage.failure is not None:
+            outcome, time, numbers = passage.failure
+            yield time, outcome, {"gate": label, **numbers}
+    for other in others:
+        if other.failure is not None:
+            outcome, time, numbers = other.failure
+            yield time, outcome, numbers
 
 
 @validated
@@ -221,7 +258,10 @@ def score(flight: Flight, goal: Problem | Plan | str, vehicle: Vehicle | str | N
     diverged = flight.outcome is not Outcome.COMPLETE
     stop = np.array([flight.ends if diverged else np.nan])
     body = None if vehicle is None else as_vehicle(vehicle).bounding_ellipsoid
-    planned = passages_asked(goal, flight.times, flight.setpoint.flat.position)
+    setpoint = flight.setpoint
+    path = SampledPath(flight.times, setpoint.flat.position, setpoint.q_world_body)
+    planned = passages_asked(goal, path)
+    is_off = flight.position_error > planned.path_radius
     ground = flight.environment.ground
     contact, touched = flight.first_contact
     below = np.zeros(1, bool) if ground is None else states.position[:, 2] < ground - TOUCHDOWN
@@ -235,12 +275,21 @@ def score(flight: Flight, goal: Problem | Plan | str, vehicle: Vehicle | str | N
         waypoints=tuple(flown_waypoints(flight, planned.waypoints)),
         stop=stop,
         is_finite=np.array([flight.outcome is not Outcome.STATE_NOT_FINITE]),
-        ground_time=np.array([flight.times[int(np.argmax(below))] if below.any() else np.nan]),
+        ground_time=_first(flight.times, below),
         contact=np.array([contact]),
         contact_time=np.array([touched]),
+        off_path_time=_first(flight.times, is_off),
+        path_radius_m=planned.path_radius,
         lap_begin_s=planned.lap_begin,
+        places=tuple(flown_waypoints(flight, planned.places)),
+        attitudes=tuple(flown_attitudes(flight, planned.attitudes)),
     )[0]
     return replace(scored, observer=_observer(flight))
+
+
+def _first(times: Array, happens: NDArray[np.bool_]) -> Array:
+    """The first of the times at which something happens, NaN if it never does, (1,)."""
+    return np.array([times[int(np.argmax(happens))] if happens.any() else np.nan])
 
 
 def _observer(flight: Flight) -> ObserverScore | None:
@@ -264,7 +313,10 @@ def scores_of(metrics: RunningMetrics, planned: Asked) -> Scores:
     """Scores of flights that were added up as they were flown, from their last metrics, leaves (flights,)."""
     ticks = np.maximum(metrics.ticks, 1.0)
     stop = np.where(metrics.flying < 0.5, metrics.stop, np.nan)
-    never = np.isinf(metrics.ground_time)
+    met = [
+        waypoint_passages(each, approach, stop)
+        for each, approach in zip((*planned.waypoints, *planned.places), metrics.waypoints, strict=True)
+    ]
     return Scores(
         max_position_error_m=np.sqrt(metrics.max_square),
         rms_position_error_m=np.sqrt(metrics.sum_square / ticks),
@@ -275,14 +327,23 @@ def scores_of(metrics: RunningMetrics, planned: Asked) -> Scores:
             passages(each, progress, stop)
             for each, progress in zip(planned.gates, metrics.gates, strict=True)
         ),
-        waypoints=tuple(
-            waypoint_passages(each, approach, stop)
-            for each, approach in zip(planned.waypoints, metrics.waypoints, strict=True)
-        ),
+        waypoints=tuple(met[: len(planned.waypoints)]),
         stop=stop,
         is_finite=metrics.is_finite > 0.5,
-        ground_time=np.where(never, np.nan, metrics.ground_time),
+        ground_time=_if_ever(metrics.ground_time),
         contact=np.zeros(stop.shape),
         contact_time=np.full(stop.shape, np.nan),
+        off_path_time=_if_ever(metrics.off_path_time),
+        path_radius_m=planned.path_radius,
         lap_begin_s=planned.lap_begin,
+        places=tuple(met[len(planned.waypoints) :]),
+        attitudes=tuple(
+            stage_attitudes(each, pointing, stop)
+            for each, pointing in zip(planned.attitudes, metrics.attitudes, strict=True)
+        ),
     )
+
+
+def _if_ever(times: Array) -> Array:
+    """Times that are infinite where something never happened, NaN instead."""
+    return np.where(np.isinf(times), np.nan, times)

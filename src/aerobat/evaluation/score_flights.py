@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import Any
+from typing import Unpack
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,7 +18,7 @@ from aerobat.engines.components import components
 from aerobat.engines.pytree import tree_map, tree_stack
 from aerobat.environment import Environment
 from aerobat.errors import SpecError
-from aerobat.evaluation.passages import NOTHING_ASKED, Asked, passages_asked
+from aerobat.evaluation.passages import NOTHING_ASKED, Asked, SampledPath, passages_asked
 from aerobat.evaluation.score import Scores, scores_of
 from aerobat.kernels import running_metrics
 from aerobat.kernels.gates.approach import Target
@@ -28,10 +28,11 @@ from aerobat.kernels.ops import Ops
 from aerobat.kernels.running_metrics import MetricsInput, MetricsParameters, RunningMetrics
 from aerobat.planning import Plan
 from aerobat.problem import Problem, as_problem
-from aerobat.simulation.config import FlightConfig
+from aerobat.simulation.config import FlightChanges, FlightConfig
 from aerobat.simulation.loop import Signals
 from aerobat.simulation.outcome import DIVERGENCE_RADIUS, TOUCHDOWN
 from aerobat.simulation.passages import PASSAGE_DEPTH, PASSAGE_WINDOW, plane_directions
+from aerobat.simulation.passages.stage_attitude import as_direction
 from aerobat.simulation.prepare import prepare
 from aerobat.simulation.reference_source import BLOCK
 from aerobat.simulation.setup import FlightSetup, Part
@@ -45,6 +46,7 @@ class MetricsMonitor:
 
     gates: tuple[int, ...]  # along how many directions each measures bodies
     waypoints: int
+    attitudes: int  # of stages
     period: int = 1
     name: str = "metrics"
     feedthrough: bool = True
@@ -53,7 +55,7 @@ class MetricsMonitor:
         self, ops: Ops, parameters: MetricsParameters, inputs: MetricsInput, signals: Signals
     ) -> RunningMetrics:
         """See `Component.init`."""
-        return running_metrics.init(self.gates, self.waypoints)
+        return running_metrics.init(self.gates, self.waypoints, self.attitudes)
 
     def step(
         self,
@@ -90,7 +92,7 @@ def score_flights(
     problem: Problem | str | None = None,
     environment: Environment | None = None,
     config: FlightConfig = FlightConfig(),  # noqa: B008 - frozen
-    **changes: Any,
+    **changes: Unpack[FlightChanges],
 ) -> Scores:
     """Fly as `fly` does with the same arguments, and score each flight as it is flown; nothing is logged.
 
@@ -105,7 +107,7 @@ def score_flights(
     Raises SpecError for arguments that do not fit together, BackendMissing for an engine that is not
     installed.
     """
-    return score_over_time(plan, vehicles, problem, environment, replace(config, **changes))[0]
+    return score_over_time(plan, vehicles, problem, environment, config.changed(changes))[0]
 
 
 @dataclass(frozen=True, eq=False)
@@ -159,8 +161,13 @@ def score_over_time(
     setup = prepare(plan, vehicles, environment=environment, config=config)
     ticks = len(setup.times)
     blocks = range(0, ticks, BLOCK)
-    parts = [setup.reference.setpoint(k, min(k + BLOCK, ticks)).flat.position for k in blocks]
-    planned = passages_asked(goal, setup.times, np.concatenate(parts))
+    parts = [setup.reference.setpoint(k, min(k + BLOCK, ticks)) for k in blocks]
+    path = SampledPath(
+        setup.times,
+        np.concatenate([part.flat.position for part in parts]),
+        np.concatenate([part.q_world_body for part in parts]),
+    )
+    planned = passages_asked(goal, path)
     rows, logged = _metrics_over_time(with_metrics(setup, planned), stride or ticks)
     scores = scores_of(tree_map(lambda leaf: leaf[:, -1], rows), planned)
     return scores, ErrorsOverTime.of(setup.times[logged], rows)
@@ -191,12 +198,16 @@ def with_metrics(setup: FlightSetup, planned: Asked = NOTHING_ASKED) -> FlightSe
     """The same flight with its metrics added up, those of planned passages among them."""
     vehicles = len(setup.fleet)
     planes = tuple(_plane(passage, vehicles) for passage in planned.gates)
-    targets = tuple(_target(waypoint, vehicles) for waypoint in planned.waypoints)
+    targets = tuple(_target(waypoint, vehicles) for waypoint in (*planned.waypoints, *planned.places))
+    directions = tuple(as_direction(attitude, vehicles) for attitude in planned.attitudes)
     ground = -np.inf if setup.environment.ground is None else setup.environment.ground - TOUCHDOWN
     body = BoundingEllipsoid(*map(components, (setup.fleet.body_centres, setup.fleet.semi_axes)))
-    limits = np.full(vehicles, DIVERGENCE_RADIUS**2), np.full(vehicles, ground)
-    parameters = MetricsParameters(*limits, body, planes, targets)
-    monitor = MetricsMonitor(tuple(len(plane.directions) for plane in planes), len(targets))
+    diverged, off, under = (
+        np.full(vehicles, x) for x in (DIVERGENCE_RADIUS**2, planned.path_radius**2, ground)
+    )
+    parameters = MetricsParameters(diverged, off, under, body, planes, targets, directions)
+    measured = tuple(len(plane.directions) for plane in planes)
+    monitor = MetricsMonitor(measured, len(targets), len(directions))
     metrics = Part(monitor, parameters, MetricsSource(setup.times))
     return replace(setup, parts=(*setup.parts, metrics))
 
@@ -206,7 +217,8 @@ def _plane(passage: PlannedPassage, vehicles: int) -> GatePlane:
     gate = passage.gate
     directions = plane_directions(gate)
     place = components(gate.position), components(gate.normal)
-    plane = GatePlane(*place, directions, passage.time, PASSAGE_WINDOW, PASSAGE_DEPTH)
+    radius = gate.opening.circumradius
+    plane = GatePlane(*place, directions, radius, passage.time, PASSAGE_WINDOW, PASSAGE_DEPTH)
     spread: GatePlane = tree_map(lambda leaf: np.full(vehicles, leaf), plane)
     return spread
 

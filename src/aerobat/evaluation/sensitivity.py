@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import lru_cache
 from types import MappingProxyType
-from typing import Any, NamedTuple, get_type_hints
+from typing import Any, NamedTuple, Unpack, get_type_hints
 
 import numpy as np
 
@@ -30,7 +30,7 @@ from aerobat.kernels.ops import Ops, Scalar
 from aerobat.kernels.rigid_body import Body
 from aerobat.kernels.vectors import dot, subtract
 from aerobat.simulation.bodies import body_states
-from aerobat.simulation.config import FlightConfig
+from aerobat.simulation.config import FlightChanges, FlightConfig
 from aerobat.simulation.loop import LoopInput, LoopParameters, compose
 from aerobat.simulation.prepare import prepare
 from aerobat.simulation.setup import FlightSetup
@@ -99,7 +99,7 @@ def sensitivity(
     *,
     environment: Environment | None = None,
     config: FlightConfig = FlightConfig(),  # noqa: B008 - frozen
-    **changes: Any,
+    **changes: Unpack[FlightChanges],
 ) -> Sensitivity:
     """Fly as `fly` does with the same arguments, and differentiate the flight's errors.
 
@@ -126,7 +126,9 @@ def sensitivity(
     and for arguments that do not fit together, BackendMissing for an engine that is not installed.
     """
     names = _known((of,) if isinstance(of, str) else tuple(of))
-    config = replace(config, **changes)
+    config = config.changed(changes)
+    if config.law is not None:
+        raise SpecError("controller is a law, of whose gains there are no slopes; leave it out")
     if config.conditions is not None:
         raise SpecError("conditions draw what flies, which leaves no slopes; leave them out, or sweep")
     setup = with_metrics(prepare(plan, vehicle, environment=environment, config=config))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import NamedTuple, Protocol
 
 from aerobat.kernels import motors
 from aerobat.kernels.allocation import Mixer, desaturate, mix, within_limits
@@ -140,12 +140,24 @@ def track_attitude(
     ahead = Wrench(mass_properties.mass * rates.ahead.thrust_change, change)
     decay_factors = motors.decay_factors(ops, rotors, elapsed)
     thrusts = motors.first_order_response(state.thrusts, state.commands.thrusts, decay_factors)
-    commands = _commands(ops, flags, model, (load, ahead), thrusts, decay_factors, elapsed)
+    commands = rotor_commands(ops, flags, model, (load, ahead), thrusts, decay_factors, elapsed)
     return ControllerState(state.outer, integral, thrusts, commands)
 
 
+class Commanding(Protocol):
+    """The state of any controller, as far as it tells of the rotors."""
+
+    @property
+    def thrusts(self) -> PerRotor:
+        """That the rotors give [N], by the nominal model."""
+
+    @property
+    def commands(self) -> Commands:
+        """The last ones."""
+
+
 def predicted(
-    ops: Ops, model: ControllerModel, state: ControllerState, body: Body, elapsed: Scalar, delay: Scalar
+    ops: Ops, model: ControllerModel, state: Commanding, body: Body, elapsed: Scalar, delay: Scalar
 ) -> Body:
     """The body when new commands take effect, `delay` [s] from now, by the nominal model (Smith's predictor).
 
@@ -156,11 +168,11 @@ def predicted(
         model: the nominal vehicle.
         state: after the last step.
         body: as it is now.
-        elapsed: since the last step [s], no less than the delay.
+        elapsed: since the last step [s]; a path's last step may be shorter than the delay.
         delay: [s].
     """
     rotors = model.airframe.rotors
-    left = motors.decay_factors(ops, rotors, elapsed - delay)
+    left = motors.decay_factors(ops, rotors, ops.maximum(elapsed - delay, 0.0))
     now = motors.first_order_response(state.thrusts, state.commands.thrusts, left)
     motion = motors.Motion(body, now)
     return motors.advance(ops, model.airframe, model.environment, motion, state.commands.thrusts, delay).body
@@ -175,7 +187,7 @@ def collective(ops: Ops, mass: Scalar, b3: Vector, attitude: AttitudeCommand) ->
     return mass * ops.maximum(dot(f, b3), _MIN_PART * norm(ops, f))
 
 
-def _commands(
+def rotor_commands(
     ops: Ops,
     flags: FeatureFlags,
     model: ControllerModel,
@@ -188,6 +200,15 @@ def _commands(
 
     The load is brought within limits first, and the lead then clipped rotor by rotor: it exceeds them for
     moments only, in which each rotor does best to hurry.
+
+    Args:
+        ops: of the arithmetic.
+        flags: features beyond the paper's law.
+        model: the nominal vehicle.
+        loads: the load, and its change.
+        thrusts: that the rotors give [N].
+        decay_factors: of the rotors in a period.
+        period: until the next tick [s].
     """
     rotors, (load, ahead) = model.airframe.rotors, loads
     desired = mix(model.mixer, load)

@@ -7,8 +7,9 @@ from math import inf
 from operator import add as plus
 from typing import NamedTuple
 
-from aerobat.kernels.gates import approach, progress
+from aerobat.kernels.gates import approach, pointing, progress
 from aerobat.kernels.gates.approach import Approach, Target
+from aerobat.kernels.gates.pointing import Direction, Pointing
 from aerobat.kernels.gates.progress import GatePlane, GateProgress
 from aerobat.kernels.gates.section import BoundingEllipsoid
 from aerobat.kernels.gates.snapshot import Snapshot
@@ -28,10 +29,12 @@ class MetricsParameters(NamedTuple):
     """Criteria by which a flight is judged."""
 
     divergence_radius_sq: Scalar  # [m²] of squared position error, beyond which a vehicle has diverged
+    path_radius_sq: Scalar  # [m²] of squared position error, beyond which it has left its path
     ground: Scalar  # [m] height, −infinity where there is none
     ellipsoid: BoundingEllipsoid  # of the vehicle
     gates: tuple[GatePlane, ...]
     waypoints: tuple[Target, ...]
+    attitudes: tuple[Direction, ...]
 
 
 class RunningMetrics(NamedTuple):
@@ -41,6 +44,7 @@ class RunningMetrics(NamedTuple):
     is_finite: Scalar  # 0 once something was not a number
     stop: Scalar  # [s] the last tick that counts, once it has diverged
     ground_time: Scalar  # [s] when it was below ground first, infinite if never
+    off_path_time: Scalar  # [s] when it had left its path first, infinite if never
     ticks: Scalar  # that count
     max_square: Scalar  # [m²] of the position error
     sum_square: Scalar  # [m²]
@@ -50,14 +54,24 @@ class RunningMetrics(NamedTuple):
     last: Snapshot
     gates: tuple[GateProgress, ...]
     waypoints: tuple[Approach, ...]
+    attitudes: tuple[Pointing, ...]
 
 
-def init(gates: tuple[int, ...], waypoints: int) -> RunningMetrics:
-    """Metrics before the first tick of a flight through gates of so many directions, by so many waypoints."""
+def init(gates: tuple[int, ...], waypoints: int, attitudes: int) -> RunningMetrics:
+    """Metrics before the first tick of a flight.
+
+    Args:
+        gates: along how many directions each measures bodies.
+        waypoints: how many there are.
+        attitudes: of stages, how many there are.
+    """
     nowhere = Snapshot(0.0, ZERO, ZERO, (1.0, 0.0, 0.0, 0.0))
     passages = tuple(progress.init(directions) for directions in gates)
     approaches = waypoints * (approach.init(),)
-    return RunningMetrics(1.0, 1.0, 0.0, inf, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, nowhere, passages, approaches)
+    never = inf, inf
+    none = (0.0,) * 6
+    directions = attitudes * (pointing.init(),)
+    return RunningMetrics(1.0, 1.0, 0.0, *never, *none, nowhere, passages, approaches, directions)
 
 
 def step(
@@ -90,12 +104,14 @@ def step(
     going = ops.select(square <= parameters.divergence_radius_sq, counts, 0.0)
     ended = (metrics.flying > 0.5) & (going < 0.5)
     below = counted & (body.position[2] < parameters.ground)
+    is_off = counted & (square > parameters.path_radius_sq)
     now = Snapshot(inputs.time, *body[:3])
     return RunningMetrics(
         flying=going,
         is_finite=ops.select(ended & (counts < 0.5), 0.0, metrics.is_finite),
         stop=ops.select(ended, ops.select(counted, inputs.time, metrics.last.time), metrics.stop),
         ground_time=ops.minimum(metrics.ground_time, ops.select(below, inputs.time, inf)),
+        off_path_time=ops.minimum(metrics.off_path_time, ops.select(is_off, inputs.time, inf)),
         ticks=metrics.ticks + counts,
         max_square=ops.select(counted, ops.maximum(metrics.max_square, square), metrics.max_square),
         sum_square=metrics.sum_square + ops.select(counted, square, 0.0),
@@ -123,6 +139,10 @@ def step(
                 (metrics.ticks > 0.5) & counted,
             )
             for latest, target in zip(metrics.waypoints, parameters.waypoints, strict=True)
+        ),
+        attitudes=tuple(
+            pointing.step(ops, latest, direction, (metrics.last, now), (metrics.ticks > 0.5) & counted)
+            for latest, direction in zip(metrics.attitudes, parameters.attitudes, strict=True)
         ),
     )
 

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
+from typing import Any
 
+from aerobat.declaration import shown
 from aerobat.environment import Environment
+from aerobat.errors import SpecError
 from aerobat.limits import body_rate, box, path_condition, rotor_command, rotor_thrust, thrust_floor, tilt
 from aerobat.limits.limit import Asked, Limit
 from aerobat.problem import Condition, Limits
@@ -49,4 +52,15 @@ def limits_along(
         conditions: What a maneuver asks throughout.
     """
     asked = Asked(vehicle, environment, limits, conditions)
-    return tuple(limit for family in FAMILIES for limit in family(asked))
+    return tuple(limit for family in FAMILIES for limit in _limits(family, asked))
+
+
+def _limits(family: Family, asked: Asked) -> Iterator[Limit]:
+    """The limits of a family. Raises SpecError for what is none, which a function of one's own may return."""
+    found: Any = family(asked)
+    if not isinstance(found, Iterable):
+        raise SpecError(f"limits '{family.__name__}' returned {shown(found)}, nothing to iterate over")
+    for limit in found:
+        if not isinstance(limit, Limit):
+            raise SpecError(f"limits '{family.__name__}' yielded {shown(limit)}, not a Limit")
+        yield limit

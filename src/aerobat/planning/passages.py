@@ -48,6 +48,13 @@ def planned_waypoints(stages: Sequence[PlacedStage], problem: Problem) -> tuple[
     )
 
 
+def other_stages(stages: Sequence[PlacedStage], problem: Problem) -> tuple[tuple[PlacedStage, Stage], ...]:
+    """The placed stages that pass no gate and meet no ball, each with the problem's own stage."""
+    places = [place for place in stages if place.gate is None]
+    matched = _matched(places, problem, lambda stage, place: stage.gate is None and stage.name == place.name)
+    return tuple((place, stage) for place, stage in matched if stage is not None and stage.ball is None)
+
+
 def _is_its_ball(stage: Stage, place: PlacedStage) -> bool:
     return stage.ball is not None and stage.name == place.name
 

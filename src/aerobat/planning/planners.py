@@ -15,7 +15,7 @@ from typing import Any, Protocol, TypeVar, cast, dataclass_transform, get_type_h
 
 from pydantic import Field
 
-from aerobat.declaration import Label, Registry, shown, validated
+from aerobat.declaration import Label, Registry, shown, suggest_for, validated
 from aerobat.errors import Infeasible, Reason, SpecError
 from aerobat.optimization.nonlinear import has_casadi
 from aerobat.planning.assessment.contradiction import contradiction
@@ -45,6 +45,8 @@ class Planner(Protocol):
 
 P = TypeVar("P", bound=Planner)
 
+DEFAULT_VEHICLE = "agile-quad"  # that is planned for where none is named, from Python as on the command line
+
 PLANNERS: Registry[Planner] = Registry(
     Planner,  # type: ignore[type-abstract]
     "planner",
@@ -62,7 +64,7 @@ PLANNERS: Registry[Planner] = Registry(
 def plan(
     problem: Problem | str,
     planner: Planner | str | None = None,
-    vehicle: Vehicle | str | None = None,
+    vehicle: Vehicle | str | None = DEFAULT_VEHICLE,
     progress: Progress | None = None,
 ) -> Plan:
     """Plan a problem; with a vehicle, for its rotors, with its certificate, its own flight, its assessment.
@@ -76,8 +78,8 @@ def plan(
         planner: How to plan, say `Miqp(order=5)`, or a registered name, whose defaults are taken; left out,
             the one that `suited_planner` names, as on the command line: where it keeps a reserve for the
             controller, 3 %.
-        vehicle: What shall fly it, or its name, within its rotors' limits; without one the plan knows no
-            limits but the problem's.
+        vehicle: What shall fly it, or its name, within its rotors' limits; by default agile-quad, as on the
+            command line. With None the plan knows no limits but the problem's.
         progress: Called with every attempt as it ends.
     """
     problem = as_problem(problem)
@@ -88,8 +90,24 @@ def plan(
         require_openings(problem, vehicle)
         _require_consistency(problem, vehicle)
     method = planner_for(problem, vehicle) if planner is None else as_planner(planner)
-    found = method.plan(problem, vehicle, progress)
+    found: Any = method.plan(problem, vehicle, progress)
+    if not isinstance(found, Plan):
+        name = getattr(method, "kind", type(method).__name__)
+        raise SpecError(f"planner '{name}' returned {shown(found)} from plan(), not a Plan")
     return found if vehicle is None or found.vehicle is not None else found.for_vehicle(vehicle)
+
+
+def _option_of(name: str) -> str:
+    """The hint about an argument that plan() has not and planners may have."""
+    classes: Mapping[str, Any] = registered_planners()
+    takers = [kind for kind, cls in classes.items() if name in {f.name for f in fields(cls)}]
+    if not takers:
+        return ""
+    made = f"ab.{classes[takers[0]].__name__}({name}=...)"
+    return f"{name} is an option of planners ({', '.join(takers)}), say planner={made}"
+
+
+suggest_for(plan, _option_of)
 
 
 def _require_consistency(problem: Problem, vehicle: Vehicle) -> None:

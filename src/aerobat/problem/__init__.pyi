@@ -1,7 +1,7 @@
 from .ball import Ball
 from .condition import Attitude, Condition, ForceBalance, LinearBound, Quantity
 from .end_state import EndState, at_rest
-from .files import as_problem, load_problem, problem_names, write_problem
+from .files import as_problem, load_problem, problem_names, problem_text, write_problem
 from .gate import Gate, tilted_gate
 from .maneuvers import (
     BarrelRoll,
@@ -29,6 +29,7 @@ from .maneuvers import (
 from .maneuvers.maneuver import maneuver, registered_maneuvers
 from .problem import PAPER_LIMITS, Limits, Problem
 from .stage import Stage, StageSequence
+from .tolerance import Tolerance
 
 __all__ = [
     "PAPER_LIMITS",
@@ -63,6 +64,7 @@ __all__ = [
     "SplitS",
     "Stage",
     "StageSequence",
+    "Tolerance",
     "Waypoint",
     "Waypoints",
     "as_problem",
@@ -70,6 +72,7 @@ __all__ = [
     "load_problem",
     "maneuver",
     "problem_names",
+    "problem_text",
     "registered_maneuvers",
     "tilted_gate",
     "write_problem",

@@ -5,7 +5,7 @@ from __future__ import annotations
 from importlib.resources import files
 
 from aerobat.declaration import PathName, to_table, validated
-from aerobat.documents import document_names, read_document, resolve_document, write_document
+from aerobat.documents import document_names, read_document, resolve_document, to_toml, write_document
 from aerobat.problem.problem import Problem
 
 PRESETS = files("aerobat.problem") / "presets"
@@ -29,6 +29,18 @@ def load_problem(name: PathName) -> Problem:
 def as_problem(problem: Problem | str) -> Problem:
     """The problem, of itself or of what `load_problem` takes. Raises SpecError as that does."""
     return load_problem(problem) if isinstance(problem, str) else problem
+
+
+@validated
+def problem_text(name: PathName) -> str:
+    """Return the text of a problem's file: a preset's own, or one's own as it was understood.
+
+    Raises SpecError as `load_problem` does.
+    """
+    problem = load_problem(name)
+    if name in problem_names():
+        return resolve_document(name, PRESETS, "problem").read_text(encoding="utf-8")
+    return to_toml(to_table(problem))
 
 
 @validated

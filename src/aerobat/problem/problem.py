@@ -33,13 +33,14 @@ from aerobat.declaration import (
     within_field,
 )
 from aerobat.environment import Environment
-from aerobat.errors import SpecError
+from aerobat.errors import OwnCodeError, SpecError
 from aerobat.problem.condition import Condition, ForceBalance, Quantity
 from aerobat.problem.end_state import EndState
 from aerobat.problem.gate import Gate, named_gate
 from aerobat.problem.maneuvers.line import Line
 from aerobat.problem.maneuvers.maneuver import MANEUVERS, Maneuver
 from aerobat.problem.stage import StageSequence
+from aerobat.problem.tolerance import Tolerance
 
 DERIVATIVES = ("position", "velocity", "acceleration", "jerk", "snap", "crackle")
 UNITS = ("m", "m/s", "m/s²", "m/s³", "m/s⁴", "m/s⁵")
@@ -137,6 +138,7 @@ class Problem:
     limits: Limits = field(default_factory=Limits)  # bounds on the path
     heading: Angle = 0.0  # [rad] about the thrust axis at the start, carried along without spin
     environment: Environment = field(default_factory=Environment)  # where it is flown
+    tolerance: Tolerance = Tolerance()  # how exactly flights keep to it beside gates and radii
     description: str = ""  # what it is, for people
 
     SHORTHANDS: ClassVar[Mapping[str, str]] = {
@@ -321,7 +323,15 @@ def _explicit_stages(
     body_radius: float,
 ) -> StageSequence:
     """As `Problem.stages`, kept: planner, certificate and score each ask for the same."""
-    sequence = maneuver.stage_sequence(gates, max_specific_thrust)
+    try:
+        sequence: Any = maneuver.stage_sequence(gates, max_specific_thrust)
+    except SpecError:
+        raise
+    except (ValueError, AssertionError) as error:
+        raise OwnCodeError(f"maneuver '{maneuver.kind}': {error!r}") from error
+    if not isinstance(sequence, StageSequence):
+        complaint = f"returned {shown(sequence)} from stage_sequence(), not a StageSequence"
+        raise SpecError(f"maneuver '{maneuver.kind}' {complaint}")
     stages = (
         s.explicit(None if s.gate is None else named_gate(gates, s.gate), body_radius)
         for s in sequence.stages

@@ -92,7 +92,7 @@ def _of_scores(scores: Scores) -> dict[str, Any]:
     for begin, passage in zip(passage_names(scores.passages), scores.passages, strict=True):
         names = (name for name in _names(type(passage)) if name not in ("gate", "lap"))
         columns |= {f"{begin}_{name}": getattr(passage, name) for name in names}
-    for waypoint in scores.waypoints:
+    for waypoint in (*scores.waypoints, *scores.places):
         begin = f"{waypoint.waypoint}_lap_{waypoint.lap}"
         columns |= {f"{begin}_{name}": getattr(waypoint, name) for name in ("time", "miss", "speed")}
     return columns

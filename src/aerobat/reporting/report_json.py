@@ -52,8 +52,8 @@ def _flight(score: Score) -> dict[str, Any]:
     """A score; what is not known or not limited is None, as JSON has neither NaN nor infinity."""
     facts = asdict(score) | {"outcome": score.outcome.name.lower()}
     facts["laps"] = [asdict(lap) for lap in score.laps]
-    for places in ("passages", "waypoints", "laps"):
-        facts[places] = [_known(place) for place in facts[places]]
+    for judged in ("passages", "waypoints", "places", "attitudes", "laps"):
+        facts[judged] = [_known(each) for each in facts[judged]]
     return facts
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from itertools import groupby
 from math import degrees, isinf, isnan
 
@@ -11,7 +11,8 @@ from rich.table import Table
 from rich.text import Text
 
 from aerobat.certification import Certificate, Finding, Side, Verdict
-from aerobat.evaluation import Passage, Score
+from aerobat.evaluation import Passage, Score, WaypointPassage
+from aerobat.evaluation.passages import GOAL
 from aerobat.evaluation.score import ObserverScore
 from aerobat.planning import Assessment, Plan, Tube
 from aerobat.planning.time_limit import best_by_limit
@@ -247,10 +248,31 @@ def flight_facts(score: Score, controller: str | None = None, plant: str | None 
         )
         missed = "not reached" if isnan(waypoint.time) else met
         yield _of_lap(waypoint.waypoint, waypoint.lap, several), missed
+    if score.places or score.attitudes:
+        yield "tolerance", _within_tolerance(score)
     for lap in score.laps:
         split = "not flown" if isnan(lap.duration) else f"{lap.duration:.3f} s, until {lap.end:.3f} s"
         yield f"lap {lap.lap}", split
     yield "saturated", f"{100 * score.saturated_fraction:.1f} % of the time"
+
+
+def _within_tolerance(score: Score) -> str:
+    """How far at most a flight is off the goal and the stages that are kept to the problem's tolerance."""
+    told = []
+    if score.places:
+        miss, allowed = max((place.miss, place.radius) for place in score.places)
+        told.append(f"{length(miss)} of {length(allowed)} off {_names(score.places)}")
+    if score.attitudes:
+        angle, tolerance = max((each.angle_deg, each.tolerance_deg) for each in score.attitudes)
+        told.append(f"{angle:.2f}° of {tolerance:.3g}° off the attitudes of {len(score.attitudes)} stages")
+    times = [place.time for place in score.places] + [attitude.time for attitude in score.attitudes]
+    return "not all reached" if any(map(isnan, times)) else f"{', '.join(told)}, at most"
+
+
+def _names(places: Sequence[WaypointPassage]) -> str:
+    """What is to be come to beside gates and waypoints, in words."""
+    stages = len(places) - sum(place.waypoint == GOAL for place in places)
+    return GOAL if not stages else f"{stages} stages" + (f" and {GOAL}" if len(places) > stages else "")
 
 
 def _observer(found: ObserverScore) -> str:

@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Annotated, Any
+from dataclasses import replace
+from typing import Annotated, Any, TypedDict
 
 from pydantic import Field, PlainValidator
 
+from aerobat.control import ControlLaw, Controller, as_controller, named_controller
 from aerobat.declaration import AS_IT_IS, FieldError, Seed, declared, shown
 from aerobat.environment import Dispersion, as_dispersion
 from aerobat.errors import SpecError
 from aerobat.simulation.plants import Plant, as_plant
 from aerobat.states import BodyState
 from aerobat.vehicle import Vehicle
-from aerobat.vehicle.controller import Controller
 
 ControlRate = Annotated[float, Field(ge=1, le=1e6, description="number from 1 to 1e6")]
 MAX_FLIGHTS = 10_000_000  # under conditions
@@ -39,6 +40,21 @@ def _flights(value: Any) -> range | None:
     return flights
 
 
+class FlightChanges(TypedDict, total=False):
+    """Fields of FlightConfig that replace those of a given one; each as FlightConfig has it, or a name."""
+
+    controller: Controller | ControlLaw | str | None
+    rate: float
+    conditions: Dispersion | str | None
+    seed: int
+    flights: range | int | None
+    start: BodyState | None
+    nominal: Vehicle | None
+    engine: str
+    plant: Plant | str | None
+    log_rate: float | None
+
+
 @declared
 class FlightConfig:
     """Settings of a flight, whatever plan is flown.
@@ -47,7 +63,8 @@ class FlightConfig:
     which they draw, and say, themselves.
     """
 
-    controller: Controller | None = None  # by default the nominal vehicle's
+    # what tracks the path, by default the nominal vehicle's: settings, a law, or a name: full, paper, lee, …
+    controller: Annotated[Controller | ControlLaw | str | None, PlainValidator(as_controller)] = None
     rate: ControlRate = 500.0  # [1/s] of the controller, unless conditions say it
     # as it would really be flown: what varies, disturbs, and is measured how; left out, as planned
     conditions: Annotated[Dispersion | None, PlainValidator(_conditions)] = None
@@ -80,18 +97,31 @@ class FlightConfig:
         asked = None if self.conditions is None else self.conditions.control_rate
         return asked or self.rate
 
+    def changed(self, changes: FlightChanges) -> FlightConfig:
+        """Return the settings with some of them replaced. Raises SpecError for unknown ones."""
+        fields: Any = changes
+        return replace(self, **fields)
+
+    @property
+    def law(self) -> ControlLaw | None:
+        """The control law asked for, in place of the tracking controller."""
+        found = named_controller(self.controller) if isinstance(self.controller, str) else self.controller
+        return found if isinstance(found, ControlLaw) else None
+
     def controller_of(self, nominal: Sequence[Vehicle]) -> Controller:
-        """The controller asked for, or that of the nominal vehicles.
+        """The settings asked for, or those of the nominal vehicles.
 
         Raises SpecError for vehicles with more than one.
         """
-        if self.controller is not None:
+        if isinstance(self.controller, Controller):
             return self.controller
         if any(vehicle.controller != nominal[0].controller for vehicle in nominal[1:]):
             raise SpecError(
                 "controller: these vehicles have different ones; give one for all, or fly them apart"
             )
-        return nominal[0].controller
+        own = nominal[0].controller
+        named = named_controller(self.controller, own) if isinstance(self.controller, str) else own
+        return named if isinstance(named, Controller) else own
 
     @property
     def rows_rate(self) -> float:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import partial
-from typing import Any
+from typing import Any, Unpack
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,7 +19,7 @@ from aerobat.flatness import Planned
 from aerobat.problem.gate import Gate
 from aerobat.simulation.bodies import body_states
 from aerobat.simulation.components import LogRow
-from aerobat.simulation.config import FlightConfig
+from aerobat.simulation.config import FlightChanges, FlightConfig
 from aerobat.simulation.flight import SERIES, Flight, setpoint_rows, setpoint_series
 from aerobat.simulation.outcome import DIVERGENCE_RADIUS, Outcome, length
 from aerobat.simulation.plants import Plant
@@ -38,7 +38,7 @@ def fly(
     *,
     environment: Environment | None = None,
     config: FlightConfig = FlightConfig(),  # noqa: B008 - frozen
-    **changes: Any,
+    **changes: Unpack[FlightChanges],
 ) -> Flight:
     """Fly a plan in the nonlinear simulation (paper, Sections III and IV-A).
 

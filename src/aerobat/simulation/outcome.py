@@ -55,6 +55,10 @@ class Outcome(Enum):
     )
     TOUCHED_GATE = "touched the frame of a gate at {time:.2f} s, as its plant felt"
     TOUCHED_GROUND = "touched the ground at {time:.2f} s, as its plant felt"
+    MISSED_ATTITUDE = (
+        "stayed {angle:.1f}° off the attitude of {stage} about {time:.2f} s, {tolerance:.3g}° allowed"
+    )
+    OFF_PATH = "left its path by more than {allowed} at {time:.2f} s, by {error} at most"
     MISSED_WAYPOINT = "missed {waypoint}, {miss:.3f} m from it at {time:.2f} s, {radius:g} m allowed"
     HIT_GROUND = "hit the ground at {time:.2f} s"
     DIVERGED = "diverged at {time:.2f} s: position error above {radius:g} m"

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
-from typing import Any
+from typing import Unpack
 
 import numpy as np
 
@@ -13,7 +12,7 @@ from aerobat.arrays import frozen
 from aerobat.control.parameters import airframe_parameters, controller_parameters, environment_parameters
 from aerobat.declaration import validated
 from aerobat.engines.pytree import tree_map
-from aerobat.environment import Environment
+from aerobat.environment import Environment, dispersion_names
 from aerobat.errors import SpecError
 from aerobat.flatness import Planned, environment_of, vehicle_of
 from aerobat.kernels.rigid_body import Body
@@ -23,14 +22,14 @@ from aerobat.simulation.components import (
     PlantParameters,
     RigidBodyPlant,
     StateObserver,
-    TrackingController,
 )
-from aerobat.simulation.config import FlightConfig
+from aerobat.simulation.config import FlightChanges, FlightConfig
+from aerobat.simulation.law_controller import flown_by
 from aerobat.simulation.reference_source import ReferenceSource
 from aerobat.simulation.setup import FlightSetup, Part
 from aerobat.states import BodyState
 from aerobat.trajectory import Trajectory, as_trajectory
-from aerobat.vehicle import Vehicle, as_vehicle
+from aerobat.vehicle import Vehicle, as_vehicle, vehicle_names
 from aerobat.vehicle.fleet import Fleet
 
 
@@ -41,7 +40,7 @@ def prepare(
     *,
     environment: Environment | None = None,
     config: FlightConfig = FlightConfig(),  # noqa: B008 - frozen
-    **changes: Any,
+    **changes: Unpack[FlightChanges],
 ) -> FlightSetup:
     """All that a flight takes, to be stepped, cut or branched at will: `loop = prepare(plan).compile()`.
 
@@ -57,7 +56,9 @@ def prepare(
 
     Raises SpecError for arguments that do not fit together.
     """
-    config = replace(config, **changes)
+    config = config.changed(changes)
+    if isinstance(vehicle, str) and vehicle in dispersion_names() and vehicle not in vehicle_names():
+        raise SpecError(f"{vehicle!r} are conditions, not a vehicle; give conditions={vehicle!r}")
     environment = environment_of(plan, environment)
     if config.conditions is not None:
         from aerobat.simulation.conditions.setup import dispersed_setup  # sensors, wind, a filter
@@ -80,7 +81,7 @@ def prepare(
         start=_start(config.start, reference, len(fleet)),
         parts=(
             Part(StateObserver()),
-            Part(TrackingController(controller.feature_flags), ControllerParameters(model, ())),
+            Part(flown_by(config.law, controller), ControllerParameters(model, ())),
             Part(RigidBodyPlant.for_rate(config.rate), plant),
         ),
         reference=reference,

@@ -146,9 +146,9 @@ def _improved(
     from_best = replace(planner, start=best, starts=2)
     again = _entry(entry.planner, from_best, best.problem, best.vehicle, progress)
     found = "no plan" if alone is None else f"{alone:.3f} s"
-    note = f"begun again from {best.planner}'s {best.duration:.3f} s; {found} alone"
+    note = f"begun again from the plan of {best.duration:.3f} s by {best.planner}; {found} alone"
     if again.plan is None or (alone is not None and again.plan.duration >= alone):
-        return replace(entry, note=f"{note}; no better so")
+        return replace(entry, note=f"{note}, and no shorter plan from there")
     return replace(again, note=note, planning_time=entry.planning_time + again.planning_time)
 
 

@@ -20,6 +20,7 @@ from aerobat.declaration import (
     declared,
     finite,
     from_table,
+    missing_fields,
     unknown_key,
     validated,
     within_field,
@@ -235,16 +236,32 @@ class Vehicle:
         sizes = np.abs(allocation).max(axis=1, keepdims=True)  # rows differ in unit
         return int(np.linalg.matrix_rank(allocation / np.where(sizes > 0, sizes, 1.0)))
 
+    def _what_is_not_controlled(self) -> str:
+        """The complaint about rotors that do not give thrust, roll, pitch and yaw independently."""
+        must = "must give thrust, roll, pitch and yaw independently"
+        axes = {"roll": self.allocation[1], "pitch": self.allocation[2]}
+        lost = [name for name, arms in axes.items() if np.ptp(arms) == 0.0]
+        if lost:
+            return f"{must}, but they stand on one line and cannot {' or '.join(lost)}; check position_body"
+        if len({rotor.spin for rotor in self.rotors}) == 1:
+            turn = "counter-clockwise" if self.rotors[0].spin > 0 else "clockwise"
+            return (
+                f"{must}, but all {len(self.rotors)} spin alike, {turn}: nothing holds the yaw against their "
+                "drag torque; let half of them spin the other way, neighbours against each other"
+            )
+        if not any(rotor.torque_coefficient for rotor in self.rotors):
+            return f"{must}, but torque_coefficient is 0, so that none of them yaws; give the propellers' own"
+        return (
+            f"{must}, but those that push one way of roll or pitch all spin alike, so that turning and yaw "
+            "come together; vary spin, position_body or torque_coefficient"
+        )
+
     def _check_control(self) -> None:
         """Refuse rotors that give no independent control, or no level hover under any gravity."""
         limits = self.min_thrusts, self.max_thrusts
         rank = self._rank()
         if rank < 4 and not self.dead_rotors:
-            raise FieldError(
-                "rotors",
-                "must give thrust, roll, pitch and yaw independently, but their allocation has rank "
-                f"{rank} instead of 4; vary position_body, spin or torque_coefficient",
-            )
+            raise FieldError("rotors", self._what_is_not_controlled())
         if rank < 4 or overloaded(self.mixer[:, 0], *limits).any():
             raise FieldError("rotors", why_no_hover(self.allocation, *limits))
 
@@ -259,10 +276,9 @@ def _rotor(table: Any, defaults: Mapping[str, Any], place: str) -> Any:
         return table
     try:
         values = rotor_table(table, defaults)
-        for each in fields(Rotor):
-            if each.name not in values:
-                complaint = "is missing; add it there or, for all rotors, in [rotor_defaults]"
-                raise FieldError(each.name, complaint)
+        missing = [each.name for each in fields(Rotor) if each.name not in values]
+        if missing:
+            raise missing_fields(missing, " there or, for all rotors, in [rotor_defaults]")
         return from_table(Rotor, values)
     except FieldError as error:
         key = error.field.partition("[")[0]

@@ -8,7 +8,7 @@ from typing import Annotated
 
 from cyclopts import Parameter, validators
 
-from aerobat.cli.options import Plugins, TaskOptions, flying, output, planning
+from aerobat.cli.options import Plugins, TaskOptions, flying, how_many, output, planning
 from aerobat.cli.progress import CausesProgress, showing
 from aerobat.cli.tasks import read_task
 from aerobat.cli.terminal import print_json
@@ -40,7 +40,7 @@ class CausesOptions:
     conditions: Annotated[str, Parameter(group=flying)] = "lab"
     """What varies from flight to flight without the causes: lab, field, or a TOML file."""
 
-    flights: Annotated[int, Parameter(group=flying, validator=validators.Number(gte=1, lte=10**6))] = 1000
+    flights: Annotated[int, how_many(1, 10**6)] = 1000
     """How many flights of each trial."""
 
     seed: Annotated[int, Parameter(group=flying, validator=validators.Number(gte=0))] = 0

@@ -21,7 +21,7 @@ from aerobat.reporting.report_json import to_json
 class FiguresOptions:
     """Where the paper's figures go."""
 
-    out: Annotated[Path, Parameter(group=output)] = Path("docs") / "figures"
+    out: Annotated[Path, Parameter(group=output)] = Path("out") / "figures"
     """The folder to write to; figures of these numbers in it are replaced."""
 
     json: Annotated[bool, Parameter(group=output, negative="", show_default=False)] = False

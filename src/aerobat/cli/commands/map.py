@@ -32,7 +32,7 @@ def map(problem: str, options: Annotated[MapOptions, Parameter(name="*")] = MapO
     bind; not flyable, where the plan's own flight is not as it should be; no plan, where none is found;
     refused at sight, where what is asked contradicts itself or the limits; or no answer in --time-limit
     seconds, 30 unless given. Writes map.csv (a row a cell), map.json, map.png and run.toml to the output
-    folder, by default out/PROBLEM-map. Exits with 0 once all cells are done, whatever they say.
+    folder, by default out/PROBLEM-map-FIELDS. Exits with 0 once all cells are done, whatever they say.
 
     Parameters
     ----------

@@ -17,7 +17,7 @@ from aerobat.cli.commands.map import finish_map, map_of
 from aerobat.cli.commands.need import NEED, finish_need, need_of
 from aerobat.cli.commands.sweep import finish_sweep, sweep_of, table_name
 from aerobat.cli.exit_code import ExitCode
-from aerobat.cli.options import ExplainingOptions, OutputOptions, Plugins, planning
+from aerobat.cli.options import ExplainingOptions, OutputOptions, Plugins, output, planning
 from aerobat.cli.runs.folder import FLIGHT, finish
 from aerobat.cli.runs.record import RunRecord, read_record, versions_now
 from aerobat.cli.tasks import plan_of
@@ -37,6 +37,9 @@ SAME = ("planner", "duration_s")  # of a comparison's rows: times of the clock a
 @dataclass(frozen=True, kw_only=True)
 class RepeatOptions(OutputOptions, ExplainingOptions):
     """Options of a run that is repeated."""
+
+    out: Annotated[Path | None, Parameter(group=output)] = None
+    """The folder to write to, replaced as a whole. Default: FOLDER-repeated, beside the one repeated."""
 
     plugins: Annotated[tuple[Path, ...], Plugins(group=planning)] = ()
 

@@ -8,7 +8,7 @@ from typing import Annotated, Literal
 
 from cyclopts import Parameter, validators
 
-from aerobat.cli.options import OutputOptions, PlanningOptions, flying, output
+from aerobat.cli.options import OutputOptions, PlanningOptions, flying, how_many, output
 from aerobat.cli.progress import SweepProgress, showing
 from aerobat.cli.runs.folder import is_of_a_run, written
 from aerobat.cli.runs.record import FlightSettings, RunRecord
@@ -33,14 +33,15 @@ from aerobat.studies.workers import WorkerEnded
 class SweepingOptions:
     """Options of many flights."""
 
-    runs: Annotated[int, Parameter(group=flying, validator=validators.Number(gte=1, lte=10**7))] = 1000
+    runs: Annotated[int, how_many(1, 10**7)] = 1000
     """How many flights."""
 
     conditions: Annotated[str, Parameter(group=flying)] = "lab"
     """What varies from flight to flight, disturbs and is measured how: none, lab, field, or a TOML file."""
 
     controller: Annotated[str, Parameter(group=flying)] = "full"
-    """The control law, at the gains of the vehicle's file: full, or paper."""
+    """The control law: full, or paper, at the gains of the vehicle's file; lee, lqr, indi; or one of your own
+    that --import brings in."""
 
     seed: Annotated[int, Parameter(group=flying, validator=validators.Number(gte=0))] = 0
     """The seed of all flights: the same seed, the same flights."""

@@ -10,7 +10,7 @@ from cyclopts import Parameter, validators
 
 from aerobat.cli.exit_code import ExitCode
 from aerobat.cli.interrupts import end_interrupts
-from aerobat.cli.options import PlanningOptions, Plugins, flying, limiting, output, planning
+from aerobat.cli.options import PlanningOptions, Plugins, flying, how_many, limiting, output, planning
 from aerobat.cli.progress import TuningProgress, showing
 from aerobat.cli.tasks import planned
 from aerobat.cli.terminal import print_json, say
@@ -39,7 +39,7 @@ class TuningOptions:
     conditions: Annotated[str, Parameter(group=flying)] = "lab"
     """What varies from flight to flight, disturbs and is measured how: none, lab, field, or a TOML file."""
 
-    flights: Annotated[int, Parameter(group=flying, validator=validators.Number(gte=2, lte=100_000))] = 200
+    flights: Annotated[int, how_many(2, 100_000)] = 200
     """How many flights of each maneuver each set of gains is tried on, and how many others judge the best."""
 
     seed: Annotated[int, Parameter(group=flying, validator=validators.Number(gte=0))] = 0

@@ -8,23 +8,24 @@ from typing import Annotated
 from cyclopts import Parameter
 
 from aerobat.cli.options import output
+from aerobat.cli.runs.new_file import write_new
 from aerobat.cli.runs.saved_plans import named_vehicle
 from aerobat.cli.terminal import say
 from aerobat.documents import in_document
 from aerobat.errors import SpecError
-from aerobat.interchange.robots import SUFFIXES, read_robot_description
+from aerobat.interchange.robots import SUFFIXES, import_vehicle, read_robot_description
 from aerobat.reporting.tables import print_table, vehicles_table
-from aerobat.storage import write_whole
+from aerobat.reporting.vehicle_table import vehicle_table
 from aerobat.vehicle import load_vehicle, vehicle_names, vehicle_text
 
 
 def vehicles(
     vehicle: str | None = None, /, *, out: Annotated[Path | None, Parameter(group=output)] = None
 ) -> None:
-    """List the built-in vehicles; of one that is named, print the file, to begin one's own with.
+    """List the built-in vehicles; say of one what it is and what looks wrong, or write its file.
 
     aerobat vehicles agile-quad --out mine.toml      a built-in one, with the source of every number
-    aerobat vehicles mine.toml                       your own, as it was understood; doubts are told
+    aerobat vehicles mine.toml                       your own: its thrust, hover, spins, agility, and doubts
     aerobat vehicles iris.sdf --out iris.toml        imported from a URDF or SDF file, with what is missing
 
     Parameters
@@ -32,14 +33,30 @@ def vehicles(
     vehicle
         A name that is listed, a vehicle's TOML file, or a robot's URDF or SDF file.
     out
-        The file to write instead of printing; it must not be there yet.
+        The file to write, as it was understood; it must not be there yet.
     """
-    if vehicle is not None:
-        _give(_text(vehicle), out)
+    if vehicle is not None and out is not None:
+        write_new(_text(vehicle), out)
+    elif vehicle is not None:
+        _show(vehicle)
     elif out is not None:
         raise SpecError("--out writes one vehicle; name it")
     else:
         print_table(vehicles_table(load_vehicle(name) for name in vehicle_names()))
+
+
+def _show(name: str) -> None:
+    """Say what a vehicle is; of a robot that lacks something, print the file as far as it goes."""
+    if name.endswith(SUFFIXES):
+        with in_document(Path(name), "robot"):
+            found = read_robot_description(name)
+        if found.missing:
+            print(_text(name), end="")
+            return
+        vehicle = import_vehicle(name)
+    else:
+        vehicle = load_vehicle(name)
+    print_table(vehicle_table(vehicle))
 
 
 def _text(name: str) -> str:
@@ -54,12 +71,3 @@ def _text(name: str) -> str:
     else:
         named_vehicle(name)
     return found.toml()
-
-
-def _give(text: str, out: Path | None) -> None:
-    if out is None:
-        print(text, end="")
-        return
-    if out.exists():
-        raise SpecError(f"--out {out} is there already; name a new file")
-    write_whole(out, text)

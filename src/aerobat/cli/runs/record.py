@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import field
+from hashlib import sha256
 from pathlib import Path
 from platform import python_version
 from typing import Annotated, Any, Literal
@@ -18,13 +19,15 @@ from aerobat.environment import Dispersion
 from aerobat.errors import SpecError
 from aerobat.evaluation.opening import Probability
 from aerobat.interchange.columns import ALL
-from aerobat.planning import Planner
-from aerobat.planning.planners import PLANNERS
+from aerobat.planning import Planner, command_settings, planner_options
+from aerobat.planning.planners import DEFAULT_VEHICLE, PLANNERS
 from aerobat.problem import Problem
 from aerobat.provenance import installed_versions
 from aerobat.vehicle import Vehicle
 
 RECORD = "run.toml"
+DEFAULT_TOLERANCE = 0.01  # of a search for the least
+MAX_NAME = 200  # bytes of a folder's name; most systems take 255
 LIBRARIES = (
     "aerobat",
     "numpy",
@@ -74,7 +77,7 @@ class RunRecord:
     time_limit: NonNegative | None = None  # [s] of each planner that is compared, or of each of many plans
     over: tuple[str, ...] = ()  # fields and values of a map, as --over gave them
     of: tuple[str, ...] | None = None  # what the least is sought of, left out all that there is
-    tolerance: Positive = 0.01  # of that, between the answer and a refusal
+    tolerance: Positive = DEFAULT_TOLERANCE  # of that, between the answer and a refusal
     columns: tuple[str, ...] = ALL  # of plan.csv
     plugins: tuple[str, ...] = ()  # files that --import named
     versions: Mapping[str, str] = field(default_factory=dict)  # of what made it
@@ -94,13 +97,50 @@ class RunRecord:
             parts.append(self.planner_name)
         if self.paper:
             parts.append("paper")
+        parts += self._planner_settings
         if self.command in ("sweep", "map", "need"):
             parts.append(self.command)
-        if self.flight.probability is not None:
-            parts.append(f"pass-{self.flight.probability:g}")
-        if self.flight.conditions is not None:
-            parts.append(self.flight.conditions.name)
-        return Path("out") / "-".join(re.sub(r"[^\w.-]+", "-", part) for part in parts)
+        name = "-".join(re.sub(r"[^\w.-]+", "-", part) for part in [*parts, *self._study_settings])
+        return Path("out") / _short(name)
+
+    @property
+    def _planner_settings(self) -> Iterator[str]:
+        """The planner's options that are not as the command has them by default, in words."""
+        if self.planner is None:
+            return
+        usual = command_settings(type(self.planner)) | ({"order": 3} if self.paper else {})
+        for option in planner_options(type(self.planner)):
+            value = getattr(self.planner, option.name)
+            if value != usual.get(option.name, option.default):
+                flag = option.flag.removeprefix("--")
+                yield flag if option.type is bool else f"{flag}-{_in_a_name(value)}"
+
+    @property
+    def _study_settings(self) -> Iterator[str]:
+        """How a run flies and what it asks, where that is not default, in words.
+
+        The number of flights is left out: a sweep of more goes on from an unfinished one of fewer.
+        """
+        flight = self.flight
+        if flight.probability is not None:
+            yield f"pass-{flight.probability:g}"
+        if flight.conditions is not None:
+            yield flight.conditions.name
+        if flight.seed:
+            yield f"seed-{flight.seed}"
+        if flight.controller != "full":
+            yield flight.controller
+        if flight.plant is not None:
+            yield flight.plant
+        if flight.table != "csv":
+            yield flight.table
+        yield from (*self.over, *(self.of or ()))
+        if self.tolerance != DEFAULT_TOLERANCE:
+            yield f"tolerance-{self.tolerance:g}"
+        if self.command == "compare" and self.time_limit is not None:  # a planner has its own
+            yield f"time-limit-{self.time_limit:g}"
+        if self.columns != ALL:
+            yield "columns-" + "-".join(self.columns)
 
     @property
     def planner_name(self) -> str:
@@ -108,9 +148,22 @@ class RunRecord:
         return str(getattr(self.planner, "kind", ""))
 
 
+def _short(name: str) -> str:
+    """The name, of one that is too long its beginning and a digest."""
+    encoded = name.encode()
+    if len(encoded) <= MAX_NAME:
+        return name
+    return f"{encoded[:MAX_NAME].decode(errors='ignore')}-{sha256(encoded).hexdigest()[:8]}"
+
+
+def _in_a_name(value: Any) -> str:
+    """A number without digits that say nothing, or text as it is."""
+    return f"{value:g}" if isinstance(value, float) else str(value)
+
+
 def default_vehicle(paper: bool = False) -> str:
     """The name of the vehicle that is taken where none is given."""
-    return "hexarotor" if paper else "agile-quad"
+    return "hexarotor" if paper else DEFAULT_VEHICLE
 
 
 def write_record(record: RunRecord, folder: Path) -> None:

@@ -19,6 +19,7 @@ class GatePlane(NamedTuple):
     centre: Vector  # [m]
     normal: Vector  # unit vector in the direction of passage
     directions: tuple[PlaneDirection, ...]  # along which bodies are measured
+    radius: Scalar  # [m] of the circle about the opening
     planned: Scalar  # [s] when it is to be crossed
     window: Scalar  # [s] by which the crossing may be earlier or later
     depth: Scalar  # [m] beyond the plane that makes a crossing a passage
@@ -68,6 +69,7 @@ def step(
     fraction = -before / ops.select(crosses > 0.5, behind - before, 1.0)
     here = between(last, now, fraction)
     latest = select_tree(ops, forward, here, progress.latest)
+    is_passing = (behind > 0.0) & (behind < plane.depth) & (latest.time < inf)
     off_time = magnitude(ops, latest.time - plane.planned)
     nearer = off_time < magnitude(ops, progress.crossing.time - plane.planned)
     passed = counted[1] & (behind >= plane.depth) & (off_time <= plane.window) & nearer
@@ -83,10 +85,10 @@ def step(
         swath.step(
             ops,
             progress.swath,
-            (plane.normal, plane.directions, plane.depth, ellipsoid),
+            (plane.normal, plane.directions, plane.radius, plane.depth, ellipsoid),
             snapshots,
             counted,
             crosses,
-            passed,
+            (is_passing, passed),
         ),
     )

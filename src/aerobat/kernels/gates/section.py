@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 from aerobat.kernels.ops import Ops, Quaternion, Scalar, Vector, clip, magnitude
 from aerobat.kernels.quaternions import axes, normalize, to_body
-from aerobat.kernels.vectors import dot
+from aerobat.kernels.vectors import dot, norm
 
 _TINY = 1e-300  # keeps 0/0 away and changes no other quotient
 _ROUNDING = 1e-9  # [m] from the middle, where neither side is the nearer; of a rise that is none
@@ -90,6 +90,12 @@ def section(
         ops.sqrt(ops.maximum(dot(a, a) - reach_sq * shear_along * shear_along, _TINY)),
         dot(a, b) - reach_sq * shear_along * shear_beside,
     )
+
+
+def extent(ops: Ops, ellipsoid: BoundingEllipsoid) -> Scalar:
+    """The distance [m] from the centre of mass that no point of the ellipsoid exceeds."""
+    x, y, z = ellipsoid.semi_axes
+    return norm(ops, ellipsoid.centre) + ops.maximum(ops.maximum(x, y), z)
 
 
 def gap(ops: Ops, at: Section) -> Scalar:

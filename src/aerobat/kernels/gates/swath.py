@@ -1,8 +1,9 @@
 """The swath of a body through a gate's plane, tick by tick: how far it reached along some directions.
 
-What counts is the stay about the plane in which the gate is crossed: from when the body, or the centre within
-the gate's depth, comes to the plane until both have left it. A body that comes into the plane beside the
-opening, and is in it without a break until it is through, has met the frame, however thin that is.
+What counts is the stay about the opening in which the gate is crossed: while the body, or the centre within
+the gate's depth, is at the plane, and near enough to touch the circle about the opening. A body that comes
+into the plane beside the opening, and is in it without a break until it is through, has met the frame,
+however thin that is. What the body does in the plane beyond that circle says nothing of the frame.
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ from aerobat.kernels.gates.section import (
     BoundingEllipsoid,
     PlaneDirection,
     PlanePoint,
+    extent,
     farthest,
     fraction_of_farthest,
     gap,
@@ -21,7 +23,7 @@ from aerobat.kernels.gates.section import (
 )
 from aerobat.kernels.gates.snapshot import Snapshot, between
 from aerobat.kernels.ops import Ops, Scalar, Vector, magnitude, select_tree
-from aerobat.kernels.vectors import dot, subtract
+from aerobat.kernels.vectors import dot, norm, subtract
 
 
 class Extreme(NamedTuple):
@@ -39,7 +41,7 @@ class SwathProgress(NamedTuple):
     """A body about a gate's plane so far."""
 
     gap: Scalar  # [m] between body and plane, negative where they meet
-    is_about: Scalar  # 1 while the vehicle is about the plane
+    is_about: Scalar  # 1 while the vehicle is about the opening
     is_crossing: Scalar  # 1 while that stay is the one in which the gate is crossed
     stay: Swath  # of this stay, none where there is none
     crossing: Swath  # of the one in which the gate is crossed
@@ -57,28 +59,33 @@ def init(directions: int) -> SwathProgress:
 def step(
     ops: Ops,
     progress: SwathProgress,
-    parameters: tuple[Vector, tuple[PlaneDirection, ...], Scalar, BoundingEllipsoid],
+    parameters: tuple[Vector, tuple[PlaneDirection, ...], Scalar, Scalar, BoundingEllipsoid],
     snapshots: tuple[Snapshot, Snapshot],
     counted: tuple[Scalar, Scalar],
     crosses: Scalar,
-    passed: Scalar,
+    crossed: tuple[Scalar, Scalar],
 ) -> SwathProgress:
     """Progress a tick later.
 
     Args:
         ops: of the arithmetic.
         progress: before the tick.
-        parameters: the plane's normal, directions in it, the depth [m] about it, and what encloses a vehicle.
+        parameters: the plane's normal, directions in it, the radius [m] of the circle about the opening, the
+            depth [m] about the plane, and what encloses a vehicle.
         snapshots: the last tick's and this one's, positions from the opening's centre.
         counted: true where there was a last tick, and where this one counts.
         crosses: 1 where the centre crosses the plane between them.
-        passed: true where with this tick the stay, this or the last, has become the one that counts.
+        crossed: true where the centre has crossed and is within the depth, wherever it crossed; and where
+            with this tick the stay, this or the last, has become the one that counts.
     """
-    normal, directions, depth, ellipsoid = parameters
+    normal, directions, radius, depth, ellipsoid = parameters
+    is_passing, passed = crossed
     now = snapshots[1]
     gap_now = gap(ops, section(ops, ellipsoid, (normal, *directions[0][:2]), now.position, now.q_world_body))
     distance = magnitude(ops, dot(now.position, normal))
-    is_about = counted[1] & (ops.minimum(gap_now, distance - depth) <= 0.0)
+    beside = norm(ops, now.position) - radius - extent(ops, ellipsoid)
+    at_plane = counted[1] & (ops.minimum(gap_now, distance - depth) <= 0.0)
+    is_about = at_plane & (ops.select(is_passing, 0.0, beside) <= 0.0)
     met, here = swept_between(
         ops, (normal, directions), ellipsoid, snapshots, (progress.gap, gap_now), crosses
     )
@@ -88,7 +95,7 @@ def step(
     return SwathProgress(
         gap_now,
         ops.select(is_about, 1.0, 0.0),
-        ops.select(is_crossing & is_about, 1.0, 0.0),
+        ops.select(is_crossing & at_plane & (beside <= 0.0), 1.0, 0.0),
         stay,
         select_tree(ops, is_crossing, stay, progress.crossing),
     )

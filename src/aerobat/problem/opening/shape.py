@@ -113,6 +113,11 @@ class OpeningShape(ABC):
         """How deep [m] its deepest point lies inside."""
 
     @property
+    def circumradius(self) -> float:
+        """The distance [m] of its farthest point from the gate's position."""
+        return float(np.linalg.norm(self.outline, axis=1).max())
+
+    @property
     def size(self) -> Array:
         """Width and height [m] of the upright box around it, (2,)."""
         return np.asarray(np.ptp(self.outline, axis=0))

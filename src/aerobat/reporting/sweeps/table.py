@@ -11,6 +11,7 @@ from rich.text import Text
 
 from aerobat.errors import SpecError
 from aerobat.evaluation import Opening
+from aerobat.evaluation.passages import criterion
 from aerobat.reporting.tables import Fact, facts_table
 from aerobat.simulation import Outcome
 from aerobat.simulation.outcome import length
@@ -60,6 +61,7 @@ def outcome_name(outcome: Outcome) -> str:
 def _flight_facts(sweep: Sweep) -> Iterable[Fact]:
     yield "number", f"{len(sweep)}, seed {sweep.seed}"
     yield "went well", str(sweep.success)
+    yield "judged by", criterion(sweep.plan.problem)
     for outcome, share in sweep.outcomes.items():
         text = f"{share.count}, {share}"
         yield outcome_name(outcome), text if outcome.is_success else Text(text, style="red")
@@ -97,6 +99,7 @@ def sweep_report(sweep: Sweep) -> dict[str, Any]:
         "seed": sweep.seed,
         "flights": len(sweep),
         "went_well": _share(sweep.success),
+        "judged_by": criterion(sweep.plan.problem),
         "outcomes": {outcome.name.lower(): _share(share) for outcome, share in sweep.outcomes.items()},
         "errors": {column: _quantiles(sweep, column) for column, _ in ERRORS},
         "passages": {

@@ -105,7 +105,17 @@ class Recoveries:
         )
         slowest = f"within {self.durations[self.possible].max():.1f} s"
         except_from = f", but not from {self._spans}" if self.no_return else ""
-        return f"given up at any instant it hovers {slowest}, no lower than {height}{except_from}"
+        return (
+            f"given up at {self._instants} and noticed {self.reaction:g} s later, it hovers {slowest}, "
+            f"no lower than {height}{except_from}"
+        )
+
+    @property
+    def _instants(self) -> str:
+        """The instants in words."""
+        if len(self.times) == 1:
+            return f"{self.times[0]:.2f} s"
+        return f"any of {len(self.times)} instants, {1e3 * np.diff(self.times).max():.3g} ms apart at most,"
 
     @property
     def _spans(self) -> str:

@@ -20,7 +20,6 @@ from aerobat.simulation.components import (
     PlantParameters,
     RigidBodyPlant,
     StateObserver,
-    TrackingController,
 )
 from aerobat.simulation.conditions.disturbance_observer import DisturbanceObserver, DisturbanceParameters
 from aerobat.simulation.conditions.draw import dispersed_fleet, draw_flights
@@ -28,6 +27,7 @@ from aerobat.simulation.conditions.observer import EkfObserver, ObserverParamete
 from aerobat.simulation.conditions.parts import WHOLE, DispersedFlights, condition_parts, whole_ticks
 from aerobat.simulation.conditions.sensors import MotionCaptureSensor
 from aerobat.simulation.config import FlightConfig
+from aerobat.simulation.law_controller import flown_by
 from aerobat.simulation.reference_source import ReferenceSource
 from aerobat.simulation.setup import FlightSetup, Part
 from aerobat.trajectory import Trajectory, as_trajectory
@@ -140,7 +140,7 @@ def _controller(
             f"computation_delay must be at most a period of the controller, {period / rate:g} s, "
             f"got {conditions.computation_delay:g} s; lower control_rate"
         )
-    controller = TrackingController(settings.feature_flags, period)
+    controller = flown_by(config.law, settings, period)
     observer: tuple[Part, ...] = ()
     slowest = max(rotor.lag for rotor in nominal.rotors)
     if settings.disturbance_filter > 0.0 and conditions.imu is not None and slowest <= _SLOWEST_ANSWERED:

@@ -17,7 +17,7 @@ from aerobat.engines.numpy import ArrayOps
 from aerobat.engines.pytree import tree_map
 from aerobat.kernels.gates import progress
 from aerobat.kernels.gates.progress import GateProgress
-from aerobat.kernels.gates.section import BoundingEllipsoid, gap, section
+from aerobat.kernels.gates.section import BoundingEllipsoid, extent, gap, section
 from aerobat.kernels.gates.snapshot import Snapshot, between
 from aerobat.kernels.gates.swath import Swath, swept_between
 from aerobat.simulation.flight import Flight
@@ -136,9 +136,15 @@ class _Track:
             ArrayOps,
             section(ArrayOps, ellipsoid, (normal, *directions[0][:2]), rows.position, rows.q_world_body),
         )
-        away = np.flatnonzero((gaps > 0.0) & (np.abs(self.distance) > PASSAGE_DEPTH))
-        first, end = away[away <= crossing], away[away > crossing]
-        stay = slice(first[-1] if first.size else 0, end[0] + 1 if end.size else len(gaps))
+        off_plane = (gaps > 0.0) & (np.abs(self.distance) > PASSAGE_DEPTH)
+        reach = gate.opening.circumradius + extent(ArrayOps, ellipsoid)
+        beside = np.linalg.norm(self.offset, axis=-1) > reach
+        index = np.arange(len(gaps))
+        passed = index[(index > crossing) & (self.distance >= PASSAGE_DEPTH)][0]
+        is_passing = (self.distance > 0.0) & (self.distance < PASSAGE_DEPTH) & (index > self.crossings(1)[0])
+        before = index[(off_plane | (beside & ~is_passing)) & (index <= crossing)]
+        after = index[(off_plane & (index > crossing)) | (beside & (index >= passed))]
+        stay = slice(before[-1] if before.size else 0, after[0] + 1 if after.size else len(gaps))
         rows, gaps = _part(rows, stay), gaps[stay]
         snapshots = _part(rows, slice(-1)), _part(rows, slice(1, None))
         crosses = np.arange(len(gaps) - 1) == crossing - stay.start

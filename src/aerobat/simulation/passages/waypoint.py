@@ -83,13 +83,22 @@ def flown_waypoints(flight: Flight, planned: tuple[PlannedWaypoint, ...]) -> lis
     return [waypoint_passages(each, _nearest(flight, each), stop) for each in planned]
 
 
+def intervals(flight: Flight, centre: Array | None = None) -> tuple[Snapshot, Snapshot]:
+    """The rows of a flight that intervals begin with, and those that they end with, leaves (T - 1,).
+
+    Args:
+        flight: one that was logged.
+        centre: where positions are counted from [m], (3,).
+    """
+    states = flight.states
+    position = states.position if centre is None else states.position - centre
+    rows = Snapshot(flight.times, *map(components, (position, states.velocity, states.q_world_body)))
+    return _part(rows, slice(-1)), _part(rows, slice(1, None))
+
+
 def _nearest(flight: Flight, planned: PlannedWaypoint) -> Approach:
     """The nearest approach within the window, leaves (1,)."""
-    states = flight.states
-    parts = states.position - planned.ball.centre, states.velocity, states.q_world_body
-    rows = Snapshot(flight.times, *map(components, parts))
-    last, now = _part(rows, slice(-1)), _part(rows, slice(1, None))
-    each = approach.nearest(ArrayOps, last, now)
+    each = approach.nearest(ArrayOps, *intervals(flight, planned.ball.centre))
     in_window = np.abs(each.time - planned.time) <= PASSAGE_WINDOW
     if not in_window.any():
         never: Approach = tree_map(np.atleast_1d, approach.init())

@@ -5,12 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cache
 
-from aerobat.control import Controller, named_controller
+from aerobat.control import Controller
 from aerobat.evaluation.score import Score, score
 from aerobat.planning import Miqp, Plan, plan
 from aerobat.problem import load_problem
 from aerobat.simulation import Flight, fly
 from aerobat.vehicle import Vehicle, load_vehicle
+from aerobat.vehicle.controller import named_controller
 
 MANEUVERS = ("flip-roll", "flip-roll-translation", "flip-pitch", "half-flip")  # in the order of Section II
 HEXAROTOR = "hexarotor"  # what the paper flies
@@ -37,7 +38,7 @@ class ManeuverFlights:
 
 def printed_plan(name: str) -> Plan:
     """The plan of a built-in problem by the program as printed, with the reference code's parameters."""
-    return plan(load_problem(name).as_in_paper(), Miqp(order=JERK))
+    return plan(load_problem(name).as_in_paper(), Miqp(order=JERK), vehicle=None)
 
 
 @cache  # two figures show it, or three

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from aerobat.arrays import Array
-from aerobat.control import Controller
+from aerobat.control import ControlLaw, Controller
 from aerobat.engines import choose
 from aerobat.environment import Dispersion
 from aerobat.evaluation import Passage, Scores
@@ -51,7 +51,7 @@ class SweepTask:
     vehicle: Vehicle  # that plan and controller know
     conditions: Dispersion
     seed: int
-    controller: Controller
+    controller: Controller | ControlLaw
     engine: str
     batch: int  # flights that are flown side by side
 

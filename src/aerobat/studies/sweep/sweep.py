@@ -11,7 +11,7 @@ from typing import Annotated
 import numpy as np
 from pydantic import Field
 
-from aerobat.control import Controller
+from aerobat.control import ControlLaw, Controller, named_controller
 from aerobat.declaration import PathName, Seed, validated
 from aerobat.engines.cores import available_cores
 from aerobat.environment import Dispersion, as_dispersion
@@ -43,7 +43,7 @@ def sweep(
     seed: Seed = 0,
     *,
     vehicle: Vehicle | str | None = None,
-    controller: Controller | None = None,
+    controller: Controller | ControlLaw | str | None = None,
     engine: str = "auto",
     batch: Batch = CHUNK,
     workers: Workers | None = None,
@@ -63,7 +63,7 @@ def sweep(
         runs: how many flights.
         seed: of their draws.
         vehicle: the nominal one, or its name, by default the plan's.
-        controller: how it is controlled, by default the vehicle's own.
+        controller: settings, a law or the name of one; by default the vehicle's own.
         engine: as for FlightConfig.
         batch: flights that are flown side by side in one process: fewer take less memory.
         workers: processes, by default one a core; 1 flies in this process.
@@ -75,6 +75,8 @@ def sweep(
     """
     conditions = as_dispersion(conditions)
     vehicle = vehicle_of(plan, vehicle)
+    if isinstance(controller, str):
+        controller = named_controller(controller, vehicle.controller)
     task = SweepTask(plan, vehicle, conditions, seed, controller or vehicle.controller, engine, batch)
     kept = None if keep is None else KeptChunks.of(Path(keep), task)
     spans = [(begin, min(begin + CHUNK, runs)) for begin in range(0, runs, CHUNK)]

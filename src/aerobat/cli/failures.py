@@ -1,0 +1,87 @@
+"""Ends that a run comes to without one of its own: a sentence each, and with --json the same as data."""
+
+from __future__ import annotations
+
+import json
+import re
+import traceback
+from collections.abc import Iterator, Sequence
+from dataclasses import asdict, dataclass
+
+from aerobat.cli.terminal import print_json, say
+from aerobat.errors import AerobatError, BackendMissing, Infeasible, OwnCodeError
+
+EXPLAIN = "add --explain to `aerobat plan` to try changes that would help"
+IMPORT_FLAG = "--import"
+JSON_FLAG = "--json"
+TRACEBACK_FLAG = "--traceback"
+
+_FLAG = re.compile(r"(?<![\w-])--[a-z][\w-]*")
+
+
+@dataclass(frozen=True)
+class Failure:
+    """The reason why a run came to no end of its own."""
+
+    kind: str  # bad_input, no_plan, missing_backend, plugin or interrupted
+    message: str  # one sentence
+    field: str | None = None  # the key, or the option, that it is about; None where it is about none
+
+    def tell(self, arguments: Sequence[str]) -> None:
+        """Say the sentence on standard error; where JSON is asked for, write all to standard output."""
+        say(self.message)
+        if JSON_FLAG in arguments:
+            print_json(json.dumps({"error": asdict(self)}, indent=2, ensure_ascii=False))
+
+
+INTERRUPTED = Failure("interrupted", "interrupted")
+
+
+def foreseen(error: AerobatError) -> Failure:
+    """The failure that an error of ours stands for."""
+    if isinstance(error, Infeasible):
+        return Failure("no_plan", error.with_remedy(EXPLAIN), next(iter(error.limits), None))
+    kind = "missing_backend" if isinstance(error, BackendMissing) else "bad_input"
+    return Failure(kind, str(error), _field(error))
+
+
+def of_plugins(error: BaseException, arguments: Sequence[str]) -> Failure | None:
+    """The failure of a plugin that an unforeseen error stands for; None where it is a defect of ours.
+
+    It names the plugin's file and line where the error passed through one, in a worker's process too. Others
+    may come of what a plugin returned.
+
+    Args:
+        error: What was raised.
+        arguments: Of the command line.
+    """
+    from aerobat.declaration.registry import imported_plugins
+
+    plugins = imported_plugins()
+    if not plugins:
+        return None
+    everything = "".join(traceback.format_exception(error))
+    lines = [f"{path}:{line}" for path, line in re.findall(r'File "(.+?)", line (\d+)', everything)]
+    within = [line for line in lines if line.rpartition(":")[0] in plugins]
+    is_ours = isinstance(error, OSError) or not any(each.startswith(IMPORT_FLAG) for each in arguments)
+    if is_ours and not within:
+        return None
+    cause = error.__cause__ if isinstance(error, OwnCodeError) and error.__cause__ else error
+    what = f"{type(cause).__name__}: {cause}" if str(cause) else type(cause).__name__
+    place = within[-1] if within else f"with {', '.join(plugins)} imported"
+    return Failure("plugin", f"{place}: {what}; {TRACEBACK_FLAG} shows the whole way there")
+
+
+def _field(error: AerobatError) -> str | None:
+    """The field that an error is about: the outermost name of it, or the option that its sentence names."""
+    named = next((name for each in _chain(error) if (name := getattr(each, "field", ""))), None)
+    option = _FLAG.search(str(error))
+    return named or (option and option[0]) or next(iter(error.limits), None)
+
+
+def _chain(error: BaseException) -> Iterator[BaseException]:
+    """The error and those in whose handling it was raised, the latest first."""
+    following: BaseException | None = error
+    while following is not None:
+        yield following
+        following = following.__context__

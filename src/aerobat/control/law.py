@@ -1,0 +1,109 @@
+"""Control laws of one's own: what a law answers, and the register of them by name.
+
+A law says which force and moment the rotors shall give. Beside it stands what every law needs: it is mixed to
+rotor commands within their limits, tilt before yaw, ahead of the rotors' lag, and the reference has what an
+IMU feels of disturbances taken off it.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable
+from typing import Any, ClassVar, NamedTuple, TypeVar, cast, dataclass_transform
+
+from pydantic import Field
+
+from aerobat.declaration import FieldError, Label, Registry, shown, unknown_name, validated
+from aerobat.kernels.control import ControllerModel
+from aerobat.kernels.control_loops import ReferencePoint
+from aerobat.kernels.ops import Ops, PerRotor, Scalar
+from aerobat.kernels.rigid_body import Body, Wrench
+from aerobat.vehicle.controller import CONTROLLERS, Controller
+from aerobat.vehicle.controller import named_controller as named_settings
+
+L = TypeVar("L", bound="ControlLaw")
+
+
+class Seen(NamedTuple):
+    """What a law knows at a tick."""
+
+    body: Body  # as the observer has it, when the commands take effect; world, rates in body axes
+    thrusts: PerRotor  # [N] that the rotors give, by the nominal model
+    reference: ReferencePoint  # world; its specific thrust is a + g e3, without drag
+
+
+class ControlLaw(ABC):
+    """A law from what is seen to the force and the moment on the body.
+
+    A law of one's own inherits from this class and is registered by `@controller("its-name")`. Its fields are
+    its gains. `init` and `step` are written in kernel arithmetic: + - * / and comparisons of scalars, and the
+    functions of `ops`, without `if` on values. Every engine flies such a law; any code is flown by `floats`.
+    """
+
+    kind: ClassVar[str] = ""  # its name, set when it is registered
+    TAKES_DISTURBANCES: ClassVar[bool] = True  # off the reference; a law that answers them itself says False
+
+    def init(self, ops: Ops, model: ControllerModel, seen: Seen) -> Any:
+        """Return the state before the first tick, a tree of tuples; by default there is none.
+
+        Args:
+            ops: Of the arithmetic.
+            model: The nominal vehicle: its mass properties and rotors, and the environment.
+            seen: At the first tick.
+        """
+        return ()
+
+    @abstractmethod
+    def step(
+        self, ops: Ops, model: ControllerModel, state: Any, seen: Seen, elapsed: Scalar
+    ) -> tuple[Any, Wrench]:
+        """Return the state at a tick, and the thrust [N] and the moment [N·m, body] to be given.
+
+        Args:
+            ops: Of the arithmetic.
+            model: The nominal vehicle: its mass properties and rotors, and the environment.
+            state: After the last tick.
+            seen: At this one.
+            elapsed: Since the last tick [s].
+        """
+
+
+_ROOM = "aerobat.control.laws"
+CONTROL_LAWS: Registry[ControlLaw] = Registry(
+    ControlLaw,  # type: ignore[type-abstract]
+    "controller",
+    "aerobat.controllers",
+    {"lee": f"{_ROOM}.lee", "lqr": f"{_ROOM}.lqr", "indi": f"{_ROOM}.indi"},
+)
+
+
+@validated
+@dataclass_transform(frozen_default=True, field_specifiers=(Field,))
+def controller(name: Label) -> Callable[[type[L]], type[L]]:
+    """Declare the class that follows and register it: by `name`, flights and the command line know it."""
+
+    def register(cls: type[L]) -> type[L]:
+        return cast("type[L]", CONTROL_LAWS.add(name, cls))
+
+    return register
+
+
+def named_controller(name: str, own: Controller = CONTROLLERS["full"]) -> Controller | ControlLaw:
+    """Return the controller of a name: full or paper, at the gains of `own`, or a law with its own gains.
+
+    Raises SpecError, with the closest name, for a name that nothing has.
+    """
+    if name in CONTROLLERS:
+        return named_settings(name, own)
+    if name not in tuple(CONTROL_LAWS):
+        raise unknown_name("controller", name, (*CONTROLLERS, *CONTROL_LAWS))
+    return CONTROL_LAWS[name]()
+
+
+def as_controller(value: Any) -> Controller | ControlLaw | str | None:
+    """Return what a flight takes for its controller. Raises FieldError for anything else."""
+    if isinstance(value, str):
+        named_controller(value)
+    elif value is not None and not isinstance(value, Controller | ControlLaw):
+        raise FieldError("", f"must be a Controller, a ControlLaw or the name of one, got {shown(value)}")
+    return cast("Controller | ControlLaw | str | None", value)

@@ -1,0 +1,1 @@
+"""Control laws that come with Aerobat beside its own, one a file."""

@@ -1,0 +1,54 @@
+"""Steps that the laws share: how a body is off an attitude, and the moment that turns it as it shall."""
+
+from __future__ import annotations
+
+from aerobat.kernels.control import ControllerModel
+from aerobat.kernels.control_loops import ReferencePoint, reference_moment
+from aerobat.kernels.ops import Axes, Ops, Scalar, Vector
+from aerobat.kernels.quaternions import axes, to_body
+from aerobat.kernels.vectors import add, cross, dot, norm, scale, transform
+
+_SHORTEST = 1e-3  # [m/s²], or [-] of unit vectors: shorter ones have no direction to follow
+
+
+def axes_along(ops: Ops, thrust: Vector, reference: ReferencePoint) -> Axes:
+    """Return the axes with the third along a specific thrust [m/s²], and the first as near the reference's.
+
+    Those of the reference where the thrust vanishes or lies along its first axis.
+    """
+    first, second, third = axes(reference.q_world_body)
+    b3 = scale(1.0 / ops.maximum(norm(ops, thrust), _SHORTEST), thrust)
+    aside = cross(b3, first)
+    size = norm(ops, aside)
+    b2 = scale(1.0 / ops.maximum(size, _SHORTEST), aside)
+    b1 = cross(b2, b3)
+    determined = (norm(ops, thrust) > _SHORTEST) & (size > _SHORTEST)
+    return (
+        _either(ops, determined, b1, first),
+        _either(ops, determined, b2, second),
+        _either(ops, determined, b3, third),
+    )
+
+
+def rotation_error(body_axes: Axes, desired: Axes) -> Vector:
+    """Return e_R = ½ (R_dᵀ R − Rᵀ R_d)^∨, sin θ about the axis from the desired attitude; body axes."""
+    b1, b2, b3 = (cross(wanted, own) for wanted, own in zip(desired, body_axes, strict=True))
+    return to_body(body_axes, scale(0.5, add(add(b1, b2), b3)))
+
+
+def moment_for(
+    model: ControllerModel, body_axes: Axes, reference: ReferencePoint, acceleration: Vector
+) -> Vector:
+    """Return the moment [N·m, body] of the reference and of an angular acceleration [rad/s²] beside it."""
+    inertia = model.airframe.mass_properties.inertia
+    return add(reference_moment(inertia, body_axes, reference), transform(inertia, acceleration))
+
+
+def collective(model: ControllerModel, body_axes: Axes, thrust: Vector) -> Scalar:
+    """Return the collective thrust [N] that gives a specific thrust's part along the body's third axis."""
+    return model.airframe.mass_properties.mass * dot(thrust, body_axes[2])
+
+
+def _either(ops: Ops, condition: Scalar, a: Vector, b: Vector) -> Vector:
+    x, y, z = (ops.select(condition, p, q) for p, q in zip(a, b, strict=True))
+    return x, y, z

@@ -1,0 +1,104 @@
+"""Incremental nonlinear dynamic inversion: Smeur, Chu and de Croon, JGCD 39 (2016), 450-461."""
+
+from __future__ import annotations
+
+from typing import Any, ClassVar, NamedTuple
+
+from aerobat.control.law import ControlLaw, Seen, controller
+from aerobat.control.laws.attitude import axes_along, collective, rotation_error
+from aerobat.declaration import NonNegative, Positive
+from aerobat.kernels import motors
+from aerobat.kernels.control import ControllerModel
+from aerobat.kernels.control_loops import thrust_demand
+from aerobat.kernels.ops import Ops, Scalar, Vector, select_tree
+from aerobat.kernels.quaternions import axes, to_body
+from aerobat.kernels.rigid_body import Wrench
+from aerobat.kernels.vectors import (
+    ZERO,
+    add,
+    add_scaled,
+    clamp_norm,
+    scale,
+    subtract,
+    transform,
+)
+
+
+class Increments(NamedTuple):
+    """What was measured, low-passed alike, so that both tell of the same instant."""
+
+    omega: Vector  # [rad/s] body, at the last tick
+    angular_acceleration: Vector  # [rad/s²] body
+    moment: Vector  # [N·m] of the rotors, body
+    integral: Vector  # [m·s] of the position error, world
+    has_omega: Scalar  # 1, or 0 before the first tick
+
+
+@controller("indi")
+class Indi(ControlLaw):
+    """The moment of the rotors, changed by what the angular acceleration that is measured lacks.
+
+    M = M_f + J (α − α_f): what turns the body beside the rotors needs no model. Attitude and position are
+    held as in Lee et al. (2010), with an integral of the position error.
+    """
+
+    TAKES_DISTURBANCES: ClassVar[bool] = False  # of moments by itself, of forces by the integral
+
+    position_gain: NonNegative = 25.0  # [1/s²]
+    velocity_gain: NonNegative = 9.0  # [1/s]
+    integral_gain: NonNegative = 10.0  # [1/s³]
+    max_integral: NonNegative = 0.5  # [m·s]
+    max_feedback: NonNegative = 15.0  # [m/s²]
+    attitude_gain: NonNegative = 625.0  # [1/s²]
+    rate_gain: NonNegative = 42.5  # [1/s]
+    filter_time: Positive = 0.02  # [s] of what is measured
+
+    def init(self, ops: Ops, model: ControllerModel, seen: Seen) -> Increments:
+        """Return what is measured before the first tick."""
+        turned = to_body(axes(seen.body.q_world_body), seen.reference.omega_dot)
+        moment = motors.wrench(model.airframe.rotors, seen.thrusts).moment_body
+        return Increments(seen.body.omega_body, turned, moment, ZERO, 0.0)
+
+    def step(
+        self, ops: Ops, model: ControllerModel, state: Any, seen: Seen, elapsed: Scalar
+    ) -> tuple[Any, Wrench]:
+        """Return the force and the moment."""
+        body, reference = seen.body, seen.reference
+        body_axes = axes(body.q_world_body)
+        measured = self._measured(ops, model, state, seen, elapsed)
+        e_v = subtract(reference.velocity, body.velocity)
+        e_x = subtract(reference.position, body.position)
+        feedback = add_scaled(
+            add_scaled(scale(self.position_gain, e_x), self.velocity_gain, e_v),
+            self.integral_gain,
+            measured.integral,
+        )
+        demand = thrust_demand(model.airframe.mass_properties, model.environment, reference)
+        thrust = add(demand.value, clamp_norm(ops, feedback, self.max_feedback))
+        e_r = rotation_error(body_axes, axes_along(ops, thrust, reference))
+        e_omega = subtract(body.omega_body, to_body(body_axes, reference.omega))
+        k_r = ops.minimum(self.attitude_gain, 0.5 * model.gains.stiffness)
+        k_omega = ops.minimum(self.rate_gain, model.gains.damping)
+        back = add_scaled(scale(k_r, e_r), k_omega, e_omega)
+        wanted = subtract(to_body(body_axes, reference.omega_dot), back)
+        lacking = subtract(wanted, measured.angular_acceleration)
+        increment = transform(model.airframe.mass_properties.inertia, lacking)
+        load = Wrench(collective(model, body_axes, thrust), add(measured.moment, increment))
+        return measured, load
+
+    def _measured(
+        self, ops: Ops, model: ControllerModel, state: Increments, seen: Seen, elapsed: Scalar
+    ) -> Increments:
+        """Return what is measured, a tick later."""
+        fraction = elapsed / (self.filter_time + elapsed)
+        turned = scale(1.0 / elapsed, subtract(seen.body.omega_body, state.omega))
+        turned = select_tree(ops, state.has_omega > 0.5, turned, state.angular_acceleration)
+        moment = motors.wrench(model.airframe.rotors, seen.thrusts).moment_body
+        error = subtract(seen.reference.position, seen.body.position)
+        return Increments(
+            seen.body.omega_body,
+            add_scaled(state.angular_acceleration, fraction, subtract(turned, state.angular_acceleration)),
+            add_scaled(state.moment, fraction, subtract(moment, state.moment)),
+            clamp_norm(ops, add_scaled(state.integral, elapsed, error), self.max_integral),
+            1.0,
+        )

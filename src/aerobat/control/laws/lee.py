@@ -1,0 +1,50 @@
+"""The geometric controller on SE(3): Lee, Leok and McClamroch, IEEE CDC 2010, arXiv:1003.2005."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from aerobat.control.law import ControlLaw, Seen, controller
+from aerobat.control.laws.attitude import axes_along, collective, moment_for, rotation_error
+from aerobat.declaration import NonNegative
+from aerobat.kernels.control import ControllerModel
+from aerobat.kernels.control_loops import thrust_demand
+from aerobat.kernels.ops import Ops, Scalar
+from aerobat.kernels.quaternions import axes, to_body
+from aerobat.kernels.rigid_body import Wrench
+from aerobat.kernels.vectors import add, add_scaled, clamp_norm, scale, subtract
+
+
+@controller("lee")
+class Lee(ControlLaw):
+    """Force along the body's thrust axis, moment by the attitude's error on SO(3) (Lee et al., 2010).
+
+    f = (−k_x e_x − k_v e_v + g e₃ + a_d) · R e₃ over the mass, and with the inertia taken out
+    M = −k_R e_R − k_Ω e_Ω + the reference's own moment. Attitude gains are at most those that the vehicle's
+    rotors allow.
+    """
+
+    position_gain: NonNegative = 20.0  # [1/s²] k_x over the mass
+    velocity_gain: NonNegative = 8.0  # [1/s] k_v over the mass
+    attitude_gain: NonNegative = 625.0  # [1/s²] k_R over the inertia
+    rate_gain: NonNegative = 42.5  # [1/s] k_Ω over the inertia
+    max_feedback: NonNegative = 15.0  # [m/s²]
+
+    def step(
+        self, ops: Ops, model: ControllerModel, state: Any, seen: Seen, elapsed: Scalar
+    ) -> tuple[Any, Wrench]:
+        """Return the force and the moment."""
+        body, reference = seen.body, seen.reference
+        body_axes = axes(body.q_world_body)
+        e_x = subtract(body.position, reference.position)
+        e_v = subtract(body.velocity, reference.velocity)
+        feedback = scale(-1.0, add_scaled(scale(self.position_gain, e_x), self.velocity_gain, e_v))
+        demand = thrust_demand(model.airframe.mass_properties, model.environment, reference)
+        thrust = add(demand.value, clamp_norm(ops, feedback, self.max_feedback))
+        e_r = rotation_error(body_axes, axes_along(ops, thrust, reference))
+        e_omega = subtract(body.omega_body, to_body(body_axes, reference.omega))
+        k_r = ops.minimum(self.attitude_gain, 0.5 * model.gains.stiffness)
+        k_omega = ops.minimum(self.rate_gain, model.gains.damping)
+        acceleration = scale(-1.0, add_scaled(scale(k_r, e_r), k_omega, e_omega))
+        moment = moment_for(model, body_axes, reference, acceleration)
+        return state, Wrench(collective(model, body_axes, thrust), moment)

@@ -1,0 +1,69 @@
+"""A flight's thrust axis beside a direction that it is to point along, tick by tick."""
+
+from __future__ import annotations
+
+from math import inf
+from typing import NamedTuple
+
+from aerobat.kernels.gates.snapshot import Snapshot
+from aerobat.kernels.ops import Ops, Scalar, Vector, clip, magnitude, select_tree
+from aerobat.kernels.quaternions import axes
+from aerobat.kernels.vectors import add_scaled, dot, norm, subtract
+
+_STRAIGHT = 1e-12  # [-] of the cosine's curvature, less is rounding
+
+
+class Direction(NamedTuple):
+    """A direction for the thrust axis at a time."""
+
+    up: Vector  # unit vector, world
+    planned: Scalar  # [s]
+    window: Scalar  # [s] by which the thrust axis may point there earlier or later
+
+
+class Pointing(NamedTuple):
+    """The nearest that the thrust axis has come to the direction so far."""
+
+    cosine: Scalar  # [-] of the angle between them, −infinite before the window
+    time: Scalar  # [s]
+
+
+def init() -> Pointing:
+    """Return the state before the first tick."""
+    return Pointing(-inf, inf)
+
+
+def nearest(ops: Ops, direction: Direction, last: Snapshot, now: Snapshot) -> Pointing:
+    """Return the nearest between two snapshots, of thrust axes straight between them.
+
+    The cosine (p + q s) / |a + s d|, of the axes a and a + d, has one extremum along s, in closed form.
+    """
+    before, after = axes(last.q_world_body)[2], axes(now.q_world_body)[2]
+    way = subtract(after, before)
+    p, q = dot(before, direction.up), dot(way, direction.up)
+    square, slope, bend = dot(before, before), dot(before, way), dot(way, way)
+    curved = p * bend - q * slope
+    is_curved = magnitude(ops, curved) > _STRAIGHT
+    fraction = (q * square - p * slope) / ops.select(is_curved, curved, 1.0)
+    fraction = clip(ops, ops.select(is_curved, fraction, 1.0), 0.0, 1.0)
+    there = add_scaled(before, fraction, way)
+    cosine, end = dot(there, direction.up) / norm(ops, there), p + q
+    time = last.time + fraction * (now.time - last.time)
+    return select_tree(ops, cosine > end, Pointing(cosine, time), Pointing(end, now.time))
+
+
+def step(
+    ops: Ops, pointing: Pointing, direction: Direction, snapshots: tuple[Snapshot, Snapshot], counted: Scalar
+) -> Pointing:
+    """Return the nearest a tick later.
+
+    Args:
+        ops: of the arithmetic.
+        pointing: before the tick.
+        direction: where the thrust axis is to point.
+        snapshots: the last tick's and this one's, attitudes of unit length.
+        counted: true where both count.
+    """
+    here = nearest(ops, direction, *snapshots)
+    in_window = magnitude(ops, here.time - direction.planned) <= direction.window
+    return select_tree(ops, counted & in_window & (here.cosine > pointing.cosine), here, pointing)

@@ -1,0 +1,90 @@
+"""The loop's component that flies a control law: what it sees before it, rotor commands behind it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+from aerobat.control import ControlLaw, Controller, Seen
+from aerobat.kernels import control, motors
+from aerobat.kernels.control import Commands, FeatureFlags
+from aerobat.kernels.control_loops import ReferencePoint, reference_moment
+from aerobat.kernels.ops import Ops, PerRotor
+from aerobat.kernels.quaternions import axes
+from aerobat.kernels.rigid_body import Wrench
+from aerobat.kernels.vectors import subtract
+from aerobat.simulation.components import ControllerParameters, TrackingController, answering
+from aerobat.simulation.loop import Component, Signals
+
+
+class LawState(NamedTuple):
+    """State of a law from tick to tick, its commands among it."""
+
+    own: Any
+    thrusts: PerRotor  # [N] that the rotors give, by the nominal model
+    commands: Commands  # the last ones
+
+
+@dataclass(frozen=True)
+class LawController:
+    """A control law, told of the body by the observer; its input is as that of the tracking controller."""
+
+    law: ControlLaw
+    flags: FeatureFlags  # of the way from its force and moment to the rotors
+    period: int = 1
+    name: str = "controller"
+    feedthrough: bool = True
+
+    def init(
+        self, ops: Ops, parameters: ControllerParameters, inputs: ReferencePoint | tuple[()], signals: Signals
+    ) -> LawState:
+        """See `Component.init`."""
+        reference = inputs or signals["reference"]
+        body = signals["observer"].body
+        first = control.init(ops, parameters.model, body, reference)
+        own = self.law.init(ops, parameters.model, Seen(body, first.thrusts, reference))
+        return LawState(own, first.thrusts, first.commands)
+
+    def step(
+        self,
+        ops: Ops,
+        parameters: ControllerParameters,
+        state: LawState,
+        inputs: ReferencePoint | tuple[()],
+        signals: Signals,
+    ) -> LawState:
+        """See `Component.step`."""
+        model, delay = parameters
+        body, elapsed = signals["observer"].body, signals["clock"].elapsed
+        reference: ReferencePoint = inputs or signals["reference"]
+        if self.law.TAKES_DISTURBANCES and "disturbance" in signals:
+            reference = answering(reference, body, signals["disturbance"])
+        rotors = model.airframe.rotors
+        decay_factors = motors.decay_factors(ops, rotors, elapsed)
+        thrusts = motors.first_order_response(state.thrusts, state.commands.thrusts, decay_factors)
+        if not isinstance(delay, tuple):
+            body = control.predicted(ops, model, state, body, elapsed, delay)
+        own, load = self.law.step(ops, model, state.own, Seen(body, thrusts, reference), elapsed)
+        loads = load, _change_ahead(model, axes(body.q_world_body), reference)
+        commands = control.rotor_commands(ops, self.flags, model, loads, thrusts, decay_factors, elapsed)
+        return LawState(own, thrusts, commands)
+
+
+def _change_ahead(model: Any, body_axes: Any, reference: ReferencePoint) -> Wrench:
+    """The change that the reference makes of force and moment until the controller's next step."""
+    inertia, mass = model.airframe.mass_properties.inertia, model.airframe.mass_properties.mass
+    now, then = (reference_moment(inertia, body_axes, each) for each in (reference, reference.ahead))
+    return Wrench(mass * reference.ahead.thrust_change, subtract(then, now))
+
+
+def flown_by(law: ControlLaw | None, settings: Controller, period: int = 1) -> Component:
+    """Return the controller's component: of a law, or else the tracking controller.
+
+    Args:
+        law: What is flown by, if it is none of settings.
+        settings: Whose switches count.
+        period: Ticks from one step to the next.
+    """
+    if law is None:
+        return TrackingController(settings.feature_flags, period)
+    return LawController(law, settings.feature_flags, period)

@@ -1,0 +1,105 @@
+"""Attitudes of stages that flights came to: the nearest of the thrust axis about the planned instant."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields, replace
+from math import degrees
+from typing import Any
+
+import numpy as np
+
+from aerobat.arrays import Array
+from aerobat.declaration import by_value
+from aerobat.engines.components import components
+from aerobat.engines.numpy import ArrayOps
+from aerobat.kernels.gates import pointing
+from aerobat.kernels.gates.pointing import Direction, Pointing
+from aerobat.kernels.gates.snapshot import Snapshot
+from aerobat.simulation.flight import Flight
+from aerobat.simulation.outcome import Outcome
+from aerobat.simulation.passages.passage import PASSAGE_WINDOW
+from aerobat.simulation.passages.waypoint import intervals
+
+
+@by_value
+@dataclass(frozen=True, eq=False)
+class PlannedAttitude:
+    """A stage's attitude to be taken at an instant."""
+
+    stage: str
+    up: Array  # unit vector along the thrust axis, world, (3,)
+    time: float  # [s]
+    tolerance: float  # [rad] between the thrust axis and `up`, at most
+    lap: int = 1  # of a course
+
+
+@by_value
+@dataclass(frozen=True, eq=False)
+class StageAttitude:
+    """The thrust axis where it comes nearest to a stage's next to the planned instant; NaN where unknown.
+
+    Of many flights, the fields but the first three are arrays (flights,).
+    """
+
+    stage: str
+    lap: int  # of a course
+    tolerance_deg: float  # the largest angle that is allowed
+    time: float  # [s]
+    angle_deg: float  # between the thrust axis and the planned one
+    planned: float  # [s] when it was planned; NaN where the flight had ended before
+
+    def of_flight(self, k: int) -> StageAttitude:
+        """One flight's of many, in plain numbers."""
+        return replace(
+            self, **{field.name: getattr(self, field.name)[k].item() for field in fields(self)[3:]}
+        )
+
+    @property
+    def failure(self) -> tuple[Outcome, float, dict[str, object]] | None:
+        """One flight's failure, when [s], and its numbers; None where nothing is wrong, or known."""
+        if np.isnan(self.planned) or self.angle_deg <= self.tolerance_deg:
+            return None
+        angles = {"angle": self.angle_deg, "tolerance": self.tolerance_deg}
+        return Outcome.MISSED_ATTITUDE, self.planned, {"stage": self.stage, **angles}
+
+
+def stage_attitudes(planned: PlannedAttitude, found: Pointing, stop: Array) -> StageAttitude:
+    """Attitudes of many flights at one stage.
+
+    Args:
+        planned: what was to be taken.
+        found: of the vehicles, leaves (flights,).
+        stop: when flights diverged [s], NaN for those that did not, (flights,).
+    """
+    came = np.isfinite(found.time)
+    angle = np.degrees(np.arccos(np.clip(found.cosine, -1.0, 1.0)))
+    numbers: dict[str, Any] = {
+        "time": np.where(came, found.time, np.nan),
+        "angle_deg": np.where(came, angle, np.nan),
+        "planned": np.where(came | ~(stop <= planned.time), planned.time, np.nan),
+    }
+    return StageAttitude(planned.stage, planned.lap, degrees(planned.tolerance), **numbers)
+
+
+def flown_attitudes(flight: Flight, planned: tuple[PlannedAttitude, ...]) -> list[StageAttitude]:
+    """Attitudes of one flight that was logged, at its rows, fields (1,)."""
+    diverged = flight.outcome is not Outcome.COMPLETE
+    stop = np.array([flight.ends if diverged else np.nan])
+    last, now = intervals(flight)
+    return [stage_attitudes(each, _nearest(last, now, each), stop) for each in planned]
+
+
+def _nearest(last: Snapshot, now: Snapshot, planned: PlannedAttitude) -> Pointing:
+    """The nearest within the window, straight between rows, leaves (1,)."""
+    each = pointing.nearest(ArrayOps, as_direction(planned, 1), last, now)
+    in_window = np.abs(each.time - planned.time) <= PASSAGE_WINDOW
+    if not in_window.any():
+        return Pointing(np.array([-np.inf]), np.array([np.inf]))
+    k = int(np.argmax(np.where(in_window, each.cosine, -np.inf)))
+    return Pointing(each.cosine[k : k + 1], each.time[k : k + 1])
+
+
+def as_direction(planned: PlannedAttitude, vehicles: int) -> Direction:
+    """A planned attitude as kernels read it, leaves (vehicles,)."""
+    up = components(np.broadcast_to(planned.up, (vehicles, 3)))
+    return Direction(up, np.full(vehicles, planned.time), np.full(vehicles, PASSAGE_WINDOW))

@@ -1,0 +1,149 @@
+"""Control laws, ready-made and of one's own: flown by every engine, swept and judged like ours."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import aerobat as ab
+from aerobat.control import CONTROL_LAWS, Seen
+from aerobat.control.laws.lqr import regulator
+from aerobat.declaration import Positive
+from aerobat.kernels.control_loops import thrust_demand
+from aerobat.kernels.quaternions import axes
+from aerobat.kernels.rigid_body import Wrench
+from aerobat.kernels.vectors import ZERO, dot
+from command_lines import run, without_pictures
+from looping_flights import QUAD, assert_same, loops, near, one
+from refusals import complaint
+from shared_plans import shared_plan
+
+LAWS = ("lee", "lqr", "indi")
+SHORT = loops(0.3)
+GENTLE = ab.Trajectory(SHORT.durations, 0.01 * SHORT.coefficients)
+
+
+@ab.controller("thrust-alone")
+class ThrustAlone(ab.ControlLaw):
+    """The reference's thrust, and no moment."""
+
+    part: Positive = 1.0  # [-] of the thrust
+
+    def step(self, ops: Any, model: Any, state: Any, seen: Seen, elapsed: Any) -> tuple[Any, Wrench]:
+        """Return the force."""
+        demand = thrust_demand(model.airframe.mass_properties, model.environment, seen.reference)
+        thrust = dot(demand.value, axes(seen.body.q_world_body)[2])
+        return state, Wrench(self.part * model.airframe.mass_properties.mass * thrust, ZERO)
+
+
+@ab.controller("thrust-for-floats")
+class ThrustForFloats(ThrustAlone):
+    """The same, as anybody would write it."""
+
+    def step(self, ops: Any, model: Any, state: Any, seen: Seen, elapsed: Any) -> tuple[Any, Wrench]:
+        """Return the force."""
+        if self.part > 0.0 and seen.body.velocity[2] < 1e6:
+            return super().step(ops, model, state, seen, elapsed)
+        return state, Wrench(0.0, ZERO)
+
+
+@pytest.mark.parametrize("law", [*LAWS, ThrustAlone(0.9)], ids=str)
+@pytest.mark.parametrize(
+    "engine",
+    ["bytecode", *(pytest.param(name, marks=pytest.mark.slow) for name in ("numpy", "compiled", "jax"))],
+)
+def test_every_engine_flies_a_law_to_the_same_numbers(law: Any, engine: str) -> None:
+    starts = near(2)
+    flights = (ab.fly(SHORT, QUAD, start=starts, controller=law, engine=e) for e in ("floats", engine))
+    assert_same(*flights, atol=1e-9)
+
+
+@pytest.mark.parametrize("law", LAWS)
+def test_a_flight_by_a_law_is_the_same_in_a_batch_and_alone(law: str) -> None:
+    starts = near(3)
+    batch = ab.fly(SHORT, QUAD, start=starts, controller=law, engine="bytecode")
+    alone = ab.fly(SHORT, QUAD, start=one(starts, 1), controller=law, engine="bytecode")
+    assert_same(batch[1], alone)
+
+
+@pytest.mark.parametrize("law", LAWS)
+@pytest.mark.parametrize("problem", ["flip-roll", "half-flip"])
+def test_the_laws_fly_maneuvers_through_their_gates(problem: str, law: str) -> None:
+    plan = shared_plan(problem)
+    score = ab.score(ab.fly(plan, controller=law, engine="bytecode"), plan)
+    assert score.outcome is ab.Outcome.THROUGH_GATES
+    assert score.max_position_error_m < 0.002
+
+
+def test_a_law_of_ones_own_is_flown_as_itself_and_by_its_name() -> None:
+    own, named = (
+        ab.fly(GENTLE, QUAD, controller=law, engine="bytecode") for law in (ThrustAlone(), "thrust-alone")
+    )
+    assert own == named
+    weaker = ab.fly(GENTLE, QUAD, controller=ThrustAlone(part=0.9), engine="bytecode")
+    assert weaker != own
+
+
+def test_the_engine_of_floats_flies_a_law_with_branches() -> None:
+    branching = ab.fly(SHORT, QUAD, controller=ThrustForFloats(), engine="floats")
+    assert_same(branching, ab.fly(SHORT, QUAD, controller=ThrustAlone(), engine="floats"))
+
+
+def test_a_law_is_swept_under_conditions_flight_by_flight_as_it_is_flown() -> None:
+    plan, gusty = shared_plan("half-flip"), ab.Dispersion(rotor=0.05, start_position=0.02)
+    swept = ab.sweep(plan, gusty, runs=6, workers=1, controller="lqr", engine="bytecode")
+    flown = ab.fly(plan, conditions=gusty, flights=range(4, 5), controller="lqr", engine="bytecode")
+    error = ab.score(flown[0], plan).max_position_error_m
+    assert swept.table["max_position_error_m"][4] == pytest.approx(error, rel=1e-9)
+    assert swept.success.fraction == 1.0
+
+
+def test_a_slow_vehicle_is_flown_by_gains_that_its_rotors_allow() -> None:
+    plan = shared_plan("line", "crazyflie")
+    for law in LAWS:
+        flight = ab.fly(plan, controller=law, engine="bytecode")
+        assert flight.position_error.max() < 0.05, law
+
+
+def test_the_regulator_of_two_integrators_is_the_one_of_the_textbook() -> None:
+    k1, k2 = regulator((0.5, np.inf), 2.0)
+    assert (k1, k2) == pytest.approx((4.0, np.sqrt(8.0)))
+    chain = np.eye(4, k=1)
+    chain[-1] = -np.array(regulator((0.1, 0.8, 6.0, 120.0), 3000.0))
+    assert np.linalg.eigvals(chain).real.max() < -2.0
+
+
+def test_what_is_no_controller_is_refused_with_what_would_be_one() -> None:
+    plan = shared_plan("line")
+    unknown = complaint(lambda: ab.fly(plan, controller="leee"))
+    assert "no controller named 'leee'; did you mean 'lee'?" in unknown
+    wrong: Any = 3
+    assert "must be a Controller, a ControlLaw or the name of one, got 3" in complaint(
+        lambda: ab.fly(plan, controller=wrong)
+    )
+    assert "controller is a law" in complaint(lambda: ab.sensitivity(plan, "mass", controller="lee"))
+    assert {"full", "paper"}.isdisjoint(CONTROL_LAWS)
+
+
+def test_the_command_line_flies_a_law_of_a_file(tmp_path: Path, monkeypatch, capsys) -> None:
+    monkeypatch.chdir(tmp_path)
+    without_pictures(monkeypatch)
+    shared_plan("line").save("line.plan")
+    Path("mine.py").write_text(
+        "import aerobat as ab\nfrom aerobat.control.laws.lee import Lee\n\n\n"
+        '@ab.controller("lee-of-mine")\nclass Mine(Lee):\n    position_gain: float = 10.0\n'
+    )
+    code, out, err = run(capsys, "fly", "line.plan", "--import", "mine.py", "--controller", "lee-of-mine")
+    assert (code, err) == (0, "")
+    assert "lee-of-mine" in out
+    assert Path("out/line-flown-lee-of-mine/report.json").exists()
+
+
+def test_a_law_stays_as_it_was_when_it_is_replaced_in_part() -> None:
+    law = CONTROL_LAWS["lee"]()
+    assert replace(law, position_gain=1.0) != law  # type: ignore[call-arg]
+    assert replace(law) == law
