@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from math import inf, nan
+from typing import Any
 
 import numpy as np
 import pytest
@@ -66,6 +68,36 @@ def test_without_news_of_the_vehicle_the_plan_is_given_up() -> None:
     sky.run(lambda: sky.client.stage is Stage.RECOVERING)
     assert sky.since_begin < 2.0
     assert "no news of the vehicle" in sky.client.report().aborted
+
+
+def setpoint_numbers(sky: Sky) -> list[float]:
+    """All numbers of the set-points sent, but the yaw rate, which is NaN where a point's yaw counts."""
+    setpoints = [message for message in sky.cable.sent if message.get_type().startswith("SET_")]
+    names = {name for message in setpoints for name in message.fieldnames} - {"yaw_rate"}
+    return np.hstack([getattr(each, name, 0.0) for each in setpoints for name in names]).tolist()
+
+
+@pytest.mark.parametrize(
+    ("field", "value"),
+    [("x", nan), ("vy", inf), ("rollspeed", nan), ("z", 1e30), ("q", [nan] * 4), ("q", [0.0] * 4)],
+)
+@pytest.mark.parametrize("phase", [Phase.SETTLE, Phase.MANEUVER])
+def test_states_that_are_none_are_left_out_and_their_silence_ends_the_flight(
+    phase: Phase, field: str, value: float | list[float]
+) -> None:
+    """Nothing that is not finite is sent, and a vehicle that is not seen is not at rest at the start."""
+    sky = over_a_link(phase=phase)
+
+    def change(message: Any) -> list[Any]:
+        if message.get_type() == "ODOMETRY":
+            setattr(message, field, value)
+        return [message]
+
+    sky.cable.change = change
+    sky.run(lambda: sky.client.stage is Stage.RECOVERING, limit=1.5)
+    assert "no news of the vehicle" in sky.client.report().aborted
+    assert any("states are left out that are not finite" in sentence for sentence in sky.said)
+    assert np.isfinite(setpoint_numbers(sky)).all()
 
 
 @pytest.mark.slow

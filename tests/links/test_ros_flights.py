@@ -5,6 +5,7 @@ from __future__ import annotations
 import subprocess
 import sys
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -322,6 +323,22 @@ def test_without_odometry_goals_stop_and_the_vehicle_hovers_by_itself() -> None:
     assert sky.call("land").success
     sky.run(lambda: sky.vehicle.landed)
     assert not sky.vehicle.crashed
+
+
+def test_odometry_that_is_not_finite_is_left_out_and_its_silence_ends_the_maneuver() -> None:
+    sky = at_the_flips_begin()
+    sky.run_into_the_plan(0.3)
+
+    def change(message: Any) -> list[Any]:
+        message.pose.pose.position.x = np.nan
+        return [message]
+
+    sky.graph.change[topics.ODOMETRY] = change
+    sky.run(lambda: bool(sky.reports), limit=1.0)
+    assert "no news of the vehicle" in sky.reports[0]
+    assert sum("odometry is left out that is not finite" in sentence for sentence in sky.said) == 1
+    sky.run_for(3.0)
+    assert sky.hovers
 
 
 @pytest.mark.slow

@@ -3,14 +3,10 @@
 from __future__ import annotations
 
 from collections import deque
-from math import inf, nan
+from math import inf, isfinite, nan
 from typing import Any
 
-import numpy as np
-
-from aerobat import so3
-from aerobat.kernels.rigid_body import Body
-from aerobat.links.goals import AttitudeGoal, Mode, Observed, PositionGoal
+from aerobat.links.goals import AttitudeGoal, Mode, Observed, PositionGoal, observed
 from aerobat.links.mavlink.connection import Connection, dialect
 from aerobat.links.mavlink.frames import swap_attitude, swap_body, swap_world, swap_yaw
 from aerobat.links.mavlink.modes import ARMED, CUSTOM_MODE_ENABLED, MAIN_AND_SUB, mode_of
@@ -45,7 +41,8 @@ class AutopilotLink:
         self.landed: bool | None = None
         self.observed: Observed | None = None
         self.parameters: dict[str, float] = {}
-        self.told: list[str] = []
+        self.told: list[str] = []  # sentences for whoever listens, who empties it
+        self._left_out: set[str] = set()  # why states were, each told once
 
     @property
     def is_known(self) -> bool:
@@ -159,21 +156,32 @@ class AutopilotLink:
             self._times.append((self._now - sent, 1e-9 * message.tc1 - 0.5 * (self._now + sent)))
 
     def _take_param_value(self, message: Any) -> None:
-        self.parameters[str(message.param_id)] = float(message.param_value)
+        if isfinite(message.param_value):
+            self.parameters[str(message.param_id)] = float(message.param_value)
 
     def _take_statustext(self, message: Any) -> None:
-        self.told.append(str(message.text))
+        self.told.append(f"the vehicle: {message.text}")
 
     def _odometry(self, message: Any) -> list[Observed]:
-        """A state, by our clock; nothing before that of the vehicle is known."""
+        """A state, by our clock; nothing before that of the vehicle is known, nor what cannot be one."""
         if not self.is_synchronized:
             return []
         _, offset = min(self._times)
-        q = swap_attitude(tuple(message.q))
-        velocity_body = swap_body((message.vx, message.vy, message.vz))
-        velocity = so3.rotate(np.array(q), np.array(velocity_body))
-        rates = swap_body((message.rollspeed, message.pitchspeed, message.yawspeed))
-        place = swap_world((message.x, message.y, message.z))
-        x, y, z = velocity.tolist()
-        self.observed = Observed(1e-6 * message.time_usec - offset, Body(place, (x, y, z), q, rates))
-        return [self.observed]
+        seen = observed(
+            1e-6 * message.time_usec - offset,
+            swap_world((message.x, message.y, message.z)),
+            swap_attitude(tuple(message.q)),
+            swap_body((message.vx, message.vy, message.vz)),
+            swap_body((message.rollspeed, message.pitchspeed, message.yawspeed)),
+        )
+        if seen is None:
+            self._leave_out("not finite, or their attitude is no unit quaternion")
+            return []
+        self.observed = seen
+        return [seen]
+
+    def _leave_out(self, reason: str) -> None:
+        """Tell once that states of a kind are left out."""
+        if reason not in self._left_out:
+            self._left_out.add(reason)
+            self.told.append(f"states are left out that are {reason}")

@@ -117,7 +117,7 @@ class Client:
         if self.mission.phase is Phase.MANEUVER:
             self.log += seen
         for sentence in self.link.told:
-            self._say(f"the vehicle: {sentence}")
+            self._say(sentence)
         self.link.told.clear()
         getattr(self, f"_while_{self.stage.name.lower()}")(now)
 
