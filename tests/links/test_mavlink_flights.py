@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from copy import copy
 from dataclasses import replace
 from math import inf, nan
 from typing import Any
@@ -98,6 +99,41 @@ def test_states_that_are_none_are_left_out_and_their_silence_ends_the_flight(
     assert "no news of the vehicle" in sky.client.report().aborted
     assert any("states are left out that are not finite" in sentence for sentence in sky.said)
     assert np.isfinite(setpoint_numbers(sky)).all()
+
+
+def test_states_that_come_twice_late_or_from_the_future_change_nothing() -> None:
+    """The log stays in order of time, and the report is that of a good flight."""
+    sky = over_a_link()
+    kept: list[Any] = []
+
+    def change(message: Any) -> list[Any]:
+        if message.get_type() != "ODOMETRY":
+            return [message]
+        kept.append(message)
+        ahead = copy(message)
+        ahead.time_usec += 10**12
+        return [message, ahead, message, kept[-20:][0]]
+
+    sky.cable.change = change
+    sky.run(lambda: sky.client.mission.phase is Phase.HOLD)
+    assert (np.diff([seen.time for seen in sky.client.log]) > 0.0).all()
+    report = sky.client.report()
+    assert not report.failures, str(report)
+    assert report.max_position_error_m == pytest.approx(max(sky.errors), abs=0.02)
+
+
+def test_a_state_from_the_future_leaves_the_watch_for_silence_on() -> None:
+    sky = over_a_link()
+    sky.run_into_the_plan(0.5)
+
+    def change(message: Any) -> list[Any]:
+        if message.get_type() == "ODOMETRY":
+            message.time_usec += 10**12
+        return [message]
+
+    sky.cable.change = change
+    sky.run(lambda: sky.client.stage is Stage.RECOVERING, limit=0.5)
+    assert "no news of the vehicle" in sky.client.report().aborted
 
 
 @pytest.mark.slow

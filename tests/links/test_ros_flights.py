@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import subprocess
 import sys
+from copy import deepcopy
 from dataclasses import replace
 from typing import Any
 
@@ -339,6 +340,24 @@ def test_odometry_that_is_not_finite_is_left_out_and_its_silence_ends_the_maneuv
     assert sum("odometry is left out that is not finite" in sentence for sentence in sky.said) == 1
     sky.run_for(3.0)
     assert sky.hovers
+
+
+def test_odometry_that_is_stamped_later_than_now_is_left_out_and_told_once() -> None:
+    sky = at_the_flips_begin()
+    sky.run_into_the_plan(0.3)
+
+    def change(message: Any) -> list[Any]:
+        ahead = deepcopy(message)
+        ahead.header.stamp.sec += 10**6
+        return [ahead, message, ahead]
+
+    sky.graph.change[topics.ODOMETRY] = change
+    sky.run_for(0.2)
+    assert sum("odometry is left out that is stamped later" in sentence for sentence in sky.said) == 1
+    assert not sky.reports
+    sky.graph.cut.add(topics.ODOMETRY)
+    sky.run(lambda: bool(sky.reports), limit=0.4)
+    assert "no news of the vehicle" in sky.reports[0]
 
 
 @pytest.mark.slow

@@ -17,6 +17,7 @@ _GROUND_STATION = 8  # the autopilot number of who is none
 _ASK_AGAIN = 0.3  # [s] from an order to the same again, where it is not obeyed
 _SYNCHRONIZE = 0.1  # [s] between questions for the time
 _SYNCHRONIZATIONS = 50  # of which the quickest counts
+_MAX_AHEAD = 0.02  # [s] beside that by which states may be stamped ahead
 
 
 class AutopilotLink:
@@ -163,7 +164,11 @@ class AutopilotLink:
         self.told.append(f"the vehicle: {message.text}")
 
     def _odometry(self, message: Any) -> list[Observed]:
-        """A state, by our clock; nothing before that of the vehicle is known, nor what cannot be one."""
+        """Return a state by our clock, if it is newer than the last and can be one.
+
+        Nothing is returned before the vehicle's clock is known. Where a message takes longer one way than the
+        other, states are stamped ahead by up to half a round trip.
+        """
         if not self.is_synchronized:
             return []
         _, offset = min(self._times)
@@ -177,6 +182,11 @@ class AutopilotLink:
         if seen is None:
             self._leave_out("not finite, or their attitude is no unit quaternion")
             return []
+        if seen.time > self._now + self.delay + _MAX_AHEAD:
+            self._leave_out("stamped later than now")
+            return []
+        if self.observed is not None and seen.time <= self.observed.time:
+            return []  # one that was overtaken, or a copy
         self.observed = seen
         return [seen]
 

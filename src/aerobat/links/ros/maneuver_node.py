@@ -27,6 +27,7 @@ from aerobat.problem import Problem
 from aerobat.vehicle import Vehicle
 
 _DELETE_ALL = 3  # what a marker does to those before it
+_MAX_AHEAD = 0.1  # [s] by which another machine's clock may be ahead of ours
 _SHOWN_EVERY = 0.15  # [s] between snapshots of the vehicle along a path that is shown
 _SHOWN_RATE = 50.0  # [1/s] of the points of a path that is shown
 
@@ -125,6 +126,8 @@ class ManeuverNode:
         seen = topics.read_odometry(message, self.origin)
         if seen is None:
             self._leave_out("is not finite, or its attitude no unit quaternion; see to the estimator")
+        elif seen.time > (self._ros.time() - self.origin) / NANOSECONDS + _MAX_AHEAD:
+            self._leave_out("is stamped later than now; set the clocks alike")
         else:
             self.commander.observe(seen)
 
