@@ -136,6 +136,25 @@ def test_a_state_from_the_future_leaves_the_watch_for_silence_on() -> None:
     assert "no news of the vehicle" in sky.client.report().aborted
 
 
+@pytest.mark.parametrize("ahead", [0.1, 1000.0])
+def test_answers_that_another_client_asked_for_tell_nothing_of_the_time(ahead: float) -> None:
+    """Its clock is ahead of ours by so long [s]; a round trip that is negative would be the shortest."""
+    sky = over_a_link(phase=Phase.SETTLE)
+
+    def change(message: Any) -> list[Any]:
+        if message.get_type() != "TIMESYNC":
+            return [message]
+        foreign = copy(message)
+        foreign.ts1 = round(1e9 * (sky.clock.now() - 0.04 + ahead))
+        return [foreign, message]
+
+    sky.cable.change = change
+    sky.run(lambda: sky.client.mission.phase is Phase.HOLD, limit=8.0)
+    report = sky.client.report()
+    assert not report.failures, str(report)
+    assert report.delay_s == pytest.approx(0.02, abs=0.006)
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("cut", ["receives", "sends", "both"])
 def test_a_link_that_is_cut_in_mid_flip_gives_it_up_and_lands_once_it_is_back(cut: str) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import deque
 from math import inf, isfinite, nan
+from random import randrange
 from typing import Any
 
 from aerobat.links.goals import AttitudeGoal, Mode, Observed, PositionGoal, observed
@@ -35,6 +36,8 @@ class AutopilotLink:
         self._interval = 1e6 / telemetry_rate
         self._system = 0
         self._sent: dict[object, float] = {}  # [s] when an order, or a question, was sent last
+        self._mark = randrange(10**6)  # [ns] by which our questions for the time differ from others'
+        self._asked: dict[int, float] = {}  # [s] when those were asked that are unanswered
         self._times: deque[tuple[float, float]] = deque(maxlen=_SYNCHRONIZATIONS)  # [s] round trip, offset
         self._now = 0.0
         self.mode: Mode | None = None
@@ -76,7 +79,7 @@ class AutopilotLink:
             self._send("heartbeat", 18, _GROUND_STATION, 0, 0, 4, 3)
         if self.is_known:
             if self._again("time", _SYNCHRONIZE):
-                self._send("timesync", 0, round(1e9 * now))
+                self._ask_time()
             if self.observed is None or now - self.observed.time > 1.0:
                 self.command(511, self._mavlink.MAVLink_odometry_message.id, self._interval)
         return seen
@@ -151,9 +154,16 @@ class AutopilotLink:
     def _take_extended_sys_state(self, message: Any) -> None:
         self.landed = message.landed_state == 1
 
+    def _ask_time(self) -> None:
+        """Ask for the time, by a number that no other client's question has."""
+        question = round(1e9 * self._now) + self._mark
+        self._asked = dict([*self._asked.items(), (question, self._now)][-_SYNCHRONIZATIONS:])
+        self._send("timesync", 0, question)
+
     def _take_timesync(self, message: Any) -> None:
-        if message.tc1 > 0:
-            sent = 1e-9 * message.ts1
+        """Take the answer to a question of ours; those to other clients come here too."""
+        sent = self._asked.pop(message.ts1, None)
+        if sent is not None and message.tc1 > 0:
             self._times.append((self._now - sent, 1e-9 * message.tc1 - 0.5 * (self._now + sent)))
 
     def _take_param_value(self, message: Any) -> None:
