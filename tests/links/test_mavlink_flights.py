@@ -14,6 +14,7 @@ import aerobat as ab
 from aerobat.errors import SpecError
 from aerobat.links.goals import Mode
 from aerobat.links.mavlink.client import ClientSettings, Stage
+from aerobat.links.mavlink.connection import dialect
 from aerobat.links.mission import MissionSettings, Phase, require_flyable
 from mavlink_sky import ORIGIN, Sky, flip, over_a_link
 
@@ -248,6 +249,45 @@ def test_a_vehicle_that_says_not_where_it_hovers_is_asked_of_the_user() -> None:
     told = Sky(settings=ClientSettings(hover_thrust=1.0 / 3.3))
     del told.front_end.parameters["MPC_THR_HOVER"]
     told.run(lambda: told.client.stage is Stage.FLYING)
+
+
+def with_a_second_system(sky: Sky) -> Sky:
+    """A flight beside another system's autopilot, number 7, disarmed, whose heartbeats come first."""
+
+    def change(message: Any) -> list[Any]:
+        if message.get_type() != "HEARTBEAT":
+            return [message]
+        foreign = dialect().MAVLink_heartbeat_message(2, 12, 81, 1 << 16, 3, 3)
+        foreign._header = replace_system(message._header, 7)
+        return [foreign, message]
+
+    sky.cable.change = change
+    return sky
+
+
+def replace_system(header: Any, system: int) -> Any:
+    """A message's header as another system would send it."""
+    changed = copy(header)
+    changed.srcSystem = system
+    return changed
+
+
+def test_of_two_systems_none_is_flown_unless_it_is_named() -> None:
+    sky = with_a_second_system(Sky())
+    with pytest.raises(SpecError, match=r"^the systems 1 and 7 answer; name the vehicle's by --system$"):
+        sky.run(lambda: sky.client.done)
+    assert not sky.vehicle.armed
+    named = with_a_second_system(Sky(settings=ClientSettings(system=1)))
+    named.run(lambda: named.client.mission.phase is Phase.APPROACH)
+    absent = with_a_second_system(Sky(settings=ClientSettings(system=2, wait=2.0)))
+    with pytest.raises(SpecError, match=r"^system 2 does not answer within 2 s; those heard are: 1, 7$"):
+        absent.run(lambda: absent.client.done)
+
+
+def test_a_second_system_that_comes_in_flight_is_not_listened_to() -> None:
+    sky = with_a_second_system(over_a_link())
+    sky.run(lambda: sky.client.mission.phase is Phase.HOLD)
+    assert not sky.client.report().failures
 
 
 def test_a_vehicle_that_cannot_be_armed_is_told_in_a_sentence() -> None:

@@ -59,7 +59,9 @@ def mavlink(
                 max_silence=options.max_silence,
                 max_lateness=options.max_lateness,
             ),
-            settings=ClientSettings(options.rate, wait=options.wait, hover_thrust=options.hover_thrust),
+            settings=ClientSettings(
+                options.rate, wait=options.wait, hover_thrust=options.hover_thrust, system=options.system
+            ),
             say=say,
             announcement=str(recoveries(found, ground=-offset[2])),
         )

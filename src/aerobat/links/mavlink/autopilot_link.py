@@ -24,17 +24,20 @@ _MAX_AHEAD = 0.02  # [s] beside that by which states may be stamped ahead
 class AutopilotLink:
     """An autopilot at the other end of a connection."""
 
-    def __init__(self, connection: Connection, telemetry_rate: float) -> None:
+    def __init__(self, connection: Connection, telemetry_rate: float, system: int | None = None) -> None:
         """Prepare to talk.
 
         Args:
             connection: the way to it.
             telemetry_rate: of its state, as it is asked for [1/s].
+            system: its number; None for the first that is heard.
         """
         self._connection = connection
         self._mavlink = dialect()
         self._interval = 1e6 / telemetry_rate
-        self._system = 0
+        self._wanted = system
+        self._system: int | None = None  # of the autopilot, once it has answered
+        self.systems: set[int] = set()  # of all autopilots that are heard
         self._sent: dict[object, float] = {}  # [s] when an order, or a question, was sent last
         self._mark = randrange(10**6)  # [ns] by which our questions for the time differ from others'
         self._asked: dict[int, float] = {}  # [s] when those were asked that are unanswered
@@ -51,7 +54,7 @@ class AutopilotLink:
     @property
     def is_known(self) -> bool:
         """True once it has answered."""
-        return self._system != 0
+        return self._system is not None
 
     @property
     def is_synchronized(self) -> bool:
@@ -129,13 +132,15 @@ class AutopilotLink:
         )
 
     def _is_ours(self, message: Any) -> bool:
-        """True for messages of the autopilot, the first that is heard."""
+        """True for messages of the autopilot: the one that is wanted, or the first that is heard."""
         if message.get_srcComponent() != _AUTOPILOT:
             return False
-        beats = message.get_type() == "HEARTBEAT" and message.autopilot != _GROUND_STATION
-        if beats and not self.is_known:
-            self._system = message.get_srcSystem()
-        return bool(message.get_srcSystem() == self._system)
+        system: int = message.get_srcSystem()
+        if message.get_type() == "HEARTBEAT" and message.autopilot != _GROUND_STATION:
+            self.systems.add(system)
+            if not self.is_known and self._wanted in (None, system):
+                self._system = system
+        return system == self._system
 
     def _again(self, order: object, every: float = _ASK_AGAIN) -> bool:
         """True where something was not sent for so long [s]; then it counts as sent now."""

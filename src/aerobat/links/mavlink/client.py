@@ -51,6 +51,7 @@ class ClientSettings:
     telemetry_rate: float = 100.0  # [1/s] of states, as the vehicle is asked for them
     wait: float = 10.0  # [s] for a vehicle to answer
     hover_thrust: float | None = None  # [-] where the vehicle does not say it
+    system: int | None = None  # the number of the vehicle among MAVLink's systems; None for the only one
 
 
 class Client:
@@ -84,7 +85,7 @@ class Client:
         stream = SetpointStream(plan.trajectory, plan.vehicle, environment, offset)
         self.mission = Mission(plan, mission, stream, PathFollower(stream, plan.vehicle, environment))
         self._plan, self._offset = plan, offset
-        self.link = AutopilotLink(connection, settings.telemetry_rate)
+        self.link = AutopilotLink(connection, settings.telemetry_rate, settings.system)
         self.stage = Stage.CONNECTING
         self.log: list[Observed] = []  # while the plan was flown
         self.settings = settings
@@ -157,12 +158,22 @@ class Client:
         if self.link.is_known:
             self._enter(Stage.ASKING, now)
         elif self._since(now) > self.settings.wait:
-            raise SpecError(
-                f"no vehicle answers within {self.settings.wait:g} s; check the address, and that it is on"
-            )
+            waited, heard = f"{self.settings.wait:g} s", ", ".join(map(str, sorted(self.link.systems)))
+            if heard:
+                raise SpecError(
+                    f"system {self.settings.system} does not answer within {waited}; those heard are: {heard}"
+                )
+            raise SpecError(f"no vehicle answers within {waited}; check the address, and that it is on")
+
+    def _require_one_system(self) -> None:
+        """Raise SpecError where there are several autopilots and none is named."""
+        if self.settings.system is None and len(self.link.systems) > 1:
+            numbers = " and ".join(map(str, sorted(self.link.systems)))
+            raise SpecError(f"the systems {numbers} answer; name the vehicle's by --system")
 
     def _while_asking(self, now: float) -> None:
         """Wait for its clock, its state and its hovering thrust, and see that it is the plan's vehicle."""
+        self._require_one_system()
         hover = self.settings.hover_thrust or self.link.parameters.get(HOVER_THRUST)
         if hover is None:
             self.link.ask_parameter(HOVER_THRUST)
@@ -197,7 +208,9 @@ class Client:
         """Stream where it stands, as PX4 asks before it obeys; then take the mode, then arm."""
         assert self._ground is not None, "its state is known"
         self.link.follow(self._ground, self._max_thrust)
-        if self._since(now) > _STREAMED:
+        if self._since(now) <= _STREAMED:
+            self._require_one_system()
+        else:
             self.link.set_mode(Mode.OFFBOARD)
             if self.link.mode is Mode.OFFBOARD:
                 self.link.arm()
