@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from copy import copy
 from dataclasses import replace
 from math import inf, nan
@@ -288,6 +289,72 @@ def test_a_second_system_that_comes_in_flight_is_not_listened_to() -> None:
     sky = with_a_second_system(over_a_link())
     sky.run(lambda: sky.client.mission.phase is Phase.HOLD)
     assert not sky.client.report().failures
+
+
+def changing(kind: str, **fields: Any) -> Callable[[Any], list[Any]]:
+    """Give fields of one kind of message other values."""
+
+    def change(message: Any) -> list[Any]:
+        if message.get_type() == kind:
+            for name, value in fields.items():
+                setattr(message, name, value)
+        return [message]
+
+    return change
+
+
+def test_a_vehicle_that_says_it_was_disarmed_in_flight_is_told_to_hover_and_land() -> None:
+    sky = over_a_link()
+    sky.run_into_the_plan(0.2)
+    sky.cable.change = changing("HEARTBEAT", base_mode=1)
+    sky.run(lambda: sky.client.stage is Stage.RECOVERING, limit=1.0)
+    assert sky.client.report().aborted == "the vehicle was disarmed"
+    sky.run(lambda: sky.vehicle.mode is Mode.HOLD, limit=0.2)
+
+
+@pytest.mark.slow
+def test_a_vehicle_that_is_not_seen_after_an_abort_is_told_to_land_and_does() -> None:
+    sky = over_a_link()
+    sky.cable.change = changing("ODOMETRY", vx=nan)
+    sky.run(lambda: sky.client.done)
+    assert "no news of the vehicle; it is told to land" in sky.said
+    assert sky.client.stage is Stage.LANDED
+    assert sky.vehicle.landed
+    assert not sky.vehicle.crashed
+
+
+@pytest.mark.slow
+def test_a_vehicle_that_seems_to_move_after_an_abort_is_told_to_land_all_the_same() -> None:
+    sky = over_a_link()
+    sky.run_into_the_plan(0.2)
+    sky.client.abort(sky.clock.now(), "enough")
+    sky.cable.change = changing("ODOMETRY", vx=1.0)
+    sky.run(lambda: sky.client.done, limit=100.0)
+    assert "the vehicle does not come to a hover; it is told to land" in sky.said
+    assert sky.client.stage is Stage.LANDED
+
+
+@pytest.mark.slow
+def test_a_vehicle_that_does_not_land_is_left_with_a_sentence() -> None:
+    sky = over_a_link()
+    sky.run_into_the_plan(0.2)
+    sky.client.abort(sky.clock.now(), "enough")
+    sky.vehicle.land = lambda: False  # type: ignore[method-assign]
+    sky.run(lambda: sky.client.done, limit=120.0)
+    assert sky.said[-1] == "the vehicle does not land as it is told; it is left to its own failsafe"
+    assert sky.client.stage is Stage.LOST
+    assert sky.hovers
+
+
+def test_a_pilot_who_takes_over_after_an_abort_is_not_interfered_with() -> None:
+    sky = over_a_link()
+    sky.run_into_the_plan(0.2)
+    sky.client.abort(sky.clock.now(), "enough")
+    sky.run_for(0.1)
+    sky.cable.change = changing("HEARTBEAT", custom_mode=1 << 16)
+    sky.run(lambda: sky.client.stage is Stage.LOST, limit=1.0)
+    assert sky.said[-1] == "a pilot has taken over; it is left to the pilot"
+    assert sky.client.report().aborted == "enough"
 
 
 def test_a_vehicle_that_cannot_be_armed_is_told_in_a_sentence() -> None:

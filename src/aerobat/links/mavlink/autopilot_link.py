@@ -43,6 +43,7 @@ class AutopilotLink:
         self._asked: dict[int, float] = {}  # [s] when those were asked that are unanswered
         self._times: deque[tuple[float, float]] = deque(maxlen=_SYNCHRONIZATIONS)  # [s] round trip, offset
         self._now = 0.0
+        self.heard = -inf  # [s] when the last message came
         self.mode: Mode | None = None
         self.armed = False
         self.landed: bool | None = None
@@ -73,6 +74,7 @@ class AutopilotLink:
         for message in self._connection.receive():
             if not self._is_ours(message):
                 continue
+            self.heard = now
             if message.get_type() == "ODOMETRY":
                 seen += self._odometry(message)
             take = getattr(self, f"_take_{message.get_type().lower()}", None)

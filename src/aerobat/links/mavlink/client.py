@@ -28,6 +28,9 @@ _STREAMED = 1.2  # [s] of set-points before PX4 takes the mode offboard
 _PATIENCE = 8.0  # [s] for a vehicle to do as it is told
 _HOVERING = 3.0  # [s] of hover after an abort, before it lands
 _STILL = 0.3  # [m/s] of a hover
+_SILENCE = 10.0  # [s] without news after an abort, after which the vehicle is told to land, or given up
+_RECOVERY = 60.0  # [s] for coming to a hover, and for a landing beside its way down
+_SLOWEST_DESCENT = 0.2  # [m/s] of a landing
 
 
 class Stage(StrEnum):
@@ -126,8 +129,7 @@ class Client:
         """Give the flight up: the vehicle is told to hover, then to land."""
         if self.stage is Stage.FLYING:
             self.mission.abort(now, reason)
-            self._enter(Stage.RECOVERING, now)
-            self._say(f"aborted: {self.mission.reason}; the vehicle is told to hover")
+            self._recover(now)
 
     def report(self) -> LinkReport:
         """What the flight came to."""
@@ -225,46 +227,81 @@ class Client:
     def _while_flying(self, now: float) -> None:
         phase = self.mission.phase
         goal = self.mission.step(now, self._observed, self.link.delay)
-        if self.link.mode is not Mode.OFFBOARD and self.mission.phase is not Phase.LAND:
-            mode = "a mode of a pilot's" if self.link.mode is None else f"the mode {self.link.mode}"
-            self.mission.abort(now, f"the vehicle went into {mode}")
+        if self.mission.phase is not Phase.LAND:
+            self._watch_vehicle(now)
         if self.mission.phase is not phase:
             self._say(str(self.mission.phase))
-        if self.mission.phase is Phase.ABORTED and self.link.mode is None:
-            self._say(f"aborted: {self.mission.reason}; it is left to the pilot")
-            self._enter(Stage.LOST, now)
-        elif self.mission.phase is Phase.ABORTED:
-            self._say(f"aborted: {self.mission.reason}; the vehicle is told to hover")
-            self._enter(Stage.RECOVERING, now)
-            self._while_recovering(now)
+        if self.mission.phase is Phase.ABORTED:
+            self._recover(now)
         elif self.mission.phase is Phase.LAND:
-            self._enter(Stage.LANDING, now)
-            self._while_landing(now)
+            self._land(now)
         elif goal is not None:
             self.link.follow(goal, self._max_thrust)
 
+    def _watch_vehicle(self, now: float) -> None:
+        """Abort where the vehicle no longer obeys."""
+        if self.link.mode is not Mode.OFFBOARD:
+            mode = "a mode of a pilot's" if self.link.mode is None else f"the mode {self.link.mode}"
+            self.mission.abort(now, f"the vehicle went into {mode}")
+        elif not self.link.armed:
+            self.mission.abort(now, "the vehicle was disarmed")
+
+    def _recover(self, now: float) -> None:
+        self._say(f"aborted: {self.mission.reason}; the vehicle is told to hover")
+        self._enter(Stage.RECOVERING, now)
+        self._while_recovering(now)
+
     def _while_recovering(self, now: float) -> None:
-        """Have it hover, and once it has for a while, land."""
+        """Have it hover; once it has for a while, or is not seen to, have it land."""
+        if self._yields(now):
+            return
         self.link.set_mode(Mode.HOLD)
-        is_still = hypot(*self._observed.body.velocity) < _STILL and self.link.mode is Mode.HOLD
-        self._hovering_since = min(self._hovering_since, now) if is_still else inf
-        if now - self._hovering_since > _HOVERING or (self.link.landed and not self.link.armed):
-            self._enter(Stage.LANDING, now)
-        elif self._since(now) > 60.0:
-            self._enter(Stage.LOST, now)
-        self._give_up_where_silent(now)
+        silence = now - self._observed.time
+        is_still = hypot(*self._observed.body.velocity) < _STILL
+        is_seen = silence < self.mission.settings.max_silence_outside
+        hovers = is_still and is_seen and self.link.mode is Mode.HOLD
+        self._hovering_since = min(self._hovering_since, now) if hovers else inf
+        if silence > _SILENCE:
+            self._land(now, "no news of the vehicle")
+        elif now - self._hovering_since > _HOVERING or self._is_down:
+            self._land(now)
+        elif self._since(now) > _RECOVERY:
+            self._land(now, "the vehicle does not come to a hover")
+
+    def _land(self, now: float, reason: str = "") -> None:
+        """Have it land, for a reason that is told."""
+        if reason:
+            self._say(f"{reason}; it is told to land")
+        self._enter(Stage.LANDING, now)
+        self._while_landing(now)
 
     def _while_landing(self, now: float) -> None:
-        self.link.set_mode(Mode.LAND)
-        if self.link.landed and not self.link.armed:
+        """Have it land until it has, a pilot takes over, or there is no hope."""
+        height = max(self._observed.body.position[2], 0.0)
+        if self._is_down:
             self._enter(Stage.LANDED, now)
             self._say("landed")
-        self._give_up_where_silent(now)
+        elif not self._yields(now):
+            self.link.set_mode(Mode.LAND)
+            if now - max(self.link.heard, self._began or 0.0) > _SILENCE:
+                self._lose(now, "no news of the vehicle")
+            elif self._since(now) > _RECOVERY + height / _SLOWEST_DESCENT:
+                self._lose(now, "the vehicle does not land as it is told")
 
-    def _give_up_where_silent(self, now: float) -> None:
-        if now - self._observed.time > self.settings.wait:
-            self._enter(Stage.LOST, now)
-            self._say("no news of the vehicle; it is left to its own failsafe")
+    @property
+    def _is_down(self) -> bool:
+        return bool(self.link.landed) and not self.link.armed
+
+    def _yields(self, now: float) -> bool:
+        """True where a pilot has taken over: the vehicle is left to him."""
+        if self.link.mode is not None:
+            return False
+        self._lose(now, "a pilot has taken over", "the pilot")
+        return True
+
+    def _lose(self, now: float, reason: str, left_to: str = "its own failsafe") -> None:
+        self._enter(Stage.LOST, now)
+        self._say(f"{reason}; it is left to {left_to}")
 
 
 def run(client: Client, clock: Clock) -> None:
