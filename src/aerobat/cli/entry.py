@@ -13,7 +13,7 @@ from collections.abc import Sequence
 
 from aerobat.cli.exit_code import ExitCode
 from aerobat.cli.interrupts import interruptible
-from aerobat.cli.terminal import discard, provide_streams, say
+from aerobat.cli.terminal import discard, is_broken, provide_streams, say
 from aerobat.errors import AerobatError, Infeasible
 
 EXPLAIN = "add --explain to `aerobat plan` to try changes that would help"
@@ -47,9 +47,6 @@ def _run(arguments: Sequence[str]) -> ExitCode:
 
         code = run(arguments)
         sys.stdout.flush()
-    except BrokenPipeError:  # whoever read has enough
-        discard(sys.stdout)
-        return ExitCode.BROKEN_PIPE
     except Infeasible as error:
         say(error.with_remedy(EXPLAIN))
         return ExitCode.NO_PLAN
@@ -57,9 +54,20 @@ def _run(arguments: Sequence[str]) -> ExitCode:
         say(str(error))
         return ExitCode.BAD_INPUT
     except OSError as error:
-        if error.filename is not None:  # of a file, which is nobody's fault but ours
-            raise
-        discard(sys.stdout)
-        say(f"cannot write to standard output: {error.strerror or error}")
-        return ExitCode.BAD_INPUT
+        return _of_the_system(error)
     return code
+
+
+def _of_the_system(error: OSError) -> ExitCode:
+    """Say what the operating system refused; one who reads no further has enough."""
+    if error.filename is not None:  # of a file, which is nobody's fault but ours
+        raise error
+    reason = error.strerror or error
+    if is_broken(sys.stdout):
+        discard(sys.stdout)
+        if isinstance(error, BrokenPipeError):
+            return ExitCode.BROKEN_PIPE
+        say(f"cannot write to standard output: {reason}")
+    else:
+        say(f"the operating system refused: {reason}")
+    return ExitCode.BAD_INPUT
