@@ -364,6 +364,22 @@ def test_a_vehicle_that_cannot_be_armed_is_told_in_a_sentence() -> None:
         sky.run(lambda: sky.client.done)
 
 
+@pytest.mark.slow
+def test_a_vehicle_that_may_have_been_armed_unheard_is_told_to_land() -> None:
+    sky = Sky()
+
+    def change(message: Any) -> list[Any]:
+        is_lost = sky.vehicle.armed and message.get_type() == "HEARTBEAT"
+        return [] if is_lost else [message]
+
+    sky.cable.change = change
+    sky.run(lambda: sky.client.stage is Stage.LANDING)
+    sky.run(lambda: not sky.vehicle.armed, limit=4.0)
+    sky.run(lambda: sky.client.done)
+    report = sky.client.report()
+    assert (report.aborted, report.ended) == ("the vehicle does not tell whether it is armed", "landed")
+
+
 def test_what_is_not_proven_for_its_vehicle_is_refused() -> None:
     plan = flip()
     bare = replace(plan, vehicle=None)

@@ -43,7 +43,7 @@ class AutopilotLink:
         self._asked: dict[int, float] = {}  # [s] when those were asked that are unanswered
         self._times: deque[tuple[float, float]] = deque(maxlen=_SYNCHRONIZATIONS)  # [s] round trip, offset
         self._now = 0.0
-        self.heard = -inf  # [s] when the last message came
+        self.heard = self.beat = -inf  # [s] when the last message came, and the last heartbeat
         self.mode: Mode | None = None
         self.armed = False
         self.landed: bool | None = None
@@ -157,6 +157,7 @@ class AutopilotLink:
     def _take_heartbeat(self, message: Any) -> None:
         self.mode = mode_of(message.custom_mode)
         self.armed = bool(message.base_mode & ARMED)
+        self.beat = self._now
 
     def _take_extended_sys_state(self, message: Any) -> None:
         self.landed = message.landed_state == 1

@@ -28,6 +28,7 @@ _STREAMED = 1.2  # [s] of set-points before PX4 takes the mode offboard
 _PATIENCE = 8.0  # [s] for a vehicle to do as it is told
 _HOVERING = 3.0  # [s] of hover after an abort, before it lands
 _STILL = 0.3  # [m/s] of a hover
+_BEATS = 2.5  # [s] in which a vehicle tells whether it is armed
 _SILENCE = 10.0  # [s] without news after an abort, after which the vehicle is told to land, or given up
 _RECOVERY = 60.0  # [s] for coming to a hover, and for a landing beside its way down
 _SLOWEST_DESCENT = 0.2  # [m/s] of a landing
@@ -97,6 +98,7 @@ class Client:
         self._began: float | None = None
         self._ground: PositionGoal | None = None
         self._hovering_since = inf
+        self._lost = ""  # why the vehicle was given up before it had landed
         vehicle, gravity = plan.vehicle, environment.gravity
         self._name = vehicle.name
         self._weight = vehicle.mass * gravity
@@ -139,7 +141,7 @@ class Client:
             self.mission.stream,
             [seen._replace(time=seen.time - began) for seen in self.log],
             offset=self._offset,
-            aborted=self.mission.reason,
+            aborted=self.mission.reason or self._lost,
             ended=str(self.stage),
             delay=self.link.delay,
             late=self.mission.max_lateness,
@@ -221,7 +223,16 @@ class Client:
             self._enter(Stage.FLYING, now)
             self._say("armed")
         elif self._since(now) > _PATIENCE:
-            what = "be armed" if self.link.mode is Mode.OFFBOARD else "take the mode offboard"
+            self._give_up_arming(now)
+
+    def _give_up_arming(self, now: float) -> None:
+        """Raise SpecError; but a vehicle that may have been armed unheard is told to land."""
+        is_ordered = self.link.mode is Mode.OFFBOARD
+        if is_ordered and now - self.link.beat > _BEATS:
+            self.mission.abort(now, "the vehicle does not tell whether it is armed")
+            self._land(now, self.mission.reason)
+        else:
+            what = "be armed" if is_ordered else "take the mode offboard"
             raise SpecError(f"the vehicle does not {what}; its own ground station says why")
 
     def _while_flying(self, now: float) -> None:
@@ -290,7 +301,8 @@ class Client:
 
     @property
     def _is_down(self) -> bool:
-        return bool(self.link.landed) and not self.link.armed
+        """True of a vehicle that has landed, by what it has told since it was told what to do."""
+        return bool(self.link.landed) and not self.link.armed and self.link.beat > (self._began or 0.0)
 
     def _yields(self, now: float) -> bool:
         """True where a pilot has taken over: the vehicle is left to him."""
@@ -301,6 +313,7 @@ class Client:
 
     def _lose(self, now: float, reason: str, left_to: str = "its own failsafe") -> None:
         self._enter(Stage.LOST, now)
+        self._lost = reason
         self._say(f"{reason}; it is left to {left_to}")
 
 
