@@ -380,6 +380,35 @@ def test_a_vehicle_that_may_have_been_armed_unheard_is_told_to_land() -> None:
     assert (report.aborted, report.ended) == ("the vehicle does not tell whether it is armed", "landed")
 
 
+def test_the_simulated_vehicle_obeys_no_order_to_another_system_and_none_without_numbers() -> None:
+    sky = over_a_link(loss=0.0)
+    make = dialect()
+    for order in (
+        make.MAVLink_command_long_message(7, 1, 21, 0, *[0.0] * 7),  # land
+        make.MAVLink_set_attitude_target_message(10**9, 7, 1, 0, [1.0, 0.0, 0.0, 0.0], 0, 0, 0, 1.0),
+        *(
+            make.MAVLink_command_long_message(1, 1, number, 0, *[x] * 7)
+            for number in (176, 511, 512)
+            for x in (nan, inf)
+        ),
+    ):
+        sky.cable.send(order)
+        sky.run_for(0.04)
+    sky.run_for(0.3)
+    assert sky.vehicle.mode is Mode.OFFBOARD
+    assert max(sky.errors) < 0.04
+
+
+def test_a_set_point_stamped_far_ahead_does_not_keep_the_vehicle_from_those_after_it() -> None:
+    sky = over_a_link(loss=0.0)
+    sky.run_into_the_plan(0.3)
+    ahead = copy(sky.cable.sent[-1])
+    ahead.time_boot_ms += 10**6
+    sky.cable.send(ahead)
+    sky.run(lambda: sky.client.mission.phase is Phase.HOLD)
+    assert not sky.client.report().failures
+
+
 def test_what_is_not_proven_for_its_vehicle_is_refused() -> None:
     plan = flip()
     bare = replace(plan, vehicle=None)

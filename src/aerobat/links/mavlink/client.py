@@ -240,11 +240,12 @@ class Client:
         goal = self.mission.step(now, self._observed, self.link.delay)
         if self.mission.phase is not Phase.LAND:
             self._watch_vehicle(now)
-        if self.mission.phase is not phase:
-            self._say(str(self.mission.phase))
         if self.mission.phase is Phase.ABORTED:
             self._recover(now)
-        elif self.mission.phase is Phase.LAND:
+            return
+        if self.mission.phase is not phase:
+            self._say(str(self.mission.phase))
+        if self.mission.phase is Phase.LAND:
             self._land(now)
         elif goal is not None:
             self.link.follow(goal, self._max_thrust)
