@@ -1,4 +1,7 @@
-"""Flights with a man in the middle, over real sockets: flown well, or given up in a sentence."""
+"""Flights with a man in the middle, by MAVLink and by topics: flown well, or given up in a sentence.
+
+The scripts in `tests/support` fly as many as one likes.
+"""
 
 from __future__ import annotations
 
@@ -8,6 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import ros_man_in_the_middle
 from man_in_the_middle import Mischief, flown, flown_with
 from mavlink_sky import flip
 
@@ -24,9 +28,15 @@ def plan(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", range(10))
 def test_whatever_comes_the_end_is_a_good_flight_or_a_sentence(seed: int, plan: Path) -> None:
-    """Two hundred were flown, by this module's script."""
     flight = flown(seed, plan)
     assert not flight.wrong, str(flight)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(10))
+def test_whatever_odometry_says_a_maneuver_is_flown_well_or_given_up_in_a_sentence(seed: int) -> None:
+    verdict, told = ros_man_in_the_middle.flown(seed)
+    assert not verdict.startswith("wrong"), told
 
 
 @pytest.mark.slow
@@ -45,3 +55,15 @@ def test_a_connection_by_tcp_that_breaks_in_flight_ends_in_a_report_and_is_opene
     assert "no news of the vehicle for 0." in report["aborted"]
     assert report["ended"] == ended
     assert flight.said.strip().endswith(last)
+
+
+@pytest.mark.slow
+def test_a_flight_that_is_interrupted_ends_in_a_report_too(plan: Path) -> None:
+    flight = flown_with([Mischief("an interrupt", IN_FLIGHT, np.inf)], plan, tcp=False)
+    report = json.loads(flight.out)
+    assert (flight.code, report["aborted"], report["ended"]) == (
+        130,
+        "interrupted",
+        "hovering after the abort",
+    )
+    assert flight.said.strip().endswith("aerobat: interrupted")

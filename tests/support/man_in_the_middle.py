@@ -204,9 +204,10 @@ FAULTS: dict[str, Fault] = {
     "random messages": of_any_kind,
     **{f"a clock {shift:+g} s off": shifted(shift) for shift in (-1e6, -0.3, 0.02, 0.3, 1e6)},
 }
+MODES = ("a reboot", "a failsafe")
 BREAKS = ("the connection closed", "the connection reset")
 # what happens at an instant, or to messages of the client
-EVENTS = ("a reboot", "a failsafe", "a deaf vehicle", "orders lost", *BREAKS)
+EVENTS = (*MODES, "a deaf vehicle", "orders lost", *BREAKS)
 
 
 @dataclass
@@ -346,7 +347,8 @@ class SteppedFlight:
         self.vehicle = SimulatedVehicle(plan.vehicle, plan.problem.environment)
         self.front_end = FrontEnd(self.vehicle, middle)
         self.path: list[tuple[float, np.ndarray]] = []  # [s], [m] where it really was
-        self._pending = [each for each in middle.mischief if each.name in ("a reboot", "a failsafe")]
+        events = (each for each in middle.mischief if each.name in (*MODES, "an interrupt"))
+        self._pending = sorted(events, key=lambda each: each.begin)
 
     def now(self) -> float:
         return self.steps * STEP / 4
@@ -371,7 +373,10 @@ class SteppedFlight:
 
     def _happen(self, now: float) -> None:
         while self._pending and self._pending[0].begin <= now:
-            if self._pending.pop(0).name == "a reboot":
+            name = self._pending.pop(0).name
+            if name == "an interrupt":
+                raise KeyboardInterrupt
+            if name == "a reboot":
                 self.front_end = FrontEnd(self.vehicle, self.middle)
             self.vehicle.hold()
 
