@@ -155,7 +155,7 @@ def damaged(chance: float) -> Fault:
 
     def fault(parcel: Parcel, rng: Random) -> Iterator[Parcel]:
         data = packed(parcel)
-        if rng.random() < chance:
+        if data and rng.random() < chance:
             place = int(rng.integers(len(data)))
             junk = rng.bytes(int(rng.integers(1, 20)))
             data = [data[:place], data[:place] + junk + data[place:], data[:place] + junk][rng.integers(3)]
