@@ -360,7 +360,7 @@ def test_a_pilot_who_takes_over_after_an_abort_is_not_interfered_with() -> None:
 def test_a_vehicle_that_cannot_be_armed_is_told_in_a_sentence() -> None:
     sky = Sky()
     sky.vehicle.crashed = True
-    with pytest.raises(SpecError, match="does not be armed"):
+    with pytest.raises(SpecError, match="the vehicle does not arm"):
         sky.run(lambda: sky.client.done)
 
 

@@ -47,7 +47,7 @@ def mavlink(
     from aerobat.links.mavlink.autopilot_link import COMPONENT, SYSTEM
     from aerobat.links.mavlink.client import Client, ClientSettings, run
     from aerobat.links.mavlink.connection import connect
-    from aerobat.links.mission import MissionSettings, require_flyable
+    from aerobat.links.mission import MissionSettings, Phase, require_flyable
 
     offset = _origin(found) if options.origin is None else np.array(options.origin)
     require_flyable(found, offset, options.vehicle)
@@ -70,7 +70,7 @@ def mavlink(
         )
         run(client, WallClock(options.speed))
     except KeyboardInterrupt:
-        if client.mission.reason:
+        if client.mission.phase is not Phase.READY:
             _print(client.report(), options.json)
         raise
     finally:

@@ -98,7 +98,7 @@ class Client:
         self._began: float | None = None
         self._ground: PositionGoal | None = None
         self._hovering_since = inf
-        self._lost = ""  # why the vehicle was given up before it had landed
+        self._lost = ""  # why the vehicle was not followed to the ground
         vehicle, gravity = plan.vehicle, environment.gravity
         self._name = vehicle.name
         self._weight = vehicle.mass * gravity
@@ -132,6 +132,8 @@ class Client:
         if self.stage is Stage.FLYING:
             self.mission.abort(now, reason)
             self._recover(now)
+        else:
+            self._lost = reason
 
     def report(self) -> LinkReport:
         """What the flight came to."""
@@ -232,7 +234,7 @@ class Client:
             self.mission.abort(now, "the vehicle does not tell whether it is armed")
             self._land(now, self.mission.reason)
         else:
-            what = "be armed" if is_ordered else "take the mode offboard"
+            what = "arm" if is_ordered else "take the mode offboard"
             raise SpecError(f"the vehicle does not {what}; its own ground station says why")
 
     def _while_flying(self, now: float) -> None:
