@@ -28,7 +28,6 @@ _STREAMED = 1.2  # [s] of set-points before PX4 takes the mode offboard
 _PATIENCE = 8.0  # [s] for a vehicle to do as it is told
 _HOVERING = 3.0  # [s] of hover after an abort, before it lands
 _STILL = 0.3  # [m/s] of a hover
-_BEATS = 2.5  # [s] in which a vehicle tells whether it is armed
 _SILENCE = 10.0  # [s] without news after an abort, after which the vehicle is told to land, or given up
 _RECOVERY = 60.0  # [s] for coming to a hover, and for a landing beside its way down
 _SLOWEST_DESCENT = 0.2  # [m/s] of a landing
@@ -98,6 +97,7 @@ class Client:
         self._began: float | None = None
         self._ground: PositionGoal | None = None
         self._hovering_since = inf
+        self._refusal = ""  # why it was not begun
         self._lost = ""  # why the vehicle was not followed to the ground
         vehicle, gravity = plan.vehicle, environment.gravity
         self._name = vehicle.name
@@ -228,14 +228,12 @@ class Client:
             self._give_up_arming(now)
 
     def _give_up_arming(self, now: float) -> None:
-        """Raise SpecError; but a vehicle that may have been armed unheard is told to land."""
-        is_ordered = self.link.mode is Mode.OFFBOARD
-        if is_ordered and now - self.link.beat > _BEATS:
-            self.mission.abort(now, "the vehicle does not tell whether it is armed")
-            self._land(now, self.mission.reason)
-        else:
-            what = "arm" if is_ordered else "take the mode offboard"
-            raise SpecError(f"the vehicle does not {what}; its own ground station says why")
+        """Raise SpecError; a vehicle that was ordered to arm may have, and is told to land before."""
+        what = "arm" if self.link.mode is Mode.OFFBOARD else "take the mode offboard"
+        self._refusal = f"the vehicle does not {what}; its own ground station says why"
+        if self.link.mode is not Mode.OFFBOARD:
+            raise SpecError(self._refusal)
+        self._land(now, "the vehicle does not arm")
 
     def _while_flying(self, now: float) -> None:
         phase = self.mission.phase
@@ -292,6 +290,8 @@ class Client:
     def _while_landing(self, now: float) -> None:
         """Have it land until it has, a pilot takes over, or there is no hope."""
         height = max(self._observed.body.position[2], 0.0)
+        if self._is_down and self._refusal:
+            raise SpecError(self._refusal)
         if self._is_down:
             self._enter(Stage.LANDED, now)
             self._say("landed")
