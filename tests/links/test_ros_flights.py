@@ -361,6 +361,23 @@ def test_odometry_that_is_stamped_later_than_now_is_left_out_and_told_once() -> 
 
 
 @pytest.mark.slow
+def test_a_vehicle_whose_odometry_jumps_is_not_led_by_goals_that_jump() -> None:
+    sky = at_the_flips_begin()
+    sky.run_into_the_plan(1.2)
+
+    def change(message: Any) -> list[Any]:
+        message.pose.pose.position.x += 5.0
+        return [message]
+
+    sky.graph.change[topics.ODOMETRY] = change
+    sky.run(lambda: bool(sky.reports), limit=1.0)
+    assert "m off its path" in sky.reports[0]
+    assert any("off its goal; it is left to itself" in sentence for sentence in sky.said)
+    sky.run_for(5.0)
+    assert sky.hovers
+
+
+@pytest.mark.slow
 def test_hold_gives_a_maneuver_up_at_once() -> None:
     sky = at_the_flips_begin()
     sky.run_into_the_plan(1.2)
