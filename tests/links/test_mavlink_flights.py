@@ -21,8 +21,8 @@ from mavlink_sky import ORIGIN, Sky, flip, over_a_link
 
 
 def test_the_phases_follow_each_other_and_are_told() -> None:
-    sky = over_a_link()
-    sky.run(lambda: sky.client.mission.phase is Phase.HOLD)
+    sky = over_a_link(phase=Phase.SETTLE)
+    sky.run(lambda: sky.client.mission.phase is Phase.MANEUVER)
     expected = ["armed", "going to the plan's start", "coming to rest there", "flying the plan"]
     assert sky.said[1:5] == expected
 
