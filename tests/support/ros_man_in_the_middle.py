@@ -133,7 +133,7 @@ def flown(seed: int) -> tuple[str, str]:
             sky.run(lambda: bool(sky.reports))
         sky.run_for(3.0)
         landing = sky.call("land")
-        sky.run(lambda: sky.node.commander.doing is Doing.NOTHING or not landing.success)
+        sky.run(lambda: sky.node.commander.doing is Doing.NOTHING or not landing.success, limit=90.0)
         sky.run_for(5.0)
     except Exception:
         return "wrong", f"{told}: {traceback.format_exc()}"
