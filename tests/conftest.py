@@ -17,8 +17,6 @@ from suites import FAST, FULL, GROUPS, missing, register_profiles
 
 # long work says nothing of its progress, but where a test asks for it: no test depends on the clock
 os.environ["AEROBAT_PROGRESS"] = "1e6"
-# ffmpeg is started without a fork of Python's own, which JAX's threads, of other tests, may lock up
-os.environ["IMAGEIO_FFMPEG_NO_PREVENT_SIGINT"] = "1"
 
 SPENT = pytest.StashKey[float]()  # [s] of the processor, by a test with its fixtures
 register_profiles()

@@ -5,6 +5,7 @@ Streams of a process are what they are from its beginning; most of what is done 
 
 from __future__ import annotations
 
+import errno
 import io
 import json
 import os
@@ -70,6 +71,26 @@ def test_a_full_standard_output_is_told(command: str, monkeypatch: pytest.Monkey
         monkeypatch.setattr(sys, "stdout", full)
         assert code(*command.split()) == 2
     assert capsys.readouterr().err == TOLD
+
+
+@has_full
+def test_a_full_standard_output_that_keeps_nothing_is_told(monkeypatch: pytest.MonkeyPatch, capsys) -> None:
+    with FULL.open("wb", buffering=0) as full:
+        monkeypatch.setattr(sys, "stdout", io.TextIOWrapper(full, write_through=True))
+        assert code("vehicles") == 2
+    assert capsys.readouterr().err == TOLD
+
+
+@pytest.mark.parametrize("number", [errno.ECONNRESET, errno.EPIPE, errno.EMFILE])
+def test_an_error_of_something_else_is_not_said_to_be_of_standard_output(
+    number: int, monkeypatch: pytest.MonkeyPatch, capsys
+) -> None:
+    def refuse(*_: object) -> None:
+        raise OSError(number, os.strerror(number))
+
+    monkeypatch.setattr("aerobat.cli.app.run", refuse)
+    assert code("check", "line.plan") == 2
+    assert capsys.readouterr().err == f"aerobat: the operating system refused: {os.strerror(number)}\n"
 
 
 @has_full

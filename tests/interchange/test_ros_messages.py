@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from operator import attrgetter
 from pathlib import Path
 from typing import Any
 
@@ -87,9 +88,25 @@ def test_odometry_is_read_as_it_was_sent_its_velocities_in_the_bodys_axes(seed: 
     twist = message.twist.twist.linear
     turn = Rotation.from_quat(q[[1, 2, 3, 0]])
     np.testing.assert_allclose(turn.apply([twist.x, twist.y, twist.z]), velocity, atol=1e-12)
-    body = topics.read_odometry(message, BEGAN).body
-    for got, sent in zip(body, (position, velocity, q, omega), strict=True):
+    read = topics.read_odometry(message, BEGAN)
+    assert read is not None
+    for got, sent in zip(read.body, (position, velocity, q, omega), strict=True):
         np.testing.assert_allclose(got, sent, atol=1e-12)
+
+
+@pytest.mark.parametrize("value", [np.nan, np.inf, -1e300])
+@pytest.mark.parametrize(
+    "field",
+    [f"pose.pose.{part}" for part in ("position.x", "orientation.w")]
+    + [f"twist.twist.{part}.y" for part in ("linear", "angular")],
+)
+def test_odometry_that_is_no_vehicles_is_none(field: str, value: float) -> None:
+    level = BodyState(np.zeros(3), np.zeros(3), so3.IDENTITY, np.zeros(3))
+    message = Messages(Ros(Graph(2)).make).odometry(BEGAN, level)
+    assert topics.read_odometry(message, BEGAN) is not None
+    whole, _, last = field.rpartition(".")
+    setattr(attrgetter(whole)(message), last, value)
+    assert topics.read_odometry(message, BEGAN) is None
 
 
 @given(seed=st.integers(0, 2**32 - 1))

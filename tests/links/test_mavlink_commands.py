@@ -6,6 +6,7 @@ import json
 import re
 import signal
 import socket
+import struct
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -144,6 +145,23 @@ def test_a_port_that_is_taken_is_told(capsys) -> None:
         )
     assert code == 2
     assert re.search("cannot open .*: Address already in use", err)
+
+
+@pytest.mark.parametrize("how", ["closed", "reset"])
+def test_a_server_by_tcp_lets_the_next_client_in_where_one_has_hung_up(how: str) -> None:
+    with socket.socket(socket.AF_INET, socket.SOCK_STREAM) as probe:
+        probe.bind(("127.0.0.1", 0))
+        port = probe.getsockname()[1]
+    server = connection.connect(f"tcpin:127.0.0.1:{port}", listen=True, system=1)
+    for _ in range(3):
+        with socket.create_connection(("127.0.0.1", port)) as client:
+            server.receive()
+            server.send(dialect().MAVLink_timesync_message(1, 2))
+            assert client.recv(100)
+            if how == "reset":
+                client.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))
+        server.receive()
+    server.close()
 
 
 def test_without_pymavlink_the_command_that_installs_it_is_told(plan: Path, capsys, monkeypatch) -> None:

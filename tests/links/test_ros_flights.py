@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import subprocess
 import sys
+from copy import deepcopy
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -322,6 +324,57 @@ def test_without_odometry_goals_stop_and_the_vehicle_hovers_by_itself() -> None:
     assert sky.call("land").success
     sky.run(lambda: sky.vehicle.landed)
     assert not sky.vehicle.crashed
+
+
+def test_odometry_that_is_not_finite_is_left_out_and_its_silence_ends_the_maneuver() -> None:
+    sky = at_the_flips_begin()
+    sky.run_into_the_plan(0.3)
+
+    def change(message: Any) -> list[Any]:
+        message.pose.pose.position.x = np.nan
+        return [message]
+
+    sky.graph.change[topics.ODOMETRY] = change
+    sky.run(lambda: bool(sky.reports), limit=1.0)
+    assert "no news of the vehicle" in sky.reports[0]
+    assert sum("odometry is left out that is not finite" in sentence for sentence in sky.said) == 1
+    sky.run_for(3.0)
+    assert sky.hovers
+
+
+def test_odometry_that_is_stamped_later_than_now_is_left_out_and_told_once() -> None:
+    sky = at_the_flips_begin()
+    sky.run_into_the_plan(0.3)
+
+    def change(message: Any) -> list[Any]:
+        ahead = deepcopy(message)
+        ahead.header.stamp.sec += 10**6
+        return [ahead, message, ahead]
+
+    sky.graph.change[topics.ODOMETRY] = change
+    sky.run_for(0.2)
+    assert sum("odometry is left out that is stamped later" in sentence for sentence in sky.said) == 1
+    assert not sky.reports
+    sky.graph.cut.add(topics.ODOMETRY)
+    sky.run(lambda: bool(sky.reports), limit=0.4)
+    assert "no news of the vehicle" in sky.reports[0]
+
+
+@pytest.mark.slow
+def test_a_vehicle_whose_odometry_jumps_is_not_led_by_goals_that_jump() -> None:
+    sky = at_the_flips_begin()
+    sky.run_into_the_plan(1.2)
+
+    def change(message: Any) -> list[Any]:
+        message.pose.pose.position.x += 5.0
+        return [message]
+
+    sky.graph.change[topics.ODOMETRY] = change
+    sky.run(lambda: bool(sky.reports), limit=1.0)
+    assert "m off its path" in sky.reports[0]
+    assert any("off its goal; it is left to itself" in sentence for sentence in sky.said)
+    sky.run_for(5.0)
+    assert sky.hovers
 
 
 @pytest.mark.slow

@@ -29,15 +29,22 @@ def flip() -> ab.Plan:
 
 
 @cache
-def _at_the_plans_begin(loss: float, delay: float) -> Sky:
-    sky = Sky(loss=loss, delay=delay)
-    sky.run(lambda: sky.client.mission.phase is Phase.MANEUVER)
+def _reached(phase: Phase, loss: float, delay: float) -> Sky:
+    """A flight whose mission is just in a phase, SETTLE or MANEUVER."""
+    before = phase is Phase.SETTLE
+    sky = Sky(loss=loss, delay=delay) if before else _reached(Phase.SETTLE, loss, delay).branched()
+    sky.run(lambda: sky.client.mission.phase is phase)
     return sky
 
 
-def over_a_link(loss: float = 0.01, delay: float = 0.02, settings: MissionSettings | None = None) -> Sky:
+def over_a_link(
+    loss: float = 0.01,
+    delay: float = 0.02,
+    settings: MissionSettings | None = None,
+    phase: Phase = Phase.MANEUVER,
+) -> Sky:
     """The flip, just begun over a link that loses so many and takes so long [s], either way."""
-    sky = _at_the_plans_begin(loss, delay).branched()
+    sky = _reached(phase, loss, delay).branched()
     if settings is not None:
         sky.client.mission.settings = settings
     return sky
@@ -87,18 +94,21 @@ class Wire:
         pass
 
 
-class Broken:
-    """A connection that can be cut, either way."""
+class Cable:
+    """A connection that can be cut, either way, and by which somebody may do as he likes."""
 
     def __init__(self, connection: Any) -> None:
         self._connection = connection
         self.receives = self.sends = True
+        self.change: Callable[[Any], list[Any]] = lambda message: [message]  # of what is received
+        self.sent: list[Any] = []
 
     def receive(self) -> list[Any]:
-        messages: list[Any] = self._connection.receive()
-        return messages if self.receives else []
+        messages = self._connection.receive() if self.receives else []
+        return [changed for message in messages for changed in self.change(message)]
 
     def send(self, message: Any) -> None:
+        self.sent.append(message)
         if self.sends:
             self._connection.send(message)
 
@@ -128,7 +138,7 @@ class Sky:
         client_end.other, vehicle_end.other = vehicle_end, client_end
         lossy = LossyConnection(vehicle_end, self.clock, loss=loss, delay=delay, seed=seed)
         self.said: list[str] = []
-        self.cable = Broken(client_end)
+        self.cable = Cable(client_end)
         self.vehicle = SimulatedVehicle(flying, plan.problem.environment)
         self.front_end = FrontEnd(self.vehicle, lossy)
         self.client = Client(
@@ -150,7 +160,8 @@ class Sky:
     def branched(self) -> Sky:
         """The same, to go on by itself."""
         whole = (dialect(), self.vehicle._body._loop)
-        return copy.deepcopy(self, {id(part): part for part in whole})
+        kept: dict[int, Any] = {id(part): part for part in whole}
+        return copy.deepcopy(self, {**kept, id(self.cable.sent): []})
 
     @property
     def since_begin(self) -> float:

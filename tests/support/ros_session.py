@@ -138,7 +138,9 @@ class Watch:
         self.goals.append(piece)
 
     def _take_odometry(self, message: Any) -> None:
-        self.states.append(topics.read_odometry(message, self.origin))
+        seen = topics.read_odometry(message, self.origin)
+        assert seen is not None, "odometry is no vehicle's"
+        self.states.append(seen)
 
 
 Ask = Callable[[str], tuple[bool, str]]

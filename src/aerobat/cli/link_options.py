@@ -41,6 +41,12 @@ class MavlinkOptions:
     vehicle: Annotated[str | None, Parameter(group=linking)] = None
     """The name of the vehicle that is there. A plan that is certified for another one is refused."""
 
+    system: Annotated[int | None, Parameter(group=linking, validator=validators.Number(gte=1, lte=255))] = (
+        None
+    )
+    """The vehicle's number among MAVLink's systems. Default: the only one that is heard; of two none is
+    flown."""
+
     origin: Annotated[tuple[float, float, float] | None, Parameter(group=linking)] = None
     """Where the plan's origin lies in the vehicle's own frame, metres east, north and up. Default: above that
     frame's origin, the plan's lowest point 3 m up."""

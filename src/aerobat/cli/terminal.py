@@ -60,6 +60,16 @@ def discard(stream: TextIO) -> None:
         os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
 
 
+def is_broken(stream: TextIO) -> bool:
+    """True of a stream that takes nothing more; it is tried with an empty line."""
+    try:
+        stream.write("\n")
+        stream.flush()
+    except OSError:
+        return True
+    return False
+
+
 def say(sentence: str) -> None:
     """Print a sentence to standard error, if that takes it; on one line, whatever names it holds."""
     line = "".join(sign if sign.isprintable() else repr(sign)[1:-1] for sign in sentence)

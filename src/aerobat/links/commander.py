@@ -177,6 +177,10 @@ class Commander:
             self._go(Doing.HOVERING, now, at_end, end.yaw)
             return self._on_way(now)
         if self.mission.phase is Phase.ABORTED:
+            off = self.mission.error(self.seen) if phase is Phase.MANEUVER else 0.0
+            if off > self.mission.settings.max_error + _ASTRAY:  # it is seen to jump, and goals would too
+                self._leave(f"the vehicle is {length(off)} off its goal")
+                return None
             self._brake(now, self.seen)
             silent = self._leave_unseen(now, self.mission.settings.max_silence)
             return None if silent else self._on_way(now)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from enum import StrEnum
-from math import atan2
+from math import atan2, hypot
 from typing import NamedTuple
 
 import numpy as np
@@ -23,6 +23,8 @@ class Mode(StrEnum):
     OFFBOARD = "offboard"
 
 
+_LARGEST = 1e6  # [m], [m/s] and [rad/s] of what is believed of a vehicle
+_UNIT = 1e-2  # [-] by which the norm of a quaternion may be off: what few decimals leave
 _STILL: Array = np.zeros(3)
 _STILL.flags.writeable = False
 
@@ -81,6 +83,29 @@ class Observed(NamedTuple):
 
     time: float  # [s] when it was so, by the link's clock
     body: Body
+
+
+def observed(
+    time: float, position: Vector, q_world_body: Quaternion, velocity_body: Vector, omega_body: Vector
+) -> Observed | None:
+    """Return the state that a message of telemetry holds, or None for numbers that no vehicle can have.
+
+    Every number is finite and below 10⁶, and the attitude is a unit quaternion within 1 %.
+
+    Args:
+        time: When the vehicle was so [s], by the link's clock.
+        position: World [m].
+        q_world_body: The attitude, body to world.
+        velocity_body: The velocity in the body's axes [m/s].
+        omega_body: The rate in the body's axes [rad/s].
+    """
+    numbers = np.array([*position, *velocity_body, *omega_body])
+    norm = hypot(*q_world_body)
+    if not (np.abs(numbers).max() <= _LARGEST and abs(norm - 1.0) <= _UNIT):  # NaN is neither
+        return None
+    velocity = so3.rotate(np.array(q_world_body) / norm, np.array(velocity_body))
+    w, x, y, z = (part / norm for part in q_world_body)
+    return Observed(time, Body(position, tuple(velocity.tolist()), (w, x, y, z), omega_body))
 
 
 def yaw_of(q_world_body: Array | Quaternion) -> float:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
 from cyclopts import Parameter
@@ -17,6 +17,9 @@ from aerobat.interchange import read_plan
 from aerobat.planning import Plan
 from aerobat.reporting.report_json import passage_facts, to_json
 from aerobat.simulation.autopilot import recoveries
+
+if TYPE_CHECKING:
+    from aerobat.links.report import LinkReport
 
 CLEARANCE = 3.0  # [m] of a plan's lowest point over where the vehicle stands
 RECOVERED = 1.0  # [m] of the lowest point of a recovery from any instant of it, at the least
@@ -44,7 +47,7 @@ def mavlink(
     from aerobat.links.mavlink.autopilot_link import COMPONENT, SYSTEM
     from aerobat.links.mavlink.client import Client, ClientSettings, run
     from aerobat.links.mavlink.connection import connect
-    from aerobat.links.mission import MissionSettings, require_flyable
+    from aerobat.links.mission import MissionSettings, Phase, require_flyable
 
     offset = _origin(found) if options.origin is None else np.array(options.origin)
     require_flyable(found, offset, options.vehicle)
@@ -59,20 +62,30 @@ def mavlink(
                 max_silence=options.max_silence,
                 max_lateness=options.max_lateness,
             ),
-            settings=ClientSettings(options.rate, wait=options.wait, hover_thrust=options.hover_thrust),
+            settings=ClientSettings(
+                options.rate, wait=options.wait, hover_thrust=options.hover_thrust, system=options.system
+            ),
             say=say,
             announcement=str(recoveries(found, ground=-offset[2])),
         )
         run(client, WallClock(options.speed))
+    except KeyboardInterrupt:
+        if client.mission.phase is not Phase.READY:
+            _print(client.report(), options.json)
+        raise
     finally:
         connection.close()
     report = client.report()
-    if options.json:
+    _print(report, options.json)
+    return ExitCode.WELL if report.is_success else ExitCode.NOT_WELL
+
+
+def _print(report: LinkReport, in_json: bool) -> None:
+    if in_json:
         passages = [passage_facts(passage) for passage in report.passages]
         print_json(to_json({**report.record(), "passages": passages}))
     else:
         print(report)
-    return ExitCode.WELL if report.is_success else ExitCode.NOT_WELL
 
 
 def _origin(plan: Plan) -> Array:

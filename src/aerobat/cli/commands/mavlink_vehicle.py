@@ -33,9 +33,9 @@ def mavlink_vehicle(
     from aerobat.links.autopilot.vehicle import SimulatedVehicle
     from aerobat.links.clock import WallClock
     from aerobat.links.mavlink.connection import LossyConnection, connect
-    from aerobat.links.mavlink.front_end import FrontEnd
+    from aerobat.links.mavlink.front_end import SYSTEM, FrontEnd
 
-    connection = connect(options.listen, listen=True, system=1)
+    connection = connect(options.listen, listen=True, system=SYSTEM)
     simulated = SimulatedVehicle(found, Environment())
     clock = WallClock(options.speed)
     if options.loss or options.delay:

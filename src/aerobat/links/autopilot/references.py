@@ -121,12 +121,12 @@ class AttitudeReference(NamedTuple):
         return cls(goal, sent, arrived, np.zeros(3), 0.0)
 
     def followed_by(self, goal: AttitudeGoal, sent: float, arrived: float) -> AttitudeReference:
-        """The next one after this; itself where it is older than this."""
+        """The next one after this; itself where that is a little older, as one that was overtaken."""
         elapsed = sent - self.sent
+        if abs(elapsed) > 10.0 * KEPT:
+            return self.first(goal, sent, arrived)
         if elapsed <= 0.0:
             return self
-        if elapsed > 10.0 * KEPT:
-            return self.first(goal, sent, arrived)
         fraction = elapsed / (elapsed + _SMOOTHING)
         change = (np.array(goal.omega_body) - self.goal.omega_body) / elapsed
         rate = (goal.thrust - self.goal.thrust) / elapsed

@@ -105,10 +105,11 @@ class SimulatedVehicle:
         return True
 
     def land(self) -> bool:
-        """Come to a hover, and from there down to the ground."""
-        self.hold()
-        if not self.landed:
-            self.mode = Mode.LAND
+        """Come to a hover, and from there down to the ground; an order that is repeated changes nothing."""
+        if self.mode is not Mode.LAND:
+            self.hold()
+            if not self.landed:
+                self.mode = Mode.LAND
         return True
 
     def go_offboard(self) -> bool:

@@ -3,14 +3,11 @@
 from __future__ import annotations
 
 from collections import deque
-from math import inf, nan
+from math import inf, isfinite, nan
+from random import randrange
 from typing import Any
 
-import numpy as np
-
-from aerobat import so3
-from aerobat.kernels.rigid_body import Body
-from aerobat.links.goals import AttitudeGoal, Mode, Observed, PositionGoal
+from aerobat.links.goals import AttitudeGoal, Mode, Observed, PositionGoal, observed
 from aerobat.links.mavlink.connection import Connection, dialect
 from aerobat.links.mavlink.frames import swap_attitude, swap_body, swap_world, swap_yaw
 from aerobat.links.mavlink.modes import ARMED, CUSTOM_MODE_ENABLED, MAIN_AND_SUB, mode_of
@@ -21,36 +18,44 @@ _GROUND_STATION = 8  # the autopilot number of who is none
 _ASK_AGAIN = 0.3  # [s] from an order to the same again, where it is not obeyed
 _SYNCHRONIZE = 0.1  # [s] between questions for the time
 _SYNCHRONIZATIONS = 50  # of which the quickest counts
+_MAX_AHEAD = 0.02  # [s] beside that by which states may be stamped ahead
 
 
 class AutopilotLink:
     """An autopilot at the other end of a connection."""
 
-    def __init__(self, connection: Connection, telemetry_rate: float) -> None:
+    def __init__(self, connection: Connection, telemetry_rate: float, system: int | None = None) -> None:
         """Prepare to talk.
 
         Args:
             connection: the way to it.
             telemetry_rate: of its state, as it is asked for [1/s].
+            system: its number; None for the first that is heard.
         """
         self._connection = connection
         self._mavlink = dialect()
         self._interval = 1e6 / telemetry_rate
-        self._system = 0
+        self._wanted = system
+        self._system: int | None = None  # of the autopilot, once it has answered
+        self.systems: set[int] = set()  # of all autopilots that are heard
         self._sent: dict[object, float] = {}  # [s] when an order, or a question, was sent last
+        self._mark = randrange(10**6)  # [ns] by which our questions for the time differ from others'
+        self._asked: dict[int, float] = {}  # [s] when those were asked that are unanswered
         self._times: deque[tuple[float, float]] = deque(maxlen=_SYNCHRONIZATIONS)  # [s] round trip, offset
         self._now = 0.0
+        self.heard = self.beat = -inf  # [s] when the last message came, and the last heartbeat
         self.mode: Mode | None = None
         self.armed = False
         self.landed: bool | None = None
         self.observed: Observed | None = None
         self.parameters: dict[str, float] = {}
-        self.told: list[str] = []
+        self.told: list[str] = []  # sentences for whoever listens, who empties it
+        self._left_out: set[str] = set()  # why states were, each told once
 
     @property
     def is_known(self) -> bool:
         """True once it has answered."""
-        return self._system != 0
+        return self._system is not None
 
     @property
     def is_synchronized(self) -> bool:
@@ -69,6 +74,7 @@ class AutopilotLink:
         for message in self._connection.receive():
             if not self._is_ours(message):
                 continue
+            self.heard = now
             if message.get_type() == "ODOMETRY":
                 seen += self._odometry(message)
             take = getattr(self, f"_take_{message.get_type().lower()}", None)
@@ -78,7 +84,7 @@ class AutopilotLink:
             self._send("heartbeat", 18, _GROUND_STATION, 0, 0, 4, 3)
         if self.is_known:
             if self._again("time", _SYNCHRONIZE):
-                self._send("timesync", 0, round(1e9 * now))
+                self._ask_time()
             if self.observed is None or now - self.observed.time > 1.0:
                 self.command(511, self._mavlink.MAVLink_odometry_message.id, self._interval)
         return seen
@@ -128,13 +134,15 @@ class AutopilotLink:
         )
 
     def _is_ours(self, message: Any) -> bool:
-        """True for messages of the autopilot, the first that is heard."""
+        """True for messages of the autopilot: the one that is wanted, or the first that is heard."""
         if message.get_srcComponent() != _AUTOPILOT:
             return False
-        beats = message.get_type() == "HEARTBEAT" and message.autopilot != _GROUND_STATION
-        if beats and not self.is_known:
-            self._system = message.get_srcSystem()
-        return bool(message.get_srcSystem() == self._system)
+        system: int = message.get_srcSystem()
+        if message.get_type() == "HEARTBEAT" and message.autopilot != _GROUND_STATION:
+            self.systems.add(system)
+            if not self.is_known and self._wanted in (None, system):
+                self._system = system
+        return system == self._system
 
     def _again(self, order: object, every: float = _ASK_AGAIN) -> bool:
         """True where something was not sent for so long [s]; then it counts as sent now."""
@@ -149,31 +157,59 @@ class AutopilotLink:
     def _take_heartbeat(self, message: Any) -> None:
         self.mode = mode_of(message.custom_mode)
         self.armed = bool(message.base_mode & ARMED)
+        self.beat = self._now
 
     def _take_extended_sys_state(self, message: Any) -> None:
         self.landed = message.landed_state == 1
 
+    def _ask_time(self) -> None:
+        """Ask for the time, by a number that no other client's question has."""
+        question = round(1e9 * self._now) + self._mark
+        self._asked = dict([*self._asked.items(), (question, self._now)][-_SYNCHRONIZATIONS:])
+        self._send("timesync", 0, question)
+
     def _take_timesync(self, message: Any) -> None:
-        if message.tc1 > 0:
-            sent = 1e-9 * message.ts1
+        """Take the answer to a question of ours; those to other clients come here too."""
+        sent = self._asked.pop(message.ts1, None)
+        if sent is not None and message.tc1 > 0:
             self._times.append((self._now - sent, 1e-9 * message.tc1 - 0.5 * (self._now + sent)))
 
     def _take_param_value(self, message: Any) -> None:
-        self.parameters[str(message.param_id)] = float(message.param_value)
+        if isfinite(message.param_value):
+            self.parameters[str(message.param_id)] = float(message.param_value)
 
     def _take_statustext(self, message: Any) -> None:
-        self.told.append(str(message.text))
+        self.told.append(f"the vehicle: {message.text}")
 
     def _odometry(self, message: Any) -> list[Observed]:
-        """A state, by our clock; nothing before that of the vehicle is known."""
+        """Return a state by our clock, if it is newer than the last and can be one.
+
+        Nothing is returned before the vehicle's clock is known. Where a message takes longer one way than the
+        other, states are stamped ahead by up to half a round trip.
+        """
         if not self.is_synchronized:
             return []
         _, offset = min(self._times)
-        q = swap_attitude(tuple(message.q))
-        velocity_body = swap_body((message.vx, message.vy, message.vz))
-        velocity = so3.rotate(np.array(q), np.array(velocity_body))
-        rates = swap_body((message.rollspeed, message.pitchspeed, message.yawspeed))
-        place = swap_world((message.x, message.y, message.z))
-        x, y, z = velocity.tolist()
-        self.observed = Observed(1e-6 * message.time_usec - offset, Body(place, (x, y, z), q, rates))
-        return [self.observed]
+        seen = observed(
+            1e-6 * message.time_usec - offset,
+            swap_world((message.x, message.y, message.z)),
+            swap_attitude(tuple(message.q)),
+            swap_body((message.vx, message.vy, message.vz)),
+            swap_body((message.rollspeed, message.pitchspeed, message.yawspeed)),
+        )
+        if seen is None:
+            self._leave_out("not finite, or their attitude is no unit quaternion")
+            return []
+        if seen.time > self._now + self.delay + _MAX_AHEAD:
+            self._leave_out("stamped later than now")
+            return []
+        if self.observed is not None and seen.time <= self.observed.time:
+            return []  # one that was overtaken, or a copy
+        self.observed = seen
+        return [seen]
+
+    def _leave_out(self, reason: str) -> None:
+        """Tell once that states of a kind are left out."""
+        if reason not in self._left_out:
+            self._left_out.add(reason)
+            self.told.append(f"states are left out that are {reason}")

@@ -28,6 +28,9 @@ _STREAMED = 1.2  # [s] of set-points before PX4 takes the mode offboard
 _PATIENCE = 8.0  # [s] for a vehicle to do as it is told
 _HOVERING = 3.0  # [s] of hover after an abort, before it lands
 _STILL = 0.3  # [m/s] of a hover
+_SILENCE = 10.0  # [s] without news after an abort, after which the vehicle is told to land, or given up
+_RECOVERY = 60.0  # [s] for coming to a hover, and for a landing beside its way down
+_SLOWEST_DESCENT = 0.2  # [m/s] of a landing
 
 
 class Stage(StrEnum):
@@ -51,6 +54,7 @@ class ClientSettings:
     telemetry_rate: float = 100.0  # [1/s] of states, as the vehicle is asked for them
     wait: float = 10.0  # [s] for a vehicle to answer
     hover_thrust: float | None = None  # [-] where the vehicle does not say it
+    system: int | None = None  # the number of the vehicle among MAVLink's systems; None for the only one
 
 
 class Client:
@@ -84,7 +88,7 @@ class Client:
         stream = SetpointStream(plan.trajectory, plan.vehicle, environment, offset)
         self.mission = Mission(plan, mission, stream, PathFollower(stream, plan.vehicle, environment))
         self._plan, self._offset = plan, offset
-        self.link = AutopilotLink(connection, settings.telemetry_rate)
+        self.link = AutopilotLink(connection, settings.telemetry_rate, settings.system)
         self.stage = Stage.CONNECTING
         self.log: list[Observed] = []  # while the plan was flown
         self.settings = settings
@@ -93,6 +97,8 @@ class Client:
         self._began: float | None = None
         self._ground: PositionGoal | None = None
         self._hovering_since = inf
+        self._refusal = ""  # why it was not begun
+        self._lost = ""  # why the vehicle was not followed to the ground
         vehicle, gravity = plan.vehicle, environment.gravity
         self._name = vehicle.name
         self._weight = vehicle.mass * gravity
@@ -117,7 +123,7 @@ class Client:
         if self.mission.phase is Phase.MANEUVER:
             self.log += seen
         for sentence in self.link.told:
-            self._say(f"the vehicle: {sentence}")
+            self._say(sentence)
         self.link.told.clear()
         getattr(self, f"_while_{self.stage.name.lower()}")(now)
 
@@ -125,8 +131,9 @@ class Client:
         """Give the flight up: the vehicle is told to hover, then to land."""
         if self.stage is Stage.FLYING:
             self.mission.abort(now, reason)
-            self._enter(Stage.RECOVERING, now)
-            self._say(f"aborted: {self.mission.reason}; the vehicle is told to hover")
+            self._recover(now)
+        else:
+            self._lost = reason
 
     def report(self) -> LinkReport:
         """What the flight came to."""
@@ -136,7 +143,7 @@ class Client:
             self.mission.stream,
             [seen._replace(time=seen.time - began) for seen in self.log],
             offset=self._offset,
-            aborted=self.mission.reason,
+            aborted=self.mission.reason or self._lost,
             ended=str(self.stage),
             delay=self.link.delay,
             late=self.mission.max_lateness,
@@ -157,12 +164,22 @@ class Client:
         if self.link.is_known:
             self._enter(Stage.ASKING, now)
         elif self._since(now) > self.settings.wait:
-            raise SpecError(
-                f"no vehicle answers within {self.settings.wait:g} s; check the address, and that it is on"
-            )
+            waited, heard = f"{self.settings.wait:g} s", ", ".join(map(str, sorted(self.link.systems)))
+            if heard:
+                raise SpecError(
+                    f"system {self.settings.system} does not answer within {waited}; those heard are: {heard}"
+                )
+            raise SpecError(f"no vehicle answers within {waited}; check the address, and that it is on")
+
+    def _require_one_system(self) -> None:
+        """Raise SpecError where there are several autopilots and none is named."""
+        if self.settings.system is None and len(self.link.systems) > 1:
+            numbers = " and ".join(map(str, sorted(self.link.systems)))
+            raise SpecError(f"the systems {numbers} answer; name the vehicle's by --system")
 
     def _while_asking(self, now: float) -> None:
         """Wait for its clock, its state and its hovering thrust, and see that it is the plan's vehicle."""
+        self._require_one_system()
         hover = self.settings.hover_thrust or self.link.parameters.get(HOVER_THRUST)
         if hover is None:
             self.link.ask_parameter(HOVER_THRUST)
@@ -197,7 +214,9 @@ class Client:
         """Stream where it stands, as PX4 asks before it obeys; then take the mode, then arm."""
         assert self._ground is not None, "its state is known"
         self.link.follow(self._ground, self._max_thrust)
-        if self._since(now) > _STREAMED:
+        if self._since(now) <= _STREAMED:
+            self._require_one_system()
+        else:
             self.link.set_mode(Mode.OFFBOARD)
             if self.link.mode is Mode.OFFBOARD:
                 self.link.arm()
@@ -206,52 +225,99 @@ class Client:
             self._enter(Stage.FLYING, now)
             self._say("armed")
         elif self._since(now) > _PATIENCE:
-            what = "be armed" if self.link.mode is Mode.OFFBOARD else "take the mode offboard"
-            raise SpecError(f"the vehicle does not {what}; its own ground station says why")
+            self._give_up_arming(now)
+
+    def _give_up_arming(self, now: float) -> None:
+        """Raise SpecError; a vehicle that was ordered to arm may have, and is told to land before."""
+        what = "arm" if self.link.mode is Mode.OFFBOARD else "take the mode offboard"
+        self._refusal = f"the vehicle does not {what}; its own ground station says why"
+        if self.link.mode is not Mode.OFFBOARD:
+            raise SpecError(self._refusal)
+        self._land(now, "the vehicle does not arm")
 
     def _while_flying(self, now: float) -> None:
         phase = self.mission.phase
         goal = self.mission.step(now, self._observed, self.link.delay)
-        if self.link.mode is not Mode.OFFBOARD and self.mission.phase is not Phase.LAND:
-            mode = "a mode of a pilot's" if self.link.mode is None else f"the mode {self.link.mode}"
-            self.mission.abort(now, f"the vehicle went into {mode}")
+        if self.mission.phase is not Phase.LAND:
+            self._watch_vehicle(now)
+        if self.mission.phase is Phase.ABORTED:
+            self._recover(now)
+            return
         if self.mission.phase is not phase:
             self._say(str(self.mission.phase))
-        if self.mission.phase is Phase.ABORTED and self.link.mode is None:
-            self._say(f"aborted: {self.mission.reason}; it is left to the pilot")
-            self._enter(Stage.LOST, now)
-        elif self.mission.phase is Phase.ABORTED:
-            self._say(f"aborted: {self.mission.reason}; the vehicle is told to hover")
-            self._enter(Stage.RECOVERING, now)
-            self._while_recovering(now)
-        elif self.mission.phase is Phase.LAND:
-            self._enter(Stage.LANDING, now)
-            self._while_landing(now)
+        if self.mission.phase is Phase.LAND:
+            self._land(now)
         elif goal is not None:
             self.link.follow(goal, self._max_thrust)
 
+    def _watch_vehicle(self, now: float) -> None:
+        """Abort where the vehicle no longer obeys."""
+        if self.link.mode is not Mode.OFFBOARD:
+            mode = "a mode of a pilot's" if self.link.mode is None else f"the mode {self.link.mode}"
+            self.mission.abort(now, f"the vehicle went into {mode}")
+        elif not self.link.armed:
+            self.mission.abort(now, "the vehicle was disarmed")
+
+    def _recover(self, now: float) -> None:
+        self._say(f"aborted: {self.mission.reason}; the vehicle is told to hover")
+        self._enter(Stage.RECOVERING, now)
+        self._while_recovering(now)
+
     def _while_recovering(self, now: float) -> None:
-        """Have it hover, and once it has for a while, land."""
+        """Have it hover; once it has for a while, or is not seen to, have it land."""
+        if self._yields(now):
+            return
         self.link.set_mode(Mode.HOLD)
-        is_still = hypot(*self._observed.body.velocity) < _STILL and self.link.mode is Mode.HOLD
-        self._hovering_since = min(self._hovering_since, now) if is_still else inf
-        if now - self._hovering_since > _HOVERING or (self.link.landed and not self.link.armed):
-            self._enter(Stage.LANDING, now)
-        elif self._since(now) > 60.0:
-            self._enter(Stage.LOST, now)
-        self._give_up_where_silent(now)
+        silence = now - self._observed.time
+        is_still = hypot(*self._observed.body.velocity) < _STILL
+        is_seen = silence < self.mission.settings.max_silence_outside
+        hovers = is_still and is_seen and self.link.mode is Mode.HOLD
+        self._hovering_since = min(self._hovering_since, now) if hovers else inf
+        if silence > _SILENCE:
+            self._land(now, "no news of the vehicle")
+        elif now - self._hovering_since > _HOVERING or self._is_down:
+            self._land(now)
+        elif self._since(now) > _RECOVERY:
+            self._land(now, "the vehicle does not come to a hover")
+
+    def _land(self, now: float, reason: str = "") -> None:
+        """Have it land, for a reason that is told."""
+        if reason:
+            self._say(f"{reason}; it is told to land")
+        self._enter(Stage.LANDING, now)
+        self._while_landing(now)
 
     def _while_landing(self, now: float) -> None:
-        self.link.set_mode(Mode.LAND)
-        if self.link.landed and not self.link.armed:
+        """Have it land until it has, a pilot takes over, or there is no hope."""
+        height = max(self._observed.body.position[2], 0.0)
+        if self._is_down and self._refusal:
+            raise SpecError(self._refusal)
+        if self._is_down:
             self._enter(Stage.LANDED, now)
             self._say("landed")
-        self._give_up_where_silent(now)
+        elif not self._yields(now):
+            self.link.set_mode(Mode.LAND)
+            if now - max(self.link.heard, self._began or 0.0) > _SILENCE:
+                self._lose(now, "no news of the vehicle")
+            elif self._since(now) > _RECOVERY + height / _SLOWEST_DESCENT:
+                self._lose(now, "the vehicle does not land as it is told")
 
-    def _give_up_where_silent(self, now: float) -> None:
-        if now - self._observed.time > self.settings.wait:
-            self._enter(Stage.LOST, now)
-            self._say("no news of the vehicle; it is left to its own failsafe")
+    @property
+    def _is_down(self) -> bool:
+        """True of a vehicle that has landed, by what it has told since it was told what to do."""
+        return bool(self.link.landed) and not self.link.armed and self.link.beat > (self._began or 0.0)
+
+    def _yields(self, now: float) -> bool:
+        """True where a pilot has taken over: the vehicle is left to him."""
+        if self.link.mode is not None:
+            return False
+        self._lose(now, "a pilot has taken over", "the pilot")
+        return True
+
+    def _lose(self, now: float, reason: str, left_to: str = "its own failsafe") -> None:
+        self._enter(Stage.LOST, now)
+        self._lost = reason
+        self._say(f"{reason}; it is left to {left_to}")
 
 
 def run(client: Client, clock: Clock) -> None:

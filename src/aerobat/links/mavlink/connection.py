@@ -4,8 +4,11 @@ from __future__ import annotations
 
 import heapq
 import os
-from collections.abc import Iterator
-from functools import cache
+import socket
+import time
+from collections.abc import Callable
+from contextlib import suppress
+from functools import cache, partial
 from importlib.util import find_spec
 from itertools import count
 from typing import Any, Protocol
@@ -16,6 +19,7 @@ from aerobat.errors import BackendMissing, SpecError
 from aerobat.links.clock import Clock
 
 _KINDS = ("udp", "udpin", "udpout", "tcp", "tcpin")
+_PATIENCE = 1.0  # [s] of the wall, for opening a broken link, and until that is tried again
 _MANY = 1000  # messages at once, after which others have their turn
 
 
@@ -60,20 +64,23 @@ def connect(address: str, *, listen: bool, system: int, component: int = 1, baud
     _check(address)
     from pymavlink import mavutil
 
+    # pymavlink prints what ails a link on standard output, which is the report's
+    mavutil.print = lambda *words: None
+    open_link = partial(
+        mavutil.mavlink_connection,
+        address,
+        baud=baud,
+        source_system=system,
+        source_component=component,
+        input=listen,
+        dialect="common",
+        retries=0,
+    )
     try:
-        link = mavutil.mavlink_connection(
-            address,
-            baud=baud,
-            source_system=system,
-            source_component=component,
-            input=listen,
-            dialect="common",
-            retries=0,
-        )
+        return _PymavlinkConnection(open_link)
     except Exception as error:  # sockets, devices and resolvers raise what they like
         reason = getattr(error, "strerror", None) or str(error) or type(error).__name__
         raise SpecError(f"cannot open {address}: {reason}; give another address or port") from None
-    return _PymavlinkConnection(link)
 
 
 def _check(address: str) -> None:
@@ -90,27 +97,71 @@ def _check(address: str) -> None:
 
 
 class _PymavlinkConnection:
-    def __init__(self, link: Any) -> None:
-        self._link = link
+    """A link by pymavlink; one that breaks is silent, and opened anew now and then."""
+
+    def __init__(self, open_link: Callable[[], Any]) -> None:
+        self._open_link = open_link
+        self._broke = 0.0  # [s] of the wall, when it did, or was not to be opened
+        self._link: Any = None
+        self._open()
 
     def receive(self) -> list[Any]:
         """See `Connection.receive`."""
-        return [message for message in self._messages() if message.get_type() != "BAD_DATA"]
+        messages: list[Any] = []
+        if not self._is_open():
+            return messages
+        try:
+            while len(messages) < _MANY and (message := self._link.recv_msg()) is not None:
+                messages.append(message)
+            self._let_go_of_client()
+        except OSError:
+            self.close()
+        return [message for message in messages if message.get_type() != "BAD_DATA"]
 
     def send(self, message: Any) -> None:
         """See `Connection.send`."""
-        self._link.mav.send(message)
+        if self._is_open():
+            try:
+                self._link.mav.send(message)
+            except OSError:
+                self.close()
 
     def close(self) -> None:
         """See `Connection.close`."""
-        self._link.close()
+        link, self._link, self._broke = self._link, None, time.monotonic()
+        if link is not None:
+            with suppress(OSError):
+                link.close()
 
-    def _messages(self) -> Iterator[Any]:
-        for _ in range(_MANY):
-            message = self._link.recv_msg()
-            if message is None:
-                return
-            yield message
+    def _is_open(self) -> bool:
+        """True of a link that works; a broken one is opened anew where it was left alone for long enough."""
+        if self._link is None and time.monotonic() - self._broke > _PATIENCE:
+            patience = socket.getdefaulttimeout()
+            socket.setdefaulttimeout(_PATIENCE)
+            try:
+                self._open()
+            except OSError:
+                self._broke = time.monotonic()
+            finally:
+                socket.setdefaulttimeout(patience)
+        return self._link is not None
+
+    def _open(self) -> None:
+        self._link = self._open_link()
+        self._link.handle_eof = self._link.handle_disconnect = _end_of_link  # of TCP
+
+    def _let_go_of_client(self) -> None:
+        """Let the next client in where that of a TCP server has hung up."""
+        port = getattr(self._link, "listen", None) and self._link.port
+        if port:
+            with suppress(BlockingIOError):
+                if not port.recv(1, socket.MSG_PEEK):
+                    port.close()
+                    self._link.port = None
+
+
+def _end_of_link() -> None:
+    raise ConnectionResetError("the other end has closed the connection")
 
 
 class LossyConnection:

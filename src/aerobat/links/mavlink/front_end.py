@@ -23,6 +23,7 @@ from aerobat.links.mavlink.frames import (
 )
 from aerobat.links.mavlink.modes import ARMED, CUSTOM_MODE_ENABLED, MAIN_AND_SUB, custom_mode
 
+SYSTEM = 1  # the vehicle's number
 _TAKEOFF_HEIGHT = "MIS_TAKEOFF_ALT"  # the one parameter that clients may set
 _FIRMWARE = 0x010F00FF  # 1.15.0, a release: which autopilot clients take it for
 _IGNORED_POSITION, _IGNORED_VELOCITY, _IGNORED_ACCELERATION, _IGNORED_YAW = 7, 56, 448, 1024
@@ -71,6 +72,8 @@ class FrontEnd:
         """Go on to this time [s], take what has come, and send what is due."""
         self.vehicle.advance(now)
         for message in self._connection.receive():
+            if getattr(message, "target_system", SYSTEM) not in (0, SYSTEM):
+                continue
             take = getattr(self, f"_take_{message.get_type().lower()}", None)
             if take is not None:
                 take(message)
@@ -214,12 +217,12 @@ class FrontEnd:
         """
         known: dict[int, Callable[[], bool]] = {
             400: lambda: self.vehicle.arm() if message.param1 > 0.5 else self.vehicle.disarm(),
-            176: lambda: self._change_mode(int(message.param2), int(message.param3)),
+            176: lambda: self._change_mode(_whole(message.param2), _whole(message.param3)),
             22: self._take_off,
             21: self.vehicle.land,
             192: lambda: self._reposition(place, message.param4),
-            511: lambda: self._set_interval(int(message.param1), message.param2),
-            512: lambda: self._give_message(int(message.param1)),
+            511: lambda: self._set_interval(_whole(message.param1), message.param2),
+            512: lambda: self._give_message(_whole(message.param1)),
         }
         act = known.get(message.command)
         result = 3 if act is None else 0 if act() else 2  # unsupported, accepted, denied
@@ -293,3 +296,8 @@ class FrontEnd:
         thrust = message.thrust * float(self.vehicle.vehicle.max_thrusts.sum())
         if np.isfinite([*q, *rates, thrust]).all() and np.linalg.norm(q) > 0.5:
             self.vehicle.follow_attitude(AttitudeGoal(q, rates, thrust), 1e-3 * message.time_boot_ms)
+
+
+def _whole(number: float) -> int:
+    """The integer that a command says as a float, -1 for what is none."""
+    return int(number) if isfinite(number) else -1

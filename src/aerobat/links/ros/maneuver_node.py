@@ -27,6 +27,7 @@ from aerobat.problem import Problem
 from aerobat.vehicle import Vehicle
 
 _DELETE_ALL = 3  # what a marker does to those before it
+_MAX_AHEAD = 0.1  # [s] by which another machine's clock may be ahead of ours
 _SHOWN_EVERY = 0.15  # [s] between snapshots of the vehicle along a path that is shown
 _SHOWN_RATE = 50.0  # [1/s] of the points of a path that is shown
 
@@ -82,6 +83,7 @@ class ManeuverNode:
         self._planning: tuple[Future[Prepared | str], Answer] | None = None
         self._flown: Prepared | None = None  # what is flown
         self._judging: Future[LinkReport] | None = None  # what came of it
+        self._left_out: set[str] = set()  # why odometry was, each said once
         ros.subscribe(settings.odometry, topics.KIND_OF_ODOMETRY, self._take_odometry, every=False)
         for name in maneuvers:
             ros.offer(f"/aerobat/{name}", partial(self._take_request, partial(self._plan, name)))
@@ -120,7 +122,20 @@ class ManeuverNode:
             self._send_report(self._messages.make(topics.KIND_OF_REPORT, data=sentence))
 
     def _take_odometry(self, message: Any) -> None:
-        self.commander.observe(topics.read_odometry(message, self.origin))
+        """Take a state, unless it cannot be one."""
+        seen = topics.read_odometry(message, self.origin)
+        if seen is None:
+            self._leave_out("is not finite, or its attitude no unit quaternion; see to the estimator")
+        elif seen.time > (self._ros.time() - self.origin) / NANOSECONDS + _MAX_AHEAD:
+            self._leave_out("is stamped later than now; set the clocks alike")
+        else:
+            self.commander.observe(seen)
+
+    def _leave_out(self, reason: str) -> None:
+        """Say once that odometry of a kind is left out."""
+        if reason not in self._left_out:
+            self._left_out.add(reason)
+            self._say(f"odometry is left out that {reason}")
 
     def _take_request(self, obey: Callable[[Answer], None], answer: Answer) -> None:
         """Obey, or answer why not."""

@@ -15,8 +15,7 @@ import numpy as np
 from aerobat import so3
 from aerobat.arrays import Array
 from aerobat.interchange.ros import BODY, NANOSECONDS, JointMotion, Messages
-from aerobat.kernels.rigid_body import Body
-from aerobat.links.goals import Observed, PathGoal, PathPiece
+from aerobat.links.goals import Observed, PathGoal, PathPiece, observed
 
 GOAL, ODOMETRY = "/aerobat/goal", "/aerobat/odometry"
 MARKERS, REPORT, CLOCK = "/aerobat/markers", "/aerobat/report", "/clock"
@@ -62,14 +61,16 @@ def read_goal(message: Any, origin: int) -> PathPiece | None:
     return PathPiece(begin, end, (nanoseconds(message.header.stamp) - origin) / NANOSECONDS, duration)
 
 
-def read_odometry(message: Any, origin: int) -> Observed:
-    """A state, by a clock that began at an instant [ns]; its velocities are in the body's axes."""
+def read_odometry(message: Any, origin: int) -> Observed | None:
+    """Return a state by a clock that began at an instant [ns]; see `observed` for what is none.
+
+    The message has its velocities in the body's axes.
+    """
     pose, twist = message.pose.pose, message.twist.twist
-    q, velocity = _quaternion(pose.orientation), _vector(twist.linear)
-    x, y, z = so3.rotate(q, velocity).tolist()
-    place, rates = (tuple(_vector(each).tolist()) for each in (pose.position, twist.angular))
     time = (nanoseconds(message.header.stamp) - origin) / NANOSECONDS
-    return Observed(time, Body(place, (x, y, z), tuple(q.tolist()), rates))
+    q = pose.orientation
+    place, velocity, rates = ((v.x, v.y, v.z) for v in (pose.position, twist.linear, twist.angular))
+    return observed(time, place, (q.w, q.x, q.y, q.z), velocity, rates)
 
 
 def nanoseconds(time: Any) -> int:

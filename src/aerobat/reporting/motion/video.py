@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import os
+import subprocess
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from pathlib import Path
-from typing import Any
+from tempfile import TemporaryFile
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,9 +25,9 @@ HOLD = 0.6  # [s] that the last picture stays
 MAX_FRAMES = 20_000  # eleven minutes
 DPI = {".mp4": 160, ".gif": 100}  # 1152 and 720 pixels across
 GIF_COLOURS = "split[a][b];[a]palettegen=max_colors=64:stats_mode=diff[p];[b][p]paletteuse=dither=none"
-ENCODING: dict[str, dict[str, Any]] = {
-    ".mp4": {"codec": "libx264", "output_params": ["-crf", "20", "-movflags", "+faststart"]},
-    ".gif": {"codec": "gif", "pix_fmt_out": "pal8", "output_params": ["-filter_complex", GIF_COLOURS]},
+ENCODING = {
+    ".mp4": ["-c:v", "libx264", "-pix_fmt", "yuv420p", "-crf", "20", "-movflags", "+faststart"],
+    ".gif": ["-c:v", "gif", "-pix_fmt", "pal8", "-filter_complex", GIF_COLOURS],
 }
 
 
@@ -53,13 +56,12 @@ def write_video(
     suffix = Path(path).suffix.lower()
     if suffix not in ENCODING:
         raise SpecError(f"video: {path} is neither .mp4 nor .gif; name a file of one of them")
-    encoder = _encoder()
+    ffmpeg = _ffmpeg()
     subject = subject_of(shown, plan, vehicle)
     times = frame_times(subject.duration, speed)
     picture = MovingPicture(subject, DPI[suffix])
     with whole_file(path) as temporary:
-        _encode(encoder, picture.size, temporary, suffix, _frames(picture, times, progress))
-        _require_whole(encoder, temporary, len(times))
+        _encode(ffmpeg, picture.size, temporary, suffix, _frames(picture, times, progress))
 
 
 def frame_times(duration: float, speed: float) -> NDArray[np.float64]:
@@ -83,42 +85,34 @@ def _frames(
 
 
 def _encode(
-    encoder: Any, size: tuple[int, int], file: Path, suffix: str, frames: Iterator[NDArray[np.uint8]]
+    ffmpeg: str, size: tuple[int, int], file: Path, suffix: str, frames: Iterator[NDArray[np.uint8]]
 ) -> None:
-    """Have FFmpeg make a file of frames."""
-    writer = encoder.write_frames(
-        str(file),
-        size,
-        fps=FPS,
-        quality=None,
-        macro_block_size=1,
-        ffmpeg_log_level="quiet",  # what was not written is told afterwards
-        **ENCODING[suffix],
-    )
-    writer.send(None)
+    """Have FFmpeg make a file of frames. Raises OSError, with what FFmpeg said, where it fails."""
+    source = ["-f", "rawvideo", "-pix_fmt", "rgb24", "-s", f"{size[0]}x{size[1]}", "-r", str(FPS), "-i", "-"]
+    command = [ffmpeg, "-y", "-v", "error", *source, *ENCODING[suffix], str(file)]
+    group = 0 if os.name == "posix" else None  # of its own: Ctrl-C is ours
+    with TemporaryFile() as said:
+        with subprocess.Popen(command, stdin=subprocess.PIPE, stderr=said, process_group=group) as process:
+            assert process.stdin is not None, "it is a pipe"
+            for frame in frames:
+                try:
+                    process.stdin.write(frame.tobytes())
+                except BrokenPipeError:  # it has ended; its status says so
+                    break
+            with suppress(BrokenPipeError):
+                process.stdin.close()
+        if process.returncode != 0:
+            said.seek(0)
+            lines = said.read().decode(errors="replace").splitlines()
+            reason = lines[-1].rpartition("] ")[2] if lines else f"status {process.returncode}"
+            raise OSError(f"FFmpeg failed: {reason}")
+
+
+def _ffmpeg() -> str:
     try:
-        for frame in frames:
-            writer.send(np.ascontiguousarray(frame))
-    except OSError:  # of a pipe to a program that has ended; `_require_whole` says so
-        pass
-    finally:
-        writer.close()
-
-
-def _require_whole(encoder: Any, file: Path, frames: int) -> None:
-    """Refuse a file with fewer frames. Raises OSError: FFmpeg ends in many ways, and none is an exception."""
-    try:
-        found = encoder.count_frames_and_secs(str(file))[0]
-    except RuntimeError:  # no video at all
-        found = 0
-    if found < frames - 1:  # a GIF counts time in hundredths of a second, and may have one less
-        raise OSError(f"FFmpeg wrote {found} of {frames} frames; see if the disk is full")
-
-
-def _encoder() -> Any:
-    try:
-        import imageio_ffmpeg
+        from imageio_ffmpeg import get_ffmpeg_exe
     except ImportError:
         remedy = 'pip install "aerobat[viewer]"'
         raise BackendMissing(f"a video needs imageio-ffmpeg; install it with {remedy}") from None
-    return imageio_ffmpeg
+    found: str = get_ffmpeg_exe()
+    return found
