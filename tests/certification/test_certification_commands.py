@@ -142,7 +142,7 @@ def test_only_rotors_with_lag_count_in_a_jump():
 
 
 def test_a_plan_of_order_five_is_judged_by_its_commands():
-    made = plan(load_problem("flip-roll"), Miqp(order=5), with_lags(VEHICLE, 0.0)).trajectory
+    made = plan(load_problem("half-flip"), Miqp(order=5), VEHICLE).trajectory
     flight = Flight(VEHICLE, stretched(made, 1.05))
     certificate = certify(flight.trajectory, flight.vehicle)
     assert not certificate.discontinuities

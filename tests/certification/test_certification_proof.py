@@ -13,13 +13,13 @@ from aerobat.environment import Environment
 from aerobat.errors import SpecError
 from aerobat.flatness import reference
 from aerobat.interchange import read_csv, write_csv
-from aerobat.planning import Miqp, plan
+from aerobat.planning import BisectionSearch, Miqp, plan
 from aerobat.problem import Limits, load_problem
 from aerobat.states import STANDARD_GRAVITY
 from aerobat.trajectory import Trajectory
 from aerobat.trajectory.minimum_effort import minimum_effort
 from aerobat.vehicle import load_vehicle
-from random_flights import Flight, certified_margin, moved, random_flight, sampled, stretched, with_lags
+from random_flights import Flight, certified_margin, moved, random_flight, sampled, with_lags
 
 VEHICLE = with_lags(load_vehicle("agile-quad"), 0.0)
 UP = np.array([0.0, 0.0, 1.0])
@@ -152,10 +152,11 @@ def test_without_drag_the_way_back_in_time_asks_the_same_of_the_rotors(seed):
     assert certified_margin(backwards, after) == pytest.approx(certified_margin(flight, before), abs=1e-4)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["flip-roll", "half-flip"])
 def test_it_accepts_the_plan_read_back_from_csv(name, tmp_path):
-    # a little slower than its limits, for rows are not at its knots
-    made = stretched(plan(load_problem(name), Miqp(order=4), vehicle=VEHICLE).trajectory, 1.03)
+    # a little within its limits, for rows are not at its knots
+    made = plan(load_problem(name), Miqp(reserve=0.25), vehicle=VEHICLE).trajectory
     certificate = certify(made, VEHICLE)
     assert certificate.certified, certificate.why
     write_csv(made, tmp_path / "plan.csv")
@@ -165,7 +166,9 @@ def test_it_accepts_the_plan_read_back_from_csv(name, tmp_path):
 
 
 def test_a_plan_whose_jerk_jumps_is_refused_for_its_body_rates():
-    made = plan(load_problem("flip-roll"), Miqp(order=3), vehicle=VEHICLE).trajectory
+    made = plan(
+        load_problem("flip-roll"), Miqp(order=3, search=BisectionSearch()), vehicle=VEHICLE
+    ).trajectory
     certificate = certify(made, VEHICLE)
     assert not certificate.certified
     assert certificate.margin > 0

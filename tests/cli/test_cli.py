@@ -121,7 +121,7 @@ def test_plan_stops_after_planning(capsys) -> None:
     assert "flight" not in report
     flyability = report["plan"]["flyability"]
     assert flyability["flies"] is True
-    assert 0.0 < flyability["error_m"] < flyability["disturbed_error_m"] < 0.05
+    assert 0.0 < flyability["error_m"] < flyability["disturbed_error_m"] < 0.15
     written = sorted(p.name for p in Path("out/half-flip").iterdir())
     assert written == ["half-flip.plan", "plan.csv", "report.json", "report.png", "run.toml"]
 
@@ -315,10 +315,10 @@ def test_nothing_heavy_is_imported_before_it_is_needed() -> None:
 
 
 @pytest.mark.process
-def test_the_main_job_needs_neither_pyplot_nor_scipy() -> None:
+def test_the_main_job_needs_neither_pyplot_nor_casadi() -> None:
     probe = (
         "import sys\nfrom aerobat.cli import main\nmain(['fly', 'line', '--json'])\n"
-        "print([m for m in ('scipy', 'casadi', 'matplotlib.pyplot') if m in sys.modules], file=sys.stderr)"
+        "print([m for m in ('casadi', 'matplotlib.pyplot') if m in sys.modules], file=sys.stderr)"
     )
     done = subprocess.run([sys.executable, "-c", probe], capture_output=True, text=True, check=True)
     assert done.stderr.strip() == "[]"
@@ -330,7 +330,7 @@ def test_a_command_imports_what_it_needs() -> None:
     others = [
         "cli.commands.sweep", "studies", "viewer", "links", "simulation.conditions",
         "interchange.robots.description", "problem.maneuvers.course", "problem.maneuvers.waypoints",
-        "planning.time_optimal.race", "planning.polynomial.descent.knot_descent",
+        "planning.time_optimal.race", "planning.time_optimal.collocated_program",
     ]  # fmt: skip
     probe = (
         "import sys\nfrom aerobat.cli import main\nmain(['fly', 'line', '--json'])\n"
@@ -340,6 +340,7 @@ def test_a_command_imports_what_it_needs() -> None:
     assert done.stderr.strip() == "[]"
 
 
+@pytest.mark.slow
 def test_check_judges_what_was_planned_not_what_it_would_assume(mars: Path, capsys) -> None:
     """The plan's own vehicle, heading, gravity, wind and limits: the certificate is the plan's."""
     planned = json.loads((mars / "report.json").read_text())["plan"]["certificate"]

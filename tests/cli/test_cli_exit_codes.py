@@ -16,7 +16,8 @@ from command_lines import code, without_pictures
 from places import ROOT
 from shared_plans import shared_plan
 
-JERK = ab.Miqp(order=3)  # the paper's, whose body rates jump, which no moment can do
+# the paper's program as it is, whose body rates jump, which no moment can do
+JERK = ab.Miqp(order=3, search=ab.BisectionSearch())
 
 
 @pytest.fixture(autouse=True)

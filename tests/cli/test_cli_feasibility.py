@@ -33,6 +33,7 @@ def code(*arguments: str) -> int:
     return 0
 
 
+@pytest.mark.slow
 def test_a_map_writes_a_row_a_cell_which_is_what_plan_says(capsys) -> None:
     assert code(*MAP, "--json", "--workers", "1") == 0
     facts = json.loads(capsys.readouterr().out)

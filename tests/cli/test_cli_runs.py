@@ -132,7 +132,7 @@ def as_the_command_has_it(planner: str, **options: Any) -> Planner:
     [
         ({}, ""),
         ({"order": 4}, "-order-4"),
-        ({"intervals": 30, "reserve": 0.1}, "-intervals-30-reserve-0.1"),
+        ({"intervals": 30, "reserve": 0.2}, "-intervals-30-reserve-0.2"),
         ({"time_limit": 2.5}, "-time-limit-2.5"),
     ],
 )

@@ -26,12 +26,12 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     halved = replace(usual, **{name: 0.5 * getattr(usual, name) for name in TUNED})
     ab.write_vehicle(replace(ab.load_vehicle("agile-quad"), name="slow", controller=halved), "slow.toml")
     ab.write_dispersion(ab.Dispersion(mass=0.03, start_position=0.02), "weak.toml")
-    shared_plan("half-flip").save("half-flip.plan")
+    shared_plan("half-flip", "agile-quad", ab.Miqp(order=4, reserve=0.15)).save("half-flip.plan")
     return tmp_path
 
 
 def test_better_gains_are_written_and_flown_by(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    cli.main(["tune", "half-flip.plan", "--vehicle", "slow.toml", *FEW, "20", "--json"])
+    cli.main(["tune", "half-flip.plan", "--vehicle", "slow.toml", *FEW, "32", "--json"])
     facts = json.loads(capsys.readouterr().out)
     assert facts["better"]
     assert facts["fresh"]["after"]["cost_m"] < facts["fresh"]["before"]["cost_m"]

@@ -17,8 +17,10 @@ from aerobat.flatness import reference
 from aerobat.limits import Limit, limits_along
 from aerobat.limits.limit import size_of
 from aerobat.planning.miqp import formulate
-from aerobat.planning.miqp.refinement.limit_rows import LimitRows
+from aerobat.planning.refinement.limit_values import Frames, LimitValues
+from aerobat.planning.refinement.refine import knots_at_stages
 from aerobat.planning.time_optimal.optimal_control.bounds import LOOKS, Bounds
+from aerobat.planning.warm_start import WarmStart
 from aerobat.problem import Condition, Limits, Problem, load_problem
 from aerobat.problem.condition import Quantity
 from aerobat.trajectory import Trajectory
@@ -35,7 +37,9 @@ BOX = Limits(
 
 @pytest.fixture(scope="module")
 def flown() -> Trajectory:
-    return shared_plan("flip-roll").trajectory
+    """A flip, cut into many parts: body axes are exact where places are near each other."""
+    whole = WarmStart(shared_plan("flip-roll").trajectory, (), ())
+    return knots_at_stages(whole, 40).trajectory
 
 
 @pytest.fixture(scope="module", params=[0.0, 0.06], ids=["equal drag", "unequal drag"])
@@ -50,8 +54,8 @@ def asked(craft: Vehicle) -> tuple[Limit, ...]:
     return limits_along(craft, WIND, problem.path_limits, (CONDITION,))
 
 
-def sampled(flown: Trajectory, craft: Vehicle, times: np.ndarray) -> tuple[LimitRows, np.ndarray, np.ndarray]:
-    rows = LimitRows(asked(craft), craft, WIND, flown.heading)
+def sampled(flown: Trajectory, craft: Vehicle, times: np.ndarray) -> tuple[LimitValues, np.ndarray, Frames]:
+    rows = LimitValues(asked(craft), craft, WIND, flown.heading)
     derivatives = np.stack([flown.evaluate(times, k) for k in range(6)], axis=1)
     return rows, derivatives, rows.frames(times, derivatives)
 
@@ -94,20 +98,37 @@ def test_the_refinement_holds_what_flatness_says_of_every_limit(flown: Trajector
     for (limit, sign), excess in zip(rows.sides, rows.values(derivatives, frames).T, strict=True):
         end = limit.upper if sign > 0.0 else limit.lower
         expected = sign * (by_flatness(flown, craft, times, limit) - end) / limit.size
-        np.testing.assert_allclose(excess, expected, atol=2e-4, err_msg=limit.name)
+        np.testing.assert_allclose(excess, expected, atol=1e-3, err_msg=limit.name)
 
 
 def test_slopes_of_every_limit_are_its_differences(flown: Trajectory, craft: Vehicle) -> None:
     times = flown.knots[2:6] + 0.4 * flown.durations[2:6]
     rows, derivatives, frames = sampled(flown, craft, times)
-    place, column = np.nonzero(np.ones(rows.values(derivatives, frames).shape))
-    slopes = rows.slopes(derivatives, frames, place, column)
+    slopes = rows.slopes(derivatives, frames)
     rng = np.random.default_rng(0)
     step = rng.normal(size=derivatives.shape) * np.abs(derivatives).max(axis=(0, 2))[:, None]
     ahead, behind = (rows.values(derivatives + h * step, frames) for h in (1e-6, -1e-6))
     expected = (ahead - behind) / 2e-6
-    found = np.sum(slopes * step[place], axis=(1, 2)).reshape(expected.shape)
+    found = np.sum(slopes * step[:, None], axis=(2, 3))
     np.testing.assert_allclose(found, expected, rtol=1e-4, atol=1e-5 * np.abs(expected).max())
+
+
+def test_second_derivatives_of_every_limit_are_differences_of_its_slopes(
+    flown: Trajectory, craft: Vehicle
+) -> None:
+    times = flown.knots[2:6] + 0.4 * flown.durations[2:6]
+    rows, derivatives, frames = sampled(flown, craft, times)
+    rng = np.random.default_rng(0)
+    weights = rng.normal(size=(len(times), len(rows.sides)))
+    step = rng.normal(size=derivatives.shape) * np.abs(derivatives).max(axis=(0, 2))[:, None]
+    slopes, second = rows.curvature(derivatives, frames, weights)
+    expected = np.einsum("mc,mcka->mka", weights, rows.slopes(derivatives, frames))
+    np.testing.assert_allclose(slopes, expected, rtol=1e-9, atol=1e-12 * np.abs(expected).max())
+    ahead, behind = (rows.curvature(derivatives + h * step, frames, weights)[0] for h in (1e-6, -1e-6))
+    found = (second @ step[:, 1:].reshape(len(times), -1, 1)).reshape(len(times), 5, 3)
+    change = (ahead - behind)[:, 1:] / 2e-6
+    scale = np.abs(change).max(axis=(0, 2), keepdims=True)
+    np.testing.assert_allclose(found / scale, change / scale, atol=1e-4)
 
 
 def test_collocation_looks_at_what_flatness_says_of_every_limit(flown: Trajectory, craft: Vehicle) -> None:
@@ -146,7 +167,7 @@ def test_a_certificate_states_every_limit_as_far_as_samples_reach_and_little_fur
                 assert finding.limit == pytest.approx(end)
                 assert finding.field == limit.fields[side is Side.MAX]
                 beyond = (finding.bound - reached) * (1.0 if side is Side.MAX else -1.0)
-                assert -1e-4 * limit.size <= beyond <= 0.03 * limit.size, limit.name
+                assert -1e-4 * limit.size <= beyond <= 0.06 * limit.size, limit.name
 
 
 def test_the_search_holds_the_linear_limits_and_no_other(craft: Vehicle) -> None:

@@ -33,7 +33,7 @@ def test_whatever_comes_the_end_is_a_good_flight_or_a_sentence(seed: int, plan: 
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", [*range(10), 133, 163])
+@pytest.mark.parametrize("seed", [*range(10), 163])
 def test_whatever_odometry_says_a_maneuver_is_flown_well_or_given_up_in_a_sentence(seed: int) -> None:
     verdict, told = ros_man_in_the_middle.flown(seed)
     assert not verdict.startswith("wrong"), told

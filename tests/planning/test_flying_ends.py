@@ -41,14 +41,15 @@ def planned(planner: str, is_free: bool) -> ab.Plan:
     return ab.plan(replace(COURSE, goal=PASSED if is_free else GIVEN), PLANNERS[planner], QUAD)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("planner", "is_free"),
     [
-        ("time-optimal", True),
+        pytest.param("time-optimal", True, marks=pytest.mark.slow),
         pytest.param("time-optimal", False, marks=pytest.mark.slow),
         pytest.param("free-knots", True, marks=pytest.mark.slow),
         ("miqp", True),
-        ("miqp", False),
+        pytest.param("miqp", False, marks=pytest.mark.slow),
         ("min-snap", True),
         ("min-snap", False),
     ],

@@ -16,7 +16,8 @@ COURSE = ab.Course((ab.PassGate("red"), ab.Hold(PLACE, 0.75), ab.PassWaypoint((6
 PROBLEM = ab.Problem("rest", ab.at_rest((0.0, 0.0, 0.0)), ab.at_rest((6.0, 6.0, 1.0)), COURSE, (GATE,))
 
 
-@pytest.mark.parametrize("planner", ["miqp", pytest.param("min-snap", marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("planner", ["miqp", "min-snap"])
 def test_a_plan_rests_where_and_as_long_as_is_asked(planner) -> None:
     plan = ab.plan(PROBLEM, planner, "agile-quad")
     assert plan.certified

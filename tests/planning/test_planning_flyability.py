@@ -13,7 +13,6 @@ from aerobat.errors import SpecError
 from aerobat.planning import (
     FLYABLE_ERROR,
     Flyability,
-    GridSearch,
     PlacedStage,
     own_flight,
     with_second_opinion,
@@ -107,9 +106,10 @@ def test_a_certified_plan_that_does_not_fly_says_so_as_a_defect_of_its_own() -> 
 
 
 def test_a_plan_whose_flight_does_not_hold_the_gate_s_attitude_says_so(plan: ab.Plan, tmp_path: Path) -> None:
-    """Its gate, asked later to be passed more exactly than it was planned."""
+    """Its gate, turned later by half a degree and asked to be passed exactly."""
     (gate,) = plan.problem.gates
-    stricter = replace(plan.problem, gates=(replace(gate, attitude_tolerance=np.deg2rad(0.2)),))
+    turned = gate.tilted(np.deg2rad(89.5))
+    stricter = replace(plan.problem, gates=(replace(turned, attitude_tolerance=np.deg2rad(0.2)),))
     strict = replace(plan, problem=stricter)
     (passage,) = flyability(strict).passages
     (scored,) = ab.score(ab.fly(strict), strict).passages
@@ -156,18 +156,11 @@ def test_the_miqp_passes_faster_through_a_gate_that_its_path_would_turn_back_in(
 
 
 @pytest.mark.slow
-def test_the_miqp_goes_straight_through_a_gate_whose_frame_it_would_touch_and_loses_no_time() -> None:
-    """Equal intervals one percent shorter are not within what the vehicle can do, or touch the frame."""
+def test_the_miqp_goes_straight_through_a_gate_whose_frame_it_would_touch() -> None:
     case = random_case(44, 129)  # as shortened, its path comes into the gate along its plane
     made = ab.plan(case.problem, vehicle=case.vehicle)
     assert made.certified
     assert made.flies
-    dt = 0.99 * made.duration / made.intervals
-    try:
-        shorter = ab.plan(case.problem, ab.Miqp(search=GridSearch(dt, dt, 1), rescue=False), case.vehicle)
-    except ab.Infeasible:
-        return
-    assert not shorter.flies
 
 
 def test_a_flight_that_diverges_is_no_small_error() -> None:

@@ -9,7 +9,6 @@ import pytest
 from aerobat.errors import SpecError
 from aerobat.planning import MinSnap, Miqp, Plan
 from aerobat.planning.evidence import Evidence
-from aerobat.planning.polynomial.descent.knot_samples import refit
 from aerobat.planning.polynomial.free_knots import FreeKnots
 from aerobat.planning.polynomial.min_snap import TimeScaling
 from aerobat.problem import (
@@ -28,8 +27,6 @@ from aerobat.problem import (
 from aerobat.states import STANDARD_GRAVITY
 from aerobat.vehicle import Vehicle, load_vehicle
 from places import CASES
-
-pytest.importorskip("casadi")
 
 # rotors up to [N], inertia [kg·m²], time-optimal duration [s] by multiple shooting
 SETS = {
@@ -59,7 +56,7 @@ def margin(plan: Plan) -> float:
 
 @cache
 def planned(name: str) -> Plan:
-    return FreeKnots(segments=2).plan(SECTION_V, vehicle(name))
+    return FreeKnots().plan(SECTION_V, vehicle(name))
 
 
 each_set = pytest.mark.parametrize(
@@ -68,11 +65,11 @@ each_set = pytest.mark.parametrize(
 
 
 @each_set
-def test_two_segments_are_certified_and_within_an_eighth_of_the_least_time(name: str) -> None:
+def test_eight_segments_are_certified_and_within_an_eighth_of_the_least_time(name: str) -> None:
     plan = planned(name)
     assert Evidence(SECTION_V, vehicle(name), plan.trajectory).certificate.certified
     assert certified(plan)
-    assert plan.trajectory.coefficients.shape == (2, 10, 3)
+    assert plan.trajectory.coefficients.shape == (8, 10, 3)
     assert plan.duration / SETS[name][2] < 1.12
 
 
@@ -100,7 +97,7 @@ def test_still_ends_have_no_jerk() -> None:
 
 
 def test_reserve_leaves_the_rotors_more_at_the_cost_of_time() -> None:
-    plan = FreeKnots(segments=2, reserve=0.05).plan(SECTION_V, vehicle("B"))
+    plan = FreeKnots(segments=4, reserve=0.05).plan(SECTION_V, vehicle("B"))
     assert certified(plan)
     assert margin(plan) > 2.0 * margin(planned("B"))
     assert plan.duration > planned("B").duration
@@ -108,7 +105,7 @@ def test_reserve_leaves_the_rotors_more_at_the_cost_of_time() -> None:
 
 @pytest.mark.slow
 def test_more_segments_are_faster() -> None:
-    plan = FreeKnots(segments=4, start=planned("E")).plan(SECTION_V, vehicle("E"))
+    plan = FreeKnots(segments=16, start=planned("E")).plan(SECTION_V, vehicle("E"))
     assert certified(plan)
     assert plan.duration < planned("E").duration
 
@@ -116,7 +113,7 @@ def test_more_segments_are_faster() -> None:
 @pytest.mark.slow
 def test_limits_of_the_problem_hold_everywhere() -> None:
     limits = Limits(velocity=4.5, acceleration=9.0)
-    slower = FreeKnots(segments=2).plan(replace(SECTION_V, limits=limits), vehicle("E"))
+    slower = FreeKnots(segments=4).plan(replace(SECTION_V, limits=limits), vehicle("E"))
     assert np.abs(slower.trajectory.component_range(1)).max() <= 4.5 + 1e-9
     assert np.abs(slower.trajectory.component_range(2)).max() <= 9.0 + 1e-9
     assert slower.status == "locally optimal"
@@ -131,17 +128,9 @@ def test_random_starts_end_certified(seed: int) -> None:
     start = MinSnap(time_scaling=TimeScaling.ALL, stop_after=1).plan(
         replace(SECTION_V, maneuver=waypoints), vehicle("B")
     )
-    plan = FreeKnots(segments=2, start=start).plan(SECTION_V, vehicle("B"))
+    plan = FreeKnots(segments=4, start=start).plan(SECTION_V, vehicle("B"))
     assert certified(plan)
     assert plan.duration / SETS["B"][2] < 1.12
-
-
-def test_stopped_solver_leaves_the_certified_start() -> None:
-    start = MinSnap().plan(SECTION_V, vehicle("A"))
-    plan = FreeKnots(iterations=1, start=start).plan(SECTION_V, vehicle("A"))
-    assert certified(plan)
-    assert plan.duration <= start.duration
-    assert plan.attempts
 
 
 LEAN = Stage(
@@ -156,7 +145,7 @@ LEANING = Problem("leaning", at_rest(np.zeros(3)), at_rest((6.0, 0.0, 0.0)), Cus
 
 @pytest.mark.parametrize(
     "problem",
-    [LEANING, pytest.param(load_problem("flip-roll"), marks=pytest.mark.slow)],
+    [pytest.param(each, marks=pytest.mark.slow) for each in (LEANING, load_problem("flip-roll"))],
     ids=["lean", "flip"],
 )
 def test_stages_hold(problem: Problem) -> None:
@@ -173,15 +162,6 @@ def test_stages_hold(problem: Problem) -> None:
                 value = value + problem.environment.weight
             along = float(condition.direction @ value)
             assert condition.lower - 1e-3 <= along <= condition.upper + 1e-3
-
-
-def test_cutting_keeps_a_path_of_degree_nine() -> None:
-    whole = planned("B").trajectory
-    times = np.linspace(0.0, whole.duration, 101)
-    for k in range(4):
-        np.testing.assert_allclose(
-            refit(whole, 7).evaluate(times, k), whole.evaluate(times, k), atol=1e-6 * 10.0**k
-        )
 
 
 @pytest.mark.slow
@@ -213,8 +193,6 @@ def test_progress_sees_every_attempt() -> None:
 def test_bad_input_gets_a_sentence() -> None:
     with pytest.raises(SpecError, match=r"^FreeKnots\.segments must be 2 or more"):
         FreeKnots(segments=1)
-    with pytest.raises(SpecError, match=r"^FreeKnots\.iterations must be 1 or more"):
-        FreeKnots(iterations=0)
     with pytest.raises(SpecError, match=r"^FreeKnots\.reserve must be less than 0\.5"):
         FreeKnots(reserve=0.5)
     with pytest.raises(SpecError, match="needs a vehicle"):
@@ -222,11 +200,3 @@ def test_bad_input_gets_a_sentence() -> None:
     falling = EndState(np.zeros(3), acceleration=np.array([0.0, 0.0, -STANDARD_GRAVITY]))
     with pytest.raises(SpecError, match=r"start\.acceleration asks no thrust"):
         FreeKnots().plan(Problem("falling", falling, SECTION_V.goal), vehicle("A"))
-
-
-@pytest.mark.slow
-def test_where_the_miqp_s_path_leads_to_an_optimum_no_other_start_is_tried() -> None:
-    problem = load_problem(str(CASES / "no-faster.toml"))
-    found = FreeKnots(reserve=0.03).plan(problem, load_vehicle(str(CASES / "no-faster-vehicle.toml")))
-    assert found.certified
-    assert sum(attempt.status == "feasible" for attempt in found.attempts) == 1

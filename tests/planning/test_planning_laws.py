@@ -195,8 +195,17 @@ def test_what_cannot_be_certified_is_no_plan() -> None:
     assert not any(attempt.feasible for attempt in refused.value.attempts)
 
 
-def test_jerk_inputs_keep_the_rotors_limits_and_their_certificate_says_what_jumps() -> None:
+@pytest.mark.slow
+def test_whatever_input_places_the_stages_the_refined_path_jumps_in_nothing() -> None:
     found = plan(load_problem("flip-roll"), Miqp(order=3), QUAD)
+    assert found.certified
+    assert found.order == 3
+    assert max(found.trajectory.jumps(k).max() for k in range(4)) < 1e-6
+
+
+@pytest.mark.slow
+def test_jerk_inputs_as_they_are_keep_the_rotors_limits_and_their_certificate_says_what_jumps() -> None:
+    found = plan(load_problem("flip-roll"), Miqp(order=3, search=ab.BisectionSearch()), QUAD)
     assert not found.certified
     assert found.certificate.margin > 0.0
     assert "body rate jumps" in str(found)

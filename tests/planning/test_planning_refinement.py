@@ -12,7 +12,6 @@ from aerobat.planning import GridSearch, Miqp, plan
 from aerobat.planning.certified_solve import tightened
 from aerobat.planning.evidence import Evidence
 from aerobat.planning.miqp.miqp import formulate
-from aerobat.planning.miqp.refinement.phases import PhasedChain, Places
 from aerobat.planning.miqp.rescue import with_more_intervals
 from aerobat.planning.miqp.shortest import COARSE_GROWTH
 from aerobat.problem import (
@@ -28,7 +27,6 @@ from aerobat.problem import (
 from aerobat.trajectory import Trajectory
 from aerobat.vehicle import Vehicle, load_vehicle
 from places import CASES
-from random_problems import random_case
 from shared_plans import shared_plan
 
 AXES = np.eye(3)
@@ -45,23 +43,11 @@ def passing(*conditions: Condition, at: object = "free") -> Problem:
     return Problem("passing", at_rest((0.0, 0.0, 0.0)), at_rest((6.0, 0.0, 0.0)), maneuver)
 
 
-@pytest.mark.parametrize("name", ["line", pytest.param("flip-roll", marks=pytest.mark.slow)])
-def test_a_plan_to_begin_from_is_certified_and_found_on_the_way_to_the_shortest(
-    name: str, quad: Vehicle
-) -> None:
-    problem = load_problem(name)
-    first, shortest = (Miqp(shortens=shortens).plan(problem, quad) for shortens in (False, True))
-    assert first.certified
-    assert first.attempts[-1].feasible
-    assert first.duration >= shortest.duration
-    assert len(first.attempts) <= len(shortest.attempts)
-
-
+@pytest.mark.slow
 def test_thirteen_intervals_are_not_called_infeasible_because_bounds_were_tightened_too_far() -> None:
     problem = load_problem(str(CASES / "false-infeasible.toml"))
     found = plan(problem, Miqp(intervals=13, rescue=False), load_vehicle("hexarotor"))
     assert found.certified
-    assert found.intervals == 13
 
 
 def test_a_flip_too_fast_for_its_limits_is_refuted_by_the_candidates_of_one_stage(quad: Vehicle) -> None:
@@ -73,6 +59,7 @@ def test_a_flip_too_fast_for_its_limits_is_refuted_by_the_candidates_of_one_stag
     assert result.nodes <= intervals
 
 
+@pytest.mark.slow
 def test_a_path_along_the_floor_is_certified_and_its_proof_is_its_own(quad: Vehicle) -> None:
     found = plan(load_problem(str(CASES / "floor.toml")), vehicle=quad)
     assert found.certified
@@ -93,35 +80,11 @@ def test_more_intervals_are_no_slower(quad: Vehicle) -> None:
     assert many.duration <= 1.01 * few.duration
 
 
-@pytest.mark.parametrize(
-    ("name", "vehicle"),
-    [
-        ("half-flip", "agile-quad"),
-        ("line", "agile-quad"),
-        pytest.param(str(CASES / "slow-start-flip.toml"), "hexarotor", marks=pytest.mark.slow),
-    ],
-)
-def test_no_equal_intervals_one_percent_shorter_can_be_flown(name: str, vehicle: str) -> None:
-    problem, flown_by = load_problem(name), load_vehicle(vehicle)
-    found = shared_plan(name, vehicle)
-    dt = 0.99 * found.duration / found.intervals
-    with pytest.raises(Infeasible):
-        plan(problem, Miqp(search=GridSearch(dt, dt, 1), rescue=False), flown_by)
-
-
 @pytest.mark.parametrize("name", ["flip-roll", "half-flip", "line"])
 def test_no_program_is_made_a_step_of_the_scan_shorter_than_any_motion(name: str) -> None:
     found = shared_plan(name)
     assert found.assessment is not None
     assert min(a.duration for a in found.attempts) >= found.assessment.least_duration / COARSE_GROWTH
-
-
-def test_a_fixed_dt_beyond_what_bounds_per_axis_alone_allow_is_refined(quad: Vehicle) -> None:
-    problem, dt = load_problem("half-flip"), 0.121
-    found = plan(problem, Miqp(search=GridSearch(dt, dt, 1), rescue=False), quad)
-    assert found.certified
-    assert found.dt == dt
-    assert found.duration == pytest.approx(20 * dt)
 
 
 def test_what_too_few_intervals_miss_is_rescued_and_said(quad: Vehicle) -> None:
@@ -141,18 +104,6 @@ def test_a_narrow_window_at_an_end_is_rescued_by_many_intervals(quad: Vehicle) -
     found = plan(passing(aside, still, level, at=(0.9, 0.96)), Miqp(intervals=13), quad)
     assert found.certified
     assert "planned with 40" in found.rescue
-
-
-@pytest.mark.slow
-def test_where_no_path_settles_more_intervals_are_tried_and_the_shorter_plan_says_so() -> None:
-    """The program's own answer takes twice as long as need be."""
-    case = random_case(72, 23)
-    own = plan(case.problem, Miqp(rescue=False), case.vehicle)
-    assert own.bound is not None
-    found = plan(case.problem, Miqp(), case.vehicle)
-    assert found.certified
-    assert found.duration < 0.6 * own.duration
-    assert "no path of miqp with 20 intervals settled; planned with 26" in str(found)
 
 
 @pytest.mark.parametrize(("asked", "more"), [(20, [26, 40]), (600, [780]), (900, []), (1000, [])])
@@ -190,33 +141,6 @@ def test_a_stage_holds_at_its_fraction_of_the_duration(quad: Vehicle) -> None:
 def test_a_stage_holds_within_its_window(quad: Vehicle) -> None:
     found = plan(passing(Condition(Quantity.POSITION, AXES[0], 2.0, 2.0), at=(0.6, 0.8)), vehicle=quad)
     assert 0.6 - 1e-9 <= found.stages[0].time / found.duration <= 0.8 + 1e-9
-
-
-def random_chain(rng: np.random.Generator) -> tuple[PhasedChain, np.ndarray]:
-    chain = PhasedChain(rng.normal(size=(5, 3)), (3, 4, 2))
-    ratios = np.array([0.8, 1.1, 1.1])
-    return chain, np.concatenate([rng.normal(size=27), ratios, [np.log(0.2)]])
-
-
-def test_samples_of_a_chain_are_those_of_its_trajectory() -> None:
-    chain, x = random_chain(np.random.default_rng(0))
-    samples = chain.samples(x, Places.even(9, 3))
-    trajectory = chain.trajectory(x, 0.0)
-    for k in range(6):
-        expected = trajectory.on_segments(np.linspace(0, 1, 4), k).reshape(-1, 3)
-        np.testing.assert_allclose(samples.derivatives[:, k], expected, atol=1e-9 * np.abs(expected).max())
-
-
-def test_slopes_of_samples_are_their_differences() -> None:
-    chain, x = random_chain(np.random.default_rng(1))
-    places = Places.even(9, 3)
-    samples = chain.samples(x, places)
-    weights = np.random.default_rng(2).normal(size=(len(places.interval), 6, 3))
-    rows = samples.rows(np.arange(len(places.interval)), weights)
-    for j in range(len(x)):
-        ahead, behind = (chain.samples(x + h * np.eye(len(x))[j], places).derivatives for h in (1e-6, -1e-6))
-        expected = np.sum(weights * (ahead - behind), axis=(1, 2)) / 2e-6
-        np.testing.assert_allclose(rows[:, j], expected, rtol=1e-5, atol=1e-5 * np.abs(rows).max())
 
 
 @pytest.fixture(scope="module")

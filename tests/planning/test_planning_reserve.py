@@ -33,8 +33,8 @@ def kept(certificate: Certificate | None) -> float:
 @pytest.mark.parametrize(
     ("planner", "reserve", "problem"),
     [
-        (Miqp(reserve=0.03), 0.03, "flip-roll"),
-        (Miqp(reserve=0.1), 0.1, "flip-roll"),
+        (Miqp(reserve=0.03), 0.03, "half-flip"),
+        pytest.param(Miqp(reserve=0.1), 0.1, "flip-roll", marks=pytest.mark.slow),
         pytest.param(Miqp(reserve=0.34), 0.34, "flip-roll", marks=pytest.mark.slow),
         (FreeKnots(segments=2, reserve=0.03), 0.03, "line"),
         pytest.param(FreeKnots(reserve=0.03), 0.03, "flip-roll", marks=pytest.mark.slow),

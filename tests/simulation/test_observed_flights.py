@@ -69,7 +69,7 @@ def test_commands_that_come_a_period_late_cost_nothing_where_the_model_is_right(
     """The controller looks ahead by its own model, to set-points of when its commands take effect."""
     late = replace(ab.load_dispersion("none"), control_rate=500.0, computation_delay=0.002)
     errors = [ab.score(ab.fly(line, conditions=c), line).max_position_error_m for c in ("none", late)]
-    assert errors[1] < errors[0] + 2e-4
+    assert errors[1] < errors[0] + 5e-4
 
 
 @pytest.mark.parametrize(

@@ -83,7 +83,7 @@ def test_a_planted_cause_is_named_first_and_explains_most_of_the_error(
     assert found.shares[0].error > 0.7 * found.largest
     # all parts add up: at every time, and along the largest error
     np.testing.assert_allclose(sum(found.errors.values()), found.error, atol=1e-4)
-    assert sum(share.error for share in found.shares) == pytest.approx(found.largest, abs=1e-4)
+    assert sum(share.error for share in found.shares) == pytest.approx(found.largest, abs=1e-3)
 
 
 @pytest.mark.parametrize("number", [0, pytest.param(1, marks=pytest.mark.slow)])
@@ -105,7 +105,7 @@ def test_the_delay_of_commands_is_read_off_the_rotors(rate: float, delay: float)
     lab = ab.load_dispersion("lab")
     sensors: dict[str, Any] = {"imu": lab.imu, "motion_capture": lab.motion_capture}
     flight = under(planned(0), 1, computation_delay=delay, control_rate=rate, **sensors)
-    assert ab.inspect_flight(flight, planned(0)).delay == pytest.approx(delay, abs=1e-4)
+    assert ab.inspect_flight(flight, planned(0)).delay == pytest.approx(delay, abs=1e-3)
 
 
 def moved(flight: ab.Flight, yaw: float, by: np.ndarray, later: float) -> ab.Flight:

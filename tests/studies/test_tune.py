@@ -32,6 +32,7 @@ def found() -> ab.Tuning:
     return ab.tune(half_flip(), WEAK, FLIGHTS, vehicle=detuned(), evaluations=32)
 
 
+@pytest.mark.slow
 def test_gains_that_were_halved_are_brought_back_to_what_the_usual_ones_give() -> None:
     usual = ab.tune(half_flip(), WEAK, FLIGHTS, evaluations=1).fresh[0]
     before, after = found().fresh

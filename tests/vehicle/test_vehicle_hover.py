@@ -40,6 +40,7 @@ def with_dead(vehicle: Vehicle, *dead: int) -> Vehicle:
 SURVIVOR = with_spins(HEXAROTOR, SURVIVING_SPINS)
 
 
+@pytest.mark.slow
 def test_a_hexarotor_with_a_dead_rotor_is_planned_certified_and_flown_by_the_others() -> None:
     problem = load_problem("half-flip")
     failed = with_dead(SURVIVOR, 0)

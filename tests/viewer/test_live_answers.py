@@ -56,6 +56,7 @@ def ask(
         return answer.status, answer.read()
 
 
+@pytest.mark.slow
 def test_a_plan_for_where_the_sliders_stand_is_the_plan_of_that_problem(replanner: Replanner) -> None:
     answer = replanner.answer({"gates[0].z": 4.0}, never)
     again = ab.plan(moved_gate(4.0), ab.Miqp(), "agile-quad")
@@ -80,7 +81,6 @@ def moved_gate(height: float) -> ab.Problem:
     [
         ({"maneuver.min_lateral_thrust": 38.0}, "Infeasible", "agile-quad gives 32"),
         ({"gates[0].tilt": 120.0}, "Refused", "must be from -90 to 90 for a half-flip"),
-        ({"planner.order": 3.0}, "Not proven", "jumps"),
     ],
 )
 def test_what_cannot_be_is_said_in_a_sentence(
@@ -90,7 +90,7 @@ def test_what_cannot_be_is_said_in_a_sentence(
     assert answer.verdict.word == word
     assert sentence in answer.verdict.sentence
     assert not answer.verdict.is_well
-    assert (answer.scene is None) == (word != "Not proven")
+    assert answer.scene is None
 
 
 def test_dispersed_flights_are_of_the_same_plan_and_counted(replanner: Replanner) -> None:

@@ -8,6 +8,7 @@ import traceback
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass
 
+from aerobat.cli.exit_code import ExitCode
 from aerobat.cli.terminal import print_json, say
 from aerobat.errors import AerobatError, BackendMissing, Infeasible, OwnCodeError
 
@@ -23,7 +24,7 @@ _FLAG = re.compile(r"(?<![\w-])--[a-z][\w-]*")
 class Failure:
     """The reason why a run came to no end of its own."""
 
-    kind: str  # bad_input, no_plan, missing_backend, plugin or interrupted
+    kind: str  # bad_input, no_plan, missing_backend, plugin, interrupted or terminated
     message: str  # one sentence
     field: str | None = None  # the key, or the option, that it is about; None where it is about none
 
@@ -34,7 +35,10 @@ class Failure:
             print_json(json.dumps({"error": asdict(self)}, indent=2, ensure_ascii=False))
 
 
-INTERRUPTED = Failure("interrupted", "interrupted")
+def stopped_by(code: ExitCode) -> Failure:
+    """The failure of a run that a signal ended: interrupted or terminated."""
+    name = code.name.lower()
+    return Failure(name, name)
 
 
 def foreseen(error: AerobatError) -> Failure:

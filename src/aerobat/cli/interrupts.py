@@ -12,6 +12,7 @@ from types import FrameType
 from aerobat.cli.exit_code import ExitCode
 
 _SIGNALS = (signal.SIGINT, signal.SIGTERM)
+REPORTED = "reported"  # of an interrupt whose command has written its report: nothing else is JSON then
 _noticed: list[int] = []
 
 
@@ -46,6 +47,11 @@ def end_interrupts() -> None:
         signal.signal(number, signal.SIG_IGN)
     if _noticed:
         raise KeyboardInterrupt
+
+
+def is_interrupted() -> bool:
+    """True where a signal came, whatever became of the exception that it raised."""
+    return bool(_noticed)
 
 
 def interrupted_by() -> ExitCode:

@@ -91,8 +91,10 @@ class Registry(Generic[T]):
             self._import_own(kind)
         if not isinstance(kind, str) or (kind not in self._classes and kind not in tuple(self)):
             known = ", ".join(map(repr, self))
-            others = f"; a {self._noun} of your own needs --import FILE.py" if isinstance(kind, str) else ""
-            raise FieldError("kind", f"must be one of {known}, got {shown(kind)}{others}")
+            others = (
+                f" a {self._noun} of your own, with --import FILE.py, or" if isinstance(kind, str) else ""
+            )
+            raise FieldError("kind", f"must be{others} one of {known}, got {shown(kind)}")
         return from_table(self[kind], {key: each for key, each in value.items() if key != "kind"})
 
     def _import_own(self, name: str) -> None:

@@ -69,7 +69,7 @@ class OpeningAhead(NamedTuple):
             extent: Of the body, in its attitude there.
         """
         through, offset = dot(self.normal, velocity), subtract(position, self.place)
-        bent = self.bending * self.reach**2 / 2.0 / ops.maximum(through, SLOWEST)
+        bent = self.bending * self.reach * self.reach / 2.0 / ops.maximum(through, SLOWEST)
         for outward, distance in zip(self.outward, self.distances, strict=True):
             room = (distance - extent(outward) - dot(outward, offset)) * through - bent
             across = self.reach * dot(outward, velocity)
@@ -119,7 +119,7 @@ def extent_of_attitude(ops: Ops, body: Ellipsoid, axes: Axes) -> Extent:
 
     def extent(outward: Vector) -> Scalar:
         along = [dot(axis, outward) for axis in axes]
-        reached = sum((size * part) ** 2 for size, part in zip(semi_axes, along, strict=True))
+        reached = sum(size * size * part * part for size, part in zip(semi_axes, along, strict=True))
         return sum(at * part for at, part in zip(centre, along, strict=True)) + ops.sqrt(reached)
 
     return extent
@@ -139,6 +139,7 @@ def extent_of_thrust(ops: Ops, body: Ellipsoid, thrust: Vector) -> Extent:
 
     def extent(outward: Vector) -> Scalar:
         along = dot(thrust, outward) / size
-        return up * along + hypot(x, y) + ops.sqrt(wide**2 * (1.0 - along**2) + high**2 * along**2)
+        squared = along * along
+        return up * along + hypot(x, y) + ops.sqrt(wide**2 * (1.0 - squared) + high**2 * squared)
 
     return extent

@@ -1,4 +1,4 @@
-"""Which gates a path leaves its body room in: a course's from the start, others once a flight hits them.
+"""The room that a path leaves its body in gates: from the start, and more once a flight hits them.
 
 What room in a gate is, `limits.body_in_gate` says.
 """
@@ -20,34 +20,26 @@ from aerobat.vehicle import Vehicle
 
 Found = TypeVar("Found")
 
-AXES = 3  # conditions that say where a stage is: more are the sides of a round or polygonal opening
 MAX_ATTEMPTS = 4  # at a more direct path, of one plan
 BENDING = 0.4  # of the largest specific thrust: the acceleration by which a path may bend there, at first
-BENDING_IN_MANEUVER = 0.1  # likewise, where a maneuver bends it as it likes
+BENDING_IN_MANEUVER = 0.25  # likewise beside a stage that does not say where it is, as a flip's
 MORE_BENDING = 1.6  # times that, where the plan's own flight does not pass
 A_LITTLE_MORE = 1.2  # the same, where it touches the frame by no more than FRAME_CLEARANCE
 
 
-def bodies_in_gates(
-    stages: Sequence[Stage], problem: Problem, vehicle: Vehicle, everywhere: bool = False
-) -> tuple[BodyInGate, ...]:
-    """Return the body's room in the gates that stages cross.
-
-    Those beside a stage that does not say where it is have none, until a flight does not pass them: a flip in
-    a gate begins and ends where it likes.
+def bodies_in_gates(stages: Sequence[Stage], problem: Problem, vehicle: Vehicle) -> tuple[BodyInGate, ...]:
+    """Return the body's room in the gates that stages cross, from the start.
 
     Args:
         stages: In order.
         problem: Its gates are crossed.
         vehicle: What flies.
-        everywhere: Whether there is room too beside gates that are crossed anywhere in a round or polygonal
-            opening, which costs up to 2 % of the duration where flights would pass without.
     """
     found = []
     for k in range(len(stages)):
-        around = stages[max(k - 1, 0) : k + 2]
-        if all(len(each.where) == AXES or (everywhere and each.is_placed) for each in around):
-            found.append(_body_in_gate(k, stages, problem, vehicle, BENDING))
+        on_course = all(each.is_placed for each in stages[max(k - 1, 0) : k + 2])
+        bending = BENDING if on_course else BENDING_IN_MANEUVER
+        found.append(_body_in_gate(k, stages, problem, vehicle, bending))
     return tuple(filter(None, found))
 
 

@@ -10,6 +10,7 @@ import dataclasses
 from abc import abstractmethod
 from collections.abc import Callable, Mapping
 from dataclasses import MISSING, dataclass, field, fields
+from functools import wraps
 from types import MappingProxyType, ModuleType
 from typing import Any, Protocol, TypeVar, cast, dataclass_transform, get_type_hints, runtime_checkable
 
@@ -17,7 +18,6 @@ from pydantic import Field
 
 from aerobat.declaration import Label, Registry, shown, suggest_for, validated
 from aerobat.errors import Infeasible, Reason, SpecError
-from aerobat.optimization.nonlinear import has_casadi
 from aerobat.planning.assessment.contradiction import contradiction
 from aerobat.planning.courses import is_course, on_open_courses
 from aerobat.planning.holds import between_holds
@@ -122,16 +122,13 @@ def suited_planner(problem: Problem, vehicle: Vehicle | None) -> str:
     """The name of the planner to take where nobody names one.
 
     It is miqp, whose search is exact, but for long courses, which it cannot search in reasonable time: for a
-    vehicle those are time-optimal's, or min-snap's where CasADi is not installed and all stages are points.
-    Closed courses are time-optimal's alone.
+    vehicle those are free-knots'. Closed courses are time-optimal's alone.
     """
     if not problem.ends:
         return "time-optimal"
     if vehicle is None or not is_course(problem.stages(vehicle.max_specific_thrust)):
         return "miqp"
-    if has_casadi():
-        return "time-optimal"
-    return "min-snap" if problem.maneuver.through_points else "miqp"
+    return "free-knots"
 
 
 def planner_for(problem: Problem, vehicle: Vehicle | None) -> Planner:
@@ -196,12 +193,25 @@ def planner(name: Label) -> Callable[[type[P]], type[P]]:
     def register(cls: type[P]) -> type[P]:
         if "plan" in vars(cls):
             planning: Any = cls
-            method = between_holds(cls.plan)
+            method = _on_one_thread(between_holds(cls.plan))
             closes = getattr(cls, "PLANS_CLOSED_COURSES", False)
             planning.plan = validated(method if closes else on_open_courses(name, method))
         return cast(type[P], PLANNERS.add(name, cls))
 
     return register
+
+
+def _on_one_thread(method: Callable[..., Plan]) -> Callable[..., Plan]:
+    """A planner's method `plan`, whose matrices are small, with its linear algebra on one thread."""
+
+    @wraps(method)
+    def plan(*args: Any, **kwargs: Any) -> Plan:
+        from aerobat.optimization.threads import one_thread  # SciPy is imported when something is planned
+
+        with one_thread():
+            return method(*args, **kwargs)
+
+    return plan
 
 
 def registered_planners() -> Mapping[str, type[Planner]]:

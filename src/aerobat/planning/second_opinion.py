@@ -11,10 +11,11 @@ from aerobat.optimization.deadline import out_of_time, within_time
 from aerobat.planning.assessment.assessment import SecondOpinion
 from aerobat.planning.planners import planner_class
 from aerobat.planning.recorder import Progress
-from aerobat.planning.result import FLYING_RESERVE, Plan
+from aerobat.planning.result import Plan
 from aerobat.simulation.autopilot import UndeterminedAttitude, recoveries
 
 OPINION_SEGMENTS = (2, 4)  # of free knots: two are quick and enough for a flip's five stages; else four
+OPINION_RESERVE = 0.03  # of every limit's range, that a shorter plan keeps: it flies, if little disturbs it
 OPINION_TIME = 20.0  # [s] at most: a poor plan of a long course would keep free knots busy for an hour
 
 
@@ -76,7 +77,7 @@ def _free_knots(plan: Plan, segments: int, progress: Progress | None) -> SecondO
     """A shorter plan by free knots that is certified and flies, if there is one."""
     options = f"--planner free-knots --segments {segments}"
     free_knots: Any = planner_class("free-knots")
-    planner = free_knots(segments=segments, start=plan, reserve=FLYING_RESERVE)
+    planner = free_knots(segments=segments, start=plan, reserve=OPINION_RESERVE)
     try:
         found = planner.plan(plan.problem, plan.vehicle, progress)
     except BackendMissing as missing:

@@ -10,6 +10,7 @@ from cyclopts import Parameter
 
 from aerobat.arrays import Array
 from aerobat.cli.exit_code import ExitCode
+from aerobat.cli.interrupts import REPORTED
 from aerobat.cli.link_options import MavlinkOptions
 from aerobat.cli.terminal import print_json, say
 from aerobat.errors import SpecError
@@ -72,6 +73,7 @@ def mavlink(
     except KeyboardInterrupt:
         if client.mission.phase is not Phase.READY:
             _print(client.report(), options.json)
+            raise KeyboardInterrupt(REPORTED) from None
         raise
     finally:
         connection.close()

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import partial
 from math import sqrt
 from typing import Annotated, Literal
 
 import numpy as np
+from pydantic import Field
 
 from aerobat.declaration import AS_IT_IS, NonNegative
 from aerobat.errors import Infeasible, Reason
@@ -19,12 +21,13 @@ from aerobat.planning.miqp.attempts import COURSE_SCAN_NODES, Attempts, Placemen
 from aerobat.planning.miqp.diagnosis import leg_without_room, why_infeasible
 from aerobat.planning.miqp.formulation import ASSUMED_THRUST_TO_WEIGHT, Formulation
 from aerobat.planning.miqp.integrator import IntegratorChain, Intervals, Order
-from aerobat.planning.miqp.refinement import descent, settled
 from aerobat.planning.miqp.rescue import Rescue
 from aerobat.planning.miqp.shortest import shortest
 from aerobat.planning.planners import Planner, option, planner
 from aerobat.planning.recorder import Progress, Recorder
-from aerobat.planning.result import Plan
+from aerobat.planning.refinement import FlownPath, Refinement
+from aerobat.planning.refinement.refine import MAX_SEGMENTS, SEGMENTS, segments_for
+from aerobat.planning.result import FLYING_RESERVE, Plan
 from aerobat.planning.search import GridSearch, Search
 from aerobat.planning.time_limit import TIME_LIMIT, stopped, too_short
 from aerobat.planning.warm_start import Reserve
@@ -39,11 +42,10 @@ class Miqp(Planner):
     """The paper's mixed-integer program (Section II), refined within what a vehicle can do.
 
     Without a vehicle, dt is the first feasible of the paper's grid, or what `search` finds. With one,
-    programs along a scan on dt say where stages lie; from there the intervals, equal in each phase between
-    stages, become as short as rotors, their commands, body rate, limits and conditions allow. With a vehicle
-    and a `search` intervals stay equal, dt is the search's, and only programs whose own path cannot be flown
-    are refined. What is returned is certified, but for orders whose jumps no rotor can make, as the
-    certificate then says.
+    programs along a scan on dt say where stages lie; from there polynomials between knots become as fast as
+    rotors, their commands, body rate, limits and conditions allow. With a vehicle and a `search` nothing is
+    refined: the plan is the program's own path, at the search's first dt that the vehicle can fly. What is
+    returned is certified, but for orders whose jumps no rotor can make, as the certificate then says.
     """
 
     order: Order | None = option(
@@ -61,13 +63,15 @@ class Miqp(Planner):
     )
     reserve: Reserve = option(
         0.0,
-        "The fraction of every limit of the rotors that is kept from either of its ends for the controller, "
-        "as unknown masses, winds and rotors need it.",
+        "The fraction of every limit of the vehicle that is kept from either of its ends for the controller; "
+        "with 0 a plan leaves it next to nothing. The default, a tenth, is given up where no plan keeps it.",
+        command_default=FLYING_RESERVE,
     )
     rescue: bool = option(
         True, "Give up where nothing is found, and try no other intervals, order or planner.", off="no-rescue"
     )
-    shortens: bool = True  # further than its first descents lead, and flies what it finds
+    segments: Annotated[int, Field(ge=2, le=MAX_SEGMENTS)] = SEGMENTS  # of a refined path, but of a course's
+    flies: bool = True  # what it finds, and mends what its own flight lacks
 
     def plan(
         self, problem: Problem, vehicle: Vehicle | None = None, progress: Progress | None = None
@@ -115,32 +119,59 @@ class Miqp(Planner):
                 raise Infeasible(leg, recorder.attempts)
             least = least_duration(problem, vehicle)
             last = max(4.0, 2.0 * first, 2.0 * least / self.intervals)
-            found = shortest(attempts, first, last, least, self.shortens)
+            return self._refined(attempts, vehicle, (first, last), least)
         if found is None:
-            if out_of_time():
-                raise too_short(problem, self.time_limit, recorder.attempts, self._quicker)
-            attempts_made = tuple(recorder.attempts)
-            why = partial(why_infeasible, formulation, attempts_made, vehicle)
-            raise Infeasible(why, attempts_made)
+            raise self._nothing_found(attempts)
         return plan_of(attempts, found, self.backend)
+
+    def _refined(
+        self, attempts: Attempts, vehicle: Vehicle, scanned: tuple[float, float], least: float
+    ) -> Plan:
+        """The plan of the shortest path from programs along a scan on dt.
+
+        Args:
+            attempts: Made here.
+            vehicle: What flies.
+            scanned: The scan's smallest and largest dt [s].
+            least: The duration [s] that no motion falls short of.
+        """
+        formulation, recorder = attempts.formulation, attempts.recorder
+        refinement = Refinement.of(formulation.problem, vehicle, recorder, self.reserve)
+        segments = segments_for(refinement.sequence, self.segments)
+        found = shortest(attempts, refinement, segments, scanned, least)
+        if refinement.in_gates and (found is None or isinstance(found.solution.source, Placement)):
+            refinement = replace(refinement, in_gates=())  # some gates leave no room where they are crossed
+            found = shortest(attempts, refinement, segments, scanned, least) or found
+        if found is None:
+            raise self._nothing_found(attempts)
+        if isinstance(found.solution.source, Placement):
+            return plan_of(attempts, found, self.backend)
+        if self.flies:
+            flight, flown = FlownPath(refinement, found).through_gates()
+            found = flown.with_reserves(flight).judged
+        return found.plan(
+            recorder,
+            planner="miqp",
+            order=formulation.chain.order,
+            status=found.solution.status,
+            backend=self.backend,
+            stages=found.solution.source.placed,
+        )
+
+    def _nothing_found(self, attempts: Attempts) -> Infeasible:
+        """The refusal: too little time, or the bound that binds."""
+        formulation, made = attempts.formulation, tuple(attempts.recorder.attempts)
+        if out_of_time():
+            return too_short(formulation.problem, self.time_limit, attempts.recorder.attempts, self._quicker)
+        return Infeasible(partial(why_infeasible, formulation, made, attempts.vehicle), made)
 
 
 def _attempt(attempts: Attempts, dt: float) -> Judged[Placement] | None:
-    """Outcome of one dt; None where nothing is found that is certified, or no time is left."""
+    """Outcome of one dt; None where its program's path is not certified, or no time is left."""
     if attempts.is_over:
         return None
-    placement = Placement(attempts.solve(dt), dt)
-    judged = attempts.judge(placement)
-    if placement.answer.x is None or attempts.vehicle is None:
-        return judged if judged.feasible else None
-    start = attempts.start(placement, held=True)
-    if judged.feasible and (not attempts.reserve or start.violation <= 0.0):
-        return judged
-    path = descent(start.program, start.x).path
-    if path is None:
-        return None
-    refined = attempts.refined(placement, partial(settled, path))
-    return refined if refined.feasible else None
+    judged = attempts.judge(Placement(attempts.solve(dt), dt))
+    return judged if judged.feasible else None
 
 
 def formulate(problem: Problem, order: int, intervals: int, vehicle: Vehicle | None = None) -> Formulation:

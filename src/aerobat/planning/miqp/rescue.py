@@ -16,7 +16,7 @@ from aerobat.planning.miqp.attempts import default_order
 from aerobat.planning.miqp.integrator import INPUT_NAMES, MAX_INTERVALS
 from aerobat.planning.planners import Planner, planner_class, planner_with_reserve
 from aerobat.planning.recorder import Recorder
-from aerobat.planning.result import Plan
+from aerobat.planning.result import FLYING_RESERVE, Plan
 from aerobat.problem.problem import Problem
 from aerobat.vehicle import Vehicle
 
@@ -95,7 +95,8 @@ class Rescue:
         for planner, how in ways:
             with within_share(share):
                 plan = self._planned(planner, how)
-            if plan is not None and plan.keeps(self.asked.reserve) and plan.duration < shorter_than:
+            kept = min(self.asked.reserve, getattr(planner, "reserve", self.asked.reserve))
+            if plan is not None and plan.keeps(kept) and plan.duration < shorter_than:
                 attempts = (*self.recorder.attempts, *plan.attempts)
                 return replace(plan, attempts=attempts, rescue=f"{failed}; planned {how}")
         return None
@@ -123,6 +124,8 @@ class Rescue:
         Where programs have solutions, but none that the vehicle can fly, that is a motion of the rigid body;
         where they have none, more intervals.
         """
+        if self.asked.reserve == FLYING_RESERVE:  # which is kept where it can be
+            yield replace(self.asked, reserve=0.0, rescue=False), "without a reserve"
         more = with_more_intervals(self.asked, self.problem, self.vehicle)
         if any(attempt.cost is not None for attempt in self.recorder.attempts):
             yield self._motion_from_all()

@@ -12,12 +12,11 @@ from aerobat.planning.certified_solve import Judged, certified_solve
 from aerobat.planning.courses import is_course
 from aerobat.planning.flyability import OwnFlight, own_flight
 from aerobat.planning.gate_clearance import cleared, more_direct
-from aerobat.planning.miqp import Miqp
 from aerobat.planning.recorder import Attempt, Recorder
 from aerobat.planning.time_optimal.collocated_program import CollocatedProgram, SolvedMotion
 from aerobat.planning.time_optimal.optimal_control.elements import Elements
-from aerobat.planning.time_optimal.starts import Start, starts
-from aerobat.planning.warm_start import MIN_INTERVALS, WarmStart
+from aerobat.planning.time_optimal.starts import Start
+from aerobat.planning.warm_start import MIN_INTERVALS
 from aerobat.problem.problem import Problem
 from aerobat.vehicle import Vehicle
 
@@ -184,28 +183,6 @@ class Race:
             solve_time=answer.time,
         )
         self.recorder.record(attempt)
-
-
-def coarse_motion(
-    problem: Problem,
-    vehicle: Vehicle,
-    recorder: Recorder,
-    reserve: float,
-    in_gates: tuple[BodyInGate, ...],
-) -> WarmStart | None:
-    """A course's fastest motion on a coarse mesh, within limits at its nodes; None where none is found.
-
-    Args:
-        problem: What is planned.
-        vehicle: What flies it.
-        recorder: Keeps an attempt a solve.
-        reserve: Of each rotor's range, kept from either of its ends.
-        in_gates: The body's room in gates.
-    """
-    race = Race(problem, vehicle, recorder, MIN_INTERVALS, COURSE_COARSE_ITERATIONS, reserve)
-    begun = starts(problem, vehicle, Miqp(), planar=False, count=COURSE_STARTS, first=None)
-    motions = [replace(start, in_gates=in_gates) for start in begun.motions]
-    return next((program.start.guess for program in race._coarse(motions, vehicle)), None)
 
 
 def _finalists(

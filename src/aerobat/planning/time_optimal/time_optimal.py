@@ -11,6 +11,7 @@ fine one, and the fastest that is certified is kept.
 from __future__ import annotations
 
 from dataclasses import field, replace
+from functools import partial
 from typing import TYPE_CHECKING, Annotated, ClassVar
 
 import numpy as np
@@ -69,7 +70,7 @@ class TimeOptimal(Planner):
     planar: bool = option(False, "Stay in the maneuver's vertical plane, where it has one.")
     iterations: Count = 500  # at most, each solve
     time_limit: NonNegative | None = option(None, TIME_LIMIT)  # [s]
-    guess: Miqp = field(default_factory=Miqp)
+    guess: Miqp = field(default_factory=partial(Miqp, segments=4, flies=False))
     start: Annotated[Plan, AS_IT_IS] | None = None
 
     def plan(

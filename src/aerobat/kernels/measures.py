@@ -1,0 +1,58 @@
+"""What limits are linear in at one instant of a motion, in scalar components: wrench, its rate, magnitudes.
+
+A motion is given in axes that the body's are near to. They are carried to the body's by the smallest
+rotation, which is exact where they are the body's own, and exact to first order beside.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from aerobat.kernels import flatness, unequal_drag
+from aerobat.kernels.ops import Matrix, Ops, Scalar, Vector
+from aerobat.kernels.unequal_drag import BodyMotion
+from aerobat.kernels.vectors import add, add_scaled, dot, scale
+
+STILL = 1e-12  # [rad²/s²] beside the square of a rate, which a body at rest has with a slope
+
+
+class Airframe(NamedTuple):
+    """What of a vehicle counts here."""
+
+    mass: Scalar  # [kg]
+    inertia: Matrix  # [kg·m²]
+    lateral_drag: Scalar  # [1/s] over the mass, across the thrust axis
+    axial_drag: Scalar  # [1/s] along it, beside that
+    unequal: Vector | None  # [1/s] along body x, y and z, where x and y differ
+
+
+def measures(ops: Ops, airframe: Airframe, motion: BodyMotion, up: Vector) -> tuple[Scalar, ...]:
+    """Return the measures in the order of `limits.quantity`: wrench (4), its rate (4), |f|, |ω|, upright.
+
+    Args:
+        ops: The arithmetic.
+        airframe: Mass, inertia and drag.
+        motion: Weight over mass, airspeed and the derivatives of position from acceleration on.
+        up: The vertical, in the axes of the motion.
+    """
+    if airframe.unequal is not None:
+        body = unequal_drag.DraggedBody(airframe.mass, airframe.unequal, airframe.inertia)
+        asked = unequal_drag.demand(ops.sqrt, body, motion)
+        rate = ops.sqrt(dot(asked.omega, asked.omega) + STILL)
+        return *asked.wrench, *asked.rate, asked.specific_thrust, rate, dot(asked.b3, up)
+    drag, v, a = airframe.lateral_drag, motion.airspeed, motion.acceleration
+    f = add(add_scaled(a, drag, v), motion.weight)
+    rates = (
+        add_scaled(rate, drag, below)
+        for rate, below in ((motion.jerk, a), (motion.snap, motion.jerk), (motion.crackle, motion.snap))
+    )
+    norm = ops.sqrt(dot(f, f))
+    f1, f2, f3 = rates
+    b3, r1, r2, r3 = (scale(1.0 / norm, vector) for vector in (f, f1, f2, f3))
+    turning = flatness.turning(b3, r1, r2, r3)
+    omega, omega_dot, angular_jerk = ((*flatness.tilted(b3, vector), 0.0) for vector in turning)
+    thrust = flatness.collective(airframe.mass, airframe.axial_drag, norm, b3, v)
+    thrust_rate = flatness.collective_rate(airframe.mass, airframe.axial_drag, b3, (norm, f1), (v, a))
+    moment, moment_rate = flatness.moment_and_rate(airframe.inertia, omega, omega_dot, angular_jerk)
+    rate = ops.sqrt(dot(turning[0], turning[0]) + STILL)
+    return thrust, *moment, thrust_rate, *moment_rate, norm, rate, dot(b3, up)

@@ -1,1 +1,0 @@
-"""Polynomials whose knots are free: the program, its samples, and the descent from a start."""

@@ -1,0 +1,84 @@
+"""By how much a path exceeds its limits, looked at densely: what places in a program leave between them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from aerobat.arrays import Array
+from aerobat.errors import Reason
+from aerobat.limits import Limit
+from aerobat.planning.refinement.limit_values import LimitValues
+from aerobat.planning.refinement.spline import DERIVATIVES
+from aerobat.trajectory import Trajectory
+
+LOOKED_AT = 64  # places of a segment
+JUST_INSIDE = 1e-9  # of a duration from its knots, where a segment is still itself and not its neighbour
+NEGLIGIBLE = 1e-9  # of a limit's size
+
+
+@dataclass(frozen=True, eq=False)
+class Excess:
+    """The constraints of a path at their worst, as fractions of their limits' sizes; negative: they hold."""
+
+    worst: Array  # in each segment, (S, c)
+    sides: tuple[tuple[Limit, float], ...]  # of each constraint
+    place: tuple[int, float]  # the constraint that is exceeded most, and when [s]
+
+    @classmethod
+    def of(
+        cls, trajectory: Trajectory, limits: LimitValues, reserve: float = 0.0, places: int = LOOKED_AT
+    ) -> Excess:
+        """Along a trajectory.
+
+        Args:
+            trajectory: The path.
+            limits: What holds along it.
+            reserve: Of the vehicle's limits' sizes, kept from either end.
+            places: Of a segment.
+        """
+        fractions = np.clip(chebyshev(places), JUST_INSIDE, 1.0 - JUST_INSIDE)
+        each = [trajectory.on_segments(fractions, k) for k in range(DERIVATIVES)]
+        derivatives = np.stack(each, axis=2).reshape(-1, DERIVATIVES, 3)
+        times = trajectory.knots[:-1, None] + trajectory.durations[:, None] * fractions
+        values = limits.values(derivatives, limits.frames(times.ravel(), derivatives))
+        values[:, limits.has_reserve] += reserve
+        values = values.reshape(trajectory.segments, places, -1)
+        values[0, 0, limits.of_path] = values[-1, -1, limits.of_path] = -1.0
+        segment, place, side = np.unravel_index(int(np.argmax(values)), values.shape)
+        return cls(values.max(axis=1), limits.sides, (int(side), float(times[segment, place])))
+
+    @property
+    def largest(self) -> float:
+        """The largest of all."""
+        return float(self.worst.max())
+
+    @property
+    def holds(self) -> bool:
+        """True if nothing is exceeded."""
+        return self.largest <= NEGLIGIBLE
+
+    @property
+    def reason(self) -> Reason:
+        """One sentence without its full stop about what is exceeded most."""
+        side, time = self.place
+        limit, sign = self.sides[side]
+        return limit.exceeded(self.largest, time, (limit.fields[sign > 0.0],))
+
+    @property
+    def nearby(self) -> Array:
+        """The worst in each segment and those beside it, where it moves when it is mended, (S, c).
+
+        Rotors count as one: they trade what they exceed.
+        """
+        names = np.array([limit.name for limit, _ in self.sides])
+        alike = np.equal.outer(names, names)
+        shared = np.where(alike, self.worst[:, None], -np.inf).max(axis=-1)
+        beside = np.pad(shared, ((1, 1), (0, 0)), mode="edge")
+        return np.asarray(np.max([beside[:-2], beside[1:-1], beside[2:]], axis=0))
+
+
+def chebyshev(count: int) -> Array:
+    """So many places in a segment, denser toward its ends, which are among them."""
+    return np.asarray((1.0 - np.cos(np.linspace(0.0, np.pi, count))) / 2.0)

@@ -1,0 +1,76 @@
+"""A refined path whose own flight has a defect, refined again: more room in gates, or a reserve."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+from aerobat.limits.body_in_gate import BodyInGate
+from aerobat.optimization.deadline import out_of_time
+from aerobat.planning.certified_solve import Judged
+from aerobat.planning.flyability import OwnFlight, own_flight
+from aerobat.planning.gate_clearance import cleared, more_direct
+from aerobat.planning.refinement.refine import RefinedPath, Refinement
+
+MAX_HALVINGS = 3  # of the bending that room in a gate allows for, where it leads to no path
+RESERVES = (0.02, 0.05, 0.1, 0.2)  # of the rotors' ranges, for paths that leave the controller too little
+
+
+@dataclass(frozen=True, eq=False)
+class FlownPath:
+    """A certified path and the refinement that it comes from."""
+
+    refinement: Refinement
+    judged: Judged[RefinedPath]
+
+    @property
+    def flight(self) -> OwnFlight:
+        """Its own."""
+        trajectory, source = self.judged.solution.trajectory, self.judged.solution.source
+        assert trajectory is not None
+        return own_flight(trajectory, self.refinement.vehicle, self.refinement.problem, source.placed)
+
+    def through_gates(self) -> tuple[OwnFlight, FlownPath]:
+        """Its flight and itself, or a path with more room in gates whose frames its flight does not clear."""
+        return cleared(self, lambda found: found.flight, FlownPath._more_direct)
+
+    def with_reserves(self, flight: OwnFlight) -> FlownPath:
+        """Itself, or a path with a reserve that leaves the controller what its flight lacked."""
+        best, found = (flight, self), self
+        for reserve in RESERVES:
+            if not flight.wants_reserve or out_of_time():
+                break
+            kept = max(reserve, self.refinement.reserve)
+            again = replace(found, refinement=replace(found.refinement, reserve=kept))._refined()
+            if again is not None:
+                flight, found = again.flight, again
+                best = min(best, (flight, found), key=lambda pair: pair[0].rank)
+        return best[1]
+
+    def _more_direct(self, flight: OwnFlight) -> FlownPath | None:
+        """The path with more room in the gates that a flight did not pass; None where none is found."""
+        refinement, stages = self.refinement, self.judged.solution.source.path.stages
+        before = refinement.rooms(stages)
+        in_gates = more_direct(before, stages, refinement.problem, refinement.vehicle, flight)
+        for _ in range(MAX_HALVINGS if in_gates != before else 0):
+            again = replace(self, refinement=replace(refinement, in_gates=in_gates))._refined()
+            if again is not None or out_of_time():
+                return again
+            in_gates = _halfway(before, in_gates)
+        return None
+
+    def _refined(self) -> FlownPath | None:
+        """The path refined once more; None where that leads to none that is certified."""
+        source = self.judged.solution.source
+        judged = self.refinement.finished(self.refinement.path(source.path))
+        if not (judged.feasible or out_of_time()):
+            judged = self.refinement.refined(source.path, source.path.trajectory.segments)
+        return replace(self, judged=judged) if judged.feasible else None
+
+
+def _halfway(before: Sequence[BodyInGate], in_gates: Sequence[BodyInGate]) -> tuple[BodyInGate, ...]:
+    """Room halfway between, of gates that had none that of half the bending."""
+    bending = {body.stage: body.bending for body in before}
+    return tuple(
+        replace(body, bending=0.5 * (body.bending + bending.get(body.stage, 0.0))) for body in in_gates
+    )

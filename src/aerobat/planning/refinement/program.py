@@ -1,0 +1,268 @@
+"""The fastest polynomials near a path within all limits, as a program for the interior point method.
+
+Limits hold at places of every segment, stages at knots. All variables stay in a box around the path: limits
+hold at places only, and what is free to leap finds motions that cheat between them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property
+from math import exp
+
+import numpy as np
+
+from aerobat.arrays import Array, Indices, Mask
+from aerobat.planning.refinement.limit_values import Frames, LimitValues
+from aerobat.planning.refinement.spline import Motion, Spline, basis
+from aerobat.planning.refinement.stage_values import KNOWN, STATE, StageValues
+
+AT_END = basis(np.array([1.0]))  # of a segment, (1, 6, 10)
+FADED = 0.1  # of the first and the last segment, along which a backoff grows from nothing,
+FADING = 3  # with this power of the way inward: positions leave rest no faster
+LIMITED = -1.0  # the value of a constraint that does not count
+
+
+@dataclass(frozen=True, eq=False)
+class RefinementProgram:
+    """Minimize ln h, the ratios of durations adding up to their number."""
+
+    spline: Spline
+    limits: LimitValues
+    stages: StageValues
+    stage_segments: tuple[int, ...]  # at whose ends stages hold
+    fractions: Array  # of every segment, at which limits hold, (p,)
+    backoff: Array  # of each segment and constraint, (S, c), of limits of the path fading towards both ends
+    radius: float  # of the box, of scaled derivatives
+    stretch: float  # the factor by which durations may differ
+
+    @cached_property
+    def cost(self) -> Array:
+        """ln h."""
+        cost = np.zeros(self.spline.size)
+        cost[self.spline.mean_column] = 1.0
+        return cost
+
+    @cached_property
+    def box(self) -> tuple[Array, Array]:
+        """Around the path."""
+        reach = np.full(self.spline.size, self.radius)
+        reach[[*self.spline.ratio_columns, self.spline.mean_column]] = np.log(self.stretch)
+        return self.spline.start - reach, self.spline.start + reach
+
+    def at(self, x: Array) -> RefinedPoint:
+        """The constraints at a point."""
+        return RefinedPoint(self, x)
+
+    @cached_property
+    def places(self) -> Array:
+        """The basis at fractions, (p, 6, 10)."""
+        return basis(self.fractions)
+
+    @cached_property
+    def near(self) -> Frames:
+        """Body axes along the path that it begins with."""
+        trajectory = self.spline.trajectory(self.spline.start)
+        times = trajectory.knots[:-1, None] + trajectory.durations[:, None] * self.fractions
+        derivatives = self.spline.derivatives(self.spline.start, self.places).reshape(-1, 6, 3)
+        return self.limits.frames(np.minimum(times.ravel(), trajectory.duration), derivatives)
+
+    @cached_property
+    def counts(self) -> Mask:
+        """Which constraints count, (S, p, c): those of the path not at the very ends, which are fixed."""
+        counts = np.ones((self.spline.segments, len(self.fractions), len(self.limits.sides)), dtype=bool)
+        counts[0, 0, self.limits.of_path] = counts[-1, -1, self.limits.of_path] = False
+        return counts
+
+    @cached_property
+    def backoffs(self) -> Array:
+        """The backoff at every place, (S, p, c): none at the ends, which may lie on limits of the path."""
+        backoffs = np.repeat(self.backoff[:, None], len(self.fractions), axis=1)
+        for segment, inward in ((0, self.fractions), (-1, 1.0 - self.fractions)):
+            backoffs[segment, :, self.limits.of_path] *= np.minimum(inward / FADED, 1.0) ** FADING
+        return backoffs
+
+    @cached_property
+    def windows(self) -> tuple[Array, Array]:
+        """Windows of stages as rows · ratios ≤ bounds, (w, S) and (w,)."""
+        rows = [
+            (sign * before, sign * end)
+            for before, (first, last) in self._windows
+            for sign, end, open_end in ((-1.0, first, 0.0), (1.0, last, 1.0))
+            if first < last and end != open_end
+        ]
+        return _stacked(rows, self.spline.segments)
+
+    @cached_property
+    def timed(self) -> tuple[Array, Array]:
+        """Ratios that add up, and stages at given fractions of the duration, as rows · ratios = targets."""
+        whole = np.full(self.spline.segments, 1.0 / self.spline.segments)
+        rows = [(before, first) for before, (first, last) in self._windows if first == last]
+        return _stacked([(whole, 1.0), *rows], self.spline.segments)
+
+    @property
+    def _windows(self) -> Iterator[tuple[Array, tuple[float, float]]]:
+        """Of each stage the weights of ratios in the fraction that goes before it, and its window."""
+        for stage, segment in zip(self.stages.stages, self.stage_segments, strict=True):
+            yield (np.arange(self.spline.segments) <= segment) / self.spline.segments, stage.window
+
+
+def _stacked(rows: list[tuple[Array, float]], width: int) -> tuple[Array, Array]:
+    """Rows (r, width) and what they are held to, (r,)."""
+    return np.array([row for row, _ in rows]).reshape(-1, width), np.array([end for _, end in rows])
+
+
+@dataclass(frozen=True, eq=False)
+class RefinedPoint:
+    """One path of a program."""
+
+    program: RefinementProgram
+    x: Array
+
+    @cached_property
+    def inequalities(self) -> Array:
+        """Limits at places, windows of stages, and what stages ask."""
+        program = self.program
+        values = program.limits.values(self._derivatives.reshape(-1, 6, 3), program.near)
+        values = values.reshape(program.counts.shape) + program.backoffs
+        rows, bounds = program.windows
+        windows = rows @ self._ratios - bounds
+        at_stages = program.stages.inequalities(self._at_stages)
+        return np.concatenate([np.where(program.counts, values, LIMITED).ravel(), windows, at_stages])
+
+    @cached_property
+    def equalities(self) -> Array:
+        """What is fixed of durations, and what stages fix."""
+        rows, targets = self.program.timed
+        at_stages = self.program.stages.equalities(self._at_stages)
+        return np.concatenate([rows @ self._ratios - targets, at_stages])
+
+    @cached_property
+    def rows(self) -> RefinedRows:
+        """The slopes of the inequalities."""
+        program = self.program
+        limits = program.limits.slopes(self._motion.derivatives.reshape(-1, 6, 3), program.near)
+        segments, count, kinds = program.counts.shape
+        slopes = self._motion.slopes.reshape(segments, count, 18, -1)
+        local = limits.reshape(segments, count, kinds, 18) @ slopes
+        local *= program.counts[..., None]
+        windows = np.zeros((len(program.windows[1]), len(self.x)))
+        windows[:, program.spline.ratio_columns] = program.windows[0] * self._ratios
+        at, by_state = program.stages.inequality_slopes(self._at_stages)
+        others = np.concatenate([windows, self._stage_rows(at, by_state)])
+        return RefinedRows(program.spline, local.reshape(segments, count * kinds, -1), others)
+
+    @cached_property
+    def equality_rows(self) -> Array:
+        """The slopes of the equalities, (p, n)."""
+        rows, _ = self.program.timed
+        timed = np.zeros((len(rows), len(self.x)))
+        timed[:, self.program.spline.ratio_columns] = rows * self._ratios
+        return np.concatenate([timed, self._stage_rows(*self.program.stages.equality_slopes())])
+
+    def curvature(self, inequality_weights: Array, equality_weights: Array) -> Array:
+        """The second derivatives of their weighted sum, (n, n)."""
+        program, spline = self.program, self.program.spline
+        segments, count, kinds = program.counts.shape
+        at_places, at_windows, at_stages = np.split(
+            inequality_weights, np.cumsum([program.counts.size, len(program.windows[1])])
+        )
+        weights = (at_places.reshape(program.counts.shape) * program.counts).reshape(-1, kinds)
+        derivatives = self._motion.derivatives.reshape(-1, 6, 3)
+        by_motion, second = program.limits.curvature(derivatives, program.near, weights)
+        moving = self._motion.slopes[:, :, 1:].reshape(segments * count, STATE + 6, -1)
+        blocks = np.swapaxes(moving, 1, 2) @ (second @ moving)
+        blocks = blocks.reshape(segments, count, *blocks.shape[1:]).sum(axis=1)
+        blocks += self._motion.curvature(by_motion.reshape(segments, count, 6, 3))
+        timed, equal = np.split(equality_weights, [len(program.timed[1])])
+        blocks += self._stage_blocks(at_stages, equal)
+        matrix = spline.assembled(blocks)
+        by_ratio = at_windows @ program.windows[0] + timed @ program.timed[0]
+        columns = spline.ratio_columns
+        matrix[columns, columns] += by_ratio * self._ratios
+        return matrix
+
+    def _stage_blocks(self, inequality_weights: Array, equality_weights: Array) -> Array:
+        """Second derivatives of what stages ask, by each segment's variables."""
+        stages = self.program.stages
+        weights = np.zeros((self.program.spline.segments, 1, 6, 3))
+        at, by_state = stages.inequality_slopes(self._at_stages)
+        equal, by_equal = stages.equality_slopes()
+        segments = np.array(self.program.stage_segments, dtype=np.intp)
+        np.add.at(weights[:, 0], segments[at], inequality_weights[:, None, None] * by_state)
+        np.add.at(weights[:, 0], segments[equal], equality_weights[:, None, None] * by_equal)
+        blocks = self._ends.curvature(weights)
+        second = stages.second_derivatives(self._at_stages, inequality_weights)
+        for segment, each in zip(segments, second, strict=True):
+            slopes = self._ends.slopes[segment, 0, :KNOWN].reshape(STATE, -1)
+            blocks[segment] += slopes.T @ each @ slopes
+        return blocks
+
+    def _stage_rows(self, at: Indices, weights: Array) -> Array:
+        """Rows (q, n) of Σ weights · derivatives at stages (q,), (q, 6, 3)."""
+        spline = self.program.spline
+        rows = np.zeros((len(at), spline.size + 1))
+        for row, stage, by_state in zip(rows, at, weights, strict=True):
+            segment = self.program.stage_segments[stage]
+            slopes = self._ends.slopes[segment, 0].reshape(18, -1)
+            np.add.at(row, spline.columns[segment], by_state.ravel() @ slopes)
+        return rows[:, :-1]
+
+    @property
+    def _ratios(self) -> Array:
+        """τ of all segments, (S,)."""
+        return np.exp(self.x[self.program.spline.ratio_columns])
+
+    @cached_property
+    def _derivatives(self) -> Array:
+        return self.program.spline.derivatives(self.x, self.program.places)
+
+    @cached_property
+    def _motion(self) -> Motion:
+        return self.program.spline.motion(self.x, self.program.places)
+
+    @cached_property
+    def _ends(self) -> Motion:
+        return self.program.spline.motion(self.x, AT_END)
+
+    @cached_property
+    def _at_stages(self) -> Array:
+        """Derivatives at stages, (stages, 6, 3)."""
+        found = self.program.spline.derivatives(self.x, AT_END)[:, 0]
+        return np.asarray(found[list(self.program.stage_segments)])
+
+    @property
+    def duration(self) -> float:
+        """Of the path [s]."""
+        return self.program.spline.segments * exp(self.x[self.program.spline.mean_column])
+
+
+@dataclass(frozen=True, eq=False)
+class RefinedRows:
+    """Slopes of inequalities: those of a segment by its own variables, others by all."""
+
+    spline: Spline
+    local: Array  # (S, r, K + 2)
+    others: Array  # (q, n)
+
+    def times(self, step: Array) -> Array:
+        """The rows times a step, (S r + q,)."""
+        local = self.local @ self.spline.gathered(step)[..., None]
+        return np.concatenate([local.ravel(), self.others @ step])
+
+    def transposed(self, weights: Array) -> Array:
+        """The sum of weighted rows, (n,)."""
+        local, others = self._split(weights)
+        parts = np.swapaxes(self.local, 1, 2) @ local
+        return self.spline.scattered(parts[..., 0]) + self.others.T @ others
+
+    def normal(self, weights: Array) -> Array:
+        """The sum of weighted rows times themselves, (n, n)."""
+        local, others = self._split(weights)
+        blocks = np.swapaxes(self.local, 1, 2) @ (local * self.local)
+        return self.spline.assembled(blocks) + self.others.T @ (others[:, None] * self.others)
+
+    def _split(self, weights: Array) -> tuple[Array, Array]:
+        segments, rows, _ = self.local.shape
+        return weights[: segments * rows].reshape(segments, rows, 1), weights[segments * rows :]

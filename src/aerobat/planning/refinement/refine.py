@@ -1,0 +1,416 @@
+"""The one refinement: from a path through stages to the fastest certified polynomials near it.
+
+Limits on a path are infinitely many constraints. They are held at places, and backed off from where a dense
+look, or the certificate, finds them exceeded between (Mitsos, "Global optimization of semi-infinite
+programs via restriction of the right-hand side", 2011): in rough rounds until the duration hardly falls,
+then in fine ones, which are damped so that what is mended stays mended, until the path is certified.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from time import perf_counter
+
+import numpy as np
+
+from aerobat.arrays import Array
+from aerobat.certification import Certificate, Verdict
+from aerobat.errors import Reason
+from aerobat.flatness import force_balance
+from aerobat.limits import limits_along
+from aerobat.limits.body_in_gate import BodyInGate
+from aerobat.limits.path_condition import limit_of
+from aerobat.optimization.deadline import out_of_time, within_share
+from aerobat.optimization.interior_point import InteriorPointResult, Settings, interior_point
+from aerobat.planning.certified_solve import Judged, Solution, certified_solve
+from aerobat.planning.courses import is_course
+from aerobat.planning.gate_clearance import bodies_in_gates
+from aerobat.planning.passages import PlacedStage
+from aerobat.planning.recorder import Recorder
+from aerobat.planning.refinement.excess import JUST_INSIDE, Excess, chebyshev
+from aerobat.planning.refinement.limit_values import LimitValues
+from aerobat.planning.refinement.program import RefinementProgram
+from aerobat.planning.refinement.spline import END_ORDER, Spline
+from aerobat.planning.refinement.stage_values import StageValues
+from aerobat.planning.rotor_margin import reserve_shortfalls
+from aerobat.planning.warm_start import WarmStart
+from aerobat.problem.condition import ForceBalance
+from aerobat.problem.problem import Problem
+from aerobat.problem.stage import Stage, StageSequence
+from aerobat.trajectory import Trajectory, polynomial
+from aerobat.vehicle import Vehicle
+
+SEGMENTS = 8  # of a maneuver: within a percent of the fastest; twice as many take three times as long
+LEG_SEGMENTS = 2  # of a course's leg
+MAX_SEGMENTS = 80  # of all: solves take a second each
+FIRST = Settings()
+ROUGH = Settings(barrier=1e-6, least_slack=1e-3)
+FINE = Settings(
+    barrier=1e-6, least_slack=1e-3, damping=1e-2, iterations=30, tolerance=1e-5, violation=5e-5, gain=2e-4
+)
+ROUGH_ROUNDS = 8  # at most
+FINE_ROUNDS = 10
+MORE_ROUNDS = 1  # of such fine rounds, from a path that is certified on
+ROUGH_SHARE = 0.5  # of the time that is left, so that there is some to certify what is found
+ROUGH_PLACES = 16  # of a segment: as many as a polynomial of degree 9 needs
+FINE_PLACES = 24
+LITTLE_GAIN = 0.005  # of the duration, from one rough round to the next: the end
+RADIUS = 2.0  # of the box in which scaled derivatives move at first,
+SHRINK = 1.5  # the factor by which it is smaller from one rough round to the next,
+LEAST_RADIUS = 1.0  # down to this
+STRETCH = 1.6  # the factor by which durations may differ in one round
+BACKOFF = 1e-4  # of every limit's size, at places
+MAX_BACKOFF = 0.03  # that one round adds: where much is exceeded, it moves elsewhere
+MORE_BACKOFF = 1.3  # times what is exceeded, in fine rounds
+NEARLY_MISSED = 0.02  # likewise, where rounds that follow may mend it
+MENDABLE = 0.5  # of a limit's size: a solve that leaves more has lost its way
+NEARLY_EXCEEDED = 2e-3  # of a limit's size: what a certificate may refute beside
+PROOF_BACKOFF = 2e-4  # of that, where a certificate refutes what a dense look does not
+RELATIVE_STAGE_TOLERANCE = 1e-5  # of a condition's size: by how much a stage may be missed through rounding
+NEWTON_STEPS = 3  # that meet what stages fix exactly
+CONVERGED = "locally optimal"  # the status of such a solution
+
+
+@dataclass(frozen=True, eq=False)
+class RefinedPath:
+    """A path with its stages, and by how much it exceeds limits."""
+
+    path: WarmStart
+    excess: Excess
+
+    @property
+    def placed(self) -> tuple[PlacedStage, ...]:
+        """Its stages, each in its segment."""
+        path = self.path
+        numbers = np.searchsorted(path.trajectory.knots[1:-1], path.times, side="left").tolist()
+        stages = zip(path.stages, numbers, path.times, strict=True)
+        return tuple(PlacedStage(s.name, segment, time, s.gate) for s, segment, time in stages)
+
+
+@dataclass(frozen=True, eq=False)
+class Refinement:
+    """What all refinements of one problem for one vehicle share."""
+
+    problem: Problem
+    vehicle: Vehicle
+    sequence: StageSequence
+    recorder: Recorder
+    reserve: float = 0.0  # of the range of each of the vehicle's limits, proven of rotors
+    in_gates: tuple[BodyInGate, ...] = ()  # that the stages cross
+    still_ends: bool = False  # without jerk
+    _known: dict[tuple[Stage, ...], StageValues] = field(default_factory=dict, init=False, repr=False)
+
+    @classmethod
+    def of(
+        cls,
+        problem: Problem,
+        vehicle: Vehicle,
+        recorder: Recorder,
+        reserve: float = 0.0,
+        still_ends: bool = False,
+    ) -> Refinement:
+        """The refinement of a problem's paths, with room for the body in all gates.
+
+        Args:
+            problem: What is planned.
+            vehicle: What flies.
+            recorder: Keeps an attempt a round.
+            reserve: Of the range of each of the vehicle's limits, kept from either end.
+            still_ends: Whether ends are without jerk.
+        """
+        sequence = problem.stages(vehicle.max_specific_thrust, vehicle.body_radius)
+        in_gates = bodies_in_gates(sequence.stages, problem, vehicle)
+        return cls(problem, vehicle, sequence, recorder, reserve, in_gates, still_ends)
+
+    @cached_property
+    def limits(self) -> LimitValues:
+        """Everything that holds all along, but for what others imply."""
+        environment = self.problem.environment
+        conditions = self.sequence.path_constraints
+        along = limits_along(self.vehicle, environment, self.problem.path_limits, conditions)
+        held = tuple(limit for limit in along if not limit.is_implied)
+        return LimitValues(held, self.vehicle, environment, self.problem.heading)
+
+    @cached_property
+    def balance(self) -> ForceBalance:
+        """The balance of thrust, acceleration and drag."""
+        return force_balance(self.problem.environment, self.vehicle)
+
+    def stage_values(self, stages: tuple[Stage, ...]) -> StageValues:
+        """What stages ask in the order of a path, compiled once."""
+        if stages not in self._known:
+            body = self.vehicle.bounding_ellipsoid
+            self._known[stages] = StageValues(stages, self.balance, body, self.rooms(stages))
+        return self._known[stages]
+
+    def rooms(self, stages: tuple[Stage, ...]) -> tuple[BodyInGate, ...]:
+        """The body's room in gates, with stages counted in the order of a path."""
+        if self.sequence.ordered:
+            return self.in_gates
+        gates = [stage.gate for stage in stages]
+        return tuple(replace(body, stage=gates.index(body.gate.name)) for body in self.in_gates)
+
+    def refined(self, guess: WarmStart, segments: int) -> Judged[RefinedPath]:
+        """The fastest certified path near a guess, or the last one that was tried.
+
+        Args:
+            guess: A path through the stages, within limits or not.
+            segments: Of the path that is sought, with a knot at every stage.
+        """
+        return self.finished(self.rough(guess, segments))
+
+    def rough(self, guess: WarmStart, segments: int) -> RefinedPath:
+        """A path that is as fast as it gets, and may exceed limits a little between places.
+
+        It is sought with few segments first, which go far in one step, then with twice as many, until there
+        are as many as asked.
+
+        Args:
+            guess: A path through the stages, within limits or not.
+            segments: Of the path that is sought, with a knot at every stage.
+        """
+        number = min(segments, max(SEGMENTS, len(guess.phases)))
+        with within_share(ROUGH_SHARE):
+            found = self._rough(knots_at_stages(guess, number))
+            while number < segments and not out_of_time():
+                number = min(2 * number, segments)
+                found = self._rough(knots_at_stages(found.path, number))
+        return found
+
+    def _rough(self, guess: WarmStart) -> RefinedPath:
+        """The fastest path near one with knots at the stages."""
+        rounds = Rounds(self, guess)
+        before = np.inf
+        for number in range(ROUGH_ROUNDS):
+            solution = rounds.solve()
+            certified_solve(_Found(solution), self.problem, self.vehicle, self.recorder, reserve=self.reserve)
+            duration = solution.duration
+            gains_little = number and duration > (1.0 - LITTLE_GAIN) * before
+            if gains_little or out_of_time() or not self.is_promising(solution.source):
+                break
+            before = duration
+            rounds.go_on(solution.source)
+        return solution.source
+
+    def finished(self, rough: RefinedPath) -> Judged[RefinedPath]:
+        """The certified path near a rough one, or the last one that was tried.
+
+        Where the duration still falls, it goes on from the path that is certified.
+        """
+        judged = self._finished(rough)
+        for _ in range(MORE_ROUNDS):
+            solution = judged.solution
+            if not judged.feasible or solution.status == CONVERGED or out_of_time():
+                break
+            again = self._finished(solution.source)
+            if not again.feasible or again.solution.duration >= solution.duration:
+                break
+            judged = again
+        return judged
+
+    def _finished(self, rough: RefinedPath) -> Judged[RefinedPath]:
+        """The certified path near one, or the last one that was tried."""
+        rounds = Rounds(self, rough.path, FINE, FINE_PLACES, LEAST_RADIUS)
+        rounds.back_off(rough.excess)
+        return certified_solve(
+            rounds, self.problem, self.vehicle, self.recorder, FINE_ROUNDS, reserve=self.reserve
+        )
+
+    def is_promising(self, path: RefinedPath) -> bool:
+        """True of a path that meets its stages and exceeds limits by so little that rounds may mend it."""
+        missed = self._missed_stage(path.path, NEARLY_MISSED)
+        return path.excess.largest <= MENDABLE and missed is None
+
+    def path(self, guess: WarmStart) -> RefinedPath:
+        """A path, looked at densely."""
+        return RefinedPath(guess, Excess.of(guess.trajectory, self.limits, self.reserve))
+
+    def solution(
+        self, path: RefinedPath, status: str, iterations: int = 0, time: float = 0.0
+    ) -> Solution[RefinedPath]:
+        """A path as a solution; a failure where it misses a stage, or exceeds limits.
+
+        Args:
+            path: What was found.
+            status: Of the solver.
+            iterations: Of the solver.
+            time: That it took [s].
+        """
+        trajectory, excess = path.path.trajectory, path.excess
+        failure = self._missed_stage(path.path)
+        if failure is None and not excess.holds:
+            failure = Reason(f"{excess.reason}{path.path.leg_at(excess.place[1])}", excess.reason.limits)
+        return Solution(
+            source=path,
+            duration=trajectory.duration,
+            trajectory=trajectory,
+            status=status,
+            nodes=iterations,
+            solve_time=time,
+            cost=trajectory.duration,
+            failure=failure,
+        )
+
+    def _missed_stage(self, path: WarmStart, tolerance: float = RELATIVE_STAGE_TOLERANCE) -> Reason | None:
+        """The first stage that a path misses, in a sentence; or None.
+
+        Args:
+            path: With its stages' times.
+            tolerance: By which a condition may be missed, as a fraction of its size.
+        """
+        for stage, time in zip(path.stages, path.times, strict=True):
+            where = (f"stage '{stage.name}'",)
+            flat = np.array([path.trajectory.evaluate(time, k) for k in range(3)])
+            for condition in stage.conditions:
+                excess = float(condition.bound(self.balance).excess(flat))
+                if excess > tolerance * limit_of(condition, self.balance).size:
+                    return Reason(f"the stage '{stage.name}' is missed by {excess:.2g} in SI units", where)
+            ball = stage.ball
+            away = 0.0 if ball is None else float(np.linalg.norm(flat[0] - ball.centre)) - ball.radius
+            if away > tolerance - RELATIVE_STAGE_TOLERANCE:
+                return Reason(f"the stage '{stage.name}' is missed by {away:.2g} m", where)
+            fraction, (earliest, latest) = time / path.trajectory.duration, stage.window
+            if max(earliest - fraction, fraction - latest) > tolerance:
+                return Reason(
+                    f"the stage '{stage.name}' is passed at {fraction:.3g} of the duration, not when asked",
+                    where,
+                )
+        return None
+
+
+class Rounds:
+    """The program near a path, again and again, with limits backed off from."""
+
+    def __init__(
+        self,
+        refinement: Refinement,
+        guess: WarmStart,
+        settings: Settings = FIRST,
+        places: int = ROUGH_PLACES,
+        radius: float = RADIUS,
+    ) -> None:
+        limits = refinement.limits
+        self._refinement, self._guess, self._settings = refinement, guess, settings
+        self._fractions, self._radius = chebyshev(places), radius
+        trajectory = guess.trajectory
+        self._segments = tuple(_segment_that_ends(trajectory, time) for time in guess.times)
+        kept = np.where(limits.has_reserve, refinement.reserve, 0.0) + BACKOFF
+        self._backoff = np.tile(kept, (trajectory.segments, 1))
+
+    def solve(self) -> Solution[RefinedPath]:
+        """The fastest path near the last one."""
+        began, refinement = perf_counter(), self._refinement
+        program = self._program
+        answer = interior_point(program, program.spline.start, self._settings)
+        x = _meeting_stages(program, answer)
+        trajectory = program.spline.trajectory(x)
+        times = tuple(float(trajectory.knots[segment + 1]) for segment in self._segments)
+        path = refinement.path(replace(self._guess, trajectory=trajectory, times=times))
+        stands_still = abs(trajectory.duration / self._guess.trajectory.duration - 1.0) < LITTLE_GAIN
+        status = CONVERGED if answer.converged or stands_still else "unknown"
+        return refinement.solution(path, status, answer.iterations, perf_counter() - began)
+
+    def tighten(self, solution: Solution[RefinedPath], certificate: Certificate | None) -> bool:
+        """Go on from a path with more room where it exceeds limits, or where its certificate refutes it."""
+        if out_of_time() or not self._refinement.is_promising(solution.source):
+            return False
+        excess = solution.source.excess
+        self.back_off(excess, MORE_BACKOFF)
+        if certificate is not None:
+            refuted = _refuted(certificate, self._refinement.reserve)
+            self._backoff += (MORE_BACKOFF * refuted + PROOF_BACKOFF) * (excess.nearby > -NEARLY_EXCEEDED)
+        self._guess = solution.source.path
+        return True
+
+    def go_on(self, path: RefinedPath) -> None:
+        """Go on from a path in a smaller region, with more room where it exceeds limits."""
+        self._guess, self._settings = path.path, ROUGH
+        self._radius = max(self._radius / SHRINK, LEAST_RADIUS)
+        self.back_off(path.excess)
+
+    def back_off(self, excess: Excess, factor: float = 1.0) -> None:
+        """Keep as much more room as is exceeded."""
+        exceeded = np.clip(excess.nearby, 0.0, MAX_BACKOFF)
+        more = BACKOFF * (exceeded > 0.0) * (factor > 1.0)
+        self._backoff += factor * exceeded + 2.0 * more
+
+    @property
+    def _program(self) -> RefinementProgram:
+        """The program around the last path."""
+        refinement, guess = self._refinement, self._guess
+        spline = Spline(refinement.problem, refinement.vehicle, guess.trajectory, refinement.still_ends)
+        return RefinementProgram(
+            spline=spline,
+            limits=refinement.limits,
+            stages=refinement.stage_values(guess.stages),
+            stage_segments=self._segments,
+            fractions=self._fractions,
+            backoff=self._backoff,
+            radius=self._radius,
+            stretch=STRETCH,
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class _Found:
+    """A solution that is looked at as it is."""
+
+    solution: Solution[RefinedPath]
+
+    def solve(self) -> Solution[RefinedPath]:
+        """The solution."""
+        return self.solution
+
+    def tighten(self, solution: Solution[RefinedPath], certificate: Certificate | None) -> bool:
+        """Nothing can be tightened."""
+        return False
+
+
+def _refuted(certificate: Certificate, reserve: float) -> float:
+    """The largest excess that a certificate refutes, or misses of the reserve, of a limit's size."""
+    refuted = (f for f in certificate.findings if f.verdict is Verdict.VIOLATED and f.limit is not None)
+    beyond = [-(f.margin or 0.0) / (f.size or max(abs(f.limit or 0.0), 1.0)) for f in refuted]
+    missed = [shortfall.size for shortfall in reserve_shortfalls(certificate, reserve)]
+    return min(max([*beyond, *missed], default=0.0), MAX_BACKOFF)
+
+
+def knots_at_stages(path: WarmStart, segments: int) -> WarmStart:
+    """Polynomials of degree 9 through a path up to snap, about so many, with a knot at every stage.
+
+    Args:
+        path: Of any degree.
+        segments: Their number, where that is no less than the phases between stages.
+    """
+    phases = path.phases
+    parts = np.ones(len(phases), dtype=int)
+    while parts.sum() < segments:
+        parts[np.argmax(phases / parts)] += 1
+    durations = np.repeat(phases / parts, parts)
+    knots = np.concatenate([[0.0], np.cumsum(durations)])
+    inside = np.stack([knots[:-1] + JUST_INSIDE * durations, knots[1:] - JUST_INSIDE * durations])
+    ends = np.stack([path.trajectory.evaluate(inside, k) for k in range(END_ORDER)], axis=2)
+    ends *= (durations[:, None] ** np.arange(END_ORDER))[..., None]
+    trajectory = Trajectory(durations, polynomial.hermite(ends[0], ends[1]), path.trajectory.heading)
+    return replace(path, trajectory=trajectory)
+
+
+def segments_for(sequence: StageSequence, asked: int = SEGMENTS) -> int:
+    """Return how many segments a path through stages has: of a course so many a leg, else as asked."""
+    legs = len(sequence.stages) + 1
+    wanted = max(asked, LEG_SEGMENTS * legs) if is_course(sequence) else asked
+    return min(max(wanted, legs), MAX_SEGMENTS)
+
+
+def _meeting_stages(program: RefinementProgram, answer: InteriorPointResult) -> Array:
+    """The point next to an answer that meets what stages fix exactly."""
+    x = answer.x
+    for _ in range(NEWTON_STEPS):
+        point = program.at(x)
+        x = x - np.linalg.lstsq(point.equality_rows, point.equalities, rcond=None)[0]
+    return np.asarray(x)
+
+
+def _segment_that_ends(trajectory: Trajectory, time: float) -> int:
+    """The segment at whose end a stage holds."""
+    return int(np.argmin(np.abs(trajectory.knots[1:] - time)))

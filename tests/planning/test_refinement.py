@@ -1,0 +1,140 @@
+"""The one refinement: its derivatives, what its paths meet, and that they are fast."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from aerobat.flatness import force_balance
+from aerobat.limits import limits_along
+from aerobat.planning.gate_clearance import bodies_in_gates
+from aerobat.planning.polynomial.knots import start_along_normals
+from aerobat.planning.recorder import Recorder
+from aerobat.planning.refinement import Refinement
+from aerobat.planning.refinement.limit_values import LimitValues
+from aerobat.planning.refinement.program import RefinementProgram
+from aerobat.planning.refinement.refine import knots_at_stages
+from aerobat.planning.refinement.spline import Spline, basis
+from aerobat.planning.refinement.stage_values import StageValues
+from aerobat.planning.warm_start import WarmStart
+from aerobat.problem import Limits, Problem, load_problem
+from aerobat.problem.ball import Ball
+from aerobat.problem.stage import Stage
+from aerobat.vehicle import Vehicle, load_vehicle
+from places import CASES
+from random_flights import with_lags
+from shared_plans import shared_plan
+
+QUAD = load_vehicle("agile-quad")
+COURSE = load_problem(str(CASES / "frame-course.toml"))
+
+
+def program(problem: Problem, vehicle: Vehicle, segments: int) -> RefinementProgram:
+    """Near a course's closed form, one of its stages a ball and in a window, its gates with room."""
+    sequence = problem.stages(vehicle.max_specific_thrust, vehicle.body_radius)
+    guess = knots_at_stages(start_along_normals(problem, vehicle, sequence, 4), segments)
+    ball = Stage("ball", ball=Ball(np.array([1.0, 2.0, 0.5]), 0.7), at=(0.1, 0.6))
+    stages = (*guess.stages[:-1], ball)
+    along = limits_along(vehicle, problem.environment, problem.path_limits, sequence.path_constraints)
+    limits = LimitValues(along, vehicle, problem.environment, problem.heading)
+    in_gates = bodies_in_gates(sequence.stages, problem, vehicle)[:-1]
+    body = vehicle.bounding_ellipsoid
+    trajectory = guess.trajectory
+    return RefinementProgram(
+        spline=Spline(problem, vehicle, trajectory),
+        limits=limits,
+        stages=StageValues(stages, force_balance(problem.environment, vehicle), body, in_gates),
+        stage_segments=tuple(int(np.argmin(np.abs(trajectory.knots[1:] - time))) for time in guess.times),
+        fractions=np.linspace(0.0, 1.0, 5),
+        backoff=np.full((trajectory.segments, len(limits.sides)), 1e-3),
+        radius=1.0,
+        stretch=1.5,
+    )
+
+
+MOVING = replace(
+    COURSE,
+    limits=Limits(velocity=9.0, acceleration=30.0),
+    start=replace(COURSE.start, velocity=np.array([1.0, 0.5, 0.2])),
+    goal=replace(COURSE.goal, free_velocity=True),
+)
+
+
+@pytest.mark.parametrize("problem", [COURSE, MOVING], ids=["rest", "moving"])
+@pytest.mark.parametrize("lag", [0.0, 0.02])
+def test_slopes_and_second_derivatives_are_differences(problem: Problem, lag: float) -> None:
+    dragged = replace(with_lags(QUAD, lag), drag_body=np.array([0.2, 0.2, 0.1]))
+    near = program(problem, dragged, 6)
+    rng = np.random.default_rng(0)
+    x = near.spline.start + 1e-3 * rng.normal(size=near.spline.size)
+    step, change = rng.normal(size=len(x)), 1e-6
+    here, ahead, behind = (near.at(x + h * step) for h in (0.0, change, -change))
+    moved = (ahead.inequalities - behind.inequalities) / (2.0 * change)
+    expected = here.rows.times(step)
+    np.testing.assert_allclose(moved, expected, atol=1e-6 * np.abs(expected).max())
+    equal = (ahead.equalities - behind.equalities) / (2.0 * change)
+    np.testing.assert_allclose(equal, here.equality_rows @ step, atol=1e-6)
+    weights, others = rng.uniform(size=len(moved)), rng.normal(size=len(equal))
+    gradients = [at.rows.transposed(weights) + at.equality_rows.T @ others for at in (ahead, behind)]
+    change_of_gradient = (gradients[0] - gradients[1]) / (2.0 * change)
+    expected = here.curvature(weights, others) @ step
+    np.testing.assert_allclose(change_of_gradient, expected, atol=1e-5 * np.abs(expected).max())
+    normal = here.rows.normal(weights) @ step
+    np.testing.assert_allclose(normal, here.rows.transposed(weights * here.rows.times(step)), rtol=1e-9)
+
+
+def test_variables_of_a_path_give_the_path_and_others_meet_its_ends() -> None:
+    near = program(MOVING, QUAD, 6)
+    spline = near.spline
+    begun = spline.trajectory(spline.start)
+    again = replace(spline, begun=begun)
+    times = np.linspace(0.0, begun.duration, 50)
+    np.testing.assert_allclose(
+        again.trajectory(again.start).evaluate(times), begun.evaluate(times), atol=1e-9
+    )
+    moved = spline.trajectory(spline.start + 0.1 * np.random.default_rng(1).normal(size=spline.size))
+    for time, state in ((0.0, MOVING.start), (moved.duration, MOVING.goal)):
+        for order in state.asked:
+            reached = moved.evaluate(time, int(order))
+            np.testing.assert_allclose(reached, state.derivatives(3)[order], atol=1e-7)
+    for order in range(5):
+        assert moved.jumps(order).max() <= 1e-6 * np.abs(moved.component_range(order)).max()
+
+
+@given(fraction=st.floats(0.0, 1.0), segment=st.integers(0, 5), order=st.integers(0, 5))
+def test_the_basis_is_the_polynomials_own(fraction: float, segment: int, order: int) -> None:
+    spline = program(COURSE, QUAD, 6).spline
+    found = spline.derivatives(spline.start, basis(np.array([fraction])))[segment, 0, order]
+    expected = spline.trajectory(spline.start).on_segments([fraction], order)[segment, 0]
+    np.testing.assert_allclose(found, expected, rtol=1e-7, atol=1e-7 * np.abs(expected).max() + 1e-9)
+
+
+@pytest.mark.parametrize(
+    ("name", "best"),
+    [pytest.param("line", 1.457, marks=pytest.mark.slow), ("half-flip", 2.080), ("flip-roll", 1.842)],
+)
+def test_a_maneuver_is_refined_to_within_a_hundredth_and_a_half_of_the_best_known(
+    name: str, best: float
+) -> None:
+    """The best known are polynomials of 8 segments found by IPOPT with free knots; no reserve."""
+    start = shared_plan(name)
+    refinement = replace(Refinement.of(start.problem, QUAD, Recorder(None)), in_gates=())
+    found = refinement.refined(WarmStart.of(start, refinement.sequence), 8)
+    assert found.feasible
+    assert found.solution.duration < 1.015 * best
+
+
+@pytest.mark.slow
+def test_a_path_that_begins_and_ends_at_a_limit_is_refined() -> None:
+    """On the ground, where its height may not be backed off from."""
+    line = load_problem("line")
+    grounded = replace(line, limits=replace(line.limits, lower=(-np.inf, -np.inf, 0.0)))
+    assert grounded.start.position[2] == 0.0
+    refinement = Refinement.of(grounded, QUAD, Recorder(None))
+    found = refinement.refined(WarmStart.of(shared_plan("line"), refinement.sequence), 8)
+    assert found.feasible
+    assert found.solution.duration < 1.02 * 1.457
