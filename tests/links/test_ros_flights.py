@@ -277,6 +277,7 @@ def test_in_the_world_gate_and_goal_stay_where_their_problem_has_them() -> None:
     np.testing.assert_allclose(middle, problem.gates[0].position, atol=1e-9)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("instant", [1.2, *(pytest.param(t, marks=pytest.mark.slow) for t in (0.2, 1.9))])
 def test_a_node_killed_at_any_instant_of_the_flip_leaves_a_hover(instant: float) -> None:
     sky = at_the_flips_begin()

@@ -331,6 +331,7 @@ def test_every_gate_is_drawn_inside_the_picture_with_a_vehicle_in_it(monkeypatch
         assert np.linalg.norm(drawn - gate.position, axis=1).min() < 0.05  # the foot of a thrust axis
 
 
+@pytest.mark.slow
 def test_every_passage_of_a_gate_is_marked_in_every_timeline():
     plan, _ = two_flips()
     passages = [stage.time for stage in plan.stages if stage.gate is not None]

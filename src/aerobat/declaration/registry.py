@@ -91,10 +91,9 @@ class Registry(Generic[T]):
             self._import_own(kind)
         if not isinstance(kind, str) or (kind not in self._classes and kind not in tuple(self)):
             known = ", ".join(map(repr, self))
-            others = (
-                f" a {self._noun} of your own, with --import FILE.py, or" if isinstance(kind, str) else ""
-            )
-            raise FieldError("kind", f"must be{others} one of {known}, got {shown(kind)}")
+            own = f"your own, with --import FILE.py, or one of {known}"
+            kinds = own if isinstance(kind, str) else known
+            raise FieldError("kind", f"must be one of {kinds}, got {shown(kind)}")
         return from_table(self[kind], {key: each for key, each in value.items() if key != "kind"})
 
     def _import_own(self, name: str) -> None:
