@@ -83,7 +83,9 @@ def test_a_double_flip_that_is_poor_says_so_and_names_what_does_better() -> None
     assessment = found.assessment
     assert assessment is not None
     assert assessment.opinion is not None
-    assert assessment.opinion.duration is not None
+    if assessment.opinion.duration is None:  # none is shorter
+        assert not assessment.poor
+        return
     assert assessment.poor == (found.duration > 1.4 * assessment.opinion.duration)
     assert not assessment.poor or str(assessment).startswith("poor: ")
     assert f"{assessment.opinion.duration:.3f} s ({assessment.opinion.options})" in str(found)
