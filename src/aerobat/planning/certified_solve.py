@@ -96,7 +96,6 @@ def certified_solve(
     vehicle: Vehicle | None,
     recorder: Recorder,
     rounds: int = 1,
-    jumps: bool = False,
     reserve: float = 0.0,
 ) -> Judged[Detail]:
     """The first solution that is certified and keeps the reserve, or the last one that was tried.
@@ -107,12 +106,10 @@ def certified_solve(
         vehicle: What shall fly it; without one every solution will do.
         recorder: Keeps an attempt a solve.
         rounds: Solves, at most.
-        jumps: Whether body rates, or thrusts of rotors with lag, may jump between segments, which no moment
-            and no rotor can do, as the certificate says.
         reserve: Of each rotor's range, that it must be proven to keep from either of its limits.
     """
     for left in reversed(range(rounds)):
-        judged = _judged(program.solve(), problem, vehicle, recorder, jumps, reserve)
+        judged = judge(program.solve(), problem, vehicle, recorder, reserve)
         if judged.feasible or not left or not program.tighten(judged.solution, judged.certificate):
             break
     return judged
@@ -160,14 +157,25 @@ def _backoff(excess: Array, bound: Array) -> Array:
     return backoff
 
 
-def _judged(
+def judge(
     solution: Solution[Detail],
     problem: Problem,
     vehicle: Vehicle | None,
     recorder: Recorder,
-    jumps: bool,
-    reserve: float,
+    reserve: float = 0.0,
+    jumps: bool = False,
 ) -> Judged[Detail]:
+    """Certify a solution, and keep the attempt.
+
+    Args:
+        solution: A path, or why there is none.
+        problem: Its limits and its environment are certified, beside the vehicle's limits.
+        vehicle: What shall fly it; without one every solution will do.
+        recorder: Keeps the attempt.
+        reserve: Of each rotor's range, that it must be proven to keep from either of its limits.
+        jumps: Whether body rates, or thrusts of rotors with lag, may jump between segments, which no moment
+            and no rotor can do, as the certificate says.
+    """
     evidence = certificate = None
     if solution.trajectory is not None and solution.failure is None and vehicle is not None:
         evidence = Evidence(problem, vehicle, solution.trajectory)

@@ -6,10 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from aerobat.certification import Certificate
 from aerobat.optimization import AssignmentResult, Solver, improved_in_windows
 from aerobat.optimization.deadline import out_of_time
-from aerobat.planning.certified_solve import Judged, Solution, certified_solve
+from aerobat.planning.certified_solve import Judged, Solution, judge
 from aerobat.planning.courses import is_placed_in_windows
 from aerobat.planning.miqp.diagnosis import NOT_CONVERGED, OUT_OF_TIME
 from aerobat.planning.miqp.formulation import Formulation
@@ -83,10 +82,22 @@ class Attempts:
             excess: By how much, as a fraction of a constraint's range, negative.
         """
         span = 0.0 if self.vehicle is None else float(self.vehicle.thrust_ranges.max())
-        answered = _Answered(self, placement, failure, excess * span or None)
-        problem = self.formulation.problem
-        return certified_solve(
-            answered, problem, self.vehicle, self.recorder, jumps=self.jumps, reserve=self.reserve
+        answer, dt = placement.answer, placement.dt
+        solved = answer.x is not None
+        solution = Solution(
+            source=placement,
+            duration=dt * self.formulation.chain.intervals,
+            trajectory=self.trajectory(answer, dt) if solved else None,
+            status=answer.status,
+            nodes=answer.nodes,
+            solve_time=answer.time,
+            cost=self.formulation.cost(answer.cost, dt) if solved else None,
+            dt=dt,
+            failure=failure or (None if solved else _why_unsolved(answer)),
+            margin=excess * span or None,
+        )
+        return judge(
+            solution, self.formulation.problem, self.vehicle, self.recorder, self.reserve, self.jumps
         )
 
     def path(self, placement: Placement, sequence: StageSequence) -> WarmStart:
@@ -115,40 +126,10 @@ class Attempts:
         )
 
 
-@dataclass
-class _Answered:
-    """A program's own answer."""
-
-    attempts: Attempts
-    placement: Placement
-    failure: str | None
-    margin: float | None  # [N] of the rotors, where it is known to be negative
-
-    def solve(self) -> Solution[Placement]:
-        """The answer, whatever it is."""
-        answer, dt = self.placement.answer, self.placement.dt
-        solved = answer.x is not None
-        return Solution(
-            source=self.placement,
-            duration=dt * self.attempts.formulation.chain.intervals,
-            trajectory=self.attempts.trajectory(answer, dt) if solved else None,
-            status=answer.status,
-            nodes=answer.nodes,
-            solve_time=answer.time,
-            cost=self.attempts.formulation.cost(answer.cost, dt) if solved else None,
-            dt=dt,
-            failure=self.failure or (None if solved else self._why_unsolved()),
-            margin=self.margin,
-        )
-
-    def tighten(self, solution: Solution[Placement], certificate: Certificate | None) -> bool:
-        """Nothing to tighten."""
-        return False
-
-    def _why_unsolved(self) -> str:
-        if self.placement.answer.status == "infeasible":
-            return "the program has no solution"
-        return OUT_OF_TIME if out_of_time() else NOT_CONVERGED
+def _why_unsolved(answer: AssignmentResult) -> str:
+    if answer.status == "infeasible":
+        return "the program has no solution"
+    return OUT_OF_TIME if out_of_time() else NOT_CONVERGED
 
 
 def flyable_order(vehicle: Vehicle | None) -> int:

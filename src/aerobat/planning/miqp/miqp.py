@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from functools import partial
 from math import sqrt
 from typing import Annotated, Literal
@@ -25,7 +24,7 @@ from aerobat.planning.miqp.rescue import Rescue
 from aerobat.planning.miqp.shortest import shortest
 from aerobat.planning.planners import Planner, option, planner
 from aerobat.planning.recorder import Progress, Recorder
-from aerobat.planning.refinement import FlownPath, Refinement
+from aerobat.planning.refinement import FlownPath, RefinedPath, Refinement
 from aerobat.planning.refinement.refine import MAX_SEGMENTS, SEGMENTS, segments_for
 from aerobat.planning.result import FLYING_RESERVE, Plan
 from aerobat.planning.search import GridSearch, Search
@@ -136,12 +135,13 @@ class Miqp(Planner):
             least: The duration [s] that no motion falls short of.
         """
         formulation, recorder = attempts.formulation, attempts.recorder
-        refinement = Refinement.of(formulation.problem, vehicle, recorder, self.reserve)
-        segments = segments_for(refinement.sequence, self.segments)
-        found = shortest(attempts, refinement, segments, scanned, least)
-        if refinement.in_gates and (found is None or isinstance(found.solution.source, Placement)):
-            refinement = replace(refinement, in_gates=())  # some gates leave no room where they are crossed
+        whole = Refinement.of(formulation.problem, vehicle, recorder, self.reserve)
+        segments = segments_for(whole.sequence, self.segments)
+        found: Judged[RefinedPath] | Judged[Placement] | None = None
+        for refinement in whole.with_and_without_rooms:
             found = shortest(attempts, refinement, segments, scanned, least) or found
+            if found is not None and isinstance(found.solution.source, RefinedPath):
+                break
         if found is None:
             raise self._nothing_found(attempts)
         if isinstance(found.solution.source, Placement):

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
-from typing import Annotated, ClassVar
+from typing import Annotated, ClassVar, NamedTuple
 
 from pydantic import Field
 
@@ -93,34 +93,40 @@ class FreeKnots(Planner):
 
         A plan is poor whose own flight does not pass a gate, or that is slow beside what is possible.
         """
-        problem, vehicle = refinement.problem, refinement.vehicle
-        best: tuple[bool, float, Plan] | None = None
+        slow = SUSPICIOUS * least_duration(refinement.problem, refinement.vehicle)
+        best: _Found | None = None
         for plan, start in self._starts(refinement):
-            found = [] if plan is None else self._as_it_is(plan, refinement)
-            path = _refined(refinement, start, segments_for(refinement.sequence, self.segments))
-            if path is not None:
-                flight, flown = path.through_gates()
-                found.append((bool(problem.gates) and flight.lingers, flown.judged))
-            for lingers, each in found:
-                made = each if isinstance(each, Plan) else _plan(each, refinement.recorder)
-                if best is None or (lingers, made.duration) < best[:2]:
-                    best = lingers, made.duration, made
-            if out_of_time() or (path is not None and plan is not None and plan is self.start):
+            own = None if plan is None else self._as_it_is(plan, refinement)
+            refined = self._refined(refinement, start)
+            best = min(filter(None, (best, own, refined)), key=lambda found: found[:2], default=None)
+            if out_of_time() or (refined is not None and plan is not None and plan is self.start):
                 break
-            slow = SUSPICIOUS * least_duration(problem, vehicle)
-            if best is not None and not best[0] and best[1] <= slow:
+            if best is not None and not best.lingers and best.duration <= slow:
                 break
-        return None if best is None else best[2]
+        return None if best is None else best.plan
 
-    def _as_it_is(self, start: Plan, refinement: Refinement) -> list[tuple[bool, Plan | Judged[RefinedPath]]]:
-        """The plan that is begun from, where it is certified and keeps the reserve; whether it lingers."""
+    def _as_it_is(self, start: Plan, refinement: Refinement) -> _Found | None:
+        """The plan that is begun from, where it is certified and keeps the reserve."""
         plan = start if start.vehicle == refinement.vehicle else start.for_vehicle(refinement.vehicle)
         if not (plan.certified and plan.keeps(self.reserve)) or plan.planner == "free-knots":
-            return []
+            return None
         said = f"free-knots found none faster than the path that it began from, {plan.planner}'s"
         kept = replace(plan, planner="free-knots", attempts=tuple(refinement.recorder.attempts), rescue=said)
         assert plan.flyability is not None
-        return [(bool(plan.problem.gates) and plan.flyability.lingers, kept)]
+        return _Found(plan.flyability.lingers, plan.duration, kept)
+
+    def _refined(self, refinement: Refinement, start: WarmStart) -> _Found | None:
+        """The certified plan near a start; None where there is none."""
+        segments = segments_for(refinement.sequence, self.segments)
+        for own in refinement.with_and_without_rooms:
+            judged = own.refined(start, segments)
+            if judged.feasible:
+                flight, flown = FlownPath(own, judged).through_gates()
+                plan = _plan(flown.judged, refinement.recorder)
+                return _Found(flight.lingers, plan.duration, plan)
+            if out_of_time():
+                break
+        return None
 
     def _starts(self, refinement: Refinement) -> Iterator[tuple[Plan | None, WarmStart]]:
         """Where to begin, at a plan or at a closed form."""
@@ -138,15 +144,12 @@ class FreeKnots(Planner):
             yield None, WarmStart.of(Miqp().plan(problem), sequence)
 
 
-def _refined(refinement: Refinement, start: WarmStart, segments: int) -> FlownPath | None:
-    """The certified path near a start; None where there is none."""
-    rooms = [refinement.in_gates, ()] if refinement.in_gates else [()]
-    for in_gates in rooms:  # some gates leave no room where they are crossed
-        own = replace(refinement, in_gates=in_gates)
-        judged = own.refined(start, segments)
-        if judged.feasible or out_of_time():
-            break
-    return FlownPath(own, judged) if judged.feasible else None
+class _Found(NamedTuple):
+    """A plan, and what it is worth: the least is the best."""
+
+    lingers: bool  # whether its own flight does not pass a gate
+    duration: float  # [s]
+    plan: Plan
 
 
 def _plan(judged: Judged[RefinedPath], recorder: Recorder) -> Plan:

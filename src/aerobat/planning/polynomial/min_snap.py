@@ -11,12 +11,11 @@ import numpy as np
 from pydantic import Field, Strict
 
 from aerobat.arrays import Array
-from aerobat.certification import Certificate
 from aerobat.declaration import AS_IT_IS, Count, NonNegative
 from aerobat.errors import Infeasible, Reason, SpecError, limits_of
 from aerobat.flatness import force_balance
 from aerobat.optimization.deadline import out_of_time, within_time
-from aerobat.planning.certified_solve import Judged, Solution, certified_solve, refuted_by_samples
+from aerobat.planning.certified_solve import Judged, Solution, judge, refuted_by_samples
 from aerobat.planning.passages import PlacedStage
 from aerobat.planning.planners import Planner, option, planner
 from aerobat.planning.polynomial.knots import first_times, fixed_at_knots, unhurried, violated_stage
@@ -124,8 +123,8 @@ class _Planning:
         """
         if self.recorder.attempts and out_of_time():
             return None
-        program = _ClosedForm(self, duration)
-        judged = certified_solve(program, self.problem, self.vehicle, self.recorder)
+        solution = _ClosedForm(self, duration).solve()
+        judged = judge(solution, self.problem, self.vehicle, self.recorder)
         stopped = len(self.recorder.attempts) == self.config.stop_after
         return judged if judged.feasible or stopped else None
 
@@ -176,7 +175,7 @@ class _Planning:
 
 @dataclass
 class _ClosedForm:
-    """The path at one duration; nothing is imposed that could be tightened."""
+    """The path at one duration."""
 
     planning: _Planning
     duration: float
@@ -231,7 +230,3 @@ class _ClosedForm:
         durations = planning.scaled(self.duration)
         fixed = planning.fixed(sequence, velocities)
         return minimum_effort(fixed, durations, planning.config.rule, planning.problem.heading)
-
-    def tighten(self, solution: Solution[None], certificate: Certificate | None) -> bool:
-        """A longer duration is all that helps."""
-        return False

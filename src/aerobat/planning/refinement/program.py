@@ -9,7 +9,6 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
-from math import exp
 
 import numpy as np
 
@@ -149,8 +148,7 @@ class RefinedPoint:
         local *= program.counts[..., None]
         windows = np.zeros((len(program.windows[1]), len(self.x)))
         windows[:, program.spline.ratio_columns] = program.windows[0] * self._ratios
-        at, by_state = program.stages.inequality_slopes(self._at_stages)
-        others = np.concatenate([windows, self._stage_rows(at, by_state)])
+        others = np.concatenate([windows, self._stage_rows(*self._stage_slopes)])
         return RefinedRows(program.spline, local.reshape(segments, count * kinds, -1), others)
 
     @cached_property
@@ -187,7 +185,7 @@ class RefinedPoint:
         """Second derivatives of what stages ask, by each segment's variables."""
         stages = self.program.stages
         weights = np.zeros((self.program.spline.segments, 1, 6, 3))
-        at, by_state = stages.inequality_slopes(self._at_stages)
+        at, by_state = self._stage_slopes
         equal, by_equal = stages.equality_slopes()
         segments = np.array(self.program.stage_segments, dtype=np.intp)
         np.add.at(weights[:, 0], segments[at], inequality_weights[:, None, None] * by_state)
@@ -227,15 +225,15 @@ class RefinedPoint:
         return self.program.spline.motion(self.x, AT_END)
 
     @cached_property
+    def _stage_slopes(self) -> tuple[Indices, Array]:
+        """The stages of what they ask, (q,), and its slopes by the derivatives there, (q, 6, 3)."""
+        return self.program.stages.inequality_slopes(self._at_stages)
+
+    @cached_property
     def _at_stages(self) -> Array:
         """Derivatives at stages, (stages, 6, 3)."""
         found = self.program.spline.derivatives(self.x, AT_END)[:, 0]
         return np.asarray(found[list(self.program.stage_segments)])
-
-    @property
-    def duration(self) -> float:
-        """Of the path [s]."""
-        return self.program.spline.segments * exp(self.x[self.program.spline.mean_column])
 
 
 @dataclass(frozen=True, eq=False)

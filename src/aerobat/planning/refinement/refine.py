@@ -23,7 +23,7 @@ from aerobat.limits.body_in_gate import BodyInGate
 from aerobat.limits.path_condition import limit_of
 from aerobat.optimization.deadline import out_of_time, within_share
 from aerobat.optimization.interior_point import InteriorPointResult, Settings, interior_point
-from aerobat.planning.certified_solve import Judged, Solution, certified_solve
+from aerobat.planning.certified_solve import Judged, Solution, certified_solve, judge
 from aerobat.planning.courses import is_course
 from aerobat.planning.gate_clearance import bodies_in_gates
 from aerobat.planning.passages import PlacedStage
@@ -63,11 +63,11 @@ STRETCH = 1.6  # the factor by which durations may differ in one round
 BACKOFF = 1e-4  # of every limit's size, at places
 MAX_BACKOFF = 0.03  # that one round adds: where much is exceeded, it moves elsewhere
 MORE_BACKOFF = 1.3  # times what is exceeded, in fine rounds
-NEARLY_MISSED = 0.02  # likewise, where rounds that follow may mend it
+FINE_BACKOFF = 2e-4  # of a limit's size, and so much more, as for what a certificate refutes beside
+NEARLY_EXCEEDED = 2e-3  # of a limit's size: where a certificate may refute what a dense look does not
 MENDABLE = 0.5  # of a limit's size: a solve that leaves more has lost its way
-NEARLY_EXCEEDED = 2e-3  # of a limit's size: what a certificate may refute beside
-PROOF_BACKOFF = 2e-4  # of that, where a certificate refutes what a dense look does not
 RELATIVE_STAGE_TOLERANCE = 1e-5  # of a condition's size: by how much a stage may be missed through rounding
+NEARLY_MISSED = 0.02  # likewise, where rounds that follow may mend it
 NEWTON_STEPS = 3  # that meet what stages fix exactly
 CONVERGED = "locally optimal"  # the status of such a solution
 
@@ -137,6 +137,11 @@ class Refinement:
         """The balance of thrust, acceleration and drag."""
         return force_balance(self.problem.environment, self.vehicle)
 
+    @property
+    def with_and_without_rooms(self) -> tuple[Refinement, ...]:
+        """Itself, then without rooms, which some gates do not leave where they are crossed."""
+        return (self, replace(self, in_gates=())) if self.in_gates else (self,)
+
     def stage_values(self, stages: tuple[Stage, ...]) -> StageValues:
         """What stages ask in the order of a path, compiled once."""
         if stages not in self._known:
@@ -184,7 +189,7 @@ class Refinement:
         before = np.inf
         for number in range(ROUGH_ROUNDS):
             solution = rounds.solve()
-            certified_solve(_Found(solution), self.problem, self.vehicle, self.recorder, reserve=self.reserve)
+            judge(solution, self.problem, self.vehicle, self.recorder, self.reserve)
             duration = solution.duration
             gains_little = number and duration > (1.0 - LITTLE_GAIN) * before
             if gains_little or out_of_time() or not self.is_promising(solution.source):
@@ -316,10 +321,10 @@ class Rounds:
         if out_of_time() or not self._refinement.is_promising(solution.source):
             return False
         excess = solution.source.excess
-        self.back_off(excess, MORE_BACKOFF)
+        self.back_off(excess, MORE_BACKOFF, FINE_BACKOFF)
         if certificate is not None:
             refuted = _refuted(certificate, self._refinement.reserve)
-            self._backoff += (MORE_BACKOFF * refuted + PROOF_BACKOFF) * (excess.nearby > -NEARLY_EXCEEDED)
+            self._backoff += (MORE_BACKOFF * refuted + FINE_BACKOFF) * (excess.nearby > -NEARLY_EXCEEDED)
         self._guess = solution.source.path
         return True
 
@@ -329,11 +334,16 @@ class Rounds:
         self._radius = max(self._radius / SHRINK, LEAST_RADIUS)
         self.back_off(path.excess)
 
-    def back_off(self, excess: Excess, factor: float = 1.0) -> None:
-        """Keep as much more room as is exceeded."""
+    def back_off(self, excess: Excess, factor: float = 1.0, more: float = 0.0) -> None:
+        """Keep more room where limits are exceeded.
+
+        Args:
+            excess: Of the last path.
+            factor: Times what is exceeded.
+            more: And so much more, of a limit's size.
+        """
         exceeded = np.clip(excess.nearby, 0.0, MAX_BACKOFF)
-        more = BACKOFF * (exceeded > 0.0) * (factor > 1.0)
-        self._backoff += factor * exceeded + 2.0 * more
+        self._backoff += factor * exceeded + more * (exceeded > 0.0)
 
     @property
     def _program(self) -> RefinementProgram:
@@ -350,21 +360,6 @@ class Rounds:
             radius=self._radius,
             stretch=STRETCH,
         )
-
-
-@dataclass(frozen=True, eq=False)
-class _Found:
-    """A solution that is looked at as it is."""
-
-    solution: Solution[RefinedPath]
-
-    def solve(self) -> Solution[RefinedPath]:
-        """The solution."""
-        return self.solution
-
-    def tighten(self, solution: Solution[RefinedPath], certificate: Certificate | None) -> bool:
-        """Nothing can be tightened."""
-        return False
 
 
 def _refuted(certificate: Certificate, reserve: float) -> float:

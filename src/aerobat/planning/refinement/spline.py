@@ -113,17 +113,17 @@ class Spline:
     @cached_property
     def size(self) -> int:
         """The number n of variables."""
-        return int(self.columns.max()) + 1
+        return self.mean_column + 1
 
     @property
     def mean_column(self) -> int:
         """The variable ln h."""
-        return self.size - 1
+        return self._layout[2]
 
     @cached_property
     def ratio_columns(self) -> Indices:
         """The variables ln τ, (S,)."""
-        return np.array([column for column, _ in self._layout[1]], dtype=np.intp)
+        return np.array(self._layout[1], dtype=np.intp)
 
     @property
     def columns(self) -> Indices:
@@ -246,10 +246,10 @@ class Spline:
         return np.asarray(thrust / np.linalg.norm(thrust))
 
     @cached_property
-    def _layout(self) -> tuple[list[tuple[int, int, Array, int]], list[tuple[int, int]]]:
-        """Segment, row of its data, direction and column of all that variables move; columns of ln τ."""
+    def _layout(self) -> tuple[list[tuple[int, int, Array, int]], list[int], int]:
+        """Segment, row, direction and column of all data that variables move; columns of ln τ; of ln h."""
         moved: list[tuple[int, int, Array, int]] = []
-        ratios: list[tuple[int, int]] = []
+        ratios: list[int] = []
         count = 0
 
         def add(direction: Array, *where: tuple[int, int]) -> None:
@@ -261,7 +261,7 @@ class Spline:
         for direction, *where in self._end_variables(*first):
             add(direction, *where)
         for segment in range(self.segments):
-            ratios.append((count, segment))
+            ratios.append(count)
             count += 1
             if segment + 1 < self.segments:
                 for order in range(END_ORDER):
@@ -271,7 +271,7 @@ class Spline:
                             add(axis, *where)
         for direction, *where in self._end_variables(*last):
             add(direction, *where)
-        return moved, ratios
+        return moved, ratios, count
 
     def _end_variables(
         self, segment: int, first: int, state: EndState
@@ -298,7 +298,7 @@ class Spline:
     @cached_property
     def _arranged(self) -> tuple[Indices, Array]:
         """`columns`, and the effect of each segment's variables on its data, (S, 10, 3, K)."""
-        moved, ratios = self._layout
+        moved, ratios, mean = self._layout
         local: list[dict[int, int]] = [{} for _ in range(self.segments)]
         for segment, _, _, column in moved:
             local[segment].setdefault(column, len(local[segment]))
@@ -309,7 +309,5 @@ class Spline:
             place = local[segment][column]
             columns[segment, place] = column
             effect[segment, row, :, place] += direction * self._sizes[row % END_ORDER]
-        for column, segment in ratios:
-            columns[segment, -2] = column
-        columns[:, -1] = 1 + max(column for *_, column in moved + [(0, 0, 0, c) for c, _ in ratios])
+        columns[:, -2], columns[:, -1] = ratios, mean
         return columns, effect

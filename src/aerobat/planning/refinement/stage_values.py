@@ -87,8 +87,7 @@ class StageValues:
             found[stage, :3, :3] += weights[first] * 2.0 / radius**2 * np.eye(3)
             first += 1
         for k, body in enumerate(self.in_gates):
-            rooms, by_state = self._functions[k]
-            del rooms
+            _, by_state = self._functions[k]
             count = 2 * len(body.gate.opening.sides[1]) + 1
             own = weights[first : first + count]
             slopes = by_state([*self._stepped(k, derivatives[body.stage]), *own])

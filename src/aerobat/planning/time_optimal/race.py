@@ -36,7 +36,6 @@ ROUNDS = 8  # of solving, at most
 MORE_RESERVE = 1.6  # times the reserve, each time that the plan's own flight leaves its path
 RESERVE_RAISES = 4  # at most
 MAX_RESERVE = 0.4
-COURSE_STARTS = 2  # of a motion for others to begin from: closed forms at their own pace
 COARSE_TIME = 0.4  # of the time that is left, where there is a limit, for all coarse solves,
 AHEAD_TIME = 0.7  # of what is left then for the first of each fine one
 
