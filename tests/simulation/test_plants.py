@@ -53,7 +53,8 @@ def test_mujoco_flies_a_curve_as_our_simulation_does() -> None:
 
 
 def through_the_gate() -> ab.Plan:
-    return shared_plan("half-flip", "agile-quad", ORDER_4)
+    """A plan with the reserve that the command line keeps."""
+    return shared_plan("half-flip", "agile-quad", ab.Miqp(order=4, reserve=0.1))
 
 
 def dash() -> ab.Trajectory:
@@ -138,7 +139,8 @@ def test_rotorpy_flies_a_curve_on_its_model_of_our_vehicle_to_millimetres() -> N
 
 @AT_LENGTH
 def test_rotorpy_flies_our_plan_on_its_model_of_our_vehicle() -> None:
-    plan = shared_plan("flip-roll", "agile-quad", ORDER_4)
+    """With a reserve of thrust, for its rotors' lag is of speeds, not of the thrusts that we plan with."""
+    plan = shared_plan("flip-roll", "agile-quad", ab.Miqp(order=4, reserve=0.2))
     flight = ab.fly(plan, plant="rotorpy")
     assert flight.position_error.max() < 0.005
     assert ab.score(flight, plan).outcome is Outcome.THROUGH_GATES
