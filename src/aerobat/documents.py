@@ -36,6 +36,13 @@ def document_names(presets: Traversable) -> tuple[str, ...]:
     return tuple(sorted(stems))
 
 
+def preset_text(name_or_path: str | os.PathLike[str], presets: Traversable) -> str | None:
+    """The text of one of the `presets` as it stands, its remarks included; None for any other document."""
+    if name_or_path not in document_names(presets):
+        return None
+    return (presets / f"{name_or_path}.toml").read_text(encoding="utf-8")
+
+
 def resolve_document(name_or_path: str | os.PathLike[str], presets: Traversable, kind: str) -> Document:
     """The document that a user means: one of the `presets` by its name, or a file by its path.
 

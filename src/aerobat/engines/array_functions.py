@@ -11,18 +11,12 @@ from typing import Any
 
 import numpy as np
 
-from aerobat.engines.tracing import Symbol, Trace, TraceOps
+from aerobat.engines.tracing import FORMS, Symbol, TraceOps
 
 ArrayFunction = Callable[[Sequence[Any]], tuple[Any, ...]]
 
 _FORMS = {
-    "add": "{} + {}",
-    "subtract": "{} - {}",
-    "multiply": "{} * {}",
-    "divide": "{} / {}",
-    "negate": "-{}",
-    "sqrt": "sqrt({})",
-    "exp": "exp({})",
+    **FORMS,
     "minimum": "minimum({}, {})",
     "maximum": "maximum({}, {})",
     "less": "less({}, {})",
@@ -44,12 +38,12 @@ def array_function(inputs: Sequence[Symbol], outputs: Sequence[Symbol]) -> Array
         operation = trace.operations[number]
         if operation.name == "constant":
             continue
-        form = _FORMS[operation.name].format(*(_value(trace, i) for i in operation.arguments))
+        form = _FORMS[operation.name].format(*map(trace.written, operation.arguments))
         lines.append(f" v{number} = {form}")
         done = {i for i in operation.arguments if last_use[i] == number and i not in kept | given}
         freed = [f"v{i}" for i in sorted(done) if trace.operations[i].name != "constant"]
         lines += [f" del {', '.join(freed)}"] if freed else []
-    lines.append(f" return ({''.join(f'{_value(trace, symbol.number)}, ' for symbol in outputs)})")
+    lines.append(f" return ({''.join(f'{trace.written(symbol.number)}, ' for symbol in outputs)})")
     functions = {name: getattr(np, name) for name in ("sqrt", "exp", "minimum", "maximum", "where")}
     namespace: dict[str, Any] = {**functions, "less": _less}
     exec(compile("\n".join(lines), "<array function>", "exec"), namespace)
@@ -109,12 +103,6 @@ def _parts(
         case "select", [condition, x, y]:
             return [(x, ops.select(condition, slope, 0.0)), (y, ops.select(condition, 0.0, slope))]
     raise ValueError(f"no derivative of {name}")
-
-
-def _value(trace: Trace, number: int) -> str:
-    """The name of a value, or a constant itself."""
-    operation = trace.operations[number]
-    return f"({operation.content!r})" if operation.name == "constant" else f"v{number}"
 
 
 def _less(x: Any, y: Any) -> Any:

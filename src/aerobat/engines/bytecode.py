@@ -26,18 +26,13 @@ from aerobat.engines.engine import (
 )
 from aerobat.engines.pytree import Tree, tree_leaves, tree_map, tree_unflatten
 from aerobat.engines.traced_loop import TracedLoop, trace_loop
+from aerobat.engines.tracing import FORMS
 
 Row = tuple[Any, ...]
 Function = Callable[..., Any]
 
 _FORMS = {
-    "add": "{} + {}",
-    "subtract": "{} - {}",
-    "multiply": "{} * {}",
-    "divide": "{} / {}",
-    "negate": "-{}",
-    "sqrt": "sqrt({})",
-    "exp": "exp({})",
+    **FORMS,
     "minimum": "{0} if {0} < {1} else {1}",
     "maximum": "{0} if {0} > {1} else {1}",
     "less": "{} < {}",
@@ -95,7 +90,7 @@ def _program(init: Init, step: Step, parameters: Tree, inputs: Tree) -> tuple[Tr
 
 def source(loop: TracedLoop) -> str:
     """The module of a loop: `init(parameters, inputs)` and `scan(parameters, carry, ticks, is_logged)`."""
-    value = [_value(loop, number) for number in range(len(loop.trace.operations))]
+    value = [loop.trace.written(number) for number in range(len(loop.trace.operations))]
 
     def listed(numbers: Iterable[int]) -> str:
         return "(" + "".join(f"{value[number]}, " for number in numbers) + ")"
@@ -135,12 +130,6 @@ def source(loop: TracedLoop) -> str:
             f" return {listed(loop.carry)}, rows",
         ]
     )
-
-
-def _value(loop: TracedLoop, number: int) -> str:
-    """The name of a value, or a constant itself."""
-    operation = loop.trace.operations[number]
-    return f"({operation.content!r})" if operation.name == "constant" else f"v{number}"
 
 
 def _bare(tree: Tree) -> Tree:

@@ -255,8 +255,7 @@ def score(flight: Flight, goal: Problem | Plan | str, vehicle: Vehicle | str | N
         vehicle = goal.vehicle
     states = flight.states
     square, angle = flight.position_error**2, flight.attitude_error
-    diverged = flight.outcome is not Outcome.COMPLETE
-    stop = np.array([flight.ends if diverged else np.nan])
+    stop = flight.diverged_at
     body = None if vehicle is None else as_vehicle(vehicle).bounding_ellipsoid
     setpoint = flight.setpoint
     path = SampledPath(flight.times, setpoint.flat.position, setpoint.q_world_body)

@@ -5,7 +5,14 @@ from __future__ import annotations
 from importlib.resources import files
 
 from aerobat.declaration import PathName, to_table, validated
-from aerobat.documents import document_names, read_document, resolve_document, to_toml, write_document
+from aerobat.documents import (
+    document_names,
+    preset_text,
+    read_document,
+    resolve_document,
+    to_toml,
+    write_document,
+)
 from aerobat.problem.problem import Problem
 
 PRESETS = files("aerobat.problem") / "presets"
@@ -37,10 +44,7 @@ def problem_text(name: PathName) -> str:
 
     Raises SpecError as `load_problem` does.
     """
-    problem = load_problem(name)
-    if name in problem_names():
-        return resolve_document(name, PRESETS, "problem").read_text(encoding="utf-8")
-    return to_toml(to_table(problem))
+    return preset_text(name, PRESETS) or to_toml(to_table(load_problem(name)))
 
 
 @validated

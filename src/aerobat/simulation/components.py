@@ -86,17 +86,40 @@ class TrackingController:
         signals: Signals,
     ) -> ControllerState:
         """See `Component.step`."""
-        model, delay = parameters
-        body, elapsed = signals["observer"].body, signals["clock"].elapsed
-        reference: ReferencePoint = inputs or signals["reference"]
-        if "disturbance" in signals:
-            reference = answering(reference, body, signals["disturbance"])
-        if not isinstance(delay, tuple):
-            body = control.predicted(ops, model, state, body, elapsed, delay)
-        return control.step(ops, self.flags, model, state, body, reference, elapsed)
+        body, reference = told(ops, parameters, state, inputs, signals)
+        return control.step(
+            ops, self.flags, parameters.model, state, body, reference, signals["clock"].elapsed
+        )
 
 
-def answering(reference: ReferencePoint, body: Body, disturbance: Any) -> ReferencePoint:
+def told(
+    ops: Ops,
+    parameters: ControllerParameters,
+    state: Any,
+    inputs: ReferencePoint | tuple[()],
+    signals: Signals,
+    takes_disturbances: bool = True,
+) -> tuple[Body, ReferencePoint]:
+    """Return the body when the commands take effect, and the reference that answers a disturbance.
+
+    Args:
+        ops: The operations of an engine.
+        parameters: A controller and its delay.
+        state: The controller's, of which the thrusts and the last commands count.
+        inputs: A reference of its own, where its commands come late.
+        signals: Of the loop.
+        takes_disturbances: Whether the reference answers what the observer knows of one.
+    """
+    body, reference = signals["observer"].body, inputs or signals["reference"]
+    if takes_disturbances and "disturbance" in signals:
+        reference = _answering(reference, body, signals["disturbance"])
+    if not isinstance(parameters.delay, tuple):
+        elapsed = signals["clock"].elapsed
+        body = control.predicted(ops, parameters.model, state, body, elapsed, parameters.delay)
+    return body, reference
+
+
+def _answering(reference: ReferencePoint, body: Body, disturbance: Any) -> ReferencePoint:
     """The reference, with what is to be thrust and turned against a disturbance in body axes taken off it."""
     body_axes = axes(body.q_world_body)
     force, turn = (

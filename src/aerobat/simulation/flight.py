@@ -181,6 +181,11 @@ class Flight:
             raise SpecError("outcome is asked of one flight; of a batch, ask flight[k].outcome or outcomes")
         return self.outcomes[0]
 
+    @property
+    def diverged_at(self) -> Array:
+        """When the one flight diverged [s], NaN where it did not, (1,). Raises SpecError for a batch."""
+        return np.array([np.nan if self.outcome is Outcome.COMPLETE else self.series["ends"]])
+
     @validated
     def __getitem__(self, vehicle: int) -> Flight:
         """The flight of one vehicle of a batch, as if it had flown alone. Raises SpecError for one flight."""

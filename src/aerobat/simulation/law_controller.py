@@ -13,7 +13,7 @@ from aerobat.kernels.ops import Ops, PerRotor
 from aerobat.kernels.quaternions import axes
 from aerobat.kernels.rigid_body import Wrench
 from aerobat.kernels.vectors import subtract
-from aerobat.simulation.components import ControllerParameters, TrackingController, answering
+from aerobat.simulation.components import ControllerParameters, TrackingController, told
 from aerobat.simulation.loop import Component, Signals
 
 
@@ -54,16 +54,11 @@ class LawController:
         signals: Signals,
     ) -> LawState:
         """See `Component.step`."""
-        model, delay = parameters
-        body, elapsed = signals["observer"].body, signals["clock"].elapsed
-        reference: ReferencePoint = inputs or signals["reference"]
-        if self.law.TAKES_DISTURBANCES and "disturbance" in signals:
-            reference = answering(reference, body, signals["disturbance"])
+        model, elapsed = parameters.model, signals["clock"].elapsed
+        body, reference = told(ops, parameters, state, inputs, signals, self.law.TAKES_DISTURBANCES)
         rotors = model.airframe.rotors
         decay_factors = motors.decay_factors(ops, rotors, elapsed)
         thrusts = motors.first_order_response(state.thrusts, state.commands.thrusts, decay_factors)
-        if not isinstance(delay, tuple):
-            body = control.predicted(ops, model, state, body, elapsed, delay)
         own, load = self.law.step(ops, model, state.own, Seen(body, thrusts, reference), elapsed)
         loads = load, _change_ahead(model, axes(body.q_world_body), reference)
         commands = control.rotor_commands(ops, self.flags, model, loads, thrusts, decay_factors, elapsed)

@@ -5,7 +5,14 @@ from __future__ import annotations
 from importlib.resources import files
 
 from aerobat.declaration import PathName, to_table, validated
-from aerobat.documents import document_names, read_document, resolve_document, to_toml, write_document
+from aerobat.documents import (
+    document_names,
+    preset_text,
+    read_document,
+    resolve_document,
+    to_toml,
+    write_document,
+)
 from aerobat.vehicle.vehicle import Vehicle
 
 PRESETS = files("aerobat.vehicle") / "presets"
@@ -38,10 +45,7 @@ def vehicle_text(name_or_path: PathName) -> str:
 
     Raises SpecError as `load_vehicle` does.
     """
-    vehicle = load_vehicle(name_or_path)
-    if name_or_path in vehicle_names():
-        return resolve_document(name_or_path, PRESETS, "vehicle").read_text(encoding="utf-8")
-    return to_toml(to_table(vehicle))
+    return preset_text(name_or_path, PRESETS) or to_toml(to_table(load_vehicle(name_or_path)))
 
 
 @validated

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from aerobat.control.law import Seen
 from aerobat.kernels.control import ControllerModel
 from aerobat.kernels.control_loops import ReferencePoint, reference_moment
 from aerobat.kernels.ops import Axes, Ops, Scalar, Vector
 from aerobat.kernels.quaternions import axes, to_body
-from aerobat.kernels.vectors import add, cross, dot, norm, scale, transform
+from aerobat.kernels.vectors import add, add_scaled, cross, dot, norm, scale, subtract, transform
 
 _SHORTEST = 1e-3  # [m/s²], or [-] of unit vectors: shorter ones have no direction to follow
 
@@ -34,6 +35,27 @@ def rotation_error(body_axes: Axes, desired: Axes) -> Vector:
     """Return e_R = ½ (R_dᵀ R − Rᵀ R_d)^∨, sin θ about the axis from the desired attitude; body axes."""
     b1, b2, b3 = (cross(wanted, own) for wanted, own in zip(desired, body_axes, strict=True))
     return to_body(body_axes, scale(0.5, add(add(b1, b2), b3)))
+
+
+def attitude_feedback(
+    ops: Ops, model: ControllerModel, seen: Seen, desired: Axes, attitude_gain: float, rate_gain: float
+) -> Vector:
+    """Return −k_R e_R − k_Ω e_Ω [rad/s²] in body axes, with gains that the vehicle's rotors allow.
+
+    Args:
+        ops: The operations of an engine.
+        model: Of the vehicle, whose own gains bound these two.
+        seen: The body and the reference.
+        desired: The axes that the body shall have.
+        attitude_gain: k_R over the inertia [1/s²].
+        rate_gain: k_Ω over the inertia [1/s].
+    """
+    body_axes = axes(seen.body.q_world_body)
+    e_r = rotation_error(body_axes, desired)
+    e_omega = subtract(seen.body.omega_body, to_body(body_axes, seen.reference.omega))
+    k_r = ops.minimum(attitude_gain, 0.5 * model.gains.stiffness)
+    k_omega = ops.minimum(rate_gain, model.gains.damping)
+    return scale(-1.0, add_scaled(scale(k_r, e_r), k_omega, e_omega))
 
 
 def moment_for(

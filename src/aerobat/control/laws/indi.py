@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any, ClassVar, NamedTuple
 
 from aerobat.control.law import ControlLaw, Seen, controller
-from aerobat.control.laws.attitude import axes_along, collective, rotation_error
+from aerobat.control.laws.attitude import attitude_feedback, axes_along, collective
 from aerobat.declaration import NonNegative, Positive
 from aerobat.kernels import motors
 from aerobat.kernels.control import ControllerModel
@@ -75,12 +75,9 @@ class Indi(ControlLaw):
         )
         demand = thrust_demand(model.airframe.mass_properties, model.environment, reference)
         thrust = add(demand.value, clamp_norm(ops, feedback, self.max_feedback))
-        e_r = rotation_error(body_axes, axes_along(ops, thrust, reference))
-        e_omega = subtract(body.omega_body, to_body(body_axes, reference.omega))
-        k_r = ops.minimum(self.attitude_gain, 0.5 * model.gains.stiffness)
-        k_omega = ops.minimum(self.rate_gain, model.gains.damping)
-        back = add_scaled(scale(k_r, e_r), k_omega, e_omega)
-        wanted = subtract(to_body(body_axes, reference.omega_dot), back)
+        desired = axes_along(ops, thrust, reference)
+        feedback = attitude_feedback(ops, model, seen, desired, self.attitude_gain, self.rate_gain)
+        wanted = add(to_body(body_axes, reference.omega_dot), feedback)
         lacking = subtract(wanted, measured.angular_acceleration)
         increment = transform(model.airframe.mass_properties.inertia, lacking)
         load = Wrench(collective(model, body_axes, thrust), add(measured.moment, increment))

@@ -5,12 +5,12 @@ from __future__ import annotations
 from typing import Any
 
 from aerobat.control.law import ControlLaw, Seen, controller
-from aerobat.control.laws.attitude import axes_along, collective, moment_for, rotation_error
+from aerobat.control.laws.attitude import attitude_feedback, axes_along, collective, moment_for
 from aerobat.declaration import NonNegative
 from aerobat.kernels.control import ControllerModel
 from aerobat.kernels.control_loops import thrust_demand
 from aerobat.kernels.ops import Ops, Scalar
-from aerobat.kernels.quaternions import axes, to_body
+from aerobat.kernels.quaternions import axes
 from aerobat.kernels.rigid_body import Wrench
 from aerobat.kernels.vectors import add, add_scaled, clamp_norm, scale, subtract
 
@@ -41,10 +41,7 @@ class Lee(ControlLaw):
         feedback = scale(-1.0, add_scaled(scale(self.position_gain, e_x), self.velocity_gain, e_v))
         demand = thrust_demand(model.airframe.mass_properties, model.environment, reference)
         thrust = add(demand.value, clamp_norm(ops, feedback, self.max_feedback))
-        e_r = rotation_error(body_axes, axes_along(ops, thrust, reference))
-        e_omega = subtract(body.omega_body, to_body(body_axes, reference.omega))
-        k_r = ops.minimum(self.attitude_gain, 0.5 * model.gains.stiffness)
-        k_omega = ops.minimum(self.rate_gain, model.gains.damping)
-        acceleration = scale(-1.0, add_scaled(scale(k_r, e_r), k_omega, e_omega))
+        desired = axes_along(ops, thrust, reference)
+        acceleration = attitude_feedback(ops, model, seen, desired, self.attitude_gain, self.rate_gain)
         moment = moment_for(model, body_axes, reference, acceleration)
         return state, Wrench(collective(model, body_axes, thrust), moment)

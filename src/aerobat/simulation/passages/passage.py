@@ -13,7 +13,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, fields, replace
 from math import degrees
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,8 +30,24 @@ from aerobat.problem.gate import Gate
 from aerobat.problem.opening import Probe, edge_name
 from aerobat.simulation.outcome import Outcome
 
+T = TypeVar("T")
+
 PASSAGE_WINDOW = 0.25  # [s] around the planned instant in which the crossing is looked for
 PASSAGE_DEPTH = 0.05  # [m] beyond the plane, where who crosses it has not merely stopped in it
+
+
+def one_of_many(found: T, k: int, shared: int) -> T:
+    """Return one flight's part of what was found of many, in plain numbers.
+
+    Args:
+        found: A dataclass, whose fields are arrays (flights,) but for the first ones.
+        k: Which flight.
+        shared: The number of first fields, which all flights share.
+    """
+    many: Any = found
+    numbers = {field.name: getattr(many, field.name)[k].item() for field in fields(many)[shared:]}
+    one: T = replace(many, **numbers)
+    return one
 
 
 @by_value
@@ -66,8 +82,7 @@ class Passage:
 
     def of_flight(self, k: int) -> Passage:
         """One flight's of many, in plain numbers."""
-        numbers = {field.name: getattr(self, field.name)[k].item() for field in fields(self)[2:]}
-        return replace(self, **numbers)
+        return one_of_many(self, k, shared=2)
 
     @property
     def failure(self) -> tuple[Outcome, float, dict[str, object]] | None:

@@ -21,7 +21,6 @@ from aerobat.kernels.gates.section import BoundingEllipsoid, extent, gap, sectio
 from aerobat.kernels.gates.snapshot import Snapshot, between
 from aerobat.kernels.gates.swath import Swath, swept_between
 from aerobat.simulation.flight import Flight
-from aerobat.simulation.outcome import Outcome
 from aerobat.simulation.passages.passage import (
     PASSAGE_DEPTH,
     PASSAGE_WINDOW,
@@ -44,8 +43,7 @@ def flown_passages(
         planned: what was to be passed.
         body: what encloses its vehicle, for the clearance.
     """
-    diverged = flight.outcome is not Outcome.COMPLETE
-    stop = np.array([flight.ends if diverged else np.nan])
+    stop = flight.diverged_at
     states = flight.states
     parts = (states.position, states.velocity, states.q_world_body)
     return [passages(each, gate_progress(each, flight.times, parts, body), stop) for each in planned]

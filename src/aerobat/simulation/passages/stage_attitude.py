@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass
 from math import degrees
 from typing import Any
 
@@ -17,7 +17,7 @@ from aerobat.kernels.gates.pointing import Direction, Pointing
 from aerobat.kernels.gates.snapshot import Snapshot
 from aerobat.simulation.flight import Flight
 from aerobat.simulation.outcome import Outcome
-from aerobat.simulation.passages.passage import PASSAGE_WINDOW
+from aerobat.simulation.passages.passage import PASSAGE_WINDOW, one_of_many
 from aerobat.simulation.passages.waypoint import intervals
 
 
@@ -50,9 +50,7 @@ class StageAttitude:
 
     def of_flight(self, k: int) -> StageAttitude:
         """One flight's of many, in plain numbers."""
-        return replace(
-            self, **{field.name: getattr(self, field.name)[k].item() for field in fields(self)[3:]}
-        )
+        return one_of_many(self, k, shared=3)
 
     @property
     def failure(self) -> tuple[Outcome, float, dict[str, object]] | None:
@@ -83,8 +81,7 @@ def stage_attitudes(planned: PlannedAttitude, found: Pointing, stop: Array) -> S
 
 def flown_attitudes(flight: Flight, planned: tuple[PlannedAttitude, ...]) -> list[StageAttitude]:
     """Attitudes of one flight that was logged, at its rows, fields (1,)."""
-    diverged = flight.outcome is not Outcome.COMPLETE
-    stop = np.array([flight.ends if diverged else np.nan])
+    stop = flight.diverged_at
     last, now = intervals(flight)
     return [stage_attitudes(each, _nearest(last, now, each), stop) for each in planned]
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass
 from typing import Any, TypeVar
 
 import numpy as np
@@ -18,7 +18,7 @@ from aerobat.kernels.gates.approach import Approach
 from aerobat.kernels.gates.snapshot import Snapshot
 from aerobat.simulation.flight import Flight
 from aerobat.simulation.outcome import Outcome
-from aerobat.simulation.passages.passage import PASSAGE_WINDOW
+from aerobat.simulation.passages.passage import PASSAGE_WINDOW, one_of_many
 
 T = TypeVar("T")
 
@@ -44,9 +44,7 @@ class WaypointPassage:
 
     def of_flight(self, k: int) -> WaypointPassage:
         """One flight's of many, in plain numbers."""
-        return replace(
-            self, **{field.name: getattr(self, field.name)[k].item() for field in fields(self)[3:]}
-        )
+        return one_of_many(self, k, shared=3)
 
     @property
     def failure(self) -> tuple[Outcome, float, dict[str, object]] | None:
@@ -78,8 +76,7 @@ def waypoint_passages(planned: PlannedWaypoint, found: Approach, stop: Array) ->
 
 def flown_waypoints(flight: Flight, planned: tuple[PlannedWaypoint, ...]) -> list[WaypointPassage]:
     """Approaches of one flight that was logged, straight between its rows, fields (1,)."""
-    diverged = flight.outcome is not Outcome.COMPLETE
-    stop = np.array([flight.ends if diverged else np.nan])
+    stop = flight.diverged_at
     return [waypoint_passages(each, _nearest(flight, each), stop) for each in planned]
 
 
