@@ -20,7 +20,7 @@ EITHER = "not (browser or ros)"  # slow tests and others
 LONG = """
 import budget, pytest
 
-budget.limit = lambda: 0.05
+budget.LIMIT = 0.01
 
 def work(): sum(range(10_000_000))
 
@@ -28,6 +28,17 @@ def test_plain(): work()
 
 @pytest.mark.slow
 def test_slow(): work()
+"""
+
+FIRST = """
+import budget, functools
+
+budget.LIMIT = 0.01
+
+@functools.cache
+def work(): sum(range(10_000_000))
+
+def test_plain(): work()
 """
 
 
@@ -68,13 +79,19 @@ def test_the_full_suite_runs_all_groups(run, tmp_path: Path) -> None:
     assert f"{len(GROUPS) + 1} tests collected" in said
 
 
-def test_an_unmarked_test_that_takes_long_fails(run) -> None:
+def test_an_unmarked_test_that_takes_long_twice_fails(run) -> None:
     code, said = run(LONG, "-m", EITHER)
     assert code == 1, said
     assert "1 failed, 1 passed" in said
     assert "test_plain took" in said
     assert "Shorten it, or mark it slow." in said
     assert run(LONG, "-m", EITHER, "--no-budget")[0] == 0
+
+
+def test_a_test_that_pays_for_what_others_share_passes_when_it_runs_again(run) -> None:
+    code, said = run(FIRST, "-m", EITHER)
+    assert code == 0, said
+    assert "1 passed" in said
 
 
 def test_without_a_browser_its_tests_say_in_one_sentence_how_to_get_one(run, tmp_path: Path) -> None:

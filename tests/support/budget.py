@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import sys
 import time
-from functools import cache
 
 # a worker a core: threads of OpenBLAS, started when NumPy is first imported, would only wait for one another
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
@@ -22,10 +21,14 @@ def processor_seconds() -> float:
     return spent.user + spent.system + spent.children_user + spent.children_system
 
 
-@cache
 def limit() -> float:
-    """Return the limit [s] on this machine: a slower one than the reference gets longer."""
+    """Return the limit [s] on this machine at this moment: a slower one than the reference gets longer."""
     return LIMIT * max(1.0, min(_loop() for _ in range(TRIES)) / REFERENCE)
+
+
+def is_exceeded(spent: float) -> bool:
+    """Return True of a time [s] beyond the limit; how fast the machine is, is asked only of a long one."""
+    return spent > LIMIT and spent > limit()
 
 
 def is_measured() -> bool:
