@@ -23,8 +23,8 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """A working folder with a detuned vehicle and weak conditions."""
     monkeypatch.chdir(tmp_path)
     usual = ab.Controller()
-    halved = replace(usual, **{name: 0.5 * getattr(usual, name) for name in TUNED})
-    ab.write_vehicle(replace(ab.load_vehicle("agile-quad"), name="slow", controller=halved), "slow.toml")
+    weak = replace(usual, **{name: 0.4 * getattr(usual, name) for name in TUNED})
+    ab.write_vehicle(replace(ab.load_vehicle("agile-quad"), name="slow", controller=weak), "slow.toml")
     ab.write_dispersion(ab.Dispersion(mass=0.03, start_position=0.02), "weak.toml")
     shared_plan("half-flip", "agile-quad", ab.Miqp(order=4, reserve=0.15)).save("half-flip.plan")
     return tmp_path

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from hypothesis import given
@@ -165,3 +165,14 @@ def test_no_time_leaves_the_start() -> None:
         found = interior_point(program, np.zeros(len(program.cost)), ACCURATE)
     assert not found.converged
     assert found.iterations == 0
+
+
+@given(seed=st.integers(0, 2**31))
+def test_known_multipliers_lead_to_the_same_minimum_sooner(seed: int) -> None:
+    program = drawn(seed, convex=True)
+    found = interior_point(program, np.zeros(len(program.cost)), ACCURATE)
+    near = replace(ACCURATE, barrier=1e-8)
+    again = interior_point(program, found.x, near, found.z)
+    assert again.converged
+    assert abs(program.cost @ (again.x - found.x)) < 1e-5 * (1.0 + abs(program.cost @ found.x))
+    assert again.iterations <= found.iterations

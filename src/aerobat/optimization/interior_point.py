@@ -34,6 +34,7 @@ _BARRIER_POWER = 1.5  # or this power of it
 _GROWTH = 4.0  # of δ, until the matrix is positive definite
 _SHRINK = 3.0  # of δ, from one step to the next
 _LARGEST_DAMPING = 1e10
+_JAMMED = 1e-4  # of a step: where slacks allow for less, they begin anew
 _BACKTRACKS = 10  # halvings of a step
 _CORRECTIONS = 3  # of second order, in a row
 _SLOW_CORRECTION = 0.99  # of the violation: a correction that leaves more ends them
@@ -46,7 +47,7 @@ _LARGE_VIOLATION = 1e4  # times the first: beyond, no step is taken
 _SWITCH_POWERS = 2.3, 1.1  # of the promised fall and of the violation, as Wächter and Biegler have them
 _CORRIDOR = 1e10  # the factor by which s z may differ from μ
 _EQUALITY_WEIGHT = 1e-2  # of the matrix's largest entry, by which equalities are added to it
-_ITERATIONS_FLAT = 5  # over which the cost has to stand still
+_ITERATIONS_FLAT = 3  # over which the cost has to stand still
 _LARGE_MULTIPLIER = 100.0  # on average: larger ones make the dual error count less
 
 
@@ -122,6 +123,7 @@ class InteriorPointResult:
     x: Array
     converged: bool  # all conditions hold, or the cost stands still at a small violation
     iterations: int
+    z: Array  # the multipliers of inequalities
 
 
 @dataclass(eq=False)
@@ -194,7 +196,10 @@ def _promises(violation: float, promised: float, length: float) -> bool:
 
 
 def interior_point(
-    program: ConstrainedProgram, start: Array, settings: Settings | None = None
+    program: ConstrainedProgram,
+    start: Array,
+    settings: Settings | None = None,
+    multipliers: Array | None = None,
 ) -> InteriorPointResult:
     """Return a local minimum near a start, feasible or not, or where iterations or time end.
 
@@ -202,8 +207,9 @@ def interior_point(
         program: What is minimized.
         start: Where to begin, (n,).
         settings: Accuracy and length.
+        multipliers: Of the inequalities, from a program that is nearly the same.
     """
-    return _InteriorPoint(program, settings or Settings()).run(start)
+    return _InteriorPoint(program, settings or Settings()).run(start, multipliers)
 
 
 class _InteriorPoint:
@@ -216,33 +222,38 @@ class _InteriorPoint:
         self._barrier = settings.barrier
         self._damping = 0.0  # of the last step that needed some
         self._filter = _Filter(1.0)
+        self._is_anew = False  # slacks and multipliers, from the last step on
 
-    def run(self, start: Array) -> InteriorPointResult:
+    def run(self, start: Array, multipliers: Array | None) -> InteriorPointResult:
         """Descend."""
-        iterate, costs = self._begun(start), []
+        iterate, costs = self._begun(start, multipliers), []
         self._filter.first = max(_violation(iterate.point, iterate.slacks), 1.0)
         for iteration in range(self._settings.iterations):
             costs.append(float(self._cost @ iterate.x))
             if self._error(iterate, 0.0) < self._settings.tolerance or self._stands_still(iterate, costs):
-                return InteriorPointResult(iterate.x, True, iteration)
+                return InteriorPointResult(iterate.x, True, iteration, iterate.z)
             if out_of_time():
-                return InteriorPointResult(iterate.x, False, iteration)
+                return InteriorPointResult(iterate.x, False, iteration, iterate.z)
             self._lower_barrier(iterate)
             if not self._advance(iterate):
-                return InteriorPointResult(iterate.x, False, iteration)
-        return InteriorPointResult(iterate.x, False, self._settings.iterations)
+                return InteriorPointResult(iterate.x, False, iteration, iterate.z)
+        return InteriorPointResult(iterate.x, False, self._settings.iterations, iterate.z)
 
-    def _begun(self, start: Array) -> _Iterate:
+    def _begun(self, start: Array, multipliers: Array | None) -> _Iterate:
         """The start within the box, with slacks and multipliers that fit the barrier."""
         push = _BOUND_PUSH * (self._upper - self._lower)
         x = np.clip(start, self._lower + push, self._upper - push)
         point, barrier = self._program.at(x), self._barrier
-        slacks = np.maximum(-point.inequalities, self._settings.least_slack)
+        least = np.full(len(point.inequalities), self._settings.least_slack)
+        if multipliers is not None:
+            least = np.minimum(least, barrier / multipliers)
+        slacks = np.maximum(-point.inequalities, least)
+        z = barrier / slacks if multipliers is None else np.maximum(multipliers, barrier / slacks)
         return _Iterate(
             x=x,
             point=point,
             slacks=slacks,
-            z=barrier / slacks,
+            z=z,
             y=np.zeros(len(point.equalities)),
             z_lower=barrier / (x - self._lower),
             z_upper=barrier / (self._upper - x),
@@ -270,7 +281,7 @@ class _InteriorPoint:
         recent = costs[-_ITERATIONS_FLAT:]
         still = len(costs) > _ITERATIONS_FLAT and max(recent) - min(recent) < self._settings.gain
         at_end = self._barrier <= self._settings.least_barrier
-        missed = max(_largest(at.point.inequalities + at.slacks), _largest(at.point.equalities))
+        missed = max(float(at.point.inequalities.max(initial=0.0)), _largest(at.point.equalities))
         return still and at_end and missed < self._settings.violation
 
     def _lower_barrier(self, at: _Iterate) -> None:
@@ -289,6 +300,10 @@ class _InteriorPoint:
         before = _violation(at.point, at.slacks), self._barrier_function(at.x, at.slacks)
         promised = self._promised(at, step)
         longest = length = self._longest(at, step)
+        if longest < _JAMMED and not self._is_anew:
+            self._begin_anew(at)
+            return True
+        self._is_anew = longest < _JAMMED
         for halvings in range(_BACKTRACKS):
             after, trial = self._tried(at, step, length)
             if self._filter.accepts(before, after, promised, length):
@@ -308,6 +323,13 @@ class _InteriorPoint:
             self._filter.add(before)
         self._move(at, step, length, trial)
         return True
+
+    def _begin_anew(self, at: _Iterate) -> None:
+        """Move slacks away from zero where they stop every step, and choose multipliers that fit."""
+        at.slacks = np.maximum(at.slacks, self._settings.least_slack)
+        at.z, at._residual = self._barrier / at.slacks, None
+        self._filter.entries.clear()
+        self._is_anew = True
 
     def _corrected(
         self,

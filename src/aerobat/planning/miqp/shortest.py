@@ -46,7 +46,7 @@ def shortest(
     """
     scan, rough = _Scan(attempts, refinement, scanned, least), list[RefinedPath]()
     for begun, (slots, guess) in enumerate(scan.starts(), 1):
-        path = refinement.rough(guess, segments)
+        path = refinement.rough(guess, segments, min(map(_duration, rough), default=inf))
         if refinement.is_promising(path):
             scan.known.append(slots)
             rough.append(path)
@@ -72,7 +72,7 @@ def _shortened(judged: Judged[RefinedPath], scan: _Scan, segments: int) -> Judge
         start = scan.start(fraction * duration / scan.attempts.formulation.chain.intervals)
         if start is None:
             continue
-        path = refinement.rough(start, segments)
+        path = refinement.rough(start, segments, best.solution.duration)
         if refinement.is_promising(path) and _duration(path) < best.solution.duration:
             found = refinement.finished(path)
             if found.feasible and found.solution.duration < best.solution.duration:

@@ -13,13 +13,15 @@ from functools import cached_property
 import numpy as np
 
 from aerobat.arrays import Array, Indices, Mask
+from aerobat.planning.refinement.excess import chebyshev
 from aerobat.planning.refinement.limit_values import Frames, LimitValues
 from aerobat.planning.refinement.spline import Motion, Spline, basis
 from aerobat.planning.refinement.stage_values import KNOWN, STATE, StageValues
 
 AT_END = basis(np.array([1.0]))  # of a segment, (1, 6, 10)
-FADED = 0.1  # of the first and the last segment, along which a backoff grows from nothing,
+FADED = 0.1  # of the first and the last segment, along which constraints of the path grow from nothing,
 FADING = 3  # with this power of the way inward: positions leave rest no faster
+LEAST_FADED = 1e-6
 LIMITED = -1.0  # the value of a constraint that does not count
 
 
@@ -32,7 +34,7 @@ class RefinementProgram:
     stages: StageValues
     stage_segments: tuple[int, ...]  # at whose ends stages hold
     fractions: Array  # of every segment, at which limits hold, (p,)
-    backoff: Array  # of each segment and constraint, (S, c), of limits of the path fading towards both ends
+    backoff: Array  # of each segment and constraint, (S, c)
     radius: float  # of the box, of scaled derivatives
     stretch: float  # the factor by which durations may differ
 
@@ -53,6 +55,20 @@ class RefinementProgram:
     def at(self, x: Array) -> RefinedPoint:
         """The constraints at a point."""
         return RefinedPoint(self, x)
+
+    def at_its_places(self, multipliers: Array) -> Array:
+        """Multipliers of a program with the same segments and stages at places of this one.
+
+        A place's multiplier is shared by those beside it here.
+        """
+        segments, _, kinds = self.counts.shape
+        apart = len(self.windows[1]) + self.stages.inequality_count
+        at_places, others = np.split(multipliers, [len(multipliers) - apart])
+        before = chebyshev(at_places.size // (segments * kinds))
+        hats = np.array([np.interp(self.fractions, before, each) for each in np.eye(len(before))])
+        shares = hats / hats.sum(axis=1, keepdims=True)
+        spread = np.einsum("sbc,bp->spc", at_places.reshape(segments, -1, kinds), shares)
+        return np.concatenate([spread.ravel(), others])
 
     @cached_property
     def places(self) -> Array:
@@ -75,12 +91,16 @@ class RefinementProgram:
         return counts
 
     @cached_property
-    def backoffs(self) -> Array:
-        """The backoff at every place, (S, p, c): none at the ends, which may lie on limits of the path."""
-        backoffs = np.repeat(self.backoff[:, None], len(self.fractions), axis=1)
+    def weights(self) -> Array:
+        """Of every constraint (S, p, c): those of the path weigh more toward the ends, where nothing moves.
+
+        What is kept there from limits fades instead, as ends may lie on limits of the path.
+        """
+        weights = np.where(self.counts, 1.0, 0.0)
         for segment, inward in ((0, self.fractions), (-1, 1.0 - self.fractions)):
-            backoffs[segment, :, self.limits.of_path] *= np.minimum(inward / FADED, 1.0) ** FADING
-        return backoffs
+            faded = np.maximum(np.minimum(inward / FADED, 1.0) ** FADING, LEAST_FADED)
+            weights[segment, :, self.limits.of_path] /= faded
+        return weights
 
     @cached_property
     def windows(self) -> tuple[Array, Array]:
@@ -124,7 +144,8 @@ class RefinedPoint:
         """Limits at places, windows of stages, and what stages ask."""
         program = self.program
         values = program.limits.values(self._derivatives.reshape(-1, 6, 3), program.near)
-        values = values.reshape(program.counts.shape) + program.backoffs
+        with np.errstate(invalid="ignore"):  # of infinite ones that do not count
+            values = values.reshape(program.counts.shape) * program.weights + program.backoff[:, None]
         rows, bounds = program.windows
         windows = rows @ self._ratios - bounds
         at_stages = program.stages.inequalities(self._at_stages)
@@ -145,7 +166,7 @@ class RefinedPoint:
         segments, count, kinds = program.counts.shape
         slopes = self._motion.slopes.reshape(segments, count, 18, -1)
         local = limits.reshape(segments, count, kinds, 18) @ slopes
-        local *= program.counts[..., None]
+        local *= program.weights[..., None]
         windows = np.zeros((len(program.windows[1]), len(self.x)))
         windows[:, program.spline.ratio_columns] = program.windows[0] * self._ratios
         others = np.concatenate([windows, self._stage_rows(*self._stage_slopes)])
@@ -166,7 +187,7 @@ class RefinedPoint:
         at_places, at_windows, at_stages = np.split(
             inequality_weights, np.cumsum([program.counts.size, len(program.windows[1])])
         )
-        weights = (at_places.reshape(program.counts.shape) * program.counts).reshape(-1, kinds)
+        weights = (at_places.reshape(program.counts.shape) * program.weights).reshape(-1, kinds)
         derivatives = self._motion.derivatives.reshape(-1, 6, 3)
         by_motion, second = program.limits.curvature(derivatives, program.near, weights)
         moving = self._motion.slopes[:, :, 1:].reshape(segments * count, STATE + 6, -1)

@@ -56,6 +56,7 @@ ROUGH_SHARE = 0.5  # of the time that is left, so that there is some to certify 
 ROUGH_PLACES = 16  # of a segment: as many as a polynomial of degree 9 needs
 FINE_PLACES = 24
 LITTLE_GAIN = 0.005  # of the duration, from one rough round to the next: the end
+BEHIND = 0.05  # of a known path's duration: one that is so much longer after a round is not gone on with
 RADIUS = 2.0  # of the box in which scaled derivatives move at first,
 SHRINK = 1.5  # the factor by which it is smaller from one rough round to the next,
 LEAST_RADIUS = 1.0  # down to this
@@ -78,6 +79,7 @@ class RefinedPath:
 
     path: WarmStart
     excess: Excess
+    multipliers: Array | None = None  # of the last program's inequalities
 
     @property
     def placed(self) -> tuple[PlacedStage, ...]:
@@ -165,7 +167,7 @@ class Refinement:
         """
         return self.finished(self.rough(guess, segments))
 
-    def rough(self, guess: WarmStart, segments: int) -> RefinedPath:
+    def rough(self, guess: WarmStart, segments: int, known: float = np.inf) -> RefinedPath:
         """A path that is as fast as it gets, and may exceed limits a little between places.
 
         It is sought with few segments first, which go far in one step, then with twice as many, until there
@@ -174,17 +176,18 @@ class Refinement:
         Args:
             guess: A path through the stages, within limits or not.
             segments: Of the path that is sought, with a knot at every stage.
+            known: The duration [s] of a path that is known: one that stays far behind it is left early.
         """
         number = min(segments, max(SEGMENTS, len(guess.phases)))
         with within_share(ROUGH_SHARE):
-            found = self._rough(knots_at_stages(guess, number))
+            found = self._rough(knots_at_stages(guess, number), known)
             while number < segments and not out_of_time():
                 number = min(2 * number, segments)
-                found = self._rough(knots_at_stages(found.path, number))
+                found = self._rough(knots_at_stages(found.path, number), known)
         return found
 
-    def _rough(self, guess: WarmStart) -> RefinedPath:
-        """The fastest path near one with knots at the stages."""
+    def _rough(self, guess: WarmStart, known: float) -> RefinedPath:
+        """The fastest path near one with knots at the stages, or one far behind a known duration [s]."""
         rounds = Rounds(self, guess)
         before = np.inf
         for number in range(ROUGH_ROUNDS):
@@ -192,7 +195,8 @@ class Refinement:
             judge(solution, self.problem, self.vehicle, self.recorder, self.reserve)
             duration = solution.duration
             gains_little = number and duration > (1.0 - LITTLE_GAIN) * before
-            if gains_little or out_of_time() or not self.is_promising(solution.source):
+            is_over = gains_little or duration > (1.0 + BEHIND) * known
+            if is_over or out_of_time() or not self.is_promising(solution.source):
                 break
             before = duration
             rounds.go_on(solution.source)
@@ -216,7 +220,7 @@ class Refinement:
 
     def _finished(self, rough: RefinedPath) -> Judged[RefinedPath]:
         """The certified path near one, or the last one that was tried."""
-        rounds = Rounds(self, rough.path, FINE, FINE_PLACES, LEAST_RADIUS)
+        rounds = Rounds(self, rough.path, FINE, FINE_PLACES, LEAST_RADIUS, rough.multipliers)
         rounds.back_off(rough.excess)
         return certified_solve(
             rounds, self.problem, self.vehicle, self.recorder, FINE_ROUNDS, reserve=self.reserve
@@ -294,6 +298,7 @@ class Rounds:
         settings: Settings = FIRST,
         places: int = ROUGH_PLACES,
         radius: float = RADIUS,
+        multipliers: Array | None = None,
     ) -> None:
         limits = refinement.limits
         self._refinement, self._guess, self._settings = refinement, guess, settings
@@ -302,16 +307,20 @@ class Rounds:
         self._segments = tuple(_segment_that_ends(trajectory, time) for time in guess.times)
         kept = np.where(limits.has_reserve, refinement.reserve, 0.0) + BACKOFF
         self._backoff = np.tile(kept, (trajectory.segments, 1))
+        self._multipliers = multipliers
 
     def solve(self) -> Solution[RefinedPath]:
         """The fastest path near the last one."""
         began, refinement = perf_counter(), self._refinement
         program = self._program
-        answer = interior_point(program, program.spline.start, self._settings)
+        known = None if self._multipliers is None else program.at_its_places(self._multipliers)
+        answer = interior_point(program, program.spline.start, self._settings, known)
+        self._multipliers = answer.z
         x = _meeting_stages(program, answer)
         trajectory = program.spline.trajectory(x)
         times = tuple(float(trajectory.knots[segment + 1]) for segment in self._segments)
-        path = refinement.path(replace(self._guess, trajectory=trajectory, times=times))
+        found = refinement.path(replace(self._guess, trajectory=trajectory, times=times))
+        path = replace(found, multipliers=answer.z)
         stands_still = abs(trajectory.duration / self._guess.trajectory.duration - 1.0) < LITTLE_GAIN
         status = CONVERGED if answer.converged or stands_still else "unknown"
         return refinement.solution(path, status, answer.iterations, perf_counter() - began)

@@ -51,6 +51,12 @@ class StageValues:
         ]
         return np.concatenate([linear, balls, *rooms])
 
+    @property
+    def inequality_count(self) -> int:
+        """q."""
+        rooms = sum(_room_count(body) for body in self.in_gates)
+        return int((~self._linear[3]).sum()) + len(self._balls) + rooms
+
     def equalities(self, derivatives: Array) -> Array:
         """The values, (p,)."""
         at, weights, bounds, equal = self._linear
@@ -88,7 +94,7 @@ class StageValues:
             first += 1
         for k, body in enumerate(self.in_gates):
             _, by_state = self._functions[k]
-            count = 2 * len(body.gate.opening.sides[1]) + 1
+            count = _room_count(body)
             own = weights[first : first + count]
             slopes = by_state([*self._stepped(k, derivatives[body.stage]), *own])
             second = [np.broadcast_to(np.imag(each), (STATE,)) / COMPLEX_STEP for each in slopes]
@@ -160,3 +166,8 @@ def _sides(limit: Limit, is_equality: bool) -> Iterator[tuple[Array, float]]:
             yield sign / limit.size * limit.quantity.path, sign * end
             if is_equality:
                 return
+
+
+def _room_count(body: BodyInGate) -> int:
+    """The number of inequalities of a body's room in a gate."""
+    return 2 * len(body.gate.opening.sides[1]) + 1
