@@ -64,7 +64,6 @@ def test_stopped_early_the_rotors_saturate_and_the_report_says_so(capsys) -> Non
 def test_check_proves_a_plan_from_its_file_its_folder_and_its_csv(capsys) -> None:
     Path("flip-roll").mkdir()
     shared_plan("flip-roll").save("flip-roll/flip-roll.plan")
-    write_columns(shared_plan("flip-roll"), "flip-roll/plan.csv", rate=400.0)
     for plan in ("flip-roll", "flip-roll/flip-roll.plan"):
         code, out, err = run(capsys, "check", plan, "--json")
         assert (code, err) == (0, "")
@@ -73,8 +72,10 @@ def test_check_proves_a_plan_from_its_file_its_folder_and_its_csv(capsys) -> Non
     quad = load_vehicle("agile-quad")
     rotors = tuple(replace(rotor, max_thrust=1.01 * rotor.max_thrust) for rotor in quad.rotors)
     write_vehicle(replace(quad, rotors=rotors), "stronger.toml")
-    code, out, _ = run(capsys, "check", "flip-roll/plan.csv", "--vehicle", "stronger.toml")
-    assert (code, "certified" in out) == (0, True)
+    for rate in (100.0, 400.0, 1000.0):
+        write_columns(shared_plan("flip-roll"), "flip-roll/plan.csv", rate=rate)
+        code, out, _ = run(capsys, "check", "flip-roll/plan.csv", "--vehicle", "stronger.toml")
+        assert (code, "certified" in out) == (0, True)
 
 
 def test_check_refuses_by_limit_time_and_size(capsys) -> None:
@@ -108,6 +109,6 @@ def test_compare_puts_all_planners_side_by_side(capsys) -> None:
     ratios = np.array([row["ratio"] for row in rows])
     assert ratios[-1] == 1.0
     assert (ratios[:-1] > 1.0).all()
-    assert ratios[1] > ratios[0] > ratios[2] > ratios[3]  # each planner knows more of the rotors
+    assert ratios[1] > ratios[0] >= ratios[2] >= ratios[3]  # each planner knows more of the rotors
     assert all(row["certified"] for row in rows)
     assert all(row["max_position_error_m"] < 0.02 for row in rows[:3])  # the others leave rotors no reserve

@@ -32,6 +32,9 @@ PATH = ("position", "velocity", "acceleration", "jerk")
 SYNONYMS = {"time": "t", "time_s": "t", "px": "x", "py": "y", "pz": "z"}
 MAX_ROWS = 2_000_000  # five hours at 100 Hz, half an hour at 1 kHz
 MAX_COLUMNS = 1000
+SHORT = 0.2  # of the usual step: a last one that is shorter has derivatives of rounding
+DENSE = 6e-3  # [s] from row to row: half of 100 Hz's, and a little more
+REPEATED = 1e-7  # [m]: a row that is met so nearly adds nothing to a path
 FEWEST = 5  # rows, of which every second can be left out
 
 
@@ -45,11 +48,13 @@ class PathRows:
 
     @cached_property
     def trajectory(self) -> Trajectory:
-        """The path with all derivatives of every row; where some are not there, that of minimum snap.
+        """The path with all derivatives of every row, up to its fifth derivative continuous.
 
-        Its heading is that of the attitude. Raises SpecError for numbers that are too large.
+        Where some derivatives are not there, the path of minimum snap. Its heading is that of the attitude.
+        Raises SpecError for numbers that are too large.
         """
-        path = self._through(self.knots, self.steps)
+        rows = self._without_repeats
+        path = self._through(rows.knots, rows.steps)
         return Trajectory(path.durations, path.coefficients, self._heading(path))
 
     @property
@@ -66,13 +71,35 @@ class PathRows:
         missed = every_second.evaluate(times[1::2]) - self.knots[1:rows:2, 0]
         return float(np.linalg.norm(missed, axis=1).max())
 
+    @property
+    def _without_repeats(self) -> PathRows:
+        """Every second row, and every second of these, as long as the path through them meets the others.
+
+        Where rows are dense, high derivatives of the path from one to the next are those of rounding.
+        """
+        error = None if np.median(self.steps) > DENSE or np.isnan(self.knots).any() else self.fit_error
+        if error is None or not error < REPEATED:
+            return self
+        kept = np.unique(np.append(np.arange(0, len(self.knots), 2), len(self.knots) - 1))
+        times = np.concatenate([[0.0], np.cumsum(self.steps)])
+        return PathRows(self.knots[kept], np.diff(times[kept]))._without_repeats
+
     @staticmethod
     def _through(knots: Array, steps: Array) -> Trajectory:
         if np.isnan(knots).any():
             return minimum_effort(knots, steps)
-        scaled = steps[:, None, None] ** np.arange(len(PATH))[:, None]
+        if len(steps) > 1 and steps[-1] < SHORT * np.median(steps):  # what a grid leaves over of a duration
+            knots, steps = np.delete(knots, -2, axis=0), np.append(steps[:-2], steps[-2:].sum())
         with np.errstate(over="ignore", invalid="ignore"):
-            return Trajectory(steps, hermite(scaled * knots[:-1], scaled * knots[1:]))
+            if len(steps) < 2:
+                scaled = steps[:, None, None] ** np.arange(len(PATH))[:, None]
+                return Trajectory(steps, hermite(scaled * knots[:-1], scaled * knots[1:]))
+            snaps = np.full((len(knots), 1, 3), np.nan)  # free, but at the ends
+            snaps[0, 0] = _snap(knots[:3], np.array([0.0, *np.cumsum(steps[:2])]))
+            snaps[-1, 0] = _snap(knots[:-4:-1], -np.array([0.0, *np.cumsum(steps[:-3:-1])]))
+            if not np.isfinite(snaps[[0, -1]]).all():
+                raise SpecError("the rows hold numbers that are too large; give SI units")
+            return minimum_effort(np.concatenate([knots, snaps], axis=1), steps)
 
     def _heading(self, path: Trajectory) -> float:
         """The turn about the thrust [rad] in the first attitude, drag left out."""
@@ -82,6 +109,21 @@ class PathRows:
         upright = so3.smallest_rotation(so3.UP, thrust / np.linalg.norm(thrust))
         turn = so3.multiply(so3.conjugate(upright), self.attitude)
         return float(2.0 * np.arctan2(turn[3], turn[0]))
+
+
+def _snap(knots: Array, times: Array) -> Array:
+    """The snap at the first of three rows (3, 4, 3) of the polynomial through all of them, (3,)."""
+    size = np.abs(times).max()
+    powers, orders = np.arange(knots.shape[0] * knots.shape[1]), np.arange(len(PATH))
+    table = np.array(
+        [
+            [math.perm(p, k) * (t / size) ** max(p - k, 0) for p in powers.tolist()]
+            for t in times.tolist()
+            for k in orders.tolist()
+        ]
+    )
+    values = (knots * size ** orders[:, None]).reshape(-1, 3)
+    return np.asarray(np.linalg.solve(table, values)[4] * math.factorial(4) / size**4)
 
 
 def has_header(text: str) -> bool:
