@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import aerobat as ab
 from aerobat.interchange import write_columns
 from aerobat.interchange.csv import read_csv
 from aerobat.planning import load_plan
@@ -98,10 +99,10 @@ def test_fly_writes_the_plan_the_flight_the_picture_and_the_report(capsys) -> No
     assert read_csv(folder / "plan.csv").duration == pytest.approx(report["plan"]["duration_s"])
     assert load_flight(folder / "flight.npz").times[-1] == pytest.approx(report["plan"]["duration_s"])
     assert (folder / "report.png").read_bytes().startswith(b"\x89PNG")
-    for word in ("planner", "stages", "rotors", "position error", "gate", "saturated", "flyability"):
-        assert word in out
-    assert "the reserve left" in out
-    assert re.search(r"controller +full", out)
+    assert "flip-roll · agile-quad: certified, and it flies" in out
+    for name in ("duration", "limited by", "margin", "space", "gate", "flight"):
+        assert re.search(rf"^ +{name} ", out, re.MULTILINE)
+    assert out.endswith("`aerobat sweep out/flip-roll` counts real flights\nwritten to out/flip-roll/\n")
 
 
 @pytest.mark.slow
@@ -141,6 +142,10 @@ def test_what_takes_seconds_to_know_is_told_where_it_is_asked_for(capsys) -> Non
     assert recoveries["sentence"].startswith("given up at any of ")
     assert load_plan("explained/line.plan").recoveries is not None
     assert explained["flight"] == plain["flight"]
+    trials = explained["trials"]
+    sweep = ab.sweep(load_plan("plain/line.plan"), "lab", trials["flights"])
+    assert (trials["conditions"], trials["succeeded"]) == ("lab", sweep.success.count)
+    assert "trials" not in plain
     assert explained["plan"]["assessment"] == plain["plan"]["assessment"]
     code, out, _ = run(capsys, "check", "plain", "--json")
     assert code == 0
@@ -150,8 +155,12 @@ def test_what_takes_seconds_to_know_is_told_where_it_is_asked_for(capsys) -> Non
     assert recoveries["sentence"] in " ".join(out.split())
     code, out, _ = run(capsys, "repeat", "plain", "--explain")
     assert code == 0
-    assert "recovery" in out
-    assert "recovery" not in run(capsys, "repeat", "plain")[1]
+    for word in ("planner", "rotors", "position error", "saturated", "flyability", "recovery"):
+        assert word in out
+    assert re.search(r"controller +full", out)
+    plain = run(capsys, "repeat", "plain")[1]
+    assert "recovery" not in plain
+    assert "saturated" not in plain
 
 
 @pytest.mark.slow
@@ -159,7 +168,7 @@ def test_a_plan_that_takes_suspiciously_long_says_so_and_what_to_give(capsys) ->
     words = ("plan", "section-v", "--vehicle", "section-v", "--planner", "min-snap")
     code, out, _ = run(capsys, *words)
     assert code == 0
-    told = "suspicious: --explain asks for a second opinion, --planner free-knots plans anew"
+    told = "warning it may take longer than need be; --explain asks another planner"
     assert told in " ".join(out.split())
     written = json.loads(Path("out/section-v-section-v-min-snap/report.json").read_text())
     assessed = written["plan"]["assessment"]

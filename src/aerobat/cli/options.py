@@ -52,9 +52,10 @@ class ExplainingOptions:
     """Options of a report on a plan."""
 
     explain: Annotated[bool, Parameter(group=output, negative="", show_default=False)] = False
-    """Find out and report what takes seconds to know, too: the recoveries to a hover from all along the plan,
-    of a plan that takes suspiciously long another planner's second opinion, and where there is no plan the
-    changes with which there is one."""
+    """Report all facts, and those that take seconds to know: how many of a hundred flights succeed under the
+    given conditions or a lab's, the recoveries to a hover from all along the plan, another planner's second
+    opinion of a plan that takes suspiciously long, and where there is no plan the changes with which there is
+    one."""
 
 
 @dataclass(frozen=True, kw_only=True)

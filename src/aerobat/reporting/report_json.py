@@ -5,13 +5,16 @@ from __future__ import annotations
 import json
 from dataclasses import asdict
 from math import degrees, inf
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from aerobat.evaluation.score import Score
 from aerobat.planning import Assessment, Flyability, Plan, Tube
 from aerobat.simulation.autopilot import Recoveries
 from aerobat.simulation.passages import Passage
 from aerobat.vehicle import implausibilities
+
+if TYPE_CHECKING:  # which takes long to import
+    from aerobat.studies.sweep import Sweep
 
 
 def report(
@@ -72,6 +75,22 @@ def passage_facts(passage: Passage) -> dict[str, Any]:
 
 def _known(facts: dict[str, Any]) -> dict[str, Any]:
     return {name: None if value in ("", inf) or value != value else value for name, value in facts.items()}
+
+
+def trial_facts(trials: Sweep | None) -> dict[str, Any]:
+    """Return how many flights under random conditions succeeded, as JSON has it; nothing where none were."""
+    if trials is None:
+        return {}
+    success = trials.success
+    return {
+        "trials": {
+            "conditions": trials.conditions.name,
+            "seed": trials.seed,
+            "flights": len(trials),
+            "succeeded": success.count,
+            "success_interval": list(success.interval),
+        }
+    }
 
 
 def _flyability(found: Flyability) -> dict[str, Any]:

@@ -170,7 +170,7 @@ def plan_facts(plan: Plan) -> Iterable[Fact]:
         yield "flyability", str(plan.flyability)
     yield from _recovery_facts(plan)
     if plan.tube is not None:
-        yield from _tube_facts(plan.tube, plan.duration)
+        yield from tube_facts(plan.tube, plan.duration)
     if plan.assessment is not None:
         yield from _assessment_facts(plan, plan.assessment)
 
@@ -180,7 +180,7 @@ def _recovery_facts(plan: Plan) -> Iterable[Fact]:
         yield "recovery", str(plan.recoveries)
 
 
-def _tube_facts(tube: Tube, duration: float) -> Iterable[Fact]:
+def tube_facts(tube: Tube, duration: float) -> Iterable[Fact]:
     """The proof that flights pass, what it costs a plan of that duration [s], and their tube."""
     yield (
         "passes",
@@ -250,10 +250,15 @@ def flight_facts(score: Score, controller: str | None = None, plant: str | None 
         yield _of_lap(waypoint.waypoint, waypoint.lap, several), missed
     if score.places or score.attitudes:
         yield "tolerance", _within_tolerance(score)
+    yield from lap_facts(score)
+    yield "saturated", f"{100 * score.saturated_fraction:.1f} % of the time"
+
+
+def lap_facts(score: Score) -> Iterable[Fact]:
+    """How long each lap took."""
     for lap in score.laps:
         split = "not flown" if isnan(lap.duration) else f"{lap.duration:.3f} s, until {lap.end:.3f} s"
         yield f"lap {lap.lap}", split
-    yield "saturated", f"{100 * score.saturated_fraction:.1f} % of the time"
 
 
 def _within_tolerance(score: Score) -> str:

@@ -26,10 +26,11 @@ def fly(
 ) -> ExitCode:
     """Plan a maneuver, fly it in simulation, and report.
 
-    Prints a short table and writes to the output folder, as one: PROBLEM.plan (the whole plan), plan.csv
-    (position, velocity, acceleration and jerk at 100 Hz), flight.npz (everything that was simulated),
-    report.png, report.json, and run.toml, from which `aerobat repeat` does all of it again. Exits with 0 only
-    if the plan is certified and the flight went well.
+    Prints whether it flies, how long it takes, what limits it and how much margin it has, and writes to the
+    output folder, as one: PROBLEM.plan (the whole plan), plan.csv (position, velocity, acceleration and jerk
+    at 100 Hz), flight.npz (everything that was simulated), report.png, report.json, and run.toml, from which
+    `aerobat repeat` does all of it again. Exits with 0 only if the plan is certified and the flight went
+    well.
 
     Parameters
     ----------
@@ -41,7 +42,7 @@ def fly(
     as_plant(flying.plant)
     settings = flight_settings(flying, flying.controller, flying.plant)
     plan, record = planned(problem, options, "fly", settings, explain=explaining.explain)
-    return finish(plan, record, options, flown(plan, settings))
+    return finish(plan, record, options, flown(plan, settings), explaining.explain)
 
 
 def flown(plan: Plan, settings: FlightSettings) -> Flown:

@@ -36,4 +36,4 @@ def plan(
     elif passing.conditions is not None or passing.seed:
         raise SpecError("--conditions and --seed are for --pass, or for `aerobat fly`; leave them out")
     found, record = planned(problem, options, "plan", settings, explain=explaining.explain)
-    return finish(found, record, options)
+    return finish(found, record, options, explain=explaining.explain)

@@ -76,7 +76,7 @@ def repeat(
     else:
         plan = with_explanation(old.plan) if options.explain else old.plan
     again = flown(plan, record.flight) if record.command == "fly" else None
-    code = finish(plan, record, options, again)
+    code = finish(plan, record, options, again, options.explain)
     return _told(folder, record, old.difference(_Run(plan, again.flight if again else None)), code)
 
 

@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from rich.table import Table
 
@@ -20,10 +21,14 @@ from aerobat.interchange.columns import write_columns
 from aerobat.planning import Plan
 from aerobat.reporting.figures import report_figure
 from aerobat.reporting.page import import_undocumented, png
-from aerobat.reporting.report_json import report, to_json
+from aerobat.reporting.report_json import report, to_json, trial_facts
+from aerobat.reporting.summary import summary
 from aerobat.reporting.tables import print_table, summary_table
 from aerobat.simulation import Flight
 from aerobat.storage import whole_folder
+
+if TYPE_CHECKING:  # which takes long to import
+    from aerobat.studies.sweep import Sweep
 
 FLIGHT = "flight.npz"
 INSPECTION = "inspect.png"  # so does its inspection, by `aerobat inspect`
@@ -70,7 +75,12 @@ def run_folder(folder: Path, record: RunRecord) -> Iterator[Path]:
 
 
 def written(
-    record: RunRecord, options: OutputOptions, write: Callable[[Path], None], facts: str, table: Table
+    record: RunRecord,
+    options: OutputOptions,
+    write: Callable[[Path], None],
+    facts: str,
+    *tables: Table,
+    hint: str = "",
 ) -> None:
     """Put a run in its place as one, then say what it is.
 
@@ -79,7 +89,8 @@ def written(
         options: Where to write, and in what form to say it.
         write: Writes all but the record to a folder.
         facts: What it is, as JSON.
-        table: The same for people.
+        tables: The same for people.
+        hint: What to type next.
     """
     folder = options.out or record.folder
     replaced = os.path.isdir(folder) and any(folder.iterdir())  # False for names that no folder can have
@@ -88,8 +99,9 @@ def written(
     if options.json:
         print_json(facts)
         return
-    print_table(table)
-    print(f"\nwritten to {folder}/" + (", in the place of an earlier run" if replaced else ""))
+    for table in tables:
+        print_table(table)
+    print(f"\n{hint}written to {folder}/" + (", in the place of an earlier run" if replaced else ""))
 
 
 @dataclass(frozen=True)
@@ -102,7 +114,9 @@ class Flown:
     plant: str | None  # the name of another simulator
 
 
-def finish(plan: Plan, record: RunRecord, options: OutputOptions, flown: Flown | None = None) -> ExitCode:
+def finish(
+    plan: Plan, record: RunRecord, options: OutputOptions, flown: Flown | None = None, explain: bool = False
+) -> ExitCode:
     """Write what was made, then say what it is; the exit code tells if all is well.
 
     Args:
@@ -110,11 +124,13 @@ def finish(plan: Plan, record: RunRecord, options: OutputOptions, flown: Flown |
         record: What it takes to do it again.
         options: Where to write, and in what form to say it.
         flown: The plan's flight, if it was flown.
+        explain: Whether flights under random conditions are counted, and all facts are told.
     """
     assert plan.vehicle is not None, "a command plans for a vehicle"
     flight, score = (flown.flight, flown.score) if flown else (None, None)
     by = (flown.controller, flown.plant) if flown else ()
-    facts = to_json(report(plan, score, plan.vehicle.name, *by))
+    trials = _trials(plan, record) if explain else None
+    facts = to_json(report(plan, score, plan.vehicle.name, *by) | trial_facts(trials))
     import_undocumented()
     picture = png(report_figure(plan, plan.vehicle, flight, score))
 
@@ -126,8 +142,19 @@ def finish(plan: Plan, record: RunRecord, options: OutputOptions, flown: Flown |
         (staging / "report.json").write_text(facts + "\n", encoding="utf-8")
         (staging / "report.png").write_bytes(picture)
 
-    written(record, options, write, facts, summary_table(plan, score, plan.vehicle.name, *by))
+    tables = [summary(plan, plan.vehicle.name, score, trials)]
+    if explain:
+        tables.append(summary_table(plan, score, "all facts", *by))
+    hint = f"--explain tells more; `aerobat sweep {options.out or record.folder}` counts real flights\n"
+    written(record, options, write, facts, *tables, hint="" if explain else hint)
     return ExitCode.WELL if _is_well(plan, score) else ExitCode.NOT_WELL
+
+
+def _trials(plan: Plan, record: RunRecord) -> Sweep | None:
+    """Flights under random conditions, of which a plain run imports nothing."""
+    from aerobat.cli.trials import trial_flights
+
+    return trial_flights(plan, record)
 
 
 def _is_well(plan: Plan, score: Score | None) -> bool:
