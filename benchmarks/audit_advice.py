@@ -11,7 +11,7 @@ from aerobat.errors import Infeasible
 from aerobat.optimization.deadline import processor, within_time
 from aerobat.planning import Miqp, plan
 from aerobat.problem import Gate
-from aerobat.studies.why import Remedy, Task, explained
+from aerobat.studies.why import Remedy, Request, explained
 from audit_measures import Attempted, attempted
 from random_problems import Case
 
@@ -32,7 +32,7 @@ WINDOW = "widen its `at`, or use more intervals"
 
 def followed(case: Case, asked: Miqp, message: str) -> str:
     """What following a refusal's advice led to."""
-    task = Task(case.problem, case.vehicle, asked)
+    task = Request(case.problem, case.vehicle, asked)
     eased = _at_sight(task, message)
     if eased is not None:
         return LIFTS if _planned(eased).message != message else f"{WRONG}, the same is said again"
@@ -54,11 +54,11 @@ def _again(remedy: Remedy) -> Attempted:
     return attempted(partial(plan, found.problem, found.planner, found.vehicle), PATIENCE)
 
 
-def _planned(task: Task) -> Attempted:
+def _planned(task: Request) -> Attempted:
     return attempted(partial(plan, task.problem, task.planner, task.vehicle), PATIENCE)
 
 
-def _at_sight(task: Task, message: str) -> Task | None:
+def _at_sight(task: Request, message: str) -> Request | None:
     """The task after what a refusal without any attempt asks for; None for other refusals."""
     assert task.vehicle is not None
     if sizes := SIZES.search(message):
@@ -71,6 +71,6 @@ def _at_sight(task: Task, message: str) -> Task | None:
     return replace(task, planner=Miqp(intervals=40)) if WINDOW in message else None
 
 
-def _with_gates(task: Task, name: str, change: Callable[[Gate], Gate]) -> Task:
+def _with_gates(task: Request, name: str, change: Callable[[Gate], Gate]) -> Request:
     gates = tuple(change(gate) if gate.name == name else gate for gate in task.problem.gates)
     return replace(task, problem=replace(task.problem, gates=gates))

@@ -41,7 +41,7 @@ from aerobat.vehicle import Ellipsoid, Rotor, Vehicle
 
 PAGE = Path(__file__).parent / "files.md"
 ANNOTATED = PAGE.parent.parent / "examples" / "vehicles" / "annotated.toml"
-WRITTEN = "## What a run writes"  # from here on the page is written by hand
+WRITTEN = "## The files of a run"  # from here on the page is written by hand
 
 PLACES = {  # where each class stands in a file
     EndState: "`[start]` and `[goal]`",

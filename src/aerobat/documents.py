@@ -129,7 +129,7 @@ def read_text(path: Document, max_size: int = MAX_DOCUMENT) -> str:
 
 
 def read_json(path: Path) -> Any:
-    """What a JSON file holds. Raises SpecError, one sentence without the file's name, where it holds none."""
+    """Return what a JSON file holds. Raises SpecError, one sentence without the file's name, for no JSON."""
     try:
         return json.loads(read_text(path))
     except (ValueError, RecursionError) as error:

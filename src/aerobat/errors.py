@@ -1,4 +1,4 @@
-"""What can go wrong, each with its evidence and a remedy, in one sentence for people."""
+"""Failures that Aerobat foresees, each with its evidence and a remedy, in one sentence for people."""
 
 from __future__ import annotations
 
@@ -70,7 +70,7 @@ class Infeasible(AerobatError):
 
     @property
     def sentence(self) -> str:
-        """Which bound binds, in a sentence without its full stop."""
+        """The sentence that says which bound binds, without its full stop."""
         if callable(self._sentence):
             self._sentence = self._sentence()
         return self._sentence

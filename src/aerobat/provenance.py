@@ -1,4 +1,4 @@
-"""What made a number or a file: the versions of the libraries behind it."""
+"""The provenance of a number or a file: the versions of the libraries behind it."""
 
 from __future__ import annotations
 

@@ -1,6 +1,8 @@
 """The documentation runs: Python blocks, the first command and its output; its links lead somewhere."""
 
 import ast
+import importlib
+import importlib.util
 import os
 import re
 import subprocess
@@ -21,6 +23,9 @@ PAGES = sorted(
         *(page for page in (ROOT / "docs").rglob("*.md") if GENERATED not in page.parents),
         *(ROOT / "src").rglob("*.md"),
     ]
+)
+SCRIPTS = sorted(
+    path for folder in ("benchmarks", "examples", "mutation") for path in (ROOT / folder).glob("*.py")
 )
 BLOCK = re.compile(r"^```(\w*)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 LINK = re.compile(r"\]\(([^)\s]+)\)")
@@ -118,3 +123,12 @@ def test_tests_that_pages_name_as_evidence_are_there() -> None:
     written = "\n".join(path.read_text(encoding="utf-8") for path in TESTS.rglob("test_*.py"))
     assert named
     assert not [name for name in named if f"def {name}(" not in written]
+
+
+@pytest.mark.parametrize("script", SCRIPTS, ids=lambda script: script.name)
+def test_scripts_import_names_that_there_are(script: Path) -> None:
+    for node in ast.walk(ast.parse(script.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.ImportFrom) and (node.module or "").startswith("aerobat"):
+            module = importlib.import_module(str(node.module))
+            for name in node.names:
+                assert hasattr(module, name.name) or importlib.util.find_spec(f"{node.module}.{name.name}")

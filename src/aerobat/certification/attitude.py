@@ -1,13 +1,13 @@
 """Body rates along pieces, in a frame that is carried along the thrust direction without spin.
 
 On a piece take any fixed axes e1, e2, e3 with e3 near the thrust, and let f = (u, v, w) in them, n = |f|,
-b3 = f/n. The smallest rotation from e3 to b3 makes of e1, e2
+b3 = f/n. The smallest rotation from e3 to b3 turns e1 and e2 into
 
-    x~ = e1 − b3_x g,   y~ = e2 − b3_y g,   g = (e3 + b3)/(1 + b3_z)
+    x~ = e1 − b3_x g,   y~ = e2 − b3_y g,   g = (e3 + b3)/(1 + b3_z).
 
-and the frame without spin lies at an angle φ from them about b3, with φ' = ω_z / (1 + b3_z) for the rates of
-`kernels.flatness` in these axes (Hanson and Ma, 1995). Across b3, where they lie, rates are complex numbers
-x + i y in x~, y~, times exp(−i φ). e3 is near b3: nothing here comes near 1 + b3_z = 0.
+The frame without spin lies at an angle φ from x~ and y~ about b3, with φ' = ω_z / (1 + b3_z) for the rates of
+`kernels.flatness` in these axes (Hanson and Ma, 1995). Rates lie across b3 and are complex numbers x + i y in
+x~, y~, times exp(−i φ). e3 is near b3: nothing here comes near 1 + b3_z = 0.
 """
 
 from __future__ import annotations

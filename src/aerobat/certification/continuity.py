@@ -100,7 +100,7 @@ def _unequal_directions(curve: ThrustCurve, ends: Array) -> tuple[Array, Array]:
 
 
 def seam(trajectory: Trajectory, vehicle: Vehicle, environment: Environment) -> tuple[Discontinuity, ...]:
-    """What a lap that is flown over and over jumps by from its end to its start, the first of it, if any.
+    """Return the first jump from the end to the start of a lap that is flown over and over, if there is one.
 
     Attitudes are compared whole: a body that is carried around without spin may come back turned.
 

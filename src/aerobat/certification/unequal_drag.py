@@ -152,7 +152,7 @@ class _Motion:
 
     @cached_property
     def per_square(self) -> Bounded:
-        """Its inverse."""
+        """The inverse of the quaternion's square norm."""
         return self.squared.bounded().inverse(self.squared.least())
 
     def turned(self, world: Array) -> list[Array]:
@@ -182,15 +182,15 @@ class _Motion:
         return x.with_error(off), y.with_error(off), z.with_error(off)
 
     def polynomials_of(self, world: Array) -> Array:
-        """What the components of a world vector do not exceed on the pieces, (P, 3)."""
+        """Return bounds of the magnitudes of a world vector's components on the pieces, (P, 3)."""
         return np.stack([self.polynomials(world[..., i]).bound()[:, 0] for i in range(3)], axis=-1)
 
     @cached_property
     def attitude_error(self) -> Array:
         """The largest angle [rad] between the polynomial's attitude and R, (P,); infinite if unknown.
 
-        With the rotation θ between them in body axes and the defects ε₁ = b1·α, ε₂ = b2·β and σ = ω_z,
-        θ_y = (ε₁ + θ_z α_y)/α_z, θ_x = (θ_z β_x − ε₂)/β_z and |θ_z'| ≤ |σ| + |ω| |(θ_x, θ_y)| to first order.
+        Let θ be the rotation between them in body axes, with the defects ε₁ = b1·α, ε₂ = b2·β and σ = ω_z.
+        To first order θ_y = (ε₁ + θ_z α_y)/α_z, θ_x = (θ_z β_x − ε₂)/β_z and |θ_z'| ≤ |σ| + |ω| |(θ_x, θ_y)|.
         """
         square = self.squared.least()[:, 0]
 

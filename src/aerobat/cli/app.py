@@ -5,36 +5,46 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from itertools import pairwise
 
-from cyclopts import App, CycloptsError
+from cyclopts import App, CycloptsError, Group
 
 from aerobat.cli.exit_code import ExitCode
 from aerobat.cli.failures import IMPORT_FLAG
 from aerobat.errors import SpecError
 
-# each is one file and one function of this name, imported when it is asked for
+# each command is one file and one function of this name, imported when it is asked for
 COMMANDS = {
-    "fly": "Plan a maneuver, fly it in simulation, and report.",
-    "plan": "Plan a maneuver and stop there.",
-    "check": "Prove that a vehicle can fly a trajectory, or say when and why it cannot.",
-    "compare": "Plan a maneuver with every planner and put the plans side by side.",
-    "sweep": "Fly a maneuver many times as it would really be flown, and count what becomes of it.",
-    "causes": "Measure what each of four causes of error costs a maneuver, alone and all together.",
-    "map": "Plan a maneuver over values of two fields, and say where there is a plan and which limits bind.",
-    "need": "Find the least thrust-to-weight ratio, the lowest ceiling and the smallest gates with a plan.",
-    "tune": "Find controller gains for a vehicle over many flights, and write them to its file.",
-    "inspect": "Say what caused a recorded flight's error, by its log and its plan.",
-    "view": "Write a page that replays a run, a plan or a flight in a browser, or serve one to try plans on.",
-    "export": "Write a plan as another system reads it, and say what that lost.",
-    "figures": "Draw the paper's figures anew, from real runs.",
-    "mavlink": "Fly a plan on an autopilot over MAVLink.",
-    "mavlink-vehicle": "Simulate a vehicle that MAVLink clients can fly.",
-    "ros1": "Fly maneuvers on demand as a node of ROS 1: services in, goals out.",
-    "ros1-vehicle": "Simulate a vehicle that is a node of ROS 1.",
-    "ros2": "Fly maneuvers on demand as a node of ROS 2: services in, goals out.",
-    "ros2-vehicle": "Simulate a vehicle that is a node of ROS 2.",
-    "repeat": "Do a run again from its folder, and say if it came to the same.",
-    "vehicles": "List the built-in vehicles, say what one is and what looks wrong, or write its file.",
-    "problems": "List the built-in problems, or print one as a file to begin one's own with.",
+    "Plan and fly": {
+        "fly": "Plan a maneuver, fly it in simulation, and report.",
+        "plan": "Plan a maneuver and stop there.",
+        "compare": "Plan a maneuver with every planner and put the plans side by side.",
+        "repeat": "Repeat a saved run and compare the results.",
+    },
+    "Study": {
+        "check": "Prove that a vehicle can fly a trajectory, or say when and why it cannot.",
+        "sweep": "Fly a maneuver many times under random conditions and report success rates.",
+        "causes": "Measure how much each of four error sources degrades a flight.",
+        "tune": "Find controller gains for a vehicle over many flights, and write them to its file.",
+        "map": "Map feasibility over two parameters.",
+        "need": "Find the least thrust-to-weight ratio, the lowest ceiling and the smallest gates.",
+    },
+    "Look": {
+        "view": "Replay a run, a plan or a flight in a browser, or serve a page with sliders.",
+        "inspect": "Find the cause of a recorded flight's error.",
+        "figures": "Draw the paper's figures from new runs.",
+    },
+    "Connect": {
+        "export": "Write a plan for another system, and report what is lost.",
+        "mavlink": "Fly a plan on an autopilot over MAVLink.",
+        "mavlink-vehicle": "Simulate a vehicle that MAVLink clients can fly.",
+        "ros1": "Fly maneuvers on demand as a node of ROS 1: services in, goals out.",
+        "ros1-vehicle": "Simulate a vehicle that is a node of ROS 1.",
+        "ros2": "Fly maneuvers on demand as a node of ROS 2: services in, goals out.",
+        "ros2-vehicle": "Simulate a vehicle that is a node of ROS 2.",
+    },
+    "Files": {
+        "problems": "List the built-in problems, or write one as a file to begin your own with.",
+        "vehicles": "List the built-in vehicles, describe one, or write its file.",
+    },
 }
 
 app = App(
@@ -55,15 +65,17 @@ app = App(
     """,
     suppress_keyboard_interrupt=False,
 )
-for name, help in COMMANDS.items():
-    place = name.replace("-", "_")
-    app.command(f"aerobat.cli.commands.{place}:{place}", name=name, help=help)
+for title, commands in COMMANDS.items():
+    group = Group.create_ordered(title)
+    for name, help in commands.items():
+        place = name.replace("-", "_")
+        app.command(f"aerobat.cli.commands.{place}:{place}", name=name, help=help, group=group)
 
 
 START = """Plan, fly and prove aggressive maneuvers for multirotors. To begin with, type:
-  aerobat fly flip-roll        plans a flip, flies it in simulation, says how it went; all in out/flip-roll/
-  aerobat problems             what else there is to fly, and `aerobat vehicles` by whom
-  aerobat --help               all commands"""
+  aerobat fly flip-roll        plan a flip, fly it in simulation, and report; results go to out/flip-roll/
+  aerobat problems             list the maneuvers, and `aerobat vehicles` the vehicles
+  aerobat --help               list all commands"""
 
 
 def run(arguments: Sequence[str]) -> ExitCode:

@@ -1,4 +1,4 @@
-"""What a run comes to, for scripts."""
+"""Outcomes of runs, as exit codes for scripts."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from enum import IntEnum
 
 
 class ExitCode(IntEnum):
-    """What a run came to, for scripts."""
+    """Outcome of a run, as an exit code for scripts."""
 
     WELL = 0
     NOT_WELL = 1  # not certified, or not flown as it should be

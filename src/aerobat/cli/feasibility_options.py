@@ -23,7 +23,7 @@ class MapOptions(PlannerOptions):
     field ends so; angle is the tilt of a half-flip's gate."""
 
     workers: Workers = None
-    """How many processes plan; the cells are the same for any number. Default: one a core."""
+    """The number of processes that plan; the cells are the same for any number. Default: one a core."""
 
     table: Annotated[Literal["csv", "parquet"], Parameter(group=output)] = "csv"
     """The form of the table, map.csv or map.parquet; the latter needs aerobat[parquet]."""
@@ -37,7 +37,7 @@ class NeedOptions(PlannerOptions):
         tuple[Literal["thrust-to-weight", "ceiling", "gate"], ...],
         Parameter(group=planning, negative="", show_default=False),
     ] = ()
-    """What the least is sought of, once or more often. Default: all that the problem has."""
+    """The quantity whose least value is sought, once or more often. Default: all that the problem has."""
 
     tolerance: Annotated[float, Parameter(group=planning, validator=validators.Number(gte=1e-4, lte=0.5))] = (
         DEFAULT_TOLERANCE
@@ -45,4 +45,4 @@ class NeedOptions(PlannerOptions):
     """Between an answer and the refusal beside it, as a part of the answer."""
 
     workers: Workers = None
-    """How many processes plan. Default: one a core."""
+    """The number of processes that plan. Default: one a core."""

@@ -11,7 +11,7 @@ from aerobat.cli.options import Plugins, output
 
 @dataclass(frozen=True, kw_only=True)
 class InspectOptions:
-    """What a log is held against, and where its picture goes."""
+    """Options of an inspection: what a log is held against, and where its picture goes."""
 
     plan: Annotated[Path | None, Parameter(group=output)] = None
     """The flight's plan, a .plan file or its folder. Default: the one beside the log."""

@@ -20,7 +20,7 @@ class MavlinkOptions:
     """Options of a flight over MAVLink."""
 
     connect: Annotated[str, Parameter(group=linking)] = "udp:127.0.0.1:14540"
-    """Where the vehicle is: udp:HOST:PORT sends there first, udpin:HOST:PORT waits for it, tcp:HOST:PORT, or
+    """The vehicle's address: udp:HOST:PORT sends there first, udpin:HOST:PORT waits for it, tcp:HOST:PORT, or
     a serial device."""
 
     baud: Annotated[int, Parameter(group=linking, validator=validators.Number(gt=0))] = 57600
@@ -48,8 +48,8 @@ class MavlinkOptions:
     flown."""
 
     origin: Annotated[tuple[float, float, float] | None, Parameter(group=linking)] = None
-    """Where the plan's origin lies in the vehicle's own frame, metres east, north and up. Default: above that
-    frame's origin, the plan's lowest point 3 m up."""
+    """The place of the plan's origin in the vehicle's own frame, metres east, north and up. Default: above
+    that frame's origin, the plan's lowest point 3 m up."""
 
     max_error: Annotated[float, Parameter(group=bounds, validator=POSITIVE)] = 1.0
     """Metres off the path at which the flight is given up: the vehicle hovers, then lands."""
@@ -61,7 +61,7 @@ class MavlinkOptions:
     """Seconds by which a set-point may be late, in the plan."""
 
     speed: Annotated[float, Parameter(group=trials, validator=POSITIVE)] = 1.0
-    """How fast time goes, for a simulated vehicle that has the same."""
+    """The pace of time, 1 as in reality, for a simulated vehicle that has the same."""
 
     plugins: Annotated[tuple[Path, ...], Plugins(group=output)] = ()
 
@@ -74,7 +74,7 @@ class MavlinkVehicleOptions:
     """Options of a simulated vehicle that speaks MAVLink."""
 
     listen: Annotated[str, Parameter(group=linking)] = "udp:127.0.0.1:14540"
-    """Where it is to be reached: udp:HOST:PORT waits there, udpout:HOST:PORT sends there first, as PX4
+    """The address of the vehicle: udp:HOST:PORT waits there, udpout:HOST:PORT sends there first, as PX4
     does."""
 
     loss: Annotated[float, Parameter(group=trials, validator=FRACTION)] = 0.0
@@ -87,7 +87,7 @@ class MavlinkVehicleOptions:
     """The seed of the losses."""
 
     speed: Annotated[float, Parameter(group=trials, validator=POSITIVE)] = 1.0
-    """How fast time goes, 1 as it does: below it, slow machines keep up."""
+    """The pace of time, 1 as in reality: below 1, slow machines keep up."""
 
     seconds: Annotated[float | None, Parameter(name="--for", group=trials, validator=POSITIVE)] = None
     """Seconds after which it ends. Default: when it is interrupted."""
@@ -101,7 +101,7 @@ class RosOptions:
     """The vehicle that is flown: a name that `aerobat vehicles` lists, or a TOML file."""
 
     planner: Annotated[str | None, Parameter(group=planning)] = None
-    """How to plan, with its own defaults; see `aerobat plan`. Default: what suits each problem."""
+    """The planner, with its own defaults; see `aerobat plan`. Default: what suits each problem."""
 
     reserve: Annotated[float, Parameter(group=planning, validator=FRACTION)] = 0.15
     """The fraction of thrusts that plans leave to the controller."""
@@ -162,7 +162,7 @@ class RosVehicleOptions:
     """States a second."""
 
     speed: Annotated[float | None, Parameter(group=trials, validator=POSITIVE)] = None
-    """How fast time goes at most, told to all on the topic /clock; it waits for goals that are late. Default:
+    """The highest pace of time, told to all on the topic /clock; time waits for goals that are late. Default:
     it is ROS time, and nothing is told."""
 
     seconds: Annotated[float | None, Parameter(name="--for", group=trials, validator=POSITIVE)] = None

@@ -22,7 +22,7 @@ serving = Group("Live", sort_key=4)
 
 @dataclass(frozen=True, kw_only=True)
 class ViewOptions:
-    """What a replay shows, and where it goes."""
+    """Options of a replay: what it shows, and where it goes."""
 
     html: Annotated[Path | None, Parameter(group=output)] = None
     """The file to write; an earlier replay is replaced. Default: replay.html in the folder of a run, or
@@ -33,7 +33,7 @@ class ViewOptions:
     Needs aerobat[viewer]."""
 
     speed: Annotated[float, Parameter(group=output, validator=POSITIVE)] = 0.5
-    """How fast time goes in the video, 1 as it was flown."""
+    """The pace of time in the video, 1 as it was flown."""
 
     vehicle: Annotated[str | None, Parameter(group=output)] = None
     """The vehicle: a name that `aerobat vehicles` lists, or a TOML file. Default: the plan's, else the preset
@@ -56,11 +56,11 @@ class LiveOptions:
     """Serve a page with sliders, at which the maneuver is planned and flown anew, until Ctrl-C."""
 
     planner: Annotated[str | None, Parameter(group=serving)] = None
-    """How to plan. Default: that of a plan, else miqp."""
+    """The planner. Default: that of a plan, else miqp."""
 
     conditions: Annotated[str | None, Parameter(group=serving)] = None
-    """What varies from flight to flight where the dispersion is 1: none, lab, field, or a TOML file. Default:
-    lab."""
+    """The variation from flight to flight where the dispersion is 1: none, lab, field, or a TOML file.
+    Default: lab."""
 
     port: Annotated[int | None, Parameter(group=serving, validator=validators.Number(gte=1, lte=65535))] = (
         None

@@ -37,7 +37,7 @@ def how_many(least: int, most: int) -> Parameter:
 
 @dataclass(frozen=True, kw_only=True)
 class OutputOptions:
-    """Where results go."""
+    """Options of the results: where they go."""
 
     out: Annotated[Path | None, Parameter(group=output)] = None
     """The folder to write to, replaced as a whole. Default: out/PROBLEM, with all that is not default in its
@@ -53,9 +53,9 @@ class ExplainingOptions:
 
     explain: Annotated[bool, Parameter(group=output, negative="", show_default=False)] = False
     """Report all facts, and those that take seconds to know: how many of a hundred flights succeed under the
-    given conditions or a lab's, the recoveries to a hover from all along the plan, another planner's second
-    opinion of a plan that takes suspiciously long, and where there is no plan the changes with which there is
-    one."""
+    given conditions or a lab's, and the recoveries to a hover from all along the plan. A plan that takes
+    suspiciously long gets another planner's second opinion. Where there is no plan, the changes with which
+    there is one are told."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -118,7 +118,7 @@ def _help(planner: str, option: PlannerOption) -> str:
 def _planners_help() -> str:
     summaries = ((name, getdoc(cls) or cls.__name__) for name, cls in registered_planners().items())
     first = (f"{name}, {doc.splitlines()[0].rstrip('.')}" for name, doc in summaries)
-    return "How to plan: " + "; ".join(first) + ". Default: miqp, of long courses time-optimal."
+    return "The planner: " + "; ".join(first) + ". Default: miqp, of long courses time-optimal."
 
 
 @_with_planner_options
@@ -142,7 +142,7 @@ class PlanningOptions(PlannerOptions):
     """The heading at the start of a CSV file's path in degrees. Default: that of its first attitude, or 0."""
 
     columns: Annotated[str, Parameter(group=output)] = ",".join(ALL)
-    """What plan.csv holds, with a header: any of time, position, velocity, acceleration, jerk, attitude,
+    """The columns of plan.csv, with a header: any of time, position, velocity, acceleration, jerk, attitude,
     rates, thrusts; or paper, the bare layout of the paper's reference code."""
 
     paper: Annotated[bool, Parameter(group=planning, negative="", show_default=False)] = False
@@ -163,8 +163,8 @@ class ConditionsOptions:
     gates as their spread asks for, and prove it on fresh flights."""
 
     conditions: Annotated[str | None, Parameter(group=flying)] = None
-    """What varies, disturbs and is measured how: none, lab, field, or a TOML file. Default: flown as planned,
-    from a state that is known."""
+    """The variation, the disturbances and the sensors: none, lab, field, or a TOML file. Default: flown as
+    planned, from a state that is known."""
 
     seed: Annotated[int, Parameter(group=flying, validator=validators.Number(gte=0))] = 0
     """The seed of the conditions: the same seed, the same flight."""

@@ -1,4 +1,4 @@
-"""What long work is at: on a terminal always, in a pipe a line on standard error every few seconds."""
+"""Progress of long work: on a terminal always, in a pipe a line on standard error every few seconds."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ VARIABLE = "AEROBAT_PROGRESS"
 
 
 class Progress:
-    """What long work has come to by now, as a line."""
+    """Progress of long work by now, as a line."""
 
     def __rich__(self) -> str:
         """The line, drawn anew whenever a terminal shows it, and none of its brackets taken for markup."""
@@ -36,7 +36,7 @@ P = TypeVar("P", bound=Progress)
 
 
 class PlanningProgress(Progress):
-    """What planning has come to by now.
+    """Progress of planning by now.
 
     Args:
         planner: The name of the planner that begins.
@@ -70,7 +70,7 @@ class PlanningProgress(Progress):
 
 
 class PassingProgress(PlanningProgress):
-    """What planning until flights pass has come to by now."""
+    """Progress of planning until flights pass, by now."""
 
     def begin(self, planner: str) -> None:
         """Another planner's turn, no round flown."""
@@ -90,7 +90,7 @@ class PassingProgress(PlanningProgress):
 
 
 class DrawingProgress(Progress):
-    """How many pictures of a video are drawn by now."""
+    """The number of pictures of a video that are drawn by now."""
 
     def __init__(self) -> None:
         self._drawn = self._all = 0
@@ -107,7 +107,7 @@ class DrawingProgress(Progress):
 
 
 class TuningProgress(Progress):
-    """What a search for gains has come to by now.
+    """Progress of a search for gains by now.
 
     Args:
         evaluations: How many sets of gains may be tried.
@@ -128,7 +128,7 @@ class TuningProgress(Progress):
 
 
 class SweepProgress(Progress):
-    """What a sweep has come to by now.
+    """Progress of a sweep by now.
 
     Args:
         runs: How many flights there shall be.
@@ -157,7 +157,7 @@ class SweepProgress(Progress):
 
 
 class MapProgress(Progress):
-    """What a map has come to by now.
+    """Progress of a map by now.
 
     Args:
         cells: How many there shall be.
@@ -220,7 +220,7 @@ class WhyProgress(Progress):
 
 
 class CausesProgress(Progress):
-    """Which trial is planned and flown.
+    """The trial that is planned and flown.
 
     Args:
         trials: How many there shall be.
@@ -240,7 +240,7 @@ class CausesProgress(Progress):
 
 
 class FiguresProgress(Progress):
-    """Which of the paper's figures is being made, and what is planned or flown for it.
+    """The figure of the paper that is being made, and what is planned or flown for it.
 
     Args:
         count: How many figures there shall be.

@@ -101,7 +101,7 @@ def planned(
 def flight_settings(
     options: ConditionsOptions, controller: str = "full", plant: str | None = None
 ) -> FlightSettings:
-    """How a plan is flown.
+    """Return the settings by which a plan is flown.
 
     Args:
         options: As they were given.

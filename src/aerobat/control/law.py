@@ -25,7 +25,7 @@ L = TypeVar("L", bound="ControlLaw")
 
 
 class Seen(NamedTuple):
-    """What a law knows at a tick."""
+    """State, rotor thrusts and reference that a law knows at a tick."""
 
     body: Body  # as the observer has it, when the commands take effect; world, rates in body axes
     thrusts: PerRotor  # [N] that the rotors give, by the nominal model

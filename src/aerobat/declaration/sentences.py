@@ -1,4 +1,4 @@
-"""What is wrong with a value, as one sentence about its field."""
+"""Complaints about a value, each as one sentence about its field."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
-"""Where a vehicle flies: gravity, wind and ground, owned by the problem and by nobody else.
+"""The surroundings of a vehicle: gravity, wind and ground, owned by the problem and by nobody else.
 
-And the conditions of a flight there: what varies, disturbs, and is measured how.
+The package also holds the conditions of a flight there: what varies, disturbs, and is measured how.
 
 The public names stand in `__init__.pyi`; each is imported when first used: calm air waits for no sensor.
 """

@@ -1,4 +1,4 @@
-"""What differs from flight to flight: the vehicle, its start, the air, its battery, what its sensors say."""
+"""Differences from flight to flight: the vehicle, its start, the air, its battery, what its sensors say."""
 
 from __future__ import annotations
 

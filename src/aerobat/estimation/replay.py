@@ -32,7 +32,7 @@ _DIAGONAL = [row * SIZE - row * (row - 1) // 2 for row in range(SIZE)]  # in the
 @by_value
 @dataclass(frozen=True, eq=False, repr=False)
 class Estimates:
-    """What the filter made of a log: the state at the end of each sample, and what became of each pose."""
+    """Estimates of a log's states: the state at the end of each sample, and what became of each pose."""
 
     times: Array  # [s], (T,), from the first sample that ends after the first pose
     position: Array  # [m] world, (T, 3)

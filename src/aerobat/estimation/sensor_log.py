@@ -1,4 +1,4 @@
-"""What an IMU and motion capture have recorded of one vehicle, checked once."""
+"""Records of an IMU and of motion capture of one vehicle, checked once."""
 
 from __future__ import annotations
 

@@ -58,8 +58,8 @@ def smallest_opening(
 
     Each flight needs some scale of the gate's opening: what its body swept over what the gate has; one that
     did not cross the plane as planned needs an infinite one. The r-th smallest of the scales of n flights
-    bounds from above what a fraction p of all flights needs, with the confidence P(B(n, p) < r), B binomial,
-    whatever their distribution (an order statistic as the bound of a quantile: David and Nagaraja, Order
+    bounds from above what a fraction p of all flights needs, whatever their distribution. The confidence of
+    that bound is P(B(n, p) < r), B binomial: an order statistic bounds a quantile (David and Nagaraja, Order
     Statistics, 2003, section 7.1). The least r that reaches the confidence is taken.
 
     Args:

@@ -117,7 +117,7 @@ def _between(path: SampledPath, values: Array, time: float) -> Array:
 
 
 def criterion(problem: Problem) -> str:
-    """What a flight keeps to that went well, in words."""
+    """Return what a flight that went well keeps to, in words."""
     stages = problem.stages(1.0).stages
     tolerance = problem.tolerance
     passed = [

@@ -3,8 +3,9 @@
 Between samples the specific thrust f is the quintic through its values and two derivatives at both ends
 (exact for trajectories of degree 7 or less), kept as Bézier control points: they bound the curve, so that
 halving intervals until each stays inside a cone is a proof, not a guess. On such a piece the frame turns
-by the smallest rotation from one thrust direction to the next, then about the direction by the area
-between the curve and that great arc (Hanson and Ma, "Parallel transport approach to curve framing", 1995).
+first by the smallest rotation from one thrust direction to the next. The frame then turns about the direction
+by the area between the curve and that great arc (Hanson and Ma, "Parallel transport approach to curve
+framing", 1995).
 """
 
 from __future__ import annotations

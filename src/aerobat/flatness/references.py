@@ -68,8 +68,9 @@ def reference(
     """Derive from `trajectory` what `vehicle` must do, at `times`, or at `rate` and the very end.
 
     The attitude starts, at the trajectory's start, as the smallest rotation from upright to the thrust,
-    turned about it by the trajectory's heading, and is carried along without spin, so that it does not depend
-    on the times. Raises SpecError unless one of times and rate is given, rising and in the trajectory.
+    turned about the thrust by the trajectory's heading. From there the attitude is carried along without
+    spin, so that it does not depend on the times. Raises SpecError unless one of times and rate is given,
+    rising and in the trajectory.
 
     Args:
         trajectory: The path and its heading, or a plan.
@@ -199,7 +200,7 @@ def has_unequal_drag(vehicle: Vehicle) -> bool:
 
 
 def force_balance(environment: Environment, vehicle: Vehicle | None = None) -> ForceBalance:
-    """What thrust works against in an environment; without a vehicle there is no drag."""
+    """Return the forces that thrust works against in an environment; without a vehicle there is no drag."""
     drag = 0.0 if vehicle is None else lateral_drag(vehicle)
     return ForceBalance(environment.gravity, drag, environment.wind)
 

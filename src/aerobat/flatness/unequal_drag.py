@@ -58,7 +58,7 @@ class UnequalDrag:
         return float(self.coefficients[0] - self.coefficients[1]) / 2
 
     def part(self, thrust: Array, airspeed: Array) -> Array:
-        """What the difference in drag may add to mean-drag thrusts (..., 3), as a fraction of them, (...)."""
+        """Return what unequal drag may add to mean-drag thrusts (..., 3), as a fraction of them, (...)."""
         size = np.maximum(np.linalg.norm(thrust, axis=-1), np.finfo(float).tiny)
         return np.asarray(abs(self.difference) * np.linalg.norm(airspeed, axis=-1) / size)
 

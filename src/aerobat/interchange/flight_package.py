@@ -31,7 +31,7 @@ UNDETERMINED = 1e-3  # of gravity: less thrust has no direction, and the attitud
 
 @dataclass(frozen=True, eq=False)
 class Setpoints:
-    """What a vehicle is to do at instants."""
+    """Motion, attitude and thrust that a vehicle is to have at instants."""
 
     times: Array  # [s], (T,)
     position: Array  # [m] world, (T, 3)
@@ -78,7 +78,7 @@ class FlightPackage:
         return np.asarray(value / self.durations[segment, None] ** derivative)
 
     def setpoints(self, times: ArrayLike) -> Setpoints:
-        """What the vehicle is to do at times [s] (T,). Raises ValueError for a plan without a vehicle."""
+        """Return the set-points at times [s] (T,). Raises ValueError for a plan without a vehicle."""
         t = np.atleast_1d(np.asarray(times, dtype=float))
         vehicle = self.document["vehicle"]
         if vehicle is None:

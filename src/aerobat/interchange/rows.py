@@ -59,9 +59,9 @@ class PathRows:
 
     @property
     def fit_error(self) -> float | None:
-        """How far [m] the path through every second row passes by the others; None of fewer than five rows.
+        """The largest distance [m] of the path through every second row from the rest; None below five rows.
 
-        Twice as far from row to row, it errs by more than the path through all rows does between them.
+        Twice as far from row to row, that path errs by more than the path through all rows does between them.
         """
         rows = len(self.knots) - (len(self.knots) + 1) % 2
         if rows < FEWEST:

@@ -1,1 +1,1 @@
-"""What runs at every tick, written once in scalar components, whatever the numbers are."""
+"""Computations of every tick, written once in scalar components, whatever the numbers are."""

@@ -149,7 +149,7 @@ class Commanding(Protocol):
 
     @property
     def thrusts(self) -> PerRotor:
-        """That the rotors give [N], by the nominal model."""
+        """The thrusts that the rotors give [N], by the nominal model."""
 
     @property
     def commands(self) -> Commands:

@@ -117,8 +117,8 @@ def thrust_demand(
 ) -> ThrustDemand:
     """The reference's specific thrust, the drag that is expected along the trajectory made up for.
 
-    With u = Rᵀ (v − w) and C = D/m it is a + g e₃ + R C u, whose rate is j + R (C u' + ω × C u), where
-    u' = Rᵀ a − ω × u.
+    With u = Rᵀ (v − w) and C = D/m, the demand is a + g e₃ + R C u. The rate of the demand is
+    j + R (C u' + ω × C u), where u' = Rᵀ a − ω × u.
     """
     body_axes = axes(reference.q_world_body)
     x, y, z = reference.specific_thrust

@@ -1,10 +1,11 @@
 """Differential flatness in scalar components: from a specific thrust to body rates, moment and thrust.
 
-With the velocity v relative to the air, f = a + g e3 + (d/m) v and its derivatives, n = |f| and b3 = f/n,
+Let v be the velocity relative to the air, f = a + g e3 + (d/m) v with its derivatives, n = |f| and b3 = f/n.
+Then
 
-    ω = b3 × f'/n,   ω' = b3 × f''/n − 2 (b3·f'/n) ω     no spin about b3, in whichever axes f is
-    M = J ω' + ω × J ω                                   body axes
-    T = m (n + (d_z − d)/m b3·v)
+    ω = b3 × f'/n,   ω' = b3 × f''/n − 2 (b3·f'/n) ω     no spin about b3, in whichever axes f is;
+    M = J ω' + ω × J ω                                   body axes;
+    T = m (n + (d_z − d)/m b3·v).
 
 ω' is b3 × b3'': what b3'' has along b3 drops out, and n'' with it. No step divides by 1 + b3_z, save the way
 into axes that are given relative to the upright ones.

@@ -1,7 +1,8 @@
-"""What limits are linear in at one instant of a motion, in scalar components: wrench, its rate, magnitudes.
+"""Measures at one instant of a motion, in which limits are linear: wrench, its rate and magnitudes.
 
-A motion is given in axes that the body's are near to. They are carried to the body's by the smallest
-rotation, which is exact where they are the body's own, and exact to first order beside.
+All is written in scalar components. A motion is given in axes that the body's are near to. The given axes
+are carried to the body's by the smallest rotation, which is exact where they are the body's own, and exact to
+first order beside.
 """
 
 from __future__ import annotations
@@ -17,7 +18,7 @@ STILL = 1e-12  # [rad²/s²] beside the square of a rate, which a body at rest h
 
 
 class Airframe(NamedTuple):
-    """What of a vehicle counts here."""
+    """Mass, inertia and drag of a vehicle."""
 
     mass: Scalar  # [kg]
     inertia: Matrix  # [kg·m²]

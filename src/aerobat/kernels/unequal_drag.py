@@ -1,10 +1,11 @@
 """Flatness of a body whose drag along its x differs from that along its y, in scalar components.
 
-With the airspeed v, the drag per mass c in body axes and h = a + g e3, thrust is along b3 alone where
+Let v be the airspeed, c the drag per mass in body axes and h = a + g e3. Thrust is along b3 alone where
 
     b1·α = 0,   b2·β = 0,     α = h + c_x v,   β = h + c_y v.
 
-Both leave one angle open. The body never spins about b3: b1' = −ω_y b3, b2' = ω_x b3, and in body axes
+Both equations leave one angle open. The body never spins about b3: b1' = −ω_y b3, b2' = ω_x b3, and in body
+axes
 
     ω_x = −β'_y/β_z,   ω_y = α'_x/α_z,   ω_z = 0,   T = m γ_z,     γ = h + c_z v.
 
@@ -103,7 +104,7 @@ def frame_spin(thrust: tuple[Scalar, Vector], alpha: tuple[Vector, Vector], body
 
 
 class DraggedBody(NamedTuple):
-    """What of a vehicle counts here."""
+    """Mass, drag and inertia of a vehicle."""
 
     mass: Scalar  # [kg]
     drag: Vector  # [1/s] over the mass, along body x, y and z
@@ -122,7 +123,7 @@ class BodyMotion(NamedTuple):
 
 
 class Demand(NamedTuple):
-    """What a motion asks of a vehicle."""
+    """Demand of a motion on a vehicle."""
 
     wrench: tuple[Scalar, Scalar, Scalar, Scalar]  # collective thrust [N] and moment [N·m], body axes
     rate: tuple[Scalar, Scalar, Scalar, Scalar]  # their derivatives

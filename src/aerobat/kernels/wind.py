@@ -1,9 +1,9 @@
 """Wind: a mean, and Dryden turbulence swept past the vehicle (MIL-F-8785C, 3.7.1.2).
 
-With T = L/V, σ² the variance of a component, and white noise as input, the forming filters are
+Let T = L/V, and σ² be the variance of a component. With white noise as input, the forming filters are
 
-    along the mean wind     σ √(2T) / (1 + T s)
-    across it, vertical     σ √T (1 + √3 T s) / (1 + T s)² = σ √T (√3/(1 + T s) + (1 − √3)/(1 + T s)²)
+    along the mean wind     σ √(2T) / (1 + T s);
+    across it, vertical     σ √T (1 + √3 T s) / (1 + T s)² = σ √T (√3/(1 + T s) + (1 − √3)/(1 + T s)²).
 
 The second is a sum of two first-order filters in a row, so that both are solved exactly from tick to tick.
 """
@@ -20,7 +20,7 @@ _SECOND = 1.0 - _FIRST  # of the second one
 
 
 class GustState(NamedTuple):
-    """What the forming filters hold, in units of the intensity."""
+    """State of the forming filters, in units of the intensity."""
 
     along: Scalar
     across: tuple[Scalar, Scalar]  # of the first filter and the second

@@ -1,15 +1,17 @@
 """The body's room in a gate: clear of the frame from before the plane until it is behind it.
 
 A stage asks where the centre of mass is at one instant. The body is about the plane for a while, and passes
-the opening if it flies on much as it flies there. With v_n along the normal and v_a outward across a
-side of the opening, d its reach and more before and behind the plane, s what it reaches outward as it is
-turned, and r the room that is left to that side from where it crosses, |path − straight line| ≤ ½ a (d/v_n)²:
+the opening if it flies on much as it flies there. Let v_n be the velocity along the normal, and v_a that
+outward across a side of the opening. The length d is the body's reach and more before and behind the plane,
+and s what the body reaches outward as it is turned. The room r is left to that side from where the body
+crosses. With an acceleration of at most a off a straight line, |path − straight line| ≤ ½ a (d/v_n)². The
+body is clear where
 
-    (r − s) v_n ± d v_a ≥ ½ a d²/v_n    on all sides    and    v_n ≥ √(2 a d),
+    (r − s) v_n ± d v_a ≥ ½ a d²/v_n    on all sides    and    v_n ≥ √(2 a d).
 
-so that it does not turn back. The body is an ellipsoid with its semi-axes on the diagonal of D and the
-attitude R, so that s = |D Rᵀ e| along e. Where only the thrust axis is known, the ellipsoid of revolution
-about that axis is taken, which encloses the body however it is turned.
+The latter keeps the body from turning back. The body is an ellipsoid with its semi-axes on the diagonal of D
+and the attitude R, so that s = |D Rᵀ e| along e. Where only the thrust axis is known, the ellipsoid of
+revolution about that axis is taken, which encloses the body however it is turned.
 
 The values are written in components once, for whoever evaluates them: floats, complex steps, CasADi's
 symbols.
@@ -103,7 +105,7 @@ class BodyInGate:
 
     @property
     def opening(self) -> OpeningAhead:
-        """Its opening in numbers."""
+        """The gate's opening in numbers."""
         return OpeningAhead.of_parameters(self.parameters.tolist())
 
 

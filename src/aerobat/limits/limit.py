@@ -45,12 +45,12 @@ class Limit:
 
     @cached_property
     def linear(self) -> tuple[Limit, ...]:
-        """What it is to programs that are linear in a path's derivatives."""
+        """The limits that stand for this one in programs that are linear in a path's derivatives."""
         return (self,) if self.quantity.is_of_path else self.search
 
     @property
     def ends(self) -> tuple[float, float]:
-        """Its ends less the quantity's constant, as fractions of its size."""
+        """The limit's ends less the quantity's constant, as fractions of the limit's size."""
         return (self.lower - self.quantity.constant) / self.size, (
             self.upper - self.quantity.constant
         ) / self.size

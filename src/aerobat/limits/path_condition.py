@@ -1,4 +1,4 @@
-"""What a maneuver asks throughout: position, velocity, acceleration or specific thrust along a direction.
+"""Conditions of a maneuver throughout: position, velocity, acceleration or specific thrust along a direction.
 
 Drag that differs along body x and y makes the specific thrust nonlinear in the path, and programs hold that
 of the mean drag. Thrust that never points down is held as it is beside that, as a bound on the tilt.

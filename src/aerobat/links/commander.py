@@ -38,7 +38,7 @@ _LONG = 1.0  # [s] without news, after which nothing can be told it any more
 
 
 class Doing(StrEnum):
-    """What a vehicle is at."""
+    """Activity of a vehicle."""
 
     NOTHING = "left to itself"
     CLIMBING = "climbing"
@@ -124,7 +124,7 @@ class Commander:
         self._go(Doing.LANDING, now, down, yaw)
 
     def require_hover(self, now: float) -> Observed:
-        """What is seen of a vehicle that hovers, ours or left to itself. Raises SpecError for another."""
+        """Return the state of a vehicle that hovers, ours or left to itself. Raises SpecError for another."""
         seen = self._recent(now)
         speed, height = hypot(*seen.body.velocity), seen.body.position[2] - self.ground
         if self.doing is Doing.HOVERING and speed <= _STILL:

@@ -1,4 +1,4 @@
-"""What a link and a vehicle tell each other: goals, modes, and how the vehicle is seen; ENU and FLU."""
+"""Goals, modes and seen states that a link and a vehicle tell each other; ENU and FLU."""
 
 from __future__ import annotations
 

@@ -162,7 +162,7 @@ class Mission(Generic[GoalT_co]):
         return goal_on(self._after, self._after.duration, self._final_yaw)
 
     def error(self, seen: Observed) -> float:
-        """How far the vehicle is off the plan at the time that it was seen [m]."""
+        """Return the distance of the vehicle from the plan at the time that it was seen [m]."""
         expected = self.stream.flat(seen.time - self.maneuver_began).position
         return float(np.linalg.norm(np.array(seen.body.position) - expected))
 

@@ -1,4 +1,4 @@
-"""What a live flight came to, by the telemetry that was heard of it."""
+"""Report of what a live flight came to, by the telemetry that was heard of it."""
 
 from __future__ import annotations
 

@@ -3,7 +3,7 @@
     minimize    ½ xᵀ H x + fᵀ x + c
     subject to  E x = target                   (equality rows)
                 lower <= A x <= upper          (range rows; infinite bounds never bind)
-                every stage sits in one of its slots, no two in the same slot, some in order
+                every stage sits in one of its slots, no two in the same slot, some in order.
 
 A stage that sits in a slot tightens the bounds of a few range rows. Nothing here knows robots or solvers.
 """

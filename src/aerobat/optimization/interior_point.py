@@ -4,15 +4,15 @@
 
 Slacks s = −c(x) > 0 and multipliers z satisfy s z = μ, and μ falls towards zero. Each step solves
 
-    (H + Cᵀ Σ C + B + δ I) dx + Eᵀ dy = −r,     E dx = −e,     Σ = z/s,
+    (H + Cᵀ Σ C + B + δ I) dx + Eᵀ dy = −r,     E dx = −e,     Σ = z/s.
 
-with the second derivatives H of the Lagrangian and what the box adds on the diagonal, B; δ is as large as
-makes the matrix positive definite, and never zero, so that directions in which nothing changes are not run
-along. A filter accepts steps that lower the violation or the barrier function (Wächter and Biegler, "On the
-implementation of an interior-point filter line-search algorithm for large-scale nonlinear programming",
-2006), with a second-order correction where the constraints' curvature rejects them. The matrix of some
-hundred to a thousand unknowns is factorized as a dense one, in a millisecond or two: what a step costs is
-second derivatives.
+H holds the second derivatives of the Lagrangian, and B is what the box adds on the diagonal. The damping δ is
+as large as makes the matrix positive definite, and never zero, so that directions in which nothing changes
+are not run along. A filter accepts steps that lower the violation or the barrier function, with a
+second-order correction where the constraints' curvature rejects them. The filter is that of Wächter and
+Biegler, "On the implementation of an interior-point filter line-search algorithm for large-scale nonlinear
+programming", 2006. The matrix of some hundred to a thousand unknowns is factorized as a dense one, in a
+millisecond or two: what a step costs is second derivatives.
 """
 
 from __future__ import annotations
@@ -88,7 +88,7 @@ class ConstrainedPoint(Protocol):
 
 
 class ConstrainedProgram(Protocol):
-    """What is minimized, and under which constraints; variables are scaled to a size of about one."""
+    """A linear cost to be minimized under constraints; variables are scaled to a size of about one."""
 
     @property
     def cost(self) -> Array:
@@ -104,7 +104,7 @@ class ConstrainedProgram(Protocol):
 
 @dataclass(frozen=True)
 class Settings:
-    """How accurately, how long and from which barrier parameter on."""
+    """Settings of the method: accuracy, number of iterations and barrier parameters."""
 
     barrier: float = 1e-5  # μ at first: a thousand limits times it are little beside a cost of one
     least_barrier: float = 1e-6  # μ in the end
@@ -118,7 +118,7 @@ class Settings:
 
 @dataclass(frozen=True, eq=False)
 class InteriorPointResult:
-    """Where the method ended."""
+    """The point at which the method ended, with its multipliers."""
 
     x: Array
     converged: bool  # all conditions hold, or the cost stands still at a small violation

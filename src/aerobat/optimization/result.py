@@ -1,4 +1,4 @@
-"""What solvers answer, and its verification against the program."""
+"""Answers of solvers, and their verification against the program."""
 
 from __future__ import annotations
 

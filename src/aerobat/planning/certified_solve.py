@@ -48,7 +48,7 @@ class Program(Protocol[Detail]):
     """A planner's program with bounds that can be tightened."""
 
     def solve(self) -> Solution[Detail]:
-        """Its solution with the bounds as they are."""
+        """Return the program's solution with the bounds as they are."""
         ...
 
     def tighten(self, solution: Solution[Detail], certificate: Certificate | None) -> bool:

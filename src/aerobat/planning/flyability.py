@@ -94,7 +94,7 @@ class Flyability(OwnFlight):
 
     @property
     def remedy(self) -> str:
-        """What may mend its defects, in words; empty where there are none."""
+        """The remedies that may mend the plan's defects, in words; empty where there are none."""
         found = []
         if self.lingers:
             found.append("ask more speed of the passage or widen the opening")

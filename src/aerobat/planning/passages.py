@@ -22,7 +22,7 @@ from aerobat.vehicle import Vehicle
 
 @dataclass(frozen=True)
 class PlacedStage:
-    """Where a stage ended up."""
+    """A stage with the interval and the time at which a plan places it."""
 
     name: str
     interval: int  # counted from 0; the stage holds at its end

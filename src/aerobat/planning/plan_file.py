@@ -1,10 +1,10 @@
 """Plans as files: everything that a plan is, in one file that whatever follows can read.
 
 A .plan file is a NumPy .npz archive without pickles. Its arrays `durations` (S,), `coefficients`
-(S, degree + 1, 3) and `heading` are the trajectory's, bit for bit; `document` holds, as UTF-8 JSON, the rest:
-the problem and the vehicle as the tables of their files, the environment in full, how the plan was made, its
-stages, attempts, certificate, flyability, recoveries, assessment and tube, frames, and which version of
-Aerobat wrote it. `digest` is the SHA-256 of all of that.
+(S, degree + 1, 3) and `heading` are the trajectory's, bit for bit. The rest is in `document`, as UTF-8 JSON:
+the problem and the vehicle as the tables of their files, the environment in full, and how the plan was made;
+its stages, attempts, certificate, flyability, recoveries, assessment and tube; frames, and the version of
+Aerobat that wrote the file. `digest` is the SHA-256 of all of that.
 
 A file proves nothing: a plan that is read has its certificate, flyability and assessment worked out anew.
 Results that take seconds are taken from the file only where the digest says that nothing was changed.

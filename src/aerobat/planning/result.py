@@ -1,4 +1,4 @@
-"""What planning returns: a trajectory that solves a problem, and the evidence for it."""
+"""The result of planning: a trajectory that solves a problem, and the evidence for it."""
 
 from __future__ import annotations
 

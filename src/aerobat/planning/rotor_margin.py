@@ -109,7 +109,7 @@ class ReserveShortfall:
 
     @property
     def size(self) -> float:
-        """What is missing, of the rotor's range."""
+        """The reserve that is missing, as a fraction of the rotor's range."""
         return self.reserve - self.kept
 
     def __str__(self) -> str:
@@ -126,9 +126,10 @@ class ReserveShortfall:
 
 
 def reserve_shortfalls(certificate: Certificate, reserve: float) -> list[ReserveShortfall]:
-    """Where rotors are not proven to keep a reserve, a fraction of their range, the worst first.
+    """Return the findings where rotors are not proven to keep a reserve, the worst first.
 
-    Empty without a reserve: then their limits are all that counts.
+    The reserve is a fraction of a rotor's range. The list is empty without a reserve: then the rotors' limits
+    are all that counts.
     """
     if reserve <= 0.0:
         return []

@@ -1,4 +1,4 @@
-"""What takes seconds to know of a plan, asked for: what another planner makes of it, and its recoveries."""
+"""Evidence on a plan that takes seconds, on request: another planner's answer, and the plan's recoveries."""
 
 from __future__ import annotations
 

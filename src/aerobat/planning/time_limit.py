@@ -21,7 +21,7 @@ def stopped(plan: Plan) -> Plan:
 
 
 def best_by_limit(plan: Plan) -> str:
-    """What is to be said of a plan that a limit ended, with its gap where one is known; else nothing."""
+    """Return words on a plan that a limit ended, with its gap where that is known; empty for other plans."""
     if plan.status != "time_limit":
         return ""
     if plan.assessment is None or plan.assessment.ratio == inf:

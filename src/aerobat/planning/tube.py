@@ -51,7 +51,7 @@ class Tube:
 
     @property
     def min_rotor_margin(self) -> float:
-        """What the tube leaves of a rotor's range where it leaves least [-]."""
+        """The least margin that the tube leaves, as a fraction of a rotor's range [-]."""
         return min(self.rotor_margin)
 
     def price(self, duration: float) -> float:

@@ -1,4 +1,4 @@
-"""Where nonlinear programs begin: at a plan of another planner, with its phases, its path and its plane."""
+"""Warm starts of nonlinear programs: a plan of another planner, with its phases, its path and its plane."""
 
 from __future__ import annotations
 

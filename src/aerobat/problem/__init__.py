@@ -1,4 +1,4 @@
-"""What is wanted: gates, maneuvers as lists of stages, problems. No optimization happens here.
+"""The input of planning: gates, maneuvers as lists of stages, problems. No optimization happens here.
 
 The public names stand in `__init__.pyi`; each is imported when first used: no maneuver waits
 for others.

@@ -47,7 +47,7 @@ class Quantity(StrEnum):
 
 @dataclass(frozen=True, eq=False)
 class ForceBalance:
-    """What the thrust works against, per mass: f = a + g e₃ + d (v − wind), with the drag d across it."""
+    """The force balance of the thrust, per mass: f = a + g e₃ + d (v − wind), with the drag d across it."""
 
     gravity: float = STANDARD_GRAVITY  # [m/s²]
     drag: float = 0.0  # [1/s] across the thrust axis, over the mass

@@ -1,4 +1,4 @@
-"""Where a motion begins and where it ends."""
+"""States in which a motion begins and ends."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ VELOCITY = 1  # the derivative of position
 
 @declared
 class EndState:
-    """Where a trajectory begins or ends; derivatives above acceleration are zero there. World frame.
+    """The world-frame state in which a trajectory begins or ends; derivatives above acceleration are zero.
 
     A goal of `free_attitude` may be reached in any attitude, at whatever body rate and thrust, as races end;
     planners that cannot leave it free take the acceleration. One of `free_velocity` is passed however fast,

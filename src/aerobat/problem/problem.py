@@ -1,4 +1,4 @@
-"""What is wanted: from where to where, through which gate, doing what, within which limits."""
+"""Problems of planning: a start and a goal, gates, a maneuver, and limits."""
 
 from __future__ import annotations
 
@@ -277,7 +277,7 @@ class Problem:
 
     @property
     def ends(self) -> Mapping[str, EndState]:
-        """Its start and its goal, by these names; none of a closed course, which ends as it begins."""
+        """The start and the goal by these names; empty for a closed course, which ends as it begins."""
         return {} if self.start.is_left_out else {"start": self.start, "goal": self.goal}
 
     @property

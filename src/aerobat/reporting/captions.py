@@ -14,7 +14,7 @@ def plan_caption(plan: Plan) -> str:
     """Origin of a plan in a few words."""
     dt = "" if plan.dt is None else f" of {plan.dt:.4f} s"
     order = "" if plan.order is None else f", order {plan.order}"
-    cost = "" if plan.cost is None else f", cost {plan.cost:.6g}"
+    cost = "" if plan.cost in (None, plan.duration) else f", cost {plan.cost:.6g}"
     solver = f"{plan.backend}, {plan.nodes} nodes, {1000 * plan.solve_time:.0f} ms".removeprefix(", ")
     return f"{plan.planner}: {plan.duration:.3f} s in {plan.intervals} intervals{dt}{order}{cost} ({solver})"
 

@@ -1,4 +1,4 @@
-"""What causes of error cost, for people, as a table, and for machines, as plain data."""
+"""The costs of causes of error, as a table for people and as plain data for machines."""
 
 from __future__ import annotations
 

@@ -29,7 +29,7 @@ PITCH = 1.72  # [in] from one row to the next
 
 @dataclass(frozen=True)
 class PictureLayout:
-    """Where a report's two pictures go, above the timelines."""
+    """The places of a report's two pictures, above the timelines."""
 
     path: Place
     stages: Place
@@ -42,7 +42,7 @@ PICTURES_STACKED = PictureLayout((0.3, 3.3, 11.0, 3.1), (0.74, 0.5, 10.53, 2.0),
 
 @dataclass(frozen=True)
 class FlightLayout:
-    """Where a flight's picture and its three timelines go on a page of its own."""
+    """The places of a flight's picture and its three timelines on a page of their own."""
 
     path: Place
     position: Place

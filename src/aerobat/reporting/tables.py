@@ -255,7 +255,7 @@ def flight_facts(score: Score, controller: str | None = None, plant: str | None 
 
 
 def lap_facts(score: Score) -> Iterable[Fact]:
-    """How long each lap took."""
+    """Yield the duration and the end of each lap."""
     for lap in score.laps:
         split = "not flown" if isnan(lap.duration) else f"{lap.duration:.3f} s, until {lap.end:.3f} s"
         yield f"lap {lap.lap}", split

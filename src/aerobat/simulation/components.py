@@ -23,7 +23,7 @@ MAX_STEP = 0.002  # [s] of RK4: enough for 1e-6 m in the fastest flips
 
 
 class Estimate(NamedTuple):
-    """What an observer knows, of which the controller takes the body."""
+    """The estimate of an observer, of which the controller takes the body."""
 
     body: Body
 
@@ -250,7 +250,7 @@ def with_ceiling(ops: Ops, airframe: Airframe, signals: Signals) -> Airframe:
 
 
 class Observed(NamedTuple):
-    """What a filter made of its sensors."""
+    """The estimate that a filter made from its sensors."""
 
     body: Body
     since_pose: Scalar  # [s] since the exposure of the last pose that it took

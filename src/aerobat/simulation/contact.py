@@ -1,4 +1,4 @@
-"""What a vehicle touches, where its plant feels that."""
+"""The contact of a vehicle, where its plant feels one."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from enum import IntEnum
 
 
 class Contact(IntEnum):
-    """What a vehicle touches; where it is both, the gate."""
+    """The object that a vehicle touches; the gate where the vehicle touches both gate and ground."""
 
     NOTHING = 0
     GROUND = 1

@@ -120,7 +120,7 @@ class Flight:
 
     @property
     def kinds(self) -> tuple[Series, ...]:
-        """Those of SERIES that there are."""
+        """The entries of SERIES that the flight has."""
         return tuple(one for one in SERIES if one.name in self.series)
 
     @property
@@ -130,9 +130,9 @@ class Flight:
 
     @property
     def first_contact(self) -> tuple[Contact, float]:
-        """What one vehicle first came to touch, and when [s]; NaN where nothing, or where nobody felt it.
+        """The first contact of one vehicle and its time [s]; NOTHING and NaN where none was felt.
 
-        One that stands on the ground at first comes to it only if it leaves it.
+        A vehicle that stands on the ground at first comes into contact only after it has left the ground.
         """
         contact = self.series.get("contact", np.zeros(1))
         came = (contact > 0) & ~np.logical_and.accumulate(contact > 0)

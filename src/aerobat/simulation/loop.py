@@ -62,7 +62,7 @@ class Component(Protocol):
 
     @property
     def name(self) -> str:
-        """Its key among the signals."""
+        """The component's key among the signals."""
 
     @property
     def period(self) -> int:

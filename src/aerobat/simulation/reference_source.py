@@ -1,4 +1,4 @@
-"""What the controller tracks, made in blocks of ticks as they are asked for."""
+"""The reference that the controller tracks, made in blocks of ticks as they are asked for."""
 
 from __future__ import annotations
 

@@ -26,7 +26,7 @@ _MIN_CHUNK = 16  # ticks
 
 
 class Source(Protocol):
-    """Where the inputs of one component come from."""
+    """The source of one component's inputs."""
 
     @property
     def per_vehicle(self) -> bool:

@@ -1,13 +1,13 @@
 """Conditions on polynomial segments at their knots, as one banded linear system: linear in the segments.
 
 A component of n segments of degree 2s - 1 has 2s·n coefficients, of the powers of normalised segment time,
-and as many conditions: s at each end of the course, 2s at each inner knot. The condition on derivative d
-reads, on the side of a segment that lasts T,
+and as many conditions: s at each end of the course, 2s at each inner knot. On the side of a segment that
+lasts T, the condition on derivative d reads
 
-    (u/T)^d Σ_j C(j, d) c_j   where it ends,      (u/T)^d c_d   where it begins,
+    (u/T)^d Σ_j C(j, d) c_j   where it ends,      (u/T)^d c_d   where it begins.
 
-the d-th derivative over d!, in units u of time: the geometric mean of all durations. So scaled, rows keep
-more digits than equilibrated ones when durations differ by orders of magnitude, and residuals in extended
+Both are the d-th derivative over d!, in units u of time: the geometric mean of all durations. So scaled, rows
+keep more digits than equilibrated ones when durations differ by orders of magnitude. Residuals in extended
 precision win back what the factorization in float64 loses (Higham, "Accuracy and Stability of Numerical
 Algorithms", chapter 12).
 """

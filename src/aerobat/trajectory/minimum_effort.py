@@ -1,8 +1,9 @@
 """Closed-form minimum-effort polynomials through waypoints (paper, Section V-B; Cutler and How, 2012).
 
-Of all curves that take the fixed derivatives at the knots, the one with the smallest ∫ |d^s p/dt^s|² dt: jerk
-for s = 3, snap for 4, crackle for 5. It consists of polynomials of degree 2s - 1, and where derivative
-d < s is free at a knot its derivative 2s - 1 - d is continuous there (at an end of the course: zero).
+Of all curves that take the fixed derivatives at the knots, the curve here has the smallest
+∫ |d^s p/dt^s|² dt: jerk for s = 3, snap for 4, crackle for 5. The curve consists of polynomials of degree
+2s - 1. Where derivative d < s is free at a knot, derivative 2s - 1 - d is continuous there (at an end of the
+course: zero).
 """
 
 from __future__ import annotations
@@ -38,13 +39,13 @@ def minimum_effort(
     rule: ContinuityRule | str = ContinuityRule.VARIATIONAL,
     heading: Angle = 0.0,
 ) -> Trajectory:
-    """Polynomials of degree 2s - 1 on n segments, through what is fixed at their n + 1 knots.
+    """Return polynomials of degree 2s - 1 on n segments, through what is fixed at their n + 1 knots.
 
-    By the variational rule the result is the minimizer of ∫ |d^s p/dt^s|² dt, `Trajectory.effort(s)`; the
-    axes do not know each other. Time and memory grow linearly with n. The paper's curves, of degree 9, have
-    s = 5. Raises SpecError for other shapes, durations that are not positive, infinities, an end without a
-    position, too little fixed to determine the curve, and durations that differ by more orders of magnitude
-    than float64 can resolve.
+    By the variational rule the result is the minimizer of ∫ |d^s p/dt^s|² dt, `Trajectory.effort(s)`; each
+    axis is independent of the others. Time and memory grow linearly with n. The paper's curves, of degree 9,
+    have s = 5. Raises SpecError for other shapes, durations that are not positive, infinities, and an end
+    without a position. Raises SpecError too where too little is fixed to determine the curve, and where
+    durations differ by more orders of magnitude than float64 can resolve.
 
     Args:
         fixed: Derivatives 0 to s - 1 of position [m/s^d], world, (n + 1, s, 3), NaN where one is free.

@@ -69,7 +69,7 @@ def squared_norm(coefficients: Array) -> Array:
 
 
 def stationary_points(coefficients: Array) -> Array:
-    """Where |p(s)|² may be extreme on [0, 1]: both ends and every interior root of its derivative.
+    """Return points of [0, 1] where |p(s)|² may be extreme: both ends and its derivative's interior roots.
 
     (S, K, D) -> (S, n), a fixed number per polynomial: complex roots give their real part and roots
     outside are moved to the nearer end, which adds harmless candidates and needs no tolerance. Each

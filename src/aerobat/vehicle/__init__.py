@@ -1,4 +1,4 @@
-"""What flies: vehicles, their rotors, and what the rotors do to the body."""
+"""Vehicles, their rotors, and the effect of the rotors on the body."""
 
 from aerobat.vehicle.allocation import (
     collective_range,

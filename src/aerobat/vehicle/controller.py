@@ -25,10 +25,11 @@ class Controller:
     weak for the attitude loop gets both loops slowed down alike (`gains`). The three switches add to the
     paper's law what its tracking error depends on; with all off it is the paper's law (`paper`).
 
-    The disturbance observer answers forces and moments that the model does not know (drag, gusts, rotors that
-    give more or less than they should) as fast as its filter, and the rotors' lag, let them be seen, where
-    the conditions of a flight have an IMU that feels them; without one, or with rotors that lag by more than
-    50 ms, the integrals of the errors alone do. Moments are answered with `moment_feedforward`.
+    The disturbance observer answers forces and moments that the model does not know: drag, gusts, rotors that
+    give more or less than they should. The observer answers as fast as its filter and the rotors' lag let
+    these be seen, where the conditions of a flight have an IMU that feels them. Without an IMU, or with
+    rotors that lag by more than 50 ms, only the integrals of the errors answer. Moments are answered with
+    `moment_feedforward`.
     """
 
     position_gain: NonNegative = 25.0  # [1/s²]

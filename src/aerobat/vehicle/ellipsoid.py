@@ -1,8 +1,9 @@
-"""What encloses a vehicle, its propellers included: the body that passes through a gate.
+"""The ellipsoid that encloses a vehicle, its propellers included: the body that passes through a gate.
 
-An ellipsoid, not a box: its section by a plane, and how far that reaches, are known in closed form, it has no
-corners where nothing is (a flip turns the body about its thrust axis by as much as its path asks, and a box
-drawn about round frames would touch with its corners), and it costs a flight little at every tick.
+The body is an ellipsoid and not a box for three reasons. The section of an ellipsoid by a plane, and the
+reach of that section, are known in closed form. An ellipsoid has no corners where nothing is: a flip turns
+the body about its thrust axis by as much as its path asks, and a box drawn about round frames would touch
+with its corners. An ellipsoid costs a flight little at every tick.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Which rotors bear a vehicle, and what is left of its control where they do not suffice.
+"""The rotors that bear a vehicle, and what is left of its control where they do not suffice.
 
 With the allocation A, a level hover divides the weight in fractions g with A g = (1, 0, 0, 0). To steer from
 it in every direction, every rotor that only pushes must bear some of it: g > 0.

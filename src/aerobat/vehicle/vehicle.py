@@ -1,4 +1,4 @@
-"""What flies: a rigid body with rotors, checked when it is made."""
+"""The vehicle: a rigid body with rotors, checked when it is made."""
 
 from __future__ import annotations
 
@@ -123,7 +123,7 @@ class Vehicle:
 
     @cached_property
     def thrust_ranges(self) -> Array:
-        """What lies between the rotors' limits [N], (n,)."""
+        """The differences between the rotors' upper and lower limits [N], (n,)."""
         return frozen(self.max_thrusts - self.min_thrusts, "thrust_ranges")
 
     @cached_property
@@ -135,12 +135,14 @@ class Vehicle:
     def allocation(self) -> Array:
         """The map from rotor thrusts [N] to thrust and moments (T [N], Mx, My, Mz [N·m]), (4, n).
 
-        With rotor i at (x, y, z) in body axes, thrust f_i along +z, spin s_i and torque coefficient c_i,
+        Rotor i is at (x, y, z) in body axes, has its thrust f_i along +z, the spin s_i and the torque
+        coefficient c_i. Then
 
-            T = Σ f_i    Mx = Σ y_i f_i    My = -Σ x_i f_i    Mz = -Σ s_i c_i f_i
+            T = Σ f_i    Mx = Σ y_i f_i    My = -Σ x_i f_i    Mz = -Σ s_i c_i f_i.
 
-        since r × f e3 = (y f, -x f, 0), and since a rotor that turns counter-clockwise (s = +1) drives the
-        body clockwise. Sections III and V-C of the paper use such a matrix.
+        Mx and My follow from r × f e3 = (y f, -x f, 0), and Mz from the drag torque: a rotor that turns
+        counter-clockwise (s = +1) drives the body clockwise. Sections III and V-C of the paper use such a
+        matrix.
         """
         x, y, _ = np.array([rotor.position_body for rotor in self.rotors]).T
         drag_torque = [-rotor.spin * rotor.torque_coefficient for rotor in self.rotors]
@@ -153,7 +155,7 @@ class Vehicle:
 
     @cached_property
     def bounding_ellipsoid(self) -> Ellipsoid:
-        """What encloses it with its propellers: `body`, or a flat ellipsoid about the rotors."""
+        """The ellipsoid that encloses vehicle and propellers: `body`, or a flat one about the rotors."""
         return about_rotors(self.rotors) if self.body is None else self.body
 
     @property
@@ -164,7 +166,7 @@ class Vehicle:
 
     @cached_property
     def dead_rotors(self) -> tuple[int, ...]:
-        """Which rotors give no thrust, counted from 0."""
+        """The numbers of the rotors that give no thrust, counted from 0."""
         return tuple(i for i, rotor in enumerate(self.rotors) if rotor.is_dead)
 
     def without_dead_rotors(self) -> Vehicle:

@@ -64,7 +64,7 @@ class Curve:
 
 @dataclass(frozen=True, eq=False)
 class Scene:
-    """What there is to see: a vehicle, gates, the planned path and the tracks of those who flew it."""
+    """The content of a view: a vehicle, gates, the planned path and the tracks of those who flew it."""
 
     title: str
     facts: tuple[str, ...]  # a line each
@@ -187,7 +187,7 @@ def _flight_scene(flight: Flight, plan: Plan | None, vehicle: Vehicle, poses: in
 
 
 def shown_rows(rows: int, flights: int, poses: int = MAX_POSES) -> Rows:
-    """Which of so many rows of each flight are shown: every k-th and the last."""
+    """Return the rows that are shown, of so many rows of each flight: every k-th and the last."""
     stride = ceil(rows / min(MAX_ROWS, poses // flights))
     return np.unique(np.append(np.arange(0, rows, stride), rows - 1))
 

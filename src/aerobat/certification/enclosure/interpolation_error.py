@@ -1,14 +1,14 @@
 """Error of flatness interpolated at Chebyshev points, proven by complex analysis.
 
 Velocity and specific thrust f are polynomials on a piece of a segment, so all that flatness makes of them
-is analytic in complex time wherever f·f keeps off zero. If q is analytic inside the Bernstein ellipse E_ρ
-about the piece and |q| <= B there, its interpolant p of degree K has |q − p| <= 4 B ρ⁻ᴷ/(ρ − 1) on the
-piece (Trefethen, Approximation Theory and Approximation Practice, theorem 8.2). Such B follow from the
-norms of the terms of v, f, f', f'' alone: with c = |c_0| of f, |f − c_0| <= Δ = δ c on E_ρ and n² = f·f,
+is analytic in complex time wherever f·f keeps off zero. Let q be analytic inside the Bernstein ellipse E_ρ
+about the piece, with |q| <= B there. Its interpolant p of degree K then has |q − p| <= 4 B ρ⁻ᴷ/(ρ − 1) on
+the piece (Trefethen, Approximation Theory and Approximation Practice, theorem 8.2). Such B follow from the
+norms of the terms of v, f, f', f'' alone. With c = |c_0| of f, |f − c_0| <= Δ = δ c on E_ρ and n² = f·f,
 
-    δ < 1/2   =>   Re n >= c (1 − δ)
+    δ < 1/2   =>   Re n >= c (1 − δ).
 
-whence the rest, as DERIVATION.md has it; complex vectors have their Hermitian norms. On the piece itself,
+The rest follows, as DERIVATION.md has it; complex vectors have their Hermitian norms. On the piece itself,
 ρ = 1, the same bounds say how large things are there, and what rounding does to them.
 """
 

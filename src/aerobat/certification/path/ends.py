@@ -1,4 +1,4 @@
-"""Where a path begins and ends, beside the states that are asked of it there."""
+"""The start and the end of a path, compared with the states that are asked of it there."""
 
 from __future__ import annotations
 

@@ -41,7 +41,7 @@ class PolynomialCurve:
         return cls(trajectory, basis, derivatives, np.stack([_sums(trajectory, k) for k in orders], axis=1))
 
     def series(self, columns: list[PolynomialColumn]) -> ChebyshevSeries:
-        """What the columns hold, as series with their errors."""
+        """Return the polynomials of the columns as Chebyshev series with their errors."""
         series = self.basis.analysis @ np.stack([column.values for column in columns], axis=-1)
         error = self.basis.lebesgue * np.stack([column.error for column in columns], axis=-1)
         whole = Subintervals.whole(self.trajectory.segments)

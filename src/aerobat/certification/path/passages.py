@@ -88,7 +88,7 @@ class _Instant:
         return cls(passage, position - passage.gate.position, velocity, thrust, floor)
 
     def findings(self) -> list[Finding]:
-        """What is asked of the passage, and what it does."""
+        """Return the findings on the passage: what it does, against what is asked of it."""
         gate = self.passage.gate
         along, depth = float(self.offset @ gate.normal), gate.opening.depth(gate.plane_axes @ self.offset)
         margin = min(self.passage.margin, gate.opening.inradius)

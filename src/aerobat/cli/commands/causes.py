@@ -38,10 +38,10 @@ class CausesOptions:
     plugins: Annotated[tuple[Path, ...], Plugins(group=planning)] = ()
 
     conditions: Annotated[str, Parameter(group=flying)] = "lab"
-    """What varies from flight to flight without the causes: lab, field, or a TOML file."""
+    """The variation from flight to flight without the causes: lab, field, or a TOML file."""
 
     flights: Annotated[int, how_many(1, 10**6)] = 1000
-    """How many flights of each trial."""
+    """The number of flights of each trial."""
 
     seed: Annotated[int, Parameter(group=flying, validator=validators.Number(gte=0))] = 0
     """The seed of all flights: the same seed, the same flights."""
@@ -53,10 +53,10 @@ class CausesOptions:
 def causes(problem: str, options: Annotated[CausesOptions, Parameter(name="*")] = CausesOptions()) -> None:
     """Measure what each of four causes of error costs, alone and all together, over many flights.
 
-    The causes that the paper's authors name: a plan that does not know the rotors' limits, a hand-off between
-    camera systems that are 5 cm and 2° apart, jerk in place of snap as the input, and loops 1.5 times as slow
-    as the vehicle's own. Each trial flies the same flights: same vehicles, starts, noise and air. Planned by
-    miqp; writes nothing.
+    The paper's authors name the causes: the plan does not know the rotors' limits; a hand-off goes between
+    camera systems that are 5 cm and 2° apart; jerk is the input in place of snap; and the loops are 1.5 times
+    as slow as the vehicle's own. Each trial flies the same flights: same vehicles, starts, noise and air.
+    Planned by miqp; writes nothing.
 
     Parameters
     ----------

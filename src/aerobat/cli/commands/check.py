@@ -63,12 +63,13 @@ def check(plan: Path, options: Annotated[CheckOptions, Parameter(name="*")] = Ch
     """Prove over continuous time that a vehicle can fly a trajectory, or say when and why it cannot.
 
     The proof covers every rotor's thrust, its command where it lags, the vehicle's body rate and, where
-    limits are given, speed, tilt and moments. It does not sample: between any two instants it bounds what
-    happens. Of a .plan file it judges what was planned: its vehicle, its environment, its heading, its
-    problem's limits, what its maneuver asks throughout, and each gate as it is passed; other files hold only
-    the path, and what is assumed is said. Beside the proof it tells of a .plan file how a vehicle that gives
-    it up comes back to a hover, how near the plan is to the shortest possible, and of one that takes
-    suspiciously long another planner's second opinion. Exits with 0 only if all is proven.
+    limits are given, speed, tilt and moments. The proof does not sample: between any two instants it bounds
+    what happens. Of a .plan file the command judges what was planned: its vehicle, its environment, its
+    heading, its problem's limits, what its maneuver asks throughout, and each gate as it is passed. Other
+    files hold only the path, and what is assumed is said. Beside the proof, the report on a .plan file tells
+    how a vehicle that gives the plan up comes back to a hover, and how near the plan is to the shortest
+    possible. For a plan that takes suspiciously long, the report adds another planner's second opinion. Exits
+    with 0 only if all is proven.
 
     Parameters
     ----------

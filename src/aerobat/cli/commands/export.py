@@ -21,7 +21,7 @@ from aerobat.reporting.report_json import to_json
 
 @dataclass(frozen=True, kw_only=True)
 class ExportOptions:
-    """What a plan is exported to, and where."""
+    """Options of an export: what a plan is exported to, and where."""
 
     to: Annotated[
         Literal["csv", "crazyflie", "ros1-bag", "ros2-bag", "mcap", "px4", "blender"], Parameter(group=output)

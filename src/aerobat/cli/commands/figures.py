@@ -19,7 +19,7 @@ from aerobat.reporting.report_json import to_json
 
 @dataclass(frozen=True, kw_only=True)
 class FiguresOptions:
-    """Where the paper's figures go."""
+    """Options of the paper's figures: where they go."""
 
     out: Annotated[Path, Parameter(group=output)] = Path("out") / "figures"
     """The folder to write to; figures of these numbers in it are replaced."""

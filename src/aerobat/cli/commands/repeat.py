@@ -141,14 +141,14 @@ class _Run:
 
     @classmethod
     def read(cls, folder: Path, record: RunRecord) -> _Run:
-        """What lies in a run's folder."""
+        """Read a run from its folder."""
         plan = read_plan(folder)
         if not isinstance(plan, Plan):
             raise SpecError(f"{folder}/ holds no .plan file; run anew")
         return cls(plan, load_flight(folder / FLIGHT) if record.command == "fly" else None)
 
     def difference(self, other: _Run) -> str:
-        """How another run differs, in words; nothing where it does not."""
+        """Return how another run differs, in words; nothing where it does not."""
         own, its = self.plan.trajectory, other.plan.trajectory
         if not _same(own.durations, its.durations) or not _same(own.coefficients, its.coefficients):
             return f"the plan takes {its.duration:.9g} s, there {own.duration:.9g} s"

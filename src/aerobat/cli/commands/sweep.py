@@ -34,10 +34,10 @@ class SweepingOptions:
     """Options of many flights."""
 
     runs: Annotated[int, how_many(1, 10**7)] = 1000
-    """How many flights."""
+    """The number of flights."""
 
     conditions: Annotated[str, Parameter(group=flying)] = "lab"
-    """What varies from flight to flight, disturbs and is measured how: none, lab, field, or a TOML file."""
+    """The variation between flights, the disturbances and the sensors: none, lab, field, or a TOML file."""
 
     controller: Annotated[str, Parameter(group=flying)] = "full"
     """The control law: full, or paper, at the gains of the vehicle's file; lee, lqr, indi; or one of your own
@@ -49,7 +49,7 @@ class SweepingOptions:
     workers: Annotated[int | None, Parameter(group=flying, validator=validators.Number(gte=1, lte=4096))] = (
         None
     )
-    """How many processes fly; the flights are the same for any number. Default: one a core."""
+    """The number of processes that fly; the flights are the same for any number. Default: one a core."""
 
     table: Annotated[Literal["csv", "parquet"], Parameter(group=output)] = "csv"
     """The form of the table, flights.csv or flights.parquet; the latter needs aerobat[parquet]."""

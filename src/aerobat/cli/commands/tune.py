@@ -37,10 +37,11 @@ class TuningOptions:
     plugins: Annotated[tuple[Path, ...], Plugins(group=planning)] = ()
 
     conditions: Annotated[str, Parameter(group=flying)] = "lab"
-    """What varies from flight to flight, disturbs and is measured how: none, lab, field, or a TOML file."""
+    """The variation between flights, the disturbances and the sensors: none, lab, field, or a TOML file."""
 
     flights: Annotated[int, how_many(2, 100_000)] = 200
-    """How many flights of each maneuver each set of gains is tried on, and how many others judge the best."""
+    """The number of flights of each maneuver that each set of gains is tried on, and of others that judge
+    the best."""
 
     seed: Annotated[int, Parameter(group=flying, validator=validators.Number(gte=0))] = 0
     """The seed of all flights: the same seed, the same gains, unless --time-limit ends the search."""
@@ -48,7 +49,7 @@ class TuningOptions:
     evaluations: Annotated[
         int, Parameter(group=limiting, validator=validators.Number(gte=1, lte=100_000))
     ] = 150
-    """How many sets of gains may be tried."""
+    """The number of sets of gains that may be tried."""
 
     time_limit: Annotated[float | None, Parameter(group=limiting, validator=validators.Number(gte=0))] = None
     """Seconds of the search; the best gains by then are judged."""

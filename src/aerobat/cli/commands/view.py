@@ -39,15 +39,15 @@ def view(
 ) -> None:
     """Write a page that replays a run, a plan or a flight: one HTML file that a browser opens from the disk.
 
-    It shows the vehicle on its path, gates, stages and thrusts, and beside them errors and rotor thrusts.
-    Space plays, the arrow keys step, 1, 2 and 3 are its cameras. Of a batch all flights are shown, of a sweep
-    the first 50, flown again, and which of them failed. It is written to replay.html in a run's folder,
-    which the next run there replaces with all else, or beside another file, unless --html says otherwise.
-    --video FILE.mp4 or FILE.gif writes a video.
+    The page shows the vehicle on its path, gates, stages and thrusts, and beside them errors and rotor
+    thrusts. Space plays, the arrow keys step, 1, 2 and 3 are its cameras. Of a batch all flights are shown,
+    of a sweep the first 50, flown again, and which of them failed. The page is written to replay.html in a
+    run's folder, which the next run there replaces with all else, or beside another file, unless --html says
+    otherwise. --video FILE.mp4 or FILE.gif writes a video.
 
-    --live serves a page with sliders instead, until Ctrl-C: they move and tilt gates, say how much thrust
-    the maneuver asks at least, the order, the thrust-to-weight and how much flights are dispersed, and
-    whatever they say is planned and flown at once, with the verdict in words.
+    --live serves a page with sliders instead, until Ctrl-C. The sliders move and tilt gates, and set the
+    thrust that the maneuver asks at least, the order, the thrust-to-weight and how much flights are
+    dispersed. Whatever the sliders say is planned and flown at once, with the verdict in words.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""What a run was: all that it takes to repeat it, as `run.toml` in its folder."""
+"""Record of a run: all that it takes to repeat it, as `run.toml` in its folder."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ def _planner(value: Any) -> Planner | None:
 
 @declared
 class FlightSettings:
-    """How a plan was flown."""
+    """Settings by which a plan was flown."""
 
     controller: str = "full"
     conditions: Dispersion | None = None  # left out, as planned
@@ -85,7 +85,7 @@ class RunRecord:
 
     @property
     def folder(self) -> Path:
-        """Where the run is written unless another place is given: whatever is not default is in the name."""
+        """The folder of the run unless another place is given: whatever is not default is in its name."""
         parts = [self.problem.name]
         if self.vehicle.name != default_vehicle(self.paper):
             parts.append(self.vehicle.name)
@@ -173,7 +173,7 @@ def write_record(record: RunRecord, folder: Path) -> None:
 
 
 def read_record(folder: Path) -> RunRecord:
-    """What a folder says of its run. Raises SpecError, one sentence, where it says nothing that is whole."""
+    """Return the record in a run's folder. Raises SpecError, one sentence, where none there is whole."""
     if not os.path.isdir(folder):
         raise SpecError(f"{folder} is no folder; give the folder of a run")
     if not (folder / RECORD).exists():

@@ -1,4 +1,4 @@
-"""What a sweep that was ended leaves beside its folder: its plan, its record, and finished flights."""
+"""Remains of a sweep that was ended, beside its folder: its plan, its record, and finished flights."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ class Unfinished:
 
     @classmethod
     def beside(cls, folder: Path) -> Unfinished:
-        """That of a sweep that is to be written to a folder."""
+        """Return the unfinished sweep beside the folder that the sweep is to be written to."""
         return cls(folder.with_name(f"{folder.name}-unfinished"))
 
     @property
@@ -34,7 +34,7 @@ class Unfinished:
 
     @property
     def finished(self) -> int:
-        """How many flights it keeps."""
+        """The number of finished flights that are kept."""
         return finished_flights(self.flights)
 
     def plan(self, record: RunRecord, make: Callable[[RunRecord], Plan]) -> Plan:

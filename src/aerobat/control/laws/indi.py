@@ -25,7 +25,7 @@ from aerobat.kernels.vectors import (
 
 
 class Increments(NamedTuple):
-    """What was measured, low-passed alike, so that both tell of the same instant."""
+    """Measured quantities, low-passed alike, so that both tell of the same instant."""
 
     omega: Vector  # [rad/s] body, at the last tick
     angular_acceleration: Vector  # [rad/s²] body

@@ -27,11 +27,11 @@ COUNTS = ("lanes", "ticks", "held inputs rows", "held codes rows", "log_stride",
 class Layout:
     """Vehicles side by side, and which parameters and inputs are one number for all.
 
-    Both functions take arrays of float64: shared parameters (s,), parameters (blocks, p, width), shared
-    inputs (ticks, r + h), inputs (blocks, ticks, i, width), held inputs (blocks, held rows, width), a table,
-    carry and next carry (blocks, c, width), outputs (logged ticks, o, lanes); and of uint16 the codes of what
-    is `Coded`, shaped as inputs and held inputs are. The last h columns of the shared inputs say where in a
-    block of the held inputs or codes the values of each kind of `Held` begin at a tick.
+    Both functions take arrays of float64: shared parameters (s,) and parameters (blocks, p, width); shared
+    inputs (ticks, r + h), inputs (blocks, ticks, i, width) and held inputs (blocks, held rows, width); a
+    table; carry and next carry (blocks, c, width), and outputs (logged ticks, o, lanes). Arrays of uint16
+    hold the codes of what is `Coded`, shaped as inputs and held inputs are. The last h columns of the shared
+    inputs say where in a block of the held inputs or codes the values of each kind of `Held` begin at a tick.
 
     `scan` logs the first tick, each `log_stride` ticks after it, and the last; `init` reads the inputs of one
     tick and writes the next carry. The lanes `begin` to `end` are run, multiples of the width.

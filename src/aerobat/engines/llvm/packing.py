@@ -28,7 +28,7 @@ class PackedInputs(NamedTuple):
 
 @dataclass(frozen=True)
 class InputKind:
-    """Where one of the inputs stands."""
+    """The place of one of the inputs."""
 
     shared: bool  # one number for all vehicles
     held: int | None = None  # the `Held` that it stands in
@@ -37,7 +37,7 @@ class InputKind:
 
 @dataclass(frozen=True)
 class Packing:
-    """Where the leaves of a loop's inputs go."""
+    """The places of the leaves of a loop's inputs."""
 
     vehicles: int
     width: int
@@ -62,7 +62,7 @@ class Packing:
 
     @cached_property
     def held_kinds(self) -> tuple[InputKind, ...]:
-        """Those that are held, of each vehicle's own."""
+        """The kinds of the inputs that are held, of each vehicle's own."""
         return tuple(dict.fromkeys(k for k in self.kinds if k.held is not None and not k.shared))
 
     @property

@@ -50,7 +50,7 @@ FORMATS: Mapping[str, Format] = {
 
 @dataclass(frozen=True)
 class Export:
-    """What was written, and what it lost."""
+    """The files that an export wrote, and what they lost."""
 
     format: str
     files: tuple[Path, ...]

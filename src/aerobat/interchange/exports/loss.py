@@ -1,8 +1,8 @@
-"""How far a plan and a file made of it are apart, over continuous time: what an export costs.
+"""Differences between a plan and a file made of it, over continuous time: what an export costs.
 
-A file of rows says nothing of what is between them. It is read as its format has it, along straight lines
-(attitudes by the shortest turn at a constant rate), or, where it is a stream of set-points, by holding the
-last. Differences of positions and of velocities are then piecewise polynomials, whose peaks are exact.
+A file of rows says nothing of what is between them. The file is read as its format has it, along straight
+lines (attitudes by the shortest turn at a constant rate), or, where it is a stream of set-points, by holding
+the last. Differences of positions and of velocities are then piecewise polynomials, whose peaks are exact.
 Attitudes are compared at many instants; between two of these they are apart as far as what they turn allows.
 """
 
@@ -59,7 +59,7 @@ class Loss:
 
 @dataclass(frozen=True)
 class Content:
-    """What is made of a plan before anything is written: files by their names, and what they lost."""
+    """Content made of a plan before anything is written: files by their names, and what they lost."""
 
     files: Mapping[str, bytes]
     loss: Loss
@@ -67,7 +67,7 @@ class Content:
 
 @dataclass(frozen=True, eq=False)
 class Rows:
-    """What the rows of a file say, as it is rounded there, in our axes."""
+    """Content of the rows of a file, as it is rounded there, in our axes."""
 
     times: Array  # [s] rising, (T,)
     position: Array  # [m] world, (T, 3)
@@ -76,7 +76,7 @@ class Rows:
 
     @classmethod
     def of(cls, found: Reference) -> Rows:
-        """What rows say that have a reference's numbers as they are."""
+        """Return rows that have a reference's numbers as they are."""
         flat = found.setpoint.flat
         return cls(found.times, flat.position, flat.velocity, found.setpoint.q_world_body)
 

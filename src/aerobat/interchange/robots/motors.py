@@ -1,7 +1,7 @@
 """Gazebo's motor models: plugins that turn a rotor's speed into thrust and torque.
 
-The multicopter motor model of Gazebo, classic or new, has f = motorConstant ω², a drag torque of
-momentConstant times that thrust, and speeds that lag by timeConstantUp while they rise and timeConstantDown
+The multicopter motor model of Gazebo, classic or new, has f = motorConstant ω² and a drag torque of
+momentConstant times that thrust. Rotor speeds lag by timeConstantUp while they rise and by timeConstantDown
 while they fall.
 """
 

@@ -27,7 +27,7 @@ class ErrorState(NamedTuple):
 
 
 class Correction(NamedTuple):
-    """What measurements have said so far."""
+    """Estimate of the error by the measurements so far."""
 
     error: ErrorState  # its mean
     rows: Rows  # its covariance

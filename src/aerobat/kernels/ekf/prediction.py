@@ -81,7 +81,7 @@ def anchored(state: EkfState) -> EkfState:
 
 
 def transition(ops: Ops, parameters: EkfParameters, state: EkfState) -> tuple[Change, Change, Change]:
-    """What becomes of the error's parts from the anchor to now, one after another, to first order in time T.
+    """Return maps of the error's parts from the anchor to now, applied in turn, to first order in time T.
 
     δp ← δp + T δv, δv ← δv − T R (f × δθ + δb_a), δθ ← Γ δθ − T δb_g. R is the attitude at the anchor, T f
     the change of velocity but for gravity's, in its axes, Γ = R_nowᵀ R.

@@ -1,9 +1,9 @@
 """The section of an ellipsoid by a gate's plane: how far it reaches along a direction in that.
 
 The ellipsoid is x = c + R A w, |w| ≤ 1, with attitude R and A = diag(semi-axes). For a unit vector d of the
-world d' = A Rᵀ d; then σ = |n'| is how far it reaches from its centre along the plane's normal n, and with
-the centre at a height h = n·c above the plane the section is the ellipse of points w with n'·w = −h, |w| ≤ 1:
-its centre is at d·c − h (d'·n')/σ² along any d in the plane, and from there it reaches
+world d' = A Rᵀ d. The ellipsoid reaches σ = |n'| from its centre along the plane's normal n. With the centre
+at a height h = n·c above the plane, the section is the ellipse of points w with n'·w = −h, |w| ≤ 1. The
+section's centre is at d·c − h (d'·n')/σ² along any d in the plane. From there the section reaches
 H √(1 − h²/σ²) with H² = d'·d' − (d'·n')²/σ².
 """
 
@@ -20,7 +20,7 @@ _ROUNDING = 1e-9  # [m] from the middle, where neither side is the nearer; of a 
 
 
 class BoundingEllipsoid(NamedTuple):
-    """What encloses a vehicle, aligned with its axes."""
+    """Ellipsoid that encloses a vehicle, aligned with its axes."""
 
     centre: Vector  # [m] from the centre of mass, body axes
     semi_axes: Vector  # [m]

@@ -1,4 +1,4 @@
-"""What a client knows of an autopilot: its clock, its state, its mode; and how to give it orders."""
+"""An autopilot as a client knows it: its clock, its state, its mode; and how to give it orders."""
 
 from __future__ import annotations
 
@@ -64,7 +64,7 @@ class AutopilotLink:
 
     @property
     def delay(self) -> float:
-        """How long a message is on its way [s]: half of the shortest round trip."""
+        """The time that a message is on its way [s]: half of the shortest round trip."""
         return 0.5 * min(self._times, default=(0.0, 0.0))[0]
 
     def receive(self, now: float) -> list[Observed]:

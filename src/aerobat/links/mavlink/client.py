@@ -34,7 +34,7 @@ _SLOWEST_DESCENT = 0.2  # [m/s] of a landing
 
 
 class Stage(StrEnum):
-    """What the client is at."""
+    """Stage of a flight that the client is at."""
 
     CONNECTING = "connecting"
     ASKING = "asking the vehicle"
@@ -136,7 +136,7 @@ class Client:
             self._lost = reason
 
     def report(self) -> LinkReport:
-        """What the flight came to."""
+        """Return the report of what the flight came to."""
         began = self.mission.maneuver_began
         return link_report(
             self._plan,

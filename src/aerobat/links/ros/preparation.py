@@ -30,7 +30,7 @@ MANEUVERS = {
 
 @dataclass(frozen=True)
 class Request:
-    """What is to be planned, and from where."""
+    """Request for a plan: what is to be planned, and from where."""
 
     problem: Problem
     vehicle: Vehicle

@@ -21,7 +21,7 @@ _CATCHING_UP = 0.005  # [s] after more, in which messages are taken that a tick 
 
 
 class Node(Protocol):
-    """What is ticked."""
+    """A node that is ticked."""
 
     origin: int  # [ns] when its clock began
 

@@ -42,7 +42,7 @@ class _Node:
 
 @dataclass(frozen=True)
 class SearchLimits:
-    """Where a search ends though nothing is proven."""
+    """The limits at which a search ends though nothing is proven."""
 
     deadline: float = inf  # [s] as `perf_counter` counts
     nodes: float = inf  # QPs solved, those that fail counted as often as they cost

@@ -22,7 +22,7 @@ from aerobat.optimization.branch_and_bound.time_decomposition import TimeDecompo
 from aerobat.optimization.deadline import shorter
 from aerobat.optimization.result import AssignmentResult, verified
 
-# chosen on three free gates by benchmarks/growth_with_stages.py; docs/benchmarks.md has the counts
+# chosen on three free gates by benchmarks/growth_with_stages.py; docs/lab/benchmarks.md has the counts
 DIRECT_NODES = 300  # of a direct search, before the sequence is cut in two
 MIN_NODES = 6000  # of all: with fewer no proof comes of a cut, and the bound is the worse for it
 

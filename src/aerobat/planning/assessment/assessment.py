@@ -1,4 +1,4 @@
-"""What is to be said of a plan beside its proof: how near it is to what is possible, and where it goes."""
+"""The assessment of a plan beside its proof: its duration against the shortest possible, and its room."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ class Box:
         return dist(self.lower, self.upper)
 
     def excess(self, other: Box) -> float:
-        """How far it goes beyond another, along the axis on which it goes farthest [m]."""
+        """Return the distance [m] by which the box exceeds another, along the axis where that is largest."""
         below = (b - a for a, b in zip(self.lower, other.lower, strict=True))
         above = (a - b for a, b in zip(self.upper, other.upper, strict=True))
         return max(*below, *above, 0.0)
@@ -71,7 +71,7 @@ class Assessment:
 
     @property
     def dive(self) -> float:
-        """How far the lowest point lies below all that is asked for [m]."""
+        """The depth of the lowest point below all that is asked for [m]."""
         return max(self.asked.lower[2] - self.lowest, 0.0)
 
     @property
@@ -92,7 +92,7 @@ class Assessment:
 
     @property
     def sentence(self) -> str:
-        """How near the duration is to what is possible, in a sentence without its full stop."""
+        """The duration against the shortest possible, in a sentence without its full stop."""
         at_most = "how near to the shortest possible is not known"
         if self.ratio < inf:
             least = f"{self.least_duration:.3f} s or more"
@@ -111,7 +111,7 @@ class Assessment:
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """What a person should know before flying it, each a sentence without its full stop."""
+        """Warnings to a person who is about to fly the plan, each a sentence without its full stop."""
         found = [self.sentence] if self.poor else []
         if self.room.excess(self.asked) > ASTRAY + self.asked.size:
             found.append(

@@ -1,8 +1,8 @@
 """The least time in which a point moves along a line, its thrust bounded and its velocity damped.
 
-ẍ = c − k ẋ with c between two bounds is linear with real eigenvalues, so that the fastest motion thrusts
-forward all the way up to its largest speed and backward from there, with a cruise between where the speed is
-limited.
+The equation ẍ = c − k ẋ with c between two bounds is linear with real eigenvalues. Therefore the fastest
+motion thrusts forward all the way up to its largest speed and backward from there. Where the speed is
+limited, the motion cruises in between.
 """
 
 from __future__ import annotations

@@ -121,7 +121,7 @@ class _Place:
 
     @classmethod
     def of_end(cls, end: EndState, direction: Array) -> _Place:
-        """Where a motion begins or ends."""
+        """Return the place where a motion begins or ends."""
         position, velocity = (float(vector @ direction) for vector in (end.position, end.velocity))
         return cls(_Turn.AT, position, velocity, end.free_velocity)
 

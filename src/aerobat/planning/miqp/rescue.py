@@ -1,4 +1,4 @@
-"""What else may find a plan where the intervals and the order asked for find none, or a poor one.
+"""Other ways to a plan where the intervals and the order asked for find none, or a poor one.
 
 A problem is not refused before other settings and planners are asked, within RESCUE_TIME.
 """

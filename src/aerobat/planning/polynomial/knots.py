@@ -1,4 +1,4 @@
-"""What a problem fixes at the knots of a polynomial path, and when to pass them at first."""
+"""Derivatives that a problem fixes at the knots of a polynomial path, and first guesses of knot times."""
 
 from __future__ import annotations
 
@@ -136,7 +136,7 @@ def path_along_normals(problem: Problem, vehicle: Vehicle, sequence: StageSequen
 
 
 def start_along_normals(problem: Problem, vehicle: Vehicle, sequence: StageSequence, order: int) -> WarmStart:
-    """That path as a start.
+    """Return the path of `path_along_normals` as a warm start.
 
     Args:
         problem: Its ends are met, its gates passed.

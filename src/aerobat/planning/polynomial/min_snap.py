@@ -37,7 +37,7 @@ FASTEST = 0.3  # times the first duration, where it begins
 
 
 class TimeScaling(StrEnum):
-    """Which segments a longer duration lengthens."""
+    """The segments that a longer duration lengthens."""
 
     FIRST = "first"  # all knots shift by as much, as in the paper: the first segment alone lengthens
     ALL = "all"  # every segment by the same factor

@@ -25,17 +25,20 @@ class FlownPath:
 
     @property
     def flight(self) -> OwnFlight:
-        """Its own."""
+        """The findings about the path's own flight, the nominal one."""
         trajectory, source = self.judged.solution.trajectory, self.judged.solution.source
         assert trajectory is not None
         return own_flight(trajectory, self.refinement.vehicle, self.refinement.problem, source.placed)
 
     def through_gates(self) -> tuple[OwnFlight, FlownPath]:
-        """Its flight and itself, or a path with more room in gates whose frames its flight does not clear."""
+        """Return the flight and the path, or those of a path with more room in gates.
+
+        More room is given in the gates whose frames the flight does not clear.
+        """
         return cleared(self, lambda found: found.flight, FlownPath._more_direct)
 
     def with_reserves(self, flight: OwnFlight) -> FlownPath:
-        """Itself, or a path with a reserve that leaves the controller what its flight lacked."""
+        """Return the path itself, or one with a reserve that leaves the controller what its flight lacked."""
         best, found = (flight, self), self
         for reserve in RESERVES:
             if not flight.wants_reserve or out_of_time():

@@ -62,12 +62,12 @@ class LimitValues:
 
     @cached_property
     def of_path(self) -> Mask:
-        """Which constraints are linear in the path's derivatives, (c,)."""
+        """The mask of the constraints that are linear in the path's derivatives, (c,)."""
         return np.array([limit.quantity.is_of_path for limit, _ in self.sides], dtype=bool)
 
     @cached_property
     def has_reserve(self) -> Mask:
-        """Which constraints a reserve for the controller is kept from, (c,)."""
+        """The mask of the constraints from which a reserve for the controller is kept, (c,)."""
         return np.array([limit.has_reserve for limit, _ in self.sides], dtype=bool)
 
     def frames(self, times: Array, derivatives: Array) -> Frames:

@@ -85,7 +85,10 @@ class RefinementProgram:
 
     @cached_property
     def counts(self) -> Mask:
-        """Which constraints count, (S, p, c): those of the path not at the very ends, which are fixed."""
+        """The mask of the constraints that count, (S, p, c).
+
+        Constraints of the path do not count at the very ends, which are fixed.
+        """
         counts = np.ones((self.spline.segments, len(self.fractions), len(self.limits.sides)), dtype=bool)
         counts[0, 0, self.limits.of_path] = counts[-1, -1, self.limits.of_path] = False
         return counts
@@ -153,7 +156,7 @@ class RefinedPoint:
 
     @cached_property
     def equalities(self) -> Array:
-        """What is fixed of durations, and what stages fix."""
+        """The values of the equality constraints on durations, then of those at stages."""
         rows, targets = self.program.timed
         at_stages = self.program.stages.equalities(self._at_stages)
         return np.concatenate([rows @ self._ratios - targets, at_stages])

@@ -83,7 +83,7 @@ class RefinedPath:
 
     @property
     def placed(self) -> tuple[PlacedStage, ...]:
-        """Its stages, each in its segment."""
+        """The path's stages, each in its segment."""
         path = self.path
         numbers = np.searchsorted(path.trajectory.knots[1:-1], path.times, side="left").tolist()
         stages = zip(path.stages, numbers, path.times, strict=True)
@@ -92,7 +92,7 @@ class RefinedPath:
 
 @dataclass(frozen=True, eq=False)
 class Refinement:
-    """What all refinements of one problem for one vehicle share."""
+    """The data that all refinements of one problem for one vehicle share."""
 
     problem: Problem
     vehicle: Vehicle
@@ -141,11 +141,11 @@ class Refinement:
 
     @property
     def with_and_without_rooms(self) -> tuple[Refinement, ...]:
-        """Itself, then without rooms, which some gates do not leave where they are crossed."""
+        """The refinement, then one without rooms, which some gates do not leave where they are crossed."""
         return (self, replace(self, in_gates=())) if self.in_gates else (self,)
 
     def stage_values(self, stages: tuple[Stage, ...]) -> StageValues:
-        """What stages ask in the order of a path, compiled once."""
+        """Return the constraints of stages in the order of a path, compiled once."""
         if stages not in self._known:
             body = self.vehicle.bounding_ellipsoid
             self._known[stages] = StageValues(stages, self.balance, body, self.rooms(stages))

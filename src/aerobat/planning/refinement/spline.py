@@ -3,8 +3,8 @@
 With h a mean duration, the k-th derivative of position at a knot is Y_k/h^k, and a segment lasts τ h. The
 variables are the Y_k at the knots, scaled to a size of one, ln τ of every segment and ln h: with all others
 held, h changes how fast a path is flown and not the path. What ends fix, they fix in SI units. On a segment
-of duration T = τ h the normalised data Z_m = τ^m Y_m + T^m fixed_m of both its knots make a motion whose
-k-th derivative is
+of duration T = τ h the normalised data of both its knots are Z_m = τ^m Y_m + T^m fixed_m. The k-th derivative
+of the motion that the data make is
 
     D_k(s) = T^-k Σ_m B_km(s) Z_m.
 """

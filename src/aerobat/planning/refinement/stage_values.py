@@ -1,4 +1,4 @@
-"""What stages ask at their knots, and the body's room in the gates that they cross, with two derivatives."""
+"""Constraints of stages at their knots and on the body's room in crossed gates, with two derivatives."""
 
 from __future__ import annotations
 
@@ -86,7 +86,10 @@ class StageValues:
         return at[equal], weights[equal]
 
     def second_derivatives(self, derivatives: Array, weights: Array) -> Array:
-        """Those of weighted inequalities by position, velocity and acceleration at stages, (stages, 9, 9)."""
+        """Return the second derivatives of the weighted inequalities, (stages, 9, 9).
+
+        The derivatives are by position, velocity and acceleration at stages.
+        """
         found = np.zeros((len(self.stages), STATE, STATE))
         first = int((~self._linear[3]).sum())
         for stage, _, radius in self._in_balls(derivatives):

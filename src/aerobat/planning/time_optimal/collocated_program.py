@@ -33,7 +33,7 @@ WARM_BARRIER = 1e-6  # the first barrier parameter of a solve that starts from a
 
 @dataclass(frozen=True, eq=False)
 class SolvedMotion:
-    """Where a solve ended, and of which program."""
+    """The motion at which a solve ended, with the program that was solved."""
 
     program: CollocatedProgram
     motion: CollocatedMotion

@@ -79,9 +79,10 @@ class Race:
         return best or next(filter(None, map(self._certified, others)), None)
 
     def flyable(self, found: Judged[SolvedMotion]) -> Judged[SolvedMotion]:
-        """What was found, so direct through gates and with so much reserve that its flight has no defect.
+        """Return the motion found, refined until its flight has no defect.
 
-        Where no reserve is wanted it stays as it is, and where none is enough the best is returned.
+        The motion is made more direct through gates, then given more reserve. Where no reserve is wanted the
+        reserve stays as it is, and where none is enough the best motion is returned.
         """
         best, reserve = cleared(found, self._own_flight, self._more_direct), self.reserve
         found = best[1]

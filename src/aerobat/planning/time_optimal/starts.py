@@ -1,4 +1,4 @@
-"""Where the program begins: other planners' plans, at their pace and at others, in a plane and in space."""
+"""Starts of the program: other planners' plans, at their pace and at others, in a plane and in space."""
 
 from __future__ import annotations
 
@@ -123,7 +123,7 @@ def _place(stage: Stage, problem: Problem) -> Array | None:
 
 
 def in_space(starts: Iterator[Start]) -> Iterator[Start]:
-    """Those that keep to no plane."""
+    """Yield the starts that keep to no plane."""
     return (start for start in starts if start.plane is None)
 
 

@@ -1,4 +1,4 @@
-"""What every maneuver answers, and the register of them by name."""
+"""The interface of maneuvers, and the register of maneuvers by name."""
 
 from __future__ import annotations
 
@@ -83,7 +83,7 @@ def gate_in_words(name: str) -> str:
 
 
 def in_sequence(words: Iterable[str]) -> str:
-    """What comes one after another, read aloud; what comes several times in a row, counted."""
+    """Return words in sequence as one reads them aloud, with a count of those that repeat in a row."""
     runs = [(word, len(tuple(run))) for word, run in groupby(words)]
     return ", ".join(word if count == 1 else f"{word}, {count} times" for word, count in runs)
 

@@ -36,7 +36,7 @@ class Circle(OpeningShape):
 
     @property
     def kind(self) -> str:
-        """Its kind as it is said before its width."""
+        """The kind of opening, as it is said before the width."""
         return "round, "
 
     @property
@@ -47,7 +47,7 @@ class Circle(OpeningShape):
 
     @property
     def sides(self) -> tuple[Array, Array]:
-        """Those of the regular polygon in it."""
+        """The sides of the regular polygon in the circle."""
         return _directions(CIRCLE_SIDES), np.full(CIRCLE_SIDES, _INSCRIBED * self.radius)
 
     @property
@@ -58,7 +58,7 @@ class Circle(OpeningShape):
 
     @property
     def inradius(self) -> float:
-        """Its radius [m]."""
+        """The radius of the circle [m]."""
         return self.radius
 
     def depth(self, points: Array) -> Array:

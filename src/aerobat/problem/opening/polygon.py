@@ -29,7 +29,7 @@ class Polygon(OpeningShape):
 
     @property
     def outline(self) -> Array:
-        """Its corners."""
+        """The corners of the polygon."""
         return self.corners
 
     @property
@@ -39,25 +39,25 @@ class Polygon(OpeningShape):
 
     @property
     def kind(self) -> str:
-        """Its kind as it is said before its width."""
+        """The kind of opening, as it is said before the width."""
         return f"a polygon of {len(self.corners)} corners, "
 
     @cached_property
     def sides(self) -> tuple[Array, Array]:
-        """Its own sides, the first from the first corner to the second."""
+        """The sides of the polygon itself, the first from the first corner to the second."""
         along = np.roll(self.corners, -1, axis=0) - self.corners
         normals = np.column_stack([along[:, 1], -along[:, 0]]) / np.linalg.norm(along, axis=1)[:, None]
         return normals, np.sum(normals * self.corners, axis=1)
 
     @property
     def probes(self) -> tuple[Probe, ...]:
-        """Its sides."""
+        """The sides of the polygon, each a probe."""
         normals, distances = self.sides
         return tuple(Probe((x, y), d) for (x, y), d in zip(normals.tolist(), distances.tolist(), strict=True))
 
     @property
     def edges(self) -> tuple[Edge, ...]:
-        """Its sides."""
+        """The sides of the polygon, each an edge."""
         ends = np.roll(self.corners, -1, axis=0)
         halves = np.linalg.norm(ends - self.corners, axis=1) / 2.0
         return tuple(map(Edge, (self.corners + ends) / 2.0, self.sides[0], halves.tolist()))
@@ -69,7 +69,7 @@ class Polygon(OpeningShape):
 
     @cached_property
     def inradius(self) -> float:
-        """How deep [m] its deepest point lies inside."""
+        """The radius of the largest circle inside [m]."""
         return self._largest_inset(np.zeros(len(self.corners)))[0]
 
     def needed(self, reach: Array) -> Array:
@@ -149,7 +149,7 @@ class Rectangle(Polygon):
 
     @property
     def kind(self) -> str:
-        """Its kind as it is said before its width: none, it is what gates are."""
+        """The kind of opening, as it is said before the width: empty, as a rectangle need not be said."""
         return ""
 
     @property
@@ -159,7 +159,7 @@ class Rectangle(Polygon):
 
     @property
     def inradius(self) -> float:
-        """How deep [m] its deepest point lies inside."""
+        """The radius of the largest circle inside [m]."""
         return min(self.width, self.height) / 2.0
 
     def needed(self, reach: Array) -> Array:

@@ -1,4 +1,4 @@
-"""What an opening is to those that plan, judge and draw it."""
+"""The interface of openings for all that plans, judges and draws them."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ class OpeningShape(ABC):
     @property
     @abstractmethod
     def edges(self) -> tuple[Edge, ...]:
-        """What a frame around it is made of."""
+        """The edges of which a frame around the opening is made."""
 
     @property
     @abstractmethod
@@ -69,15 +69,15 @@ class OpeningShape(ABC):
     @property
     @abstractmethod
     def kind(self) -> str:
-        """Its kind as it is said before its width, empty of a rectangle."""
+        """The kind of opening, as it is said before the width; empty for a rectangle."""
 
     @abstractmethod
     def depth(self, points: Array) -> Array:
-        """How deep points (..., 2) lie inside, their distance to the nearest edge [m], (...), or below 0."""
+        """Return the depth of points (..., 2) inside: distances [m] to the nearest edge (...), or below 0."""
 
     @abstractmethod
     def at_clearance(self, clearance: float) -> LinearBounds:
-        """What is left at a clearance [m] from the edges: in too narrow an opening its middle."""
+        """Return the part left at a clearance [m] from the edges: in too narrow an opening its middle."""
 
     @abstractmethod
     def admits(self, section: Array) -> bool:
@@ -110,7 +110,7 @@ class OpeningShape(ABC):
     @property
     @abstractmethod
     def inradius(self) -> float:
-        """How deep [m] its deepest point lies inside."""
+        """The radius of the largest circle inside [m]."""
 
     @property
     def circumradius(self) -> float:

@@ -1,1 +1,1 @@
-"""What is feasible, and what a problem needs, as figures, tables for people and plain data."""
+"""Feasible problems and the requirements of a problem, as figures, tables for people and plain data."""

@@ -23,7 +23,7 @@ class Kind:
 
     @property
     def name(self) -> str:
-        """It in a few words."""
+        """The name of the kind in a few words: its feasibility and the limits that bind."""
         return f"{self.feasibility}: {', '.join(self.limits) or NOT_NAMED}"
 
 

@@ -49,7 +49,7 @@ NAMED = 6  # stages up to which their names stand above the timelines
 
 @dataclass(frozen=True, eq=False)
 class Subject:
-    """What a picture is of: a plan, or a flight or many."""
+    """The subject of a picture: a plan, one flight or many flights."""
 
     title: str
     vehicle: Vehicle

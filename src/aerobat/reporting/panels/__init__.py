@@ -1,1 +1,1 @@
-"""What pages are put together from: paths, stages, timelines, signals, each drawn into its axes."""
+"""The parts of a page: paths, stages, timelines and signals, each drawn into its own axes."""

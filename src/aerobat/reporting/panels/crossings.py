@@ -23,7 +23,7 @@ PALE, FEW = 0.18, 64  # the least opacity of a dot, and the crossings up to whic
 
 @dataclass(frozen=True, eq=False)
 class Crossings:
-    """Where flights crossed a gate's plane."""
+    """The points at which flights crossed a gate's plane."""
 
     gate: Gate
     right: Array  # [m] of the opening's centre, NaN where a flight did not cross, (flights,)

@@ -22,7 +22,7 @@ FLATNESS_RATIO = 0.3  # height over length, below which a path is drawn across t
 
 @dataclass(frozen=True, eq=False)
 class PoseHistory:
-    """Where a vehicle is, or shall be, over time."""
+    """The actual or planned poses of a vehicle over time."""
 
     times: Array  # [s], (T,)
     position: Array  # [m], (T, 3)

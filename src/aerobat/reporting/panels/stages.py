@@ -51,8 +51,8 @@ KEYS = np.array([0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0])  # [m/s
 def draw_stages(axes: Axes, plan: Plan, vehicle: Vehicle) -> str:
     """Draw the stages in the maneuver's plane; return a note on what is shown.
 
-    Where they would cover each other in that plane, as those of a maneuver that stays in place or leaves it,
-    they follow one another along the panel's longer side, each in the vertical plane of its own thrust.
+    Stages that would cover each other in that plane follow one another along the panel's longer side, each in
+    the vertical plane of its own thrust. Maneuvers that stay in place or leave the plane have such stages.
     """
     shots = plan_keyframes(plan, vehicle)
     plane = maneuver_plane(plan, shots.thrust)
@@ -234,10 +234,10 @@ def _write_name(axes: Axes, keyframe: Keyframe, anchor: Array, side: str) -> Non
 
 
 def names_beside(places: Array, thrust: Array, size: Array, column: float) -> Array:
-    """Where names go in columns left and right of a picture, each on the side its thrust points away from.
+    """Return the places of names in columns left and right of a picture, each opposite to the thrust there.
 
-    All in inches from the lower left corner of a picture of `size` (2,), names up to `column` wide;
-    (k, 2) -> (k, 2).
+    All lengths are in inches from the lower left corner of a picture of `size` (2,); names are up to `column`
+    wide; (k, 2) -> (k, 2).
     """
     lateral = np.where(np.abs(thrust[:, 0]) > 0.2 * np.abs(thrust).max(), thrust[:, 0], 0.0)
     off_centre = places[:, 0] - places[:, 0].mean()
@@ -249,6 +249,6 @@ def names_beside(places: Array, thrust: Array, size: Array, column: float) -> Ar
 
 
 def names_below(places: Array, thrust: Array, size: Array, column: float) -> Array:
-    """Where names go in a row at the foot of a picture, in inches, as in `names_beside`."""
+    """Return the places of names in a row at the foot of a picture, in inches, as in `names_beside`."""
     across = spread_out(places[:, 0], column, 0.3, size[0] - 0.3)
     return np.stack([across, np.full_like(across, STAGE_ROW)], axis=1)

@@ -1,4 +1,4 @@
-"""Which of the paper's figures there are, by their numbers."""
+"""The paper's figures that can be drawn, by their numbers."""
 
 from __future__ import annotations
 

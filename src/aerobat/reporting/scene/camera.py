@@ -37,7 +37,7 @@ class Camera:
         return np.array([right, so3.cross(self.toward, right)])
 
     def project(self, points: Array) -> Array:
-        """Where world points [m] come to lie on the picture [m], (..., 3) -> (..., 2)."""
+        """Project world points [m] onto the picture [m], (..., 3) -> (..., 2)."""
         return np.asarray(points @ self.screen.T)
 
     def nearness(self, points: Array) -> Array:

@@ -72,7 +72,7 @@ def sweep_figure(sweep: Sweep) -> Figure:
 
 
 def crossings(sweep: Sweep) -> dict[str, Crossings]:
-    """Where flights crossed each gate's plane, by the names of the passages."""
+    """Return the points at which flights crossed each gate's plane, by the names of the passages."""
     found = {}
     for name, gate in sweep.passages.items():
         left, up = (np.asarray(sweep.table[f"{name}_{axis}_m"]) for axis in ("lateral", "up"))

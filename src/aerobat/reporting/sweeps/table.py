@@ -40,7 +40,7 @@ def sweep_table(sweep: Sweep) -> Table:
 
 
 def success_sentence(sweep: Sweep) -> str:
-    """How many flights went well, and what conditions they had."""
+    """Return a sentence with the share of flights that went well, its interval and the seed."""
     return f"{sweep.success} of the flights went well, at 95 % confidence; seed {sweep.seed}"
 
 

@@ -1,4 +1,4 @@
-"""What an autopilot does by itself: it follows points and attitudes, brakes, and recovers to a hover."""
+"""An autopilot, which follows points and attitudes, brakes, and recovers to a hover by itself."""
 
 from aerobat.simulation.autopilot.recovery import Recoveries, UndeterminedAttitude, recoveries
 

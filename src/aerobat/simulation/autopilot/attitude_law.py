@@ -25,7 +25,7 @@ _TINY = 1e-300  # keeps 0/0 away and changes no other quotient
 
 
 class Authority(NamedTuple):
-    """What the rotors of a hovering vehicle can do about its attitude."""
+    """The angular accelerations that the rotors of a hovering vehicle can give, and their lag."""
 
     tilt: Scalar  # [rad/s²] in roll and pitch
     yaw: Scalar  # [rad/s²]

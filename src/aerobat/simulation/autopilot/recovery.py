@@ -74,7 +74,7 @@ class Recoveries:
 
     @property
     def height_lost(self) -> Array:
-        """How far below the instant's height it comes [m], (T,)."""
+        """The height lost in the recovery from each instant [m], down to the lowest point, (T,)."""
         return self.heights - self.lowest
 
     @property

@@ -21,7 +21,10 @@ class DisturbanceParameters(NamedTuple):
 
 
 class Disturbance(NamedTuple):
-    """What an IMU feels beyond the model, body axes: most of it, as rotors' mismatch, turns with the body."""
+    """The disturbance that an IMU feels beyond the model, in body axes.
+
+    Most of a disturbance, such as the rotors' mismatch, turns with the body.
+    """
 
     force: Vector  # [m/s²] over mass
     angular_acceleration: Vector  # [rad/s²]

@@ -1,4 +1,4 @@
-"""What one flight draws of its conditions: the vehicle that really flies, its start, errors, disturbances."""
+"""Draws of a flight from its conditions: the vehicle that really flies, its start, errors, disturbances."""
 
 from __future__ import annotations
 

@@ -32,7 +32,7 @@ class ObserverInput(NamedTuple):
 
 
 class ObserverState(NamedTuple):
-    """What the observer knows."""
+    """The state of the observer."""
 
     body: Body  # for the controller
     filter: EkfState

@@ -52,7 +52,7 @@ _MOVING = 1e-3  # [m/s] a path that is slower has no direction
 
 @dataclass(frozen=True, eq=False)
 class DispersedFlights:
-    """What conditions are made for."""
+    """The flights for which conditions are made."""
 
     draws: Draws
     fleet: Fleet  # that really flies

@@ -30,8 +30,8 @@ _DRAWN_AT_ONCE = 256  # samples of a vehicle: a call of its generator takes as l
 class RandomSource:
     """Standard normals and uniform numbers of a component that steps at every so many ticks.
 
-    They are drawn by blocks of samples that begin at multiples of their size, so that any cuts of the ticks
-    into chunks, in any order, give the same bits, and only for ticks at which the component steps.
+    The numbers are drawn by blocks of samples that begin at multiples of their size, so that any cuts of the
+    ticks into chunks, in any order, give the same bits. Only ticks at which the component steps draw numbers.
     """
 
     def __init__(

@@ -90,7 +90,7 @@ class _Track:
 
     @cached_property
     def distance(self) -> Array:
-        """How far beyond the gate's plane [m], (T,)."""
+        """The distance of each row beyond the gate's plane [m], (T,)."""
         return np.asarray(self.offset @ self.planned.gate.normal)
 
     @cached_property
@@ -104,7 +104,7 @@ class _Track:
 
     @property
     def passages(self) -> list[np.intp]:
-        """Those of the crossings after which it gets far enough beyond before it comes back."""
+        """The crossings after which the vehicle gets far enough beyond the plane before it comes back."""
         back = np.append(self.crossings(-1), len(self.times))
         return [
             k
@@ -125,7 +125,7 @@ class _Track:
         return intervals[k] if off_times and off_times[k] <= PASSAGE_WINDOW else None
 
     def swept(self, crossing: np.intp, body: Ellipsoid) -> Swath:
-        """What the body sweeps of the plane in the stay in which it is crossed, leaves (1,)."""
+        """Return the swath that the body sweeps in the plane during the stay of a crossing, leaves (1,)."""
         gate = self.planned.gate
         normal, directions = components(gate.normal), plane_directions(gate)
         ellipsoid = BoundingEllipsoid(tuple(body.centre.tolist()), tuple(body.semi_axes.tolist()))

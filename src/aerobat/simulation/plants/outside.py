@@ -49,7 +49,7 @@ class OutsidePlant:
 
 @dataclass(frozen=True)
 class Actuator:
-    """What acts on the plant outside: commands, wind, and what the battery leaves of the rotors' limits."""
+    """The inputs of the plant outside: commands, wind, and the rotors' limits as the battery leaves them."""
 
     period: int = 1
     name: str = "actuator"
@@ -72,7 +72,7 @@ class Actuator:
 
 
 class OutsideRow(NamedTuple):
-    """What a tick logs, and what the plant outside is told."""
+    """The row that a tick logs, and the actuation that the plant outside is told."""
 
     log: LogRow
     actuation: Actuation

@@ -1,4 +1,4 @@
-"""What a plant of another simulator is told, and what it answers, tick by tick."""
+"""The interface to a plant of another simulator: its inputs and its answers, tick by tick."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ class PlantScene:
 
 
 class Actuation(NamedTuple):
-    """What acts on a plant from one tick to the next."""
+    """The inputs of a plant from one tick to the next."""
 
     commands: PerRotor  # [N] of the rotors, that are in effect
     wind: Vector  # [m/s] velocity of the air, world
@@ -39,11 +39,11 @@ class PlantRun(Protocol):
 
     @property
     def motion(self) -> Motion:
-        """Its state and the thrusts [N] of its rotors, as they are now."""
+        """The present state of the vehicle and the present thrusts [N] of its rotors."""
 
     @property
     def contact(self) -> Contact:
-        """What it has touched since the last look; a gate's frame comes before the ground."""
+        """The vehicle's contact since the last look; a gate's frame comes before the ground."""
 
     def advance(self, actuation: Actuation, duration: float) -> None:
         """Let some time [s] pass under what is held meanwhile."""

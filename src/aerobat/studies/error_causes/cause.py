@@ -22,7 +22,7 @@ def _read_only(changes: Mapping[str, Any]) -> Mapping[str, Any]:
 
 @declared
 class Trial:
-    """How a maneuver is planned and flown; what causes change."""
+    """The settings by which a maneuver is planned and flown; causes change them."""
 
     planner: Annotated[Planner, AS_IT_IS]
     conditions: Dispersion

@@ -1,4 +1,4 @@
-"""What causes of error come to: flights with each alone, with all, with none, and what each costs."""
+"""Results of causes of error: flights with each alone, with all, with none, and the cost of each."""
 
 from __future__ import annotations
 
@@ -24,10 +24,10 @@ Confidence = Annotated[float, Field(gt=0.0, lt=1.0)]
 @by_value
 @dataclass(frozen=True)
 class Cost:
-    """How much larger an error is with a cause than without: the median over pairs of flights.
+    """The growth of an error by a cause: the median over pairs of flights, with the cause and without.
 
     The interval holds the median of all such differences at the confidence, whatever their distribution: its
-    ends are order statistics, by the sign test. Of too few pairs for that it is infinite.
+    ends are order statistics, by the sign test. With too few pairs for the test the interval is infinite.
     """
 
     median: float

@@ -68,12 +68,12 @@ class Field:
 
     @property
     def place(self) -> str:
-        """Its whole name."""
+        """The whole name of the field."""
         return _joined(self.keys)
 
     @property
     def unit(self) -> str:
-        """Its unit, empty where it has none."""
+        """The unit of the field, empty where it has none."""
         if self.keys == (ANGLE,):
             return "°"
         of_vehicle = self.keys[0] == VEHICLE

@@ -174,7 +174,7 @@ class _Search:
 
     @property
     def requirement(self) -> Requirement:
-        """What came of it."""
+        """The result of the search."""
         assert self.refused is not None, "a search ends beside a refusal"
         value, found = (None, None) if self.planned is None else self.planned
         at, refusal = self.refused

@@ -1,4 +1,4 @@
-"""What a problem needs so much of at least: how it is set to a value, and where to look for the least."""
+"""Quantities of which a problem needs a minimum: how each is set to a value, and where to seek the least."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Where a log's clock and axes lie against those of its plan."""
+"""The alignment of a log's clock and axes with those of its plan."""
 
 from __future__ import annotations
 

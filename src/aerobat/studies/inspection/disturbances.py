@@ -1,11 +1,13 @@
 """Accelerations by which a logged vehicle left what its controller would have had it do, each of one cause.
 
-With the error e = p − p_ref and the position loop's own answer to it, F(e) = −(k_p e + k_v e' + k_i ∫e),
+The error is e = p − p_ref; the position loop's own answer to the error is F(e) = −(k_p e + k_v e' + k_i ∫e).
+Thus
 
-    e'' = F(e) + [F(ê) − F(e)] + [a_thrust − a_ref − F(ê)] + [a − a_thrust]
+    e'' = F(e) + [F(ê) − F(e)] + [a_thrust − a_ref − F(ê)] + [a − a_thrust].
 
-where ê is the error as the observer had it, and a_thrust what the nominal vehicle does under the thrusts
-that were logged: the observer's part, what was not delivered, and what the vehicle's model leaves out.
+Here ê is the error as the observer had it, and a_thrust is the acceleration of the nominal vehicle under the
+logged thrusts. The brackets are the observer's part, the part that was not delivered, and the part that the
+vehicle's model leaves out.
 """
 
 from __future__ import annotations
@@ -58,7 +60,7 @@ class PositionLoop:
 
 
 class Kind(IntEnum):
-    """How what was not delivered between two rows came about."""
+    """The origin of the acceleration that was not delivered between two rows."""
 
     UNSATURATED = 0
     ASKED_BY_PLAN = 1  # the set-points themselves ask rotors for more than they can

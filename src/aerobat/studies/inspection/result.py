@@ -58,7 +58,7 @@ class ErrorShare:
 @by_value
 @dataclass(frozen=True, eq=False, repr=False)
 class Inspection:
-    """What caused a flight's position error."""
+    """The causes of a flight's position error."""
 
     times: Array  # [s] of the log, (T,)
     error: Array  # [m] position less set-point, world, (T, 3)

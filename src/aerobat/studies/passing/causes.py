@@ -1,4 +1,4 @@
-"""Which cause stands in the way of passing: each is switched off alone, for the same flights."""
+"""The cause that stands in the way of passing: each is switched off alone, for the same flights."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ class Freed:
     share: Share
 
     def sentence(self, probability: float) -> str:
-        """What stands in the way, in words."""
+        """Return a sentence that says whether this cause alone stands in the way of passing."""
         without = f"without it {self.share} pass"
         if self.share.fraction >= probability:
             return f"{self.cause} stands in the way: {without}"

@@ -1,4 +1,4 @@
-"""What tightening a plan comes to: its rounds, its proof and its price."""
+"""The result of tightening a plan: its rounds, its proof and its price."""
 
 from __future__ import annotations
 

@@ -45,7 +45,7 @@ _PASSAGE = (  # numbers of a passage, each with the name of its column after the
 
 @dataclass(frozen=True)
 class SweepTask:
-    """What is flown, and how."""
+    """The plan that a sweep flies, and the settings of its flights."""
 
     plan: Plan
     vehicle: Vehicle  # that plan and controller know

@@ -81,7 +81,7 @@ class KeptChunks:
 
 
 def finished_flights(folder: Path) -> int:
-    """How many flights a folder keeps."""
+    """Return the number of flights that a folder keeps."""
     spans = (path.stem.split("-")[1:] for path in folder.glob("flights-*-*.npz"))
     return sum(int(end) - int(begin) for begin, end in spans)
 

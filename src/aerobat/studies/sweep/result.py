@@ -1,4 +1,4 @@
-"""What a sweep comes to: a table with a row a flight, its shares and quantiles, and errors over time."""
+"""The result of a sweep: a table with a row a flight, its shares and quantiles, and errors over time."""
 
 from __future__ import annotations
 

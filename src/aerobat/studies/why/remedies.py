@@ -52,7 +52,7 @@ class Why:
 
     @property
     def advice(self) -> str:
-        """What helps, in a sentence without its full stop."""
+        """The changes that help, in a sentence without its full stop."""
         if self.remedies:
             return f"'{self.problem}' is planned {', or '.join(map(str, self.remedies))}"
         if not self.tried:
@@ -74,9 +74,10 @@ def why(
     """Find out why a problem has no plan, and with which changes it has one.
 
     Changes are tried one at a time: without each limit, with stronger rotors, with stages at any time, and so
-    on. Where none is enough alone, the fewest of all of them together are sought. Each is planned by
-    `planner`, by the planner that suits the problem, and by all other registered ones, until one has a plan
-    that is certified and flies, or 10 s of the processor are over. All of that takes up to minutes.
+    on. Where none is enough alone, the fewest of all of them together are sought. Each change is planned by
+    `planner`, by the planner that suits the problem, and by all other registered ones. The planners stop once
+    one has a plan that is certified and flies, or 10 s of the processor are over. The whole search takes
+    up to minutes.
 
     Args:
         problem: What is to be planned, or its name.

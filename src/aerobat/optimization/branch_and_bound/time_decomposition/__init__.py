@@ -2,7 +2,7 @@
 
 `TimeDecomposition` and `cut_stage` are all that `solver` uses; the docstring there says who reaches them.
 DERIVATION.md of the folder above says why the answer is exact. `benchmarks/growth_with_stages.py` measures
-three gates, and docs/benchmarks.md has what each threshold is worth on them.
+three gates, and docs/lab/benchmarks.md has what each threshold is worth on them.
 """
 
 from aerobat.optimization.branch_and_bound.time_decomposition.search import TimeDecomposition, cut_stage

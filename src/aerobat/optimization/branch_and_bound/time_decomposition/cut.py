@@ -110,7 +110,7 @@ class Cut:
         return self._triangle @ costate
 
     def costate(self, price: Array) -> Array:
-        """What the state is worth at a price of z: the inverse of `price`."""
+        """Return the costate, the worth of the state, at a price of z: the inverse of `price`."""
         return np.asarray(np.linalg.lstsq(self._triangle, price, rcond=None)[0])
 
     def optimal_price(self, x: Array, multipliers: Array) -> Array:

@@ -30,7 +30,7 @@ class HalfMinimum:
 
 @dataclass(frozen=True, eq=False)
 class HalfAnswer:
-    """What is known of a half at a price: its bound and, where one was found, the best solution."""
+    """The answer for a half at a price: its bound and, where a solution was found, the best one."""
 
     bound: float  # no solution costs less
     nodes: int

@@ -15,7 +15,7 @@ STIFFNESS = 0.03  # of the mean compliance, added in all directions: other solut
 
 
 class CuttingPlanes:
-    """What the halves' solutions at some prices say of their minima at others: a level method [LNN].
+    """Cutting planes on the halves' minima at any price, from solutions at some prices: a level method [LNN].
 
     A solution of the half before the cut that costs c at the price q, with the state z, costs c + (q′ − q)ᵀz
     at q′, so that the minimum there is no higher; behind the cut the state counts negative. Distances between

@@ -1,4 +1,4 @@
-"""How a motion begins and ends: in given states, or as a lap that ends in the state in which it begins."""
+"""Boundaries of a motion: ends in given states, or a lap that ends in the state in which it begins."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ SECONDS = 0.1  # [s] that scales the slope of the thrust, beside its own scale
 
 
 class Boundary(Protocol):
-    """What holds where a motion begins and ends."""
+    """The constraints that hold where a motion begins and ends."""
 
     @property
     def is_closed(self) -> bool:
@@ -93,12 +93,12 @@ class FixedEnds:
 
     @cached_property
     def start(self) -> End:
-        """Where the motion begins."""
+        """The end at which the motion begins."""
         return End.of(self.elements.problem.start, self.elements)
 
     @cached_property
     def goal(self) -> End:
-        """Where it ends."""
+        """The end at which the motion ends."""
         return End.of(self.elements.problem.goal, self.elements)
 
     def fix(self, motion: CollocatedMotion, continuous: bool) -> None:
@@ -128,7 +128,7 @@ class FixedEnds:
         return min(floor, END_SHARE * at_ends)
 
     def corrected(self, trajectory: Trajectory) -> FixedEnds:
-        """Itself."""
+        """Return the boundary itself: given ends need no correction."""
         return self
 
 

@@ -117,7 +117,7 @@ class Bounds:
 
 @dataclass(frozen=True, eq=False)
 class Backoff:
-    """How much more than its bounds each quantity keeps at the nodes of each interval."""
+    """The tightening of each quantity's bounds at the nodes of each interval."""
 
     low: Array  # above the lower ends, (K, M)
     high: Array  # below the upper ends, (K, M)

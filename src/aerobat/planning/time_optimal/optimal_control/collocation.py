@@ -1,14 +1,15 @@
 """Two-point Hermite collocation: a motion of the rigid body as unknowns, equations, and a trajectory.
 
-Time is cut into phases, these into intervals, the input linear on each. From both ends of an interval the
-equations of motion give x', x'', x''' exactly; the quintic through them, integrated, must lead from one state
-to the next,
+Time is cut into phases and phases into intervals; the input is linear on each interval. At both ends of an
+interval the equations of motion give x', x'', x''' exactly. The integral of the quintic through these must
+lead from one state to the next, a rule of order six:
 
-    x₁ = x₀ + h/2 (x₀' + x₁') + h²/10 (x₀'' − x₁'') + h³/120 (x₀''' + x₁''')        of order six,
+    x₁ = x₀ + h/2 (x₀' + x₁') + h²/10 (x₀'' − x₁'') + h³/120 (x₀''' + x₁''').
 
-and so, twice, for the position, whose acceleration is such a quintic. A solution therefore *is* a piecewise
-polynomial of degree seven, with the rigid body's thrust direction, body rates, moments and collective thrust
-at both ends of every interval: nothing is interpolated between the program and what is flown.
+For the position, whose acceleration is such a quintic, the integral is taken twice. A solution therefore
+*is* a piecewise polynomial of degree seven, with the rigid body's thrust direction, body rates, moments and
+collective thrust at both ends of every interval: nothing is interpolated between the program and what is
+flown.
 
 All this is a sum of what either side of an interval contributes, of its own state and of the input.
 """
@@ -202,7 +203,7 @@ class IntervalSide:
         self.rates = body.derivatives(self.state, self.input, self.slope)
 
     def defect(self) -> Any:
-        """Its part of how far the quintics miss the next state, (12,)."""
+        """Return the side's part of the defect by which the quintics miss the next state, (12,)."""
         h, ca = self.duration, import_casadi()
         signed = self.state if self.last else -self.state
         missed = signed - h * self._combined(INTEGRAL)
@@ -217,7 +218,7 @@ class IntervalSide:
         return [self.state[POSITION], self.state[VELOCITY], *(rate[VELOCITY] for rate in self.rates)]
 
     def between(self, s: float) -> list[Any]:
-        """Its part of position to snap at a fraction s of the interval, (3,) each."""
+        """Return the side's part of position to snap at a fraction s of the interval, (3,) each."""
         h, powers = self.duration, np.vander([s], 6, increasing=True)[0]
         parts = [
             h**2 * self._combined(DOUBLE_INTEGRAL * powers * s**2)[VELOCITY],

@@ -39,7 +39,7 @@ RATE_SCALE = 10.0  # [rad/s] of body rates that have no bound
 
 @dataclass(frozen=True, eq=False)
 class Elements:
-    """What a vehicle's motion through a problem, in a plane if there is one, is made of."""
+    """The functions of a vehicle's motion through a problem, in a plane if there is one."""
 
     problem: Problem
     vehicle: Vehicle
@@ -52,7 +52,7 @@ class Elements:
 
     @cached_property
     def bounds(self) -> Bounds:
-        """What holds all along."""
+        """The bounds that hold all along the motion."""
         return Bounds.of(self.problem, self.vehicle)
 
     @property
@@ -88,10 +88,10 @@ class Elements:
 
     @cached_property
     def sides(self) -> tuple[ElementFunction, ElementFunction]:
-        """What either side of an interval contributes to the rows of both, and its own rows.
+        """The contributions of either side of an interval to the rows of both, and the side's own rows.
 
-        Of both: defects, path bounds between nodes. Its own: rotors, path bounds that may jump at nodes, and
-        squared body rates between nodes, of the first side alone.
+        Rows of both: defects, path bounds between nodes. A side's own: rotors, path bounds that may jump at
+        nodes, and squared body rates between nodes, of the first side alone.
         """
         first, last = (self._side(last) for last in (0, 1))
         return first, last

@@ -1,13 +1,13 @@
 """The rigid body that never spins about its thrust axis, in CasADi's symbols.
 
-Its state is x = (p, v, q, ω_x, ω_y), its input u = (n, ω'_x, ω'_y): the norm of the specific thrust f [m/s²]
-and angular accelerations about the body's x and y [rad/s²]. With w the velocity relative to the air and the
-drag d + δ along b1, d − δ along b2 and d_z along b3,
+The state is x = (p, v, q, ω_x, ω_y), the input u = (n, ω'_x, ω'_y): the norm of the specific thrust f [m/s²]
+and angular accelerations about the body's x and y [rad/s²]. The velocity relative to the air is w, and the
+drag is d + δ along b1, d − δ along b2 and d_z along b3. The equations of motion are
 
-    p' = v    v' = n b3 − g e3 − (d w + δ (b1·w b1 − b2·w b2))/m    q' = ½ q ⊗ (0, ω)
+    p' = v    v' = n b3 − g e3 − (d w + δ (b1·w b1 − b2·w b2))/m    q' = ½ q ⊗ (0, ω).
 
-and the rotors bear T = m n + (d_z − d) b3·w and the moments that ω_z = 0 needs, M = J ω' + ω × J ω. Flatness
-and the controller carry the attitude in the same way, without spin, and count drag in the same way.
+The rotors bear T = m n + (d_z − d) b3·w and the moments that ω_z = 0 needs, M = J ω' + ω × J ω. Flatness and
+the controller carry the attitude in the same way, without spin, and count drag in the same way.
 """
 
 from __future__ import annotations

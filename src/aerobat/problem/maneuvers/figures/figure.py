@@ -32,7 +32,7 @@ LEVEL = 1e-3  # [-] a direction of passage with less across the vertical has no 
 
 @dataclass(frozen=True, eq=False)
 class Place:
-    """Where a figure stands, with coordinates forward, left and up."""
+    """The place where a figure stands, with coordinates forward, left and up."""
 
     position: Array  # [m] world, (3,)
     axes: Array  # forward, left and up as rows, unit vectors, world, (3, 3)
@@ -109,7 +109,10 @@ class Figure(Maneuver):
         return super().in_words(gates) + (" mirrored" if self.mirrored else "")
 
     def place(self, gates: Sequence[Gate], max_specific_thrust: float) -> Place:
-        """Where it stands. Raises SpecError for a gate that is not there, or passed straight up or down."""
+        """Return the place where the figure stands.
+
+        Raises SpecError for a gate that is not there, or passed straight up or down.
+        """
         position, forward = self.position, np.array([np.cos(self.heading), np.sin(self.heading), 0.0])
         if self.gate is not None:
             gate = named_gate(gates, self.gate)

@@ -1,0 +1,68 @@
+"""Docstrings, help texts and headings begin with a verb or a noun, and no sentence is long."""
+
+import ast
+import re
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from places import ROOT
+
+SOURCES = sorted((ROOT / "src" / "aerobat").rglob("*.py"))
+PAGES = sorted([ROOT / "README.md", ROOT / "CONTRIBUTING.md", *(ROOT / "docs").glob("*.md")])
+BEGINS_BADLY = re.compile(r"(?:What|How|Whether|Which|Where|Its?|Itself|They|Them|Those|That|This|These)\b")
+SENTENCE_END = re.compile(r"(?<=[.!?:;])\s+")
+SECTIONS = re.compile(r"\n\s*(?:Args|Returns|Raises|Yields|Parameters)\b")
+BLOCK = re.compile(r"```.*?```", re.DOTALL)
+MOST_WORDS = 35
+README_LINES = 120
+
+
+def docstrings(source: str) -> Iterator[tuple[str, str]]:
+    """Names and docstrings of a module, and of whatever public it holds; an option's help is one, too."""
+    tree = ast.parse(source)
+    yield "module", ast.get_docstring(tree) or ""
+    for node in ast.walk(tree):
+        if isinstance(node, ast.ClassDef | ast.FunctionDef) and not node.name.startswith("_"):
+            yield node.name, ast.get_docstring(node) or ""
+        if isinstance(node, ast.ClassDef):
+            for before, after in zip(node.body, node.body[1:], strict=False):
+                is_option = isinstance(before, ast.AnnAssign) and isinstance(after, ast.Expr)
+                if is_option and isinstance(after.value, ast.Constant):
+                    yield ast.unparse(before.target), str(after.value.value)
+
+
+def faults(name: str, text: str) -> Iterator[str]:
+    """Yield what is wrong with a text."""
+    if BEGINS_BADLY.match(text.strip()):
+        yield f"{name} begins with '{text.split()[0]}'"
+    prose = " ".join(SECTIONS.split(text, maxsplit=1)[0].split())
+    for sentence in SENTENCE_END.split(prose):
+        if len(sentence.split()) > MOST_WORDS:
+            yield f"{name} has a sentence of {len(sentence.split())} words: {sentence[:60]}"
+
+
+@pytest.mark.parametrize("path", SOURCES, ids=lambda path: str(path.relative_to(ROOT / "src" / "aerobat")))
+def test_public_docstrings_and_help_texts_stand_alone(path: Path) -> None:
+    source = path.read_text(encoding="utf-8")
+    assert not [fault for name, text in docstrings(source) for fault in faults(name, text)]
+
+
+@pytest.mark.parametrize("path", PAGES, ids=lambda path: path.name)
+def test_headings_stand_alone(path: Path) -> None:
+    headings = re.findall(r"^#+ (.*)$", BLOCK.sub("", path.read_text(encoding="utf-8")), re.MULTILINE)
+    assert not [heading for heading in headings if BEGINS_BADLY.match(heading)]
+
+
+def test_the_readme_is_short() -> None:
+    text = (ROOT / "README.md").read_text(encoding="utf-8")
+    assert len(text.splitlines()) <= README_LINES
+    paragraphs = BLOCK.sub("", text).split("\n\n")
+    assert not [fault for part in paragraphs if "|" not in part for fault in faults("README", part)]
+
+
+def test_a_fault_is_found() -> None:
+    assert list(faults("f", "What it is.")) == ["f begins with 'What'"]
+    assert len(list(faults("f", " ".join(["word"] * 36)))) == 1
+    assert not list(faults("f", "Return a whole. " + " ".join(["word"] * 34)))
