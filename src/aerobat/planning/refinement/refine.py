@@ -165,7 +165,10 @@ class Refinement:
             guess: A path through the stages, within limits or not.
             segments: Of the path that is sought, with a knot at every stage.
         """
-        return self.finished(self.rough(guess, segments))
+        rough = self.rough(guess, segments)
+        if self.is_promising(rough):
+            return self.finished(rough)
+        return judge(self.solution(rough, "unknown"), self.problem, self.vehicle, self.recorder, self.reserve)
 
     def rough(self, guess: WarmStart, segments: int, known: float = np.inf) -> RefinedPath:
         """A path that is as fast as it gets, and may exceed limits a little between places.
