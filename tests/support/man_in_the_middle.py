@@ -466,6 +466,14 @@ def flown_with(mischief: list[Mischief], plan: Path, tcp: bool, first: bool = Fa
     return flight
 
 
+def is_an_error(out: str) -> bool:
+    """True of the JSON of an error."""
+    try:
+        return list(json.loads(out)) == ["error"]
+    except ValueError:
+        return False
+
+
 def wrongs(flight: Flight, stepped: SteppedFlight, clients: list[Client]) -> Iterator[str]:
     """What must not be."""
     if flight.raised:
@@ -475,8 +483,8 @@ def wrongs(flight: Flight, stepped: SteppedFlight, clients: list[Client]) -> Ite
         yield f"{stepped.middle.not_finite} set-points that are not finite"
     vehicle, is_flying = stepped.vehicle, not stepped.vehicle.landed
     if flight.code == ExitCode.BAD_INPUT:
-        if flight.out or not flight.said.strip():
-            yield "output where nothing was flown, or no sentence"
+        if not (flight.said.strip() and is_an_error(flight.out)):
+            yield "another output than an error where nothing was flown, or no sentence"
         if is_flying or (vehicle.armed and clients and clients[0].stage is Stage.FLYING):
             yield "refused in flight"
         return
