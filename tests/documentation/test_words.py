@@ -11,6 +11,8 @@ from places import ROOT
 
 SOURCES = sorted((ROOT / "src" / "aerobat").rglob("*.py"))
 PAGES = sorted([ROOT / "README.md", ROOT / "CONTRIBUTING.md", *(ROOT / "docs").glob("*.md")])
+PROSE = sorted({*PAGES, ROOT / "CHANGELOG.md", *(ROOT / "docs" / "how-to").glob("*.md")})
+PARAGRAPH = re.compile(r"\n\s*\n|\n(?=\s*[-*|\d])")
 BEGINS_BADLY = re.compile(r"(?:What|How|Whether|Which|Where|Its?|Itself|They|Them|Those|That|This|These)\b")
 SENTENCE_END = re.compile(r"(?<=[.!?:;])\s+")
 SECTIONS = re.compile(r"\n\s*(?:Args|Returns|Raises|Yields|Parameters)\b")
@@ -55,11 +57,16 @@ def test_headings_stand_alone(path: Path) -> None:
     assert not [heading for heading in headings if BEGINS_BADLY.match(heading)]
 
 
+@pytest.mark.parametrize("path", PROSE, ids=lambda path: path.name)
+def test_sentences_of_pages_are_short(path: Path) -> None:
+    text = BLOCK.sub("", path.read_text(encoding="utf-8"))
+    parts = [part.strip() for part in PARAGRAPH.split(text)]
+    told = [part for part in parts if not part.startswith(("|", "#", "$$"))]
+    assert not [fault for part in told for fault in faults(path.name, part) if "sentence" in fault]
+
+
 def test_the_readme_is_short() -> None:
-    text = (ROOT / "README.md").read_text(encoding="utf-8")
-    assert len(text.splitlines()) <= README_LINES
-    paragraphs = BLOCK.sub("", text).split("\n\n")
-    assert not [fault for part in paragraphs if "|" not in part for fault in faults("README", part)]
+    assert len((ROOT / "README.md").read_text(encoding="utf-8").splitlines()) <= README_LINES
 
 
 def test_a_fault_is_found() -> None:
