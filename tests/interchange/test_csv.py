@@ -42,6 +42,18 @@ def test_rows_come_back_exactly_and_so_does_the_duration(seed, order, dt, tmp_pa
 
 
 @examples(20)
+@given(seed=seeds, rate=st.floats(10.0, 60.0))
+def test_a_polynomial_of_degree_nine_comes_back_between_rows_too(seed, rate, tmp_path_factory):
+    trajectory = Trajectory([1.0], np.random.default_rng(seed).normal(size=(1, 10, 3)))
+    path = tmp_path_factory.mktemp("csv") / "plan.csv"
+    write_csv(trajectory, path, rate)
+    back = read_csv(path, rate)
+    times = np.linspace(0.0, min(back.duration, 1.0), 777)
+    for k, tolerance in enumerate((1e-11, 1e-9, 1e-7, 1e-5, 1e-3)):
+        assert np.abs(back.evaluate(times, k) - trajectory.evaluate(times, k)).max() < tolerance
+
+
+@examples(20)
 @given(seed=seeds, rate=st.floats(20.0, 400.0))
 def test_between_rows_the_error_is_that_of_hermite_interpolation(seed, rate, tmp_path_factory):
     # a polynomial of degree 9 on one segment: |error| ≤ max|p⁽⁸⁾| h⁸ / (8! 2⁸)

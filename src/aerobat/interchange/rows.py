@@ -32,6 +32,7 @@ PATH = ("position", "velocity", "acceleration", "jerk")
 SYNONYMS = {"time": "t", "time_s": "t", "px": "x", "py": "y", "pz": "z"}
 MAX_ROWS = 2_000_000  # five hours at 100 Hz, half an hour at 1 kHz
 MAX_COLUMNS = 1000
+MEETING = len(PATH) + 1  # the derivative that is continuous, and the number of those that meet at rows
 SHORT = 0.2  # of the usual step: a last one that is shorter has derivatives of rounding
 DENSE = 6e-3  # [s] from row to row: half of 100 Hz's, and a little more
 REPEATED = 1e-7  # [m]: a row that is met so nearly adds nothing to a path
@@ -91,15 +92,12 @@ class PathRows:
         if len(steps) > 1 and steps[-1] < SHORT * np.median(steps):  # what a grid leaves over of a duration
             knots, steps = np.delete(knots, -2, axis=0), np.append(steps[:-2], steps[-2:].sum())
         with np.errstate(over="ignore", invalid="ignore"):
-            if len(steps) < 2:
-                scaled = steps[:, None, None] ** np.arange(len(PATH))[:, None]
-                return Trajectory(steps, hermite(scaled * knots[:-1], scaled * knots[1:]))
-            snaps = np.full((len(knots), 1, 3), np.nan)  # free, but at the ends
-            snaps[0, 0] = _snap(knots[:3], np.array([0.0, *np.cumsum(steps[:2])]))
-            snaps[-1, 0] = _snap(knots[:-4:-1], -np.array([0.0, *np.cumsum(steps[:-3:-1])]))
-            if not np.isfinite(snaps[[0, -1]]).all():
+            if len(steps) > 1:
+                knots = np.concatenate([knots, _snaps(knots, steps)[:, None]], axis=1)
+            if not np.isfinite(knots).all():
                 raise SpecError("the rows hold numbers that are too large; give SI units")
-            return minimum_effort(np.concatenate([knots, snaps], axis=1), steps)
+            scaled = steps[:, None, None] ** np.arange(knots.shape[1])[:, None]
+            return Trajectory(steps, hermite(scaled * knots[:-1], scaled * knots[1:]))
 
     def _heading(self, path: Trajectory) -> float:
         """The turn about the thrust [rad] in the first attitude, drag left out."""
@@ -109,6 +107,40 @@ class PathRows:
         upright = so3.smallest_rotation(so3.UP, thrust / np.linalg.norm(thrust))
         turn = so3.multiply(so3.conjugate(upright), self.attitude)
         return float(2.0 * np.arctan2(turn[3], turn[0]))
+
+
+def _snaps(knots: Array, steps: Array) -> Array:
+    """Return the snaps at rows (rows, 4, 3) with which the fifth derivative is continuous, (rows, 3).
+
+    The snaps at both ends are those of the polynomials through the three rows there.
+    """
+    from scipy.linalg import solve_banded
+
+    unit = np.eye(2 * MEETING)
+    powers = hermite(unit[:MEETING], unit[MEETING:])[
+        MEETING:
+    ]  # from the fifth power on, by derivatives at ends
+    at_left = math.factorial(MEETING) * powers[0]
+    at_right = np.array([math.perm(MEETING + k, MEETING) for k in range(MEETING)]) @ powers
+    scaled = steps[:, None, None] ** np.arange(len(PATH))[:, None]
+    ends = np.concatenate([scaled * knots[:-1], scaled * knots[1:]], axis=1)
+    known = [*range(len(PATH)), *range(MEETING, MEETING + len(PATH))]
+    left, right = (
+        np.tensordot(ends, weights[known], (1, 0)) / steps[:, None] ** MEETING
+        for weights in (at_left, at_right)
+    )
+    system, target = np.zeros((3, len(knots))), np.zeros((len(knots), 3))
+    system[1, [0, -1]] = 1.0
+    target[0] = _snap(knots[:3], np.array([0.0, *np.cumsum(steps[:2])]))
+    target[-1] = _snap(knots[:-4:-1], -np.array([0.0, *np.cumsum(steps[:-3:-1])]))
+    before, after = 1.0 / steps[:-1], 1.0 / steps[1:]
+    system[2, :-2] = at_right[MEETING - 1] * before
+    system[1, 1:-1] = at_right[-1] * before - at_left[MEETING - 1] * after
+    system[0, 2:] = -at_left[-1] * after
+    target[1:-1] = left[1:] - right[:-1]
+    if not (np.isfinite(system).all() and np.isfinite(target).all()):
+        raise SpecError("the rows hold numbers that are too large; give SI units")
+    return np.asarray(solve_banded((1, 1), system, target))
 
 
 def _snap(knots: Array, times: Array) -> Array:
