@@ -24,6 +24,14 @@ def random_trajectory(seed, order=4, dt=0.1, intervals=5):
     return Trajectory.from_inputs(initial, 50 * rng.normal(size=(intervals, 3)), dt)
 
 
+def read_back(seed, rate, tmp_path_factory):
+    """A random polynomial of degree 9 on one segment, and the path that its file is read back as."""
+    trajectory = Trajectory([1.0], np.random.default_rng(seed).normal(size=(1, 10, 3)))
+    path = tmp_path_factory.mktemp("csv") / "plan.csv"
+    write_csv(trajectory, path, rate)
+    return trajectory, read_csv(path, rate)
+
+
 @examples(30)
 @given(seed=seeds, order=st.integers(3, 5), dt=st.floats(0.02, 0.3))
 def test_rows_come_back_exactly_and_so_does_the_duration(seed, order, dt, tmp_path_factory):
@@ -44,10 +52,7 @@ def test_rows_come_back_exactly_and_so_does_the_duration(seed, order, dt, tmp_pa
 @examples(20)
 @given(seed=seeds, rate=st.floats(10.0, 60.0))
 def test_a_polynomial_of_degree_nine_comes_back_between_rows_too(seed, rate, tmp_path_factory):
-    trajectory = Trajectory([1.0], np.random.default_rng(seed).normal(size=(1, 10, 3)))
-    path = tmp_path_factory.mktemp("csv") / "plan.csv"
-    write_csv(trajectory, path, rate)
-    back = read_csv(path, rate)
+    trajectory, back = read_back(seed, rate, tmp_path_factory)
     times = np.linspace(0.0, min(back.duration, 1.0), 777)
     for k, tolerance in enumerate((1e-11, 1e-9, 1e-7, 1e-5, 1e-3)):
         assert np.abs(back.evaluate(times, k) - trajectory.evaluate(times, k)).max() < tolerance
@@ -57,10 +62,7 @@ def test_a_polynomial_of_degree_nine_comes_back_between_rows_too(seed, rate, tmp
 @given(seed=seeds, rate=st.floats(20.0, 400.0))
 def test_between_rows_the_error_is_that_of_hermite_interpolation(seed, rate, tmp_path_factory):
     # a polynomial of degree 9 on one segment: |error| ≤ max|p⁽⁸⁾| h⁸ / (8! 2⁸)
-    trajectory = Trajectory([1.0], np.random.default_rng(seed).normal(size=(1, 10, 3)))
-    path = tmp_path_factory.mktemp("csv") / "plan.csv"
-    write_csv(trajectory, path, rate)
-    back = read_csv(path, rate)
+    trajectory, back = read_back(seed, rate, tmp_path_factory)
     times = np.linspace(0.0, min(back.duration, 1.0), 1500)
     error = np.abs(back.evaluate(times) - trajectory.evaluate(times)).max()
     bound = np.abs(trajectory.on_segments(np.linspace(0, 1, 50), 8)).max() / rate**8 / (40320 * 256)

@@ -117,9 +117,8 @@ def _snaps(knots: Array, steps: Array) -> Array:
     from scipy.linalg import solve_banded
 
     unit = np.eye(2 * MEETING)
-    powers = hermite(unit[:MEETING], unit[MEETING:])[
-        MEETING:
-    ]  # from the fifth power on, by derivatives at ends
+    coefficients = hermite(unit[:MEETING], unit[MEETING:])  # by the derivatives at both ends
+    powers = coefficients[MEETING:]
     at_left = math.factorial(MEETING) * powers[0]
     at_right = np.array([math.perm(MEETING + k, MEETING) for k in range(MEETING)]) @ powers
     scaled = steps[:, None, None] ** np.arange(len(PATH))[:, None]
@@ -138,20 +137,17 @@ def _snaps(knots: Array, steps: Array) -> Array:
     system[1, 1:-1] = at_right[-1] * before - at_left[MEETING - 1] * after
     system[0, 2:] = -at_left[-1] * after
     target[1:-1] = left[1:] - right[:-1]
-    if not (np.isfinite(system).all() and np.isfinite(target).all()):
-        raise SpecError("the rows hold numbers that are too large; give SI units")
-    return np.asarray(solve_banded((1, 1), system, target))
+    return np.asarray(solve_banded((1, 1), system, target, check_finite=False))
 
 
 def _snap(knots: Array, times: Array) -> Array:
     """The snap at the first of three rows (3, 4, 3) of the polynomial through all of them, (3,)."""
-    size = np.abs(times).max()
-    powers, orders = np.arange(knots.shape[0] * knots.shape[1]), np.arange(len(PATH))
+    size, orders = np.abs(times).max(), np.arange(len(PATH))
     table = np.array(
         [
-            [math.perm(p, k) * (t / size) ** max(p - k, 0) for p in powers.tolist()]
+            [math.perm(p, k) * (t / size) ** max(p - k, 0) for p in range(knots[..., 0].size)]
             for t in times.tolist()
-            for k in orders.tolist()
+            for k in range(len(PATH))
         ]
     )
     values = (knots * size ** orders[:, None]).reshape(-1, 3)

@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from math import degrees, inf, isnan
+from math import inf, isnan
 from typing import TYPE_CHECKING
 
 from rich.table import Table
@@ -15,7 +15,7 @@ from rich.text import Text
 from aerobat.certification import Certificate, Side
 from aerobat.evaluation import Score
 from aerobat.planning import Assessment, Flyability, Plan
-from aerobat.reporting.tables import Fact, facts_table, lap_facts, tube_facts
+from aerobat.reporting.tables import Fact, facts_table, lap_facts, reached, tube_facts
 
 if TYPE_CHECKING:  # which takes long to import
     from aerobat.studies.sweep import Sweep
@@ -62,12 +62,12 @@ def _facts(plan: Plan, score: Score | None, trials: Sweep | None) -> Iterable[Fa
     if plan.tube is not None:
         yield from tube_facts(plan.tube, plan.duration)
     if found is not None:
-        yield "space", _space(found)
+        yield "space", reached(found, decimals=0)
     if score is not None:
         yield from _flight(score)
         yield from lap_facts(score)
     if trials is not None:
-        yield "real flights", success_of(trials)
+        yield "real flights", _success_of(trials)
     for warning in () if found is None else found.warnings:
         yield "warning", Text(warning, style="red")
     if plan.wants_second_opinion:
@@ -106,13 +106,6 @@ def _margin(found: Flyability) -> Iterable[Fact]:
     yield "margin", f"{100.0 * kept:.2g} % of a rotor's thrust{little}; {moved}"
 
 
-def _space(found: Assessment) -> str:
-    """Return the room that the path takes, and its fastest."""
-    angles = ((found.max_tilt, "° of tilt"), (found.max_body_rate, "°/s"))
-    turned = [f"{degrees(angle):.0f}{unit}" for angle, unit in angles if angle is not None]
-    return ", ".join([str(found.room), f"{found.max_speed:.0f} m/s", *turned])
-
-
 def _flight(score: Score) -> Iterable[Fact]:
     """Yield what came of the flight."""
     if not score.outcome.is_success:
@@ -143,7 +136,7 @@ def _length(metres: float) -> str:
     return f"{max(metres, SMALL) / size:.2g} {unit}"
 
 
-def success_of(trials: Sweep) -> str:
+def _success_of(trials: Sweep) -> str:
     """Return how many flights succeed, and what that says of all."""
     low, high = trials.success.interval
     return (

@@ -205,11 +205,16 @@ def _assessment_facts(plan: Plan, found: Assessment) -> Iterable[Fact]:
     """Rows about what is possible and about room and rates; warnings in red."""
     if not found.poor:
         yield "possible", found.sentence + (f"; {_suspicion(plan)}" if plan.wants_second_opinion else "")
-    angles = ((found.max_tilt, "° of tilt"), (found.max_body_rate, "°/s"))
-    turned = [f"{degrees(angle):.0f}{unit}" for angle, unit in angles if angle is not None]
-    yield "reaches", ", ".join([str(found.room), f"{found.max_speed:.1f} m/s", *turned])
+    yield "reaches", reached(found, decimals=1)
     for warning in found.warnings:
         yield "warning", Text(warning, style="red")
+
+
+def reached(found: Assessment, decimals: int) -> str:
+    """Return the room that a path takes, its greatest speed with so many decimals, its tilt and its rate."""
+    angles = ((found.max_tilt, "° of tilt"), (found.max_body_rate, "°/s"))
+    turned = [f"{degrees(angle):.0f}{unit}" for angle, unit in angles if angle is not None]
+    return ", ".join([str(found.room), f"{found.max_speed:.{decimals}f} m/s", *turned])
 
 
 def _suspicion(plan: Plan) -> str:

@@ -21,7 +21,7 @@ from aerobat.planning.refinement.stage_values import KNOWN, STATE, StageValues
 AT_END = basis(np.array([1.0]))  # of a segment, (1, 6, 10)
 FADED = 0.1  # of the first and the last segment, along which constraints of the path grow from nothing,
 FADING = 3  # with this power of the way inward: positions leave rest no faster
-LEAST_FADED = 1e-6
+LEAST_FADED = 1e-6  # so that the very ends, which do not count, divide by no zero
 LIMITED = -1.0  # the value of a constraint that does not count
 
 

@@ -168,7 +168,7 @@ class Refinement:
         rough = self.rough(guess, segments)
         if self.is_promising(rough):
             return self.finished(rough)
-        return judge(self.solution(rough, "unknown"), self.problem, self.vehicle, self.recorder, self.reserve)
+        return Judged(self.problem, self.vehicle, self.solution(rough, "unknown"), None, False)
 
     def rough(self, guess: WarmStart, segments: int, known: float = np.inf) -> RefinedPath:
         """A path that is as fast as it gets, and may exceed limits a little between places.
