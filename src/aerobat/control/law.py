@@ -42,6 +42,7 @@ class ControlLaw(ABC):
 
     kind: ClassVar[str] = ""  # its name, set when it is registered
     TAKES_DISTURBANCES: ClassVar[bool] = True  # off the reference; a law that answers them itself says False
+    GIVES_RATES: ClassVar[bool] = False  # as `setpoint` of its state, a RateSetpoint, to an inner loop
 
     def init(self, ops: Ops, model: ControllerModel, seen: Seen) -> Any:
         """Return the state before the first tick, a tree of tuples; by default there is none.
@@ -73,7 +74,7 @@ CONTROL_LAWS: Registry[ControlLaw] = Registry(
     ControlLaw,  # type: ignore[type-abstract]
     "controller",
     "aerobat.controllers",
-    {"lee": f"{_ROOM}.lee", "lqr": f"{_ROOM}.lqr", "indi": f"{_ROOM}.indi"},
+    {name: f"{_ROOM}.{name}" for name in ("lee", "lqr", "indi", "rates")},
 )
 
 

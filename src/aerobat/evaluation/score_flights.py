@@ -28,6 +28,7 @@ from aerobat.kernels.ops import Ops
 from aerobat.kernels.running_metrics import MetricsInput, MetricsParameters, RunningMetrics
 from aerobat.planning import Plan
 from aerobat.problem import Problem, as_problem
+from aerobat.simulation.components import rotor_commands
 from aerobat.simulation.config import FlightChanges, FlightConfig
 from aerobat.simulation.loop import Signals
 from aerobat.simulation.outcome import DIVERGENCE_RADIUS, TOUCHDOWN
@@ -66,7 +67,7 @@ class MetricsMonitor:
         signals: Signals,
     ) -> RunningMetrics:
         """See `Component.step`."""
-        motion, commands = signals["plant"], signals["controller"].commands
+        motion, commands = signals["plant"], rotor_commands(signals)
         reference = (signals["reference"].position, signals["reference"].q_world_body)
         actuation = (motion.thrusts, commands.thrusts, commands.saturated)
         return running_metrics.step(ops, parameters, metrics, motion.body, reference, actuation, inputs)

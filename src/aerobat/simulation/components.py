@@ -9,12 +9,13 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from aerobat.arrays import Array
-from aerobat.kernels import control, motors
+from aerobat.kernels import control, motors, rate_loop
 from aerobat.kernels.control import Commands, ControllerModel, ControllerState, FeatureFlags
 from aerobat.kernels.control_loops import ReferencePoint
 from aerobat.kernels.motors import Airframe, Motion
-from aerobat.kernels.ops import Ops, PerRotor, Scalar, select_tree
+from aerobat.kernels.ops import Ops, PerRotor, Scalar, Vector, select_tree
 from aerobat.kernels.quaternions import axes, to_world
+from aerobat.kernels.rate_loop import RateLoopModel, RateLoopState
 from aerobat.kernels.rigid_body import Body, EnvironmentParameters
 from aerobat.kernels.vectors import subtract
 from aerobat.simulation.loop import Signals
@@ -134,10 +135,10 @@ def _answering(reference: ReferencePoint, body: Body, disturbance: Any) -> Refer
 
 
 class CommandsOnTheirWay(NamedTuple):
-    """Rotor commands [N] of a controller whose computation takes time."""
+    """What a controller whose computation takes time has sent: rotor commands [N], or a set-point of rates."""
 
-    in_effect: PerRotor
-    latest: PerRotor  # of the last tick, which take effect next
+    in_effect: Any
+    latest: Any  # of the last tick, which takes effect next
 
 
 @dataclass(frozen=True)
@@ -155,8 +156,8 @@ class ComputationDelay:
         self, ops: Ops, parameters: tuple[()], takes_effect: Scalar, signals: Signals
     ) -> CommandsOnTheirWay:
         """See `Component.init`."""
-        thrusts = signals["controller"].commands.thrusts
-        return CommandsOnTheirWay(thrusts, thrusts)
+        sent = _sent(signals["controller"])
+        return CommandsOnTheirWay(sent, sent)
 
     def step(
         self,
@@ -169,7 +170,7 @@ class ComputationDelay:
         """See `Component.step`."""
         return CommandsOnTheirWay(
             select_tree(ops, takes_effect > 0.5, state.latest, state.in_effect),
-            signals["controller"].commands.thrusts,
+            _sent(signals["controller"]),
         )
 
 
@@ -225,12 +226,63 @@ class RigidBodyPlant:
         return motion
 
 
+@dataclass(frozen=True)
+class RateLoop:
+    """The inner loop of a flight controller, on its own gyro, behind a law that gives it rates and thrust."""
+
+    period: int = 1
+    name: str = "rate_loop"
+    feedthrough: bool = True
+
+    def init(
+        self, ops: Ops, parameters: RateLoopModel, inputs: tuple[()], signals: Signals
+    ) -> RateLoopState:
+        """See `Component.init`."""
+        return rate_loop.init(signals["controller"].thrusts, signals["start"].omega_body)
+
+    def step(
+        self,
+        ops: Ops,
+        parameters: RateLoopModel,
+        state: RateLoopState,
+        inputs: tuple[()],
+        signals: Signals,
+    ) -> RateLoopState:
+        """See `Component.step`."""
+        setpoint, elapsed = _in_effect(signals), signals["clock"].elapsed
+        return rate_loop.step(ops, parameters, state, setpoint, gyro(signals), elapsed)
+
+
+def gyro(signals: Signals) -> Vector:
+    """The body rates [rad/s] that are measured at this tick, or the true ones where there is no IMU."""
+    measured: Vector
+    measured = signals["imu"].sample.omega if "imu" in signals else signals["plant"].body.omega_body
+    return measured
+
+
+def _sent(controller: Any) -> Any:
+    """What a controller sends at its step: rotor commands [N], or the set-point of an inner loop."""
+    own = getattr(controller, "own", None)
+    return own.setpoint if hasattr(own, "setpoint") else controller.commands.thrusts
+
+
+def _in_effect(signals: Signals) -> Any:
+    """What of that is in effect at this tick, some while old."""
+    if "computation_delay" in signals:
+        return signals["computation_delay"].in_effect
+    return _sent(signals["controller"])
+
+
+def rotor_commands(signals: Signals) -> Commands:
+    """The latest commands to the rotors: of the inner loop where there is one, else of the controller."""
+    commands: Commands = signals["rate_loop" if "rate_loop" in signals else "controller"].commands
+    return commands
+
+
 def commands_in_effect(signals: Signals) -> PerRotor:
     """The rotors' commands [N] of this tick, which may be some while old."""
-    if "computation_delay" in signals:
-        commands: PerRotor = signals["computation_delay"].in_effect
-    else:
-        commands = signals["controller"].commands.thrusts
+    commands: PerRotor
+    commands = signals["rate_loop"].commands.thrusts if "rate_loop" in signals else _in_effect(signals)
     return commands
 
 
@@ -269,4 +321,4 @@ def log_row(signals: Signals) -> LogRow:
     observer = signals["observer"]
     known = isinstance(observer, Estimate)
     observed = () if known else Observed(observer.body, observer.filter.since_pose)
-    return LogRow(signals["plant"], signals["controller"].commands, observed)
+    return LogRow(signals["plant"], rotor_commands(signals), observed)

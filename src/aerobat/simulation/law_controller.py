@@ -3,18 +3,28 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import pi
 from typing import Any, NamedTuple
+
+import numpy as np
 
 from aerobat.control import ControlLaw, Controller, Seen
 from aerobat.kernels import control, motors
-from aerobat.kernels.control import Commands, FeatureFlags
+from aerobat.kernels.control import Commands, ControllerModel, FeatureFlags
 from aerobat.kernels.control_loops import ReferencePoint, reference_moment
 from aerobat.kernels.ops import Ops, PerRotor
 from aerobat.kernels.quaternions import axes
+from aerobat.kernels.rate_loop import RateLoopModel
 from aerobat.kernels.rigid_body import Wrench
 from aerobat.kernels.vectors import subtract
-from aerobat.simulation.components import ControllerParameters, TrackingController, told
+from aerobat.simulation.components import ControllerParameters, RateLoop, TrackingController, told
 from aerobat.simulation.loop import Component, Signals
+from aerobat.simulation.setup import Part
+
+
+GYRO, DERIVATIVE = 0.5 / (pi * 250.0), 0.5 / (pi * 150.0)  # [s] of an inner loop's filters: 250 Hz, 150 Hz
+# rates are ahead of the rotors' lag by themselves, and what the inner loop makes of them is not led again
+_BEHIND_RATES = FeatureFlags(moment_feedforward=True, motor_lag_compensation=False, prioritize_tilt=True)
 
 
 class LawState(NamedTuple):
@@ -82,4 +92,17 @@ def flown_by(law: ControlLaw | None, settings: Controller, period: int = 1) -> C
     """
     if law is None:
         return TrackingController(settings.feature_flags, period)
-    return LawController(law, settings.feature_flags, period)
+    return LawController(law, _BEHIND_RATES if law.GIVES_RATES else settings.feature_flags, period)
+
+
+def inner_loop(law: ControlLaw | None, model: ControllerModel) -> tuple[Part, ...]:
+    """Return the inner loop behind a law that gives rates, one part; nothing for other controllers.
+
+    Args:
+        law: What is flown by, if it is none of settings.
+        model: The nominal vehicles, leaves (vehicles,).
+    """
+    if law is None or not law.GIVES_RATES:
+        return ()
+    filters = (np.full(len(model.airframe.mass_properties.mass), time) for time in (GYRO, DERIVATIVE))
+    return (Part(RateLoop(), RateLoopModel(model.airframe, model.mixer, *filters)),)

@@ -24,7 +24,7 @@ from aerobat.simulation.components import (
     StateObserver,
 )
 from aerobat.simulation.config import FlightChanges, FlightConfig
-from aerobat.simulation.law_controller import flown_by
+from aerobat.simulation.law_controller import flown_by, inner_loop
 from aerobat.simulation.reference_source import ReferenceSource
 from aerobat.simulation.setup import FlightSetup, Part
 from aerobat.states import BodyState
@@ -82,6 +82,7 @@ def prepare(
         parts=(
             Part(StateObserver()),
             Part(flown_by(config.law, controller), ControllerParameters(model, ())),
+            *inner_loop(config.law, model),
             Part(RigidBodyPlant.for_rate(config.rate), plant),
         ),
         reference=reference,

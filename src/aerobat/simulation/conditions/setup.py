@@ -27,7 +27,7 @@ from aerobat.simulation.conditions.observer import EkfObserver, ObserverParamete
 from aerobat.simulation.conditions.parts import WHOLE, DispersedFlights, condition_parts, whole_ticks
 from aerobat.simulation.conditions.sensors import MotionCaptureSensor
 from aerobat.simulation.config import FlightConfig
-from aerobat.simulation.law_controller import flown_by
+from aerobat.simulation.law_controller import flown_by, inner_loop
 from aerobat.simulation.reference_source import ReferenceSource
 from aerobat.simulation.setup import FlightSetup, Part
 from aerobat.trajectory import Trajectory, as_trajectory
@@ -147,13 +147,15 @@ def _controller(
         # a filter faster than the rotors takes their lag's misfit for a disturbance, and unsettles the loop
         times = flights.all(max(settings.disturbance_filter, slowest)), flights.all(delay / rate)
         observer = (Part(DisturbanceObserver(period), DisturbanceParameters(model, *times)),)
+    inner = inner_loop(config.law, model)
     if period == 1 and delay == 0:
-        return (*observer, Part(controller, ControllerParameters(model, ())))
+        return (*observer, Part(controller, ControllerParameters(model, ())), *inner)
     source = ReferenceSource(flights.trajectory, nominal, environment, rate, every=period, delay=delay / rate)
     if delay == 0:
-        return (*observer, Part(controller, ControllerParameters(model, ()), source))
+        return (*observer, Part(controller, ControllerParameters(model, ()), source), *inner)
     return (
         *observer,
         Part(controller, ControllerParameters(model, flights.all(delay / rate)), source),
         Part(ComputationDelay(), (), DelayTicks(period, delay)),
+        *inner,
     )

@@ -1,0 +1,105 @@
+"""Collective thrust and body rates: the outer loop of a vehicle whose flight controller holds the rates."""
+
+from __future__ import annotations
+
+from typing import Any, ClassVar, NamedTuple
+
+from aerobat.control.law import ControlLaw, Seen, controller
+from aerobat.declaration import NonNegative, Positive
+from aerobat.kernels.control import ControllerModel, collective
+from aerobat.kernels.control_loops import (
+    PositionLoopState,
+    ReferencePoint,
+    attitude_command,
+    attitude_error,
+    init_position_loop,
+    reference_moment,
+    step_position_loop,
+    thrust_demand,
+)
+from aerobat.kernels.ops import Ops, Scalar, Vector
+from aerobat.kernels.quaternions import axes, to_body
+from aerobat.kernels.rate_loop import RateSetpoint, rate_gains, times
+from aerobat.kernels.rigid_body import Wrench
+from aerobat.kernels.vectors import (
+    ZERO,
+    add,
+    add_scaled,
+    clip_components,
+    scale,
+    subtract,
+    transform,
+)
+
+
+class RatesState(NamedTuple):
+    """State of the outer loop from tick to tick, its set-point among it."""
+
+    outer: PositionLoopState
+    integral: Vector  # [rad] that feed-forward has left in the inner loop's integral
+    setpoint: RateSetpoint
+
+
+@controller("rates")
+class Rates(ControlLaw):
+    """Body rates and collective thrust for an inner loop (CTBR), which a flight controller has.
+
+    Position and attitude are held as by the tracking controller, at the position gains of the vehicle. The
+    moment that the reference asks, ahead of the rotors' lag, is fed forward through the inverse of the inner
+    loop's PID. The inner loop is `kernels.rate_loop`, or a real flight controller's.
+    """
+
+    TAKES_DISTURBANCES: ClassVar[bool] = False
+    GIVES_RATES: ClassVar[bool] = True
+
+    tilt_gain: NonNegative = 18.0  # [1/s] rate per angle of roll and pitch
+    yaw_gain: NonNegative = 6.0  # [1/s] rate per angle of yaw
+    max_rate: Positive = 31.0  # [rad/s] of each axis: what most gyros can tell is 35
+
+    def init(self, ops: Ops, model: ControllerModel, seen: Seen) -> RatesState:
+        """Return the state before the first tick, the reference's own rates and thrust its set-point."""
+        outer = init_position_loop(ops, model.gains, seen.body, seen.reference)
+        omega = to_body(axes(seen.body.q_world_body), seen.reference.omega)
+        demand = thrust_demand(model.airframe.mass_properties, model.environment, seen.reference)
+        attitude = attitude_command(ops, outer, demand, seen.reference)
+        mass, b3 = model.airframe.mass_properties.mass, axes(seen.body.q_world_body)[2]
+        return RatesState(outer, ZERO, RateSetpoint(omega, collective(ops, mass, b3, attitude)))
+
+    def step(
+        self, ops: Ops, model: ControllerModel, state: Any, seen: Seen, elapsed: Scalar
+    ) -> tuple[Any, Wrench]:
+        """Return the state, and the wrench that the inner loop is expected to give for its set-point."""
+        mass_properties, rotors = model.airframe
+        body, reference = seen.body, seen.reference
+        body_axes = axes(body.q_world_body)
+        outer = step_position_loop(ops, model.gains, state.outer, body, reference, elapsed)
+        demand = thrust_demand(mass_properties, model.environment, reference)
+        attitude = attitude_command(ops, outer, demand, reference)
+        error = attitude_error(ops, body, body_axes, attitude)
+        gains = rate_gains(ops, rotors)
+        lag = 1.0 / rotors.inverse_time_constant[0]
+        asked = self._fed_forward(model, body_axes, reference, lag / elapsed)
+        turning = add(asked, times(gains.derivative, to_body(body_axes, reference.omega_dot)))
+        left = subtract(turning, times(gains.integral, state.integral))
+        p, q, r = gains.proportional
+        lead = left[0] / p, left[1] / q, left[2] / r
+        feedback = times(scale(2.0, error.rotation), (self.tilt_gain, self.tilt_gain, self.yaw_gain))
+        omega = add(add(to_body(body_axes, attitude.omega), lead), feedback)
+        thrust = collective(ops, mass_properties.mass, body_axes[2], attitude)
+        thrust = thrust + mass_properties.mass * reference.ahead.thrust_change * lag / elapsed
+        setpoint = RateSetpoint(clip_components(ops, omega, self.max_rate), thrust)
+        rate_error = subtract(setpoint.omega, body.omega_body)
+        angular = add(times(gains.proportional, subtract(rate_error, lead)), asked)
+        load = Wrench(thrust, transform(mass_properties.inertia, angular))
+        integral = add_scaled(state.integral, elapsed, lead)
+        return RatesState(outer, integral, setpoint), load
+
+    def _fed_forward(
+        self, model: ControllerModel, body_axes: Any, reference: ReferencePoint, steps: Scalar
+    ) -> Vector:
+        """Return the reference's moment over the inertia [rad/s²], so many steps of the controller ahead."""
+        properties = model.airframe.mass_properties
+        now, then = (
+            reference_moment(properties.inertia, body_axes, each) for each in (reference, reference.ahead)
+        )
+        return transform(properties.inverse_inertia, add_scaled(now, steps, subtract(then, now)))

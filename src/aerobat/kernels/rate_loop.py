@@ -1,0 +1,127 @@
+"""The inner loop of a flight controller: body rates and collective thrust to rotor commands.
+
+A PID on the filtered gyro, its derivative on the measurement alone, mixed so that tilt comes before thrust. With
+rotors of lag τ and a moment of J (p e + i ∫e − d ω'), rates follow τ ω'' + (1 + d) ω' + p ω = p ω_set: the gains
+below place that pair of poles.
+"""
+
+from __future__ import annotations
+
+from functools import reduce
+from typing import NamedTuple
+
+from aerobat.kernels.allocation import Mixer, mix
+from aerobat.kernels.control import Commands
+from aerobat.kernels.motors import Airframe, Rotors
+from aerobat.kernels.ops import Ops, PerRotor, Scalar, Vector, clip
+from aerobat.kernels.rigid_body import Wrench
+from aerobat.kernels.vectors import ZERO, add, add_scaled, clip_components, scale, subtract, transform
+
+_SPEED = 1.5  # [-] frequency of the poles in roll and pitch, over the inverse of the rotors' lag
+_DAMPING = 0.8  # [-] ratio of all poles
+_INTEGRAL = 8.0  # [1/s] integral gain over the proportional one
+_SHORTEST_LAG = 0.01  # [s] of rotors: faster ones leave the loop's own delays
+_MAX_INTEGRAL = 0.25  # [rad] of the rate error, per axis
+_TINY = 1e-300  # keeps 0/0 away and changes no other quotient
+
+
+class RateSetpoint(NamedTuple):
+    """Command of the outer loop: collective thrust and body rates."""
+
+    omega: Vector  # [rad/s] body
+    thrust: Scalar  # [N] collective
+
+
+class RateGains(NamedTuple):
+    """Gains per unit of inertia, by body axis; see the module."""
+
+    proportional: Vector  # [1/s]
+    integral: Vector  # [1/s²]
+    derivative: Vector  # [-]
+
+
+class RateLoopModel(NamedTuple):
+    """A nominal vehicle, and the filters of its flight controller."""
+
+    airframe: Airframe
+    mixer: Mixer
+    gyro_filter: Scalar  # [s] time constant
+    derivative_filter: Scalar  # [s] time constant
+
+
+class RateLoopState(NamedTuple):
+    """State of the inner loop from tick to tick, its commands among it."""
+
+    gyro: Vector  # [rad/s] filtered
+    derivative: Vector  # [rad/s²] filtered
+    integral: Vector  # [rad] of the rate error
+    commands: Commands
+
+
+def rate_gains(ops: Ops, rotors: Rotors) -> RateGains:
+    """Gains that suit the slowest rotor of a vehicle.
+
+    Roll and pitch have a derivative, and so poles faster than the rotors' lag alone allows; yaw, whose moment is
+    weak, has none.
+    """
+    lag = ops.maximum(reduce(ops.maximum, (1.0 / rate for rate in rotors.inverse_time_constant)), _SHORTEST_LAG)
+    tilt, yaw = _SPEED * _SPEED / lag, 1.0 / (4.0 * _DAMPING * _DAMPING * lag)
+    damping = 2.0 * _DAMPING * _SPEED - 1.0
+    proportional = (tilt, tilt, yaw)
+    return RateGains(proportional, scale(_INTEGRAL, proportional), (damping, damping, 0.0))
+
+
+def init(thrusts: PerRotor, gyro: Vector) -> RateLoopState:
+    """The state before the first tick, with the rotors' thrusts [N] commanded as they are."""
+    return RateLoopState(gyro, ZERO, ZERO, Commands(thrusts, False))
+
+
+def step(
+    ops: Ops, model: RateLoopModel, state: RateLoopState, setpoint: RateSetpoint, gyro: Vector, elapsed: Scalar
+) -> RateLoopState:
+    """The state, new commands included, `elapsed` [s] after the last tick.
+
+    Args:
+        ops: of the arithmetic.
+        model: the vehicle and the filters.
+        state: after the last tick.
+        setpoint: of the outer loop.
+        gyro: the measured rate [rad/s], body.
+        elapsed: since the last tick [s].
+    """
+    filtered = _low_passed(state.gyro, gyro, model.gyro_filter, elapsed)
+    slope = scale(1.0 / elapsed, subtract(filtered, state.gyro))
+    derivative = _low_passed(state.derivative, slope, model.derivative_filter, elapsed)
+    error = subtract(setpoint.omega, filtered)
+    integral = clip_components(ops, add_scaled(state.integral, elapsed, error), _MAX_INTEGRAL)
+    gains = rate_gains(ops, model.airframe.rotors)
+    angular = subtract(
+        add(times(gains.proportional, error), times(gains.integral, integral)),
+        times(gains.derivative, derivative),
+    )
+    moment = transform(model.airframe.mass_properties.inertia, angular)
+    commands = _mixed(ops, model, Wrench(setpoint.thrust, moment))
+    return RateLoopState(filtered, derivative, integral, commands)
+
+
+def times(a: Vector, b: Vector) -> Vector:
+    """Products of components."""
+    return a[0] * b[0], a[1] * b[1], a[2] * b[2]
+
+
+def _low_passed(before: Vector, now: Vector, time_constant: Scalar, elapsed: Scalar) -> Vector:
+    return add_scaled(before, elapsed / (time_constant + elapsed), subtract(now, before))
+
+
+def _mixed(ops: Ops, model: RateLoopModel, load: Wrench) -> Commands:
+    """Commands within limits: moments are scaled to fit, and the collective thrust then moved to suit them."""
+    rotors = model.airframe.rotors
+    turning = mix(model.mixer, load._replace(thrust=0.0))
+    high, low = reduce(ops.minimum, rotors.max_thrust), reduce(ops.maximum, rotors.min_thrust)
+    spread = reduce(ops.maximum, turning) - reduce(ops.minimum, turning)
+    fraction = ops.minimum(1.0, (high - low) / (spread + _TINY))
+    turning = tuple(fraction * f for f in turning)
+    level = load.thrust / len(turning)
+    moved = clip(ops, level, low - reduce(ops.minimum, turning), high - reduce(ops.maximum, turning))
+    saturated = ops.select((fraction >= 1.0) & (moved <= level) & (moved >= level), False, True)
+    return Commands(tuple(moved + f for f in turning), saturated)
