@@ -99,7 +99,8 @@ def told(
     state: Any,
     inputs: ReferencePoint | tuple[()],
     signals: Signals,
-    takes_disturbances: bool = True,
+    takes_forces: bool = True,
+    takes_moments: bool = True,
 ) -> tuple[Body, ReferencePoint]:
     """Return the body when the commands take effect, and the reference that answers a disturbance.
 
@@ -109,26 +110,31 @@ def told(
         state: The controller's, of which the thrusts and the last commands count.
         inputs: A reference of its own, where its commands come late.
         signals: Of the loop.
-        takes_disturbances: Whether the reference answers what the observer knows of one.
+        takes_forces: Whether the reference answers the disturbing force that the observer knows.
+        takes_moments: The same of the moment.
     """
     body, reference = signals["observer"].body, inputs or signals["reference"]
-    if takes_disturbances and "disturbance" in signals:
-        reference = _answering(reference, body, signals["disturbance"])
+    if takes_forces and "disturbance" in signals:
+        reference = _answering(reference, body, signals["disturbance"], takes_moments)
     if not isinstance(parameters.delay, tuple):
         elapsed = signals["clock"].elapsed
         body = control.predicted(ops, parameters.model, state, body, elapsed, parameters.delay)
     return body, reference
 
 
-def _answering(reference: ReferencePoint, body: Body, disturbance: Any) -> ReferencePoint:
+def _answering(
+    reference: ReferencePoint, body: Body, disturbance: Any, takes_moments: bool
+) -> ReferencePoint:
     """The reference, with what is to be thrust and turned against a disturbance in body axes taken off it."""
     body_axes = axes(body.q_world_body)
     force, turn = (
         to_world(body_axes, each) for each in (disturbance.force, disturbance.angular_acceleration)
     )
+    reference = reference._replace(specific_thrust=subtract(reference.specific_thrust, force))
+    if not takes_moments:
+        return reference
     ahead = reference.ahead._replace(omega_dot=subtract(reference.ahead.omega_dot, turn))
     return reference._replace(
-        specific_thrust=subtract(reference.specific_thrust, force),
         omega_dot=subtract(reference.omega_dot, turn),
         ahead=ahead,
     )

@@ -65,7 +65,8 @@ class LawController:
     ) -> LawState:
         """See `Component.step`."""
         model, elapsed = parameters.model, signals["clock"].elapsed
-        body, reference = told(ops, parameters, state, inputs, signals, self.law.TAKES_DISTURBANCES)
+        takes = self.law.TAKES_DISTURBANCES, not self.law.GIVES_RATES
+        body, reference = told(ops, parameters, state, inputs, signals, *takes)
         rotors = model.airframe.rotors
         decay_factors = motors.decay_factors(ops, rotors, elapsed)
         thrusts = motors.first_order_response(state.thrusts, state.commands.thrusts, decay_factors)

@@ -49,12 +49,13 @@ class Rates(ControlLaw):
     loop's PID. The inner loop is `kernels.rate_loop`, or a real flight controller's.
     """
 
-    TAKES_DISTURBANCES: ClassVar[bool] = False
+    TAKES_DISTURBANCES: ClassVar[bool] = True
     GIVES_RATES: ClassVar[bool] = True
 
-    tilt_gain: NonNegative = 18.0  # [1/s] rate per angle of roll and pitch
+    tilt_gain: NonNegative = 16.0  # [1/s] rate per angle of roll and pitch
     yaw_gain: NonNegative = 6.0  # [1/s] rate per angle of yaw
-    max_rate: Positive = 31.0  # [rad/s] of each axis: what most gyros can tell is 35
+    max_correction: Positive = 5.0  # [rad/s] of each axis, beside what the reference asks
+    max_rate: Positive = 34.0  # [rad/s] of each axis: gyros tell 35, which are 2000°/s
 
     def init(self, ops: Ops, model: ControllerModel, seen: Seen) -> RatesState:
         """Return the state before the first tick, the reference's own rates and thrust its set-point."""
@@ -84,7 +85,10 @@ class Rates(ControlLaw):
         p, q, r = gains.proportional
         lead = left[0] / p, left[1] / q, left[2] / r
         feedback = times(scale(2.0, error.rotation), (self.tilt_gain, self.tilt_gain, self.yaw_gain))
-        omega = add(add(to_body(body_axes, attitude.omega), lead), feedback)
+        asked_rate = to_body(body_axes, reference.omega)
+        correction = add(subtract(to_body(body_axes, attitude.omega), asked_rate), feedback)
+        correction = clip_components(ops, correction, self.max_correction)
+        omega = add(add(asked_rate, lead), correction)
         thrust = collective(ops, mass_properties.mass, body_axes[2], attitude)
         thrust = thrust + mass_properties.mass * reference.ahead.thrust_change * lag / elapsed
         setpoint = RateSetpoint(clip_components(ops, omega, self.max_rate), thrust)
