@@ -15,7 +15,7 @@ from aerobat.kernels.control_loops import ReferencePoint
 from aerobat.kernels.motors import Airframe, Motion
 from aerobat.kernels.ops import Ops, PerRotor, Scalar, Vector, select_tree
 from aerobat.kernels.quaternions import axes, to_world
-from aerobat.kernels.rate_loop import RateLoopModel, RateLoopState
+from aerobat.kernels.rate_loop import RateLoopModel, RateLoopState, RateSetpoint
 from aerobat.kernels.rigid_body import Body, EnvironmentParameters
 from aerobat.kernels.vectors import subtract
 from aerobat.simulation.loop import Signals
@@ -255,7 +255,7 @@ class RateLoop:
         signals: Signals,
     ) -> RateLoopState:
         """See `Component.step`."""
-        setpoint, elapsed = _in_effect(signals), signals["clock"].elapsed
+        setpoint, elapsed = setpoint_in_effect(signals), signals["clock"].elapsed
         return rate_loop.step(ops, parameters, state, setpoint, gyro(signals), elapsed)
 
 
@@ -272,8 +272,8 @@ def _sent(controller: Any) -> Any:
     return own.setpoint if hasattr(own, "setpoint") else controller.commands.thrusts
 
 
-def _in_effect(signals: Signals) -> Any:
-    """What of that is in effect at this tick, some while old."""
+def setpoint_in_effect(signals: Signals) -> Any:
+    """What the controller sent that is in effect now: rotor commands [N], or a set-point of rates."""
     if "computation_delay" in signals:
         return signals["computation_delay"].in_effect
     return _sent(signals["controller"])
@@ -287,8 +287,10 @@ def rotor_commands(signals: Signals) -> Commands:
 
 def commands_in_effect(signals: Signals) -> PerRotor:
     """The rotors' commands [N] of this tick, which may be some while old."""
-    commands: PerRotor
-    commands = signals["rate_loop"].commands.thrusts if "rate_loop" in signals else _in_effect(signals)
+    in_effect = setpoint_in_effect(signals)
+    if isinstance(in_effect, RateSetpoint):
+        return rotor_commands(signals).thrusts
+    commands: PerRotor = in_effect
     return commands
 
 

@@ -12,6 +12,7 @@ from aerobat.control import ControlLaw, Controller, as_controller, named_control
 from aerobat.declaration import AS_IT_IS, FieldError, Seed, declared, shown
 from aerobat.environment import Dispersion, as_dispersion
 from aerobat.errors import SpecError
+from aerobat.simulation.flight_controller import Autopilot, as_autopilot
 from aerobat.simulation.plants import Plant, as_plant
 from aerobat.states import BodyState
 from aerobat.vehicle import Vehicle
@@ -52,6 +53,7 @@ class FlightChanges(TypedDict, total=False):
     nominal: Vehicle | None
     engine: str
     plant: Plant | str | None
+    autopilot: Autopilot | str | None
     log_rate: float | None
 
 
@@ -77,6 +79,8 @@ class FlightConfig:
     engine: str = "auto"
     # physics that others wrote in place of ours, or its name, mujoco or rotorpy: one vehicle a flight
     plant: Annotated[Plant | None, PlainValidator(as_plant)] = None
+    # a firmware that holds the rates in place of the model of one, or its name, betaflight: one vehicle a flight
+    autopilot: Annotated[Autopilot | None, PlainValidator(as_autopilot)] = None
     log_rate: LogRate | None = None  # [1/s] of the flight's rows, rate over a whole number; by default rate
 
     def __post_init__(self) -> None:
@@ -86,6 +90,8 @@ class FlightConfig:
         elif self.start is not None or self.nominal is not None:
             name = "start" if self.start is not None else "nominal"
             raise FieldError(name, "comes of the conditions; leave it out, or leave out conditions")
+        if self.autopilot is not None and (self.law is None or not self.law.GIVES_RATES):
+            raise FieldError("autopilot", "holds rates, which a controller gives it; fly by controller='rates'")
         stride = self.control_rate / self.rows_rate
         if stride < 1.0 or abs(stride - round(stride)) > 1e-6 * stride:
             complaint = f"must be {self.control_rate:g} 1/s over a whole number, got {self.log_rate}"
@@ -105,7 +111,8 @@ class FlightConfig:
     @property
     def law(self) -> ControlLaw | None:
         """The control law asked for, in place of the tracking controller."""
-        found = named_controller(self.controller) if isinstance(self.controller, str) else self.controller
+        asked = self.controller if self.controller is not None or self.autopilot is None else "rates"
+        found = named_controller(asked) if isinstance(asked, str) else asked
         return found if isinstance(found, ControlLaw) else None
 
     def controller_of(self, nominal: Sequence[Vehicle]) -> Controller:

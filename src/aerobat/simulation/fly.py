@@ -22,7 +22,6 @@ from aerobat.simulation.components import LogRow
 from aerobat.simulation.config import FlightChanges, FlightConfig
 from aerobat.simulation.flight import SERIES, Flight, setpoint_rows, setpoint_series
 from aerobat.simulation.outcome import DIVERGENCE_RADIUS, Outcome, length
-from aerobat.simulation.plants import Plant
 from aerobat.simulation.plants.outside import fly_outside
 from aerobat.simulation.prepare import prepare
 from aerobat.simulation.setup import FlightSetup
@@ -57,9 +56,10 @@ def fly(
     installed.
     """
     setup = prepare(plan, vehicle, environment=environment, config=config, **changes)
-    if setup.config.plant is not None:
+    outside = [each.kind for each in (setup.config.autopilot, setup.config.plant) if each is not None]
+    if outside:
         gates = () if isinstance(plan, Trajectory) else plan.problem.gates
-        return _flown_outside(setup, setup.config.plant, gates)
+        return _flown_outside(setup, gates, " on ".join(outside))
     stride = setup.log_stride
     engine = setup.engine()
     loop = setup.compile(engine)
@@ -79,16 +79,18 @@ def fly(
     return _flight(setup, log, setup.times[logged], setpoints, engine.name)
 
 
-def _flown_outside(setup: FlightSetup, plant: Plant, gates: tuple[Gate, ...]) -> Flight:
-    rows, contact = fly_outside(setup, plant, gates)
+def _flown_outside(setup: FlightSetup, gates: tuple[Gate, ...], name: str) -> Flight:
+    rows, contact = fly_outside(setup, gates)
     logged = logged_ticks(len(setup.times), setup.log_stride)
     setpoints = []
     for begin, end in setup.chunks():
         kept = logged[(logged >= begin) & (logged < end)]
         setpoints.append(setpoint_rows(setup.reference.setpoint(begin, end), kept - begin))
     log = tree_map(lambda leaf: leaf[..., logged], rows)
-    touched = np.maximum.reduceat(contact, logged).astype(np.float64)
-    return _flight(setup, log, setup.times[logged], setpoints, plant.kind, touched[None])
+    touched = None
+    if setup.config.plant is not None:
+        touched = np.maximum.reduceat(contact, logged).astype(np.float64)[None]
+    return _flight(setup, log, setup.times[logged], setpoints, name, touched)
 
 
 def _flight(

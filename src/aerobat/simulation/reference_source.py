@@ -48,7 +48,7 @@ class ReferenceSource:
         """
         self.times = trajectory.sample(rate)
         self._trajectory = trajectory
-        self._vehicle = vehicle
+        self.vehicle = vehicle
         self._environment = environment
         self._period = 1.0 / rate
         self._every = every
@@ -65,6 +65,13 @@ class ReferenceSource:
         return BodyState(
             first.flat.position[0], first.flat.velocity[0], first.q_world_body[0], first.omega_body[0]
         )
+
+    @property
+    def max_rate(self) -> float:
+        """The most [rad/s] that the reference turns about any axis of the body."""
+        blocks = range(0, len(self), BLOCK)
+        turning = (self.setpoint(begin, min(begin + BLOCK, len(self))).omega_body for begin in blocks)
+        return max(float(np.abs(omega).max()) for omega in turning)
 
     def setpoint(self, begin: int, end: int) -> Setpoint:
         """Set-points of the ticks from `begin` to before `end`, all of one block."""
@@ -108,7 +115,7 @@ class ReferenceSource:
         last = len(self) - 1
         known = self.times[np.minimum(np.arange(first, first + ticks + self._every), last)]
         times = np.minimum(known + self._delay, self.times[last])
-        rows = reference(self._trajectory, self._vehicle, times, environment=self._environment).setpoint
+        rows = reference(self._trajectory, self.vehicle, times, environment=self._environment).setpoint
         following = np.arange(self._every, self._every + ticks)
         self._block = block
         self._setpoint = setpoint_rows(rows, slice(ticks))
@@ -116,7 +123,7 @@ class ReferenceSource:
             self._setpoint,
             setpoint_rows(rows, following),
             self._environment,
-            self._vehicle,
+            self.vehicle,
         )
 
 

@@ -1,31 +1,51 @@
-"""The loop with a plant outside of it: the rest is compiled as ever, and stepped tick by tick."""
+"""The loop with a plant, a flight controller's firmware or both outside of it.
+
+The rest is compiled as ever, and stepped tick by tick: it tells the firmware what is measured and what rates are
+to be had, and the plant what the firmware commands.
+"""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from math import ceil
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from aerobat.engines.floats import first_numbers
+from aerobat.engines.engine import expanded
+from aerobat.engines.floats import FloatOps, first_numbers
 from aerobat.engines.pytree import tree_map, tree_stack
 from aerobat.errors import SpecError
+from aerobat.kernels import motors
+from aerobat.kernels.control import Commands
 from aerobat.kernels.motors import Motion
-from aerobat.kernels.ops import Ops
+from aerobat.kernels.ops import Ops, Vector
+from aerobat.kernels.rate_loop import RateSetpoint
+from aerobat.kernels.rigid_body import EnvironmentParameters, specific_force
+from aerobat.kernels.vectors import ZERO
 from aerobat.problem.gate import Gate
 from aerobat.simulation.components import (
+    MAX_STEP,
     LogRow,
     PlantParameters,
+    RateLoop,
     commands_in_effect,
+    gyro,
     log_row,
+    rotor_commands,
+    setpoint_in_effect,
     with_ceiling,
     with_wind,
 )
+from aerobat.simulation.contact import Contact
+from aerobat.simulation.flight_controller import AutopilotRun, Sensed
 from aerobat.simulation.loop import LoopInput, Signals, compose
-from aerobat.simulation.plants.plant import Actuation, Plant, PlantScene
+from aerobat.simulation.plants.plant import Actuation, PlantRun, PlantScene
 from aerobat.simulation.setup import FlightSetup, Part
 from aerobat.vehicle.ellipsoid import Ellipsoid
+
+ROUNDING = 1e-9  # of a step
 
 
 @dataclass(frozen=True)
@@ -57,7 +77,7 @@ class Actuator:
 
     def init(self, ops: Ops, parameters: PlantParameters, inputs: tuple[()], signals: Signals) -> Actuation:
         """See `Component.init`."""
-        thrusts = signals["controller"].commands.thrusts
+        thrusts = rotor_commands(signals).thrusts
         return Actuation(thrusts, parameters.environment.wind, parameters.airframe.rotors.max_thrust)
 
     def step(
@@ -71,52 +91,134 @@ class Actuator:
         )
 
 
+class Told(NamedTuple):
+    """What a firmware outside is told at a tick."""
+
+    gyro: Vector  # [rad/s] body
+    specific_force: Vector | tuple[()]  # [m/s²] body; () where there is no IMU
+    setpoint: RateSetpoint
+
+
 class OutsideRow(NamedTuple):
-    """The row that a tick logs, and the actuation that the plant outside is told."""
+    """The row that a tick logs, and what is told outside."""
 
     log: LogRow
     actuation: Actuation
+    told: Told | tuple[()]  # () where no firmware flies
 
 
-def fly_outside(
-    setup: FlightSetup, plant: Plant, gates: tuple[Gate, ...]
-) -> tuple[LogRow, NDArray[np.int64]]:
+class RigidBodyRun:
+    """Our own rigid body and rotors, advanced outside of the loop; see `PlantRun`."""
+
+    contact = Contact.NOTHING
+
+    def __init__(self, scene: PlantScene, motion: Motion) -> None:
+        self.motion = motion
+        self._airframe, self._gravity = scene.airframe, scene.gravity
+
+    def advance(self, actuation: Actuation, duration: float) -> None:
+        """See `PlantRun.advance`."""
+        environment = EnvironmentParameters(self._gravity, actuation.wind)
+        rotors = self._airframe.rotors._replace(max_thrust=actuation.ceilings)
+        airframe = self._airframe._replace(rotors=rotors)
+        steps = max(1, ceil(duration / MAX_STEP - ROUNDING))
+        for _ in range(steps):
+            self.motion = motors.advance(
+                FloatOps, airframe, environment, self.motion, actuation.commands, duration / steps
+            )
+
+
+def fly_outside(setup: FlightSetup, gates: tuple[Gate, ...]) -> tuple[LogRow, NDArray[np.int64]]:
     """Rows of all ticks with leaves (1, ticks), and what was touched before each, by the codes of Contact.
 
     Args:
-        setup: of one vehicle.
-        plant: that takes the place of the rigid body.
-        gates: that it may touch.
+        setup: of one vehicle, its config's plant in the place of the rigid body, its autopilot in that of the
+            inner loop's model.
+        gates: that the vehicle may touch.
 
     Raises:
-        SpecError: there are several vehicles, or the plant cannot fly this one.
-        BackendMissing: the plant's simulator is not installed.
+        SpecError: there are several vehicles, or plant or firmware cannot fly this one.
+        BackendMissing: the plant's simulator, or the firmware, is not installed.
     """
+    plant, autopilot = setup.config.plant, setup.config.autopilot
     if len(setup.fleet) != 1:
-        raise SpecError(f"plant: {plant.kind} flies one vehicle at a time, not {len(setup.fleet)}")
+        name = autopilot.kind if plant is None and autopilot else plant.kind if plant else ""
+        raise SpecError(f"plant: {name} flies one vehicle at a time, not {len(setup.fleet)}")
     parameters: PlantParameters = setup.parts[-1].parameters
-    parts = (Part(OutsidePlant()), *setup.parts[:-1], Part(Actuator(), parameters))
+    inner = [part for part in setup.parts[:-1] if autopilot is None or not isinstance(part.component, RateLoop)]
+    parts = (Part(OutsidePlant()), *inner, Part(Actuator(), parameters))
     inside = replace(setup, parts=parts)
     motion = Motion(first_numbers(setup.start), tuple(0.0 for _ in parameters.airframe.rotors.max_thrust))
     first = _told(inside.first_tick, motion)
-    loop = inside.engine().compile(*compose(inside.components, _outside_row), inside.parameters, first)
+    log = _outside_row if autopilot is None else _firmware_row
+    init, step = compose(inside.components, log)
+    loop = inside.engine().compile(init, step, inside.parameters, first)
     carry = loop.init(first)
-    states = dict(zip((part.component.name for part in parts), carry, strict=True))
-    run = plant.begin(
-        _scene(setup, gates), motion._replace(thrusts=first_numbers(states["controller"].thrusts))
-    )
+    numbers = first_numbers(inside.parameters), first_numbers(expanded(first))
+    states = zip((part.component.name for part in parts), init(FloatOps, *numbers), strict=True)
+    motion = motion._replace(thrusts=dict(states)["controller"].thrusts)
+    scene = _scene(setup, gates)
+    run: PlantRun = RigidBodyRun(scene, motion) if plant is None else plant.begin(scene, motion)
     rows, touched = [], np.zeros(len(setup.times), dtype=np.int64)
-    for tick, period in enumerate(np.diff(setup.times, append=setup.times[-1]).tolist()):
-        carry, row = loop.step(carry, _told(inside.tick(tick), run.motion))
-        rows.append(row.log)
-        touched[tick] = run.contact
-        if period > 0.0:
-            run.advance(first_numbers(row.actuation), period)
+    with _Firmware(setup, scene) as firmware:
+        for tick, period in enumerate(np.diff(setup.times, append=setup.times[-1]).tolist()):
+            before = run.motion
+            carry, row = loop.step(carry, _told(inside.tick(tick), before))
+            log_row, actuation = firmware.step(row, before, period)
+            rows.append(log_row)
+            touched[tick] = run.contact
+            if period > 0.0:
+                run.advance(actuation, period)
     return tree_stack(rows, lambda parts: np.stack(parts, axis=-1)), touched
 
 
+class _Firmware:
+    """The autopilot of a flight's config, if it has one, between the loop and the plant."""
+
+    def __init__(self, setup: FlightSetup, scene: PlantScene) -> None:
+        self._setup, self._scene = setup, scene
+        self._run: AutopilotRun | None = None
+
+    def __enter__(self) -> _Firmware:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        if self._run is not None:
+            self._run.close()
+
+    def step(self, row: OutsideRow, motion: Motion, period: float) -> tuple[LogRow, Actuation]:
+        """The row of a tick and the actuation until the next, with the firmware's commands where one flies."""
+        actuation: Actuation = first_numbers(row.actuation)
+        autopilot = self._setup.config.autopilot
+        if autopilot is None:
+            return row.log, actuation
+        told: Told = first_numbers(row.told)
+        sensed = Sensed(told.gyro, told.specific_force or self._felt(motion), motion.body.q_world_body)
+        if self._run is None:
+            rates = self._setup.reference.max_rate
+            self._run = autopilot.begin(self._setup.reference.vehicle, sensed, told.setpoint, rates)
+        commands = self._run.step(sensed, told.setpoint, period)
+        rotors = self._scene.airframe.rotors
+        limits = zip(commands, rotors.min_thrust, rotors.max_thrust, strict=True)
+        saturated = any(not low < command < high for command, low, high in limits)
+        logged = Commands(tuple(np.array([each]) for each in commands), np.array([saturated]))
+        return row.log._replace(commands=logged), actuation._replace(commands=commands)
+
+    def _felt(self, motion: Motion) -> Vector:
+        """The specific force of calm air, where no IMU measures it."""
+        properties, rotors = self._scene.airframe
+        thrust = motors.collective_thrust(rotors, motion.thrusts)
+        environment = EnvironmentParameters(self._scene.gravity, ZERO)
+        return specific_force(properties, environment, motion.body, thrust)
+
+
 def _outside_row(signals: Signals) -> OutsideRow:
-    return OutsideRow(log_row(signals), signals["actuator"])
+    return OutsideRow(log_row(signals), signals["actuator"], ())
+
+
+def _firmware_row(signals: Signals) -> OutsideRow:
+    felt = signals["imu"].sample.specific_force if "imu" in signals else ()
+    return _outside_row(signals)._replace(told=Told(gyro(signals), felt, setpoint_in_effect(signals)))
 
 
 def _told(inputs: LoopInput, motion: Motion) -> LoopInput:

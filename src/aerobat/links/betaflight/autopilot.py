@@ -1,0 +1,97 @@
+"""Betaflight's own firmware as the inner loop of a simulated flight."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from aerobat.errors import SpecError
+from aerobat.kernels.ops import PerRotor
+from aerobat.kernels.rate_loop import RateSetpoint
+from aerobat.links.betaflight.msp import arming_disable_flags
+from aerobat.links.betaflight.packets import Sticks, idle_sticks, state_packet
+from aerobat.links.betaflight.process import Firmware, configured
+from aerobat.links.betaflight.settings import betaflight_settings, max_rate, rotor_order
+from aerobat.simulation.flight_controller import AUTOPILOTS, Autopilot, Sensed
+from aerobat.vehicle import Vehicle
+
+_STEP = 0.005  # [s] between packets while it stands
+_BOOT = 1.0  # [s] without packets: channels that come before the receiver's set-up are lost with it
+_GRACE, _ARMING, _SPINNING_UP = 5.0, 0.5, 0.1  # [s]; it arms no earlier than 5 s after its start
+_STILL = Sensed((0.0, 0.0, 0.0), (0.0, 0.0, 9.81), (1.0, 0.0, 0.0, 0.0))
+_THROTTLE = 0.05  # [-] from which on motors turn
+_LOST = 0.02  # [s] of motors at rest under throttle, after which the firmware is disarmed
+
+
+class Betaflight(Autopilot):
+    """Betaflight's firmware, compiled by the package betaflight for the simulator; needs gcc and Linux.
+
+    The vehicle is held at its start until the firmware is armed and its motors turn, then let go.
+    """
+
+    def begin(
+        self, vehicle: Vehicle, sensed: Sensed, setpoint: RateSetpoint, max_rate: float
+    ) -> BetaflightRun:
+        """Return the firmware, armed, its motors at the first set-point; see `Autopilot.begin`."""
+        return BetaflightRun(vehicle, setpoint, max_rate)
+
+
+AUTOPILOTS.add("betaflight", Betaflight)
+
+
+class BetaflightRun:
+    """A firmware that flies a vehicle; see `AutopilotRun`."""
+
+    def __init__(self, vehicle: Vehicle, setpoint: RateSetpoint, peak: float) -> None:
+        stick_rate = max_rate(peak)
+        lines = betaflight_settings(vehicle, stick_rate, simulated=True)
+        self._order = rotor_order(vehicle)
+        self._low = vehicle.min_thrusts[list(self._order)]
+        self._span = vehicle.max_thrusts[list(self._order)] - self._low
+        self._sticks = Sticks(stick_rate)
+        self._time, self._at_rest = 0.0, 0.0  # [s] of the flight, and of motors that do not obey
+        self._firmware = Firmware(configured(lines))
+        try:
+            self._arm(setpoint.thrust)
+        except BaseException:
+            self._firmware.close()
+            raise
+
+    def _arm(self, thrust: float) -> None:
+        """Arm it, and have the motors turn as at the start. Raises SpecError, naming the flags that are up."""
+        self._firmware.step(_BOOT)
+        for duration, armed in ((_GRACE, False), (_ARMING, True)):
+            self._stand(duration, idle_sticks(armed))
+        commands = self._stand(_SPINNING_UP, Sticks(1.0).packet(_STILL.omega, self._throttle(thrust)))
+        if not any(commands):
+            flags = " and ".join(arming_disable_flags(self._firmware.exchange))
+            raise SpecError(f"autopilot: Betaflight refuses to arm: {flags or 'it names no reason'}")
+
+    def _stand(self, duration: float, sticks: bytes) -> tuple[float, ...]:
+        commands: tuple[float, ...] = ()
+        for _ in range(round(duration / _STEP)):
+            commands = self._firmware.step(_STEP, state_packet(_STILL), sticks).commands
+        return commands
+
+    def _throttle(self, thrust: float) -> float:
+        share = (thrust - self._low.sum()) / self._span.sum()
+        return float(np.clip(share, 0.0, 1.0))
+
+    def step(self, sensed: Sensed, setpoint: RateSetpoint, duration: float) -> PerRotor:
+        """See `AutopilotRun.step`."""
+        throttle = self._throttle(setpoint.thrust)
+        sticks = self._sticks.packet(setpoint.omega, throttle)
+        motors = self._firmware.step(duration, state_packet(sensed), sticks)
+        self._time += duration
+        self._at_rest = self._at_rest + duration if throttle > _THROTTLE and not any(motors.commands) else 0.0
+        if self._at_rest > _LOST:
+            flags = " and ".join(arming_disable_flags(self._firmware.exchange))
+            raise SpecError(
+                f"autopilot: Betaflight disarmed {self._time:.2f} s into the flight: {flags or 'it names no reason'}"
+            )
+        commands = self._low + self._span * motors.commands
+        by_rotor = dict(zip(self._order, commands.tolist(), strict=True))
+        return tuple(by_rotor[k] for k in range(len(by_rotor)))
+
+    def close(self) -> None:
+        """See `AutopilotRun.close`."""
+        self._firmware.close()

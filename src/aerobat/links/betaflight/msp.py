@@ -1,0 +1,81 @@
+"""MSP, Betaflight's serial protocol: frames, the status with its arming-disable flags, raw channels."""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Callable, Sequence
+from functools import reduce
+from operator import xor
+
+from aerobat.errors import SpecError
+
+STATUS_EX, SET_RAW_RC = 150, 200
+_TO_BOARD, _FROM_BOARD, _REFUSED = b"$M<", b"$M>", b"$M!"
+_HEAD = 5  # bytes before the payload: three, its size, the code
+# the firmware's src/main/fc/runtime_config.c, bit by bit
+ARMING_DISABLE_FLAGS = (
+    "NOGYRO", "FAILSAFE", "RXLOSS", "NOT_DISARMED", "BOXFAILSAFE", "RUNAWAY", "CRASH", "THROTTLE", "ANGLE",
+    "BOOTGRACE", "NOPREARM", "LOAD", "CALIB", "CLI", "CMS", "BST", "MSP", "PARALYZE", "GPS", "RESCUE_SW",
+    "DSHOT_TELEM", "REBOOT_REQD", "DSHOT_BBANG", "NO_ACC_CAL", "MOTOR_PROTO", "FLIP_SWITCH", "ALT_HOLD_SW",
+    "POS_HOLD_SW", "ARM_SWITCH",
+)  # fmt: skip
+_SWITCH = "ARM_SWITCH"  # up beside others while the switch asks for arming
+_FLAGS_AT = 15  # of the status: the count of bytes of flight modes beyond the first four
+
+
+def request(code: int, payload: bytes = b"") -> bytes:
+    """The frame of a request to a board. Raises SpecError for a payload of more than 255 bytes."""
+    if len(payload) > 255:
+        raise SpecError(f"payload of an MSP frame must be 255 bytes at most, got {len(payload)}")
+    return _framed(_TO_BOARD, code, payload)
+
+
+def _framed(head: bytes, code: int, payload: bytes) -> bytes:
+    body = bytes([len(payload), code]) + payload
+    return head + body + bytes([reduce(xor, body)])
+
+
+def response(data: bytes, code: int) -> bytes | None:
+    """The payload of the first whole answer to a request in some bytes, None where none is whole yet.
+
+    Raises SpecError for an answer that says that the board does not know the request.
+    """
+    begin = 0
+    while (begin := data.find(b"$M", begin)) >= 0:
+        frame = data[begin:]
+        size = frame[3] if len(frame) >= _HEAD else 0
+        if len(frame) < _HEAD + size + 1:
+            return None
+        payload = frame[_HEAD : _HEAD + size]
+        whole = frame[: _HEAD + size + 1]
+        if whole == _framed(_REFUSED, code, payload):
+            raise SpecError(f"the board does not know MSP request {code}; update its firmware")
+        if whole == _framed(_FROM_BOARD, code, payload):
+            return payload
+        begin += 1
+    return None
+
+
+def raw_channels(channels: Sequence[int]) -> bytes:
+    """The frame of MSP_SET_RAW_RC: a receiver's channels, 1000 to 2000, in the order of the board's map."""
+    return request(SET_RAW_RC, struct.pack(f"<{len(channels)}H", *channels))
+
+
+def flags_of(status: bytes) -> tuple[str, ...]:
+    """The names of the arming-disable flags that a status holds, the switch's own left out beside others."""
+    at = _FLAGS_AT + 2 + (status[_FLAGS_AT] & 15)
+    (bits,) = struct.unpack_from("<I", status, at)
+    names = [name for bit, name in enumerate(ARMING_DISABLE_FLAGS) if bits >> bit & 1]
+    return tuple(name for name in names if name != _SWITCH or len(names) == 1)
+
+
+def arming_disable_flags(exchange: Callable[[bytes, Callable[[bytes], bool]], bytes]) -> tuple[str, ...]:
+    """The arming-disable flags of a board.
+
+    Args:
+        exchange: sends bytes, and returns what comes back once a predicate holds of it.
+    """
+    answer = exchange(request(STATUS_EX), lambda data: response(data, STATUS_EX) is not None)
+    payload = response(answer, STATUS_EX)
+    assert payload is not None, "it was waited for"
+    return flags_of(payload)

@@ -1,0 +1,73 @@
+"""Packets between Betaflight's simulator target and a simulated vehicle, and the signs of what they hold.
+
+Betaflight counts roll to the right, pitch nose down on its stick, and yaw clockwise seen from above; its motors
+are numbered rear right, front right, rear left, front left. Its simulator target sends them as front right, rear
+left, front left, rear right.
+"""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Sequence
+
+from aerobat.kernels.ops import Vector
+from aerobat.simulation.flight_controller import Sensed
+
+_STATE = struct.Struct("<d3d3d4d3d3dd")
+_STICKS = struct.Struct("<d16H")
+_ARMED, _DISARMED, _CENTRE = 1900, 1000, 1500
+_HALF_TRAVEL = 500.0  # of a stick, from its centre
+_LOWEST, _HIGHEST = 1000, 2000
+_IDLE, _TRAVEL = 1050.0, 950.0  # of the throttle: below the first, min_check, the motors idle
+_CHANNELS = 16
+_AIR_PRESSURE = 101325.0  # [Pa]
+_TIMESTAMP = 1.0  # [s] always: the firmware would set its clock's pace by differences
+MOTORS = ("front right", "rear left", "front left", "rear right")  # in the order of the packet
+
+
+def state_packet(sensed: Sensed) -> bytes:
+    """The packet of a state; position and velocity, which the firmware does not fly by, are zero."""
+    p, q, r = sensed.omega
+    force = (-part for part in sensed.specific_force)
+    return _STATE.pack(_TIMESTAMP, p, -q, -r, *force, *sensed.q_world_body, *(0.0,) * 6, _AIR_PRESSURE)
+
+
+class Sticks:
+    """Channels of a receiver for body rates and thrust; what rounding leaves is made up for by the next ones."""
+
+    def __init__(self, max_rate: float) -> None:
+        """Prepare.
+
+        Args:
+            max_rate: [rad/s] at the end of each stick.
+        """
+        self._scale = _HALF_TRAVEL / max_rate
+        self._left = [0.0] * 4
+
+    def packet(self, omega: Vector, throttle: float, armed: bool = True) -> bytes:
+        """The packet of body rates [rad/s] and a collective thrust, 0 to 1 of what all rotors give."""
+        p, q, r = omega
+        wanted = (
+            _CENTRE + self._scale * p,
+            _CENTRE + self._scale * q,
+            _IDLE + _TRAVEL * throttle,
+            _CENTRE - self._scale * r,
+        )
+        channels = [self._rounded(k, value) for k, value in enumerate(wanted)]
+        return _channels(channels, armed)
+
+    def _rounded(self, channel: int, value: float) -> int:
+        asked = value + self._left[channel]
+        sent = min(max(round(asked), _LOWEST), _HIGHEST)
+        self._left[channel] = min(max(asked - sent, -0.5), 0.5)
+        return sent
+
+
+def idle_sticks(armed: bool) -> bytes:
+    """The packet of centred sticks and no throttle."""
+    return _channels([_CENTRE, _CENTRE, _LOWEST, _CENTRE], armed)
+
+
+def _channels(sticks: Sequence[int], armed: bool) -> bytes:
+    others = [_DISARMED] * (_CHANNELS - len(sticks) - 1)
+    return _STICKS.pack(_TIMESTAMP, *sticks, _ARMED if armed else _DISARMED, *others)

