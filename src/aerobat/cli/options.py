@@ -174,10 +174,15 @@ class ConditionsOptions:
 class FlyingOptions(ConditionsOptions):
     """Options of the flight."""
 
-    controller: Annotated[str, Parameter(group=flying)] = "full"
+    controller: Annotated[str | None, Parameter(group=flying)] = None
     """The control law: full, or paper, the paper's own without moment feed-forward, motor-lag compensation
-    and tilt before yaw, both at the gains of the vehicle's file; lee, lqr, indi; or one of your own that
-    --import brings in."""
+    and tilt before yaw, both at the gains of the vehicle's file; lee, lqr, indi; rates, collective thrust and
+    body rates for an inner loop (CTBR); or one of your own that --import brings in. Default: full, with
+    --autopilot rates."""
+
+    autopilot: Annotated[str | None, Parameter(group=flying)] = None
+    """A flight controller's firmware, to which the controller rates gives rates and thrust: betaflight, or
+    your own that --import brings in. The run's folder then holds settings to paste to a board."""
 
     plant: Annotated[str | None, Parameter(group=flying)] = None
     """Another simulator's physics in place of the built-in: mujoco, in which a gate that is touched is felt,

@@ -99,7 +99,10 @@ def planned(
 
 
 def flight_settings(
-    options: ConditionsOptions, controller: str = "full", plant: str | None = None
+    options: ConditionsOptions,
+    controller: str = "full",
+    plant: str | None = None,
+    autopilot: str | None = None,
 ) -> FlightSettings:
     """Return the settings by which a plan is flown.
 
@@ -107,11 +110,19 @@ def flight_settings(
         options: As they were given.
         controller: The name of what flies it.
         plant: The name of the physics, None for the built-in.
+        autopilot: The name of the firmware of the inner loop, None for our model.
     """
     conditions = None if options.conditions is None else load_dispersion(options.conditions)
     if options.probability is not None and conditions is None:
         raise SpecError("--pass needs --conditions, under which flights shall pass; give lab, say")
-    return FlightSettings(controller, conditions, options.seed, plant=plant, probability=options.probability)
+    return FlightSettings(
+        controller,
+        conditions,
+        options.seed,
+        plant=plant,
+        autopilot=autopilot,
+        probability=options.probability,
+    )
 
 
 def plan_of(record: RunRecord, explain: bool = False) -> Plan:
@@ -163,8 +174,6 @@ def _plan_that_passes(record: RunRecord) -> Plan:
     assert flight.conditions is not None, "with conditions"
     if record.paper:
         raise SpecError("--pass keeps a reserve, the paper none; leave out --pass or --paper")
-    if flight.controller != "full":
-        raise SpecError(f"--pass plans for --controller full, not {flight.controller}; leave one of them out")
     from aerobat.studies.passing import plan_to_pass
 
     with showing(PassingProgress(record.planner_name)) as progress:
@@ -175,6 +184,7 @@ def _plan_that_passes(record: RunRecord) -> Plan:
             probability=flight.probability,
             conditions=flight.conditions,
             seed=flight.seed,
+            controller=flight.controller,
             progress=progress.record,
             tried=progress.tried,
         ).plan

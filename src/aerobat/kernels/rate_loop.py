@@ -1,8 +1,8 @@
 """The inner loop of a flight controller: body rates and collective thrust to rotor commands.
 
-A PID on the filtered gyro, its derivative on the measurement alone, mixed so that tilt comes before thrust. With
-rotors of lag τ and a moment of J (p e + i ∫e − d ω'), rates follow τ ω'' + (1 + d) ω' + p ω = p ω_set: the gains
-below place that pair of poles.
+A PID on the filtered gyro, its derivative on the measurement alone, mixed so that moments come before thrust.
+With rotors of lag τ and a moment of J (p e + i ∫e − d ω'), rates follow τ ω'' + (1 + d) ω' + p ω = p ω_set.
+The gains below place that pair of poles.
 """
 
 from __future__ import annotations
@@ -61,10 +61,12 @@ class RateLoopState(NamedTuple):
 def rate_gains(ops: Ops, rotors: Rotors) -> RateGains:
     """Gains that suit the slowest rotor of a vehicle.
 
-    Roll and pitch have a derivative, and so poles faster than the rotors' lag alone allows; yaw, whose moment is
-    weak, has none.
+    Roll and pitch have a derivative, and so poles faster than the rotors' lag alone allows. Yaw, whose moment
+    is weak, has none.
     """
-    lag = ops.maximum(reduce(ops.maximum, (1.0 / rate for rate in rotors.inverse_time_constant)), _SHORTEST_LAG)
+    lag = ops.maximum(
+        reduce(ops.maximum, (1.0 / rate for rate in rotors.inverse_time_constant)), _SHORTEST_LAG
+    )
     tilt, yaw = _SPEED * _SPEED / lag, 1.0 / (4.0 * _DAMPING * _DAMPING * lag)
     damping = 2.0 * _DAMPING * _SPEED - 1.0
     proportional = (tilt, tilt, yaw)
@@ -77,7 +79,12 @@ def init(thrusts: PerRotor, gyro: Vector) -> RateLoopState:
 
 
 def step(
-    ops: Ops, model: RateLoopModel, state: RateLoopState, setpoint: RateSetpoint, gyro: Vector, elapsed: Scalar
+    ops: Ops,
+    model: RateLoopModel,
+    state: RateLoopState,
+    setpoint: RateSetpoint,
+    gyro: Vector,
+    elapsed: Scalar,
 ) -> RateLoopState:
     """The state, new commands included, `elapsed` [s] after the last tick.
 
@@ -114,7 +121,7 @@ def _low_passed(before: Vector, now: Vector, time_constant: Scalar, elapsed: Sca
 
 
 def _mixed(ops: Ops, model: RateLoopModel, load: Wrench) -> Commands:
-    """Commands within limits: moments are scaled to fit, and the collective thrust then moved to suit them."""
+    """Commands within limits: moments are scaled to fit, then the collective thrust is moved to suit them."""
     rotors = model.airframe.rotors
     turning = mix(model.mixer, load._replace(thrust=0.0))
     high, low = reduce(ops.minimum, rotors.max_thrust), reduce(ops.maximum, rotors.min_thrust)

@@ -141,7 +141,7 @@ def _answering(
 
 
 class CommandsOnTheirWay(NamedTuple):
-    """What a controller whose computation takes time has sent: rotor commands [N], or a set-point of rates."""
+    """What a controller that takes its time has sent: rotor commands [N], or a set-point of rates."""
 
     in_effect: Any
     latest: Any  # of the last tick, which takes effect next
@@ -240,9 +240,7 @@ class RateLoop:
     name: str = "rate_loop"
     feedthrough: bool = True
 
-    def init(
-        self, ops: Ops, parameters: RateLoopModel, inputs: tuple[()], signals: Signals
-    ) -> RateLoopState:
+    def init(self, ops: Ops, parameters: RateLoopModel, inputs: tuple[()], signals: Signals) -> RateLoopState:
         """See `Component.init`."""
         return rate_loop.init(signals["controller"].thrusts, signals["start"].omega_body)
 
@@ -268,8 +266,8 @@ def gyro(signals: Signals) -> Vector:
 
 def _sent(controller: Any) -> Any:
     """What a controller sends at its step: rotor commands [N], or the set-point of an inner loop."""
-    own = getattr(controller, "own", None)
-    return own.setpoint if hasattr(own, "setpoint") else controller.commands.thrusts
+    setpoint = getattr(getattr(controller, "own", None), "setpoint", None)
+    return controller.commands.thrusts if setpoint is None else setpoint
 
 
 def setpoint_in_effect(signals: Signals) -> Any:

@@ -79,7 +79,7 @@ class FlightConfig:
     engine: str = "auto"
     # physics that others wrote in place of ours, or its name, mujoco or rotorpy: one vehicle a flight
     plant: Annotated[Plant | None, PlainValidator(as_plant)] = None
-    # a firmware that holds the rates in place of the model of one, or its name, betaflight: one vehicle a flight
+    # a firmware that holds the rates in place of our model, or its name, betaflight: one vehicle a flight
     autopilot: Annotated[Autopilot | None, PlainValidator(as_autopilot)] = None
     log_rate: LogRate | None = None  # [1/s] of the flight's rows, rate over a whole number; by default rate
 
@@ -91,7 +91,9 @@ class FlightConfig:
             name = "start" if self.start is not None else "nominal"
             raise FieldError(name, "comes of the conditions; leave it out, or leave out conditions")
         if self.autopilot is not None and (self.law is None or not self.law.GIVES_RATES):
-            raise FieldError("autopilot", "holds rates, which a controller gives it; fly by controller='rates'")
+            raise FieldError(
+                "autopilot", "holds rates, which a controller gives it; fly by controller='rates'"
+            )
         stride = self.control_rate / self.rows_rate
         if stride < 1.0 or abs(stride - round(stride)) > 1e-6 * stride:
             complaint = f"must be {self.control_rate:g} 1/s over a whole number, got {self.log_rate}"

@@ -24,7 +24,7 @@ class AutopilotRun(Protocol):
     """A firmware that flies a vehicle."""
 
     def step(self, sensed: Sensed, setpoint: RateSetpoint, duration: float) -> PerRotor:
-        """Return the rotor commands [N] for the next while [s]. Raises SpecError where the firmware gives up."""
+        """Return the rotor commands [N] for the next while [s]. Raises SpecError where it gives up."""
 
     def close(self) -> None:
         """End the firmware; called once, whatever became of the flight."""
@@ -39,7 +39,9 @@ class Autopilot(ABC):
     kind: ClassVar[str] = ""  # its name in settings, set when it is registered
 
     @abstractmethod
-    def begin(self, vehicle: Vehicle, sensed: Sensed, setpoint: RateSetpoint, max_rate: float) -> AutopilotRun:
+    def begin(
+        self, vehicle: Vehicle, sensed: Sensed, setpoint: RateSetpoint, max_rate: float
+    ) -> AutopilotRun:
         """Return the firmware, armed, its motors at the first set-point.
 
         Args:
@@ -50,6 +52,15 @@ class Autopilot(ABC):
 
         Raises BackendMissing where it is not installed, SpecError for what it cannot fly or refuses.
         """
+
+    def settings(self, vehicle: Vehicle, max_rate: float) -> str:
+        """Return the firmware's settings for a real board, as text for its command line; none by default.
+
+        Args:
+            vehicle: The vehicle that the firmware is configured for.
+            max_rate: The most [rad/s] that the reference turns about any axis.
+        """
+        return ""
 
 
 AUTOPILOTS: Registry[Autopilot] = Registry(

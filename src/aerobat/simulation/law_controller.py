@@ -21,7 +21,6 @@ from aerobat.simulation.components import ControllerParameters, RateLoop, Tracki
 from aerobat.simulation.loop import Component, Signals
 from aerobat.simulation.setup import Part
 
-
 GYRO, DERIVATIVE = 0.5 / (pi * 250.0), 0.5 / (pi * 150.0)  # [s] of an inner loop's filters: 250 Hz, 150 Hz
 # rates are ahead of the rotors' lag by themselves, and what the inner loop makes of them is not led again
 _BEHIND_RATES = FeatureFlags(moment_feedforward=True, motor_lag_compensation=False, prioritize_tilt=True)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated
 
+import numpy as np
 from cyclopts import Parameter
 
 from aerobat.cli.exit_code import ExitCode
@@ -12,8 +13,10 @@ from aerobat.cli.runs.folder import Flown, finish
 from aerobat.cli.runs.record import FlightSettings
 from aerobat.cli.tasks import flight_settings, planned
 from aerobat.control import named_controller
+from aerobat.errors import SpecError
 from aerobat.evaluation import score
 from aerobat.planning import Plan, nominal_flight
+from aerobat.simulation.flight_controller import as_autopilot
 from aerobat.simulation.fly import fly as simulate
 from aerobat.simulation.plants import as_plant
 
@@ -29,8 +32,8 @@ def fly(
     Prints whether it flies, how long it takes, what limits it and how much margin it has, and writes to the
     output folder, as one: PROBLEM.plan (the whole plan), plan.csv (position, velocity, acceleration and jerk
     at 100 Hz), flight.npz (everything that was simulated), report.png, report.json, and run.toml, from which
-    `aerobat repeat` does all of it again. Exits with 0 only if the plan is certified and the flight went
-    well.
+    `aerobat repeat` does all of it again. With --autopilot, autopilot.txt has the settings of a
+    real board for it. Exits with 0 only if the plan is certified and the flight went well.
 
     Parameters
     ----------
@@ -38,19 +41,30 @@ def fly(
         A name that `aerobat problems` lists, a problem's TOML file, or a .plan file or a run's folder, whose
         plan is flown as it is.
     """
-    named_controller(flying.controller)  # refused before anything is planned
-    as_plant(flying.plant)
-    settings = flight_settings(flying, flying.controller, flying.plant)
+    settings = flight_settings(flying, _controller(flying), flying.plant, flying.autopilot)
     plan, record = planned(problem, options, "fly", settings, explain=explaining.explain)
     return finish(plan, record, options, flown(plan, settings), explaining.explain)
+
+
+def _controller(flying: FlyingOptions) -> str:
+    """The name of the controller asked for. Raises SpecError for names, or pairs, that cannot fly."""
+    as_plant(flying.plant)
+    name = flying.controller or ("full" if flying.autopilot is None else "rates")
+    law = named_controller(name)
+    if as_autopilot(flying.autopilot) is not None and not getattr(law, "GIVES_RATES", False):
+        raise SpecError(
+            f"--autopilot {flying.autopilot} holds body rates, which --controller {name} does not give; "
+            "leave --controller out"
+        )
+    return name
 
 
 def flown(plan: Plan, settings: FlightSettings) -> Flown:
     """The flight of a plan, and its score."""
     assert plan.vehicle is not None, "a command plans for a vehicle"
     controller = named_controller(settings.controller, plan.vehicle.controller)
-    given = settings.conditions, settings.plant
-    is_nominal = given == (None, None) and controller == plan.vehicle.controller
+    given = settings.conditions, settings.plant, settings.autopilot
+    is_nominal = given == (None, None, None) and controller == plan.vehicle.controller
     if is_nominal:  # the flight that the plan was judged by
         flight = nominal_flight(plan.trajectory, plan.vehicle, plan.problem.environment)
     else:
@@ -60,5 +74,12 @@ def flown(plan: Plan, settings: FlightSettings) -> Flown:
             conditions=settings.conditions,
             seed=settings.seed,
             plant=settings.plant,
+            autopilot=settings.autopilot,
         )
-    return Flown(flight, score(flight, plan, plan.vehicle), settings.controller, settings.plant)
+    judged = score(flight, plan, plan.vehicle)
+    autopilot = as_autopilot(settings.autopilot)
+    if autopilot is None:
+        return Flown(flight, judged, settings.controller, settings.plant)
+    by = f"{settings.controller} on {settings.autopilot}"
+    peak = float(np.abs(flight.setpoint.omega_body).max())
+    return Flown(flight, judged, by, settings.plant, autopilot.settings(plan.vehicle, peak))

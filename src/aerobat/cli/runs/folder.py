@@ -31,11 +31,13 @@ if TYPE_CHECKING:  # which takes long to import
     from aerobat.studies.sweep import Sweep
 
 FLIGHT = "flight.npz"
+AUTOPILOT = "autopilot.txt"  # the settings of the firmware that flew
 INSPECTION = "inspect.png"  # so does its inspection, by `aerobat inspect`
 REPLAY = "replay.html"  # joins the run later, by `aerobat view`
 FILES = (
     RECORD,
     FLIGHT,
+    AUTOPILOT,
     REPLAY,
     INSPECTION,
     "plan.npz",
@@ -112,6 +114,7 @@ class Flown:
     score: Score
     controller: str
     plant: str | None  # the name of another simulator
+    settings: str = ""  # of a firmware that flew, for its command line
 
 
 def finish(
@@ -139,6 +142,8 @@ def finish(
         write_columns(plan, staging / "plan.csv", record.columns)
         if flight is not None:
             flight.save(staging / FLIGHT)
+        if flown is not None and flown.settings:
+            (staging / AUTOPILOT).write_text(flown.settings, encoding="utf-8")
         (staging / "report.json").write_text(facts + "\n", encoding="utf-8")
         (staging / "report.png").write_bytes(picture)
 

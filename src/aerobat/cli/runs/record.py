@@ -54,6 +54,7 @@ class FlightSettings:
     conditions: Dispersion | None = None  # left out, as planned
     seed: Seed = 0  # of the conditions
     plant: str | None = None  # whose physics, left out the built-in
+    autopilot: str | None = None  # the firmware of the inner loop, left out our model of one
     runs: Count = 1  # flights of a sweep
     table: Literal["csv", "parquet"] = "csv"  # the form of the table of a sweep, or of a map
     probability: Probability | None = None  # of passing under the conditions, that it was planned for
@@ -128,8 +129,10 @@ class RunRecord:
             yield flight.conditions.name
         if flight.seed:
             yield f"seed-{flight.seed}"
-        if flight.controller != "full":
+        if flight.controller != ("full" if flight.autopilot is None else "rates"):
             yield flight.controller
+        if flight.autopilot is not None:
+            yield flight.autopilot
         if flight.plant is not None:
             yield flight.plant
         if flight.table != "csv":

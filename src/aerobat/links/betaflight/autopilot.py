@@ -10,7 +10,7 @@ from aerobat.kernels.rate_loop import RateSetpoint
 from aerobat.links.betaflight.msp import arming_disable_flags
 from aerobat.links.betaflight.packets import Sticks, idle_sticks, state_packet
 from aerobat.links.betaflight.process import Firmware, configured
-from aerobat.links.betaflight.settings import betaflight_settings, max_rate, rotor_order
+from aerobat.links.betaflight.settings import betaflight_settings, rotor_order, stick_rate
 from aerobat.simulation.flight_controller import AUTOPILOTS, Autopilot, Sensed
 from aerobat.vehicle import Vehicle
 
@@ -34,6 +34,11 @@ class Betaflight(Autopilot):
         """Return the firmware, armed, its motors at the first set-point; see `Autopilot.begin`."""
         return BetaflightRun(vehicle, setpoint, max_rate)
 
+    def settings(self, vehicle: Vehicle, max_rate: float) -> str:
+        """Return the lines to paste to a board; what protects a vehicle on the ground stays on."""
+        lines = betaflight_settings(vehicle, stick_rate(max_rate))
+        return "\n".join((f"# {vehicle.name}, for the command line of Betaflight 4.6", *lines, "save", ""))
+
 
 AUTOPILOTS.add("betaflight", Betaflight)
 
@@ -42,12 +47,12 @@ class BetaflightRun:
     """A firmware that flies a vehicle; see `AutopilotRun`."""
 
     def __init__(self, vehicle: Vehicle, setpoint: RateSetpoint, peak: float) -> None:
-        stick_rate = max_rate(peak)
-        lines = betaflight_settings(vehicle, stick_rate, simulated=True)
+        rate = stick_rate(peak)
+        lines = betaflight_settings(vehicle, rate, simulated=True)
         self._order = rotor_order(vehicle)
         self._low = vehicle.min_thrusts[list(self._order)]
         self._span = vehicle.max_thrusts[list(self._order)] - self._low
-        self._sticks = Sticks(stick_rate)
+        self._sticks = Sticks(rate)
         self._time, self._at_rest = 0.0, 0.0  # [s] of the flight, and of motors that do not obey
         self._firmware = Firmware(configured(lines))
         try:
@@ -57,14 +62,18 @@ class BetaflightRun:
             raise
 
     def _arm(self, thrust: float) -> None:
-        """Arm it, and have the motors turn as at the start. Raises SpecError, naming the flags that are up."""
+        """Arm it, and have the motors turn as at the start. Raises SpecError, naming the flags set."""
         self._firmware.step(_BOOT)
         for duration, armed in ((_GRACE, False), (_ARMING, True)):
             self._stand(duration, idle_sticks(armed))
         commands = self._stand(_SPINNING_UP, Sticks(1.0).packet(_STILL.omega, self._throttle(thrust)))
         if not any(commands):
-            flags = " and ".join(arming_disable_flags(self._firmware.exchange))
-            raise SpecError(f"autopilot: Betaflight refuses to arm: {flags or 'it names no reason'}")
+            raise SpecError(f"autopilot: Betaflight refuses to arm: {self._flags}")
+
+    @property
+    def _flags(self) -> str:
+        """The arming-disable flags that are set, in words."""
+        return " and ".join(arming_disable_flags(self._firmware.exchange)) or "it names no reason"
 
     def _stand(self, duration: float, sticks: bytes) -> tuple[float, ...]:
         commands: tuple[float, ...] = ()
@@ -84,9 +93,8 @@ class BetaflightRun:
         self._time += duration
         self._at_rest = self._at_rest + duration if throttle > _THROTTLE and not any(motors.commands) else 0.0
         if self._at_rest > _LOST:
-            flags = " and ".join(arming_disable_flags(self._firmware.exchange))
             raise SpecError(
-                f"autopilot: Betaflight disarmed {self._time:.2f} s into the flight: {flags or 'it names no reason'}"
+                f"autopilot: Betaflight disarmed {self._time:.2f} s into the flight: {self._flags}"
             )
         commands = self._low + self._span * motors.commands
         by_rotor = dict(zip(self._order, commands.tolist(), strict=True))

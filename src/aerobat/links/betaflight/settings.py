@@ -1,7 +1,7 @@
 """Betaflight's settings for a vehicle, as lines of its command line that can be pasted to a board.
 
-The gains are those of `kernels.rate_loop`, in the firmware's units. What would change rates or thrust on the way
-is switched off: stick expo and smoothing, attenuation by throttle, relaxed integrals, boosts.
+The gains are those of `kernels.rate_loop`, in the firmware's units. What would change rates or thrust on
+the way is switched off: stick expo and smoothing, attenuation by throttle, relaxed integrals, boosts.
 """
 
 from __future__ import annotations
@@ -35,11 +35,12 @@ _OFF = {
     "tpa_low_rate": 0, "crash_recovery": "OFF", "abs_control_gain": 0, "thr_expo": 0, "thrust_linear": 0,
     "rc_smoothing": "OFF", "vbat_sag_compensation": 0, "yaw_lowpass_hz": 0, "simplified_pids_mode": "OFF",
     "simplified_gyro_filter": "OFF", "simplified_dterm_filter": "OFF", "d_max_roll": 0, "d_max_pitch": 0,
-    "d_max_yaw": 0, "f_roll": 0, "f_pitch": 0, "f_yaw": 0, "gyro_lpf1_dyn_min_hz": 0, "gyro_lpf2_static_hz": 0,
-    "dterm_lpf1_dyn_min_hz": 0, "dterm_lpf2_static_hz": 0,
+    "d_max_yaw": 0, "f_roll": 0, "f_pitch": 0, "f_yaw": 0, "gyro_lpf1_dyn_min_hz": 0,
+    "gyro_lpf2_static_hz": 0, "dterm_lpf1_dyn_min_hz": 0, "dterm_lpf2_static_hz": 0,
 }  # fmt: skip
 _WHOLE = {
-    "pidsum_limit": 1000, "pidsum_limit_yaw": 1000, "yaw_rate_limit": 1998, "airmode_start_throttle_percent": 0,
+    "pidsum_limit": 1000, "pidsum_limit_yaw": 1000, "yaw_rate_limit": 1998,
+    "airmode_start_throttle_percent": 0,
     "gyro_lpf1_static_hz": round(0.5 / (pi * GYRO)), "dterm_lpf1_static_hz": round(0.5 / (pi * DERIVATIVE)),
 }  # fmt: skip
 # what protects a real vehicle on its way to the ground, and would end a flip
@@ -49,26 +50,26 @@ _SIMULATED = {
 }  # fmt: skip
 
 
-def max_rate(peak: float) -> float:
+def stick_rate(peak: float) -> float:
     """The rate at a stick's end [rad/s] for references that turn at `peak` [rad/s] at most about any axis.
 
     Raises SpecError for more than the firmware's gyro can tell.
     """
     if (fastest := 180.0 / pi * peak) > GYRO_LIMIT:
         raise SpecError(
-            f"autopilot: the path turns at {fastest:.0f}°/s, and Betaflight knows rates up to {GYRO_LIMIT:.0f}°/s; "
-            "plan it with a lower max_body_rate of the vehicle"
+            f"autopilot: the path turns at {fastest:.0f}°/s, and Betaflight knows rates up to "
+            f"{GYRO_LIMIT:.0f}°/s; plan it with a lower max_body_rate of the vehicle"
         )
     wanted = max(fastest + 180.0 / pi * _CORRECTION, _MIN_RATE)
     return pi / 180.0 * min(_COARSEST * ceil(wanted / _COARSEST), _COARSEST * int(GYRO_LIMIT / _COARSEST))
 
 
 def rotor_order(vehicle: Vehicle) -> tuple[int, ...]:
-    """The vehicle's rotor at each of the packet's motors. Raises SpecError for no symmetric quadrotor in X."""
+    """The vehicle's rotor at each of the packet's motors. Raises SpecError for any but a quadrotor in X."""
     places = np.array([rotor.position_body for rotor in vehicle.rotors])
     complaint = SpecError(
-        f"autopilot: Betaflight's simulator flies quadrotors in X, and the rotors of '{vehicle.name}' are none; "
-        "take another vehicle, such as agile-quad"
+        f"autopilot: Betaflight's simulator flies quadrotors in X, and the rotors of '{vehicle.name}' are no "
+        "such; take another vehicle, such as agile-quad"
     )
     if len(places) != len(MOTORS):
         raise complaint
@@ -85,26 +86,34 @@ def rotor_order(vehicle: Vehicle) -> tuple[int, ...]:
     return tuple(order)
 
 
-def betaflight_settings(vehicle: Vehicle, stick_rate: float, simulated: bool = False) -> tuple[str, ...]:
+def betaflight_settings(vehicle: Vehicle, max_rate: float, simulated: bool = False) -> tuple[str, ...]:
     """Return lines of Betaflight's command line for a vehicle, without the `save` behind them.
 
     Args:
         vehicle: Whose inertia, levers and lag give the gains.
-        stick_rate: [rad/s] at the end of each stick.
+        max_rate: [rad/s] at the end of each stick.
         simulated: Whether what protects a real vehicle is switched off too.
 
     Raises SpecError for a vehicle that the firmware's mixer or gains do not fit.
     """
     order = rotor_order(vehicle)
     reversed_yaw = vehicle.rotors[order[0]].spin < 0  # Betaflight's front right turns counter-clockwise
-    rate = round(180.0 / pi * stick_rate / _COARSEST)
-    values: dict[str, object] = {"rates_type": "ACTUAL", "yaw_motors_reversed": "ON" if reversed_yaw else "OFF"}
+    rate = round(180.0 / pi * max_rate / _COARSEST)
+    values: dict[str, object] = {
+        "rates_type": "ACTUAL",
+        "yaw_motors_reversed": "ON" if reversed_yaw else "OFF",
+    }
     for axis in ("roll", "pitch", "yaw"):
         values |= {f"{axis}_rc_rate": rate, f"{axis}_srate": rate, f"{axis}_expo": 0}
     values |= dict(_gains(vehicle)) | _OFF | _WHOLE | (_SIMULATED if simulated else {})
     features = ("feature -GPS", "feature -TELEMETRY") if simulated else ()
     arming = "aux 0 0 0 1700 2100 0 0"  # by the first switch
-    return (*features, "feature AIRMODE", arming, *(f"set {name} = {value}" for name, value in values.items()))
+    return (
+        *features,
+        "feature AIRMODE",
+        arming,
+        *(f"set {name} = {value}" for name, value in values.items()),
+    )
 
 
 def _gains(vehicle: Vehicle) -> Iterator[tuple[str, int]]:

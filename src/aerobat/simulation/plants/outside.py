@@ -1,7 +1,7 @@
 """The loop with a plant, a flight controller's firmware or both outside of it.
 
-The rest is compiled as ever, and stepped tick by tick: it tells the firmware what is measured and what rates are
-to be had, and the plant what the firmware commands.
+The rest is compiled as ever, and stepped tick by tick: it tells the firmware what is measured and which rates
+are asked, and the plant what the firmware commands.
 """
 
 from __future__ import annotations
@@ -145,7 +145,7 @@ def fly_outside(setup: FlightSetup, gates: tuple[Gate, ...]) -> tuple[LogRow, ND
         name = autopilot.kind if plant is None and autopilot else plant.kind if plant else ""
         raise SpecError(f"plant: {name} flies one vehicle at a time, not {len(setup.fleet)}")
     parameters: PlantParameters = setup.parts[-1].parameters
-    inner = [part for part in setup.parts[:-1] if autopilot is None or not isinstance(part.component, RateLoop)]
+    inner = setup.parts[:-1] if autopilot is None else _without_rate_loop(setup.parts[:-1])
     parts = (Part(OutsidePlant()), *inner, Part(Actuator(), parameters))
     inside = replace(setup, parts=parts)
     motion = Motion(first_numbers(setup.start), tuple(0.0 for _ in parameters.airframe.rotors.max_thrust))
@@ -172,6 +172,10 @@ def fly_outside(setup: FlightSetup, gates: tuple[Gate, ...]) -> tuple[LogRow, ND
     return tree_stack(rows, lambda parts: np.stack(parts, axis=-1)), touched
 
 
+def _without_rate_loop(parts: tuple[Part, ...]) -> tuple[Part, ...]:
+    return tuple(part for part in parts if not isinstance(part.component, RateLoop))
+
+
 class _Firmware:
     """The autopilot of a flight's config, if it has one, between the loop and the plant."""
 
@@ -187,7 +191,7 @@ class _Firmware:
             self._run.close()
 
     def step(self, row: OutsideRow, motion: Motion, period: float) -> tuple[LogRow, Actuation]:
-        """The row of a tick and the actuation until the next, with the firmware's commands where one flies."""
+        """The row of a tick, and the actuation until the next: by the firmware's commands where one flies."""
         actuation: Actuation = first_numbers(row.actuation)
         autopilot = self._setup.config.autopilot
         if autopilot is None:

@@ -9,6 +9,7 @@ from typing import Annotated, Any
 
 from pydantic import Field
 
+from aerobat.control import named_controller
 from aerobat.declaration import Seed, validated
 from aerobat.environment import Dispersion, as_dispersion
 from aerobat.errors import Infeasible, SpecError
@@ -45,6 +46,7 @@ def plan_to_pass(
     probability: Probability = 0.99,
     conditions: Dispersion | str = "lab",
     seed: Seed = 0,
+    controller: str = "full",
     flights: Flights = 1000,
     fresh: Flights | None = None,
     progress: Callable[[Attempt], None] | None = None,
@@ -66,6 +68,7 @@ def plan_to_pass(
         probability: With which a flight shall pass [-].
         conditions: What varies from flight to flight, or the name of a preset or a file.
         seed: Of the flights.
+        controller: The name of what flies: full, or a control law.
         flights: How many tell how to tighten, numbered from 0.
         fresh: How many prove it, numbered behind those; by default 20 over the probability of failing.
         progress: Called with every attempt at a plan as it ends.
@@ -83,7 +86,10 @@ def plan_to_pass(
     proving = fresh or max(round(PROVING_FAILURES / (1.0 - probability)), _least_flights(probability))
     _require_enough("flights", flights, probability)
     _require_enough("fresh", proving, probability)
-    task = _Task(as_problem(problem), method, as_vehicle(vehicle), conditions, seed, probability, progress)
+    named_controller(controller)
+    task = _Task(
+        as_problem(problem), method, as_vehicle(vehicle), conditions, seed, controller, probability, progress
+    )
     return _Tightening(task, range(flights), proving, tried or (lambda done: None)).passing()
 
 
@@ -111,6 +117,7 @@ class _Task:
     vehicle: Vehicle
     conditions: Dispersion
     seed: int
+    controller: str
     probability: float
     progress: Callable[[Attempt], None] | None
 
@@ -121,7 +128,10 @@ class _Task:
 
     def scores(self, found: Plan, flights: range, conditions: Dispersion | None = None) -> Scores:
         """Scores of flights of a plan, by default under the task's conditions."""
-        return score_flights(found, conditions=conditions or self.conditions, seed=self.seed, flights=flights)
+        conditions = conditions or self.conditions
+        return score_flights(
+            found, conditions=conditions, seed=self.seed, flights=flights, controller=self.controller
+        )
 
     def share(self, found: Plan, flights: range, conditions: Dispersion | None = None) -> Share:
         """The share of flights of a plan that pass."""
