@@ -22,7 +22,7 @@ from looping_flights import QUAD, assert_same, loops, near, one
 from refusals import complaint
 from shared_plans import shared_plan
 
-LAWS = ("lee", "lqr", "indi")
+LAWS = ("lee", "lqr", "indi", "rates")
 SHORT = loops(0.3)
 GENTLE = ab.Trajectory(SHORT.durations, 0.01 * SHORT.coefficients)
 
@@ -76,7 +76,7 @@ def test_the_laws_fly_maneuvers_through_their_gates(problem: str, law: str) -> N
     plan = shared_plan(problem)
     score = ab.score(ab.fly(plan, controller=law, engine="compiled"), plan)
     assert score.outcome is ab.Outcome.THROUGH_GATES
-    assert score.max_position_error_m < 0.002
+    assert score.max_position_error_m < (0.005 if law == "rates" else 0.002)  # behind a gyro's filter
 
 
 def test_a_law_of_ones_own_is_flown_as_itself_and_by_its_name() -> None:

@@ -9,6 +9,9 @@ from typing import Any
 
 from hypothesis import HealthCheck, settings
 
+from aerobat.errors import BackendMissing
+from aerobat.links.betaflight.process import require_firmware
+
 FAST, FULL = "fast", "full"
 SHARE = 4  # the default suite draws one in so many of the examples that the full one draws
 FEWEST = 5  # examples of a law in the default suite
@@ -20,6 +23,7 @@ GROUPS = {
     "browser": "opens pages in a browser; needs Chromium, Chrome or Edge",
     "peer": "compares with programs that others wrote, at length",
     "ros": "flies a session with a real ROS; needs the interpreters of ROS_PYTHONS",
+    "betaflight": "flies on Betaflight's own firmware; needs the package betaflight, gcc and Linux",
     "docs": "runs the documentation, its tutorials and its site",
 }
 BROWSERS = (
@@ -62,6 +66,11 @@ def missing(group: str) -> str | None:
             "no browser was found, neither Chromium nor Chrome nor Edge; install one, as with "
             "`apt-get install chromium`, or leave the browser's tests out"
         )
+    if group == "betaflight":
+        try:
+            require_firmware()
+        except BackendMissing as error:
+            return f"{error}; or leave the tests with Betaflight out"
     unset = [name for name in ROS_PYTHONS.values() if not os.path.isfile(os.environ.get(name, ""))]
     if group == "ros" and unset:
         return (

@@ -53,6 +53,10 @@ class Autopilot(ABC):
         Raises BackendMissing where it is not installed, SpecError for what it cannot fly or refuses.
         """
 
+    @abstractmethod
+    def require(self) -> None:
+        """Raise BackendMissing where the firmware, or what it takes to run it, is not installed."""
+
     def settings(self, vehicle: Vehicle, max_rate: float) -> str:
         """Return the firmware's settings for a real board, as text for its command line; none by default.
 

@@ -51,7 +51,11 @@ def _controller(flying: FlyingOptions) -> str:
     as_plant(flying.plant)
     name = flying.controller or ("full" if flying.autopilot is None else "rates")
     law = named_controller(name)
-    if as_autopilot(flying.autopilot) is not None and not getattr(law, "GIVES_RATES", False):
+    autopilot = as_autopilot(flying.autopilot)
+    if autopilot is None:
+        return name
+    autopilot.require()
+    if not getattr(law, "GIVES_RATES", False):
         raise SpecError(
             f"--autopilot {flying.autopilot} holds body rates, which --controller {name} does not give; "
             "leave --controller out"

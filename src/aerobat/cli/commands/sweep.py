@@ -40,8 +40,8 @@ class SweepingOptions:
     """The variation between flights, the disturbances and the sensors: none, lab, field, or a TOML file."""
 
     controller: Annotated[str, Parameter(group=flying)] = "full"
-    """The control law: full, or paper, at the gains of the vehicle's file; lee, lqr, indi; or one of your own
-    that --import brings in."""
+    """The control law: full, or paper, at the gains of the vehicle's file; lee, lqr, indi, rates; or one of
+    your own that --import brings in."""
 
     seed: Annotated[int, Parameter(group=flying, validator=validators.Number(gte=0))] = 0
     """The seed of all flights: the same seed, the same flights."""

@@ -9,7 +9,7 @@ from aerobat.kernels.ops import PerRotor
 from aerobat.kernels.rate_loop import RateSetpoint
 from aerobat.links.betaflight.msp import arming_disable_flags
 from aerobat.links.betaflight.packets import Sticks, idle_sticks, state_packet
-from aerobat.links.betaflight.process import Firmware, configured
+from aerobat.links.betaflight.process import Firmware, configured, require_firmware
 from aerobat.links.betaflight.settings import betaflight_settings, rotor_order, stick_rate
 from aerobat.simulation.flight_controller import AUTOPILOTS, Autopilot, Sensed
 from aerobat.vehicle import Vehicle
@@ -33,6 +33,10 @@ class Betaflight(Autopilot):
     ) -> BetaflightRun:
         """Return the firmware, armed, its motors at the first set-point; see `Autopilot.begin`."""
         return BetaflightRun(vehicle, setpoint, max_rate)
+
+    def require(self) -> None:
+        """See `Autopilot.require`."""
+        require_firmware()
 
     def settings(self, vehicle: Vehicle, max_rate: float) -> str:
         """Return the lines to paste to a board; what protects a vehicle on the ground stays on."""

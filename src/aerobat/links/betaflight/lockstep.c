@@ -10,9 +10,11 @@
 #include <arpa/inet.h>
 #include <dlfcn.h>
 #include <pthread.h>
+#include <signal.h>
 #include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/prctl.h>
 #include <sys/select.h>
 #include <sys/socket.h>
 #include <time.h>
@@ -57,6 +59,7 @@ __attribute__((constructor)) static void begin(void)
 {
     const char *fd = getenv("AEROBAT_ORDERS");
     main_thread = pthread_self();
+    prctl(PR_SET_PDEATHSIG, SIGKILL);  // should it not come to read that its orders have ended
     orders = fd ? atoi(fd) : -1;
 }
 

@@ -1,15 +1,15 @@
-"""MSP, Betaflight's serial protocol: frames, the status with its arming-disable flags, raw channels."""
+"""MSP, Betaflight's serial protocol: frames, and the status with its arming-disable flags."""
 
 from __future__ import annotations
 
 import struct
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from functools import reduce
 from operator import xor
 
 from aerobat.errors import SpecError
 
-STATUS_EX, SET_RAW_RC = 150, 200
+STATUS_EX = 150
 _TO_BOARD, _FROM_BOARD, _REFUSED = b"$M<", b"$M>", b"$M!"
 _HEAD = 5  # bytes before the payload: three, its size, the code
 # the firmware's src/main/fc/runtime_config.c, bit by bit
@@ -24,9 +24,7 @@ _FLAGS_AT = 15  # of the status: the count of bytes of flight modes beyond the f
 
 
 def request(code: int, payload: bytes = b"") -> bytes:
-    """The frame of a request to a board. Raises SpecError for a payload of more than 255 bytes."""
-    if len(payload) > 255:
-        raise SpecError(f"payload of an MSP frame must be 255 bytes at most, got {len(payload)}")
+    """The frame of a request to a board, its payload 255 bytes at most."""
     return _framed(_TO_BOARD, code, payload)
 
 
@@ -43,6 +41,9 @@ def response(data: bytes, code: int) -> bytes | None:
     begin = 0
     while (begin := data.find(b"$M", begin)) >= 0:
         frame = data[begin:]
+        if len(frame) >= len(_FROM_BOARD) and not frame.startswith((_FROM_BOARD, _REFUSED)):
+            begin += 1
+            continue
         size = frame[3] if len(frame) >= _HEAD else 0
         if len(frame) < _HEAD + size + 1:
             return None
@@ -54,11 +55,6 @@ def response(data: bytes, code: int) -> bytes | None:
             return payload
         begin += 1
     return None
-
-
-def raw_channels(channels: Sequence[int]) -> bytes:
-    """The frame of MSP_SET_RAW_RC: a receiver's channels, 1000 to 2000, in the order of the board's map."""
-    return request(SET_RAW_RC, struct.pack(f"<{len(channels)}H", *channels))
 
 
 def flags_of(status: bytes) -> tuple[str, ...]:

