@@ -49,7 +49,7 @@ def turned(omega: tuple[float, float, float], duration: float) -> np.ndarray:
 @pytest.mark.parametrize("axis", [0, 1, 2])
 def test_rates_follow_their_set_point_as_the_poles_say(axis: int) -> None:
     """τ ω'' + (1 + d) ω' + p ω + i ∫ω = p r + i ∫r, solved apart from the loop."""
-    gains, lag, asked = rate_gains(FloatOps, AIRFRAME.rotors), QUAD.rotors[0].lag, 0.2
+    gains, lag, asked = rate_gains(FloatOps, AIRFRAME), QUAD.rotors[0].lag, 0.2
     p, i, d = (part[axis] for part in gains)
     rate, slope, integral, expected = 0.0, 0.0, 0.0, []
     for _ in range(2000):

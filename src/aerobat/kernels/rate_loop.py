@@ -8,17 +8,20 @@ The gains below place that pair of poles.
 from __future__ import annotations
 
 from functools import reduce
+from operator import add as add_scalars
+from operator import mul
 from typing import NamedTuple
 
 from aerobat.kernels.allocation import Mixer, mix
 from aerobat.kernels.control import Commands
-from aerobat.kernels.motors import Airframe, Rotors
-from aerobat.kernels.ops import Ops, PerRotor, Scalar, Vector, clip
+from aerobat.kernels.motors import Airframe
+from aerobat.kernels.ops import Ops, PerRotor, Scalar, Vector, clip, magnitude
 from aerobat.kernels.rigid_body import Wrench
 from aerobat.kernels.vectors import ZERO, add, add_scaled, clip_components, scale, subtract, transform
 
-_SPEED = 1.5  # [-] frequency of the poles in roll and pitch, over the inverse of the rotors' lag
+_SPEED = 2.0  # [-] frequency of the poles in roll and pitch, over the inverse of the rotors' lag
 _DAMPING = 0.8  # [-] ratio of all poles
+_YAW_SHARE = 0.01  # [s/rad] of all the moment of yaw, that an error of yaw rate asks for
 _INTEGRAL = 8.0  # [1/s] integral gain over the proportional one
 _SHORTEST_LAG = 0.01  # [s] of rotors: faster ones leave the loop's own delays
 _MAX_INTEGRAL = 0.25  # [rad] of the rate error, per axis
@@ -58,16 +61,19 @@ class RateLoopState(NamedTuple):
     commands: Commands
 
 
-def rate_gains(ops: Ops, rotors: Rotors) -> RateGains:
-    """Gains that suit the slowest rotor of a vehicle.
+def rate_gains(ops: Ops, airframe: Airframe) -> RateGains:
+    """Gains that suit the slowest rotor of a vehicle, and its moment of yaw.
 
-    Roll and pitch have a derivative, and so poles faster than the rotors' lag alone allows. Yaw, whose moment
-    is weak, has none.
+    Roll and pitch have a derivative, and so poles faster than the rotors' lag alone allows. Yaw has none, and
+    less gain where its moment is weak: it must leave the rotors to roll and pitch.
     """
-    lag = ops.maximum(
-        reduce(ops.maximum, (1.0 / rate for rate in rotors.inverse_time_constant)), _SHORTEST_LAG
+    (_, inertia), rotors = airframe.mass_properties[:2], airframe.rotors
+    lag = reduce(ops.maximum, (1.0 / rate for rate in rotors.inverse_time_constant), _SHORTEST_LAG)
+    torque = reduce(
+        add_scalars, map(mul, (magnitude(ops, c) for c in rotors.allocation[3]), rotors.max_thrust)
     )
     tilt, yaw = _SPEED * _SPEED / lag, 1.0 / (4.0 * _DAMPING * _DAMPING * lag)
+    yaw = ops.minimum(yaw, _YAW_SHARE * torque / inertia[2][2])
     damping = 2.0 * _DAMPING * _SPEED - 1.0
     proportional = (tilt, tilt, yaw)
     return RateGains(proportional, scale(_INTEGRAL, proportional), (damping, damping, 0.0))
@@ -101,7 +107,7 @@ def step(
     derivative = _low_passed(state.derivative, slope, model.derivative_filter, elapsed)
     error = subtract(setpoint.omega, filtered)
     integral = clip_components(ops, add_scaled(state.integral, elapsed, error), _MAX_INTEGRAL)
-    gains = rate_gains(ops, model.airframe.rotors)
+    gains = rate_gains(ops, model.airframe)
     angular = subtract(
         add(times(gains.proportional, error), times(gains.integral, integral)),
         times(gains.derivative, derivative),

@@ -77,7 +77,7 @@ class Rates(ControlLaw):
         demand = thrust_demand(mass_properties, model.environment, reference)
         attitude = attitude_command(ops, outer, demand, reference)
         error = attitude_error(ops, body, body_axes, attitude)
-        gains = rate_gains(ops, rotors)
+        gains = rate_gains(ops, model.airframe)
         lag = 1.0 / rotors.inverse_time_constant[0]
         asked = self._fed_forward(model, body_axes, reference, lag / elapsed)
         turning = add(asked, times(gains.derivative, to_body(body_axes, reference.omega_dot)))

@@ -118,7 +118,7 @@ def betaflight_settings(vehicle: Vehicle, max_rate: float, simulated: bool = Fal
 
 def _gains(vehicle: Vehicle) -> Iterator[tuple[str, int]]:
     fleet = Fleet.of([vehicle])
-    gains = rate_gains(FloatOps, first_numbers(airframe_parameters(fleet)).rotors)
+    gains = rate_gains(FloatOps, first_numbers(airframe_parameters(fleet)))
     span = fleet.max_thrusts[0] - fleet.min_thrusts[0]
     torque = np.abs(fleet.allocation[0, 1:]) @ span  # [N·m] when every motor gives all that it can to an axis
     authority = torque / np.diagonal(fleet.inertia[0])  # [rad/s²]
