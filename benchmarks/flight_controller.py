@@ -14,13 +14,10 @@ import time
 import numpy as np
 
 import aerobat as ab
-from aerobat.planning import command_settings
-from aerobat.studies.passing import plan_to_pass
 
 MANEUVERS = ("half-flip", "flip-roll", "flip-pitch", "power-loop", "split-s")
 CONDITIONS = "lab"
-PASS = 0.95
-PLANNER = ab.Miqp(**command_settings(ab.Miqp))  # as `aerobat fly --pass 0.95 --controller rates` has it
+PLANNER = ab.Miqp(reserve=0.15)
 SHARE, MEDIAN, MOST = 0.95, 0.05, 0.20  # [-], [m], [m] the floors
 
 
@@ -30,7 +27,7 @@ def main(flights: int, vehicles: list[str]) -> None:
     passed, distances, differences = [], [], []
     for vehicle in map(ab.load_vehicle, vehicles):
         for maneuver in MANEUVERS:
-            plan = plan_to_pass(maneuver, PLANNER, vehicle, probability=PASS, controller="rates").plan
+            plan = ab.plan(maneuver, PLANNER, vehicle)
             ended, real, model = [], [], []
             for flight in range(flights):
                 drawn = {

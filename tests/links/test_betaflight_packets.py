@@ -71,7 +71,7 @@ def test_settings_hold_the_gains_of_the_inner_loop() -> None:
     lever, inertia, lag = 0.106066, 0.001, 0.02
     authority = 4 * lever * QUAD.rotors[0].max_thrust / inertia
     for gain, unit in (("p_roll", 0.032029), ("d_roll", 0.000529)):
-        asked = {"p_roll": 2.0**2 / lag, "d_roll": 2 * 0.8 * 2.0 - 1}[gain]
+        asked = {"p_roll": 75.0**2 * lag, "d_roll": 2 * 0.8 * 75.0 * lag - 1}[gain]
         given = int(values[gain]) * unit * 180.0 / pi / 1000.0 * authority
         assert given == pytest.approx(asked, rel=0.04)
     assert values["roll_srate"] == values["yaw_rc_rate"] == "115"

@@ -19,7 +19,7 @@ from aerobat.kernels.ops import Ops, PerRotor, Scalar, Vector, clip, magnitude
 from aerobat.kernels.rigid_body import Wrench
 from aerobat.kernels.vectors import ZERO, add, add_scaled, clip_components, scale, subtract, transform
 
-_SPEED = 2.0  # [-] frequency of the poles in roll and pitch, over the inverse of the rotors' lag
+_FREQUENCY = 75.0  # [rad/s] of the poles in roll and pitch, which the filters' delays let pass
 _DAMPING = 0.8  # [-] ratio of all poles
 _YAW_SHARE = 0.01  # [s/rad] of all the moment of yaw, that an error of yaw rate asks for
 _INTEGRAL = 8.0  # [1/s] integral gain over the proportional one
@@ -72,9 +72,9 @@ def rate_gains(ops: Ops, airframe: Airframe) -> RateGains:
     torque = reduce(
         add_scalars, map(mul, (magnitude(ops, c) for c in rotors.allocation[3]), rotors.max_thrust)
     )
-    tilt, yaw = _SPEED * _SPEED / lag, 1.0 / (4.0 * _DAMPING * _DAMPING * lag)
+    tilt, yaw = _FREQUENCY * _FREQUENCY * lag, 1.0 / (4.0 * _DAMPING * _DAMPING * lag)
     yaw = ops.minimum(yaw, _YAW_SHARE * torque / inertia[2][2])
-    damping = 2.0 * _DAMPING * _SPEED - 1.0
+    damping = ops.maximum(2.0 * _DAMPING * _FREQUENCY * lag - 1.0, 0.0)
     proportional = (tilt, tilt, yaw)
     return RateGains(proportional, scale(_INTEGRAL, proportional), (damping, damping, 0.0))
 

@@ -141,7 +141,7 @@ def _answering(
 
 
 class CommandsOnTheirWay(NamedTuple):
-    """What a controller that takes its time has sent: rotor commands [N], or a set-point of rates."""
+    """Commands of a controller that takes its time: of rotors [N], or a set-point of rates."""
 
     in_effect: Any
     latest: Any  # of the last tick, which takes effect next
@@ -265,13 +265,13 @@ def gyro(signals: Signals) -> Vector:
 
 
 def _sent(controller: Any) -> Any:
-    """What a controller sends at its step: rotor commands [N], or the set-point of an inner loop."""
+    """The commands that a controller sends at its step: of rotors [N], or a set-point of rates."""
     setpoint = getattr(getattr(controller, "own", None), "setpoint", None)
     return controller.commands.thrusts if setpoint is None else setpoint
 
 
 def setpoint_in_effect(signals: Signals) -> Any:
-    """What the controller sent that is in effect now: rotor commands [N], or a set-point of rates."""
+    """Return the commands in effect now: of rotors [N], or a set-point of rates."""
     if "computation_delay" in signals:
         return signals["computation_delay"].in_effect
     return _sent(signals["controller"])

@@ -199,7 +199,7 @@ class Firmware:
 
 @lru_cache(maxsize=32)
 def configured(lines: tuple[str, ...]) -> bytes:
-    """What a firmware saves of some lines of its command line."""
+    """Return the settings that a firmware saves of lines of its command line."""
     with Firmware() as firmware:
         return firmware.configure(lines)
 

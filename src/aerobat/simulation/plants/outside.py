@@ -92,7 +92,7 @@ class Actuator:
 
 
 class Told(NamedTuple):
-    """What a firmware outside is told at a tick."""
+    """Inputs of a firmware outside at a tick."""
 
     gyro: Vector  # [rad/s] body
     specific_force: Vector | tuple[()]  # [m/s²] body; () where there is no IMU
