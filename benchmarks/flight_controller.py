@@ -17,7 +17,7 @@ import aerobat as ab
 
 MANEUVERS = ("half-flip", "flip-roll", "flip-pitch", "power-loop", "split-s")
 CONDITIONS = "lab"
-PLANNER = ab.Miqp(reserve=0.15)
+PLANNER = ab.Miqp(reserve=0.1)
 SHARE, MEDIAN, MOST = 0.95, 0.05, 0.20  # [-], [m], [m] the floors
 
 

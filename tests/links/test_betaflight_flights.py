@@ -33,7 +33,7 @@ HOVER = QUAD.mass * 9.81
 
 
 def armed() -> BetaflightRun:
-    return Betaflight().begin(QUAD, LEVEL, RateSetpoint((0.0, 0.0, 0.0), HOVER), 10.0)
+    return Betaflight().begin(QUAD, RateSetpoint((0.0, 0.0, 0.0), HOVER), 10.0)
 
 
 def hover(flying: BetaflightRun) -> None:

@@ -39,14 +39,11 @@ class Autopilot(ABC):
     kind: ClassVar[str] = ""  # its name in settings, set when it is registered
 
     @abstractmethod
-    def begin(
-        self, vehicle: Vehicle, sensed: Sensed, setpoint: RateSetpoint, max_rate: float
-    ) -> AutopilotRun:
+    def begin(self, vehicle: Vehicle, setpoint: RateSetpoint, max_rate: float) -> AutopilotRun:
         """Return the firmware, armed, its motors at the first set-point.
 
         Args:
             vehicle: The nominal vehicle that the firmware is configured for.
-            sensed: At the start.
             setpoint: At the start.
             max_rate: The most [rad/s] that the reference turns about any axis.
 

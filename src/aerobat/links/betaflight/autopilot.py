@@ -28,9 +28,7 @@ class Betaflight(Autopilot):
     The vehicle is held at its start until the firmware is armed and its motors turn, then let go.
     """
 
-    def begin(
-        self, vehicle: Vehicle, sensed: Sensed, setpoint: RateSetpoint, max_rate: float
-    ) -> BetaflightRun:
+    def begin(self, vehicle: Vehicle, setpoint: RateSetpoint, max_rate: float) -> BetaflightRun:
         """Return the firmware, armed, its motors at the first set-point; see `Autopilot.begin`."""
         return BetaflightRun(vehicle, setpoint, max_rate)
 

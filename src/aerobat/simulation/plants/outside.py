@@ -200,7 +200,7 @@ class _Firmware:
         sensed = Sensed(told.gyro, told.specific_force or self._felt(motion), motion.body.q_world_body)
         if self._run is None:
             rates = self._setup.reference.max_rate
-            self._run = autopilot.begin(self._setup.reference.vehicle, sensed, told.setpoint, rates)
+            self._run = autopilot.begin(self._setup.reference.vehicle, told.setpoint, rates)
         commands = self._run.step(sensed, told.setpoint, period)
         rotors = self._scene.airframe.rotors
         limits = zip(commands, rotors.min_thrust, rotors.max_thrust, strict=True)
