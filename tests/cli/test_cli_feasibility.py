@@ -73,7 +73,7 @@ def test_what_is_needed_is_told_and_written_with_its_plan(capsys) -> None:
     assert code(*least, "--out", "gate") == 0
     assert "of its size" in capsys.readouterr().out
     assert {path.name for path in Path("gate").iterdir()} == {"need.json", "run.toml", "half-flip-gate.plan"}
-    (facts,) = json.loads(Path("gate/need.json").read_bytes())["requirements"]
+    facts = json.loads(Path("gate/need.json").read_bytes())["requirements"]["gate"]
     assert ab.load_plan("gate/half-flip-gate.plan").duration == facts["duration_s"]
 
 
@@ -86,8 +86,8 @@ def test_what_is_needed_is_written_with_its_plans_and_repeated(capsys) -> None:
     plans = {f"half-flip-{quantity}.plan" for quantity in ("gate", "ceiling")}
     assert {path.name for path in folder.iterdir()} == {"need.json", "run.toml", *plans}
     facts = json.loads((folder / "need.json").read_bytes())
-    for each in facts["requirements"]:
-        plan = ab.load_plan(folder / f"half-flip-{each['quantity']}.plan")
+    for quantity, each in facts["requirements"].items():
+        plan = ab.load_plan(folder / f"half-flip-{quantity}.plan")
         assert plan.certified
         assert plan.flies
         assert plan.duration == each["duration_s"]

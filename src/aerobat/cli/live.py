@@ -13,7 +13,7 @@ from aerobat.cli.tasks import planned
 from aerobat.cli.terminal import open_in_browser, print_json
 from aerobat.environment import load_dispersion
 from aerobat.errors import SpecError
-from aerobat.reporting.report_json import to_json
+from aerobat.reporting.plain_data import to_json
 from aerobat.viewer.live.view_live import view_live
 
 PROBLEM = "flip-roll"  # where nobody names one

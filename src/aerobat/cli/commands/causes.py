@@ -14,9 +14,8 @@ from aerobat.cli.tasks import read_task
 from aerobat.cli.terminal import print_json
 from aerobat.environment import load_dispersion
 from aerobat.planning import Miqp
-from aerobat.reporting.error_causes import error_causes_report, error_causes_table
-from aerobat.reporting.report_json import to_json
-from aerobat.reporting.tables import print_table
+from aerobat.reporting.plain_data import to_json
+from aerobat.reporting.tables import print_table, table
 from aerobat.studies.error_causes import error_causes, four_causes
 
 ORDER = 4  # snap as the input, with which jerk is compared
@@ -79,6 +78,6 @@ def causes(problem: str, options: Annotated[CausesOptions, Parameter(name="*")] 
             begin=progress.begin,
         )
     if options.json:
-        print_json(to_json(error_causes_report(measured)))
+        print_json(to_json(measured))
     else:
-        print_table(error_causes_table(measured))
+        print_table(table(measured))

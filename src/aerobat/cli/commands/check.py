@@ -20,8 +20,10 @@ from aerobat.errors import SpecError
 from aerobat.interchange import read_plan
 from aerobat.planning import Plan, with_explanation
 from aerobat.planning.evidence import envelope_for
-from aerobat.reporting.report_json import evidence_facts, to_json
-from aerobat.reporting.tables import certificate_table, evidence_table, print_table
+from aerobat.reporting.facts import Fact, Facts
+from aerobat.reporting.plain_data import plain, to_json
+from aerobat.reporting.plans import evidence
+from aerobat.reporting.tables import print_table, table
 from aerobat.trajectory import Trajectory
 from aerobat.vehicle import Vehicle, load_vehicle
 
@@ -94,14 +96,15 @@ def check(plan: Path, options: Annotated[CheckOptions, Parameter(name="*")] = Ch
     )
     certificate = certify(trajectory, vehicle, environment, envelope)
     explained = _explained(found, trajectory, vehicle) if isinstance(found, Plan) else None
+    beside = Facts(evidence(explained))
     if options.json:
-        print_json(to_json(certificate.record() | evidence_facts(explained)))
+        print_json(to_json(plain(certificate) | plain(beside)))
         return _judgement(certificate)
-    print_table(certificate_table(certificate, f"{plan} · {vehicle.name}"))
+    print_table(table(certificate, title=f"{plan} · {vehicle.name}"))
     if not isinstance(found, Plan):
         print(_assumed(options, vehicle, environment))
     elif explained is not None:
-        print_table(evidence_table(explained))
+        print_table(table(Facts((Fact("", beside, "beside the proof"),))))
     return _judgement(certificate)
 
 

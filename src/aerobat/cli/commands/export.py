@@ -16,7 +16,7 @@ from aerobat.interchange import read_plan
 from aerobat.interchange.exports import FORMATS
 from aerobat.interchange.exports import export as export_plan
 from aerobat.planning import Plan
-from aerobat.reporting.report_json import to_json
+from aerobat.reporting.plain_data import to_json
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -14,7 +14,7 @@ from aerobat.cli.progress import FiguresProgress, showing
 from aerobat.cli.terminal import print_json
 from aerobat.reporting.paper.figures import FIGURES, paper_figure, require_known
 from aerobat.reporting.paper.files import require_own_page, write_figures
-from aerobat.reporting.report_json import to_json
+from aerobat.reporting.plain_data import to_json
 
 
 @dataclass(frozen=True, kw_only=True)

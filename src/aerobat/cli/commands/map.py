@@ -17,9 +17,9 @@ from aerobat.cli.tasks import make_planner, read_task
 from aerobat.errors import SpecError
 from aerobat.interchange.tables import require_writable, write_table
 from aerobat.reporting.feasibility.figure import map_figure
-from aerobat.reporting.feasibility.table import map_report, map_table
 from aerobat.reporting.page import png
-from aerobat.reporting.report_json import to_json
+from aerobat.reporting.plain_data import to_json
+from aerobat.reporting.tables import table
 from aerobat.storage import require_replaceable
 from aerobat.studies.feasibility import Axis, FeasibilityMap, feasibility_map
 from aerobat.studies.feasibility.probe import TIME_LIMIT
@@ -84,7 +84,7 @@ def map_of(record: RunRecord, workers: int | None = None) -> FeasibilityMap:
 
 def finish_map(found: FeasibilityMap, record: RunRecord, options: OutputOptions) -> None:
     """Write a map, then show it."""
-    facts = to_json(map_report(found))
+    facts = to_json(found)
     picture = png(map_figure(found))
 
     def write(staging: Path) -> None:
@@ -92,4 +92,4 @@ def finish_map(found: FeasibilityMap, record: RunRecord, options: OutputOptions)
         (staging / "map.json").write_text(facts + "\n", encoding="utf-8")
         (staging / "map.png").write_bytes(picture)
 
-    written(record, options, write, facts, map_table(found))
+    written(record, options, write, facts, table(found))

@@ -16,7 +16,7 @@ from aerobat.cli.terminal import print_json, say
 from aerobat.errors import SpecError
 from aerobat.interchange import read_plan
 from aerobat.planning import Plan
-from aerobat.reporting.report_json import passage_facts, to_json
+from aerobat.reporting.plain_data import plain, to_json
 from aerobat.simulation.autopilot import recoveries
 
 if TYPE_CHECKING:
@@ -84,8 +84,8 @@ def mavlink(
 
 def _print(report: LinkReport, in_json: bool) -> None:
     if in_json:
-        passages = [passage_facts(passage) for passage in report.passages]
-        print_json(to_json({**report.record(), "passages": passages}))
+        judged = {"success": report.is_success, "failures": report.failures}
+        print_json(to_json({**plain(report), **judged}))
     else:
         print(report)
 

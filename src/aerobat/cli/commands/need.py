@@ -14,8 +14,9 @@ from aerobat.cli.progress import NeedProgress, showing
 from aerobat.cli.runs.folder import is_of_a_run, written
 from aerobat.cli.runs.record import RunRecord
 from aerobat.cli.tasks import make_planner, read_task
-from aerobat.reporting.feasibility.table import requirements_report, requirements_table
-from aerobat.reporting.report_json import to_json
+from aerobat.reporting.feasibility.facts import requirements
+from aerobat.reporting.plain_data import to_json
+from aerobat.reporting.tables import table
 from aerobat.storage import require_replaceable
 from aerobat.studies.feasibility import Requirement, min_requirements
 from aerobat.studies.feasibility.probe import TIME_LIMIT
@@ -75,8 +76,8 @@ def need_of(record: RunRecord, workers: int | None = None) -> tuple[Requirement,
 
 def finish_need(found: Sequence[Requirement], record: RunRecord, options: OutputOptions) -> None:
     """Write what is needed, then show it."""
-    names = record.problem.name, record.vehicle.name
-    facts = to_json(requirements_report(*names, found))
+    told = requirements(record.problem.name, record.vehicle.name, found)
+    facts = to_json(told)
 
     def write(staging: Path) -> None:
         (staging / NEED).write_text(facts + "\n", encoding="utf-8")
@@ -84,4 +85,4 @@ def finish_need(found: Sequence[Requirement], record: RunRecord, options: Output
             if each.plan is not None:
                 each.plan.save(staging / f"{record.problem.name}-{each.quantity}.plan")
 
-    written(record, options, write, facts, requirements_table(*names, found))
+    written(record, options, write, facts, table(told))

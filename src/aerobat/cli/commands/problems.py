@@ -11,7 +11,8 @@ from aerobat.cli.options import output
 from aerobat.cli.runs.new_file import write_new
 from aerobat.errors import SpecError
 from aerobat.problem import load_problem, problem_names, problem_text
-from aerobat.reporting.tables import print_table, problems_table
+from aerobat.reporting.facts import Fact, Facts
+from aerobat.reporting.tables import print_table, table
 
 
 def problems(
@@ -36,4 +37,6 @@ def problems(
     elif out is not None:
         raise SpecError("--out writes one problem; name it")
     else:
-        print_table(problems_table(load_problem(name) for name in problem_names()))
+        print_table(
+            table(Facts([Fact("problems", [load_problem(name) for name in problem_names()], "problems")]))
+        )

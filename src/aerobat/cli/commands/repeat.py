@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated, Any
@@ -26,9 +25,8 @@ from aerobat.documents import read_json
 from aerobat.errors import SpecError
 from aerobat.interchange import read_plan, read_table
 from aerobat.planning import Plan, with_explanation
-from aerobat.reporting.comparison import comparison_rows
-from aerobat.reporting.feasibility.table import requirements_report
-from aerobat.reporting.report_json import to_json
+from aerobat.reporting.feasibility.facts import requirements
+from aerobat.reporting.plain_data import plain
 from aerobat.simulation import Flight, load_flight
 
 SAME = ("planner", "duration_s")  # of a comparison's rows: times of the clock are not
@@ -82,11 +80,11 @@ def repeat(
 
 def _repeat_comparison(folder: Path, record: RunRecord, options: RepeatOptions) -> ExitCode:
     try:
-        old = [[row[name] for name in SAME] for row in read_json(folder / COMPARISON)]
+        old = [[row[name] for name in SAME] for row in read_json(folder / COMPARISON)["planners"]]
     except (SpecError, TypeError, KeyError):
         raise SpecError(f"{folder}/ has no {COMPARISON} that can be read; compare anew") from None
     comparison = comparison_of(record)
-    rows = [[row[name] for name in SAME] for row in comparison_rows(comparison)]
+    rows = [[row[name] for name in SAME] for row in plain(comparison)["planners"]]
     finish_comparison(comparison, record, options)
     return _told(folder, record, "" if rows == old else "durations are others", ExitCode.WELL)
 
@@ -115,8 +113,8 @@ def _repeat_need(folder: Path, record: RunRecord, options: RepeatOptions) -> Exi
         raise SpecError(f"{folder}/ has no {NEED} that can be read; search anew") from None
     found = need_of(record)
     finish_need(found, record, options)
-    report = to_json(requirements_report(record.problem.name, record.vehicle.name, found))
-    difference = "" if json.loads(report) == old else "what is needed is another"
+    again = plain(requirements(record.problem.name, record.vehicle.name, found))
+    difference = "" if again == old else "what is needed is another"
     return _told(folder, record, difference, ExitCode.WELL)
 
 

@@ -20,9 +20,9 @@ from aerobat.environment import load_dispersion
 from aerobat.interchange.tables import require_writable, write_table
 from aerobat.planning import Plan
 from aerobat.reporting.page import png
-from aerobat.reporting.report_json import to_json
+from aerobat.reporting.plain_data import to_json
 from aerobat.reporting.sweeps.figure import sweep_figure
-from aerobat.reporting.sweeps.table import sweep_report, sweep_table
+from aerobat.reporting.tables import table
 from aerobat.storage import require_replaceable
 from aerobat.studies.sweep import Sweep
 from aerobat.studies.sweep import sweep as sweep_plan
@@ -134,7 +134,7 @@ def sweep_of(plan: Plan, record: RunRecord, options: OutputOptions, workers: int
 
 def finish_sweep(sweep: Sweep, record: RunRecord, options: OutputOptions) -> None:
     """Write a sweep, then show it."""
-    facts = to_json(sweep_report(sweep))
+    facts = to_json(sweep)
     picture = png(sweep_figure(sweep))
 
     def write(staging: Path) -> None:
@@ -143,5 +143,5 @@ def finish_sweep(sweep: Sweep, record: RunRecord, options: OutputOptions) -> Non
         (staging / "sweep.json").write_text(facts + "\n", encoding="utf-8")
         (staging / "sweep.png").write_bytes(picture)
 
-    written(record, options, write, facts, sweep_table(sweep))
+    written(record, options, write, facts, table(sweep))
     Unfinished.beside(options.out or record.folder).remove()

@@ -16,9 +16,8 @@ from aerobat.cli.tasks import planned
 from aerobat.cli.terminal import print_json, say
 from aerobat.environment import load_dispersion
 from aerobat.errors import SpecError
-from aerobat.reporting.report_json import to_json
-from aerobat.reporting.sweeps.tuning import tuning_report, tuning_table
-from aerobat.reporting.tables import print_table
+from aerobat.reporting.plain_data import plain, to_json
+from aerobat.reporting.tables import print_table, table
 from aerobat.studies.tune import tune as tune_gains
 from aerobat.vehicle import write_vehicle
 
@@ -101,8 +100,8 @@ def tune(
         end_interrupts()
         write_vehicle(tuning.tuned_vehicle, out)
     if options.json:
-        print_json(to_json(tuning_report(tuning) | {"file": str(out) if tuning.is_better else None}))
+        print_json(to_json(plain(tuning) | {"file": str(out) if tuning.is_better else None}))
     else:
-        print_table(tuning_table(tuning))
+        print_table(table(tuning))
     say(f"written to {out}" if tuning.is_better else "nothing is written")
     return ExitCode.WELL if tuning.is_better else ExitCode.NOT_WELL

@@ -14,8 +14,9 @@ from aerobat.cli.terminal import say
 from aerobat.documents import in_document
 from aerobat.errors import SpecError
 from aerobat.interchange.robots import SUFFIXES, import_vehicle, read_robot_description
-from aerobat.reporting.tables import print_table, vehicles_table
-from aerobat.reporting.vehicle_table import vehicle_table
+from aerobat.reporting.facts import Fact, Facts
+from aerobat.reporting.tables import print_table, table
+from aerobat.reporting.vehicles import vehicle_row
 from aerobat.vehicle import load_vehicle, vehicle_names, vehicle_text
 
 
@@ -42,7 +43,8 @@ def vehicles(
     elif out is not None:
         raise SpecError("--out writes one vehicle; name it")
     else:
-        print_table(vehicles_table(load_vehicle(name) for name in vehicle_names()))
+        rows = [vehicle_row(load_vehicle(name)) for name in vehicle_names()]
+        print_table(table(Facts([Fact("vehicles", rows, "vehicles")])))
 
 
 def _show(name: str) -> None:
@@ -56,7 +58,7 @@ def _show(name: str) -> None:
         vehicle = import_vehicle(name)
     else:
         vehicle = load_vehicle(name)
-    print_table(vehicle_table(vehicle))
+    print_table(table(vehicle))
 
 
 def _text(name: str) -> str:

@@ -20,7 +20,7 @@ from aerobat.errors import SpecError
 from aerobat.interchange import read_plan
 from aerobat.planning import Plan
 from aerobat.reporting.motion.video import write_video
-from aerobat.reporting.report_json import to_json
+from aerobat.reporting.plain_data import to_json
 from aerobat.simulation import Flight, load_flight
 from aerobat.simulation.flight import MAX_FLIGHT
 from aerobat.simulation.fly import fly as simulate
