@@ -17,7 +17,7 @@ class InspectOptions:
     """The flight's plan, a .plan file or its folder. Default: the one beside the log."""
 
     vehicle: Annotated[str | None, Parameter(group=output)] = None
-    """The vehicle: a name that `aerobat vehicles` lists, or a TOML file. Default: the plan's."""
+    """The vehicle: a name that `aerobat show` lists, or a TOML file. Default: the plan's."""
 
     figure: Annotated[Path | None, Parameter(group=output)] = None
     """The picture's file. Default: inspect.png in the log's folder."""

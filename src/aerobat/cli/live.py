@@ -36,7 +36,7 @@ class ViewOptions:
     """The pace of time in the video, 1 as it was flown."""
 
     vehicle: Annotated[str | None, Parameter(group=output)] = None
-    """The vehicle: a name that `aerobat vehicles` lists, or a TOML file. Default: the plan's, else the preset
+    """The vehicle: a name that `aerobat show` lists, or a TOML file. Default: the plan's, else the preset
     of the flight's name."""
 
     plugins: Annotated[tuple[Path, ...], Plugins(group=output)] = ()

@@ -63,7 +63,7 @@ class TaskOptions(OutputOptions):
     """The problem's and the vehicle's options, and where results go."""
 
     vehicle: Annotated[str | None, Parameter(group=planning)] = None
-    """The vehicle: a name that `aerobat vehicles` lists, or a TOML file. Default: that of a .plan file, else
+    """The vehicle: a name that `aerobat show` lists, or a TOML file. Default: that of a .plan file, else
     agile-quad, or hexarotor with --paper."""
 
     angle: Annotated[float | None, Parameter(group=planning)] = None

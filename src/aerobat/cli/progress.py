@@ -239,30 +239,6 @@ class CausesProgress(Progress):
         return f"{self._name} ({self._begun} of {self._trials})"
 
 
-class FiguresProgress(Progress):
-    """The figure of the paper that is being made, and what is planned or flown for it.
-
-    Args:
-        count: How many figures there shall be.
-    """
-
-    def __init__(self, count: int) -> None:
-        self._count = count
-        self._begun, self._number, self._doing = 0, 0, ""
-
-    def figure(self, number: int) -> None:
-        """Another figure's turn."""
-        self._begun, self._number, self._doing = self._begun + 1, number, ""
-
-    def begin(self, doing: str) -> None:
-        """Take note of what is planned or flown next."""
-        self._doing = f": {doing}"
-
-    def __str__(self) -> str:
-        """Which figure, how many there are, and what it is at."""
-        return f"figure {self._number} ({self._begun} of {self._count}){self._doing}"
-
-
 def planning_progress(planner: str = "") -> AbstractContextManager[PlanningProgress]:
     """Show what planning is at in the block."""
     return showing(PlanningProgress(planner))

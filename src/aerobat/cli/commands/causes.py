@@ -26,7 +26,7 @@ class CausesOptions:
     """Options of a measurement of causes of error."""
 
     vehicle: Annotated[str | None, Parameter(group=planning)] = None
-    """The vehicle: a name that `aerobat vehicles` lists, or a TOML file. Default: agile-quad."""
+    """The vehicle: a name that `aerobat show` lists, or a TOML file. Default: agile-quad."""
 
     angle: Annotated[float | None, Parameter(group=planning)] = None
     """The tilt of a half-flip's gate in degrees, -90 to 90, to the right when positive."""
@@ -60,7 +60,7 @@ def causes(problem: str, options: Annotated[CausesOptions, Parameter(name="*")] 
     Parameters
     ----------
     problem
-        A name that `aerobat problems` lists, or a problem's TOML file, with a gate.
+        A name that `aerobat show` lists, or a problem's TOML file, with a gate.
     """
     chosen = TaskOptions(vehicle=options.vehicle, angle=options.angle, plugins=options.plugins)
     task, vehicle = read_task(problem, chosen)

@@ -33,7 +33,7 @@ class CheckOptions:
     """Limits that a trajectory is checked for, beyond those of its vehicle's rotors and its problem."""
 
     vehicle: Annotated[str | None, Parameter(group=limiting)] = None
-    """The vehicle: a name that `aerobat vehicles` lists, or a TOML file. Default: the plan's, else
+    """The vehicle: a name that `aerobat show` lists, or a TOML file. Default: the plan's, else
     agile-quad."""
 
     heading: Annotated[float | None, Parameter(group=limiting)] = None

@@ -27,7 +27,7 @@ class TuningOptions:
     """Options of a search for gains."""
 
     vehicle: Annotated[str | None, Parameter(group=planning)] = None
-    """The vehicle whose gains are sought: a name that `aerobat vehicles` lists, or a TOML file. Default: that
+    """The vehicle whose gains are sought: a name that `aerobat show` lists, or a TOML file. Default: that
     of a .plan file, else agile-quad."""
 
     angle: Annotated[float | None, Parameter(group=planning)] = None
@@ -74,12 +74,12 @@ def tune(
     Parameters
     ----------
     problems
-        One or more: names that `aerobat problems` lists, problems' TOML files, or .plan files or runs'
+        One or more: names that `aerobat show` lists, problems' TOML files, or .plan files or runs'
         folders, whose plans are flown as they are.
     """
     out = options.out
     if not problems:
-        raise SpecError("a problem is missing; `aerobat problems` lists some")
+        raise SpecError("a problem is missing; `aerobat show` lists some")
     if out is not None and out.suffix != ".toml":
         raise SpecError(f"--out must be a vehicle's file, its name ending in .toml, got {out}")
     conditions = load_dispersion(options.conditions)
