@@ -1,4 +1,4 @@
-"""`aerobat feasibility --over` and `aerobat feasibility`, and their folders: what is there, what is repeated, what is refused."""
+"""`aerobat feasibility`, and their folders: what is there, what is repeated, what is refused."""
 
 from __future__ import annotations
 

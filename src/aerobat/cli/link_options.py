@@ -1,12 +1,11 @@
 """The options of live links, each with its help."""
 
 from dataclasses import dataclass
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
 from cyclopts import Group, Parameter, validators
 
-from aerobat.cli.options import POSITIVE, Plugins, output, planning
+from aerobat.cli.options import POSITIVE, PluginOptions, RunOptions, planning
 
 if TYPE_CHECKING:
     from aerobat.links.mission import MissionSettings
@@ -19,7 +18,7 @@ FRACTION = validators.Number(gte=0, lt=1)
 
 
 @dataclass(frozen=True, kw_only=True)
-class MissionOptions:
+class MissionOptions(PluginOptions):
     """Options of what ends a flight by a link."""
 
     max_error: Annotated[float, Parameter(group=bounds, validator=POSITIVE)] = 1.0
@@ -31,8 +30,6 @@ class MissionOptions:
 
     max_lateness: Annotated[float, Parameter(group=bounds, validator=POSITIVE)] = 0.1
     """Seconds by which a set-point may be late, in the plan."""
-
-    plugins: Annotated[tuple[Path, ...], Plugins(group=output)] = ()
 
     @property
     def mission(self) -> "MissionSettings":
@@ -69,7 +66,7 @@ class RosNodeOptions(EndOptions):
 
 
 @dataclass(frozen=True, kw_only=True)
-class MavlinkOptions(MissionOptions):
+class MavlinkOptions(MissionOptions, RunOptions):
     """Options of a flight over MAVLink."""
 
     connect: Annotated[str, Parameter(group=linking)] = "udp:127.0.0.1:14540"
@@ -106,9 +103,6 @@ class MavlinkOptions(MissionOptions):
 
     speed: Annotated[float, Parameter(group=trials, validator=POSITIVE)] = 1.0
     """The pace of time, 1 as in reality, for a simulated vehicle that has the same."""
-
-    json: Annotated[bool, Parameter(group=output, negative="", show_default=False)] = False
-    """Print the report as JSON on standard output, and nothing else."""
 
 
 @dataclass(frozen=True, kw_only=True)

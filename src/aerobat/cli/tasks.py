@@ -11,7 +11,7 @@ from aerobat.cli.options import (
     ConditionsOptions,
     PlannerOptions,
     PlanningOptions,
-    TaskOptions,
+    ProblemOptions,
     is_given,
     offered_options,
     option_name,
@@ -38,7 +38,7 @@ from aerobat.problem import Problem, load_problem
 from aerobat.vehicle import Vehicle
 
 
-def read_task(name: str, options: TaskOptions, paper: bool = False) -> tuple[Problem, Vehicle]:
+def read_task(name: str, options: ProblemOptions, paper: bool = False) -> tuple[Problem, Vehicle]:
     """The problem and the vehicle that a command names."""
     problem = load_problem(name)
     vehicle = named_vehicle(options.vehicle or default_vehicle(paper))

@@ -15,7 +15,7 @@ from aerobat.cli.commands.feasibility import NEED, finish_map, finish_need, map_
 from aerobat.cli.commands.fly import flown
 from aerobat.cli.commands.sweep import finish_sweep, sweep_of, table_name
 from aerobat.cli.exit_code import ExitCode
-from aerobat.cli.options import ExplainingOptions, OutputOptions, Plugins, output, planning
+from aerobat.cli.options import ExplainingOptions, OutputOptions, output
 from aerobat.cli.runs.folder import FLIGHT, finish
 from aerobat.cli.runs.record import RunRecord, read_record, versions_now
 from aerobat.cli.tasks import plan_of
@@ -37,8 +37,6 @@ class RepeatOptions(OutputOptions, ExplainingOptions):
 
     out: Annotated[Path | None, Parameter(group=output)] = None
     """The folder to write to, replaced as a whole. Default: FOLDER-repeated, beside the one repeated."""
-
-    plugins: Annotated[tuple[Path, ...], Plugins(group=planning)] = ()
 
 
 def repeat(

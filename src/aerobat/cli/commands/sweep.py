@@ -8,7 +8,7 @@ from typing import Annotated, Literal
 
 from cyclopts import Parameter, validators
 
-from aerobat.cli.options import OutputOptions, PlanningOptions, flying, how_many, output
+from aerobat.cli.options import FlightsOptions, OutputOptions, PlanningOptions, flying, output
 from aerobat.cli.progress import SweepProgress, showing
 from aerobat.cli.runs.folder import is_of_a_run, written
 from aerobat.cli.runs.record import FlightSettings, RunRecord
@@ -30,21 +30,12 @@ from aerobat.studies.workers import WorkerEnded
 
 
 @dataclass(frozen=True, kw_only=True)
-class SweepingOptions:
-    """Options of many flights."""
-
-    runs: Annotated[int, how_many(1, 10**7)] = 1000
-    """The number of flights."""
-
-    conditions: Annotated[str, Parameter(group=flying)] = "lab"
-    """The variation between flights, the disturbances and the sensors: none, lab, field, or a TOML file."""
+class SweepingOptions(FlightsOptions):
+    """Options of a sweep."""
 
     controller: Annotated[str, Parameter(group=flying)] = "full"
     """The control law: full, or paper, at the gains of the vehicle's file; lee, lqr, indi; or one of your own
     that --import brings in."""
-
-    seed: Annotated[int, Parameter(group=flying, validator=validators.Number(gte=0))] = 0
-    """The seed of all flights: the same seed, the same flights."""
 
     workers: Annotated[int | None, Parameter(group=flying, validator=validators.Number(gte=1, lte=4096))] = (
         None
@@ -79,7 +70,7 @@ def sweep(
         controller=sweeping.controller,
         conditions=load_dispersion(sweeping.conditions),
         seed=sweeping.seed,
-        runs=sweeping.runs,
+        runs=sweeping.flights,
         table=sweeping.table,
     )
     require_writable(table_name(settings))

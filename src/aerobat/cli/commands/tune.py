@@ -10,7 +10,15 @@ from cyclopts import Parameter, validators
 
 from aerobat.cli.exit_code import ExitCode
 from aerobat.cli.interrupts import end_interrupts
-from aerobat.cli.options import PlanningOptions, Plugins, flying, how_many, limiting, output, planning
+from aerobat.cli.options import (
+    FlightsOptions,
+    OutputOptions,
+    PlanningOptions,
+    ProblemOptions,
+    how_many,
+    limiting,
+    output,
+)
 from aerobat.cli.progress import TuningProgress, showing
 from aerobat.cli.tasks import planned
 from aerobat.cli.terminal import print_json, say
@@ -23,27 +31,12 @@ from aerobat.vehicle import write_vehicle
 
 
 @dataclass(frozen=True, kw_only=True)
-class TuningOptions:
+class TuningOptions(ProblemOptions, FlightsOptions, OutputOptions):
     """Options of a search for gains."""
-
-    vehicle: Annotated[str | None, Parameter(group=planning)] = None
-    """The vehicle whose gains are sought: a name that `aerobat show` lists, or a TOML file. Default: that
-    of a .plan file, else agile-quad."""
-
-    angle: Annotated[float | None, Parameter(group=planning)] = None
-    """The tilt of a half-flip's gate in degrees, -90 to 90, to the right when positive."""
-
-    plugins: Annotated[tuple[Path, ...], Plugins(group=planning)] = ()
-
-    conditions: Annotated[str, Parameter(group=flying)] = "lab"
-    """The variation between flights, the disturbances and the sensors: none, lab, field, or a TOML file."""
 
     flights: Annotated[int, how_many(2, 100_000)] = 200
     """The number of flights of each maneuver that each set of gains is tried on, and of others that judge
     the best."""
-
-    seed: Annotated[int, Parameter(group=flying, validator=validators.Number(gte=0))] = 0
-    """The seed of all flights: the same seed, the same gains, unless --time-limit ends the search."""
 
     evaluations: Annotated[
         int, Parameter(group=limiting, validator=validators.Number(gte=1, lte=100_000))
@@ -55,9 +48,6 @@ class TuningOptions:
 
     out: Annotated[Path | None, Parameter(group=output)] = None
     """The vehicle's file to write; an earlier one is replaced. Default: out/VEHICLE-tuned.toml."""
-
-    json: Annotated[bool, Parameter(group=output, negative="", show_default=False)] = False
-    """Print before and after as JSON on standard output, and nothing else."""
 
 
 def tune(
