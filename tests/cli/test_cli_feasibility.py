@@ -13,7 +13,7 @@ import pytest
 
 import aerobat as ab
 from aerobat import cli
-from aerobat.cli.progress import MapProgress, NeedProgress, WhyProgress
+from aerobat.cli.progress import Progress
 from aerobat.interchange import read_table
 
 MAP = ("feasibility", "half-flip", "--over", "angle=0:90:90", "--over", "speed=4:12:8")
@@ -179,17 +179,12 @@ def test_an_interrupt_leaves_nothing_but_a_word(command: tuple[str, ...], worker
 
 def test_progress_says_how_many_and_how_long_still() -> None:
     now = [0.0]
-    progress = MapProgress(100, lambda: now[0])
-    assert str(progress) == "0 of 100 cells in 0 s"
+    progress = Progress("cells", 100, lambda: now[0])
+    assert str(progress) == "cells 0 of 100 in 0 s"
     now[0] = 5.0
-    progress.record(20, 12)
-    assert str(progress) == "20 of 100 cells in 5 s: 12 planned; 20 s to go"
-    need = NeedProgress()
-    need.record("ceiling", 3.51, True)
-    need.record("gate", 0.5, False)
-    need.record("ceiling", 3.5, False)
-    assert str(need) == "3 plans tried; ceiling 3.5 refused; gate 0.5 refused"
-    why = WhyProgress()
-    why.record("without limits.velocity", True)
-    why.record("with min_thrust 0", False)
-    assert str(why) == "2 changes tried, 1 would help; with min_thrust 0: no plan"
+    progress.counting("planned")(20, 12)
+    assert str(progress) == "cells 20 of 100 in 5 s: 12 planned; 20 s to go"
+    tried = Progress("plans tried", clock=lambda: now[0])
+    for note in ("ceiling 3.51 planned", "gate 0.5 refused"):
+        tried.step(note)
+    assert str(tried) == "plans tried 2 in 0 s: gate 0.5 refused"

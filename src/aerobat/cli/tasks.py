@@ -16,7 +16,7 @@ from aerobat.cli.options import (
     offered_options,
     option_name,
 )
-from aerobat.cli.progress import PassingProgress, WhyProgress, planning_progress, showing
+from aerobat.cli.progress import Progress, planning_progress, showing
 from aerobat.cli.runs.record import FlightSettings, RunRecord, default_vehicle
 from aerobat.cli.runs.saved_plans import named_vehicle, plan_source, read_saved_plan
 from aerobat.cli.terminal import say
@@ -138,8 +138,12 @@ def _advice(record: RunRecord, refusal: Infeasible) -> str:
     from aerobat.studies.why import Request, explained
 
     task = Request(record.problem, None if record.paper else record.vehicle, record.planner)
-    with showing(WhyProgress()) as progress:
-        return explained(refusal, task, progress.record).advice
+    with showing(Progress("changes tried")) as progress:
+
+        def note(change: str, helps: bool) -> None:
+            progress.step(f"{change}: {'planned' if helps else 'no plan'}")
+
+        return explained(refusal, task, note).advice
 
 
 def _plan_made(record: RunRecord, explain: bool) -> Plan:
@@ -167,7 +171,7 @@ def _plan_that_passes(record: RunRecord) -> Plan:
         raise SpecError(f"--pass plans for --controller full, not {flight.controller}; leave one of them out")
     from aerobat.studies.passing import plan_to_pass
 
-    with showing(PassingProgress(record.planner_name)) as progress:
+    with planning_progress(record.planner_name) as progress:
         return plan_to_pass(
             record.problem,
             record.planner,

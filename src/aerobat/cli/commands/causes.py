@@ -8,7 +8,7 @@ from typing import Annotated
 from cyclopts import Parameter, validators
 
 from aerobat.cli.options import FlightsOptions, ProblemOptions, planning
-from aerobat.cli.progress import CausesProgress, showing
+from aerobat.cli.progress import Progress, showing
 from aerobat.cli.tasks import read_task
 from aerobat.cli.terminal import print_json
 from aerobat.environment import load_dispersion
@@ -44,7 +44,7 @@ def causes(problem: str, options: Annotated[CausesOptions, Parameter(name="*")] 
     task, vehicle = read_task(problem, options)
     conditions = load_dispersion(options.conditions)
     switched = four_causes(conditions, vehicle.controller)
-    with showing(CausesProgress(len(switched) + 2)) as progress:
+    with showing(Progress("trial", len(switched) + 2)) as progress:
         measured = error_causes(
             task,
             vehicle,
@@ -53,7 +53,7 @@ def causes(problem: str, options: Annotated[CausesOptions, Parameter(name="*")] 
             conditions=conditions,
             flights=options.flights,
             seed=options.seed,
-            begin=progress.begin,
+            begin=progress.step,
         )
     if options.json:
         print_json(to_json(measured))

@@ -11,7 +11,7 @@ from cyclopts import Parameter
 
 from aerobat.cli.feasibility_options import FeasibilityOptions
 from aerobat.cli.options import OutputOptions
-from aerobat.cli.progress import MapProgress, NeedProgress, showing
+from aerobat.cli.progress import Progress, showing
 from aerobat.cli.runs.folder import is_of_a_run, written
 from aerobat.cli.runs.record import FlightSettings, RunRecord
 from aerobat.cli.tasks import make_planner, read_task
@@ -93,7 +93,7 @@ def map_of(record: RunRecord, workers: int | None = None) -> FeasibilityMap:
     over = {axis.name: axis.values for axis in axes}
     if len(over) < len(axes):
         raise SpecError(f"--over names {axes[0].name} twice; give another field, or drop one")
-    with showing(MapProgress(prod(len(axis.values) for axis in axes))) as progress:
+    with showing(Progress("cells", prod(len(axis.values) for axis in axes))) as progress:
         return feasibility_map(
             record.problem,
             over,
@@ -101,7 +101,7 @@ def map_of(record: RunRecord, workers: int | None = None) -> FeasibilityMap:
             record.planner,
             time_limit=TIME_LIMIT if record.time_limit is None else record.time_limit,
             workers=workers,
-            progress=progress.record,
+            progress=progress.counting("planned"),
         )
 
 
@@ -125,7 +125,11 @@ def need_of(record: RunRecord, workers: int | None = None) -> tuple[Requirement,
         record: What is planned, and how.
         workers: How many processes plan.
     """
-    with showing(NeedProgress()) as progress:
+    with showing(Progress("plans tried")) as progress:
+
+        def note(quantity: str, value: float, planned: bool) -> None:
+            progress.step(f"{quantity} {value:.4g} {'planned' if planned else 'refused'}")
+
         return min_requirements(
             record.problem,
             record.vehicle,
@@ -134,7 +138,7 @@ def need_of(record: RunRecord, workers: int | None = None) -> tuple[Requirement,
             tolerance=record.tolerance,
             time_limit=TIME_LIMIT if record.time_limit is None else record.time_limit,
             workers=workers,
-            progress=progress.record,
+            progress=note,
         )
 
 

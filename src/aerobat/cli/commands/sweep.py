@@ -9,7 +9,7 @@ from typing import Annotated, Literal
 from cyclopts import Parameter, validators
 
 from aerobat.cli.options import FlightsOptions, OutputOptions, PlanningOptions, flying, output
-from aerobat.cli.progress import SweepProgress, showing
+from aerobat.cli.progress import Progress, showing
 from aerobat.cli.runs.folder import is_of_a_run, written
 from aerobat.cli.runs.record import FlightSettings, RunRecord
 from aerobat.cli.runs.unfinished import Unfinished
@@ -102,7 +102,7 @@ def sweep_of(plan: Plan, record: RunRecord, options: OutputOptions, workers: int
     assert flight.conditions is not None, "a sweep has conditions"
     unfinished = Unfinished.beside(options.out or record.folder)
     try:
-        with showing(SweepProgress(flight.runs)) as progress:
+        with showing(Progress("flown", flight.runs)) as progress:
             return sweep_plan(
                 plan,
                 flight.conditions,
@@ -112,7 +112,7 @@ def sweep_of(plan: Plan, record: RunRecord, options: OutputOptions, workers: int
                 controller=named_controller(flight.controller, record.vehicle.controller),
                 workers=workers,
                 keep=unfinished.flights,
-                progress=progress.record,
+                progress=progress.counting("went well"),
             )
     except BaseException as error:
         if not unfinished.finished:

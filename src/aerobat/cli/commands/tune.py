@@ -19,7 +19,7 @@ from aerobat.cli.options import (
     limiting,
     output,
 )
-from aerobat.cli.progress import TuningProgress, showing
+from aerobat.cli.progress import Progress, showing
 from aerobat.cli.tasks import planned
 from aerobat.cli.terminal import print_json, say
 from aerobat.environment import load_dispersion
@@ -75,7 +75,7 @@ def tune(
     conditions = load_dispersion(options.conditions)
     planning = PlanningOptions(vehicle=options.vehicle, angle=options.angle, plugins=options.plugins)
     plans = [planned(problem, planning, "plan")[0] for problem in problems]
-    with showing(TuningProgress(options.evaluations)) as progress:
+    with showing(Progress("sets of gains tried", options.evaluations)) as progress:
         tuning = tune_gains(
             plans,
             conditions,
@@ -83,7 +83,7 @@ def tune(
             options.seed,
             evaluations=options.evaluations,
             time_limit=options.time_limit,
-            progress=progress.record,
+            progress=lambda tried, cost: progress.tell(tried, f"cost {100 * cost:.2f} cm so far"),
         )
     out = out or Path("out") / f"{tuning.vehicle.name}-tuned.toml"
     if tuning.is_better:
