@@ -195,7 +195,7 @@ def test_a_plan_that_takes_suspiciously_long_says_so_and_what_to_give(capsys) ->
 def test_check_judges_a_plan_of_what_cannot_hover_all_the_same(capsys) -> None:
     """The exit code is the proof's; of the way back it is told that there is none."""
     run(capsys, "plan", "line")
-    run(capsys, "vehicles", "agile-quad", "--out", "agile.toml")
+    run(capsys, "show", "agile-quad", "--out", "agile.toml")
     text = Path("agile.toml").read_text(encoding="utf-8")
     Path("heavy.toml").write_text(re.sub(r"(?m)^mass = .*$", "mass = 20.0", text, count=1))
     code, out, _ = run(capsys, "check", "out/line", "--vehicle", "heavy.toml", "--json")
@@ -254,7 +254,7 @@ def test_without_arguments_three_lines_say_what_to_type_first(capsys) -> None:
     first, *lines = out.splitlines()
     assert first.endswith("To begin with, type:")
     assert [line.split("  ")[1] for line in lines] == [
-        "aerobat fly flip-roll", "aerobat problems", "aerobat --help",
+        "aerobat fly flip-roll", "aerobat show", "aerobat --help",
     ]  # fmt: skip
 
 
@@ -265,7 +265,6 @@ def test_without_arguments_three_lines_say_what_to_type_first(capsys) -> None:
         ("causes", "--runs --flights"),
         ("tune", "--runs --flights"),
         ("repeat", "Default: FOLDER-repeated"),
-        ("figures", "[default: out/figures]"),
         ("fly", "or one of your own that --import brings in"),
     ],
 )
@@ -277,9 +276,8 @@ def test_help_tells_what_the_command_does(command: str, said: str, capsys, monke
 
 
 def test_what_there_is_is_listed(capsys) -> None:
-    _, out, _ = run(capsys, "vehicles")
+    _, out, _ = run(capsys, "show")
     assert all(name in out for name in vehicle_names())
-    _, out, _ = run(capsys, "problems")
     assert all(name in out for name in problem_names())
 
 
@@ -320,8 +318,7 @@ def test_help_tells_every_command_and_option(capsys) -> None:
     _, out, _ = run(capsys, "--help")
     assert "Exit codes" in out
     assert all(
-        command in out
-        for command in ["fly", "plan", "check", "compare", "sweep", "tune", "inspect", "vehicles"]
+        command in out for command in ["fly", "plan", "check", "compare", "sweep", "tune", "inspect", "show"]
     )
     _, out, _ = run(capsys, "fly", "--help")
     options = "vehicle planner order intervals segments stop-after backend paper angle out json seed"
@@ -414,7 +411,7 @@ def test_a_folder_that_cannot_be_filled_leaves_the_earlier_run_whole(mars: Path,
 @pytest.mark.parametrize(
     "command",
     [
-        ["problems"],
+        ["show"],
         pytest.param(["plan", "line", "--json"], marks=pytest.mark.process),
         pytest.param(["fly", "--help"], marks=pytest.mark.process),
     ],

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from aerobat.cli.progress import SweepProgress, showing
+from aerobat.cli.progress import Progress, showing
 from aerobat.cli.runs.record import USUAL_CONDITIONS, RunRecord
 from aerobat.control import named_controller
 from aerobat.environment import load_dispersion
@@ -33,9 +33,14 @@ def trial_flights(plan: Plan, record: RunRecord) -> Sweep | None:
         return None
     controller = named_controller(flight.controller, plan.vehicle.controller)
     try:
-        with showing(SweepProgress(FLIGHTS)) as progress:
+        with showing(Progress("flown", FLIGHTS)) as progress:
             return sweep_plan(
-                plan, conditions, FLIGHTS, flight.seed, controller=controller, progress=progress.record
+                plan,
+                conditions,
+                FLIGHTS,
+                flight.seed,
+                controller=controller,
+                progress=progress.counting("went well"),
             )
     except SpecError:
         return None

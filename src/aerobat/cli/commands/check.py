@@ -11,7 +11,7 @@ from cyclopts import Parameter
 
 from aerobat.certification import Certificate, Envelope, certify
 from aerobat.cli.exit_code import ExitCode
-from aerobat.cli.options import POSITIVE, Plugins, limiting, output
+from aerobat.cli.options import POSITIVE, VehicleOptions, limiting
 from aerobat.cli.runs.record import default_vehicle
 from aerobat.cli.runs.saved_plans import named_vehicle
 from aerobat.cli.terminal import print_json
@@ -29,12 +29,8 @@ from aerobat.vehicle import Vehicle, load_vehicle
 
 
 @dataclass(frozen=True, kw_only=True)
-class CheckOptions:
+class CheckOptions(VehicleOptions):
     """Limits that a trajectory is checked for, beyond those of its vehicle's rotors and its problem."""
-
-    vehicle: Annotated[str | None, Parameter(group=limiting)] = None
-    """The vehicle: a name that `aerobat vehicles` lists, or a TOML file. Default: the plan's, else
-    agile-quad."""
 
     heading: Annotated[float | None, Parameter(group=limiting)] = None
     """The heading at the start in degrees, carried along the path without spin. Default: the file's own, of a
@@ -52,13 +48,8 @@ class CheckOptions:
     max_rate: Annotated[float | None, Parameter(group=limiting, validator=POSITIVE)] = None
     """The greatest body rate allowed, degrees a second."""
 
-    plugins: Annotated[tuple[Path, ...], Plugins(group=limiting)] = ()
-
     max_moment: Annotated[float | None, Parameter(group=limiting, validator=POSITIVE)] = None
     """The greatest moment allowed, N m."""
-
-    json: Annotated[bool, Parameter(group=output, negative="", show_default=False)] = False
-    """Print the certificate as JSON on standard output, and nothing else."""
 
 
 def check(plan: Path, options: Annotated[CheckOptions, Parameter(name="*")] = CheckOptions()) -> ExitCode:

@@ -40,7 +40,7 @@ def compare(problem: str, options: Annotated[CompareOptions, Parameter(name="*")
     Parameters
     ----------
     problem
-        A name that `aerobat problems` lists, or a problem's TOML file.
+        A name that `aerobat show` lists, or a problem's TOML file.
     """
     task, vehicle = read_task(problem, options)
     record = RunRecord(

@@ -35,7 +35,7 @@ def fly(
     Parameters
     ----------
     problem
-        A name that `aerobat problems` lists, a problem's TOML file, or a .plan file or a run's folder, whose
+        A name that `aerobat show` lists, a problem's TOML file, or a .plan file or a run's folder, whose
         plan is flown as it is.
     """
     named_controller(flying.controller)  # refused before anything is planned

@@ -11,12 +11,11 @@ from cyclopts import Parameter
 from numpy.typing import NDArray
 
 from aerobat.cli.commands.compare import COMPARISON, comparison_of, finish_comparison
+from aerobat.cli.commands.feasibility import NEED, finish_map, finish_need, map_of, need_of
 from aerobat.cli.commands.fly import flown
-from aerobat.cli.commands.map import finish_map, map_of
-from aerobat.cli.commands.need import NEED, finish_need, need_of
 from aerobat.cli.commands.sweep import finish_sweep, sweep_of, table_name
 from aerobat.cli.exit_code import ExitCode
-from aerobat.cli.options import ExplainingOptions, OutputOptions, Plugins, output, planning
+from aerobat.cli.options import ExplainingOptions, OutputOptions, output
 from aerobat.cli.runs.folder import FLIGHT, finish
 from aerobat.cli.runs.record import RunRecord, read_record, versions_now
 from aerobat.cli.tasks import plan_of
@@ -39,8 +38,6 @@ class RepeatOptions(OutputOptions, ExplainingOptions):
     out: Annotated[Path | None, Parameter(group=output)] = None
     """The folder to write to, replaced as a whole. Default: FOLDER-repeated, beside the one repeated."""
 
-    plugins: Annotated[tuple[Path, ...], Plugins(group=planning)] = ()
-
 
 def repeat(
     folder: Path, options: Annotated[RepeatOptions, Parameter(name="*")] = RepeatOptions()
@@ -55,7 +52,7 @@ def repeat(
     Parameters
     ----------
     folder
-        A folder that `aerobat plan`, `fly`, `sweep`, `map`, `need` or `compare` wrote.
+        A folder that `aerobat plan`, `fly`, `sweep`, `feasibility` or `compare` wrote.
     """
     record = read_record(folder)
     out = options.out or folder.with_name(f"{folder.resolve().name}-repeated")

@@ -10,7 +10,7 @@ from typing import Annotated
 from cyclopts import Parameter
 
 from aerobat.cli.live import LiveOptions, ViewOptions, serve
-from aerobat.cli.progress import DrawingProgress, showing
+from aerobat.cli.progress import Progress, showing
 from aerobat.cli.runs.folder import FLIGHT, REPLAY
 from aerobat.cli.runs.record import RECORD, RunRecord, read_record
 from aerobat.cli.runs.saved_plans import named_vehicle
@@ -70,8 +70,10 @@ def view(
     if page is not None:
         require_replaceable(page)
     if options.video is not None:
-        with showing(DrawingProgress()) as progress:
-            write_video(run.shown, options.video, run.plan, vehicle, options.speed, progress.record)
+        with showing(Progress("pictures drawn")) as progress:
+            write_video(
+                run.shown, options.video, run.plan, vehicle, options.speed, progress.counting("in all")
+            )
     if page is not None:
         save_replay(replay, page)
     if options.json:
