@@ -68,7 +68,10 @@ def mars(tmp_path_factory: pytest.TempPathFactory) -> Path:
     problem.write_text(MARS)
     with pytest.MonkeyPatch.context() as patch:
         without_pictures(patch)
-        assert code("fly", problem, "--vehicle", "crazyflie", "--out", folder / "run") == 0
+        assert (
+            code("fly", problem, "--vehicle", "crazyflie", "--conditions", "none", "--out", folder / "run")
+            == 0
+        )
     return folder / "run"
 
 
@@ -100,9 +103,20 @@ def test_fly_writes_the_plan_the_flight_the_picture_and_the_report(capsys) -> No
     assert load_flight(folder / "flight.npz").times[-1] == pytest.approx(report["plan"]["duration_s"])
     assert (folder / "report.png").read_bytes().startswith(b"\x89PNG")
     assert "flip-roll · agile-quad: certified, and it flies" in out
-    for name in ("duration", "limited by", "margin", "space", "gate", "flight"):
+    for name in ("duration", "limited by", "margin", "space", "gate", "flight", "conditions"):
         assert re.search(rf"^ +{name} ", out, re.MULTILINE)
-    assert out.endswith("`aerobat sweep out/flip-roll` counts real flights\nwritten to out/flip-roll/\n")
+    assert out.endswith("`aerobat sweep out/flip-roll` counts more flights\nwritten to out/flip-roll/\n")
+
+
+def test_a_plan_that_few_flights_survive_is_not_well_unless_nothing_shall_vary(capsys, unpictured) -> None:
+    """Without a reserve, disturbances move the vehicle off its path."""
+    code, out, _ = run(capsys, "fly", "line", "--reserve", "0")
+    assert code == 1
+    assert "line · agile-quad: certified, but too few flights succeed under 'lab' conditions" in out
+    assert re.search(r"lab: \d+ of 100 flights succeed, .* --pass 0\.95", " ".join(out.split()))
+    code, out, _ = run(capsys, "fly", "line", "--reserve", "0", "--conditions", "none")
+    assert code == 0
+    assert "of 100" not in out
 
 
 @pytest.mark.slow
@@ -145,7 +159,7 @@ def test_what_takes_seconds_to_know_is_told_where_it_is_asked_for(capsys) -> Non
     trials = explained["trials"]
     sweep = ab.sweep(load_plan("plain/line.plan"), "lab", trials["flights"])
     assert (trials["conditions"], trials["succeeded"]) == ("lab", sweep.success.count)
-    assert "trials" not in plain
+    assert explained["trials"] == plain["trials"]
     assert explained["plan"]["assessment"] == plain["plan"]["assessment"]
     code, out, _ = run(capsys, "check", "plain", "--json")
     assert code == 0
@@ -366,7 +380,7 @@ def test_check_says_what_it_assumes_of_a_file_that_holds_no_more_than_a_path(mar
 
 @pytest.mark.usefixtures("unpictured")
 def test_a_saved_plan_is_flown_as_it_is(mars: Path, capsys) -> None:
-    code, _, err = run(capsys, "fly", mars / "mars.plan", "--out", "again")
+    code, _, err = run(capsys, "fly", mars / "mars.plan", "--conditions", "none", "--out", "again")
     assert (code, err) == (0, "")
     first, again = (load_flight(folder / "flight.npz") for folder in (mars, Path("again")))
     np.testing.assert_array_equal(first.states.q_world_body, again.states.q_world_body)

@@ -55,7 +55,8 @@ app = App(
     went well and why not, and writes the plan, the flight, a picture and a report to out/flip-roll/.
     """,
     help_epilogue="""Exit codes: 0 all is well; 1 not certified, or not flown as it should be (off its
-    path, past a gate, into its frame or the ground): all is written, and the report says why; 2 the input is
+    path, past a gate, into its frame or the ground, or so in more than 5 of 100 flights): all is written, and
+    the report says why; 2 the input is
     wrong or the output cannot be written (one sentence says where); 3 no plan was found (one sentence says
     which bound binds, and with --explain another which changes would help); 130 interrupted; 143
     terminated; then with nothing written. A sweep that was flown ends with 0, whatever became of its flights;

@@ -92,8 +92,8 @@ class ExplainingOptions:
     """Options of a report on a plan."""
 
     explain: Annotated[bool, Parameter(group=output, negative="", show_default=False)] = False
-    """Report all facts, and those that take seconds to know: how many of a hundred flights succeed under the
-    given conditions or a lab's, and the recoveries to a hover from all along the plan. A plan that takes
+    """Report all facts, and those that take seconds to know: the recoveries to a hover from all along the
+    plan, and how many of a hundred flights succeed of a plan that is not flown. A plan that takes
     suspiciously long gets another planner's second opinion. Where there is no plan, the changes with which
     there is one are told."""
 
@@ -190,12 +190,12 @@ class ConditionsOptions:
         float | None,
         Parameter(name="--pass", group=planning, validator=validators.Number(gt=0, lt=1)),
     ] = None
-    """Plan until flights under --conditions pass with this probability, with a reserve of thrust and narrower
-    gates as their spread asks for, and prove it on fresh flights."""
+    """Plan until flights under --conditions, by default lab, pass with this probability, with a reserve of
+    thrust and narrower gates as their spread asks for, and prove it on fresh flights."""
 
     conditions: Annotated[str | None, Parameter(group=flying)] = None
-    """The variation, the disturbances and the sensors: none, lab, field, or a TOML file. Default: flown as
-    planned, from a state that is known."""
+    """The variation, the disturbances and the sensors: none, lab, field, or a TOML file. Default: one flight
+    as planned, from a state that is known, and a hundred under lab, which are counted."""
 
     seed: Seed = 0
     """The seed of the conditions: the same seed, the same flight."""

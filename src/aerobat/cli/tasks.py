@@ -17,7 +17,7 @@ from aerobat.cli.options import (
     option_name,
 )
 from aerobat.cli.progress import Progress, planning_progress, showing
-from aerobat.cli.runs.record import FlightSettings, RunRecord, default_vehicle
+from aerobat.cli.runs.record import USUAL_CONDITIONS, FlightSettings, RunRecord, default_vehicle
 from aerobat.cli.runs.saved_plans import named_vehicle, plan_source, read_saved_plan
 from aerobat.cli.terminal import say
 from aerobat.environment import load_dispersion
@@ -108,9 +108,8 @@ def flight_settings(
         controller: The name of what flies it.
         plant: The name of the physics, None for the built-in.
     """
-    conditions = None if options.conditions is None else load_dispersion(options.conditions)
-    if options.probability is not None and conditions is None:
-        raise SpecError("--pass needs --conditions, under which flights shall pass; give lab, say")
+    named = options.conditions or (None if options.probability is None else USUAL_CONDITIONS)
+    conditions = None if named is None else load_dispersion(named)
     return FlightSettings(controller, conditions, options.seed, plant=plant, probability=options.probability)
 
 

@@ -125,12 +125,13 @@ def finish(
         record: What it takes to do it again.
         options: Where to write, and in what form to say it.
         flown: The plan's flight, if it was flown.
-        explain: Whether flights under random conditions are counted, and all facts are told.
+        explain: Whether all facts are told, and flights are counted of a plan that was not flown.
     """
     assert plan.vehicle is not None, "a command plans for a vehicle"
     flight, score = (flown.flight, flown.score) if flown else (None, None)
     controller, plant = (flown.controller, flown.plant) if flown else (None, None)
-    report = Report(plan, score, controller, plant, _trials(plan, record) if explain else None)
+    trials = _trials(plan, record) if flown or explain else None
+    report = Report(plan, score, controller, plant, trials)
     facts = to_json(report)
     import_undocumented()
     picture = png(report_figure(plan, plan.vehicle, flight, score))
@@ -146,9 +147,9 @@ def finish(
     tables = [table(report, most=REPORT)]
     if explain:
         tables.append(table(report, least=EXPLAIN, title=f"{plan.problem.name} · all facts"))
-    hint = f"--explain tells more; `aerobat sweep {options.out or record.folder}` counts real flights\n"
+    hint = f"--explain tells more; `aerobat sweep {options.out or record.folder}` counts more flights\n"
     written(record, options, write, facts, *tables, hint="" if explain else hint)
-    return ExitCode.WELL if _is_well(plan, score) else ExitCode.NOT_WELL
+    return ExitCode.WELL if report.is_well else ExitCode.NOT_WELL
 
 
 def _trials(plan: Plan, record: RunRecord) -> Sweep | None:
@@ -156,8 +157,3 @@ def _trials(plan: Plan, record: RunRecord) -> Sweep | None:
     from aerobat.cli.trials import trial_flights
 
     return trial_flights(plan, record)
-
-
-def _is_well(plan: Plan, score: Score | None) -> bool:
-    """True if the plan is certified and flies, and its flight, if there is one, went well."""
-    return plan.certified and plan.flies and (score is None or score.outcome.is_success)
