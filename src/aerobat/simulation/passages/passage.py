@@ -23,7 +23,7 @@ from aerobat.arrays import Array
 from aerobat.certification import PlannedPassage
 from aerobat.declaration import by_value
 from aerobat.engines.components import components
-from aerobat.kernels.gates.progress import GateProgress
+from aerobat.kernels.gates.progress import GatePlane, GateProgress
 from aerobat.kernels.gates.section import PlaneDirection
 from aerobat.kernels.gates.swath import Extreme, Swath
 from aerobat.problem.gate import Gate
@@ -190,8 +190,16 @@ def _in_opening(probe: Probe, extreme: Extreme) -> Array:
     return np.stack([left * along - up * beside, up * along + left * beside], axis=-1)
 
 
-def plane_directions(gate: Gate) -> tuple[PlaneDirection, ...]:
-    """The directions in which a body that passes a gate is measured, as kernels read them."""
+def gate_plane(planned: PlannedPassage) -> GatePlane:
+    """A planned passage as kernels read it, leaves numbers."""
+    gate = planned.gate
+    place = components(gate.position), components(gate.normal)
+    about = planned.time, PASSAGE_WINDOW, PASSAGE_DEPTH
+    return GatePlane(*place, _directions(gate), gate.opening.circumradius, *about)
+
+
+def _directions(gate: Gate) -> tuple[PlaneDirection, ...]:
+    """The directions in which a body that passes a gate is measured."""
     probes = gate.opening.probes
     turned = [probe.direction @ gate.plane_axes for probe in probes]
     beside = [np.array([-up, left]) @ gate.plane_axes for (left, up), *_ in probes]
