@@ -14,7 +14,7 @@ from aerobat.errors import SpecError
 from aerobat.kernels.rigid_body import Body
 from aerobat.simulation import FlightConfig, fly, prepare
 from aerobat.simulation.components import StateObserver
-from aerobat.simulation.loop import Clock, Due, LoopInput, LoopParameters, compose
+from aerobat.simulation.loop import Due, LoopInput, LoopParameters, StepClock, compose
 from aerobat.simulation.setup import FlightSetup
 from aerobat.vehicle import load_vehicle
 from looping_flights import HEXA, QUAD, assert_same, loops, near
@@ -142,8 +142,8 @@ def test_a_component_steps_at_its_own_period_and_holds_between(engine: str) -> N
     start = Body(*((np.zeros(2),) * n for n in (3, 3, 4, 3)))
     parameters = LoopParameters(start, ((), (), ()))
     times = np.full(11, 0.01)
-    due = Due((np.arange(11) % 4 == 0).astype(float), Clock(4 * times, 4 * times))
-    inputs = LoopInput(Clock(times, times), (due, (), ()), (), ((), (), ()))
+    due = Due((np.arange(11) % 4 == 0).astype(float), StepClock(4 * times, 4 * times))
+    inputs = LoopInput(StepClock(times, times), (due, (), ()), (), ((), (), ()))
     slow, plant, follower = run_whole(choose(engine, 2, 11), *compose(components, log), parameters, inputs)
     assert slow[0][1].tolist() == [1, 1, 1, 1, 2, 2, 2, 2, 3, 3, 3]
     np.testing.assert_allclose(slow[1][1], 0.04, rtol=1e-15)

@@ -12,7 +12,7 @@ from aerobat.arrays import Array
 from aerobat.kernels import control, motors
 from aerobat.kernels.control import Commands, ControllerModel, ControllerState, FeatureFlags
 from aerobat.kernels.control_loops import ReferencePoint
-from aerobat.kernels.motors import Airframe, Motion
+from aerobat.kernels.motors import Airframe, VehicleState
 from aerobat.kernels.ops import Ops, PerRotor, Scalar, select_tree
 from aerobat.kernels.quaternions import axes, to_world
 from aerobat.kernels.rigid_body import Body, EnvironmentParameters
@@ -208,13 +208,15 @@ class RigidBodyPlant:
         """The plant for so many ticks a second."""
         return cls(max(1, math.ceil(1.0 / rate / MAX_STEP - 1e-9)))
 
-    def init(self, ops: Ops, parameters: PlantParameters, inputs: tuple[()], signals: Signals) -> Motion:
+    def init(
+        self, ops: Ops, parameters: PlantParameters, inputs: tuple[()], signals: Signals
+    ) -> VehicleState:
         """See `Component.init`; the rotors give at first what the controller takes them to give."""
-        return Motion(signals["start"], signals["controller"].thrusts)
+        return VehicleState(signals["start"], signals["controller"].thrusts)
 
     def step(
-        self, ops: Ops, parameters: PlantParameters, motion: Motion, inputs: tuple[()], signals: Signals
-    ) -> Motion:
+        self, ops: Ops, parameters: PlantParameters, motion: VehicleState, inputs: tuple[()], signals: Signals
+    ) -> VehicleState:
         """See `Component.step`."""
         airframe = with_ceiling(ops, parameters.airframe, signals)
         environment = with_wind(parameters.environment, signals)
@@ -249,7 +251,7 @@ def with_ceiling(ops: Ops, airframe: Airframe, signals: Signals) -> Airframe:
     return airframe._replace(rotors=rotors._replace(max_thrust=lowered))
 
 
-class Observed(NamedTuple):
+class LoggedEstimate(NamedTuple):
     """The estimate that a filter made from its sensors."""
 
     body: Body
@@ -259,14 +261,14 @@ class Observed(NamedTuple):
 class LogRow(NamedTuple):
     """Row of the log, kept of each tick."""
 
-    motion: Motion
+    motion: VehicleState
     commands: Commands
-    observed: Observed | tuple[()]  # () where the true state is known
+    observed: LoggedEstimate | tuple[()]  # () where the true state is known
 
 
 def log_row(signals: Signals) -> LogRow:
     """The row of a flight's log."""
     observer = signals["observer"]
     known = isinstance(observer, Estimate)
-    observed = () if known else Observed(observer.body, observer.filter.since_pose)
+    observed = () if known else LoggedEstimate(observer.body, observer.filter.since_pose)
     return LogRow(signals["plant"], signals["controller"].commands, observed)

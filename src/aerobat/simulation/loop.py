@@ -22,7 +22,7 @@ Signals: TypeAlias = Mapping[str, Any]  # "clock", "reference", "start", and by 
 Log: TypeAlias = Callable[[Signals], Tree]
 
 
-class Clock(NamedTuple):
+class StepClock(NamedTuple):
     """Time about a component's step, which at few of them differs from the step before."""
 
     elapsed: Scalar  # [s] since its last step
@@ -45,13 +45,13 @@ class Due(NamedTuple):
     """The turn of a component that does not step at every tick."""
 
     now: Scalar  # 1 at a tick that it steps at, 0 at others
-    clock: Clock  # about the latest of these ticks, from the one before to the next
+    clock: StepClock  # about the latest of these ticks, from the one before to the next
 
 
 class LoopInput(NamedTuple):
     """Inputs from outside at a tick."""
 
-    clock: Clock
+    clock: StepClock
     due: tuple[Due | tuple[()], ...]  # of each component; () where it steps at every tick
     reference: ReferencePoint
     own: tuple[Tree, ...]  # of each component

@@ -30,7 +30,7 @@ from aerobat.simulation.passages import (
     scan_log,
     waypoint_target,
 )
-from aerobat.simulation.setup import FlightSetup, Part
+from aerobat.simulation.setup import FlightSetup, LoopPart
 from aerobat.vehicle import Ellipsoid
 
 
@@ -107,7 +107,7 @@ def with_metrics(setup: FlightSetup, criteria: Criteria = Criteria()) -> FlightS
         waypoints=for_all(tuple(map(waypoint_target, (*criteria.waypoints, *criteria.places)))),
         attitudes=for_all(tuple(map(attitude_direction, criteria.attitudes))),
     )
-    metrics = Part(MetricsMonitor(), parameters, MetricsSource(setup.times))
+    metrics = LoopPart(MetricsMonitor(), parameters, MetricsSource(setup.times))
     return replace(setup, parts=(*setup.parts, metrics))
 
 

@@ -26,7 +26,7 @@ from aerobat.simulation.components import (
 from aerobat.simulation.config import FlightChanges, FlightConfig
 from aerobat.simulation.law_controller import flown_by
 from aerobat.simulation.reference_source import ReferenceSource
-from aerobat.simulation.setup import FlightSetup, Part
+from aerobat.simulation.setup import FlightSetup, LoopPart
 from aerobat.states import BodyState
 from aerobat.trajectory import Trajectory, as_trajectory
 from aerobat.vehicle import Vehicle, as_vehicle, vehicle_names
@@ -80,9 +80,9 @@ def prepare(
     return FlightSetup(
         start=_start(config.start, reference, len(fleet)),
         parts=(
-            Part(StateObserver()),
-            Part(flown_by(config.law, controller), ControllerParameters(model, ())),
-            Part(RigidBodyPlant.for_rate(config.rate), plant),
+            LoopPart(StateObserver()),
+            LoopPart(flown_by(config.law, controller), ControllerParameters(model, ())),
+            LoopPart(RigidBodyPlant.for_rate(config.rate), plant),
         ),
         reference=reference,
         fleet=fleet,

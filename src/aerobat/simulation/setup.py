@@ -37,7 +37,7 @@ class Source(Protocol):
 
 
 @dataclass(frozen=True, eq=False)
-class Part:
+class LoopPart:
     """One component of the loop, its parameters with leaves (vehicles,), and where its inputs come from."""
 
     component: Component
@@ -50,7 +50,7 @@ class FlightSetup:
     """Everything that a flight takes; to be compiled, then stepped or scanned at will."""
 
     start: Body  # the true state at first
-    parts: tuple[Part, ...]  # in the order of their steps
+    parts: tuple[LoopPart, ...]  # in the order of their steps
     reference: ReferenceSource
     fleet: Fleet  # that flies
     nominal: Fleet

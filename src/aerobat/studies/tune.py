@@ -161,7 +161,7 @@ def tune(
     flown = _vehicle_of(plans, vehicle)
     names = _checked(gains, flown.controller)
     objective = _Objective(plans, flown, as_dispersion(conditions), seed)
-    search = _Search(objective, names, range(flights), evaluations, progress)
+    search = _GainSearch(objective, names, range(flights), evaluations, progress)
     with within_time(time_limit):
         search.run()
     training = objective.fly(flown.controller, range(flights)), search.best
@@ -228,7 +228,7 @@ class _Ended(Exception):
     """The search has had its time, or its share of tries."""
 
 
-class _Search:
+class _GainSearch:
     """Gains that are tried, and the best of them."""
 
     def __init__(

@@ -12,7 +12,7 @@ from aerobat.engines.floats import FloatOps, first_numbers
 from aerobat.engines.pytree import Tree, tree_map
 from aerobat.environment import Environment
 from aerobat.kernels.control_loops import Gains, ReferencePoint, init_position_loop
-from aerobat.kernels.motors import Motion
+from aerobat.kernels.motors import VehicleState
 from aerobat.kernels.rigid_body import Body
 from aerobat.links.goals import yaw_of
 from aerobat.simulation.autopilot.braking import point_reference
@@ -61,14 +61,14 @@ class LiveBody:
         state = self.state
         self.state = _at_rest(state.position[:2], yaw_of(state.q_world_body))
         observer, controller, motion = self._carry
-        self._carry = (observer, controller, Motion(_one(self.state), motion.thrusts))
+        self._carry = (observer, controller, VehicleState(_one(self.state), motion.thrusts))
 
     def stop_rotors(self) -> None:
         """Have the rotors give the least that they can, and be known to."""
         observer, controller, motion = self._carry
         commands = controller.commands._replace(thrusts=self._idle)
         stopped = controller._replace(thrusts=self._idle, commands=commands)
-        self._carry = (observer, stopped, Motion(motion.body, self._idle))
+        self._carry = (observer, stopped, VehicleState(motion.body, self._idle))
 
 
 def _at_rest(place: Array, yaw: float) -> BodyState:

@@ -18,7 +18,7 @@ from aerobat.kernels.rigid_body import Body
 from aerobat.simulation.autopilot.attitude_law import Authority
 from aerobat.simulation.autopilot.controller import AutopilotController, AutopilotModel, Guidance
 from aerobat.simulation.components import PlantParameters, RigidBodyPlant, StateObserver
-from aerobat.simulation.loop import Clock, Log, LoopInput, LoopParameters, compose
+from aerobat.simulation.loop import Log, LoopInput, LoopParameters, StepClock, compose
 from aerobat.vehicle import Vehicle
 from aerobat.vehicle.fleet import Fleet
 
@@ -79,4 +79,4 @@ def autopilot_inputs(references: ReferencePoint, by_attitude: bool, upright: boo
     ticks = len(references.position[0])
     period = np.full(ticks, 1.0 / RATE)
     own = ((), Guidance(np.full(ticks, float(by_attitude)), np.full(ticks, float(upright))), ())
-    return LoopInput(Clock(period, period), ((), (), ()), references, own)
+    return LoopInput(StepClock(period, period), ((), (), ()), references, own)

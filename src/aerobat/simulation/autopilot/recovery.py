@@ -22,7 +22,7 @@ from aerobat.environment import Environment
 from aerobat.errors import SpecError
 from aerobat.flatness import Planned, TimeInterval, environment_of, reference, vehicle_of
 from aerobat.kernels.control_loops import Lookahead, ReferencePoint
-from aerobat.kernels.motors import Motion
+from aerobat.kernels.motors import VehicleState
 from aerobat.kernels.rigid_body import Body
 from aerobat.simulation.autopilot.braking import MIN_FLOOR, Braking, nearest_heading, point_reference
 from aerobat.simulation.autopilot.loop import (
@@ -197,7 +197,7 @@ class _Flock:
         self._carry: Tree = (
             observer,
             controller._replace(thrusts=turning),
-            Motion(motion.body, turning),
+            VehicleState(motion.body, turning),
         )
         self._time = 0.0
         self.lowest = flat.position[:, 2].copy()

@@ -27,7 +27,7 @@ from aerobat.kernels.gates.progress import GatePlane, GateProgress
 from aerobat.kernels.gates.section import PlaneDirection
 from aerobat.kernels.gates.swath import Extreme, Swath
 from aerobat.problem.gate import Gate
-from aerobat.problem.opening import Probe, edge_name
+from aerobat.problem.opening import EdgeProbe, edge_name
 from aerobat.simulation.outcome import Outcome
 
 T = TypeVar("T")
@@ -183,7 +183,7 @@ def _closest(gate: Gate, swath: Swath, crossed: NDArray[np.bool_]) -> dict[str, 
     return places | {"closest_edge": np.array(names)}
 
 
-def _in_opening(probe: Probe, extreme: Extreme) -> Array:
+def _in_opening(probe: EdgeProbe, extreme: Extreme) -> Array:
     """The points (left, up) of a gate's plane that reach the farthest along a probe [m], (flights, 2)."""
     left, up = probe.direction
     along, beside = extreme.point

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from aerobat.engines.floats import first_numbers
 from aerobat.engines.pytree import tree_map, tree_stack
 from aerobat.errors import SpecError
-from aerobat.kernels.motors import Motion
+from aerobat.kernels.motors import VehicleState
 from aerobat.kernels.ops import Ops
 from aerobat.problem.gate import Gate
 from aerobat.simulation.components import (
@@ -24,7 +24,7 @@ from aerobat.simulation.components import (
 )
 from aerobat.simulation.loop import LoopInput, Signals, compose
 from aerobat.simulation.plants.plant import Actuation, Plant, PlantScene
-from aerobat.simulation.setup import FlightSetup, Part
+from aerobat.simulation.setup import FlightSetup, LoopPart
 from aerobat.vehicle.ellipsoid import Ellipsoid
 
 
@@ -36,13 +36,20 @@ class OutsidePlant:
     name: str = "plant"
     feedthrough: bool = True
 
-    def init(self, ops: Ops, parameters: PlantParameters, inputs: Motion, signals: Signals) -> Motion:
+    def init(
+        self, ops: Ops, parameters: PlantParameters, inputs: VehicleState, signals: Signals
+    ) -> VehicleState:
         """See `Component.init`."""
         return inputs
 
     def step(
-        self, ops: Ops, parameters: PlantParameters, state: Motion, inputs: Motion, signals: Signals
-    ) -> Motion:
+        self,
+        ops: Ops,
+        parameters: PlantParameters,
+        state: VehicleState,
+        inputs: VehicleState,
+        signals: Signals,
+    ) -> VehicleState:
         """See `Component.step`."""
         return inputs
 
@@ -95,9 +102,11 @@ def fly_outside(
     if len(setup.fleet) != 1:
         raise SpecError(f"plant: {plant.kind} flies one vehicle at a time, not {len(setup.fleet)}")
     parameters: PlantParameters = setup.parts[-1].parameters
-    parts = (Part(OutsidePlant()), *setup.parts[:-1], Part(Actuator(), parameters))
+    parts = (LoopPart(OutsidePlant()), *setup.parts[:-1], LoopPart(Actuator(), parameters))
     inside = replace(setup, parts=parts)
-    motion = Motion(first_numbers(setup.start), tuple(0.0 for _ in parameters.airframe.rotors.max_thrust))
+    motion = VehicleState(
+        first_numbers(setup.start), tuple(0.0 for _ in parameters.airframe.rotors.max_thrust)
+    )
     first = _told(inside.first_tick, motion)
     loop = inside.engine().compile(*compose(inside.components, _outside_row), inside.parameters, first)
     carry = loop.init(first)
@@ -119,7 +128,7 @@ def _outside_row(signals: Signals) -> OutsideRow:
     return OutsideRow(log_row(signals), signals["actuator"])
 
 
-def _told(inputs: LoopInput, motion: Motion) -> LoopInput:
+def _told(inputs: LoopInput, motion: VehicleState) -> LoopInput:
     """The inputs of a tick with the plant's motion, which is the first component's."""
     return inputs._replace(own=(tree_map(np.float64, motion), *inputs.own[1:]))
 
