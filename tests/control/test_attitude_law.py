@@ -45,7 +45,7 @@ def tilts_and_speeds(
 
 
 def body_of(signals: Signals) -> object:
-    return signals["plant"].body
+    return signals.plant.body
 
 
 def any_attitudes(rng: np.random.Generator, copies: int = COPIES) -> Array:

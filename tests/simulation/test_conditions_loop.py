@@ -32,7 +32,7 @@ TICKS = 120
 
 
 def position(signals: Any) -> Any:
-    return signals["plant"].body.position
+    return signals.plant.body.position
 
 
 def everything(signals: Any) -> Any:
@@ -51,11 +51,10 @@ class HeldPlant:
     """A body that stands still at its start, so that there is little to compile."""
 
     period: int = 1
-    name: str = "plant"
     feedthrough: bool = False
 
     def init(self, ops: Any, thrusts: Any, inputs: Any, signals: Any) -> VehicleState:
-        return VehicleState(signals["start"], thrusts)
+        return VehicleState(signals.start, thrusts)
 
     def step(self, ops: Any, thrusts: Any, motion: VehicleState, inputs: Any, signals: Any) -> VehicleState:
         return motion

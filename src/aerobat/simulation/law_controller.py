@@ -32,15 +32,14 @@ class LawController:
     law: ControlLaw
     flags: FeatureFlags  # of the way from its force and moment to the rotors
     period: int = 1
-    name: str = "controller"
     feedthrough: bool = True
 
     def init(
         self, ops: Ops, parameters: ControllerParameters, inputs: ReferencePoint | tuple[()], signals: Signals
     ) -> LawState:
         """See `Component.init`."""
-        reference = inputs or signals["reference"]
-        body = signals["observer"].body
+        reference = inputs or signals.reference
+        body = signals.observer.body
         first = control.init(ops, parameters.model, body, reference)
         own = self.law.init(ops, parameters.model, Seen(body, first.thrusts, reference))
         return LawState(own, first.thrusts, first.commands)
@@ -54,7 +53,7 @@ class LawController:
         signals: Signals,
     ) -> LawState:
         """See `Component.step`."""
-        model, elapsed = parameters.model, signals["clock"].elapsed
+        model, elapsed = parameters.model, signals.clock.elapsed
         body, reference = told(ops, parameters, state, inputs, signals, self.law.TAKES_DISTURBANCES)
         rotors = model.airframe.rotors
         decay_factors = motors.decay_factors(ops, rotors, elapsed)

@@ -50,7 +50,6 @@ class MetricsMonitor:
     """The loop's component that adds up a flight's metrics."""
 
     period: int = 1
-    name: str = "metrics"
     feedthrough: bool = True
 
     def init(
@@ -68,8 +67,8 @@ class MetricsMonitor:
         signals: Signals,
     ) -> RunningMetrics:
         """See `Component.step`."""
-        motion, commands = signals["plant"], signals["controller"].commands
-        reference = (signals["reference"].position, signals["reference"].q_world_body)
+        motion, commands = signals.plant, signals.controller.commands
+        reference = (signals.reference.position, signals.reference.q_world_body)
         actuation = (motion.thrusts, commands.thrusts, commands.saturated)
         return running_metrics.step(ops, parameters, metrics, motion.body, reference, actuation, inputs)
 
@@ -88,8 +87,7 @@ class MetricsSource:
 
 def metrics_row(signals: Signals) -> RunningMetrics:
     """The metrics so far."""
-    metrics: RunningMetrics = signals["metrics"]
-    return metrics
+    return signals.of(RunningMetrics)
 
 
 def with_metrics(setup: FlightSetup, criteria: Criteria = Criteria()) -> FlightSetup:  # noqa: B008 - frozen

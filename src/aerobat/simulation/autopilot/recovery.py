@@ -239,7 +239,7 @@ class _Flock:
 
 def _body(signals: Signals) -> Body:
     """The row of a log."""
-    body: Body = signals["plant"].body
+    body: Body = signals.plant.body
     return body
 
 

@@ -22,7 +22,7 @@ from aerobat.simulation.components import (
     with_ceiling,
     with_wind,
 )
-from aerobat.simulation.loop import LoopInput, Signals, compose
+from aerobat.simulation.loop import Controlling, LoopInput, Signals, compose
 from aerobat.simulation.plants.plant import Actuation, Plant, PlantScene
 from aerobat.simulation.setup import FlightSetup, LoopPart
 from aerobat.vehicle.ellipsoid import Ellipsoid
@@ -33,7 +33,6 @@ class OutsidePlant:
     """A plant that the loop is told of at every tick; its parameters are those of the vehicle's model."""
 
     period: int = 1
-    name: str = "plant"
     feedthrough: bool = True
 
     def init(
@@ -59,12 +58,11 @@ class Actuator:
     """The inputs of the plant outside: commands, wind, and the rotors' limits as the battery leaves them."""
 
     period: int = 1
-    name: str = "actuator"
     feedthrough: bool = True
 
     def init(self, ops: Ops, parameters: PlantParameters, inputs: tuple[()], signals: Signals) -> Actuation:
         """See `Component.init`."""
-        thrusts = signals["controller"].commands.thrusts
+        thrusts = signals.controller.commands.thrusts
         return Actuation(thrusts, parameters.environment.wind, parameters.airframe.rotors.max_thrust)
 
     def step(
@@ -110,10 +108,8 @@ def fly_outside(
     first = _told(inside.first_tick, motion)
     loop = inside.engine().compile(*compose(inside.components, _outside_row), inside.parameters, first)
     carry = loop.init(first)
-    states = dict(zip((part.component.name for part in parts), carry, strict=True))
-    run = plant.begin(
-        _scene(setup, gates), motion._replace(thrusts=first_numbers(states["controller"].thrusts))
-    )
+    controller = next(state for state in carry if isinstance(state, Controlling))
+    run = plant.begin(_scene(setup, gates), motion._replace(thrusts=first_numbers(controller.thrusts)))
     rows, touched = [], np.zeros(len(setup.times), dtype=np.int64)
     for tick, period in enumerate(np.diff(setup.times, append=setup.times[-1]).tolist()):
         carry, row = loop.step(carry, _told(inside.tick(tick), run.motion))
@@ -125,7 +121,7 @@ def fly_outside(
 
 
 def _outside_row(signals: Signals) -> OutsideRow:
-    return OutsideRow(log_row(signals), signals["actuator"])
+    return OutsideRow(log_row(signals), signals.of(Actuation))
 
 
 def _told(inputs: LoopInput, motion: VehicleState) -> LoopInput:
