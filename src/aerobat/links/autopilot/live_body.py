@@ -7,6 +7,7 @@ from math import cos, sin
 import numpy as np
 
 from aerobat.arrays import Array
+from aerobat.engines import choose
 from aerobat.engines.engine import first_row
 from aerobat.engines.floats import FloatOps, first_numbers
 from aerobat.engines.pytree import Tree, tree_map
@@ -16,7 +17,7 @@ from aerobat.kernels.motors import VehicleState
 from aerobat.kernels.rigid_body import Body
 from aerobat.links.goals import yaw_of
 from aerobat.simulation.autopilot.braking import point_reference
-from aerobat.simulation.autopilot.loop import autopilot_inputs, autopilot_loop, autopilot_parameters
+from aerobat.simulation.autopilot.loop import autopilot_inputs, autopilot_setup
 from aerobat.simulation.bodies import bodies
 from aerobat.simulation.components import log_row
 from aerobat.states import BodyState
@@ -32,11 +33,11 @@ class LiveBody:
         vehicle.require_hover(environment.gravity)
         self._idle = tuple(np.array([least]) for least in vehicle.min_thrusts)
         self.state = _at_rest(np.zeros(2), 0.0)  # the true one, (·,)
-        parameters = autopilot_parameters(_one(self.state), vehicle, environment)
-        _, model, _ = parameters.own
+        setup = autopilot_setup(_one(self.state), vehicle, environment)
+        _, model, _ = setup.parameters.own
         self._gains: tuple[Gains, Gains] = first_numbers((model.tracking.gains, model.upright))
         first = first_row(autopilot_inputs(_hovering(environment.gravity), False))
-        self._loop = autopilot_loop(vehicle, parameters, first, log_row, _LONG)
+        self._loop = setup.compile_for(choose("auto", 1, _LONG), first, log_row)
         self._carry: Tree = self._loop.init(first)
         self.stop_rotors()
 

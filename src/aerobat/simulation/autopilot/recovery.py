@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from aerobat import so3
 from aerobat.arrays import Array, frozen
 from aerobat.declaration import Finite, NonNegative, Series, by_value, short, validated
+from aerobat.engines import choose
 from aerobat.engines.components import components, from_components
 from aerobat.engines.engine import first_row
 from aerobat.engines.pytree import Tree
@@ -29,8 +30,7 @@ from aerobat.simulation.autopilot.loop import (
     KEPT,
     RATE,
     autopilot_inputs,
-    autopilot_loop,
-    autopilot_parameters,
+    autopilot_setup,
 )
 from aerobat.simulation.bodies import bodies
 from aerobat.simulation.loop import Signals
@@ -185,13 +185,8 @@ class _Flock:
         flat, count = setpoint.flat, len(thrusts)
         start = bodies(BodyState(flat.position, flat.velocity, setpoint.q_world_body, setpoint.omega_body))
         first = first_row(autopilot_inputs(_kept(setpoint, np.zeros(1), vehicle), True))
-        self._loop = autopilot_loop(
-            vehicle,
-            autopilot_parameters(start, vehicle, environment),
-            first,
-            _body,
-            round(HORIZON * RATE),
-        )
+        engine = choose("auto", count, round(HORIZON * RATE))
+        self._loop = autopilot_setup(start, vehicle, environment).compile_for(engine, first, _body)
         observer, controller, motion = self._loop.init(first)
         turning = components(np.clip(thrusts, vehicle.min_thrusts, vehicle.max_thrusts))
         self._carry: Tree = (

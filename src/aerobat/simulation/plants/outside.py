@@ -22,7 +22,7 @@ from aerobat.simulation.components import (
     with_ceiling,
     with_wind,
 )
-from aerobat.simulation.loop import Controlling, LoopInput, Signals, compose
+from aerobat.simulation.loop import Controlling, LoopInput, Signals
 from aerobat.simulation.plants.plant import Actuation, Plant, PlantScene
 from aerobat.simulation.setup import FlightSetup, LoopPart
 from aerobat.vehicle.ellipsoid import Ellipsoid
@@ -106,7 +106,7 @@ def fly_outside(
         first_numbers(setup.start), tuple(0.0 for _ in parameters.airframe.rotors.max_thrust)
     )
     first = _told(inside.first_tick, motion)
-    loop = inside.engine().compile(*compose(inside.components, _outside_row), inside.parameters, first)
+    loop = inside.compile_for(inside.engine(), first, _outside_row)
     carry = loop.init(first)
     controller = next(state for state in carry if isinstance(state, Controlling))
     run = plant.begin(_scene(setup, gates), motion._replace(thrusts=first_numbers(controller.thrusts)))
