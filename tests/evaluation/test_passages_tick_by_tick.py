@@ -25,7 +25,8 @@ from aerobat.simulation.passages import (
     PASSAGE_WINDOW,
     Passage,
     WaypointPassage,
-    gate_plane,
+    bounding_ellipsoid,
+    gate_places,
     log_rows,
     passages,
     passages_in_log,
@@ -33,7 +34,7 @@ from aerobat.simulation.passages import (
 )
 from aerobat.simulation.passages.waypoint import GRAZING
 from gate_motions import CRUISE, SPEED
-from polyline_judge import as_ellipsoid, gate_progress
+from polyline_judge import gate_progress
 from score_cases import QUAD
 from suites import examples
 
@@ -74,7 +75,7 @@ def tick_by_tick(
     planned: PlannedPassage, states: tuple[Array, Array, Array], body: ab.Ellipsoid, ends: Array
 ) -> Passage:
     """Passages of flights of which ticks from `ends` on do not count, by the kernel."""
-    place = gate_plane(planned), as_ellipsoid(body)
+    [place] = gate_places((planned,), bounding_ellipsoid(body))
     found = tree_map(lambda leaf: np.full(FLIGHTS, leaf, dtype=float), progress.init(place))
     rows = log_rows(np.broadcast_to(TIMES[:, None], (TICKS, FLIGHTS)), *states)
     last = now = tree_map(lambda leaf: leaf[0], rows)

@@ -14,11 +14,15 @@ from scipy import stats
 from aerobat.engines.engine import expanded
 from aerobat.engines.pytree import tree_leaves
 from aerobat.environment import Battery, Dispersion, Gusts, HandOff, Imu, MotionCapture, load_dispersion
+from aerobat.kernels.battery import BatteryState
+from aerobat.kernels.imu import ImuSample, ImuState
 from aerobat.kernels.motors import VehicleState
+from aerobat.kernels.wind import WindState
 from aerobat.simulation import Outcome, fly
 from aerobat.simulation.components import log_row
 from aerobat.simulation.conditions.draw import draw_flights
 from aerobat.simulation.conditions.random_source import RandomSource
+from aerobat.simulation.conditions.sensors import MocapState
 from aerobat.simulation.setup import LoopPart
 from aerobat.trajectory import Trajectory
 from dispersed_loops import dispersed_setup, drawn, rows_of
@@ -36,8 +40,8 @@ def position(signals: Any) -> Any:
 
 
 def everything(signals: Any) -> Any:
-    names = ("wind", "battery", "imu_bias", "imu", "motion_capture", "plant")
-    return tuple(signals[name] for name in names)
+    kinds = (WindState, BatteryState, ImuSample, ImuState, MocapState, VehicleState)
+    return tuple(map(signals.of, kinds))
 
 
 @cache

@@ -17,10 +17,10 @@ from aerobat.engines.numpy import ArrayOps
 from aerobat.engines.pytree import tree_map
 from aerobat.kernels.gates import progress
 from aerobat.kernels.gates.progress import GateProgress
-from aerobat.kernels.gates.section import BoundingEllipsoid, extent, gap, section
+from aerobat.kernels.gates.section import extent, gap, section
 from aerobat.kernels.gates.snapshot import Snapshot, between
 from aerobat.kernels.gates.swath import Swath, swept_between
-from aerobat.simulation.passages import PASSAGE_DEPTH, PASSAGE_WINDOW, gate_plane
+from aerobat.simulation.passages import PASSAGE_DEPTH, PASSAGE_WINDOW, bounding_ellipsoid, gate_places
 from aerobat.vehicle import Ellipsoid
 
 T = TypeVar("T")
@@ -41,8 +41,8 @@ def gate_progress(
     forward, backward = track.nearest(track.passages), track.nearest(track.crossings(-1))
     in_window = np.abs(times - planned.time) <= PASSAGE_WINDOW
     about = track.distance[in_window] if in_window.any() else track.distance[-1:]
-    plane = gate_plane(planned)
-    before: GateProgress = tree_map(lambda leaf: np.full(1, leaf), progress.init((plane, as_ellipsoid(body))))
+    [place] = gate_places((planned,), bounding_ellipsoid(body))
+    before: GateProgress = tree_map(lambda leaf: np.full(1, leaf), progress.init(place))
     found = before._replace(max_distance=np.array([about.max()]), min_distance=np.array([about.min()]))
     if backward is not None:
         found = found._replace(backward=track.crossing(backward).time)
@@ -50,11 +50,6 @@ def gate_progress(
         return found
     found = found._replace(crossing=track.crossing(forward))
     return found._replace(swath=found.swath._replace(crossing=track.swept(forward, body)))
-
-
-def as_ellipsoid(body: Ellipsoid) -> BoundingEllipsoid:
-    """A body as kernels read it."""
-    return BoundingEllipsoid(components(body.centre), components(body.semi_axes))
 
 
 @dataclass(frozen=True)
@@ -106,8 +101,8 @@ class _Track:
     def swept(self, crossing: np.intp, body: Ellipsoid) -> Swath:
         """Return the swath that the body sweeps in the plane during the stay of a crossing, leaves (1,)."""
         gate = self.planned.gate
-        normal, directions = components(gate.normal), gate_plane(self.planned).directions
-        ellipsoid = as_ellipsoid(body)
+        [(plane, ellipsoid)] = gate_places((self.planned,), bounding_ellipsoid(body))
+        normal, directions = plane.normal, plane.directions
         rows = self.rows
         gaps = gap(
             ArrayOps,

@@ -14,7 +14,7 @@ from aerobat.certification import PlannedPassage, PlannedWaypoint
 from aerobat.engines.components import components
 from aerobat.engines.pytree import Tree, tree_map
 from aerobat.kernels import running_metrics
-from aerobat.kernels.gates import approach, pointing
+from aerobat.kernels.gates import approach, pointing, progress
 from aerobat.kernels.gates.section import BoundingEllipsoid
 from aerobat.kernels.ops import Ops
 from aerobat.kernels.running_metrics import MetricsInput, MetricsParameters, RunningMetrics
@@ -24,8 +24,8 @@ from aerobat.simulation.outcome import DIVERGENCE_RADIUS, TOUCHDOWN, Outcome
 from aerobat.simulation.passages import (
     PlannedAttitude,
     attitude_direction,
-    follow_gates,
-    gate_plane,
+    bounding_ellipsoid,
+    gate_places,
     log_rows,
     scan_log,
     waypoint_target,
@@ -96,12 +96,13 @@ def with_metrics(setup: FlightSetup, criteria: Criteria = Criteria()) -> FlightS
     def for_all(tree: Tree) -> Tree:
         return tree_map(lambda leaf: np.full(len(setup.fleet), leaf), tree)
 
+    ellipsoid = BoundingEllipsoid(*map(components, (setup.fleet.body_centres, setup.fleet.semi_axes)))
     parameters = MetricsParameters(
         divergence_radius_sq=for_all(DIVERGENCE_RADIUS**2),
         path_radius_sq=for_all(criteria.path_radius**2),
         ground=for_all(_lowest(setup.environment.ground)),
-        ellipsoid=BoundingEllipsoid(*map(components, (setup.fleet.body_centres, setup.fleet.semi_axes))),
-        gates=for_all(tuple(map(gate_plane, criteria.gates))),
+        ellipsoid=ellipsoid,
+        gates=for_all(tuple(plane for plane, _ in gate_places(criteria.gates, ellipsoid))),
         waypoints=for_all(tuple(map(waypoint_target, (*criteria.waypoints, *criteria.places)))),
         attitudes=for_all(tuple(map(attitude_direction, criteria.attitudes))),
     )
@@ -140,7 +141,7 @@ def metrics_of_log(flight: Flight, criteria: Criteria, body: Ellipsoid | None) -
     )
     metrics: RunningMetrics = tree_map(np.atleast_1d, numbers)
     return metrics._replace(
-        gates=tuple(follow_gates(rows, criteria.gates, body)),
+        gates=tuple(scan_log(progress, gate_places(criteria.gates, bounding_ellipsoid(body)), rows)),
         waypoints=tuple(scan_log(approach, targets, rows)),
         attitudes=tuple(scan_log(pointing, [attitude_direction(each) for each in criteria.attitudes], rows)),
     )

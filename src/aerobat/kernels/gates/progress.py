@@ -18,7 +18,7 @@ class GatePlane(NamedTuple):
 
     centre: Vector  # [m]
     normal: Vector  # unit vector in the direction of passage
-    directions: tuple[PlaneDirection, ...]  # along which a body is measured
+    directions: tuple[PlaneDirection, ...]  # along which a body is measured; none of a body that is not known
     radius: Scalar  # [m] of the circle about the opening
     planned: Scalar  # [s] when it is to be crossed
     window: Scalar  # [s] by which the crossing may be earlier or later
@@ -54,7 +54,7 @@ def step(
     Args:
         ops: of the arithmetic.
         progress: before the tick.
-        gate: its plane, and what encloses the vehicle.
+        gate: its plane, and what encloses the vehicle; () where no body is measured.
         snapshots: the last tick's and this one's.
         counted: true where there was a last tick, and where this one counts.
     """
@@ -75,19 +75,15 @@ def step(
     back_off_time = magnitude(ops, here.time - plane.planned)
     nearer_back = back_off_time < magnitude(ops, progress.backward - plane.planned)
     in_window = counted[1] & (magnitude(ops, now.time - plane.planned) <= plane.window)
+    swept = progress.swath
+    if plane.directions:
+        about = plane.normal, plane.directions, plane.radius, plane.depth, ellipsoid
+        swept = swath.step(ops, swept, about, (last, now), counted, crosses, (is_passing, passed))
     return GateProgress(
         latest,
         select_tree(ops, passed, latest, progress.crossing),
         ops.select(back & (back_off_time <= plane.window) & nearer_back, here.time, progress.backward),
         ops.select(in_window, ops.maximum(progress.max_distance, behind), progress.max_distance),
         ops.select(in_window, ops.minimum(progress.min_distance, behind), progress.min_distance),
-        swath.step(
-            ops,
-            progress.swath,
-            (plane.normal, plane.directions, plane.radius, plane.depth, ellipsoid),
-            (last, now),
-            counted,
-            crosses,
-            (is_passing, passed),
-        ),
+        swept,
     )

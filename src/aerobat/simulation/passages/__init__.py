@@ -1,11 +1,12 @@
 """Passages of flights: through gates, what the body leaves of their openings; by waypoints; in attitudes."""
 
-from aerobat.simulation.passages.log import follow_gates, log_rows, passages_in_log, scan_log
+from aerobat.simulation.passages.log import log_rows, passages_in_log, scan_log
 from aerobat.simulation.passages.passage import (
     PASSAGE_DEPTH,
     PASSAGE_WINDOW,
     Passage,
-    gate_plane,
+    bounding_ellipsoid,
+    gate_places,
     passages,
 )
 from aerobat.simulation.passages.stage_attitude import (
@@ -24,8 +25,8 @@ __all__ = [
     "StageAttitude",
     "WaypointPassage",
     "attitude_direction",
-    "follow_gates",
-    "gate_plane",
+    "bounding_ellipsoid",
+    "gate_places",
     "log_rows",
     "passages",
     "passages_in_log",

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from functools import lru_cache, partial
 from operator import itemgetter
 from typing import NamedTuple, Protocol
@@ -16,16 +16,11 @@ from aerobat.engines import choose
 from aerobat.engines.components import components
 from aerobat.engines.engine import Init, Step, first_row
 from aerobat.engines.pytree import Tree, tree_leaves, tree_map, tree_stack
-from aerobat.kernels.gates import progress, swath
-from aerobat.kernels.gates.progress import GateProgress
-from aerobat.kernels.gates.section import BoundingEllipsoid
+from aerobat.kernels.gates import progress
 from aerobat.kernels.gates.snapshot import Snapshot
 from aerobat.kernels.ops import Ops, Scalar
-from aerobat.kernels.vectors import ZERO
-from aerobat.simulation.passages.passage import Passage, gate_plane, passages
+from aerobat.simulation.passages.passage import Passage, bounding_ellipsoid, gate_places, passages
 from aerobat.vehicle import Ellipsoid
-
-_ANY_BODY = BoundingEllipsoid(ZERO, (1.0, 1.0, 1.0))  # in place of one that is not known
 
 
 class PlaceKernel(Protocol):
@@ -49,7 +44,7 @@ class PlaceKernel(Protocol):
         """The state a tick later."""
 
 
-class LogRow(NamedTuple):
+class ScannedRow(NamedTuple):
     """A row of a log."""
 
     snapshot: Snapshot
@@ -66,51 +61,34 @@ def scan_log(kernel: PlaceKernel, places: Sequence[Tree], rows: Snapshot) -> lis
 
     Places that are alike are followed side by side, as vehicles are in flight.
     """
+    row = ScannedRow(rows, np.minimum(np.arange(len(rows.time), dtype=np.float64), 1.0))
+    found: dict[int, Tree] = {}
     alike = defaultdict(list)
     for k, place in enumerate(places):
         alike[len(tree_leaves(place))].append(k)
-    inputs = LogRow(rows, np.minimum(np.arange(len(rows.time), dtype=np.float64), 1.0))
-    found: dict[int, Tree] = {}
     for numbers in alike.values():
-        found |= zip(numbers, _scan_alike(kernel, [places[k] for k in numbers], inputs), strict=True)
+        parameters = tree_stack([places[k] for k in numbers], partial(np.array, dtype=np.float64))
+        engine = choose("auto", len(numbers), len(rows.time))
+        loop = engine.compile(*_functions(kernel), parameters, first_row(row))
+        _, states = loop.scan(loop.init(first_row(row)), row, len(rows.time))
+        for i, k in enumerate(numbers):
+            found[k] = tree_map(itemgetter((slice(i, i + 1), -1)), states)
     return [found[k] for k in range(len(places))]
-
-
-def _scan_alike(kernel: PlaceKernel, places: Sequence[Tree], rows: LogRow) -> Iterator[Tree]:
-    parameters = tree_stack(places, partial(np.array, dtype=np.float64))
-    engine = choose("auto", len(places), len(rows.follows))
-    loop = engine.compile(*_functions(kernel), parameters, first_row(rows))
-    _, states = loop.scan(loop.init(first_row(rows)), rows, len(rows.follows))
-    for k in range(len(places)):
-        yield tree_map(itemgetter((slice(k, k + 1), -1)), states)
 
 
 @lru_cache
 def _functions(kernel: PlaceKernel) -> tuple[Init, Step]:
     """The loop over rows, whose carry is the kernel's state and the row before; a row of it is the state."""
 
-    def init(ops: Ops, place: Tree, row: LogRow) -> Tree:
+    def init(ops: Ops, place: Tree, row: ScannedRow) -> Tree:
         return kernel.init(place), row.snapshot
 
-    def step(ops: Ops, place: Tree, carry: Tree, row: LogRow) -> tuple[Tree, Tree]:
+    def step(ops: Ops, place: Tree, carry: Tree, row: ScannedRow) -> tuple[Tree, Tree]:
         state, last = carry
         state = kernel.step(ops, state, place, (last, row.snapshot), (row.follows > 0.5, True))
         return (state, row.snapshot), state
 
     return init, step
-
-
-def follow_gates(
-    rows: Snapshot, planned: Sequence[PlannedPassage], body: Ellipsoid | None
-) -> list[GateProgress]:
-    """Progress through gates at the end of a log, leaves (1,); without a body it sweeps nothing."""
-    enclosing = _ANY_BODY
-    if body is not None:
-        enclosing = BoundingEllipsoid(components(body.centre), components(body.semi_axes))
-    found = scan_log(progress, [(gate_plane(each), enclosing) for each in planned], rows)
-    if body is not None:
-        return found
-    return [each._replace(swath=tree_map(np.atleast_1d, swath.init(len(each.swath.stay)))) for each in found]
 
 
 def passages_in_log(
@@ -124,5 +102,5 @@ def passages_in_log(
         body: what encloses its vehicle; without it the clearance is unknown.
         stop: when the flight diverged [s], NaN where it did not, (1,).
     """
-    found = follow_gates(rows, planned, body)
+    found = scan_log(progress, gate_places(planned, bounding_ellipsoid(body)), rows)
     return tuple(passages(each, states, stop) for each, states in zip(planned, found, strict=True))
