@@ -220,7 +220,7 @@ def gate_places(
 
 
 def bounding_ellipsoid(body: Ellipsoid | None) -> BoundingEllipsoid | tuple[()]:
-    """What encloses a vehicle as kernels read it, leaves numbers; () where that is not known."""
+    """The ellipsoid that encloses a vehicle as kernels read it, leaves numbers; () where none is known."""
     if body is None:
         return ()
     return BoundingEllipsoid(components(body.centre), components(body.semi_axes))
