@@ -38,7 +38,7 @@ def _row(measured: ErrorCauses, result: TrialResult) -> Iterator[Fact]:
     low, middle, high = (f"{100 * value:.1f}" for value in (cost.low, cost.median, cost.high))
     median, most = (_quantile(result.position_error, level) for level in (0.5, 0.95))
     gate, attitude = _quantile(result.gate_error, 0.5), _quantile(result.gate_attitude_error, 0.5)
-    saturated = float(result.scores.saturated_fraction.mean())
+    saturated = float(np.mean(result.scores.saturated_fraction))
     success = float(result.scores.succeeded.mean())
     yield Fact("cause", result.cause, "cause")
     yield Fact("duration_s", result.plan.duration, "plan", f"{result.plan.duration:.3f} s")

@@ -10,8 +10,8 @@ import numpy as np
 
 from aerobat.arrays import AXES
 from aerobat.evaluation.passages import GOAL
-from aerobat.evaluation.score import ObserverScore, Score, Scores
-from aerobat.reporting.facts import REPORT, Columns, Fact, facts, fields_of, picture, said
+from aerobat.evaluation.score import ObserverScore, Score
+from aerobat.reporting.facts import REPORT, Columns, Fact, facts, fields_of, kept, picture, said
 from aerobat.reporting.plans import rough_length
 from aerobat.simulation import Flight
 from aerobat.simulation.outcome import digits, length
@@ -28,6 +28,8 @@ METRICS = (
     "rms_attitude_error_deg",
     "saturated_fraction",
 )
+# numbers of a score that its sentence is made of
+EVENTS = ("stop", "is_finite", "ground_time", "off_path_time", "contact", "contact_time", "path_radius_m")
 
 
 @picture.register(Flight)
@@ -39,8 +41,12 @@ def _(flight: Flight) -> Figure:
 
 @facts.register
 def _(score: Score) -> Iterator[Fact]:
-    yield from fields_of(score)
-    yield Fact("laps", score.laps)
+    if score.is_batch:
+        yield Fact("", text=str(score))
+        yield Fact("flights", Columns(_flights_of(score)))
+        return
+    yield from (fact for fact in fields_of(score) if fact.key not in EVENTS)
+    yield from kept(outcome=score.outcome, sentence=score.sentence, laps=score.laps)
     yield from _report(score)
     for lap in score.laps:
         split = "not flown" if isnan(lap.duration) else f"{lap.duration:.3f} s, until {lap.end:.3f} s"
@@ -77,12 +83,6 @@ def _(passage: Passage) -> Iterator[Fact]:
 def _(flight: Flight) -> Iterator[Fact]:
     yield Fact("", text=str(flight))
     yield Fact("rows", Columns(_rows_of(flight)))
-
-
-@facts.register
-def _(scores: Scores) -> Iterator[Fact]:
-    yield Fact("", text=str(scores))
-    yield Fact("flights", Columns(_flights_of(scores)))
 
 
 def _report(score: Score) -> Iterator[Fact]:
@@ -194,7 +194,7 @@ def _columns(flight: Flight) -> Iterator[tuple[str, Any]]:
                 yield f"{one.name}_{names[k] if names else k}", column
 
 
-def _flights_of(scores: Scores) -> dict[str, Any]:
+def _flights_of(scores: Score) -> dict[str, Any]:
     """The columns of many flights' scores."""
     from aerobat.studies.sweep.flights import passage_names  # which takes long to import
 
