@@ -13,14 +13,17 @@ from numpy.typing import NDArray
 from aerobat import so3
 from aerobat.arrays import Array
 from aerobat.declaration import by_value, in_notebooks, short, shown, validated
+from aerobat.engines.components import components
+from aerobat.engines.numpy import ArrayOps
+from aerobat.environment import Environment
 from aerobat.errors import OutOfRange, SpecError
 from aerobat.evaluation.passages import Asked, SampledPath, passages_asked
-from aerobat.kernels.running_metrics import RunningMetrics
+from aerobat.kernels.running_metrics import Ground, RunningMetrics, lowest_height
 from aerobat.planning import Plan
 from aerobat.problem import Problem, as_problem
 from aerobat.simulation.contact import Contact
 from aerobat.simulation.flight import Flight
-from aerobat.simulation.outcome import TOUCHDOWN, Outcome, counted, length
+from aerobat.simulation.outcome import LANDING_DEPTH, LANDING_SPEED, TOUCHDOWN, Outcome, counted, length
 from aerobat.simulation.passages import (
     Passage,
     StageAttitude,
@@ -261,9 +264,8 @@ def score(flight: Flight, goal: Problem | Plan | str, vehicle: Vehicle | str | N
     path = SampledPath(flight.times, setpoint.flat.position, setpoint.q_world_body)
     planned = passages_asked(goal, path)
     is_off = flight.position_error > planned.path_radius
-    ground = flight.environment.ground
     contact, touched = flight.first_contact
-    below = np.zeros(1, bool) if ground is None else states.position[:, 2] < ground - TOUCHDOWN
+    lowest = lowest_height(ArrayOps, ground_of(flight.environment), components(states.velocity))
     scored = Scores(
         max_position_error_m=np.sqrt([square.max()]),
         rms_position_error_m=np.sqrt([square.mean()]),
@@ -274,7 +276,7 @@ def score(flight: Flight, goal: Problem | Plan | str, vehicle: Vehicle | str | N
         waypoints=tuple(flown_waypoints(flight, planned.waypoints)),
         stop=stop,
         is_finite=np.array([flight.outcome is not Outcome.STATE_NOT_FINITE]),
-        ground_time=_first(flight.times, below),
+        ground_time=_first(flight.times, states.position[:, 2] < lowest),
         contact=np.array([contact]),
         contact_time=np.array([touched]),
         off_path_time=_first(flight.times, is_off),
@@ -284,6 +286,12 @@ def score(flight: Flight, goal: Problem | Plan | str, vehicle: Vehicle | str | N
         attitudes=tuple(flown_attitudes(flight, planned.attitudes)),
     )[0]
     return replace(scored, observer=_observer(flight))
+
+
+def ground_of(environment: Environment) -> Ground:
+    """Return the ground of an environment as flights hit it."""
+    height = -inf if environment.ground is None else environment.ground
+    return Ground(height - TOUCHDOWN, height - LANDING_DEPTH, LANDING_SPEED**2)
 
 
 def _first(times: Array, happens: NDArray[np.bool_]) -> Array:

@@ -19,18 +19,18 @@ from aerobat.engines.pytree import tree_map, tree_stack
 from aerobat.environment import Environment
 from aerobat.errors import SpecError
 from aerobat.evaluation.passages import NOTHING_ASKED, Asked, SampledPath, passages_asked
-from aerobat.evaluation.score import Scores, scores_of
+from aerobat.evaluation.score import Scores, ground_of, scores_of
 from aerobat.kernels import running_metrics
 from aerobat.kernels.gates.approach import Target
 from aerobat.kernels.gates.progress import GatePlane
 from aerobat.kernels.gates.section import BoundingEllipsoid
 from aerobat.kernels.ops import Ops
-from aerobat.kernels.running_metrics import MetricsInput, MetricsParameters, RunningMetrics
+from aerobat.kernels.running_metrics import Ground, MetricsInput, MetricsParameters, RunningMetrics
 from aerobat.planning import Plan
 from aerobat.problem import Problem, as_problem
 from aerobat.simulation.config import FlightChanges, FlightConfig
 from aerobat.simulation.loop import Signals
-from aerobat.simulation.outcome import DIVERGENCE_RADIUS, TOUCHDOWN
+from aerobat.simulation.outcome import DIVERGENCE_RADIUS
 from aerobat.simulation.passages import PASSAGE_DEPTH, PASSAGE_WINDOW, plane_directions
 from aerobat.simulation.passages.stage_attitude import as_direction
 from aerobat.simulation.prepare import prepare
@@ -200,12 +200,12 @@ def with_metrics(setup: FlightSetup, planned: Asked = NOTHING_ASKED) -> FlightSe
     planes = tuple(_plane(passage, vehicles) for passage in planned.gates)
     targets = tuple(_target(waypoint, vehicles) for waypoint in (*planned.waypoints, *planned.places))
     directions = tuple(as_direction(attitude, vehicles) for attitude in planned.attitudes)
-    ground = -np.inf if setup.environment.ground is None else setup.environment.ground - TOUCHDOWN
     body = BoundingEllipsoid(*map(components, (setup.fleet.body_centres, setup.fleet.semi_axes)))
-    diverged, off, under = (
-        np.full(vehicles, x) for x in (DIVERGENCE_RADIUS**2, planned.path_radius**2, ground)
+    diverged, off, *ground = (
+        np.full(vehicles, x)
+        for x in (DIVERGENCE_RADIUS**2, planned.path_radius**2, *ground_of(setup.environment))
     )
-    parameters = MetricsParameters(diverged, off, under, body, planes, targets, directions)
+    parameters = MetricsParameters(diverged, off, Ground(*ground), body, planes, targets, directions)
     measured = tuple(len(plane.directions) for plane in planes)
     monitor = MetricsMonitor(measured, len(targets), len(directions))
     metrics = Part(monitor, parameters, MetricsSource(setup.times))
