@@ -111,7 +111,7 @@ def _leg(rng: np.random.Generator, heading: float) -> Array:
 def _written_gate(
     rng: np.random.Generator, place: Array, heading: float, number: int, vehicle: Vehicle
 ) -> Gate:
-    """An upright gate as a rule, some tilted or sloped; its opening is thrice as wide as the vehicle or more."""
+    """An upright gate as a rule, some tilted or sloped, at least thrice as wide as the vehicle."""
     least = max(1.0, 6.0 * float(vehicle.bounding_ellipsoid.semi_axes.max()))  # [m]
     wide = float(round(least * rng.uniform(1.0, 1.6), 1))
     tall = float(round(wide * rng.uniform(0.6, 1.0), 1))
