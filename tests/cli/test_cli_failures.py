@@ -103,7 +103,7 @@ AT_IMPORT = {
         2,
         "there are two planners named 'miqp', Miqp of aerobat.planning.miqp.miqp and A of",
     ),
-    "import aerobat as ab\n@ab.maneuver('m')\nclass A(ab.Maneuver):\n    x: 'Y' = 1\n    stage_sequence = 3": (
+    "import aerobat as ab\n@ab.maneuver('m')\nclass A(ab.Maneuver):\n    x: 'Y'\n    stage_sequence = 3": (
         2,
         "a field whose type is no known name",
     ),

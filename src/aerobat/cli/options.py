@@ -52,8 +52,8 @@ class ExplainingOptions:
     """Options of a report on a plan."""
 
     explain: Annotated[bool, Parameter(group=output, negative="", show_default=False)] = False
-    """Report all facts, and those that take seconds to know: how many of a hundred flights succeed under the
-    given conditions or a lab's, and the recoveries to a hover from all along the plan. A plan that takes
+    """Report all facts, and those that take seconds to know: how many of a hundred flights succeed under
+    given conditions too, and the recoveries to a hover from all along the plan. A plan that takes
     suspiciously long gets another planner's second opinion. Where there is no plan, the changes with which
     there is one are told."""
 
@@ -164,7 +164,7 @@ class ConditionsOptions:
 
     conditions: Annotated[str | None, Parameter(group=flying)] = None
     """The variation, the disturbances and the sensors: none, lab, field, or a TOML file. Default: flown as
-    planned, from a state that is known."""
+    planned, from a state that is known; `aerobat fly` then counts a hundred flights under lab, too."""
 
     seed: Annotated[int, Parameter(group=flying, validator=validators.Number(gte=0))] = 0
     """The seed of the conditions: the same seed, the same flight."""

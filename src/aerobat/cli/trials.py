@@ -1,4 +1,4 @@
-"""Flights of a plan under random conditions, for a report that explains it."""
+"""Flights of a plan under random conditions, for the verdict on it."""
 
 from __future__ import annotations
 

@@ -22,6 +22,7 @@ if TYPE_CHECKING:  # which takes long to import
 
 SMALL = 1e-4  # [m]: smaller errors mean nothing in a simulation that knows the vehicle
 ENOUGH_MARGIN = 0.05  # of a rotor's thrust: with less, few real flights succeed
+ENOUGH_FLIGHTS = 0.95  # of all under random conditions: a plan that is proven to have fewer succeed is poor
 SEVERAL_TIMES = 2.0  # times the shortest possible: no percentage beyond
 
 
@@ -34,11 +35,16 @@ def summary(plan: Plan, vehicle: str, score: Score | None = None, trials: Sweep 
         score: The score of the plan's flight, where it was flown.
         trials: Flights under random conditions, where they were asked for.
     """
-    title = f"{plan.problem.name} · {vehicle}: {_verdict(plan, score)}"
+    title = f"{plan.problem.name} · {vehicle}: {_verdict(plan, score, trials)}"
     return facts_table(title, {"": _facts(plan, score, trials)})
 
 
-def _verdict(plan: Plan, score: Score | None) -> str:
+def too_few_succeed(trials: Sweep | None) -> bool:
+    """Return True where flights prove that fewer than `ENOUGH_FLIGHTS` of all succeed."""
+    return trials is not None and trials.success.interval[1] < ENOUGH_FLIGHTS
+
+
+def _verdict(plan: Plan, score: Score | None, trials: Sweep | None) -> str:
     """Whether the maneuver flies, in a few words."""
     if not plan.certified:
         return "not certified"
@@ -46,6 +52,8 @@ def _verdict(plan: Plan, score: Score | None) -> str:
         return "certified, but not flyable"
     if score is not None and not score.outcome.is_success:
         return "certified, but this flight fails"
+    if too_few_succeed(trials):
+        return "certified, but too few real flights succeed"
     return "certified, and it flies"
 
 
@@ -136,10 +144,15 @@ def _length(metres: float) -> str:
     return f"{max(metres, SMALL) / size:.2g} {unit}"
 
 
-def _success_of(trials: Sweep) -> str:
+def _success_of(trials: Sweep) -> Text:
     """Return how many flights succeed, and what that says of all."""
     low, high = trials.success.interval
-    return (
-        f"{trials.success.count} of {len(trials)} succeed under '{trials.conditions.name}' conditions, so "
+    name = trials.conditions.name
+    found = (
+        f"{trials.success.count} of {len(trials)} succeed under '{name}' conditions, so "
         f"{100.0 * low:.0f} to {100.0 * high:.0f} % of all, at 95 % confidence"
     )
+    if not too_few_succeed(trials):
+        return Text(found)
+    remedy = f"--pass {ENOUGH_FLIGHTS:g} --conditions {name} plans for more"
+    return Text(f"{found}; {remedy}", style="red")

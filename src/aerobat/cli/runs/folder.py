@@ -22,7 +22,7 @@ from aerobat.planning import Plan
 from aerobat.reporting.figures import report_figure
 from aerobat.reporting.page import import_undocumented, png
 from aerobat.reporting.report_json import report, to_json, trial_facts
-from aerobat.reporting.summary import summary
+from aerobat.reporting.summary import summary, too_few_succeed
 from aerobat.reporting.tables import print_table, summary_table
 from aerobat.simulation import Flight
 from aerobat.storage import whole_folder
@@ -124,12 +124,13 @@ def finish(
         record: What it takes to do it again.
         options: Where to write, and in what form to say it.
         flown: The plan's flight, if it was flown.
-        explain: Whether flights under random conditions are counted, and all facts are told.
+        explain: Whether flights under random conditions are counted in any case, and all facts are told.
     """
     assert plan.vehicle is not None, "a command plans for a vehicle"
     flight, score = (flown.flight, flown.score) if flown else (None, None)
     by = (flown.controller, flown.plant) if flown else ()
-    trials = _trials(plan, record) if explain else None
+    is_well = _is_well(plan, score)
+    trials = _trials(plan, record) if explain or (is_well and _are_due(record)) else None
     facts = to_json(report(plan, score, plan.vehicle.name, *by) | trial_facts(trials))
     import_undocumented()
     picture = png(report_figure(plan, plan.vehicle, flight, score))
@@ -145,13 +146,19 @@ def finish(
     tables = [summary(plan, plan.vehicle.name, score, trials)]
     if explain:
         tables.append(summary_table(plan, score, "all facts", *by))
-    hint = f"--explain tells more; `aerobat sweep {options.out or record.folder}` counts real flights\n"
+    hint = f"--explain tells more; `aerobat sweep {options.out or record.folder}` flies more of them\n"
     written(record, options, write, facts, *tables, hint="" if explain else hint)
-    return ExitCode.WELL if _is_well(plan, score) else ExitCode.NOT_WELL
+    return ExitCode.WELL if is_well and not too_few_succeed(trials) else ExitCode.NOT_WELL
+
+
+def _are_due(record: RunRecord) -> bool:
+    """True for a flight without conditions of its own: flights under a lab's belong to its verdict."""
+    flight = record.flight
+    return record.command == "fly" and flight.conditions is None and flight.plant is None
 
 
 def _trials(plan: Plan, record: RunRecord) -> Sweep | None:
-    """Flights under random conditions, of which a plain run imports nothing."""
+    """Flights under random conditions, of which a run without a flight imports nothing."""
     from aerobat.cli.trials import trial_flights
 
     return trial_flights(plan, record)
