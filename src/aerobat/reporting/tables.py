@@ -150,7 +150,9 @@ def plan_facts(plan: Plan) -> Iterable[Fact]:
         yield "rescue", plan.rescue
     dt = "" if plan.dt is None else f"dt {plan.dt:.4f} s "
     yield "duration", f"{plan.duration:.3f} s, {dt}after {len(plan.attempts)} attempts"
-    if plan.cost is not None:
+    if plan.cost == plan.duration:  # as refined plans have it
+        yield "optimality", _optimality(plan)
+    elif plan.cost is not None:
         yield "cost", f"{plan.cost:.7g}, {_optimality(plan)}"
     if plan.spread is not None:
         coarse = f"{plan.starts[0]:.3f} to {plan.starts[-1]:.3f} s on a coarse mesh"
