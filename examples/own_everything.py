@@ -140,7 +140,7 @@ def write_vehicle(folder: Path) -> None:
     """Import the robot's description, and add what such a file has no words for."""
     (folder / "mine.toml").unlink(missing_ok=True)  # of an earlier run: no command replaces a vehicle's file
     (folder / "mine.urdf").write_text(ROBOT, encoding="utf-8")
-    command = [sys.executable, "-m", "aerobat", "vehicles", "mine.urdf", "--out", "mine.toml"]
+    command = [sys.executable, "-m", "aerobat", "show", "mine.urdf", "--out", "mine.toml"]
     subprocess.run(command, cwd=folder, check=True, capture_output=True)
     text = (folder / "mine.toml").read_text(encoding="utf-8")
     text = text.replace("[rotor_defaults]\n", "[rotor_defaults]\nlag = 0.025\n")  # [s] of a thrust stand
