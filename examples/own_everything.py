@@ -80,7 +80,7 @@ PLUGIN = '''
 import aerobat as ab
 from aerobat.declaration import Positive
 from aerobat.kernels.quaternions import axes, conjugate, multiply, to_body
-from aerobat.kernels.rigid_body import Wrench
+from aerobat.kernels.rigid_body import RotorWrench
 from aerobat.kernels.vectors import add, add_scaled, dot, scale, subtract, transform
 
 
@@ -122,7 +122,7 @@ class Mine(ab.ControlLaw):
         turn = add_scaled(scale(self.attitude_gain, error), self.rate_gain, rates)
         turn = add(turn, to_body(body_axes, reference.omega_dot))
         mass, inertia = model.airframe.mass_properties[:2]
-        return state, Wrench(mass * thrust, transform(inertia, turn))
+        return state, RotorWrench(mass * thrust, transform(inertia, turn))
 '''
 
 

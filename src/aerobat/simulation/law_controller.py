@@ -14,7 +14,7 @@ from aerobat.kernels.control import Commands, FeatureFlags
 from aerobat.kernels.control_loops import ReferencePoint, reference_moment
 from aerobat.kernels.ops import Ops, PerRotor
 from aerobat.kernels.quaternions import axes
-from aerobat.kernels.rigid_body import RotorWrench, Wrench
+from aerobat.kernels.rigid_body import RotorWrench
 from aerobat.kernels.vectors import subtract
 from aerobat.simulation.components import ControllerParameters, TrackingController, told
 from aerobat.simulation.loop import Component, Signals
@@ -71,14 +71,16 @@ class LawController:
         commands = control.rotor_commands(ops, self.flags, model, loads, thrusts, decay_factors, elapsed)
         return LawState(own, thrusts, commands)
 
-    def _checked(self, answer: Any) -> tuple[Any, Wrench]:
+    def _checked(self, answer: Any) -> tuple[Any, RotorWrench]:
         """The state and the wrench that a law answered. Raises SpecError for anything else."""
         match answer:
             case (own, (thrust, (x, y, z))) if all(
                 hasattr(each, "__truediv__") for each in (thrust, x, y, z)
             ):
-                return own, Wrench(thrust, (x, y, z))
-        raise _wrong(self.law.step, f"returned {shown(answer)}, not the state and a Wrench of four numbers")
+                return own, RotorWrench(thrust, (x, y, z))
+        raise _wrong(
+            self.law.step, f"returned {shown(answer)}, not the state and a RotorWrench of four numbers"
+        )
 
 
 def _wrong(method: Any, complaint: str) -> SpecError:
