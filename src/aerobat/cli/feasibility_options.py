@@ -7,10 +7,8 @@ from typing import Annotated, Literal
 
 from cyclopts import Parameter, validators
 
-from aerobat.cli.options import PlannerOptions, output, planning
+from aerobat.cli.options import PlannerOptions, Workers, output, planning
 from aerobat.cli.runs.record import DEFAULT_TOLERANCE
-
-Workers = Annotated[int | None, Parameter(group=planning, validator=validators.Number(gte=1, lte=4096))]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -22,8 +20,7 @@ class MapOptions(PlannerOptions):
     Fields have the names of files, as limits.velocity, gate.width, vehicle.mass, or speed where no other
     field ends so; angle is the tilt of a half-flip's gate."""
 
-    workers: Workers = None
-    """The number of processes that plan; the cells are the same for any number. Default: one a core."""
+    workers: Annotated[str | None, Workers(group=planning)] = None
 
     table: Annotated[Literal["csv", "parquet"], Parameter(group=output)] = "csv"
     """The form of the table, map.csv or map.parquet; the latter needs aerobat[parquet]."""
@@ -44,5 +41,4 @@ class NeedOptions(PlannerOptions):
     )
     """Between an answer and the refusal beside it, as a part of the answer."""
 
-    workers: Workers = None
-    """The number of processes that plan. Default: one a core."""
+    workers: Annotated[str | None, Workers(group=planning)] = None

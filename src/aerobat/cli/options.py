@@ -26,6 +26,22 @@ Plugins = partial(
     negative="",
     help="A Python file that registers maneuvers or planners of your own; may be given several times.",
 )
+
+
+def _require_workers(type_: Any, value: str | None) -> None:
+    from aerobat.studies.workers import read_workers  # takes a tenth of a second
+
+    if value is not None:
+        read_workers(value)
+
+
+Workers = partial(
+    Parameter,
+    name="--workers",
+    validator=_require_workers,
+    help="The number of processes, or a Dask scheduler as dask://HOST:PORT, which needs aerobat[cluster]; "
+    "the results are the same for any. Default: one a core.",
+)
 Options = TypeVar("Options", bound=type[Any])
 
 
@@ -168,6 +184,15 @@ class ConditionsOptions:
 
     seed: Annotated[int, Parameter(group=flying, validator=validators.Number(gte=0))] = 0
     """The seed of the conditions: the same seed, the same flight."""
+
+    workers: Annotated[
+        str | None,
+        Workers(
+            group=planning,
+            help="The number of processes that fly for --pass, or a Dask scheduler as dask://HOST:PORT; the "
+            "plan is the same for any. Default: one a core.",
+        ),
+    ] = None
 
 
 @dataclass(frozen=True, kw_only=True)

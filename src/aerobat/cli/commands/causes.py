@@ -8,7 +8,7 @@ from typing import Annotated
 
 from cyclopts import Parameter, validators
 
-from aerobat.cli.options import Plugins, TaskOptions, flying, how_many, output, planning
+from aerobat.cli.options import Plugins, TaskOptions, Workers, flying, how_many, output, planning
 from aerobat.cli.progress import CausesProgress, showing
 from aerobat.cli.tasks import read_task
 from aerobat.cli.terminal import print_json
@@ -46,6 +46,8 @@ class CausesOptions:
     seed: Annotated[int, Parameter(group=flying, validator=validators.Number(gte=0))] = 0
     """The seed of all flights: the same seed, the same flights."""
 
+    workers: Annotated[str | None, Workers(group=flying)] = None
+
     json: Annotated[bool, Parameter(group=output, negative="", show_default=False)] = False
     """Print the measurements as JSON on standard output, and nothing else."""
 
@@ -76,6 +78,7 @@ def causes(problem: str, options: Annotated[CausesOptions, Parameter(name="*")] 
             conditions=conditions,
             flights=options.flights,
             seed=options.seed,
+            workers=options.workers,
             begin=progress.begin,
         )
     if options.json:

@@ -59,12 +59,12 @@ def map(problem: str, options: Annotated[MapOptions, Parameter(name="*")] = MapO
     finish_map(map_of(record, options.workers), record, options)
 
 
-def map_of(record: RunRecord, workers: int | None = None) -> FeasibilityMap:
+def map_of(record: RunRecord, workers: str | None = None) -> FeasibilityMap:
     """The map of a run, made anew.
 
     Args:
         record: What is planned, and how.
-        workers: How many processes plan.
+        workers: Who plans.
     """
     axes = [Axis.parse(text) for text in record.over]
     over = {axis.name: axis.values for axis in axes}

@@ -53,12 +53,12 @@ def need(problem: str, options: Annotated[NeedOptions, Parameter(name="*")] = Ne
     finish_need(need_of(record, options.workers), record, options)
 
 
-def need_of(record: RunRecord, workers: int | None = None) -> tuple[Requirement, ...]:
+def need_of(record: RunRecord, workers: str | None = None) -> tuple[Requirement, ...]:
     """The answers of a run, made anew.
 
     Args:
         record: What is planned, and how.
-        workers: How many processes plan.
+        workers: Who plans.
     """
     with showing(NeedProgress()) as progress:
         return min_requirements(

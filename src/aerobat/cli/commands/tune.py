@@ -10,7 +10,16 @@ from cyclopts import Parameter, validators
 
 from aerobat.cli.exit_code import ExitCode
 from aerobat.cli.interrupts import end_interrupts
-from aerobat.cli.options import PlanningOptions, Plugins, flying, how_many, limiting, output, planning
+from aerobat.cli.options import (
+    PlanningOptions,
+    Plugins,
+    Workers,
+    flying,
+    how_many,
+    limiting,
+    output,
+    planning,
+)
 from aerobat.cli.progress import TuningProgress, showing
 from aerobat.cli.tasks import planned
 from aerobat.cli.terminal import print_json, say
@@ -57,6 +66,8 @@ class TuningOptions:
     out: Annotated[Path | None, Parameter(group=output)] = None
     """The vehicle's file to write; an earlier one is replaced. Default: out/VEHICLE-tuned.toml."""
 
+    workers: Annotated[str | None, Workers(group=flying)] = None
+
     json: Annotated[bool, Parameter(group=output, negative="", show_default=False)] = False
     """Print before and after as JSON on standard output, and nothing else."""
 
@@ -94,6 +105,7 @@ def tune(
             options.seed,
             evaluations=options.evaluations,
             time_limit=options.time_limit,
+            workers=options.workers,
             progress=progress.record,
         )
     out = out or Path("out") / f"{tuning.vehicle.name}-tuned.toml"

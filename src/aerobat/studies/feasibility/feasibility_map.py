@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
-from concurrent.futures import Executor, Future, as_completed
+from concurrent.futures import Executor
 from dataclasses import dataclass, replace
 from itertools import product
 from math import nan, prod
@@ -15,7 +15,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from aerobat.declaration import NonNegative, by_value, in_notebooks, short, validated
-from aerobat.engines.cores import available_cores
 from aerobat.errors import SpecError
 from aerobat.planning import Planner, as_planner
 from aerobat.problem import Problem, as_problem
@@ -23,8 +22,7 @@ from aerobat.studies.feasibility.axis import MAX_CELLS, Axis
 from aerobat.studies.feasibility.binding import least_reserve
 from aerobat.studies.feasibility.fields import Field, Scenario
 from aerobat.studies.feasibility.probe import TIME_LIMIT, Feasibility, Task, probe
-from aerobat.studies.workers import Workers
-from aerobat.studies.workers import workers as processes
+from aerobat.studies.workers import Workers, pool
 from aerobat.vehicle import Vehicle, as_vehicle
 
 MAX_AXES = 2
@@ -115,8 +113,8 @@ def feasibility_map(
         vehicle: what flies it, or its name.
         planner: how, or its registered name, by default the one that suits each problem.
         time_limit: of each cell [s].
-        workers: processes, by default one a core; 1 plans in this process.
-        executor: what plans instead, as `dask.distributed.Client(...).get_executor()`.
+        workers: processes, by default one a core; 1 plans in this process; dask://HOST:PORT on a cluster.
+        executor: any of `concurrent.futures` that plans instead, as a `dask.distributed` client's.
         progress: called with the cells done, and of them those that are planned, as they are finished.
 
     Raises SpecError for names of no field, and for values that a field cannot take.
@@ -126,14 +124,15 @@ def feasibility_map(
     fields = _fields(axes, scenario)
     task = Task(scenario, fields, None if planner is None else as_planner(planner), time_limit)
     places = list(product(*(axis.values for axis in axes)))
-    count = min(workers or available_cores(), len(places))
-    if executor is not None:
-        cells = _cells(executor, task, places, progress, cancels=True)
-    else:
-        with processes(count, forked=True) as pool:
-            cells = _cells(pool, task, places, progress)
+    cells: dict[tuple[float, ...], Cell] = {}
+    with pool(workers, executor, len(places)) as planning:
+        for values, cell in planning.results(_cell, task, places):
+            cells[values] = cell
+            if progress is not None:
+                progress(len(cells), sum(cell.is_planned for cell in cells.values()))
     told = tuple(replace(axis, unit=field.unit) for axis, field in zip(axes, fields, strict=True))
-    return FeasibilityMap(scenario.problem, scenario.vehicle, told, cells)
+    found = tuple(cells[values] for values in places)
+    return FeasibilityMap(scenario.problem, scenario.vehicle, told, found)
 
 
 def _fields(axes: Sequence[Axis], scenario: Scenario) -> tuple[Field, ...]:
@@ -149,37 +148,6 @@ def _fields(axes: Sequence[Axis], scenario: Scenario) -> tuple[Field, ...]:
     for field, axis in zip(fields, axes, strict=True):
         field.require(scenario, axis.values)
     return fields
-
-
-def _cells(
-    executor: Executor,
-    task: Task,
-    places: Sequence[tuple[float, ...]],
-    progress: Callable[[int, int], None] | None,
-    cancels: bool = False,
-) -> tuple[Cell, ...]:
-    """The cells of places, in their order.
-
-    Args:
-        executor: what plans.
-        task: what is planned.
-        places: values of its fields.
-        progress: called with the cells done and planned.
-        cancels: True for an executor that goes on when the map does not.
-    """
-    pending: dict[Future[Cell], int] = {}
-    cells: dict[int, Cell] = {}
-    try:
-        for number, values in enumerate(places):
-            pending[executor.submit(_cell, task, values)] = number
-        for future in as_completed(pending):
-            cells[pending[future]] = future.result()
-            if progress is not None:
-                progress(len(cells), sum(cell.is_planned for cell in cells.values()))
-    finally:
-        for future in pending if cancels else ():
-            future.cancel()
-    return tuple(cells[number] for number in range(len(places)))
 
 
 def _cell(task: Task, values: tuple[float, ...]) -> Cell:
