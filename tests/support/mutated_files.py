@@ -205,7 +205,7 @@ def both(name: str, reader: Reader) -> dict[str, Reader]:
 
 def kept_chunk(path: Path) -> str:
     """A digest of what a kept chunk holds."""
-    chunk = KeptChunks(path.parent).read(0, 1)
+    chunk = KeptChunks(path.parent).read(range(1))
     if chunk is None:
         raise SpecError("it is flown again")
     return digest_of(dict(chunk.columns))
