@@ -20,8 +20,8 @@ from aerobat.planning import Planner, as_planner
 from aerobat.problem import Problem, as_problem
 from aerobat.studies.feasibility.axis import MAX_CELLS, Axis
 from aerobat.studies.feasibility.binding import least_reserve
-from aerobat.studies.feasibility.fields import Field, Scenario
 from aerobat.studies.feasibility.probe import TIME_LIMIT, Feasibility, Task, probe
+from aerobat.studies.lens import Lens, Scenario, lens
 from aerobat.studies.workers import Workers, pool
 from aerobat.vehicle import Vehicle, as_vehicle
 
@@ -108,8 +108,8 @@ def feasibility_map(
     Args:
         problem: what is planned, or its name.
         over: the values of each field, by its name: `{"angle": [0, 45, 90], "speed": range(2, 21, 2)}`. Names
-            are those of files, as `limits.velocity`, `gates[0].width`, `vehicle.mass`; the last part alone
-            where no other field has it; and `angle` for the tilt [deg] of a half-flip's gate.
+            are those of `lens`, as `limits.velocity`, `gates[0].width`, `vehicle.mass`, `planner.reserve`;
+            the last part alone where no other field has it; `angle` for the tilt of a half-flip's gate.
         vehicle: what flies it, or its name.
         planner: how, or its registered name, by default the one that suits each problem.
         time_limit: of each cell [s].
@@ -119,10 +119,11 @@ def feasibility_map(
 
     Raises SpecError for names of no field, and for values that a field cannot take.
     """
-    scenario = Scenario(as_problem(problem), as_vehicle(vehicle))
+    chosen = None if planner is None else as_planner(planner)
+    scenario = Scenario(as_problem(problem), as_vehicle(vehicle), chosen)
     axes = tuple(Axis.of(name, values) for name, values in over.items())
     fields = _fields(axes, scenario)
-    task = Task(scenario, fields, None if planner is None else as_planner(planner), time_limit)
+    task = Task(scenario, fields, time_limit)
     places = list(product(*(axis.values for axis in axes)))
     cells: dict[tuple[float, ...], Cell] = {}
     with pool(workers, executor, len(places)) as planning:
@@ -135,14 +136,14 @@ def feasibility_map(
     return FeasibilityMap(scenario.problem, scenario.vehicle, told, found)
 
 
-def _fields(axes: Sequence[Axis], scenario: Scenario) -> tuple[Field, ...]:
+def _fields(axes: Sequence[Axis], scenario: Scenario) -> tuple[Lens, ...]:
     """The fields of axes. Raises SpecError for what is no map of a scenario."""
     if not 1 <= len(axes) <= MAX_AXES:
         raise SpecError(f"over must name one field or two, got {len(axes)}")
     cells = prod(len(axis.values) for axis in axes)
     if cells > MAX_CELLS:
         raise SpecError(f"over: {cells} cells are too many, {MAX_CELLS} at most; take larger steps")
-    fields = tuple(Field.of(axis.name, scenario) for axis in axes)
+    fields = tuple(lens(axis.name, scenario) for axis in axes)
     if len({field.place for field in fields}) < len(fields):
         raise SpecError(f"over: {axes[0].name} and {axes[1].name} are the same field; drop one of them")
     for field, axis in zip(fields, axes, strict=True):

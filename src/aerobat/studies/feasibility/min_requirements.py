@@ -16,9 +16,9 @@ from aerobat.declaration import NonNegative, by_value, validated
 from aerobat.errors import Infeasible
 from aerobat.planning import Plan, Planner, as_planner
 from aerobat.problem import Problem, as_problem
-from aerobat.studies.feasibility.fields import Scenario
 from aerobat.studies.feasibility.probe import TIME_LIMIT, Feasibility, Probe, Task, probe
 from aerobat.studies.feasibility.quantities import Quantity, named_quantities
+from aerobat.studies.lens import Scenario
 from aerobat.studies.workers import Pool, Workers, pool
 from aerobat.vehicle import Vehicle, as_vehicle
 
@@ -96,10 +96,10 @@ def min_requirements(
         SpecError: quantities are unknown, or the problem has no such thing.
         Infeasible: nothing suffices, whichever quantity grows; the sentence says why.
     """
-    scenario = Scenario(as_problem(problem), as_vehicle(vehicle))
-    planner = None if planner is None else as_planner(planner)
+    chosen = None if planner is None else as_planner(planner)
+    scenario = Scenario(as_problem(problem), as_vehicle(vehicle), chosen)
     searches = [_Search(q, scenario, tolerance) for q in named_quantities(of, scenario.problem)]
-    tasks = tuple(Task(scenario, (search.quantity,), planner, time_limit) for search in searches)
+    tasks = tuple(Task(scenario, (search.quantity,), time_limit) for search in searches)
     with pool(workers, executor, len(searches)) as planning:
         _search(planning, tasks, searches, progress)
     found = tuple(search.requirement for search in searches)
