@@ -96,11 +96,13 @@ def _norms(vectors: Array) -> Array:
 
 def _scored(scores: Scores) -> Columns:
     """What flights came to."""
-    columns: Columns = {"outcome": np.array([outcome.name.lower() for outcome in scores.outcomes])}
+    flights = list(scores)
+    columns: Columns = {"outcome": np.array([flight.outcome.name.lower() for flight in flights])}
     columns |= {name: np.array(getattr(scores, name)) for name in _ERRORS}
-    for name, passage in zip(passage_names(scores.passages), scores.passages, strict=True):
+    for number, name in enumerate(passage_names(scores.passages)):
+        passage = scores.passages[number]
         columns |= {f"{name}_{column}": np.array(getattr(passage, field)) for field, column in _PASSAGE}
-        ends = [_passage_outcome(passage.of_flight(k)) for k in range(len(scores))]
+        ends = [_passage_outcome(flight.passages[number]) for flight in flights]
         columns[f"{name}_outcome"] = np.array(ends)
     return columns
 
