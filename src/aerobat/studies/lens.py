@@ -16,7 +16,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from aerobat.declaration import FieldError, from_table, shown, unknown_key, validated, within_field
+from aerobat.declaration import FieldError, from_table, shown, unknown_key, within_field
 from aerobat.declaration.sentences import closest
 from aerobat.environment import Dispersion
 from aerobat.errors import SpecError
@@ -120,7 +120,6 @@ class Lens:
         return isinstance(self.keys[-1], str)
 
 
-@validated
 def lens(name: str, whole: Any) -> Lens:
     """Return the lens on the field of a name.
 

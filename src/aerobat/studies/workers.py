@@ -40,7 +40,8 @@ MAX_DEATHS = 3  # of workers, one after another without any part done, after whi
 LIBRARIES = ("aerobat", "numpy", "scipy", "llvmlite", "jax")  # that numbers come from
 _QUEUED = 2  # groups of parts for each worker: one that it works at, and the next
 _QUEUED_ELSEWHERE = 256  # groups, for an executor that does not say how many workers it has
-_SHARES = 64  # into which a study's parts are grouped at least: a worker is never long without a word
+_SHARES = 4  # groups at least that each worker gets of a study's parts, so that all end about together
+_WORKERS_ELSEWHERE = 16  # where an executor does not say how many it has
 _CONNECTING = 10.0  # [s] within which a scheduler answers
 _DASK = re.compile(r"dask://([^\s/:]+|\[[0-9a-fA-F:]+\]):(\d{1,5})")
 
@@ -73,9 +74,9 @@ class WorkerEnded(SpecError):
 class Pool:
     """The workers that do a study's parts; see `pool`."""
 
-    def __init__(self, processes: int = 1, executor: Executor | None = None) -> None:
-        """Take an executor, else so many processes, of which one is this process."""
-        self._processes = processes
+    def __init__(self, count: int = 1, executor: Executor | None = None) -> None:
+        """Take an executor of about so many workers, else so many processes, of which one is this process."""
+        self._count = count
         self._given = executor
         self._own = ExitStack()
         self._started: Executor | None = None
@@ -103,12 +104,12 @@ class Pool:
         Raises WorkerEnded where workers die over and over, and whatever the function raises.
         """
         waiting = parts if isinstance(parts, deque) else deque(parts)
-        is_here = self._given is None and self._processes == 1
+        is_here = self._given is None and self._count == 1
         while waiting and (is_here or (compiles and self._given is None and self._started is None)):
             part = waiting.popleft()
             yield part, function(task, part)
             compiles = False
-        size = min(max(len(waiting) // _SHARES, 1), together)
+        size = min(max(len(waiting) // (_SHARES * self._count), 1), together)
         shared = _Shared(task)
         deaths = 0
         while waiting:
@@ -150,7 +151,7 @@ class Pool:
     ) -> None:
         """Hand on groups of parts, as many as keep all workers at work."""
         executor = self._executor()
-        queued = _QUEUED_ELSEWHERE if self._given is not None else _QUEUED * self._processes
+        queued = _QUEUED_ELSEWHERE if self._given is not None else _QUEUED * self._count
         while waiting and len(self._pending) < queued:
             group = [waiting.popleft() for _ in range(min(size, len(waiting)))]
             try:
@@ -163,7 +164,7 @@ class Pool:
         if self._given is not None:
             return self._given
         if self._started is None:
-            self._started = self._own.enter_context(processes(self._processes, forked=True))
+            self._started = self._own.enter_context(processes(self._count, forked=True))
         return self._started
 
     def _too_many_deaths(self) -> WorkerEnded:
@@ -190,17 +191,17 @@ def pool(
     Raises SpecError where no scheduler answers, and BackendMissing where Dask is not installed.
     """
     if executor is None and isinstance(workers, str):
-        with _dask_executor(workers) as found, Pool(executor=found) as made:
+        with _dask_pool(workers) as made:
             yield made
         return
     count = workers if isinstance(workers, int) else available_cores()
-    with Pool(max(min(count, parts), 1), executor) as made:
+    with Pool(max(min(count, parts), 1) if executor is None else _WORKERS_ELSEWHERE, executor) as made:
         yield made
 
 
 @contextmanager
-def _dask_executor(address: str) -> Iterator[Executor]:
-    """What works at a scheduler's."""
+def _dask_pool(address: str) -> Iterator[Pool]:
+    """The workers of a scheduler."""
     try:
         dask: Any = import_module("distributed")
     except ImportError:
@@ -213,8 +214,8 @@ def _dask_executor(address: str) -> Iterator[Executor]:
             f"workers: no scheduler answers at {address}; start one with `dask scheduler`, and workers with "
             "`dask worker`"
         ) from None
-    with client:
-        yield client.get_executor()
+    with client, Pool(max(sum(client.nthreads().values()), 1), client.get_executor()) as made:
+        yield made
 
 
 def _is_death(error: BaseException) -> bool:

@@ -56,14 +56,21 @@ class Task:
     scenario: Scenario
     variables: tuple[Variable, ...]
     time_limit: float  # [s] of each
+    flights: range = range(0)  # of each plan, under the scenario's conditions
+    seed: int = 0  # of the flights
+
+    def varied(self, values: Sequence[float]) -> Scenario:
+        """The scenario where the variables have these values. Raises SpecError where that cannot be."""
+        scenario = self.scenario
+        for variable, value in zip(self.variables, values, strict=True):
+            scenario = variable.set(scenario, value)
+        return scenario
 
 
 def probe(task: Task, values: Sequence[float]) -> Probe:
     """The answer where the variables have these values."""
-    scenario = task.scenario
     try:
-        for variable, value in zip(task.variables, values, strict=True):
-            scenario = variable.set(scenario, value)
+        scenario = task.varied(values)
         found = contradiction(scenario.problem, scenario.vehicle)
         if found is not None:
             limits = found.limits or (f"stage '{found.stage}'",)
