@@ -19,8 +19,7 @@ from aerobat.limits.body_in_gate import BodyInGate, extent_of_attitude, extent_o
 from aerobat.planning import PlacedStage
 from aerobat.reporting.report_json import report
 from aerobat.simulation import Outcome
-from aerobat.simulation.passages import PASSAGE_DEPTH, passages
-from aerobat.simulation.passages.polyline import gate_progress
+from aerobat.simulation.passages import PASSAGE_DEPTH, log_rows, passages_in_log
 from gate_motions import CROSSING, RATE, Motion, cruise, motion
 from random_problems import random_case
 from score_cases import QUAD
@@ -221,7 +220,8 @@ def upright_passage(gate: ab.Gate, body: ab.Ellipsoid, times: Array, position: l
     """The passage of a body that is moved without turning."""
     states = np.column_stack(position), np.zeros((len(times), 3)), np.tile(so3.IDENTITY, (len(times), 1))
     planned = PlannedPassage(gate, CROSSING, gate.up)
-    return passages(planned, gate_progress(planned, times, states, body), np.array([np.nan])).of_flight(0)
+    rows = log_rows(times, *states)
+    return passages_in_log(rows, (planned,), body, np.array([np.nan]))[0].of_flight(0)
 
 
 def test_who_slides_along_the_plane_into_the_opening_has_hit_the_frame() -> None:

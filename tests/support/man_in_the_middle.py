@@ -30,7 +30,7 @@ import pytest
 from aerobat.cli.exit_code import ExitCode
 from aerobat.links.autopilot.vehicle import SimulatedVehicle
 from aerobat.links.mavlink import connection
-from aerobat.links.mavlink.client import Client, Stage
+from aerobat.links.mavlink.client import Client, ClientStage
 from aerobat.links.mavlink.connection import dialect
 from aerobat.links.mavlink.front_end import FrontEnd
 from command_lines import code
@@ -485,7 +485,7 @@ def wrongs(flight: Flight, stepped: SteppedFlight, clients: list[Client]) -> Ite
     if flight.code == ExitCode.BAD_INPUT:
         if not (flight.said.strip() and is_an_error(flight.out)):
             yield "another output than an error where nothing was flown, or no sentence"
-        if is_flying or (vehicle.armed and clients and clients[0].stage is Stage.FLYING):
+        if is_flying or (vehicle.armed and clients and clients[0].stage is ClientStage.FLYING):
             yield "refused in flight"
         return
     try:

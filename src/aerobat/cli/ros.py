@@ -16,7 +16,7 @@ from aerobat.links.autopilot.vehicle import SimulatedVehicle
 from aerobat.links.mission import MissionSettings
 from aerobat.links.ros.maneuver_node import ManeuverNode, NodeSettings
 from aerobat.links.ros.middleware import Middleware, PacedClock
-from aerobat.links.ros.preparation import MANEUVERS, Request, prepare
+from aerobat.links.ros.preparation import MANEUVERS, ManeuverRequest, prepare
 from aerobat.links.ros.run import RVIZ, run
 from aerobat.links.ros.vehicle_node import VehicleNode
 from aerobat.planning import Planner, planner_class, suited_planner
@@ -74,7 +74,7 @@ def _rehearse(
     """Begin to plan one maneuver for nobody, so that the first real one finds everything imported."""
     problem, planner = next(iter(maneuvers.values()))
     aloft = settings.takeoff_height * so3.UP
-    executor.submit(prepare, Request(problem, vehicle, planner, aloft, 0.0, 0.0, in_world=False))
+    executor.submit(prepare, ManeuverRequest(problem, vehicle, planner, aloft, 0.0, 0.0, in_world=False))
 
 
 def simulate(

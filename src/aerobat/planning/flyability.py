@@ -20,7 +20,7 @@ from aerobat.planning.passages import PlacedStage, planned_passages
 from aerobat.problem.problem import Problem
 from aerobat.simulation import Flight, FlightConfig, Outcome, fly
 from aerobat.simulation.outcome import DIVERGENCE_RADIUS, length
-from aerobat.simulation.passages import Passage, flown_passages
+from aerobat.simulation.passages import Passage, log_rows, passages_in_log
 from aerobat.trajectory import Trajectory
 from aerobat.vehicle import Vehicle
 
@@ -130,7 +130,10 @@ def own_flight(
         stages: Where they are placed.
     """
     flight = nominal_flight(trajectory, vehicle, problem.environment)
-    flown = flown_passages(flight, planned_passages(stages, problem), vehicle.bounding_ellipsoid)
+    states = flight.states
+    rows = log_rows(flight.times, states.position, states.velocity, states.q_world_body)
+    planned, body = planned_passages(stages, problem), vehicle.bounding_ellipsoid
+    flown = passages_in_log(rows, planned, body, flight.diverged_at)
     return OwnFlight(
         error=_largest_error(flight), passages=tuple(_flown(passage.of_flight(0)) for passage in flown)
     )

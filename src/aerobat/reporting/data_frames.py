@@ -11,7 +11,7 @@ import numpy as np
 from aerobat.arrays import AXES
 from aerobat.declaration import validated
 from aerobat.errors import BackendMissing
-from aerobat.evaluation.score import Scores
+from aerobat.evaluation.score import Score
 from aerobat.planning import Attempt, Plan
 from aerobat.reporting.comparison import comparison_rows
 from aerobat.simulation import Flight
@@ -34,7 +34,7 @@ METRICS = (
 
 
 @validated
-def to_dataframe(table: Flight | Plan | Comparison | Scores | Sweep | FeasibilityMap) -> DataFrame:
+def to_dataframe(table: Flight | Plan | Comparison | Score | Sweep | FeasibilityMap) -> DataFrame:
     """Return a pandas DataFrame, SI units unless a column says otherwise.
 
     Of a flight its rows: time, then each series of SERIES by its components, as `position_x` and `thrusts_0`;
@@ -54,7 +54,7 @@ def to_dataframe(table: Flight | Plan | Comparison | Scores | Sweep | Feasibilit
         return DataFrame(dict(table.table))
     if isinstance(table, Comparison):
         return DataFrame(comparison_rows(table))
-    return DataFrame(_of_scores(table) if isinstance(table, Scores) else _of_flight(table))
+    return DataFrame(_of_scores(table) if isinstance(table, Score) else _of_flight(table))
 
 
 def _names(cls: Any) -> list[str]:
@@ -85,7 +85,7 @@ def _columns(flight: Flight) -> Iterator[tuple[str, Any]]:
                 yield f"{one.name}_{names[k] if names else k}", column
 
 
-def _of_scores(scores: Scores) -> dict[str, Any]:
+def _of_scores(scores: Score) -> dict[str, Any]:
     """The columns of many flights' scores."""
     columns: dict[str, Any] = {name: getattr(scores, name) for name in METRICS}
     columns["outcome"] = [outcome.name.lower() for outcome in scores.outcomes]

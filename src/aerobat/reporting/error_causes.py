@@ -86,7 +86,7 @@ def _facts(measured: ErrorCauses, result: TrialResult) -> dict[str, Any]:
         "cost_m": {name: _known(getattr(cost, name)) for name in ("median", "low", "high")},
         "gate_error_m": _known(_quantile(result.gate_error, 0.5)),
         "gate_attitude_error_deg": _known(_quantile(result.gate_attitude_error, 0.5)),
-        "saturated_fraction": float(result.scores.saturated_fraction.mean()),
+        "saturated_fraction": float(np.mean(result.scores.saturated_fraction)),
         "success": float(result.scores.succeeded.mean()),
     }
 

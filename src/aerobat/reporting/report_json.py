@@ -16,6 +16,9 @@ from aerobat.vehicle import implausibilities
 if TYPE_CHECKING:  # which takes long to import
     from aerobat.studies.sweep import Sweep
 
+# numbers of a score that its sentence is made of
+EVENTS = ("stop", "is_finite", "ground_time", "off_path_time", "contact", "contact_time", "path_radius_m")
+
 
 def report(
     plan: Plan,
@@ -53,7 +56,8 @@ def to_json(facts: dict[str, Any] | list[dict[str, Any]]) -> str:
 
 def _flight(score: Score) -> dict[str, Any]:
     """A score; what is not known or not limited is None, as JSON has neither NaN nor infinity."""
-    facts = asdict(score) | {"outcome": score.outcome.name.lower()}
+    facts = {name: value for name, value in asdict(score).items() if name not in EVENTS}
+    facts |= {"outcome": score.outcome.name.lower(), "sentence": score.sentence}
     facts["laps"] = [asdict(lap) for lap in score.laps]
     for judged in ("passages", "waypoints", "places", "attitudes", "laps"):
         facts[judged] = [_known(each) for each in facts[judged]]

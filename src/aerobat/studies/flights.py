@@ -10,7 +10,7 @@ import numpy as np
 from aerobat.control import ControlLaw, Controller
 from aerobat.engines import choose
 from aerobat.environment import Dispersion
-from aerobat.evaluation import Scores, score_flights
+from aerobat.evaluation import Score, score_flights
 from aerobat.planning import Plan
 from aerobat.simulation import FlightConfig
 from aerobat.studies.workers import Pool
@@ -46,7 +46,7 @@ def cut(flights: range, size: int = CHUNK) -> list[range]:
     return [flights[first : first + size] for first in range(0, len(flights), size)]
 
 
-def fly_scores(pool: Pool, tasks: tuple[FlightTask, ...], flights: range) -> list[Scores]:
+def fly_scores(pool: Pool, tasks: tuple[FlightTask, ...], flights: range) -> list[Score]:
     """Score the same flights of each task.
 
     Args:
@@ -59,7 +59,7 @@ def fly_scores(pool: Pool, tasks: tuple[FlightTask, ...], flights: range) -> lis
     return [_joined([found[k, numbers] for numbers in cut(flights)]) for k in range(len(tasks))]
 
 
-def _score_chunk(tasks: tuple[FlightTask, ...], part: tuple[int, range]) -> Scores:
+def _score_chunk(tasks: tuple[FlightTask, ...], part: tuple[int, range]) -> Score:
     number, flights = part
     task = tasks[number]
     return score_flights(task.plan, task.vehicle, config=task.config(flights))

@@ -25,7 +25,7 @@ from aerobat.control import Controller
 from aerobat.declaration import NonNegative, Seed, by_value, in_notebooks, short, unknown_name, validated
 from aerobat.environment import Dispersion, as_dispersion
 from aerobat.errors import SpecError
-from aerobat.evaluation import Scores
+from aerobat.evaluation import Score
 from aerobat.flatness import vehicle_of
 from aerobat.optimization.deadline import out_of_time, within_time
 from aerobat.planning import Plan
@@ -170,7 +170,7 @@ def tune(
     training, others = range(flights), range(flights, 2 * flights)
     with pool(workers, executor, len(plans) * len(cut(training))) as flying:
         objective = _Objective(flying, plans, flown, as_dispersion(conditions), seed)
-        search = _Search(objective, names, training, evaluations, progress)
+        search = _GainSearch(objective, names, training, evaluations, progress)
         with within_time(time_limit):
             search.run()
         trained = objective.fly(flown.controller, training), search.best
@@ -221,7 +221,7 @@ class _Objective:
         return FlightCosts(frozen(errors, "max_position_error_m"), frozen(failed, "failed"))
 
 
-def _errors(scores: Scores) -> Array:
+def _errors(scores: Score) -> Array:
     lost = np.isfinite(scores.stop)
     return np.where(lost, DIVERGENCE_RADIUS, np.minimum(scores.max_position_error_m, DIVERGENCE_RADIUS))
 
@@ -230,7 +230,7 @@ class _Ended(Exception):
     """The search has had its time, or its share of tries."""
 
 
-class _Search:
+class _GainSearch:
     """Gains that are tried, and the best of them."""
 
     def __init__(

@@ -20,7 +20,7 @@ from aerobat.environment import Environment
 from aerobat.flatness import axial_drag, has_unequal_drag, lateral_drag, reference_of
 from aerobat.flatness.parallel_transport import frames
 from aerobat.flatness.references import UNDETERMINED, specific_thrust
-from aerobat.kernels.measures import Airframe, measures
+from aerobat.kernels.measures import InertiaAndDrag, measures
 from aerobat.kernels.unequal_drag import BodyMotion
 from aerobat.limits import MEASURES, Limit
 from aerobat.so3 import UP
@@ -165,10 +165,10 @@ class LimitValues:
         return array_function(given, outputs), array_function([*given, *weights], gradient(total, motion))
 
     @property
-    def _airframe(self) -> Airframe:
+    def _airframe(self) -> InertiaAndDrag:
         vehicle = self.vehicle
         unequal = tuple((vehicle.drag_body / vehicle.mass).tolist()) if has_unequal_drag(vehicle) else None
-        return Airframe(
+        return InertiaAndDrag(
             vehicle.mass, vehicle.inertia.tolist(), lateral_drag(vehicle), axial_drag(vehicle), unequal
         )
 

@@ -17,7 +17,7 @@ from aerobat.errors import Infeasible
 from aerobat.planning import Plan, Planner, as_planner
 from aerobat.problem import Problem, as_problem
 from aerobat.studies.feasibility.probe import TIME_LIMIT, Feasibility, Probe, Task, probe
-from aerobat.studies.feasibility.quantities import Quantity, named_quantities
+from aerobat.studies.feasibility.quantities import NeededQuantity, named_quantities
 from aerobat.studies.lens import Scenario
 from aerobat.studies.workers import Pool, Workers, pool
 from aerobat.vehicle import Vehicle, as_vehicle
@@ -137,7 +137,7 @@ def _probe(tasks: tuple[Task, ...], part: tuple[int, float]) -> Probe:
 class _Search:
     """The bisection of one quantity, between a value that is refused and one for which there is a plan."""
 
-    quantity: Quantity
+    quantity: NeededQuantity
     scenario: Scenario
     tolerance: float
     planned: tuple[float, Probe] | None = None  # the least so far

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from aerobat.arrays import Array
-from aerobat.evaluation import Passage, Scores
+from aerobat.evaluation import Passage, Score
 from aerobat.evaluation.score_flights import ErrorsOverTime, score_over_time
 from aerobat.simulation.conditions.draw import Draws, draw_flights
 from aerobat.studies.flights import CHUNK, FlightTask, cut
@@ -23,7 +23,7 @@ AGAIN = "#"  # between a gate's name and the number of its passage, from the sec
 
 Columns = dict[str, NDArray[Any]]
 
-_ERRORS = tuple(field.name for field in fields(Scores)[:5])
+_ERRORS = tuple(field.name for field in fields(Score)[:5])
 _PASSAGE = (  # numbers of a passage, each with the name of its column after the gate's
     ("time", "time_s"),
     ("lateral", "lateral_m"),
@@ -94,7 +94,7 @@ def _norms(vectors: Array) -> Array:
     return np.asarray(np.linalg.norm(vectors, axis=1))
 
 
-def _scored(scores: Scores) -> Columns:
+def _scored(scores: Score) -> Columns:
     """What flights came to."""
     flights = list(scores)
     columns: Columns = {"outcome": np.array([flight.outcome.name.lower() for flight in flights])}
