@@ -19,6 +19,7 @@ from test_sweep import RUNS, SEED, SPREAD, hop, whole
 
 import aerobat as ab
 from aerobat.errors import BackendMissing
+from aerobat.studies import workers
 from aerobat.studies.flights import CHUNK
 from aerobat.studies.workers import MAX_DEATHS, Pool, WorkerEnded, pool
 
@@ -63,6 +64,16 @@ def compared(**at_work: Any) -> list[Any]:
     return [(each.planner, each.plan and each.plan.trajectory, each.score) for each in found]
 
 
+def measured(**at_work: Any) -> list[Any]:
+    late = ab.Cause("late", {"conditions.computation_delay": 0.002})
+    planner = ab.Miqp(order=4, reserve=0.1, flies=False)
+    options = {"planner": planner, "conditions": SPREAD, "flights": FLIGHTS}
+    return [
+        each.scores
+        for each in ab.error_causes("half-flip", "hexarotor", [late], **options, **at_work).results
+    ]
+
+
 STUDIES: dict[str, Callable[..., Any]] = {
     "sweep": lambda **at_work: ab.sweep(hop(), SPREAD, FLIGHTS, SEED, **at_work),
     "map": lambda **at_work: ab.feasibility_map(
@@ -72,8 +83,9 @@ STUDIES: dict[str, Callable[..., Any]] = {
     "tune": lambda **at_work: ab.tune(hop(), SPREAD, FLIGHTS, evaluations=2, **at_work),
     "pass": passed,
     "compare": compared,
+    "causes": measured,
 }
-SLOW = ("need", "pass", "compare")
+SLOW = ("need", "pass", "compare", "causes")
 
 
 @pytest.mark.parametrize(
@@ -117,16 +129,16 @@ def _dies(parent: int, number: int) -> int:
 @pytest.mark.process
 @pytest.mark.skipif(sys.platform == "win32", reason="there processes are ended otherwise")
 def test_parts_of_a_process_that_died_are_done_again(tmp_path: Path) -> None:
-    with pool(2) as workers:
-        found = list(workers.results(_dies_once, tmp_path / "mark", range(12)))
+    with pool(2) as done:
+        found = list(done.results(_dies_once, tmp_path / "mark", range(12)))
     assert sorted(found) == [(number, number) for number in range(12)]
 
 
 @pytest.mark.process
 @pytest.mark.skipif(sys.platform == "win32", reason="there processes are ended otherwise")
 def test_where_every_process_dies_a_sentence_says_so() -> None:
-    with pytest.raises(WorkerEnded, match="take fewer workers") as ended, pool(2) as workers:
-        list(workers.results(_dies, os.getpid(), range(MAX_DEATHS)))
+    with pytest.raises(WorkerEnded, match="take fewer workers") as ended, pool(2) as done:
+        list(done.results(_dies, os.getpid(), range(MAX_DEATHS)))
     assert "\n" not in str(ended.value)
 
 
@@ -182,6 +194,15 @@ def test_workers_that_are_none_are_refused_in_a_sentence(workers: Any) -> None:
         ab.SpecError, match=r"workers must be .*whole number from 1 to 4096, or dask://HOST:PORT"
     ):
         ab.sweep(hop(), SPREAD, 1, workers=workers)
+
+
+def test_a_worker_of_other_versions_refuses_to_work(monkeypatch: pytest.MonkeyPatch) -> None:
+    shared = pickle.dumps(workers._Shared("a task"))
+    assert pickle.loads(shared).task == "a task"
+    workers._unpacked.cache_clear()
+    monkeypatch.setattr(workers, "_versions", lambda: (("aerobat", "0.0"),))
+    with pytest.raises(ab.SpecError, match=r"one has aerobat 0\.0, and not aerobat .*; install the same"):
+        pickle.loads(shared)
 
 
 @pytest.mark.process
