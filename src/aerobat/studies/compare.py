@@ -16,7 +16,7 @@ from aerobat.planning import Attempt, Plan, Planner, TimeOptimal, as_planner, pl
 from aerobat.planning.time_limit import best_by_limit
 from aerobat.problem import Problem, as_problem
 from aerobat.simulation import Flight, fly
-from aerobat.studies.workers import Workers, pool
+from aerobat.studies.workers import Pool, Workers, pool
 from aerobat.vehicle import Vehicle, as_vehicle
 
 
@@ -102,7 +102,8 @@ def compare(
         raise SpecError("planners must be one planner or more; leave them out for all")
     begin = begin or (lambda name: None)
     task = _Task(problem, vehicle, time_limit)
-    found = _entries(task, compared, progress, begin, (workers, executor))
+    with pool(workers, executor, len(compared)) as planning:
+        found = _entries(task, compared, progress, begin, planning)
     for i, (name, planner) in enumerate(compared):
         if isinstance(planner, TimeOptimal):
             begin(f"{name} again")
@@ -131,7 +132,7 @@ def _entries(
     planners: Sequence[tuple[str, Planner]],
     progress: Callable[[Attempt], None] | None,
     begin: Callable[[str], None],
-    at_work: tuple[int | str, Executor | None],
+    planning: Pool,
 ) -> list[Entry]:
     """The entries of planners, in their order.
 
@@ -140,32 +141,32 @@ def _entries(
         planners: By their names.
         progress: Called with every attempt in this process.
         begin: Called with each planner's name.
-        at_work: The workers, and the executor, of `pool`.
+        planning: What plans.
     """
-    if at_work == (1, None):
-        found = []
-        for name, planner in planners:
-            begin(name)
-            found.append(_timed_entry(task, name, planner, progress))
-        return found
-    with pool(*at_work, len(planners)) as planning:
-        entries = {}
-        for number, entry in planning.results(_entry_of, (task, tuple(planners)), range(len(planners))):
-            begin(entry.planner)
-            entries[number] = entry
-    return [entries[number] for number in range(len(planners))]
+    if planning.is_here:
+        return [_begun(task, each, progress, begin) for each in planners]
+    entries = {}
+    for named, entry in planning.results(_timed_entry, task, planners):
+        begin(entry.planner)
+        entries[named] = entry
+    return [entries[named] for named in planners]
 
 
-def _entry_of(shared: tuple[_Task, tuple[tuple[str, Planner], ...]], number: int) -> Entry:
-    task, planners = shared
-    return _timed_entry(task, *planners[number], None)
+def _begun(
+    task: _Task,
+    named: tuple[str, Planner],
+    progress: Callable[[Attempt], None] | None,
+    begin: Callable[[str], None],
+) -> Entry:
+    begin(named[0])
+    return _timed_entry(task, named, progress)
 
 
 def _timed_entry(
-    task: _Task, name: str, planner: Planner, progress: Callable[[Attempt], None] | None
+    task: _Task, named: tuple[str, Planner], progress: Callable[[Attempt], None] | None = None
 ) -> Entry:
     with within_time(task.time_limit):
-        return _entry(name, planner, task.problem, task.vehicle, progress)
+        return _entry(*named, task.problem, task.vehicle, progress)
 
 
 def _named(planner: tuple[str, Planner] | str) -> tuple[str, Planner]:

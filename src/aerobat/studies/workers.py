@@ -104,8 +104,7 @@ class Pool:
         Raises WorkerEnded where workers die over and over, and whatever the function raises.
         """
         waiting = parts if isinstance(parts, deque) else deque(parts)
-        is_here = self._given is None and self._count == 1
-        while waiting and (is_here or (compiles and self._given is None and self._started is None)):
+        while waiting and (self.is_here or (compiles and self._given is None and self._started is None)):
             part = waiting.popleft()
             yield part, function(task, part)
             compiles = False
@@ -130,6 +129,11 @@ class Pool:
                 waiting.extendleft(part for group in self._pending.values() for part in reversed(group))
                 self._pending.clear()
                 self.close()
+
+    @property
+    def is_here(self) -> bool:
+        """True where this process does all parts."""
+        return self._given is None and self._count == 1
 
     def close(self) -> None:
         """End the pool's own processes, and what an executor has not begun."""
