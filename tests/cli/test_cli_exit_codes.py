@@ -25,7 +25,7 @@ def _elsewhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     without_pictures(monkeypatch)
 
 
-@pytest.mark.parametrize("command", [["fly", "line.plan"], ["check", "line.plan"], ["vehicles"], ["--help"]])
+@pytest.mark.parametrize("command", [["fly", "line.plan"], ["check", "line.plan"], ["show"], ["--help"]])
 def test_what_went_well_exits_with_0(command: list[str]) -> None:
     shared_plan("line").save("line.plan")
     assert code(*command) == 0

@@ -17,7 +17,7 @@ from aerobat.optimization import AssignmentProgram, SlottedStage, improved_in_wi
 from aerobat.optimization.moving_window import WIDTH, evenly_spread
 from aerobat.planning.miqp import diagnosis, formulate
 from aerobat.planning.recorder import Attempt
-from aerobat.reporting.tables import plan_facts
+from aerobat.reporting.facts import facts
 from suites import examples
 
 SLOTS = 6
@@ -161,7 +161,7 @@ def test_a_plan_placed_in_windows_states_its_gap() -> None:
     assert plan.cost is not None
     assert plan.bound <= plan.cost
     assert plan.gap == pytest.approx(1.0 - plan.bound / plan.cost, abs=1e-9)
-    said = dict(plan_facts(plan))
+    said = {fact.label: fact.said for fact in facts(plan)}
     if plan.gap > 1e-6:
         assert any("% of the optimum" in str(each) for each in said.values())
 

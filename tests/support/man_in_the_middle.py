@@ -1,4 +1,4 @@
-"""Flights by `aerobat mavlink` with a man in the middle: over real sockets, in steps of a clock of their own.
+"""Flights by `aerobat link mavlink` with a man in the middle: real sockets, steps of a clock of their own.
 
     uv run --dev python tests/support/man_in_the_middle.py 200
 
@@ -455,7 +455,7 @@ def flown_with(mischief: list[Mischief], plan: Path, tcp: bool, first: bool = Fa
         patch.setattr("aerobat.links.mavlink.client.Client", Seen)
         patch.setattr(connection, "time", stepped)
         try:
-            flight.code = code("mavlink", plan, "--connect", middle.address, "--json")
+            flight.code = code("link", "mavlink", plan, "--connect", middle.address, "--json")
         except Endless:
             flight.raised = "it does not end"
         except Exception:

@@ -288,7 +288,7 @@ def _calls(folder: Path) -> dict[str, dict[str, Any]]:
             "name": "a gate",
         },
         "smallest_opening": _wide_enough(),
-        "to_dataframe": {"table": plan()},
+        "to_dataframe": {"result": plan()},
         "tracking_figure": {"plan": plan(), "vehicle": agile, "flight": flight()},
         "view": {"shown": flight(), "plan": plan(), "vehicle": agile},
         "view_live": {

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from math import degrees
 
 import numpy as np
@@ -51,10 +51,6 @@ class LinkReport:
     def is_late(self) -> bool:
         """True where a set-point was later than a vehicle carries the one before on."""
         return self.max_lateness_s > KEPT
-
-    def record(self) -> dict[str, object]:
-        """Plain data."""
-        return {**asdict(self), "success": self.is_success, "failures": list(self.failures)}
 
     def __str__(self) -> str:
         """One sentence."""
