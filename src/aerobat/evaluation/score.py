@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from math import inf, isfinite, isinf
 from typing import Any, TypeAlias
@@ -96,7 +96,9 @@ class Score:
     observer: ObserverScore | None = None  # of a filter, where a logged flight had one
 
     def __post_init__(self) -> None:
-        """Write-protect."""
+        """Write-protect the arrays of a batch."""
+        if not self.is_batch:
+            return
         judged = (*self.passages, *self.waypoints, *self.places, *self.attitudes)
         parts = (part for one in judged for part in vars(one).values())
         for value in (*vars(self).values(), *parts):
@@ -119,17 +121,8 @@ class Score:
             raise SpecError("this is the score of one flight, not of a batch: use it without an index")
         if not -len(self) <= k < len(self):
             raise OutOfRange(f"there are {len(self)} flights, no flight {shown(k)}; count from 0")
-        numbers: dict[str, Any] = {
-            name: value[k].item() for name, value in vars(self).items() if isinstance(value, np.ndarray)
-        }
-        return replace(
-            self,
-            **numbers,
-            passages=tuple(passage.of_flight(k) for passage in self.passages),
-            waypoints=tuple(waypoint.of_flight(k) for waypoint in self.waypoints),
-            places=tuple(place.of_flight(k) for place in self.places),
-            attitudes=tuple(attitude.of_flight(k) for attitude in self.attitudes),
-        )
+        many = (getattr(self, field.name) for field in fields(self))
+        return Score(*(_of_flight(value, k) for value in many))
 
     def __iter__(self) -> Iterator[Score]:
         return (self[k] for k in range(len(self)))
@@ -217,6 +210,13 @@ class Score:
         if isfinite(self.off_path_time):
             error, allowed = length(self.max_position_error_m), length(self.path_radius_m)
             yield self.off_path_time, Outcome.OFF_PATH, {"allowed": allowed, "error": error}
+
+
+def _of_flight(value: Any, k: int) -> Any:
+    """One flight's part of a field of many."""
+    if isinstance(value, tuple):
+        return tuple(each.of_flight(k) for each in value)
+    return value[k].item() if isinstance(value, np.ndarray) else value
 
 
 def _failures(

@@ -21,8 +21,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 COMPONENTS = {3: AXES, 4: "wxyz"}  # of vectors and quaternions
-# numbers of a score that its sentence is made of
-EVENTS = ("stop", "is_finite", "ground_time", "off_path_time", "contact", "contact_time", "path_radius_m")
 METRICS = (
     "max_position_error_m",
     "rms_position_error_m",
@@ -30,6 +28,8 @@ METRICS = (
     "rms_attitude_error_deg",
     "saturated_fraction",
 )
+# numbers of a score that its sentence is made of
+EVENTS = ("stop", "is_finite", "ground_time", "off_path_time", "contact", "contact_time", "path_radius_m")
 
 
 @picture.register(Flight)
@@ -41,18 +41,12 @@ def _(flight: Flight) -> Figure:
 
 @facts.register
 def _(score: Score) -> Iterator[Fact]:
-    yield from _of_batch(score) if score.is_batch else _of_one(score)
-
-
-def _of_batch(score: Score) -> Iterator[Fact]:
-    yield Fact("", text=str(score))
-    yield Fact("flights", Columns(_flights_of(score)))
-
-
-def _of_one(score: Score) -> Iterator[Fact]:
+    if score.is_batch:
+        yield Fact("", text=str(score))
+        yield Fact("flights", Columns(_flights_of(score)))
+        return
     yield from (fact for fact in fields_of(score) if fact.key not in EVENTS)
-    yield from kept(outcome=score.outcome, sentence=score.sentence)
-    yield Fact("laps", score.laps)
+    yield from kept(outcome=score.outcome, sentence=score.sentence, laps=score.laps)
     yield from _report(score)
     for lap in score.laps:
         split = "not flown" if isnan(lap.duration) else f"{lap.duration:.3f} s, until {lap.end:.3f} s"

@@ -12,7 +12,7 @@ plane, from when it comes into the plane until it has left it, is to lie within 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, fields
 from functools import partial
 from math import degrees
 from typing import Any, TypeVar
@@ -49,8 +49,8 @@ def one_of_many(found: T, k: int, shared: int) -> T:
         shared: The number of first fields, which all flights share.
     """
     many: Any = found
-    numbers = {field.name: getattr(many, field.name)[k].item() for field in fields(many)[shared:]}
-    one: T = replace(many, **numbers)
+    values = [getattr(many, field.name) for field in fields(many)]
+    one: T = type(many)(*values[:shared], *(value[k].item() for value in values[shared:]))
     return one
 
 
