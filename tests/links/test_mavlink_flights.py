@@ -417,7 +417,7 @@ def test_what_is_not_proven_for_its_vehicle_is_refused() -> None:
     plan = flip()
     bare = replace(plan, vehicle=None)
     assert plan.vehicle is not None
-    weak = replace(plan.vehicle, rotors=tuple(replace(r, max_thrust=6.0) for r in plan.vehicle.rotors))
+    weak = replace(plan.vehicle, rotors=tuple(replace(r, max_thrust=5.0) for r in plan.vehicle.rotors))
     refuted = replace(plan, vehicle=weak)
     require_flyable(plan, ORIGIN, "agile-quad")
     for wrong, words in (

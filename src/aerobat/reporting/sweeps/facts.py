@@ -8,10 +8,9 @@ from itertools import starmap
 from math import isfinite
 from typing import TYPE_CHECKING
 
-from aerobat.errors import SpecError
-from aerobat.evaluation import Opening
 from aerobat.evaluation.passages import criterion
 from aerobat.reporting.facts import Columns, Fact, Facts, facts, kept, picture
+from aerobat.reporting.sweeps.words import known_opening, outcome_name
 from aerobat.simulation import Outcome
 from aerobat.simulation.outcome import length
 from aerobat.studies.sweep import Share, Sweep
@@ -57,25 +56,6 @@ def _(sweep: Sweep) -> Figure:
     from aerobat.reporting.sweeps.figure import sweep_figure
 
     return sweep_figure(sweep)
-
-
-def success_sentence(sweep: Sweep) -> str:
-    """Return a sentence with the share of flights that went well, its interval and the seed."""
-    return f"{sweep.success} of the flights went well, at 95 % confidence; seed {sweep.seed}"
-
-
-def known_opening(sweep: Sweep, passage: str) -> Opening | None:
-    """The smallest opening that 99 % pass; None where the flights are too few to say, or too many miss."""
-    try:
-        found = sweep.smallest_opening(passage)
-    except SpecError:
-        return None
-    return found if isfinite(found.scale) else None
-
-
-def outcome_name(outcome: Outcome) -> str:
-    """An outcome in two or three words."""
-    return outcome.name.lower().replace("_", " ")
 
 
 def _outcome(outcome: Outcome, share: Share) -> Fact:
