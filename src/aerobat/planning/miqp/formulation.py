@@ -16,7 +16,7 @@ import numpy as np
 
 from aerobat.arrays import Array, Indices, frozen
 from aerobat.errors import SpecError
-from aerobat.optimization import AssignmentProgram, LinearDynamics, SlottedStage
+from aerobat.optimization import AssignmentProgram, SlottedStage
 from aerobat.planning.miqp.integrator import INPUT_NAMES, IntegratorChain
 from aerobat.planning.task import Task
 from aerobat.problem.condition import Condition, Quantity
@@ -99,7 +99,6 @@ class Formulation:
             upper=upper * scale - free,
             stages=tuple(self._assigned(i, scale, free) for i in range(len(self.sequence.stages))),
             precedence=self._precedence,
-            dynamics=self._dynamics,
         )
 
     def inputs(self, x: Array, dt: float) -> Array:
@@ -124,16 +123,6 @@ class Formulation:
     def _met(self) -> Array:
         """The derivatives below the order that the goal fixes."""
         return self.problem.goal.fixed(self.chain.order)
-
-    @cached_property
-    def _dynamics(self) -> LinearDynamics:
-        """The chains of the three axes, derivatives of x first."""
-        axes, n = np.eye(3), self.chain.intervals
-        return LinearDynamics(
-            transition=np.asarray(np.kron(axes, self.chain.transition), dtype=float),
-            gain=np.asarray(np.kron(axes, self.chain.gain[:, None]), dtype=float),
-            columns=np.arange(3 * n).reshape(3, n).T,
-        )
 
     @cached_property
     def _precedence(self) -> tuple[tuple[int, int], ...]:
