@@ -14,7 +14,7 @@ import time
 os.environ["OPENBLAS_NUM_THREADS"] = "1"  # one thread, before NumPy starts its own
 
 from aerobat.optimization import AssignmentProgram, improved_in_windows, solver
-from aerobat.planning.miqp import formulate
+from aerobat.planning.miqp.miqp import formulate
 from aerobat.planning.task import Task
 from aerobat.problem import load_problem
 from growth_with_stages import flips

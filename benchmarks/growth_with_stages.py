@@ -21,7 +21,7 @@ import numpy as np
 
 from aerobat.errors import AerobatError
 from aerobat.optimization import AssignmentProgram, solver
-from aerobat.planning.miqp import formulate
+from aerobat.planning.miqp.miqp import formulate
 from aerobat.planning.task import Task
 from aerobat.problem import CustomManeuver, load_problem
 from paper_programs import paper_program

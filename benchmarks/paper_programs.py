@@ -1,7 +1,7 @@
 """The programs that the benchmarks solve: the paper's maneuvers with its numbers."""
 
 from aerobat.optimization import AssignmentProgram
-from aerobat.planning.miqp import formulate
+from aerobat.planning.miqp.miqp import formulate
 from aerobat.planning.task import Task
 from aerobat.problem import load_problem
 

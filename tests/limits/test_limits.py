@@ -15,7 +15,7 @@ from aerobat.environment import Environment
 from aerobat.flatness import reference
 from aerobat.limits import Limit, limits_along
 from aerobat.limits.limit import size_of
-from aerobat.planning.miqp import formulate
+from aerobat.planning.miqp.miqp import formulate
 from aerobat.planning.refinement.limit_values import Frames, LimitValues
 from aerobat.planning.refinement.refine import knots_at_stages
 from aerobat.planning.task import Task

@@ -15,7 +15,8 @@ from hypothesis import strategies as st
 import aerobat as ab
 from aerobat.optimization import AssignmentProgram, SlottedStage, improved_in_windows, solver
 from aerobat.optimization.moving_window import WIDTH, evenly_spread
-from aerobat.planning.miqp import diagnosis, formulate
+from aerobat.planning.miqp import diagnosis
+from aerobat.planning.miqp.miqp import formulate
 from aerobat.planning.recorder import Attempt
 from aerobat.planning.task import Task
 from aerobat.reporting.tables import plan_facts

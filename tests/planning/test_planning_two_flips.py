@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from aerobat.optimization import AssignmentProgram, solver
-from aerobat.planning.miqp import formulate
+from aerobat.planning.miqp.miqp import formulate
 from aerobat.planning.task import Task
 from aerobat.problem import CustomManeuver, Problem, load_problem
 from aerobat.problem.condition import Condition, Quantity

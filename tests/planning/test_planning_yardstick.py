@@ -9,7 +9,7 @@ from aerobat.flatness import force_balance, reference
 from aerobat.planning import FreeKnots, MinSnap, Miqp, Plan, Planner, TimeScaling
 from aerobat.planning.flyability import own_flight
 from aerobat.planning.task import Task
-from aerobat.planning.time_optimal import TimeOptimal
+from aerobat.planning.time_optimal.time_optimal import TimeOptimal
 from aerobat.problem import Limits, Problem, Waypoint, Waypoints, at_rest, load_problem
 from aerobat.problem.gate import tilted_gate
 from aerobat.problem.maneuvers import Flip, GatePassage, HalfFlip

@@ -12,10 +12,9 @@ from hypothesis import strategies as st
 from aerobat.planning.gate_clearance import bodies_in_gates
 from aerobat.planning.polynomial.knots import start_along_normals
 from aerobat.planning.recorder import Recorder
-from aerobat.planning.refinement import Refinement
 from aerobat.planning.refinement.limit_values import LimitValues
 from aerobat.planning.refinement.program import RefinementProgram
-from aerobat.planning.refinement.refine import knots_at_stages
+from aerobat.planning.refinement.refine import Refinement, knots_at_stages
 from aerobat.planning.refinement.spline import Spline, basis
 from aerobat.planning.refinement.stage_values import StageValues
 from aerobat.planning.task import Task

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 from typing import Annotated
 
@@ -10,9 +9,8 @@ import numpy as np
 from pydantic import Field
 
 from aerobat.arrays import Array
-from aerobat.errors import Infeasible, SpecError
+from aerobat.errors import SpecError
 from aerobat.flatness.references import UNDETERMINED
-from aerobat.planning.planners import Planner
 from aerobat.planning.result import Plan
 from aerobat.planning.task import Task
 from aerobat.problem.problem import Problem
@@ -89,16 +87,3 @@ def flown_task(planner: str, problem: Problem, vehicle: Vehicle | None, reserve:
                 f"{name}.acceleration asks no thrust, which leaves the attitude there open; change it"
             )
     return task
-
-
-def plans_to_begin_from(planners: Iterable[Planner], problem: Problem, vehicle: Vehicle) -> Iterator[Plan]:
-    """The plans of other planners that find one.
-
-    Raises Infeasible where a stage asks more thrust than the vehicle has.
-    """
-    for planner in planners:
-        try:
-            yield planner.plan(problem, vehicle)
-        except Infeasible as infeasible:
-            if not infeasible.attempts:  # no attempt: refused at once, and whatever the planner
-                raise

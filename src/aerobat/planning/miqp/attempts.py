@@ -61,7 +61,7 @@ class Attempts:
 
     @property
     def task(self) -> Task:
-        """What is planned."""
+        """The task that is planned."""
         return self.formulation.task
 
     @property

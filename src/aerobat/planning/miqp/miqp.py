@@ -23,8 +23,8 @@ from aerobat.planning.miqp.rescue import Rescue
 from aerobat.planning.miqp.shortest import shortest
 from aerobat.planning.planners import Planner, option, planner
 from aerobat.planning.recorder import Progress, Recorder
-from aerobat.planning.refinement import FlownPath, RefinedPath, Refinement
-from aerobat.planning.refinement.refine import MAX_SEGMENTS, SEGMENTS, segments_for
+from aerobat.planning.refinement.flown import FlownPath
+from aerobat.planning.refinement.refine import MAX_SEGMENTS, SEGMENTS, RefinedPath, Refinement, segments_for
 from aerobat.planning.result import FLYING_RESERVE, Plan
 from aerobat.planning.search import GridSearch, Search
 from aerobat.planning.task import Task

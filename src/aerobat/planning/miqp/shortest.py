@@ -13,8 +13,8 @@ from math import inf
 from aerobat.optimization.deadline import out_of_time
 from aerobat.planning.certified_solve import Judged
 from aerobat.planning.miqp.attempts import Attempts, Placement
-from aerobat.planning.refinement import RefinedPath, Refinement
 from aerobat.planning.refinement.excess import Excess
+from aerobat.planning.refinement.refine import RefinedPath, Refinement
 from aerobat.planning.warm_start import WarmStart
 
 GROWTH = 1.15  # of dt, from one program to the next

@@ -6,7 +6,7 @@ by a cost that knows nothing of them: that is where the closed form loses most o
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from typing import Annotated, ClassVar, NamedTuple
 
@@ -19,16 +19,16 @@ from aerobat.planning.assessment.assessment import SUSPICIOUS
 from aerobat.planning.assessment.lower_bound import least_duration
 from aerobat.planning.certified_solve import Judged
 from aerobat.planning.courses import is_course
-from aerobat.planning.miqp import Miqp
+from aerobat.planning.miqp.miqp import Miqp
 from aerobat.planning.planners import Planner, option, planner
 from aerobat.planning.polynomial.knots import start_along_normals
 from aerobat.planning.polynomial.min_snap import MinSnap
 from aerobat.planning.recorder import Progress, Recorder
-from aerobat.planning.refinement import FlownPath, RefinedPath, Refinement, segments_for
-from aerobat.planning.refinement.refine import MAX_SEGMENTS, SEGMENTS
+from aerobat.planning.refinement.flown import FlownPath
+from aerobat.planning.refinement.refine import MAX_SEGMENTS, SEGMENTS, RefinedPath, Refinement, segments_for
 from aerobat.planning.result import FLYING_RESERVE, Plan
 from aerobat.planning.time_limit import TIME_LIMIT, stopped, too_short
-from aerobat.planning.warm_start import Reserve, WarmStart, flown_task, plans_to_begin_from
+from aerobat.planning.warm_start import Reserve, WarmStart, flown_task
 from aerobat.problem.problem import Problem
 from aerobat.vehicle import Vehicle
 
@@ -138,7 +138,7 @@ class FreeKnots(Planner):
             yield None, start_along_normals(task, order)
         closed_form: list[Planner] = [MinSnap()] if problem.maneuver.through_points and not on_course else []
         others = [*closed_form, Miqp(reserve=self.reserve, rescue=False, flies=False)]
-        for plan in plans_to_begin_from(others, problem, task.vehicle):
+        for plan in _plans_to_begin_from(others, problem, task.vehicle):
             yield plan, WarmStart.of(plan, task.stages)
         if not (on_course or out_of_time()):
             yield None, WarmStart.of(Miqp().plan(problem), task.stages)
@@ -162,3 +162,16 @@ def _plan(judged: Judged[RefinedPath], recorder: Recorder) -> Plan:
         backend="builtin",
         stages=judged.solution.source.placed,
     )
+
+
+def _plans_to_begin_from(planners: Iterable[Planner], problem: Problem, vehicle: Vehicle) -> Iterator[Plan]:
+    """The plans of other planners that find one.
+
+    Raises Infeasible where a stage asks more thrust than the vehicle has.
+    """
+    for each in planners:
+        try:
+            yield each.plan(problem, vehicle)
+        except Infeasible as infeasible:
+            if not infeasible.attempts:  # no attempt: refused at once, and whatever the planner
+                raise

@@ -22,7 +22,7 @@ from aerobat.planning.time_optimal.optimal_control.collocation import (
 )
 from aerobat.planning.time_optimal.optimal_control.elements import Elements
 from aerobat.planning.time_optimal.optimal_control.program import OptimalControl
-from aerobat.planning.time_optimal.starts import Start, initial_motion
+from aerobat.planning.time_optimal.start import Start, initial_motion
 from aerobat.planning.warm_start import WarmStart
 from aerobat.trajectory import Trajectory
 

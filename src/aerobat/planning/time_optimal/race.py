@@ -16,7 +16,7 @@ from aerobat.planning.recorder import Attempt, Recorder
 from aerobat.planning.task import Task
 from aerobat.planning.time_optimal.collocated_program import CollocatedProgram, SolvedMotion
 from aerobat.planning.time_optimal.optimal_control.elements import Elements
-from aerobat.planning.time_optimal.starts import Start
+from aerobat.planning.time_optimal.start import Start
 from aerobat.planning.warm_start import MIN_INTERVALS
 from aerobat.vehicle import Vehicle
 

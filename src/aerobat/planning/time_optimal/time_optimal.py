@@ -21,7 +21,7 @@ from aerobat.declaration import AS_IT_IS, Count, NonNegative
 from aerobat.errors import Infeasible, Reason, SpecError, limits_of
 from aerobat.optimization.deadline import out_of_time, within_time
 from aerobat.optimization.nonlinear import import_casadi
-from aerobat.planning.miqp import Miqp
+from aerobat.planning.miqp.miqp import Miqp
 from aerobat.planning.planners import Planner, option, planner
 from aerobat.planning.recorder import Progress, Recorder
 from aerobat.planning.result import FLYING_RESERVE, Plan
