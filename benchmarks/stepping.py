@@ -36,7 +36,7 @@ from aerobat.engines.llvm import engine as llvm_engine
 from aerobat.engines.traced_loop import TracedLoop, trace_loop
 from stepping_peers import PEERS, VEHICLES, Peer
 
-ENGINES = ("numpy", "jax", "jax-float32", "compiled")
+ENGINES = ("jax", "jax-float32", "compiled")
 CONDITIONS = ("compiled, sensors and filter", "compiled, lab")
 FLOORS = {"crazyflow": 20, "RotorPy, batched": 100}
 FLIPS = (1, 4)  # in a row, in the shorter and the longer flight

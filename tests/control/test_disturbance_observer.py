@@ -26,8 +26,8 @@ def swept(vehicle: str, controller: ab.Controller) -> ab.Sweep:
 
 
 def few(conditions: ab.Dispersion, controller: ab.Controller, flights: int) -> ab.Passage:
-    """Passages of some flights, which nothing is compiled for."""
-    options = {"seed": 5, "flights": flights, "controller": controller, "engine": "bytecode"}
+    """Passages of some flights."""
+    options = {"seed": 5, "flights": flights, "controller": controller, "engine": "compiled"}
     return ab.score_flights(flip("agile-quad"), conditions=conditions, **options).passages[0]
 
 

@@ -14,7 +14,7 @@ from aerobat.engines.engine import Coded, Held, expanded, first_row
 from aerobat.engines.pytree import tree_leaves, tree_map
 from suites import examples
 
-FAST = ("floats", "bytecode", "numpy", "compiled")  # to be ready
+FAST = ("floats", "compiled")  # to be ready
 XLA = tuple(pytest.param(name, marks=pytest.mark.slow) for name in ENGINE_NAMES if name not in FAST)
 VEHICLES, TICKS = 21, 1003
 

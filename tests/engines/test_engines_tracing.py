@@ -162,7 +162,7 @@ def test_conditions_that_vehicles_do_not_share_guard_nothing() -> None:
     assert [block.guard for block in loop.guarded_blocks(loop.body, loop.inputs[2:])] == [None]
 
 
-@pytest.mark.parametrize("engine", ["bytecode", "compiled", pytest.param("jax", marks=pytest.mark.slow)])
+@pytest.mark.parametrize("engine", ["floats", "compiled", pytest.param("jax", marks=pytest.mark.slow)])
 @pytest.mark.parametrize("vehicles", [1, 9])
 def test_guards_change_no_bit_of_a_loop(engine: str, vehicles: int) -> None:
     rng = np.random.default_rng(4)

@@ -276,7 +276,7 @@ def test_contact_is_said_with_its_edge_and_its_instant() -> None:
     assert unknown["clearance"] is unknown["closest_edge"] is unknown["needed_width"] is None
 
 
-@pytest.mark.parametrize("engine", ["bytecode", "compiled", pytest.param("numpy", marks=pytest.mark.slow)])
+@pytest.mark.parametrize("engine", ["floats", "compiled"])
 def test_in_a_batch_each_vehicle_has_its_own_body(engine: str) -> None:
     path, problem = cruise()
     bodies = [ab.Ellipsoid((0.25, 0.25, height)) for height in (0.05, 0.1, 0.2)]

@@ -20,7 +20,7 @@ from places import SUPPORT
 from score_cases import QUAD, assert_same, near
 from shared_plans import shared_plan
 
-SLOW = tuple(pytest.param(name, marks=pytest.mark.slow) for name in ("floats", "numpy", "jax"))
+SLOW = tuple(pytest.param(name, marks=pytest.mark.slow) for name in ("floats", "jax"))
 
 
 @pytest.fixture(scope="module")
@@ -56,13 +56,13 @@ def fallen(count: int) -> BodyState:
 @cache
 def logged(count: int) -> Flight:
     return fly(
-        shared_plan("flip-roll"), dispersed(count), start=fallen(count), nominal=QUAD, engine="bytecode"
+        shared_plan("flip-roll"), dispersed(count), start=fallen(count), nominal=QUAD, engine="compiled"
     )
 
 
-@pytest.mark.parametrize("engine", ["bytecode", "compiled", *SLOW])
+@pytest.mark.parametrize("engine", ["compiled", *SLOW])
 def test_scores_are_those_of_the_logged_flights_also_where_one_diverges(engine: str, flip: Plan) -> None:
-    count = 2 if engine in ("bytecode", "floats", "numpy") else 4
+    count = 2 if engine == "floats" else 4
     flights = logged(count)
     scores = score_flights(flip, dispersed(count), start=fallen(count), nominal=QUAD, engine=engine)
     for k, vehicle in enumerate(dispersed(count)):
@@ -118,7 +118,7 @@ def test_scores_do_not_depend_on_what_flies_beside(flip: Plan) -> None:
             assert_same(fewer[k], scores[k], 0.0)
 
 
-@pytest.mark.parametrize("engine", ["bytecode", "compiled", pytest.param("numpy", marks=pytest.mark.slow)])
+@pytest.mark.parametrize("engine", ["floats", "compiled"])
 def test_a_slower_log_is_part_of_the_full_one(engine: str, flip: Plan) -> None:
     full = fly(flip, [QUAD] * 2, engine=engine)
     slow = fly(flip, [QUAD] * 2, engine=engine, log_rate=62.5)

@@ -186,9 +186,9 @@ PATHS = {
 @pytest.mark.parametrize(
     ("path", "engine"),
     [
-        *((path, "bytecode") for path in PATHS),
+        *((path, "compiled") for path in PATHS),
         ("twice", "compiled"),
-        *(pytest.param("twice", engine, marks=pytest.mark.slow) for engine in ("floats", "numpy")),
+        pytest.param("twice", "floats", marks=pytest.mark.slow),
     ],
 )
 def test_passages_are_the_same_from_a_log_and_as_they_are_flown(path: str, engine: str) -> None:

@@ -88,14 +88,14 @@ def test_flights_that_keep_no_log_are_kept_to_the_same_tolerance(
     plan = replace(plan, problem=replace(plan.problem, tolerance=tolerance))
     first = [CRUISE.evaluate(0.0, derivative) for derivative in range(2)]
     starts = replace(states, position=first[0] + states.position, velocity=first[1] + states.velocity)
-    scores = ab.score_flights(plan, start=starts, engine="bytecode")
+    scores = ab.score_flights(plan, start=starts)
     logged = [ab.score(ab.fly(plan, start=one(starts, k)), plan) for k in range(6)]
     assert [score.sentence for score in scores] == [score.sentence for score in logged]
     assert len({score.outcome for score in logged}) > 1
 
 
 def test_a_sweep_says_what_its_flights_are_judged_by() -> None:
-    swept = ab.sweep(cruising(), ab.Dispersion(rotor=0.05), runs=8, workers=1, engine="bytecode")
+    swept = ab.sweep(cruising(), ab.Dispersion(rotor=0.05), runs=8, workers=1)
     judged = "the whole path within 10.00 cm, attitudes of stages within 10°"
     assert sweep_report(swept)["judged_by"] == judged
     console = Console(width=200)

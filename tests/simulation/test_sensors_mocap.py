@@ -49,7 +49,7 @@ def sensor_of(dispersion: Dispersion, flights: int = 1) -> Any:
 
 def seen_by(dispersion: Dispersion, flights: int = FLIGHTS) -> tuple[np.ndarray, ...]:
     """Of every exposure of some flights: position error, attitude error, whether it is valid, its time."""
-    engine = "bytecode" if flights < FLIGHTS else "compiled"
+    engine = "compiled"
     setup = dispersed_setup(loops(2.0), QUAD, dispersion, drawn(dispersion, QUAD, flights), engine=engine)
     rows = rows_of(setup, log)
     at = slice(0, 2001, 10)
@@ -92,7 +92,7 @@ def test_nothing_is_seen_during_an_outage_and_all_before_and_after() -> None:
 def test_a_pose_arrives_its_latency_after_its_exposure(latency: int) -> None:
     dispersion = with_capture(latency=latency / RATE)
     sensor, _ = sensor_of(dispersion)
-    setup = dispersed_setup(loops(1.0), QUAD, dispersion, drawn(dispersion, QUAD, 1), engine="bytecode")
+    setup = dispersed_setup(loops(1.0), QUAD, dispersion, drawn(dispersion, QUAD, 1))
     rows = rows_of(setup, log)
     delivered, true = (from_components(part)[0] for part in (rows.delivered.pose[0], rows.body.position))
     ticks = np.arange(len(setup.times))

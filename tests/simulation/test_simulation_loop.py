@@ -79,19 +79,15 @@ def test_a_flight_branched_in_the_air_goes_both_ways() -> None:
 
 
 @pytest.mark.parametrize(
-    ("engine", "log_rate"),
-    [
-        ("bytecode", 100.0),
-        *(pytest.param("compiled", rate, marks=pytest.mark.slow) for rate in (None, 100.0, 3.125)),
-    ],
+    "log_rate", [100.0, *(pytest.param(rate, marks=pytest.mark.slow) for rate in (None, 3.125))]
 )
 def test_neither_blocks_of_references_nor_chunks_of_noise_change_a_flight(
-    monkeypatch, engine: str, log_rate: float | None
+    monkeypatch, log_rate: float | None
 ) -> None:
-    flights, path = (3, loops(2.0)) if engine == "compiled" else (1, loops(1.0))
-    options = {"conditions": "lab", "flights": flights, "seed": 3, "log_rate": log_rate, "engine": engine}
+    path = loops(2.0)
+    options = {"conditions": "lab", "flights": 3, "seed": 3, "log_rate": log_rate, "engine": "compiled"}
     whole = fly(path, HEXA, **options)
-    monkeypatch.setattr("aerobat.simulation.setup._VEHICLE_TICKS", flights * 37)
+    monkeypatch.setattr("aerobat.simulation.setup._VEHICLE_TICKS", 3 * 37)
     assert_same(fly(path, HEXA, **options), whole)
     for module in ("setup", "reference_source"):
         monkeypatch.setattr(f"aerobat.simulation.{module}.BLOCK", 130)
@@ -133,9 +129,7 @@ def log(signals: Any) -> Any:
     return signals["slow"], signals["plant"], signals["follower"]
 
 
-@pytest.mark.parametrize(
-    "engine", ["floats", "bytecode", "numpy", "compiled", pytest.param("jax", marks=pytest.mark.slow)]
-)
+@pytest.mark.parametrize("engine", ["floats", "compiled", pytest.param("jax", marks=pytest.mark.slow)])
 def test_a_component_steps_at_its_own_period_and_holds_between(engine: str) -> None:
     """And one without feedthrough is seen a tick later, wherever in the order it stands."""
     components = (Counter(4, "slow"), Counter(1, "plant", feedthrough=False), Follower("plant"))

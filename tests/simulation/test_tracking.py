@@ -194,9 +194,7 @@ def dispersed(vehicle: Vehicle, rng: np.random.Generator) -> Vehicle:
 def test_conditions_are_drawn_from_the_seed_alone() -> None:
     vehicle, problem = load_vehicle("agile-quad"), load_problem("line")
     trajectory = planned("line", "agile-quad").trajectory
-    one, again, other = (
-        fly(trajectory, vehicle, conditions="lab", seed=seed, engine="bytecode") for seed in (1, 1, 2)
-    )
+    one, again, other = (fly(trajectory, vehicle, conditions="lab", seed=seed) for seed in (1, 1, 2))
     np.testing.assert_array_equal(one.states.position, again.states.position)
     assert np.abs(one.states.position - other.states.position).max() > 1e-5
     assert score(one, problem).max_position_error_m < 0.2

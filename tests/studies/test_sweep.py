@@ -52,9 +52,8 @@ def test_neither_batches_nor_processes_change_a_bit_of_flights_that_are_observed
         assert sweep(hop(), lab, RUNS, SEED, workers=workers, batch=7) == whole(lab)
 
 
-@pytest.mark.parametrize("engine", [pytest.param("numpy", marks=pytest.mark.slow), "compiled"])
-def test_a_batch_of_one_flies_as_it_does_among_others(engine: str) -> None:
-    few, many = (sweep(hop(), SPREAD, 3, SEED, workers=1, batch=batch, engine=engine) for batch in (1, 3))
+def test_a_batch_of_one_flies_as_it_does_among_others() -> None:
+    few, many = (sweep(hop(), SPREAD, 3, SEED, workers=1, batch=batch, engine="compiled") for batch in (1, 3))
     assert few == many
 
 
@@ -125,7 +124,7 @@ def test_finished_flights_of_another_sweep_are_not_taken(tmp_path: Path) -> None
         "seed": {"seed": 8},
         "vehicle": {"vehicle": "crazyflie"},
         "controller": {"controller": ab.Controller(moment_feedforward=False)},
-        "engine": {"engine": "numpy"},
+        "engine": {"engine": "floats"},
     }
     for name, change in others.items():
         options: dict[str, Any] = {"conditions": "none", "seed": SEED} | change

@@ -195,7 +195,7 @@ def test_a_controller_in_a_file_is_checked_as_every_field(tmp_path: Path) -> Non
 
 
 def test_a_sweep_is_flown_by_its_vehicles_controller() -> None:
-    own = ab.sweep(half_flip(), WEAK, 3, vehicle=detuned(), workers=1, engine="bytecode")
-    named = ab.sweep(half_flip(), WEAK, 3, controller=HALVED, workers=1, engine="bytecode")
+    own = ab.sweep(half_flip(), WEAK, 3, vehicle=detuned(), workers=1)
+    named = ab.sweep(half_flip(), WEAK, 3, controller=HALVED, workers=1)
     for name, column in named.table.items():
         np.testing.assert_array_equal(own.table[name], column)

@@ -12,7 +12,7 @@ from aerobat.evaluation import Score
 from aerobat.states import BodyState
 from aerobat.vehicle import load_vehicle
 
-EXACT = ("floats", "bytecode", "numpy", "compiled", "jax")  # in float64
+EXACT = ("floats", "compiled", "jax")  # in float64
 QUAD = load_vehicle("agile-quad")
 
 

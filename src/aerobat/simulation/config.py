@@ -73,7 +73,7 @@ class FlightConfig:
     flights: Annotated[range | None, PlainValidator(_flights)] = None
     start: Annotated[BodyState, AS_IT_IS] | None = None  # true, by default the trajectory's; or a batch's
     nominal: Vehicle | None = None  # that controller and set-points are made for; by default what flies
-    # floats, bytecode, numpy, compiled, jax, jax-float32, or the fastest that is installed
+    # floats, compiled, jax, jax-float32, or the fastest for so many ticks
     engine: str = "auto"
     # physics that others wrote in place of ours, or its name, mujoco or rotorpy: one vehicle a flight
     plant: Annotated[Plant | None, PlainValidator(as_plant)] = None

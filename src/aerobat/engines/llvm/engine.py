@@ -10,6 +10,7 @@ from functools import lru_cache
 from itertools import compress
 from typing import Any
 
+import llvmlite
 import llvmlite.binding as llvm
 import numpy as np
 
@@ -26,6 +27,7 @@ from aerobat.engines.engine import (
     tick_count,
 )
 from aerobat.engines.llvm.codegen import module
+from aerobat.engines.llvm.kept_code import kept_code
 from aerobat.engines.llvm.layout import ARRAYS, COUNTS, Layout
 from aerobat.engines.llvm.packing import PackedInputs, Packing
 from aerobat.engines.pytree import Tree, piecewise_constant_leaves, tree_leaves, tree_map, tree_unflatten
@@ -144,13 +146,26 @@ def _bare(tree: Tree) -> Tree:
 @lru_cache(maxsize=32)
 def machine_code(loop: TracedLoop, layout: Layout) -> tuple[Function, Function]:
     """`init` and `scan` of a loop as functions of the addresses of ARRAYS, and COUNTS."""
-    code = llvm.create_mcjit_compiler(llvm.parse_assembly(module(loop, layout)), target_machine())
+    machine = target_machine()
+    code = llvm.create_mcjit_compiler(llvm.parse_assembly(""), machine)
+    code.add_object_file(llvm.ObjectFileRef.from_data(object_code(loop, layout)))
     code.finalize_object()
     signature = ctypes.CFUNCTYPE(None, *[ctypes.c_void_p] * len(ARRAYS), *[ctypes.c_int64] * len(COUNTS))
     functions: list[Any] = [signature(code.get_function_address(name)) for name in ("init", "scan")]
     for function in functions:
         function.code = code  # lives as long as what calls it
     return functions[0], functions[1]
+
+
+def object_code(loop: TracedLoop, layout: Layout) -> bytes:
+    """Return a loop's object code for the machine that this runs on, compiled or kept from earlier."""
+    features = llvm.get_host_cpu_features().flatten()
+    versions = f"llvmlite {llvmlite.__version__}, LLVM {llvm.llvm_version_info}"
+    machine = f"{llvm.get_default_triple()} {llvm.get_host_cpu_name()} {features}"
+    return kept_code(
+        f"{versions}\n{machine}\n{layout}\n{loop}",
+        lambda: target_machine().emit_object(llvm.parse_assembly(module(loop, layout))),
+    )
 
 
 @lru_cache(maxsize=4)
