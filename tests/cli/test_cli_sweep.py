@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 import aerobat as ab
-from aerobat.cli.progress import SweepProgress
+from aerobat.cli.progress import Progress
 from aerobat.interchange import read_table
 from aerobat.studies.sweep.kept import KeptChunks
 from command_lines import code
@@ -202,8 +202,8 @@ def test_a_sweep_that_cannot_be_flown_leaves_nothing(capsys) -> None:
 
 def test_progress_tells_how_many_how_well_and_how_long_still() -> None:
     now = [0.0]
-    progress = SweepProgress(200, lambda: now[0])
+    progress = Progress("flown", 200, lambda: now[0])
     assert str(progress) == "flown 0 of 200 in 0 s"
     now[0] = 5.0
-    progress.record(50, 49)
-    assert str(progress) == "flown 50 of 200 in 5 s: 98.0 % went well; 15 s to go"
+    progress.counting("went well")(50, 49)
+    assert str(progress) == "flown 50 of 200 in 5 s: 49 went well; 15 s to go"

@@ -19,7 +19,7 @@ from aerobat.planning.miqp import diagnosis
 from aerobat.planning.miqp.miqp import formulate
 from aerobat.planning.recorder import Attempt
 from aerobat.planning.task import Task
-from aerobat.reporting.tables import plan_facts
+from aerobat.reporting.facts import facts
 from suites import examples
 
 SLOTS = 6
@@ -163,7 +163,7 @@ def test_a_plan_placed_in_windows_states_its_gap() -> None:
     assert plan.cost is not None
     assert plan.bound <= plan.cost
     assert plan.gap == pytest.approx(1.0 - plan.bound / plan.cost, abs=1e-9)
-    said = dict(plan_facts(plan))
+    said = {fact.label: fact.said for fact in facts(plan)}
     if plan.gap > 1e-6:
         assert any("% of the optimum" in str(each) for each in said.values())
 

@@ -19,7 +19,8 @@ from aerobat.planning import (
 )
 from aerobat.planning.flyability import disturbed_flight
 from aerobat.planning.task import Task
-from aerobat.reporting.report_json import report
+from aerobat.reporting.plain_data import plain
+from aerobat.reporting.report import Report
 from aerobat.simulation import Outcome
 from aerobat.trajectory import Trajectory
 from random_problems import random_case
@@ -97,10 +98,10 @@ def test_a_certified_plan_that_does_not_fly_says_so_as_a_defect_of_its_own() -> 
     assert plan.certified
     assert not plan.flies
     assert flyability(plan).error > FLYABLE_ERROR
-    for text in (str(plan), str(report(plan)["plan"]["flyability"]["sentence"])):
+    for text in (str(plan), str(plain(Report(plan))["plan"]["flyability"]["sentence"])):
         assert "a defect of the plan, not of the flight" in text
         assert text.count("keep more reserve for the controller, or take another planner") == 1
-    assert report(plan)["plan"]["flyability"]["flies"] is False
+    assert plain(Report(plan))["plan"]["flyability"]["flies"] is False
 
 
 def test_a_plan_whose_flight_does_not_hold_the_gate_s_attitude_says_so(plan: ab.Plan, tmp_path: Path) -> None:
@@ -118,7 +119,7 @@ def test_a_plan_whose_flight_does_not_hold_the_gate_s_attitude_says_so(plan: ab.
     sentence = f"its own flight passed gate 'gate' {scored.attitude_error_deg:.1f}° off the attitude asked"
     assert sentence in str(strict)
     assert "0.2° allowed, a defect of the plan" in str(strict)
-    (facts,) = report(strict)["plan"]["flyability"]["passages"]
+    (facts,) = plain(Report(strict))["plan"]["flyability"]["passages"]
     assert facts["failure"] == passage.failure
     assert facts["attitude_error_deg"] == pytest.approx(scored.attitude_error_deg)
     assert facts["attitude_tolerance_deg"] == pytest.approx(0.2)

@@ -16,7 +16,8 @@ from hypothesis import strategies as st
 
 import aerobat as ab
 from aerobat.errors import Reason
-from aerobat.reporting.feasibility.table import requirements_report
+from aerobat.reporting.feasibility.facts import requirements
+from aerobat.reporting.plain_data import plain
 from aerobat.studies.feasibility import Feasibility
 from aerobat.studies.feasibility.feasibility_map import Cell
 from shared_plans import shared_plan
@@ -220,8 +221,8 @@ def test_where_only_no_ceiling_suffices_that_is_the_answer() -> None:
     assert found.value == np.inf
     assert found.plan == line()
     assert str(found).startswith("ceiling: no limit, planned in")
-    report = requirements_report("line", "agile-quad", [found])
-    assert report["requirements"][0]["least"] is None
+    report = plain(requirements("line", "agile-quad", [found]))
+    assert report["requirements"]["ceiling"]["least"] is None
 
 
 def test_what_no_strength_suffices_for_is_infeasible_and_says_so() -> None:

@@ -16,14 +16,14 @@ import pytest
 
 import aerobat as ab
 from aerobat.viewer.live.desk import MAX_PAGES, Desk
-from aerobat.viewer.live.replan import FLIGHTS, Answer, Overtaken, Replanner, Verdict
+from aerobat.viewer.live.replan import FLIGHTS, Answer, LiveVerdict, Overtaken, Replanner
 from aerobat.viewer.live.server import GRACE
 from aerobat.viewer.live.sliders import Setting, sliders_of
 from aerobat.viewer.live.view_live import LiveView
 from shared_plans import shared_plan
 
 JSON = {"Content-Type": "application/json"}
-FINE = Answer(Verdict("Feasible", "fine", True))
+FINE = Answer(LiveVerdict("Feasible", "fine", True))
 
 
 @pytest.fixture(scope="module")
@@ -64,7 +64,7 @@ def test_a_plan_for_where_the_sliders_stand_is_the_plan_of_that_problem(replanne
     assert answer.scene.times[-1] == pytest.approx(again.duration)
     assert answer.scene.gates[0].position[2] == 4.0
     assert again.certificate is not None
-    assert answer.verdict == Verdict(
+    assert answer.verdict == LiveVerdict(
         "Feasible" if again.certified else "Not proven",
         f"{again.duration:.2f} s, {again.certificate.why}",
         again.certified,

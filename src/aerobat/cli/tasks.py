@@ -11,13 +11,13 @@ from aerobat.cli.options import (
     ConditionsOptions,
     PlannerOptions,
     PlanningOptions,
-    TaskOptions,
+    ProblemOptions,
     is_given,
     offered_options,
     option_name,
 )
-from aerobat.cli.progress import PassingProgress, WhyProgress, planning_progress, showing
-from aerobat.cli.runs.record import FlightSettings, RunRecord, default_vehicle
+from aerobat.cli.progress import Progress, planning_progress, showing
+from aerobat.cli.runs.record import USUAL_CONDITIONS, FlightSettings, RunRecord, default_vehicle
 from aerobat.cli.runs.saved_plans import named_vehicle, plan_source, read_saved_plan
 from aerobat.cli.terminal import say
 from aerobat.environment import load_dispersion
@@ -38,7 +38,7 @@ from aerobat.problem import Problem, load_problem
 from aerobat.vehicle import Vehicle
 
 
-def read_task(name: str, options: TaskOptions, paper: bool = False) -> tuple[Problem, Vehicle]:
+def read_task(name: str, options: ProblemOptions, paper: bool = False) -> tuple[Problem, Vehicle]:
     """The problem and the vehicle that a command names."""
     problem = load_problem(name)
     vehicle = named_vehicle(options.vehicle or default_vehicle(paper))
@@ -108,9 +108,8 @@ def flight_settings(
         controller: The name of what flies it.
         plant: The name of the physics, None for the built-in.
     """
-    conditions = None if options.conditions is None else load_dispersion(options.conditions)
-    if options.probability is not None and conditions is None:
-        raise SpecError("--pass needs --conditions, under which flights shall pass; give lab, say")
+    named = options.conditions or (None if options.probability is None else USUAL_CONDITIONS)
+    conditions = None if named is None else load_dispersion(named)
     return FlightSettings(controller, conditions, options.seed, plant=plant, probability=options.probability)
 
 
@@ -138,8 +137,12 @@ def _advice(record: RunRecord, refusal: Infeasible) -> str:
     from aerobat.studies.why import Request, explained
 
     task = Request(record.problem, None if record.paper else record.vehicle, record.planner)
-    with showing(WhyProgress()) as progress:
-        return explained(refusal, task, progress.record).advice
+    with showing(Progress("changes tried")) as progress:
+
+        def note(change: str, helps: bool) -> None:
+            progress.step(f"{change}: {'planned' if helps else 'no plan'}")
+
+        return explained(refusal, task, note).advice
 
 
 def _plan_made(record: RunRecord, explain: bool) -> Plan:
@@ -167,7 +170,7 @@ def _plan_that_passes(record: RunRecord) -> Plan:
         raise SpecError(f"--pass plans for --controller full, not {flight.controller}; leave one of them out")
     from aerobat.studies.passing import plan_to_pass
 
-    with showing(PassingProgress(record.planner_name)) as progress:
+    with planning_progress(record.planner_name) as progress:
         return plan_to_pass(
             record.problem,
             record.planner,

@@ -17,7 +17,7 @@ from aerobat.declaration import FieldError, Label, Registry, shown, unknown_name
 from aerobat.kernels.control import ControllerModel
 from aerobat.kernels.control_loops import ReferencePoint
 from aerobat.kernels.ops import Ops, PerRotor, Scalar
-from aerobat.kernels.rigid_body import Body, Wrench
+from aerobat.kernels.rigid_body import Body, RotorWrench
 from aerobat.vehicle.controller import CONTROLLERS, Controller
 from aerobat.vehicle.controller import named_controller as named_settings
 
@@ -56,7 +56,7 @@ class ControlLaw(ABC):
     @abstractmethod
     def step(
         self, ops: Ops, model: ControllerModel, state: Any, seen: Seen, elapsed: Scalar
-    ) -> tuple[Any, Wrench]:
+    ) -> tuple[Any, RotorWrench]:
         """Return the state at a tick, and the thrust [N] and the moment [N·m, body] to be given.
 
         Args:

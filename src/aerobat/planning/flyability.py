@@ -20,7 +20,7 @@ from aerobat.planning.passages import PlacedStage, planned_passages
 from aerobat.planning.task import Task
 from aerobat.simulation import Flight, FlightConfig, Outcome, fly
 from aerobat.simulation.outcome import DIVERGENCE_RADIUS, length
-from aerobat.simulation.passages import Passage, flown_passages
+from aerobat.simulation.passages import Passage, log_rows, passages_in_log
 from aerobat.trajectory import Trajectory
 from aerobat.vehicle import Vehicle
 
@@ -121,8 +121,10 @@ class Flyability(OwnFlight):
 def own_flight(task: Task, trajectory: Trajectory, stages: Sequence[PlacedStage]) -> OwnFlight:
     """The findings of the nominal flight of a path, its task's stages placed along it."""
     flight = nominal_flight(trajectory, task.vehicle, task.environment)
-    passages = planned_passages(stages, task.problem)
-    flown = flown_passages(flight, passages, task.vehicle.bounding_ellipsoid)
+    states = flight.states
+    rows = log_rows(flight.times, states.position, states.velocity, states.q_world_body)
+    planned, body = planned_passages(stages, task.problem), task.vehicle.bounding_ellipsoid
+    flown = passages_in_log(rows, planned, body, flight.diverged_at)
     return OwnFlight(
         error=_largest_error(flight), passages=tuple(_flown(passage.of_flight(0)) for passage in flown)
     )

@@ -23,7 +23,7 @@ from aerobat.vehicle import Vehicle
 
 # of every limit's range, kept from either end for the controller by planners that use all of it, where a
 # plan shall be flown: rotors without lag leave it nothing otherwise
-FLYING_RESERVE = 0.1
+FLYING_RESERVE = 0.15
 
 
 @validated

@@ -4,28 +4,24 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from aerobat.arrays import Array
 from aerobat.kernels import control, motors
+from aerobat.kernels.battery import BatteryState
 from aerobat.kernels.control import Commands, ControllerModel, ControllerState, FeatureFlags
 from aerobat.kernels.control_loops import ReferencePoint
-from aerobat.kernels.motors import Airframe, Motion
-from aerobat.kernels.ops import Ops, PerRotor, Scalar, select_tree
+from aerobat.kernels.motors import Airframe, VehicleState
+from aerobat.kernels.ops import Ops, PerRotor, Scalar, Vector, select_tree
 from aerobat.kernels.quaternions import axes, to_world
 from aerobat.kernels.rigid_body import Body, EnvironmentParameters
 from aerobat.kernels.vectors import subtract
-from aerobat.simulation.loop import Signals
+from aerobat.kernels.wind import WindState
+from aerobat.simulation.loop import Controlling, Estimate, Signals
 
 MAX_STEP = 0.002  # [s] of RK4: enough for 1e-6 m in the fastest flips
-
-
-class Estimate(NamedTuple):
-    """The estimate of an observer, of which the controller takes the body."""
-
-    body: Body
 
 
 @dataclass(frozen=True)
@@ -33,18 +29,17 @@ class StateObserver:
     """The true state, as if it were known."""
 
     period: int = 1
-    name: str = "observer"
     feedthrough: bool = True
 
     def init(self, ops: Ops, parameters: tuple[()], inputs: tuple[()], signals: Signals) -> Estimate:
         """See `Component.init`."""
-        return Estimate(signals["start"])
+        return Estimate(signals.start)
 
     def step(
         self, ops: Ops, parameters: tuple[()], state: Estimate, inputs: tuple[()], signals: Signals
     ) -> Estimate:
         """See `Component.step`."""
-        return Estimate(signals["plant"].body)
+        return Estimate(signals.plant.body)
 
 
 class ControllerParameters(NamedTuple):
@@ -63,7 +58,6 @@ class TrackingController:
 
     flags: FeatureFlags
     period: int = 1
-    name: str = "controller"
     feedthrough: bool = True
 
     def init(
@@ -74,8 +68,8 @@ class TrackingController:
         signals: Signals,
     ) -> ControllerState:
         """See `Component.init`."""
-        reference = inputs or signals["reference"]
-        return control.init(ops, parameters.model, signals["observer"].body, reference)
+        reference = inputs or signals.reference
+        return control.init(ops, parameters.model, signals.observer.body, reference)
 
     def step(
         self,
@@ -87,15 +81,13 @@ class TrackingController:
     ) -> ControllerState:
         """See `Component.step`."""
         body, reference = told(ops, parameters, state, inputs, signals)
-        return control.step(
-            ops, self.flags, parameters.model, state, body, reference, signals["clock"].elapsed
-        )
+        return control.step(ops, self.flags, parameters.model, state, body, reference, signals.clock.elapsed)
 
 
 def told(
     ops: Ops,
     parameters: ControllerParameters,
-    state: Any,
+    state: Controlling,
     inputs: ReferencePoint | tuple[()],
     signals: Signals,
     takes_disturbances: bool = True,
@@ -110,16 +102,29 @@ def told(
         signals: Of the loop.
         takes_disturbances: Whether the reference answers what the observer knows of one.
     """
-    body, reference = signals["observer"].body, inputs or signals["reference"]
-    if takes_disturbances and "disturbance" in signals:
-        reference = _answering(reference, body, signals["disturbance"])
+    body, reference = signals.observer.body, inputs or signals.reference
+    disturbance = signals.find(Disturbance)
+    if takes_disturbances and disturbance is not None:
+        reference = _answering(reference, body, disturbance)
     if not isinstance(parameters.delay, tuple):
-        elapsed = signals["clock"].elapsed
+        elapsed = signals.clock.elapsed
         body = control.predicted(ops, parameters.model, state, body, elapsed, parameters.delay)
     return body, reference
 
 
-def _answering(reference: ReferencePoint, body: Body, disturbance: Any) -> ReferencePoint:
+class Disturbance(NamedTuple):
+    """The disturbance that an IMU feels beyond the model, in body axes.
+
+    Most of a disturbance, such as the rotors' mismatch, turns with the body.
+    """
+
+    force: Vector  # [m/s²] over mass
+    angular_acceleration: Vector  # [rad/s²]
+    omega_body: Vector  # [rad/s] at the last step
+    has_omega: Scalar  # 1, or 0 before the first step
+
+
+def _answering(reference: ReferencePoint, body: Body, disturbance: Disturbance) -> ReferencePoint:
     """The reference, with what is to be thrust and turned against a disturbance in body axes taken off it."""
     body_axes = axes(body.q_world_body)
     force, turn = (
@@ -148,14 +153,13 @@ class ComputationDelay:
     """
 
     period: int = 1
-    name: str = "computation_delay"
     feedthrough: bool = True
 
     def init(
         self, ops: Ops, parameters: tuple[()], takes_effect: Scalar, signals: Signals
     ) -> CommandsOnTheirWay:
         """See `Component.init`."""
-        thrusts = signals["controller"].commands.thrusts
+        thrusts = signals.controller.commands.thrusts
         return CommandsOnTheirWay(thrusts, thrusts)
 
     def step(
@@ -169,7 +173,7 @@ class ComputationDelay:
         """See `Component.step`."""
         return CommandsOnTheirWay(
             select_tree(ops, takes_effect > 0.5, state.latest, state.in_effect),
-            signals["controller"].commands.thrusts,
+            signals.controller.commands.thrusts,
         )
 
 
@@ -200,7 +204,6 @@ class RigidBodyPlant:
 
     substeps: int
     period: int = 1
-    name: str = "plant"
     feedthrough: bool = False
 
     @classmethod
@@ -208,18 +211,20 @@ class RigidBodyPlant:
         """The plant for so many ticks a second."""
         return cls(max(1, math.ceil(1.0 / rate / MAX_STEP - 1e-9)))
 
-    def init(self, ops: Ops, parameters: PlantParameters, inputs: tuple[()], signals: Signals) -> Motion:
+    def init(
+        self, ops: Ops, parameters: PlantParameters, inputs: tuple[()], signals: Signals
+    ) -> VehicleState:
         """See `Component.init`; the rotors give at first what the controller takes them to give."""
-        return Motion(signals["start"], signals["controller"].thrusts)
+        return VehicleState(signals.start, signals.controller.thrusts)
 
     def step(
-        self, ops: Ops, parameters: PlantParameters, motion: Motion, inputs: tuple[()], signals: Signals
-    ) -> Motion:
+        self, ops: Ops, parameters: PlantParameters, motion: VehicleState, inputs: tuple[()], signals: Signals
+    ) -> VehicleState:
         """See `Component.step`."""
         airframe = with_ceiling(ops, parameters.airframe, signals)
         environment = with_wind(parameters.environment, signals)
         commands = commands_in_effect(signals)
-        dt = signals["clock"].period / self.substeps
+        dt = signals.clock.period / self.substeps
         for _ in range(self.substeps):
             motion = motors.advance(ops, airframe, environment, motion, commands, dt)
         return motion
@@ -227,29 +232,28 @@ class RigidBodyPlant:
 
 def commands_in_effect(signals: Signals) -> PerRotor:
     """The rotors' commands [N] of this tick, which may be some while old."""
-    if "computation_delay" in signals:
-        commands: PerRotor = signals["computation_delay"].in_effect
-    else:
-        commands = signals["controller"].commands.thrusts
-    return commands
+    delayed = signals.find(CommandsOnTheirWay)
+    return signals.controller.commands.thrusts if delayed is None else delayed.in_effect
 
 
 def with_wind(environment: EnvironmentParameters, signals: Signals) -> EnvironmentParameters:
-    """The environment with the wind of this tick, where the loop has a component of that name."""
-    return environment._replace(wind=signals["wind"].velocity) if "wind" in signals else environment
+    """The environment with the wind of this tick, where the loop has a component that makes one."""
+    wind = signals.find(WindState)
+    return environment if wind is None else environment._replace(wind=wind.velocity)
 
 
 def with_ceiling(ops: Ops, airframe: Airframe, signals: Signals) -> Airframe:
     """The airframe with what the battery leaves of its rotors' limits, where the loop has one."""
-    if "battery" not in signals:
+    battery = signals.find(BatteryState)
+    if battery is None:
         return airframe
-    rotors, ceiling = airframe.rotors, signals["battery"].ceiling
+    rotors, ceiling = airframe.rotors, battery.ceiling
     limits = zip(rotors.min_thrust, rotors.max_thrust, strict=True)
     lowered = tuple(ops.maximum(ceiling * high, low) for low, high in limits)
     return airframe._replace(rotors=rotors._replace(max_thrust=lowered))
 
 
-class Observed(NamedTuple):
+class LoggedEstimate(NamedTuple):
     """The estimate that a filter made from its sensors."""
 
     body: Body
@@ -259,14 +263,13 @@ class Observed(NamedTuple):
 class LogRow(NamedTuple):
     """Row of the log, kept of each tick."""
 
-    motion: Motion
+    motion: VehicleState
     commands: Commands
-    observed: Observed | tuple[()]  # () where the true state is known
+    observed: LoggedEstimate | tuple[()]  # () where the true state is known
 
 
 def log_row(signals: Signals) -> LogRow:
     """The row of a flight's log."""
-    observer = signals["observer"]
-    known = isinstance(observer, Estimate)
-    observed = () if known else Observed(observer.body, observer.filter.since_pose)
-    return LogRow(signals["plant"], signals["controller"].commands, observed)
+    body, own = signals.observer
+    observed = LoggedEstimate(body, own.filter.since_pose) if own else ()
+    return LogRow(signals.plant, signals.controller.commands, observed)

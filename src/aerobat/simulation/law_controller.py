@@ -11,7 +11,7 @@ from aerobat.kernels.control import Commands, FeatureFlags
 from aerobat.kernels.control_loops import ReferencePoint, reference_moment
 from aerobat.kernels.ops import Ops, PerRotor
 from aerobat.kernels.quaternions import axes
-from aerobat.kernels.rigid_body import Wrench
+from aerobat.kernels.rigid_body import RotorWrench
 from aerobat.kernels.vectors import subtract
 from aerobat.simulation.components import ControllerParameters, TrackingController, told
 from aerobat.simulation.loop import Component, Signals
@@ -32,15 +32,14 @@ class LawController:
     law: ControlLaw
     flags: FeatureFlags  # of the way from its force and moment to the rotors
     period: int = 1
-    name: str = "controller"
     feedthrough: bool = True
 
     def init(
         self, ops: Ops, parameters: ControllerParameters, inputs: ReferencePoint | tuple[()], signals: Signals
     ) -> LawState:
         """See `Component.init`."""
-        reference = inputs or signals["reference"]
-        body = signals["observer"].body
+        reference = inputs or signals.reference
+        body = signals.observer.body
         first = control.init(ops, parameters.model, body, reference)
         own = self.law.init(ops, parameters.model, Seen(body, first.thrusts, reference))
         return LawState(own, first.thrusts, first.commands)
@@ -54,7 +53,7 @@ class LawController:
         signals: Signals,
     ) -> LawState:
         """See `Component.step`."""
-        model, elapsed = parameters.model, signals["clock"].elapsed
+        model, elapsed = parameters.model, signals.clock.elapsed
         body, reference = told(ops, parameters, state, inputs, signals, self.law.TAKES_DISTURBANCES)
         rotors = model.airframe.rotors
         decay_factors = motors.decay_factors(ops, rotors, elapsed)
@@ -65,11 +64,11 @@ class LawController:
         return LawState(own, thrusts, commands)
 
 
-def _change_ahead(model: Any, body_axes: Any, reference: ReferencePoint) -> Wrench:
+def _change_ahead(model: Any, body_axes: Any, reference: ReferencePoint) -> RotorWrench:
     """The change that the reference makes of force and moment until the controller's next step."""
     inertia, mass = model.airframe.mass_properties.inertia, model.airframe.mass_properties.mass
     now, then = (reference_moment(inertia, body_axes, each) for each in (reference, reference.ahead))
-    return Wrench(mass * reference.ahead.thrust_change, subtract(then, now))
+    return RotorWrench(mass * reference.ahead.thrust_change, subtract(then, now))
 
 
 def flown_by(law: ControlLaw | None, settings: Controller, period: int = 1) -> Component:

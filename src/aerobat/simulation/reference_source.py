@@ -13,7 +13,7 @@ from aerobat.environment import Environment
 from aerobat.flatness import axial_drag, force_balance, has_unequal_drag, reference
 from aerobat.kernels.control_loops import Lookahead, ReferencePoint
 from aerobat.simulation.flight import setpoint_rows
-from aerobat.simulation.loop import Clock, Due
+from aerobat.simulation.loop import Due, StepClock
 from aerobat.states import BodyState, Setpoint
 from aerobat.trajectory import Trajectory
 from aerobat.vehicle import Vehicle
@@ -79,13 +79,15 @@ class ReferenceSource:
         points: ReferencePoint = tree_map(lambda leaf: leaf[begin - first : end - first], self._points)
         return points
 
-    def clock(self, begin: int, end: int, every: int = 1) -> Clock:
+    def clock(self, begin: int, end: int, every: int = 1) -> StepClock:
         """Time about the ticks from `begin` to before `end`, of what steps at every so many.
 
         All periods but the last are alike to the last bit, so that an engine may see that they are.
         """
         steps = np.arange(begin, end) // every
-        return Clock(self._period_after(np.maximum(steps - 1, 0), every), self._period_after(steps, every))
+        return StepClock(
+            self._period_after(np.maximum(steps - 1, 0), every), self._period_after(steps, every)
+        )
 
     def due(self, every: int, begin: int, end: int) -> Due:
         """The turns, at these ticks, of a component that steps at every so many."""

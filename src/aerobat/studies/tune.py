@@ -24,7 +24,7 @@ from aerobat.control import Controller
 from aerobat.declaration import NonNegative, Seed, by_value, in_notebooks, short, unknown_name, validated
 from aerobat.environment import Dispersion, as_dispersion
 from aerobat.errors import SpecError
-from aerobat.evaluation import Scores, score_flights
+from aerobat.evaluation import Score, score_flights
 from aerobat.flatness import vehicle_of
 from aerobat.optimization.deadline import out_of_time, within_time
 from aerobat.planning import Plan
@@ -161,7 +161,7 @@ def tune(
     flown = _vehicle_of(plans, vehicle)
     names = _checked(gains, flown.controller)
     objective = _Objective(plans, flown, as_dispersion(conditions), seed)
-    search = _Search(objective, names, range(flights), evaluations, progress)
+    search = _GainSearch(objective, names, range(flights), evaluations, progress)
     with within_time(time_limit):
         search.run()
     training = objective.fly(flown.controller, range(flights)), search.best
@@ -219,7 +219,7 @@ class _Objective:
         return FlightCosts(frozen(errors, "max_position_error_m"), frozen(failed, "failed"))
 
 
-def _errors(scores: Scores) -> Array:
+def _errors(scores: Score) -> Array:
     lost = np.isfinite(scores.stop)
     return np.where(lost, DIVERGENCE_RADIUS, np.minimum(scores.max_position_error_m, DIVERGENCE_RADIUS))
 
@@ -228,7 +228,7 @@ class _Ended(Exception):
     """The search has had its time, or its share of tries."""
 
 
-class _Search:
+class _GainSearch:
     """Gains that are tried, and the best of them."""
 
     def __init__(

@@ -13,9 +13,10 @@ from aerobat.cli.progress import planning_progress
 from aerobat.cli.runs.folder import written
 from aerobat.cli.runs.record import RunRecord
 from aerobat.cli.tasks import read_task
-from aerobat.reporting.comparison import comparison_figure, comparison_rows, comparison_table
+from aerobat.reporting.comparison import comparison_figure
 from aerobat.reporting.page import png
-from aerobat.reporting.report_json import to_json
+from aerobat.reporting.plain_data import to_json
+from aerobat.reporting.tables import table
 from aerobat.studies.compare import Comparison
 from aerobat.studies.compare import compare as compare_planners
 
@@ -39,7 +40,7 @@ def compare(problem: str, options: Annotated[CompareOptions, Parameter(name="*")
     Parameters
     ----------
     problem
-        A name that `aerobat problems` lists, or a problem's TOML file.
+        A name that `aerobat show` lists, or a problem's TOML file.
     """
     task, vehicle = read_task(problem, options)
     record = RunRecord(
@@ -67,11 +68,11 @@ def comparison_of(record: RunRecord) -> Comparison:
 
 def finish_comparison(comparison: Comparison, record: RunRecord, options: OutputOptions) -> None:
     """Write a comparison, then show it."""
-    rows = to_json(comparison_rows(comparison))
+    facts = to_json(comparison)
     picture = png(comparison_figure(comparison))
 
     def write(staging: Path) -> None:
-        (staging / COMPARISON).write_text(rows + "\n", encoding="utf-8")
+        (staging / COMPARISON).write_text(facts + "\n", encoding="utf-8")
         (staging / "compare.png").write_bytes(picture)
 
-    written(record, options, write, rows, comparison_table(comparison))
+    written(record, options, write, facts, table(comparison))

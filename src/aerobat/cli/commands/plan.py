@@ -28,7 +28,7 @@ def plan(
     Parameters
     ----------
     problem
-        A name that `aerobat problems` lists, or a problem's TOML file.
+        A name that `aerobat show` lists, or a problem's TOML file.
     """
     settings = FlightSettings()
     if passing.probability is not None:

@@ -13,7 +13,7 @@ from aerobat.planning.courses import is_placed_in_windows
 from aerobat.planning.miqp.diagnosis import NOT_CONVERGED, OUT_OF_TIME
 from aerobat.planning.miqp.formulation import Formulation
 from aerobat.planning.miqp.integrator import INPUT_NAMES
-from aerobat.planning.passages import PlacedStage
+from aerobat.planning.passages import PlacedStage, place_stages
 from aerobat.planning.recorder import Recorder
 from aerobat.planning.result import Plan
 from aerobat.planning.task import Task
@@ -122,10 +122,8 @@ class Attempts:
         """When a path passes its stages."""
         trajectory, slots = judged.solution.trajectory, judged.solution.source.answer.slots or ()
         assert trajectory is not None
-        stages = zip(self.formulation.sequence.stages, slots, strict=True)
-        return tuple(
-            PlacedStage(s.name, slot, float(trajectory.knots[slot + 1]), s.gate) for s, slot in stages
-        )
+        times = [float(trajectory.knots[slot + 1]) for slot in slots]
+        return place_stages(self.formulation.sequence.stages, slots, times)
 
 
 def _why_unsolved(answer: AssignmentResult) -> str:

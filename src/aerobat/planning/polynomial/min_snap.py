@@ -15,7 +15,7 @@ from aerobat.declaration import AS_IT_IS, Count, NonNegative
 from aerobat.errors import Infeasible, Reason, SpecError, limits_of
 from aerobat.optimization.deadline import out_of_time, within_time
 from aerobat.planning.certified_solve import Judged, Solution, judge, refuted_by_samples
-from aerobat.planning.passages import PlacedStage
+from aerobat.planning.passages import place_stages
 from aerobat.planning.planners import Planner, option, planner
 from aerobat.planning.polynomial.knots import first_times, fixed_at_knots, unhurried, violated_stage
 from aerobat.planning.recorder import Progress, Recorder
@@ -154,14 +154,13 @@ class _Planning:
     def result(self, found: Judged[None]) -> Plan:
         """The plan of what the search settled on."""
         times = np.cumsum(self.scaled(found.solution.duration))[:-1].tolist()
-        stages = enumerate(zip(self.task.stages.stages, times, strict=True))
         return found.plan(
             self.recorder,
             planner="min-snap",
             order=self.config.order,
             status="feasible" if found.feasible else "stopped",
             backend="closed form",
-            stages=tuple(PlacedStage(stage.name, i, time, stage.gate) for i, (stage, time) in stages),
+            stages=place_stages(self.task.stages.stages, range(len(times)), times),
         )
 
 

@@ -19,7 +19,7 @@ from aerobat.engines.tracing import Trace, TraceOps
 from aerobat.flatness import axial_drag, has_unequal_drag, lateral_drag, reference_of
 from aerobat.flatness.parallel_transport import frames
 from aerobat.flatness.references import UNDETERMINED, specific_thrust
-from aerobat.kernels.measures import Airframe, measures
+from aerobat.kernels.measures import InertiaAndDrag, measures
 from aerobat.kernels.unequal_drag import BodyMotion
 from aerobat.limits import MEASURES, Limit
 from aerobat.planning.task import Task
@@ -162,10 +162,10 @@ class LimitValues:
         return array_function(given, outputs), array_function([*given, *weights], gradient(total, motion))
 
     @property
-    def _airframe(self) -> Airframe:
+    def _airframe(self) -> InertiaAndDrag:
         vehicle = self.task.vehicle
         unequal = tuple((vehicle.drag_body / vehicle.mass).tolist()) if has_unequal_drag(vehicle) else None
-        return Airframe(
+        return InertiaAndDrag(
             vehicle.mass, vehicle.inertia.tolist(), lateral_drag(vehicle), axial_drag(vehicle), unequal
         )
 

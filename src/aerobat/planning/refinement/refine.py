@@ -24,7 +24,7 @@ from aerobat.optimization.interior_point import InteriorPointResult, Settings, i
 from aerobat.planning.certified_solve import Judged, Solution, certified_solve, judge
 from aerobat.planning.courses import is_course
 from aerobat.planning.gate_clearance import bodies_in_gates
-from aerobat.planning.passages import PlacedStage
+from aerobat.planning.passages import PlacedStage, place_stages
 from aerobat.planning.recorder import Recorder
 from aerobat.planning.refinement.excess import JUST_INSIDE, Excess, chebyshev
 from aerobat.planning.refinement.limit_values import LimitValues
@@ -85,8 +85,7 @@ class RefinedPath:
         """The path's stages, each in its segment."""
         path = self.path
         numbers = np.searchsorted(path.trajectory.knots[1:-1], path.times, side="left").tolist()
-        stages = zip(path.stages, numbers, path.times, strict=True)
-        return tuple(PlacedStage(s.name, segment, time, s.gate) for s, segment, time in stages)
+        return place_stages(path.stages, numbers, path.times)
 
 
 @dataclass(frozen=True, eq=False)

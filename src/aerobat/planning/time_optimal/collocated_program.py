@@ -11,7 +11,7 @@ from aerobat.certification import Certificate
 from aerobat.optimization.deadline import out_of_time
 from aerobat.optimization.nonlinear import NonlinearResult, solve_nonlinear
 from aerobat.planning.certified_solve import Solution
-from aerobat.planning.passages import PlacedStage
+from aerobat.planning.passages import PlacedStage, place_stages
 from aerobat.planning.time_optimal.optimal_control.boundary import ClosedLap, FixedEnds
 from aerobat.planning.time_optimal.optimal_control.bounds import Backoff
 from aerobat.planning.time_optimal.optimal_control.collocation import (
@@ -51,10 +51,10 @@ class SolvedMotion:
     @property
     def placed(self) -> tuple[PlacedStage, ...]:
         """When the motion passes its stages."""
-        ends = np.cumsum(self.program.mesh.intervals).tolist()
-        times = np.cumsum(self.motion.phases).tolist()
-        stages = zip(self.program.control.stages, ends, times, strict=False)
-        return tuple(PlacedStage(s.name, end - 1, time, s.gate) for s, end, time in stages)
+        stages = self.program.control.stages
+        latest = np.cumsum(self.program.mesh.intervals) - 1
+        times = np.cumsum(self.motion.phases)
+        return place_stages(stages, latest[: len(stages)].tolist(), times[: len(stages)].tolist())
 
     @property
     def failure(self) -> str:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from aerobat.engines.floats import first_numbers
 from aerobat.engines.pytree import tree_map, tree_stack
 from aerobat.errors import SpecError
-from aerobat.kernels.motors import Motion
+from aerobat.kernels.motors import VehicleState
 from aerobat.kernels.ops import Ops
 from aerobat.problem.gate import Gate
 from aerobat.simulation.components import (
@@ -22,9 +22,9 @@ from aerobat.simulation.components import (
     with_ceiling,
     with_wind,
 )
-from aerobat.simulation.loop import LoopInput, Signals, compose
+from aerobat.simulation.loop import Controlling, LoopInput, Signals
 from aerobat.simulation.plants.plant import Actuation, Plant, PlantScene
-from aerobat.simulation.setup import FlightSetup, Part
+from aerobat.simulation.setup import FlightSetup, LoopPart
 from aerobat.vehicle.ellipsoid import Ellipsoid
 
 
@@ -33,16 +33,22 @@ class OutsidePlant:
     """A plant that the loop is told of at every tick; its parameters are those of the vehicle's model."""
 
     period: int = 1
-    name: str = "plant"
     feedthrough: bool = True
 
-    def init(self, ops: Ops, parameters: PlantParameters, inputs: Motion, signals: Signals) -> Motion:
+    def init(
+        self, ops: Ops, parameters: PlantParameters, inputs: VehicleState, signals: Signals
+    ) -> VehicleState:
         """See `Component.init`."""
         return inputs
 
     def step(
-        self, ops: Ops, parameters: PlantParameters, state: Motion, inputs: Motion, signals: Signals
-    ) -> Motion:
+        self,
+        ops: Ops,
+        parameters: PlantParameters,
+        state: VehicleState,
+        inputs: VehicleState,
+        signals: Signals,
+    ) -> VehicleState:
         """See `Component.step`."""
         return inputs
 
@@ -52,12 +58,11 @@ class Actuator:
     """The inputs of the plant outside: commands, wind, and the rotors' limits as the battery leaves them."""
 
     period: int = 1
-    name: str = "actuator"
     feedthrough: bool = True
 
     def init(self, ops: Ops, parameters: PlantParameters, inputs: tuple[()], signals: Signals) -> Actuation:
         """See `Component.init`."""
-        thrusts = signals["controller"].commands.thrusts
+        thrusts = signals.controller.commands.thrusts
         return Actuation(thrusts, parameters.environment.wind, parameters.airframe.rotors.max_thrust)
 
     def step(
@@ -95,16 +100,16 @@ def fly_outside(
     if len(setup.fleet) != 1:
         raise SpecError(f"plant: {plant.kind} flies one vehicle at a time, not {len(setup.fleet)}")
     parameters: PlantParameters = setup.parts[-1].parameters
-    parts = (Part(OutsidePlant()), *setup.parts[:-1], Part(Actuator(), parameters))
+    parts = (LoopPart(OutsidePlant()), *setup.parts[:-1], LoopPart(Actuator(), parameters))
     inside = replace(setup, parts=parts)
-    motion = Motion(first_numbers(setup.start), tuple(0.0 for _ in parameters.airframe.rotors.max_thrust))
-    first = _told(inside.first_tick, motion)
-    loop = inside.engine().compile(*compose(inside.components, _outside_row), inside.parameters, first)
-    carry = loop.init(first)
-    states = dict(zip((part.component.name for part in parts), carry, strict=True))
-    run = plant.begin(
-        _scene(setup, gates), motion._replace(thrusts=first_numbers(states["controller"].thrusts))
+    motion = VehicleState(
+        first_numbers(setup.start), tuple(0.0 for _ in parameters.airframe.rotors.max_thrust)
     )
+    first = _told(inside.first_tick, motion)
+    loop = inside.compile_for(inside.engine(), first, _outside_row)
+    carry = loop.init(first)
+    controller = next(state for state in carry if isinstance(state, Controlling))
+    run = plant.begin(_scene(setup, gates), motion._replace(thrusts=first_numbers(controller.thrusts)))
     rows, touched = [], np.zeros(len(setup.times), dtype=np.int64)
     for tick, period in enumerate(np.diff(setup.times, append=setup.times[-1]).tolist()):
         carry, row = loop.step(carry, _told(inside.tick(tick), run.motion))
@@ -116,10 +121,10 @@ def fly_outside(
 
 
 def _outside_row(signals: Signals) -> OutsideRow:
-    return OutsideRow(log_row(signals), signals["actuator"])
+    return OutsideRow(log_row(signals), signals.of(Actuation))
 
 
-def _told(inputs: LoopInput, motion: Motion) -> LoopInput:
+def _told(inputs: LoopInput, motion: VehicleState) -> LoopInput:
     """The inputs of a tick with the plant's motion, which is the first component's."""
     return inputs._replace(own=(tree_map(np.float64, motion), *inputs.own[1:]))
 

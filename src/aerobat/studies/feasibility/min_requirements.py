@@ -17,7 +17,7 @@ from aerobat.planning import Plan, Planner, as_planner
 from aerobat.problem import Problem, as_problem
 from aerobat.studies.feasibility.fields import Scenario
 from aerobat.studies.feasibility.probe import TIME_LIMIT, Feasibility, Probe, Task, probe
-from aerobat.studies.feasibility.quantities import Quantity, named_quantities
+from aerobat.studies.feasibility.quantities import NeededQuantity, named_quantities
 from aerobat.studies.workers import Workers
 from aerobat.studies.workers import workers as processes
 from aerobat.vehicle import Vehicle, as_vehicle
@@ -146,7 +146,7 @@ def _found(
 class _Search:
     """The bisection of one quantity, between a value that is refused and one for which there is a plan."""
 
-    quantity: Quantity
+    quantity: NeededQuantity
     scenario: Scenario
     tolerance: float
     planned: tuple[float, Probe] | None = None  # the least so far

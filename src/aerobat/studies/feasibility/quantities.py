@@ -17,7 +17,7 @@ from aerobat.problem import Problem
 from aerobat.studies.feasibility.fields import THRUST_TO_WEIGHT, VEHICLE, Field, Scenario
 
 
-class Quantity(ABC):
+class NeededQuantity(ABC):
     """Something of which less makes a scenario harder."""
 
     name: ClassVar[str]
@@ -41,7 +41,7 @@ class Quantity(ABC):
         return inf
 
 
-class ThrustToWeight(Quantity):
+class ThrustToWeight(NeededQuantity):
     """All rotors at full thrust, in weights on Earth, each its part of them as it is."""
 
     name = "thrust-to-weight"
@@ -55,7 +55,7 @@ class ThrustToWeight(Quantity):
         return Field(self.name, (VEHICLE, THRUST_TO_WEIGHT)).changed(scenario, value)
 
 
-class Ceiling(Quantity):
+class Ceiling(NeededQuantity):
     """The height that the path stays below."""
 
     name = "ceiling"
@@ -81,7 +81,7 @@ class Ceiling(Quantity):
         return Field(self.name, ("limits", "upper", 2)).changed(scenario, value)
 
 
-class GateSize(Quantity):
+class GateSize(NeededQuantity):
     """The openings of all gates, as parts of what they are."""
 
     name = "gate"
@@ -99,10 +99,12 @@ class GateSize(Quantity):
         return replace(scenario, problem=replace(scenario.problem, gates=gates))
 
 
-QUANTITIES: dict[str, Quantity] = {each.name: each for each in (ThrustToWeight(), Ceiling(), GateSize())}
+QUANTITIES: dict[str, NeededQuantity] = {
+    each.name: each for each in (ThrustToWeight(), Ceiling(), GateSize())
+}
 
 
-def named_quantities(names: Sequence[str] | None, problem: Problem) -> tuple[Quantity, ...]:
+def named_quantities(names: Sequence[str] | None, problem: Problem) -> tuple[NeededQuantity, ...]:
     """The quantities of these names, by default all that a problem has. Raises SpecError for others."""
     if names is None:
         return tuple(each for each in QUANTITIES.values() if problem.gates or not isinstance(each, GateSize))

@@ -12,7 +12,7 @@ from pydantic import Field
 from aerobat.declaration import Seed, validated
 from aerobat.environment import Dispersion, as_dispersion
 from aerobat.errors import Infeasible, SpecError
-from aerobat.evaluation import Scores, score_flights
+from aerobat.evaluation import Score, score_flights
 from aerobat.evaluation.opening import Probability
 from aerobat.planning import Attempt, Plan, Planner, as_planner, plan
 from aerobat.planning.tube import Tube
@@ -119,7 +119,7 @@ class _Task:
         found = plan(problem, replace(self.planner, reserve=reserve), self.vehicle, self.progress)
         return replace(found, problem=self.problem)
 
-    def scores(self, found: Plan, flights: range, conditions: Dispersion | None = None) -> Scores:
+    def scores(self, found: Plan, flights: range, conditions: Dispersion | None = None) -> Score:
         """Scores of flights of a plan, by default under the task's conditions."""
         return score_flights(found, conditions=conditions or self.conditions, seed=self.seed, flights=flights)
 
@@ -161,7 +161,7 @@ class _Tightening:
             steps, done = steps + STRIDE, following
         raise AssertionError("a proof ends one way or the other")
 
-    def _plain(self) -> tuple[Round, Scores]:
+    def _plain(self) -> tuple[Round, Score]:
         found = self.task.plan(self.task.planner.reserve, self.task.problem)
         scores = self.task.scores(found, self.training)
         return self._noted(Round(self.task.planner.reserve, found, _passed(scores))), scores
@@ -219,7 +219,7 @@ class _Tightening:
         self._narrowed = firm
         return again[0]
 
-    def _planned(self, steps: int, problem: Problem) -> tuple[Round, Scores] | None:
+    def _planned(self, steps: int, problem: Problem) -> tuple[Round, Score] | None:
         """A round with so many steps of reserve through gates as a problem has them, and its scores."""
         reserve = round(self.task.planner.reserve + steps * STEP, 9)
         try:
@@ -281,5 +281,5 @@ class _Tightening:
         )
 
 
-def _passed(scores: Scores) -> Share:
+def _passed(scores: Score) -> Share:
     return Share(int(scores.succeeded.sum()), len(scores))

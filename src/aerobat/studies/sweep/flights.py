@@ -14,7 +14,7 @@ from aerobat.arrays import Array
 from aerobat.control import ControlLaw, Controller
 from aerobat.engines import choose
 from aerobat.environment import Dispersion
-from aerobat.evaluation import Passage, Scores
+from aerobat.evaluation import Passage, Score
 from aerobat.evaluation.score_flights import ErrorsOverTime, score_over_time
 from aerobat.planning import Plan
 from aerobat.simulation import FlightConfig
@@ -29,7 +29,7 @@ AGAIN = "#"  # between a gate's name and the number of its passage, from the sec
 
 Columns = dict[str, NDArray[Any]]
 
-_ERRORS = tuple(field.name for field in fields(Scores)[:5])
+_ERRORS = tuple(field.name for field in fields(Score)[:5])
 _PASSAGE = (  # numbers of a passage, each with the name of its column after the gate's
     ("time", "time_s"),
     ("lateral", "lateral_m"),
@@ -122,7 +122,7 @@ def _norms(vectors: Array) -> Array:
     return np.asarray(np.linalg.norm(vectors, axis=1))
 
 
-def _scored(scores: Scores) -> Columns:
+def _scored(scores: Score) -> Columns:
     """What flights came to."""
     columns: Columns = {"outcome": np.array([outcome.name.lower() for outcome in scores.outcomes])}
     columns |= {name: np.array(getattr(scores, name)) for name in _ERRORS}
