@@ -50,6 +50,7 @@ def test_what_the_command_says_is_measured_and_told(
         "conditions": ab.load_dispersion("lab"),
         "flights": 8,
         "seed": 3,
+        "workers": None,
     }
     assert "cruise · agile-quad" in table
     assert all(result.cause in table for result in found.results)

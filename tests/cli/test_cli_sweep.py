@@ -141,10 +141,10 @@ from aerobat.cli import main
 from aerobat.studies.sweep import flights, sweep
 
 whole = flights.fly_chunk
-def fly_chunk(task, begin, end):
-    if begin == 100:
+def fly_chunk(task, numbers):
+    if numbers.start == 100:
         os.kill(os.getpid(), signal.SIGKILL)
-    return whole(task, begin, end)
+    return whole(task, numbers)
 fly_chunk.__module__ = flights.__name__
 flights.fly_chunk = sys.modules["aerobat.studies.sweep.sweep"].fly_chunk = fly_chunk
 main(sys.argv[1:])
@@ -164,7 +164,7 @@ def test_after_a_worker_was_killed_the_flights_that_are_kept_are_counted() -> No
     kept, killed = ended.stderr.splitlines()[-2:]
     assert re.fullmatch(r"aerobat: \d+ of 150 flights are kept: the same command goes on from there", kept)
     assert killed == (
-        "aerobat: a worker process was killed or has ended by itself; "
+        "aerobat: worker processes were killed or have ended by themselves; "
         "where memory is short, take fewer workers"
     )
 

@@ -43,7 +43,17 @@ FORMS = (  # of a gate, from its file to its score
 )
 ROOMS = ("problem", "planning", "certification", "simulation", "kernels", "evaluation")
 # who asks for a score, looks something up by its name, or takes one flight's part of many
-HANDED_ON = ("score", "stages", "gate", "named_gate", "init", "of_flight", "one_of_many", "__getitem__")
+HANDED_ON = (
+    "score",
+    "stages",
+    "gate",
+    "named_gate",
+    "init",
+    "of_flight",
+    "_of_flight",
+    "one_of_many",
+    "__getitem__",
+)
 WINDOW = """
 name = "window"
 maneuver = { kind = "line" }

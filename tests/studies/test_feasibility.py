@@ -47,6 +47,25 @@ def half_flip(angle: float, speed: float) -> ab.Problem:
 
 
 @pytest.mark.slow
+def test_of_plans_that_are_flown_a_cell_counts_what_passes_under_its_own_conditions() -> None:
+    spreads, reserves, options = (0.0, 0.3), (0.0, 0.2), {"vehicle": "agile-quad", "workers": 1}
+    weak = ab.Dispersion(name="weak", start_position=0.02)
+    over = {"conditions.mass": spreads, "planner.reserve": reserves}
+    planner = ab.Miqp(flies=False)
+    found = ab.feasibility_map("line", over, planner=planner, conditions=weak, flights=20, seed=3, **options)
+    for cell in found.cells:
+        spread, reserve = cell.values
+        plan = ab.plan("line", replace(planner, reserve=reserve), "agile-quad")
+        scores = ab.score_flights(plan, conditions=replace(weak, mass=spread), seed=3, flights=20)
+        assert cell.duration == plan.duration
+        assert cell.passed is not None
+        assert (cell.passed.count, cell.passed.of) == (scores.succeeded.sum(), 20)
+    assert found.cells[0].passed.count > found.cells[-1].passed.count
+    with pytest.raises(ab.SpecError, match="conditions is not given; give it first"):
+        ab.feasibility_map("line", over, **options)
+
+
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("angle", "speed"),
     [

@@ -58,7 +58,7 @@ def ask(
 
 @pytest.mark.slow
 def test_a_plan_for_where_the_sliders_stand_is_the_plan_of_that_problem(replanner: Replanner) -> None:
-    answer = replanner.answer({"gates[0].z": 4.0}, never)
+    answer = replanner.answer({"gates[0].position.z": 4.0}, never)
     again = ab.plan(moved_gate(4.0), ab.Miqp(), "agile-quad")
     assert answer.scene is not None
     assert answer.scene.times[-1] == pytest.approx(again.duration)
@@ -109,7 +109,7 @@ def test_dispersed_flights_are_of_the_same_plan_and_counted(replanner: Replanner
 def test_planning_that_is_overtaken_is_given_up(replanner: Replanner) -> None:
     plans = len(replanner.plans)
     with pytest.raises(Overtaken):
-        replanner.answer({"gates[0].z": 2.7}, lambda: True)
+        replanner.answer({"gates[0].position.z": 2.7}, lambda: True)
     assert len(replanner.plans) == plans
 
 

@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 
 from cyclopts import Parameter, validators
 
-from aerobat.cli.options import PlannerOptions, output, planning
+from aerobat.cli.options import PlannerOptions, Workers, output, planning
 from aerobat.cli.runs.record import DEFAULT_TOLERANCE
 from aerobat.errors import SpecError
 
@@ -32,10 +32,7 @@ class FeasibilityOptions(PlannerOptions):
     )
     """Between the least and the refusal beside it, as a part of the least."""
 
-    workers: Annotated[
-        int | None, Parameter(group=planning, validator=validators.Number(gte=1, lte=4096))
-    ] = None
-    """The number of processes that plan; what they find is the same for any number. Default: one a core."""
+    workers: Annotated[str | None, Workers(group=planning)] = None
 
     table: Annotated[Literal["csv", "parquet"], Parameter(group=output)] = "csv"
     """The form of a map's table, map.csv or map.parquet; the latter needs aerobat[parquet]."""

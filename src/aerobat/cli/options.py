@@ -3,6 +3,7 @@
 # no postponed annotations here: the class of options is made from them, where nobody could look names up
 
 from dataclasses import dataclass, field, make_dataclass
+from functools import partial
 from inspect import getdoc
 from pathlib import Path
 from typing import Annotated, Any, TypeVar
@@ -19,6 +20,22 @@ output = Group("Output", sort_key=3)
 
 Seed = Annotated[int, Parameter(group=flying, validator=validators.Number(gte=0))]
 POSITIVE = validators.Number(gt=0)
+
+
+def _require_workers(type_: Any, value: str | None) -> None:
+    from aerobat.studies.workers import read_workers  # takes a tenth of a second
+
+    if value is not None:
+        read_workers(value)
+
+
+Workers = partial(
+    Parameter,
+    name="--workers",
+    validator=_require_workers,
+    help="The number of processes, or a Dask scheduler as dask://HOST:PORT, which needs aerobat[cluster]; "
+    "the results are the same for any. Default: one a core.",
+)
 Options = TypeVar("Options", bound=type[Any])
 
 
@@ -199,6 +216,15 @@ class ConditionsOptions:
 
     seed: Seed = 0
     """The seed of the conditions: the same seed, the same flight."""
+
+    workers: Annotated[
+        str | None,
+        Workers(
+            group=planning,
+            help="The number of processes that fly for --pass, or a Dask scheduler as dask://HOST:PORT; the "
+            "plan is the same for any. Default: one a core.",
+        ),
+    ] = None
 
 
 @dataclass(frozen=True, kw_only=True)

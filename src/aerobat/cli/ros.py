@@ -22,7 +22,7 @@ from aerobat.links.ros.run import RVIZ, run
 from aerobat.links.ros.vehicle_node import VehicleNode
 from aerobat.planning import Planner, planner_class, suited_planner
 from aerobat.problem import Problem, load_problem
-from aerobat.studies.workers import workers
+from aerobat.studies.workers import processes
 from aerobat.vehicle import Vehicle
 
 _VEHICLE_RATE = 250.0  # [1/s] at which the simulated vehicle goes on
@@ -53,7 +53,7 @@ def fly_on_demand(problems: tuple[str, ...], options: RosOptions) -> None:
     ros = _joined("aerobat", options.generation, sim_time=options.sim_time)
     try:
         # two, so that none of them is this one
-        with workers(2, forked=False) as executor:
+        with processes(2, forked=False) as executor:
             _rehearse(executor, vehicle, maneuvers, settings)
             node = ManeuverNode(ros, vehicle, maneuvers, executor, settings, say)
             say(f"flies {vehicle.name}: /aerobat/ takeoff, {', '.join(maneuvers)}, hold, land")

@@ -54,6 +54,7 @@ def planned(
     flight: FlightSettings = FlightSettings(),
     make: Callable[[RunRecord], Plan] | None = None,
     explain: bool = False,
+    workers: str | None = None,
 ) -> tuple[Plan, RunRecord]:
     """The plan that a command names, certified for its vehicle, and what it takes to make it again.
 
@@ -64,6 +65,7 @@ def planned(
         flight: How the plan is flown.
         make: The way from a record to a plan, by default planning.
         explain: Whether what takes seconds to know is found out too.
+        workers: Who flies what tells whether flights pass.
     """
     source, columns = plan_source(name), column_groups(options.columns)
     if source is not None:
@@ -95,7 +97,7 @@ def planned(
         columns=columns,
         plugins=tuple(map(str, options.plugins)),
     )
-    return plan_of(record, explain) if make is None else make(record), record
+    return plan_of(record, explain, workers) if make is None else make(record), record
 
 
 def flight_settings(
@@ -110,18 +112,25 @@ def flight_settings(
     """
     named = options.conditions or (None if options.probability is None else USUAL_CONDITIONS)
     conditions = None if named is None else load_dispersion(named)
+    if options.workers is not None and options.probability is None:
+        raise SpecError("--workers fly for --pass; give that too, or leave --workers out")
     return FlightSettings(controller, conditions, options.seed, plant=plant, probability=options.probability)
 
 
-def plan_of(record: RunRecord, explain: bool = False) -> Plan:
+def plan_of(record: RunRecord, explain: bool = False, workers: str | None = None) -> Plan:
     """The plan of a run, made anew; explained on request, in what is left of its time.
 
     Raises Infeasible where there is none; on request with the changes that would help, once it is said that
     there is none.
+
+    Args:
+        record: What is planned, and how.
+        explain: Whether what takes seconds to know is found out too.
+        workers: Who flies what tells whether flights pass.
     """
     assert record.planner is not None, "a plan that came from a file is not made"
     if record.flight.probability is not None:
-        found = _plan_that_passes(record)
+        found = _plan_that_passes(record, workers)
         return with_explanation(found) if explain else found
     try:
         return _plan_made(record, explain)
@@ -158,7 +167,7 @@ def _plan_made(record: RunRecord, explain: bool) -> Plan:
         return with_explanation(found, progress.record) if explain else found
 
 
-def _plan_that_passes(record: RunRecord) -> Plan:
+def _plan_that_passes(record: RunRecord, workers: str | None) -> Plan:
     """The plan of a run that is tightened until flights pass."""
     flight = record.flight
     assert record.planner is not None, "a plan that came from a file is not made"
@@ -178,6 +187,7 @@ def _plan_that_passes(record: RunRecord) -> Plan:
             probability=flight.probability,
             conditions=flight.conditions,
             seed=flight.seed,
+            workers=workers,
             progress=progress.record,
             tried=progress.tried,
         ).plan

@@ -13,7 +13,8 @@ from typing import Any, ClassVar, NamedTuple, TypeVar, cast, dataclass_transform
 
 from pydantic import Field
 
-from aerobat.declaration import FieldError, Label, Registry, shown, unknown_name, validated
+from aerobat.declaration import FieldError, Label, Registry, placed, shown, unknown_name, validated
+from aerobat.errors import SpecError
 from aerobat.kernels.control import ControllerModel
 from aerobat.kernels.control_loops import ReferencePoint
 from aerobat.kernels.ops import Ops, PerRotor, Scalar
@@ -97,7 +98,12 @@ def named_controller(name: str, own: Controller = CONTROLLERS["full"]) -> Contro
         return named_settings(name, own)
     if name not in tuple(CONTROL_LAWS):
         raise unknown_name("controller", name, (*CONTROLLERS, *CONTROL_LAWS))
-    return CONTROL_LAWS[name]()
+    law = CONTROL_LAWS[name]
+    try:
+        return law()
+    except SpecError as error:
+        wanting = SpecError(f"controller '{name}' is flown at the defaults of its gains: {error}")
+        raise placed(wanting, law.step) from None
 
 
 def as_controller(value: Any) -> Controller | ControlLaw | str | None:

@@ -25,12 +25,20 @@ class MetricsInput(NamedTuple):
     time: Scalar  # [s]
 
 
+class Ground(NamedTuple):
+    """The ground as flights hit it: a slow vehicle that comes down near it has landed."""
+
+    height: Scalar  # [m] below which a fast vehicle has hit it, −infinity where there is none
+    landing_height: Scalar  # [m] below which a slow vehicle has hit it, too
+    landing_speed_sq: Scalar  # [m²/s²] of squared speed, up to which a vehicle is slow
+
+
 class MetricsParameters(NamedTuple):
     """Criteria by which a flight is judged."""
 
     divergence_radius_sq: Scalar  # [m²] of squared position error, beyond which a vehicle has diverged
     path_radius_sq: Scalar  # [m²] of squared position error, beyond which it has left its path
-    ground: Scalar  # [m] height, −infinity where there is none
+    ground: Ground
     ellipsoid: BoundingEllipsoid  # of the vehicle
     gates: tuple[GatePlane, ...]
     waypoints: tuple[Target, ...]
@@ -97,7 +105,7 @@ def step(
     angle = angle_between(ops, body.q_world_body, q_world_body)
     going = ops.select(square <= parameters.divergence_radius_sq, counts, 0.0)
     ended = (metrics.flying > 0.5) & (going < 0.5)
-    below = counted & (body.position[2] < parameters.ground)
+    below = counted & (body.position[2] < lowest_height(ops, parameters.ground, body.velocity))
     is_off = counted & (square > parameters.path_radius_sq)
     now = Snapshot(inputs.time, *body[:3])
     snapshots, both = (metrics.last, now), (metrics.ticks > 0.5, counted)
@@ -127,6 +135,12 @@ def step(
             for latest, direction in zip(metrics.attitudes, parameters.attitudes, strict=True)
         ),
     )
+
+
+def lowest_height(ops: Ops, ground: Ground, velocity: Vector) -> Scalar:
+    """Return the height [m] below which a vehicle with a velocity [m/s] has hit the ground."""
+    is_slow = dot(velocity, velocity) <= ground.landing_speed_sq
+    return ops.select(is_slow, ground.landing_height, ground.height)
 
 
 def _is_finite(body: Body, thrusts: PerRotor, commands: PerRotor) -> Scalar:

@@ -6,6 +6,9 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 from aerobat.control import ControlLaw, Controller, Seen
+from aerobat.declaration import placed, shown
+from aerobat.engines.pytree import tree_leaves
+from aerobat.errors import SpecError
 from aerobat.kernels import control, motors
 from aerobat.kernels.control import Commands, FeatureFlags
 from aerobat.kernels.control_loops import ReferencePoint, reference_moment
@@ -42,6 +45,8 @@ class LawController:
         body = signals.observer.body
         first = control.init(ops, parameters.model, body, reference)
         own = self.law.init(ops, parameters.model, Seen(body, first.thrusts, reference))
+        if any(isinstance(leaf, str) for leaf in tree_leaves(own)):
+            raise _wrong(self.law.init, f"returned {shown(own)}, not a tree of tuples of numbers")
         return LawState(own, first.thrusts, first.commands)
 
     def step(
@@ -58,10 +63,30 @@ class LawController:
         rotors = model.airframe.rotors
         decay_factors = motors.decay_factors(ops, rotors, elapsed)
         thrusts = motors.first_order_response(state.thrusts, state.commands.thrusts, decay_factors)
-        own, load = self.law.step(ops, model, state.own, Seen(body, thrusts, reference), elapsed)
+        answer: Any = self.law.step(ops, model, state.own, Seen(body, thrusts, reference), elapsed)
+        own, load = self._checked(answer)
+        if len(tree_leaves(own)) != len(tree_leaves(state.own)):
+            raise _wrong(self.law.step, f"returned the state {shown(own)}, of another shape than before")
         loads = load, _change_ahead(model, axes(body.q_world_body), reference)
         commands = control.rotor_commands(ops, self.flags, model, loads, thrusts, decay_factors, elapsed)
         return LawState(own, thrusts, commands)
+
+    def _checked(self, answer: Any) -> tuple[Any, RotorWrench]:
+        """The state and the wrench that a law answered. Raises SpecError for anything else."""
+        match answer:
+            case (own, (thrust, (x, y, z))) if all(
+                hasattr(each, "__truediv__") for each in (thrust, x, y, z)
+            ):
+                return own, RotorWrench(thrust, (x, y, z))
+        raise _wrong(
+            self.law.step, f"returned {shown(answer)}, not the state and a RotorWrench of four numbers"
+        )
+
+
+def _wrong(method: Any, complaint: str) -> SpecError:
+    """Return the error of a law's method, with its file and line."""
+    law = f"controller '{method.__self__.kind}'"
+    return placed(SpecError(f"{law}: {method.__name__}() {complaint}"), method)
 
 
 def _change_ahead(model: Any, body_axes: Any, reference: ReferencePoint) -> RotorWrench:

@@ -12,15 +12,23 @@ from numpy.typing import NDArray
 from aerobat.arrays import Array
 from aerobat.certification import PlannedPassage, PlannedWaypoint
 from aerobat.engines.components import components
+from aerobat.engines.numpy import ArrayOps
 from aerobat.engines.pytree import Tree, tree_map
+from aerobat.environment import Environment
 from aerobat.kernels import running_metrics
 from aerobat.kernels.gates import approach, pointing, progress
 from aerobat.kernels.gates.section import BoundingEllipsoid
 from aerobat.kernels.ops import Ops
-from aerobat.kernels.running_metrics import MetricsInput, MetricsParameters, RunningMetrics
+from aerobat.kernels.running_metrics import (
+    Ground,
+    MetricsInput,
+    MetricsParameters,
+    RunningMetrics,
+    lowest_height,
+)
 from aerobat.simulation.flight import Flight
 from aerobat.simulation.loop import Signals
-from aerobat.simulation.outcome import DIVERGENCE_RADIUS, TOUCHDOWN, Outcome
+from aerobat.simulation.outcome import DIVERGENCE_RADIUS, LANDING_DEPTH, LANDING_SPEED, TOUCHDOWN, Outcome
 from aerobat.simulation.passages import (
     PlannedAttitude,
     attitude_direction,
@@ -100,7 +108,7 @@ def with_metrics(setup: FlightSetup, criteria: Criteria = Criteria()) -> FlightS
     parameters = MetricsParameters(
         divergence_radius_sq=for_all(DIVERGENCE_RADIUS**2),
         path_radius_sq=for_all(criteria.path_radius**2),
-        ground=for_all(_lowest(setup.environment.ground)),
+        ground=for_all(_ground(setup.environment)),
         ellipsoid=ellipsoid,
         gates=for_all(tuple(plane for plane, _ in gate_places(criteria.gates, ellipsoid))),
         waypoints=for_all(tuple(map(waypoint_target, (*criteria.waypoints, *criteria.places)))),
@@ -121,12 +129,13 @@ def metrics_of_log(flight: Flight, criteria: Criteria, body: Ellipsoid | None) -
     times, states = flight.times, flight.states
     rows = log_rows(times, states.position, states.velocity, states.q_world_body)
     square, angle = flight.position_error**2, flight.attitude_error
+    lowest = lowest_height(ArrayOps, _ground(flight.environment), components(states.velocity))
     targets = [waypoint_target(each) for each in (*criteria.waypoints, *criteria.places)]
     numbers = RunningMetrics(
         flying=float(flight.outcome is Outcome.COMPLETE),
         is_finite=float(flight.outcome is not Outcome.STATE_NOT_FINITE),
         stop=flight.series["ends"],
-        ground_time=_first(times, states.position[:, 2] < _lowest(flight.environment.ground)),
+        ground_time=_first(times, states.position[:, 2] < lowest),
         off_path_time=_first(times, flight.position_error > criteria.path_radius),
         ticks=float(len(times)),
         max_square=square.max(),
@@ -147,9 +156,10 @@ def metrics_of_log(flight: Flight, criteria: Criteria, body: Ellipsoid | None) -
     )
 
 
-def _lowest(ground: float | None) -> float:
-    """The height [m] below which a vehicle has hit the ground."""
-    return -inf if ground is None else ground - TOUCHDOWN
+def _ground(environment: Environment) -> Ground:
+    """The ground of an environment as flights hit it."""
+    height = -inf if environment.ground is None else environment.ground
+    return Ground(height - TOUCHDOWN, height - LANDING_DEPTH, LANDING_SPEED**2)
 
 
 def _first(times: Array, happens: NDArray[np.bool_]) -> float:

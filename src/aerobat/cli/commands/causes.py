@@ -7,7 +7,7 @@ from typing import Annotated
 
 from cyclopts import Parameter, validators
 
-from aerobat.cli.options import FlightsOptions, ProblemOptions, planning
+from aerobat.cli.options import FlightsOptions, ProblemOptions, Workers, flying, planning
 from aerobat.cli.progress import Progress, showing
 from aerobat.cli.tasks import read_task
 from aerobat.cli.terminal import print_json
@@ -26,6 +26,8 @@ class CausesOptions(ProblemOptions, FlightsOptions):
 
     reserve: Annotated[float, Parameter(group=planning, validator=validators.Number(gte=0, lt=0.5))] = 0.1
     """Of every limit's range, kept at either end by plans that know the rotors."""
+
+    workers: Annotated[str | None, Workers(group=flying)] = None
 
 
 def causes(problem: str, options: Annotated[CausesOptions, Parameter(name="*")] = CausesOptions()) -> None:
@@ -53,6 +55,7 @@ def causes(problem: str, options: Annotated[CausesOptions, Parameter(name="*")] 
             conditions=conditions,
             flights=options.flights,
             seed=options.seed,
+            workers=options.workers,
             begin=progress.step,
         )
     if options.json:

@@ -8,7 +8,7 @@ from typing import Annotated
 
 from cyclopts import Parameter, validators
 
-from aerobat.cli.options import OutputOptions, TaskOptions, planning
+from aerobat.cli.options import OutputOptions, TaskOptions, Workers, planning
 from aerobat.cli.progress import planning_progress
 from aerobat.cli.runs.folder import written
 from aerobat.cli.runs.record import RunRecord
@@ -21,6 +21,10 @@ from aerobat.studies.compare import Comparison
 from aerobat.studies.compare import compare as compare_planners
 
 COMPARISON = "compare.json"
+WORKERS = (
+    "The number of processes that plan side by side, or a Dask scheduler as dask://HOST:PORT. By default "
+    "one, where no planner slows another down."
+)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -29,6 +33,8 @@ class CompareOptions(TaskOptions):
 
     time_limit: Annotated[float | None, Parameter(group=planning, validator=validators.Number(gte=0))] = None
     """Seconds for each planner; the best plan that it finds by then is taken, and said to be that."""
+
+    workers: Annotated[str, Workers(group=planning, help=WORKERS)] = "1"
 
 
 def compare(problem: str, options: Annotated[CompareOptions, Parameter(name="*")] = CompareOptions()) -> None:
@@ -51,11 +57,16 @@ def compare(problem: str, options: Annotated[CompareOptions, Parameter(name="*")
         time_limit=options.time_limit,
         plugins=tuple(map(str, options.plugins)),
     )
-    finish_comparison(comparison_of(record), record, options)
+    finish_comparison(comparison_of(record, options.workers), record, options)
 
 
-def comparison_of(record: RunRecord) -> Comparison:
-    """All planners on a run's problem."""
+def comparison_of(record: RunRecord, workers: str = "1") -> Comparison:
+    """Compare all planners on a run's problem.
+
+    Args:
+        record: What is planned.
+        workers: Who plans.
+    """
     with planning_progress() as progress:
         return compare_planners(
             record.problem,
@@ -63,6 +74,7 @@ def comparison_of(record: RunRecord) -> Comparison:
             progress=progress.record,
             begin=progress.begin,
             time_limit=record.time_limit,
+            workers=workers,
         )
 
 

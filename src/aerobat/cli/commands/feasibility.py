@@ -82,12 +82,12 @@ def feasibility(
         finish_need(need_of(record, options.workers), record, options)
 
 
-def map_of(record: RunRecord, workers: int | None = None) -> FeasibilityMap:
+def map_of(record: RunRecord, workers: str | None = None) -> FeasibilityMap:
     """The map of a run, made anew.
 
     Args:
         record: What is planned, and how.
-        workers: How many processes plan.
+        workers: Who plans.
     """
     axes = [Axis.parse(text) for text in record.over]
     over = {axis.name: axis.values for axis in axes}
@@ -118,12 +118,12 @@ def finish_map(found: FeasibilityMap, record: RunRecord, options: OutputOptions)
     written(record, options, write, facts, table(found))
 
 
-def need_of(record: RunRecord, workers: int | None = None) -> tuple[Requirement, ...]:
+def need_of(record: RunRecord, workers: str | None = None) -> tuple[Requirement, ...]:
     """The answers of a run, made anew.
 
     Args:
         record: What is planned, and how.
-        workers: How many processes plan.
+        workers: Who plans.
     """
     with showing(Progress("plans tried")) as progress:
 

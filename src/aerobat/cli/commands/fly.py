@@ -41,7 +41,9 @@ def fly(
     named_controller(flying.controller)  # refused before anything is planned
     as_plant(flying.plant)
     settings = flight_settings(flying, flying.controller, flying.plant)
-    plan, record = planned(problem, options, "fly", settings, explain=explaining.explain)
+    plan, record = planned(
+        problem, options, "fly", settings, explain=explaining.explain, workers=flying.workers
+    )
     return finish(plan, record, options, flown(plan, settings), explaining.explain)
 
 

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Literal
 
-from cyclopts import Parameter, validators
+from cyclopts import Parameter
 
-from aerobat.cli.options import FlightsOptions, OutputOptions, PlanningOptions, flying, output
+from aerobat.cli.options import FlightsOptions, OutputOptions, PlanningOptions, Workers, flying, output
 from aerobat.cli.progress import Progress, showing
 from aerobat.cli.runs.folder import is_of_a_run, written
 from aerobat.cli.runs.record import FlightSettings, RunRecord
@@ -37,10 +37,7 @@ class SweepingOptions(FlightsOptions):
     """The control law: full, or paper, at the gains of the vehicle's file; lee, lqr, indi; or one of your own
     that --import brings in."""
 
-    workers: Annotated[int | None, Parameter(group=flying, validator=validators.Number(gte=1, lte=4096))] = (
-        None
-    )
-    """The number of processes that fly; the flights are the same for any number. Default: one a core."""
+    workers: Annotated[str | None, Workers(group=flying)] = None
 
     table: Annotated[Literal["csv", "parquet"], Parameter(group=output)] = "csv"
     """The form of the table, flights.csv or flights.parquet; the latter needs aerobat[parquet]."""
@@ -89,14 +86,14 @@ def table_name(settings: FlightSettings) -> str:
     return f"flights.{settings.table}"
 
 
-def sweep_of(plan: Plan, record: RunRecord, options: OutputOptions, workers: int | None = None) -> Sweep:
+def sweep_of(plan: Plan, record: RunRecord, options: OutputOptions, workers: str | None = None) -> Sweep:
     """The flights of a run; what is finished is kept beside the run's folder until that is written.
 
     Args:
         plan: What is flown.
         record: How.
         options: Where to.
-        workers: How many processes fly.
+        workers: Who flies it.
     """
     flight = record.flight
     assert flight.conditions is not None, "a sweep has conditions"

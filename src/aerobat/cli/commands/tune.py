@@ -15,6 +15,8 @@ from aerobat.cli.options import (
     OutputOptions,
     PlanningOptions,
     ProblemOptions,
+    Workers,
+    flying,
     how_many,
     limiting,
     output,
@@ -48,6 +50,8 @@ class TuningOptions(ProblemOptions, FlightsOptions, OutputOptions):
 
     out: Annotated[Path | None, Parameter(group=output)] = None
     """The vehicle's file to write; an earlier one is replaced. Default: out/VEHICLE-tuned.toml."""
+
+    workers: Annotated[str | None, Workers(group=flying)] = None
 
 
 def tune(
@@ -83,6 +87,7 @@ def tune(
             options.seed,
             evaluations=options.evaluations,
             time_limit=options.time_limit,
+            workers=options.workers,
             progress=lambda tried, cost: progress.tell(tried, f"cost {100 * cost:.2f} cm so far"),
         )
     out = out or Path("out") / f"{tuning.vehicle.name}-tuned.toml"

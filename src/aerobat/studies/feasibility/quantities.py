@@ -14,7 +14,7 @@ from aerobat.declaration import unknown_name
 from aerobat.errors import SpecError
 from aerobat.planning import Plan
 from aerobat.problem import Problem
-from aerobat.studies.feasibility.fields import THRUST_TO_WEIGHT, VEHICLE, Field, Scenario
+from aerobat.studies.lens import Scenario, lens
 
 
 class NeededQuantity(ABC):
@@ -29,7 +29,7 @@ class NeededQuantity(ABC):
         """Return what the scenario has, infinite where it has no bound."""
 
     @abstractmethod
-    def changed(self, scenario: Scenario, value: float) -> Scenario:
+    def set(self, whole: Scenario, value: float) -> Scenario:
         """Return the scenario with so much of it. Raises SpecError where that contradicts the rest."""
 
     def floor(self, scenario: Scenario) -> float:
@@ -50,9 +50,9 @@ class ThrustToWeight(NeededQuantity):
         """Return the vehicle's."""
         return scenario.vehicle.thrust_to_weight
 
-    def changed(self, scenario: Scenario, value: float) -> Scenario:
+    def set(self, whole: Scenario, value: float) -> Scenario:
         """Return the scenario with rotors as strong."""
-        return Field(self.name, (VEHICLE, THRUST_TO_WEIGHT)).changed(scenario, value)
+        return lens("vehicle.thrust_to_weight", whole).set(whole, value)
 
 
 class Ceiling(NeededQuantity):
@@ -76,9 +76,9 @@ class Ceiling(NeededQuantity):
         """Return the height of its highest point."""
         return float(plan.trajectory.component_range(0)[1][2])
 
-    def changed(self, scenario: Scenario, value: float) -> Scenario:
+    def set(self, whole: Scenario, value: float) -> Scenario:
         """Return the scenario under such a ceiling."""
-        return Field(self.name, ("limits", "upper", 2)).changed(scenario, value)
+        return lens("limits.upper.z", whole).set(whole, value)
 
 
 class GateSize(NeededQuantity):
@@ -93,10 +93,10 @@ class GateSize(NeededQuantity):
             raise SpecError(f"'{scenario.problem.name}' has no gate that could be smaller; leave gate out")
         return 1.0
 
-    def changed(self, scenario: Scenario, value: float) -> Scenario:
+    def set(self, whole: Scenario, value: float) -> Scenario:
         """Return the scenario with openings of that part of their size."""
-        gates = tuple(gate.resized(value, value) for gate in scenario.problem.gates)
-        return replace(scenario, problem=replace(scenario.problem, gates=gates))
+        gates = tuple(gate.resized(value, value) for gate in whole.problem.gates)
+        return replace(whole, problem=replace(whole.problem, gates=gates))
 
 
 QUANTITIES: dict[str, NeededQuantity] = {

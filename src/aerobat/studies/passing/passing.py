@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from concurrent.futures import Executor
 from dataclasses import dataclass, field, replace
 from math import ceil, log
 from typing import Annotated, Any
@@ -12,16 +13,18 @@ from pydantic import Field
 from aerobat.declaration import Seed, validated
 from aerobat.environment import Dispersion, as_dispersion
 from aerobat.errors import Infeasible, SpecError
-from aerobat.evaluation import Score, score_flights
+from aerobat.evaluation import Score
 from aerobat.evaluation.opening import Probability
 from aerobat.planning import Attempt, Plan, Planner, as_planner, plan
 from aerobat.planning.tube import Tube
 from aerobat.problem import Problem, as_problem
+from aerobat.studies.flights import FlightTask, cut, fly_scores
 from aerobat.studies.passing.causes import standing_in_the_way
 from aerobat.studies.passing.result import Passing, Round
 from aerobat.studies.passing.spread import LEVEL, firmer, narrowed, spread_of
 from aerobat.studies.sweep import Share
 from aerobat.studies.sweep.share import CONFIDENCE, percent
+from aerobat.studies.workers import Pool, Workers, pool
 from aerobat.vehicle import Vehicle, as_vehicle
 
 STEP = 0.02  # of every limit's range, between reserves that are tried
@@ -47,6 +50,8 @@ def plan_to_pass(
     seed: Seed = 0,
     flights: Flights = 1000,
     fresh: Flights | None = None,
+    workers: Workers | None = None,
+    executor: Executor | None = None,
     progress: Callable[[Attempt], None] | None = None,
     tried: Callable[[Round], None] | None = None,
 ) -> Passing:
@@ -68,6 +73,8 @@ def plan_to_pass(
         seed: Of the flights.
         flights: How many tell how to tighten, numbered from 0.
         fresh: How many prove it, numbered behind those; by default 20 over the probability of failing.
+        workers: Processes, by default one a core; 1 flies in this process; dask://HOST:PORT on a cluster.
+        executor: Any of `concurrent.futures` that flies instead, as a `dask.distributed` client's.
         progress: Called with every attempt at a plan as it ends.
         tried: Called with every round as it ends.
 
@@ -83,8 +90,12 @@ def plan_to_pass(
     proving = fresh or max(round(PROVING_FAILURES / (1.0 - probability)), _least_flights(probability))
     _require_enough("flights", flights, probability)
     _require_enough("fresh", proving, probability)
-    task = _Task(as_problem(problem), method, as_vehicle(vehicle), conditions, seed, probability, progress)
-    return _Tightening(task, range(flights), proving, tried or (lambda done: None)).passing()
+    flown = range(flights)
+    with pool(workers, executor, len(cut(range(max(flights, proving))))) as flying:
+        task = _Task(
+            as_problem(problem), method, as_vehicle(vehicle), conditions, seed, probability, progress, flying
+        )
+        return _Tightening(task, flown, proving, tried or (lambda done: None)).passing()
 
 
 def _least_flights(probability: float) -> int:
@@ -113,6 +124,7 @@ class _Task:
     seed: int
     probability: float
     progress: Callable[[Attempt], None] | None
+    flying: Pool
 
     def plan(self, reserve: float, problem: Problem) -> Plan:
         """The plan with a reserve, and through gates as `problem` has them, judged by the task's own."""
@@ -121,7 +133,10 @@ class _Task:
 
     def scores(self, found: Plan, flights: range, conditions: Dispersion | None = None) -> Score:
         """Scores of flights of a plan, by default under the task's conditions."""
-        return score_flights(found, conditions=conditions or self.conditions, seed=self.seed, flights=flights)
+        task = FlightTask(
+            found, self.vehicle, conditions or self.conditions, self.seed, self.vehicle.controller
+        )
+        return fly_scores(self.flying, (task,), flights)[0]
 
     def share(self, found: Plan, flights: range, conditions: Dispersion | None = None) -> Share:
         """The share of flights of a plan that pass."""
