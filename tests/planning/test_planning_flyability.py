@@ -17,8 +17,8 @@ from aerobat.planning import (
     own_flight,
     with_second_opinion,
 )
-from aerobat.planning.evidence import envelope_for
 from aerobat.planning.flyability import disturbed_flight
+from aerobat.planning.task import Task
 from aerobat.reporting.plain_data import plain
 from aerobat.reporting.report import Report
 from aerobat.simulation import Outcome
@@ -52,9 +52,7 @@ def test_flyability_is_the_score_of_the_plan_s_own_flight(plan: ab.Plan) -> None
     error = ab.score(ab.fly(plan), plan).max_position_error_m
     assert flyability(plan).error == pytest.approx(error, rel=1e-9)
     assert plan.vehicle is not None
-    assert (
-        own_flight(plan.trajectory, plan.vehicle, plan.problem, plan.stages).error == flyability(plan).error
-    )
+    assert own_flight(plan.evidence.task, plan.trajectory, plan.stages).error == flyability(plan).error
     assert 0.0 < error < FLYABLE_ERROR
     assert plan.flies
 
@@ -167,7 +165,7 @@ def test_the_miqp_goes_straight_through_a_gate_whose_frame_it_would_touch() -> N
 def test_a_flight_that_diverges_is_no_small_error() -> None:
     """It is lost, wherever it was last."""
     away = Trajectory([1.0], [[[0.0, 0.0, 0.0], [0.0, 0.0, 0.0], [90.0, 0.0, 0.0]]])
-    assert own_flight(away, QUAD, ab.load_problem("line"), ()).error >= 5.0
+    assert own_flight(Task.of(ab.load_problem("line"), QUAD), away, ()).error >= 5.0
 
 
 def test_flyability_survives_the_plan_s_file(plan: ab.Plan, tmp_path: Path) -> None:
@@ -182,7 +180,7 @@ def test_the_evidence_is_that_of_the_plan_s_own_vehicle_and_path(plan: ab.Plan) 
         plan.trajectory,
         CRAZYFLIE,
         plan.problem.environment,
-        envelope_for(plan.problem, CRAZYFLIE, plan.stages),
+        Task.of(plan.problem, CRAZYFLIE).envelope(plan.stages),
     )
     slower = replace(plan.trajectory, durations=1.1 * plan.trajectory.durations)
     assert replace(plan, trajectory=slower).certificate != plan.certificate

@@ -19,7 +19,7 @@ from aerobat.environment import Environment
 from aerobat.errors import SpecError
 from aerobat.interchange import read_plan
 from aerobat.planning import Plan, with_explanation
-from aerobat.planning.evidence import envelope_for
+from aerobat.planning.task import Task
 from aerobat.reporting.facts import Fact, Facts
 from aerobat.reporting.plain_data import plain, to_json
 from aerobat.reporting.plans import evidence
@@ -79,7 +79,7 @@ def check(plan: Path, options: Annotated[CheckOptions, Parameter(name="*")] = Ch
     vehicle = chosen or own_vehicle or load_vehicle(default_vehicle())
     environment = found.problem.environment if isinstance(found, Plan) else Environment()
     envelope = replace(
-        envelope_for(found.problem, vehicle, found.stages) if isinstance(found, Plan) else Envelope(),
+        Task.of(found.problem, vehicle).envelope(found.stages) if isinstance(found, Plan) else Envelope(),
         speed=options.max_speed or inf,
         tilt=inf if options.max_tilt is None else radians(options.max_tilt),
         body_rate=inf if options.max_rate is None else radians(options.max_rate),

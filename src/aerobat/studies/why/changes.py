@@ -9,7 +9,7 @@ from functools import partial
 import numpy as np
 
 from aerobat.planning import Planner
-from aerobat.planning.miqp.formulation import ASSUMED_THRUST_TO_WEIGHT
+from aerobat.planning.task import max_specific_thrust
 from aerobat.problem.problem import DERIVATIVES, Problem
 from aerobat.problem.stage import Stage
 from aerobat.studies.lens import lens
@@ -35,9 +35,7 @@ class Request:
     @property
     def max_specific_thrust(self) -> float:
         """The vehicle's, by which stages ask, or what is assumed without one [m/s²]."""
-        if self.vehicle is None:
-            return ASSUMED_THRUST_TO_WEIGHT * self.problem.environment.gravity
-        return self.vehicle.max_specific_thrust
+        return max_specific_thrust(self.problem, self.vehicle)
 
 
 @dataclass(frozen=True)
