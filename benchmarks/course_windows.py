@@ -14,7 +14,8 @@ import time
 os.environ["OPENBLAS_NUM_THREADS"] = "1"  # one thread, before NumPy starts its own
 
 from aerobat.optimization import AssignmentProgram, improved_in_windows, solver
-from aerobat.planning.miqp import formulate
+from aerobat.planning.miqp.miqp import formulate
+from aerobat.planning.task import Task
 from aerobat.problem import load_problem
 from growth_with_stages import flips
 
@@ -25,8 +26,8 @@ THREE_FLIPS = 0.086657770820432  # the proven optimum
 def main() -> None:
     race = load_problem("race-7")
     cases: dict[str, tuple[AssignmentProgram, float | None]] = {
-        "race-7, N = 42": (formulate(race, 4, 42).program(9.0 / 42), None),
-        "race-7, N = 70": (formulate(race, 4, 70).program(9.0 / 70), None),
+        "race-7, N = 42": (formulate(Task.of(race), 4, 42).program(9.0 / 42), None),
+        "race-7, N = 70": (formulate(Task.of(race), 4, 70).program(9.0 / 70), None),
         "three flips, N = 60": (flips(3, 60, 6.0), THREE_FLIPS),
         "five flips, N = 100": (flips(5, 100, 10.0), None),
     }

@@ -21,7 +21,8 @@ import numpy as np
 
 from aerobat.errors import AerobatError
 from aerobat.optimization import AssignmentProgram, solver
-from aerobat.planning.miqp import formulate
+from aerobat.planning.miqp.miqp import formulate
+from aerobat.planning.task import Task
 from aerobat.problem import CustomManeuver, load_problem
 from paper_programs import paper_program
 
@@ -87,7 +88,7 @@ def flips(gates: int, intervals: int, duration: float) -> AssignmentProgram:
     limits = replace(example.limits, upper=example.limits.upper + np.maximum(shift, 0.0))
     maneuver = replace(example.maneuver, stages=tuple(stages))
     problem = replace(example, goal=goal, gates=tuple(passed), limits=limits, maneuver=maneuver)
-    return formulate(problem, 3, intervals).program(duration / intervals)
+    return formulate(Task.of(problem), 3, intervals).program(duration / intervals)
 
 
 def solved(program: AssignmentProgram) -> int:

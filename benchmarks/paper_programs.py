@@ -1,7 +1,8 @@
 """The programs that the benchmarks solve: the paper's maneuvers with its numbers."""
 
 from aerobat.optimization import AssignmentProgram
-from aerobat.planning.miqp import formulate
+from aerobat.planning.miqp.miqp import formulate
+from aerobat.planning.task import Task
 from aerobat.problem import load_problem
 
 FLIPS = ("flip-roll", "flip-pitch", "flip-roll-translation")
@@ -9,4 +10,4 @@ FLIPS = ("flip-roll", "flip-pitch", "flip-roll-translation")
 
 def paper_program(name: str, intervals: int = 20, duration: float = 2.0) -> AssignmentProgram:
     """A maneuver in paper mode on `intervals` intervals that take `duration` [s] together."""
-    return formulate(load_problem(name).as_in_paper(), 3, intervals).program(duration / intervals)
+    return formulate(Task.of(load_problem(name).as_in_paper()), 3, intervals).program(duration / intervals)

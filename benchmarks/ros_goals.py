@@ -1,4 +1,4 @@
-"""Goals of `aerobat ros1` or `ros2` in real time: how many arrive, and when, while the vehicle hovers.
+"""Goals of `aerobat link ros` in real time: how many arrive, and when, while the vehicle hovers.
 
 Both nodes and this one are processes of their own on one machine. A goal's age is the time from its stamp to
 when it is taken here; jitter is how the time between two of them differs from a period. Ages are with the

@@ -104,8 +104,8 @@ waypoints = [
 ```
 """
 VEHICLE = """
-`aerobat vehicles agile-quad --out mine.toml` writes a built-in vehicle's file to begin with, the source of
-every number beside it; `aerobat vehicles mine.toml` says how yours is understood, and what looks wrong. All
+`aerobat show agile-quad --out mine.toml` writes a built-in vehicle's file to begin with, the source of
+every number beside it; `aerobat show mine.toml` says how yours is understood, and what looks wrong. All
 that a file may hold, [annotated](../examples/vehicles/annotated.toml):
 """
 ROTOR = """
@@ -134,7 +134,7 @@ Left out, every field has its default; a flight that names another controller is
 IMPORT = """
 ### From URDF and SDF
 
-`aerobat vehicles iris.sdf --out iris.toml`, or `aerobat.import_vehicle("iris.sdf")`, reads mass, inertia,
+`aerobat show iris.sdf --out iris.toml`, or `aerobat.import_vehicle("iris.sdf")`, reads mass, inertia,
 centre of mass and rotors of a robot's description; `--vehicle iris.sdf` flies it as it is.
 
 | there | here |

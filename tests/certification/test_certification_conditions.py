@@ -12,6 +12,7 @@ from aerobat.certification import Envelope, Finding, Side, Verdict, certify
 from aerobat.environment import Environment
 from aerobat.flatness import force_balance, reference
 from aerobat.planning.evidence import Evidence
+from aerobat.planning.task import Task
 from aerobat.problem import Condition, load_problem
 from aerobat.states import STANDARD_GRAVITY
 from aerobat.trajectory import Trajectory
@@ -94,10 +95,10 @@ def test_a_certificate_of_a_problem_holds_what_its_maneuver_asks_throughout():
     states[1, 0, 1] = 40.0
     path = minimum_effort(states, [2.0])
     diving = Trajectory(path.durations, path.coefficients + 0.8 * path.coefficients[..., [0, 2, 1]])
-    asked = Evidence(load_problem("half-flip"), VEHICLE, diving).certificate
+    asked = Evidence(Task.of(load_problem("half-flip"), VEHICLE), diving).certificate
     names = [f.quantity for f in asked.findings if f.verdict is Verdict.VIOLATED]
     assert "specific thrust along (0, 0, 1)" in names
-    line = Evidence(load_problem("line"), VEHICLE, diving).certificate
+    line = Evidence(Task.of(load_problem("line"), VEHICLE), diving).certificate
     assert not any("specific thrust" in finding.quantity for finding in line.findings)
 
 

@@ -182,7 +182,6 @@ ARGUMENT_FAULTS = {
     "a limit below zero": (["check", "taken", "--max-speed", "-1"], "max-speed"),
     "rows at no rate": (["check", "taken", "--rate", "0"], "rate"),
     "conditions of a plan that need not pass": (["plan", "line", "--conditions", "lab"], "--pass"),
-    "to pass under nothing": (["plan", "line", "--pass", "0.9"], "--conditions"),
     "to pass for certain": (["fly", "line", "--pass", "1", "--conditions", "lab"], "--pass"),
     "to pass as in the paper": (
         ["plan", "line", "--paper", "--pass", "0.9", "--conditions", "lab"],

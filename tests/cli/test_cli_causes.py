@@ -9,8 +9,7 @@ import pytest
 
 import aerobat as ab
 from aerobat import cli
-from aerobat.reporting.error_causes import error_causes_report
-from aerobat.reporting.report_json import to_json
+from aerobat.reporting.plain_data import to_json
 from aerobat.studies.error_causes import error_causes, four_causes
 from public_calls import cruise
 
@@ -51,12 +50,13 @@ def test_what_the_command_says_is_measured_and_told(
         "conditions": ab.load_dispersion("lab"),
         "flights": 8,
         "seed": 3,
+        "workers": None,
     }
     assert "cruise · agile-quad" in table
     assert all(result.cause in table for result in found.results)
     cli.main(["causes", "half-flip", *FEW, "--json"])
     told = json.loads(capsys.readouterr().out)["causes"]
-    assert {name: facts["cost_m"]["median"] for name, facts in told.items()} == {
+    assert {facts["cause"]: facts["cost_median_m"] for facts in told} == {
         result.cause: found.cost(result.cause).median for result in found.results
     }
 
@@ -64,9 +64,10 @@ def test_what_the_command_says_is_measured_and_told(
 def test_bounds_that_few_flights_cannot_give_are_null_in_json() -> None:
     """Two flights vouch for no interval of a median: its ends are infinite, which JSON has no word for."""
     found = quick_study(flights=2)
-    told = json.loads(to_json(error_causes_report(found)))
-    assert told["causes"]["late"]["cost_m"]["low"] is None
-    assert told["causes"]["late"]["cost_m"]["median"] == found.cost("late").median
+    told = json.loads(to_json(found))
+    (late,) = (facts for facts in told["causes"] if facts["cause"] == "late")
+    assert late["cost_low_m"] is None
+    assert late["cost_median_m"] == found.cost("late").median
 
 
 @pytest.mark.slow
@@ -83,14 +84,15 @@ def test_the_table_holds_what_python_measures(capsys: pytest.CaptureFixture[str]
         flights=8,
         seed=3,
     )
-    assert list(told["causes"]) == [result.cause for result in measured.results]
-    assert len(told["causes"]) == 6
+    rows = {facts["cause"]: facts for facts in told["causes"]}
+    assert list(rows) == [result.cause for result in measured.results]
+    assert len(rows) == 6
     for result in measured.results:
-        facts = told["causes"][result.cause]
+        facts = rows[result.cause]
         assert facts["duration_s"] == result.plan.duration
-        assert facts["cost_m"]["median"] == measured.cost(result.cause).median
-        assert facts["error_m"]["median"] in result.position_error
-    assert told["causes"]["hand-off 5 cm, 2°"]["cost_m"]["median"] > 0.03
+        assert facts["cost_median_m"] == measured.cost(result.cause).median
+        assert facts["error_median_m"] in result.position_error
+    assert rows["hand-off 5 cm, 2°"]["cost_median_m"] > 0.03
 
 
 def test_a_hand_off_is_made_where_conditions_have_none() -> None:

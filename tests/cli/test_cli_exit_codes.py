@@ -11,7 +11,6 @@ import pytest
 import aerobat as ab
 from aerobat import cli
 from aerobat.cli.exit_code import ExitCode
-from aerobat.simulation import Outcome
 from command_lines import code, without_pictures
 from places import ROOT
 from shared_plans import shared_plan
@@ -26,7 +25,7 @@ def _elsewhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     without_pictures(monkeypatch)
 
 
-@pytest.mark.parametrize("command", [["fly", "line.plan"], ["check", "line.plan"], ["vehicles"], ["--help"]])
+@pytest.mark.parametrize("command", [["fly", "line.plan"], ["check", "line.plan"], ["show"], ["--help"]])
 def test_what_went_well_exits_with_0(command: list[str]) -> None:
     shared_plan("line").save("line.plan")
     assert code(*command) == 0
@@ -54,10 +53,10 @@ def test_an_export_of_a_plan_that_is_not_certified_warns_and_exits_with_1(capsys
 def test_a_flight_that_went_wrong_exits_with_1_and_is_written(monkeypatch) -> None:
     from aerobat.evaluation import score
 
-    def missed(*arguments: object):
-        return replace(score(*arguments), outcome=Outcome.MISSED_GATE)
+    def fallen(*arguments: object):
+        return replace(score(*arguments), ground_time=0.5)
 
-    monkeypatch.setattr("aerobat.cli.commands.fly.score", missed)
+    monkeypatch.setattr("aerobat.cli.commands.fly.score", fallen)
     shared_plan("line").save("line.plan")
     assert code("fly", "line.plan", "--out", "missed") == 1
     assert Path("missed/flight.npz").exists()

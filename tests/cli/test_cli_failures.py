@@ -8,7 +8,8 @@ from pathlib import Path
 import pytest
 
 from aerobat.cli.commands import fly as fly_command
-from command_lines import run
+from command_lines import run, without_pictures
+from shared_plans import shared_plan
 
 MANEUVER = """
 import aerobat as ab
@@ -39,6 +40,21 @@ class Mine(Plant):
 
 PLANTS.add("{name}", Mine)
 """
+LAW = """
+import aerobat as ab
+from aerobat.kernels.rigid_body import Wrench
+
+@ab.controller("{name}")
+class Mine(ab.ControlLaw):
+    {field}
+
+    def init(self, ops, model, seen):
+        {init}
+
+    def step(self, ops, model, state, seen, elapsed):
+        {step}
+"""
+HOVER = "return state, Wrench(9.81 * model.airframe.mass_properties.mass, (0.0, 0.0, 0.0))"
 PROBLEM = """
 start.position = [0.0, 0.0, 1.0]
 goal.position = [1.0, 0.0, 1.0]
@@ -70,9 +86,47 @@ IN_A_PLAN = {
 }
 
 
+# what stands in the plugin; the line that fails, and what is said of it
+AT_IMPORT = {
+    "1 / 0": (1, "ZeroDivisionError: division by zero"),
+    "def f(:": (1, "SyntaxError: invalid syntax"),
+    "raise SystemExit(0)": (1, "SystemExit: 0"),
+    "import no_such_module": (1, "ModuleNotFoundError: No module named 'no_such_module'"),
+    "from aerobat import no_such_name": (1, "ImportError: cannot import name 'no_such_name'"),
+    "import aerobat as ab\nab.tilted_gate((0.0, 0.0))": (2, "position must be 3 numbers"),
+    "import aerobat as ab\n@ab.maneuver('')\nclass A(ab.Maneuver): ...": (2, "must be one line of text"),
+    "import aerobat as ab\n@ab.maneuver(3)\nclass A(ab.Maneuver): ...": (2, "kind must be text, got 3"),
+    "import aerobat as ab\n@ab.maneuver('f')\ndef f(): ...": (2, "a maneuver is a class"),
+    "import aerobat as ab\n@ab.controller('c')\nclass A: ...": (2, "must inherit from ControlLaw"),
+    "import aerobat as ab\n@ab.controller('c')\nclass A(ab.ControlLaw): ...": (2, "A has no step"),
+    "import aerobat as ab\n@ab.planner('miqp')\nclass A(ab.Planner):\n    def plan(*_): ...": (
+        2,
+        "there are two planners named 'miqp', Miqp of aerobat.planning.miqp.miqp and A of",
+    ),
+    "import aerobat as ab\n@ab.maneuver('m')\nclass A(ab.Maneuver):\n    x: 'Y'\n    stage_sequence = 3": (
+        2,
+        "a field whose type is no known name",
+    ),
+}
+# what stands in a law, and what is said of it beside its file and line
+IN_A_LAW = {
+    ("step", 'raise ValueError("boom")'): "ValueError: boom",
+    ("step", "return None"): "step() returned None, not the state and a Wrench",
+    ("step", 'return state, Wrench("a", (0.0, 0.0, 0.0))'): "not the state and a Wrench of four numbers",
+    ("step", "return state, Wrench(1.0, (0.0, 0.0))"): "not the state and a Wrench of four numbers",
+    ("step", "return (state, 1.0), Wrench(1.0, (0.0, 0.0, 0.0))"): "of another shape than before",
+    ("step", "return state, Wrench(seen.height, (0.0, 0.0, 0.0))"): "AttributeError: 'Seen' object has no",
+    ("step", "return seen.thrusts[9]"): "IndexError: tuple index out of range",
+    ("init", 'raise KeyError("gain")'): "KeyError: 'gain'",
+    ("init", 'return "none"'): "init() returned 'none', not a tree of tuples of numbers",
+    ("field", "gain: float"): "is flown at the defaults of its gains: Mine.gain is missing",
+}
+
+
 @pytest.fixture(autouse=True)
 def _folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
+    without_pictures(monkeypatch)
 
 
 def in_one_sentence(err: str) -> str:
@@ -122,6 +176,61 @@ def test_what_fails_in_a_plant_of_ones_own_is_one_sentence(name: str, body: str,
     code, _, err = run(capsys, "fly", "line", "--order", "4", "--import", "mine.py", "--plant", name)
     assert code == 2
     assert said in in_one_sentence(err)
+
+
+@pytest.mark.parametrize("text", AT_IMPORT, ids=range(len(AT_IMPORT)))
+def test_what_fails_while_a_plugin_is_imported_is_one_sentence_with_file_and_line(text: str, capsys) -> None:
+    Path("mine.py").write_text(text)
+    code, out, err = run(capsys, "plan", "line", "--import", "mine.py")
+    line, said = AT_IMPORT[text]
+    assert (code, out) == (2, "")
+    assert f"mine.py:{line}" in in_one_sentence(err)
+    assert said in err
+    assert not Path("out").exists()
+
+
+@pytest.mark.parametrize("place", IN_A_LAW, ids=range(len(IN_A_LAW)))
+def test_what_fails_in_a_law_of_ones_own_is_one_sentence_with_file_and_line(
+    place: tuple[str, str], capsys
+) -> None:
+    name = f"mine-{list(IN_A_LAW).index(place)}"
+    text = LAW.format(**{"name": name, "field": "", "init": "return ()", "step": HOVER} | dict([place]))
+    Path("mine.py").write_text(text)
+    shared_plan("line").save("line.plan")
+    code, out, err = run(capsys, "fly", "line.plan", "--import", "mine.py", "--controller", name)
+    assert (code, out) == (2, "")
+    assert f"{Path('mine.py').resolve()}:" in in_one_sentence(err)
+    assert IN_A_LAW[place] in err
+    assert not Path("out").exists()
+
+
+@pytest.mark.parametrize(
+    ("body", "said"),
+    [
+        (
+            "return ab.Plan(problem, ab.Trajectory([1.0], [[[float('nan')] * 3]]), 'x')",
+            "coefficients must be",
+        ),
+        ("return 'plan'", "returned 'plan' from plan(), not a Plan"),
+        ("yield problem", "from plan(), not a Plan"),
+    ],
+)
+def test_wrong_values_of_a_planner_name_its_file_and_line(body: str, said: str, capsys) -> None:
+    name = f"mine-v{len(body)}"
+    Path("mine.py").write_text(PLANNER.format(name=name, body=body))
+    code, _, err = run(capsys, "plan", "line", "--import", "mine.py", "--planner", name)
+    assert code == 2
+    assert f"{Path('mine.py').resolve()}:" in in_one_sentence(err)
+    assert said in err
+
+
+def test_a_law_that_asks_for_no_number_is_flown_and_its_flight_told_to_have_failed(capsys) -> None:
+    step = "return state, Wrench(float('nan'), (0.0, 0.0, 0.0))"
+    Path("mine.py").write_text(LAW.format(name="mine-nan", field="", init="return ()", step=step))
+    shared_plan("line").save("line.plan")
+    code, out, err = run(capsys, "fly", "line.plan", "--import", "mine.py", "--controller", "mine-nan")
+    assert (code, err) == (1, "")
+    assert "certified, but this flight fails" in out
 
 
 def test_traceback_shows_all_of_what_failed_in_a_plugin(capsys) -> None:

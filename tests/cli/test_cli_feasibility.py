@@ -1,4 +1,4 @@
-"""`aerobat map` and `aerobat need`, and their folders: what is there, what is repeated, what is refused."""
+"""`aerobat feasibility`, and their folders: what is there, what is repeated, what is refused."""
 
 from __future__ import annotations
 
@@ -13,11 +13,12 @@ import pytest
 
 import aerobat as ab
 from aerobat import cli
-from aerobat.cli.progress import MapProgress, NeedProgress, WhyProgress
+from aerobat.cli.progress import Progress
 from aerobat.interchange import read_table
 
-MAP = ("map", "half-flip", "--over", "angle=0:90:90", "--over", "speed=4:12:8")
-NEED = ("need", "half-flip", "--of", "gate", "--of", "ceiling", "--tolerance", "0.2", "--workers", "1")
+MAP = ("feasibility", "half-flip", "--over", "angle=0:90:90", "--over", "speed=4:12:8")
+LEAST = ("--least", "gate", "--least", "ceiling", "--tolerance", "0.2", "--workers", "1")
+NEED = ("feasibility", "half-flip", *LEAST)
 
 
 @pytest.fixture(autouse=True)
@@ -58,7 +59,7 @@ def test_a_map_writes_a_row_a_cell_which_is_what_plan_says(capsys) -> None:
 @pytest.mark.slow
 def test_a_repeated_map_comes_to_the_same_bits(capsys) -> None:
     quick = ("--planner", "min-snap", "--workers", "1")
-    assert code("map", "line", "--over", "goal.position.x=1:3:2", "--out", "map", *quick) == 0
+    assert code("feasibility", "line", "--over", "goal.position.x=1:3:2", "--out", "map", *quick) == 0
     assert capsys.readouterr().out.endswith("written to map/\n")
     assert code("repeat", "map") == 0
     assert "the same as in map/, bit for bit" in capsys.readouterr().err
@@ -69,11 +70,11 @@ def test_a_repeated_map_comes_to_the_same_bits(capsys) -> None:
 
 
 def test_what_is_needed_is_told_and_written_with_its_plan(capsys) -> None:
-    least = ("need", "half-flip", "--of", "gate", "--tolerance", "0.5", "--workers", "1")
+    least = ("feasibility", "half-flip", "--least", "gate", "--tolerance", "0.5", "--workers", "1")
     assert code(*least, "--out", "gate") == 0
     assert "of its size" in capsys.readouterr().out
     assert {path.name for path in Path("gate").iterdir()} == {"need.json", "run.toml", "half-flip-gate.plan"}
-    (facts,) = json.loads(Path("gate/need.json").read_bytes())["requirements"]
+    facts = json.loads(Path("gate/need.json").read_bytes())["requirements"]["gate"]
     assert ab.load_plan("gate/half-flip-gate.plan").duration == facts["duration_s"]
 
 
@@ -86,8 +87,8 @@ def test_what_is_needed_is_written_with_its_plans_and_repeated(capsys) -> None:
     plans = {f"half-flip-{quantity}.plan" for quantity in ("gate", "ceiling")}
     assert {path.name for path in folder.iterdir()} == {"need.json", "run.toml", *plans}
     facts = json.loads((folder / "need.json").read_bytes())
-    for each in facts["requirements"]:
-        plan = ab.load_plan(folder / f"half-flip-{each['quantity']}.plan")
+    for quantity, each in facts["requirements"].items():
+        plan = ab.load_plan(folder / f"half-flip-{quantity}.plan")
         assert plan.certified
         assert plan.flies
         assert plan.duration == each["duration_s"]
@@ -100,22 +101,26 @@ def test_what_is_needed_is_written_with_its_plans_and_repeated(capsys) -> None:
 
 
 REFUSED = (
-    (("map", "half-flip"), "--over is missing"),
-    (("map", "half-flip", "--over", "sped=1:2:1"), "did you mean 'speed'?"),
-    (("map", "half-flip", "--over", "speed=2:1:1"), "the range of speed is empty"),
-    (("map", "half-flip", "--over", "speed=1:2:0"), "the step of speed is 0"),
-    (("map", "half-flip", "--over", "speed=0:1:1e-7"), "10000 at most"),
-    (("map", "half-flip", "--over", "speed=1:200:1", "--over", "angle=0:90:1"), "18200 cells are too many"),
-    (("map", "half-flip", "--over", "speed=1", "--over", "speed=2"), "--over names speed twice"),
-    (("map", "half-flip", "--over", "angle=0:100:50"), "angle must be from -90 to 90 degrees"),
-    (("map", "flip-roll", "--over", "angle=0:90:50"), "only the gate of a half-flip can be tilted"),
-    (("map", "line", "--over", "vehicle.mass=1", "--planner", "free-knot"), "did you mean"),
-    (("map", "line", "--over", "vehicle.mass=1", "--segments", "3"), "--segments is for --planner"),
-    (("map", "line", "--over", "vehicle.mass=1", "--out", "mine"), "mine/ holds thesis.tex"),
-    (("need", "half-flip", "--of", "weight"), "weight"),
-    (("need", "line", "--of", "gate"), "has no gate that could be smaller"),
-    (("need", "line", "--tolerance", "0"), "tolerance"),
-    (("need", "line", "--out", "mine"), "mine/ holds thesis.tex"),
+    (("feasibility", "half-flip", "--over", "sped=1:2:1"), "did you mean 'speed'?"),
+    (("feasibility", "half-flip", "--over", "speed=2:1:1"), "the range of speed is empty"),
+    (("feasibility", "half-flip", "--over", "speed=1:2:0"), "the step of speed is 0"),
+    (("feasibility", "half-flip", "--over", "speed=0:1:1e-7"), "10000 at most"),
+    (
+        ("feasibility", "line", "--over", "speed=1:200:1", "--over", "vehicle.mass=1:91:1"),
+        "18200 cells are too",
+    ),
+    (("feasibility", "line", "--over", "speed=1", "--least", "gate"), "--least finds the least, --over maps"),
+    (("feasibility", "line", "--table", "parquet"), "--table is for a map"),
+    (("feasibility", "half-flip", "--over", "speed=1", "--over", "speed=2"), "--over names speed twice"),
+    (("feasibility", "half-flip", "--over", "angle=0:100:50"), "angle must be from -90 to 90 degrees"),
+    (("feasibility", "flip-roll", "--over", "angle=0:90:50"), "only the gate of a half-flip can be tilted"),
+    (("feasibility", "line", "--over", "vehicle.mass=1", "--planner", "free-knot"), "did you mean"),
+    (("feasibility", "line", "--over", "vehicle.mass=1", "--segments", "3"), "--segments is for --planner"),
+    (("feasibility", "line", "--over", "vehicle.mass=1", "--out", "mine"), "mine/ holds thesis.tex"),
+    (("feasibility", "half-flip", "--least", "weight"), "weight"),
+    (("feasibility", "line", "--least", "gate"), "has no gate that could be smaller"),
+    (("feasibility", "line", "--tolerance", "0"), "tolerance"),
+    (("feasibility", "line", "--out", "mine"), "mine/ holds thesis.tex"),
 )
 
 
@@ -138,9 +143,9 @@ def test_what_nothing_suffices_for_ends_with_its_own_code(capsys) -> None:
         '        raise ab.Infeasible("nothing", ["one attempt"])\n'
     )
     arguments = ("line", "--import", "stuck.py", "--planner", "stuck", "--workers", "1")
-    assert code("need", *arguments) == 3
+    assert code("feasibility", *arguments) == 3
     assert "'line' has no plan on agile-quad" in capsys.readouterr().err
-    assert code("map", *arguments, "--over", "vehicle.mass=0.9,1") == 0
+    assert code("feasibility", *arguments, "--over", "vehicle.mass=0.9,1") == 0
     assert capsys.readouterr().out.count("no plan") == 2
     assert [path.name for path in Path("out").iterdir()] == ["line-stuck-map-vehicle.mass-0.9-1"]
 
@@ -160,7 +165,7 @@ cli.main(sys.argv[1:])
 
 @pytest.mark.process
 @pytest.mark.parametrize("workers", ["1", "2"])
-@pytest.mark.parametrize("command", [("map", "half-flip", "--over", "speed=4:8:2"), NEED[:-2]])
+@pytest.mark.parametrize("command", [("feasibility", "half-flip", "--over", "speed=4:8:2"), NEED[:-2]])
 def test_an_interrupt_leaves_nothing_but_a_word(command: tuple[str, ...], workers: str) -> None:
     ended = subprocess.run(
         [sys.executable, "-c", INTERRUPTED, *command, "--workers", workers],
@@ -174,17 +179,12 @@ def test_an_interrupt_leaves_nothing_but_a_word(command: tuple[str, ...], worker
 
 def test_progress_says_how_many_and_how_long_still() -> None:
     now = [0.0]
-    progress = MapProgress(100, lambda: now[0])
-    assert str(progress) == "0 of 100 cells in 0 s"
+    progress = Progress("cells", 100, lambda: now[0])
+    assert str(progress) == "cells 0 of 100 in 0 s"
     now[0] = 5.0
-    progress.record(20, 12)
-    assert str(progress) == "20 of 100 cells in 5 s: 12 planned; 20 s to go"
-    need = NeedProgress()
-    need.record("ceiling", 3.51, True)
-    need.record("gate", 0.5, False)
-    need.record("ceiling", 3.5, False)
-    assert str(need) == "3 plans tried; ceiling 3.5 refused; gate 0.5 refused"
-    why = WhyProgress()
-    why.record("without limits.velocity", True)
-    why.record("with min_thrust 0", False)
-    assert str(why) == "2 changes tried, 1 would help; with min_thrust 0: no plan"
+    progress.counting("planned")(20, 12)
+    assert str(progress) == "cells 20 of 100 in 5 s: 12 planned; 20 s to go"
+    tried = Progress("plans tried", clock=lambda: now[0])
+    for note in ("ceiling 3.51 planned", "gate 0.5 refused"):
+        tried.step(note)
+    assert str(tried) == "plans tried 2 in 0 s: gate 0.5 refused"

@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 import aerobat as ab
-from aerobat.cli.progress import SweepProgress
+from aerobat.cli.progress import Progress
 from aerobat.interchange import read_table
 from aerobat.studies.sweep.kept import KeptChunks
 from command_lines import code
@@ -141,10 +141,10 @@ from aerobat.cli import main
 from aerobat.studies.sweep import flights, sweep
 
 whole = flights.fly_chunk
-def fly_chunk(task, begin, end):
-    if begin == 100:
+def fly_chunk(task, numbers):
+    if numbers.start == 100:
         os.kill(os.getpid(), signal.SIGKILL)
-    return whole(task, begin, end)
+    return whole(task, numbers)
 fly_chunk.__module__ = flights.__name__
 flights.fly_chunk = sys.modules["aerobat.studies.sweep.sweep"].fly_chunk = fly_chunk
 main(sys.argv[1:])
@@ -164,7 +164,7 @@ def test_after_a_worker_was_killed_the_flights_that_are_kept_are_counted() -> No
     kept, killed = ended.stderr.splitlines()[-2:]
     assert re.fullmatch(r"aerobat: \d+ of 150 flights are kept: the same command goes on from there", kept)
     assert killed == (
-        "aerobat: a worker process was killed or has ended by itself; "
+        "aerobat: worker processes were killed or have ended by themselves; "
         "where memory is short, take fewer workers"
     )
 
@@ -202,8 +202,8 @@ def test_a_sweep_that_cannot_be_flown_leaves_nothing(capsys) -> None:
 
 def test_progress_tells_how_many_how_well_and_how_long_still() -> None:
     now = [0.0]
-    progress = SweepProgress(200, lambda: now[0])
+    progress = Progress("flown", 200, lambda: now[0])
     assert str(progress) == "flown 0 of 200 in 0 s"
     now[0] = 5.0
-    progress.record(50, 49)
-    assert str(progress) == "flown 50 of 200 in 5 s: 98.0 % went well; 15 s to go"
+    progress.counting("went well")(50, 49)
+    assert str(progress) == "flown 50 of 200 in 5 s: 49 went well; 15 s to go"

@@ -36,7 +36,7 @@ def of_ascii(name: str, monkeypatch: pytest.MonkeyPatch) -> io.BytesIO:
     return written
 
 
-@pytest.mark.parametrize("command", ["plan line.plan", "vehicles", "problems", "plan --help"])
+@pytest.mark.parametrize("command", ["plan line.plan", "show", "plan --help"])
 def test_a_terminal_of_ascii_gets_ascii(command: str, monkeypatch: pytest.MonkeyPatch) -> None:
     written = of_ascii("stdout", monkeypatch)
     assert code(*command.split()) == 0
@@ -65,7 +65,7 @@ def test_a_sentence_of_an_error_is_in_ascii_too(monkeypatch: pytest.MonkeyPatch,
 
 
 @has_full
-@pytest.mark.parametrize("command", ["check line.plan --json", "vehicles", "--help"])
+@pytest.mark.parametrize("command", ["check line.plan --json", "show", "--help"])
 def test_a_full_standard_output_is_told(command: str, monkeypatch: pytest.MonkeyPatch, capsys) -> None:
     with FULL.open("w", encoding="utf-8") as full:
         monkeypatch.setattr(sys, "stdout", full)
@@ -77,7 +77,7 @@ def test_a_full_standard_output_is_told(command: str, monkeypatch: pytest.Monkey
 def test_a_full_standard_output_that_keeps_nothing_is_told(monkeypatch: pytest.MonkeyPatch, capsys) -> None:
     with FULL.open("wb", buffering=0) as full:
         monkeypatch.setattr(sys, "stdout", io.TextIOWrapper(full, write_through=True))
-        assert code("vehicles") == 2
+        assert code("show") == 2
     assert capsys.readouterr().err == TOLD
 
 

@@ -11,7 +11,7 @@ import pytest
 
 import aerobat as ab
 from aerobat import cli
-from aerobat.cli.progress import TuningProgress
+from aerobat.cli.progress import Progress
 from aerobat.studies.tune import TUNED
 from shared_plans import shared_plan
 
@@ -55,10 +55,10 @@ def test_gains_that_are_no_better_are_not_written(folder: Path, capsys: pytest.C
 
 
 def test_an_interrupted_search_writes_nothing(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    def interrupt(self: TuningProgress, tried: int, cost: float) -> None:
+    def interrupt(self: Progress, done: int, note: str) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(TuningProgress, "record", interrupt)
+    monkeypatch.setattr(Progress, "tell", interrupt)
     before = sorted(folder.iterdir())
     with pytest.raises(SystemExit) as stop:
         cli.main(["tune", "half-flip", "--vehicle", "slow.toml", *FEW, "20"])
@@ -86,10 +86,3 @@ def test_wrong_command_lines_end_in_a_sentence(
     assert not out
     assert complaint in err
     assert err.count("\n") == 1
-
-
-def test_progress_tells_what_was_tried_and_how_good_it_is() -> None:
-    progress = TuningProgress(150)
-    assert str(progress) == "tuning: 0 of at most 150 sets of gains"
-    progress.record(3, 0.1234)
-    assert str(progress) == "tuning: 3 of at most 150 sets of gains, cost 12.34 cm so far"

@@ -11,11 +11,12 @@ import pytest
 import aerobat as ab
 from aerobat import so3
 from aerobat.arrays import Array
+from aerobat.engines import choose
 from aerobat.engines.components import from_components
 from aerobat.engines.engine import first_row
 from aerobat.engines.pytree import tree_stack
 from aerobat.simulation.autopilot.braking import point_reference
-from aerobat.simulation.autopilot.loop import RATE, autopilot_inputs, autopilot_loop, autopilot_parameters
+from aerobat.simulation.autopilot.loop import RATE, autopilot_inputs, autopilot_setup
 from aerobat.simulation.bodies import bodies
 from aerobat.simulation.loop import Signals
 from aerobat.vehicle import Vehicle, vehicle_names
@@ -31,21 +32,23 @@ def tilts_and_speeds(
     copies = len(fleet)
     zero = np.zeros((copies, 3))
     start = bodies(ab.BodyState(zero, velocity, q_world_body, zero))
-    singles = [autopilot_parameters(start, vehicle, ab.Environment()) for vehicle in fleet]
+    setups = [autopilot_setup(start, vehicle, ab.Environment()) for vehicle in fleet]
     own = tree_stack(
-        [single.own for single in singles], lambda leaves: np.array([x[k] for k, x in enumerate(leaves)])
+        [setup.parameters.own for setup in setups],
+        lambda leaves: np.array([x[k] for k, x in enumerate(leaves)]),
     )
+    parts = [replace(part, parameters=each) for part, each in zip(setups[0].parts, own, strict=True)]
     still = np.zeros((round(seconds * RATE), copies, 3))
     inputs = autopilot_inputs(point_reference(still, still, still, still, 0.0, 9.81), by_attitude)
-    parameters = singles[0]._replace(own=own)
-    loop = autopilot_loop(fleet[0], parameters, first_row(inputs), body_of, len(still))
+    setup = replace(setups[0], parts=tuple(parts))
+    loop = setup.compile_for(choose("auto", copies, len(still)), first_row(inputs), body_of)
     _, flown = loop.scan(loop.init(first_row(inputs)), inputs)
     up = so3.thrust_axis(from_components(flown.q_world_body))[..., 2]
     return np.arccos(np.clip(up, -1.0, 1.0)), np.linalg.norm(from_components(flown.velocity), axis=-1)
 
 
 def body_of(signals: Signals) -> object:
-    return signals["plant"].body
+    return signals.plant.body
 
 
 def any_attitudes(rng: np.random.Generator, copies: int = COPIES) -> Array:

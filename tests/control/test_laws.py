@@ -15,7 +15,7 @@ from aerobat.control.laws.lqr import regulator
 from aerobat.declaration import Positive
 from aerobat.kernels.control_loops import thrust_demand
 from aerobat.kernels.quaternions import axes
-from aerobat.kernels.rigid_body import Wrench
+from aerobat.kernels.rigid_body import RotorWrench
 from aerobat.kernels.vectors import ZERO, dot
 from command_lines import run, without_pictures
 from looping_flights import QUAD, assert_same, loops, near, one
@@ -33,22 +33,22 @@ class ThrustAlone(ab.ControlLaw):
 
     part: Positive = 1.0  # [-] of the thrust
 
-    def step(self, ops: Any, model: Any, state: Any, seen: Seen, elapsed: Any) -> tuple[Any, Wrench]:
+    def step(self, ops: Any, model: Any, state: Any, seen: Seen, elapsed: Any) -> tuple[Any, RotorWrench]:
         """Return the force."""
         demand = thrust_demand(model.airframe.mass_properties, model.environment, seen.reference)
         thrust = dot(demand.value, axes(seen.body.q_world_body)[2])
-        return state, Wrench(self.part * model.airframe.mass_properties.mass * thrust, ZERO)
+        return state, RotorWrench(self.part * model.airframe.mass_properties.mass * thrust, ZERO)
 
 
 @ab.controller("thrust-for-floats")
 class ThrustForFloats(ThrustAlone):
     """The same, as anybody would write it."""
 
-    def step(self, ops: Any, model: Any, state: Any, seen: Seen, elapsed: Any) -> tuple[Any, Wrench]:
+    def step(self, ops: Any, model: Any, state: Any, seen: Seen, elapsed: Any) -> tuple[Any, RotorWrench]:
         """Return the force."""
         if self.part > 0.0 and seen.body.velocity[2] < 1e6:
             return super().step(ops, model, state, seen, elapsed)
-        return state, Wrench(0.0, ZERO)
+        return state, RotorWrench(0.0, ZERO)
 
 
 @pytest.mark.parametrize("law", [*LAWS, ThrustAlone(0.9)], ids=str)

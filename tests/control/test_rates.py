@@ -13,7 +13,7 @@ from aerobat.engines.floats import FloatOps, first_numbers
 from aerobat.environment import Environment
 from aerobat.kernels import motors, rate_loop
 from aerobat.kernels.control import Commands
-from aerobat.kernels.motors import Motion
+from aerobat.kernels.motors import VehicleState
 from aerobat.kernels.rate_loop import RateLoopModel, RateLoopState, RateSetpoint, rate_gains
 from aerobat.kernels.rigid_body import Body, EnvironmentParameters
 from aerobat.vehicle.fleet import Fleet
@@ -35,7 +35,7 @@ def turned(omega: tuple[float, float, float], duration: float) -> np.ndarray:
     """Rates of a vehicle at rest that is asked to turn, a row a tick, with filters that do nothing."""
     model = RateLoopModel(AIRFRAME, MIXER, 0.0, 0.0)
     hover = (HOVER / 4,) * 4
-    motion, state = Motion(STILL, hover), rate_loop.init(hover, STILL.omega_body)
+    motion, state = VehicleState(STILL, hover), rate_loop.init(hover, STILL.omega_body)
     rows = []
     for _ in range(round(duration / TICK)):
         rows.append(motion.body.omega_body)

@@ -24,11 +24,11 @@ INLINE = re.compile(r"`(?:uv run )?(aerobat [^`]+)`")
 LEFT_OPEN = re.compile(r"\.\.\.|…|\[|\||>|\b[A-Z]{3,}\b")  # a placeholder, a choice, another program
 
 
-def commands(page: Path) -> Iterator[str]:
-    """Yield the commands of a page that leave nothing open."""
+def commands(page: Path, in_text: bool = True) -> Iterator[str]:
+    """Yield the commands of a page that leave nothing open: those of its blocks, and of its text."""
     text = page.read_text(encoding="utf-8").replace("\\\n", " ")
     blocks = "\n".join(BLOCK.findall(text))
-    for command in [*SHOWN.findall(blocks), *INLINE.findall(text)]:
+    for command in [*SHOWN.findall(blocks), *(INLINE.findall(text) if in_text else ())]:
         words = shlex.split(command.partition(" #")[0].removesuffix(" &"))
         if len(words) > 1 and not any(map(LEFT_OPEN.search, words)):
             yield shlex.join(words[1:])

@@ -13,6 +13,7 @@ from aerobat.arrays import Array
 from aerobat.engines.components import from_components
 from aerobat.engines.pytree import tree_stack
 from aerobat.kernels.ekf.covariance import unpack
+from aerobat.kernels.imu import ImuSample
 from aerobat.simulation import prepare
 from ekf_flights import CONVERGED, STRIDE, planned
 
@@ -21,7 +22,7 @@ LATENCY = 10  # ticks of `lab`
 
 def filter_row(signals: Any) -> Any:
     """The truth, the filter's state, and the true biases."""
-    return signals["plant"].body, signals["observer"].filter, signals["imu_bias"]
+    return signals.plant.body, signals.observer.own.filter, signals.of(ImuSample)
 
 
 def fused_errors(plan: ab.Plan, conditions: ab.Dispersion, flights: range) -> tuple[Array, Array, Array]:

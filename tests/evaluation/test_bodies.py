@@ -102,12 +102,12 @@ def test_a_dead_rotor_is_carried_through_gates() -> None:
 
 
 @cache
-def scored() -> ab.Scores:
+def scored() -> ab.Score:
     path, problem = cruise()
     return ab.score_flights(path, QUAD, problem=problem)
 
 
-def needing(widths: Array, heights: Array) -> ab.Scores:
+def needing(widths: Array, heights: Array) -> ab.Score:
     """Scores of flights whose bodies swept so much of a gate's plane, NaN where they did not cross it."""
     scores = scored()
     passage = replace(scores.passages[0], needed_width=widths.copy(), needed_height=heights.copy())

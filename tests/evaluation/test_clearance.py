@@ -17,10 +17,10 @@ from aerobat.certification import PlannedPassage
 from aerobat.engines.floats import FloatOps
 from aerobat.limits.body_in_gate import BodyInGate, extent_of_attitude, extent_of_thrust
 from aerobat.planning import PlacedStage
-from aerobat.reporting.report_json import report
+from aerobat.reporting.plain_data import plain
+from aerobat.reporting.report import Report
 from aerobat.simulation import Outcome
-from aerobat.simulation.passages import PASSAGE_DEPTH, passages
-from aerobat.simulation.passages.polyline import gate_progress
+from aerobat.simulation.passages import PASSAGE_DEPTH, log_rows, passages_in_log
 from gate_motions import CROSSING, RATE, Motion, cruise, motion
 from random_problems import random_case
 from score_cases import QUAD
@@ -221,7 +221,8 @@ def upright_passage(gate: ab.Gate, body: ab.Ellipsoid, times: Array, position: l
     """The passage of a body that is moved without turning."""
     states = np.column_stack(position), np.zeros((len(times), 3)), np.tile(so3.IDENTITY, (len(times), 1))
     planned = PlannedPassage(gate, CROSSING, gate.up)
-    return passages(planned, gate_progress(planned, times, states, body), np.array([np.nan])).of_flight(0)
+    rows = log_rows(times, *states)
+    return passages_in_log(rows, (planned,), body, np.array([np.nan]))[0].of_flight(0)
 
 
 def test_who_slides_along_the_plane_into_the_opening_has_hit_the_frame() -> None:
@@ -269,10 +270,10 @@ def test_contact_is_said_with_its_edge_and_its_instant() -> None:
     assert result.outcome is Outcome.HIT_FRAME
     assert result.sentence == f"hit the frame of the gate, {100 * depth:.1f} cm into its lower edge at 0.50 s"
     plan = ab.Plan(problem, path, "by hand", vehicle=QUAD)
-    (facts,) = report(plan, result)["flight"]["passages"]
+    (facts,) = plain(Report(plan, result))["flight"]["passages"]
     assert facts["closest_edge"] == "lower"
     assert (facts["closest_lateral"], facts["closest_up"]) == pytest.approx((0.0, -0.15), abs=1e-3)
-    (unknown,) = report(plan, ab.score(flight, problem))["flight"]["passages"]
+    (unknown,) = plain(Report(plan, ab.score(flight, problem)))["flight"]["passages"]
     assert unknown["clearance"] is unknown["closest_edge"] is unknown["needed_width"] is None
 
 
@@ -311,7 +312,7 @@ def test_a_plan_whose_own_flight_touches_the_frame_does_not_fly_and_says_where()
     assert "1.3 cm into its lower edge at 0.50 s" in str(plan.flyability)
     clearance = ab.score(ab.fly(plan), plan).passages[0].clearance
     assert plan.flyability.passages[0].clearance == pytest.approx(clearance, abs=1e-12)
-    assert report(plan)["plan"]["flyability"]["passages"][0]["clearance_m"] == pytest.approx(clearance)
+    assert plain(Report(plan))["plan"]["flyability"]["passages"][0]["clearance_m"] == pytest.approx(clearance)
 
 
 @pytest.mark.slow

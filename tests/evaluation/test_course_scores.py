@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 import aerobat as ab
-from aerobat.reporting.report_json import report
+from aerobat.reporting.plain_data import plain
+from aerobat.reporting.report import Report
 from aerobat.simulation.passages.waypoint import GRAZING
 
 RED = ab.tilted_gate((3.0, 0.0, 1.0), 0.0, width=2.0, height=2.0, name="red")
@@ -53,7 +54,7 @@ def test_laps_end_with_their_last_passage_and_add_up() -> None:
     first, second = score.laps
     assert (first.end, second.end) == (score.waypoints[1].time, score.passages[3].time)
     assert first.duration + second.duration == pytest.approx(second.end)
-    facts = report(planned(), score)["flight"]["laps"]
+    facts = plain(Report(planned(), score))["flight"]["laps"]
     assert facts == [vars(first), vars(second)]
 
 

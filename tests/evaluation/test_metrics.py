@@ -144,11 +144,24 @@ def test_a_gate_that_a_flight_ends_before_was_not_reached(quad: Vehicle) -> None
 
 
 def test_a_flight_below_the_ground_has_hit_it(quad: Vehicle) -> None:
-    dive = Trajectory(np.array([1.0]), np.array([[[0.0, 0, 1], [0, 0, -2]]]))
+    dive = Trajectory(np.array([1.0]), np.array([[[0.0, 0, 1], [0, 0, -4]]]))
     flight = fly(dive, quad, environment=Environment(ground=0.0))
     result = score(flight, problem())
     assert result.outcome is Outcome.HIT_GROUND
-    assert result.sentence == "hit the ground at 0.50 s"
+    assert result.sentence == "hit the ground at 0.25 s"
+
+
+def test_a_slow_vehicle_that_sinks_a_little_on_the_ground_has_landed_and_a_fast_one_has_hit_it(
+    quad: Vehicle,
+) -> None:
+    air = Environment(ground=0.0)
+    for speed, depth, hits in ((0.5, 0.05, False), (3.0, 0.05, True), (0.5, 0.15, True)):
+        way = 1.0 + depth  # [m]
+        descent = Trajectory(np.array([way / speed]), np.array([[[0.0, 0, 1], [0, 0, -way]]]))
+        flight = fly(descent, quad, environment=air)
+        found = score(flight, problem()).outcome
+        swept = score_flights(descent, quad, problem=problem(), environment=air)[0].outcome
+        assert [each is Outcome.HIT_GROUND for each in (found, swept)] == [hits, hits], (speed, depth)
 
 
 def test_a_flight_through_its_gates_says_how_fast_and_how_far_off_at_the_worst(cruise: Flight) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import asdict
+from operator import itemgetter
 from typing import Any
 
 import numpy as np
@@ -14,29 +15,30 @@ import aerobat as ab
 from aerobat import so3
 from aerobat.arrays import Array
 from aerobat.certification import PlannedPassage, PlannedWaypoint
-from aerobat.engines.components import components
 from aerobat.engines.numpy import ArrayOps
 from aerobat.engines.pytree import tree_map
 from aerobat.kernels.gates import progress
-from aerobat.kernels.gates.section import BoundingEllipsoid
-from aerobat.kernels.gates.snapshot import Snapshot
 from aerobat.problem.ball import Ball
 from aerobat.simulation import Outcome
+from aerobat.simulation.metrics import Criteria, metrics_of_log
 from aerobat.simulation.passages import (
-    PASSAGE_DEPTH,
     PASSAGE_WINDOW,
     Passage,
-    flown_waypoints,
+    WaypointPassage,
+    bounding_ellipsoid,
+    gate_places,
+    log_rows,
     passages,
-    plane_directions,
+    passages_in_log,
+    waypoint_passages,
 )
-from aerobat.simulation.passages.polyline import gate_progress
 from aerobat.simulation.passages.waypoint import GRAZING
 from gate_motions import CRUISE, SPEED
+from polyline_judge import gate_progress
 from score_cases import QUAD
 from suites import examples
 
-FLIGHTS, TICKS = 40, 300
+FLIGHTS, TICKS, LOGGED = 40, 300, 8
 TIMES = np.linspace(0.0, 1.0, TICKS)  # [s]
 PENTAGON = np.array([[0.9, 0.1], [0.3, 0.8], [-0.7, 0.5], [-0.5, -0.6], [0.4, -0.7]])  # [m] in no symmetry
 OPENINGS: tuple[dict[str, Any], ...] = (
@@ -73,34 +75,16 @@ def tick_by_tick(
     planned: PlannedPassage, states: tuple[Array, Array, Array], body: ab.Ellipsoid, ends: Array
 ) -> Passage:
     """Passages of flights of which ticks from `ends` on do not count, by the kernel."""
-    gate = planned.gate
-    directions = plane_directions(gate)
-    plane = progress.GatePlane(
-        components(gate.position),
-        components(gate.normal),
-        directions,
-        gate.opening.circumradius,
-        planned.time,
-        PASSAGE_WINDOW,
-        PASSAGE_DEPTH,
-    )
-    ellipsoid = BoundingEllipsoid(components(body.centre), components(body.semi_axes))
-    found = tree_map(lambda leaf: np.full(FLIGHTS, leaf, dtype=float), progress.init(len(directions)))
-    last = _snapshot(planned, states, 0)
-    for k, time in enumerate(TIMES):
-        now = _snapshot(planned, states, k)
+    [place] = gate_places((planned,), bounding_ellipsoid(body))
+    found = tree_map(lambda leaf: np.full(FLIGHTS, leaf, dtype=float), progress.init(place))
+    rows = log_rows(np.broadcast_to(TIMES[:, None], (TICKS, FLIGHTS)), *states)
+    last = now = tree_map(lambda leaf: leaf[0], rows)
+    for k in range(TICKS):
+        last, now = now, tree_map(itemgetter(k), rows)
         counted = np.full(FLIGHTS, k > 0), k < ends
-        assert now.time[0] == time
         with np.errstate(invalid="ignore"):  # 0/0, of what is not selected
-            found = progress.step(ArrayOps, found, plane, ellipsoid, (last, now), counted)
-        last = now
+            found = progress.step(ArrayOps, found, place, (last, now), counted)
     return passages(planned, found, np.where(ends < TICKS, TIMES[ends - 1], np.nan))
-
-
-def _snapshot(planned: PlannedPassage, states: tuple[Array, Array, Array], k: int) -> Snapshot:
-    position, velocity, q = (part[k] for part in states)
-    time = np.full(FLIGHTS, TIMES[k])
-    return Snapshot(time, *map(components, (position - planned.gate.position, velocity, q)))
 
 
 @pytest.mark.parametrize(
@@ -114,7 +98,9 @@ def _snapshot(planned: PlannedPassage, states: tuple[Array, Array, Array], k: in
 )
 @given(seeds)
 @examples(2)
-def test_a_log_shows_what_was_judged_tick_by_tick(opening: dict[str, Any], seed: int) -> None:
+def test_a_gate_is_judged_tick_by_tick_as_from_the_whole_flight_at_once(
+    opening: dict[str, Any], seed: int
+) -> None:
     rng = np.random.default_rng(seed)
     gate = random_gate(rng, opening)
     body = ab.Ellipsoid(rng.uniform(0.02, 0.3, 3), rng.uniform(-0.05, 0.05, 3))
@@ -124,14 +110,17 @@ def test_a_log_shows_what_was_judged_tick_by_tick(opening: dict[str, Any], seed:
     streamed = tick_by_tick(planned, states, body, ends)
     crossed = 0
     for k, end in enumerate(ends):
-        logged = gate_progress(planned, TIMES[:end], [part[:end, k] for part in states], body)
+        log = [part[:end, k] for part in states]
         stop = np.array([TIMES[end - 1] if end < TICKS else np.nan])
-        one, other = (
-            asdict(found.of_flight(j)) for found, j in ((streamed, k), (passages(planned, logged, stop), 0))
-        )
+        others = [passages(planned, gate_progress(planned, TIMES[:end], log, body), stop)]
+        if k < LOGGED:
+            others += passages_in_log(log_rows(TIMES[:end], *log), (planned,), body, stop)
+        one = asdict(streamed.of_flight(k))
         crossed += bool(np.isfinite(one["time"]))
-        assert one.pop("closest_edge") == other.pop("closest_edge")
-        assert one == pytest.approx(other, abs=1e-9, nan_ok=True)
+        edge = one.pop("closest_edge")
+        for other in (asdict(each.of_flight(0)) for each in others):
+            assert edge == other.pop("closest_edge")
+            assert one == pytest.approx(other, abs=1e-9, nan_ok=True)
     assert crossed > 0
 
 
@@ -148,8 +137,8 @@ def test_a_ball_straight_through_a_gate_is_nearest_to_its_frame_where_geometry_h
     velocity, attitude = np.tile(4.0 * gate.normal, (TICKS, 1)), np.tile(so3.IDENTITY, (TICKS, 1))
     planned = PlannedPassage(gate, 0.5, gate.up)
     states = position, velocity, attitude
-    found = gate_progress(planned, TIMES, states, ab.Ellipsoid((radius, radius, radius)))
-    passage = passages(planned, found, np.array([np.nan])).of_flight(0)
+    rows, body = log_rows(TIMES, *states), ab.Ellipsoid((radius, radius, radius))
+    passage = passages_in_log(rows, (planned,), body, np.array([np.nan]))[0].of_flight(0)
     depth, nearest = depth_in(opening, aside)
     assert (passage.lateral, passage.up) == pytest.approx(tuple(aside), abs=1e-9)
     assert passage.inside == (depth > 0.0)
@@ -162,6 +151,12 @@ def test_a_ball_straight_through_a_gate_is_nearest_to_its_frame_where_geometry_h
     assert -1e-9 <= passage.clearance - (depth - radius) <= 1e-9 + coarse
     closest = np.array([passage.closest_lateral, passage.closest_up])
     assert np.linalg.norm(closest - nearest) < 1e-6 + 50.0 * coarse
+
+
+def waypoint_passage(flight: ab.Flight, planned: PlannedWaypoint) -> WaypointPassage:
+    """The passage of a flight by a waypoint."""
+    [found] = metrics_of_log(flight, Criteria(waypoints=(planned,)), None).waypoints
+    return waypoint_passages(planned, found, flight.diverged_at).of_flight(0)
 
 
 def depth_in(opening: dict[str, Any], point: Array) -> tuple[float, Array]:
@@ -187,7 +182,7 @@ def test_a_waypoint_is_judged_by_the_nearest_approach_within_its_window(
     flight = ab.fly(CRUISE, QUAD)
     centre = np.array([SPEED, aside * np.cos(turn), 1.0 + aside * np.sin(turn)])
     planned = PlannedWaypoint("point", Ball(centre, radius), 1.0 - late)
-    (passage,) = (found.of_flight(0) for found in flown_waypoints(flight, (planned,)))
+    passage = waypoint_passage(flight, planned)
     beyond = max(abs(late) - PASSAGE_WINDOW, 0.0)  # [s] by which the nearest is outside of the window
     step = flight.times[1] - flight.times[0]
     assert passage.time == pytest.approx(1.0 - np.sign(late) * beyond, abs=2e-3 + step)
@@ -203,5 +198,5 @@ def test_a_waypoint_missed_by_more_than_what_grazes_it_is_missed() -> None:
     flight = ab.fly(CRUISE, QUAD)
     for beyond, failure in ((0.5 * GRAZING, None), (2.0 * GRAZING, Outcome.MISSED_WAYPOINT)):
         planned = PlannedWaypoint("point", Ball(np.array([SPEED, 0.0, 1.3]), 0.3 - beyond), 1.0)
-        (passage,) = (found.of_flight(0) for found in flown_waypoints(flight, (planned,)))
+        passage = waypoint_passage(flight, planned)
         assert (passage.failure and passage.failure[0]) is failure

@@ -14,7 +14,8 @@ import aerobat as ab
 from aerobat import so3
 from aerobat.planning import PlacedStage
 from aerobat.problem import Tolerance
-from aerobat.reporting.sweeps.table import sweep_report, sweep_table
+from aerobat.reporting.plain_data import plain
+from aerobat.reporting.tables import table
 from aerobat.simulation import Outcome
 from gate_motions import CRUISE, SPEED
 from looping_flights import one
@@ -97,10 +98,10 @@ def test_flights_that_keep_no_log_are_kept_to_the_same_tolerance(
 def test_a_sweep_says_what_its_flights_are_judged_by() -> None:
     swept = ab.sweep(cruising(), ab.Dispersion(rotor=0.05), runs=8, workers=1)
     judged = "the whole path within 10.00 cm, attitudes of stages within 10°"
-    assert sweep_report(swept)["judged_by"] == judged
+    assert plain(swept)["judged_by"] == judged
     console = Console(width=200)
     with console.capture() as shown:
-        console.print(sweep_table(swept))
+        console.print(table(swept))
     assert judged in shown.get()
     far = swept.table["max_position_error_m"] > 0.1
     assert (swept.table["outcome"][far] != "complete").all()

@@ -171,14 +171,15 @@ def test_the_shipped_rviz_configurations_show_what_is_published(middleware: str)
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        (("ros1",), "ROS 1 needs rospy.*/opt/ros/noetic/setup.bash"),
-        (("ros2",), "ROS 2 needs rclpy.*/opt/ros/DISTRIBUTION/setup.bash"),
-        (("ros1-vehicle",), "ROS 1 needs rospy"),
-        (("ros2-vehicle", "--speed", "0.5"), "ROS 2 needs rclpy"),
-        (("ros2", "flip-rool"), "did you mean 'flip-roll'"),
-        (("ros1", "--vehicle", "agile-quda"), "agile-quad"),
-        (("ros1", "--reserve", "0.7"), "reserve"),
-        (("ros2", "--rate", "1000"), "rate"),
+        (("link", "ros", "--ros", "1"), "ROS 1 needs rospy.*/opt/ros/noetic/setup.bash"),
+        (("link", "ros"), "ROS 2 needs rclpy.*/opt/ros/DISTRIBUTION/setup.bash"),
+        (("link", "ros-vehicle", "--ros", "1"), "ROS 1 needs rospy"),
+        (("link", "ros-vehicle", "--speed", "0.5"), "ROS 2 needs rclpy"),
+        (("link", "ros", "flip-rool"), "did you mean 'flip-roll'"),
+        (("link", "ros", "--vehicle", "agile-quda"), "agile-quad"),
+        (("link", "ros", "--reserve", "0.7"), "reserve"),
+        (("link", "ros", "--rate", "1000"), "rate"),
+        (("link", "ros", "--ros", "1", "--sim-time"), "--sim-time is for --ros 2"),
     ],
 )
 def test_what_is_missing_or_wrong_is_said_in_a_sentence(

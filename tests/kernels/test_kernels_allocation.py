@@ -48,7 +48,7 @@ def parameters(vehicle: Vehicle, count: int) -> tuple[Rotors, Mixer]:
 def allocate(vehicle: Vehicle, load: Wrench) -> np.ndarray:
     """Thrusts for a batch of loads (k,): exact where they fit, the kernel's `desaturate` elsewhere."""
     rotors, mixer = parameters(vehicle, len(load.thrust))
-    desired = rigid_body.Wrench(load.thrust, components(load.moment_body))
+    desired = rigid_body.RotorWrench(load.thrust, components(load.moment_body))
     exact = mix(mixer, desired)
     limited, feasible = desaturate(ArrayOps, rotors, mixer, desired), within_limits(rotors, exact)
     chosen = tuple(np.where(feasible, f, g) for f, g in zip(exact, limited, strict=True))
@@ -161,7 +161,7 @@ def test_floats_allocate_as_arrays_do(rotors: int, seed: int) -> None:
     together = allocate(vehicle, load)
     rotors, mixer = tree_map(lambda leaf: leaf[0], parameters(vehicle, 1))
     for k in range(5):
-        desired = rigid_body.Wrench(load.thrust[k], tuple(load.moment_body[k]))
+        desired = rigid_body.RotorWrench(load.thrust[k], tuple(load.moment_body[k]))
         exact = mix(mixer, desired)
         alone = exact if within_limits(rotors, exact) else desaturate(FloatOps, rotors, mixer, desired)
         np.testing.assert_allclose(alone, together[k], rtol=0, atol=1e-12 * span(vehicle))

@@ -11,14 +11,14 @@ from hypothesis import strategies as st
 
 from aerobat import so3
 from aerobat.certification import Side, certify
-from aerobat.certification.envelope import Envelope
 from aerobat.environment import Environment
 from aerobat.flatness import reference
 from aerobat.limits import Limit, limits_along
 from aerobat.limits.limit import size_of
-from aerobat.planning.miqp import formulate
+from aerobat.planning.miqp.miqp import formulate
 from aerobat.planning.refinement.limit_values import Frames, LimitValues
 from aerobat.planning.refinement.refine import knots_at_stages
+from aerobat.planning.task import Task
 from aerobat.planning.time_optimal.optimal_control.bounds import LOOKS, Bounds
 from aerobat.planning.warm_start import WarmStart
 from aerobat.problem import Condition, Limits, Problem, load_problem
@@ -48,14 +48,14 @@ def craft(request: pytest.FixtureRequest) -> Vehicle:
     return replace(load_vehicle("agile-quad"), drag_body=drag, max_body_rate=40.0)
 
 
-def asked(craft: Vehicle) -> tuple[Limit, ...]:
-    """A limit of every family."""
-    problem = replace(load_problem("flip-roll"), limits=BOX, environment=WIND)
-    return limits_along(craft, WIND, problem.path_limits, (CONDITION,))
+def asked(craft: Vehicle) -> Task:
+    """A task with a limit of every family."""
+    task = Task.of(replace(load_problem("flip-roll"), limits=BOX, environment=WIND), craft)
+    return replace(task, stages=replace(task.stages, path_constraints=(CONDITION,)))
 
 
 def sampled(flown: Trajectory, craft: Vehicle, times: np.ndarray) -> tuple[LimitValues, np.ndarray, Frames]:
-    rows = LimitValues(asked(craft), craft, WIND, flown.heading)
+    rows = LimitValues(asked(craft))
     derivatives = np.stack([flown.evaluate(times, k) for k in range(6)], axis=1)
     return rows, derivatives, rows.frames(times, derivatives)
 
@@ -132,8 +132,7 @@ def test_second_derivatives_of_every_limit_are_differences_of_its_slopes(
 
 
 def test_collocation_looks_at_what_flatness_says_of_every_limit(flown: Trajectory, craft: Vehicle) -> None:
-    problem = replace(load_problem("flip-roll"), limits=BOX, environment=WIND)
-    bounds = Bounds.of(problem, craft)
+    bounds = Bounds.of(asked(craft))
     times = flown.knots[:-1, None] + LOOKS * flown.durations[:, None]
     inner = times[:, 6:-6].ravel()  # differences in time know nothing of knots
     found = bounds.along(flown)[:, 6:-6].reshape(len(inner), -1)
@@ -148,10 +147,8 @@ def test_a_certificate_states_every_limit_as_far_as_samples_reach_and_little_fur
     flown: Trajectory, craft: Vehicle
 ) -> None:
     times = np.linspace(1e-5, flown.duration - 1e-5, 1500)
-    problem = replace(load_problem("flip-roll"), limits=BOX, environment=WIND)
-    envelope = Envelope(limits=problem.path_limits, conditions=(CONDITION,))
-    findings = certify(flown, craft, WIND, envelope).findings
-    for limit in asked(craft):
+    findings = certify(flown, craft, WIND, asked(craft).envelope()).findings
+    for limit in asked(craft).limits:
         if not limit.is_proven:
             continue
         values = by_flatness(flown, craft, times, limit, along_b3=True)
@@ -172,9 +169,9 @@ def test_a_certificate_states_every_limit_as_far_as_samples_reach_and_little_fur
 
 def test_the_search_holds_the_linear_limits_and_no_other(craft: Vehicle) -> None:
     problem = replace(load_problem("line"), limits=replace(BOX, snap=np.inf), environment=WIND)
-    free = formulate(replace(problem, limits=Limits()), 4, 10, craft)
-    held = formulate(problem, 4, 10, craft)
-    assert all(limit.quantity.is_of_path for limit in held.limits if limit.linear)
+    free = formulate(Task.of(replace(problem, limits=Limits()), craft), 4, 10)
+    held = formulate(Task.of(problem, craft), 4, 10)
+    assert all(limit.quantity.is_of_path for limit in held.task.limits if limit.linear)
     lower, upper = held.program(0.2).lower, held.program(0.2).upper
     assert np.isfinite([*lower, *upper]).sum() > np.isfinite([*free.program(0.2).lower]).sum()
 

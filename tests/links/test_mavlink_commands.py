@@ -41,6 +41,7 @@ def simulated_vehicle(*options: str) -> Iterator[str]:
         sys.executable,
         "-m",
         "aerobat",
+        "link",
         "mavlink-vehicle",
         "agile-quad",
         "--listen",
@@ -88,7 +89,17 @@ def test_two_processes_fly_the_flip_through_its_gate_over_udp(plan: Path) -> Non
 def flown(plan: Path, speed: str) -> tuple[dict[str, Any], str]:
     """What came of a flight in two processes, and what was said of it."""
     with simulated_vehicle("--loss", "0.01", "--delay", "0.02", "--speed", speed) as address:
-        command = [sys.executable, "-m", "aerobat", "mavlink", str(plan), "--connect", address, "--json"]
+        command = [
+            sys.executable,
+            "-m",
+            "aerobat",
+            "link",
+            "mavlink",
+            str(plan),
+            "--connect",
+            address,
+            "--json",
+        ]
         options = ["--speed", speed, "--origin", "0", "0", "1.5"]
         done = subprocess.run([*command, *options], capture_output=True, text=True, check=False)
     assert done.returncode in (0, 1), done.stderr
@@ -130,7 +141,7 @@ def test_bad_input_ends_in_a_sentence_and_flies_nothing(
     monkeypatch.chdir(tmp_path)
     ab.write_csv(flip().trajectory, "path.csv")
     meant = {"PLAN": str(plan), "NOBODY": f"udp:127.0.0.1:{free_port()}"}
-    code, _, err = run(capsys, "mavlink", *(meant.get(each, each) for each in arguments))
+    code, _, err = run(capsys, "link", "mavlink", *(meant.get(each, each) for each in arguments))
     assert code == 2, err
     assert err.count("\n") == 1, err
     assert words in err
@@ -141,7 +152,13 @@ def test_a_port_that_is_taken_is_told(capsys) -> None:
         taken.bind(("127.0.0.1", 0))
         taken.listen()
         code, _, err = run(
-            capsys, "mavlink-vehicle", "--listen", f"tcpin:127.0.0.1:{taken.getsockname()[1]}", "--for", "0.1"
+            capsys,
+            "link",
+            "mavlink-vehicle",
+            "--listen",
+            f"tcpin:127.0.0.1:{taken.getsockname()[1]}",
+            "--for",
+            "0.1",
         )
     assert code == 2
     assert re.search("cannot open .*: Address already in use", err)
@@ -167,7 +184,7 @@ def test_a_server_by_tcp_lets_the_next_client_in_where_one_has_hung_up(how: str)
 def test_without_pymavlink_the_command_that_installs_it_is_told(plan: Path, capsys, monkeypatch) -> None:
     connection.dialect.cache_clear()
     monkeypatch.setattr(connection, "find_spec", lambda name: None)
-    code, _, err = run(capsys, "mavlink", str(plan))
+    code, _, err = run(capsys, "link", "mavlink", str(plan))
     assert code == 2
     assert err.endswith('install it with pip install "aerobat[mavlink]"\n')
 

@@ -14,7 +14,7 @@ import pytest
 import aerobat as ab
 from aerobat.errors import SpecError
 from aerobat.links.goals import Mode
-from aerobat.links.mavlink.client import ClientSettings, Stage
+from aerobat.links.mavlink.client import ClientSettings, ClientStage
 from aerobat.links.mavlink.connection import dialect
 from aerobat.links.mission import MissionSettings, Phase, require_flyable
 from mavlink_sky import ORIGIN, Sky, flip, over_a_link
@@ -68,7 +68,7 @@ def test_without_news_of_the_vehicle_the_plan_is_given_up() -> None:
     sky = over_a_link()
     sky.run_into_the_plan(1.1)
     sky.cable.receives = False
-    sky.run(lambda: sky.client.stage is Stage.RECOVERING)
+    sky.run(lambda: sky.client.stage is ClientStage.RECOVERING)
     assert sky.since_begin < 2.0
     assert "no news of the vehicle" in sky.client.report().aborted
 
@@ -97,7 +97,7 @@ def test_states_that_are_none_are_left_out_and_their_silence_ends_the_flight(
         return [message]
 
     sky.cable.change = change
-    sky.run(lambda: sky.client.stage is Stage.RECOVERING, limit=1.5)
+    sky.run(lambda: sky.client.stage is ClientStage.RECOVERING, limit=1.5)
     assert "no news of the vehicle" in sky.client.report().aborted
     assert any("states are left out that are not finite" in sentence for sentence in sky.said)
     assert np.isfinite(setpoint_numbers(sky)).all()
@@ -134,7 +134,7 @@ def test_a_state_from_the_future_leaves_the_watch_for_silence_on() -> None:
         return [message]
 
     sky.cable.change = change
-    sky.run(lambda: sky.client.stage is Stage.RECOVERING, limit=0.5)
+    sky.run(lambda: sky.client.stage is ClientStage.RECOVERING, limit=0.5)
     assert "no news of the vehicle" in sky.client.report().aborted
 
 
@@ -165,10 +165,10 @@ def test_a_link_that_is_cut_in_mid_flip_gives_it_up_and_lands_once_it_is_back(cu
     for way in ("receives", "sends") if cut == "both" else (cut,):
         setattr(sky.cable, way, False)
     sky.run_for(2.0)
-    assert sky.client.stage is Stage.RECOVERING
+    assert sky.client.stage is ClientStage.RECOVERING
     sky.cable.receives = sky.cable.sends = True
     sky.run(lambda: sky.client.done)
-    assert sky.client.stage is Stage.LANDED
+    assert sky.client.stage is ClientStage.LANDED
     assert not sky.vehicle.crashed
     report = sky.client.report()
     assert not report.is_success
@@ -182,7 +182,7 @@ def test_a_link_that_stays_cut_is_left_to_the_vehicles_own_failsafe() -> None:
     sky.run_into_the_plan(0.9)
     sky.cable.receives = sky.cable.sends = False
     sky.run(lambda: sky.client.done)
-    assert sky.client.stage is Stage.LOST
+    assert sky.client.stage is ClientStage.LOST
     assert sky.hovers
     assert "failsafe" in sky.said[-1]
 
@@ -197,7 +197,7 @@ def test_a_set_point_that_is_late_gives_the_plan_up() -> None:
     sky.client_lives = True
     sky.run(lambda: sky.client.done)
     assert sky.client.report().aborted == "a set-point was 0.08 s late"
-    assert sky.client.stage is Stage.LANDED
+    assert sky.client.stage is ClientStage.LANDED
     assert not sky.vehicle.crashed
 
 
@@ -205,7 +205,7 @@ def test_an_error_over_its_bound_is_told_and_the_vehicle_brought_to_rest() -> No
     sky = over_a_link(settings=MissionSettings(max_error=0.005))
     sky.run(lambda: sky.client.mission.phase is not Phase.MANEUVER)
     assert "off its path" in sky.client.report().aborted
-    assert sky.client.stage is Stage.RECOVERING
+    assert sky.client.stage is ClientStage.RECOVERING
 
 
 @pytest.mark.slow
@@ -216,7 +216,7 @@ def test_an_error_over_its_bound_gives_the_plan_up() -> None:
     sky = Sky(vehicle=replace(own, drag_body=np.full(3, 0.8)), mission=MissionSettings(max_error=0.3))
     sky.run(lambda: sky.client.done)
     assert "off its path" in sky.client.report().aborted
-    assert sky.client.stage is Stage.LANDED
+    assert sky.client.stage is ClientStage.LANDED
     assert not sky.vehicle.crashed
 
 
@@ -231,7 +231,7 @@ def test_a_pilot_who_takes_over_is_not_interfered_with() -> None:
     sky.client.link._take_heartbeat(beat)
     sky.cable.send = lambda message: sent.append(message.get_type())  # type: ignore[method-assign]
     sky.client.tick(sky.clock.now() + 0.001)
-    assert sky.client.stage is Stage.LOST
+    assert sky.client.stage is ClientStage.LOST
     assert not {"COMMAND_LONG", "SET_ATTITUDE_TARGET", "SET_POSITION_TARGET_LOCAL_NED"} & set(sent)
 
 
@@ -249,7 +249,7 @@ def test_a_vehicle_that_says_not_where_it_hovers_is_asked_of_the_user() -> None:
         sky.run(lambda: sky.client.done)
     told = Sky(settings=ClientSettings(hover_thrust=1.0 / 3.3))
     del told.front_end.parameters["MPC_THR_HOVER"]
-    told.run(lambda: told.client.stage is Stage.FLYING)
+    told.run(lambda: told.client.stage is ClientStage.FLYING)
 
 
 def with_a_second_system(sky: Sky) -> Sky:
@@ -307,7 +307,7 @@ def test_a_vehicle_that_says_it_was_disarmed_in_flight_is_told_to_hover_and_land
     sky = over_a_link()
     sky.run_into_the_plan(0.2)
     sky.cable.change = changing("HEARTBEAT", base_mode=1)
-    sky.run(lambda: sky.client.stage is Stage.RECOVERING, limit=1.0)
+    sky.run(lambda: sky.client.stage is ClientStage.RECOVERING, limit=1.0)
     assert sky.client.report().aborted == "the vehicle was disarmed"
     sky.run(lambda: sky.vehicle.mode is Mode.HOLD, limit=0.2)
 
@@ -318,7 +318,7 @@ def test_a_vehicle_that_is_not_seen_after_an_abort_is_told_to_land_and_does() ->
     sky.cable.change = changing("ODOMETRY", vx=nan)
     sky.run(lambda: sky.client.done)
     assert "no news of the vehicle; it is told to land" in sky.said
-    assert sky.client.stage is Stage.LANDED
+    assert sky.client.stage is ClientStage.LANDED
     assert sky.vehicle.landed
     assert not sky.vehicle.crashed
 
@@ -331,7 +331,7 @@ def test_a_vehicle_that_seems_to_move_after_an_abort_is_told_to_land_all_the_sam
     sky.cable.change = changing("ODOMETRY", vx=1.0)
     sky.run(lambda: sky.client.done, limit=100.0)
     assert "the vehicle does not come to a hover; it is told to land" in sky.said
-    assert sky.client.stage is Stage.LANDED
+    assert sky.client.stage is ClientStage.LANDED
 
 
 @pytest.mark.slow
@@ -342,7 +342,7 @@ def test_a_vehicle_that_does_not_land_is_left_with_a_sentence() -> None:
     sky.vehicle.land = lambda: False  # type: ignore[method-assign]
     sky.run(lambda: sky.client.done, limit=120.0)
     assert sky.said[-1] == "the vehicle does not land as it is told; it is left to its own failsafe"
-    assert sky.client.stage is Stage.LOST
+    assert sky.client.stage is ClientStage.LOST
     assert sky.hovers
 
 
@@ -352,7 +352,7 @@ def test_a_pilot_who_takes_over_after_an_abort_is_not_interfered_with() -> None:
     sky.client.abort(sky.clock.now(), "enough")
     sky.run_for(0.1)
     sky.cable.change = changing("HEARTBEAT", custom_mode=1 << 16)
-    sky.run(lambda: sky.client.stage is Stage.LOST, limit=1.0)
+    sky.run(lambda: sky.client.stage is ClientStage.LOST, limit=1.0)
     assert sky.said[-1] == "a pilot has taken over; it is left to the pilot"
     assert sky.client.report().aborted == "enough"
 
@@ -417,7 +417,7 @@ def test_what_is_not_proven_for_its_vehicle_is_refused() -> None:
     plan = flip()
     bare = replace(plan, vehicle=None)
     assert plan.vehicle is not None
-    weak = replace(plan.vehicle, rotors=tuple(replace(r, max_thrust=6.0) for r in plan.vehicle.rotors))
+    weak = replace(plan.vehicle, rotors=tuple(replace(r, max_thrust=5.0) for r in plan.vehicle.rotors))
     refuted = replace(plan, vehicle=weak)
     require_flyable(plan, ORIGIN, "agile-quad")
     for wrong, words in (

@@ -15,9 +15,11 @@ from hypothesis import strategies as st
 import aerobat as ab
 from aerobat.optimization import AssignmentProgram, SlottedStage, improved_in_windows, solver
 from aerobat.optimization.moving_window import WIDTH, evenly_spread
-from aerobat.planning.miqp import diagnosis, formulate
+from aerobat.planning.miqp import diagnosis
+from aerobat.planning.miqp.miqp import formulate
 from aerobat.planning.recorder import Attempt
-from aerobat.reporting.tables import plan_facts
+from aerobat.planning.task import Task
+from aerobat.reporting.facts import facts
 from suites import examples
 
 SLOTS = 6
@@ -128,7 +130,7 @@ def course() -> ab.Problem:
 
 
 def test_a_course_costs_a_fraction_of_what_a_short_search_of_the_whole_finds() -> None:
-    program = formulate(ab.load_problem("race-7"), 4, 28).program(9.0 / 28)
+    program = formulate(Task.of(ab.load_problem("race-7")), 4, 28).program(9.0 / 28)
     short = solver().solve(program, node_limit=500)
     placed = improved_in_windows(program, short)
     assert placed.cost < 0.4 * short.cost
@@ -137,7 +139,7 @@ def test_a_course_costs_a_fraction_of_what_a_short_search_of_the_whole_finds() -
 
 @pytest.mark.parametrize("intervals", [18, pytest.param(28, marks=pytest.mark.slow)])
 def test_windows_place_seven_points_as_the_search_that_proves_it(intervals: int) -> None:
-    program = formulate(ab.load_problem("race-7"), 4, intervals).program(9.0 / intervals)
+    program = formulate(Task.of(ab.load_problem("race-7")), 4, intervals).program(9.0 / intervals)
     placed = improved_in_windows(program, solver().solve(program, node_limit=50))
     proven = solver().solve(program, start=placed.slots)
     assert proven.status == "optimal"
@@ -147,8 +149,8 @@ def test_windows_place_seven_points_as_the_search_that_proves_it(intervals: int)
 def test_where_searches_end_without_an_answer_no_plan_is_denied(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(diagnosis, "_binding", lambda *_: iter(()))
     ended = Attempt(2.0, False, "unknown", "", None, 500, 1.0)
-    formulation = formulate(course(), 4, 24)
-    said = diagnosis.why_infeasible(formulation, [ended, replace(ended, status="infeasible")], None)
+    formulation = formulate(Task.of(course()), 4, 24)
+    said = diagnosis.why_infeasible(formulation, [ended, replace(ended, status="infeasible")])
     assert "1 of 2 programs" in said
     assert "exclude each other" not in said
 
@@ -161,7 +163,7 @@ def test_a_plan_placed_in_windows_states_its_gap() -> None:
     assert plan.cost is not None
     assert plan.bound <= plan.cost
     assert plan.gap == pytest.approx(1.0 - plan.bound / plan.cost, abs=1e-9)
-    said = dict(plan_facts(plan))
+    said = {fact.label: fact.said for fact in facts(plan)}
     if plan.gap > 1e-6:
         assert any("% of the optimum" in str(each) for each in said.values())
 
@@ -179,5 +181,5 @@ def test_a_course_without_room_for_its_stages_is_refused_at_once_with_the_leg_an
     names = [stage.name for stage in problem.stages(1.0).stages]
     assert names.index(said[2]) == names.index(said[1]) + 1
     for intervals, has_room in ((20, False), (int(said[3]), True)):
-        formulation = formulate(problem, 5, intervals, vehicle)
+        formulation = formulate(Task.of(problem, vehicle), 5, intervals)
         assert (diagnosis.leg_without_room(formulation, 0.5) is None) == has_room

@@ -14,7 +14,6 @@ from aerobat.errors import AerobatError, BackendMissing, SpecError
 from aerobat.optimization import (
     BACKENDS,
     AssignmentProgram,
-    LinearDynamics,
     SlottedStage,
     available_backends,
     backends,
@@ -38,27 +37,6 @@ def test_a_stage_takes_the_cheaper_slot() -> None:
     assert result.slots == (0,)
     np.testing.assert_allclose(result.x, [0.75, 0.25], atol=1e-12)
     assert result.cost == pytest.approx(0.75**2 + 2.0 * 0.25**2)
-
-
-@pytest.mark.parametrize(
-    ("change", "named"),
-    [
-        ({"transition": np.ones((2, 3))}, "dynamics: transition must be square"),
-        ({"transition": [[np.nan]]}, "dynamics: transition"),
-        ({"gain": np.ones((1, 2))}, "dynamics: gain"),
-        ({"columns": [0, 1]}, "dynamics: columns must be a table of variables"),
-        ({"columns": [[0], [0]]}, "dynamics: columns must name all 2 variables, each once"),
-        ({"columns": [[0.5], [1.0]]}, "dynamics: columns must be whole numbers"),
-        ({"columns": [[0]]}, "dynamics: columns must name all 2 variables"),
-        ({"columns": [[1], [2]]}, "dynamics: columns must name all 2 variables"),
-        ({"columns": [[0, 1]], "gain": [[1.0, 1.0]]}, "a line for every slot of the stages, got 1"),
-    ],
-)
-def test_dynamics_that_do_not_fit_a_program_are_refused(change: dict[str, Any], named: str) -> None:
-    fits: dict[str, Any] = {"transition": [[1.0]], "gain": [[1.0]], "columns": [[0], [1]]}
-    assert AssignmentProgram(**GOOD, dynamics=LinearDynamics(**fits)).dynamics is not None
-    with pytest.raises(SpecError, match=named):
-        AssignmentProgram(**GOOD, dynamics=LinearDynamics(**fits | change))
 
 
 @pytest.mark.parametrize(

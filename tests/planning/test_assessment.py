@@ -12,9 +12,10 @@ import aerobat as ab
 from aerobat.planning import Plan, with_second_opinion
 from aerobat.planning.rotor_margin import RotorMargin
 from aerobat.reporting.figures import report_figure
-from aerobat.reporting.report_json import report
+from aerobat.reporting.plain_data import plain
+from aerobat.reporting.report import Report
 from aerobat.reporting.style import RED
-from aerobat.reporting.tables import summary_table
+from aerobat.reporting.tables import table
 from aerobat.vehicle import Rotor
 from shared_plans import shared_plan
 
@@ -160,9 +161,9 @@ def test_table_and_report_tell_the_assessment_and_the_table_its_warnings_in_red(
     assert ab.load_plan(tmp_path / "dive.plan").assessment == found.assessment
     console = Console(width=200, force_terminal=True, color_system="standard")
     with console.capture() as capture:
-        console.print(summary_table(found, None, "agile-quad"))
+        console.print(table(Report(found)))
     assert "\x1b[31mdives 2.5 m below" in capture.get()
-    told = report(found)["plan"]["assessment"]
+    told = plain(Report(found))["plan"]["assessment"]
     assert told["lowest_m"] == pytest.approx(-1.5, abs=0.05)
     assert told["ratio"] > 1.0
     assert told["second_opinion"] is None
@@ -170,7 +171,7 @@ def test_table_and_report_tell_the_assessment_and_the_table_its_warnings_in_red(
 
 
 def test_a_report_tells_how_near_a_plan_is_to_what_is_possible() -> None:
-    told = report(line())["plan"]["assessment"]
+    told = plain(Report(line()))["plan"]["assessment"]
     assert told["sentence"].startswith(f"at most {told['ratio']:.2f} times the shortest possible")
 
 

@@ -18,7 +18,7 @@ from aerobat.links.mission import Mission, MissionSettings
 from aerobat.links.path_follower import PathForwarder
 from aerobat.links.stream import SetpointStream
 from aerobat.planning import least_duration
-from aerobat.reporting.tables import flight_facts
+from aerobat.reporting.facts import facts
 from aerobat.trajectory import Trajectory
 from random_flights import with_lags
 
@@ -101,8 +101,8 @@ def test_a_flight_begins_in_the_laps_state_and_is_judged_and_timed_all_the_way_r
     (lap,) = score.laps
     assert lap.duration == pytest.approx(plan.duration, abs=1e-3)
     assert (lap.end, plan.laps[0]) == pytest.approx((plan.duration, plan.duration), abs=1e-3)
-    row = dict(flight_facts(score))["lap 1"]
-    assert row == f"{lap.duration:.3f} s, until {lap.end:.3f} s"
+    (lap_1,) = (fact.said for fact in facts(score) if fact.label == "lap 1")
+    assert lap_1 == f"{lap.duration:.3f} s, until {lap.end:.3f} s"
     assert ab.score_flights(plan)[0].laps[0].duration == pytest.approx(lap.duration, abs=1e-6)
 
 

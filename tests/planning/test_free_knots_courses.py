@@ -9,6 +9,7 @@ from aerobat.planning import FreeKnots, MinSnap, Plan
 from aerobat.planning.flyability import FlownPassage, OwnFlight, own_flight
 from aerobat.planning.gate_clearance import more_direct
 from aerobat.planning.rotor_margin import reserve_shortfalls
+from aerobat.planning.task import Task
 from aerobat.problem import Course, PassGate, Problem, at_rest, load_problem, tilted_gate
 from aerobat.vehicle import Vehicle, load_vehicle
 from random_flights import with_lags
@@ -82,19 +83,19 @@ def test_tilted_gates_are_passed_with_the_whole_body_anywhere_or_upright_as_aske
     ]
     assert min(np.linalg.norm(offset) for offset in offsets[0::2]) > 0.05  # no one's centre is asked
     assert max(np.linalg.norm(offset) for offset in offsets[1::2]) < 1e-5
-    flight = own_flight(plan.trajectory, JERKY, plan.problem, plan.stages)
+    flight = own_flight(Task.of(plan.problem, JERKY), plan.trajectory, plan.stages)
     assert all(passage.clearance is not None and passage.clearance > 0.0 for passage in flight.passages)
 
 
 def test_a_path_is_made_more_direct_by_less_where_the_body_only_touches_the_frame() -> None:
-    problem = load_problem("flip-roll")
-    stages = problem.stages(QUAD.max_specific_thrust, QUAD.body_radius).stages
+    task = Task.of(load_problem("flip-roll"), QUAD)
+    stages = task.stages.stages
 
     def raised_by(clearance: float) -> float:
-        missed = FlownPassage(problem.gates[0].name, 0.0, None, "hit the frame", clearance)
+        missed = FlownPassage(task.problem.gates[0].name, 0.0, None, "hit the frame", clearance)
         flight = OwnFlight(error=0.0, passages=(missed,))
-        (body,) = more_direct((), stages, problem, QUAD, flight)
-        (again,) = more_direct((body,), stages, problem, QUAD, flight)
+        (body,) = more_direct((), stages, task, flight)
+        (again,) = more_direct((body,), stages, task, flight)
         return again.bending / body.bending
 
     assert 1.0 < raised_by(-0.001) < raised_by(-0.1)

@@ -6,6 +6,7 @@ import pytest
 
 from aerobat.planning import FreeKnots, Miqp, Planner, TimeOptimal, plan
 from aerobat.planning.gate_clearance import bodies_in_gates
+from aerobat.planning.task import Task
 from aerobat.problem import Course, PassGate, Problem, at_rest, load_problem, tilted_gate
 from aerobat.vehicle import load_vehicle
 from places import CASES
@@ -43,5 +44,4 @@ def test_openings_of_any_shape_may_have_room_for_the_body(shape: dict[str, objec
     shaped = tuple(replace(gate, width=None, height=None, **shape) for gate in gates)
     course = Course(tuple(PassGate(gate.name, crossing_point="free") for gate in gates))
     problem = Problem("shapes", at_rest((0.0, 0.0, 1.0)), at_rest((6.0, 0.0, 1.0)), course, shaped)
-    stages = problem.stages(QUAD.max_specific_thrust, QUAD.body_radius).stages
-    assert [body.stage for body in bodies_in_gates(stages, problem, QUAD)] == [0, 1]
+    assert [body.stage for body in bodies_in_gates(Task.of(problem, QUAD))] == [0, 1]

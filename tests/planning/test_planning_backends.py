@@ -8,6 +8,7 @@ from aerobat.errors import Infeasible
 from aerobat.optimization import solver
 from aerobat.planning import Miqp, plan
 from aerobat.planning.miqp.miqp import formulate
+from aerobat.planning.task import Task
 from aerobat.problem import load_problem
 
 SHORT = ("half-flip", "line", "section-v")
@@ -25,7 +26,7 @@ def test_gurobi_finds_what_the_built_in_search_finds(name: str, order: int) -> N
     pytest.importorskip("gurobipy")
     problem = load_problem(name)
     own = plan(problem, Miqp(order=order), vehicle=None)
-    program = formulate(problem, order, 20).program(own.dt)
+    program = formulate(Task.of(problem), order, 20).program(own.dt)
     exact = solver("builtin").solve(program)
     found = solver("gurobi").solve(program, time_limit=60.0)
     assert found.x is not None
@@ -40,7 +41,7 @@ def test_gurobi_finds_what_the_built_in_search_finds(name: str, order: int) -> N
 def test_scip_finds_what_the_built_in_search_finds(name: str, order: int) -> None:
     pytest.importorskip("pyscipopt")
     problem = load_problem(name)
-    program = formulate(problem, order, 8).program(
+    program = formulate(Task.of(problem), order, 8).program(
         plan(problem, Miqp(order=order, intervals=8), vehicle=None).dt
     )
     exact, found = solver("builtin").solve(program), solver("scip").solve(program)

@@ -15,7 +15,6 @@ from hypothesis import strategies as st
 
 import aerobat as ab
 from aerobat.errors import SpecError
-from aerobat.planning.evidence import envelope_for
 from aerobat.simulation.autopilot import Recoveries
 from aerobat.storage import digest_of, read_arrays
 from command_lines import run, without_pictures
@@ -51,7 +50,7 @@ def test_the_certificate_in_the_file_is_that_of_what_the_file_holds(plan: ab.Pla
     plan.save(tmp_path / "half.plan")
     again = ab.load_plan(tmp_path / "half.plan")
     assert again.vehicle is not None
-    envelope = envelope_for(again.problem, again.vehicle, again.stages)
+    envelope = again.evidence.task.envelope(again.stages)
     found = ab.certify(again.trajectory, again.vehicle, again.problem.environment, envelope)
     assert found == again.certificate
 
@@ -89,7 +88,7 @@ def test_a_file_with_any_one_number_changed_is_refused_or_proven_anew(
     with suppress(SpecError):  # a number that makes no sense there
         again = ab.load_plan(path)
         assert again.vehicle is not None
-        envelope = envelope_for(again.problem, again.vehicle, again.stages)
+        envelope = again.evidence.task.envelope(again.stages)
         proven = ab.certify(again.trajectory, again.vehicle, again.problem.environment, envelope)
         assert again.certificate == proven
 

@@ -17,9 +17,10 @@ from aerobat.planning import (
     own_flight,
     with_second_opinion,
 )
-from aerobat.planning.evidence import envelope_for
 from aerobat.planning.flyability import disturbed_flight
-from aerobat.reporting.report_json import report
+from aerobat.planning.task import Task
+from aerobat.reporting.plain_data import plain
+from aerobat.reporting.report import Report
 from aerobat.simulation import Outcome
 from aerobat.trajectory import Trajectory
 from random_problems import random_case
@@ -51,9 +52,7 @@ def test_flyability_is_the_score_of_the_plan_s_own_flight(plan: ab.Plan) -> None
     error = ab.score(ab.fly(plan), plan).max_position_error_m
     assert flyability(plan).error == pytest.approx(error, rel=1e-9)
     assert plan.vehicle is not None
-    assert (
-        own_flight(plan.trajectory, plan.vehicle, plan.problem, plan.stages).error == flyability(plan).error
-    )
+    assert own_flight(plan.evidence.task, plan.trajectory, plan.stages).error == flyability(plan).error
     assert 0.0 < error < FLYABLE_ERROR
     assert plan.flies
 
@@ -99,10 +98,10 @@ def test_a_certified_plan_that_does_not_fly_says_so_as_a_defect_of_its_own() -> 
     assert plan.certified
     assert not plan.flies
     assert flyability(plan).error > FLYABLE_ERROR
-    for text in (str(plan), str(report(plan)["plan"]["flyability"]["sentence"])):
+    for text in (str(plan), str(plain(Report(plan))["plan"]["flyability"]["sentence"])):
         assert "a defect of the plan, not of the flight" in text
         assert text.count("keep more reserve for the controller, or take another planner") == 1
-    assert report(plan)["plan"]["flyability"]["flies"] is False
+    assert plain(Report(plan))["plan"]["flyability"]["flies"] is False
 
 
 def test_a_plan_whose_flight_does_not_hold_the_gate_s_attitude_says_so(plan: ab.Plan, tmp_path: Path) -> None:
@@ -120,7 +119,7 @@ def test_a_plan_whose_flight_does_not_hold_the_gate_s_attitude_says_so(plan: ab.
     sentence = f"its own flight passed gate 'gate' {scored.attitude_error_deg:.1f}° off the attitude asked"
     assert sentence in str(strict)
     assert "0.2° allowed, a defect of the plan" in str(strict)
-    (facts,) = report(strict)["plan"]["flyability"]["passages"]
+    (facts,) = plain(Report(strict))["plan"]["flyability"]["passages"]
     assert facts["failure"] == passage.failure
     assert facts["attitude_error_deg"] == pytest.approx(scored.attitude_error_deg)
     assert facts["attitude_tolerance_deg"] == pytest.approx(0.2)
@@ -166,7 +165,7 @@ def test_the_miqp_goes_straight_through_a_gate_whose_frame_it_would_touch() -> N
 def test_a_flight_that_diverges_is_no_small_error() -> None:
     """It is lost, wherever it was last."""
     away = Trajectory([1.0], [[[0.0, 0.0, 0.0], [0.0, 0.0, 0.0], [90.0, 0.0, 0.0]]])
-    assert own_flight(away, QUAD, ab.load_problem("line"), ()).error >= 5.0
+    assert own_flight(Task.of(ab.load_problem("line"), QUAD), away, ()).error >= 5.0
 
 
 def test_flyability_survives_the_plan_s_file(plan: ab.Plan, tmp_path: Path) -> None:
@@ -181,7 +180,7 @@ def test_the_evidence_is_that_of_the_plan_s_own_vehicle_and_path(plan: ab.Plan) 
         plan.trajectory,
         CRAZYFLIE,
         plan.problem.environment,
-        envelope_for(plan.problem, CRAZYFLIE, plan.stages),
+        Task.of(plan.problem, CRAZYFLIE).envelope(plan.stages),
     )
     slower = replace(plan.trajectory, durations=1.1 * plan.trajectory.durations)
     assert replace(plan, trajectory=slower).certificate != plan.certificate

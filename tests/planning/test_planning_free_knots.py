@@ -11,6 +11,7 @@ from aerobat.planning import MinSnap, Miqp, Plan
 from aerobat.planning.evidence import Evidence
 from aerobat.planning.polynomial.free_knots import FreeKnots
 from aerobat.planning.polynomial.min_snap import TimeScaling
+from aerobat.planning.task import Task
 from aerobat.problem import (
     Condition,
     CustomManeuver,
@@ -67,7 +68,7 @@ each_set = pytest.mark.parametrize(
 @each_set
 def test_eight_segments_are_certified_and_within_an_eighth_of_the_least_time(name: str) -> None:
     plan = planned(name)
-    assert Evidence(SECTION_V, vehicle(name), plan.trajectory).certificate.certified
+    assert Evidence(Task.of(SECTION_V, vehicle(name)), plan.trajectory).certificate.certified
     assert certified(plan)
     assert plan.trajectory.coefficients.shape == (8, 10, 3)
     assert plan.duration / SETS[name][2] < 1.12

@@ -82,7 +82,7 @@ def test_commands_of_rotors_with_lag_stay_within_limits(lagging: Plan) -> None:
 def test_a_vehicle_with_lag_flies_its_certified_plan(lagging: Plan) -> None:
     """It missed the gate by 93 cm where lag was left out."""
     assert lagging.vehicle is not None
-    flown = own_flight(lagging.trajectory, lagging.vehicle, lagging.problem, lagging.stages)
+    flown = own_flight(lagging.evidence.task, lagging.trajectory, lagging.stages)
     assert flown.error < 0.05
 
 

@@ -22,8 +22,8 @@ from aerobat.planning import (
     registered_planners,
 )
 from aerobat.planning.certified_solve import Solution, certified_solve
-from aerobat.planning.evidence import envelope_for
 from aerobat.planning.recorder import Recorder
+from aerobat.planning.task import Task
 from aerobat.problem import EndState, Limits, Problem, Waypoint, Waypoints, at_rest, load_problem
 from aerobat.vehicle import load_vehicle
 
@@ -112,7 +112,7 @@ def test_a_solution_that_ignores_its_ends_is_no_plan_whichever_program_it_is_of(
         def tighten(self, solution: Solution[None], certificate: ab.Certificate | None) -> bool:
             return False
 
-    judged = certified_solve(Moved(), STEP, QUAD, recorder := Recorder(None))
+    judged = certified_solve(Moved(), Task.of(STEP, QUAD), recorder := Recorder(None))
     assert not judged.feasible
     assert recorder.attempts[-1].outcome.startswith("goal position error 0.01 m of 0 m at 3.000 s")
 
@@ -128,7 +128,7 @@ def test_a_plan_for_another_gravity_is_certified_for_that_one_only(name: str) ->
 def test_a_flip_on_mars_is_certified_on_mars() -> None:
     mars = replace(load_problem("flip-roll"), environment=Environment(gravity=3.7))
     found = plan(mars, vehicle=QUAD)
-    envelope = envelope_for(mars, QUAD, found.stages)
+    envelope = Task.of(mars, QUAD).envelope(found.stages)
     assert found.certificate == ab.certify(found.trajectory, QUAD, mars.environment, envelope)
     assert found.certified
     on_earth = ab.certify(found.trajectory, QUAD, envelope=ab.Envelope(limits=mars.path_limits))

@@ -9,15 +9,14 @@ from aerobat.errors import Infeasible
 from aerobat.flatness import force_balance
 from aerobat.optimization import solver
 from aerobat.planning import GridSearch, Miqp, plan
-from aerobat.planning.certified_solve import tightened
 from aerobat.planning.evidence import Evidence
 from aerobat.planning.miqp.miqp import formulate
 from aerobat.planning.miqp.rescue import with_more_intervals
 from aerobat.planning.miqp.shortest import COARSE_GROWTH
+from aerobat.planning.task import Task
 from aerobat.problem import (
     Condition,
     CustomManeuver,
-    Limits,
     Problem,
     Quantity,
     Stage,
@@ -53,7 +52,7 @@ def test_thirteen_intervals_are_not_called_infeasible_because_bounds_were_tighte
 def test_a_flip_too_fast_for_its_limits_is_refuted_by_the_candidates_of_one_stage(quad: Vehicle) -> None:
     """Not by all pairs of them, of which there are four times as many."""
     problem, intervals = load_problem("flip-roll"), 20
-    program = formulate(problem, 5, intervals, quad).program(0.05)
+    program = formulate(Task.of(problem, quad), 5, intervals).program(0.05)
     result = solver("builtin").solve(program)
     assert result.status == "infeasible"
     assert result.nodes <= intervals
@@ -63,14 +62,8 @@ def test_a_flip_too_fast_for_its_limits_is_refuted_by_the_candidates_of_one_stag
 def test_a_path_along_the_floor_is_certified_and_its_proof_is_its_own(quad: Vehicle) -> None:
     found = plan(load_problem(str(CASES / "floor.toml")), vehicle=quad)
     assert found.certified
-    proof = Evidence(found.problem, quad, found.trajectory, found.stages).certificate
+    proof = Evidence(Task.of(found.problem, quad), found.trajectory, found.stages).certificate
     assert proof.findings == found.certificate.findings
-
-
-def test_a_bound_at_zero_is_tightened_by_more_than_what_is_exceeded() -> None:
-    floor = Limits(lower=(-np.inf, -np.inf, 0.0))
-    sinking = Trajectory([1.0], np.array([[[0.0, 0.0, 0.0], [0.0, 0.0, -1e-3]]]))
-    assert tightened(floor, floor, sinking, 1).lower[2] > 1.01e-3
 
 
 @pytest.mark.slow

@@ -25,7 +25,7 @@ from aerobat.planning import (
 from aerobat.planning.recorder import Progress
 from aerobat.planning.second_opinion import OPINION_TIME
 from aerobat.problem import load_problem
-from aerobat.reporting.tables import plan_facts
+from aerobat.reporting.facts import facts
 from aerobat.studies.compare import compare
 from aerobat.vehicle import load_vehicle
 
@@ -115,7 +115,8 @@ def test_what_a_limit_left_of_a_comparison_says_how_far_from_the_shortest_possib
     told = f"the best found by the time limit, at most {ratio:.2f} times the shortest possible"
     assert entry.note.startswith(told)
     if found.bound is None:  # else it is a program's own, whose cost is another
-        assert dict(plan_facts(found))["cost"].endswith(told)
+        (cost,) = (fact for fact in facts(found) if fact.key == "cost")
+        assert cost.said.endswith(told)
 
 
 @pytest.mark.slow

@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from aerobat.optimization import AssignmentProgram, solver
-from aerobat.planning.miqp import formulate
+from aerobat.planning.miqp.miqp import formulate
+from aerobat.planning.task import Task
 from aerobat.problem import CustomManeuver, Problem, load_problem
 from aerobat.problem.condition import Condition, Quantity
 from aerobat.trajectory import Trajectory
@@ -22,7 +23,7 @@ COST = 56720.5713  # sum of squared jerks for N = 40
 
 @cache
 def two_flips(intervals: int, duration: float = DURATION) -> AssignmentProgram:
-    return formulate(in_the_plane(load_problem(EXAMPLE)), 3, intervals).program(duration / intervals)
+    return formulate(Task.of(in_the_plane(load_problem(EXAMPLE))), 3, intervals).program(duration / intervals)
 
 
 def in_the_plane(problem: Problem) -> Problem:
@@ -50,7 +51,7 @@ def test_forty_intervals_are_proven_optimal_with_a_few_hundred_relaxations() -> 
 
 
 def test_both_gates_are_met_upside_down_and_upright_flight_lies_between() -> None:
-    formulation = formulate(load_problem(EXAMPLE), 3, 40)
+    formulation = formulate(Task.of(load_problem(EXAMPLE)), 3, 40)
     dt = DURATION / 40
     result = solver().solve(formulation.program(dt))
     assert result.x is not None
@@ -84,7 +85,7 @@ def varied(seed: int) -> AssignmentProgram:
     )
     limits = replace(example.limits, acceleration=rng.uniform(25, 60), velocity=rng.uniform(5, 12))
     problem = replace(example, maneuver=replace(example.maneuver, stages=stages), limits=limits)
-    return formulate(problem, int(rng.integers(3, 5)), 12).program(rng.uniform(0.2, 0.4))
+    return formulate(Task.of(problem), int(rng.integers(3, 5)), 12).program(rng.uniform(0.2, 0.4))
 
 
 def stronger(condition: Condition, factor: float) -> Condition:
@@ -103,7 +104,7 @@ def test_gurobi_agrees_on_variations(seed: int) -> None:
 
 
 def test_a_setup_shared_along_dt_gives_the_answers_of_a_fresh_one() -> None:
-    formulation, kept = formulate(load_problem(EXAMPLE), 3, 20), solver()
+    formulation, kept = formulate(Task.of(load_problem(EXAMPLE)), 3, 20), solver()
     for duration in (4.0, 5.0, 1.0, 3.0, 4.0):
         program = formulation.program(duration / 20)
         together, alone = kept.solve(program), solver().solve(program)

@@ -8,7 +8,8 @@ import pytest
 from aerobat.flatness import force_balance, reference
 from aerobat.planning import FreeKnots, MinSnap, Miqp, Plan, Planner, TimeScaling
 from aerobat.planning.flyability import own_flight
-from aerobat.planning.time_optimal import TimeOptimal
+from aerobat.planning.task import Task
+from aerobat.planning.time_optimal.time_optimal import TimeOptimal
 from aerobat.problem import Limits, Problem, Waypoint, Waypoints, at_rest, load_problem
 from aerobat.problem.gate import tilted_gate
 from aerobat.problem.maneuvers import Flip, GatePassage, HalfFlip
@@ -120,7 +121,7 @@ def test_a_plan_with_a_reserve_flies_within_5_cm(name):
     vehicle = lagging(load_vehicle("section-v"), lag, drag)
     found = TimeOptimal(reserve=0.03, starts=1).plan(problem, vehicle)
     assert found.certified
-    assert own_flight(found.trajectory, vehicle, problem, found.stages).error <= 0.05
+    assert own_flight(Task.of(problem, vehicle), found.trajectory, found.stages).error <= 0.05
 
 
 @pytest.mark.slow

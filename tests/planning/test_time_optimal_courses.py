@@ -9,6 +9,7 @@ from aerobat.errors import Infeasible, SpecError
 from aerobat.evaluation import score
 from aerobat.planning import Miqp, Plan, TimeOptimal
 from aerobat.planning.assessment.lower_bound import least_duration
+from aerobat.planning.task import Task
 from aerobat.planning.time_optimal.optimal_control.bounds import Backoff, Bounds
 from aerobat.planning.time_optimal.optimal_control.collocation import CollocatedMotion, Mesh
 from aerobat.problem import EndState, Problem, Waypoint, Waypoints, at_rest, load_problem, tilted_gate
@@ -131,7 +132,7 @@ def test_a_course_that_cannot_be_flown_names_the_leg():
 def test_a_backoff_leaves_rotors_a_range_beside_the_reserve():
     """A reserve and a backoff that crossed ended as "lower must not exceed upper"."""
     problem = load_problem("line")
-    bounds = Bounds.of(problem, JERKY)
+    bounds = Bounds.of(Task.of(problem, JERKY))
     fast = Trajectory(
         [0.1], [[[0, 0, 0], [0, 0, 0], [0, 0, 0.1365]]]
     )  # upward at 27 m/s², 1 N too much for each rotor
@@ -181,7 +182,7 @@ def test_gates_of_any_attitude_are_passed_by_the_whole_body():
 
 def test_what_is_exceeded_still_is_backed_off_from_twice_as_far():
     """Between nodes it may be exceeded by so little that what is added to nodes never reached it."""
-    bounds = Bounds.of(load_problem("line"), JERKY)
+    bounds = Bounds.of(Task.of(load_problem("line"), JERKY))
     # upward at a hair more than rotors give
     fast = Trajectory([0.1], [[[0, 0, 0], [0, 0, 0], [0, 0, 0.5 * 0.01 * (3.3 - 1 + 1e-6) * 9.81]]])
     backoff = Backoff.none(1, bounds).grown(bounds, fast)

@@ -20,7 +20,6 @@ from aerobat.planning.passages import require_openings
 from aerobat.problem.gate import in_opening
 from aerobat.problem.opening import Circle, OpeningShape, Polygon, Rectangle
 from aerobat.reporting.scene.glyphs import gate_bars
-from aerobat.simulation.passages import plane_directions
 from aerobat.simulation.plants.mujoco import _frame_bars
 from gate_motions import motion
 from score_cases import QUAD
@@ -319,5 +318,5 @@ def test_the_smallest_opening_is_of_the_gate_s_kind() -> None:
     found = opening_of(np.full(400, 0.8), gate, 0.99, 0.95)
     assert (found.width, found.height, found.scale) == pytest.approx((0.8, 0.8, 0.8))
     assert gate.resized(0.8, 1.0).opening.inradius == pytest.approx(0.4)
-    assert len(plane_directions(gate)) == 12
+    assert len(gate.opening.probes) == 12
     assert len(in_opening(gate, 0.1)) == 13

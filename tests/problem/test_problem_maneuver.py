@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from aerobat import so3
 from aerobat.errors import SpecError
-from aerobat.planning.miqp import Miqp
+from aerobat.planning.miqp.miqp import Miqp
 from aerobat.problem import (
     Attitude,
     Condition,

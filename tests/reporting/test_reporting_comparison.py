@@ -9,7 +9,8 @@ from matplotlib.collections import PolyCollection
 from rich.console import Console
 
 import aerobat as ab
-from aerobat.reporting.comparison import comparison_rows, comparison_table
+from aerobat.reporting.plain_data import plain
+from aerobat.reporting.tables import table
 from aerobat.studies.compare import Comparison, Entry
 from reporting_cases import require_legible, simulated
 from shared_plans import shared_plan
@@ -17,7 +18,7 @@ from shared_plans import shared_plan
 pytestmark = pytest.mark.filterwarnings("error")  # drawing warns of nothing
 KEYS = [
     "planner", "segments", "duration_s", "ratio",
-    "certified", "min_margin_n", "planning_s", "max_position_error_m", "note",
+    "certified", "min_margin_n", "max_position_error_m", "planning_s", "note",
 ]  # fmt: skip
 REASON = "the planner free-knots needs CasADi, which is not installed; pip install 'aerobat[casadi]'"
 NOTE = "begun again from free-knots's 3.000 s; 3.200 s alone"
@@ -42,13 +43,13 @@ def flip():
 def printed(comparison):
     console = Console(width=80)
     with console.capture() as capture:
-        console.print(comparison_table(comparison))
+        console.print(table(comparison))
     return capture.get()
 
 
 def test_rows_hold_what_the_plans_and_flights_are():
     comparison = section_v()
-    rows = comparison_rows(comparison)
+    rows = plain(comparison)["planners"]
     assert [list(row) for row in rows] == [KEYS] * 4
     for row, entry in zip(rows, comparison.entries, strict=True):
         told = row["planner"], row["planning_s"], row["note"]
@@ -66,13 +67,13 @@ def test_rows_hold_what_the_plans_and_flights_are():
 
 
 def test_a_planner_without_a_plan_has_none_for_what_there_is_not():
-    row = comparison_rows(section_v())[2]
+    row = plain(section_v())["planners"][2]
     assert row.pop("note") == ""
     assert {key for key, value in row.items() if value is not None} == {"planner", "planning_s"}
 
 
 def test_there_is_no_ratio_without_a_time_optimal_plan():
-    assert [row["ratio"] for row in comparison_rows(flip())] == [None, None]
+    assert [row["ratio"] for row in plain(flip())["planners"]] == [None, None]
 
 
 def test_the_table_fits_a_terminal_and_tells_notes_and_why_there_is_no_plan():

@@ -12,9 +12,10 @@ from rich.console import Console
 
 import aerobat as ab
 from aerobat.reporting.feasibility.legend import kinds_of
-from aerobat.reporting.feasibility.table import map_report, map_table
 from aerobat.reporting.notebooks import html, png
+from aerobat.reporting.plain_data import plain
 from aerobat.reporting.style import RED
+from aerobat.reporting.tables import table
 from aerobat.studies.feasibility import Axis, Cell, Feasibility
 from reporting_cases import require_legible
 
@@ -43,7 +44,7 @@ def made(rows: int, columns: int) -> ab.FeasibilityMap:
 
 def shown(found: ab.FeasibilityMap, width: int = 200) -> str:
     console = Console(file=StringIO(), width=width)
-    console.print(map_table(found))
+    console.print(table(found))
     assert isinstance(console.file, StringIO)
     return console.file.getvalue()
 
@@ -111,7 +112,7 @@ def test_a_line_says_of_every_value_why_it_has_no_plan() -> None:
 
 def test_plain_data_has_every_cell_and_a_notebook_the_table() -> None:
     found = made(3, 4)
-    report = map_report(found)
+    report = plain(found)
     assert [cell["sentence"] for cell in report["cells"]] == [cell.sentence for cell in found.cells]
     assert report["over"] == {"angle": [0.0, 1.0, 2.0], "speed": [0.0, 2.0, 4.0, 6.0]}
     assert report["units"] == {"angle": "°", "speed": "m/s"}

@@ -11,9 +11,9 @@ from matplotlib.colors import to_hex
 
 import aerobat as ab
 from aerobat.reporting.notebooks import html, png
+from aerobat.reporting.plain_data import plain
 from aerobat.reporting.style import RED
 from aerobat.reporting.sweeps.figure import crossings
-from aerobat.reporting.sweeps.table import sweep_report
 from aerobat.studies.sweep.result import ErrorBand
 from reporting_cases import require_legible
 from shared_plans import shared_plan
@@ -68,7 +68,7 @@ def test_flights_that_do_not_come_to_a_gate_are_worse_than_any_that_miss_it() ->
     assert none.quantile("gate_miss_m", 0.0) == np.inf
     assert none.within("gate_miss_m", 1e9).count == 0
     assert none.passed("gate").count == 0
-    facts = sweep_report(none)["passages"]["gate"]
+    facts = plain(none)["passages"]["gate"]
     assert facts["miss_m"] == {"50%": None, "95%": None, "100%": None}
     with pytest.raises(ab.SpecError, match="no passage named 'gat'; did you mean 'gate'"):
         none.passed("gat")

@@ -14,12 +14,16 @@ from scipy import stats
 from aerobat.engines.engine import expanded
 from aerobat.engines.pytree import tree_leaves
 from aerobat.environment import Battery, Dispersion, Gusts, HandOff, Imu, MotionCapture, load_dispersion
-from aerobat.kernels.motors import Motion
+from aerobat.kernels.battery import BatteryState
+from aerobat.kernels.imu import ImuSample, ImuState
+from aerobat.kernels.motors import VehicleState
+from aerobat.kernels.wind import WindState
 from aerobat.simulation import Outcome, fly
 from aerobat.simulation.components import log_row
 from aerobat.simulation.conditions.draw import draw_flights
 from aerobat.simulation.conditions.random_source import RandomSource
-from aerobat.simulation.setup import Part
+from aerobat.simulation.conditions.sensors import MocapState
+from aerobat.simulation.setup import LoopPart
 from aerobat.trajectory import Trajectory
 from dispersed_loops import dispersed_setup, drawn, rows_of
 from looping_flights import HEXA, assert_same, loops
@@ -32,12 +36,12 @@ TICKS = 120
 
 
 def position(signals: Any) -> Any:
-    return signals["plant"].body.position
+    return signals.plant.body.position
 
 
 def everything(signals: Any) -> Any:
-    names = ("wind", "battery", "imu_bias", "imu", "motion_capture", "plant")
-    return tuple(signals[name] for name in names)
+    kinds = (WindState, BatteryState, ImuSample, ImuState, MocapState, VehicleState)
+    return tuple(map(signals.of, kinds))
 
 
 @cache
@@ -51,13 +55,12 @@ class HeldPlant:
     """A body that stands still at its start, so that there is little to compile."""
 
     period: int = 1
-    name: str = "plant"
     feedthrough: bool = False
 
-    def init(self, ops: Any, thrusts: Any, inputs: Any, signals: Any) -> Motion:
-        return Motion(signals["start"], thrusts)
+    def init(self, ops: Any, thrusts: Any, inputs: Any, signals: Any) -> VehicleState:
+        return VehicleState(signals.start, thrusts)
 
-    def step(self, ops: Any, thrusts: Any, motion: Motion, inputs: Any, signals: Any) -> Motion:
+    def step(self, ops: Any, thrusts: Any, motion: VehicleState, inputs: Any, signals: Any) -> VehicleState:
         return motion
 
 
@@ -76,7 +79,7 @@ def test_a_last_tick_shorter_than_the_delay_of_rotors_without_lag_is_flown_alike
 def held_rows(engine: str) -> list[np.ndarray]:
     setup = dispersed_setup(loops(1.0), HEXA, ALL, drawn(ALL, HEXA, 3), engine=engine)
     thrusts = tuple(np.linspace(1.0, 2.0, 3) for _ in range(6))
-    setup = replace(setup, parts=(*setup.parts[:-3], Part(HeldPlant(), thrusts)))
+    setup = replace(setup, parts=(*setup.parts[:-3], LoopPart(HeldPlant(), thrusts)))
     return tree_leaves(rows_of(setup, everything, TICKS))
 
 

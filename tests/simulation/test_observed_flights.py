@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import aerobat as ab
-from aerobat.reporting.tables import flight_facts
+from aerobat.reporting.facts import facts
 from aerobat.simulation.flight import SERIES
 
 LAB = ab.load_dispersion("lab")
@@ -55,14 +55,15 @@ def test_an_outage_is_flown_by_the_imu_and_said_with_its_times(
     assert found.observer is not None
     assert found.observer.coasted
     assert found.observer.longest_without_pose_s == pytest.approx(duration, abs=0.03)
-    said = dict(flight_facts(found))["observer"]
+    (said,) = (fact.said for fact in facts(found) if fact.label == "observer")
     assert f"no poses from {begin - 0.01:.2f}" in said
     assert "the IMU alone" in said
 
 
 def test_without_an_outage_nothing_is_said_of_one(line: ab.Plan) -> None:
     found = ab.score(ab.fly(line, conditions="lab", seed=1), line)
-    assert "IMU" not in dict(flight_facts(found))["observer"]
+    (said,) = (fact.said for fact in facts(found) if fact.label == "observer")
+    assert "IMU" not in said
 
 
 def test_commands_that_come_a_period_late_cost_nothing_where_the_model_is_right(line: ab.Plan) -> None:

@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 
 import aerobat as ab
-from aerobat.reporting.report_json import report, to_json
+from aerobat.reporting.plain_data import plain, to_json
+from aerobat.reporting.report import Report
 from shared_plans import shared_plan
 
 LOW = -0.3  # [m] a ground so near under the flip that there is a point of no return
@@ -96,7 +97,7 @@ def test_a_plan_keeps_its_recoveries_in_its_file_and_in_its_report(
         plan = replace(flip, recoveries=found)
         plan.save(tmp_path / "flip.plan")
         assert ab.load_plan(tmp_path / "flip.plan").recoveries == found
-        told = report(plan)["plan"]["recoveries"]
+        told = plain(Report(plan))["plan"]["recoveries"]
         assert json.loads(to_json(told)) == told
         assert told["sentence"] == str(found)
     assert told["durations_s"] == [0.5, None]

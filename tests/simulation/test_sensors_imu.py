@@ -13,7 +13,7 @@ from aerobat.engines.engine import expanded
 from aerobat.engines.numpy import ArrayOps
 from aerobat.environment import Dispersion, Imu, MotionCapture
 from aerobat.kernels import imu
-from aerobat.kernels.imu import BiasParameters, ImuParameters, ImuSample
+from aerobat.kernels.imu import BiasParameters, ImuParameters, ImuSample, ImuState
 from aerobat.simulation.conditions.draw import draw_flights
 from aerobat.simulation.conditions.sensors import ImuSource
 from dispersed_loops import RATE, dispersed_setup, drawn, rows_of
@@ -28,7 +28,7 @@ class Felt(NamedTuple):
 
 
 def log(signals: Any) -> Felt:
-    return Felt(signals["imu"].sample, signals["plant"].body)
+    return Felt(signals.of(ImuState).sample, signals.plant.body)
 
 
 def with_imu(**errors: float) -> Dispersion:

@@ -19,6 +19,7 @@ from aerobat.kernels import mocap
 from aerobat.kernels.mocap import PoseSample
 from aerobat.kernels.rigid_body import Pose
 from aerobat.simulation.conditions.parts import hand_off_plane
+from aerobat.simulation.conditions.sensors import MocapState, MotionCaptureSensor
 from dispersed_loops import RATE, dispersed_setup, drawn, rows_of
 from looping_flights import QUAD, loops
 
@@ -33,7 +34,7 @@ class Seen(NamedTuple):
 
 
 def log(signals: Any) -> Seen:
-    return Seen(signals["motion_capture"].delivered, signals["plant"].body)
+    return Seen(signals.of(MocapState).delivered, signals.plant.body)
 
 
 def with_capture(**errors: Any) -> Dispersion:
@@ -43,7 +44,7 @@ def with_capture(**errors: Any) -> Dispersion:
 def sensor_of(dispersion: Dispersion, flights: int = 1) -> Any:
     """The sensor and its parameters."""
     setup = dispersed_setup(loops(1.0), QUAD, dispersion, drawn(dispersion, QUAD, flights))
-    [part] = (part for part in setup.parts if part.component.name == "motion_capture")
+    [part] = (part for part in setup.parts if isinstance(part.component, MotionCaptureSensor))
     return part.component, part.parameters
 
 

@@ -13,8 +13,8 @@ from aerobat.control.parameters import airframe_parameters
 from aerobat.engines.floats import FloatOps
 from aerobat.engines.pytree import tree_map
 from aerobat.kernels import motors, rigid_body
-from aerobat.kernels.motors import Airframe, Motion, advance
-from aerobat.kernels.rigid_body import Body, EnvironmentParameters, MassProperties, Wrench
+from aerobat.kernels.motors import Airframe, VehicleState, advance
+from aerobat.kernels.rigid_body import Body, EnvironmentParameters, MassProperties, RotorWrench
 from aerobat.simulation.bodies import bodies, body_states
 from aerobat.simulation.components import RigidBodyPlant
 from aerobat.states import BodyState
@@ -44,7 +44,7 @@ def body_of(state: BodyState) -> Body:
 
 
 def flown(
-    inertial: MassProperties, body: Body, load: Callable[[float], Wrench], end: float, steps: int
+    inertial: MassProperties, body: Body, load: Callable[[float], RotorWrench], end: float, steps: int
 ) -> Body:
     dt = end / steps
     for k in range(steps):
@@ -53,8 +53,8 @@ def flown(
     return body
 
 
-def no_load(t: float) -> Wrench:
-    return Wrench(0.0, (0.0, 0.0, 0.0))
+def no_load(t: float) -> RotorWrench:
+    return RotorWrench(0.0, (0.0, 0.0, 0.0))
 
 
 def test_torque_free_tumbling_keeps_energy_and_angular_momentum() -> None:
@@ -110,8 +110,8 @@ def test_a_body_that_drifts_with_the_wind_feels_no_drag() -> None:
     np.testing.assert_allclose(drifting.velocity, [0.0, 0.0, -9.81], rtol=1e-13)
 
 
-def wavy_load(t: float) -> Wrench:
-    return Wrench(
+def wavy_load(t: float) -> RotorWrench:
+    return RotorWrench(
         9.0 + 4.0 * np.sin(5 * t), (0.05 * np.cos(7 * t), -0.04 * np.sin(4 * t), 0.03 * np.cos(3 * t))
     )
 
@@ -147,7 +147,7 @@ def test_body_and_rotors_together_are_of_order_four() -> None:
     commands = (3.0, 0.5, 2.0, 7.0, 1.0, 2.5)
 
     def after(steps: int) -> np.ndarray:
-        motion = Motion(body_of(TUMBLING), (1.0, 2.0, 3.0, 1.0, 2.0, 3.0))
+        motion = VehicleState(body_of(TUMBLING), (1.0, 2.0, 3.0, 1.0, 2.0, 3.0))
         for _ in range(steps):
             motion = advance(FloatOps, airframe, CALM, motion, commands, 0.2 / steps)
         return np.concatenate(motion.body)
@@ -170,7 +170,7 @@ def test_a_period_of_two_milliseconds_is_integrated_to_micrometres() -> None:
 
 def after_commands(airframe: Airframe, steps: int, periods: int) -> Body:
     """Commands that throw an agile vehicle about, to 20 rad/s and back."""
-    motion = Motion(body_of(TUMBLING), (2.0,) * 4)
+    motion = VehicleState(body_of(TUMBLING), (2.0,) * 4)
     for k in range(periods):
         wave = [2.0 + 0.5 * np.sin(0.02 * k + phase) for phase in (0.0, 0.2, 0.1, 0.3)]
         for _ in range(steps):

@@ -2,7 +2,7 @@
 
 import pickle
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
@@ -14,7 +14,7 @@ from aerobat.errors import SpecError
 from aerobat.kernels.rigid_body import Body
 from aerobat.simulation import FlightConfig, fly, prepare
 from aerobat.simulation.components import StateObserver
-from aerobat.simulation.loop import Clock, Due, LoopInput, LoopParameters, compose
+from aerobat.simulation.loop import Due, LoopInput, LoopParameters, StepClock, compose
 from aerobat.simulation.setup import FlightSetup
 from aerobat.vehicle import load_vehicle
 from looping_flights import HEXA, QUAD, assert_same, loops, near
@@ -94,55 +94,71 @@ def test_neither_blocks_of_references_nor_chunks_of_noise_change_a_flight(
     assert_same(fly(path, HEXA, **options), whole, atol=1e-12)
 
 
+class Slow(NamedTuple):
+    steps: Any
+    elapsed: Any
+
+
+class Plain(NamedTuple):
+    steps: Any
+    elapsed: Any
+
+
+class Seen(NamedTuple):
+    steps: Any
+
+
+Count = Slow | Plain
+
+
 @dataclass(frozen=True)
 class Counter:
     """Counts its steps and the time between them."""
 
+    kind: type[Count]
     period: int
-    name: str
     feedthrough: bool = True
 
-    def init(self, ops: Any, parameters: Any, inputs: Any, signals: Any) -> Any:
-        return 0.0, 0.0
+    def init(self, ops: Any, parameters: Any, inputs: Any, signals: Any) -> Count:
+        return self.kind(0.0, 0.0)
 
-    def step(self, ops: Any, parameters: Any, state: Any, inputs: Any, signals: Any) -> Any:
-        return state[0] + 1.0, signals["clock"].elapsed
+    def step(self, ops: Any, parameters: Any, state: Count, inputs: Any, signals: Any) -> Count:
+        return self.kind(state.steps + 1.0, signals.clock.elapsed)
 
 
 @dataclass(frozen=True)
 class Follower:
     """Shows what it sees of another."""
 
-    of: str
+    of: type[Count]
     period: int = 1
-    name: str = "follower"
     feedthrough: bool = True
 
-    def init(self, ops: Any, parameters: Any, inputs: Any, signals: Any) -> Any:
-        return 0.0
+    def init(self, ops: Any, parameters: Any, inputs: Any, signals: Any) -> Seen:
+        return Seen(0.0)
 
-    def step(self, ops: Any, parameters: Any, state: Any, inputs: Any, signals: Any) -> Any:
-        return signals[self.of][0]
+    def step(self, ops: Any, parameters: Any, state: Seen, inputs: Any, signals: Any) -> Seen:
+        return Seen(signals.of(self.of).steps)
 
 
 def log(signals: Any) -> Any:
-    return signals["slow"], signals["plant"], signals["follower"]
+    return signals.of(Slow), signals.of(Plain), signals.of(Seen)
 
 
 @pytest.mark.parametrize("engine", ["floats", "compiled", pytest.param("jax", marks=pytest.mark.slow)])
 def test_a_component_steps_at_its_own_period_and_holds_between(engine: str) -> None:
     """And one without feedthrough is seen a tick later, wherever in the order it stands."""
-    components = (Counter(4, "slow"), Counter(1, "plant", feedthrough=False), Follower("plant"))
+    components = (Counter(Slow, 4), Counter(Plain, 1, feedthrough=False), Follower(Plain))
     start = Body(*((np.zeros(2),) * n for n in (3, 3, 4, 3)))
     parameters = LoopParameters(start, ((), (), ()))
     times = np.full(11, 0.01)
-    due = Due((np.arange(11) % 4 == 0).astype(float), Clock(4 * times, 4 * times))
-    inputs = LoopInput(Clock(times, times), (due, (), ()), (), ((), (), ()))
+    due = Due((np.arange(11) % 4 == 0).astype(float), StepClock(4 * times, 4 * times))
+    inputs = LoopInput(StepClock(times, times), (due, (), ()), (), ((), (), ()))
     slow, plant, follower = run_whole(choose(engine, 2, 11), *compose(components, log), parameters, inputs)
     assert slow[0][1].tolist() == [1, 1, 1, 1, 2, 2, 2, 2, 3, 3, 3]
     np.testing.assert_allclose(slow[1][1], 0.04, rtol=1e-15)
     assert plant[0][1].tolist() == list(range(11))
-    assert follower[1].tolist() == list(range(11))
+    assert follower.steps[1].tolist() == list(range(11))
 
 
 def test_a_slower_observer_makes_a_worse_flight_and_touches_nothing_else() -> None:
@@ -151,7 +167,7 @@ def test_a_slower_observer_makes_a_worse_flight_and_touches_nothing_else() -> No
     for period in (1, 10):
         slower = with_observer_period(setup, period)
         inputs = slower.inputs(0, len(setup.times))
-        functions = compose(slower.components, lambda signals: signals["plant"].body)
+        functions = compose(slower.components, lambda signals: signals.plant.body)
         flown = run_whole(setup.engine(), *functions, setup.parameters, inputs).position
         path = np.array(inputs.reference.position)[:, None]
         errors.append(np.linalg.norm(np.array(flown) - path, axis=0).max())

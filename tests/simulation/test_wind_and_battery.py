@@ -12,6 +12,7 @@ import aerobat as ab
 from aerobat.engines.engine import expanded
 from aerobat.environment import Battery, Dispersion, Environment, Gusts
 from aerobat.kernels import wind
+from aerobat.kernels.battery import BatteryState
 from aerobat.kernels.wind import GustFilter, GustNoise
 from aerobat.simulation.conditions.disturbances import WindSource
 from aerobat.simulation.conditions.draw import dispersed_fleet, draw_flights
@@ -100,7 +101,7 @@ def hover(duration: float) -> Trajectory:
 def battery_rows(plan: Any, battery: Battery, flights: int = 1) -> Any:
     dispersion = Dispersion(battery=battery)
     setup = dispersed_setup(plan, HEXA, dispersion, drawn(dispersion, HEXA, flights))
-    return rows_of(setup, lambda signals: (signals["battery"], signals["plant"].thrusts))
+    return rows_of(setup, lambda signals: (signals.of(BatteryState), signals.plant.thrusts))
 
 
 def test_a_hover_empties_the_battery_in_its_endurance_and_not_further() -> None:

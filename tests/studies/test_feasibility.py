@@ -16,7 +16,8 @@ from hypothesis import strategies as st
 
 import aerobat as ab
 from aerobat.errors import Reason
-from aerobat.reporting.feasibility.table import requirements_report
+from aerobat.reporting.feasibility.facts import requirements
+from aerobat.reporting.plain_data import plain
 from aerobat.studies.feasibility import Feasibility
 from aerobat.studies.feasibility.feasibility_map import Cell
 from shared_plans import shared_plan
@@ -43,6 +44,25 @@ def half_flip(angle: float, speed: float) -> ab.Problem:
     problem = ab.load_problem("half-flip")
     gates = (problem.gates[0].tilted(radians(angle)),)
     return replace(problem, gates=gates, maneuver=ab.HalfFlip(passage=ab.GatePassage(speed=speed)))
+
+
+@pytest.mark.slow
+def test_of_plans_that_are_flown_a_cell_counts_what_passes_under_its_own_conditions() -> None:
+    spreads, reserves, options = (0.0, 0.3), (0.0, 0.2), {"vehicle": "agile-quad", "workers": 1}
+    weak = ab.Dispersion(name="weak", start_position=0.02)
+    over = {"conditions.mass": spreads, "planner.reserve": reserves}
+    planner = ab.Miqp(flies=False)
+    found = ab.feasibility_map("line", over, planner=planner, conditions=weak, flights=20, seed=3, **options)
+    for cell in found.cells:
+        spread, reserve = cell.values
+        plan = ab.plan("line", replace(planner, reserve=reserve), "agile-quad")
+        scores = ab.score_flights(plan, conditions=replace(weak, mass=spread), seed=3, flights=20)
+        assert cell.duration == plan.duration
+        assert cell.passed is not None
+        assert (cell.passed.count, cell.passed.of) == (scores.succeeded.sum(), 20)
+    assert found.cells[0].passed.count > found.cells[-1].passed.count
+    with pytest.raises(ab.SpecError, match="conditions is not given; give it first"):
+        ab.feasibility_map("line", over, **options)
 
 
 @pytest.mark.slow
@@ -220,8 +240,8 @@ def test_where_only_no_ceiling_suffices_that_is_the_answer() -> None:
     assert found.value == np.inf
     assert found.plan == line()
     assert str(found).startswith("ceiling: no limit, planned in")
-    report = requirements_report("line", "agile-quad", [found])
-    assert report["requirements"][0]["least"] is None
+    report = plain(requirements("line", "agile-quad", [found]))
+    assert report["requirements"]["ceiling"]["least"] is None
 
 
 def test_what_no_strength_suffices_for_is_infeasible_and_says_so() -> None:

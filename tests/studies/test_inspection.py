@@ -183,7 +183,7 @@ def test_the_command_says_draws_and_prints_what_the_function_finds(tmp_path: Pat
     flight.save(tmp_path / "flight.npz")
     found = ab.inspect_flight(flight, plan)
     cli.main(["inspect", str(tmp_path)])
-    assert found.verdict in capsys.readouterr().out
+    assert found.verdict in " ".join(capsys.readouterr().out.split())
     assert (tmp_path / "inspect.png").read_bytes().startswith(b"\x89PNG")
     file, figure = str(tmp_path / "flight.npz"), str(tmp_path / "other.png")
     cli.main(["inspect", file, "--plan", str(tmp_path / "flip.plan"), "--figure", figure, "--json"])

@@ -11,7 +11,7 @@ from aerobat.studies.passing import Passing, Round
 
 WEAK = ab.Dispersion(name="weak", mass=0.05, rotor=0.04, start_position=0.02)
 HARSH = ab.Dispersion(name="harsh", start_velocity=30.0, mass=1e-4)
-FEW = {"flights": 60, "fresh": 80, "seed": 3}
+FEW = {"flights": 60, "fresh": 80, "seed": 3, "workers": 1}
 PLANNER = ab.Miqp(reserve=0.1, flies=False)
 
 

@@ -20,8 +20,8 @@ from scipy.stats import binomtest
 
 import aerobat as ab
 from aerobat.storage import read_arrays
+from aerobat.studies.flights import CHUNK
 from aerobat.studies.sweep import Share, Sweep, sweep
-from aerobat.studies.sweep.flights import CHUNK
 
 RUNS = 2 * CHUNK + 20
 SEED = 7
@@ -210,15 +210,6 @@ def test_a_sweep_that_is_killed_leaves_no_process_and_goes_on_where_it_stopped(
 def test_an_executor_can_be_handed_in() -> None:
     with ThreadPoolExecutor(2) as executor:
         assert sweep(hop(), SPREAD, RUNS, SEED, executor=executor) == whole()
-
-
-@pytest.mark.peer
-@pytest.mark.process
-def test_dask_flies_the_same_flights_on_two_workers() -> None:
-    distributed = pytest.importorskip("distributed")
-    options = {"n_workers": 2, "threads_per_worker": 1, "host": "127.0.0.1", "dashboard_address": None}
-    with distributed.Client(**options) as client:
-        assert sweep(hop(), SPREAD, RUNS, SEED, executor=client.get_executor()) == whole()
 
 
 @given(of=st.integers(1, 5000), fraction=st.floats(0.0, 1.0))

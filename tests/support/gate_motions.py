@@ -10,8 +10,7 @@ import aerobat as ab
 from aerobat import so3
 from aerobat.arrays import Array
 from aerobat.certification import PlannedPassage
-from aerobat.simulation.passages import passages
-from aerobat.simulation.passages.polyline import gate_progress
+from aerobat.simulation.passages import log_rows, passages_in_log
 
 RATE = 500.0  # [1/s] as flights are logged
 CROSSING = 0.5  # [s]
@@ -42,8 +41,8 @@ class Motion:
         """Its passage, logged at a rate [1/s]."""
         times = np.arange(0.0, 1.0, 1 / rate) + 0.3 / rate
         planned = PlannedPassage(self.gate, CROSSING, self.gate.up)
-        progress = gate_progress(planned, times, self.states(times), self.body)
-        return passages(planned, progress, np.array([np.nan])).of_flight(0)
+        rows = log_rows(times, *self.states(times))
+        return passages_in_log(rows, (planned,), self.body, np.array([np.nan]))[0].of_flight(0)
 
 
 def motion(seed: int, speed: tuple[float, float] = (2.0, 10.0)) -> Motion:

@@ -1,4 +1,4 @@
-"""Flights by `aerobat mavlink` with a man in the middle: over real sockets, in steps of a clock of their own.
+"""Flights by `aerobat link mavlink` with a man in the middle: real sockets, steps of a clock of their own.
 
     uv run --dev python tests/support/man_in_the_middle.py 200
 
@@ -30,7 +30,7 @@ import pytest
 from aerobat.cli.exit_code import ExitCode
 from aerobat.links.autopilot.vehicle import SimulatedVehicle
 from aerobat.links.mavlink import connection
-from aerobat.links.mavlink.client import Client, Stage
+from aerobat.links.mavlink.client import Client, ClientStage
 from aerobat.links.mavlink.connection import dialect
 from aerobat.links.mavlink.front_end import FrontEnd
 from command_lines import code
@@ -455,7 +455,7 @@ def flown_with(mischief: list[Mischief], plan: Path, tcp: bool, first: bool = Fa
         patch.setattr("aerobat.links.mavlink.client.Client", Seen)
         patch.setattr(connection, "time", stepped)
         try:
-            flight.code = code("mavlink", plan, "--connect", middle.address, "--json")
+            flight.code = code("link", "mavlink", plan, "--connect", middle.address, "--json")
         except Endless:
             flight.raised = "it does not end"
         except Exception:
@@ -485,7 +485,7 @@ def wrongs(flight: Flight, stepped: SteppedFlight, clients: list[Client]) -> Ite
     if flight.code == ExitCode.BAD_INPUT:
         if not (flight.said.strip() and is_an_error(flight.out)):
             yield "another output than an error where nothing was flown, or no sentence"
-        if is_flying or (vehicle.armed and clients and clients[0].stage is Stage.FLYING):
+        if is_flying or (vehicle.armed and clients and clients[0].stage is ClientStage.FLYING):
             yield "refused in flight"
         return
     try:

@@ -39,7 +39,8 @@ from aerobat.problem.files import write_problem
 from aerobat.simulation import load_flight
 from aerobat.simulation.autopilot import Recoveries
 from aerobat.storage import digest_of
-from aerobat.studies.sweep.flights import SweepTask, fly_chunk
+from aerobat.studies.flights import FlightTask
+from aerobat.studies.sweep.flights import fly_chunk
 from aerobat.studies.sweep.kept import KeptChunks
 from aerobat.trajectory import load_trajectory, save_trajectory
 from aerobat.vehicle.files import write_vehicle
@@ -179,16 +180,16 @@ def run_record(path: Path) -> None:
 
 
 @cache
-def sweep_task() -> SweepTask:
+def sweep_task() -> FlightTask:
     """A sweep of a plan."""
     vehicle = plan().vehicle
     assert vehicle is not None
-    return SweepTask(plan(), vehicle, ab.load_dispersion("none"), 0, vehicle.controller, "auto", 1)
+    return FlightTask(plan(), vehicle, ab.load_dispersion("none"), 0, vehicle.controller, "auto", 1)
 
 
 def sweep_chunk(path: Path) -> None:
     """One kept flight of it."""
-    KeptChunks.of(path.parent, sweep_task()).write(0, 1, fly_chunk(sweep_task(), 0, 1))
+    KeptChunks.of(path.parent, sweep_task()).write(range(1), fly_chunk(sweep_task(), range(1)))
 
 
 def described(path: Path) -> str:
@@ -204,7 +205,7 @@ def both(name: str, reader: Reader) -> dict[str, Reader]:
 
 def kept_chunk(path: Path) -> str:
     """A digest of what a kept chunk holds."""
-    chunk = KeptChunks(path.parent).read(0, 1)
+    chunk = KeptChunks(path.parent).read(range(1))
     if chunk is None:
         raise SpecError("it is flown again")
     return digest_of(dict(chunk.columns))

@@ -132,7 +132,7 @@ VALUES: dict[str, tuple[str, ...]] = {
         "gates[7].width=1",
         "a..b=1",
     ),
-    "--of": ("ceiling", "gate", "thrust", ""),
+    "--least": ("ceiling", "gate", "thrust", ""),
     "--tolerance": ("0.3", "0.5", *NUMBERS),
     "--paper": (),
     "--json": (),
@@ -153,27 +153,27 @@ OWN = {
     "view": ["--html", "--video", "--speed", "--json", "--import", "--vehicle"],
     "export": ["--to", "--out", "--rate", "--json", "--import"],
     "inspect": ["--plan", "--figure", "--json", "--import", "--vehicle"],
-    "vehicles": ["--help"],
-    "problems": ["--help"],
+    "show": ["--help"],
     "compare": ["--out", "--angle", "--json", "--vehicle"],
     "sweep": ["--runs", "--workers", "--table", "--conditions", "--seed", "--vehicle", "--out", "--json"],
     "causes": ["--flights", "--conditions", "--seed", "--vehicle", "--angle", "--reserve", "--json"],
-    "map": ["--over", "--workers", "--table", "--angle", "--vehicle", "--planner", "--out", "--json"],
-    "need": ["--of", "--tolerance", "--workers", "--angle", "--vehicle", "--planner", "--out", "--json"],
+    "feasibility": [
+        "--over", "--least", "--tolerance", "--workers", "--table", "--angle", "--vehicle", "--planner",
+        "--out", "--json",
+    ],
     "tune": ["--flights", "--evaluations", "--conditions", "--seed", "--vehicle", "--out", "--time-limit"],
-    "mavlink": [
+    "link mavlink": [
         "--connect", "--wait", "--rate", "--hover-thrust", "--vehicle", "--origin", "--max-error", "--speed",
     ],
-    "mavlink-vehicle": ["--listen", "--loss", "--delay", "--seed", "--speed", "--for"],
+    "link mavlink-vehicle": ["--listen", "--loss", "--delay", "--seed", "--speed", "--for"],
 }  # fmt: skip
 SHORT = {
     "sweep": {"--runs": "3", "--workers": "1"},
     "causes": {"--flights": "2"},
-    "map": {"--over": "vehicle.mass=0.9", "--workers": "1", "--time-limit": "2"},
-    "need": {"--of": "ceiling", "--tolerance": "0.5", "--workers": "1", "--time-limit": "2"},
+    "feasibility": {"--over": "vehicle.mass=0.9", "--workers": "1", "--time-limit": "2"},
     "tune": {"--flights": "2", "--evaluations": "2"},
-    "mavlink": {"--wait": "0.05", "--connect": "udp:127.0.0.1:9"},
-    "mavlink-vehicle": {"--for": "0.05", "--listen": "udp:127.0.0.1:0"},
+    "link mavlink": {"--wait": "0.05", "--connect": "udp:127.0.0.1:9"},
+    "link mavlink-vehicle": {"--for": "0.05", "--listen": "udp:127.0.0.1:0"},
 }  # what makes commands end soon
 
 
@@ -212,11 +212,11 @@ def command_lines(count: int, seed: int) -> Iterator[list[str]]:
 
 def _command_line(rng: random.Random) -> list[str]:
     often = ["fly", "plan", "check", "repeat", "view", "inspect", "export"]
-    seldom = ["compare", "vehicles", "problems", "flyy", ""]
+    seldom = ["compare", "show", "show", "flyy", ""]
     command = rng.choice([*often * 4, *SHORT, *SHORT, *seldom])
-    line = [command] if command else []
+    line = command.split()
     names = OWN.get(command, list(VALUES))
-    if command not in ("vehicles", "problems") and rng.random() < 0.95:
+    if command != "show" and rng.random() < 0.95:
         right = {
             "check": ("kept", "path.csv", "kept/line.plan"),
             "repeat": ("kept",),
@@ -225,11 +225,10 @@ def _command_line(rng: random.Random) -> list[str]:
             "export": ("kept", "kept/line.plan"),
             "compare": ("lien",),
             "causes": ("half-flip", "line"),
-            "map": ("line", "short.toml"),
-            "need": ("line", "short.toml"),
+            "feasibility": ("line", "short.toml"),
             "tune": ("line", "kept"),
-            "mavlink": ("kept", "kept/line.plan"),
-            "mavlink-vehicle": ("agile-quad", "hexarotor"),
+            "link mavlink": ("kept", "kept/line.plan"),
+            "link mavlink-vehicle": ("agile-quad", "hexarotor"),
         }
         line.append(rng.choice(right.get(command, CHEAP) if rng.random() < 0.6 else BROKEN))
     if command == "compare" and line[-1] in CHEAP:  # all planners take long

@@ -271,7 +271,8 @@ def session(generation: str, speed: str | None) -> Iterator[Session]:
     A vehicle stands on the ground; of a given speed it is the clock.
     """
     with ExitStack() as stack:
-        aerobat = (sys.executable, "-X", "faulthandler", "-m", "aerobat")
+        link = (sys.executable, "-X", "faulthandler", "-m", "aerobat", "link")
+        which = ("--ros", generation[-1])
         options: tuple[str, ...] = ()
         pace = () if speed is None else ("--speed", speed)
         ros: Any
@@ -284,7 +285,7 @@ def session(generation: str, speed: str | None) -> Iterator[Session]:
             domain = str(os.getpid() % 100)
             os.environ |= {"ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST", "ROS_DOMAIN_ID": domain}
             options = () if speed is None else ("--sim-time",)
-        stack.enter_context(process(*aerobat, f"{generation}-vehicle", *pace, says="obeys"))
+        stack.enter_context(process(*link, "ros-vehicle", *which, *pace, says="obeys"))
         if generation == "ros1":
             from aerobat.links.ros.rospy_middleware import RospyMiddleware
 
@@ -295,7 +296,12 @@ def session(generation: str, speed: str | None) -> Iterator[Session]:
             ros = RclpyMiddleware("watch")
             ask = ros2_services(ros._node)
         stack.callback(ros.close)
-        yield ros, Watch(ros), ask, lambda: process(*aerobat, generation, *options, says="to look")
+        yield (
+            ros,
+            Watch(ros),
+            ask,
+            lambda: process(*link, "ros", *which, *options, says="to look"),
+        )
 
 
 def main(generation: str) -> int:

@@ -16,14 +16,14 @@ import pytest
 
 import aerobat as ab
 from aerobat.viewer.live.desk import MAX_PAGES, Desk
-from aerobat.viewer.live.replan import FLIGHTS, Answer, Overtaken, Replanner, Verdict
+from aerobat.viewer.live.replan import FLIGHTS, Answer, LiveVerdict, Overtaken, Replanner
 from aerobat.viewer.live.server import GRACE
 from aerobat.viewer.live.sliders import Setting, sliders_of
 from aerobat.viewer.live.view_live import LiveView
 from shared_plans import shared_plan
 
 JSON = {"Content-Type": "application/json"}
-FINE = Answer(Verdict("Feasible", "fine", True))
+FINE = Answer(LiveVerdict("Feasible", "fine", True))
 
 
 @pytest.fixture(scope="module")
@@ -58,13 +58,13 @@ def ask(
 
 @pytest.mark.slow
 def test_a_plan_for_where_the_sliders_stand_is_the_plan_of_that_problem(replanner: Replanner) -> None:
-    answer = replanner.answer({"gates[0].z": 4.0}, never)
+    answer = replanner.answer({"gates[0].position.z": 4.0}, never)
     again = ab.plan(moved_gate(4.0), ab.Miqp(), "agile-quad")
     assert answer.scene is not None
     assert answer.scene.times[-1] == pytest.approx(again.duration)
     assert answer.scene.gates[0].position[2] == 4.0
     assert again.certificate is not None
-    assert answer.verdict == Verdict(
+    assert answer.verdict == LiveVerdict(
         "Feasible" if again.certified else "Not proven",
         f"{again.duration:.2f} s, {again.certificate.why}",
         again.certified,
@@ -109,7 +109,7 @@ def test_dispersed_flights_are_of_the_same_plan_and_counted(replanner: Replanner
 def test_planning_that_is_overtaken_is_given_up(replanner: Replanner) -> None:
     plans = len(replanner.plans)
     with pytest.raises(Overtaken):
-        replanner.answer({"gates[0].z": 2.7}, lambda: True)
+        replanner.answer({"gates[0].position.z": 2.7}, lambda: True)
     assert len(replanner.plans) == plans
 
 

@@ -76,7 +76,7 @@ def test_a_slider_that_is_moved_shows_another_plan_in_the_same_page(show, size) 
     before, duration, picture = verdict(seen), seen.page.evaluate("DURATION"), seen.picture()
     assert before[0] == "Feasible"
     assert "within its limit" in before[1], "the bound that binds is named"
-    slide(seen, "gates[0].z", 5.0)
+    slide(seen, "gates[0].position.z", 5.0)
     assert np.abs(path(seen)[:, 2]).max() == pytest.approx(5.0, abs=0.5)
     assert np.linalg.norm(path(seen) - [2.5, 2.0, 5.0], axis=1).min() < 0.05, "it goes through the gate there"
     assert seen.page.evaluate("DURATION") > duration
@@ -109,7 +109,7 @@ def test_the_gate_goes_with_its_sliders_before_anything_is_planned(show) -> None
     seen = show()
     place = "replay.world.gates.children[0].matrix.toArray()"
     seen.page.evaluate("live.ask = () => {}")
-    for key, value in (("gates[0].x", 1.5), ("gates[0].tilt", 60.0)):
+    for key, value in (("gates[0].position.x", 1.5), ("gates[0].tilt", 60.0)):
         seen.page.evaluate(f"live.move('{key}', {value})")
     shown = np.array(seen.do(place)).reshape(4, 4).T
     gate = ab.tilted_gate((1.5, 2.0, 3.5), tilt=np.radians(60.0))
@@ -121,20 +121,20 @@ def test_the_gate_goes_with_its_sliders_before_anything_is_planned(show) -> None
 def test_the_next_plan_is_drawn_by_the_programs_of_the_last(show) -> None:
     """Software compiles them for seconds."""
     seen = show()
-    slide(seen, "gates[0].z", 3.0)
+    slide(seen, "gates[0].position.z", 3.0)
     seen.page.evaluate(
         "() => { window.linked = 0; const gl = replay.renderer.getContext();"
         "const link = gl.linkProgram.bind(gl);"
         "gl.linkProgram = (program) => ((window.linked += 1), link(program)) }"
     )
     for height in (3.2, 4.0):
-        slide(seen, "gates[0].z", height)
+        slide(seen, "gates[0].position.z", height)
         assert seen.page.evaluate("window.linked") == 0
 
 
 def test_of_many_values_in_quick_succession_the_last_one_is_shown(show) -> None:
     seen = show()
-    seen.page.evaluate("for (const z of [3, 3.2, 4.1, 4.6, 4.8, 3.7]) live.move('gates[0].z', z)")
+    seen.page.evaluate("for (const z of [3, 3.2, 4.1, 4.6, 4.8, 3.7]) live.move('gates[0].position.z', z)")
     seen.until("!document.querySelector('#verdict.busy')")
     assert seen.page.evaluate("HEADER.gates[0].position[2]") == 3.7
     assert seen.page.evaluate("live.answered") == 1
@@ -143,10 +143,10 @@ def test_of_many_values_in_quick_succession_the_last_one_is_shown(show) -> None:
 def test_a_focused_slider_is_moved_by_keys_and_time_is_not(show) -> None:
     seen = show()
     seen.do("replay.seek(1)")
-    seen.page.locator("[name='gates[0].y']").focus()
+    seen.page.locator("[name='gates[0].position.y']").focus()
     seen.page.keyboard.press("ArrowRight")
     seen.page.keyboard.press("ArrowRight")
-    assert seen.page.evaluate("live.moved['gates[0].y']") == pytest.approx(2.2)
+    assert seen.page.evaluate("live.moved['gates[0].position.y']") == pytest.approx(2.2)
     assert seen.time == 1.0
     seen.until("!document.querySelector('#verdict.busy')")
 

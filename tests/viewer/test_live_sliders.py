@@ -40,9 +40,9 @@ def value(setting: Setting, key: str) -> float:
         ),
         "planner.order": lambda: setting.planner.order,
         "dispersion": lambda: setting.dispersion,
-        "gates[0].x": lambda: gate.position[0],
-        "gates[0].y": lambda: gate.position[1],
-        "gates[0].z": lambda: gate.position[2],
+        "gates[0].position.x": lambda: gate.position[0],
+        "gates[0].position.y": lambda: gate.position[1],
+        "gates[0].position.z": lambda: gate.position[2],
         "gates[0].tilt": lambda: np.degrees(np.arctan2(-gate.up @ upright(gate), gate.up[2])),
         "maneuver.min_lateral_thrust": lambda: maneuver.min_lateral_thrust,
         "maneuver.min_inverted_thrust": lambda: maneuver.min_inverted_thrust,
@@ -99,7 +99,9 @@ def test_the_gate_of_a_flip_turns_with_it() -> None:
         assert turned.up[2] == pytest.approx(np.cos(np.radians(tilt)), abs=1e-12)
 
 
-@pytest.mark.parametrize("values", [{"gates[0].z": 1e9}, {"gates[7].z": 0.0}, {"order": 4.0}])
+@pytest.mark.parametrize(
+    "values", [{"gates[0].position.z": 1e9}, {"gates[7].position.z": 0.0}, {"order": 4.0}]
+)
 def test_what_no_slider_says_is_refused(values: dict[str, float]) -> None:
     with pytest.raises(ab.SpecError, match="there is no slider that stands at"):
         moved(setting("half-flip"), list(sliders("half-flip").values()), values)

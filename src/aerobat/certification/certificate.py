@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from enum import StrEnum
 from math import degrees
 from typing import Literal
@@ -198,18 +198,6 @@ class Certificate:
         """The same with the findings about passages through gates and about waypoints."""
         others = tuple(f for f in self.findings if f.gate is None and f.waypoint is None)
         return replace(self, findings=(*others, *passages))
-
-    def record(self) -> dict[str, object]:
-        """Plain data: dictionaries, lists, numbers, strings and None."""
-        return {
-            "certified": self.certified,
-            "why": self.why,
-            "margin_n": self.margin,
-            "findings": [{**asdict(finding), "margin": finding.margin} for finding in self.findings],
-            "undetermined": [asdict(span) for span in self.undetermined],
-            "discontinuities": [asdict(jump) for jump in self.discontinuities],
-            "too_unequal": self.too_unequal,
-        }
 
     def __str__(self) -> str:
         """The outcome in one sentence."""

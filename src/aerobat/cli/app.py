@@ -12,7 +12,8 @@ from aerobat.cli.failures import IMPORT_FLAG
 from aerobat.errors import SpecError
 
 # each command is one file and one function of this name, imported when it is asked for
-COMMANDS = {
+# those of `link` share one file
+COMMANDS: dict[str, dict[str, str | dict[str, str]]] = {
     "Plan and fly": {
         "fly": "Plan a maneuver, fly it in simulation, and report.",
         "plan": "Plan a maneuver and stop there.",
@@ -24,28 +25,27 @@ COMMANDS = {
         "sweep": "Fly a maneuver many times under random conditions and report success rates.",
         "causes": "Measure how much each of four error sources degrades a flight.",
         "tune": "Find controller gains for a vehicle over many flights, and write them to its file.",
-        "map": "Map feasibility over two parameters.",
-        "need": "Find the least thrust-to-weight ratio, the lowest ceiling and the smallest gates.",
+        "feasibility": "Find the least that a maneuver needs, or map feasibility over two parameters.",
     },
     "Look": {
         "view": "Replay a run, a plan or a flight in a browser, or serve a page with sliders.",
         "inspect": "Find the cause of a recorded flight's error.",
-        "figures": "Draw the paper's figures from new runs.",
     },
     "Connect": {
         "export": "Write a plan for another system, and report what is lost.",
-        "mavlink": "Fly a plan on an autopilot over MAVLink.",
-        "mavlink-vehicle": "Simulate a vehicle that MAVLink clients can fly.",
-        "ros1": "Fly maneuvers on demand as a node of ROS 1: services in, goals out.",
-        "ros1-vehicle": "Simulate a vehicle that is a node of ROS 1.",
-        "ros2": "Fly maneuvers on demand as a node of ROS 2: services in, goals out.",
-        "ros2-vehicle": "Simulate a vehicle that is a node of ROS 2.",
+        "link": {
+            "mavlink": "Fly a plan on an autopilot over MAVLink.",
+            "mavlink-vehicle": "Simulate a vehicle that MAVLink clients can fly.",
+            "ros": "Fly maneuvers on demand as a node of ROS 1 or 2: services in, goals out.",
+            "ros-vehicle": "Simulate a vehicle that is a node of ROS 1 or 2.",
+        },
     },
     "Files": {
-        "problems": "List the built-in problems, or write one as a file to begin your own with.",
-        "vehicles": "List the built-in vehicles, describe one, or write its file.",
+        "show": "List the built-in problems and vehicles, describe one, or write its file.",
     },
 }
+
+LINK = "Fly by MAVLink or ROS, or simulate a vehicle for either."
 
 app = App(
     name="aerobat",
@@ -55,7 +55,8 @@ app = App(
     went well and why not, and writes the plan, the flight, a picture and a report to out/flip-roll/.
     """,
     help_epilogue="""Exit codes: 0 all is well; 1 not certified, or not flown as it should be (off its
-    path, past a gate, into its frame or the ground): all is written, and the report says why; 2 the input is
+    path, past a gate, into its frame or the ground, or so in more than 5 of 100 flights): all is written, and
+    the report says why; 2 the input is
     wrong or the output cannot be written (one sentence says where); 3 no plan was found (one sentence says
     which bound binds, and with --explain another which changes would help); 130 interrupted; 143
     terminated; then with nothing written. A sweep that was flown ends with 0, whatever became of its flights;
@@ -68,13 +69,19 @@ app = App(
 for title, commands in COMMANDS.items():
     group = Group.create_ordered(title)
     for name, help in commands.items():
-        place = name.replace("-", "_")
-        app.command(f"aerobat.cli.commands.{place}:{place}", name=name, help=help, group=group)
+        if isinstance(help, str):
+            app.command(f"aerobat.cli.commands.{name}:{name}", name=name, help=help, group=group)
+            continue
+        inner = App(name=name, help=LINK, group=group)
+        app.command(inner)
+        for each, its_help in help.items():
+            place = each.replace("-", "_")
+            inner.command(f"aerobat.cli.commands.{name}:{place}", name=each, help=its_help)
 
 
 START = """Plan, fly and prove aggressive maneuvers for multirotors. To begin with, type:
   aerobat fly flip-roll        plan a flip, fly it in simulation, and report; results go to out/flip-roll/
-  aerobat problems             list the maneuvers, and `aerobat vehicles` the vehicles
+  aerobat show                 list the maneuvers and the vehicles
   aerobat --help               list all commands"""
 
 

@@ -10,7 +10,7 @@ from dataclasses import asdict, dataclass
 
 from aerobat.cli.exit_code import ExitCode
 from aerobat.cli.terminal import print_json, say
-from aerobat.errors import AerobatError, BackendMissing, Infeasible, OwnCodeError
+from aerobat.errors import AerobatError, BackendMissing, Infeasible, OwnCodeError, SpecError
 
 EXPLAIN = "add --explain to `aerobat plan` to try changes that would help"
 IMPORT_FLAG = "--import"
@@ -45,8 +45,12 @@ def foreseen(error: AerobatError) -> Failure:
     """The failure that an error of ours stands for."""
     if isinstance(error, Infeasible):
         return Failure("no_plan", error.with_remedy(EXPLAIN), next(iter(error.limits), None))
-    kind = "missing_backend" if isinstance(error, BackendMissing) else "bad_input"
-    return Failure(kind, str(error), _field(error))
+    if isinstance(error, BackendMissing):
+        return Failure("missing_backend", str(error))
+    from aerobat.declaration.registry import placed
+
+    sentence = placed(error) if isinstance(error, SpecError) else error
+    return Failure("bad_input", str(sentence), _field(error))
 
 
 def of_plugins(error: BaseException, arguments: Sequence[str]) -> Failure | None:

@@ -1,4 +1,4 @@
-"""The options of maps of what is feasible, and of searches for the least that a problem needs."""
+"""The options of `aerobat feasibility`, each with its help."""
 
 # no postponed annotations here: the class that these inherit from is made from its annotations
 
@@ -7,33 +7,21 @@ from typing import Annotated, Literal
 
 from cyclopts import Parameter, validators
 
-from aerobat.cli.options import PlannerOptions, output, planning
+from aerobat.cli.options import PlannerOptions, Workers, output, planning
 from aerobat.cli.runs.record import DEFAULT_TOLERANCE
-
-Workers = Annotated[int | None, Parameter(group=planning, validator=validators.Number(gte=1, lte=4096))]
+from aerobat.errors import SpecError
 
 
 @dataclass(frozen=True, kw_only=True)
-class MapOptions(PlannerOptions):
-    """Options of a map."""
+class FeasibilityOptions(PlannerOptions):
+    """Options of a map of what is feasible, and of a search for the least."""
 
     over: Annotated[tuple[str, ...], Parameter(group=planning, negative="", show_default=False)] = ()
     """A field and its values, FIRST:LAST:STEP or values between commas, as angle=0:90:10; once or twice.
     Fields have the names of files, as limits.velocity, gate.width, vehicle.mass, or speed where no other
     field ends so; angle is the tilt of a half-flip's gate."""
 
-    workers: Workers = None
-    """The number of processes that plan; the cells are the same for any number. Default: one a core."""
-
-    table: Annotated[Literal["csv", "parquet"], Parameter(group=output)] = "csv"
-    """The form of the table, map.csv or map.parquet; the latter needs aerobat[parquet]."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class NeedOptions(PlannerOptions):
-    """Options of a search for the least."""
-
-    of: Annotated[
+    least: Annotated[
         tuple[Literal["thrust-to-weight", "ceiling", "gate"], ...],
         Parameter(group=planning, negative="", show_default=False),
     ] = ()
@@ -42,7 +30,18 @@ class NeedOptions(PlannerOptions):
     tolerance: Annotated[float, Parameter(group=planning, validator=validators.Number(gte=1e-4, lte=0.5))] = (
         DEFAULT_TOLERANCE
     )
-    """Between an answer and the refusal beside it, as a part of the answer."""
+    """Between the least and the refusal beside it, as a part of the least."""
 
-    workers: Workers = None
-    """The number of processes that plan. Default: one a core."""
+    workers: Annotated[str | None, Workers(group=planning)] = None
+
+    table: Annotated[Literal["csv", "parquet"], Parameter(group=output)] = "csv"
+    """The form of a map's table, map.csv or map.parquet; the latter needs aerobat[parquet]."""
+
+    def require_one(self) -> None:
+        """Raise SpecError for options of a map and of a search for the least together."""
+        of_least = {"--least": bool(self.least), "--tolerance": self.tolerance != DEFAULT_TOLERANCE}
+        for flag, is_given in of_least.items():
+            if self.over and is_given:
+                raise SpecError(f"{flag} finds the least, --over maps; leave one of them out")
+        if self.table != "csv" and not self.over:
+            raise SpecError("--table is for a map; add --over, or leave it out")

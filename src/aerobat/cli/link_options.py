@@ -1,12 +1,14 @@
 """The options of live links, each with its help."""
 
 from dataclasses import dataclass
-from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, Literal
 
 from cyclopts import Group, Parameter, validators
 
-from aerobat.cli.options import POSITIVE, Plugins, output, planning
+from aerobat.cli.options import POSITIVE, PluginOptions, RunOptions, planning
+
+if TYPE_CHECKING:
+    from aerobat.links.mission import MissionSettings
 
 linking = Group("Link", sort_key=1)
 trials = Group("Trials", sort_key=2)
@@ -16,7 +18,55 @@ FRACTION = validators.Number(gte=0, lt=1)
 
 
 @dataclass(frozen=True, kw_only=True)
-class MavlinkOptions:
+class MissionOptions(PluginOptions):
+    """Options of what ends a flight by a link."""
+
+    max_error: Annotated[float, Parameter(group=bounds, validator=POSITIVE)] = 1.0
+    """Metres off the path at which the flight is given up: the vehicle is brought to a hover, and by MAVLink
+    it lands."""
+
+    max_silence: Annotated[float, Parameter(group=bounds, validator=POSITIVE)] = 0.25
+    """Seconds without news of the vehicle, in the plan, at which it is given up."""
+
+    max_lateness: Annotated[float, Parameter(group=bounds, validator=POSITIVE)] = 0.1
+    """Seconds by which a set-point may be late, in the plan."""
+
+    @property
+    def mission(self) -> "MissionSettings":
+        """The same as settings of a mission."""
+        from aerobat.links.mission import MissionSettings
+
+        return MissionSettings(
+            max_error=self.max_error, max_silence=self.max_silence, max_lateness=self.max_lateness
+        )
+
+
+@dataclass(frozen=True, kw_only=True)
+class EndOptions:
+    """Options of what runs until it is interrupted."""
+
+    seconds: Annotated[float | None, Parameter(name="--for", group=trials, validator=POSITIVE)] = None
+    """Seconds after which it ends. Default: when it is interrupted."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class RosNodeOptions(EndOptions):
+    """Options of a node of ROS."""
+
+    generation: Annotated[
+        Literal["1", "2"], Parameter(name="--ros", group=linking, env_var="ROS_VERSION")
+    ] = "2"
+    """The generation of ROS."""
+
+    goal: Annotated[str, Parameter(group=linking)] = "/aerobat/goal"
+    """The topic of goals."""
+
+    odometry: Annotated[str, Parameter(group=linking)] = "/aerobat/odometry"
+    """The topic of the vehicle's state."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class MavlinkOptions(MissionOptions, RunOptions):
     """Options of a flight over MAVLink."""
 
     connect: Annotated[str, Parameter(group=linking)] = "udp:127.0.0.1:14540"
@@ -51,26 +101,12 @@ class MavlinkOptions:
     """The place of the plan's origin in the vehicle's own frame, metres east, north and up. Default: above
     that frame's origin, the plan's lowest point 3 m up."""
 
-    max_error: Annotated[float, Parameter(group=bounds, validator=POSITIVE)] = 1.0
-    """Metres off the path at which the flight is given up: the vehicle hovers, then lands."""
-
-    max_silence: Annotated[float, Parameter(group=bounds, validator=POSITIVE)] = 0.25
-    """Seconds without news of the vehicle, in the plan, at which it is given up."""
-
-    max_lateness: Annotated[float, Parameter(group=bounds, validator=POSITIVE)] = 0.1
-    """Seconds by which a set-point may be late, in the plan."""
-
     speed: Annotated[float, Parameter(group=trials, validator=POSITIVE)] = 1.0
     """The pace of time, 1 as in reality, for a simulated vehicle that has the same."""
 
-    plugins: Annotated[tuple[Path, ...], Plugins(group=output)] = ()
-
-    json: Annotated[bool, Parameter(group=output, negative="", show_default=False)] = False
-    """Print the report as JSON on standard output, and nothing else."""
-
 
 @dataclass(frozen=True, kw_only=True)
-class MavlinkVehicleOptions:
+class MavlinkVehicleOptions(EndOptions):
     """Options of a simulated vehicle that speaks MAVLink."""
 
     listen: Annotated[str, Parameter(group=linking)] = "udp:127.0.0.1:14540"
@@ -89,16 +125,13 @@ class MavlinkVehicleOptions:
     speed: Annotated[float, Parameter(group=trials, validator=POSITIVE)] = 1.0
     """The pace of time, 1 as in reality: below 1, slow machines keep up."""
 
-    seconds: Annotated[float | None, Parameter(name="--for", group=trials, validator=POSITIVE)] = None
-    """Seconds after which it ends. Default: when it is interrupted."""
-
 
 @dataclass(frozen=True, kw_only=True)
-class RosOptions:
+class RosOptions(MissionOptions, RosNodeOptions):
     """Options of a ROS node that flies maneuvers."""
 
     vehicle: Annotated[str, Parameter(group=planning)] = "agile-quad"
-    """The vehicle that is flown: a name that `aerobat vehicles` lists, or a TOML file."""
+    """The vehicle that is flown: a name that `aerobat show` lists, or a TOML file."""
 
     planner: Annotated[str | None, Parameter(group=planning)] = None
     """The planner, with its own defaults; see `aerobat plan`. Default: what suits each problem."""
@@ -116,47 +149,16 @@ class RosOptions:
     takeoff_height: Annotated[float, Parameter(group=linking, validator=POSITIVE)] = 3.0
     """Metres that the service takeoff climbs."""
 
-    goal: Annotated[str, Parameter(group=linking)] = "/aerobat/goal"
-    """The topic of goals."""
-
-    odometry: Annotated[str, Parameter(group=linking)] = "/aerobat/odometry"
-    """The topic of the vehicle's state."""
+    sim_time: Annotated[bool, Parameter(group=linking, negative="")] = False
+    """Time is that of the topic /clock (use_sim_time); of ROS 2."""
 
     jerk: Annotated[bool, Parameter(group=linking)] = True
     """Goals tell the jerk, as a second joint; some controllers warn of more than one."""
 
-    max_error: Annotated[float, Parameter(group=bounds, validator=POSITIVE)] = 1.0
-    """Metres off the path at which a maneuver is given up: the vehicle is brought to a hover."""
-
-    max_silence: Annotated[float, Parameter(group=bounds, validator=POSITIVE)] = 0.25
-    """Seconds without odometry, in a maneuver, at which it is given up: goals stop."""
-
-    max_lateness: Annotated[float, Parameter(group=bounds, validator=POSITIVE)] = 0.1
-    """Seconds by which a goal may be late, in a maneuver."""
-
-    seconds: Annotated[float | None, Parameter(name="--for", group=trials, validator=POSITIVE)] = None
-    """Seconds after which it ends. Default: when it is interrupted."""
-
-    plugins: Annotated[tuple[Path, ...], Plugins(group=planning)] = ()
-
 
 @dataclass(frozen=True, kw_only=True)
-class Ros2Options(RosOptions):
-    """Options of a node of ROS 2."""
-
-    sim_time: Annotated[bool, Parameter(group=linking, negative="")] = False
-    """Time is that of the topic /clock (use_sim_time)."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class RosVehicleOptions:
+class RosVehicleOptions(RosNodeOptions):
     """Options of a simulated vehicle that is a ROS node."""
-
-    goal: Annotated[str, Parameter(group=linking)] = "/aerobat/goal"
-    """The topic of goals."""
-
-    odometry: Annotated[str, Parameter(group=linking)] = "/aerobat/odometry"
-    """The topic of the vehicle's state."""
 
     rate: Annotated[float, Parameter(group=linking, validator=validators.Number(gte=20, lte=250))] = 100.0
     """States a second."""
@@ -164,6 +166,3 @@ class RosVehicleOptions:
     speed: Annotated[float | None, Parameter(group=trials, validator=POSITIVE)] = None
     """The highest pace of time, told to all on the topic /clock; time waits for goals that are late. Default:
     it is ROS time, and nothing is told."""
-
-    seconds: Annotated[float | None, Parameter(name="--for", group=trials, validator=POSITIVE)] = None
-    """Seconds after which it ends. Default: when it is interrupted."""

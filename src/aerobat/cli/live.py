@@ -8,12 +8,12 @@ from typing import Annotated
 
 from cyclopts import Group, Parameter, validators
 
-from aerobat.cli.options import POSITIVE, PlanningOptions, Plugins, output
+from aerobat.cli.options import POSITIVE, PlanningOptions, VehicleOptions, output
 from aerobat.cli.tasks import planned
 from aerobat.cli.terminal import open_in_browser, print_json
 from aerobat.environment import load_dispersion
 from aerobat.errors import SpecError
-from aerobat.reporting.report_json import to_json
+from aerobat.reporting.plain_data import to_json
 from aerobat.viewer.live.view_live import view_live
 
 PROBLEM = "flip-roll"  # where nobody names one
@@ -21,7 +21,7 @@ serving = Group("Live", sort_key=4)
 
 
 @dataclass(frozen=True, kw_only=True)
-class ViewOptions:
+class ViewOptions(VehicleOptions):
     """Options of a replay: what it shows, and where it goes."""
 
     html: Annotated[Path | None, Parameter(group=output)] = None
@@ -35,17 +35,8 @@ class ViewOptions:
     speed: Annotated[float, Parameter(group=output, validator=POSITIVE)] = 0.5
     """The pace of time in the video, 1 as it was flown."""
 
-    vehicle: Annotated[str | None, Parameter(group=output)] = None
-    """The vehicle: a name that `aerobat vehicles` lists, or a TOML file. Default: the plan's, else the preset
-    of the flight's name."""
-
-    plugins: Annotated[tuple[Path, ...], Plugins(group=output)] = ()
-
     open: Annotated[bool, Parameter(group=output, negative="", show_default=False)] = False
     """Open the page in the browser."""
-
-    json: Annotated[bool, Parameter(group=output, negative="", show_default=False)] = False
-    """Print what was written as JSON on standard output, and nothing else."""
 
 
 @dataclass(frozen=True, kw_only=True)

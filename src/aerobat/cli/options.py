@@ -18,13 +18,23 @@ flying = Group("Flying", sort_key=2)
 limiting = Group("Limits", sort_key=2)
 output = Group("Output", sort_key=3)
 
+Seed = Annotated[int, Parameter(group=flying, validator=validators.Number(gte=0))]
 POSITIVE = validators.Number(gt=0)
-Plugins = partial(
+
+
+def _require_workers(type_: Any, value: str | None) -> None:
+    from aerobat.studies.workers import read_workers  # takes a tenth of a second
+
+    if value is not None:
+        read_workers(value)
+
+
+Workers = partial(
     Parameter,
-    show_default=False,
-    name="--import",
-    negative="",
-    help="A Python file that registers maneuvers or planners of your own; may be given several times.",
+    name="--workers",
+    validator=_require_workers,
+    help="The number of processes, or a Dask scheduler as dask://HOST:PORT, which needs aerobat[cluster]; "
+    "the results are the same for any. Default: one a core.",
 )
 Options = TypeVar("Options", bound=type[Any])
 
@@ -36,15 +46,62 @@ def how_many(least: int, most: int) -> Parameter:
 
 
 @dataclass(frozen=True, kw_only=True)
-class OutputOptions:
+class PluginOptions:
+    """Options of all commands that code of one's own may take part in."""
+
+    plugins: Annotated[
+        tuple[Path, ...], Parameter(name="--import", group=output, negative="", show_default=False)
+    ] = ()
+    """A Python file that registers maneuvers, planners or control laws of your own; may be given several
+    times."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class RunOptions(PluginOptions):
+    """Options of all commands that report what they made."""
+
+    json: Annotated[bool, Parameter(group=output, negative="", show_default=False)] = False
+    """Print the report as JSON on standard output, and nothing else."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class VehicleOptions(RunOptions):
+    """Options of all commands that are about a vehicle."""
+
+    vehicle: Annotated[str | None, Parameter(group=planning)] = None
+    """The vehicle: a name that `aerobat show` lists, or a TOML file. Default: that of a plan or a flight,
+    else agile-quad, or hexarotor with --paper."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class ProblemOptions(VehicleOptions):
+    """Options of all commands that plan a problem."""
+
+    angle: Annotated[float | None, Parameter(group=planning)] = None
+    """The tilt of a half-flip's gate in degrees, -90 to 90, to the right when positive."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class FlightsOptions:
+    """Options of many flights."""
+
+    flights: Annotated[int, how_many(1, 10**7)] = 1000
+    """The number of flights, of each trial where there are several."""
+
+    conditions: Annotated[str, Parameter(group=flying)] = "lab"
+    """The variation between flights, the disturbances and the sensors: none, lab, field, or a TOML file."""
+
+    seed: Seed = 0
+    """The seed of all flights: the same seed, the same flights."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class OutputOptions(RunOptions):
     """Options of the results: where they go."""
 
     out: Annotated[Path | None, Parameter(group=output)] = None
     """The folder to write to, replaced as a whole. Default: out/PROBLEM, with all that is not default in its
     name, as in out/half-flip-crazyflie-45deg-free-knots."""
-
-    json: Annotated[bool, Parameter(group=output, negative="", show_default=False)] = False
-    """Print the report as JSON on standard output, and nothing else."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -52,24 +109,15 @@ class ExplainingOptions:
     """Options of a report on a plan."""
 
     explain: Annotated[bool, Parameter(group=output, negative="", show_default=False)] = False
-    """Report all facts, and those that take seconds to know: how many of a hundred flights succeed under the
-    given conditions or a lab's, and the recoveries to a hover from all along the plan. A plan that takes
+    """Report all facts, and those that take seconds to know: the recoveries to a hover from all along the
+    plan, and how many of a hundred flights succeed of a plan that is not flown. A plan that takes
     suspiciously long gets another planner's second opinion. Where there is no plan, the changes with which
     there is one are told."""
 
 
 @dataclass(frozen=True, kw_only=True)
-class TaskOptions(OutputOptions):
+class TaskOptions(ProblemOptions, OutputOptions):
     """The problem's and the vehicle's options, and where results go."""
-
-    vehicle: Annotated[str | None, Parameter(group=planning)] = None
-    """The vehicle: a name that `aerobat vehicles` lists, or a TOML file. Default: that of a .plan file, else
-    agile-quad, or hexarotor with --paper."""
-
-    angle: Annotated[float | None, Parameter(group=planning)] = None
-    """The tilt of a half-flip's gate in degrees, -90 to 90, to the right when positive."""
-
-    plugins: Annotated[tuple[Path, ...], Plugins(group=planning)] = ()
 
 
 def offered_options() -> dict[str, dict[str, PlannerOption]]:
@@ -159,15 +207,24 @@ class ConditionsOptions:
         float | None,
         Parameter(name="--pass", group=planning, validator=validators.Number(gt=0, lt=1)),
     ] = None
-    """Plan until flights under --conditions pass with this probability, with a reserve of thrust and narrower
-    gates as their spread asks for, and prove it on fresh flights."""
+    """Plan until flights under --conditions, by default lab, pass with this probability, with a reserve of
+    thrust and narrower gates as their spread asks for, and prove it on fresh flights."""
 
     conditions: Annotated[str | None, Parameter(group=flying)] = None
-    """The variation, the disturbances and the sensors: none, lab, field, or a TOML file. Default: flown as
-    planned, from a state that is known."""
+    """The variation, the disturbances and the sensors: none, lab, field, or a TOML file. Default: one flight
+    as planned, from a state that is known, and a hundred under lab, which are counted."""
 
-    seed: Annotated[int, Parameter(group=flying, validator=validators.Number(gte=0))] = 0
+    seed: Seed = 0
     """The seed of the conditions: the same seed, the same flight."""
+
+    workers: Annotated[
+        str | None,
+        Workers(
+            group=planning,
+            help="The number of processes that fly for --pass, or a Dask scheduler as dask://HOST:PORT; the "
+            "plan is the same for any. Default: one a core.",
+        ),
+    ] = None
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -23,7 +23,40 @@ VARIABLE = "AEROBAT_PROGRESS"
 
 
 class Progress:
-    """Progress of long work by now, as a line."""
+    """Progress of long work by now, as a line.
+
+    Args:
+        doing: What is counted, in words.
+        total: How many there shall be; 0 where nobody knows.
+        clock: Seconds that rise.
+    """
+
+    def __init__(self, doing: str, total: int = 0, clock: Callable[[], float] = perf_counter) -> None:
+        self._clock = clock
+        self._began = clock()
+        self._doing, self._total = doing, total
+        self._done, self._note = 0, ""
+
+    def tell(self, done: int, note: str = "") -> None:
+        """Take note of how many are done, and of what is to be said of them."""
+        self._done, self._note = done, note
+
+    def step(self, note: str) -> None:
+        """Take note of one more."""
+        self.tell(self._done + 1, note)
+
+    def counting(self, name: str) -> Callable[[int, int], None]:
+        """Return what takes note of how many are done, and of how many of those are of that name."""
+        return lambda done, some: self.tell(done, f"{some} {name}")
+
+    def __str__(self) -> str:
+        """How many, for how long, what is to be said of them, and how long still."""
+        spent = self._clock() - self._began
+        of = f" of {self._total}" if self._total else ""
+        text = f"{self._doing} {self._done}{of} in {spent:.0f} s" + (f": {self._note}" if self._note else "")
+        if not self._total or not self._done:
+            return text
+        return f"{text}; {(self._total - self._done) * spent / self._done:.0f} s to go"
 
     def __rich__(self) -> str:
         """The line, drawn anew whenever a terminal shows it, and none of its brackets taken for markup."""
@@ -44,7 +77,7 @@ class PlanningProgress(Progress):
     """
 
     def __init__(self, planner: str = "", clock: Callable[[], float] = perf_counter) -> None:
-        self._clock = clock
+        super().__init__("planning", clock=clock)
         self.begin(planner)
 
     def begin(self, planner: str) -> None:
@@ -52,8 +85,14 @@ class PlanningProgress(Progress):
         self._planner = planner
         self._began = self._clock()
         self._best = inf  # [s] the shortest duration that will do
-        self._tried = 0
-        self._last = ""
+        self._tried = self._rounds = 0
+        self._last = self._trial = ""
+
+    def tried(self, trial: Round) -> None:
+        """Take note of flights of a plan that is to pass; the next one is planned anew."""
+        self._best = inf
+        self._rounds += 1
+        self._trial = f"; round {self._rounds}, {trial}"
 
     def record(self, attempt: Attempt) -> None:
         """Take note of an attempt that ended."""
@@ -66,201 +105,8 @@ class PlanningProgress(Progress):
         """Which planner, for how long, how good so far, and what it tried last."""
         best = "no plan so far" if self._best == inf else f"{self._best:.3f} s so far"
         last = f"; attempt {self._tried}: {self._last}" if self._tried else ""
-        return f"planning with {self._planner} for {self._clock() - self._began:.0f} s: {best}{last}"
-
-
-class PassingProgress(PlanningProgress):
-    """Progress of planning until flights pass, by now."""
-
-    def begin(self, planner: str) -> None:
-        """Another planner's turn, no round flown."""
-        super().begin(planner)
-        self._rounds = 0
-        self._trial = ""
-
-    def tried(self, trial: Round) -> None:
-        """Take note of a round that ended; the next one is planned anew."""
-        self._best = inf
-        self._rounds += 1
-        self._trial = str(trial)
-
-    def __str__(self) -> str:
-        """What planning is at, and what the last round came to."""
-        return super().__str__() + (f"; round {self._rounds}, {self._trial}" if self._rounds else "")
-
-
-class DrawingProgress(Progress):
-    """The number of pictures of a video that are drawn by now."""
-
-    def __init__(self) -> None:
-        self._drawn = self._all = 0
-
-    def record(self, drawn: int, all: int) -> None:
-        """Take note of a picture that is drawn."""
-        self._drawn, self._all = drawn, all
-
-    def __str__(self) -> str:
-        """How many, and of how many."""
-        return (
-            f"drawing the video: {self._drawn} of {self._all} pictures" if self._all else "drawing the video"
-        )
-
-
-class TuningProgress(Progress):
-    """Progress of a search for gains by now.
-
-    Args:
-        evaluations: How many sets of gains may be tried.
-    """
-
-    def __init__(self, evaluations: int) -> None:
-        self._evaluations = evaluations
-        self._tried, self._cost = 0, inf
-
-    def record(self, tried: int, cost: float) -> None:
-        """Take note of how many sets of gains were tried, and of the lowest cost [m]."""
-        self._tried, self._cost = tried, cost
-
-    def __str__(self) -> str:
-        """How many sets of gains, and how good the best of them is."""
-        best = f", cost {100 * self._cost:.2f} cm so far" if self._tried else ""
-        return f"tuning: {self._tried} of at most {self._evaluations} sets of gains{best}"
-
-
-class SweepProgress(Progress):
-    """Progress of a sweep by now.
-
-    Args:
-        runs: How many flights there shall be.
-        clock: Seconds that rise.
-    """
-
-    def __init__(self, runs: int, clock: Callable[[], float] = perf_counter) -> None:
-        self._clock = clock
-        self._began = clock()
-        self._runs = runs
-        self._done = self._well = 0
-
-    def record(self, done: int, well: int) -> None:
-        """Take note of the flights done, and of those that went well."""
-        self._done, self._well = done, well
-
-    def __str__(self) -> str:
-        """How many flights, how well, for how long, how long still."""
         spent = self._clock() - self._began
-        text = f"flown {self._done} of {self._runs} in {spent:.0f} s"
-        if not self._done:
-            return text
-        well = f"{100 * self._well / self._done:.1f} % went well"
-        left = (self._runs - self._done) * spent / self._done
-        return f"{text}: {well}; {left:.0f} s to go"
-
-
-class MapProgress(Progress):
-    """Progress of a map by now.
-
-    Args:
-        cells: How many there shall be.
-        clock: Seconds that rise.
-    """
-
-    def __init__(self, cells: int, clock: Callable[[], float] = perf_counter) -> None:
-        self._clock = clock
-        self._began = clock()
-        self._cells = cells
-        self._done = self._planned = 0
-
-    def record(self, done: int, planned: int) -> None:
-        """Take note of the cells done, and of those that have a plan."""
-        self._done, self._planned = done, planned
-
-    def __str__(self) -> str:
-        """How many cells, how many of them planned, for how long, how long still."""
-        spent = self._clock() - self._began
-        text = f"{self._done} of {self._cells} cells in {spent:.0f} s"
-        if not self._done:
-            return text
-        left = (self._cells - self._done) * spent / self._done
-        return f"{text}: {self._planned} planned; {left:.0f} s to go"
-
-
-class NeedProgress(Progress):
-    """The last value that was tried of each quantity."""
-
-    def __init__(self) -> None:
-        self._tried = 0
-        self._last: dict[str, str] = {}
-
-    def record(self, quantity: str, value: float, planned: bool) -> None:
-        """Take note of a value that was tried."""
-        self._tried += 1
-        self._last[quantity] = f"{quantity} {value:.4g} {'planned' if planned else 'refused'}"
-
-    def __str__(self) -> str:
-        """How many were tried, and how the last of each quantity ended."""
-        return "; ".join([f"{self._tried} plans tried", *self._last.values()])
-
-
-class WhyProgress(Progress):
-    """The changes that were tried where there is no plan."""
-
-    def __init__(self) -> None:
-        self._tried = self._helpful = 0
-        self._last = ""
-
-    def record(self, change: str, helps: bool) -> None:
-        """Take note of a change that was tried."""
-        self._tried += 1
-        self._helpful += helps
-        self._last = f"; {change}: {'planned' if helps else 'no plan'}"
-
-    def __str__(self) -> str:
-        """How many were tried, how many help, and the last."""
-        return f"{self._tried} changes tried, {self._helpful} would help{self._last}"
-
-
-class CausesProgress(Progress):
-    """The trial that is planned and flown.
-
-    Args:
-        trials: How many there shall be.
-    """
-
-    def __init__(self, trials: int) -> None:
-        self._trials = trials
-        self._begun, self._name = 0, ""
-
-    def begin(self, name: str) -> None:
-        """Another trial's turn."""
-        self._begun, self._name = self._begun + 1, name
-
-    def __str__(self) -> str:
-        """Which cause, and how many trials there are."""
-        return f"{self._name} ({self._begun} of {self._trials})"
-
-
-class FiguresProgress(Progress):
-    """The figure of the paper that is being made, and what is planned or flown for it.
-
-    Args:
-        count: How many figures there shall be.
-    """
-
-    def __init__(self, count: int) -> None:
-        self._count = count
-        self._begun, self._number, self._doing = 0, 0, ""
-
-    def figure(self, number: int) -> None:
-        """Another figure's turn."""
-        self._begun, self._number, self._doing = self._begun + 1, number, ""
-
-    def begin(self, doing: str) -> None:
-        """Take note of what is planned or flown next."""
-        self._doing = f": {doing}"
-
-    def __str__(self) -> str:
-        """Which figure, how many there are, and what it is at."""
-        return f"figure {self._number} ({self._begun} of {self._count}){self._doing}"
+        return f"planning with {self._planner} for {spent:.0f} s: {best}{last}{self._trial}"
 
 
 def planning_progress(planner: str = "") -> AbstractContextManager[PlanningProgress]:

@@ -2,36 +2,36 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from concurrent.futures import Executor
 from math import inf
 from pathlib import Path
+from typing import Literal
 
 from aerobat import so3
 from aerobat.cli.link_options import RosOptions, RosVehicleOptions
 from aerobat.cli.runs.saved_plans import named_vehicle
 from aerobat.cli.terminal import say
 from aerobat.environment import Environment
+from aerobat.errors import SpecError
 from aerobat.links.autopilot.vehicle import SimulatedVehicle
-from aerobat.links.mission import MissionSettings
 from aerobat.links.ros.maneuver_node import ManeuverNode, NodeSettings
 from aerobat.links.ros.middleware import Middleware, PacedClock
-from aerobat.links.ros.preparation import MANEUVERS, Request, prepare
+from aerobat.links.ros.preparation import MANEUVERS, ManeuverRequest, prepare
 from aerobat.links.ros.run import RVIZ, run
 from aerobat.links.ros.vehicle_node import VehicleNode
 from aerobat.planning import Planner, planner_class, suited_planner
 from aerobat.problem import Problem, load_problem
-from aerobat.studies.workers import workers
+from aerobat.studies.workers import processes
 from aerobat.vehicle import Vehicle
 
 _VEHICLE_RATE = 250.0  # [1/s] at which the simulated vehicle goes on
 
 
-def fly_on_demand(join: Callable[[], Middleware], problems: tuple[str, ...], options: RosOptions) -> None:
+def fly_on_demand(problems: tuple[str, ...], options: RosOptions) -> None:
     """Offer maneuvers as services, until interrupted.
 
     Args:
-        join: what makes this process a node.
         problems: names or files of those beside the paper's.
         options: of the command.
     """
@@ -43,19 +43,17 @@ def fly_on_demand(join: Callable[[], Middleware], problems: tuple[str, ...], opt
         with_jerk=options.jerk,
         goal=options.goal,
         odometry=options.odometry,
-        mission=MissionSettings(
-            max_error=options.max_error, max_silence=options.max_silence, max_lateness=options.max_lateness
-        ),
+        mission=options.mission,
     )
     services = {**MANEUVERS, **{_service(name): name for name in problems}}
     maneuvers = {}
     for service, name in services.items():
         problem = load_problem(name)
         maneuvers[service] = problem, _planner(problem, vehicle, options)
-    ros = join()
+    ros = _joined("aerobat", options.generation, sim_time=options.sim_time)
     try:
         # two, so that none of them is this one
-        with workers(2, forked=False) as executor:
+        with processes(2, forked=False) as executor:
             _rehearse(executor, vehicle, maneuvers, settings)
             node = ManeuverNode(ros, vehicle, maneuvers, executor, settings, say)
             say(f"flies {vehicle.name}: /aerobat/ takeoff, {', '.join(maneuvers)}, hold, land")
@@ -74,22 +72,41 @@ def _rehearse(
     """Begin to plan one maneuver for nobody, so that the first real one finds everything imported."""
     problem, planner = next(iter(maneuvers.values()))
     aloft = settings.takeoff_height * so3.UP
-    executor.submit(prepare, Request(problem, vehicle, planner, aloft, 0.0, 0.0, in_world=False))
+    executor.submit(prepare, ManeuverRequest(problem, vehicle, planner, aloft, 0.0, 0.0, in_world=False))
 
 
-def simulate(
-    join: Callable[[PacedClock | None], Middleware], vehicle: str, options: RosVehicleOptions
-) -> None:
+def _joined(
+    name: str, generation: Literal["1", "2"], clock: PacedClock | None = None, sim_time: bool = False
+) -> Middleware:
+    """This process as a node of ROS.
+
+    Args:
+        name: of the node.
+        generation: of ROS.
+        clock: what it lives by; else ROS time.
+        sim_time: whether that is the topic /clock's, which ROS 1 says by itself.
+    """
+    if generation == "2":
+        from aerobat.links.ros.rclpy_middleware import RclpyMiddleware
+
+        return RclpyMiddleware(name, clock, sim_time)
+    if sim_time:
+        raise SpecError("--sim-time is for --ros 2; leave it out")
+    from aerobat.links.ros.rospy_middleware import RospyMiddleware
+
+    return RospyMiddleware(name, clock)
+
+
+def simulate(vehicle: str, options: RosVehicleOptions) -> None:
     """Simulate a vehicle, until interrupted.
 
     Args:
-        join: what makes this process a node, that lives by a clock of its own or by ROS time.
         vehicle: its name or file.
         options: of the command.
     """
     found = named_vehicle(vehicle)
     clock = None if options.speed is None else PacedClock(options.speed)
-    ros = join(clock)
+    ros = _joined("aerobat_vehicle", options.generation, clock)
     try:
         node = VehicleNode(
             ros,

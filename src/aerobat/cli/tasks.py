@@ -11,13 +11,13 @@ from aerobat.cli.options import (
     ConditionsOptions,
     PlannerOptions,
     PlanningOptions,
-    TaskOptions,
+    ProblemOptions,
     is_given,
     offered_options,
     option_name,
 )
-from aerobat.cli.progress import PassingProgress, WhyProgress, planning_progress, showing
-from aerobat.cli.runs.record import FlightSettings, RunRecord, default_vehicle
+from aerobat.cli.progress import Progress, planning_progress, showing
+from aerobat.cli.runs.record import USUAL_CONDITIONS, FlightSettings, RunRecord, default_vehicle
 from aerobat.cli.runs.saved_plans import named_vehicle, plan_source, read_saved_plan
 from aerobat.cli.terminal import say
 from aerobat.environment import load_dispersion
@@ -38,7 +38,7 @@ from aerobat.problem import Problem, load_problem
 from aerobat.vehicle import Vehicle
 
 
-def read_task(name: str, options: TaskOptions, paper: bool = False) -> tuple[Problem, Vehicle]:
+def read_task(name: str, options: ProblemOptions, paper: bool = False) -> tuple[Problem, Vehicle]:
     """The problem and the vehicle that a command names."""
     problem = load_problem(name)
     vehicle = named_vehicle(options.vehicle or default_vehicle(paper))
@@ -54,6 +54,7 @@ def planned(
     flight: FlightSettings = FlightSettings(),
     make: Callable[[RunRecord], Plan] | None = None,
     explain: bool = False,
+    workers: str | None = None,
 ) -> tuple[Plan, RunRecord]:
     """The plan that a command names, certified for its vehicle, and what it takes to make it again.
 
@@ -64,6 +65,7 @@ def planned(
         flight: How the plan is flown.
         make: The way from a record to a plan, by default planning.
         explain: Whether what takes seconds to know is found out too.
+        workers: Who flies what tells whether flights pass.
     """
     source, columns = plan_source(name), column_groups(options.columns)
     if source is not None:
@@ -95,7 +97,7 @@ def planned(
         columns=columns,
         plugins=tuple(map(str, options.plugins)),
     )
-    return plan_of(record, explain) if make is None else make(record), record
+    return plan_of(record, explain, workers) if make is None else make(record), record
 
 
 def flight_settings(
@@ -112,9 +114,10 @@ def flight_settings(
         plant: The name of the physics, None for the built-in.
         autopilot: The name of the firmware of the inner loop, None for our model.
     """
-    conditions = None if options.conditions is None else load_dispersion(options.conditions)
-    if options.probability is not None and conditions is None:
-        raise SpecError("--pass needs --conditions, under which flights shall pass; give lab, say")
+    named = options.conditions or (None if options.probability is None else USUAL_CONDITIONS)
+    conditions = None if named is None else load_dispersion(named)
+    if options.workers is not None and options.probability is None:
+        raise SpecError("--workers fly for --pass; give that too, or leave --workers out")
     return FlightSettings(
         controller,
         conditions,
@@ -125,15 +128,20 @@ def flight_settings(
     )
 
 
-def plan_of(record: RunRecord, explain: bool = False) -> Plan:
+def plan_of(record: RunRecord, explain: bool = False, workers: str | None = None) -> Plan:
     """The plan of a run, made anew; explained on request, in what is left of its time.
 
     Raises Infeasible where there is none; on request with the changes that would help, once it is said that
     there is none.
+
+    Args:
+        record: What is planned, and how.
+        explain: Whether what takes seconds to know is found out too.
+        workers: Who flies what tells whether flights pass.
     """
     assert record.planner is not None, "a plan that came from a file is not made"
     if record.flight.probability is not None:
-        found = _plan_that_passes(record)
+        found = _plan_that_passes(record, workers)
         return with_explanation(found) if explain else found
     try:
         return _plan_made(record, explain)
@@ -149,8 +157,12 @@ def _advice(record: RunRecord, refusal: Infeasible) -> str:
     from aerobat.studies.why import Request, explained
 
     task = Request(record.problem, None if record.paper else record.vehicle, record.planner)
-    with showing(WhyProgress()) as progress:
-        return explained(refusal, task, progress.record).advice
+    with showing(Progress("changes tried")) as progress:
+
+        def note(change: str, helps: bool) -> None:
+            progress.step(f"{change}: {'planned' if helps else 'no plan'}")
+
+        return explained(refusal, task, note).advice
 
 
 def _plan_made(record: RunRecord, explain: bool) -> Plan:
@@ -166,7 +178,7 @@ def _plan_made(record: RunRecord, explain: bool) -> Plan:
         return with_explanation(found, progress.record) if explain else found
 
 
-def _plan_that_passes(record: RunRecord) -> Plan:
+def _plan_that_passes(record: RunRecord, workers: str | None) -> Plan:
     """The plan of a run that is tightened until flights pass."""
     flight = record.flight
     assert record.planner is not None, "a plan that came from a file is not made"
@@ -176,7 +188,7 @@ def _plan_that_passes(record: RunRecord) -> Plan:
         raise SpecError("--pass keeps a reserve, the paper none; leave out --pass or --paper")
     from aerobat.studies.passing import plan_to_pass
 
-    with showing(PassingProgress(record.planner_name)) as progress:
+    with planning_progress(record.planner_name) as progress:
         return plan_to_pass(
             record.problem,
             record.planner,
@@ -185,6 +197,7 @@ def _plan_that_passes(record: RunRecord) -> Plan:
             conditions=flight.conditions,
             seed=flight.seed,
             controller=flight.controller,
+            workers=workers,
             progress=progress.record,
             tried=progress.tried,
         ).plan

@@ -1,9 +1,9 @@
-"""Flights of a plan under random conditions, for a report that explains it."""
+"""Flights of a plan under random conditions, which decide whether a real flight is likely to succeed."""
 
 from __future__ import annotations
 
-from aerobat.cli.progress import SweepProgress, showing
-from aerobat.cli.runs.record import RunRecord
+from aerobat.cli.progress import Progress, showing
+from aerobat.cli.runs.record import USUAL_CONDITIONS, RunRecord
 from aerobat.control import named_controller
 from aerobat.environment import load_dispersion
 from aerobat.errors import SpecError
@@ -11,12 +11,14 @@ from aerobat.planning import Plan
 from aerobat.studies.sweep import Sweep
 from aerobat.studies.sweep import sweep as sweep_plan
 
-CONDITIONS = "lab"  # where a run names none
 FLIGHTS = 100  # a success rate within a few percent
 
 
 def trial_flights(plan: Plan, record: RunRecord) -> Sweep | None:
-    """Fly a plan under the run's conditions, or a lab's; None for a vehicle that cannot hover.
+    """Fly a plan under the run's conditions, or a lab's.
+
+    None is returned where nothing varies, for the paper's plans, which leave nothing to the controller, for
+    another simulator's physics, which take minutes, and for a vehicle that cannot hover.
 
     Args:
         plan: The plan, for a vehicle.
@@ -24,12 +26,21 @@ def trial_flights(plan: Plan, record: RunRecord) -> Sweep | None:
     """
     assert plan.vehicle is not None, "a command plans for a vehicle"
     flight = record.flight
-    conditions = load_dispersion(CONDITIONS) if flight.conditions is None else flight.conditions
+    if flight.conditions is None and record.paper:
+        return None
+    conditions = load_dispersion(USUAL_CONDITIONS) if flight.conditions is None else flight.conditions
+    if flight.plant is not None or conditions == load_dispersion("none"):
+        return None
     controller = named_controller(flight.controller, plan.vehicle.controller)
     try:
-        with showing(SweepProgress(FLIGHTS)) as progress:
+        with showing(Progress("flown", FLIGHTS)) as progress:
             return sweep_plan(
-                plan, conditions, FLIGHTS, flight.seed, controller=controller, progress=progress.record
+                plan,
+                conditions,
+                FLIGHTS,
+                flight.seed,
+                controller=controller,
+                progress=progress.counting("went well"),
             )
     except SpecError:
         return None

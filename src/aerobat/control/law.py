@@ -13,11 +13,12 @@ from typing import Any, ClassVar, NamedTuple, TypeVar, cast, dataclass_transform
 
 from pydantic import Field
 
-from aerobat.declaration import FieldError, Label, Registry, shown, unknown_name, validated
+from aerobat.declaration import FieldError, Label, Registry, placed, shown, unknown_name, validated
+from aerobat.errors import SpecError
 from aerobat.kernels.control import ControllerModel
 from aerobat.kernels.control_loops import ReferencePoint
 from aerobat.kernels.ops import Ops, PerRotor, Scalar
-from aerobat.kernels.rigid_body import Body, Wrench
+from aerobat.kernels.rigid_body import Body, RotorWrench
 from aerobat.vehicle.controller import CONTROLLERS, Controller
 from aerobat.vehicle.controller import named_controller as named_settings
 
@@ -57,7 +58,7 @@ class ControlLaw(ABC):
     @abstractmethod
     def step(
         self, ops: Ops, model: ControllerModel, state: Any, seen: Seen, elapsed: Scalar
-    ) -> tuple[Any, Wrench]:
+    ) -> tuple[Any, RotorWrench]:
         """Return the state at a tick, and the thrust [N] and the moment [N·m, body] to be given.
 
         Args:
@@ -98,7 +99,12 @@ def named_controller(name: str, own: Controller = CONTROLLERS["full"]) -> Contro
         return named_settings(name, own)
     if name not in tuple(CONTROL_LAWS):
         raise unknown_name("controller", name, (*CONTROLLERS, *CONTROL_LAWS))
-    return CONTROL_LAWS[name]()
+    law = CONTROL_LAWS[name]
+    try:
+        return law()
+    except SpecError as error:
+        wanting = SpecError(f"controller '{name}' is flown at the defaults of its gains: {error}")
+        raise placed(wanting, law.step) from None
 
 
 def as_controller(value: Any) -> Controller | ControlLaw | str | None:

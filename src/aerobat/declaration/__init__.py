@@ -35,7 +35,7 @@ from aerobat.declaration.field_types import (
     unit,
 )
 from aerobat.declaration.notebooks import in_notebooks
-from aerobat.declaration.registry import Registry, import_plugin
+from aerobat.declaration.registry import Registry, import_plugin, placed
 from aerobat.declaration.sentences import (
     FieldError,
     missing_fields,
@@ -84,6 +84,7 @@ __all__ = [
     "in_radians",
     "missing_fields",
     "number",
+    "placed",
     "short",
     "shown",
     "suggest_for",

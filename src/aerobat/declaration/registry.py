@@ -7,7 +7,9 @@ import sys
 from collections.abc import Iterator, Mapping
 from importlib import import_module
 from importlib.machinery import SourceFileLoader
+from inspect import isabstract, unwrap
 from pathlib import Path
+from traceback import extract_tb
 from types import MappingProxyType
 from typing import Any, Generic, TypeVar
 
@@ -51,12 +53,18 @@ class Registry(Generic[T]):
             raise SpecError(f"a {self._noun} is a class, got {shown(cls)}; write its name above a class")
         if not issubclass(cls, self._base):
             raise SpecError(f"{cls.__name__} must inherit from {self._base.__name__} to be a {self._noun}")
+        if isabstract(cls):
+            wanting = " and ".join(sorted(vars(cls)["__abstractmethods__"]))
+            raise SpecError(f"{cls.__name__} has no {wanting} and is no {self._noun} without; define it")
         if cls.__module__ != self._modules.get(name):
             self._import_own(name)
         other = self._classes.get(name)
         if other and (other.__module__, other.__qualname__) != (cls.__module__, cls.__qualname__):
-            raise SpecError(f"there are two {self._noun}s named {name!r}, {other!r} and {cls!r}; rename one")
+            both = " and ".join(f"{each.__name__} of {each.__module__}" for each in (other, cls))
+            raise SpecError(f"there are two {self._noun}s named {name!r}, {both}; rename one")
         made: Any = declared(cls)
+        if not made.__pydantic_complete__:
+            raise SpecError(f"{cls.__name__} has a field whose type is no known name; import that type")
         made.kind = name
         self._classes[name] = made
         return self._classes[name]
@@ -156,7 +164,43 @@ def _import(load: Any, what: str) -> None:
     try:
         load()
     except SpecError as error:
-        raise SpecError(f"{what}: {error}") from None
-    except Exception as error:
+        raise SpecError(f"{what}{_line(error)}: {error}") from None
+    except (Exception, SystemExit) as error:
         reason = " ".join(str(error).split())
-        raise SpecError(f"{what} cannot be imported: {type(error).__name__}: {reason}") from error
+        said = f"{type(error).__name__}: {reason}" if reason else type(error).__name__
+        raise SpecError(f"{what}{_line(error)} cannot be imported: {said}") from error
+
+
+def _line(error: BaseException) -> str:
+    """Return the line of a plugin at which it failed, after a colon; nothing where it was in no plugin."""
+    if isinstance(error, SyntaxError) and error.filename in imported_plugins():
+        return f":{error.lineno}"
+    found = [line for path, line in passed_lines(error) if path in imported_plugins()]
+    return f":{found[-1]}" if found else ""
+
+
+def placed(error: SpecError, method: Any = None) -> SpecError:
+    """Return the error with the plugin's file and line before its sentence, where one has brought it about.
+
+    Args:
+        error: What was raised.
+        method: Of the class that answered wrongly; its beginning is told where the error came through no line
+            of a plugin.
+    """
+    code = getattr(unwrap(method), "__code__", None) if callable(method) else None
+    lines = [*([] if code is None else [(code.co_filename, code.co_firstlineno)]), *passed_lines(error)]
+    within = [f"{path}:{line}" for path, line in lines if path in imported_plugins()]
+    if not within or any(path in str(error) for path in imported_plugins()):
+        return error
+    return SpecError(f"{within[-1]}: {error}")
+
+
+def passed_lines(error: BaseException) -> list[tuple[str, int]]:
+    """Return the files and lines that an error came through, and those in whose handling it was raised."""
+    lines: list[tuple[str, int]] = []
+    following: BaseException | None = error
+    while following is not None:
+        frames = extract_tb(following.__traceback__)
+        lines += [(frame.filename, frame.lineno or 0) for frame in frames]
+        following = following.__context__
+    return lines

@@ -10,12 +10,13 @@ from aerobat.engines.pytree import Tree
 
 def components(array: Array) -> Tree:
     """(..., n) -> a tuple of n leaves of shape (...)."""
-    return tuple(np.ascontiguousarray(np.moveaxis(array, -1, 0)))
+    last = array.ndim - 1
+    return tuple(np.ascontiguousarray(array.transpose(last, *range(last))))
 
 
 def matrix_components(matrices: Array) -> Tree:
     """(..., rows, columns) -> rows of columns of leaves (...)."""
-    return tuple(components(row) for row in np.moveaxis(matrices, -2, 0))
+    return tuple(components(matrices[..., k, :]) for k in range(matrices.shape[-2]))
 
 
 def from_components(leaves: Tree) -> Array:

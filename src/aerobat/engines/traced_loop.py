@@ -14,7 +14,7 @@ MIN_GUARDED = 32  # operations that are worth a branch
 
 
 @dataclass(frozen=True)
-class Block:
+class GuardedBlock:
     """Values that are computed together: always, or only where a logical value holds."""
 
     guard: int | None
@@ -81,7 +81,7 @@ class TracedLoop:
                 found.append(number)
         return found
 
-    def guarded_blocks(self, numbers: Sequence[int], shared: Iterable[int]) -> list[Block]:
+    def guarded_blocks(self, numbers: Sequence[int], shared: Iterable[int]) -> list[GuardedBlock]:
         """The values of `numbers` in blocks; what only selections by a shared condition use is guarded.
 
         Where the condition does not hold, a guarded value is not computed, and no selection takes it.
@@ -103,7 +103,7 @@ class TracedLoop:
                         missing.discard(number)
                 waiting = [number for number in waiting if number in missing]
                 if block:
-                    blocks.append(Block(guard, tuple(block)))
+                    blocks.append(GuardedBlock(guard, tuple(block)))
         return blocks
 
     def _guards(self, numbers: Sequence[int], shared: set[int]) -> dict[int, int]:
@@ -122,7 +122,7 @@ class TracedLoop:
                 guards |= dict.fromkeys(only, condition)
         return guards
 
-    def stored_early(self, blocks: Sequence[Block]) -> list[dict[int, int]]:
+    def stored_early(self, blocks: Sequence[GuardedBlock]) -> list[dict[int, int]]:
         """For each block, the parts of the carry that may take their next values in it, and these values.
 
         They are those that otherwise stay as they are, and that nothing asks for after the block.

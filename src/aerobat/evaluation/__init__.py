@@ -1,7 +1,7 @@
 """Evaluation: how well flights went, and what that depends on."""
 
 from aerobat.evaluation.opening import Opening, smallest_opening
-from aerobat.evaluation.score import LapTime, Score, Scores, score
+from aerobat.evaluation.score import LapTime, Score, score
 from aerobat.evaluation.score_flights import score_flights
 from aerobat.evaluation.sensitivity import Gradient, Sensitivity, sensitivity
 from aerobat.simulation.passages import Passage, WaypointPassage
@@ -12,7 +12,6 @@ __all__ = [
     "Opening",
     "Passage",
     "Score",
-    "Scores",
     "Sensitivity",
     "WaypointPassage",
     "score",

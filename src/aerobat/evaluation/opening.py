@@ -12,7 +12,7 @@ from pydantic import Field
 from aerobat.arrays import Array
 from aerobat.declaration import by_value, unknown_name, validated
 from aerobat.errors import SpecError
-from aerobat.evaluation.score import Scores
+from aerobat.evaluation.score import Score
 from aerobat.problem import Gate
 from aerobat.simulation.outcome import length
 
@@ -48,7 +48,7 @@ class Opening:
 
 @validated
 def smallest_opening(
-    scores: Scores,
+    scores: Score,
     gate: Gate,
     probability: Probability = 0.99,
     confidence: Probability = 0.95,
@@ -117,7 +117,7 @@ def _rank(count: int, probability: float, confidence: float) -> int:
     return min(int(binom.ppf(confidence, count, probability)) + 1, count)
 
 
-def _needed(scores: Scores, gate: Gate, side: Side) -> Array:
+def _needed(scores: Score, gate: Gate, side: Side) -> Array:
     """The scale of the opening that each flight needs, infinite where none will do, (flights,)."""
     passages = [passage for passage in scores.passages if passage.gate == gate.name]
     if not passages:

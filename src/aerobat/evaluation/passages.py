@@ -6,7 +6,7 @@ path where there is no gate or waypoint, are kept to the problem's tolerance.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from itertools import pairwise
 from math import degrees, inf
 from typing import NamedTuple
@@ -16,31 +16,18 @@ import numpy as np
 from aerobat.arrays import Array
 from aerobat.certification import PlannedPassage, PlannedWaypoint
 from aerobat.declaration import unit
-from aerobat.planning import Plan, planned_passages, planned_waypoints
-from aerobat.planning.passages import other_stages
+from aerobat.planning import Plan
+from aerobat.planning.passages import timed_stages
 from aerobat.problem.ball import Ball
 from aerobat.problem.condition import Quantity
 from aerobat.problem.problem import Problem
 from aerobat.problem.stage import Stage
+from aerobat.simulation.metrics import Criteria
 from aerobat.simulation.outcome import length
 from aerobat.simulation.passages import PASSAGE_WINDOW, PlannedAttitude
 from aerobat.so3 import thrust_axis
 
 GOAL = "the goal"  # the name of a path's end among what is come to
-
-
-class Asked(NamedTuple):
-    """Passages of gates, waypoints and other stages, each in the order of the stages."""
-
-    gates: tuple[PlannedPassage, ...]
-    waypoints: tuple[PlannedWaypoint, ...]
-    lap_begin: float = 0.0  # [s] when the first lap begins
-    places: tuple[PlannedWaypoint, ...] = ()  # of other stages that say where they are, and the goal
-    attitudes: tuple[PlannedAttitude, ...] = ()  # of other stages
-    path_radius: float = inf  # [m] by which the path may be left
-
-
-NOTHING_ASKED = Asked((), ())
 
 
 class SampledPath(NamedTuple):
@@ -51,8 +38,8 @@ class SampledPath(NamedTuple):
     q_world_body: Array  # (T, 4)
 
 
-def passages_asked(goal: Problem | Plan, path: SampledPath) -> Asked:
-    """The passages in the order of the stages, of all gates where no stage names one or has a ball.
+def criteria_of(goal: Problem | Plan, path: SampledPath) -> Criteria:
+    """The criteria of flights: passages in the order of the stages, of all gates where no stage has a place.
 
     The first lap begins with the path; a closed one's with the last passage, a whole round before that.
 
@@ -63,26 +50,30 @@ def passages_asked(goal: Problem | Plan, path: SampledPath) -> Asked:
         goal: the problem, or a plan for it.
         path: its set-points.
     """
-    asked = _asked(goal, path.times, path.position)
     problem = goal.problem if isinstance(goal, Plan) else goal
-    asked = asked._replace(
-        places=(*_places(goal, path), *_goal(problem, path)),
-        attitudes=_attitudes(goal, path),
-        path_radius=problem.tolerance.position if asked == NOTHING_ASKED else inf,
+    placed = timed_stages(goal.stages, problem) if isinstance(goal, Plan) else ()
+    passed = [(stage, time) for stage, time in placed if stage.gate is not None or stage.ball is not None]
+    others = [(stage, time) for stage, time in placed if stage.gate is None and stage.ball is None]
+    passed = passed or _nearest_stages(problem, path)
+    latest = max((time for _, time in passed), default=0.0)
+    return Criteria(
+        gates=tuple(PlannedPassage.of(s, problem.gate(s.gate), t) for s, t in passed if s.gate is not None),
+        waypoints=tuple(PlannedWaypoint(s.name, s.ball, t, s.lap) for s, t in passed if s.ball is not None),
+        lap_begin=0.0 if problem.ends else latest - float(path.times[-1]),
+        places=(*_places(others, problem, path), *_goal(problem, path)),
+        attitudes=tuple(_attitudes(others, problem, path)),
+        path_radius=inf if passed else problem.tolerance.position,
     )
-    passed = [gate.time for gate in asked.gates] + [waypoint.time for waypoint in asked.waypoints]
-    latest = max(passed, default=0.0)
-    return asked if problem.ends else asked._replace(lap_begin=latest - float(path.times[-1]))
 
 
-def _places(goal: Problem | Plan, path: SampledPath) -> Iterator[PlannedWaypoint]:
-    """Where a plan's other stages are, of those that say anything of it."""
-    if isinstance(goal, Plan):
-        for place, stage in other_stages(goal.stages, goal.problem):
-            if stage.where:
-                centre = _between(path, path.position, place.time)
-                ball = Ball(centre, goal.problem.tolerance.position)
-                yield PlannedWaypoint(place.name, ball, place.time, stage.lap)
+def _places(
+    others: Sequence[tuple[Stage, float]], problem: Problem, path: SampledPath
+) -> Iterator[PlannedWaypoint]:
+    """Where other stages are, of those that say anything of it."""
+    for stage, time in others:
+        if stage.where:
+            ball = Ball(_between(path, path.position, time), problem.tolerance.position)
+            yield PlannedWaypoint(stage.name, ball, time, stage.lap)
 
 
 def _goal(problem: Problem, path: SampledPath) -> Iterator[PlannedWaypoint]:
@@ -92,17 +83,15 @@ def _goal(problem: Problem, path: SampledPath) -> Iterator[PlannedWaypoint]:
         yield PlannedWaypoint(GOAL, ball, float(path.times[-1]))
 
 
-def _attitudes(goal: Problem | Plan, path: SampledPath) -> tuple[PlannedAttitude, ...]:
-    """The attitudes of a plan's other stages, of those that ask for one."""
-    if not isinstance(goal, Plan):
-        return ()
+def _attitudes(
+    others: Sequence[tuple[Stage, float]], problem: Problem, path: SampledPath
+) -> Iterator[PlannedAttitude]:
+    """The attitudes of other stages, of those that ask for one."""
     axes = thrust_axis(path.q_world_body)
-    tolerance = goal.problem.tolerance.attitude
-    return tuple(
-        PlannedAttitude(place.name, unit(_between(path, axes, place.time)), place.time, tolerance, stage.lap)
-        for place, stage in other_stages(goal.stages, goal.problem)
-        if _asks_attitude(stage)
-    )
+    for stage, time in others:
+        if _asks_attitude(stage):
+            up = unit(_between(path, axes, time))
+            yield PlannedAttitude(stage.name, up, time, problem.tolerance.attitude, stage.lap)
 
 
 def _asks_attitude(stage: Stage) -> bool:
@@ -130,23 +119,14 @@ def criterion(problem: Problem) -> str:
     return ", ".join([*passed, kept])
 
 
-def _asked(goal: Problem | Plan, times: Array, position: Array) -> Asked:
-    """The passages, whenever the first lap begins."""
-    problem = goal.problem if isinstance(goal, Plan) else goal
-    if isinstance(goal, Plan):
-        planned = Asked(planned_passages(goal.stages, problem), planned_waypoints(goal.stages, problem))
-        if planned != NOTHING_ASKED:
-            return planned
+def _nearest_stages(problem: Problem, path: SampledPath) -> list[tuple[Stage, float]]:
+    """The stages that pass a gate or meet a ball, or all gates, each where the set-points come nearest."""
     sequence = problem.stages(1.0)
     stages = [stage for stage in sequence.stages if stage.gate is not None or stage.ball is not None]
     stages = stages or [Stage(gate.name, gate=gate.name) for gate in problem.gates]
     centres = np.reshape([stage.centre(problem.gates) for stage in stages], (-1, 3))
     in_order = sequence.ordered and bool(sequence.stages)
-    placed = list(zip(stages, _nearest_instants(centres, times, position, in_order), strict=True))
-    return Asked(
-        tuple(PlannedPassage.of(s, problem.gate(s.gate), t) for s, t in placed if s.gate is not None),
-        tuple(PlannedWaypoint(s.name, s.ball, t, s.lap) for s, t in placed if s.ball is not None),
-    )
+    return list(zip(stages, _nearest_instants(centres, path.times, path.position, in_order), strict=True))
 
 
 def _nearest_instants(centres: Array, times: Array, position: Array, in_order: bool) -> list[float]:

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, fields, replace
-from math import inf, isinf
-from typing import TypeAlias
+from functools import cached_property
+from math import inf, isfinite, isinf
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,20 +15,18 @@ from aerobat import so3
 from aerobat.arrays import Array
 from aerobat.declaration import by_value, in_notebooks, short, shown, validated
 from aerobat.errors import OutOfRange, SpecError
-from aerobat.evaluation.passages import Asked, SampledPath, passages_asked
+from aerobat.evaluation.passages import SampledPath, criteria_of
 from aerobat.kernels.running_metrics import RunningMetrics
 from aerobat.planning import Plan
 from aerobat.problem import Problem, as_problem
 from aerobat.simulation.contact import Contact
 from aerobat.simulation.flight import Flight
-from aerobat.simulation.outcome import TOUCHDOWN, Outcome, counted, length
+from aerobat.simulation.metrics import Criteria, metrics_of_log
+from aerobat.simulation.outcome import Outcome, counted, length
 from aerobat.simulation.passages import (
     Passage,
     StageAttitude,
     WaypointPassage,
-    flown_attitudes,
-    flown_passages,
-    flown_waypoints,
     passages,
     stage_attitudes,
     waypoint_passages,
@@ -68,10 +67,14 @@ class LapTime:
 
 
 @in_notebooks
+@short
 @by_value
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Score:
-    """A flight in numbers."""
+    """A flight in numbers, or a batch of flights: then numbers are arrays (flights,).
+
+    `score[k]` is the score of one flight of a batch.
+    """
 
     max_position_error_m: float
     rms_position_error_m: float
@@ -79,13 +82,80 @@ class Score:
     rms_attitude_error_deg: float
     saturated_fraction: float  # of the control periods, any rotor's command clipped
     passages: tuple[Passage, ...]  # one for each gate, in the order of the stages
-    outcome: Outcome  # the first thing that went wrong, if anything did
-    sentence: str  # the outcome with its numbers
-    observer: ObserverScore | None = None  # of a filter, where a logged flight had one
-    waypoints: tuple[WaypointPassage, ...] = ()  # one for each ball, in the order of the stages
+    waypoints: tuple[WaypointPassage, ...]  # one for each ball, in the order of the stages
+    places: tuple[WaypointPassage, ...]  # other stages that say where they are, then the goal
+    attitudes: tuple[StageAttitude, ...]  # of other stages, in their order
+    stop: float  # [s] when it diverged, NaN if it did not
+    is_finite: bool  # false where it diverged by what is not a number
+    ground_time: float  # [s] when the vehicle was below ground first, NaN if never
+    off_path_time: float  # [s] when the vehicle had left its path first, NaN if never
+    contact: Contact  # what the vehicle came to touch first, where its plant felt that
+    contact_time: float  # [s] when, NaN if never
+    path_radius_m: float = inf  # by which the path may be left
     lap_begin_s: float = 0.0  # when the first lap begins; a closed course's before the flight
-    places: tuple[WaypointPassage, ...] = ()  # other stages that say where they are, then the goal
-    attitudes: tuple[StageAttitude, ...] = ()  # of other stages, in their order
+    observer: ObserverScore | None = None  # of a filter, where a logged flight had one
+
+    def __post_init__(self) -> None:
+        """Write-protect the arrays of a batch."""
+        if not self.is_batch:
+            return
+        judged = (*self.passages, *self.waypoints, *self.places, *self.attitudes)
+        parts = (part for one in judged for part in vars(one).values())
+        for value in (*vars(self).values(), *parts):
+            if isinstance(value, np.ndarray):
+                value.flags.writeable = False
+
+    @property
+    def is_batch(self) -> bool:
+        """True for a batch, false for one flight."""
+        return bool(np.ndim(self.stop))
+
+    def __len__(self) -> int:
+        """The number of flights of a batch."""
+        return np.size(self.stop)
+
+    @validated
+    def __getitem__(self, k: int) -> Score:
+        """The score of one flight of a batch. Raises SpecError for one flight."""
+        if not self.is_batch:
+            raise SpecError("this is the score of one flight, not of a batch: use it without an index")
+        if not -len(self) <= k < len(self):
+            raise OutOfRange(f"there are {len(self)} flights, no flight {shown(k)}; count from 0")
+        many = (getattr(self, field.name) for field in fields(self))
+        return Score(*(_of_flight(value, k) for value in many))
+
+    def __iter__(self) -> Iterator[Score]:
+        return (self[k] for k in range(len(self)))
+
+    def __str__(self) -> str:
+        """One line for people."""
+        error = f"position error {length(float(np.max(self.max_position_error_m)))} at most"
+        if self.is_batch:
+            return f"{len(self)} flights: {counted(self.outcomes)}; {error}"
+        turned = f"attitude error {self.rms_attitude_error_deg:.2f}° RMS"
+        saturated = f"saturated {100 * self.saturated_fraction:.1f} % of the time"
+        errors = [*([] if self.outcome.is_success else [error]), turned, saturated]
+        return f"{self.sentence}; {', '.join(errors)}"
+
+    @property
+    def outcome(self) -> Outcome:
+        """The first thing that went wrong, if anything did. Raises SpecError for a batch."""
+        return self._end[0]
+
+    @property
+    def sentence(self) -> str:
+        """The outcome with its numbers. Raises SpecError for a batch."""
+        return self._end[1]
+
+    @cached_property
+    def outcomes(self) -> tuple[Outcome, ...]:
+        """Outcome of each flight."""
+        return tuple(score.outcome for score in self) if self.is_batch else (self.outcome,)
+
+    @property
+    def succeeded(self) -> NDArray[np.bool_]:
+        """True of flights that did all that was asked, (flights,)."""
+        return np.array([outcome.is_success for outcome in self.outcomes])
 
     @property
     def laps(self) -> tuple[LapTime, ...]:
@@ -99,103 +169,23 @@ class Score:
         durations = np.diff([0.0, *ends]).tolist()
         return tuple(map(LapTime, numbers, ends, durations)) if has_laps else ()
 
-    def __str__(self) -> str:
-        """One line for people."""
-        error = (
-            "" if self.outcome.is_success else f"position error {length(self.max_position_error_m)} at most, "
-        )
-        return (
-            f"{self.sentence}; {error}attitude error {self.rms_attitude_error_deg:.2f}° RMS, "
-            f"saturated {100 * self.saturated_fraction:.1f} % of the time"
-        )
-
-
-@short
-@by_value
-@dataclass(frozen=True, eq=False, repr=False)
-class Scores:
-    """The scores of many flights: arrays with one entry a flight; `scores[k]` is one flight's Score."""
-
-    max_position_error_m: Array
-    rms_position_error_m: Array
-    max_attitude_error_deg: Array
-    rms_attitude_error_deg: Array
-    saturated_fraction: Array
-    passages: tuple[Passage, ...]  # one for each gate, its fields arrays
-    waypoints: tuple[WaypointPassage, ...]  # one for each ball, its fields arrays
-    stop: Array  # [s] when a flight diverged, NaN if it did not
-    is_finite: Array  # false where a flight diverged by what is not a number
-    ground_time: Array  # [s] when a vehicle was below ground first, NaN if never
-    contact: Array  # what it came to touch first, by the codes of Contact, where its plant felt that
-    contact_time: Array  # [s] when, NaN if never
-    off_path_time: Array  # [s] when a vehicle had left its path first, NaN if never
-    path_radius_m: float = inf  # by which the path may be left
-    lap_begin_s: float = 0.0  # when the first lap begins; a closed course's before the flight
-    places: tuple[WaypointPassage, ...] = ()  # other stages that say where they are, then the goal
-    attitudes: tuple[StageAttitude, ...] = ()  # of other stages, in their order
-
-    def __post_init__(self) -> None:
-        """Write-protect."""
-        judged = (*self.passages, *self.waypoints, *self.places, *self.attitudes)
-        parts = (part for one in judged for part in vars(one).values())
-        for value in (*vars(self).values(), *parts):
-            if isinstance(value, np.ndarray):
-                value.flags.writeable = False
-
-    def __len__(self) -> int:
-        return len(self.stop)
-
-    @validated
-    def __getitem__(self, k: int) -> Score:
-        """The score of one flight."""
-        if not -len(self) <= k < len(self):
-            raise OutOfRange(f"there are {len(self)} flights, no flight {shown(k)}; count from 0")
-        found = Score(
-            **{field.name: float(getattr(self, field.name)[k]) for field in fields(self)[:5]},
-            passages=tuple(passage.of_flight(k) for passage in self.passages),
-            outcome=Outcome.COMPLETE,
-            sentence="",
-            observer=None,
-            waypoints=tuple(waypoint.of_flight(k) for waypoint in self.waypoints),
-            lap_begin_s=self.lap_begin_s,
-            places=tuple(place.of_flight(k) for place in self.places),
-            attitudes=tuple(attitude.of_flight(k) for attitude in self.attitudes),
-        )
-        outcome, sentence = self._outcome(k, found)
-        return replace(found, outcome=outcome, sentence=sentence)
-
-    def __iter__(self) -> Iterator[Score]:
-        return (self[k] for k in range(len(self)))
-
-    def __str__(self) -> str:
-        """One line for people."""
-        error = f"position error {length(float(self.max_position_error_m.max()))} at most"
-        return f"{len(self)} flights: {counted(self.outcomes)}; {error}"
-
-    @property
-    def succeeded(self) -> NDArray[np.bool_]:
-        """True of flights that did all that was asked, (flights,)."""
-        return np.array([outcome.is_success for outcome in self.outcomes])
-
-    @property
-    def outcomes(self) -> tuple[Outcome, ...]:
-        """Outcome of each flight."""
-        return tuple(score.outcome for score in self)
-
-    def _outcome(self, k: int, score: Score) -> tuple[Outcome, str]:
+    @cached_property
+    def _end(self) -> tuple[Outcome, str]:
         """The first thing that went wrong, else through all gates, else flown to the end.
 
         What gates, waypoints, the ground and the plant say comes before what is kept to a tolerance.
         """
-        passed = score.passages
-        found = [*self._endings(k), *_failures(passed, score.waypoints)] or [
-            *_failures((), (*score.places, *score.attitudes)),
-            *self._departure(k),
+        if self.is_batch:
+            raise SpecError("outcome is asked of one flight; of a batch, ask score[k].outcome or outcomes")
+        passed = self.passages
+        found = [*self._endings(), *_failures(passed, self.waypoints)] or [
+            *_failures((), (*self.places, *self.attitudes)),
+            *self._departure(),
         ]
         if found:
             time, outcome, numbers = min(found, key=lambda event: event[0])
             return outcome, outcome.sentence(time=time, **numbers)
-        error = length(score.max_position_error_m)
+        error = length(self.max_position_error_m)
         if not passed:
             allowed = "" if isinf(self.path_radius_m) else f", {length(self.path_radius_m)} allowed"
             return Outcome.COMPLETE, Outcome.COMPLETE.sentence(error=error) + allowed
@@ -205,24 +195,28 @@ class Scores:
         numbers = {"gate": gates, "speed": worst.speed, "miss": length(worst.miss), "error": error}
         return Outcome.THROUGH_GATES, Outcome.THROUGH_GATES.sentence(**numbers)
 
-    def _endings(self, k: int) -> Iterator[Event]:
+    def _endings(self) -> Iterator[Event]:
         """The divergence of a flight, and what it touched."""
-        if np.isfinite(self.stop[k]):
-            outcome = Outcome.DIVERGED if self.is_finite[k] else Outcome.STATE_NOT_FINITE
-            yield float(self.stop[k]), outcome, {}
-        if np.isfinite(self.ground_time[k]):
-            yield float(self.ground_time[k]), Outcome.HIT_GROUND, {}
-        if np.isfinite(self.contact_time[k]):
-            at_gate = self.contact[k] == Contact.GATE
-            outcome = Outcome.TOUCHED_GATE if at_gate else Outcome.TOUCHED_GROUND
-            yield float(self.contact_time[k]), outcome, {}
+        if isfinite(self.stop):
+            yield self.stop, Outcome.DIVERGED if self.is_finite else Outcome.STATE_NOT_FINITE, {}
+        if isfinite(self.ground_time):
+            yield self.ground_time, Outcome.HIT_GROUND, {}
+        if isfinite(self.contact_time):
+            at_gate = self.contact == Contact.GATE
+            yield self.contact_time, Outcome.TOUCHED_GATE if at_gate else Outcome.TOUCHED_GROUND, {}
 
-    def _departure(self, k: int) -> Iterator[Event]:
+    def _departure(self) -> Iterator[Event]:
         """When a flight left its path, if it did."""
-        if np.isfinite(self.off_path_time[k]):
-            error = length(float(self.max_position_error_m[k]))
-            numbers = {"allowed": length(self.path_radius_m), "error": error}
-            yield float(self.off_path_time[k]), Outcome.OFF_PATH, {**numbers}
+        if isfinite(self.off_path_time):
+            error, allowed = length(self.max_position_error_m), length(self.path_radius_m)
+            yield self.off_path_time, Outcome.OFF_PATH, {"allowed": allowed, "error": error}
+
+
+def _of_flight(value: Any, k: int) -> Any:
+    """One flight's part of a field of many."""
+    if isinstance(value, tuple):
+        return tuple(each.of_flight(k) for each in value)
+    return value[k].item() if isinstance(value, np.ndarray) else value
 
 
 def _failures(
@@ -253,42 +247,12 @@ def score(flight: Flight, goal: Problem | Plan | str, vehicle: Vehicle | str | N
     goal = as_problem(goal) if isinstance(goal, str) else goal
     if vehicle is None and isinstance(goal, Plan):
         vehicle = goal.vehicle
-    states = flight.states
-    square, angle = flight.position_error**2, flight.attitude_error
-    stop = flight.diverged_at
     body = None if vehicle is None else as_vehicle(vehicle).bounding_ellipsoid
     setpoint = flight.setpoint
-    path = SampledPath(flight.times, setpoint.flat.position, setpoint.q_world_body)
-    planned = passages_asked(goal, path)
-    is_off = flight.position_error > planned.path_radius
-    ground = flight.environment.ground
+    criteria = criteria_of(goal, SampledPath(flight.times, setpoint.flat.position, setpoint.q_world_body))
     contact, touched = flight.first_contact
-    below = np.zeros(1, bool) if ground is None else states.position[:, 2] < ground - TOUCHDOWN
-    scored = Scores(
-        max_position_error_m=np.sqrt([square.max()]),
-        rms_position_error_m=np.sqrt([square.mean()]),
-        max_attitude_error_deg=np.rad2deg([angle.max()]),
-        rms_attitude_error_deg=np.rad2deg(np.sqrt([np.mean(angle**2)])),
-        saturated_fraction=np.array([flight.saturated.mean()]),
-        passages=tuple(flown_passages(flight, planned.gates, body)),
-        waypoints=tuple(flown_waypoints(flight, planned.waypoints)),
-        stop=stop,
-        is_finite=np.array([flight.outcome is not Outcome.STATE_NOT_FINITE]),
-        ground_time=_first(flight.times, below),
-        contact=np.array([contact]),
-        contact_time=np.array([touched]),
-        off_path_time=_first(flight.times, is_off),
-        path_radius_m=planned.path_radius,
-        lap_begin_s=planned.lap_begin,
-        places=tuple(flown_waypoints(flight, planned.places)),
-        attitudes=tuple(flown_attitudes(flight, planned.attitudes)),
-    )[0]
-    return replace(scored, observer=_observer(flight))
-
-
-def _first(times: Array, happens: NDArray[np.bool_]) -> Array:
-    """The first of the times at which something happens, NaN if it never does, (1,)."""
-    return np.array([times[int(np.argmax(happens))] if happens.any() else np.nan])
+    batch = score_of(metrics_of_log(flight, criteria, body), criteria)
+    return replace(batch[0], contact=contact, contact_time=touched, observer=_observer(flight))
 
 
 def _observer(flight: Flight) -> ObserverScore | None:
@@ -308,38 +272,35 @@ def _observer(flight: Flight) -> ObserverScore | None:
     )
 
 
-def scores_of(metrics: RunningMetrics, planned: Asked) -> Scores:
-    """Scores of flights that were added up as they were flown, from their last metrics, leaves (flights,)."""
+def score_of(metrics: RunningMetrics, criteria: Criteria) -> Score:
+    """The score of flights from their last metrics, leaves (flights,)."""
     ticks = np.maximum(metrics.ticks, 1.0)
     stop = np.where(metrics.flying < 0.5, metrics.stop, np.nan)
-    met = [
-        waypoint_passages(each, approach, stop)
-        for each, approach in zip((*planned.waypoints, *planned.places), metrics.waypoints, strict=True)
-    ]
-    return Scores(
-        max_position_error_m=np.sqrt(metrics.max_square),
-        rms_position_error_m=np.sqrt(metrics.sum_square / ticks),
-        max_attitude_error_deg=np.rad2deg(metrics.max_angle),
-        rms_attitude_error_deg=np.rad2deg(np.sqrt(metrics.sum_square_angle / ticks)),
-        saturated_fraction=metrics.saturated / ticks,
-        passages=tuple(
-            passages(each, progress, stop)
-            for each, progress in zip(planned.gates, metrics.gates, strict=True)
-        ),
-        waypoints=tuple(met[: len(planned.waypoints)]),
-        stop=stop,
-        is_finite=metrics.is_finite > 0.5,
-        ground_time=_if_ever(metrics.ground_time),
-        contact=np.zeros(stop.shape),
-        contact_time=np.full(stop.shape, np.nan),
-        off_path_time=_if_ever(metrics.off_path_time),
-        path_radius_m=planned.path_radius,
-        lap_begin_s=planned.lap_begin,
-        places=tuple(met[len(planned.waypoints) :]),
+    targets = (*criteria.waypoints, *criteria.places)
+    met = [waypoint_passages(*pair, stop) for pair in zip(targets, metrics.waypoints, strict=True)]
+    numbers: dict[str, Any] = {
+        "max_position_error_m": np.sqrt(metrics.max_square),
+        "rms_position_error_m": np.sqrt(metrics.sum_square / ticks),
+        "max_attitude_error_deg": np.rad2deg(metrics.max_angle),
+        "rms_attitude_error_deg": np.rad2deg(np.sqrt(metrics.sum_square_angle / ticks)),
+        "saturated_fraction": metrics.saturated / ticks,
+        "stop": stop,
+        "is_finite": metrics.is_finite > 0.5,
+        "ground_time": _if_ever(metrics.ground_time),
+        "off_path_time": _if_ever(metrics.off_path_time),
+        "contact": np.full(stop.shape, int(Contact.NOTHING)),
+        "contact_time": np.full(stop.shape, np.nan),
+    }
+    return Score(
+        **numbers,
+        passages=tuple(passages(*pair, stop) for pair in zip(criteria.gates, metrics.gates, strict=True)),
+        waypoints=tuple(met[: len(criteria.waypoints)]),
+        places=tuple(met[len(criteria.waypoints) :]),
         attitudes=tuple(
-            stage_attitudes(each, pointing, stop)
-            for each, pointing in zip(planned.attitudes, metrics.attitudes, strict=True)
+            stage_attitudes(*pair, stop) for pair in zip(criteria.attitudes, metrics.attitudes, strict=True)
         ),
+        path_radius_m=criteria.path_radius,
+        lap_begin_s=criteria.lap_begin,
     )
 
 

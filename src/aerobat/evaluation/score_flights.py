@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 from typing import Unpack
 
@@ -11,78 +11,23 @@ import numpy as np
 from numpy.typing import NDArray
 
 from aerobat.arrays import Array
-from aerobat.certification import PlannedPassage, PlannedWaypoint
 from aerobat.declaration import validated
 from aerobat.engines import logged_ticks
-from aerobat.engines.components import components
 from aerobat.engines.pytree import tree_map, tree_stack
 from aerobat.environment import Environment
 from aerobat.errors import SpecError
-from aerobat.evaluation.passages import NOTHING_ASKED, Asked, SampledPath, passages_asked
-from aerobat.evaluation.score import Scores, scores_of
-from aerobat.kernels import running_metrics
-from aerobat.kernels.gates.approach import Target
-from aerobat.kernels.gates.progress import GatePlane
-from aerobat.kernels.gates.section import BoundingEllipsoid
-from aerobat.kernels.ops import Ops
-from aerobat.kernels.running_metrics import MetricsInput, MetricsParameters, RunningMetrics
+from aerobat.evaluation.passages import SampledPath, criteria_of
+from aerobat.evaluation.score import Score, score_of
+from aerobat.kernels.running_metrics import RunningMetrics
 from aerobat.planning import Plan
 from aerobat.problem import Problem, as_problem
-from aerobat.simulation.components import rotor_commands
 from aerobat.simulation.config import FlightChanges, FlightConfig
-from aerobat.simulation.loop import Signals
-from aerobat.simulation.outcome import DIVERGENCE_RADIUS, TOUCHDOWN
-from aerobat.simulation.passages import PASSAGE_DEPTH, PASSAGE_WINDOW, plane_directions
-from aerobat.simulation.passages.stage_attitude import as_direction
+from aerobat.simulation.metrics import metrics_row, with_metrics
 from aerobat.simulation.prepare import prepare
 from aerobat.simulation.reference_source import BLOCK
-from aerobat.simulation.setup import FlightSetup, Part
+from aerobat.simulation.setup import FlightSetup
 from aerobat.trajectory import Trajectory
 from aerobat.vehicle import Vehicle
-
-
-@dataclass(frozen=True)
-class MetricsMonitor:
-    """The loop's component that adds up a flight's metrics."""
-
-    gates: tuple[int, ...]  # along how many directions each measures bodies
-    waypoints: int
-    attitudes: int  # of stages
-    period: int = 1
-    name: str = "metrics"
-    feedthrough: bool = True
-
-    def init(
-        self, ops: Ops, parameters: MetricsParameters, inputs: MetricsInput, signals: Signals
-    ) -> RunningMetrics:
-        """See `Component.init`."""
-        return running_metrics.init(self.gates, self.waypoints, self.attitudes)
-
-    def step(
-        self,
-        ops: Ops,
-        parameters: MetricsParameters,
-        metrics: RunningMetrics,
-        inputs: MetricsInput,
-        signals: Signals,
-    ) -> RunningMetrics:
-        """See `Component.step`."""
-        motion, commands = signals["plant"], rotor_commands(signals)
-        reference = (signals["reference"].position, signals["reference"].q_world_body)
-        actuation = (motion.thrusts, commands.thrusts, commands.saturated)
-        return running_metrics.step(ops, parameters, metrics, motion.body, reference, actuation, inputs)
-
-
-@dataclass(frozen=True, eq=False)
-class MetricsSource:
-    """The instants of ticks."""
-
-    times: Array
-    per_vehicle: bool = False
-
-    def chunk(self, begin: int, end: int) -> MetricsInput:
-        """See `Source.chunk`."""
-        return MetricsInput(self.times[begin:end])
 
 
 @validated
@@ -94,7 +39,7 @@ def score_flights(
     environment: Environment | None = None,
     config: FlightConfig = FlightConfig(),  # noqa: B008 - frozen
     **changes: Unpack[FlightChanges],
-) -> Scores:
+) -> Score:
     """Fly as `fly` does with the same arguments, and score each flight as it is flown; nothing is logged.
 
     Args:
@@ -139,7 +84,7 @@ def score_over_time(
     environment: Environment | None,
     config: FlightConfig,
     stride: int | None = None,
-) -> tuple[Scores, ErrorsOverTime]:
+) -> tuple[Score, ErrorsOverTime]:
     """Score flights as `score_flights` does, and return their errors over time too.
 
     Args:
@@ -168,9 +113,9 @@ def score_over_time(
         np.concatenate([part.flat.position for part in parts]),
         np.concatenate([part.q_world_body for part in parts]),
     )
-    planned = passages_asked(goal, path)
-    rows, logged = _metrics_over_time(with_metrics(setup, planned), stride or ticks)
-    scores = scores_of(tree_map(lambda leaf: leaf[:, -1], rows), planned)
+    criteria = criteria_of(goal, path)
+    rows, logged = _metrics_over_time(with_metrics(setup, criteria), stride or ticks)
+    scores = score_of(tree_map(lambda leaf: leaf[:, -1], rows), criteria)
     return scores, ErrorsOverTime.of(setup.times[logged], rows)
 
 
@@ -187,44 +132,3 @@ def _metrics_over_time(setup: FlightSetup, stride: int) -> tuple[RunningMetrics,
         parts.append(tree_map(partial(np.compress, kept, axis=1), rows))
     metrics: RunningMetrics = tree_stack(parts, lambda leaves: np.concatenate(leaves, axis=-1))
     return metrics, logged
-
-
-def metrics_row(signals: Signals) -> RunningMetrics:
-    """The metrics so far."""
-    metrics: RunningMetrics = signals["metrics"]
-    return metrics
-
-
-def with_metrics(setup: FlightSetup, planned: Asked = NOTHING_ASKED) -> FlightSetup:
-    """The same flight with its metrics added up, those of planned passages among them."""
-    vehicles = len(setup.fleet)
-    planes = tuple(_plane(passage, vehicles) for passage in planned.gates)
-    targets = tuple(_target(waypoint, vehicles) for waypoint in (*planned.waypoints, *planned.places))
-    directions = tuple(as_direction(attitude, vehicles) for attitude in planned.attitudes)
-    ground = -np.inf if setup.environment.ground is None else setup.environment.ground - TOUCHDOWN
-    body = BoundingEllipsoid(*map(components, (setup.fleet.body_centres, setup.fleet.semi_axes)))
-    diverged, off, under = (
-        np.full(vehicles, x) for x in (DIVERGENCE_RADIUS**2, planned.path_radius**2, ground)
-    )
-    parameters = MetricsParameters(diverged, off, under, body, planes, targets, directions)
-    measured = tuple(len(plane.directions) for plane in planes)
-    monitor = MetricsMonitor(measured, len(targets), len(directions))
-    metrics = Part(monitor, parameters, MetricsSource(setup.times))
-    return replace(setup, parts=(*setup.parts, metrics))
-
-
-def _plane(passage: PlannedPassage, vehicles: int) -> GatePlane:
-    """A planned passage as kernels read it, leaves (vehicles,)."""
-    gate = passage.gate
-    directions = plane_directions(gate)
-    place = components(gate.position), components(gate.normal)
-    radius = gate.opening.circumradius
-    plane = GatePlane(*place, directions, radius, passage.time, PASSAGE_WINDOW, PASSAGE_DEPTH)
-    spread: GatePlane = tree_map(lambda leaf: np.full(vehicles, leaf), plane)
-    return spread
-
-
-def _target(waypoint: PlannedWaypoint, vehicles: int) -> Target:
-    """A planned waypoint as kernels read it, leaves (vehicles,)."""
-    centre = components(np.broadcast_to(waypoint.ball.centre, (vehicles, 3)))
-    return Target(centre, np.full(vehicles, waypoint.time), np.full(vehicles, PASSAGE_WINDOW))

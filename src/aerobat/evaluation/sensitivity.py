@@ -22,7 +22,6 @@ from aerobat.engines.numpy import ArrayOps
 from aerobat.engines.pytree import Tree, tree_leaves, tree_map
 from aerobat.environment import Environment
 from aerobat.errors import SpecError
-from aerobat.evaluation.score_flights import metrics_row, with_metrics
 from aerobat.flatness import Planned
 from aerobat.kernels.control_loops import Gains
 from aerobat.kernels.motors import Airframe
@@ -32,6 +31,7 @@ from aerobat.kernels.vectors import dot, subtract
 from aerobat.simulation.bodies import body_states
 from aerobat.simulation.config import FlightChanges, FlightConfig
 from aerobat.simulation.loop import LoopInput, LoopParameters, compose
+from aerobat.simulation.metrics import metrics_row, with_metrics
 from aerobat.simulation.prepare import prepare
 from aerobat.simulation.setup import FlightSetup
 from aerobat.trajectory import Trajectory

@@ -35,7 +35,7 @@ class TimeInterval:
 
 
 @dataclass(frozen=True)
-class Frames:
+class TransportedFrames:
     """Attitudes along a thrust curve, at its samples and at the nodes put between them, M in all."""
 
     q_world_body: Array  # (M, 4), sign continuous
@@ -44,7 +44,7 @@ class Frames:
     undetermined: tuple[TimeInterval, ...]
 
 
-def frames(times: Array, thrust: Array, floor: float, heading: float) -> Frames:
+def frames(times: Array, thrust: Array, floor: float, heading: float) -> TransportedFrames:
     """Carry a frame along the specific thrust; times (T,), thrust f, f', f'' (T, 3, 3), floor on |f| [m/s²].
 
     It starts as the smallest rotation from the vertical to f, turned about f by `heading`. Where |f| is below
@@ -60,7 +60,7 @@ def frames(times: Array, thrust: Array, floor: float, heading: float) -> Frames:
     directions = _held_directions(f, magnitude, determined)
     smooth = determined[1:] & determined[:-1]
     q = _carry(directions, np.where(smooth[:, None, None], control, directions[:-1, None]), heading)
-    return Frames(q, determined, samples, _undetermined(nodes, control, determined, floor))
+    return TransportedFrames(q, determined, samples, _undetermined(nodes, control, determined, floor))
 
 
 def _carry(directions: Array, control: Array, heading: float) -> Array:

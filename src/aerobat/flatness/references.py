@@ -18,7 +18,7 @@ from aerobat.declaration import Angle, Positive, by_value, short, validated
 from aerobat.environment import Environment
 from aerobat.errors import SpecError
 from aerobat.flatness.flyable import Planned, environment_of, vehicle_of
-from aerobat.flatness.parallel_transport import Frames, TimeInterval, frames
+from aerobat.flatness.parallel_transport import TimeInterval, TransportedFrames, frames
 from aerobat.flatness.unequal_drag import (
     FrameAngle,
     UnequalDrag,
@@ -218,7 +218,7 @@ def _nodes_for_quintics(trajectory: Trajectory, vehicle: Vehicle) -> list[float]
 
 def _mean_frames(
     trajectory: Trajectory, vehicle: Vehicle, environment: Environment, times: Array
-) -> tuple[Frames, NDArray[np.intp]]:
+) -> tuple[TransportedFrames, NDArray[np.intp]]:
     """The frames along the mean-drag thrust, and where among their nodes some times (T,) are."""
     flat = trajectory.flat(times)
     # both sides of every knot join the times, which show the later side, and what quintics need between
@@ -236,7 +236,7 @@ def _mean_frames(
 
 def _turned_frames(
     trajectory: Trajectory, vehicle: Vehicle, environment: Environment, times: Array
-) -> tuple[Frames, NDArray[np.intp], FrameAngle]:
+) -> tuple[TransportedFrames, NDArray[np.intp], FrameAngle]:
     """The same, and the angle between the frames of mean and of unequal drag."""
     drag = UnequalDrag.of(vehicle, environment)
     pieces = resolved_pieces(trajectory, drag)
@@ -255,14 +255,14 @@ def _thrust_on_segments(
     return specific_thrust(vehicle, environment, v - environment.wind, a, j, snap)
 
 
-def _frames(times: Array, thrust: Array, environment: Environment, heading: float) -> Frames:
+def _frames(times: Array, thrust: Array, environment: Environment, heading: float) -> TransportedFrames:
     return frames(times, thrust, UNDETERMINED * environment.gravity, float(frozen(heading, "heading", ())))
 
 
 def _assembled(
     times: Array,
     flat: FlatState,
-    path: Frames,
+    path: TransportedFrames,
     nodes: NDArray[np.intp],
     vehicle: Vehicle,
     environment: Environment,
@@ -273,7 +273,7 @@ def _assembled(
     Args:
         times: [s], (T,).
         flat: The motion then.
-        path: Frames along the mean-drag thrust.
+        path: TransportedFrames along the mean-drag thrust.
         nodes: Where the times are among them, (T,).
         vehicle: What flies.
         environment: Where.

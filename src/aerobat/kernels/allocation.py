@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 from aerobat.kernels.motors import Rotors, clamp
 from aerobat.kernels.ops import Ops, PerRotor, Scalar, clip, magnitude
-from aerobat.kernels.rigid_body import Wrench
+from aerobat.kernels.rigid_body import RotorWrench
 
 _BEARING = 1e-9  # [-] a rotor with a smaller fraction of the collective thrust bears nothing
 
@@ -23,7 +23,7 @@ class Mixer(NamedTuple):
     max_collective: Scalar  # [N]
 
 
-def mix(mixer: Mixer, load: Wrench) -> PerRotor:
+def mix(mixer: Mixer, load: RotorWrench) -> PerRotor:
     """The least-norm rotor thrusts [N] that make a load, limits ignored."""
     mx, my, mz = load.moment_body
     columns = zip(mixer.collective, mixer.roll, mixer.pitch, mixer.yaw, strict=True)
@@ -38,7 +38,7 @@ def within_limits(rotors: Rotors, thrusts: PerRotor) -> Scalar:
     return inside
 
 
-def desaturate(ops: Ops, rotors: Rotors, mixer: Mixer, load: Wrench) -> PerRotor:
+def desaturate(ops: Ops, rotors: Rotors, mixer: Mixer, load: RotorWrench) -> PerRotor:
     """Thrusts within limits [N] that make, of a load that does not fit, what can be had; yaw is shed first.
 
     Next, collective thrust is lowered until roll and pitch fit: a vehicle that cannot tilt is lost, one that

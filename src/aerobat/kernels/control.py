@@ -24,7 +24,7 @@ from aerobat.kernels.control_loops import (
 from aerobat.kernels.motors import Airframe
 from aerobat.kernels.ops import Axes, Ops, PerRotor, Scalar, Vector
 from aerobat.kernels.quaternions import axes
-from aerobat.kernels.rigid_body import Body, EnvironmentParameters, Wrench
+from aerobat.kernels.rigid_body import Body, EnvironmentParameters, RotorWrench
 from aerobat.kernels.vectors import ZERO, add, dot, norm, subtract
 
 _MIN_PART = 0.3  # [-] of the commanded specific thrust, kept where the vehicle points away from it
@@ -75,7 +75,7 @@ def init(ops: Ops, model: ControllerModel, body: Body, reference: ReferencePoint
     mass_properties, rotors = model.airframe
     moment = reference_moment(mass_properties.inertia, axes(body.q_world_body), reference)
     demand = thrust_demand(mass_properties, model.environment, reference)
-    feedforward = Wrench(mass_properties.mass * norm(ops, demand.value), moment)
+    feedforward = RotorWrench(mass_properties.mass * norm(ops, demand.value), moment)
     thrusts = motors.clamp(ops, rotors, mix(model.mixer, feedforward))
     outer = init_position_loop(ops, model.gains, body, reference)
     return ControllerState(outer, ZERO, thrusts, Commands(thrusts, False))
@@ -136,8 +136,8 @@ def track_attitude(
             reference_moment(mass_properties.inertia, body_axes, each) for each in (rates, rates.ahead)
         )
         moment, change = add(moment, now), subtract(then, now)
-    load = Wrench(pursuit.thrust, moment)
-    ahead = Wrench(mass_properties.mass * rates.ahead.thrust_change, change)
+    load = RotorWrench(pursuit.thrust, moment)
+    ahead = RotorWrench(mass_properties.mass * rates.ahead.thrust_change, change)
     decay_factors = motors.decay_factors(ops, rotors, elapsed)
     thrusts = motors.first_order_response(state.thrusts, state.commands.thrusts, decay_factors)
     commands = rotor_commands(ops, flags, model, (load, ahead), thrusts, decay_factors, elapsed)
@@ -174,7 +174,7 @@ def predicted(
     rotors = model.airframe.rotors
     left = motors.decay_factors(ops, rotors, ops.maximum(elapsed - delay, 0.0))
     now = motors.first_order_response(state.thrusts, state.commands.thrusts, left)
-    motion = motors.Motion(body, now)
+    motion = motors.VehicleState(body, now)
     return motors.advance(ops, model.airframe, model.environment, motion, state.commands.thrusts, delay).body
 
 
@@ -191,7 +191,7 @@ def rotor_commands(
     ops: Ops,
     flags: FeatureFlags,
     model: ControllerModel,
-    loads: tuple[Wrench, Wrench],
+    loads: tuple[RotorWrench, RotorWrench],
     thrusts: PerRotor,
     decay_factors: PerRotor,
     period: Scalar,

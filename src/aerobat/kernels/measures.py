@@ -17,7 +17,7 @@ from aerobat.kernels.vectors import add, add_scaled, dot, scale
 STILL = 1e-12  # [rad²/s²] beside the square of a rate, which a body at rest has with a slope
 
 
-class Airframe(NamedTuple):
+class InertiaAndDrag(NamedTuple):
     """Mass, inertia and drag of a vehicle."""
 
     mass: Scalar  # [kg]
@@ -27,7 +27,7 @@ class Airframe(NamedTuple):
     unequal: Vector | None  # [1/s] along body x, y and z, where x and y differ
 
 
-def measures(ops: Ops, airframe: Airframe, motion: BodyMotion, up: Vector) -> tuple[Scalar, ...]:
+def measures(ops: Ops, airframe: InertiaAndDrag, motion: BodyMotion, up: Vector) -> tuple[Scalar, ...]:
     """Return the measures in the order of `limits.quantity`: wrench (4), its rate (4), |f|, |ω|, upright.
 
     Args:

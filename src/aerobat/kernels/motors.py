@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 from aerobat.kernels import rigid_body
 from aerobat.kernels.ops import Ops, PerRotor, Scalar, clip
-from aerobat.kernels.rigid_body import Body, EnvironmentParameters, MassProperties, Wrench
+from aerobat.kernels.rigid_body import Body, EnvironmentParameters, MassProperties, RotorWrench
 
 
 class Rotors(NamedTuple):
@@ -50,10 +50,10 @@ def collective_thrust(rotors: Rotors, thrusts: PerRotor) -> Scalar:
     return _weighted_sum(rotors.allocation[0], thrusts)
 
 
-def wrench(rotors: Rotors, thrusts: PerRotor) -> Wrench:
+def wrench(rotors: Rotors, thrusts: PerRotor) -> RotorWrench:
     """The collective thrust and the moments that rotor thrusts [N] make."""
     collective, mx, my, mz = (_weighted_sum(row, thrusts) for row in rotors.allocation)
-    return Wrench(collective, (mx, my, mz))
+    return RotorWrench(collective, (mx, my, mz))
 
 
 def _weighted_sum(weights: PerRotor, values: PerRotor) -> Scalar:
@@ -67,7 +67,7 @@ class Airframe(NamedTuple):
     rotors: Rotors
 
 
-class Motion(NamedTuple):
+class VehicleState(NamedTuple):
     """All that evolves in a flying vehicle."""
 
     body: Body
@@ -78,10 +78,10 @@ def advance(
     ops: Ops,
     airframe: Airframe,
     environment: EnvironmentParameters,
-    motion: Motion,
+    motion: VehicleState,
     commands: PerRotor,
     dt: Scalar,
-) -> Motion:
+) -> VehicleState:
     """The motion after `dt` [s] under held rotor commands [N].
 
     The rotors are solved exactly, so RK4 sees their true load at each of its stages: order four jointly.
@@ -96,4 +96,4 @@ def advance(
     body = rigid_body.step(
         ops, airframe.mass_properties, environment, motion.body, (at_start, at_middle, at_end), dt
     )
-    return Motion(body, end)
+    return VehicleState(body, end)

@@ -16,7 +16,7 @@ from aerobat.kernels.allocation import Mixer, mix
 from aerobat.kernels.control import Commands
 from aerobat.kernels.motors import Airframe
 from aerobat.kernels.ops import Ops, PerRotor, Scalar, Vector, clip, magnitude
-from aerobat.kernels.rigid_body import Wrench
+from aerobat.kernels.rigid_body import RotorWrench
 from aerobat.kernels.vectors import ZERO, add, add_scaled, clip_components, scale, subtract, transform
 
 _FREQUENCY = 75.0  # [rad/s] of the poles in roll and pitch, which the filters' delays let pass
@@ -113,7 +113,7 @@ def step(
         times(gains.derivative, derivative),
     )
     moment = transform(model.airframe.mass_properties.inertia, angular)
-    commands = _mixed(ops, model, Wrench(setpoint.thrust, moment))
+    commands = _mixed(ops, model, RotorWrench(setpoint.thrust, moment))
     return RateLoopState(filtered, derivative, integral, commands)
 
 
@@ -126,7 +126,7 @@ def _low_passed(before: Vector, now: Vector, time_constant: Scalar, elapsed: Sca
     return add_scaled(before, elapsed / (time_constant + elapsed), subtract(now, before))
 
 
-def _mixed(ops: Ops, model: RateLoopModel, load: Wrench) -> Commands:
+def _mixed(ops: Ops, model: RateLoopModel, load: RotorWrench) -> Commands:
     """Commands within limits: moments are scaled to fit, then the collective thrust is moved to suit them."""
     rotors = model.airframe.rotors
     turning = mix(model.mixer, load._replace(thrust=0.0))

@@ -41,7 +41,7 @@ class EnvironmentParameters(NamedTuple):
     wind: Vector  # [m/s] velocity of the air, world
 
 
-class Wrench(NamedTuple):
+class RotorWrench(NamedTuple):
     """Force and moment of the rotors on the body."""
 
     thrust: Scalar  # [N] along b3
@@ -49,7 +49,7 @@ class Wrench(NamedTuple):
 
 
 def derivative(
-    mass_properties: MassProperties, environment: EnvironmentParameters, body: Body, load: Wrench
+    mass_properties: MassProperties, environment: EnvironmentParameters, body: Body, load: RotorWrench
 ) -> Body:
     """The time derivative of a body's state.
 
@@ -97,7 +97,7 @@ def step(
     mass_properties: MassProperties,
     environment: EnvironmentParameters,
     body: Body,
-    loads: tuple[Wrench, Wrench, Wrench],
+    loads: tuple[RotorWrench, RotorWrench, RotorWrench],
     dt: Scalar,
 ) -> Body:
     """The state after `dt` [s] of classical RK4, under the loads at its start, middle and end.

@@ -25,12 +25,20 @@ class MetricsInput(NamedTuple):
     time: Scalar  # [s]
 
 
+class Ground(NamedTuple):
+    """The ground as flights hit it: a slow vehicle that comes down near it has landed."""
+
+    height: Scalar  # [m] below which a fast vehicle has hit it, −infinity where there is none
+    landing_height: Scalar  # [m] below which a slow vehicle has hit it, too
+    landing_speed_sq: Scalar  # [m²/s²] of squared speed, up to which a vehicle is slow
+
+
 class MetricsParameters(NamedTuple):
     """Criteria by which a flight is judged."""
 
     divergence_radius_sq: Scalar  # [m²] of squared position error, beyond which a vehicle has diverged
     path_radius_sq: Scalar  # [m²] of squared position error, beyond which it has left its path
-    ground: Scalar  # [m] height, −infinity where there is none
+    ground: Ground
     ellipsoid: BoundingEllipsoid  # of the vehicle
     gates: tuple[GatePlane, ...]
     waypoints: tuple[Target, ...]
@@ -57,21 +65,15 @@ class RunningMetrics(NamedTuple):
     attitudes: tuple[Pointing, ...]
 
 
-def init(gates: tuple[int, ...], waypoints: int, attitudes: int) -> RunningMetrics:
-    """Metrics before the first tick of a flight.
-
-    Args:
-        gates: along how many directions each measures bodies.
-        waypoints: how many there are.
-        attitudes: of stages, how many there are.
-    """
+def init(parameters: MetricsParameters) -> RunningMetrics:
+    """Metrics before the first tick of a flight."""
     nowhere = Snapshot(0.0, ZERO, ZERO, (1.0, 0.0, 0.0, 0.0))
-    passages = tuple(progress.init(directions) for directions in gates)
-    approaches = waypoints * (approach.init(),)
+    gates = tuple(progress.init((plane, parameters.ellipsoid)) for plane in parameters.gates)
+    waypoints = tuple(approach.init(target) for target in parameters.waypoints)
+    attitudes = tuple(pointing.init(direction) for direction in parameters.attitudes)
     never = inf, inf
     none = (0.0,) * 6
-    directions = attitudes * (pointing.init(),)
-    return RunningMetrics(1.0, 1.0, 0.0, *never, *none, nowhere, passages, approaches, directions)
+    return RunningMetrics(1.0, 1.0, 0.0, *never, *none, nowhere, gates, waypoints, attitudes)
 
 
 def step(
@@ -103,9 +105,10 @@ def step(
     angle = angle_between(ops, body.q_world_body, q_world_body)
     going = ops.select(square <= parameters.divergence_radius_sq, counts, 0.0)
     ended = (metrics.flying > 0.5) & (going < 0.5)
-    below = counted & (body.position[2] < parameters.ground)
+    below = counted & (body.position[2] < lowest_height(ops, parameters.ground, body.velocity))
     is_off = counted & (square > parameters.path_radius_sq)
     now = Snapshot(inputs.time, *body[:3])
+    snapshots, both = (metrics.last, now), (metrics.ticks > 0.5, counted)
     return RunningMetrics(
         flying=going,
         is_finite=ops.select(ended & (counts < 0.5), 0.0, metrics.is_finite),
@@ -120,36 +123,24 @@ def step(
         saturated=metrics.saturated + ops.select(saturated, counts, 0.0),
         last=now,
         gates=tuple(
-            progress.step(
-                ops,
-                gate,
-                plane,
-                parameters.ellipsoid,
-                (_relative(metrics.last, plane.centre), _relative(now, plane.centre)),
-                (metrics.ticks > 0.5, counted),
-            )
+            progress.step(ops, gate, (plane, parameters.ellipsoid), snapshots, both)
             for gate, plane in zip(metrics.gates, parameters.gates, strict=True)
         ),
         waypoints=tuple(
-            approach.step(
-                ops,
-                latest,
-                target,
-                (_relative(metrics.last, target.centre), _relative(now, target.centre)),
-                (metrics.ticks > 0.5) & counted,
-            )
+            approach.step(ops, latest, target, snapshots, both)
             for latest, target in zip(metrics.waypoints, parameters.waypoints, strict=True)
         ),
         attitudes=tuple(
-            pointing.step(ops, latest, direction, (metrics.last, now), (metrics.ticks > 0.5) & counted)
+            pointing.step(ops, latest, direction, snapshots, both)
             for latest, direction in zip(metrics.attitudes, parameters.attitudes, strict=True)
         ),
     )
 
 
-def _relative(snapshot: Snapshot, centre: Vector) -> Snapshot:
-    """The snapshot with its position from a centre."""
-    return snapshot._replace(position=subtract(snapshot.position, centre))
+def lowest_height(ops: Ops, ground: Ground, velocity: Vector) -> Scalar:
+    """Return the height [m] below which a vehicle with a velocity [m/s] has hit the ground."""
+    is_slow = dot(velocity, velocity) <= ground.landing_speed_sq
+    return ops.select(is_slow, ground.landing_height, ground.height)
 
 
 def _is_finite(body: Body, thrusts: PerRotor, commands: PerRotor) -> Scalar:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from math import degrees
 
 import numpy as np
@@ -15,8 +15,7 @@ from aerobat.links.stream import SetpointStream
 from aerobat.planning import Plan, planned_passages
 from aerobat.simulation.autopilot.loop import KEPT
 from aerobat.simulation.outcome import length
-from aerobat.simulation.passages import Passage, passages
-from aerobat.simulation.passages.polyline import gate_progress
+from aerobat.simulation.passages import Passage, log_rows, passages_in_log
 
 
 @dataclass(frozen=True)
@@ -52,10 +51,6 @@ class LinkReport:
     def is_late(self) -> bool:
         """True where a set-point was later than a vehicle carries the one before on."""
         return self.max_lateness_s > KEPT
-
-    def record(self) -> dict[str, object]:
-        """Plain data."""
-        return {**asdict(self), "success": self.is_success, "failures": list(self.failures)}
 
     def __str__(self) -> str:
         """One sentence."""
@@ -103,13 +98,10 @@ def link_report(
     points = [stream.at(t) for t in times]
     off = np.linalg.norm(position - [point.position for point in points], axis=-1)
     turned = so3.angle_between(q, np.array([point.q_world_body for point in points]))
-    states = (position - offset, velocity, q)
+    rows = log_rows(times, position - offset, velocity, q)
     body = None if plan.vehicle is None else plan.vehicle.bounding_ellipsoid
     stop = np.array([times[-1] if aborted else np.nan])
-    flown = [
-        passages(asked, gate_progress(asked, times, states, body), stop).of_flight(0)
-        for asked in planned_passages(plan.stages, plan.problem)
-    ]
+    flown = passages_in_log(rows, planned_passages(plan.stages, plan.problem), body, stop)
     return LinkReport(
         aborted=aborted,
         ended=ended,
@@ -119,5 +111,5 @@ def link_report(
         max_position_error_m=float(off.max()),
         max_attitude_error_deg=degrees(float(turned.max())),
         longest_silence_s=float(np.diff(times).max()),
-        passages=tuple(flown),
+        passages=tuple(passage.of_flight(0) for passage in flown),
     )

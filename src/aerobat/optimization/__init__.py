@@ -1,6 +1,6 @@
 """Numerical optimization that knows no robots: convex QPs with stages, each assigned to one slot."""
 
-from aerobat.optimization.assignment import AssignmentProgram, LinearDynamics, SlottedStage
+from aerobat.optimization.assignment import AssignmentProgram, SlottedStage
 from aerobat.optimization.backends import BACKENDS, Solver, available_backends, solver
 from aerobat.optimization.moving_window import evenly_spread, improved_in_windows
 from aerobat.optimization.result import AssignmentResult
@@ -9,7 +9,6 @@ __all__ = [
     "BACKENDS",
     "AssignmentProgram",
     "AssignmentResult",
-    "LinearDynamics",
     "SlottedStage",
     "Solver",
     "available_backends",

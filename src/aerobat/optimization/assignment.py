@@ -66,37 +66,6 @@ class SlottedStage:
 
 
 @dataclass(frozen=True, eq=False)
-class LinearDynamics:
-    """Variables as the inputs of a linear system, slot after slot: s_k = F s_{k−1} + G x[columns[k]].
-
-    Rows that see later inputs than those of slot k see the inputs up to k through the state s_k alone.
-    Raises SpecError for what does not fit together.
-    """
-
-    transition: Array  # F (r, r)
-    gain: Array  # G (r, i)
-    columns: Indices  # (s, i) of the program's variables, each once
-
-    def __post_init__(self) -> None:
-        """Copy, write-protect and check."""
-        transition = _shared(self.transition, "dynamics: transition", (None, None))
-        columns = _indices(self.columns, "dynamics: columns")
-        if columns.ndim != 2:
-            raise SpecError("dynamics: columns must be a table of variables, one line for each slot")
-        if transition.shape != (len(transition),) * 2:
-            raise SpecError(f"dynamics: transition must be square, got the shape {transition.shape}")
-        _set(self, transition=transition, columns=columns)
-        _set(self, gain=_shared(self.gain, "dynamics: gain", (len(transition), columns.shape[1])))
-
-    def state(self, slot: int) -> Array:
-        """Return the state at the end of a slot per input up to it, (r, (slot + 1) i), in slots' order."""
-        blocks = [self.gain]
-        for _ in range(slot):
-            blocks.append(self.transition @ blocks[-1])
-        return np.concatenate(blocks[::-1], axis=1)
-
-
-@dataclass(frozen=True, eq=False)
 class AssignmentProgram:
     """The whole problem.
 
@@ -114,7 +83,6 @@ class AssignmentProgram:
     hessian: Array | None = None  # H (n, n) symmetric positive definite; None is 2 I: xᵀx is minimized
     gradient: Array | None = None  # f (n,); None is 0
     constant: float = 0.0  # c
-    dynamics: LinearDynamics | None = None  # by which long sequences are cut in two
 
     def __post_init__(self) -> None:
         """Copy, write-protect and check."""
@@ -131,8 +99,6 @@ class AssignmentProgram:
             _set(self, gradient=_shared(self.gradient, "gradient", (self.num_variables,)))
         _set(self, stages=tuple(self.stages), precedence=tuple((int(i), int(j)) for i, j in self.precedence))
         self._check_stages()
-        if self.dynamics is not None:
-            self._check_dynamics(self.dynamics.columns)
 
     def _check_stages(self) -> None:
         m = len(self.rows)
@@ -144,14 +110,6 @@ class AssignmentProgram:
         stages = len(self.stages)
         if any(not 0 <= k < stages for pair in self.precedence for k in pair):
             raise SpecError(f"precedence must name stages 0..{stages - 1}, got {self.precedence}")
-
-    def _check_dynamics(self, columns: Indices) -> None:
-        variables = np.arange(self.num_variables)
-        if not np.array_equal(np.sort(columns, None), variables):
-            raise SpecError(f"dynamics: columns must name all {len(variables)} variables, each once")
-        if any(max(stage.slots) >= len(columns) for stage in self.stages):
-            lines = len(columns)
-            raise SpecError(f"dynamics: columns must have a line for every slot of the stages, got {lines}")
 
     @property
     def num_variables(self) -> int:

@@ -3,7 +3,7 @@ from .assessment.lower_bound import least_duration
 from .certified_solve import Judged, Solution, certified_solve
 from .evidence import Evidence
 from .flyability import FLYABLE_ERROR, FlownPassage, Flyability, OwnFlight, nominal_flight, own_flight
-from .miqp import Miqp
+from .miqp.miqp import Miqp
 from .passages import PlacedStage, planned_passages, planned_waypoints
 from .planners import (
     Planner,

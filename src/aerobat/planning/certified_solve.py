@@ -9,21 +9,13 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import Any, Generic, Protocol, TypeVar
 
-import numpy as np
-
-from aerobat.arrays import Array
 from aerobat.certification import Certificate
-from aerobat.errors import SpecError
 from aerobat.planning.evidence import Evidence
 from aerobat.planning.recorder import Attempt, Recorder
 from aerobat.planning.result import Plan
 from aerobat.planning.rotor_margin import reserve_shortfalls, sampled_margin
-from aerobat.problem.problem import Limits, Problem
+from aerobat.planning.task import Task
 from aerobat.trajectory import Trajectory
-from aerobat.vehicle import Vehicle
-
-BACKOFF = 1e-4  # of a bound, of one at or next to zero in SI units: it is tightened by so much more
-NEGLIGIBLE = 1e-9  # in SI units: an excess that means nothing
 
 Detail = TypeVar("Detail")
 
@@ -63,8 +55,7 @@ class Program(Protocol[Detail]):
 class Judged(Generic[Detail]):
     """A solution and what decides about it: its own certificate, where there is a vehicle."""
 
-    problem: Problem
-    vehicle: Vehicle | None
+    task: Task
     solution: Solution[Detail]
     evidence: Evidence | None  # for the solution's path, where there is a vehicle
     feasible: bool
@@ -79,112 +70,64 @@ class Judged(Generic[Detail]):
         trajectory = self.solution.trajectory
         assert trajectory is not None, "a plan is made of a solution that has a trajectory"
         plan = Plan(
-            problem=self.problem,
+            problem=self.task.problem,
             trajectory=trajectory,
             cost=self.solution.cost,
             dt=self.solution.dt,
             attempts=tuple(recorder.attempts),
-            vehicle=self.vehicle,
+            vehicle=self.task.vehicle_if_any,
             **facts,
         )
         return plan if self.evidence is None else replace(plan, evidence=self.evidence.at(plan.stages))
 
 
 def certified_solve(
-    program: Program[Detail],
-    problem: Problem,
-    vehicle: Vehicle | None,
-    recorder: Recorder,
-    rounds: int = 1,
-    reserve: float = 0.0,
+    program: Program[Detail], task: Task, recorder: Recorder, rounds: int = 1
 ) -> Judged[Detail]:
     """The first solution that is certified and keeps the reserve, or the last one that was tried.
 
     Args:
         program: What is solved and tightened.
-        problem: Its limits and its environment are certified, beside the vehicle's limits.
-        vehicle: What shall fly it; without one every solution will do.
+        task: What is certified.
         recorder: Keeps an attempt a solve.
         rounds: Solves, at most.
-        reserve: Of each rotor's range, that it must be proven to keep from either of its limits.
     """
     for left in reversed(range(rounds)):
-        judged = judge(program.solve(), problem, vehicle, recorder, reserve)
+        judged = judge(program.solve(), task, recorder)
         if judged.feasible or not left or not program.tighten(judged.solution, judged.certificate):
             break
     return judged
 
 
-def refuted_by_samples(
-    solution: Solution[Detail], problem: Problem, vehicle: Vehicle | None
-) -> Solution[Detail]:
+def refuted_by_samples(solution: Solution[Detail], task: Task) -> Solution[Detail]:
     """The solution, a failure where samples already show that the vehicle's rotors cannot follow it."""
-    if vehicle is None or solution.trajectory is None or solution.failure is not None:
+    if task.vehicle_if_any is None or solution.trajectory is None or solution.failure is not None:
         return solution
-    sampled = sampled_margin(solution.trajectory, vehicle, problem.environment)
+    sampled = sampled_margin(solution.trajectory, task.vehicle, task.environment)
     if sampled.margin >= 0.0:
         return solution
     return replace(solution, failure=sampled.reason, margin=sampled.margin)
 
 
-def tightened(bounds: Limits, limits: Limits, trajectory: Trajectory, derivatives: int) -> Limits | None:
-    """Bounds tighter by as much as a trajectory exceeds the limits; None where that leaves nothing.
-
-    Args:
-        bounds: What was imposed where the program could, say at nodes.
-        limits: What shall hold everywhere.
-        trajectory: The solution with these bounds.
-        derivatives: How many of position's derivatives, itself included, are looked at.
-
-    Where nothing is exceeded, the same object is returned.
-    """
-    for derivative in range(derivatives):
-        (lower, upper), (least, most) = limits.of(derivative), trajectory.component_range(derivative)
-        below, above = _backoff(lower - least, lower), _backoff(most - upper, upper)
-        if below.any() or above.any():
-            try:
-                bounds = bounds.tightened(derivative, below, above)
-            except SpecError:
-                return None
-    return bounds
-
-
-def _backoff(excess: Array, bound: Array) -> Array:
-    """A little more than what is exceeded, and nothing where nothing but rounding is."""
-    backoff = np.zeros_like(excess)
-    exceeded = excess > NEGLIGIBLE
-    backoff[exceeded] = excess[exceeded] + BACKOFF * np.maximum(np.abs(bound[exceeded]), 1.0)
-    return backoff
-
-
-def judge(
-    solution: Solution[Detail],
-    problem: Problem,
-    vehicle: Vehicle | None,
-    recorder: Recorder,
-    reserve: float = 0.0,
-    jumps: bool = False,
-) -> Judged[Detail]:
-    """Certify a solution, and keep the attempt.
+def judge(solution: Solution[Detail], task: Task, recorder: Recorder, jumps: bool = False) -> Judged[Detail]:
+    """Certify a solution, its reserve included, and keep the attempt.
 
     Args:
         solution: A path, or why there is none.
-        problem: Its limits and its environment are certified, beside the vehicle's limits.
-        vehicle: What shall fly it; without one every solution will do.
+        task: What is certified; without a vehicle every path will do.
         recorder: Keeps the attempt.
-        reserve: Of each rotor's range, that it must be proven to keep from either of its limits.
         jumps: Whether body rates, or thrusts of rotors with lag, may jump between segments, which no moment
             and no rotor can do, as the certificate says.
     """
     evidence = certificate = None
-    if solution.trajectory is not None and solution.failure is None and vehicle is not None:
-        evidence = Evidence(problem, vehicle, solution.trajectory)
+    if solution.trajectory is not None and solution.failure is None and task.vehicle_if_any is not None:
+        evidence = Evidence(task.without_reserve, solution.trajectory)
         certificate = evidence.certificate
     outcome = solution.failure
     if certificate is not None:
         within = replace(certificate, discontinuities=()) if jumps else certificate
         outcome = None if within.certified else certificate.why
-        shortfalls = reserve_shortfalls(certificate, reserve)
+        shortfalls = reserve_shortfalls(certificate, task.reserve)
         if outcome is None and shortfalls:
             outcome = shortfalls[0].reason
     feasible = outcome is None
@@ -202,4 +145,4 @@ def judge(
             margin=margin,
         )
     )
-    return Judged(problem, vehicle, solution, evidence, feasible)
+    return Judged(task, solution, evidence, feasible)

@@ -17,10 +17,10 @@ from math import isinf, isnan, radians
 
 from aerobat.environment import Environment
 from aerobat.planning.passages import PlacedStage, planned_passages
-from aerobat.problem.problem import Problem
+from aerobat.planning.task import Task
 from aerobat.simulation import Flight, FlightConfig, Outcome, fly
 from aerobat.simulation.outcome import DIVERGENCE_RADIUS, length
-from aerobat.simulation.passages import Passage, flown_passages
+from aerobat.simulation.passages import Passage, log_rows, passages_in_log
 from aerobat.trajectory import Trajectory
 from aerobat.vehicle import Vehicle
 
@@ -118,19 +118,13 @@ class Flyability(OwnFlight):
         )
 
 
-def own_flight(
-    trajectory: Trajectory, vehicle: Vehicle, problem: Problem, stages: Sequence[PlacedStage]
-) -> OwnFlight:
-    """The findings of the nominal flight.
-
-    Args:
-        trajectory: What is flown.
-        vehicle: What flies it.
-        problem: Its environment is where, its stages say what is asked of gates.
-        stages: Where they are placed.
-    """
-    flight = nominal_flight(trajectory, vehicle, problem.environment)
-    flown = flown_passages(flight, planned_passages(stages, problem), vehicle.bounding_ellipsoid)
+def own_flight(task: Task, trajectory: Trajectory, stages: Sequence[PlacedStage]) -> OwnFlight:
+    """The findings of the nominal flight of a path, its task's stages placed along it."""
+    flight = nominal_flight(trajectory, task.vehicle, task.environment)
+    states = flight.states
+    rows = log_rows(flight.times, states.position, states.velocity, states.q_world_body)
+    planned, body = planned_passages(stages, task.problem), task.vehicle.bounding_ellipsoid
+    flown = passages_in_log(rows, planned, body, flight.diverged_at)
     return OwnFlight(
         error=_largest_error(flight), passages=tuple(_flown(passage.of_flight(0)) for passage in flown)
     )
@@ -152,25 +146,20 @@ def _flown(passage: Passage) -> FlownPassage:
 
 
 def own_flights(
-    trajectory: Trajectory,
-    vehicle: Vehicle,
-    problem: Problem,
-    stages: Sequence[PlacedStage],
-    margin: float,
+    task: Task, trajectory: Trajectory, stages: Sequence[PlacedStage], margin: float
 ) -> Flyability:
     """Fly a path twice: nominally, and with the rotors' reserve used up.
 
     Args:
+        task: Its vehicle flies, in its environment.
         trajectory: What is flown.
-        vehicle: What flies it.
-        problem: Its environment is where, its stages say what is asked of gates.
-        stages: Where they are placed.
+        stages: The task's, placed.
         margin: Of the rotors, proven [N]: the reserve.
     """
     disturbance = max(margin, 0.0)
-    fraction = disturbance / float(vehicle.max_thrusts.max())
-    nominal = own_flight(trajectory, vehicle, problem, stages)
-    disturbed = disturbed_flight(trajectory, vehicle, problem.environment, fraction)
+    fraction = disturbance / float(task.vehicle.max_thrusts.max())
+    nominal = own_flight(task, trajectory, stages)
+    disturbed = disturbed_flight(trajectory, task.vehicle, task.environment, fraction)
     return Flyability(
         error=nominal.error,
         passages=nominal.passages,

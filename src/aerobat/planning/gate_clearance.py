@@ -13,10 +13,9 @@ from aerobat.certification import PlannedPassage
 from aerobat.limits.body_in_gate import FRAME_CLEARANCE, BodyInGate
 from aerobat.optimization.deadline import out_of_time
 from aerobat.planning.flyability import FLYABLE_ERROR, OwnFlight
-from aerobat.problem.problem import Problem
+from aerobat.planning.task import Task
 from aerobat.problem.stage import Stage
 from aerobat.simulation.passages import PASSAGE_DEPTH
-from aerobat.vehicle import Vehicle
 
 Found = TypeVar("Found")
 
@@ -27,36 +26,25 @@ MORE_BENDING = 1.6  # times that, where the plan's own flight does not pass
 A_LITTLE_MORE = 1.2  # the same, where it touches the frame by no more than FRAME_CLEARANCE
 
 
-def bodies_in_gates(stages: Sequence[Stage], problem: Problem, vehicle: Vehicle) -> tuple[BodyInGate, ...]:
-    """Return the body's room in the gates that stages cross, from the start.
-
-    Args:
-        stages: In order.
-        problem: Its gates are crossed.
-        vehicle: What flies.
-    """
-    found = []
+def bodies_in_gates(task: Task) -> tuple[BodyInGate, ...]:
+    """Return the body's room in the gates that stages cross, from the start."""
+    found, stages = [], task.stages.stages
     for k in range(len(stages)):
         on_course = all(each.is_placed for each in stages[max(k - 1, 0) : k + 2])
         bending = BENDING if on_course else BENDING_IN_MANEUVER
-        found.append(_body_in_gate(k, stages, problem, vehicle, bending))
+        found.append(_body_in_gate(k, stages, task, bending))
     return tuple(filter(None, found))
 
 
 def more_direct(
-    in_gates: Sequence[BodyInGate],
-    stages: Sequence[Stage],
-    problem: Problem,
-    vehicle: Vehicle,
-    flight: OwnFlight,
+    in_gates: Sequence[BodyInGate], stages: Sequence[Stage], task: Task, flight: OwnFlight
 ) -> tuple[BodyInGate, ...]:
     """Return more room in the gates that a flight did not pass, and room in those that had none.
 
     Args:
         in_gates: The room that the flown path has in gates that the stages cross.
-        stages: In order.
-        problem: Its gates are crossed.
-        vehicle: What flies.
+        stages: In the order of the path.
+        task: Its gates are crossed.
         flight: With a passage for each stage that names a gate.
     """
     crossing = [k for k, stage in enumerate(stages) if stage.gate is not None]
@@ -65,7 +53,7 @@ def more_direct(
     for k, flown in missed.items():
         last = found.get(k)
         if last is None:
-            found[k] = _body_in_gate(k, stages, problem, vehicle, BENDING_IN_MANEUVER)
+            found[k] = _body_in_gate(k, stages, task, BENDING_IN_MANEUVER)
         else:
             touches = flown.clearance is not None and flown.clearance >= -FRAME_CLEARANCE
             found[k] = replace(last, bending=(A_LITTLE_MORE if touches else MORE_BENDING) * last.bending)
@@ -98,12 +86,10 @@ def cleared(
     return best
 
 
-def _body_in_gate(
-    k: int, stages: Sequence[Stage], problem: Problem, vehicle: Vehicle, bending: float
-) -> BodyInGate | None:
+def _body_in_gate(k: int, stages: Sequence[Stage], task: Task, bending: float) -> BodyInGate | None:
     """The room in the gate that stage k crosses, in its direction; None where it crosses none."""
-    name = stages[k].gate
+    name, problem = stages[k].gate, task.problem
     if name is None or PlannedPassage.of(stages[k], problem.gate(name), 0.0).min_speed <= 0.0:
         return None
-    reach = vehicle.body_radius + PASSAGE_DEPTH
-    return BodyInGate(problem.gate(name), k, reach, bending * vehicle.max_specific_thrust)
+    reach = task.vehicle.body_radius + PASSAGE_DEPTH
+    return BodyInGate(problem.gate(name), k, reach, bending * task.vehicle.max_specific_thrust)

@@ -19,7 +19,7 @@ from aerobat.declaration import AS_IT_IS, declared
 from aerobat.errors import SpecError
 from aerobat.flatness import reference
 from aerobat.optimization.deadline import within_time
-from aerobat.planning.passages import PlacedStage
+from aerobat.planning.passages import PlacedStage, place_stages
 from aerobat.planning.recorder import Progress
 from aerobat.planning.result import Plan
 from aerobat.problem import Gate, Maneuver, Problem, Stage, StageSequence, at_rest
@@ -120,7 +120,7 @@ def _joined(problem: Problem, found: Sequence[Plan | Stage]) -> Plan:
     for each in found:
         if isinstance(each, Stage):
             pieces.append((np.array([each.hold]), _padded(np.reshape(each.place, (1, 1, 3)), degree)))
-            stages.append(PlacedStage(each.name, max(segments - 1, 0), time))
+            stages += place_stages((each,), (max(segments - 1, 0),), (time,))
         else:
             trajectory = each.trajectory
             pieces.append((trajectory.durations, _padded(trajectory.coefficients, degree)))

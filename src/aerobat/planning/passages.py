@@ -5,7 +5,7 @@ And, before anything is searched, the openings of gates beside the vehicle that 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -30,44 +30,41 @@ class PlacedStage:
     gate: str | None = None  # the name of the gate that is passed there
 
 
+def place_stages(
+    stages: Iterable[Stage], intervals: Iterable[int], times: Iterable[float]
+) -> tuple[PlacedStage, ...]:
+    """Stages at the ends of intervals and at times [s]."""
+    placed = zip(stages, intervals, times, strict=True)
+    return tuple(PlacedStage(stage.name, interval, time, stage.gate) for stage, interval, time in placed)
+
+
+def timed_stages(places: Sequence[PlacedStage], problem: Problem) -> tuple[tuple[Stage, float], ...]:
+    """The problem's own stages that are placed, each with its time [s], in the order of the places.
+
+    A place belongs to the first stage of its gate or, without one, of its name, to which none before belongs.
+    A gate that no stage names is passed all the same; another place that no stage names is left out.
+    """
+    waiting = list(problem.stages(1.0).stages)  # the attitudes are the same, whatever thrust there is
+    found = []
+    for place in places:
+        key = (place.gate, None if place.gate else place.name)
+        stage = next((each for each in waiting if (each.gate, None if each.gate else each.name) == key), None)
+        waiting = [other for other in waiting if other is not stage]
+        if stage is not None or place.gate is not None:
+            found.append((stage or Stage(place.name, gate=place.gate), place.time))
+    return tuple(found)
+
+
 def planned_passages(stages: Sequence[PlacedStage], problem: Problem) -> tuple[PlannedPassage, ...]:
     """The gates that are passed at placed stages, as the problem's own stages ask, in their order."""
-    placed = [place for place in stages if place.gate is not None]
-    return tuple(
-        PlannedPassage.of(stage or Stage(place.name), problem.gate(str(place.gate)), place.time)
-        for place, stage in _matched(placed, problem, lambda stage, place: stage.gate == place.gate)
-    )
+    asked = timed_stages(stages, problem)
+    return tuple(PlannedPassage.of(s, problem.gate(s.gate), t) for s, t in asked if s.gate is not None)
 
 
 def planned_waypoints(stages: Sequence[PlacedStage], problem: Problem) -> tuple[PlannedWaypoint, ...]:
     """The balls that are met at placed stages, in their order."""
-    return tuple(
-        PlannedWaypoint(stage.name, stage.ball, place.time, stage.lap)
-        for place, stage in _matched(stages, problem, _is_its_ball)
-        if stage is not None and stage.ball is not None
-    )
-
-
-def other_stages(stages: Sequence[PlacedStage], problem: Problem) -> tuple[tuple[PlacedStage, Stage], ...]:
-    """The placed stages that pass no gate and meet no ball, each with the problem's own stage."""
-    places = [place for place in stages if place.gate is None]
-    matched = _matched(places, problem, lambda stage, place: stage.gate is None and stage.name == place.name)
-    return tuple((place, stage) for place, stage in matched if stage is not None and stage.ball is None)
-
-
-def _is_its_ball(stage: Stage, place: PlacedStage) -> bool:
-    return stage.ball is not None and stage.name == place.name
-
-
-def _matched(
-    places: Sequence[PlacedStage], problem: Problem, belongs: Callable[[Stage, PlacedStage], bool]
-) -> Iterator[tuple[PlacedStage, Stage | None]]:
-    """Each place with the first of the problem's own stages that belongs to it and to none before."""
-    asked = list(problem.stages(1.0).stages)  # the attitudes are the same, whatever thrust there is
-    for place in places:
-        stage = next((stage for stage in asked if belongs(stage, place)), None)
-        asked = [other for other in asked if other is not stage]
-        yield place, stage
+    asked = timed_stages(stages, problem)
+    return tuple(PlannedWaypoint(s.name, s.ball, t, s.lap) for s, t in asked if s.ball is not None)
 
 
 def require_openings(problem: Problem, vehicle: Vehicle) -> None:

@@ -16,7 +16,7 @@ from typing import Any, Protocol, TypeVar, cast, dataclass_transform, get_type_h
 
 from pydantic import Field
 
-from aerobat.declaration import Label, Registry, shown, suggest_for, validated
+from aerobat.declaration import Label, Registry, placed, shown, suggest_for, validated
 from aerobat.errors import Infeasible, Reason, SpecError
 from aerobat.planning.assessment.contradiction import contradiction
 from aerobat.planning.courses import is_course, on_open_courses
@@ -93,7 +93,8 @@ def plan(
     found: Any = method.plan(problem, vehicle, progress)
     if not isinstance(found, Plan):
         name = getattr(method, "kind", type(method).__name__)
-        raise SpecError(f"planner '{name}' returned {shown(found)} from plan(), not a Plan")
+        wrong = SpecError(f"planner '{name}' returned {shown(found)} from plan(), not a Plan")
+        raise placed(wrong, method.plan)
     return found if vehicle is None or found.vehicle is not None else found.for_vehicle(vehicle)
 
 

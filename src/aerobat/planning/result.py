@@ -14,6 +14,7 @@ from aerobat.planning.flyability import Flyability
 from aerobat.planning.passages import PlacedStage
 from aerobat.planning.recorder import Attempt
 from aerobat.planning.rotor_margin import RotorMargin, reserve_shortfalls
+from aerobat.planning.task import Task
 from aerobat.planning.tube import Tube
 from aerobat.problem.problem import Problem
 from aerobat.simulation.autopilot import Recoveries
@@ -22,7 +23,7 @@ from aerobat.vehicle import Vehicle
 
 # of every limit's range, kept from either end for the controller by planners that use all of it, where a
 # plan shall be flown: rotors without lag leave it nothing otherwise
-FLYING_RESERVE = 0.1
+FLYING_RESERVE = 0.15
 
 
 @validated
@@ -56,7 +57,7 @@ class Plan:
     def __post_init__(self) -> None:
         own = None
         if self.vehicle is not None:
-            own = Evidence(self.problem, self.vehicle, self.trajectory, self.stages)
+            own = Evidence(Task.of(self.problem, self.vehicle), self.trajectory, self.stages)
         if self.evidence != own:  # that of another path, before `replace`
             object.__setattr__(self, "evidence", own)
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 from typing import Annotated
 
@@ -10,11 +9,10 @@ import numpy as np
 from pydantic import Field
 
 from aerobat.arrays import Array
-from aerobat.errors import Infeasible, SpecError
-from aerobat.flatness import force_balance
+from aerobat.errors import SpecError
 from aerobat.flatness.references import UNDETERMINED
-from aerobat.planning.planners import Planner
 from aerobat.planning.result import Plan
+from aerobat.planning.task import Task
 from aerobat.problem.problem import Problem
 from aerobat.problem.stage import Stage, StageSequence
 from aerobat.trajectory import Trajectory
@@ -74,32 +72,18 @@ class WarmStart:
         return np.array([*directions[1], 0.0])
 
 
-def require_attitudes(planner: str, problem: Problem, vehicle: Vehicle | None) -> Vehicle:
-    """The vehicle, whose attitude is determined at both ends.
+def flown_task(planner: str, problem: Problem, vehicle: Vehicle | None, reserve: float) -> Task:
+    """The task for a vehicle whose attitude is determined at both ends.
 
-    Raises SpecError where there is none, and for ends in free fall, whose attitude is open.
+    Raises SpecError where there is no vehicle, and for ends in free fall, whose attitude is open.
     """
     if vehicle is None:
         raise SpecError(f"the {planner} planner needs a vehicle: no limits, no least time; give --vehicle")
+    task = Task.of(problem, vehicle, reserve)
     for name, state in problem.ends.items():
-        thrust = force_balance(problem.environment, vehicle).specific_thrust(
-            state.velocity, state.acceleration
-        )
+        thrust = task.balance.specific_thrust(state.velocity, state.acceleration)
         if np.linalg.norm(thrust) < UNDETERMINED * problem.environment.gravity:
             raise SpecError(
                 f"{name}.acceleration asks no thrust, which leaves the attitude there open; change it"
             )
-    return vehicle
-
-
-def plans_to_begin_from(planners: Iterable[Planner], problem: Problem, vehicle: Vehicle) -> Iterator[Plan]:
-    """The plans of other planners that find one.
-
-    Raises Infeasible where a stage asks more thrust than the vehicle has.
-    """
-    for planner in planners:
-        try:
-            yield planner.plan(problem, vehicle)
-        except Infeasible as infeasible:
-            if not infeasible.attempts:  # no attempt: refused at once, and whatever the planner
-                raise
+    return task

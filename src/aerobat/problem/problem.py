@@ -27,6 +27,7 @@ from aerobat.declaration import (
     from_table,
     in_degrees,
     in_radians,
+    placed,
     shown,
     to_table,
     validated,
@@ -324,11 +325,17 @@ def _explicit_stages(
 ) -> StageSequence:
     """As `Problem.stages`, kept: planner, certificate and score each ask for the same."""
     try:
-        sequence: Any = maneuver.stage_sequence(gates, max_specific_thrust)
-    except SpecError:
-        raise
+        return _explicit(maneuver, maneuver.stage_sequence(gates, max_specific_thrust), gates, body_radius)
+    except SpecError as error:
+        raise placed(error, maneuver.stage_sequence) from None
     except (ValueError, AssertionError) as error:
         raise OwnCodeError(f"maneuver '{maneuver.kind}': {error!r}") from error
+
+
+def _explicit(
+    maneuver: Maneuver, sequence: Any, gates: tuple[Gate, ...], body_radius: float
+) -> StageSequence:
+    """Return a maneuver's sequence with all that its stages ask spelled out."""
     if not isinstance(sequence, StageSequence):
         complaint = f"returned {shown(sequence)} from stage_sequence(), not a StageSequence"
         raise SpecError(f"maneuver '{maneuver.kind}' {complaint}")

@@ -12,11 +12,17 @@ from aerobat.simulation.outcome import length
 
 def plan_caption(plan: Plan) -> str:
     """Origin of a plan in a few words."""
-    dt = "" if plan.dt is None else f" of {plan.dt:.4f} s"
+    grid = "segments" if plan.dt is None else f"intervals of {plan.dt:.4f} s"
     order = "" if plan.order is None else f", order {plan.order}"
     cost = "" if plan.cost in (None, plan.duration) else f", cost {plan.cost:.6g}"
     solver = f"{plan.backend}, {plan.nodes} nodes, {1000 * plan.solve_time:.0f} ms".removeprefix(", ")
-    return f"{plan.planner}: {plan.duration:.3f} s in {plan.intervals} intervals{dt}{order}{cost} ({solver})"
+    return f"{plan.planner}: {plan.duration:.3f} s in {plan.intervals} {grid}{order}{cost} ({solver})"
+
+
+def plan_captions(plan: Plan) -> list[str]:
+    """Origin of a plan, its proof, and what its own flights leave to the controller, a line each."""
+    found = (plan.certificate, plan.flyability)
+    return [plan_caption(plan), *(str(each) for each in found if each is not None)]
 
 
 def score_caption(score: Score) -> str:

@@ -1,18 +1,17 @@
-"""Planners side by side: as rows of data, as a table, and as a picture on a common time axis."""
+"""Planners side by side: their facts, and a picture on a common time axis."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from itertools import cycle
 from textwrap import fill
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
-from rich.table import Table
-from rich.text import Text
 
 from aerobat.declaration import validated
 from aerobat.planning import Plan
+from aerobat.reporting.facts import Fact, Facts, facts, picture
 from aerobat.reporting.page import (
     AXIS,
     COLUMNS,
@@ -38,7 +37,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-NONE = "–"  # in place of a number that there is not
+DRAWN = ("duration_s", "ratio", "certified", "min_margin_n", "max_position_error_m")  # beside a timeline
 COLOURS = (INK, YELLOW, SKY, BLUE, MUTED)  # of planners, in their order
 PATH_VERTICES = 200  # of a drawn path
 TAIL = 1.02  # where the time axis ends, relative to the longest duration
@@ -53,43 +52,40 @@ SENTENCE = 72  # letters to a line beside a timeline
 PARAGRAPH = 150  # letters to a line across the page
 
 
-def comparison_rows(comparison: Comparison) -> list[dict[str, Any]]:
-    """Plain data, a row a planner; None where there is no plan, and for ratios where none is time-optimal."""
-    return [
-        {
-            "planner": entry.planner,
-            "segments": entry.plan and entry.plan.intervals,
-            "duration_s": entry.plan and entry.plan.duration,
-            "ratio": comparison.ratio(entry),
-            "certified": None if entry.plan is None else entry.certified,
-            "min_margin_n": _margin(entry.plan),
-            "planning_s": entry.planning_time,
-            "max_position_error_m": entry.score and entry.score.max_position_error_m,
-            "note": entry.note,
-        }
-        for entry in comparison.entries
-    ]
+@facts.register
+def _(comparison: Comparison) -> Iterator[Fact]:
+    problem, vehicle = comparison.problem.name, comparison.vehicle.name
+    yield Fact("problem", problem, text=f"{problem} · {vehicle}")
+    yield Fact("vehicle", vehicle)
+    yield Fact("planners", [_row(comparison, entry) for entry in comparison.entries], "planners")
+    for entry in comparison.entries:  # outcomes that are worth a sentence
+        if entry.score is None or entry.score.outcome is not Outcome.COMPLETE:
+            yield Fact("", text=f"{_name(entry)}: {entry.outcome}")
+    yield from (Fact("", text=f"{_name(entry)}: {entry.note}") for entry in comparison.entries if entry.note)
 
 
-def comparison_table(comparison: Comparison) -> Table:
-    """The same for people, in 80 columns; below it, the outcomes that are worth a sentence."""
-    title = f"{comparison.problem.name} · {comparison.vehicle.name}"
-    table = Table(title=title, title_justify="left", caption_justify="left", box=None, pad_edge=False)
-    table.add_column("planner", no_wrap=True)
-    for name in ("segments", *_facts(comparison, comparison.entries[0]), "took"):
-        table.add_column(name, justify="right", no_wrap=True)
-    for entry in comparison.entries:
-        segments = NONE if entry.plan is None else str(entry.plan.intervals)
-        spent = f"{entry.planning_time:.2f} s"
-        table.add_row(entry.planner, segments, *_facts(comparison, entry).values(), spent)
-    notes = [
-        f"{_name(entry)}: {entry.outcome}"
-        for entry in comparison.entries
-        if entry.score is None or entry.score.outcome is not Outcome.COMPLETE
-    ]
-    notes += [f"{_name(entry)}: {entry.note}" for entry in comparison.entries if entry.note]
-    table.caption = Text("\n".join(notes)) if notes else None  # as it stands: brackets are no markup
-    return table
+picture.register(Comparison, lambda comparison: comparison_figure(comparison))
+
+
+def _row(comparison: Comparison, entry: Entry) -> Facts:
+    """A planner's result; None where there is no plan, and for ratios where none is time-optimal."""
+    plan, ratio, margin = entry.plan, comparison.ratio(entry), _margin(entry.plan)
+    error = None if entry.score is None else entry.score.max_position_error_m
+    took = entry.planning_time
+    duration = None if plan is None else f"{plan.duration:.3f} s"
+    return Facts(
+        (
+            Fact("planner", entry.planner, "planner"),
+            Fact("segments", plan and plan.intervals, "segments"),
+            Fact("duration_s", plan and plan.duration, "duration", duration),
+            Fact("ratio", ratio, "ratio", None if ratio is None else f"{ratio:.2f}"),
+            Fact("certified", None if plan is None else entry.certified, "certified"),
+            Fact("min_margin_n", margin, "margin", None if margin is None else f"{margin:.2g} N"),
+            Fact("max_position_error_m", error, "error", None if error is None else length(error)),
+            Fact("planning_s", took, "took", f"{took:.2f} s"),
+            Fact("note", entry.note),
+        )
+    )
 
 
 @validated
@@ -123,24 +119,16 @@ def _margin(plan: Plan | None) -> float | None:
     return None if plan.margin is None else plan.margin.margin
 
 
-def _facts(comparison: Comparison, entry: Entry) -> dict[str, str]:
-    """A planner's result in words, by what they say."""
-    plan, ratio, margin = entry.plan, comparison.ratio(entry), _margin(entry.plan)
-    certified = "yes" if entry.certified else "no"
-    return {
-        "duration": NONE if plan is None else f"{plan.duration:.3f} s",
-        "ratio": NONE if ratio is None else f"{ratio:.2f}",
-        "certified": NONE if plan is None else certified,
-        "margin": NONE if margin is None else f"{margin:.2g} N",
-        "error": NONE if entry.score is None else length(entry.score.max_position_error_m),
-    }
-
-
 def _name(entry: Entry) -> str:
     """Label that tells a planner from others of its kind."""
     if entry.plan is None:
         return entry.planner
     return f"{entry.planner}, {entry.plan.intervals} segments"
+
+
+def _drawn(comparison: Comparison, entry: Entry) -> list[Fact]:
+    """The facts of a planner's result that stand beside its timeline."""
+    return [fact for fact in _row(comparison, entry) if fact.key in DRAWN]
 
 
 def _path(entry: Entry, plan: Plan, colour: str) -> NamedPath:
@@ -155,8 +143,8 @@ def _pitch(entry: Entry) -> float:
 def _draw_rows(figure: Figure, comparison: Comparison, colours: Sequence[str], top: float) -> None:
     """A row a planner from `top` [in] downward: its timeline and facts, or why it has no plan."""
     timelines: list[Axes] = []
-    for x, name in zip(PLACES, _facts(comparison, comparison.entries[0]), strict=True):
-        write(figure, x, top, name, size=SMALL, color=MUTED)
+    for x, fact in zip(PLACES, _drawn(comparison, comparison.entries[0]), strict=True):
+        write(figure, x, top, fact.label, size=SMALL, color=MUTED)
     for entry, colour in zip(comparison.entries, colours, strict=True):
         top -= _pitch(entry)
         if entry.plan is None:
@@ -192,11 +180,11 @@ def _share_scales(timelines: Sequence[Axes]) -> None:
 
 def _write_facts(figure: Figure, comparison: Comparison, entry: Entry, bottom: float) -> None:
     """Numbers beside a timeline, and what became of the flight below them."""
-    for x, (name, fact) in zip(PLACES, _facts(comparison, entry).items(), strict=True):
-        wrong = name == "certified" and not entry.certified
-        write(figure, x, bottom + 0.6, fact, size=TITLE, color=RED if wrong else INK)
-    facts = (f"planned in {entry.planning_time:.2f} s", entry.note, entry.outcome)
-    note = fill("; ".join(filter(None, facts)), SENTENCE)
+    for x, fact in zip(PLACES, _drawn(comparison, entry), strict=True):
+        wrong = fact.key == "certified" and not entry.certified
+        write(figure, x, bottom + 0.6, fact.said, size=TITLE, color=RED if wrong else INK)
+    notes = (f"planned in {entry.planning_time:.2f} s", entry.note, entry.outcome)
+    note = fill("; ".join(filter(None, notes)), SENTENCE)
     write(figure, PLACES[0], bottom + 0.42, note, size=SMALL, color=MUTED, va="top")
 
 

@@ -1,98 +1,62 @@
-"""to_dataframe(): what is a table, as one of pandas."""
+"""to_dataframe(): a result as a table of pandas."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
-from aerobat.arrays import AXES
-from aerobat.declaration import validated
+from aerobat.declaration import unknown_name, validated
 from aerobat.errors import BackendMissing
-from aerobat.evaluation.score import Scores
-from aerobat.planning import Attempt, Plan
-from aerobat.reporting.comparison import comparison_rows
-from aerobat.simulation import Flight
-from aerobat.studies.compare import Comparison
-from aerobat.studies.feasibility import FeasibilityMap
-from aerobat.studies.sweep import Sweep
-from aerobat.studies.sweep.flights import passage_names
+from aerobat.reporting.facts import Columns, Facts, facts
+from aerobat.reporting.plain_data import plain
 
 if TYPE_CHECKING:
     from pandas import DataFrame
 
-COMPONENTS = {3: AXES, 4: "wxyz"}  # of vectors and quaternions
-METRICS = (
-    "max_position_error_m",
-    "rms_position_error_m",
-    "max_attitude_error_deg",
-    "rms_attitude_error_deg",
-    "saturated_fraction",
-)
-
 
 @validated
-def to_dataframe(table: Flight | Plan | Comparison | Scores | Sweep | FeasibilityMap) -> DataFrame:
-    """Return a pandas DataFrame, SI units unless a column says otherwise.
+def to_dataframe(result: Any, table: str | None = None) -> DataFrame:
+    """Return a pandas DataFrame of a result, or of a list of results; units as in its columns' names.
 
-    Of a flight its rows: time, then each series of SERIES by its components, as `position_x` and `thrusts_0`;
-    of a batch all flights' rows, one flight below the other, with the number of the vehicle first. Of a plan
-    its attempts, of a comparison its planners, of scores the flights with their passages through each gate,
-    of a sweep its table, of a map of what is feasible its cells.
-    Raises BackendMissing without pandas.
+    A result that has tables gives the first of them: of a flight its rows, the series by their components, as
+    `position_x` and `thrusts_0`, of a batch with the number of the vehicle first; of a plan its attempts, of
+    a comparison its planners, of scores the flights with their passages through each gate, of a sweep its
+    flights, of a map of what is feasible its cells. A result without tables is one row.
+    Raises BackendMissing without pandas, SpecError for what is no result, or has no such table.
+
+    Args:
+        result: What it is of.
+        table: The key of another of its tables, as "stages" of a plan.
     """
     try:
         from pandas import DataFrame
     except ImportError:
         remedy = 'pip install "aerobat[pandas]"'
         raise BackendMissing(f"to_dataframe needs pandas; install it with {remedy}") from None
-    if isinstance(table, Plan):
-        return DataFrame([asdict(attempt) for attempt in table.attempts], columns=_names(Attempt))
-    if isinstance(table, Sweep | FeasibilityMap):
-        return DataFrame(dict(table.table))
-    if isinstance(table, Comparison):
-        return DataFrame(comparison_rows(table))
-    return DataFrame(_of_scores(table) if isinstance(table, Scores) else _of_flight(table))
+    if isinstance(result, list):
+        return DataFrame([dict(_cells(plain(each))) for each in result])
+    tables = {fact.key: fact.value for fact in facts(result) if fact.key and _is_table(fact.value)}
+    if table is not None and table not in tables:
+        raise unknown_name("table", table, list(tables))
+    found = tables.get(table) if table is not None else next(iter(tables.values()), None)
+    if isinstance(found, Columns):
+        return DataFrame(dict(found))
+    rows = [plain(result)] if found is None else map(plain, found)
+    return DataFrame([dict(_cells(row)) for row in rows])
 
 
-def _names(cls: Any) -> list[str]:
-    return list(cls.__dataclass_fields__)
+def _is_table(value: Any) -> bool:
+    """True for columns, and for a sequence of results, an empty one too."""
+    is_rows = isinstance(value, list | tuple) and not isinstance(value, Facts)
+    return isinstance(value, Columns) or (
+        is_rows and not any(isinstance(each, int | float | str) for each in value)
+    )
 
 
-def _of_flight(flight: Flight) -> dict[str, Any]:
-    """The columns of a flight, or of a batch."""
-    if not flight.is_batch:
-        return dict(_columns(flight))
-    each = [dict(_columns(flight[k])) for k in range(len(flight.vehicles))]
-    numbers = [np.full(len(columns["time"]), k) for k, columns in enumerate(each)]
-    joined = {name: np.concatenate([columns[name] for columns in each]) for name in each[0]}
-    return {"vehicle": np.concatenate(numbers), **joined}
-
-
-def _columns(flight: Flight) -> Iterator[tuple[str, Any]]:
-    yield "time", flight.times
-    for one in flight.kinds:
-        values = flight.series[one.name]
-        if not one.over_time:
-            continue
-        if values.ndim == 1:
-            yield one.name, values
+def _cells(row: dict[str, Any], begin: str = "") -> Iterator[tuple[str, Any]]:
+    """Yield the cells of a row, those within others by dotted keys."""
+    for key, value in row.items():
+        if isinstance(value, dict):
+            yield from _cells(value, f"{begin}{key}.")
         else:
-            names = COMPONENTS.get(values.shape[1]) if one.shape[0] > 0 else None
-            for k, column in enumerate(values.T):
-                yield f"{one.name}_{names[k] if names else k}", column
-
-
-def _of_scores(scores: Scores) -> dict[str, Any]:
-    """The columns of many flights' scores."""
-    columns: dict[str, Any] = {name: getattr(scores, name) for name in METRICS}
-    columns["outcome"] = [outcome.name.lower() for outcome in scores.outcomes]
-    for begin, passage in zip(passage_names(scores.passages), scores.passages, strict=True):
-        names = (name for name in _names(type(passage)) if name not in ("gate", "lap"))
-        columns |= {f"{begin}_{name}": getattr(passage, name) for name in names}
-    for waypoint in (*scores.waypoints, *scores.places):
-        begin = f"{waypoint.waypoint}_lap_{waypoint.lap}"
-        columns |= {f"{begin}_{name}": getattr(waypoint, name) for name in ("time", "miss", "speed")}
-    return columns
+            yield f"{begin}{key}", value

@@ -10,7 +10,7 @@ from aerobat.declaration import validated
 from aerobat.errors import SpecError
 from aerobat.evaluation.score import Score
 from aerobat.planning import Plan
-from aerobat.reporting.captions import error_caption, plan_caption, score_caption
+from aerobat.reporting.captions import error_caption, plan_captions, score_caption
 from aerobat.reporting.page import AXIS, COLUMNS, TITLES, Place, blank_page, heading, house_style, panel
 from aerobat.reporting.panels import timelines
 from aerobat.reporting.panels.path import draw_path
@@ -37,7 +37,7 @@ class PictureLayout:
 
 
 PICTURES_SIDE_BY_SIDE = PictureLayout((0.3, 0.05, 6.1, 6.1), (7.0, 0.5, 4.3, 5.65), 6.7)
-PICTURES_STACKED = PictureLayout((0.3, 3.3, 11.0, 3.1), (0.74, 0.5, 10.53, 2.0), 6.95)
+PICTURES_STACKED = PictureLayout((0.3, 3.5, 11.0, 4.0), (0.74, 0.5, 10.53, 2.2), 8.05)
 
 
 @dataclass(frozen=True)
@@ -59,11 +59,11 @@ TIMELINES_BESIDE = FlightLayout(
     height=6.85,
 )
 TIMELINES_BELOW = FlightLayout(
-    path=(0.3, 2.7, 11.0, 3.1),
+    path=(0.3, 2.7, 11.0, 4.0),
     position=(0.68, AXIS, 3.05, 1.6),
     attitude=(4.5, AXIS, 3.05, 1.6),
     rotors=(8.3, AXIS, 3.05, 1.6),
-    height=6.4,
+    height=7.3,
 )
 
 
@@ -124,7 +124,7 @@ def report_figure(
 
 
 def _flight_page(plan: Plan, vehicle: Vehicle, flight: Flight, score: Score | None) -> Figure:
-    facts = [plan_caption(plan), error_caption(flight) if score is None else score_caption(score)]
+    facts = [*plan_captions(plan), error_caption(flight) if score is None else score_caption(score)]
     reference = reference_poses(plan_reference(plan, vehicle))
     figure, rows = _pictures(plan, vehicle, reference, actual_poses(flight), 2, facts)
     errors, thrusts = ([panel(figure, x, y, WIDTH, ROW) for y in rows] for x in COLUMNS)
@@ -139,8 +139,7 @@ def _flight_page(plan: Plan, vehicle: Vehicle, flight: Flight, score: Score | No
 
 def _plan_page(plan: Plan, vehicle: Vehicle) -> Figure:
     reference = plan_reference(plan, vehicle)
-    facts = [plan_caption(plan), *([] if plan.margin is None else [f"rotors {plan.margin}"])]
-    facts += [] if plan.tube is None else [str(plan.tube)]
+    facts = [*plan_captions(plan), *([] if plan.tube is None else [str(plan.tube)])]
     figure, rows = _pictures(plan, vehicle, reference_poses(reference), [], 1, facts)
     specific, rotors = (panel(figure, x, rows[0], WIDTH, ROW) for x in COLUMNS)
     timelines.draw_specific_thrust(specific, plan, vehicle)

@@ -1,16 +1,18 @@
-"""A picture of an inspection: a flight's position error, and what each cause put into it."""
+"""An inspection: its facts, and a picture of a flight's position error and each cause's part in it."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from aerobat.arrays import Array
 from aerobat.declaration import validated
+from aerobat.reporting.facts import Fact, Facts, facts, kept, picture
 from aerobat.reporting.page import AXIS, TITLES, blank_page, heading, house_style, panel
 from aerobat.reporting.style import BLUE, FAINT, INK, RED
-from aerobat.studies.inspection import CAUSES, Inspection
+from aerobat.studies.inspection import CAUSES, ErrorShare, Inspection
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -21,6 +23,40 @@ CAUSE = 0.75  # [in] of one cause's
 GAP = 0.5  # [in] between causes, for a name
 LEFT = 0.9  # [in]
 WIDTH = 10.4  # [in]
+
+
+@facts.register
+def _(found: Inspection) -> Iterator[Fact]:
+    yield Fact("verdict", found.verdict, text=found.verdict)
+    yield from kept(cause=found.cause, max_position_error_m=found.largest, time_s=found.time)
+    yield Fact("shares", found.shares, "shares")
+    yield from (Fact("", text=remark) for remark in found.remarks)
+    place = found.alignment
+    yield from kept(
+        command_delay_s=found.delay,
+        saturated_fraction=found.saturated,
+        has_observer=found.observed,
+        alignment=Facts(
+            kept(
+                time_shift_s=place.time_shift,
+                yaw_deg=float(np.rad2deg(place.yaw)),
+                translation_m=place.translation,
+                misfit_m=place.misfit,
+            )
+        ),
+    )
+
+
+@facts.register
+def _(share: ErrorShare) -> Iterator[Fact]:
+    yield Fact("cause", share.cause, "cause", CAUSES[share.cause][0])
+    yield Fact("error_m", share.error, "error", f"{100 * share.error:+.1f} cm")
+    felt = f"from {share.begin:.2f} to {share.end:.2f} s" if share.is_felt else ""
+    yield Fact("begin_s", share.begin, "felt", felt)
+    yield Fact("end_s", share.end)
+
+
+picture.register(Inspection, lambda found: inspection_figure(found))
 
 
 @validated

@@ -10,23 +10,20 @@ import numpy as np
 
 from aerobat.arrays import Array
 from aerobat.kernels import control, motors, rate_loop
+from aerobat.kernels.battery import BatteryState
 from aerobat.kernels.control import Commands, ControllerModel, ControllerState, FeatureFlags
 from aerobat.kernels.control_loops import ReferencePoint
-from aerobat.kernels.motors import Airframe, Motion
+from aerobat.kernels.imu import ImuState
+from aerobat.kernels.motors import Airframe, VehicleState
 from aerobat.kernels.ops import Ops, PerRotor, Scalar, Vector, select_tree
 from aerobat.kernels.quaternions import axes, to_world
 from aerobat.kernels.rate_loop import RateLoopModel, RateLoopState, RateSetpoint
 from aerobat.kernels.rigid_body import Body, EnvironmentParameters
 from aerobat.kernels.vectors import subtract
-from aerobat.simulation.loop import Signals
+from aerobat.kernels.wind import WindState
+from aerobat.simulation.loop import Controlling, Estimate, Signals
 
 MAX_STEP = 0.002  # [s] of RK4: enough for 1e-6 m in the fastest flips
-
-
-class Estimate(NamedTuple):
-    """The estimate of an observer, of which the controller takes the body."""
-
-    body: Body
 
 
 @dataclass(frozen=True)
@@ -34,18 +31,17 @@ class StateObserver:
     """The true state, as if it were known."""
 
     period: int = 1
-    name: str = "observer"
     feedthrough: bool = True
 
     def init(self, ops: Ops, parameters: tuple[()], inputs: tuple[()], signals: Signals) -> Estimate:
         """See `Component.init`."""
-        return Estimate(signals["start"])
+        return Estimate(signals.start)
 
     def step(
         self, ops: Ops, parameters: tuple[()], state: Estimate, inputs: tuple[()], signals: Signals
     ) -> Estimate:
         """See `Component.step`."""
-        return Estimate(signals["plant"].body)
+        return Estimate(signals.plant.body)
 
 
 class ControllerParameters(NamedTuple):
@@ -64,7 +60,6 @@ class TrackingController:
 
     flags: FeatureFlags
     period: int = 1
-    name: str = "controller"
     feedthrough: bool = True
 
     def init(
@@ -75,8 +70,8 @@ class TrackingController:
         signals: Signals,
     ) -> ControllerState:
         """See `Component.init`."""
-        reference = inputs or signals["reference"]
-        return control.init(ops, parameters.model, signals["observer"].body, reference)
+        reference = inputs or signals.reference
+        return control.init(ops, parameters.model, signals.observer.body, reference)
 
     def step(
         self,
@@ -88,15 +83,13 @@ class TrackingController:
     ) -> ControllerState:
         """See `Component.step`."""
         body, reference = told(ops, parameters, state, inputs, signals)
-        return control.step(
-            ops, self.flags, parameters.model, state, body, reference, signals["clock"].elapsed
-        )
+        return control.step(ops, self.flags, parameters.model, state, body, reference, signals.clock.elapsed)
 
 
 def told(
     ops: Ops,
     parameters: ControllerParameters,
-    state: Any,
+    state: Controlling,
     inputs: ReferencePoint | tuple[()],
     signals: Signals,
     takes_forces: bool = True,
@@ -113,17 +106,30 @@ def told(
         takes_forces: Whether the reference answers the disturbing force that the observer knows.
         takes_moments: The same of the moment.
     """
-    body, reference = signals["observer"].body, inputs or signals["reference"]
-    if takes_forces and "disturbance" in signals:
-        reference = _answering(reference, body, signals["disturbance"], takes_moments)
+    body, reference = signals.observer.body, inputs or signals.reference
+    disturbance = signals.find(Disturbance)
+    if takes_forces and disturbance is not None:
+        reference = _answering(reference, body, disturbance, takes_moments)
     if not isinstance(parameters.delay, tuple):
-        elapsed = signals["clock"].elapsed
+        elapsed = signals.clock.elapsed
         body = control.predicted(ops, parameters.model, state, body, elapsed, parameters.delay)
     return body, reference
 
 
+class Disturbance(NamedTuple):
+    """The disturbance that an IMU feels beyond the model, in body axes.
+
+    Most of a disturbance, such as the rotors' mismatch, turns with the body.
+    """
+
+    force: Vector  # [m/s²] over mass
+    angular_acceleration: Vector  # [rad/s²]
+    omega_body: Vector  # [rad/s] at the last step
+    has_omega: Scalar  # 1, or 0 before the first step
+
+
 def _answering(
-    reference: ReferencePoint, body: Body, disturbance: Any, takes_moments: bool
+    reference: ReferencePoint, body: Body, disturbance: Disturbance, takes_moments: bool
 ) -> ReferencePoint:
     """The reference, with what is to be thrust and turned against a disturbance in body axes taken off it."""
     body_axes = axes(body.q_world_body)
@@ -155,14 +161,13 @@ class ComputationDelay:
     """
 
     period: int = 1
-    name: str = "computation_delay"
     feedthrough: bool = True
 
     def init(
         self, ops: Ops, parameters: tuple[()], takes_effect: Scalar, signals: Signals
     ) -> CommandsOnTheirWay:
         """See `Component.init`."""
-        sent = _sent(signals["controller"])
+        sent = _sent(signals.controller)
         return CommandsOnTheirWay(sent, sent)
 
     def step(
@@ -176,7 +181,7 @@ class ComputationDelay:
         """See `Component.step`."""
         return CommandsOnTheirWay(
             select_tree(ops, takes_effect > 0.5, state.latest, state.in_effect),
-            _sent(signals["controller"]),
+            _sent(signals.controller),
         )
 
 
@@ -207,7 +212,6 @@ class RigidBodyPlant:
 
     substeps: int
     period: int = 1
-    name: str = "plant"
     feedthrough: bool = False
 
     @classmethod
@@ -215,18 +219,20 @@ class RigidBodyPlant:
         """The plant for so many ticks a second."""
         return cls(max(1, math.ceil(1.0 / rate / MAX_STEP - 1e-9)))
 
-    def init(self, ops: Ops, parameters: PlantParameters, inputs: tuple[()], signals: Signals) -> Motion:
+    def init(
+        self, ops: Ops, parameters: PlantParameters, inputs: tuple[()], signals: Signals
+    ) -> VehicleState:
         """See `Component.init`; the rotors give at first what the controller takes them to give."""
-        return Motion(signals["start"], signals["controller"].thrusts)
+        return VehicleState(signals.start, signals.controller.thrusts)
 
     def step(
-        self, ops: Ops, parameters: PlantParameters, motion: Motion, inputs: tuple[()], signals: Signals
-    ) -> Motion:
+        self, ops: Ops, parameters: PlantParameters, motion: VehicleState, inputs: tuple[()], signals: Signals
+    ) -> VehicleState:
         """See `Component.step`."""
         airframe = with_ceiling(ops, parameters.airframe, signals)
         environment = with_wind(parameters.environment, signals)
         commands = commands_in_effect(signals)
-        dt = signals["clock"].period / self.substeps
+        dt = signals.clock.period / self.substeps
         for _ in range(self.substeps):
             motion = motors.advance(ops, airframe, environment, motion, commands, dt)
         return motion
@@ -237,12 +243,11 @@ class RateLoop:
     """The inner loop of a flight controller, on its own gyro, behind a law that gives it rates and thrust."""
 
     period: int = 1
-    name: str = "rate_loop"
     feedthrough: bool = True
 
     def init(self, ops: Ops, parameters: RateLoopModel, inputs: tuple[()], signals: Signals) -> RateLoopState:
         """See `Component.init`."""
-        return rate_loop.init(signals["controller"].thrusts, signals["start"].omega_body)
+        return rate_loop.init(signals.controller.thrusts, signals.start.omega_body)
 
     def step(
         self,
@@ -253,15 +258,14 @@ class RateLoop:
         signals: Signals,
     ) -> RateLoopState:
         """See `Component.step`."""
-        setpoint, elapsed = setpoint_in_effect(signals), signals["clock"].elapsed
+        setpoint, elapsed = setpoint_in_effect(signals), signals.clock.elapsed
         return rate_loop.step(ops, parameters, state, setpoint, gyro(signals), elapsed)
 
 
 def gyro(signals: Signals) -> Vector:
     """The body rates [rad/s] that are measured at this tick, or the true ones where there is no IMU."""
-    measured: Vector
-    measured = signals["imu"].sample.omega if "imu" in signals else signals["plant"].body.omega_body
-    return measured
+    imu = signals.find(ImuState)
+    return signals.plant.body.omega_body if imu is None else imu.sample.omega
 
 
 def _sent(controller: Any) -> Any:
@@ -272,15 +276,14 @@ def _sent(controller: Any) -> Any:
 
 def setpoint_in_effect(signals: Signals) -> Any:
     """Return the commands in effect now: of rotors [N], or a set-point of rates."""
-    if "computation_delay" in signals:
-        return signals["computation_delay"].in_effect
-    return _sent(signals["controller"])
+    delayed = signals.find(CommandsOnTheirWay)
+    return _sent(signals.controller) if delayed is None else delayed.in_effect
 
 
 def rotor_commands(signals: Signals) -> Commands:
     """The latest commands to the rotors: of the inner loop where there is one, else of the controller."""
-    commands: Commands = signals["rate_loop" if "rate_loop" in signals else "controller"].commands
-    return commands
+    inner = signals.find(RateLoopState)
+    return signals.controller.commands if inner is None else inner.commands
 
 
 def commands_in_effect(signals: Signals) -> PerRotor:
@@ -293,21 +296,23 @@ def commands_in_effect(signals: Signals) -> PerRotor:
 
 
 def with_wind(environment: EnvironmentParameters, signals: Signals) -> EnvironmentParameters:
-    """The environment with the wind of this tick, where the loop has a component of that name."""
-    return environment._replace(wind=signals["wind"].velocity) if "wind" in signals else environment
+    """The environment with the wind of this tick, where the loop has a component that makes one."""
+    wind = signals.find(WindState)
+    return environment if wind is None else environment._replace(wind=wind.velocity)
 
 
 def with_ceiling(ops: Ops, airframe: Airframe, signals: Signals) -> Airframe:
     """The airframe with what the battery leaves of its rotors' limits, where the loop has one."""
-    if "battery" not in signals:
+    battery = signals.find(BatteryState)
+    if battery is None:
         return airframe
-    rotors, ceiling = airframe.rotors, signals["battery"].ceiling
+    rotors, ceiling = airframe.rotors, battery.ceiling
     limits = zip(rotors.min_thrust, rotors.max_thrust, strict=True)
     lowered = tuple(ops.maximum(ceiling * high, low) for low, high in limits)
     return airframe._replace(rotors=rotors._replace(max_thrust=lowered))
 
 
-class Observed(NamedTuple):
+class LoggedEstimate(NamedTuple):
     """The estimate that a filter made from its sensors."""
 
     body: Body
@@ -317,14 +322,13 @@ class Observed(NamedTuple):
 class LogRow(NamedTuple):
     """Row of the log, kept of each tick."""
 
-    motion: Motion
+    motion: VehicleState
     commands: Commands
-    observed: Observed | tuple[()]  # () where the true state is known
+    observed: LoggedEstimate | tuple[()]  # () where the true state is known
 
 
 def log_row(signals: Signals) -> LogRow:
     """The row of a flight's log."""
-    observer = signals["observer"]
-    known = isinstance(observer, Estimate)
-    observed = () if known else Observed(observer.body, observer.filter.since_pose)
-    return LogRow(signals["plant"], rotor_commands(signals), observed)
+    body, own = signals.observer
+    observed = LoggedEstimate(body, own.filter.since_pose) if own else ()
+    return LogRow(signals.plant, rotor_commands(signals), observed)

@@ -9,17 +9,20 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from aerobat.control import ControlLaw, Controller, Seen
+from aerobat.declaration import placed, shown
+from aerobat.engines.pytree import tree_leaves
+from aerobat.errors import SpecError
 from aerobat.kernels import control, motors
 from aerobat.kernels.control import Commands, ControllerModel, FeatureFlags
 from aerobat.kernels.control_loops import ReferencePoint, reference_moment
 from aerobat.kernels.ops import Ops, PerRotor
 from aerobat.kernels.quaternions import axes
 from aerobat.kernels.rate_loop import RateLoopModel
-from aerobat.kernels.rigid_body import Wrench
+from aerobat.kernels.rigid_body import RotorWrench
 from aerobat.kernels.vectors import subtract
 from aerobat.simulation.components import ControllerParameters, RateLoop, TrackingController, told
 from aerobat.simulation.loop import Component, Signals
-from aerobat.simulation.setup import Part
+from aerobat.simulation.setup import LoopPart
 
 GYRO, DERIVATIVE = 0.5 / (pi * 250.0), 0.5 / (pi * 150.0)  # [s] of an inner loop's filters: 250 Hz, 150 Hz
 # rates are ahead of the rotors' lag by themselves, and what the inner loop makes of them is not led again
@@ -41,17 +44,18 @@ class LawController:
     law: ControlLaw
     flags: FeatureFlags  # of the way from its force and moment to the rotors
     period: int = 1
-    name: str = "controller"
     feedthrough: bool = True
 
     def init(
         self, ops: Ops, parameters: ControllerParameters, inputs: ReferencePoint | tuple[()], signals: Signals
     ) -> LawState:
         """See `Component.init`."""
-        reference = inputs or signals["reference"]
-        body = signals["observer"].body
+        reference = inputs or signals.reference
+        body = signals.observer.body
         first = control.init(ops, parameters.model, body, reference)
         own = self.law.init(ops, parameters.model, Seen(body, first.thrusts, reference))
+        if any(isinstance(leaf, str) for leaf in tree_leaves(own)):
+            raise _wrong(self.law.init, f"returned {shown(own)}, not a tree of tuples of numbers")
         return LawState(own, first.thrusts, first.commands)
 
     def step(
@@ -63,23 +67,43 @@ class LawController:
         signals: Signals,
     ) -> LawState:
         """See `Component.step`."""
-        model, elapsed = parameters.model, signals["clock"].elapsed
+        model, elapsed = parameters.model, signals.clock.elapsed
         takes = self.law.TAKES_DISTURBANCES, not self.law.GIVES_RATES
         body, reference = told(ops, parameters, state, inputs, signals, *takes)
         rotors = model.airframe.rotors
         decay_factors = motors.decay_factors(ops, rotors, elapsed)
         thrusts = motors.first_order_response(state.thrusts, state.commands.thrusts, decay_factors)
-        own, load = self.law.step(ops, model, state.own, Seen(body, thrusts, reference), elapsed)
+        answer: Any = self.law.step(ops, model, state.own, Seen(body, thrusts, reference), elapsed)
+        own, load = self._checked(answer)
+        if len(tree_leaves(own)) != len(tree_leaves(state.own)):
+            raise _wrong(self.law.step, f"returned the state {shown(own)}, of another shape than before")
         loads = load, _change_ahead(model, axes(body.q_world_body), reference)
         commands = control.rotor_commands(ops, self.flags, model, loads, thrusts, decay_factors, elapsed)
         return LawState(own, thrusts, commands)
 
+    def _checked(self, answer: Any) -> tuple[Any, RotorWrench]:
+        """The state and the wrench that a law answered. Raises SpecError for anything else."""
+        match answer:
+            case (own, (thrust, (x, y, z))) if all(
+                hasattr(each, "__truediv__") for each in (thrust, x, y, z)
+            ):
+                return own, RotorWrench(thrust, (x, y, z))
+        raise _wrong(
+            self.law.step, f"returned {shown(answer)}, not the state and a RotorWrench of four numbers"
+        )
 
-def _change_ahead(model: Any, body_axes: Any, reference: ReferencePoint) -> Wrench:
+
+def _wrong(method: Any, complaint: str) -> SpecError:
+    """Return the error of a law's method, with its file and line."""
+    law = f"controller '{method.__self__.kind}'"
+    return placed(SpecError(f"{law}: {method.__name__}() {complaint}"), method)
+
+
+def _change_ahead(model: Any, body_axes: Any, reference: ReferencePoint) -> RotorWrench:
     """The change that the reference makes of force and moment until the controller's next step."""
     inertia, mass = model.airframe.mass_properties.inertia, model.airframe.mass_properties.mass
     now, then = (reference_moment(inertia, body_axes, each) for each in (reference, reference.ahead))
-    return Wrench(mass * reference.ahead.thrust_change, subtract(then, now))
+    return RotorWrench(mass * reference.ahead.thrust_change, subtract(then, now))
 
 
 def flown_by(law: ControlLaw | None, settings: Controller, period: int = 1) -> Component:
@@ -95,7 +119,7 @@ def flown_by(law: ControlLaw | None, settings: Controller, period: int = 1) -> C
     return LawController(law, _BEHIND_RATES if law.GIVES_RATES else settings.feature_flags, period)
 
 
-def inner_loop(law: ControlLaw | None, model: ControllerModel) -> tuple[Part, ...]:
+def inner_loop(law: ControlLaw | None, model: ControllerModel) -> tuple[LoopPart, ...]:
     """Return the inner loop behind a law that gives rates, one part; nothing for other controllers.
 
     Args:
@@ -105,4 +129,4 @@ def inner_loop(law: ControlLaw | None, model: ControllerModel) -> tuple[Part, ..
     if law is None or not law.GIVES_RATES:
         return ()
     filters = (np.full(len(model.airframe.mass_properties.mass), time) for time in (GYRO, DERIVATIVE))
-    return (Part(RateLoop(), RateLoopModel(model.airframe, model.mixer, *filters)),)
+    return (LoopPart(RateLoop(), RateLoopModel(model.airframe, model.mixer, *filters)),)

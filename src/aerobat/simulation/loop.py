@@ -8,21 +8,23 @@ state between.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 from functools import lru_cache
-from typing import Any, NamedTuple, Protocol, TypeAlias
+from typing import NamedTuple, Protocol, TypeAlias, TypeVar, runtime_checkable
 
 from aerobat.engines.engine import Init, Step
 from aerobat.engines.pytree import Tree
+from aerobat.kernels.control import Commands
 from aerobat.kernels.control_loops import ReferencePoint
-from aerobat.kernels.ops import Ops, Scalar, select_tree
+from aerobat.kernels.motors import VehicleState
+from aerobat.kernels.ops import Ops, PerRotor, Scalar, select_tree
 from aerobat.kernels.rigid_body import Body
 
-Signals: TypeAlias = Mapping[str, Any]  # "clock", "reference", "start", and by name the components' states
-Log: TypeAlias = Callable[[Signals], Tree]
+State = TypeVar("State")
 
 
-class Clock(NamedTuple):
+class StepClock(NamedTuple):
     """Time about a component's step, which at few of them differs from the step before."""
 
     elapsed: Scalar  # [s] since its last step
@@ -32,6 +34,65 @@ class Clock(NamedTuple):
     def piecewise_constant(self) -> bool:
         """True: see `engines.engine.Compile`."""
         return True
+
+
+class Estimate(NamedTuple):
+    """The state of an observer, of which the controller takes the body."""
+
+    body: Body
+    own: Tree = ()  # what the observer goes on from; () where it sees the true state
+
+
+@runtime_checkable
+class Controlling(Protocol):
+    """The part of a controller's state that other components see."""
+
+    @property
+    def thrusts(self) -> PerRotor:
+        """The thrusts [N] that the rotors give, by the nominal model."""
+
+    @property
+    def commands(self) -> Commands:
+        """The last commands."""
+
+
+@dataclass(frozen=True)
+class Signals:
+    """All that components see of each other at a tick: their states, found by their types."""
+
+    clock: StepClock
+    reference: ReferencePoint
+    start: Body  # the true state at first
+    states: list[Tree]  # of the components in their order; before the first tick, of those that have one
+
+    def find(self, kind: type[State]) -> State | None:
+        """The state of that type; None where no component has one."""
+        return next((state for state in self.states if isinstance(state, kind)), None)
+
+    def of(self, kind: type[State]) -> State:
+        """The state of that type, which a component has. Raises LookupError where none does."""
+        found = self.find(kind)
+        if found is None:
+            raise LookupError(f"no component of the loop has a state of the type {kind.__name__}")
+        return found
+
+    @property
+    def plant(self) -> VehicleState:
+        """The true state of body and rotors."""
+        return self.of(VehicleState)
+
+    @property
+    def observer(self) -> Estimate:
+        """The state as it is known."""
+        return self.of(Estimate)
+
+    @property
+    def controller(self) -> Controlling:
+        """The controller's state, whichever controller it is."""
+        return next(state for state in self.states if isinstance(state, Controlling))
+
+
+Log: TypeAlias = Callable[[Signals], Tree]
 
 
 class LoopParameters(NamedTuple):
@@ -45,13 +106,13 @@ class Due(NamedTuple):
     """The turn of a component that does not step at every tick."""
 
     now: Scalar  # 1 at a tick that it steps at, 0 at others
-    clock: Clock  # about the latest of these ticks, from the one before to the next
+    clock: StepClock  # about the latest of these ticks, from the one before to the next
 
 
 class LoopInput(NamedTuple):
     """Inputs from outside at a tick."""
 
-    clock: Clock
+    clock: StepClock
     due: tuple[Due | tuple[()], ...]  # of each component; () where it steps at every tick
     reference: ReferencePoint
     own: tuple[Tree, ...]  # of each component
@@ -59,10 +120,6 @@ class LoopInput(NamedTuple):
 
 class Component(Protocol):
     """One part of the loop: a frozen, hashable value that holds no numbers of a flight."""
-
-    @property
-    def name(self) -> str:
-        """The component's key among the signals."""
 
     @property
     def period(self) -> int:
@@ -87,30 +144,25 @@ def compose(components: tuple[Component, ...], log: Log) -> tuple[Init, Step]:
     """
 
     def init(ops: Ops, parameters: LoopParameters, inputs: LoopInput) -> tuple[Tree, ...]:
-        signals = {"start": parameters.start, "clock": inputs.clock, "reference": inputs.reference}
-        carry = []
+        signals = Signals(inputs.clock, inputs.reference, parameters.start, [])
         for component, own, given in zip(components, parameters.own, inputs.own, strict=True):
-            state = component.init(ops, own, given, signals)
-            signals[component.name] = state
-            carry.append(state)
-        return tuple(carry)
+            signals.states.append(component.init(ops, own, given, signals))
+        return tuple(signals.states)
 
     def step(
         ops: Ops, parameters: LoopParameters, carry: tuple[Tree, ...], inputs: LoopInput
     ) -> tuple[tuple[Tree, ...], Tree]:
-        signals = {"start": parameters.start, "clock": inputs.clock, "reference": inputs.reference}
-        signals |= {component.name: state for component, state in zip(components, carry, strict=True)}
+        signals = Signals(inputs.clock, inputs.reference, parameters.start, list(carry))
         following = []
-        for component, own, before, due, given in zip(
-            components, parameters.own, carry, inputs.due, inputs.own, strict=True
-        ):
-            seen = signals if not due else {**signals, "clock": due.clock}
+        each = zip(components, parameters.own, carry, inputs.due, inputs.own, strict=True)
+        for k, (component, own, before, due, given) in enumerate(each):
+            seen = signals if not due else replace(signals, clock=due.clock)
             state = component.step(ops, own, before, given, seen)
             if due:
                 state = select_tree(ops, due.now > 0.5, state, before)
             following.append(state)
             if component.feedthrough:
-                signals[component.name] = state
+                signals.states[k] = state
         return tuple(following), log(signals)
 
     return init, step

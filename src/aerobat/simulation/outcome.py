@@ -8,6 +8,10 @@ from enum import Enum
 
 DIVERGENCE_RADIUS = 5.0  # [m] of position error: no controller is expected back from there
 TOUCHDOWN = 1e-3  # [m] below the ground that is no hit: paths that land end on it
+# The simulated ground does not hold a vehicle up that takes off or lands a few centimetres off its path.
+# A slow vehicle that sinks by no more than places are kept to counts as standing on the ground.
+LANDING_SPEED = 2.0  # [m/s] that of a fall from 20 cm, which a landing gear takes
+LANDING_DEPTH = 0.1  # [m] the tolerance of places
 NO_LENGTH = 1e-6  # [m] less is rounding
 FEW_DECIMALS = 0.095  # what rounds to less than 0.10 has no two digits in two decimals
 

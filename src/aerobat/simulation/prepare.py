@@ -9,24 +9,17 @@ import numpy as np
 
 from aerobat import so3
 from aerobat.arrays import frozen
-from aerobat.control.parameters import airframe_parameters, controller_parameters, environment_parameters
 from aerobat.declaration import validated
-from aerobat.engines.pytree import tree_map
 from aerobat.environment import Environment, dispersion_names
 from aerobat.errors import SpecError
 from aerobat.flatness import Planned, environment_of, vehicle_of
 from aerobat.kernels.rigid_body import Body
 from aerobat.simulation.bodies import bodies
-from aerobat.simulation.components import (
-    ControllerParameters,
-    PlantParameters,
-    RigidBodyPlant,
-    StateObserver,
-)
+from aerobat.simulation.components import ControllerParameters, StateObserver
 from aerobat.simulation.config import FlightChanges, FlightConfig
 from aerobat.simulation.law_controller import flown_by, inner_loop
 from aerobat.simulation.reference_source import ReferenceSource
-from aerobat.simulation.setup import FlightSetup, Part
+from aerobat.simulation.setup import FlightSetup, LoopPart, controller_model, plant_part
 from aerobat.states import BodyState
 from aerobat.trajectory import Trajectory, as_trajectory
 from aerobat.vehicle import Vehicle, as_vehicle, vehicle_names
@@ -71,19 +64,14 @@ def prepare(
     fleet = Fleet.of(flying)
     nominal_fleet = fleet if nominal is flying else Fleet.of(nominal)
     controller = config.controller_of(nominal)
-    model = controller_parameters(controller, nominal_fleet, environment)
-    for grounded in np.flatnonzero(~np.isfinite(model.gains.stiffness)):
-        nominal[grounded].require_hover(environment.gravity)
-    if nominal_fleet is not fleet:  # one for all
-        model = tree_map(lambda leaf: np.broadcast_to(leaf, len(fleet)), model)
-    plant = PlantParameters(airframe_parameters(fleet), environment_parameters(environment, len(fleet)))
+    model = controller_model(controller, nominal, nominal_fleet, environment, len(fleet))
     return FlightSetup(
         start=_start(config.start, reference, len(fleet)),
         parts=(
-            Part(StateObserver()),
-            Part(flown_by(config.law, controller), ControllerParameters(model, ())),
+            LoopPart(StateObserver()),
+            LoopPart(flown_by(config.law, controller), ControllerParameters(model, ())),
             *inner_loop(config.law, model),
-            Part(RigidBodyPlant.for_rate(config.rate), plant),
+            plant_part(fleet, environment, config.rate),
         ),
         reference=reference,
         fleet=fleet,

@@ -2,18 +2,22 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+from functools import lru_cache
+
 import numpy as np
 from numpy.typing import NDArray
 
 from aerobat import so3
 from aerobat.arrays import Array
 from aerobat.engines.components import components
+from aerobat.engines.engine import read_only
 from aerobat.engines.pytree import Tree, tree_map
 from aerobat.environment import Environment
 from aerobat.flatness import axial_drag, force_balance, has_unequal_drag, reference
 from aerobat.kernels.control_loops import Lookahead, ReferencePoint
 from aerobat.simulation.flight import setpoint_rows
-from aerobat.simulation.loop import Clock, Due
+from aerobat.simulation.loop import Due, StepClock
 from aerobat.states import BodyState, Setpoint
 from aerobat.trajectory import Trajectory
 from aerobat.vehicle import Vehicle
@@ -50,10 +54,10 @@ class ReferenceSource:
         self._trajectory = trajectory
         self.vehicle = vehicle
         self._environment = environment
+        self._rate = rate
         self._period = 1.0 / rate
         self._every = every
         self._delay = delay
-        self._block = -1
 
     def __len__(self) -> int:
         return len(self.times)
@@ -75,24 +79,26 @@ class ReferenceSource:
 
     def setpoint(self, begin: int, end: int) -> Setpoint:
         """Set-points of the ticks from `begin` to before `end`, all of one block."""
-        self._make(begin)
-        first = self._block * BLOCK
-        return setpoint_rows(self._setpoint, slice(begin - first, end - first))
+        first = begin - begin % BLOCK
+        return setpoint_rows(self._block(begin).setpoint, slice(begin - first, end - first))
 
     def chunk(self, begin: int, end: int) -> ReferencePoint:
         """References of the controller at the ticks from `begin` to before `end`, all of one block."""
-        self._make(begin)
-        first = self._block * BLOCK
-        points: ReferencePoint = tree_map(lambda leaf: leaf[begin - first : end - first], self._points)
+        first = begin - begin % BLOCK
+        points: ReferencePoint = tree_map(
+            lambda leaf: leaf[begin - first : end - first], self._block(begin).points
+        )
         return points
 
-    def clock(self, begin: int, end: int, every: int = 1) -> Clock:
+    def clock(self, begin: int, end: int, every: int = 1) -> StepClock:
         """Time about the ticks from `begin` to before `end`, of what steps at every so many.
 
         All periods but the last are alike to the last bit, so that an engine may see that they are.
         """
         steps = np.arange(begin, end) // every
-        return Clock(self._period_after(np.maximum(steps - 1, 0), every), self._period_after(steps, every))
+        return StepClock(
+            self._period_after(np.maximum(steps - 1, 0), every), self._period_after(steps, every)
+        )
 
     def due(self, every: int, begin: int, end: int) -> Due:
         """The turns, at these ticks, of a component that steps at every so many."""
@@ -107,24 +113,42 @@ class ReferenceSource:
         whole = ends < final
         return np.where(whole, every * self._period, self.times[ends] - self.times[begins])
 
-    def _make(self, tick: int) -> None:
-        block = tick // BLOCK
-        if block == self._block:
-            return
-        first, ticks = block * BLOCK, min(BLOCK, len(self) - block * BLOCK)
-        last = len(self) - 1
-        known = self.times[np.minimum(np.arange(first, first + ticks + self._every), last)]
-        times = np.minimum(known + self._delay, self.times[last])
-        rows = reference(self._trajectory, self.vehicle, times, environment=self._environment).setpoint
-        following = np.arange(self._every, self._every + ticks)
-        self._block = block
-        self._setpoint = setpoint_rows(rows, slice(ticks))
-        self._points = reference_points(
-            self._setpoint,
-            setpoint_rows(rows, following),
-            self._environment,
-            self.vehicle,
+    def _block(self, tick: int) -> _Block:
+        """The block that a tick is in."""
+        vehicle, environment = self.vehicle, self._environment
+        return _block(
+            self._trajectory, vehicle, environment, self._rate, self._every, self._delay, tick // BLOCK
         )
+
+
+@dataclass(frozen=True, eq=False)
+class _Block:
+    """Set-points of the ticks of a block."""
+
+    setpoint: Setpoint
+    points: ReferencePoint  # the same as kernels read them, leaves (ticks,), read-only
+
+
+@lru_cache(maxsize=16)  # of 2 MB: the flights of a study are of one plan or few, whatever else they draw
+def _block(
+    trajectory: Trajectory,
+    vehicle: Vehicle,
+    environment: Environment,
+    rate: float,
+    every: int,
+    delay: float,
+    number: int,
+) -> _Block:
+    """The block of that number of a `ReferenceSource`, whose arguments the others are."""
+    grid = trajectory.sample(rate)
+    first, last = number * BLOCK, len(grid) - 1
+    ticks = min(BLOCK, len(grid) - first)
+    known = grid[np.minimum(np.arange(first, first + ticks + every), last)]
+    times = np.minimum(known + delay, grid[last])
+    rows = reference(trajectory, vehicle, times, environment=environment).setpoint
+    setpoint, following = setpoint_rows(rows, slice(ticks)), np.arange(every, every + ticks)
+    points = reference_points(setpoint, setpoint_rows(rows, following), environment, vehicle)
+    return _Block(setpoint, tree_map(read_only, points))
 
 
 def reference_points(

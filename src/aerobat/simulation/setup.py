@@ -2,22 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
 from typing import Protocol
 
+import numpy as np
+
 from aerobat.arrays import Array
+from aerobat.control.parameters import airframe_parameters, controller_parameters, environment_parameters
 from aerobat.engines import CompiledLoop, Engine, choose
 from aerobat.engines.engine import first_row
-from aerobat.engines.pytree import Tree
+from aerobat.engines.pytree import Tree, tree_map
 from aerobat.environment import Environment
+from aerobat.kernels.control import ControllerModel
 from aerobat.kernels.rigid_body import Body
-from aerobat.simulation.components import log_row
+from aerobat.simulation.components import PlantParameters, RigidBodyPlant, log_row
 from aerobat.simulation.config import FlightConfig
 from aerobat.simulation.loop import Component, Log, LoopInput, LoopParameters, compose
 from aerobat.simulation.reference_source import BLOCK, ReferenceSource
+from aerobat.vehicle import Vehicle
 from aerobat.vehicle.controller import Controller
 from aerobat.vehicle.fleet import Fleet
 
@@ -37,7 +42,7 @@ class Source(Protocol):
 
 
 @dataclass(frozen=True, eq=False)
-class Part:
+class LoopPart:
     """One component of the loop, its parameters with leaves (vehicles,), and where its inputs come from."""
 
     component: Component
@@ -46,19 +51,11 @@ class Part:
 
 
 @dataclass(frozen=True, eq=False)
-class FlightSetup:
-    """Everything that a flight takes; to be compiled, then stepped or scanned at will."""
+class LoopSetup:
+    """A loop before it runs: its parts, to be compiled, then stepped or scanned at will."""
 
     start: Body  # the true state at first
-    parts: tuple[Part, ...]  # in the order of their steps
-    reference: ReferenceSource
-    fleet: Fleet  # that flies
-    nominal: Fleet
-    environment: Environment
-    config: FlightConfig
-    controller: Controller  # whose gains the loop has
-    is_batch: bool
-    rate: float  # [1/s] of the ticks
+    parts: tuple[LoopPart, ...]  # in the order of their steps
 
     @property
     def components(self) -> tuple[Component, ...]:
@@ -69,6 +66,63 @@ class FlightSetup:
     def parameters(self) -> LoopParameters:
         """Of the loop."""
         return LoopParameters(self.start, tuple(part.parameters for part in self.parts))
+
+    def compile_for(self, engine: Engine, first_tick: LoopInput, log: Log) -> CompiledLoop:
+        """The loop, ready for `init`, `step` and `scan`; its rows are what `log` takes of the signals."""
+        return engine.compile(*compose(self.components, log), self.parameters, first_tick)
+
+
+def plant_part(
+    fleet: Fleet, environment: Environment, rate: float, effectiveness: Array | None = None
+) -> LoopPart:
+    """The rigid bodies of a fleet.
+
+    Args:
+        fleet: what flies.
+        environment: where.
+        rate: of the ticks [1/s].
+        effectiveness: of the rotors [-], (vehicles, n); left out, 1.
+    """
+    airframe = airframe_parameters(fleet, effectiveness)
+    return LoopPart(
+        RigidBodyPlant.for_rate(rate),
+        PlantParameters(airframe, environment_parameters(environment, len(fleet))),
+    )
+
+
+def controller_model(
+    controller: Controller, nominal: Sequence[Vehicle], known: Fleet, environment: Environment, flights: int
+) -> ControllerModel:
+    """The model by which a controller flies, leaves (flights,).
+
+    Args:
+        controller: its settings.
+        nominal: the vehicles that it knows, one for each flight or one for all.
+        known: the fleet of these.
+        environment: where.
+        flights: how many there are.
+
+    Raises SpecError for a vehicle that cannot hover.
+    """
+    model = controller_parameters(controller, known, environment)
+    for grounded in np.flatnonzero(~np.isfinite(model.gains.stiffness)).tolist():
+        nominal[grounded].require_hover(environment.gravity)
+    spread: ControllerModel = tree_map(lambda leaf: np.broadcast_to(leaf, flights), model)
+    return spread
+
+
+@dataclass(frozen=True, eq=False)
+class FlightSetup(LoopSetup):
+    """Everything that a flight takes."""
+
+    reference: ReferenceSource
+    fleet: Fleet  # that flies
+    nominal: Fleet
+    environment: Environment
+    config: FlightConfig
+    controller: Controller  # whose gains the loop has
+    is_batch: bool
+    rate: float  # [1/s] of the ticks
 
     @property
     def times(self) -> Array:
@@ -86,8 +140,7 @@ class FlightSetup:
 
     def compile(self, engine: Engine | None = None, log: Log = log_row) -> CompiledLoop:
         """The loop, ready for `init`, `step` and `scan`; its rows are what `log` takes of the signals."""
-        init, step = compose(self.components, log)
-        return (engine or self.engine()).compile(init, step, self.parameters, self.first_tick)
+        return self.compile_for(engine or self.engine(), self.first_tick, log)
 
     @cached_property
     def first_tick(self) -> LoopInput:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from concurrent.futures import Executor
 from dataclasses import dataclass, replace
 from time import perf_counter
 from typing import Any
@@ -15,6 +16,7 @@ from aerobat.planning import Attempt, Plan, Planner, TimeOptimal, as_planner, pl
 from aerobat.planning.time_limit import best_by_limit
 from aerobat.problem import Problem, as_problem
 from aerobat.simulation import Flight, fly
+from aerobat.studies.workers import Pool, Workers, pool
 from aerobat.vehicle import Vehicle, as_vehicle
 
 
@@ -73,6 +75,9 @@ def compare(
     progress: Callable[[Attempt], None] | None = None,
     begin: Callable[[str], None] | None = None,
     time_limit: NonNegative | None = None,
+    *,
+    workers: Workers = 1,
+    executor: Executor | None = None,
 ) -> Comparison:
     """Plan a problem with each planner and fly each plan.
 
@@ -85,20 +90,20 @@ def compare(
         problem: What is planned, or its name.
         vehicle: What flies it, or its name.
         planners: Each with a name, or the name of a registered one; by default all that are registered.
-        progress: Called with every attempt as it ends.
-        begin: Called with each planner's name when its turn comes.
+        progress: Called with every attempt as it ends, of planners in this process.
+        begin: Called with each planner's name when its turn comes, or when another process is done with it.
         time_limit: For each planner [s]; the best plan that it finds by then counts.
+        workers: Processes, or dask://HOST:PORT; by default this one, where no planner slows another down.
+        executor: Any of `concurrent.futures` that plans instead, as a `dask.distributed` client's.
     """
     problem, vehicle = as_problem(problem), as_vehicle(vehicle)
     compared = all_planners() if planners is None else [_named(each) for each in planners]
     if not compared:
         raise SpecError("planners must be one planner or more; leave them out for all")
     begin = begin or (lambda name: None)
-    found = []
-    for name, planner in compared:
-        begin(name)
-        with within_time(time_limit):
-            found.append(_entry(name, planner, problem, vehicle, progress))
+    task = _Task(problem, vehicle, time_limit)
+    with pool(workers, executor, len(compared)) as planning:
+        found = _entries(task, compared, progress, begin, planning)
     for i, (name, planner) in enumerate(compared):
         if isinstance(planner, TimeOptimal):
             begin(f"{name} again")
@@ -111,6 +116,57 @@ def compare(
             f"no planner finds a plan for '{problem.name}' on {vehicle.name}: {entries[0].outcome}"
         )
     return Comparison(problem, vehicle, entries)
+
+
+@dataclass(frozen=True)
+class _Task:
+    """What all planners plan."""
+
+    problem: Problem
+    vehicle: Vehicle
+    time_limit: float | None  # [s] of each
+
+
+def _entries(
+    task: _Task,
+    planners: Sequence[tuple[str, Planner]],
+    progress: Callable[[Attempt], None] | None,
+    begin: Callable[[str], None],
+    planning: Pool,
+) -> list[Entry]:
+    """The entries of planners, in their order.
+
+    Args:
+        task: What is planned.
+        planners: By their names.
+        progress: Called with every attempt in this process.
+        begin: Called with each planner's name.
+        planning: What plans.
+    """
+    if planning.is_here:
+        return [_begun(task, each, progress, begin) for each in planners]
+    entries = {}
+    for named, entry in planning.results(_timed_entry, task, planners):
+        begin(entry.planner)
+        entries[named] = entry
+    return [entries[named] for named in planners]
+
+
+def _begun(
+    task: _Task,
+    named: tuple[str, Planner],
+    progress: Callable[[Attempt], None] | None,
+    begin: Callable[[str], None],
+) -> Entry:
+    begin(named[0])
+    return _timed_entry(task, named, progress)
+
+
+def _timed_entry(
+    task: _Task, named: tuple[str, Planner], progress: Callable[[Attempt], None] | None = None
+) -> Entry:
+    with within_time(task.time_limit):
+        return _entry(*named, task.problem, task.vehicle, progress)
 
 
 def _named(planner: tuple[str, Planner] | str) -> tuple[str, Planner]:

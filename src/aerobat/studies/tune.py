@@ -10,6 +10,7 @@ not by their luck. The luck of the best is told by other flights, which the sear
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from concurrent.futures import Executor
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from math import inf
@@ -24,11 +25,13 @@ from aerobat.control import Controller
 from aerobat.declaration import NonNegative, Seed, by_value, in_notebooks, short, unknown_name, validated
 from aerobat.environment import Dispersion, as_dispersion
 from aerobat.errors import SpecError
-from aerobat.evaluation import Scores, score_flights
+from aerobat.evaluation import Score
 from aerobat.flatness import vehicle_of
 from aerobat.optimization.deadline import out_of_time, within_time
 from aerobat.planning import Plan
 from aerobat.simulation.outcome import DIVERGENCE_RADIUS, length
+from aerobat.studies.flights import FlightTask, cut, fly_scores
+from aerobat.studies.workers import Pool, Workers, pool
 from aerobat.vehicle import Vehicle
 
 TUNED = (
@@ -135,6 +138,8 @@ def tune(
     gains: Sequence[str] = TUNED,
     evaluations: Evaluations = 150,
     time_limit: NonNegative | None = None,
+    workers: Workers | None = None,
+    executor: Executor | None = None,
     progress: Callable[[int, float], None] | None = None,
 ) -> Tuning:
     """Search the controller gains with which a vehicle flies plans best under conditions.
@@ -153,6 +158,8 @@ def tune(
         gains: The settings of its controller that may change: any of TUNABLE.
         evaluations: How many sets of gains may be tried.
         time_limit: Of the search [s]; the best gains until then are judged.
+        workers: Processes, by default one a core; 1 flies in this process; dask://HOST:PORT on a cluster.
+        executor: Any of `concurrent.futures` that flies instead, as a `dask.distributed` client's.
         progress: Called after each set of gains with how many there were, and the lowest cost so far [m].
 
     Raises SpecError for plans of several vehicles, and for gains that are unknown or zero.
@@ -160,15 +167,16 @@ def tune(
     plans = (plan,) if isinstance(plan, Plan) else tuple(plan)
     flown = _vehicle_of(plans, vehicle)
     names = _checked(gains, flown.controller)
-    objective = _Objective(plans, flown, as_dispersion(conditions), seed)
-    search = _Search(objective, names, range(flights), evaluations, progress)
-    with within_time(time_limit):
-        search.run()
-    training = objective.fly(flown.controller, range(flights)), search.best
-    others = range(flights, 2 * flights)
-    fresh = objective.fly(flown.controller, others), objective.fly(search.controller, others)
+    training, others = range(flights), range(flights, 2 * flights)
+    with pool(workers, executor, len(plans) * len(cut(training))) as flying:
+        objective = _Objective(flying, plans, flown, as_dispersion(conditions), seed)
+        search = _GainSearch(objective, names, training, evaluations, progress)
+        with within_time(time_limit):
+            search.run()
+        trained = objective.fly(flown.controller, training), search.best
+        fresh = objective.fly(flown.controller, others), objective.fly(search.controller, others)
     interval = _confidence(*fresh, seed)
-    return Tuning(flown, search.controller, names, search.tried, training, fresh, interval)
+    return Tuning(flown, search.controller, names, search.tried, trained, fresh, interval)
 
 
 def _vehicle_of(plans: Sequence[Plan], vehicle: Vehicle | str | None) -> Vehicle:
@@ -197,6 +205,7 @@ def _checked(gains: Sequence[str], controller: Controller) -> tuple[str, ...]:
 class _Objective:
     """What every set of gains is tried on."""
 
+    flying: Pool
     plans: tuple[Plan, ...]
     vehicle: Vehicle
     conditions: Dispersion
@@ -204,22 +213,15 @@ class _Objective:
 
     def fly(self, controller: Controller, flights: range) -> FlightCosts:
         """The flights of these numbers, of each plan."""
-        scores = [
-            score_flights(
-                plan,
-                self.vehicle,
-                conditions=self.conditions,
-                seed=self.seed,
-                flights=flights,
-                controller=controller,
-            )
-            for plan in self.plans
-        ]
+        tasks = tuple(
+            FlightTask(plan, self.vehicle, self.conditions, self.seed, controller) for plan in self.plans
+        )
+        scores = fly_scores(self.flying, tasks, flights)
         errors, failed = [_errors(each) for each in scores], [1.0 - each.succeeded for each in scores]
         return FlightCosts(frozen(errors, "max_position_error_m"), frozen(failed, "failed"))
 
 
-def _errors(scores: Scores) -> Array:
+def _errors(scores: Score) -> Array:
     lost = np.isfinite(scores.stop)
     return np.where(lost, DIVERGENCE_RADIUS, np.minimum(scores.max_position_error_m, DIVERGENCE_RADIUS))
 
@@ -228,7 +230,7 @@ class _Ended(Exception):
     """The search has had its time, or its share of tries."""
 
 
-class _Search:
+class _GainSearch:
     """Gains that are tried, and the best of them."""
 
     def __init__(

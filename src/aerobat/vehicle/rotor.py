@@ -81,7 +81,7 @@ class Rotor:
         return rotor_table(table, {})
 
 
-class _Source(NamedTuple):
+class _KeyedValue(NamedTuple):
     """A value that a table gives for a field, and the key behind it."""
 
     field: str
@@ -99,7 +99,7 @@ def rotor_table(own: Mapping[str, Any], defaults: Mapping[str, Any]) -> dict[str
     if own.get("max_thrust") == 0:
         own, defaults = _of_dead_rotor(own, defaults)
     merged = {**defaults, **own}
-    table: dict[str, _Source] = {}
+    table: dict[str, _KeyedValue] = {}
     for source in (
         *_plain(own, True),
         *_plain(defaults, False),
@@ -128,14 +128,14 @@ def _of_dead_rotor(
     return own, defaults
 
 
-def _plain(table: Mapping[str, Any], is_own: bool) -> Iterator[_Source]:
+def _plain(table: Mapping[str, Any], is_own: bool) -> Iterator[_KeyedValue]:
     """The keys that are fields, or nothing that is known."""
     for key, value in table.items():
         if key not in Rotor.SHORTHANDS:
-            yield _Source(key, key, value, is_own)
+            yield _KeyedValue(key, key, value, is_own)
 
 
-def _of_speeds(table: Mapping[str, Any], own: Mapping[str, Any]) -> Iterator[_Source]:
+def _of_speeds(table: Mapping[str, Any], own: Mapping[str, Any]) -> Iterator[_KeyedValue]:
     """Thrusts f = k_f ω² at the ends of the range of speeds, and c = k_m / k_f."""
     needing = [key for key in ("max_rpm", "min_rpm", "k_m") if key in table]
     if not needing:
@@ -145,27 +145,27 @@ def _of_speeds(table: Mapping[str, Any], own: Mapping[str, Any]) -> Iterator[_So
     k_f = _positive(table, "k_f")
     for key, name in (("max_rpm", "max_thrust"), ("min_rpm", "min_thrust")):
         if key in table:
-            yield _Source(
+            yield _KeyedValue(
                 name, key, k_f * (_not_negative(table, key) * RAD_PER_S) ** 2, key in own or "k_f" in own
             )
     if "k_m" in table:
-        yield _Source(
+        yield _KeyedValue(
             "torque_coefficient", "k_m", _not_negative(table, "k_m") / k_f, "k_m" in own or "k_f" in own
         )
 
 
-def _of_curve(table: Mapping[str, Any], own: Mapping[str, Any]) -> Iterator[_Source]:
+def _of_curve(table: Mapping[str, Any], own: Mapping[str, Any]) -> Iterator[_KeyedValue]:
     """The ends of a thrust curve, and the torque per thrust that fits its rows best."""
     key = "thrust_curve"
     if key not in table:
         return
     with within_field(key):
         rows = _curve(table[key])
-    yield _Source("min_thrust", key, float(rows[0, 1]), key in own)
-    yield _Source("max_thrust", key, float(rows[-1, 1]), key in own)
+    yield _KeyedValue("min_thrust", key, float(rows[0, 1]), key in own)
+    yield _KeyedValue("max_thrust", key, float(rows[-1, 1]), key in own)
     if rows.shape[1] == WITH_TORQUE:
         thrust, torque = rows[:, 1], rows[:, 2]
-        yield _Source("torque_coefficient", key, float(thrust @ torque / (thrust @ thrust)), key in own)
+        yield _KeyedValue("torque_coefficient", key, float(thrust @ torque / (thrust @ thrust)), key in own)
 
 
 def _curve(value: Any) -> Array:

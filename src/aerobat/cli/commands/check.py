@@ -11,7 +11,7 @@ from cyclopts import Parameter
 
 from aerobat.certification import Certificate, Envelope, certify
 from aerobat.cli.exit_code import ExitCode
-from aerobat.cli.options import POSITIVE, Plugins, limiting, output
+from aerobat.cli.options import POSITIVE, VehicleOptions, limiting
 from aerobat.cli.runs.record import default_vehicle
 from aerobat.cli.runs.saved_plans import named_vehicle
 from aerobat.cli.terminal import print_json
@@ -19,20 +19,18 @@ from aerobat.environment import Environment
 from aerobat.errors import SpecError
 from aerobat.interchange import read_plan
 from aerobat.planning import Plan, with_explanation
-from aerobat.planning.evidence import envelope_for
-from aerobat.reporting.report_json import evidence_facts, to_json
-from aerobat.reporting.tables import certificate_table, evidence_table, print_table
+from aerobat.planning.task import Task
+from aerobat.reporting.facts import Fact, Facts
+from aerobat.reporting.plain_data import plain, to_json
+from aerobat.reporting.plans import evidence
+from aerobat.reporting.tables import print_table, table
 from aerobat.trajectory import Trajectory
 from aerobat.vehicle import Vehicle, load_vehicle
 
 
 @dataclass(frozen=True, kw_only=True)
-class CheckOptions:
+class CheckOptions(VehicleOptions):
     """Limits that a trajectory is checked for, beyond those of its vehicle's rotors and its problem."""
-
-    vehicle: Annotated[str | None, Parameter(group=limiting)] = None
-    """The vehicle: a name that `aerobat vehicles` lists, or a TOML file. Default: the plan's, else
-    agile-quad."""
 
     heading: Annotated[float | None, Parameter(group=limiting)] = None
     """The heading at the start in degrees, carried along the path without spin. Default: the file's own, of a
@@ -50,13 +48,8 @@ class CheckOptions:
     max_rate: Annotated[float | None, Parameter(group=limiting, validator=POSITIVE)] = None
     """The greatest body rate allowed, degrees a second."""
 
-    plugins: Annotated[tuple[Path, ...], Plugins(group=limiting)] = ()
-
     max_moment: Annotated[float | None, Parameter(group=limiting, validator=POSITIVE)] = None
     """The greatest moment allowed, N m."""
-
-    json: Annotated[bool, Parameter(group=output, negative="", show_default=False)] = False
-    """Print the certificate as JSON on standard output, and nothing else."""
 
 
 def check(plan: Path, options: Annotated[CheckOptions, Parameter(name="*")] = CheckOptions()) -> ExitCode:
@@ -86,7 +79,7 @@ def check(plan: Path, options: Annotated[CheckOptions, Parameter(name="*")] = Ch
     vehicle = chosen or own_vehicle or load_vehicle(default_vehicle())
     environment = found.problem.environment if isinstance(found, Plan) else Environment()
     envelope = replace(
-        envelope_for(found.problem, vehicle, found.stages) if isinstance(found, Plan) else Envelope(),
+        Task.of(found.problem, vehicle).envelope(found.stages) if isinstance(found, Plan) else Envelope(),
         speed=options.max_speed or inf,
         tilt=inf if options.max_tilt is None else radians(options.max_tilt),
         body_rate=inf if options.max_rate is None else radians(options.max_rate),
@@ -94,14 +87,15 @@ def check(plan: Path, options: Annotated[CheckOptions, Parameter(name="*")] = Ch
     )
     certificate = certify(trajectory, vehicle, environment, envelope)
     explained = _explained(found, trajectory, vehicle) if isinstance(found, Plan) else None
+    beside = Facts(evidence(explained))
     if options.json:
-        print_json(to_json(certificate.record() | evidence_facts(explained)))
+        print_json(to_json(plain(certificate) | plain(beside)))
         return _judgement(certificate)
-    print_table(certificate_table(certificate, f"{plan} · {vehicle.name}"))
+    print_table(table(certificate, title=f"{plan} · {vehicle.name}"))
     if not isinstance(found, Plan):
         print(_assumed(options, vehicle, environment))
     elif explained is not None:
-        print_table(evidence_table(explained))
+        print_table(table(Facts((Fact("", beside, "beside the proof"),))))
     return _judgement(certificate)
 
 

@@ -8,18 +8,23 @@ from typing import Annotated
 
 from cyclopts import Parameter, validators
 
-from aerobat.cli.options import OutputOptions, TaskOptions, planning
+from aerobat.cli.options import OutputOptions, TaskOptions, Workers, planning
 from aerobat.cli.progress import planning_progress
 from aerobat.cli.runs.folder import written
 from aerobat.cli.runs.record import RunRecord
 from aerobat.cli.tasks import read_task
-from aerobat.reporting.comparison import comparison_figure, comparison_rows, comparison_table
+from aerobat.reporting.comparison import comparison_figure
 from aerobat.reporting.page import png
-from aerobat.reporting.report_json import to_json
+from aerobat.reporting.plain_data import to_json
+from aerobat.reporting.tables import table
 from aerobat.studies.compare import Comparison
 from aerobat.studies.compare import compare as compare_planners
 
 COMPARISON = "compare.json"
+WORKERS = (
+    "The number of processes that plan side by side, or a Dask scheduler as dask://HOST:PORT. By default "
+    "one, where no planner slows another down."
+)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -28,6 +33,8 @@ class CompareOptions(TaskOptions):
 
     time_limit: Annotated[float | None, Parameter(group=planning, validator=validators.Number(gte=0))] = None
     """Seconds for each planner; the best plan that it finds by then is taken, and said to be that."""
+
+    workers: Annotated[str, Workers(group=planning, help=WORKERS)] = "1"
 
 
 def compare(problem: str, options: Annotated[CompareOptions, Parameter(name="*")] = CompareOptions()) -> None:
@@ -39,7 +46,7 @@ def compare(problem: str, options: Annotated[CompareOptions, Parameter(name="*")
     Parameters
     ----------
     problem
-        A name that `aerobat problems` lists, or a problem's TOML file.
+        A name that `aerobat show` lists, or a problem's TOML file.
     """
     task, vehicle = read_task(problem, options)
     record = RunRecord(
@@ -50,11 +57,16 @@ def compare(problem: str, options: Annotated[CompareOptions, Parameter(name="*")
         time_limit=options.time_limit,
         plugins=tuple(map(str, options.plugins)),
     )
-    finish_comparison(comparison_of(record), record, options)
+    finish_comparison(comparison_of(record, options.workers), record, options)
 
 
-def comparison_of(record: RunRecord) -> Comparison:
-    """All planners on a run's problem."""
+def comparison_of(record: RunRecord, workers: str = "1") -> Comparison:
+    """Compare all planners on a run's problem.
+
+    Args:
+        record: What is planned.
+        workers: Who plans.
+    """
     with planning_progress() as progress:
         return compare_planners(
             record.problem,
@@ -62,16 +74,17 @@ def comparison_of(record: RunRecord) -> Comparison:
             progress=progress.record,
             begin=progress.begin,
             time_limit=record.time_limit,
+            workers=workers,
         )
 
 
 def finish_comparison(comparison: Comparison, record: RunRecord, options: OutputOptions) -> None:
     """Write a comparison, then show it."""
-    rows = to_json(comparison_rows(comparison))
+    facts = to_json(comparison)
     picture = png(comparison_figure(comparison))
 
     def write(staging: Path) -> None:
-        (staging / COMPARISON).write_text(rows + "\n", encoding="utf-8")
+        (staging / COMPARISON).write_text(facts + "\n", encoding="utf-8")
         (staging / "compare.png").write_bytes(picture)
 
-    written(record, options, write, rows, comparison_table(comparison))
+    written(record, options, write, facts, table(comparison))

@@ -9,18 +9,18 @@ from typing import Annotated, Literal
 from cyclopts import Parameter
 
 from aerobat.cli.exit_code import ExitCode
-from aerobat.cli.options import POSITIVE, Plugins, output
+from aerobat.cli.options import POSITIVE, RunOptions, output
 from aerobat.cli.terminal import print_json, say
 from aerobat.errors import SpecError
 from aerobat.interchange import read_plan
 from aerobat.interchange.exports import FORMATS
 from aerobat.interchange.exports import export as export_plan
 from aerobat.planning import Plan
-from aerobat.reporting.report_json import to_json
+from aerobat.reporting.plain_data import to_json
 
 
 @dataclass(frozen=True, kw_only=True)
-class ExportOptions:
+class ExportOptions(RunOptions):
     """Options of an export: what a plan is exported to, and where."""
 
     to: Annotated[
@@ -34,11 +34,6 @@ class ExportOptions:
 
     rate: Annotated[float | None, Parameter(group=output, validator=POSITIVE)] = None
     """Rows, messages or keys a second. Default: 100, of px4 250; crazyflie has none."""
-
-    plugins: Annotated[tuple[Path, ...], Plugins(group=output)] = ()
-
-    json: Annotated[bool, Parameter(group=output, negative="", show_default=False)] = False
-    """Print what was written and lost as JSON on standard output, and nothing else."""
 
 
 def export(plan: Path, options: Annotated[ExportOptions, Parameter(name="*")]) -> ExitCode:

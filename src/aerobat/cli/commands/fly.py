@@ -32,17 +32,20 @@ def fly(
     Prints whether it flies, how long it takes, what limits it and how much margin it has, and writes to the
     output folder, as one: PROBLEM.plan (the whole plan), plan.csv (position, velocity, acceleration and jerk
     at 100 Hz), flight.npz (everything that was simulated), report.png, report.json, and run.toml, from which
-    `aerobat repeat` does all of it again. With --autopilot, autopilot.txt has the settings of a
-    real board for it. Exits with 0 only if the plan is certified and the flight went well.
+    `aerobat repeat` does all of it again. With --autopilot, autopilot.txt has the settings of a real board
+    for it. Exits with 0 only if the plan is certified, the flight went well, and at least 95 of 100 flights
+    under the conditions succeed; --conditions none leaves these out.
 
     Parameters
     ----------
     problem
-        A name that `aerobat problems` lists, a problem's TOML file, or a .plan file or a run's folder, whose
+        A name that `aerobat show` lists, a problem's TOML file, or a .plan file or a run's folder, whose
         plan is flown as it is.
     """
     settings = flight_settings(flying, _controller(flying), flying.plant, flying.autopilot)
-    plan, record = planned(problem, options, "fly", settings, explain=explaining.explain)
+    plan, record = planned(
+        problem, options, "fly", settings, explain=explaining.explain, workers=flying.workers
+    )
     return finish(plan, record, options, flown(plan, settings), explaining.explain)
 
 

@@ -17,7 +17,8 @@ from aerobat.interchange import read_flight_log, read_plan
 from aerobat.planning import Plan
 from aerobat.reporting.inspection import inspection_figure
 from aerobat.reporting.page import png
-from aerobat.reporting.report_json import to_json
+from aerobat.reporting.plain_data import to_json
+from aerobat.reporting.tables import print_table, table
 from aerobat.simulation import load_flight
 from aerobat.storage import write_whole
 from aerobat.studies.inspection import inspect_flight
@@ -52,11 +53,7 @@ def inspect(log: Path, options: Annotated[InspectOptions, Parameter(name="*")] =
     picture = options.figure or file.parent / INSPECTION
     write_whole(picture, png(inspection_figure(found)))
     if options.json:
-        print_json(to_json(found.record()))
+        print_json(to_json(found))
         return
-    print(found.verdict)
-    for share in found.shares:
-        print(f"  {share}")
-    for remark in found.remarks:
-        print(remark)
+    print_table(table(found))
     print(f"written to {picture}")

@@ -28,12 +28,16 @@ def plan(
     Parameters
     ----------
     problem
-        A name that `aerobat problems` lists, or a problem's TOML file.
+        A name that `aerobat show` lists, or a problem's TOML file.
     """
     settings = FlightSettings()
     if passing.probability is not None:
         settings = flight_settings(passing)
-    elif passing.conditions is not None or passing.seed:
-        raise SpecError("--conditions and --seed are for --pass, or for `aerobat fly`; leave them out")
-    found, record = planned(problem, options, "plan", settings, explain=explaining.explain)
+    elif passing.conditions is not None or passing.seed or passing.workers is not None:
+        raise SpecError(
+            "--conditions, --seed and --workers are for --pass, or for `aerobat fly`; leave them out"
+        )
+    found, record = planned(
+        problem, options, "plan", settings, explain=explaining.explain, workers=passing.workers
+    )
     return finish(found, record, options, explain=explaining.explain)

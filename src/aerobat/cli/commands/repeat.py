@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated, Any
@@ -12,12 +11,11 @@ from cyclopts import Parameter
 from numpy.typing import NDArray
 
 from aerobat.cli.commands.compare import COMPARISON, comparison_of, finish_comparison
+from aerobat.cli.commands.feasibility import NEED, finish_map, finish_need, map_of, need_of
 from aerobat.cli.commands.fly import flown
-from aerobat.cli.commands.map import finish_map, map_of
-from aerobat.cli.commands.need import NEED, finish_need, need_of
 from aerobat.cli.commands.sweep import finish_sweep, sweep_of, table_name
 from aerobat.cli.exit_code import ExitCode
-from aerobat.cli.options import ExplainingOptions, OutputOptions, Plugins, output, planning
+from aerobat.cli.options import ExplainingOptions, OutputOptions, output
 from aerobat.cli.runs.folder import FLIGHT, finish
 from aerobat.cli.runs.record import RunRecord, read_record, versions_now
 from aerobat.cli.tasks import plan_of
@@ -26,9 +24,8 @@ from aerobat.documents import read_json
 from aerobat.errors import SpecError
 from aerobat.interchange import read_plan, read_table
 from aerobat.planning import Plan, with_explanation
-from aerobat.reporting.comparison import comparison_rows
-from aerobat.reporting.feasibility.table import requirements_report
-from aerobat.reporting.report_json import to_json
+from aerobat.reporting.feasibility.facts import requirements
+from aerobat.reporting.plain_data import plain
 from aerobat.simulation import Flight, load_flight
 
 SAME = ("planner", "duration_s")  # of a comparison's rows: times of the clock are not
@@ -40,8 +37,6 @@ class RepeatOptions(OutputOptions, ExplainingOptions):
 
     out: Annotated[Path | None, Parameter(group=output)] = None
     """The folder to write to, replaced as a whole. Default: FOLDER-repeated, beside the one repeated."""
-
-    plugins: Annotated[tuple[Path, ...], Plugins(group=planning)] = ()
 
 
 def repeat(
@@ -57,7 +52,7 @@ def repeat(
     Parameters
     ----------
     folder
-        A folder that `aerobat plan`, `fly`, `sweep`, `map`, `need` or `compare` wrote.
+        A folder that `aerobat plan`, `fly`, `sweep`, `feasibility` or `compare` wrote.
     """
     record = read_record(folder)
     out = options.out or folder.with_name(f"{folder.resolve().name}-repeated")
@@ -82,11 +77,11 @@ def repeat(
 
 def _repeat_comparison(folder: Path, record: RunRecord, options: RepeatOptions) -> ExitCode:
     try:
-        old = [[row[name] for name in SAME] for row in read_json(folder / COMPARISON)]
+        old = [[row[name] for name in SAME] for row in read_json(folder / COMPARISON)["planners"]]
     except (SpecError, TypeError, KeyError):
         raise SpecError(f"{folder}/ has no {COMPARISON} that can be read; compare anew") from None
     comparison = comparison_of(record)
-    rows = [[row[name] for name in SAME] for row in comparison_rows(comparison)]
+    rows = [[row[name] for name in SAME] for row in plain(comparison)["planners"]]
     finish_comparison(comparison, record, options)
     return _told(folder, record, "" if rows == old else "durations are others", ExitCode.WELL)
 
@@ -115,8 +110,8 @@ def _repeat_need(folder: Path, record: RunRecord, options: RepeatOptions) -> Exi
         raise SpecError(f"{folder}/ has no {NEED} that can be read; search anew") from None
     found = need_of(record)
     finish_need(found, record, options)
-    report = to_json(requirements_report(record.problem.name, record.vehicle.name, found))
-    difference = "" if json.loads(report) == old else "what is needed is another"
+    again = plain(requirements(record.problem.name, record.vehicle.name, found))
+    difference = "" if again == old else "what is needed is another"
     return _told(folder, record, difference, ExitCode.WELL)
 
 

@@ -6,10 +6,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Literal
 
-from cyclopts import Parameter, validators
+from cyclopts import Parameter
 
-from aerobat.cli.options import OutputOptions, PlanningOptions, flying, how_many, output
-from aerobat.cli.progress import SweepProgress, showing
+from aerobat.cli.options import FlightsOptions, OutputOptions, PlanningOptions, Workers, flying, output
+from aerobat.cli.progress import Progress, showing
 from aerobat.cli.runs.folder import is_of_a_run, written
 from aerobat.cli.runs.record import FlightSettings, RunRecord
 from aerobat.cli.runs.unfinished import Unfinished
@@ -20,9 +20,9 @@ from aerobat.environment import load_dispersion
 from aerobat.interchange.tables import require_writable, write_table
 from aerobat.planning import Plan
 from aerobat.reporting.page import png
-from aerobat.reporting.report_json import to_json
+from aerobat.reporting.plain_data import to_json
 from aerobat.reporting.sweeps.figure import sweep_figure
-from aerobat.reporting.sweeps.table import sweep_report, sweep_table
+from aerobat.reporting.tables import table
 from aerobat.storage import require_replaceable
 from aerobat.studies.sweep import Sweep
 from aerobat.studies.sweep import sweep as sweep_plan
@@ -30,26 +30,14 @@ from aerobat.studies.workers import WorkerEnded
 
 
 @dataclass(frozen=True, kw_only=True)
-class SweepingOptions:
-    """Options of many flights."""
-
-    runs: Annotated[int, how_many(1, 10**7)] = 1000
-    """The number of flights."""
-
-    conditions: Annotated[str, Parameter(group=flying)] = "lab"
-    """The variation between flights, the disturbances and the sensors: none, lab, field, or a TOML file."""
+class SweepingOptions(FlightsOptions):
+    """Options of a sweep."""
 
     controller: Annotated[str, Parameter(group=flying)] = "full"
     """The control law: full, or paper, at the gains of the vehicle's file; lee, lqr, indi, rates; or one of
     your own that --import brings in."""
 
-    seed: Annotated[int, Parameter(group=flying, validator=validators.Number(gte=0))] = 0
-    """The seed of all flights: the same seed, the same flights."""
-
-    workers: Annotated[int | None, Parameter(group=flying, validator=validators.Number(gte=1, lte=4096))] = (
-        None
-    )
-    """The number of processes that fly; the flights are the same for any number. Default: one a core."""
+    workers: Annotated[str | None, Workers(group=flying)] = None
 
     table: Annotated[Literal["csv", "parquet"], Parameter(group=output)] = "csv"
     """The form of the table, flights.csv or flights.parquet; the latter needs aerobat[parquet]."""
@@ -71,7 +59,7 @@ def sweep(
     Parameters
     ----------
     problem
-        A name that `aerobat problems` lists, a problem's TOML file, or a .plan file or a run's folder, whose
+        A name that `aerobat show` lists, a problem's TOML file, or a .plan file or a run's folder, whose
         plan is flown as it is.
     """
     named_controller(sweeping.controller)  # refused before anything is planned
@@ -79,7 +67,7 @@ def sweep(
         controller=sweeping.controller,
         conditions=load_dispersion(sweeping.conditions),
         seed=sweeping.seed,
-        runs=sweeping.runs,
+        runs=sweeping.flights,
         table=sweeping.table,
     )
     require_writable(table_name(settings))
@@ -98,20 +86,20 @@ def table_name(settings: FlightSettings) -> str:
     return f"flights.{settings.table}"
 
 
-def sweep_of(plan: Plan, record: RunRecord, options: OutputOptions, workers: int | None = None) -> Sweep:
+def sweep_of(plan: Plan, record: RunRecord, options: OutputOptions, workers: str | None = None) -> Sweep:
     """The flights of a run; what is finished is kept beside the run's folder until that is written.
 
     Args:
         plan: What is flown.
         record: How.
         options: Where to.
-        workers: How many processes fly.
+        workers: Who flies it.
     """
     flight = record.flight
     assert flight.conditions is not None, "a sweep has conditions"
     unfinished = Unfinished.beside(options.out or record.folder)
     try:
-        with showing(SweepProgress(flight.runs)) as progress:
+        with showing(Progress("flown", flight.runs)) as progress:
             return sweep_plan(
                 plan,
                 flight.conditions,
@@ -121,7 +109,7 @@ def sweep_of(plan: Plan, record: RunRecord, options: OutputOptions, workers: int
                 controller=named_controller(flight.controller, record.vehicle.controller),
                 workers=workers,
                 keep=unfinished.flights,
-                progress=progress.record,
+                progress=progress.counting("went well"),
             )
     except BaseException as error:
         if not unfinished.finished:
@@ -134,7 +122,7 @@ def sweep_of(plan: Plan, record: RunRecord, options: OutputOptions, workers: int
 
 def finish_sweep(sweep: Sweep, record: RunRecord, options: OutputOptions) -> None:
     """Write a sweep, then show it."""
-    facts = to_json(sweep_report(sweep))
+    facts = to_json(sweep)
     picture = png(sweep_figure(sweep))
 
     def write(staging: Path) -> None:
@@ -143,5 +131,5 @@ def finish_sweep(sweep: Sweep, record: RunRecord, options: OutputOptions) -> Non
         (staging / "sweep.json").write_text(facts + "\n", encoding="utf-8")
         (staging / "sweep.png").write_bytes(picture)
 
-    written(record, options, write, facts, sweep_table(sweep))
+    written(record, options, write, facts, table(sweep))
     Unfinished.beside(options.out or record.folder).remove()

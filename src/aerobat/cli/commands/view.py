@@ -10,7 +10,7 @@ from typing import Annotated
 from cyclopts import Parameter
 
 from aerobat.cli.live import LiveOptions, ViewOptions, serve
-from aerobat.cli.progress import DrawingProgress, showing
+from aerobat.cli.progress import Progress, showing
 from aerobat.cli.runs.folder import FLIGHT, REPLAY
 from aerobat.cli.runs.record import RECORD, RunRecord, read_record
 from aerobat.cli.runs.saved_plans import named_vehicle
@@ -20,7 +20,7 @@ from aerobat.errors import SpecError
 from aerobat.interchange import read_plan
 from aerobat.planning import Plan
 from aerobat.reporting.motion.video import write_video
-from aerobat.reporting.report_json import to_json
+from aerobat.reporting.plain_data import to_json
 from aerobat.simulation import Flight, load_flight
 from aerobat.simulation.flight import MAX_FLIGHT
 from aerobat.simulation.fly import fly as simulate
@@ -70,8 +70,10 @@ def view(
     if page is not None:
         require_replaceable(page)
     if options.video is not None:
-        with showing(DrawingProgress()) as progress:
-            write_video(run.shown, options.video, run.plan, vehicle, options.speed, progress.record)
+        with showing(Progress("pictures drawn")) as progress:
+            write_video(
+                run.shown, options.video, run.plan, vehicle, options.speed, progress.counting("in all")
+            )
     if page is not None:
         save_replay(replay, page)
     if options.json:

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from rich.table import Table
+from rich.console import Group
 
 from aerobat.cli.exit_code import ExitCode
 from aerobat.cli.interrupts import end_interrupts
@@ -19,11 +19,12 @@ from aerobat.cli.terminal import print_json
 from aerobat.evaluation import Score
 from aerobat.interchange.columns import write_columns
 from aerobat.planning import Plan
+from aerobat.reporting.facts import EXPLAIN, REPORT
 from aerobat.reporting.figures import report_figure
 from aerobat.reporting.page import import_undocumented, png
-from aerobat.reporting.report_json import report, to_json, trial_facts
-from aerobat.reporting.summary import summary
-from aerobat.reporting.tables import print_table, summary_table
+from aerobat.reporting.plain_data import to_json
+from aerobat.reporting.report import Report
+from aerobat.reporting.tables import print_table, table
 from aerobat.simulation import Flight
 from aerobat.storage import whole_folder
 
@@ -81,7 +82,7 @@ def written(
     options: OutputOptions,
     write: Callable[[Path], None],
     facts: str,
-    *tables: Table,
+    *tables: Group,
     hint: str = "",
 ) -> None:
     """Put a run in its place as one, then say what it is.
@@ -101,8 +102,8 @@ def written(
     if options.json:
         print_json(facts)
         return
-    for table in tables:
-        print_table(table)
+    for each in tables:
+        print_table(each)
     print(f"\n{hint}written to {folder}/" + (", in the place of an earlier run" if replaced else ""))
 
 
@@ -127,13 +128,14 @@ def finish(
         record: What it takes to do it again.
         options: Where to write, and in what form to say it.
         flown: The plan's flight, if it was flown.
-        explain: Whether flights under random conditions are counted, and all facts are told.
+        explain: Whether all facts are told, and flights are counted of a plan that was not flown.
     """
     assert plan.vehicle is not None, "a command plans for a vehicle"
     flight, score = (flown.flight, flown.score) if flown else (None, None)
-    by = (flown.controller, flown.plant) if flown else ()
-    trials = _trials(plan, record) if explain else None
-    facts = to_json(report(plan, score, plan.vehicle.name, *by) | trial_facts(trials))
+    controller, plant = (flown.controller, flown.plant) if flown else (None, None)
+    trials = _trials(plan, record) if flown or explain else None
+    report = Report(plan, score, controller, plant, trials)
+    facts = to_json(report)
     import_undocumented()
     picture = png(report_figure(plan, plan.vehicle, flight, score))
 
@@ -147,12 +149,12 @@ def finish(
         (staging / "report.json").write_text(facts + "\n", encoding="utf-8")
         (staging / "report.png").write_bytes(picture)
 
-    tables = [summary(plan, plan.vehicle.name, score, trials)]
+    tables = [table(report, most=REPORT)]
     if explain:
-        tables.append(summary_table(plan, score, "all facts", *by))
-    hint = f"--explain tells more; `aerobat sweep {options.out or record.folder}` counts real flights\n"
+        tables.append(table(report, least=EXPLAIN, title=f"{plan.problem.name} · all facts"))
+    hint = f"--explain tells more; `aerobat sweep {options.out or record.folder}` counts more flights\n"
     written(record, options, write, facts, *tables, hint="" if explain else hint)
-    return ExitCode.WELL if _is_well(plan, score) else ExitCode.NOT_WELL
+    return ExitCode.WELL if report.is_well else ExitCode.NOT_WELL
 
 
 def _trials(plan: Plan, record: RunRecord) -> Sweep | None:
@@ -160,8 +162,3 @@ def _trials(plan: Plan, record: RunRecord) -> Sweep | None:
     from aerobat.cli.trials import trial_flights
 
     return trial_flights(plan, record)
-
-
-def _is_well(plan: Plan, score: Score | None) -> bool:
-    """True if the plan is certified and flies, and its flight, if there is one, went well."""
-    return plan.certified and plan.flies and (score is None or score.outcome.is_success)

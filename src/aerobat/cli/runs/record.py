@@ -26,6 +26,7 @@ from aerobat.provenance import installed_versions
 from aerobat.vehicle import Vehicle
 
 RECORD = "run.toml"
+USUAL_CONDITIONS = "lab"  # under which flights are counted where a run names no others
 DEFAULT_TOLERANCE = 0.01  # of a search for the least
 MAX_NAME = 200  # bytes of a folder's name; most systems take 255
 LIBRARIES = (

@@ -12,7 +12,7 @@ from aerobat.kernels.control import ControllerModel
 from aerobat.kernels.control_loops import thrust_demand
 from aerobat.kernels.ops import Ops, Scalar, Vector, select_tree
 from aerobat.kernels.quaternions import axes, to_body
-from aerobat.kernels.rigid_body import Wrench
+from aerobat.kernels.rigid_body import RotorWrench
 from aerobat.kernels.vectors import (
     ZERO,
     add,
@@ -61,7 +61,7 @@ class Indi(ControlLaw):
 
     def step(
         self, ops: Ops, model: ControllerModel, state: Any, seen: Seen, elapsed: Scalar
-    ) -> tuple[Any, Wrench]:
+    ) -> tuple[Any, RotorWrench]:
         """Return the force and the moment."""
         body, reference = seen.body, seen.reference
         body_axes = axes(body.q_world_body)
@@ -80,7 +80,7 @@ class Indi(ControlLaw):
         wanted = add(to_body(body_axes, reference.omega_dot), feedback)
         lacking = subtract(wanted, measured.angular_acceleration)
         increment = transform(model.airframe.mass_properties.inertia, lacking)
-        load = Wrench(collective(model, body_axes, thrust), add(measured.moment, increment))
+        load = RotorWrench(collective(model, body_axes, thrust), add(measured.moment, increment))
         return measured, load
 
     def _measured(

@@ -11,7 +11,7 @@ from aerobat.kernels.control import ControllerModel
 from aerobat.kernels.control_loops import thrust_demand
 from aerobat.kernels.ops import Ops, Scalar
 from aerobat.kernels.quaternions import axes
-from aerobat.kernels.rigid_body import Wrench
+from aerobat.kernels.rigid_body import RotorWrench
 from aerobat.kernels.vectors import add, add_scaled, clamp_norm, scale, subtract
 
 
@@ -32,7 +32,7 @@ class Lee(ControlLaw):
 
     def step(
         self, ops: Ops, model: ControllerModel, state: Any, seen: Seen, elapsed: Scalar
-    ) -> tuple[Any, Wrench]:
+    ) -> tuple[Any, RotorWrench]:
         """Return the force and the moment."""
         body, reference = seen.body, seen.reference
         body_axes = axes(body.q_world_body)
@@ -44,4 +44,4 @@ class Lee(ControlLaw):
         desired = axes_along(ops, thrust, reference)
         acceleration = attitude_feedback(ops, model, seen, desired, self.attitude_gain, self.rate_gain)
         moment = moment_for(model, body_axes, reference, acceleration)
-        return state, Wrench(collective(model, body_axes, thrust), moment)
+        return state, RotorWrench(collective(model, body_axes, thrust), moment)

@@ -19,7 +19,7 @@ from aerobat.kernels.control import ControllerModel
 from aerobat.kernels.control_loops import thrust_demand
 from aerobat.kernels.ops import Ops, Scalar
 from aerobat.kernels.quaternions import axes, to_body
-from aerobat.kernels.rigid_body import Wrench
+from aerobat.kernels.rigid_body import RotorWrench
 from aerobat.kernels.vectors import clamp_norm, dot, norm, subtract
 
 _MIN_THRUST = 3.0  # [m/s²] with less, turning hardly moves the vehicle: position waits
@@ -56,7 +56,7 @@ class Lqr(ControlLaw):
 
     def step(
         self, ops: Ops, model: ControllerModel, state: Any, seen: Seen, elapsed: Scalar
-    ) -> tuple[Any, Wrench]:
+    ) -> tuple[Any, RotorWrench]:
         """Return the force and the moment."""
         k1, k2, k3, k4 = regulator(
             (self.position, self.velocity, 10.0 * self.tilt, 10.0 * self.rate),
@@ -84,4 +84,4 @@ class Lqr(ControlLaw):
         )
         thrust = dot(demand, body_axes[2]) - z1 * z - z2 * vz
         mass = model.airframe.mass_properties.mass
-        return state, Wrench(mass * thrust, moment_for(model, body_axes, reference, acceleration))
+        return state, RotorWrench(mass * thrust, moment_for(model, body_axes, reference, acceleration))

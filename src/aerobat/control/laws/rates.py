@@ -20,7 +20,7 @@ from aerobat.kernels.control_loops import (
 from aerobat.kernels.ops import Ops, Scalar, Vector
 from aerobat.kernels.quaternions import axes, to_body
 from aerobat.kernels.rate_loop import RateSetpoint, rate_gains, times
-from aerobat.kernels.rigid_body import Wrench
+from aerobat.kernels.rigid_body import RotorWrench
 from aerobat.kernels.vectors import (
     ZERO,
     add,
@@ -68,7 +68,7 @@ class Rates(ControlLaw):
 
     def step(
         self, ops: Ops, model: ControllerModel, state: Any, seen: Seen, elapsed: Scalar
-    ) -> tuple[Any, Wrench]:
+    ) -> tuple[Any, RotorWrench]:
         """Return the state, and the wrench that the inner loop is expected to give for its set-point."""
         mass_properties, rotors = model.airframe
         body, reference = seen.body, seen.reference
@@ -94,7 +94,7 @@ class Rates(ControlLaw):
         setpoint = RateSetpoint(clip_components(ops, omega, self.max_rate), thrust)
         rate_error = subtract(setpoint.omega, body.omega_body)
         angular = add(times(gains.proportional, subtract(rate_error, lead)), asked)
-        load = Wrench(thrust, transform(mass_properties.inertia, angular))
+        load = RotorWrench(thrust, transform(mass_properties.inertia, angular))
         integral = add_scaled(state.integral, elapsed, lead)
         return RatesState(outer, integral, setpoint), load
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from aerobat.errors import BackendMissing
 from aerobat.flatness import reference
-from aerobat.interchange.exports.loss import Content, Rows
+from aerobat.interchange.exports.loss import Content, ExportRows
 from aerobat.interchange.exports.stored_types import StoredTypes
 from aerobat.interchange.ros import NANOSECONDS, Messages, PlanMessages, Stamped
 from aerobat.planning import Plan
@@ -34,7 +34,7 @@ def _bag(container: str, plan: Plan, rate: float) -> Content:
     found = reference(plan, times=times)
     made = PlanMessages(Messages(StoredTypes(store)), plan).all(found)
     messages = sorted(made, key=lambda each: each.stamp)
-    loss = Rows.of(found).loss(plan)
+    loss = ExportRows.of(found).loss(plan)
     with tempfile.TemporaryDirectory() as scratch:  # the writers want a place of their own
         write = _write_ros1 if container == "ros1" else partial(_write_ros2, container)
         return Content(write(store, messages, Path(scratch) / NAME), loss)

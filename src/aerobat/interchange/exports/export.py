@@ -13,7 +13,7 @@ from aerobat.interchange.columns import ALL, columns_text
 from aerobat.interchange.exports.bags import ROS2_BAG, mcap, ros1_bag, ros2_bag
 from aerobat.interchange.exports.crazyflie import PIECES, crazyflie_pieces
 from aerobat.interchange.exports.gltf import blender_scene
-from aerobat.interchange.exports.loss import Content, Loss, Rows
+from aerobat.interchange.exports.loss import Content, ExportRows, Loss
 from aerobat.interchange.exports.px4 import SETPOINTS, px4_setpoints
 from aerobat.planning import Plan
 from aerobat.storage import require_replaceable, whole_folder, write_whole
@@ -33,7 +33,7 @@ class Format:
 
 def _table(plan: Plan, rate: float) -> Content:
     """Every column that there is, as in a run's plan.csv. Lost is what lies between rows."""
-    rows = Rows.of(reference(plan, rate=rate))
+    rows = ExportRows.of(reference(plan, rate=rate))
     return Content({"plan.csv": columns_text(plan, ALL, rate).encode()}, rows.loss(plan))
 
 

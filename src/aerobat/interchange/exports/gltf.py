@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from aerobat import so3
 from aerobat.arrays import Array
 from aerobat.flatness import reference
-from aerobat.interchange.exports.loss import Content, Rows
+from aerobat.interchange.exports.loss import Content, ExportRows
 from aerobat.planning import Plan
 from aerobat.problem.gate import Gate
 from aerobat.vehicle import Vehicle
@@ -55,7 +55,7 @@ def blender_scene(plan: Plan, rate: float) -> Content:
         scene.node(gate.name, scene.mesh(gate.name, [scene.primitive(_frame(gate), TRIANGLES, "gate")]))
     rotation = np.concatenate([_y_up(q[:, 1:]), q[:, :1]], axis=1)
     scene.animate(vehicle, times, {"translation": _y_up(position), "rotation": rotation})
-    rows = Rows(found.times, position.astype(float), None, so3.normalize(q))
+    rows = ExportRows(found.times, position.astype(float), None, so3.normalize(q))
     return Content({f"{plan.problem.name}.glb": scene.binary(plan.problem.name)}, rows.loss(plan))
 
 

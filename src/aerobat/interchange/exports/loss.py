@@ -66,7 +66,7 @@ class Content:
 
 
 @dataclass(frozen=True, eq=False)
-class Rows:
+class ExportRows:
     """Content of the rows of a file, as it is rounded there, in our axes."""
 
     times: Array  # [s] rising, (T,)
@@ -75,7 +75,7 @@ class Rows:
     q_world_body: Array  # (T, 4)
 
     @classmethod
-    def of(cls, found: Reference) -> Rows:
+    def of(cls, found: Reference) -> ExportRows:
         """Return rows that have a reference's numbers as they are."""
         flat = found.setpoint.flat
         return cls(found.times, flat.position, flat.velocity, found.setpoint.q_world_body)

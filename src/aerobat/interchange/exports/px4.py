@@ -13,7 +13,7 @@ import numpy as np
 from aerobat import so3
 from aerobat.arrays import Array
 from aerobat.flatness import Reference, reference
-from aerobat.interchange.exports.loss import Content, Rows
+from aerobat.interchange.exports.loss import Content, ExportRows
 from aerobat.planning import Plan
 
 ATTITUDE, RATES, PATH = SETPOINTS = (
@@ -68,7 +68,7 @@ def px4_setpoints(plan: Plan, rate: float) -> Content:
     q_world_body = so3.multiply(
         so3.multiply(so3.conjugate(NED_ENU), so3.normalize(q_d)), so3.conjugate(FLU_FRD)
     )
-    rows = Rows(found.times, ned(position), ned(velocity), q_world_body)
+    rows = ExportRows(found.times, ned(position), ned(velocity), q_world_body)
     files = {name: _table(timestamps, HEADERS[name], columns[name]) for name in SETPOINTS}
     return Content(files, rows.loss(plan, held=True))
 

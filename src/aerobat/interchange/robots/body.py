@@ -12,14 +12,14 @@ from aerobat.arrays import Array
 from aerobat.errors import SpecError
 
 
-class Pose(NamedTuple):
+class RigidTransform(NamedTuple):
     """A frame in another one: what is at x there is at `rotation` x + `origin` here."""
 
     rotation: Array  # (3, 3)
     origin: Array  # [m], (3,)
 
     @classmethod
-    def of(cls, origin: Array, roll_pitch_yaw: Array) -> Pose:
+    def of(cls, origin: Array, roll_pitch_yaw: Array) -> RigidTransform:
         """The frame at an origin, turned by roll, pitch and yaw [rad] about the fixed x, y and z."""
         (cr, cp, cy), (sr, sp, sy) = np.cos(roll_pitch_yaw), np.sin(roll_pitch_yaw)
         about_x = np.array([[1, 0, 0], [0, cr, -sr], [0, sr, cr]])
@@ -27,13 +27,13 @@ class Pose(NamedTuple):
         about_z = np.array([[cy, -sy, 0], [sy, cy, 0], [0, 0, 1]])
         return cls(about_z @ about_y @ about_x, origin)
 
-    def then(self, inner: Pose) -> Pose:
+    def then(self, inner: RigidTransform) -> RigidTransform:
         """The frame `inner` of this one, where this one is given."""
-        return Pose(self.rotation @ inner.rotation, self.rotation @ inner.origin + self.origin)
+        return RigidTransform(self.rotation @ inner.rotation, self.rotation @ inner.origin + self.origin)
 
 
 MOMENTS = ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")  # as both formats name them, in the order of `link_of`
-IDENTITY = Pose(np.eye(3), np.zeros(3))
+IDENTITY = RigidTransform(np.eye(3), np.zeros(3))
 
 
 @dataclass(frozen=True)
@@ -41,7 +41,7 @@ class Link:
     """A link in the frame of its model."""
 
     name: str
-    pose: Pose
+    pose: RigidTransform
     mass: float  # [kg]
     centre: Array  # [m] of its mass, (3,)
     inertia: Array  # [kg·m²] about that centre, the model's axes, (3, 3)
@@ -75,8 +75,8 @@ class Robot:
 
 def link_of(
     name: str,
-    pose: Pose,
-    inertial: Pose,
+    pose: RigidTransform,
+    inertial: RigidTransform,
     mass: float,
     moments: Array,
     radius: float | None,

@@ -56,7 +56,7 @@ class VehicleDescription:
         if self.missing:
             raise SpecError(
                 f"nothing is said of the rotors' {', '.join(self.missing)}; write a vehicle's file of it and "
-                "add them: aerobat vehicles FILE --out mine.toml"
+                "add them: aerobat show FILE --out mine.toml"
             )
         return from_table(Vehicle, self.table)
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from aerobat.arrays import Array
 from aerobat.errors import SpecError
-from aerobat.interchange.robots.body import IDENTITY, MOMENTS, Link, Pose, Robot, link_of
+from aerobat.interchange.robots.body import IDENTITY, MOMENTS, Link, RigidTransform, Robot, link_of
 from aerobat.interchange.robots.markup import (
     by_name,
     child_number,
@@ -102,7 +102,7 @@ def _axes(frames: dict[str, Element]) -> dict[str, Array]:
     return found
 
 
-def _link(name: str, element: Element, pose: Pose, axis: Array | None) -> Link:
+def _link(name: str, element: Element, pose: RigidTransform, axis: Array | None) -> Link:
     radius = collision_radius(element, name, lambda each, key: each.findtext(key))
     inertial = element.find("inertial")
     if inertial is None:
@@ -116,7 +116,7 @@ def _link(name: str, element: Element, pose: Pose, axis: Array | None) -> Link:
     return link_of(name, pose, _pose(inertial, what), mass, np.array(moments), radius, axis)
 
 
-def _pose(element: Element, what: str) -> Pose:
+def _pose(element: Element, what: str) -> RigidTransform:
     """The pose that stands in an element, relative to whatever it is relative to."""
     pose = element.find("pose")
     if pose is None:
@@ -125,10 +125,10 @@ def _pose(element: Element, what: str) -> Pose:
         raise SpecError(f"{what}: its pose is no roll, pitch and yaw; write it as euler_rpy")
     values = numbers(pose.text, 6, f"{what}: pose")
     angles = np.radians(values[3:]) if pose.get("degrees") in ("true", "1") else values[3:]
-    return Pose.of(values[:3], angles)
+    return RigidTransform.of(values[:3], angles)
 
 
-def _pose_of(name: str, frames: dict[str, Element]) -> Pose:
+def _pose_of(name: str, frames: dict[str, Element]) -> RigidTransform:
     """The pose of a link, joint or frame in the model's frame, by whatever it is relative to."""
     chain: list[Element] = []
     while name != MODEL_FRAME:

@@ -9,7 +9,7 @@ import numpy as np
 
 from aerobat.arrays import Array
 from aerobat.errors import SpecError
-from aerobat.interchange.robots.body import IDENTITY, MOMENTS, Link, Pose, Robot, link_of
+from aerobat.interchange.robots.body import IDENTITY, MOMENTS, Link, RigidTransform, Robot, link_of
 from aerobat.interchange.robots.markup import by_name, collision_radius, direction, name_of, numbers
 from aerobat.interchange.robots.motors import read_motors
 
@@ -37,9 +37,9 @@ def read_urdf(root: Element, path: Path) -> Robot:
     return Robot(root.get("name") or path.stem, links, read_motors(root, children), defaults, notes)
 
 
-def _poses(root: Element, links: dict[str, Element]) -> dict[str, Pose]:
+def _poses(root: Element, links: dict[str, Element]) -> dict[str, RigidTransform]:
     """Each link's frame in that of the first one, by the joints between."""
-    above: dict[str, tuple[str, Pose]] = {}
+    above: dict[str, tuple[str, RigidTransform]] = {}
     for joint in root.findall("joint"):
         name, parent, child = name_of(joint, "joint"), _end(joint, "parent"), _end(joint, "child")
         for end in (parent, child):
@@ -58,7 +58,9 @@ def _poses(root: Element, links: dict[str, Element]) -> dict[str, Pose]:
     return poses
 
 
-def _follow(name: str, above: dict[str, tuple[str, Pose]], poses: dict[str, Pose]) -> None:
+def _follow(
+    name: str, above: dict[str, tuple[str, RigidTransform]], poses: dict[str, RigidTransform]
+) -> None:
     """Find the poses of a link and of those between it and one whose pose is known."""
     chain = [name]
     while chain[-1] not in poses:
@@ -71,7 +73,7 @@ def _follow(name: str, above: dict[str, tuple[str, Pose]], poses: dict[str, Pose
         poses[child] = poses[parent].then(joint)
 
 
-def _link(name: str, element: Element, pose: Pose, joint: Element | None) -> Link:
+def _link(name: str, element: Element, pose: RigidTransform, joint: Element | None) -> Link:
     radius = collision_radius(element, name, lambda each, key: each.get(key))
     axis = None if joint is None else _axis(joint, pose)
     inertial = element.find("inertial")
@@ -92,7 +94,7 @@ def _link(name: str, element: Element, pose: Pose, joint: Element | None) -> Lin
     )
 
 
-def _axis(joint: Element, pose: Pose) -> Array | None:
+def _axis(joint: Element, pose: RigidTransform) -> Array | None:
     """The axis of a joint that turns, whose frame is that of its child, at `pose` in the first link's."""
     axis = joint.find("axis")
     if axis is None or joint.get("type") == "fixed":
@@ -101,12 +103,12 @@ def _axis(joint: Element, pose: Pose) -> Array | None:
     return None if found is None else pose.rotation @ found
 
 
-def _origin(element: Element, what: str) -> Pose:
+def _origin(element: Element, what: str) -> RigidTransform:
     origin = element.find("origin")
     if origin is None:
         return IDENTITY
     places: list[Array] = [numbers(origin.get(key), 3, f"{what}: origin {key}") for key in ("xyz", "rpy")]
-    return Pose.of(*places)
+    return RigidTransform.of(*places)
 
 
 def _attribute(element: Element | None, key: str, what: str) -> float:

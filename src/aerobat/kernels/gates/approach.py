@@ -5,7 +5,7 @@ from __future__ import annotations
 from math import inf
 from typing import NamedTuple
 
-from aerobat.kernels.gates.snapshot import Snapshot, between
+from aerobat.kernels.gates.snapshot import Snapshot, between, relative
 from aerobat.kernels.ops import Ops, Scalar, Vector, clip, magnitude, select_tree
 from aerobat.kernels.vectors import ZERO, dot, subtract
 
@@ -26,12 +26,12 @@ class Approach(NamedTuple):
     velocity: Vector  # [m/s]
 
 
-def init() -> Approach:
+def init(target: Target) -> Approach:
     """Before the first tick."""
     return Approach(inf, inf, ZERO)
 
 
-def nearest(ops: Ops, last: Snapshot, now: Snapshot) -> Approach:
+def _nearest(ops: Ops, last: Snapshot, now: Snapshot) -> Approach:
     """The nearest between two snapshots, positions from the place."""
     way = subtract(now.position, last.position)
     square = dot(way, way)
@@ -41,7 +41,11 @@ def nearest(ops: Ops, last: Snapshot, now: Snapshot) -> Approach:
 
 
 def step(
-    ops: Ops, approach: Approach, target: Target, snapshots: tuple[Snapshot, Snapshot], counted: Scalar
+    ops: Ops,
+    approach: Approach,
+    target: Target,
+    snapshots: tuple[Snapshot, Snapshot],
+    counted: tuple[Scalar, Scalar],
 ) -> Approach:
     """The nearest a tick later.
 
@@ -49,9 +53,10 @@ def step(
         ops: of the arithmetic.
         approach: before the tick.
         target: the place.
-        snapshots: the last tick's and this one's, positions from the place.
-        counted: true where both count.
+        snapshots: the last tick's and this one's.
+        counted: true where there was a last tick, and where this one counts.
     """
-    here = nearest(ops, *snapshots)
+    here = _nearest(ops, *(relative(each, target.centre) for each in snapshots))
     in_window = magnitude(ops, here.time - target.planned) <= target.window
-    return select_tree(ops, counted & in_window & (here.square < approach.square), here, approach)
+    counts = counted[0] & counted[1] & in_window
+    return select_tree(ops, counts & (here.square < approach.square), here, approach)

@@ -28,12 +28,12 @@ class Pointing(NamedTuple):
     time: Scalar  # [s]
 
 
-def init() -> Pointing:
+def init(direction: Direction) -> Pointing:
     """Return the state before the first tick."""
     return Pointing(-inf, inf)
 
 
-def nearest(ops: Ops, direction: Direction, last: Snapshot, now: Snapshot) -> Pointing:
+def _nearest(ops: Ops, direction: Direction, last: Snapshot, now: Snapshot) -> Pointing:
     """Return the nearest between two snapshots, of thrust axes straight between them.
 
     The cosine (p + q s) / |a + s d|, of the axes a and a + d, has one extremum along s, in closed form.
@@ -53,7 +53,11 @@ def nearest(ops: Ops, direction: Direction, last: Snapshot, now: Snapshot) -> Po
 
 
 def step(
-    ops: Ops, pointing: Pointing, direction: Direction, snapshots: tuple[Snapshot, Snapshot], counted: Scalar
+    ops: Ops,
+    pointing: Pointing,
+    direction: Direction,
+    snapshots: tuple[Snapshot, Snapshot],
+    counted: tuple[Scalar, Scalar],
 ) -> Pointing:
     """Return the nearest a tick later.
 
@@ -62,8 +66,9 @@ def step(
         pointing: before the tick.
         direction: where the thrust axis is to point.
         snapshots: the last tick's and this one's, attitudes of unit length.
-        counted: true where both count.
+        counted: true where there was a last tick, and where this one counts.
     """
-    here = nearest(ops, direction, *snapshots)
+    here = _nearest(ops, direction, *snapshots)
     in_window = magnitude(ops, here.time - direction.planned) <= direction.window
-    return select_tree(ops, counted & in_window & (here.cosine > pointing.cosine), here, pointing)
+    counts = counted[0] & counted[1] & in_window
+    return select_tree(ops, counts & (here.cosine > pointing.cosine), here, pointing)

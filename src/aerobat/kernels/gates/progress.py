@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 from aerobat.kernels.gates import swath
 from aerobat.kernels.gates.section import BoundingEllipsoid, PlaneDirection
-from aerobat.kernels.gates.snapshot import Snapshot, between
+from aerobat.kernels.gates.snapshot import Snapshot, between, relative
 from aerobat.kernels.gates.swath import SwathProgress
 from aerobat.kernels.ops import Ops, Scalar, Vector, magnitude, select_tree
 from aerobat.kernels.vectors import ZERO, dot
@@ -18,7 +18,7 @@ class GatePlane(NamedTuple):
 
     centre: Vector  # [m]
     normal: Vector  # unit vector in the direction of passage
-    directions: tuple[PlaneDirection, ...]  # along which bodies are measured
+    directions: tuple[PlaneDirection, ...]  # along which a body is measured; none of a body that is not known
     radius: Scalar  # [m] of the circle about the opening
     planned: Scalar  # [s] when it is to be crossed
     window: Scalar  # [s] by which the crossing may be earlier or later
@@ -36,17 +36,16 @@ class GateProgress(NamedTuple):
     swath: SwathProgress  # of the body through the plane
 
 
-def init(directions: int) -> GateProgress:
-    """Progress before the first tick, of a body measured along so many directions."""
+def init(gate: tuple[GatePlane, BoundingEllipsoid]) -> GateProgress:
+    """Progress before the first tick."""
     never = Snapshot(inf, ZERO, ZERO, (1.0, 0.0, 0.0, 0.0))
-    return GateProgress(never, never, inf, -inf, inf, swath.init(directions))
+    return GateProgress(never, never, inf, -inf, inf, swath.init(len(gate[0].directions)))
 
 
 def step(
     ops: Ops,
     progress: GateProgress,
-    plane: GatePlane,
-    ellipsoid: BoundingEllipsoid,
+    gate: tuple[GatePlane, BoundingEllipsoid],
     snapshots: tuple[Snapshot, Snapshot],
     counted: tuple[Scalar, Scalar],
 ) -> GateProgress:
@@ -55,12 +54,12 @@ def step(
     Args:
         ops: of the arithmetic.
         progress: before the tick.
-        plane: the gate's.
-        ellipsoid: what encloses the vehicle.
-        snapshots: the last tick's and this one's, positions from the opening's centre.
+        gate: its plane, and what encloses the vehicle; () where no body is measured.
+        snapshots: the last tick's and this one's.
         counted: true where there was a last tick, and where this one counts.
     """
-    last, now = snapshots
+    plane, ellipsoid = gate
+    last, now = (relative(each, plane.centre) for each in snapshots)
     before, behind = dot(last.position, plane.normal), dot(now.position, plane.normal)
     both = counted[0] & counted[1]
     forward = both & (before <= 0.0) & (behind > 0.0)
@@ -76,19 +75,15 @@ def step(
     back_off_time = magnitude(ops, here.time - plane.planned)
     nearer_back = back_off_time < magnitude(ops, progress.backward - plane.planned)
     in_window = counted[1] & (magnitude(ops, now.time - plane.planned) <= plane.window)
+    swept = progress.swath
+    if plane.directions:
+        about = plane.normal, plane.directions, plane.radius, plane.depth, ellipsoid
+        swept = swath.step(ops, swept, about, (last, now), counted, crosses, (is_passing, passed))
     return GateProgress(
         latest,
         select_tree(ops, passed, latest, progress.crossing),
         ops.select(back & (back_off_time <= plane.window) & nearer_back, here.time, progress.backward),
         ops.select(in_window, ops.maximum(progress.max_distance, behind), progress.max_distance),
         ops.select(in_window, ops.minimum(progress.min_distance, behind), progress.min_distance),
-        swath.step(
-            ops,
-            progress.swath,
-            (plane.normal, plane.directions, plane.radius, plane.depth, ellipsoid),
-            snapshots,
-            counted,
-            crosses,
-            (is_passing, passed),
-        ),
+        swept,
     )

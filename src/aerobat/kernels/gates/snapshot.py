@@ -17,6 +17,11 @@ class Snapshot(NamedTuple):
     q_world_body: Quaternion  # between two ticks not quite of unit length
 
 
+def relative(snapshot: Snapshot, centre: Vector) -> Snapshot:
+    """The snapshot with its position from a centre."""
+    return snapshot._replace(position=subtract(snapshot.position, centre))
+
+
 def between(a: Snapshot, b: Snapshot, fraction: Scalar) -> Snapshot:
     """The snapshot at a fraction of the way from one to another, straight."""
     w, x, y, z = (p + fraction * (q - p) for p, q in zip(a.q_world_body, b.q_world_body, strict=True))

@@ -7,16 +7,17 @@ from math import cos, sin
 import numpy as np
 
 from aerobat.arrays import Array
+from aerobat.engines import choose
 from aerobat.engines.engine import first_row
 from aerobat.engines.floats import FloatOps, first_numbers
 from aerobat.engines.pytree import Tree, tree_map
 from aerobat.environment import Environment
 from aerobat.kernels.control_loops import Gains, ReferencePoint, init_position_loop
-from aerobat.kernels.motors import Motion
+from aerobat.kernels.motors import VehicleState
 from aerobat.kernels.rigid_body import Body
 from aerobat.links.goals import yaw_of
 from aerobat.simulation.autopilot.braking import point_reference
-from aerobat.simulation.autopilot.loop import autopilot_inputs, autopilot_loop, autopilot_parameters
+from aerobat.simulation.autopilot.loop import autopilot_inputs, autopilot_setup
 from aerobat.simulation.bodies import bodies
 from aerobat.simulation.components import log_row
 from aerobat.states import BodyState
@@ -32,11 +33,11 @@ class LiveBody:
         vehicle.require_hover(environment.gravity)
         self._idle = tuple(np.array([least]) for least in vehicle.min_thrusts)
         self.state = _at_rest(np.zeros(2), 0.0)  # the true one, (·,)
-        parameters = autopilot_parameters(_one(self.state), vehicle, environment)
-        _, model, _ = parameters.own
+        setup = autopilot_setup(_one(self.state), vehicle, environment)
+        _, model, _ = setup.parameters.own
         self._gains: tuple[Gains, Gains] = first_numbers((model.tracking.gains, model.upright))
         first = first_row(autopilot_inputs(_hovering(environment.gravity), False))
-        self._loop = autopilot_loop(vehicle, parameters, first, log_row, _LONG)
+        self._loop = setup.compile_for(choose("auto", 1, _LONG), first, log_row)
         self._carry: Tree = self._loop.init(first)
         self.stop_rotors()
 
@@ -61,14 +62,14 @@ class LiveBody:
         state = self.state
         self.state = _at_rest(state.position[:2], yaw_of(state.q_world_body))
         observer, controller, motion = self._carry
-        self._carry = (observer, controller, Motion(_one(self.state), motion.thrusts))
+        self._carry = (observer, controller, VehicleState(_one(self.state), motion.thrusts))
 
     def stop_rotors(self) -> None:
         """Have the rotors give the least that they can, and be known to."""
         observer, controller, motion = self._carry
         commands = controller.commands._replace(thrusts=self._idle)
         stopped = controller._replace(thrusts=self._idle, commands=commands)
-        self._carry = (observer, stopped, Motion(motion.body, self._idle))
+        self._carry = (observer, stopped, VehicleState(motion.body, self._idle))
 
 
 def _at_rest(place: Array, yaw: float) -> BodyState:

@@ -33,7 +33,7 @@ _RECOVERY = 60.0  # [s] for coming to a hover, and for a landing beside its way 
 _SLOWEST_DESCENT = 0.2  # [m/s] of a landing
 
 
-class Stage(StrEnum):
+class ClientStage(StrEnum):
     """Stage of a flight that the client is at."""
 
     CONNECTING = "connecting"
@@ -89,7 +89,7 @@ class Client:
         self.mission = Mission(plan, mission, stream, PathFollower(stream, plan.vehicle, environment))
         self._plan, self._offset = plan, offset
         self.link = AutopilotLink(connection, settings.telemetry_rate, settings.system)
-        self.stage = Stage.CONNECTING
+        self.stage = ClientStage.CONNECTING
         self.log: list[Observed] = []  # while the plan was flown
         self.settings = settings
         self._say = say
@@ -108,7 +108,7 @@ class Client:
     @property
     def done(self) -> bool:
         """True once there is nothing left to do."""
-        return self.stage in (Stage.LANDED, Stage.LOST)
+        return self.stage in (ClientStage.LANDED, ClientStage.LOST)
 
     def tick(self, now: float) -> None:
         """Take what has come by this time [s], and send what is due.
@@ -129,7 +129,7 @@ class Client:
 
     def abort(self, now: float, reason: str) -> None:
         """Give the flight up: the vehicle is told to hover, then to land."""
-        if self.stage is Stage.FLYING:
+        if self.stage is ClientStage.FLYING:
             self.mission.abort(now, reason)
             self._recover(now)
         else:
@@ -149,7 +149,7 @@ class Client:
             late=self.mission.max_lateness,
         )
 
-    def _enter(self, stage: Stage, now: float) -> None:
+    def _enter(self, stage: ClientStage, now: float) -> None:
         self.stage, self._began = stage, now
 
     @property
@@ -162,7 +162,7 @@ class Client:
 
     def _while_connecting(self, now: float) -> None:
         if self.link.is_known:
-            self._enter(Stage.ASKING, now)
+            self._enter(ClientStage.ASKING, now)
         elif self._since(now) > self.settings.wait:
             waited, heard = f"{self.settings.wait:g} s", ", ".join(map(str, sorted(self.link.systems)))
             if heard:
@@ -193,7 +193,7 @@ class Client:
             self._say(f"connected; a message takes {1e3 * self.link.delay:.0f} ms")
             if self._announcement:
                 self._say(self._announcement)
-            self._enter(Stage.ARMING, now)
+            self._enter(ClientStage.ARMING, now)
         elif self._since(now) > self.settings.wait:
             missing, remedy = "its state (ODOMETRY)", "have it send that message"
             if hover is None:
@@ -222,7 +222,7 @@ class Client:
                 self.link.arm()
         if self.link.armed and self.link.mode is Mode.OFFBOARD:
             self.mission.begin(now, self._observed)
-            self._enter(Stage.FLYING, now)
+            self._enter(ClientStage.FLYING, now)
             self._say("armed")
         elif self._since(now) > _PATIENCE:
             self._give_up_arming(now)
@@ -260,7 +260,7 @@ class Client:
 
     def _recover(self, now: float) -> None:
         self._say(f"aborted: {self.mission.reason}; the vehicle is told to hover")
-        self._enter(Stage.RECOVERING, now)
+        self._enter(ClientStage.RECOVERING, now)
         self._while_recovering(now)
 
     def _while_recovering(self, now: float) -> None:
@@ -284,7 +284,7 @@ class Client:
         """Have it land, for a reason that is told."""
         if reason:
             self._say(f"{reason}; it is told to land")
-        self._enter(Stage.LANDING, now)
+        self._enter(ClientStage.LANDING, now)
         self._while_landing(now)
 
     def _while_landing(self, now: float) -> None:
@@ -293,7 +293,7 @@ class Client:
         if self._is_down and self._refusal:
             raise SpecError(self._refusal)
         if self._is_down:
-            self._enter(Stage.LANDED, now)
+            self._enter(ClientStage.LANDED, now)
             self._say("landed")
         elif not self._yields(now):
             self.link.set_mode(Mode.LAND)
@@ -315,7 +315,7 @@ class Client:
         return True
 
     def _lose(self, now: float, reason: str, left_to: str = "its own failsafe") -> None:
-        self._enter(Stage.LOST, now)
+        self._enter(ClientStage.LOST, now)
         self._lost = reason
         self._say(f"{reason}; it is left to {left_to}")
 
@@ -332,7 +332,7 @@ def run(client: Client, clock: Clock) -> None:
     except KeyboardInterrupt:
         until = clock.now() + 1.0
         client.abort(clock.now(), "interrupted")
-        while clock.now() < until and client.stage is Stage.RECOVERING:
+        while clock.now() < until and client.stage is ClientStage.RECOVERING:
             client.tick(clock.now())
             clock.sleep_until(clock.now() + period)
         raise

@@ -21,7 +21,7 @@ from aerobat.links.rehearsal import rehearse
 from aerobat.links.report import LinkReport
 from aerobat.links.ros import topics
 from aerobat.links.ros.middleware import Answer, Middleware
-from aerobat.links.ros.preparation import Prepared, Request, judge, prepare
+from aerobat.links.ros.preparation import ManeuverRequest, Prepared, judge, prepare
 from aerobat.planning import Planner
 from aerobat.problem import Problem
 from aerobat.vehicle import Vehicle
@@ -162,7 +162,7 @@ class ManeuverNode:
         """Have a maneuver planned from where the vehicle hovers."""
         seen = self.commander.require_hover(self._now)
         problem, planner = self._maneuvers[name]
-        request = Request(
+        request = ManeuverRequest(
             problem,
             self._vehicle,
             planner,

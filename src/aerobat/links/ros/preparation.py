@@ -29,7 +29,7 @@ MANEUVERS = {
 
 
 @dataclass(frozen=True)
-class Request:
+class ManeuverRequest:
     """Request for a plan: what is to be planned, and from where."""
 
     problem: Problem
@@ -51,7 +51,7 @@ class Prepared:
     announcement: str
 
 
-def prepare(request: Request) -> Prepared | str:
+def prepare(request: ManeuverRequest) -> Prepared | str:
     """The plan from where the vehicle hovers, or a sentence that says why there is none."""
     try:
         return _prepared(request)
@@ -61,7 +61,7 @@ def prepare(request: Request) -> Prepared | str:
         return str(error)
 
 
-def _prepared(request: Request) -> Prepared:
+def _prepared(request: ManeuverRequest) -> Prepared:
     problem, offset = _from_here(request)
     found = plan(problem, request.planner, request.vehicle)
     height = offset - (0.0, 0.0, request.ground)
@@ -76,7 +76,7 @@ def _prepared(request: Request) -> Prepared:
     return Prepared(found, offset, stream, told)
 
 
-def _from_here(request: Request) -> tuple[Problem, Array]:
+def _from_here(request: ManeuverRequest) -> tuple[Problem, Array]:
     """The problem that begins where the vehicle hovers, and where its origin lies in the world [m]."""
     asked = replace(request.problem, heading=request.yaw)
     if request.in_world:

@@ -23,15 +23,6 @@ _EQUALITY_TOLERANCE = 1e-12  # bounds closer than this, relative to the larger, 
 _CONTRADICTION_TOLERANCE = 1e-9  # on the same scale, by which a lower bound must exceed the upper one
 
 
-@dataclass(frozen=True, eq=False)
-class Assignments:
-    """Some that cost less than a cutoff."""
-
-    found: list[tuple[float, tuple[int, ...]]]  # their costs, their slots
-    nodes: int  # QPs solved
-    are_all: bool  # none is missing
-
-
 class DirectSearch:
     """Searches whole programs, and keeps factorizations for the next with the same matrices.
 
@@ -45,12 +36,8 @@ class DirectSearch:
         program: AssignmentProgram,
         limits: SearchLimits,
         start: Sequence[int] | None = None,
-        cutoff: float = inf,
     ) -> AssignmentResult:
-        """Return the assignment of minimum cost, or what was found within the limits, not yet verified.
-
-        Nothing at least as dear as `cutoff` is looked for; the bound is then no higher than that.
-        """
+        """Return the assignment of minimum cost, or what was found within the limits, not yet verified."""
         try:
             prepared = self._prepared(program)
         except NotConverged:
@@ -58,18 +45,7 @@ class DirectSearch:
         if prepared is None:
             return _without_solution("infeasible", inf)
         factorization, blocks = prepared
-        return factorization.claim(program, blocks, limits, start, cutoff)
-
-    def below(self, program: AssignmentProgram, limits: SearchLimits, cutoff: float) -> Assignments:
-        """Return every assignment that costs less than `cutoff`."""
-        try:
-            prepared = self._prepared(program)
-        except NotConverged:
-            return Assignments([], 0, False)
-        if prepared is None:
-            return Assignments([], 0, True)
-        factorization, blocks = prepared
-        return factorization.below(program, blocks, limits, cutoff)
+        return factorization.claim(program, blocks, limits, start)
 
     def _prepared(self, program: AssignmentProgram) -> tuple[_Factorization, _Blocks] | None:
         """The factorization, kept from the last program where it fits, and what is to be searched.
@@ -137,10 +113,11 @@ class _Factorization:
         blocks: _Blocks,
         limits: SearchLimits,
         start: Sequence[int] | None,
-        cutoff: float,
     ) -> AssignmentResult:
         """Search the coupled block, and put its solution and the independent block's together."""
-        search = self._search(blocks, cutoff, wants_all=False)
+        search = BestFirstSearch(
+            self.candidates, self.dual_bounds, self.coupled_qp, blocks.bounds, blocks.root
+        )
         if start is not None:
             search.try_start({stage: start[stage] for stage in self.candidates.free_stages})
         search.run(limits)
@@ -160,18 +137,6 @@ class _Factorization:
             nodes=search.nodes,
         )
 
-    def below(
-        self, program: AssignmentProgram, blocks: _Blocks, limits: SearchLimits, cutoff: float
-    ) -> Assignments:
-        """As `DirectSearch.below`."""
-        search = self._search(blocks, cutoff, wants_all=True)
-        search.run(limits)
-        found = [
-            (blocks.elsewhere + blocks.root.cost(value), self.candidates.slots_with(program, chosen))
-            for value, chosen in search.found
-        ]
-        return Assignments(found, search.nodes, not search.is_unfinished)
-
     def blocks(self, program: AssignmentProgram, lower: Array, upper: Array) -> _Blocks | None:
         """Return a program's right-hand sides, the independent block solved; None where it has no solution.
 
@@ -189,12 +154,6 @@ class _Factorization:
         root = root.in_units(max(root.min_norm, self.candidates.min_norm(bounds)) or 1.0)
         elsewhere = program.constant + independent.cost(solution.value)
         return _Blocks(root, bounds.in_units(root.unit), independent, solution.y, elsewhere)
-
-    def _search(self, blocks: _Blocks, cutoff: float, wants_all: bool) -> BestFirstSearch:
-        value = blocks.root.value(cutoff - blocks.elsewhere)
-        return BestFirstSearch(
-            self.candidates, self.dual_bounds, self.coupled_qp, blocks.bounds, blocks.root, value, wants_all
-        )
 
 
 def _without_solution(status: Status, bound: float) -> AssignmentResult:

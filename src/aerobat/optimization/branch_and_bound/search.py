@@ -58,22 +58,13 @@ class BestFirstSearch:
         qp: LeastDistanceQP,
         bounds: CandidateBounds,
         root: ReducedBounds,
-        cutoff: float = UNBOUNDED,
-        wants_all: bool = False,
     ) -> None:
-        """`bounds` are those of the candidates, `root` those of the rows with no stage assigned.
-
-        No ½|y|² of `cutoff` or more is looked for. With `wants_all` every assignment below it is: none of
-        them is then the best, they are in `found`, and there are no more unless it `is_unfinished`.
-        """
+        """`bounds` are those of the candidates, `root` those of the rows with no stage assigned."""
         self._candidates = candidates
         self._dual_bounds = dual_bounds
         self._qp = qp
         self._bounds = bounds
         self._root = root
-        self._first_cutoff = cutoff
-        self._wants_all = wants_all
-        self.found: list[tuple[float, tuple[int, ...]]] = []  # ½|y|² and candidates
         self._heap: list[tuple[float, int, _Node, LazyChildren | None]] = []
         self._ticket = count()
         self._unresolved = inf  # the smallest bound of a relaxation that the QP solver could not solve
@@ -127,11 +118,8 @@ class BestFirstSearch:
         inherited = self._dual_bounds.root_bounds(self._bounds)
         if solution is not None and inherited.covers_all_stages(pending):
             root = _Node(solution, (), pending, inherited)
-            if self._wants_all:
-                self._push(solution.value, root)
-            else:
-                self._dive(root)
-        next_dive = inf if self._wants_all else _DIVE_GROWTH * self.nodes
+            self._dive(root)
+        next_dive = _DIVE_GROWTH * self.nodes
         while self._heap and self._improves(self._heap[0][0]) and not self._is_over:
             node = self._next()
             if node is None:
@@ -181,16 +169,13 @@ class BestFirstSearch:
     def _children(self, node: _Node) -> LazyChildren | None:
         """Return the node's children; None where its solution is an assignment's, the best so far."""
         if not node.pending:
-            if self._wants_all:
-                self.found.append((node.solution.value, node.chosen))
-            else:
-                self.best = (node.solution, node.chosen)
+            self.best = (node.solution, node.chosen)
             return None
         lower_bounds = node.inherited
         # else a few QPs cost less than their bounds
         if not node.chosen or len(node.pending) > 1 or len(lower_bounds.candidates) > _MAX_INHERITED:
             lower_bounds = self._dual_bounds.single_bounds(node.solution, self._bounds, node.inherited)
-        complete = None if self._wants_all else self._completed(node, lower_bounds)
+        complete = self._completed(node, lower_bounds)
         if complete is not None:
             self.best = (node.solution, complete)
             return None
@@ -257,7 +242,7 @@ class BestFirstSearch:
 
     @property
     def _cutoff(self) -> float:
-        return self._first_cutoff if self.best is None else min(self.best[0].value, self._first_cutoff)
+        return UNBOUNDED if self.best is None else self.best[0].value
 
     def _improves(self, bound: float) -> bool:
         return bound < self._cutoff - _OPTIMALITY_GAP * (self._cutoff + abs(self._root.base_cost))

@@ -10,42 +10,33 @@ from aerobat.arrays import Array
 from aerobat.certification import Certificate, Side
 from aerobat.planning.assessment.assessment import Assessment, Box, Point
 from aerobat.planning.assessment.lower_bound import least_duration
-from aerobat.problem.problem import Problem
+from aerobat.planning.task import Task
 from aerobat.trajectory import Trajectory
-from aerobat.vehicle import Vehicle
 
 
-def assessment(
-    problem: Problem, vehicle: Vehicle, trajectory: Trajectory, certificate: Certificate
-) -> Assessment:
-    """Assess a path.
-
-    Args:
-        problem: What the path solves.
-        vehicle: What flies it.
-        trajectory: The path.
-        certificate: Of the path, for the vehicle.
-    """
+def assessment(task: Task, trajectory: Trajectory, certificate: Certificate) -> Assessment:
+    """Assess a path by its task and its certificate."""
     lowest, highest = trajectory.component_range(0)
     return Assessment(
         duration=trajectory.duration,
-        least_duration=least_duration(problem, vehicle),
+        least_duration=least_duration(task.problem, task.vehicle),
         room=Box(_point(lowest), _point(highest)),
-        asked=_asked(problem, vehicle),
+        asked=_asked(task),
         max_speed=_largest(certificate, "speed") or 0.0,
         max_tilt=_largest(certificate, "tilt"),
         max_body_rate=_largest(certificate, "body rate"),
-        ground=problem.environment.ground,
-        rate_limit=vehicle.max_body_rate,
+        ground=task.environment.ground,
+        rate_limit=task.vehicle.max_body_rate,
     )
 
 
-def _asked(problem: Problem, vehicle: Vehicle) -> Box:
+def _asked(task: Task) -> Box:
     """The box of start, goal, gates, and of what stages ask of positions along the world's axes."""
+    problem = task.problem
     places = [end.position for end in problem.ends.values()] + [gate.position for gate in problem.gates]
     points = np.reshape(places, (-1, 3))
     lower, upper = points.min(axis=0, initial=inf), points.max(axis=0, initial=-inf)
-    for stage in problem.stages(vehicle.max_specific_thrust).stages:
+    for stage in task.stages.stages:
         for condition in stage.where:
             axes = np.flatnonzero(condition.direction)
             if len(axes) == 1:

@@ -13,12 +13,12 @@ from aerobat.planning.courses import is_placed_in_windows
 from aerobat.planning.miqp.diagnosis import NOT_CONVERGED, OUT_OF_TIME
 from aerobat.planning.miqp.formulation import Formulation
 from aerobat.planning.miqp.integrator import INPUT_NAMES
-from aerobat.planning.passages import PlacedStage
+from aerobat.planning.passages import PlacedStage, place_stages
 from aerobat.planning.recorder import Recorder
 from aerobat.planning.result import Plan
+from aerobat.planning.task import Task
 from aerobat.planning.warm_start import WarmStart
 from aerobat.problem.problem import Problem
-from aerobat.problem.stage import StageSequence
 from aerobat.trajectory import Trajectory
 from aerobat.vehicle import Vehicle
 
@@ -40,10 +40,8 @@ class Attempts:
     """All that attempts at one problem share."""
 
     formulation: Formulation
-    vehicle: Vehicle | None
     solver: Solver
     recorder: Recorder
-    reserve: float = 0.0  # of what the vehicle can do, kept for the controller
     slots: tuple[int, ...] | None = None  # of the last solution: where the next solve begins
 
     def solve(self, dt: float, node_limit: int | None = None) -> AssignmentResult:
@@ -62,6 +60,11 @@ class Attempts:
         return answer
 
     @property
+    def task(self) -> Task:
+        """The task that is planned."""
+        return self.formulation.task
+
+    @property
     def is_over(self) -> bool:
         """True where no time is left for another; the first is made in any case."""
         return bool(self.recorder.attempts) and out_of_time()
@@ -69,7 +72,7 @@ class Attempts:
     @property
     def jumps(self) -> bool:
         """True if the order makes what no moment, or no rotor with lag, can do; its certificate says so."""
-        return self.formulation.chain.order < flyable_order(self.vehicle)
+        return self.formulation.chain.order < flyable_order(self.task.vehicle_if_any)
 
     def judge(
         self, placement: Placement, failure: str | None = None, excess: float = 0.0
@@ -81,7 +84,8 @@ class Attempts:
             failure: Why the vehicle cannot follow it, where that is known without a certificate.
             excess: By how much, as a fraction of a constraint's range, negative.
         """
-        span = 0.0 if self.vehicle is None else float(self.vehicle.thrust_ranges.max())
+        vehicle = self.task.vehicle_if_any
+        span = 0.0 if vehicle is None else float(vehicle.thrust_ranges.max())
         answer, dt = placement.answer, placement.dt
         solved = answer.x is not None
         solution = Solution(
@@ -96,16 +100,14 @@ class Attempts:
             failure=failure or (None if solved else _why_unsolved(answer)),
             margin=excess * span or None,
         )
-        return judge(
-            solution, self.formulation.problem, self.vehicle, self.recorder, self.reserve, self.jumps
-        )
+        return judge(solution, self.task, self.recorder, self.jumps)
 
-    def path(self, placement: Placement, sequence: StageSequence) -> WarmStart:
-        """The path of an answer, with a sequence's stages in their order."""
+    def path(self, placement: Placement) -> WarmStart:
+        """The path of an answer, with the stages in their order."""
         trajectory, slots = self.trajectory(placement.answer, placement.dt), placement.answer.slots or ()
         times = [float(trajectory.knots[slot + 1]) for slot in slots]
         order = sorted(range(len(times)), key=times.__getitem__)
-        stages = tuple(sequence.stages[i] for i in order)
+        stages = tuple(self.task.stages.stages[i] for i in order)
         return WarmStart(trajectory, stages, tuple(times[i] for i in order))
 
     def trajectory(self, answer: AssignmentResult, dt: float) -> Trajectory:
@@ -120,10 +122,8 @@ class Attempts:
         """When a path passes its stages."""
         trajectory, slots = judged.solution.trajectory, judged.solution.source.answer.slots or ()
         assert trajectory is not None
-        stages = zip(self.formulation.sequence.stages, slots, strict=True)
-        return tuple(
-            PlacedStage(s.name, slot, float(trajectory.knots[slot + 1]), s.gate) for s, slot in stages
-        )
+        times = [float(trajectory.knots[slot + 1]) for slot in slots]
+        return place_stages(self.formulation.sequence.stages, slots, times)
 
 
 def _why_unsolved(answer: AssignmentResult) -> str:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from math import ceil, inf
+from typing import Any
 
 import numpy as np
 
@@ -17,7 +18,6 @@ from aerobat.planning.miqp.formulation import Formulation
 from aerobat.planning.recorder import Attempt
 from aerobat.problem.problem import DERIVATIVES, UNITS
 from aerobat.problem.stage import Stage
-from aerobat.vehicle import Vehicle
 
 OUT_OF_TIME = "no solution was found in time"
 NOT_CONVERGED = "the solver did not converge"
@@ -26,11 +26,12 @@ DIAGNOSIS_TIME = 1.0  # [s] of the processor, for all relaxed problems together
 PROBES = 4  # durations at which a relaxed problem is tried
 
 
-def why_infeasible(formulation: Formulation, attempts: Sequence[Attempt], vehicle: Vehicle | None) -> str:
+def why_infeasible(formulation: Formulation, attempts: Sequence[Attempt]) -> str:
     """One sentence: the vehicle, when some program had a solution, otherwise the bounds that exclude all."""
     tried = [a.duration / formulation.chain.intervals for a in attempts]
     said = f"'{formulation.problem.name}' has no plan at any dt from {min(tried):.3g} to {max(tried):.3g} s"
     solved = [a for a in attempts if a.cost is not None]
+    vehicle = formulation.task.vehicle_if_any
     if solved and vehicle is not None:
         best = max(solved, key=lambda a: -inf if a.margin is None else a.margin).outcome
         return Reason(f"{said} that {vehicle.name} can fly: at best, {best}", limits_of(best))
@@ -110,19 +111,24 @@ def _binding(formulation: Formulation, dts: Sequence[float]) -> Iterator[tuple[s
 
 def _relaxations(formulation: Formulation) -> Iterator[tuple[str, str, Formulation]]:
     """Yield each bound in words, by its field, and the problem without it."""
-    problem, sequence = formulation.problem, formulation.sequence
+    task = formulation.task
+    problem, sequence = task.problem, task.stages
+
+    def without(**changes: Any) -> Formulation:
+        return replace(formulation, task=replace(task, **changes))
+
     for derivative in range(formulation.chain.order + 1):
         bound = problem.path_limits.of(derivative)[1]
         if np.isfinite(np.concatenate(problem.path_limits.of(derivative))).any():
             field = f"limits.{DERIVATIVES[derivative]}" if derivative else "limits.lower and limits.upper"
             name = f"{field} ({np.min(bound):g} {UNITS[derivative]})"
             name = name if derivative else f"the volume between {field}"
-            without = replace(problem, limits=problem.path_limits.without(derivative))
-            yield name, field, replace(formulation, problem=without)
+            unlimited = replace(problem, limits=problem.path_limits.without(derivative))
+            yield name, field, without(problem=unlimited)
     for i, stage in enumerate(sequence.stages):
         others = sequence.stages[:i] + sequence.stages[i + 1 :]
         name, fewer = f"stage '{stage.name}'", replace(sequence, stages=others)
-        yield f"the {name}", name, replace(formulation, sequence=fewer)
+        yield f"the {name}", name, without(stages=fewer)
     if sequence.path_constraints:
-        relaxed = replace(formulation, sequence=replace(sequence, path_constraints=()))
-        yield "what holds at every interval", FIELD, relaxed
+        unconstrained = replace(sequence, path_constraints=())
+        yield "what holds at every interval", FIELD, without(stages=unconstrained)

@@ -16,17 +16,13 @@ import numpy as np
 
 from aerobat.arrays import Array, Indices, frozen
 from aerobat.errors import SpecError
-from aerobat.limits import Limit, limits_along
-from aerobat.optimization import AssignmentProgram, LinearDynamics, SlottedStage
+from aerobat.optimization import AssignmentProgram, SlottedStage
 from aerobat.planning.miqp.integrator import INPUT_NAMES, IntegratorChain
-from aerobat.problem.condition import Condition, ForceBalance, Quantity
+from aerobat.planning.task import Task
+from aerobat.problem.condition import Condition, Quantity
 from aerobat.problem.end_state import VELOCITY
 from aerobat.problem.problem import DERIVATIVES, Problem
 from aerobat.problem.stage import Stage, StageSequence
-from aerobat.vehicle import Vehicle
-
-# without a vehicle, stages that ask a fraction of its thrust assume what a hexarotor in the paper's class has
-ASSUMED_THRUST_TO_WEIGHT = 5.0
 
 
 @dataclass(frozen=True)
@@ -53,11 +49,8 @@ class Formulation:
     input.
     """
 
-    problem: Problem
-    sequence: StageSequence
+    task: Task
     chain: IntegratorChain
-    balance: ForceBalance  # what specific thrust works against
-    vehicle: Vehicle | None = None  # that shall fly it
 
     def __post_init__(self) -> None:
         """Check."""
@@ -81,12 +74,15 @@ class Formulation:
                     f"{INPUT_NAMES[self.chain.order]}; plan with --order {derivative} or drop it"
                 )
 
+    @property
+    def problem(self) -> Problem:
+        """The task's problem."""
+        return self.task.problem
+
     @cached_property
-    def limits(self) -> tuple[Limit, ...]:
-        """Everything that holds all along a path."""
-        problem = self.problem
-        conditions = self.sequence.path_constraints
-        return limits_along(self.vehicle, problem.environment, problem.path_limits, conditions)
+    def sequence(self) -> StageSequence:
+        """The task's stages, all that they ask linear: a polytope in each ball."""
+        return self.task.stages.linear
 
     def program(self, dt: float) -> AssignmentProgram:
         """The program at one dt [s]; without drag its matrices are the same arrays for all dt."""
@@ -103,7 +99,6 @@ class Formulation:
             upper=upper * scale - free,
             stages=tuple(self._assigned(i, scale, free) for i in range(len(self.sequence.stages))),
             precedence=self._precedence,
-            dynamics=self._dynamics,
         )
 
     def inputs(self, x: Array, dt: float) -> Array:
@@ -130,16 +125,6 @@ class Formulation:
         return self.problem.goal.fixed(self.chain.order)
 
     @cached_property
-    def _dynamics(self) -> LinearDynamics:
-        """The chains of the three axes, derivatives of x first."""
-        axes, n = np.eye(3), self.chain.intervals
-        return LinearDynamics(
-            transition=np.asarray(np.kron(axes, self.chain.transition), dtype=float),
-            gain=np.asarray(np.kron(axes, self.chain.gain[:, None]), dtype=float),
-            columns=np.arange(3 * n).reshape(3, n).T,
-        )
-
-    @cached_property
     def _precedence(self) -> tuple[tuple[int, int], ...]:
         stages = len(self.sequence.stages)
         return tuple((i, i + 1) for i in range(stages - 1)) if self.sequence.ordered else ()
@@ -159,13 +144,13 @@ class Formulation:
 
     def _limit_rows(self) -> Iterable[tuple[Row, float, float]]:
         """What holds all along, as far as it is linear; the vehicle's limits are left to the refinement."""
-        for limit in self.limits:
+        for limit in self.task.limits:
             for linear in limit.linear:
                 *_, derivative = linear.quantity.derivatives
                 at_goal = derivative == VELOCITY and self.problem.goal.free_velocity
                 intervals = self.chain.intervals - (derivative != self.chain.order and not at_goal)
                 x, y, z = linear.quantity.path[derivative].tolist()
-                drag = self.balance.drag if len(linear.quantity.derivatives) > 1 else 0.0
+                drag = self.task.balance.drag if len(linear.quantity.derivatives) > 1 else 0.0
                 lower, upper = linear.ends
                 for interval in range(intervals):
                     row = Row(interval, derivative, (x, y, z), drag)
@@ -226,7 +211,7 @@ class Formulation:
     def _row(self, condition: Condition, interval: int) -> Row:
         x, y, z = condition.direction.tolist()
         about_thrust = condition.quantity is Quantity.SPECIFIC_THRUST
-        drag = self.balance.drag if about_thrust else 0.0
+        drag = self.task.balance.drag if about_thrust else 0.0
         return Row(interval, condition.quantity.derivative, (x, y, z), drag)
 
     def _slots(self, stage: Stage) -> range:
@@ -246,7 +231,7 @@ class Formulation:
     @cached_property
     def _stage_bounds(self) -> tuple[Array, ...]:
         """For each stage the bounds of its conditions in SI units, (conditions, 2)."""
-        bounds = ([c.bound(self.balance) for c in stage.conditions] for stage in self.sequence.stages)
+        bounds = ([c.bound(self.task.balance) for c in stage.conditions] for stage in self.sequence.stages)
         return tuple(np.array([b.limits for b in stage]).reshape(-1, 2) for stage in bounds)
 
     def _assigned(self, i: int, scale: Array, free: Array) -> SlottedStage:

@@ -30,16 +30,6 @@ class IntegratorChain:
     intervals: Intervals
 
     @cached_property
-    def transition(self) -> Array:
-        """Effect of the state on that one interval later, normalised, (r, r)."""
-        return np.asarray(self._taylor(np.ones(1))[0])
-
-    @cached_property
-    def gain(self) -> Array:
-        """Effect of the input over an interval on the state at its end, normalised, (r,)."""
-        return np.asarray(self.forced[0, :, 0])
-
-    @cached_property
     def forced(self) -> Array:
         """Effect of the inputs at interval ends, (N, r, N): derivative d at the end of interval n per input.
 

@@ -11,26 +11,25 @@ from pydantic import Field
 
 from aerobat.declaration import AS_IT_IS, NonNegative
 from aerobat.errors import Infeasible, Reason
-from aerobat.flatness import force_balance
 from aerobat.optimization import AssignmentProgram, solver
 from aerobat.optimization.deadline import out_of_time, within_time
 from aerobat.planning.assessment.lower_bound import least_duration
 from aerobat.planning.certified_solve import Judged
 from aerobat.planning.miqp.attempts import COURSE_SCAN_NODES, Attempts, Placement, default_order, plan_of
 from aerobat.planning.miqp.diagnosis import leg_without_room, why_infeasible
-from aerobat.planning.miqp.formulation import ASSUMED_THRUST_TO_WEIGHT, Formulation
+from aerobat.planning.miqp.formulation import Formulation
 from aerobat.planning.miqp.integrator import IntegratorChain, Intervals, Order
 from aerobat.planning.miqp.rescue import Rescue
 from aerobat.planning.miqp.shortest import shortest
 from aerobat.planning.planners import Planner, option, planner
 from aerobat.planning.recorder import Progress, Recorder
-from aerobat.planning.refinement import FlownPath, RefinedPath, Refinement
-from aerobat.planning.refinement.refine import MAX_SEGMENTS, SEGMENTS, segments_for
+from aerobat.planning.refinement.flown import FlownPath
+from aerobat.planning.refinement.refine import MAX_SEGMENTS, SEGMENTS, RefinedPath, Refinement, segments_for
 from aerobat.planning.result import FLYING_RESERVE, Plan
 from aerobat.planning.search import GridSearch, Search
+from aerobat.planning.task import Task
 from aerobat.planning.time_limit import TIME_LIMIT, stopped, too_short
 from aerobat.planning.warm_start import Reserve
-from aerobat.problem.condition import ForceBalance
 from aerobat.problem.problem import Problem
 from aerobat.problem.stage import StageSequence
 from aerobat.vehicle import Vehicle
@@ -63,7 +62,7 @@ class Miqp(Planner):
     reserve: Reserve = option(
         0.0,
         "The fraction of every limit of the vehicle that is kept from either of its ends for the controller; "
-        "with 0 a plan leaves it next to nothing. The default, a tenth, is given up where no plan keeps it.",
+        "with 0 a plan leaves it next to nothing. The default, 0.15, is given up where no plan keeps it.",
         command_default=FLYING_RESERVE,
     )
     rescue: bool = option(
@@ -106,8 +105,8 @@ class Miqp(Planner):
 
     def _planned(self, problem: Problem, vehicle: Vehicle | None, recorder: Recorder) -> Plan:
         order = default_order(problem, vehicle) if self.order is None else self.order
-        formulation = formulate(problem, order, self.intervals, vehicle)
-        attempts = Attempts(formulation, vehicle, solver(self.backend), recorder, self.reserve)
+        formulation = formulate(Task.of(problem, vehicle, self.reserve), order, self.intervals)
+        attempts = Attempts(formulation, solver(self.backend), recorder)
         if vehicle is None or self.search is not None:
             found = (self.search or GridSearch()).smallest(partial(_attempt, attempts))
         else:
@@ -118,25 +117,22 @@ class Miqp(Planner):
                 raise Infeasible(leg, recorder.attempts)
             least = least_duration(problem, vehicle)
             last = max(4.0, 2.0 * first, 2.0 * least / self.intervals)
-            return self._refined(attempts, vehicle, (first, last), least)
+            return self._refined(attempts, (first, last), least)
         if found is None:
             raise self._nothing_found(attempts)
         return plan_of(attempts, found, self.backend)
 
-    def _refined(
-        self, attempts: Attempts, vehicle: Vehicle, scanned: tuple[float, float], least: float
-    ) -> Plan:
+    def _refined(self, attempts: Attempts, scanned: tuple[float, float], least: float) -> Plan:
         """The plan of the shortest path from programs along a scan on dt.
 
         Args:
             attempts: Made here.
-            vehicle: What flies.
             scanned: The scan's smallest and largest dt [s].
             least: The duration [s] that no motion falls short of.
         """
-        formulation, recorder = attempts.formulation, attempts.recorder
-        whole = Refinement.of(formulation.problem, vehicle, recorder, self.reserve)
-        segments = segments_for(whole.sequence, self.segments)
+        task, recorder = attempts.task, attempts.recorder
+        whole = Refinement.of(task, recorder)
+        segments = segments_for(task.stages, self.segments)
         found: Judged[RefinedPath] | Judged[Placement] | None = None
         for refinement in whole.with_and_without_rooms:
             found = shortest(attempts, refinement, segments, scanned, least) or found
@@ -152,7 +148,7 @@ class Miqp(Planner):
         return found.plan(
             recorder,
             planner="miqp",
-            order=formulation.chain.order,
+            order=attempts.formulation.chain.order,
             status=found.solution.status,
             backend=self.backend,
             stages=found.solution.source.placed,
@@ -160,10 +156,10 @@ class Miqp(Planner):
 
     def _nothing_found(self, attempts: Attempts) -> Infeasible:
         """The refusal: too little time, or the bound that binds."""
-        formulation, made = attempts.formulation, tuple(attempts.recorder.attempts)
+        made = tuple(attempts.recorder.attempts)
         if out_of_time():
-            return too_short(formulation.problem, self.time_limit, attempts.recorder.attempts, self._quicker)
-        return Infeasible(partial(why_infeasible, formulation, made, attempts.vehicle), made)
+            return too_short(attempts.task.problem, self.time_limit, made, self._quicker)
+        return Infeasible(partial(why_infeasible, attempts.formulation, made), made)
 
 
 def _attempt(attempts: Attempts, dt: float) -> Judged[Placement] | None:
@@ -174,31 +170,26 @@ def _attempt(attempts: Attempts, dt: float) -> Judged[Placement] | None:
     return judged if judged.feasible else None
 
 
-def formulate(problem: Problem, order: int, intervals: int, vehicle: Vehicle | None = None) -> Formulation:
-    """The problem's program for any dt, its stages' thrusts scaled to the vehicle.
+def formulate(task: Task, order: int, intervals: int) -> Formulation:
+    """A task's program for any dt.
 
     Raises Infeasible when a stage asks more thrust than the vehicle has.
 
     Args:
-        problem: What is planned.
+        task: What is planned.
         order: Of the derivative of position that is the input.
         intervals: Their number, N.
-        vehicle: What shall fly it, or nothing in particular.
     """
-    gravity = problem.environment.gravity
-    thrust = ASSUMED_THRUST_TO_WEIGHT * gravity if vehicle is None else vehicle.max_specific_thrust
-    sequence = problem.stages(thrust, 0.0 if vehicle is None else vehicle.body_radius).linear
-    if vehicle is not None:
-        _check_thrust(sequence, vehicle)
-    balance = force_balance(problem.environment, vehicle)
-    _check_stages(sequence, balance)
-    return Formulation(problem, sequence, IntegratorChain(order, intervals), balance, vehicle)
+    if task.vehicle_if_any is not None:
+        _check_thrust(task.stages, task.vehicle)
+    _check_stages(task)
+    return Formulation(task, IntegratorChain(order, intervals))
 
 
-def _check_stages(sequence: StageSequence, balance: ForceBalance) -> None:
+def _check_stages(task: Task) -> None:
     """Refuse a stage whose own conditions exclude each other, at whatever time."""
-    for stage in sequence.stages:
-        bounds = [condition.bound(balance) for condition in stage.conditions]
+    for stage in task.stages.linear.stages:
+        bounds = [condition.bound(task.balance) for condition in stage.conditions]
         if not bounds:
             continue
         instant = AssignmentProgram(

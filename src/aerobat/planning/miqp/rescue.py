@@ -125,6 +125,8 @@ class Rescue:
         where they have none, more intervals.
         """
         if self.asked.reserve == FLYING_RESERVE:  # which is kept where it can be
+            less = FLYING_RESERVE / 3.0
+            yield replace(self.asked, reserve=less, rescue=False), f"with a reserve of {less:g}"
             yield replace(self.asked, reserve=0.0, rescue=False), "without a reserve"
         more = with_more_intervals(self.asked, self.problem, self.vehicle)
         if any(attempt.cost is not None for attempt in self.recorder.attempts):

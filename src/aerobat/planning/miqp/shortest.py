@@ -13,8 +13,8 @@ from math import inf
 from aerobat.optimization.deadline import out_of_time
 from aerobat.planning.certified_solve import Judged
 from aerobat.planning.miqp.attempts import Attempts, Placement
-from aerobat.planning.refinement import RefinedPath, Refinement
 from aerobat.planning.refinement.excess import Excess
+from aerobat.planning.refinement.refine import RefinedPath, Refinement
 from aerobat.planning.warm_start import WarmStart
 
 GROWTH = 1.15  # of dt, from one program to the next
@@ -104,7 +104,7 @@ class _Scan:
             placement = Placement(self.attempts.solve(dt, SCAN_NODES), dt)
             excess = inf
             if placement.answer.x is not None:
-                guess = self.attempts.path(placement, self.refinement.sequence)
+                guess = self.attempts.path(placement)
                 excess = self._recorded(placement, guess)
             else:
                 self.attempts.judge(placement)
@@ -123,7 +123,7 @@ class _Scan:
         if placement.answer.x is None or placement.answer.slots in self.known:
             return None
         self.known.append(placement.answer.slots)
-        return self.attempts.path(placement, self.refinement.sequence)
+        return self.attempts.path(placement)
 
     def certified(self) -> Judged[Placement] | None:
         """The answer that the vehicle can fly as it is, certified, or None."""
@@ -134,8 +134,7 @@ class _Scan:
 
     def _recorded(self, placement: Placement, guess: WarmStart) -> float:
         """The largest excess of an answer's path, which is kept as an attempt where there is one."""
-        refinement = self.refinement
-        found = Excess.of(guess.trajectory, refinement.limits, refinement.reserve, SCAN_PLACES)
+        found = Excess.of(guess.trajectory, self.refinement.limits, SCAN_PLACES)
         if not found.holds:
             self.attempts.judge(placement, found.reason, -found.largest)
         return 0.0 if found.holds else found.largest

@@ -6,7 +6,7 @@ by a cost that knows nothing of them: that is where the closed form loses most o
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from typing import Annotated, ClassVar, NamedTuple
 
@@ -19,16 +19,16 @@ from aerobat.planning.assessment.assessment import SUSPICIOUS
 from aerobat.planning.assessment.lower_bound import least_duration
 from aerobat.planning.certified_solve import Judged
 from aerobat.planning.courses import is_course
-from aerobat.planning.miqp import Miqp
+from aerobat.planning.miqp.miqp import Miqp
 from aerobat.planning.planners import Planner, option, planner
 from aerobat.planning.polynomial.knots import start_along_normals
 from aerobat.planning.polynomial.min_snap import MinSnap
 from aerobat.planning.recorder import Progress, Recorder
-from aerobat.planning.refinement import FlownPath, RefinedPath, Refinement, segments_for
-from aerobat.planning.refinement.refine import MAX_SEGMENTS, SEGMENTS
+from aerobat.planning.refinement.flown import FlownPath
+from aerobat.planning.refinement.refine import MAX_SEGMENTS, SEGMENTS, RefinedPath, Refinement, segments_for
 from aerobat.planning.result import FLYING_RESERVE, Plan
 from aerobat.planning.time_limit import TIME_LIMIT, stopped, too_short
-from aerobat.planning.warm_start import Reserve, WarmStart, plans_to_begin_from, require_attitudes
+from aerobat.planning.warm_start import Reserve, WarmStart, flown_task
 from aerobat.problem.problem import Problem
 from aerobat.vehicle import Vehicle
 
@@ -72,9 +72,8 @@ class FreeKnots(Planner):
         Raises SpecError without a vehicle and for input that makes no sense, Infeasible when nothing is
         certified.
         """
-        vehicle = require_attitudes("free-knots", problem, vehicle)
-        recorder = Recorder(progress)
-        refinement = Refinement.of(problem, vehicle, recorder, self.reserve, self.still_ends)
+        task, recorder = flown_task("free-knots", problem, vehicle, self.reserve), Recorder(progress)
+        refinement = Refinement.of(task, recorder, self.still_ends)
         with within_time(self.time_limit):
             found = self._fastest(refinement)
             if found is not None:
@@ -83,8 +82,8 @@ class FreeKnots(Planner):
                 raise too_short(problem, self.time_limit, recorder.attempts)
         last = recorder.attempts[-1].outcome if recorder.attempts else "no path to begin from was found"
         sentence = (
-            f"no polynomials are certified to fly '{problem.name}' with {vehicle.name}: at the last attempt "
-            f"{last}; widen what binds there, or give other --segments"
+            f"no polynomials are certified to fly '{problem.name}' with {task.vehicle.name}: at the last "
+            f"attempt {last}; widen what binds there, or give other --segments"
         )
         raise Infeasible(Reason(sentence, limits_of(last)), recorder.attempts)
 
@@ -93,7 +92,7 @@ class FreeKnots(Planner):
 
         A plan is poor whose own flight does not pass a gate, or that is slow beside what is possible.
         """
-        slow = SUSPICIOUS * least_duration(refinement.problem, refinement.vehicle)
+        slow = SUSPICIOUS * least_duration(refinement.task.problem, refinement.task.vehicle)
         best: _Found | None = None
         for plan, start in self._starts(refinement):
             own = None if plan is None else self._as_it_is(plan, refinement)
@@ -107,7 +106,8 @@ class FreeKnots(Planner):
 
     def _as_it_is(self, start: Plan, refinement: Refinement) -> _Found | None:
         """The plan that is begun from, where it is certified and keeps the reserve."""
-        plan = start if start.vehicle == refinement.vehicle else start.for_vehicle(refinement.vehicle)
+        vehicle = refinement.task.vehicle
+        plan = start if start.vehicle == vehicle else start.for_vehicle(vehicle)
         if not (plan.certified and plan.keeps(self.reserve)) or plan.planner == "free-knots":
             return None
         said = f"free-knots found none faster than the path that it began from, {plan.planner}'s"
@@ -117,7 +117,7 @@ class FreeKnots(Planner):
 
     def _refined(self, refinement: Refinement, start: WarmStart) -> _Found | None:
         """The certified plan near a start; None where there is none."""
-        segments = segments_for(refinement.sequence, self.segments)
+        segments = segments_for(refinement.task.stages, self.segments)
         for own in refinement.with_and_without_rooms:
             judged = own.refined(start, segments)
             if judged.feasible:
@@ -130,18 +130,18 @@ class FreeKnots(Planner):
 
     def _starts(self, refinement: Refinement) -> Iterator[tuple[Plan | None, WarmStart]]:
         """Where to begin, at a plan or at a closed form."""
-        problem, vehicle, sequence = refinement.problem, refinement.vehicle, refinement.sequence
-        on_course = is_course(sequence)
+        task, problem = refinement.task, refinement.task.problem
+        on_course = is_course(task.stages)
         if self.start is not None:
-            yield self.start, WarmStart.of(self.start, sequence)
+            yield self.start, WarmStart.of(self.start, task.stages)
         for order in START_ORDERS if on_course else ():
-            yield None, start_along_normals(problem, vehicle, sequence, order)
+            yield None, start_along_normals(task, order)
         closed_form: list[Planner] = [MinSnap()] if problem.maneuver.through_points and not on_course else []
         others = [*closed_form, Miqp(reserve=self.reserve, rescue=False, flies=False)]
-        for plan in plans_to_begin_from(others, problem, vehicle):
-            yield plan, WarmStart.of(plan, sequence)
+        for plan in _plans_to_begin_from(others, problem, task.vehicle):
+            yield plan, WarmStart.of(plan, task.stages)
         if not (on_course or out_of_time()):
-            yield None, WarmStart.of(Miqp().plan(problem), sequence)
+            yield None, WarmStart.of(Miqp().plan(problem), task.stages)
 
 
 class _Found(NamedTuple):
@@ -162,3 +162,16 @@ def _plan(judged: Judged[RefinedPath], recorder: Recorder) -> Plan:
         backend="builtin",
         stages=judged.solution.source.placed,
     )
+
+
+def _plans_to_begin_from(planners: Iterable[Planner], problem: Problem, vehicle: Vehicle) -> Iterator[Plan]:
+    """The plans of other planners that find one.
+
+    Raises Infeasible where a stage asks more thrust than the vehicle has.
+    """
+    for each in planners:
+        try:
+            yield each.plan(problem, vehicle)
+        except Infeasible as infeasible:
+            if not infeasible.attempts:  # no attempt: refused at once, and whatever the planner
+                raise

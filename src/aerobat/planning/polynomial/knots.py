@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from itertools import filterfalse, pairwise
 from math import sqrt
@@ -11,16 +11,15 @@ import numpy as np
 
 from aerobat.arrays import Array
 from aerobat.errors import Reason
-from aerobat.flatness import force_balance
 from aerobat.planning.rotor_margin import sampled_margin
+from aerobat.planning.task import Task
 from aerobat.planning.warm_start import WarmStart
 from aerobat.problem.condition import Condition, ForceBalance, Quantity, fixed
 from aerobat.problem.gate import Gate
 from aerobat.problem.problem import Problem
-from aerobat.problem.stage import Stage, StageSequence
+from aerobat.problem.stage import Stage
 from aerobat.trajectory import Trajectory
 from aerobat.trajectory.minimum_effort import minimum_effort
-from aerobat.vehicle import Vehicle
 
 LEG_THRUST_FRACTION = 0.3  # of the specific thrust, that accelerates along a leg when times are guessed
 SHORTEST_LEG = 0.2  # [s] that a leg is given at first
@@ -31,9 +30,7 @@ MIN_GATE_SPEED = 3.0  # [m/s] of starts through gates
 STAGE_TOLERANCE = 1e-6  # in SI units: by how much a condition may be missed through rounding
 
 
-def fixed_at_knots(
-    problem: Problem, sequence: StageSequence, order: int, balance: ForceBalance, velocities: Array
-) -> Array:
+def fixed_at_knots(task: Task, order: int, velocities: Array) -> Array:
     """Position and its derivatives below `order` at start, stages and goal, (K, order, 3); NaN: free.
 
     The closed form takes each axis alone and equalities only. So conditions in oblique directions fix, by
@@ -43,18 +40,17 @@ def fixed_at_knots(
     afterwards.
 
     Args:
-        problem: Its ends are fixed.
-        sequence: Its stages' equalities are fixed.
+        task: Its ends and its stages' equalities are fixed.
         order: How many derivatives there are.
-        balance: Of thrust, acceleration and drag.
         velocities: At the stages [m/s], of which the drag is taken, (K - 2, 3).
     """
-    fixed = np.full((len(sequence.stages) + 2, order, 3), np.nan)
+    problem, stages = task.problem, task.stages.stages
+    fixed = np.full((len(stages) + 2, order, 3), np.nan)
     met = problem.goal.fixed(order)
     fixed[0], fixed[-1, met] = problem.start.derivatives(order), problem.goal.derivatives(order)[met]
-    for knot, (stage, velocity) in enumerate(zip(sequence.stages, velocities, strict=True), 1):
+    for knot, (stage, velocity) in enumerate(zip(stages, velocities, strict=True), 1):
         for derivative in range(3):
-            fixed[knot, derivative] = _fixed(stage, derivative, balance, velocity)
+            fixed[knot, derivative] = _fixed(stage, derivative, task.balance, velocity)
         centre = stage.centre(problem.gates)
         if centre is not None:
             fixed[knot, 0] = centre
@@ -74,38 +70,40 @@ def first_times(problem: Problem, fixed: Array, max_specific_thrust: float) -> A
     return durations
 
 
-def unhurried(sequence: StageSequence) -> StageSequence:
+def unhurried(task: Task) -> Task:
     """The same without the least speeds of stages that ask no attitude."""
     stages = (
         stage if stage.attitude else replace(stage, conditions=tuple(filterfalse(_hurries, stage.conditions)))
-        for stage in sequence.stages
+        for stage in task.stages.stages
     )
-    return replace(sequence, stages=tuple(stages))
+    return _with_stages(task, stages)
 
 
-def stretched_path(problem: Problem, vehicle: Vehicle, sequence: StageSequence, order: int) -> Trajectory:
+def _with_stages(task: Task, stages: Iterable[Stage]) -> Task:
+    """The task with other stages."""
+    return replace(task, stages=replace(task.stages, stages=tuple(stages)))
+
+
+def stretched_path(task: Task, order: int) -> Trajectory:
     """The closed form through ordered stages, legs as long as the roots of their distances, for a warm start.
 
     So slow as a whole that rotors exceed their limits by EXCEEDED at most: a motion that is a little too fast
     is nearer to the fastest than one that is too slow.
 
     Args:
-        problem: Its ends are met.
-        vehicle: What flies it.
-        sequence: The stages.
+        task: Its ends and stages are met.
         order: The derivative of position whose square is minimized.
     """
-    balance = force_balance(problem.environment, vehicle)
-    still = np.zeros((len(sequence.stages), 3))
-    fixed = fixed_at_knots(problem, unhurried(sequence), order, balance, still)
-    durations = first_times(problem, fixed, vehicle.max_specific_thrust)
+    vehicle, still = task.vehicle, np.zeros((len(task.stages.stages), 3))
+    fixed = fixed_at_knots(unhurried(task), order, still)
+    durations = first_times(task.problem, fixed, vehicle.max_specific_thrust)
     allowed = -EXCEEDED * float(vehicle.thrust_ranges.max())
 
     def path(steps: int) -> Trajectory:
-        return minimum_effort(fixed, durations * PACE**steps, heading=problem.heading)
+        return minimum_effort(fixed, durations * PACE**steps, heading=task.problem.heading)
 
     def too_fast(steps: int) -> bool:
-        return sampled_margin(path(steps), vehicle, problem.environment).margin < allowed
+        return sampled_margin(path(steps), vehicle, task.environment).margin < allowed
 
     slower = next((steps for steps in range(PACES) if not too_fast(steps)), PACES)
     if slower > 0:
@@ -113,48 +111,44 @@ def stretched_path(problem: Problem, vehicle: Vehicle, sequence: StageSequence, 
     return path(1 - next((steps for steps in range(1, PACES) if too_fast(-steps)), PACES))
 
 
-def path_along_normals(problem: Problem, vehicle: Vehicle, sequence: StageSequence, order: int) -> Trajectory:
+def path_along_normals(task: Task, order: int) -> Trajectory:
     """The closed form through ordered stages, stretched, gates passed along their normals.
 
     As fast there as the closed form that leaves that open, or as MIN_GATE_SPEED says.
 
     Args:
-        problem: Its ends are met, its gates passed.
-        vehicle: What flies it.
-        sequence: The stages.
+        task: Its ends are met, its gates passed.
         order: The derivative of position whose square is minimized.
     """
-    path = stretched_path(problem, vehicle, sequence, order)
+    path = stretched_path(task, order)
     speeds = np.linalg.norm(path.evaluate(path.knots[1:-1], 1), axis=-1).tolist()
     stages = [
         stage
         if stage.gate is None
-        else replace(stage, conditions=(*stage.conditions, *_along(problem.gate(stage.gate), speed)))
-        for stage, speed in zip(sequence.stages, speeds, strict=True)
+        else replace(stage, conditions=(*stage.conditions, *_along(task.problem.gate(stage.gate), speed)))
+        for stage, speed in zip(task.stages.stages, speeds, strict=True)
     ]
-    return stretched_path(problem, vehicle, replace(sequence, stages=tuple(stages)), order)
+    return stretched_path(_with_stages(task, stages), order)
 
 
-def start_along_normals(problem: Problem, vehicle: Vehicle, sequence: StageSequence, order: int) -> WarmStart:
+def start_along_normals(task: Task, order: int) -> WarmStart:
     """Return the path of `path_along_normals` as a warm start.
 
     Args:
-        problem: Its ends are met, its gates passed.
-        vehicle: What flies it.
-        sequence: The stages, in order.
+        task: Its ends are met, its gates passed, its stages in order.
         order: The derivative of position whose square is minimized.
     """
-    path = path_along_normals(problem, vehicle, sequence, order)
-    return WarmStart(path, sequence.stages, tuple(path.knots[1:-1].tolist()))
+    path = path_along_normals(task, order)
+    return WarmStart(path, task.stages.stages, tuple(path.knots[1:-1].tolist()))
 
 
-def violated_stage(sequence: StageSequence, trajectory: Trajectory, balance: ForceBalance) -> Reason | None:
+def violated_stage(task: Task, trajectory: Trajectory) -> Reason | None:
     """The first stage that a trajectory with a knot a stage misses, in a sentence; or None."""
     values = [trajectory.evaluate(trajectory.knots[1:-1], k) for k in range(3)]
     fractions = trajectory.knots[1:-1] / trajectory.duration
-    for stage, flat, fraction in zip(sequence.stages, np.stack(values, axis=1), fractions, strict=True):
+    for stage, flat, fraction in zip(task.stages.stages, np.stack(values, axis=1), fractions, strict=True):
         for condition in stage.conditions:
-            bound = condition.bound(balance)
+            bound = condition.bound(task.balance)
             value = float(bound.value(flat))
             if bound.excess(flat) > STAGE_TOLERANCE:
                 given = f"{condition.name} {condition.range}, the closed form gives {value:.4g}"

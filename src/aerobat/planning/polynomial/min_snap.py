@@ -13,18 +13,17 @@ from pydantic import Field, Strict
 from aerobat.arrays import Array
 from aerobat.declaration import AS_IT_IS, Count, NonNegative
 from aerobat.errors import Infeasible, Reason, SpecError, limits_of
-from aerobat.flatness import force_balance
 from aerobat.optimization.deadline import out_of_time, within_time
 from aerobat.planning.certified_solve import Judged, Solution, judge, refuted_by_samples
-from aerobat.planning.passages import PlacedStage
+from aerobat.planning.passages import place_stages
 from aerobat.planning.planners import Planner, option, planner
 from aerobat.planning.polynomial.knots import first_times, fixed_at_knots, unhurried, violated_stage
 from aerobat.planning.recorder import Progress, Recorder
 from aerobat.planning.result import Plan
 from aerobat.planning.search import BisectionSearch, GridSearch, Search
+from aerobat.planning.task import Task
 from aerobat.planning.time_limit import TIME_LIMIT, stopped, too_short
 from aerobat.problem.problem import Problem
-from aerobat.problem.stage import StageSequence
 from aerobat.trajectory import Trajectory
 from aerobat.trajectory.minimum_effort import ContinuityRule, minimum_effort
 from aerobat.vehicle import Vehicle
@@ -103,18 +102,11 @@ class _Planning:
     ) -> None:
         weight = problem.environment.gravity
         thrust = FIRST_GUESS_THRUST_TO_WEIGHT * weight if vehicle is None else vehicle.max_specific_thrust
-        self.config, self.problem, self.vehicle, self.recorder = config, problem, vehicle, recorder
-        body_radius = 0.0 if vehicle is None else vehicle.body_radius
-        self.sequence: StageSequence = problem.stages(thrust, body_radius)
-        self.balance = force_balance(problem.environment, vehicle)
-        still = np.zeros((len(self.sequence.stages), 3))
-        self.durations = first_times(problem, self.fixed(self.sequence, still), thrust)
+        self.config, self.task, self.recorder = config, Task.of(problem, vehicle), recorder
+        fixed = fixed_at_knots(self.task, config.order, np.zeros((len(self.task.stages.stages), 3)))
+        self.durations = first_times(problem, fixed, thrust)
         timed = TimeScaling.ALL if problem.maneuver.first_times is None else TimeScaling.FIRST
         self.scaling = config.time_scaling or timed
-
-    def fixed(self, sequence: StageSequence, velocities: Array) -> Array:
-        """All that a sequence fixes at the knots, given the velocities at its stages [m/s], (K - 2, 3)."""
-        return fixed_at_knots(self.problem, sequence, self.config.order, self.balance, velocities)
 
     def attempt(self, duration: float) -> Judged[None] | None:
         """Outcome of one duration; None unless it meets its stages and the vehicle can fly it.
@@ -124,7 +116,7 @@ class _Planning:
         if self.recorder.attempts and out_of_time():
             return None
         solution = _ClosedForm(self, duration).solve()
-        judged = judge(solution, self.problem, self.vehicle, self.recorder)
+        judged = judge(solution, self.task, self.recorder)
         stopped = len(self.recorder.attempts) == self.config.stop_after
         return judged if judged.feasible or stopped else None
 
@@ -154,22 +146,21 @@ class _Planning:
             else "give the waypoints other times or fix fewer components, or take the planner free-knots"
         )
         sentence = (
-            f"'{self.problem.name}' has no closed-form path that flies at any duration from {shortest:.3g} "
-            f"to {longest.duration:.3g} s: {before}at the last, {longest.outcome}; {remedy}"
+            f"'{self.task.problem.name}' has no closed-form path that flies at any duration from "
+            f"{shortest:.3g} to {longest.duration:.3g} s: {before}at the last, {longest.outcome}; {remedy}"
         )
         return Reason(sentence, limits_of(longest.outcome))
 
     def result(self, found: Judged[None]) -> Plan:
         """The plan of what the search settled on."""
         times = np.cumsum(self.scaled(found.solution.duration))[:-1].tolist()
-        stages = enumerate(zip(self.sequence.stages, times, strict=True))
         return found.plan(
             self.recorder,
             planner="min-snap",
             order=self.config.order,
             status="feasible" if found.feasible else "stopped",
             backend="closed form",
-            stages=tuple(PlacedStage(stage.name, i, time, stage.gate) for i, (stage, time) in stages),
+            stages=place_stages(self.task.stages.stages, range(len(times)), times),
         )
 
 
@@ -186,10 +177,10 @@ class _ClosedForm:
         Speeds at least as high as asked are left free where they come out so, and held at that elsewhere.
         """
         started = perf_counter()
-        planning, problem, order = self.planning, self.planning.problem, self.planning.config.order
-        for sequence in (unhurried(planning.sequence), planning.sequence):
-            trajectory = self._trajectory(sequence)
-            failure = violated_stage(planning.sequence, trajectory, planning.balance)
+        task, order = self.planning.task, self.planning.config.order
+        for begun in (unhurried(task), task):
+            trajectory = self._trajectory(begun)
+            failure = violated_stage(task, trajectory)
             if failure is None:
                 break
         solution = Solution(
@@ -202,31 +193,30 @@ class _ClosedForm:
             cost=trajectory.effort(order),
             failure=failure,
         )
-        return refuted_by_samples(solution, problem, planning.vehicle)
+        return refuted_by_samples(solution, task)
 
-    def _trajectory(self, sequence: StageSequence) -> Trajectory:
+    def _trajectory(self, task: Task) -> Trajectory:
         """The closed form through stages whose drag at the stages is that of its own velocities there.
 
         Those are an affine function of the velocities of which the drag is taken, v ↦ M v + c, found column
         by column; what is wanted is v = M v + c.
         """
-        stages = len(sequence.stages)
+        stages = len(task.stages.stages)
         still = np.zeros((stages, 3))
-        trajectory = self._with_drag_of(sequence, still)
-        if self.planning.balance.drag == 0.0 or not stages:
+        trajectory = self._with_drag_of(task, still)
+        if task.balance.drag == 0.0 or not stages:
             return trajectory
         there = trajectory.knots[1:-1]
         constant = trajectory.evaluate(there, 1).ravel()
         columns = [
-            self._with_drag_of(sequence, unit.reshape(stages, 3)).evaluate(there, 1).ravel() - constant
+            self._with_drag_of(task, unit.reshape(stages, 3)).evaluate(there, 1).ravel() - constant
             for unit in np.eye(still.size)
         ]
         own = np.linalg.solve(np.eye(still.size) - np.array(columns).T, constant)
-        return self._with_drag_of(sequence, np.asarray(own).reshape(stages, 3))
+        return self._with_drag_of(task, np.asarray(own).reshape(stages, 3))
 
-    def _with_drag_of(self, sequence: StageSequence, velocities: Array) -> Trajectory:
+    def _with_drag_of(self, task: Task, velocities: Array) -> Trajectory:
         """The closed form through stages, with the drag of velocities there [m/s], (K - 2, 3)."""
-        planning = self.planning
-        durations = planning.scaled(self.duration)
-        fixed = planning.fixed(sequence, velocities)
-        return minimum_effort(fixed, durations, planning.config.rule, planning.problem.heading)
+        config, durations = self.planning.config, self.planning.scaled(self.duration)
+        fixed = fixed_at_knots(task, config.order, velocities)
+        return minimum_effort(fixed, durations, config.rule, task.problem.heading)

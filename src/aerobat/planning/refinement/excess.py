@@ -27,15 +27,12 @@ class Excess:
     place: tuple[int, float]  # the constraint that is exceeded most, and when [s]
 
     @classmethod
-    def of(
-        cls, trajectory: Trajectory, limits: LimitValues, reserve: float = 0.0, places: int = LOOKED_AT
-    ) -> Excess:
+    def of(cls, trajectory: Trajectory, limits: LimitValues, places: int = LOOKED_AT) -> Excess:
         """Along a trajectory.
 
         Args:
             trajectory: The path.
-            limits: What holds along it.
-            reserve: Of the vehicle's limits' sizes, kept from either end.
+            limits: What holds along it, the reserve included.
             places: Of a segment.
         """
         fractions = np.clip(chebyshev(places), JUST_INSIDE, 1.0 - JUST_INSIDE)
@@ -43,7 +40,7 @@ class Excess:
         derivatives = np.stack(each, axis=2).reshape(-1, DERIVATIVES, 3)
         times = trajectory.knots[:-1, None] + trajectory.durations[:, None] * fractions
         values = limits.values(derivatives, limits.frames(times.ravel(), derivatives))
-        values[:, limits.has_reserve] += reserve
+        values += limits.reserve
         values = values.reshape(trajectory.segments, places, -1)
         values[0, 0, limits.of_path] = values[-1, -1, limits.of_path] = -1.0
         segment, place, side = np.unravel_index(int(np.argmax(values)), values.shape)

@@ -26,9 +26,8 @@ class FlownPath:
     @property
     def flight(self) -> OwnFlight:
         """The findings about the path's own flight, the nominal one."""
-        trajectory, source = self.judged.solution.trajectory, self.judged.solution.source
-        assert trajectory is not None
-        return own_flight(trajectory, self.refinement.vehicle, self.refinement.problem, source.placed)
+        source = self.judged.solution.source
+        return own_flight(self.refinement.task, source.path.trajectory, source.placed)
 
     def through_gates(self) -> tuple[OwnFlight, FlownPath]:
         """Return the flight and the path, or those of a path with more room in gates.
@@ -43,8 +42,8 @@ class FlownPath:
         for reserve in RESERVES:
             if not flight.wants_reserve or out_of_time():
                 break
-            kept = max(reserve, self.refinement.reserve)
-            again = replace(found, refinement=replace(found.refinement, reserve=kept))._refined()
+            task = replace(self.refinement.task, reserve=max(reserve, self.refinement.task.reserve))
+            again = replace(found, refinement=replace(found.refinement, task=task))._refined()
             if again is not None:
                 flight, found = again.flight, again
                 best = min(best, (flight, found), key=lambda pair: pair[0].rank)
@@ -54,7 +53,7 @@ class FlownPath:
         """The path with more room in the gates that a flight did not pass; None where none is found."""
         refinement, stages = self.refinement, self.judged.solution.source.path.stages
         before = refinement.rooms(stages)
-        in_gates = more_direct(before, stages, refinement.problem, refinement.vehicle, flight)
+        in_gates = more_direct(before, stages, refinement.task, flight)
         for _ in range(MAX_HALVINGS if in_gates != before else 0):
             again = replace(self, refinement=replace(refinement, in_gates=in_gates))._refined()
             if again is not None or out_of_time():

@@ -16,16 +16,15 @@ from aerobat import so3
 from aerobat.arrays import Array, Mask
 from aerobat.engines.array_functions import ArrayFunction, array_function, gradient
 from aerobat.engines.tracing import Trace, TraceOps
-from aerobat.environment import Environment
 from aerobat.flatness import axial_drag, has_unequal_drag, lateral_drag, reference_of
 from aerobat.flatness.parallel_transport import frames
 from aerobat.flatness.references import UNDETERMINED, specific_thrust
-from aerobat.kernels.measures import Airframe, measures
+from aerobat.kernels.measures import InertiaAndDrag, measures
 from aerobat.kernels.unequal_drag import BodyMotion
 from aerobat.limits import MEASURES, Limit
+from aerobat.planning.task import Task
 from aerobat.so3 import UP
 from aerobat.states import FlatState
-from aerobat.vehicle import Vehicle
 
 COMPLEX_STEP = 1e-20
 MOVING = slice(1, 6)  # velocity to crackle: what measures depend on
@@ -45,17 +44,14 @@ class Frames:
 class LimitValues:
     """Constraints c ≤ 0 on a path's derivatives, each as a fraction of its limit's size."""
 
-    limits: tuple[Limit, ...]
-    vehicle: Vehicle
-    environment: Environment
-    heading: float  # [rad]
+    task: Task
 
     @cached_property
     def sides(self) -> tuple[tuple[Limit, float], ...]:
         """The limit of each constraint, with -1 for its lower end and 1 for its upper one."""
         return tuple(
             (limit, sign)
-            for limit in self.limits
+            for limit in self.task.held
             for sign, end in zip((-1.0, 1.0), limit.ends, strict=True)
             if isfinite(end)
         )
@@ -66,14 +62,14 @@ class LimitValues:
         return np.array([limit.quantity.is_of_path for limit, _ in self.sides], dtype=bool)
 
     @cached_property
-    def has_reserve(self) -> Mask:
-        """The mask of the constraints from which a reserve for the controller is kept, (c,)."""
-        return np.array([limit.has_reserve for limit, _ in self.sides], dtype=bool)
+    def reserve(self) -> Array:
+        """The reserve for the controller that is kept from each, as a fraction of its limit's size, (c,)."""
+        return np.array([self.task.reserve if limit.has_reserve else 0.0 for limit, _ in self.sides])
 
     def frames(self, times: Array, derivatives: Array) -> Frames:
         """Body axes along a path's derivatives (m, 6, 3) at times (m,)."""
         axes = self._axes(times, derivatives)
-        return Frames(axes, self.environment.weight @ axes, UP @ axes)
+        return Frames(axes, self.task.environment.weight @ axes, UP @ axes)
 
     def values(self, derivatives: Array, near: Frames) -> Array:
         """The constraints at derivatives (m, 6, 3), (m, c), infinite where thrust is against its frame."""
@@ -128,7 +124,7 @@ class LimitValues:
     def _local(self, derivatives: Array, near: Frames) -> Array:
         """Airspeed, acceleration, jerk, snap and crackle in body axes, (15, m)."""
         moving = derivatives[:, MOVING].copy()
-        moving[:, 0] -= self.environment.wind
+        moving[:, 0] -= self.task.environment.wind
         return np.asarray((moving @ near.axes).reshape(len(derivatives), MOTION).T)
 
     def _stepped(self, moving: Array) -> Array:
@@ -140,14 +136,15 @@ class LimitValues:
 
     def _axes(self, times: Array, derivatives: Array) -> Array:
         """Body axes in the world, as columns, (m, 3, 3)."""
+        vehicle, environment, heading = self.task.vehicle, self.task.environment, self.task.problem.heading
         position, velocity, acceleration, jerk, snap = np.moveaxis(derivatives[:, :5], 1, 0)
-        if has_unequal_drag(self.vehicle):
+        if has_unequal_drag(vehicle):
             flat = FlatState(position, velocity, acceleration, jerk, snap)
-            found = reference_of(times, flat, self.vehicle, self.environment, self.heading)
+            found = reference_of(times, flat, vehicle, environment, heading)
             return so3.axes(found.setpoint.q_world_body)
-        airspeed = velocity - self.environment.wind
-        thrust = specific_thrust(self.vehicle, self.environment, airspeed, acceleration, jerk, snap)
-        path = frames(times, thrust, UNDETERMINED * self.environment.gravity, self.heading)
+        airspeed = velocity - environment.wind
+        thrust = specific_thrust(vehicle, environment, airspeed, acceleration, jerk, snap)
+        path = frames(times, thrust, UNDETERMINED * environment.gravity, heading)
         return so3.axes(path.q_world_body[path.samples])
 
     @cached_property
@@ -165,10 +162,10 @@ class LimitValues:
         return array_function(given, outputs), array_function([*given, *weights], gradient(total, motion))
 
     @property
-    def _airframe(self) -> Airframe:
-        vehicle = self.vehicle
+    def _airframe(self) -> InertiaAndDrag:
+        vehicle = self.task.vehicle
         unequal = tuple((vehicle.drag_body / vehicle.mass).tolist()) if has_unequal_drag(vehicle) else None
-        return Airframe(
+        return InertiaAndDrag(
             vehicle.mass, vehicle.inertia.tolist(), lateral_drag(vehicle), axial_drag(vehicle), unequal
         )
 

@@ -17,8 +17,6 @@ import numpy as np
 from aerobat.arrays import Array
 from aerobat.certification import Certificate, Verdict
 from aerobat.errors import Reason
-from aerobat.flatness import force_balance
-from aerobat.limits import limits_along
 from aerobat.limits.body_in_gate import BodyInGate
 from aerobat.limits.path_condition import limit_of
 from aerobat.optimization.deadline import out_of_time, within_share
@@ -26,7 +24,7 @@ from aerobat.optimization.interior_point import InteriorPointResult, Settings, i
 from aerobat.planning.certified_solve import Judged, Solution, certified_solve, judge
 from aerobat.planning.courses import is_course
 from aerobat.planning.gate_clearance import bodies_in_gates
-from aerobat.planning.passages import PlacedStage
+from aerobat.planning.passages import PlacedStage, place_stages
 from aerobat.planning.recorder import Recorder
 from aerobat.planning.refinement.excess import JUST_INSIDE, Excess, chebyshev
 from aerobat.planning.refinement.limit_values import LimitValues
@@ -34,12 +32,10 @@ from aerobat.planning.refinement.program import RefinementProgram
 from aerobat.planning.refinement.spline import END_ORDER, Spline
 from aerobat.planning.refinement.stage_values import StageValues
 from aerobat.planning.rotor_margin import reserve_shortfalls
+from aerobat.planning.task import Task
 from aerobat.planning.warm_start import WarmStart
-from aerobat.problem.condition import ForceBalance
-from aerobat.problem.problem import Problem
 from aerobat.problem.stage import Stage, StageSequence
 from aerobat.trajectory import Trajectory, polynomial
-from aerobat.vehicle import Vehicle
 
 SEGMENTS = 8  # of a maneuver: within a percent of the fastest; twice as many take three times as long
 LEG_SEGMENTS = 2  # of a course's leg
@@ -52,6 +48,9 @@ FINE = Settings(
 ROUGH_ROUNDS = 8  # at most
 FINE_ROUNDS = 10
 MORE_ROUNDS = 1  # of such fine rounds, from a path that is certified on
+FAR_BACKOFF = (
+    0.01  # of a limit's size: where so much was kept on the way, limits are left where they need not
+)
 ROUGH_SHARE = 0.5  # of the time that is left, so that there is some to certify what is found
 ROUGH_PLACES = 16  # of a segment: as many as a polynomial of degree 9 needs
 FINE_PLACES = 24
@@ -86,58 +85,34 @@ class RefinedPath:
         """The path's stages, each in its segment."""
         path = self.path
         numbers = np.searchsorted(path.trajectory.knots[1:-1], path.times, side="left").tolist()
-        stages = zip(path.stages, numbers, path.times, strict=True)
-        return tuple(PlacedStage(s.name, segment, time, s.gate) for s, segment, time in stages)
+        return place_stages(path.stages, numbers, path.times)
 
 
 @dataclass(frozen=True, eq=False)
 class Refinement:
     """The data that all refinements of one problem for one vehicle share."""
 
-    problem: Problem
-    vehicle: Vehicle
-    sequence: StageSequence
+    task: Task
     recorder: Recorder
-    reserve: float = 0.0  # of the range of each of the vehicle's limits, proven of rotors
     in_gates: tuple[BodyInGate, ...] = ()  # that the stages cross
     still_ends: bool = False  # without jerk
     _known: dict[tuple[Stage, ...], StageValues] = field(default_factory=dict, init=False, repr=False)
 
     @classmethod
-    def of(
-        cls,
-        problem: Problem,
-        vehicle: Vehicle,
-        recorder: Recorder,
-        reserve: float = 0.0,
-        still_ends: bool = False,
-    ) -> Refinement:
-        """The refinement of a problem's paths, with room for the body in all gates.
+    def of(cls, task: Task, recorder: Recorder, still_ends: bool = False) -> Refinement:
+        """The refinement of a task's paths, with room for the body in all gates.
 
         Args:
-            problem: What is planned.
-            vehicle: What flies.
+            task: What is planned, with a vehicle.
             recorder: Keeps an attempt a round.
-            reserve: Of the range of each of the vehicle's limits, kept from either end.
             still_ends: Whether ends are without jerk.
         """
-        sequence = problem.stages(vehicle.max_specific_thrust, vehicle.body_radius)
-        in_gates = bodies_in_gates(sequence.stages, problem, vehicle)
-        return cls(problem, vehicle, sequence, recorder, reserve, in_gates, still_ends)
+        return cls(task, recorder, bodies_in_gates(task), still_ends)
 
     @cached_property
     def limits(self) -> LimitValues:
         """Everything that holds all along, but for what others imply."""
-        environment = self.problem.environment
-        conditions = self.sequence.path_constraints
-        along = limits_along(self.vehicle, environment, self.problem.path_limits, conditions)
-        held = tuple(limit for limit in along if not limit.is_implied)
-        return LimitValues(held, self.vehicle, environment, self.problem.heading)
-
-    @cached_property
-    def balance(self) -> ForceBalance:
-        """The balance of thrust, acceleration and drag."""
-        return force_balance(self.problem.environment, self.vehicle)
+        return LimitValues(self.task)
 
     @property
     def with_and_without_rooms(self) -> tuple[Refinement, ...]:
@@ -147,13 +122,12 @@ class Refinement:
     def stage_values(self, stages: tuple[Stage, ...]) -> StageValues:
         """Return the constraints of stages in the order of a path, compiled once."""
         if stages not in self._known:
-            body = self.vehicle.bounding_ellipsoid
-            self._known[stages] = StageValues(stages, self.balance, body, self.rooms(stages))
+            self._known[stages] = StageValues(stages, self.task, self.rooms(stages))
         return self._known[stages]
 
     def rooms(self, stages: tuple[Stage, ...]) -> tuple[BodyInGate, ...]:
         """The body's room in gates, with stages counted in the order of a path."""
-        if self.sequence.ordered:
+        if self.task.stages.ordered:
             return self.in_gates
         gates = [stage.gate for stage in stages]
         return tuple(replace(body, stage=gates.index(body.gate.name)) for body in self.in_gates)
@@ -168,7 +142,7 @@ class Refinement:
         rough = self.rough(guess, segments)
         if self.is_promising(rough):
             return self.finished(rough)
-        return Judged(self.problem, self.vehicle, self.solution(rough, "unknown"), None, False)
+        return Judged(self.task, self.solution(rough, "unknown"), None, False)
 
     def rough(self, guess: WarmStart, segments: int, known: float = np.inf) -> RefinedPath:
         """A path that is as fast as it gets, and may exceed limits a little between places.
@@ -195,7 +169,7 @@ class Refinement:
         before = np.inf
         for number in range(ROUGH_ROUNDS):
             solution = rounds.solve()
-            judge(solution, self.problem, self.vehicle, self.recorder, self.reserve)
+            judge(solution, self.task, self.recorder)
             duration = solution.duration
             gains_little = number and duration > (1.0 - LITTLE_GAIN) * before
             is_over = gains_little or duration > (1.0 + BEHIND) * known
@@ -208,26 +182,26 @@ class Refinement:
     def finished(self, rough: RefinedPath) -> Judged[RefinedPath]:
         """The certified path near a rough one, or the last one that was tried.
 
-        Where the duration still falls, it goes on from the path that is certified.
+        Where the duration still falls, or much was kept from limits on the way, it goes on from the path that
+        is certified.
         """
-        judged = self._finished(rough)
+        judged, is_far = self._finished(rough)
         for _ in range(MORE_ROUNDS):
             solution = judged.solution
-            if not judged.feasible or solution.status == CONVERGED or out_of_time():
+            is_over = solution.status == CONVERGED and not is_far
+            if not judged.feasible or is_over or out_of_time():
                 break
-            again = self._finished(solution.source)
+            again, is_far = self._finished(solution.source)
             if not again.feasible or again.solution.duration >= solution.duration:
                 break
             judged = again
         return judged
 
-    def _finished(self, rough: RefinedPath) -> Judged[RefinedPath]:
-        """The certified path near one, or the last one that was tried."""
+    def _finished(self, rough: RefinedPath) -> tuple[Judged[RefinedPath], bool]:
+        """The certified path near one, or the last one that was tried; True if it keeps far from limits."""
         rounds = Rounds(self, rough.path, FINE, FINE_PLACES, LEAST_RADIUS, rough.multipliers)
         rounds.back_off(rough.excess)
-        return certified_solve(
-            rounds, self.problem, self.vehicle, self.recorder, FINE_ROUNDS, reserve=self.reserve
-        )
+        return certified_solve(rounds, self.task, self.recorder, FINE_ROUNDS), rounds.is_far
 
     def is_promising(self, path: RefinedPath) -> bool:
         """True of a path that meets its stages and exceeds limits by so little that rounds may mend it."""
@@ -236,7 +210,7 @@ class Refinement:
 
     def path(self, guess: WarmStart) -> RefinedPath:
         """A path, looked at densely."""
-        return RefinedPath(guess, Excess.of(guess.trajectory, self.limits, self.reserve))
+        return RefinedPath(guess, Excess.of(guess.trajectory, self.limits))
 
     def solution(
         self, path: RefinedPath, status: str, iterations: int = 0, time: float = 0.0
@@ -275,8 +249,8 @@ class Refinement:
             where = (f"stage '{stage.name}'",)
             flat = np.array([path.trajectory.evaluate(time, k) for k in range(3)])
             for condition in stage.conditions:
-                excess = float(condition.bound(self.balance).excess(flat))
-                if excess > tolerance * limit_of(condition, self.balance).size:
+                excess = float(condition.bound(self.task.balance).excess(flat))
+                if excess > tolerance * limit_of(condition, self.task.balance).size:
                     return Reason(f"the stage '{stage.name}' is missed by {excess:.2g} in SI units", where)
             ball = stage.ball
             away = 0.0 if ball is None else float(np.linalg.norm(flat[0] - ball.centre)) - ball.radius
@@ -308,7 +282,7 @@ class Rounds:
         self._fractions, self._radius = chebyshev(places), radius
         trajectory = guess.trajectory
         self._segments = tuple(_segment_that_ends(trajectory, time) for time in guess.times)
-        kept = np.where(limits.has_reserve, refinement.reserve, 0.0) + BACKOFF
+        kept = limits.reserve + BACKOFF
         self._backoff = np.tile(kept, (trajectory.segments, 1))
         self._multipliers = multipliers
 
@@ -335,7 +309,7 @@ class Rounds:
         excess = solution.source.excess
         self.back_off(excess, MORE_BACKOFF, FINE_BACKOFF)
         if certificate is not None:
-            refuted = _refuted(certificate, self._refinement.reserve)
+            refuted = _refuted(certificate, self._refinement.task.reserve)
             self._backoff += (MORE_BACKOFF * refuted + FINE_BACKOFF) * (excess.nearby > -NEARLY_EXCEEDED)
         self._guess = solution.source.path
         return True
@@ -358,10 +332,15 @@ class Rounds:
         self._backoff += factor * exceeded + more * (exceeded > 0.0)
 
     @property
+    def is_far(self) -> bool:
+        """True where much is kept from some limit, beside the reserve."""
+        return float((self._backoff - self._refinement.limits.reserve).max()) > FAR_BACKOFF
+
+    @property
     def _program(self) -> RefinementProgram:
         """The program around the last path."""
         refinement, guess = self._refinement, self._guess
-        spline = Spline(refinement.problem, refinement.vehicle, guess.trajectory, refinement.still_ends)
+        spline = Spline(refinement.task, guess.trajectory, refinement.still_ends)
         return RefinementProgram(
             spline=spline,
             limits=refinement.limits,

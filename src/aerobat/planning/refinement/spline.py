@@ -18,11 +18,10 @@ from math import log, perm
 import numpy as np
 
 from aerobat.arrays import Array, Indices
-from aerobat.flatness import force_balance, lateral_drag
+from aerobat.flatness import lateral_drag
+from aerobat.planning.task import Task
 from aerobat.problem.end_state import EndState
-from aerobat.problem.problem import Problem
 from aerobat.trajectory import Trajectory, polynomial
-from aerobat.vehicle import Vehicle
 
 END_ORDER = 5  # derivatives at either end of a segment that make its polynomial: position to snap
 DEGREE = 2 * END_ORDER - 1
@@ -95,8 +94,7 @@ class Spline:
     all of it; where any attitude will do, all from acceleration on.
     """
 
-    problem: Problem
-    vehicle: Vehicle
+    task: Task
     begun: Trajectory  # of degree 9
     still_ends: bool = False
 
@@ -145,7 +143,7 @@ class Spline:
     def trajectory(self, x: Array) -> Trajectory:
         """The path of variables (n,)."""
         data, _, _, durations = self._data(x)
-        return Trajectory(durations, TO_COEFFICIENTS @ data, self.problem.heading)
+        return Trajectory(durations, TO_COEFFICIENTS @ data, self.task.problem.heading)
 
     def derivatives(self, x: Array, places: Array) -> Array:
         """Derivatives of position (S, p, 6, 3) at places, (S, p, 6, 10) or (p, 6, 10) as `basis` has them."""
@@ -199,12 +197,12 @@ class Spline:
     @property
     def _shared(self) -> int:
         """The number of derivatives that both neighbours of a knot share."""
-        return END_ORDER if self.vehicle.lags.any() else SNAP
+        return END_ORDER if self.task.vehicle.lags.any() else SNAP
 
     @cached_property
     def _sizes(self) -> Array:
         """What one is of each normalised derivative [m]: what the greatest specific thrust does in h."""
-        length = self.vehicle.max_specific_thrust * self.mean_duration**2 / perm(DEGREE, 2)
+        length = self.task.vehicle.max_specific_thrust * self.mean_duration**2 / perm(DEGREE, 2)
         return np.array([length * perm(DEGREE, k) for k in range(END_ORDER)])
 
     @cached_property
@@ -220,7 +218,7 @@ class Spline:
     def _fixed_data(self) -> Array:
         """What the ends fix of the derivatives, in SI units, zero elsewhere, (S, 10, 3)."""
         fixed = np.zeros((self.segments, 2 * END_ORDER, 3))
-        drag = lateral_drag(self.vehicle)
+        drag = lateral_drag(self.task.vehicle)
         for segment, first, state in self._end_states:
             for order in state.asked:
                 fixed[segment, first + order] = state.derivatives(JERK)[order]
@@ -237,12 +235,12 @@ class Spline:
     @property
     def _end_states(self) -> tuple[tuple[int, int, EndState], ...]:
         """The segment, the row of its position and the state of both ends."""
-        return (0, 0, self.problem.start), (self.segments - 1, END_ORDER, self.problem.goal)
+        problem = self.task.problem
+        return (0, 0, problem.start), (self.segments - 1, END_ORDER, problem.goal)
 
     def _thrust_direction(self, state: EndState) -> Array:
         """Where the thrust points at an end, (3,)."""
-        balance = force_balance(self.problem.environment, self.vehicle)
-        thrust = balance.specific_thrust(state.velocity, state.acceleration)
+        thrust = self.task.balance.specific_thrust(state.velocity, state.acceleration)
         return np.asarray(thrust / np.linalg.norm(thrust))
 
     @cached_property

@@ -17,11 +17,10 @@ from aerobat.limits import Limit
 from aerobat.limits.body_in_gate import BodyInGate, OpeningAhead, extent_of_thrust
 from aerobat.limits.path_condition import limit_of
 from aerobat.planning.refinement.limit_values import COMPLEX_STEP
+from aerobat.planning.task import Task
 from aerobat.problem.ball import Ball
-from aerobat.problem.condition import ForceBalance
 from aerobat.problem.problem import DERIVATIVES
 from aerobat.problem.stage import Stage
-from aerobat.vehicle import Ellipsoid
 
 KNOWN = 3  # derivatives that stages ask of: position, velocity, acceleration
 STATE = 3 * KNOWN  # their components
@@ -36,8 +35,7 @@ class StageValues:
     """
 
     stages: tuple[Stage, ...]
-    balance: ForceBalance
-    body: Ellipsoid
+    task: Task
     in_gates: tuple[BodyInGate, ...] = ()
 
     def inequalities(self, derivatives: Array) -> Array:
@@ -121,7 +119,7 @@ class StageValues:
             (k, *row, condition.lower == condition.upper)
             for k, stage in enumerate(self.stages)
             for condition in stage.conditions
-            for row in _sides(limit_of(condition, self.balance), condition.lower == condition.upper)
+            for row in _sides(limit_of(condition, self.task.balance), condition.lower == condition.upper)
         ]
         return (
             np.array([row[0] for row in rows], dtype=np.intp),
@@ -144,17 +142,18 @@ class StageValues:
         """Of each gate, what is missing of the room, and slopes by the state of its weighted sum."""
         return tuple(self._room_functions(body) for body in self.in_gates)
 
-    def _room_functions(self, body: BodyInGate) -> tuple[ArrayFunction, ArrayFunction]:
+    def _room_functions(self, room: BodyInGate) -> tuple[ArrayFunction, ArrayFunction]:
         trace = Trace()
         ops = TraceOps(trace)
         position, velocity, acceleration = (trace.vector(name) for name in DERIVATIVES[:KNOWN])
-        parameters = [trace.input(f"opening {i}") for i in range(len(body.parameters))]
-        thrust = add(add_scaled(acceleration, self.balance.drag, velocity), xyz(self.balance.constant))
-        extent = extent_of_thrust(ops, self.body, thrust)
+        parameters = [trace.input(f"opening {i}") for i in range(len(room.parameters))]
+        balance, body = self.task.balance, self.task.vehicle.bounding_ellipsoid
+        thrust = add(add_scaled(acceleration, balance.drag, velocity), xyz(balance.constant))
+        extent = extent_of_thrust(ops, body, thrust)
         *sides, speed = OpeningAhead.of_parameters(parameters).room(ops, position, velocity, extent)
-        size = body.gate.opening.inradius * body.min_speed
+        size = room.gate.opening.inradius * room.min_speed
         missing: list[Symbol] = [trace.symbol(-1.0 / size * side) for side in sides]
-        missing.append(trace.symbol(-1.0 / body.min_speed * speed))
+        missing.append(trace.symbol(-1.0 / room.min_speed * speed))
         weights = [trace.input(f"weights {i}") for i in range(len(missing))]
         total = trace.symbol(sum(w * value for w, value in zip(weights, missing, strict=True)))
         state = [*position, *velocity, *acceleration]

@@ -11,7 +11,7 @@ from aerobat.certification import Certificate
 from aerobat.optimization.deadline import out_of_time
 from aerobat.optimization.nonlinear import NonlinearResult, solve_nonlinear
 from aerobat.planning.certified_solve import Solution
-from aerobat.planning.passages import PlacedStage
+from aerobat.planning.passages import PlacedStage, place_stages
 from aerobat.planning.time_optimal.optimal_control.boundary import ClosedLap, FixedEnds
 from aerobat.planning.time_optimal.optimal_control.bounds import Backoff
 from aerobat.planning.time_optimal.optimal_control.collocation import (
@@ -22,7 +22,7 @@ from aerobat.planning.time_optimal.optimal_control.collocation import (
 )
 from aerobat.planning.time_optimal.optimal_control.elements import Elements
 from aerobat.planning.time_optimal.optimal_control.program import OptimalControl
-from aerobat.planning.time_optimal.starts import Start, initial_motion
+from aerobat.planning.time_optimal.start import Start, initial_motion
 from aerobat.planning.warm_start import WarmStart
 from aerobat.trajectory import Trajectory
 
@@ -43,7 +43,7 @@ class SolvedMotion:
     def trajectory(self) -> Trajectory:
         """The motion's trajectory."""
         elements = self.program.control.elements
-        mesh, heading = self.program.mesh, elements.problem.heading
+        mesh, heading = self.program.mesh, elements.task.problem.heading
         if not self.program.control.boundary.is_closed:
             return trajectory_of(elements.body, mesh, self.motion, heading)
         return closed(trajectory_of(elements.body, mesh, self.motion.closed, heading))
@@ -51,10 +51,10 @@ class SolvedMotion:
     @property
     def placed(self) -> tuple[PlacedStage, ...]:
         """When the motion passes its stages."""
-        ends = np.cumsum(self.program.mesh.intervals).tolist()
-        times = np.cumsum(self.motion.phases).tolist()
-        stages = zip(self.program.control.stages, ends, times, strict=False)
-        return tuple(PlacedStage(s.name, end - 1, time, s.gate) for s, end, time in stages)
+        stages = self.program.control.stages
+        latest = np.cumsum(self.program.mesh.intervals) - 1
+        times = np.cumsum(self.motion.phases)
+        return place_stages(stages, latest[: len(stages)].tolist(), times[: len(stages)].tolist())
 
     @property
     def failure(self) -> str:
@@ -116,7 +116,7 @@ class CollocatedProgram:
         self.backoff = Backoff.none(self.mesh.total, elements.bounds)
         self._barrier = barrier
         self._multipliers: tuple[Array, Array] | None = None
-        self._x = self.mesh.pack(initial_motion(start, self.mesh, elements.problem, elements.vehicle))
+        self._x = self.mesh.pack(initial_motion(start, self.mesh, elements.task))
         self._ahead: Solution[SolvedMotion] | None = None
 
     def solve_ahead(self) -> None:
@@ -172,8 +172,9 @@ class CollocatedProgram:
 
 def optimal_control(elements: Elements, start: Start, reserve: float) -> OptimalControl:
     """The optimal control through the stages in the order of a start, a reserve kept from rotors' limits."""
-    floor = max(elements.bounds.floor.lower, THRUST_RESERVE * reserve * elements.vehicle.max_specific_thrust)
-    boundary = FixedEnds(elements) if elements.problem.ends else ClosedLap(elements)
+    kept = THRUST_RESERVE * reserve * elements.task.vehicle.max_specific_thrust
+    floor = max(elements.bounds.floor.lower, kept)
+    boundary = ClosedLap(elements) if elements.task.stages.closed else FixedEnds(elements)
     return OptimalControl(
         elements=elements,
         boundary=boundary,

@@ -13,11 +13,11 @@ from aerobat.planning.courses import is_course
 from aerobat.planning.flyability import OwnFlight, own_flight
 from aerobat.planning.gate_clearance import cleared, more_direct
 from aerobat.planning.recorder import Attempt, Recorder
+from aerobat.planning.task import Task
 from aerobat.planning.time_optimal.collocated_program import CollocatedProgram, SolvedMotion
 from aerobat.planning.time_optimal.optimal_control.elements import Elements
-from aerobat.planning.time_optimal.starts import Start
+from aerobat.planning.time_optimal.start import Start
 from aerobat.planning.warm_start import MIN_INTERVALS
-from aerobat.problem.problem import Problem
 from aerobat.vehicle import Vehicle
 
 COARSE_INTERVALS = 24  # in all, of first solves, whose durations come a few percent too long
@@ -44,19 +44,17 @@ AHEAD_TIME = 0.7  # of what is left then for the first of each fine one
 class Race:
     """One run of the planner."""
 
-    problem: Problem
-    vehicle: Vehicle
+    task: Task
     recorder: Recorder
     intervals: int  # of the fine mesh
     iterations: int  # of each solve, at most
-    reserve: float  # of each rotor's range
     durations: tuple[float, ...] = ()  # [s] that starts came to on the coarse mesh, rising
     _elements: dict[tuple[bool, bool], Elements] = field(default_factory=dict)
 
     @cached_property
     def on_course(self) -> bool:
         """True of a course, whose starts lead to much the same motion: the first that converges will do."""
-        return is_course(self.problem.stages(self.vehicle.max_specific_thrust))
+        return is_course(self.task.stages)
 
     def winner(self, starts: Sequence[Start], body: Vehicle) -> Judged[SolvedMotion] | None:
         """The fastest that is certified, of the finalists; of the others the first, if none of them is.
@@ -84,7 +82,7 @@ class Race:
         The motion is made more direct through gates, then given more reserve. Where no reserve is wanted the
         reserve stays as it is, and where none is enough the best motion is returned.
         """
-        best, reserve = cleared(found, self._own_flight, self._more_direct), self.reserve
+        best, reserve = cleared(found, self._own_flight, self._more_direct), self.task.reserve
         found = best[1]
         for _ in range(RESERVE_RAISES if reserve > 0.0 else 0):
             if not best[0].wants_reserve or out_of_time():
@@ -101,10 +99,10 @@ class Race:
         """What is found with more room in the gates that a flight did not pass, if anything is."""
         solved = found.solution.source
         before, control = solved.program.start.in_gates, solved.program.control
-        in_gates = more_direct(before, control.stages, self.problem, self.vehicle, flight)
+        in_gates = more_direct(before, control.stages, self.task, flight)
         if in_gates == before:
             return None
-        return self._certified(self._fine(control.elements, solved, self.reserve, in_gates))
+        return self._certified(self._fine(control.elements, solved, self.task.reserve, in_gates))
 
     def _coarse(self, starts: Sequence[Start], body: Vehicle) -> list[CollocatedProgram]:
         """Fine programs from where coarse ones end, the fastest first."""
@@ -116,7 +114,7 @@ class Race:
             solved = CollocatedProgram(
                 elements,
                 start,
-                self.reserve,
+                self.task.reserve,
                 elements.mesh(self._coarse_intervals(start)),
                 min(COURSE_COARSE_ITERATIONS if self.on_course else COARSE_ITERATIONS, self.iterations),
                 COARSE_TOLERANCE,
@@ -126,7 +124,7 @@ class Race:
                 usable = solved.answer.converged
             self._record(solved, usable)
             if usable:
-                ended.append(self._fine(elements, solved, self.reserve))
+                ended.append(self._fine(elements, solved, self.task.reserve))
         ended.sort(key=lambda program: program.duration)
         self.durations = tuple(program.duration for program in ended)
         return ended
@@ -155,19 +153,17 @@ class Race:
 
     def _elements_for(self, start: Start, body: Vehicle) -> Elements:
         """The functions of programs in the start's plane or in space, which starts share."""
-        key = start.plane is None, body is self.vehicle
+        key = start.plane is None, body is self.task.vehicle
         if key not in self._elements:
-            self._elements[key] = Elements(self.problem, body, start.plane)
+            self._elements[key] = Elements(replace(self.task, vehicle_if_any=body), start.plane)
         return self._elements[key]
 
     def _own_flight(self, found: Judged[SolvedMotion]) -> OwnFlight:
         solved = found.solution.source
-        return own_flight(solved.trajectory, self.vehicle, self.problem, solved.placed)
+        return own_flight(self.task, solved.trajectory, solved.placed)
 
     def _certified(self, program: CollocatedProgram) -> Judged[SolvedMotion] | None:
-        found = certified_solve(
-            program, self.problem, self.vehicle, self.recorder, ROUNDS, reserve=self.reserve
-        )
+        found = certified_solve(program, self.task, self.recorder, ROUNDS)
         return found if found.feasible else None
 
     def _record(self, solved: SolvedMotion, usable: bool) -> None:

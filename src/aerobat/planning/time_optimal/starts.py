@@ -8,25 +8,22 @@ from itertools import islice
 
 import numpy as np
 
-from aerobat import so3
 from aerobat.arrays import Array
 from aerobat.errors import Infeasible
-from aerobat.flatness import force_balance, reference
-from aerobat.limits.body_in_gate import BodyInGate
 from aerobat.planning.courses import is_course
 from aerobat.planning.gate_clearance import bodies_in_gates
-from aerobat.planning.miqp import Miqp
+from aerobat.planning.miqp.miqp import Miqp
 from aerobat.planning.planners import Planner
 from aerobat.planning.polynomial.knots import path_along_normals, start_along_normals
 from aerobat.planning.polynomial.min_snap import MinSnap
 from aerobat.planning.result import Plan
-from aerobat.planning.time_optimal.optimal_control.collocation import CollocatedMotion, Mesh
+from aerobat.planning.task import Task
+from aerobat.planning.time_optimal.start import Start
 from aerobat.planning.warm_start import WarmStart
 from aerobat.problem.end_state import at_rest
 from aerobat.problem.maneuvers.line import Line
 from aerobat.problem.problem import Problem
 from aerobat.problem.stage import Stage, StageSequence
-from aerobat.so3 import UP
 from aerobat.trajectory import Trajectory
 from aerobat.trajectory.minimum_effort import ORDERS
 from aerobat.vehicle import Vehicle
@@ -40,17 +37,6 @@ ASIDE = 0.1  # of a path's length, by which it is bent out of its plane: symmetr
 
 
 @dataclass(frozen=True, eq=False)
-class Start:
-    """A motion to begin from, whether it is kept in its plane, and where it comes from."""
-
-    guess: WarmStart
-    plane: Array | None  # the normal of the plane that is kept, (3,)
-    aside: Array  # [m] by which positions are moved halfway, less before and after, (3,)
-    origin: str
-    in_gates: tuple[BodyInGate, ...] = ()  # those that the stages of `guess` cross
-
-
-@dataclass(frozen=True, eq=False)
 class Starts:
     """Motions to begin from, the likeliest first, and the plans among them that will do as they are."""
 
@@ -58,14 +44,11 @@ class Starts:
     plans: tuple[Plan, ...]  # certified for the vehicle
 
 
-def starts(
-    problem: Problem, vehicle: Vehicle, guess: Miqp, planar: bool, count: int, first: Plan | None
-) -> Starts:
+def starts(task: Task, guess: Miqp, planar: bool, count: int, first: Plan | None) -> Starts:
     """So many motions to begin from; all in the maneuver's vertical plane where that is asked.
 
     Args:
-        problem: What is planned.
-        vehicle: What flies it.
+        task: What is planned.
         guess: The mixed-integer planner that plans for the vehicle's rotors, then without.
         planar: Whether plans that lie in a plane keep to it.
         count: How many.
@@ -74,41 +57,38 @@ def starts(
     Raises:
         Infeasible: A stage asks more thrust than the vehicle has.
     """
-    sequence = problem.stages(vehicle.max_specific_thrust, vehicle.body_radius)
-    in_gates = bodies_in_gates(sequence.stages, problem, vehicle) if is_course(sequence) else ()
+    sequence = task.stages
+    in_gates = bodies_in_gates(task) if is_course(sequence) else ()
     if sequence.closed:
-        laps = [
-            (flying_lap(problem, vehicle, sequence, order), f"minimum {ORDERS[order]}") for order in (3, 4)
-        ]
+        laps = [(flying_lap(task, order), f"minimum {ORDERS[order]}") for order in (3, 4)]
         found = tuple(islice(in_space(_variations(laps, False)), count))
         return Starts(tuple(replace(start, in_gates=in_gates) for start in found), ())
     if is_course(sequence):
         plans = [] if first is None else [(first, f"{first.planner}'s plan")]
-        sources = [*_sources(plans, sequence), *_closed_forms(problem, vehicle, sequence)]
+        sources = [*_sources(plans, sequence), *_closed_forms(task)]
     else:
-        plans = list(_plans(problem, vehicle, guess, first))
-        sources = list(_sources(plans, sequence)) or list(_closed_forms(problem, vehicle, sequence))
-    own = tuple(plan for plan, _ in plans if plan.certified and plan.vehicle == vehicle)
+        plans = list(_plans(task.problem, task.vehicle, guess, first))
+        sources = list(_sources(plans, sequence)) or list(_closed_forms(task))
+    own = tuple(plan for plan, _ in plans if plan.certified and plan.vehicle == task.vehicle)
     motions = islice(_variations(sources, planar), count)
     return Starts(tuple(replace(start, in_gates=in_gates) for start in motions), own)
 
 
-def flying_lap(problem: Problem, vehicle: Vehicle, sequence: StageSequence, order: int) -> WarmStart:
+def flying_lap(task: Task, order: int) -> WarmStart:
     """A lap of the closed form through a closed sequence as a start: of three in a row the middle one.
 
     From a rest at its last place to one at its first, laps begin and end half-way in time between those two.
 
     Args:
-        problem: Its gates and its environment count.
-        vehicle: What flies it.
-        sequence: The stages, in order.
+        task: With a closed course.
         order: The derivative of position whose square is minimized.
     """
+    problem, sequence = task.problem, task.stages
     places = [place for stage in sequence.stages if (place := _place(stage, problem)) is not None]
     lap = (Stage("seam"), *sequence.stages)
     laps = replace(sequence, stages=(*UNROLLED * lap, Stage("seam")), closed=False)
     open_ends = replace(problem, maneuver=Line(), start=at_rest(places[-1]), goal=at_rest(places[0]))
-    path = path_along_normals(open_ends, vehicle, laps, order)
+    path = path_along_normals(replace(task, problem=open_ends, stages=laps), order)
     first = 1 + len(lap) * (UNROLLED // 2)  # the knot at which the middle lap begins
     segments = slice(first, first + len(lap))
     middle = Trajectory(path.durations[segments], path.coefficients[segments], problem.heading)
@@ -127,12 +107,10 @@ def in_space(starts: Iterator[Start]) -> Iterator[Start]:
     return (start for start in starts if start.plane is None)
 
 
-def _closed_forms(
-    problem: Problem, vehicle: Vehicle, sequence: StageSequence
-) -> Iterator[tuple[WarmStart, str]]:
+def _closed_forms(task: Task) -> Iterator[tuple[WarmStart, str]]:
     """Minimum-effort paths through the stages, stretched until rotors nearly follow them."""
     for order in (3, 4):
-        yield start_along_normals(problem, vehicle, sequence, order), f"minimum {ORDERS[order]}"
+        yield start_along_normals(task, order), f"minimum {ORDERS[order]}"
 
 
 def _sources(plans: Sequence[tuple[Plan, str]], sequence: StageSequence) -> Iterator[tuple[WarmStart, str]]:
@@ -208,51 +186,3 @@ def _at_other_pace(start: WarmStart, factors: Array) -> WarmStart:
     durations = trajectory.durations * factors[np.searchsorted(start.times, middles)]
     times = np.cumsum(start.phases * factors)[:-1]
     return replace(start, trajectory=replace(trajectory, durations=durations), times=tuple(times.tolist()))
-
-
-def initial_motion(start: Start, mesh: Mesh, problem: Problem, vehicle: Vehicle) -> CollocatedMotion:
-    """States and inputs of the vehicle along a start at the mesh's nodes, inputs within twice their scale.
-
-    Args:
-        start: The motion to begin from.
-        mesh: Its phases and nodes.
-        problem: Its environment counts.
-        vehicle: What flies.
-    """
-    environment = problem.environment
-    guess = start.guess
-    times = np.concatenate([[0.0], np.cumsum(mesh.durations(guess.phases))])
-    times = np.minimum(times, guess.trajectory.duration)
-    setpoint = reference(guess.trajectory, vehicle, times, environment=environment).setpoint
-    flat = setpoint.flat
-    thrust = force_balance(environment, vehicle).specific_thrust(flat.velocity, flat.acceleration)
-    attitude, turning = setpoint.q_world_body, (setpoint.omega_body, setpoint.omega_dot_body)
-    if not problem.ends:
-        attitude, turning = _without_twist(attitude, turning, times / times[-1])
-    rates, accelerations = (vectors[:, :2] for vectors in turning)
-    place = flat.position + np.sin(np.pi * times / times[-1])[:, None] * start.aside
-    states = np.concatenate([place, flat.velocity, attitude, rates], axis=1).T
-    norm = np.linalg.norm(thrust, axis=-1)[:, None]
-    inputs = np.concatenate([norm, accelerations], axis=1).T
-    bound = 2.0 * mesh.input_scale[:, None]
-    inputs = np.clip(inputs, -bound, bound)
-    return CollocatedMotion(guess.phases, states, inputs[:, :-1], inputs[:, 1:])
-
-
-def _without_twist(
-    attitude: Array, vectors: tuple[Array, Array], fractions: Array
-) -> tuple[Array, tuple[Array, Array]]:
-    """Attitudes along a lap turned about the thrust axis, evenly, so that the last is as the first.
-
-    What is carried along a lap without spin comes back turned, by the solid angle about which thrust went.
-
-    Args:
-        attitude: Of the body, (K, 4).
-        vectors: In body axes, (K, 3) each.
-        fractions: Of the lap's duration, (K,).
-    """
-    twist = so3.multiply(so3.conjugate(attitude[0]), attitude[-1])
-    angle = 2.0 * np.arctan2(twist[3], twist[0])
-    turn = so3.about_axis(UP, -np.arctan2(np.sin(angle), np.cos(angle)) * fractions)
-    omega, omega_dot = (so3.rotate(so3.conjugate(turn), each) for each in vectors)
-    return so3.multiply(attitude, turn), (omega, omega_dot)

@@ -21,13 +21,13 @@ from aerobat.declaration import AS_IT_IS, Count, NonNegative
 from aerobat.errors import Infeasible, Reason, SpecError, limits_of
 from aerobat.optimization.deadline import out_of_time, within_time
 from aerobat.optimization.nonlinear import import_casadi
-from aerobat.planning.miqp import Miqp
+from aerobat.planning.miqp.miqp import Miqp
 from aerobat.planning.planners import Planner, option, planner
 from aerobat.planning.recorder import Progress, Recorder
 from aerobat.planning.result import FLYING_RESERVE, Plan
 from aerobat.planning.rotor_margin import reserve_shortfalls
 from aerobat.planning.time_limit import TIME_LIMIT, stopped, too_short
-from aerobat.planning.warm_start import MIN_INTERVALS, Reserve, require_attitudes
+from aerobat.planning.warm_start import MIN_INTERVALS, Reserve, flown_task
 from aerobat.problem.problem import Problem
 from aerobat.vehicle import Vehicle
 
@@ -85,17 +85,17 @@ class TimeOptimal(Planner):
         from aerobat.planning.time_optimal.race import Race, with_smoother
         from aerobat.planning.time_optimal.starts import starts
 
-        vehicle = require_attitudes("time-optimal", problem, vehicle)
+        task = flown_task("time-optimal", problem, vehicle, self.reserve)
         if np.isfinite(problem.path_limits.of(BOUNDED_DERIVATIVES)[1]).any():
             raise SpecError(
                 "limits.crackle cannot be held by the time-optimal planner, whose moments jump; drop it"
             )
         import_casadi()
-        race = Race(problem, vehicle, Recorder(progress), self.intervals, self.iterations, self.reserve)
+        race = Race(task, Recorder(progress), self.intervals, self.iterations)
         attempts = race.recorder.attempts
         with within_time(self.time_limit):
-            begun = starts(problem, vehicle, self.guess, self.planar, self.starts, self.start)
-            for body in with_smoother(vehicle, SMOOTHING_LAG):
+            begun = starts(task, self.guess, self.planar, self.starts, self.start)
+            for body in with_smoother(task.vehicle, SMOOTHING_LAG):
                 found = race.winner(begun.motions, body)
                 own = None if found is None else _plan(race.flyable(found), race)
                 if out_of_time():
@@ -104,7 +104,7 @@ class TimeOptimal(Planner):
                     return own
         last = attempts[-1].outcome
         sentence = (
-            f"no motion of '{problem.name}' was found that {vehicle.name} can do: at the last attempt "
+            f"no motion of '{problem.name}' was found that {task.vehicle.name} can do: at the last attempt "
             f"{last}; ask less of its stages and limits, or give more intervals"
         )
         raise Infeasible(Reason(sentence, limits_of(last)), attempts)
@@ -120,9 +120,9 @@ def _best_so_far(own: Plan | None, begun: Starts, race: Race, limit: float | Non
     if own is not None and (start is None or own.duration <= start.duration):
         return own
     if start is None:
-        raise too_short(race.problem, limit, attempts)
+        raise too_short(race.task.problem, limit, attempts)
     instead = f"time-optimal found none faster in time than the path that it began from, {start.planner}'s"
-    shortfalls = [] if start.certificate is None else reserve_shortfalls(start.certificate, race.reserve)
+    shortfalls = [] if start.certificate is None else reserve_shortfalls(start.certificate, race.task.reserve)
     if shortfalls:
         instead += f", whose {shortfalls[0]}"
     return replace(start, planner="time-optimal", attempts=attempts, rescue=instead)

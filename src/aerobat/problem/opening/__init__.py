@@ -6,16 +6,16 @@ at a clearance from the edges, along which directions a body that passes is meas
 
 from aerobat.problem.opening.circle import Circle
 from aerobat.problem.opening.polygon import Corners, Polygon, Rectangle
-from aerobat.problem.opening.shape import Edge, LinearBounds, OpeningShape, Probe, edge_name
+from aerobat.problem.opening.shape import Edge, EdgeProbe, LinearBounds, OpeningShape, edge_name
 
 __all__ = [
     "Circle",
     "Corners",
     "Edge",
+    "EdgeProbe",
     "LinearBounds",
     "OpeningShape",
     "Polygon",
-    "Probe",
     "Rectangle",
     "edge_name",
 ]

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from aerobat.arrays import Array
-from aerobat.problem.opening.shape import Edge, LinearBounds, OpeningShape, Probe
+from aerobat.problem.opening.shape import Edge, EdgeProbe, LinearBounds, OpeningShape
 
 CIRCLE_POINTS = 48  # of a circle's outline, and of the frame around it
 CIRCLE_SIDES = 24  # of the polygon in a circle that planners take: 0.9 % of the radius is lost
@@ -40,10 +40,10 @@ class Circle(OpeningShape):
         return "round, "
 
     @property
-    def probes(self) -> tuple[Probe, ...]:
+    def probes(self) -> tuple[EdgeProbe, ...]:
         """Half of the directions around it, both ways each."""
         half = _directions(CIRCLE_SIDES)[: CIRCLE_SIDES // 2]
-        return tuple(Probe((x, y), self.radius, True, True) for x, y in half.tolist())
+        return tuple(EdgeProbe((x, y), self.radius, True, True) for x, y in half.tolist())
 
     @property
     def sides(self) -> tuple[Array, Array]:

@@ -12,7 +12,7 @@ from pydantic import Field, PlainValidator
 
 from aerobat.arrays import Array
 from aerobat.declaration import FieldError, finite, shown
-from aerobat.problem.opening.shape import Edge, LinearBounds, OpeningShape, Probe
+from aerobat.problem.opening.shape import Edge, EdgeProbe, LinearBounds, OpeningShape
 
 STRAIGHT = 1e-6  # [-] the sine of a turn that is none
 FARTHEST = 1e15  # [m] likewise of all lengths in files
@@ -50,10 +50,12 @@ class Polygon(OpeningShape):
         return normals, np.sum(normals * self.corners, axis=1)
 
     @property
-    def probes(self) -> tuple[Probe, ...]:
+    def probes(self) -> tuple[EdgeProbe, ...]:
         """The sides of the polygon, each a probe."""
         normals, distances = self.sides
-        return tuple(Probe((x, y), d) for (x, y), d in zip(normals.tolist(), distances.tolist(), strict=True))
+        return tuple(
+            EdgeProbe((x, y), d) for (x, y), d in zip(normals.tolist(), distances.tolist(), strict=True)
+        )
 
     @property
     def edges(self) -> tuple[Edge, ...]:
@@ -153,9 +155,9 @@ class Rectangle(Polygon):
         return ""
 
     @property
-    def probes(self) -> tuple[Probe, ...]:
+    def probes(self) -> tuple[EdgeProbe, ...]:
         """Across and up, both ways each."""
-        return Probe((1.0, 0.0), self.width / 2.0, True), Probe((0.0, 1.0), self.height / 2.0, True)
+        return EdgeProbe((1.0, 0.0), self.width / 2.0, True), EdgeProbe((0.0, 1.0), self.height / 2.0, True)
 
     @property
     def inradius(self) -> float:

@@ -13,7 +13,7 @@ from aerobat.arrays import Array
 SHARPEST = 4.0  # by which a frame's outer corner may lie farther out than its bars are thick
 
 
-class Probe(NamedTuple):
+class EdgeProbe(NamedTuple):
     """A direction in which a body that passes is measured against an opening."""
 
     direction: tuple[float, float]  # unit vector (left, up)
@@ -48,7 +48,7 @@ class OpeningShape(ABC):
 
     @property
     @abstractmethod
-    def probes(self) -> tuple[Probe, ...]:
+    def probes(self) -> tuple[EdgeProbe, ...]:
         """The directions in which a body that passes is measured; all within their limits, it is inside."""
 
     @property

@@ -24,8 +24,9 @@ FILLS = {  # of cells without a plan that flies
     Feasibility.REFUSED: HAIR,
     Feasibility.NO_ANSWER: PAPER,
 }
-MAX_WIDTH, MAX_HEIGHT = 9.6, 6.5  # [in] of a grid
-CELL = (1.1, 0.5)  # [in] of one of its cells, at most
+WIDTH, HEIGHTS = 9.6, (2.6, 6.5)  # [in] of a grid: across the page, and as high as its rows ask
+CELL_HEIGHT = 0.5  # [in] of one of its cells, where that is within these heights
+TICK_WIDTH = 0.37  # [in] of a number under a grid
 LINE = 2.6  # [in] the height of a line's axes
 ROW = 0.2  # [in] of the legend
 BAR = 0.14  # [in] the width of the scale of durations
@@ -65,8 +66,7 @@ def _size(found: FeasibilityMap) -> tuple[float, float]:
     """Width and height of the axes [in]."""
     if len(found.axes) == 1:
         return PAGE_WIDTH - COLUMNS[0] - MARGIN, LINE
-    rows, columns = (len(axis.values) for axis in found.axes)
-    return min(CELL[0] * columns, MAX_WIDTH), min(CELL[1] * rows, MAX_HEIGHT)
+    return WIDTH, float(np.clip(CELL_HEIGHT * len(found.axes[0].values), *HEIGHTS))
 
 
 def _draw_grid(figure: Figure, axes: Axes, found: FeasibilityMap) -> None:
@@ -77,7 +77,7 @@ def _draw_grid(figure: Figure, axes: Axes, found: FeasibilityMap) -> None:
     axes.imshow(colours.reshape(rows, columns, 4), origin="lower", aspect="auto", interpolation="nearest")
     for axis, set_ticks, set_label, size in (
         (found.axes[0], axes.set_yticks, axes.set_ylabel, _size(found)[1] / ROW),
-        (found.axes[1], axes.set_xticks, axes.set_xlabel, _size(found)[0] / CELL[0] * 3.0),
+        (found.axes[1], axes.set_xticks, axes.set_xlabel, WIDTH / TICK_WIDTH),
     ):
         step = max(1, int(np.ceil(len(axis.values) / size)))
         places = np.arange(0, len(axis.values), step)

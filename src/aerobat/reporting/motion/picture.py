@@ -17,7 +17,7 @@ from aerobat.problem.gate import Gate
 from aerobat.reporting.page import AXIS, Place, house_style, panel, write
 from aerobat.reporting.panels import timelines
 from aerobat.reporting.panels.poses import PoseHistory, actual_poses, plan_reference, reference_poses
-from aerobat.reporting.scene.axes_box import box_around, draw_axes_box
+from aerobat.reporting.scene.axes_box import box_around, draw_axes_box, room_for_box
 from aerobat.reporting.scene.camera import Camera, best_view
 from aerobat.reporting.scene.glyphs import (
     enlargement,
@@ -165,7 +165,7 @@ class MovingPicture:
         box = box_around(np.concatenate([*points, gate_corners(subject.gates)]), 0.6 * reach)
         self._floor = float(box.lower[2])
         size = np.array(SCENE[2:])
-        camera = best_view(subject.reference.path, subject.gates, box.corners, size)
+        camera = best_view(subject.reference.path, subject.gates, box.corners, room_for_box(size))
         draw_axes_box(self._scene, box, camera)
         return camera
 

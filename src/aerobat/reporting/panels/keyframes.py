@@ -77,6 +77,11 @@ class Keyframes:
         instants = tuple(self.instants[k] for k in kept)
         return Keyframes(instants, self.position[kept], self.q_world_body[kept], self.thrust[kept])
 
+    def numbered(self) -> Keyframes:
+        """The same, each with its number before its name, as timelines count stages."""
+        instants = tuple(replace(each, name=f"{k} {each.name}") for k, each in enumerate(self.instants, 1))
+        return replace(self, instants=instants)
+
     def storyboard(self, plane: ManeuverPlane, downward: bool, pitch: float) -> tuple[Keyframes, Array]:
         """The same in a row, each turned about the vertical until its thrust lies in the plane.
 

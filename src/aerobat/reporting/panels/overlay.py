@@ -13,7 +13,7 @@ from aerobat.problem.gate import Gate
 from aerobat.reporting.page import size_of
 from aerobat.reporting.panels.keyframes import plane_of
 from aerobat.reporting.panels.path import mark_ends
-from aerobat.reporting.scene.axes_box import box_around, draw_axes_box
+from aerobat.reporting.scene.axes_box import box_around, draw_axes_box, room_for_box
 from aerobat.reporting.scene.camera import best_view
 from aerobat.reporting.scene.glyphs import gate_corners, gate_shapes
 from aerobat.reporting.scene.shapes import draw_depth_sorted
@@ -39,7 +39,7 @@ def draw_overlay(axes: Axes, paths: Sequence[NamedPath], gates: Sequence[Gate]) 
     plane = plane_of(points)
     if plane is None:
         box = box_around(points, 0.02 * float(np.ptp(points, axis=0).max()))
-        camera = best_view(points, gates, box.corners, size_of(axes))
+        camera = best_view(points, gates, box.corners, room_for_box(size_of(axes)))
         draw_axes_box(axes, box, camera)
     else:
         camera = plane.camera

@@ -13,7 +13,7 @@ from aerobat.planning import PlacedStage
 from aerobat.problem.gate import Gate
 from aerobat.reporting.page import HEADING, legend, size_of
 from aerobat.reporting.panels.poses import PoseHistory
-from aerobat.reporting.scene.axes_box import box_around, draw_axes_box
+from aerobat.reporting.scene.axes_box import box_around, draw_axes_box, room_for_box
 from aerobat.reporting.scene.camera import Camera, best_view
 from aerobat.reporting.scene.glyphs import (
     direction_marks,
@@ -36,6 +36,7 @@ if TYPE_CHECKING:
 
 POSES = 20  # time steps at which the vehicle is drawn, fewer where it would cover itself
 SIZE = 0.085  # of the vehicle as drawn, relative to the path's extent
+CLEAR = 1.0  # from one drawn vehicle to the next, at least, relative to the vehicle as drawn
 MARKED = 3  # of so many gaps between drawn vehicles one has an arrowhead
 DIRECTION = 0.03  # of an arrowhead, likewise
 BELOW = 0.06  # by which a reference path is drawn under an actual one, likewise
@@ -70,7 +71,7 @@ def draw_path(
     reach = scale * span(vehicle)
     paths = [poses.path for poses in (reference, *actual)]
     box = box_around(np.concatenate([*paths, gate_corners(gates)]), 0.6 * reach)
-    camera = best_view(reference.path, gates, box.corners, size_of(axes))
+    camera = best_view(reference.path, gates, box.corners, room_for_box(size_of(axes)))
     draw_axes_box(axes, box, camera)
     floor = float(box.lower[2])
     poses = actual[0] if actual else reference
@@ -104,7 +105,7 @@ def pose_samples(poses: PoseHistory, size: float, gates: Sequence[Gate]) -> tupl
     step = float(np.ptp(poses.times)) / POSES
     kept = poses.rows_at_gates(gates) or [0]
     for k in poses.rows(np.arange(poses.times[kept[0]] % step, poses.times[-1] + 1e-9, step)):
-        if np.linalg.norm(poses.position[kept] - poses.position[k], axis=-1).min() > 0.5 * size:
+        if np.linalg.norm(poses.position[kept] - poses.position[k], axis=-1).min() > CLEAR * size:
             kept.append(k)
     return sorted(kept), step
 

@@ -37,9 +37,11 @@ KEY_HEIGHT = 0.38  # [in] of the keys above the axes
 VEHICLE = 0.6  # [in] a vehicle, about
 COLUMN = 0.62  # [in] kept free for names on either side of a tall panel, at least
 LETTER = 0.082  # [in] the width of a name's letter
-FACTS = 1.2  # [in] kept free beside what is told of a stage that is shown in a plane of its own
-FACTS_ACROSS = 1.55  # [in] kept free across it, where stages stand side by side
+FACTS = 1.0  # [in] kept free beside what is told of a stage that is shown in a plane of its own
+FACTS_ACROSS = 1.1  # [in] from one stage to the next, where they stand side by side
 MOST_STAGES = 11  # that follow one another legibly
+ROOM = 1.15  # from one stage to the next, relative to the largest gate
+BETWEEN = 0.8  # of that way, that the longest arrow may take
 STAGE_ROW = 0.5  # [in] kept free for names at the foot of a wide panel
 # [in] from a hair line's end to the text, for each alignment of it
 GAPS = {"right": np.array([-0.04, 0.0]), "left": np.array([0.04, 0.0]), "center": np.array([0.0, -0.04])}
@@ -60,25 +62,27 @@ def draw_stages(axes: Axes, plan: Plan, vehicle: Vehicle) -> str:
     gates = plan.problem.gates
     column = max(COLUMN, LETTER * max(len(keyframe.name) for keyframe in shots.instants))
     frame = camera.project(np.concatenate([shots.position, *(gate.outline for gate in gates)]))
-    inches = _fit(axes, frame, VEHICLE, span(vehicle), column)  # per metre
+    inches = _fit(axes, frame, VEHICLE, span(vehicle), (column, column))  # per metre
     reach = enlargement(vehicle, VEHICLE / inches) * span(vehicle)  # [m]
     axes.set(xlabel=plane.label, ylabel="z [m]")
     if not _is_crowded(shots, camera, 0.5 * reach):
         shots = shots.only(_apart(shots, camera, 0.85 * reach))
         path = plan.trajectory.evaluate(np.linspace(0.0, plan.duration, 241))
         axes.plot(*camera.project(path).T, color=BAND, linewidth=1.6)
-        scale = _draw(axes, shots, gates, plane, vehicle, column)
-        note = "a stage holds at the end of interval n" if plan.stages else "equal steps of time"
+        scale = _draw(axes, shots, gates, plane, vehicle, (column, column))
+        end = "segment" if plan.dt is None else "interval"
+        note = f"a stage holds at the end of {end} n" if plan.stages else "equal steps of time"
     else:
         stages = [k for k, keyframe in enumerate(shots.instants) if keyframe.interval is not None]
         width, height = size_of(axes)
         most = MOST_STAGES if height >= width else min(MOST_STAGES, int(width / FACTS_ACROSS))
-        facts = FACTS if height >= width else FACTS_ACROSS
-        shown = sorted({stages[round(k)] for k in np.linspace(0, len(stages) - 1, most)})
-        shots, gates = _storyboard(axes, shots.only(shown), gates, plane)
-        scale = _draw(axes, shots, gates, plane, vehicle, max(column, facts), STORYBOARD)
-        some = "" if len(shown) == len(stages) else f"{len(shown)} of {len(stages)} "
-        note = f"{some}in order, each seen across its thrust"
+        shown = sorted({round(k) for k in np.linspace(0, len(stages) - 1, most)})
+        numbered = shots.only(stages).numbered().only(shown)
+        shots, gates = _storyboard(axes, numbered, gates, plane)
+        scale = _draw(axes, shots, gates, plane, vehicle, (0.0, max(column, FACTS)), STORYBOARD)
+        left_out = len(stages) - len(shown)
+        some = f" but for {left_out} of {len(stages)}" if left_out else ""
+        note = f"in order{some}, each seen across its thrust"
     return note if scale == 1.0 else f"{note}; vehicle {scale:g} times its size"
 
 
@@ -104,9 +108,15 @@ def _storyboard(
     axes: Axes, shots: Keyframes, gates: Sequence[Gate], plane: ManeuverPlane
 ) -> tuple[Keyframes, tuple[Gate, ...]]:
     """Stages that follow one another along the panel's longer side, each with the gate that it passes."""
-    width, height = size_of(axes)
-    downward = height >= width
-    shown, turns = shots.storyboard(plane, downward, 1.0)
+    size = size_of(axes)
+    downward = bool(size[1] >= size[0])
+    own = [gate for gate in gates if any(gate.name == each.gate for each in shots.instants)]
+    largest = 2.0 * max((gate.opening.circumradius for gate in own), default=0.0)  # [m]
+    pitch = max(1.0, ROOM * largest)
+    if not downward:  # the row fills the panel
+        tall = size[1] - STAGE_ROW
+        pitch = max(pitch, largest * float(size[0] / max(len(shots.instants), 1) / tall))
+    shown, turns = shots.storyboard(plane, downward, pitch)
     moved = []
     for keyframe, position, turn in zip(shown.instants, shown.position, turns, strict=True):
         for gate in gates:
@@ -124,22 +134,23 @@ def _draw(
     gates: Sequence[Gate],
     plane: ManeuverPlane,
     vehicle: Vehicle,
-    column: float,
+    columns: tuple[float, float],
     shrink: float = 1.0,
 ) -> float:
     """Draw vehicles, gates, arrows of thrust and names; return by how much vehicles are enlarged.
 
-    Names take `column` [in]; vehicles and arrows are `shrink` times as large as usual.
+    Names take columns [in] left and right; vehicles and arrows are `shrink` times as large as usual.
     """
     camera = plane.camera
     frame = camera.project(np.concatenate([shots.position, *(gate.outline for gate in gates)]))
-    inches = _fit(axes, frame, shrink * VEHICLE, span(vehicle), column)  # per metre
+    inches = _fit(axes, frame, shrink * VEHICLE, span(vehicle), columns)  # per metre
     scale = enlargement(vehicle, shrink * VEHICLE / inches)
     places, thrust = camera.project(shots.position), camera.project(shots.thrust)
-    arrow = shrink * ARROW / max(float(np.abs(thrust).max()), 1e-9)  # [in] per m/s²
+    longest = min(shrink * ARROW, BETWEEN * _least_step(places) * inches)  # [in]
+    arrow = longest / max(float(np.abs(thrust).max()), 1e-9)  # [in] per m/s²
     tips = places + thrust * arrow / inches
     pad = 0.6 * inches * scale * span(vehicle)
-    inches = _fit(axes, np.concatenate([frame, tips]), pad, span(vehicle), column)
+    inches = _fit(axes, np.concatenate([frame, tips]), pad, span(vehicle), columns)
     for gate in gates:
         draw_depth_sorted(axes, gate_section(gate, camera), camera, zorder=1.5)
     vehicles = []
@@ -148,22 +159,27 @@ def _draw(
     draw_depth_sorted(axes, vehicles, camera, zorder=2.2)
     _draw_sums(axes, places, thrust * arrow / inches)
     _draw_components(axes, places, thrust * arrow, arrow, plane)
-    _draw_names(axes, shots.instants, places, thrust, 0.55 * scale * span(vehicle), column)
+    _draw_names(axes, shots.instants, places, thrust, 0.55 * scale * span(vehicle), columns)
     return scale
 
 
-def _fit(axes: Axes, points: Array, pad: float, min_side: float, column: float) -> float:
+def _least_step(places: Array) -> float:
+    """The least distance [m] from one place (k, 2) to the next."""
+    return float(np.linalg.norm(np.diff(places, axis=0), axis=1).min(initial=np.inf))
+
+
+def _fit(axes: Axes, points: Array, pad: float, min_side: float, columns: tuple[float, float]) -> float:
     """Fit points (n, 2) [m], `pad` [in] around, and names beside them; return both axes' scale [in/m].
 
-    Names take `column` [in] on either side of a tall panel. What is shorter than `min_side` [m] is
-    shown that long.
+    Names take columns [in] left and right of a tall panel. What is shorter than `min_side` [m] is shown that
+    long.
     """
     size = size_of(axes)
-    left, foot = (column, 0.0) if size[1] >= size[0] else (0.0, STAGE_ROW)
-    free = size - (2 * left, foot)
+    (left, right), foot = (columns, 0.0) if size[1] >= size[0] else ((0.0, 0.0), STAGE_ROW)
+    free = size - (left + right, foot)
     low, high = points.min(axis=0), points.max(axis=0)
     inches = float(((free - np.minimum(2 * pad, 0.5 * free)) / np.maximum(high - low, min_side)).min())
-    centre, half = (low + high) / 2 - np.array([0.0, foot / 2]) / inches, size / 2 / inches
+    centre, half = (low + high) / 2 + np.array([right - left, -foot]) / 2 / inches, size / 2 / inches
     axes.set(xlim=(centre[0] - half[0], centre[0] + half[0]), ylim=(centre[1] - half[1], centre[1] + half[1]))
     return inches
 
@@ -198,7 +214,12 @@ def _draw_components(axes: Axes, places: Array, arrows: Array, unit: float, plan
 
 
 def _draw_names(
-    axes: Axes, instants: tuple[Keyframe, ...], places: Array, thrust: Array, clear: float, column: float
+    axes: Axes,
+    instants: tuple[Keyframe, ...],
+    places: Array,
+    thrust: Array,
+    clear: float,
+    columns: tuple[float, float],
 ) -> None:
     """Names, times and intervals beside the vehicles or below them, with a hair line to each."""
     from matplotlib.collections import LineCollection
@@ -208,7 +229,7 @@ def _draw_names(
     corner = np.array([axes.get_xlim()[0], axes.get_ylim()[0]])
     beside = size[1] >= size[0]
     layout = names_beside if beside else names_below
-    anchors = layout((places - corner) * inches, thrust, size, column) / inches + corner
+    anchors = layout((places - corner) * inches, thrust, size, columns) / inches + corner
     away = anchors - places
     reach = np.linalg.norm(away, axis=1, keepdims=True)
     starts = places + away * np.minimum(clear / np.maximum(reach, 1e-9), 1.0)
@@ -228,27 +249,28 @@ def _write_name(axes: Axes, keyframe: Keyframe, anchor: Array, side: str) -> Non
         axes.text(x, y, f"{keyframe.time:.2f} s", size=SMALL, color=MUTED, ha=side, va=up)
         return
     axes.text(x, y, keyframe.name, size=NORMAL, weight="bold", ha=side, va="top" if below else "bottom")
-    plane = "" if keyframe.along is None else f", h along {keyframe.along:g}°"
-    facts = f"{keyframe.time:.2f} s\nn = {keyframe.interval}{plane}"
+    place = f"n = {keyframe.interval}" if keyframe.along is None else f"h along {keyframe.along:g}°"
+    facts = f"{keyframe.time:.2f} s\n{place}"
     axes.text(x, y, "\n" * below + facts, size=SMALL, color=MUTED, linespacing=1.15, ha=side, va="top")
 
 
-def names_beside(places: Array, thrust: Array, size: Array, column: float) -> Array:
+def names_beside(places: Array, thrust: Array, size: Array, columns: tuple[float, float]) -> Array:
     """Return the places of names in columns left and right of a picture, each opposite to the thrust there.
 
-    All lengths are in inches from the lower left corner of a picture of `size` (2,); names are up to `column`
-    wide; (k, 2) -> (k, 2).
+    All lengths are in inches from the lower left corner of a picture of `size` (2,). Names are as wide as
+    their columns, and none stands in a column of no width; (k, 2) -> (k, 2).
     """
     lateral = np.where(np.abs(thrust[:, 0]) > 0.2 * np.abs(thrust).max(), thrust[:, 0], 0.0)
     off_centre = places[:, 0] - places[:, 0].mean()
-    left = np.where(lateral == 0.0, off_centre < -1e-3 * size[0], lateral > 0.0)
-    anchors = np.where(left[:, None], [column, 0.0], [size[0] - column, 0.0])
+    left = np.where(lateral == 0.0, off_centre < -1e-3 * size[0], lateral > 0.0) & (columns[0] > 0.0)
+    anchors = np.where(left[:, None], [columns[0], 0.0], [size[0] - columns[1], 0.0])
     for side in (left, ~left):
         anchors[side, 1] = spread_out(places[side, 1], PITCH_UP, 0.3, size[1] - 0.3)
     return anchors
 
 
-def names_below(places: Array, thrust: Array, size: Array, column: float) -> Array:
+def names_below(places: Array, thrust: Array, size: Array, columns: tuple[float, float]) -> Array:
     """Return the places of names in a row at the foot of a picture, in inches, as in `names_beside`."""
-    across = spread_out(places[:, 0], column, 0.3, size[0] - 0.3)
+    width = max(columns)
+    across = spread_out(places[:, 0], width, 0.3, size[0] - 0.3)
     return np.stack([across, np.full_like(across, STAGE_ROW)], axis=1)

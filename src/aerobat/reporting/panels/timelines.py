@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 
 SPIN_RAMPS = {1: ("#00315f", "#6fa3d4"), -1: ("#1c2b39", "#8b97a3")}  # dark to light, by the sense of turning
 LENGTHS = (("m", 1.0), ("cm", 1e-2))
+FEW_ROTORS = 4  # whose names a legend has room for
 NAME_WIDTH, LETTER = 0.36, 0.065  # [in] that a stage's name takes at least, and by the letter
 
 
@@ -61,7 +62,8 @@ def draw_rotor_thrusts(axes: Axes, times: Array, thrusts: Array, vehicle: Vehicl
     """Draw every rotor's thrust (..., T, n) [N], blue or grey by its sense of turning, and dashed limits."""
     colours = rotor_colours(vehicle)
     for i, colour in enumerate(colours):
-        draw_series(axes, times, thrusts[..., i], colour, width=1.0, label=f"{i}" if i else "rotor 0")
+        label = f"rotor {i}" if i == 0 or len(colours) <= FEW_ROTORS else f"{i}"
+        draw_series(axes, times, thrusts[..., i], colour, width=1.0, label=label)
     limits = sorted({*vehicle.min_thrusts.tolist(), *vehicle.max_thrusts.tolist()})
     for limit in limits:
         label = "limits" if limit == limits[-1] else ""

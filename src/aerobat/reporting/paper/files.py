@@ -14,8 +14,8 @@ PAGE = "figures.md"
 INTRODUCTION = """# The paper's figures
 
 Lusk and Tordesillas, *Trajectory Optimization for Multirotors*: its figures, each from plans and flights
-made for it by `aerobat figures`. Under each stand what the paper's shows and how ours compares. Figs. 1, 4
-and 7 are photographs and a block diagram.
+made for it by `python -m aerobat.reporting.paper`. Under each stand what the paper's shows and how ours
+compares. Figs. 1, 4 and 7 are photographs and a block diagram.
 
 """
 SECTION = re.compile(r"^## Fig\. (\d+) ", re.MULTILINE)
@@ -64,7 +64,8 @@ def _sections(page: Path) -> dict[int, str]:
     except (OSError, UnicodeDecodeError):
         introduction, rest = "", []
     if introduction.partition("\n")[0] != INTRODUCTION.partition("\n")[0]:
-        raise SpecError(f"{page} was not written by `aerobat figures`; give a folder of its own")
+        maker = "`python -m aerobat.reporting.paper`"
+        raise SpecError(f"{page} was not written by {maker}; give a folder of its own")
     numbers, texts = rest[::2], rest[1::2]
     return {
         int(number): f"## Fig. {number} {text.rstrip()}\n"

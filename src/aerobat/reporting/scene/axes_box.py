@@ -16,9 +16,10 @@ from aerobat.reporting.style import HAIR, NORMAL, PAPER, SMALL
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-MIN_SIDE = np.array([0.35, 0.35, 0.12])  # of a box, relative to its longest
+MIN_SIDE = np.array([0.22, 0.22, 0.12])  # of a box, relative to its longest
 ROUND = np.array([1.0, 2.0, 5.0])
-BOX_MARGIN = 0.5  # [in] for the scales around a box
+# [in] for the scales: left of a box and below it, right of it and above
+BOX_MARGINS = np.array([[0.5, 0.5], [0.3, 0.2]])
 NUMBERS = 0.15  # [in] from an edge to the numbers along it
 NAME_OFFSETS = np.array([0.3, 0.2])  # [in] from the numbers to the axis' name, to the side and up or down
 MIN_PITCH = 0.26  # [in] between the numbers of a scale
@@ -76,13 +77,18 @@ def draw_axes_box(axes: Axes, box: AxesBox, camera: Camera) -> None:
         _scale(axes, box, camera, axis, per_metre)
 
 
+def room_for_box(size: Array) -> Array:
+    """Return the room [in] that scales leave to a box in a picture of a size (2,), (2,)."""
+    return np.asarray(size - BOX_MARGINS.sum(axis=0))
+
+
 def _fit(axes: Axes, box: AxesBox, camera: Camera) -> float:
-    """Centre the box in the axes and return the scale [in/m]."""
+    """Centre the box in the room that its scales leave, and return the scale [in/m]."""
     picture = camera.project(box.corners)
     low, high = picture.min(axis=0), picture.max(axis=0)
-    size = size_of(axes)
-    per_metre = float(((size - 2 * BOX_MARGIN) / (high - low)).min())
-    centre, half = (low + high) / 2, size / per_metre / 2
+    per_metre = float((room_for_box(size_of(axes)) / (high - low)).min())
+    centre = (low + high) / 2 + (BOX_MARGINS[1] - BOX_MARGINS[0]) / 2 / per_metre
+    half = size_of(axes) / per_metre / 2
     axes.set(xlim=(centre[0] - half[0], centre[0] + half[0]), ylim=(centre[1] - half[1], centre[1] + half[1]))
     axes.set_axis_off()
     return per_metre

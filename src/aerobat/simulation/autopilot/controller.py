@@ -48,14 +48,13 @@ class AutopilotController:
 
     flags: FeatureFlags
     period: int = 1
-    name: str = "controller"
     feedthrough: bool = True
 
     def init(
         self, ops: Ops, parameters: AutopilotModel, inputs: Guidance, signals: Signals
     ) -> ControllerState:
         """See `Component.init`."""
-        return control.init(ops, parameters.tracking, signals["observer"].body, signals["reference"])
+        return control.init(ops, parameters.tracking, signals.observer.body, signals.reference)
 
     def step(
         self,
@@ -66,7 +65,7 @@ class AutopilotController:
         signals: Signals,
     ) -> ControllerState:
         """See `Component.step`."""
-        body, reference, elapsed = signals["observer"].body, signals["reference"], signals["clock"].elapsed
+        body, reference, elapsed = signals.observer.body, signals.reference, signals.clock.elapsed
         model, authority, slower = parameters
         commanded, upright = inputs.by_attitude > 0.5, inputs.upright > 0.5
         gains = select_tree(ops, upright, slower, model.gains)

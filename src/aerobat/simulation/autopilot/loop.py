@@ -4,21 +4,15 @@ from __future__ import annotations
 
 import numpy as np
 
-from aerobat.control.parameters import (
-    airframe_parameters,
-    controller_parameters,
-    environment_parameters,
-    hover_authority,
-    max_bandwidth,
-)
-from aerobat.engines import CompiledLoop, choose
+from aerobat.control.parameters import controller_parameters, hover_authority, max_bandwidth
 from aerobat.environment import Environment
 from aerobat.kernels.control_loops import ReferencePoint
 from aerobat.kernels.rigid_body import Body
 from aerobat.simulation.autopilot.attitude_law import Authority
 from aerobat.simulation.autopilot.controller import AutopilotController, AutopilotModel, Guidance
-from aerobat.simulation.components import PlantParameters, RigidBodyPlant, StateObserver
-from aerobat.simulation.loop import Clock, Log, LoopInput, LoopParameters, compose
+from aerobat.simulation.components import StateObserver
+from aerobat.simulation.loop import LoopInput, StepClock
+from aerobat.simulation.setup import LoopPart, LoopSetup, plant_part
 from aerobat.vehicle import Vehicle
 from aerobat.vehicle.fleet import Fleet
 
@@ -30,8 +24,8 @@ _LAG_COUNTED = 0.6  # [-] of the rotors' lag, which the attitude loop's lead mak
 KEPT = 0.04  # [s] for which commanded rates are kept where nothing newer comes; then the attitude is
 
 
-def autopilot_parameters(start: Body, vehicle: Vehicle, environment: Environment) -> LoopParameters:
-    """Parameters of as many copies of a vehicle as there are states at first, leaves (copies,)."""
+def autopilot_setup(start: Body, vehicle: Vehicle, environment: Environment) -> LoopSetup:
+    """The loop of as many copies of a vehicle as there are states at first, leaves (copies,)."""
     copies = len(start.position[0])
     fleet = Fleet.of([vehicle] * copies)
     tracking = controller_parameters(vehicle.controller, fleet, environment)
@@ -41,31 +35,10 @@ def autopilot_parameters(start: Body, vehicle: Vehicle, environment: Environment
         accelerations[:, :2].min(axis=-1), accelerations.min(axis=-1), fleet.lags.max(axis=-1)
     )
     slewing = 1.0 / max_bandwidth(fleet, environment, _FREE_ERROR) + _LAG_COUNTED * fleet.lags.max(axis=-1)
-    upright = vehicle.controller.gains(1.0 / slewing)
-    model = AutopilotModel(tracking, authority, upright)
-    plant = PlantParameters(airframe_parameters(fleet), environment_parameters(environment, copies))
-    return LoopParameters(start, ((), model, plant))
-
-
-def autopilot_loop(
-    vehicle: Vehicle, parameters: LoopParameters, first: LoopInput, log: Log, ticks: int
-) -> CompiledLoop:
-    """The loop of observer, controller and plant, in whichever engine is the fastest.
-
-    Args:
-        vehicle: whose controller's features count.
-        parameters: see `autopilot_parameters`.
-        first: inputs of one tick.
-        log: what a row takes of the signals.
-        ticks: about how many will be flown.
-    """
-    parts = (
-        StateObserver(),
-        AutopilotController(vehicle.controller.feature_flags),
-        RigidBodyPlant.for_rate(RATE),
-    )
-    engine = choose("auto", len(parameters.start.position[0]), ticks)
-    return engine.compile(*compose(parts, log), parameters, first)
+    model = AutopilotModel(tracking, authority, upright=vehicle.controller.gains(1.0 / slewing))
+    controller = AutopilotController(vehicle.controller.feature_flags)
+    parts = LoopPart(StateObserver()), LoopPart(controller, model), plant_part(fleet, environment, RATE)
+    return LoopSetup(start, parts)
 
 
 def autopilot_inputs(references: ReferencePoint, by_attitude: bool, upright: bool = True) -> LoopInput:
@@ -79,4 +52,4 @@ def autopilot_inputs(references: ReferencePoint, by_attitude: bool, upright: boo
     ticks = len(references.position[0])
     period = np.full(ticks, 1.0 / RATE)
     own = ((), Guidance(np.full(ticks, float(by_attitude)), np.full(ticks, float(upright))), ())
-    return LoopInput(Clock(period, period), ((), (), ()), references, own)
+    return LoopInput(StepClock(period, period), ((), (), ()), references, own)

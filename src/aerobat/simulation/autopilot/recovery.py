@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from aerobat import so3
 from aerobat.arrays import Array, frozen
 from aerobat.declaration import Finite, NonNegative, Series, by_value, short, validated
+from aerobat.engines import choose
 from aerobat.engines.components import components, from_components
 from aerobat.engines.engine import first_row
 from aerobat.engines.pytree import Tree
@@ -22,15 +23,14 @@ from aerobat.environment import Environment
 from aerobat.errors import SpecError
 from aerobat.flatness import Planned, TimeInterval, environment_of, reference, vehicle_of
 from aerobat.kernels.control_loops import Lookahead, ReferencePoint
-from aerobat.kernels.motors import Motion
+from aerobat.kernels.motors import VehicleState
 from aerobat.kernels.rigid_body import Body
 from aerobat.simulation.autopilot.braking import MIN_FLOOR, Braking, nearest_heading, point_reference
 from aerobat.simulation.autopilot.loop import (
     KEPT,
     RATE,
     autopilot_inputs,
-    autopilot_loop,
-    autopilot_parameters,
+    autopilot_setup,
 )
 from aerobat.simulation.bodies import bodies
 from aerobat.simulation.loop import Signals
@@ -185,19 +185,14 @@ class _Flock:
         flat, count = setpoint.flat, len(thrusts)
         start = bodies(BodyState(flat.position, flat.velocity, setpoint.q_world_body, setpoint.omega_body))
         first = first_row(autopilot_inputs(_kept(setpoint, np.zeros(1), vehicle), True))
-        self._loop = autopilot_loop(
-            vehicle,
-            autopilot_parameters(start, vehicle, environment),
-            first,
-            _body,
-            round(HORIZON * RATE),
-        )
+        engine = choose("auto", count, round(HORIZON * RATE))
+        self._loop = autopilot_setup(start, vehicle, environment).compile_for(engine, first, _body)
         observer, controller, motion = self._loop.init(first)
         turning = components(np.clip(thrusts, vehicle.min_thrusts, vehicle.max_thrusts))
         self._carry: Tree = (
             observer,
             controller._replace(thrusts=turning),
-            Motion(motion.body, turning),
+            VehicleState(motion.body, turning),
         )
         self._time = 0.0
         self.lowest = flat.position[:, 2].copy()
@@ -239,7 +234,7 @@ class _Flock:
 
 def _body(signals: Signals) -> Body:
     """The row of a log."""
-    body: Body = signals["plant"].body
+    body: Body = signals.plant.body
     return body
 
 

@@ -7,8 +7,10 @@ from typing import NamedTuple
 
 from aerobat.kernels import motors, rigid_body
 from aerobat.kernels.control import ControllerModel
-from aerobat.kernels.ops import Ops, Scalar, Vector
+from aerobat.kernels.imu import ImuState
+from aerobat.kernels.ops import Ops, Scalar
 from aerobat.kernels.vectors import ZERO, add_scaled, scale, subtract
+from aerobat.simulation.components import Disturbance
 from aerobat.simulation.loop import Signals
 
 
@@ -20,18 +22,6 @@ class DisturbanceParameters(NamedTuple):
     delay: Scalar  # [s] from the controller's step to its commands' effect
 
 
-class Disturbance(NamedTuple):
-    """The disturbance that an IMU feels beyond the model, in body axes.
-
-    Most of a disturbance, such as the rotors' mismatch, turns with the body.
-    """
-
-    force: Vector  # [m/s²] over mass
-    angular_acceleration: Vector  # [rad/s²]
-    omega_body: Vector  # [rad/s] at the last step
-    has_omega: Scalar  # 1, or 0 before the first step
-
-
 @dataclass(frozen=True)
 class DisturbanceObserver:
     """The low-passed difference between what is measured and the nominal model, of force and of moment.
@@ -41,7 +31,6 @@ class DisturbanceObserver:
     """
 
     period: int = 1
-    name: str = "disturbance"
     feedthrough: bool = True
 
     def init(
@@ -59,9 +48,9 @@ class DisturbanceObserver:
         signals: Signals,
     ) -> Disturbance:
         """See `Component.step`."""
-        model, elapsed = parameters.model, signals["clock"].elapsed
+        model, elapsed = parameters.model, signals.clock.elapsed
         mass_properties, rotors = model.airframe
-        observer, controller = signals["observer"], signals["controller"]
+        observer, controller = signals.observer, signals.controller
         left = motors.decay_factors(ops, rotors, ops.maximum(elapsed - parameters.delay, 0.0))
         thrusts = motors.first_order_response(controller.thrusts, controller.commands.thrusts, left)
         load = motors.wrench(rotors, thrusts)
@@ -69,8 +58,8 @@ class DisturbanceObserver:
         specific_force = rigid_body.specific_force(
             mass_properties, model.environment, observer.body, load.thrust
         )
-        bias = observer.filter.nominal.accelerometer_bias
-        felt = subtract(signals["imu"].sample.specific_force, bias)
+        bias = observer.own.filter.nominal.accelerometer_bias
+        felt = subtract(signals.of(ImuState).sample.specific_force, bias)
         omega = observer.body.omega_body
         turned = scale(1.0 / elapsed, subtract(omega, state.omega_body))
         fraction = elapsed / (parameters.time_constant + elapsed)

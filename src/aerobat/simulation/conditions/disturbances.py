@@ -22,7 +22,6 @@ class Wind:
     """The wind, held from one step to the next; the plant and the accelerometer feel it."""
 
     period: int = 1
-    name: str = "wind"
     feedthrough: bool = True
 
     def init(self, ops: Ops, parameters: WindParameters, noise: GustNoise, signals: Signals) -> WindState:
@@ -59,7 +58,6 @@ class BatterySag:
     """The battery, emptied by the rotors' thrusts; the plant's ceilings are what it leaves of them."""
 
     period: int = 1
-    name: str = "battery"
     feedthrough: bool = True
 
     def init(
@@ -77,4 +75,4 @@ class BatterySag:
         signals: Signals,
     ) -> BatteryState:
         """See `Component.step`."""
-        return battery.step(ops, parameters, state, signals["plant"].thrusts, signals["clock"].elapsed)
+        return battery.step(ops, parameters, state, signals.plant.thrusts, signals.clock.elapsed)

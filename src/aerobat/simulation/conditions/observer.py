@@ -10,10 +10,11 @@ import numpy as np
 from aerobat.arrays import Array
 from aerobat.kernels import ekf
 from aerobat.kernels.ekf import EkfParameters, EkfState
+from aerobat.kernels.imu import ImuState
 from aerobat.kernels.ops import Ops, Scalar, select_tree
-from aerobat.kernels.rigid_body import Body, Pose
-from aerobat.simulation.conditions.sensors import MotionCaptureSensor
-from aerobat.simulation.loop import Signals
+from aerobat.kernels.rigid_body import Pose
+from aerobat.simulation.conditions.sensors import MocapState, MotionCaptureSensor
+from aerobat.simulation.loop import Estimate, Signals
 
 
 class ObserverParameters(NamedTuple):
@@ -31,10 +32,9 @@ class ObserverInput(NamedTuple):
     arrives: Scalar  # 1 if one arrives
 
 
-class ObserverState(NamedTuple):
-    """The state of the observer."""
+class FilterState(NamedTuple):
+    """A filter, and what it has to carry back."""
 
-    body: Body  # for the controller
     filter: EkfState
     exposures: tuple[Pose, ...]  # the filter's own poses at the latest exposures, the latest first
 
@@ -46,34 +46,34 @@ class EkfObserver:
     exposure_period: int  # ticks
     latency: int  # ticks
     period: int = 1
-    name: str = "observer"
     feedthrough: bool = True
 
     def init(
         self, ops: Ops, parameters: ObserverParameters, inputs: ObserverInput, signals: Signals
-    ) -> ObserverState:
+    ) -> Estimate:
         """See `Component.init`; the velocity is taken for the reference's."""
-        pose = signals["motion_capture"].delivered.pose
-        state = ekf.init(parameters.ekf, pose, signals["reference"].velocity)
+        pose = signals.of(MocapState).delivered.pose
+        state = ekf.init(parameters.ekf, pose, signals.reference.velocity)
         waiting = self.latency // self.exposure_period + 1
-        return ObserverState(ekf.estimated_body(state, signals["imu"].sample), state, (pose,) * waiting)
+        body = ekf.estimated_body(state, signals.of(ImuState).sample)
+        return Estimate(body, FilterState(state, (pose,) * waiting))
 
     def step(
         self,
         ops: Ops,
         parameters: ObserverParameters,
-        state: ObserverState,
+        state: Estimate,
         inputs: ObserverInput,
         signals: Signals,
-    ) -> ObserverState:
+    ) -> Estimate:
         """See `Component.step`."""
-        sample = signals["imu"].sample
-        before = ekf.propagate(ops, parameters.ekf, state.filter, sample, inputs.elapsed)
-        pushed = (ekf.pose_of(before), *state.exposures[:-1])
-        exposures = select_tree(ops, inputs.exposes > 0.5, pushed, state.exposures)
+        sample = signals.of(ImuState).sample
+        before = ekf.propagate(ops, parameters.ekf, state.own.filter, sample, inputs.elapsed)
+        pushed = (ekf.pose_of(before), *state.own.exposures[:-1])
+        exposures = select_tree(ops, inputs.exposes > 0.5, pushed, state.own.exposures)
         fused = self._fused(ops, parameters, before, exposures, signals)
         after, exposures = select_tree(ops, inputs.arrives > 0.5, fused, (before, exposures))
-        return ObserverState(ekf.estimated_body(after, sample), after, exposures)
+        return Estimate(ekf.estimated_body(after, sample), FilterState(after, exposures))
 
     def _fused(
         self,
@@ -84,7 +84,7 @@ class EkfObserver:
         signals: Signals,
     ) -> tuple[EkfState, tuple[Pose, ...]]:
         """The filter, and its poses at exposures, after the pose that arrives, if it is valid."""
-        measured = signals["motion_capture"].delivered
+        measured = signals.of(MocapState).delivered
         before = ekf.predict_covariance(ops, parameters.ekf, state)
         age = self.latency * parameters.tick
         after = ekf.fuse(

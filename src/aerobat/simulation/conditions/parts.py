@@ -38,7 +38,7 @@ from aerobat.simulation.conditions.sensors import (
     MocapSource,
     MotionCaptureSensor,
 )
-from aerobat.simulation.setup import Part
+from aerobat.simulation.setup import LoopPart
 from aerobat.trajectory import Trajectory
 from aerobat.vehicle import Vehicle
 from aerobat.vehicle.fleet import Fleet
@@ -85,7 +85,7 @@ class DispersedFlights:
         return max(1, int(self.rate / rate + WHOLE))
 
 
-def condition_parts(dispersion: Dispersion, flights: DispersedFlights) -> tuple[Part, ...]:
+def condition_parts(dispersion: Dispersion, flights: DispersedFlights) -> tuple[LoopPart, ...]:
     """The parts of some conditions, in their order in the loop, before observer, controller and plant.
 
     Raises SpecError for sensors whose rates do not fit the ticks.
@@ -102,7 +102,7 @@ def condition_parts(dispersion: Dispersion, flights: DispersedFlights) -> tuple[
     return tuple(parts)
 
 
-def wind_part(gusts: Gusts, flights: DispersedFlights) -> Part:
+def wind_part(gusts: Gusts, flights: DispersedFlights) -> LoopPart:
     """Mean wind and gusts."""
     time_constant = gusts.length / gusts.airspeed
     period = flights.slow_period(max(SLOW, GUSTY / time_constant))
@@ -122,7 +122,7 @@ def wind_part(gusts: Gusts, flights: DispersedFlights) -> Part:
         gust_filter(period / flights.rate / time_constant, len(flights.draws)),
         GustState(along, (first, second), (third, fourth)),
     )
-    return Part(Wind(period), parameters, WindSource(flights.draws, period))
+    return LoopPart(Wind(period), parameters, WindSource(flights.draws, period))
 
 
 def gust_filter(step: float, vehicles: int) -> GustFilter:
@@ -143,7 +143,7 @@ def gust_filter(step: float, vehicles: int) -> GustFilter:
     return GustFilter(a, b, c, (d, e, f))
 
 
-def battery_part(battery: Battery, flights: DispersedFlights) -> Part:
+def battery_part(battery: Battery, flights: DispersedFlights) -> LoopPart:
     """A battery that the nominal vehicle's hover empties within its endurance."""
     nominal = Fleet.of([flights.nominal])
     hover = flights.nominal.mass * flights.environment.gravity * np.abs(nominal.mixer[0, :, 0])
@@ -151,10 +151,10 @@ def battery_part(battery: Battery, flights: DispersedFlights) -> Part:
     hover_power = np.sum(hover**1.5 / radii)
     usage = flights.effectiveness**1.5 / radii / hover_power / battery.endurance
     parameters = BatteryParameters(flights.each("charge"), components(usage), flights.all(battery.sag))
-    return Part(BatterySag(flights.slow_period()), parameters)
+    return LoopPart(BatterySag(flights.slow_period()), parameters)
 
 
-def imu_parts(imu: Imu, flights: DispersedFlights) -> tuple[Part, Part]:
+def imu_parts(imu: Imu, flights: DispersedFlights) -> tuple[LoopPart, LoopPart]:
     """An IMU's biases, and the IMU."""
     slow = flights.slow_period()
     walk = np.sqrt(slow / flights.rate)
@@ -177,12 +177,12 @@ def imu_parts(imu: Imu, flights: DispersedFlights) -> tuple[Part, Part]:
         ImuParameters(*map(flights.all, numbers)),
     )
     return (
-        Part(ImuBias(slow), biases, ImuSource(flights.draws, "imu_bias", slow, block=32)),
-        Part(ImuSensor(period), felt, ImuSource(flights.draws, "imu", period)),
+        LoopPart(ImuBias(slow), biases, ImuSource(flights.draws, "imu_bias", slow, block=32)),
+        LoopPart(ImuSensor(period), felt, ImuSource(flights.draws, "imu", period)),
     )
 
 
-def motion_capture_part(capture: MotionCapture, flights: DispersedFlights) -> Part:
+def motion_capture_part(capture: MotionCapture, flights: DispersedFlights) -> LoopPart:
     """Motion capture."""
     period = whole_ticks(flights.rate, capture.rate, "motion_capture.rate")
     latency = round(capture.latency * flights.rate)
@@ -205,7 +205,7 @@ def motion_capture_part(capture: MotionCapture, flights: DispersedFlights) -> Pa
         first_error=(flights.each("first_position_error"), flights.each("first_attitude_error")),
     )
     source = MocapSource(flights.draws, period, flights.rate)
-    return Part(MotionCaptureSensor(period, latency), parameters, source)
+    return LoopPart(MotionCaptureSensor(period, latency), parameters, source)
 
 
 def _seam(hand_off: HandOff | None, flights: DispersedFlights) -> Seam:

@@ -28,7 +28,6 @@ class ImuBias:
     """The biases of an IMU, held from one step to the next."""
 
     period: int = 1
-    name: str = "imu_bias"
     feedthrough: bool = True
 
     def init(self, ops: Ops, parameters: BiasParameters, noise: ImuSample, signals: Signals) -> ImuSample:
@@ -52,10 +51,9 @@ class FeltParameters(NamedTuple):
 
 @dataclass(frozen=True)
 class ImuSensor:
-    """An IMU at the centre of mass, biased as `imu_bias` says; its sample ends at the tick of its step."""
+    """An IMU at the centre of mass, biased as `ImuBias` says; its sample ends at the tick of its step."""
 
     period: int = 1
-    name: str = "imu"
     feedthrough: bool = True
 
     def init(self, ops: Ops, parameters: FeltParameters, noise: ImuSample, signals: Signals) -> ImuState:
@@ -66,12 +64,12 @@ class ImuSensor:
         self, ops: Ops, parameters: FeltParameters, state: ImuState, noise: ImuSample, signals: Signals
     ) -> ImuState:
         """See `Component.step`."""
-        body, thrusts = signals["plant"]
+        body, thrusts = signals.plant
         thrust = motors.collective_thrust(parameters.airframe.rotors, thrusts)
         environment = with_wind(parameters.environment, signals)
         force = rigid_body.specific_force(parameters.airframe.mass_properties, environment, body, thrust)
         felt = ImuSample(body.omega_body, force)
-        return imu.step(ops, parameters.errors, state, felt, signals["imu_bias"], noise)
+        return imu.step(ops, parameters.errors, state, felt, signals.of(ImuSample), noise)
 
 
 class ImuSource:
@@ -115,19 +113,18 @@ class MocapState(NamedTuple):
 class MotionCaptureSensor:
     """Motion capture: a pose is taken at every step, and arrives `latency` ticks later.
 
-    It steps at exposures alone. Of tick t with `arrives([t])`, `signals["motion_capture"].delivered` is the
+    It steps at exposures alone. Of tick t with `arrives([t])`, `MocapState.delivered` is the
     pose of tick t − latency. Before the first arrival it is a pose from before the flight, not valid as a
     measurement, with an error of its own.
     """
 
     period: int = 1
     latency: int = 0  # ticks
-    name: str = "motion_capture"
     feedthrough: bool = True
 
     def init(self, ops: Ops, parameters: MocapParameters, inputs: MocapInput, signals: Signals) -> MocapState:
         """See `Component.init`."""
-        known = PoseSample(mocap.first_pose(ops, parameters, signals["start"]), 0.0)
+        known = PoseSample(mocap.first_pose(ops, parameters, signals.start), 0.0)
         return MocapState((known,) * (self.latency // self.period + 1))
 
     def step(
@@ -139,7 +136,7 @@ class MotionCaptureSensor:
         signals: Signals,
     ) -> MocapState:
         """See `Component.step`."""
-        taken = mocap.sample(ops, parameters, signals["plant"].body, inputs)
+        taken = mocap.sample(ops, parameters, signals.plant.body, inputs)
         return MocapState((taken, *state.queue[:-1]))
 
     def arrives(self, ticks: np.ndarray) -> Mask:

@@ -4,10 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-import numpy as np
-
-from aerobat.control.parameters import airframe_parameters, controller_parameters, environment_parameters
-from aerobat.engines.pytree import tree_map
 from aerobat.environment import Dispersion, Environment
 from aerobat.errors import SpecError
 from aerobat.estimation import Ekf, ekf_parameters
@@ -17,8 +13,6 @@ from aerobat.simulation.components import (
     ComputationDelay,
     ControllerParameters,
     DelayTicks,
-    PlantParameters,
-    RigidBodyPlant,
     StateObserver,
 )
 from aerobat.simulation.conditions.disturbance_observer import DisturbanceObserver, DisturbanceParameters
@@ -29,7 +23,7 @@ from aerobat.simulation.conditions.sensors import MotionCaptureSensor
 from aerobat.simulation.config import FlightConfig
 from aerobat.simulation.law_controller import flown_by, inner_loop
 from aerobat.simulation.reference_source import ReferenceSource
-from aerobat.simulation.setup import FlightSetup, Part
+from aerobat.simulation.setup import FlightSetup, LoopPart, controller_model, plant_part
 from aerobat.trajectory import Trajectory, as_trajectory
 from aerobat.vehicle import Vehicle
 from aerobat.vehicle.controller import Controller
@@ -74,20 +68,19 @@ def dispersed_setup(
         gates=() if isinstance(plan, Trajectory) else plan.problem.gates,
     )
     reference = ReferenceSource(as_trajectory(plan), nominal, environment, rate)
+    known = Fleet.of([nominal])
     disturbed = condition_parts(conditions, flights)
-    airframe = airframe_parameters(flights.fleet, flights.effectiveness)
-    plant = PlantParameters(airframe, environment_parameters(environment, len(draws)))
     return FlightSetup(
         start=bodies(flights.draws.starts(reference.start)),
         parts=(
             *disturbed,
             _observer(conditions, flights, disturbed),
-            *_controller(conditions, flights, config, controller),
-            Part(RigidBodyPlant.for_rate(rate), plant),
+            *_controller(conditions, flights, known, config, controller),
+            plant_part(flights.fleet, environment, rate, flights.effectiveness),
         ),
         reference=reference,
         fleet=flights.fleet,
-        nominal=Fleet.of([nominal]),
+        nominal=known,
         environment=environment,
         config=config,
         controller=controller,
@@ -109,15 +102,15 @@ def _tick_rate(conditions: Dispersion, control_rate: float) -> float:
     )
 
 
-def _observer(conditions: Dispersion, flights: DispersedFlights, disturbed: Sequence[Part]) -> Part:
+def _observer(conditions: Dispersion, flights: DispersedFlights, disturbed: Sequence[LoopPart]) -> LoopPart:
     """The filter behind the sensors, where there are any, or the true state."""
     imu, capture = conditions.imu, conditions.motion_capture
     if imu is None or capture is None:
-        return Part(StateObserver())
+        return LoopPart(StateObserver())
     sensor = next(p.component for p in disturbed if isinstance(p.component, MotionCaptureSensor))
     settings = Ekf.of_sensors(imu, capture, max(conditions.start_velocity, _LEAST_START_VELOCITY))
     parameters = ekf_parameters(settings, flights.environment.gravity, len(flights.draws))
-    return Part(
+    return LoopPart(
         EkfObserver(sensor.period, sensor.latency),
         ObserverParameters(parameters, flights.all(1.0 / flights.rate)),
         ObserverSource(sensor, flights.rate),
@@ -125,14 +118,15 @@ def _observer(conditions: Dispersion, flights: DispersedFlights, disturbed: Sequ
 
 
 def _controller(
-    conditions: Dispersion, flights: DispersedFlights, config: FlightConfig, settings: Controller
-) -> tuple[Part, ...]:
+    conditions: Dispersion,
+    flights: DispersedFlights,
+    known: Fleet,
+    config: FlightConfig,
+    settings: Controller,
+) -> tuple[LoopPart, ...]:
     """The controller at its own period, its reference that of its commands' effect, and its delay."""
     nominal, environment, rate = flights.nominal, flights.environment, flights.rate
-    model = controller_parameters(settings, Fleet.of([nominal]), environment)
-    if not np.isfinite(model.gains.stiffness).all():
-        nominal.require_hover(environment.gravity)
-    model = tree_map(lambda leaf: np.broadcast_to(leaf, len(flights.draws)), model)
+    model = controller_model(settings, (nominal,), known, environment, len(flights.draws))
     period = whole_ticks(rate, config.control_rate, "control_rate")
     delay = round(conditions.computation_delay * rate)
     if delay > period:
@@ -141,21 +135,21 @@ def _controller(
             f"got {conditions.computation_delay:g} s; lower control_rate"
         )
     controller = flown_by(config.law, settings, period)
-    observer: tuple[Part, ...] = ()
+    observer: tuple[LoopPart, ...] = ()
     slowest = max(rotor.lag for rotor in nominal.rotors)
     if settings.disturbance_filter > 0.0 and conditions.imu is not None and slowest <= _SLOWEST_ANSWERED:
         # a filter faster than the rotors takes their lag's misfit for a disturbance, and unsettles the loop
         times = flights.all(max(settings.disturbance_filter, slowest)), flights.all(delay / rate)
-        observer = (Part(DisturbanceObserver(period), DisturbanceParameters(model, *times)),)
+        observer = (LoopPart(DisturbanceObserver(period), DisturbanceParameters(model, *times)),)
     inner = inner_loop(config.law, model)
     if period == 1 and delay == 0:
-        return (*observer, Part(controller, ControllerParameters(model, ())), *inner)
+        return (*observer, LoopPart(controller, ControllerParameters(model, ())), *inner)
     source = ReferenceSource(flights.trajectory, nominal, environment, rate, every=period, delay=delay / rate)
     if delay == 0:
-        return (*observer, Part(controller, ControllerParameters(model, ()), source), *inner)
+        return (*observer, LoopPart(controller, ControllerParameters(model, ()), source), *inner)
     return (
         *observer,
-        Part(controller, ControllerParameters(model, flights.all(delay / rate)), source),
-        Part(ComputationDelay(), (), DelayTicks(period, delay)),
+        LoopPart(controller, ControllerParameters(model, flights.all(delay / rate)), source),
+        LoopPart(ComputationDelay(), (), DelayTicks(period, delay)),
         *inner,
     )

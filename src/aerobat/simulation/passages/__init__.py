@@ -1,20 +1,21 @@
 """Passages of flights: through gates, what the body leaves of their openings; by waypoints; in attitudes."""
 
+from aerobat.simulation.passages.log import log_rows, passages_in_log, scan_log
 from aerobat.simulation.passages.passage import (
     PASSAGE_DEPTH,
     PASSAGE_WINDOW,
     Passage,
+    bounding_ellipsoid,
+    gate_places,
     passages,
-    plane_directions,
 )
-from aerobat.simulation.passages.polyline import flown_passages
 from aerobat.simulation.passages.stage_attitude import (
     PlannedAttitude,
     StageAttitude,
-    flown_attitudes,
+    attitude_direction,
     stage_attitudes,
 )
-from aerobat.simulation.passages.waypoint import WaypointPassage, flown_waypoints, waypoint_passages
+from aerobat.simulation.passages.waypoint import WaypointPassage, waypoint_passages, waypoint_target
 
 __all__ = [
     "PASSAGE_DEPTH",
@@ -23,11 +24,14 @@ __all__ = [
     "PlannedAttitude",
     "StageAttitude",
     "WaypointPassage",
-    "flown_attitudes",
-    "flown_passages",
-    "flown_waypoints",
+    "attitude_direction",
+    "bounding_ellipsoid",
+    "gate_places",
+    "log_rows",
     "passages",
-    "plane_directions",
+    "passages_in_log",
+    "scan_log",
     "stage_attitudes",
     "waypoint_passages",
+    "waypoint_target",
 ]

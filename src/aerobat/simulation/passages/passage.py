@@ -11,7 +11,9 @@ plane, from when it comes into the plane until it has left it, is to lie within 
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields, replace
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
+from functools import partial
 from math import degrees
 from typing import Any, TypeVar
 
@@ -23,12 +25,14 @@ from aerobat.arrays import Array
 from aerobat.certification import PlannedPassage
 from aerobat.declaration import by_value
 from aerobat.engines.components import components
-from aerobat.kernels.gates.progress import GateProgress
-from aerobat.kernels.gates.section import PlaneDirection
-from aerobat.kernels.gates.swath import Extreme, Swath
+from aerobat.engines.pytree import tree_map
+from aerobat.kernels.gates.progress import GatePlane, GateProgress
+from aerobat.kernels.gates.section import BoundingEllipsoid, PlaneDirection
+from aerobat.kernels.gates.swath import NOWHERE, Extreme, Swath
 from aerobat.problem.gate import Gate
-from aerobat.problem.opening import Probe, edge_name
+from aerobat.problem.opening import EdgeProbe, edge_name
 from aerobat.simulation.outcome import Outcome
+from aerobat.vehicle import Ellipsoid
 
 T = TypeVar("T")
 
@@ -45,8 +49,8 @@ def one_of_many(found: T, k: int, shared: int) -> T:
         shared: The number of first fields, which all flights share.
     """
     many: Any = found
-    numbers = {field.name: getattr(many, field.name)[k].item() for field in fields(many)[shared:]}
-    one: T = replace(many, **numbers)
+    values = [getattr(many, field.name) for field in fields(many)]
+    one: T = type(many)(*values[:shared], *(value[k].item() for value in values[shared:]))
     return one
 
 
@@ -155,10 +159,11 @@ def _closest(gate: Gate, swath: Swath, crossed: NDArray[np.bool_]) -> dict[str, 
 
     Args:
         gate: what is passed.
-        swath: through its plane, leaves (flights,).
+        swath: through its plane, leaves (flights,); none where the body is not known.
         crossed: true where it is crossed.
     """
     opening = gate.opening
+    swath = swath or len(opening.probes) * (tree_map(partial(np.full, len(crossed)), NOWHERE),)
     times, reach = (np.stack(part, axis=-1) for part in zip(*(each[:2] for each in swath), strict=True))
     limits = np.array([probe.limit for probe in opening.probes])
     known = crossed & np.isfinite(times).all(axis=-1)
@@ -183,15 +188,46 @@ def _closest(gate: Gate, swath: Swath, crossed: NDArray[np.bool_]) -> dict[str, 
     return places | {"closest_edge": np.array(names)}
 
 
-def _in_opening(probe: Probe, extreme: Extreme) -> Array:
+def _in_opening(probe: EdgeProbe, extreme: Extreme) -> Array:
     """The points (left, up) of a gate's plane that reach the farthest along a probe [m], (flights, 2)."""
     left, up = probe.direction
     along, beside = extreme.point
     return np.stack([left * along - up * beside, up * along + left * beside], axis=-1)
 
 
-def plane_directions(gate: Gate) -> tuple[PlaneDirection, ...]:
-    """The directions in which a body that passes a gate is measured, as kernels read them."""
+def gate_places(
+    planned: Sequence[PlannedPassage], ellipsoid: BoundingEllipsoid | tuple[()]
+) -> list[tuple[GatePlane, BoundingEllipsoid | tuple[()]]]:
+    """Planned passages as kernels read them, leaves numbers, each with what encloses the vehicle.
+
+    Without that, no body is measured.
+    """
+    return [
+        (
+            GatePlane(
+                centre=components(each.gate.position),
+                normal=components(each.gate.normal),
+                directions=_directions(each.gate) if ellipsoid else (),
+                radius=each.gate.opening.circumradius,
+                planned=each.time,
+                window=PASSAGE_WINDOW,
+                depth=PASSAGE_DEPTH,
+            ),
+            ellipsoid,
+        )
+        for each in planned
+    ]
+
+
+def bounding_ellipsoid(body: Ellipsoid | None) -> BoundingEllipsoid | tuple[()]:
+    """The ellipsoid that encloses a vehicle as kernels read it, leaves numbers; () where none is known."""
+    if body is None:
+        return ()
+    return BoundingEllipsoid(components(body.centre), components(body.semi_axes))
+
+
+def _directions(gate: Gate) -> tuple[PlaneDirection, ...]:
+    """The directions in which a body that passes a gate is measured."""
     probes = gate.opening.probes
     turned = [probe.direction @ gate.plane_axes for probe in probes]
     beside = [np.array([-up, left]) @ gate.plane_axes for (left, up), *_ in probes]

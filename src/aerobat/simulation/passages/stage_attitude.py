@@ -11,14 +11,9 @@ import numpy as np
 from aerobat.arrays import Array
 from aerobat.declaration import by_value
 from aerobat.engines.components import components
-from aerobat.engines.numpy import ArrayOps
-from aerobat.kernels.gates import pointing
 from aerobat.kernels.gates.pointing import Direction, Pointing
-from aerobat.kernels.gates.snapshot import Snapshot
-from aerobat.simulation.flight import Flight
 from aerobat.simulation.outcome import Outcome
 from aerobat.simulation.passages.passage import PASSAGE_WINDOW, one_of_many
-from aerobat.simulation.passages.waypoint import intervals
 
 
 @by_value
@@ -79,24 +74,6 @@ def stage_attitudes(planned: PlannedAttitude, found: Pointing, stop: Array) -> S
     return StageAttitude(planned.stage, planned.lap, degrees(planned.tolerance), **numbers)
 
 
-def flown_attitudes(flight: Flight, planned: tuple[PlannedAttitude, ...]) -> list[StageAttitude]:
-    """Attitudes of one flight that was logged, at its rows, fields (1,)."""
-    stop = flight.diverged_at
-    last, now = intervals(flight)
-    return [stage_attitudes(each, _nearest(last, now, each), stop) for each in planned]
-
-
-def _nearest(last: Snapshot, now: Snapshot, planned: PlannedAttitude) -> Pointing:
-    """The nearest within the window, straight between rows, leaves (1,)."""
-    each = pointing.nearest(ArrayOps, as_direction(planned, 1), last, now)
-    in_window = np.abs(each.time - planned.time) <= PASSAGE_WINDOW
-    if not in_window.any():
-        return Pointing(np.array([-np.inf]), np.array([np.inf]))
-    k = int(np.argmax(np.where(in_window, each.cosine, -np.inf)))
-    return Pointing(each.cosine[k : k + 1], each.time[k : k + 1])
-
-
-def as_direction(planned: PlannedAttitude, vehicles: int) -> Direction:
-    """A planned attitude as kernels read it, leaves (vehicles,)."""
-    up = components(np.broadcast_to(planned.up, (vehicles, 3)))
-    return Direction(up, np.full(vehicles, planned.time), np.full(vehicles, PASSAGE_WINDOW))
+def attitude_direction(planned: PlannedAttitude) -> Direction:
+    """A planned attitude as kernels read it, leaves numbers."""
+    return Direction(components(planned.up), planned.time, PASSAGE_WINDOW)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
 
@@ -11,16 +11,9 @@ from aerobat.arrays import Array
 from aerobat.certification import PlannedWaypoint
 from aerobat.declaration import by_value
 from aerobat.engines.components import components
-from aerobat.engines.numpy import ArrayOps
-from aerobat.engines.pytree import tree_map
-from aerobat.kernels.gates import approach
-from aerobat.kernels.gates.approach import Approach
-from aerobat.kernels.gates.snapshot import Snapshot
-from aerobat.simulation.flight import Flight
+from aerobat.kernels.gates.approach import Approach, Target
 from aerobat.simulation.outcome import Outcome
 from aerobat.simulation.passages.passage import PASSAGE_WINDOW, one_of_many
-
-T = TypeVar("T")
 
 # [m] beyond the radius that is no miss: paths of least time touch the ball, and no flight is its path
 GRAZING = 1e-3
@@ -74,37 +67,6 @@ def waypoint_passages(planned: PlannedWaypoint, found: Approach, stop: Array) ->
     return WaypointPassage(planned.name, planned.lap, planned.ball.radius, **numbers)
 
 
-def flown_waypoints(flight: Flight, planned: tuple[PlannedWaypoint, ...]) -> list[WaypointPassage]:
-    """Approaches of one flight that was logged, straight between its rows, fields (1,)."""
-    stop = flight.diverged_at
-    return [waypoint_passages(each, _nearest(flight, each), stop) for each in planned]
-
-
-def intervals(flight: Flight, centre: Array | None = None) -> tuple[Snapshot, Snapshot]:
-    """The rows of a flight that intervals begin with, and those that they end with, leaves (T - 1,).
-
-    Args:
-        flight: one that was logged.
-        centre: where positions are counted from [m], (3,).
-    """
-    states = flight.states
-    position = states.position if centre is None else states.position - centre
-    rows = Snapshot(flight.times, *map(components, (position, states.velocity, states.q_world_body)))
-    return _part(rows, slice(-1)), _part(rows, slice(1, None))
-
-
-def _nearest(flight: Flight, planned: PlannedWaypoint) -> Approach:
-    """The nearest approach within the window, leaves (1,)."""
-    each = approach.nearest(ArrayOps, *intervals(flight, planned.ball.centre))
-    in_window = np.abs(each.time - planned.time) <= PASSAGE_WINDOW
-    if not in_window.any():
-        never: Approach = tree_map(np.atleast_1d, approach.init())
-        return never
-    k = int(np.argmin(np.where(in_window, each.square, np.inf)))
-    return _part(each, slice(k, k + 1))
-
-
-def _part(tree: T, part: slice) -> T:
-    """A part of the leaves."""
-    cut: T = tree_map(lambda leaf: leaf[part], tree)
-    return cut
+def waypoint_target(planned: PlannedWaypoint) -> Target:
+    """A planned waypoint as kernels read it, leaves numbers."""
+    return Target(components(planned.ball.centre), planned.time, PASSAGE_WINDOW)

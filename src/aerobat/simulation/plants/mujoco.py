@@ -18,7 +18,7 @@ from pydantic import Field
 from aerobat import so3
 from aerobat.arrays import Array
 from aerobat.errors import BackendMissing
-from aerobat.kernels.motors import Airframe, Motion
+from aerobat.kernels.motors import Airframe, VehicleState
 from aerobat.kernels.rigid_body import Body
 from aerobat.problem.gate import Gate
 from aerobat.simulation.contact import Contact
@@ -41,7 +41,7 @@ class Mujoco(Plant):
     contacts: bool = True  # with gates and ground; false: the vehicle passes through them
     max_step: Annotated[float, Field(gt=0, le=0.01)] = 0.001  # [s] of its Runge-Kutta steps
 
-    def begin(self, scene: PlantScene, motion: Motion) -> MujocoRun:
+    def begin(self, scene: PlantScene, motion: VehicleState) -> MujocoRun:
         """Return the vehicle of a scene at its start. Raises BackendMissing without MuJoCo."""
         return MujocoRun(scene, motion, self.contacts, self.max_step)
 
@@ -52,7 +52,7 @@ PLANTS.add("mujoco", Mujoco)
 class MujocoRun:
     """A vehicle in MuJoCo, on its way; see `PlantRun`."""
 
-    def __init__(self, scene: PlantScene, motion: Motion, contacts: bool, max_step: float) -> None:
+    def __init__(self, scene: PlantScene, motion: VehicleState, contacts: bool, max_step: float) -> None:
         self._mujoco = _import_mujoco()
         self._airframe = scene.airframe
         rates = [rate for rate in scene.airframe.rotors.inverse_time_constant if rate < _AT_ONCE]
@@ -65,7 +65,7 @@ class MujocoRun:
         self._contact = Contact.NOTHING
         self._begin(motion)
 
-    def _begin(self, motion: Motion) -> None:
+    def _begin(self, motion: VehicleState) -> None:
         data, body = self._data, motion.body
         data.qpos[:] = [*body.position, *body.q_world_body]
         data.qvel[:] = [*body.velocity, *body.omega_body]
@@ -75,14 +75,14 @@ class MujocoRun:
         self._feel()
 
     @property
-    def motion(self) -> Motion:
+    def motion(self) -> VehicleState:
         """See `PlantRun.motion`."""
         position, q = self._data.qpos[:3].tolist(), self._data.qpos[3:7].tolist()
         velocity, omega = self._data.qvel[:3].tolist(), self._data.qvel[3:6].tolist()
         thrusts = np.clip(self._data.ctrl, *self._model.actuator_ctrlrange.T)
         thrusts[self._lagging] = self._data.act
         body = Body(tuple(position), tuple(velocity), tuple(q), tuple(omega))
-        return Motion(body, tuple(thrusts.tolist()))
+        return VehicleState(body, tuple(thrusts.tolist()))
 
     @property
     def contact(self) -> Contact:

@@ -19,7 +19,8 @@ from aerobat.engines.pytree import tree_map, tree_stack
 from aerobat.errors import SpecError
 from aerobat.kernels import motors
 from aerobat.kernels.control import Commands
-from aerobat.kernels.motors import Motion
+from aerobat.kernels.imu import ImuState
+from aerobat.kernels.motors import VehicleState
 from aerobat.kernels.ops import Ops, Vector
 from aerobat.kernels.rate_loop import RateSetpoint
 from aerobat.kernels.rigid_body import EnvironmentParameters, specific_force
@@ -40,9 +41,9 @@ from aerobat.simulation.components import (
 )
 from aerobat.simulation.contact import Contact
 from aerobat.simulation.flight_controller import AutopilotRun, Sensed
-from aerobat.simulation.loop import LoopInput, Signals, compose
+from aerobat.simulation.loop import Controlling, LoopInput, Signals, compose
 from aerobat.simulation.plants.plant import Actuation, PlantRun, PlantScene
-from aerobat.simulation.setup import FlightSetup, Part
+from aerobat.simulation.setup import FlightSetup, LoopPart
 from aerobat.vehicle.ellipsoid import Ellipsoid
 
 ROUNDING = 1e-9  # of a step
@@ -53,16 +54,22 @@ class OutsidePlant:
     """A plant that the loop is told of at every tick; its parameters are those of the vehicle's model."""
 
     period: int = 1
-    name: str = "plant"
     feedthrough: bool = True
 
-    def init(self, ops: Ops, parameters: PlantParameters, inputs: Motion, signals: Signals) -> Motion:
+    def init(
+        self, ops: Ops, parameters: PlantParameters, inputs: VehicleState, signals: Signals
+    ) -> VehicleState:
         """See `Component.init`."""
         return inputs
 
     def step(
-        self, ops: Ops, parameters: PlantParameters, state: Motion, inputs: Motion, signals: Signals
-    ) -> Motion:
+        self,
+        ops: Ops,
+        parameters: PlantParameters,
+        state: VehicleState,
+        inputs: VehicleState,
+        signals: Signals,
+    ) -> VehicleState:
         """See `Component.step`."""
         return inputs
 
@@ -72,7 +79,6 @@ class Actuator:
     """The inputs of the plant outside: commands, wind, and the rotors' limits as the battery leaves them."""
 
     period: int = 1
-    name: str = "actuator"
     feedthrough: bool = True
 
     def init(self, ops: Ops, parameters: PlantParameters, inputs: tuple[()], signals: Signals) -> Actuation:
@@ -112,7 +118,7 @@ class RigidBodyRun:
 
     contact = Contact.NOTHING
 
-    def __init__(self, scene: PlantScene, motion: Motion) -> None:
+    def __init__(self, scene: PlantScene, motion: VehicleState) -> None:
         self.motion = motion
         self._airframe, self._gravity = scene.airframe, scene.gravity
 
@@ -146,17 +152,19 @@ def fly_outside(setup: FlightSetup, gates: tuple[Gate, ...]) -> tuple[LogRow, ND
         raise SpecError(f"plant: {name} flies one vehicle at a time, not {len(setup.fleet)}")
     parameters: PlantParameters = setup.parts[-1].parameters
     inner = setup.parts[:-1] if autopilot is None else _without_rate_loop(setup.parts[:-1])
-    parts = (Part(OutsidePlant()), *inner, Part(Actuator(), parameters))
+    parts = (LoopPart(OutsidePlant()), *inner, LoopPart(Actuator(), parameters))
     inside = replace(setup, parts=parts)
-    motion = Motion(first_numbers(setup.start), tuple(0.0 for _ in parameters.airframe.rotors.max_thrust))
+    motion = VehicleState(
+        first_numbers(setup.start), tuple(0.0 for _ in parameters.airframe.rotors.max_thrust)
+    )
     first = _told(inside.first_tick, motion)
     log = _outside_row if autopilot is None else _firmware_row
     init, step = compose(inside.components, log)
     loop = inside.engine().compile(init, step, inside.parameters, first)
     carry = loop.init(first)
     numbers = first_numbers(inside.parameters), first_numbers(expanded(first))
-    states = zip((part.component.name for part in parts), init(FloatOps, *numbers), strict=True)
-    motion = motion._replace(thrusts=dict(states)["controller"].thrusts)
+    controller = next(each for each in init(FloatOps, *numbers) if isinstance(each, Controlling))
+    motion = motion._replace(thrusts=controller.thrusts)
     scene = _scene(setup, gates)
     run: PlantRun = RigidBodyRun(scene, motion) if plant is None else plant.begin(scene, motion)
     rows, touched = [], np.zeros(len(setup.times), dtype=np.int64)
@@ -172,7 +180,7 @@ def fly_outside(setup: FlightSetup, gates: tuple[Gate, ...]) -> tuple[LogRow, ND
     return tree_stack(rows, lambda parts: np.stack(parts, axis=-1)), touched
 
 
-def _without_rate_loop(parts: tuple[Part, ...]) -> tuple[Part, ...]:
+def _without_rate_loop(parts: tuple[LoopPart, ...]) -> tuple[LoopPart, ...]:
     return tuple(part for part in parts if not isinstance(part.component, RateLoop))
 
 
@@ -190,7 +198,7 @@ class _Firmware:
         if self._run is not None:
             self._run.close()
 
-    def step(self, row: OutsideRow, motion: Motion, period: float) -> tuple[LogRow, Actuation]:
+    def step(self, row: OutsideRow, motion: VehicleState, period: float) -> tuple[LogRow, Actuation]:
         """The row of a tick, and the actuation until the next: by the firmware's commands where one flies."""
         actuation: Actuation = first_numbers(row.actuation)
         autopilot = self._setup.config.autopilot
@@ -208,7 +216,7 @@ class _Firmware:
         logged = Commands(tuple(np.array([each]) for each in commands), np.array([saturated]))
         return row.log._replace(commands=logged), actuation._replace(commands=commands)
 
-    def _felt(self, motion: Motion) -> Vector:
+    def _felt(self, motion: VehicleState) -> Vector:
         """The specific force of calm air, where no IMU measures it."""
         properties, rotors = self._scene.airframe
         thrust = motors.collective_thrust(rotors, motion.thrusts)
@@ -217,15 +225,16 @@ class _Firmware:
 
 
 def _outside_row(signals: Signals) -> OutsideRow:
-    return OutsideRow(log_row(signals), signals["actuator"], ())
+    return OutsideRow(log_row(signals), signals.of(Actuation), ())
 
 
 def _firmware_row(signals: Signals) -> OutsideRow:
-    felt = signals["imu"].sample.specific_force if "imu" in signals else ()
+    imu = signals.find(ImuState)
+    felt = () if imu is None else imu.sample.specific_force
     return _outside_row(signals)._replace(told=Told(gyro(signals), felt, setpoint_in_effect(signals)))
 
 
-def _told(inputs: LoopInput, motion: Motion) -> LoopInput:
+def _told(inputs: LoopInput, motion: VehicleState) -> LoopInput:
     """The inputs of a tick with the plant's motion, which is the first component's."""
     return inputs._replace(own=(tree_map(np.float64, motion), *inputs.own[1:]))
 

@@ -8,7 +8,7 @@ from typing import Any, ClassVar, NamedTuple, Protocol
 
 from aerobat.declaration import FieldError, Registry, shown
 from aerobat.errors import SpecError
-from aerobat.kernels.motors import Airframe, Motion
+from aerobat.kernels.motors import Airframe, VehicleState
 from aerobat.kernels.ops import PerRotor, Vector
 from aerobat.problem.gate import Gate
 from aerobat.simulation.contact import Contact
@@ -38,7 +38,7 @@ class PlantRun(Protocol):
     """A vehicle in another simulator, on its way."""
 
     @property
-    def motion(self) -> Motion:
+    def motion(self) -> VehicleState:
         """The present state of the vehicle and the present thrusts [N] of its rotors."""
 
     @property
@@ -58,7 +58,7 @@ class Plant(ABC):
     kind: ClassVar[str] = ""  # its name in settings, set when it is registered
 
     @abstractmethod
-    def begin(self, scene: PlantScene, motion: Motion) -> PlantRun:
+    def begin(self, scene: PlantScene, motion: VehicleState) -> PlantRun:
         """Return the vehicle of a scene at its start.
 
         Raises BackendMissing where the simulator is not installed, SpecError for what it has not.

@@ -17,7 +17,7 @@ from pydantic import PlainValidator
 from aerobat.arrays import Array
 from aerobat.declaration import FieldError, shown, validated
 from aerobat.errors import BackendMissing, SpecError
-from aerobat.kernels.motors import Airframe, Motion
+from aerobat.kernels.motors import Airframe, VehicleState
 from aerobat.kernels.rigid_body import Body
 from aerobat.simulation.contact import Contact
 from aerobat.simulation.plants.plant import PLANTS, Actuation, Plant, PlantScene
@@ -45,7 +45,7 @@ class RotorPy(Plant):
     # one of RotorPy's own, with its drag, lift and flapping, as hummingbird; left out, made of what flies
     vehicle: Annotated[str | None, PlainValidator(_vehicle_name)] = None
 
-    def begin(self, scene: PlantScene, motion: Motion) -> RotorPyRun:
+    def begin(self, scene: PlantScene, motion: VehicleState) -> RotorPyRun:
         """Return the vehicle of a scene at its start.
 
         Raises BackendMissing without RotorPy, SpecError for more than four rotors and other gravity.
@@ -66,7 +66,7 @@ PLANTS.add("rotorpy", RotorPy)
 class RotorPyRun:
     """A vehicle in RotorPy, on its way; see `PlantRun`."""
 
-    def __init__(self, parameters: Mapping[str, Any], motion: Motion) -> None:
+    def __init__(self, parameters: Mapping[str, Any], motion: VehicleState) -> None:
         body = motion.body
         self._thrust_coefficient = parameters["k_eta"]
         w, x, y, z = body.q_world_body
@@ -84,12 +84,12 @@ class RotorPyRun:
         )
 
     @property
-    def motion(self) -> Motion:
+    def motion(self) -> VehicleState:
         """See `PlantRun.motion`."""
         position, velocity, q, omega = (tuple(self._state[name].tolist()) for name in "xvqw")
         x, y, z, w = q
         thrusts = self._thrust_coefficient * self._state["rotor_speeds"] ** 2
-        return Motion(Body(position, velocity, (w, x, y, z), omega), tuple(thrusts.tolist()))
+        return VehicleState(Body(position, velocity, (w, x, y, z), omega), tuple(thrusts.tolist()))
 
     @property
     def contact(self) -> Contact:

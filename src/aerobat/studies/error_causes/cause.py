@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import fields, is_dataclass, replace
 from types import MappingProxyType
 from typing import Annotated, Any
 
 from pydantic import AfterValidator
 
 from aerobat.control import Controller
-from aerobat.declaration import AS_IT_IS, Label, declared, shown, unknown_name
+from aerobat.declaration import AS_IT_IS, Label, declared
 from aerobat.environment import Dispersion
 from aerobat.errors import SpecError
 from aerobat.planning import Planner
+from aerobat.studies.lens import lens
 
 
 def _read_only(changes: Mapping[str, Any]) -> Mapping[str, Any]:
@@ -47,7 +47,7 @@ class Cause:
         Raises SpecError for a path that names no field, and for a value that the field does not take.
         """
         for path, value in self.changes.items():
-            trial = _changed(trial, path, value, path)
+            trial = lens(path, trial).set(trial, value)
         return trial
 
 
@@ -69,17 +69,3 @@ def together(causes: Iterable[Cause], name: str) -> Cause:
 def _overlap(path: str, other: str) -> bool:
     """True where one path is the other, or leads into it."""
     return f"{path}.".startswith(f"{other}.") or f"{other}.".startswith(f"{path}.")
-
-
-def _changed(value: Any, path: str, new: Any, whole: str) -> Any:
-    """The value with the field at the end of a path changed; `whole` is the path that errors tell."""
-    name, _, rest = path.partition(".")
-    if not is_dataclass(value):
-        before = whole.removesuffix(f".{path}")
-        raise SpecError(f"{whole}: {before} is {shown(value)}, it has no fields; change it whole")
-    names = [field.name for field in fields(value)]
-    if name not in names:
-        raise unknown_name(f"field of {type(value).__name__}", name, names)
-    inner = _changed(getattr(value, name), rest, new, whole) if rest else new
-    changes: dict[str, Any] = {name: inner}
-    return replace(value, **changes)  # type: ignore[type-var]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from concurrent.futures import Executor
 from typing import Annotated
 
 from pydantic import Field
@@ -11,11 +12,12 @@ from aerobat.control import Controller
 from aerobat.declaration import Seed, validated
 from aerobat.environment import Dispersion, as_dispersion
 from aerobat.errors import Infeasible, SpecError
-from aerobat.evaluation import score_flights
 from aerobat.planning import Plan, Planner, as_planner, plan
 from aerobat.problem import Problem, as_problem
 from aerobat.studies.error_causes.cause import Cause, Trial, together
 from aerobat.studies.error_causes.result import ALL, NONE, ErrorCauses, TrialResult
+from aerobat.studies.flights import FlightTask, cut, fly_scores
+from aerobat.studies.workers import Workers, pool
 from aerobat.vehicle import Vehicle, as_vehicle
 
 Flights = Annotated[int, Field(ge=1, le=10**6, description="whole number from 1 to a million")]
@@ -32,6 +34,8 @@ def error_causes(
     controller: Controller | None = None,
     flights: Flights = 1000,
     seed: Seed = 0,
+    workers: Workers | None = None,
+    executor: Executor | None = None,
     begin: Callable[[str], None] | None = None,
 ) -> ErrorCauses:
     """Plan and fly a maneuver with no cause of error, with each alone, and with all together.
@@ -48,6 +52,8 @@ def error_causes(
         controller: how it is controlled without them, by default the vehicle's own.
         flights: how many, of each trial.
         seed: of all flights.
+        workers: processes, by default one a core; 1 flies in this process; dask://HOST:PORT on a cluster.
+        executor: any of `concurrent.futures` that flies instead, as a `dask.distributed` client's.
         begin: called with each trial's name when its turn comes.
 
     Raises:
@@ -65,21 +71,16 @@ def error_causes(
     trials = [each.applied(none) for each in (Cause(NONE, {}), *causes, together(causes, ALL))]
     plans: dict[tuple[Planner, bool], Plan] = {}
     results = []
-    for name, trial in zip(names, trials, strict=True):
-        if begin is not None:
-            begin(name)
-        key = trial.planner, trial.vehicle_known
-        if key not in plans:
-            plans[key] = _planned(name, problem, trial.planner, vehicle if trial.vehicle_known else None)
-        scores = score_flights(
-            plans[key],
-            vehicle,
-            conditions=trial.conditions,
-            controller=trial.controller,
-            flights=flights,
-            seed=seed,
-        )
-        results.append(TrialResult(name, trial, plans[key], scores))
+    with pool(workers, executor, len(cut(range(flights)))) as flying:
+        for name, trial in zip(names, trials, strict=True):
+            if begin is not None:
+                begin(name)
+            key = trial.planner, trial.vehicle_known
+            if key not in plans:
+                plans[key] = _planned(name, problem, trial.planner, vehicle if trial.vehicle_known else None)
+            task = FlightTask(plans[key], vehicle, trial.conditions, seed, trial.controller)
+            (scores,) = fly_scores(flying, (task,), range(flights))
+            results.append(TrialResult(name, trial, plans[key], scores))
     return ErrorCauses(tuple(results), seed)
 
 

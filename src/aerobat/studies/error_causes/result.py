@@ -10,7 +10,7 @@ from pydantic import Field
 
 from aerobat.arrays import Array
 from aerobat.declaration import Label, Positive, by_value, short, unknown_name, validated
-from aerobat.evaluation import Scores
+from aerobat.evaluation import Score
 from aerobat.planning import Plan
 from aerobat.simulation.outcome import length
 from aerobat.studies.error_causes.cause import Trial
@@ -55,7 +55,7 @@ class TrialResult:
     cause: str  # its name, NONE or ALL
     trial: Trial
     plan: Plan
-    scores: Scores
+    scores: Score
 
     def __str__(self) -> str:
         """One line for people."""
@@ -64,7 +64,7 @@ class TrialResult:
     @property
     def position_error(self) -> Array:
         """The largest of each flight [m]."""
-        return np.nan_to_num(self.scores.max_position_error_m, nan=np.inf)
+        return np.asarray(np.nan_to_num(self.scores.max_position_error_m, nan=np.inf))
 
     @property
     def gate_error(self) -> Array:

@@ -4,30 +4,33 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
-from concurrent.futures import Executor, Future, as_completed
+from concurrent.futures import Executor
 from dataclasses import dataclass, replace
 from itertools import product
 from math import nan, prod
 from types import MappingProxyType
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import Field as Bounds
 
-from aerobat.declaration import NonNegative, by_value, in_notebooks, short, validated
-from aerobat.engines.cores import available_cores
+from aerobat.declaration import NonNegative, Seed, by_value, in_notebooks, short, validated
+from aerobat.environment import Dispersion, as_dispersion
 from aerobat.errors import SpecError
 from aerobat.planning import Planner, as_planner
 from aerobat.problem import Problem, as_problem
 from aerobat.studies.feasibility.axis import MAX_CELLS, Axis
 from aerobat.studies.feasibility.binding import least_reserve
-from aerobat.studies.feasibility.fields import Field, Scenario
 from aerobat.studies.feasibility.probe import TIME_LIMIT, Feasibility, Task, probe
-from aerobat.studies.workers import Workers
-from aerobat.studies.workers import workers as processes
+from aerobat.studies.flights import FlightTask, fly_scores
+from aerobat.studies.lens import Lens, Scenario, lens
+from aerobat.studies.sweep.share import Share
+from aerobat.studies.workers import Pool, Workers, pool
 from aerobat.vehicle import Vehicle, as_vehicle
 
 MAX_AXES = 2
+Flights = Annotated[int, Bounds(ge=1, le=10**6, description="whole number from 1 to a million")]
 
 
 @by_value
@@ -41,6 +44,7 @@ class Cell:
     limits: tuple[str, ...]  # that bind, by the names of their fields; none where that is not known
     reserve: float | None  # of its range, that every rotor is proven to keep from either limit
     sentence: str  # the proof, or why there is none
+    passed: Share | None = None  # of flights under the scenario's conditions; None where none were flown
 
     @property
     def is_planned(self) -> bool:
@@ -76,8 +80,8 @@ class FeasibilityMap:
     def table(self) -> Mapping[str, NDArray[Any]]:
         """A row a cell: a column for each field by its name, then what there is to say of it.
 
-        Columns `feasibility`, `limits` and `sentence` are text, `duration_s` and `reserve` numbers, NaN where
-        there is no plan.
+        Columns `feasibility`, `limits` and `sentence` are text, `duration_s`, `reserve` and `passed` numbers,
+        NaN where there is no plan, or no flight.
         """
         columns = {axis.name: np.array([c.values[i] for c in self.cells]) for i, axis in enumerate(self.axes)}
         columns |= {
@@ -85,6 +89,7 @@ class FeasibilityMap:
             "duration_s": np.array([nan if c.duration is None else c.duration for c in self.cells]),
             "limits": np.array([", ".join(cell.limits) for cell in self.cells]),
             "reserve": np.array([nan if c.reserve is None else c.reserve for c in self.cells]),
+            "passed": np.array([nan if c.passed is None else c.passed.fraction for c in self.cells]),
             "sentence": np.array([cell.sentence for cell in self.cells]),
         }
         return MappingProxyType(columns)
@@ -98,11 +103,14 @@ def feasibility_map(
     planner: Planner | str | None = None,
     *,
     time_limit: NonNegative = TIME_LIMIT,
+    conditions: Dispersion | str | None = None,
+    flights: Flights = 100,
+    seed: Seed = 0,
     workers: Workers | None = None,
     executor: Executor | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> FeasibilityMap:
-    """Plan a problem for all values of one or two of its or its vehicle's fields, and say which limits bind.
+    """Plan a problem for all values of one or two fields, and say which limits bind.
 
     Every cell is planned by itself, as `plan` would with those values, none is inferred from another; but a
     refusal tries no changes that would help, and what contradicts itself is refused without a search.
@@ -110,40 +118,46 @@ def feasibility_map(
     Args:
         problem: what is planned, or its name.
         over: the values of each field, by its name: `{"angle": [0, 45, 90], "speed": range(2, 21, 2)}`. Names
-            are those of files, as `limits.velocity`, `gates[0].width`, `vehicle.mass`; the last part alone
-            where no other field has it; and `angle` for the tilt [deg] of a half-flip's gate.
+            are those of `lens`, as `limits.velocity`, `gates[0].width`, `vehicle.mass`, `planner.reserve`;
+            the last part alone where no other field has it; `angle` for the tilt of a half-flip's gate.
         vehicle: what flies it, or its name.
         planner: how, or its registered name, by default the one that suits each problem.
         time_limit: of each cell [s].
-        workers: processes, by default one a core; 1 plans in this process.
-        executor: what plans instead, as `dask.distributed.Client(...).get_executor()`.
+        conditions: under which each plan is flown too, or their name; their fields can be varied then.
+        flights: how many of each plan there are under conditions.
+        seed: of the flights.
+        workers: processes, by default one a core; 1 plans in this process; dask://HOST:PORT on a cluster.
+        executor: any of `concurrent.futures` that plans instead, as a `dask.distributed` client's.
         progress: called with the cells done, and of them those that are planned, as they are finished.
 
     Raises SpecError for names of no field, and for values that a field cannot take.
     """
-    scenario = Scenario(as_problem(problem), as_vehicle(vehicle))
+    chosen = None if planner is None else as_planner(planner)
+    varied = None if conditions is None else as_dispersion(conditions)
+    scenario = Scenario(as_problem(problem), as_vehicle(vehicle), chosen, varied)
     axes = tuple(Axis.of(name, values) for name, values in over.items())
     fields = _fields(axes, scenario)
-    task = Task(scenario, fields, None if planner is None else as_planner(planner), time_limit)
+    task = Task(scenario, fields, time_limit, range(flights), seed)
     places = list(product(*(axis.values for axis in axes)))
-    count = min(workers or available_cores(), len(places))
-    if executor is not None:
-        cells = _cells(executor, task, places, progress, cancels=True)
-    else:
-        with processes(count, forked=True) as pool:
-            cells = _cells(pool, task, places, progress)
+    cells: dict[tuple[float, ...], Cell] = {}
+    with pool(workers, executor, len(places)) as planning:
+        for values, cell in planning.results(_cell, task, places):
+            cells[values] = cell
+            if progress is not None:
+                progress(len(cells), sum(cell.is_planned for cell in cells.values()))
     told = tuple(replace(axis, unit=field.unit) for axis, field in zip(axes, fields, strict=True))
-    return FeasibilityMap(scenario.problem, scenario.vehicle, told, cells)
+    found = tuple(cells[values] for values in places)
+    return FeasibilityMap(scenario.problem, scenario.vehicle, told, found)
 
 
-def _fields(axes: Sequence[Axis], scenario: Scenario) -> tuple[Field, ...]:
+def _fields(axes: Sequence[Axis], scenario: Scenario) -> tuple[Lens, ...]:
     """The fields of axes. Raises SpecError for what is no map of a scenario."""
     if not 1 <= len(axes) <= MAX_AXES:
         raise SpecError(f"over must name one field or two, got {len(axes)}")
     cells = prod(len(axis.values) for axis in axes)
     if cells > MAX_CELLS:
         raise SpecError(f"over: {cells} cells are too many, {MAX_CELLS} at most; take larger steps")
-    fields = tuple(Field.of(axis.name, scenario) for axis in axes)
+    fields = tuple(lens(axis.name, scenario) for axis in axes)
     if len({field.place for field in fields}) < len(fields):
         raise SpecError(f"over: {axes[0].name} and {axes[1].name} are the same field; drop one of them")
     for field, axis in zip(fields, axes, strict=True):
@@ -151,40 +165,15 @@ def _fields(axes: Sequence[Axis], scenario: Scenario) -> tuple[Field, ...]:
     return fields
 
 
-def _cells(
-    executor: Executor,
-    task: Task,
-    places: Sequence[tuple[float, ...]],
-    progress: Callable[[int, int], None] | None,
-    cancels: bool = False,
-) -> tuple[Cell, ...]:
-    """The cells of places, in their order.
-
-    Args:
-        executor: what plans.
-        task: what is planned.
-        places: values of its fields.
-        progress: called with the cells done and planned.
-        cancels: True for an executor that goes on when the map does not.
-    """
-    pending: dict[Future[Cell], int] = {}
-    cells: dict[int, Cell] = {}
-    try:
-        for number, values in enumerate(places):
-            pending[executor.submit(_cell, task, values)] = number
-        for future in as_completed(pending):
-            cells[pending[future]] = future.result()
-            if progress is not None:
-                progress(len(cells), sum(cell.is_planned for cell in cells.values()))
-    finally:
-        for future in pending if cancels else ():
-            future.cancel()
-    return tuple(cells[number] for number in range(len(places)))
-
-
 def _cell(task: Task, values: tuple[float, ...]) -> Cell:
     found = probe(task, values)
-    plan = found.plan
+    plan, passed = found.plan, None
+    if plan is not None and found.is_planned and task.scenario.conditions is not None:
+        varied = task.varied(values)
+        assert varied.conditions is not None, "a field of conditions is varied, not whether there are any"
+        flown = FlightTask(plan, varied.vehicle, varied.conditions, task.seed, varied.vehicle.controller)
+        (scores,) = fly_scores(Pool(), (flown,), task.flights)
+        passed = Share(int(scores.succeeded.sum()), len(scores))
     return Cell(
         values=values,
         feasibility=found.feasibility,
@@ -192,4 +181,5 @@ def _cell(task: Task, values: tuple[float, ...]) -> Cell:
         limits=found.limits,
         reserve=None if plan is None else least_reserve(plan),
         sentence=found.sentence,
+        passed=passed,
     )

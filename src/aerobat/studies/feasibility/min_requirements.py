@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Callable, Generator, Sequence
-from concurrent.futures import FIRST_COMPLETED, Executor, Future, wait
+from concurrent.futures import Executor
+from contextlib import suppress
 from dataclasses import dataclass
 from math import isfinite
 from typing import Annotated
@@ -11,15 +13,13 @@ from typing import Annotated
 from pydantic import Field as Bounds
 
 from aerobat.declaration import NonNegative, by_value, validated
-from aerobat.engines.cores import available_cores
 from aerobat.errors import Infeasible
 from aerobat.planning import Plan, Planner, as_planner
 from aerobat.problem import Problem, as_problem
-from aerobat.studies.feasibility.fields import Scenario
 from aerobat.studies.feasibility.probe import TIME_LIMIT, Feasibility, Probe, Task, probe
-from aerobat.studies.feasibility.quantities import Quantity, named_quantities
-from aerobat.studies.workers import Workers
-from aerobat.studies.workers import workers as processes
+from aerobat.studies.feasibility.quantities import NeededQuantity, named_quantities
+from aerobat.studies.lens import Scenario
+from aerobat.studies.workers import Pool, Workers, pool
 from aerobat.vehicle import Vehicle, as_vehicle
 
 GROWTH = 1.5  # from one value to the next, where what there is does not suffice
@@ -70,6 +70,7 @@ def min_requirements(
     tolerance: Tolerance = 0.01,
     time_limit: NonNegative = TIME_LIMIT,
     workers: Workers | None = None,
+    executor: Executor | None = None,
     progress: Tried | None = None,
 ) -> tuple[Requirement, ...]:
     """Find the least of each quantity for which a problem has a plan, the others as they are, by bisection.
@@ -87,66 +88,56 @@ def min_requirements(
         tolerance: between the answer and the refusal, as a part of the answer, of a ceiling of its height
             above what is met below it, or of a metre where that is more.
         time_limit: of each plan [s]; where none is found by then, it counts as refused.
-        workers: processes, by default one a core; 1 plans in this process.
+        workers: processes, by default one a core; 1 plans in this process; dask://HOST:PORT on a cluster.
+        executor: any of `concurrent.futures` that plans instead, as a `dask.distributed` client's.
         progress: called with each quantity, value and whether it is planned, as they are tried.
 
     Raises:
         SpecError: quantities are unknown, or the problem has no such thing.
         Infeasible: nothing suffices, whichever quantity grows; the sentence says why.
     """
-    scenario = Scenario(as_problem(problem), as_vehicle(vehicle))
-    planner = None if planner is None else as_planner(planner)
+    chosen = None if planner is None else as_planner(planner)
+    scenario = Scenario(as_problem(problem), as_vehicle(vehicle), chosen)
     searches = [_Search(q, scenario, tolerance) for q in named_quantities(of, scenario.problem)]
-    with processes(min(workers or available_cores(), len(searches)), forked=True) as pool:
-        found = _found(pool, searches, planner, time_limit, progress)
+    tasks = tuple(Task(scenario, (search.quantity,), time_limit) for search in searches)
+    with pool(workers, executor, len(searches)) as planning:
+        _search(planning, tasks, searches, progress)
+    found = tuple(search.requirement for search in searches)
     if all(each.plan is None for each in found):
         raise Infeasible(f"'{scenario.problem.name}' has no plan on {scenario.vehicle.name}: {found[0]}")
     return found
 
 
-def _found(
-    executor: Executor,
-    searches: Sequence[_Search],
-    planner: Planner | None,
-    time_limit: float,
-    tried: Tried | None,
-) -> tuple[Requirement, ...]:
-    """The answers of searches, each of which has one plan made at a time.
+def _search(
+    planning: Pool, tasks: tuple[Task, ...], searches: Sequence[_Search], tried: Tried | None
+) -> None:
+    """Run searches side by side, each of which has one plan made at a time.
 
     Args:
-        executor: what plans.
-        searches: of a quantity each.
-        planner: how; None for the one that suits each problem.
-        time_limit: of each plan [s].
-        tried: called with each value that was tried.
+        planning: What plans.
+        tasks: The task of each search.
+        searches: Of a quantity each.
+        tried: Called with each value that was tried.
     """
-    runs = {search: search.run() for search in searches}
-    pending: dict[Future[Probe], tuple[_Search, float]] = {}
+    runs = [search.run() for search in searches]
+    parts = deque((number, next(run)) for number, run in enumerate(runs))
+    for (number, value), found in planning.results(_probe, tasks, parts):
+        if tried is not None:
+            tried(searches[number].quantity.name, value, found.is_planned)
+        with suppress(StopIteration):
+            parts.append((number, runs[number].send(found)))
 
-    def submit(search: _Search, value: float) -> None:
-        task = Task(search.scenario, (search.quantity,), planner, time_limit)
-        pending[executor.submit(probe, task, (value,))] = search, value
 
-    for search, run in runs.items():
-        submit(search, next(run))
-    while pending:
-        for future in wait(pending, return_when=FIRST_COMPLETED).done:
-            search, value = pending.pop(future)
-            found = future.result()
-            if tried is not None:
-                tried(search.quantity.name, value, found.is_planned)
-            try:
-                submit(search, runs[search].send(found))
-            except StopIteration:
-                continue
-    return tuple(search.requirement for search in searches)
+def _probe(tasks: tuple[Task, ...], part: tuple[int, float]) -> Probe:
+    number, value = part
+    return probe(tasks[number], (value,))
 
 
 @dataclass(eq=False)
 class _Search:
     """The bisection of one quantity, between a value that is refused and one for which there is a plan."""
 
-    quantity: Quantity
+    quantity: NeededQuantity
     scenario: Scenario
     tolerance: float
     planned: tuple[float, Probe] | None = None  # the least so far

@@ -9,10 +9,10 @@ from typing import Protocol
 
 from aerobat.errors import Infeasible, SpecError, limits_of
 from aerobat.optimization.deadline import out_of_time, within_time
-from aerobat.planning import Plan, Planner, plan
+from aerobat.planning import Plan, plan
 from aerobat.planning.assessment.contradiction import contradiction
 from aerobat.studies.feasibility.binding import binding_limits
-from aerobat.studies.feasibility.fields import Scenario
+from aerobat.studies.lens import Scenario
 
 TIME_LIMIT = 30.0  # [s] of planning, where no other is given: most scenarios take one
 
@@ -45,7 +45,7 @@ class Probe:
 class Variable(Protocol):
     """Something of a scenario that can be set to a number."""
 
-    def changed(self, scenario: Scenario, value: float) -> Scenario:
+    def set(self, whole: Scenario, value: float) -> Scenario:
         """The scenario with it at a value. Raises SpecError where that cannot be."""
 
 
@@ -55,16 +55,22 @@ class Task:
 
     scenario: Scenario
     variables: tuple[Variable, ...]
-    planner: Planner | None  # None for the one that suits each problem
     time_limit: float  # [s] of each
+    flights: range = range(0)  # of each plan, under the scenario's conditions
+    seed: int = 0  # of the flights
+
+    def varied(self, values: Sequence[float]) -> Scenario:
+        """The scenario where the variables have these values. Raises SpecError where that cannot be."""
+        scenario = self.scenario
+        for variable, value in zip(self.variables, values, strict=True):
+            scenario = variable.set(scenario, value)
+        return scenario
 
 
 def probe(task: Task, values: Sequence[float]) -> Probe:
     """The answer where the variables have these values."""
-    scenario = task.scenario
     try:
-        for variable, value in zip(task.variables, values, strict=True):
-            scenario = variable.changed(scenario, value)
+        scenario = task.varied(values)
         found = contradiction(scenario.problem, scenario.vehicle)
         if found is not None:
             limits = found.limits or (f"stage '{found.stage}'",)
@@ -77,7 +83,7 @@ def probe(task: Task, values: Sequence[float]) -> Probe:
 def _planned(scenario: Scenario, task: Task) -> Probe:
     with within_time(task.time_limit):
         try:
-            found = plan(scenario.problem, task.planner, scenario.vehicle)
+            found = plan(scenario.problem, scenario.planner, scenario.vehicle)
         except Infeasible as error:
             reason = Feasibility.NO_PLAN if error.attempts else Feasibility.REFUSED
             return Probe(Feasibility.NO_ANSWER if out_of_time() else reason, error.sentence, error.limits)

@@ -14,10 +14,10 @@ from aerobat.declaration import unknown_name
 from aerobat.errors import SpecError
 from aerobat.planning import Plan
 from aerobat.problem import Problem
-from aerobat.studies.feasibility.fields import THRUST_TO_WEIGHT, VEHICLE, Field, Scenario
+from aerobat.studies.lens import Scenario, lens
 
 
-class Quantity(ABC):
+class NeededQuantity(ABC):
     """Something of which less makes a scenario harder."""
 
     name: ClassVar[str]
@@ -29,7 +29,7 @@ class Quantity(ABC):
         """Return what the scenario has, infinite where it has no bound."""
 
     @abstractmethod
-    def changed(self, scenario: Scenario, value: float) -> Scenario:
+    def set(self, whole: Scenario, value: float) -> Scenario:
         """Return the scenario with so much of it. Raises SpecError where that contradicts the rest."""
 
     def floor(self, scenario: Scenario) -> float:
@@ -41,7 +41,7 @@ class Quantity(ABC):
         return inf
 
 
-class ThrustToWeight(Quantity):
+class ThrustToWeight(NeededQuantity):
     """All rotors at full thrust, in weights on Earth, each its part of them as it is."""
 
     name = "thrust-to-weight"
@@ -50,12 +50,12 @@ class ThrustToWeight(Quantity):
         """Return the vehicle's."""
         return scenario.vehicle.thrust_to_weight
 
-    def changed(self, scenario: Scenario, value: float) -> Scenario:
+    def set(self, whole: Scenario, value: float) -> Scenario:
         """Return the scenario with rotors as strong."""
-        return Field(self.name, (VEHICLE, THRUST_TO_WEIGHT)).changed(scenario, value)
+        return lens("vehicle.thrust_to_weight", whole).set(whole, value)
 
 
-class Ceiling(Quantity):
+class Ceiling(NeededQuantity):
     """The height that the path stays below."""
 
     name = "ceiling"
@@ -76,12 +76,12 @@ class Ceiling(Quantity):
         """Return the height of its highest point."""
         return float(plan.trajectory.component_range(0)[1][2])
 
-    def changed(self, scenario: Scenario, value: float) -> Scenario:
+    def set(self, whole: Scenario, value: float) -> Scenario:
         """Return the scenario under such a ceiling."""
-        return Field(self.name, ("limits", "upper", 2)).changed(scenario, value)
+        return lens("limits.upper.z", whole).set(whole, value)
 
 
-class GateSize(Quantity):
+class GateSize(NeededQuantity):
     """The openings of all gates, as parts of what they are."""
 
     name = "gate"
@@ -93,16 +93,18 @@ class GateSize(Quantity):
             raise SpecError(f"'{scenario.problem.name}' has no gate that could be smaller; leave gate out")
         return 1.0
 
-    def changed(self, scenario: Scenario, value: float) -> Scenario:
+    def set(self, whole: Scenario, value: float) -> Scenario:
         """Return the scenario with openings of that part of their size."""
-        gates = tuple(gate.resized(value, value) for gate in scenario.problem.gates)
-        return replace(scenario, problem=replace(scenario.problem, gates=gates))
+        gates = tuple(gate.resized(value, value) for gate in whole.problem.gates)
+        return replace(whole, problem=replace(whole.problem, gates=gates))
 
 
-QUANTITIES: dict[str, Quantity] = {each.name: each for each in (ThrustToWeight(), Ceiling(), GateSize())}
+QUANTITIES: dict[str, NeededQuantity] = {
+    each.name: each for each in (ThrustToWeight(), Ceiling(), GateSize())
+}
 
 
-def named_quantities(names: Sequence[str] | None, problem: Problem) -> tuple[Quantity, ...]:
+def named_quantities(names: Sequence[str] | None, problem: Problem) -> tuple[NeededQuantity, ...]:
     """The quantities of these names, by default all that a problem has. Raises SpecError for others."""
     if names is None:
         return tuple(each for each in QUANTITIES.values() if problem.gates or not isinstance(each, GateSize))

@@ -59,7 +59,7 @@ class PositionLoop:
         return -(self.position * error + self.velocity * rate + self.integral * integral)
 
 
-class Kind(IntEnum):
+class ShortfallCause(IntEnum):
     """The origin of the acceleration that was not delivered between two rows."""
 
     UNSATURATED = 0
@@ -74,7 +74,7 @@ class Disturbances:
     observer: Array  # by what the observer saw wrongly
     vehicle: Array  # by what the vehicle's model leaves out
     missing: Array  # not delivered
-    kinds: Array  # Kind of what is missing, (T − 1,)
+    kinds: Array  # ShortfallCause of what is missing, (T − 1,)
 
 
 def disturbances(flight: Flight, vehicle: Vehicle, loop: PositionLoop) -> Disturbances:
@@ -145,7 +145,11 @@ def _kinds(flight: Flight, vehicle: Vehicle, recovery: float) -> Array:
         begin - np.maximum.accumulate(np.where(rows[:-1], begin, -np.inf)) <= recovery + _CLOCK
         for rows in (flight.saturated, beyond)
     )
-    return np.where(asked, Kind.ASKED_BY_PLAN, np.where(saturated, Kind.LED_TO, Kind.UNSATURATED))
+    return np.where(
+        asked,
+        ShortfallCause.ASKED_BY_PLAN,
+        np.where(saturated, ShortfallCause.LED_TO, ShortfallCause.UNSATURATED),
+    )
 
 
 def _asked_too_much(flight: Flight, vehicle: Vehicle) -> Array:

@@ -6,7 +6,7 @@ import numpy as np
 from scipy.linalg import expm
 
 from aerobat.arrays import Array
-from aerobat.studies.inspection.disturbances import Disturbances, Kind, PositionLoop
+from aerobat.studies.inspection.disturbances import Disturbances, PositionLoop, ShortfallCause
 
 _DIGITS = 9  # of a row's duration [s], so that rows alike are stepped alike
 _ANSWERED = 1e-3  # [m/s²] of feedback, below which it answers nothing but rounding
@@ -33,9 +33,9 @@ def responses(
     errors = [state[0]]
     durations = np.round(np.diff(times), _DIGITS)
     steps = {float(h): _step(float(h), loop) for h in np.unique(durations)}
-    answered, before = NAMES.index(unsaturated), Kind.UNSATURATED
+    answered, before = NAMES.index(unsaturated), ShortfallCause.UNSATURATED
     for row, h in enumerate(durations):
-        kind = Kind(found.kinds[row])
+        kind = ShortfallCause(found.kinds[row])
         if kind is not before:
             answered = _cause(kind, state, loop, NAMES.index(unsaturated))
         before = kind
@@ -50,11 +50,11 @@ def responses(
     return {name: series[:, k] for k, name in enumerate(NAMES)}
 
 
-def _cause(kind: Kind, state: Array, loop: PositionLoop, unsaturated: int) -> int:
+def _cause(kind: ShortfallCause, state: Array, loop: PositionLoop, unsaturated: int) -> int:
     """The number of the cause of what is missing from now on."""
-    if kind is Kind.ASKED_BY_PLAN:
+    if kind is ShortfallCause.ASKED_BY_PLAN:
         return NAMES.index("saturation")
-    if kind is Kind.UNSATURATED:
+    if kind is ShortfallCause.UNSATURATED:
         return unsaturated
     off, rate = np.linalg.norm(state[:2], axis=-1)
     sizes = loop.position * off + loop.velocity * rate

@@ -51,7 +51,12 @@ class ErrorShare:
         """One line for people."""
         felt = f"felt from {self.begin:.2f} to {self.end:.2f} s"
         part = f"{CAUSES[self.cause][0]}: {100 * self.error:+.1f} cm"
-        return f"{part}, {felt}" if abs(self.error) >= _SHOWN else part
+        return f"{part}, {felt}" if self.is_felt else part
+
+    @property
+    def is_felt(self) -> bool:
+        """True where it is more than nothing."""
+        return abs(self.error) >= _SHOWN
 
 
 @short
@@ -135,27 +140,3 @@ class Inspection:
     def __str__(self) -> str:
         """One line for people."""
         return self.verdict
-
-    def record(self) -> dict[str, object]:
-        """All but the series, for a file."""
-        shares = [
-            {"cause": one.cause, "error_m": one.error, "begin_s": one.begin, "end_s": one.end}
-            for one in self.shares
-        ]
-        place = self.alignment
-        return {
-            "verdict": self.verdict,
-            "cause": self.cause,
-            "max_position_error_m": self.largest,
-            "time_s": self.time,
-            "shares": shares,
-            "command_delay_s": self.delay,
-            "saturated_fraction": self.saturated,
-            "has_observer": self.observed,
-            "alignment": {
-                "time_shift_s": place.time_shift,
-                "yaw_deg": float(np.rad2deg(place.yaw)),
-                "translation_m": place.translation.tolist(),
-                "misfit_m": place.misfit,
-            },
-        }

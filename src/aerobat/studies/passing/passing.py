@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from concurrent.futures import Executor
 from dataclasses import dataclass, field, replace
 from math import ceil, log
 from typing import Annotated, Any
@@ -13,16 +14,18 @@ from aerobat.control import named_controller
 from aerobat.declaration import Seed, validated
 from aerobat.environment import Dispersion, as_dispersion
 from aerobat.errors import Infeasible, SpecError
-from aerobat.evaluation import Scores, score_flights
+from aerobat.evaluation import Score
 from aerobat.evaluation.opening import Probability
 from aerobat.planning import Attempt, Plan, Planner, as_planner, plan
 from aerobat.planning.tube import Tube
 from aerobat.problem import Problem, as_problem
+from aerobat.studies.flights import FlightTask, cut, fly_scores
 from aerobat.studies.passing.causes import standing_in_the_way
 from aerobat.studies.passing.result import Passing, Round
 from aerobat.studies.passing.spread import LEVEL, firmer, narrowed, spread_of
 from aerobat.studies.sweep import Share
 from aerobat.studies.sweep.share import CONFIDENCE, percent
+from aerobat.studies.workers import Pool, Workers, pool
 from aerobat.vehicle import Vehicle, as_vehicle
 
 STEP = 0.02  # of every limit's range, between reserves that are tried
@@ -49,6 +52,8 @@ def plan_to_pass(
     controller: str = "full",
     flights: Flights = 1000,
     fresh: Flights | None = None,
+    workers: Workers | None = None,
+    executor: Executor | None = None,
     progress: Callable[[Attempt], None] | None = None,
     tried: Callable[[Round], None] | None = None,
 ) -> Passing:
@@ -71,6 +76,8 @@ def plan_to_pass(
         controller: The name of what flies: full, or a control law.
         flights: How many tell how to tighten, numbered from 0.
         fresh: How many prove it, numbered behind those; by default 20 over the probability of failing.
+        workers: Processes, by default one a core; 1 flies in this process; dask://HOST:PORT on a cluster.
+        executor: Any of `concurrent.futures` that flies instead, as a `dask.distributed` client's.
         progress: Called with every attempt at a plan as it ends.
         tried: Called with every round as it ends.
 
@@ -87,10 +94,20 @@ def plan_to_pass(
     _require_enough("flights", flights, probability)
     _require_enough("fresh", proving, probability)
     named_controller(controller)
-    task = _Task(
-        as_problem(problem), method, as_vehicle(vehicle), conditions, seed, controller, probability, progress
-    )
-    return _Tightening(task, range(flights), proving, tried or (lambda done: None)).passing()
+    flown = range(flights)
+    with pool(workers, executor, len(cut(range(max(flights, proving))))) as flying:
+        task = _Task(
+            as_problem(problem),
+            method,
+            as_vehicle(vehicle),
+            conditions,
+            seed,
+            controller,
+            probability,
+            progress,
+            flying,
+        )
+        return _Tightening(task, flown, proving, tried or (lambda done: None)).passing()
 
 
 def _least_flights(probability: float) -> int:
@@ -120,18 +137,18 @@ class _Task:
     controller: str
     probability: float
     progress: Callable[[Attempt], None] | None
+    flying: Pool
 
     def plan(self, reserve: float, problem: Problem) -> Plan:
         """The plan with a reserve, and through gates as `problem` has them, judged by the task's own."""
         found = plan(problem, replace(self.planner, reserve=reserve), self.vehicle, self.progress)
         return replace(found, problem=self.problem)
 
-    def scores(self, found: Plan, flights: range, conditions: Dispersion | None = None) -> Scores:
+    def scores(self, found: Plan, flights: range, conditions: Dispersion | None = None) -> Score:
         """Scores of flights of a plan, by default under the task's conditions."""
-        conditions = conditions or self.conditions
-        return score_flights(
-            found, conditions=conditions, seed=self.seed, flights=flights, controller=self.controller
-        )
+        controller = named_controller(self.controller, self.vehicle.controller)
+        task = FlightTask(found, self.vehicle, conditions or self.conditions, self.seed, controller)
+        return fly_scores(self.flying, (task,), flights)[0]
 
     def share(self, found: Plan, flights: range, conditions: Dispersion | None = None) -> Share:
         """The share of flights of a plan that pass."""
@@ -171,7 +188,7 @@ class _Tightening:
             steps, done = steps + STRIDE, following
         raise AssertionError("a proof ends one way or the other")
 
-    def _plain(self) -> tuple[Round, Scores]:
+    def _plain(self) -> tuple[Round, Score]:
         found = self.task.plan(self.task.planner.reserve, self.task.problem)
         scores = self.task.scores(found, self.training)
         return self._noted(Round(self.task.planner.reserve, found, _passed(scores))), scores
@@ -229,7 +246,7 @@ class _Tightening:
         self._narrowed = firm
         return again[0]
 
-    def _planned(self, steps: int, problem: Problem) -> tuple[Round, Scores] | None:
+    def _planned(self, steps: int, problem: Problem) -> tuple[Round, Score] | None:
         """A round with so many steps of reserve through gates as a problem has them, and its scores."""
         reserve = round(self.task.planner.reserve + steps * STEP, 9)
         try:
@@ -291,5 +308,5 @@ class _Tightening:
         )
 
 
-def _passed(scores: Scores) -> Share:
+def _passed(scores: Score) -> Share:
     return Share(int(scores.succeeded.sum()), len(scores))

@@ -10,7 +10,7 @@ import numpy as np
 from aerobat.arrays import Array
 from aerobat.environment import Dispersion
 from aerobat.errors import SpecError
-from aerobat.evaluation import Scores
+from aerobat.evaluation import Score
 from aerobat.planning import Plan
 from aerobat.planning.passages import require_openings
 from aerobat.problem import Gate, Problem
@@ -69,7 +69,7 @@ def spread_of(plan: Plan, vehicle: Vehicle, conditions: Dispersion, seed: int, f
     )
 
 
-def narrowed(problem: Problem, vehicle: Vehicle, scores: Scores) -> Problem:
+def narrowed(problem: Problem, vehicle: Vehicle, scores: Score) -> Problem:
     """The problem with openings and tolerances less by what flights stray in the gates.
 
     An opening stays as it is where the vehicle would not fit into a smaller one.
@@ -88,7 +88,7 @@ def narrowed(problem: Problem, vehicle: Vehicle, scores: Scores) -> Problem:
     return smaller
 
 
-def firmer(problem: Problem, vehicle: Vehicle, plan: Plan, scores: Scores, fraction: float) -> Problem:
+def firmer(problem: Problem, vehicle: Vehicle, plan: Plan, scores: Score, fraction: float) -> Problem:
     """The problem with more thrust in the gates than its plan has, where flights stray off their attitude.
 
     Against a push across the thrust the vehicle leans by their ratio: the more thrust, the less. The problem
@@ -126,14 +126,14 @@ def _planned_thrust(plan: Plan, passage: Passage) -> float:
     return float(np.linalg.norm(acceleration + plan.problem.environment.weight))
 
 
-def _pointed(gate: Gate, scores: Scores) -> Gate:
+def _pointed(gate: Gate, scores: Score) -> Gate:
     """The gate with the rest of its tolerance of attitude."""
     strays = radians(_quantile(gate, scores, "attitude_error_deg"))
     left = max(gate.attitude_tolerance - strays, MIN_TOLERANCE * gate.attitude_tolerance)
     return replace(gate, attitude_tolerance=left)
 
 
-def _smaller(gate: Gate, scores: Scores) -> Gate:
+def _smaller(gate: Gate, scores: Score) -> Gate:
     """The gate with the rest of its opening."""
     across, up = (
         max(1.0 - 2.0 * _quantile(gate, scores, offset) / side, MIN_OPENING)
@@ -142,7 +142,7 @@ def _smaller(gate: Gate, scores: Scores) -> Gate:
     return gate.resized(across, up)
 
 
-def _quantile(gate: Gate, scores: Scores, field: str) -> float:
+def _quantile(gate: Gate, scores: Score, field: str) -> float:
     """The largest size of a field over the passages of a gate, in LEVEL of the flights that crossed it."""
     sizes = [np.abs(getattr(each, field)) for each in scores.passages if each.gate == gate.name]
     known = [each[np.isfinite(each)] for each in sizes]

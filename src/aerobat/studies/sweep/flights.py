@@ -4,24 +4,18 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, fields
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from aerobat.arrays import Array
-from aerobat.control import ControlLaw, Controller
-from aerobat.engines import choose
-from aerobat.environment import Dispersion
-from aerobat.evaluation import Passage, Scores
+from aerobat.evaluation import Passage, Score
 from aerobat.evaluation.score_flights import ErrorsOverTime, score_over_time
-from aerobat.planning import Plan
-from aerobat.simulation import FlightConfig
 from aerobat.simulation.conditions.draw import Draws, draw_flights
-from aerobat.vehicle import Vehicle
+from aerobat.studies.flights import CHUNK, FlightTask, cut
 
-CHUNK = 50  # flights that are flown, kept and resumed as one, whatever the batches and the cores
 SAMPLED = 4 * CHUNK  # flights, the first ones, whose errors are kept over time
 STRIDE = 10  # ticks from one instant of theirs to the next
 PASSED, NOT_REACHED = "passed", "not_reached"  # ends of a passage, beside the outcomes that are failures
@@ -29,7 +23,7 @@ AGAIN = "#"  # between a gate's name and the number of its passage, from the sec
 
 Columns = dict[str, NDArray[Any]]
 
-_ERRORS = tuple(field.name for field in fields(Scores)[:5])
+_ERRORS = tuple(field.name for field in fields(Score)[:5])
 _PASSAGE = (  # numbers of a passage, each with the name of its column after the gate's
     ("time", "time_s"),
     ("lateral", "lateral_m"),
@@ -43,19 +37,6 @@ _PASSAGE = (  # numbers of a passage, each with the name of its column after the
 )
 
 
-@dataclass(frozen=True)
-class SweepTask:
-    """The plan that a sweep flies, and the settings of its flights."""
-
-    plan: Plan
-    vehicle: Vehicle  # that plan and controller know
-    conditions: Dispersion
-    seed: int
-    controller: Controller | ControlLaw
-    engine: str
-    batch: int  # flights that are flown side by side
-
-
 @dataclass(frozen=True, eq=False)
 class Chunk:
     """Flights that were flown: columns of the table, and errors over time of those that are sampled."""
@@ -66,11 +47,10 @@ class Chunk:
     attitude_error: Array  # [rad], (sampled flights, T)
 
 
-def fly_chunk(task: SweepTask, begin: int, end: int) -> Chunk:
-    """The flights from number `begin` to before `end`; how they are cut into batches changes no bit."""
-    config, is_sampled = _config(task), begin < SAMPLED
-    batches = [range(first, min(first + task.batch, end)) for first in range(begin, end, task.batch)]
-    parts = [_flown(task, replace(config, flights=numbers), is_sampled) for numbers in batches]
+def fly_chunk(task: FlightTask, flights: range) -> Chunk:
+    """Fly flights of consecutive numbers; how they are cut into batches changes no bit."""
+    is_sampled = flights.start < SAMPLED
+    parts = [_flown(task, numbers, is_sampled) for numbers in cut(flights, task.batch)]
     columns = {name: np.concatenate([part[name] for part, _ in parts]) for name in parts[0][0]}
     if not is_sampled:
         return Chunk(columns, np.zeros(0), *np.zeros((2, 0, 0)))
@@ -83,19 +63,11 @@ def fly_chunk(task: SweepTask, begin: int, end: int) -> Chunk:
     )
 
 
-def _config(task: SweepTask) -> FlightConfig:
-    """Settings of all flights. An engine has its own rounding, so that one flies all chunks, small or not."""
-    config = FlightConfig(controller=task.controller, conditions=task.conditions, seed=task.seed)
-    ticks = round(task.plan.duration * config.control_rate)
-    return replace(config, engine=choose(task.engine, CHUNK, ticks).name)
-
-
-def _flown(task: SweepTask, config: FlightConfig, is_sampled: bool) -> tuple[Columns, ErrorsOverTime]:
-    """Columns of the table for the flights of a config, and their errors over time if they are sampled."""
-    assert config.flights is not None
-    draws = draw_flights(task.conditions, len(task.vehicle.rotors), task.seed, config.flights)
+def _flown(task: FlightTask, numbers: range, is_sampled: bool) -> tuple[Columns, ErrorsOverTime]:
+    """Columns of the table for some flights, and their errors over time if they are sampled."""
+    draws = draw_flights(task.conditions, len(task.vehicle.rotors), task.seed, numbers)
     stride = STRIDE if is_sampled else None
-    scores, errors = score_over_time(task.plan, task.vehicle, None, None, config, stride)
+    scores, errors = score_over_time(task.plan, task.vehicle, None, None, task.config(numbers), stride)
     return _drawn(draws) | _scored(scores), errors
 
 
@@ -122,13 +94,15 @@ def _norms(vectors: Array) -> Array:
     return np.asarray(np.linalg.norm(vectors, axis=1))
 
 
-def _scored(scores: Scores) -> Columns:
+def _scored(scores: Score) -> Columns:
     """What flights came to."""
-    columns: Columns = {"outcome": np.array([outcome.name.lower() for outcome in scores.outcomes])}
+    flights = list(scores)
+    columns: Columns = {"outcome": np.array([flight.outcome.name.lower() for flight in flights])}
     columns |= {name: np.array(getattr(scores, name)) for name in _ERRORS}
-    for name, passage in zip(passage_names(scores.passages), scores.passages, strict=True):
+    for number, name in enumerate(passage_names(scores.passages)):
+        passage = scores.passages[number]
         columns |= {f"{name}_{column}": np.array(getattr(passage, field)) for field, column in _PASSAGE}
-        ends = [_passage_outcome(passage.of_flight(k)) for k in range(len(scores))]
+        ends = [_passage_outcome(flight.passages[number]) for flight in flights]
         columns[f"{name}_outcome"] = np.array(ends)
     return columns
 

@@ -17,7 +17,8 @@ from aerobat.errors import SpecError
 from aerobat.planning import Plan
 from aerobat.provenance import installed_versions
 from aerobat.storage import digest_of, read_arrays, whole_file, write_whole
-from aerobat.studies.sweep.flights import CHUNK, SAMPLED, STRIDE, Chunk, SweepTask
+from aerobat.studies.flights import CHUNK, FlightTask
+from aerobat.studies.sweep.flights import SAMPLED, STRIDE, Chunk
 
 FINGERPRINT = "fingerprint.json"
 LIBRARIES = ("aerobat", "numpy", "llvmlite", "jax")  # that the numbers of flights come from
@@ -31,7 +32,7 @@ class KeptChunks:
     folder: Path
 
     @classmethod
-    def of(cls, folder: Path, task: SweepTask) -> KeptChunks:
+    def of(cls, folder: Path, task: FlightTask) -> KeptChunks:
         """The folder, new or of the same sweep. Raises SpecError, one sentence, for any other's."""
         own = fingerprint(task)
         path = folder / FINGERPRINT
@@ -52,32 +53,32 @@ class KeptChunks:
             raise SpecError(f"{folder}/ keeps flights of another sweep ({others}); remove it to begin anew")
         return cls(folder)
 
-    def read(self, begin: int, end: int) -> Chunk | None:
+    def read(self, flights: range) -> Chunk | None:
         """Finished flights; None where there are none, or none as they were kept."""
         try:
-            arrays = read_arrays(self._path(begin, end), "sweep")
+            arrays = read_arrays(self._path(flights), "sweep")
             if str(arrays["digest"]) != digest_of(arrays):
                 return None
             columns = {str(name): arrays[f"column_{k}"] for k, name in enumerate(arrays["names"])}
             found = Chunk(columns, *(arrays[name] for name in _OVER_TIME))
         except (SpecError, KeyError, TypeError):
             return None
-        return found if all(column.shape == (end - begin,) for column in columns.values()) else None
+        return found if all(column.shape == (len(flights),) for column in columns.values()) else None
 
-    def write(self, begin: int, end: int, chunk: Chunk) -> None:
+    def write(self, flights: range, chunk: Chunk) -> None:
         """Keep finished flights."""
         arrays: dict[str, Any] = {"names": np.array(list(chunk.columns))}
         arrays |= {name: getattr(chunk, name) for name in _OVER_TIME}
         arrays |= {f"column_{k}": column for k, column in enumerate(chunk.columns.values())}
-        with whole_file(self._path(begin, end)) as temporary, temporary.open("wb") as file:
+        with whole_file(self._path(flights)) as temporary, temporary.open("wb") as file:
             np.savez(file, **arrays, digest=digest_of(arrays))
 
     def remove(self) -> None:
         """Remove the folder, as its flights are kept elsewhere by now."""
         shutil.rmtree(self.folder, ignore_errors=True)
 
-    def _path(self, begin: int, end: int) -> Path:
-        return self.folder / f"flights-{begin}-{end}.npz"
+    def _path(self, flights: range) -> Path:
+        return self.folder / f"flights-{flights.start}-{flights.stop}.npz"
 
 
 def finished_flights(folder: Path) -> int:
@@ -86,7 +87,7 @@ def finished_flights(folder: Path) -> int:
     return sum(int(end) - int(begin) for begin, end in spans)
 
 
-def fingerprint(task: SweepTask) -> dict[str, Any]:
+def fingerprint(task: FlightTask) -> dict[str, Any]:
     """All that the numbers of flights depend on, in few words; batches and cores are not among it."""
     return {
         "format": "aerobat-sweep-1",

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import FIRST_COMPLETED, Executor, Future, wait
-from itertools import islice
+from collections.abc import Callable, Sequence
+from concurrent.futures import Executor
 from pathlib import Path
 from typing import Annotated
 
@@ -13,25 +12,22 @@ from pydantic import Field
 
 from aerobat.control import ControlLaw, Controller, named_controller
 from aerobat.declaration import PathName, Seed, validated
-from aerobat.engines.cores import available_cores
 from aerobat.environment import Dispersion, as_dispersion
 from aerobat.flatness import vehicle_of
 from aerobat.planning import Plan
 from aerobat.simulation import Outcome
-from aerobat.studies.sweep.flights import CHUNK, Chunk, SweepTask, fly_chunk
+from aerobat.studies.flights import CHUNK, TOGETHER, FlightTask, cut
+from aerobat.studies.sweep.flights import Chunk, fly_chunk
 from aerobat.studies.sweep.kept import KeptChunks
 from aerobat.studies.sweep.result import Sweep
-from aerobat.studies.workers import InProcess, Workers
-from aerobat.studies.workers import workers as processes
+from aerobat.studies.workers import Workers, pool
 from aerobat.vehicle import Vehicle
 
 Runs = Annotated[int, Field(ge=1, le=10**7, description="whole number from 1 to ten million")]
 Batch = Annotated[int, Field(ge=1, le=CHUNK, description=f"whole number from 1 to {CHUNK}")]
 
-_AHEAD = 2  # chunks for each worker that wait to be flown
 _WELL = tuple(outcome.name.lower() for outcome in Outcome if outcome.is_success)
 
-Span = tuple[int, int]
 Progress = Callable[[int, int], None]
 
 
@@ -66,8 +62,8 @@ def sweep(
         controller: settings, a law or the name of one; by default the vehicle's own.
         engine: as for FlightConfig.
         batch: flights that are flown side by side in one process: fewer take less memory.
-        workers: processes, by default one a core; 1 flies in this process.
-        executor: what flies instead, as `dask.distributed.Client(...).get_executor()`.
+        workers: processes, by default one a core; 1 flies in this process; dask://HOST:PORT on a cluster.
+        executor: any of `concurrent.futures` that flies instead, as a `dask.distributed` client's.
         keep: a folder for finished flights, from which a sweep that was ended goes on; it stays.
         progress: called with the flights done, and of them those that went well, as they are finished.
 
@@ -77,31 +73,23 @@ def sweep(
     vehicle = vehicle_of(plan, vehicle)
     if isinstance(controller, str):
         controller = named_controller(controller, vehicle.controller)
-    task = SweepTask(plan, vehicle, conditions, seed, controller or vehicle.controller, engine, batch)
+    task = FlightTask(plan, vehicle, conditions, seed, controller or vehicle.controller, engine, batch)
     kept = None if keep is None else KeptChunks.of(Path(keep), task)
-    spans = [(begin, min(begin + CHUNK, runs)) for begin in range(0, runs, CHUNK)]
+    spans = cut(range(runs))
     tally = _Tally(progress)
     chunks = {}
-    for span in spans:
-        found = None if kept is None else kept.read(*span)
+    for flights in spans:
+        found = None if kept is None else kept.read(flights)
         if found is not None:
-            chunks[span] = tally.counted(found)
-    missing = [span for span in spans if span not in chunks]
-    cores = workers or available_cores()
-
-    def finish(executor: Executor, spans: Sequence[Span], cancels: bool = False) -> None:
-        for span, chunk in _in_parallel(executor, task, spans, _AHEAD * cores, cancels):
+            chunks[flights] = tally.counted(found)
+    missing = [flights for flights in spans if flights not in chunks]
+    with pool(workers, executor, len(missing)) as flying:
+        flown = flying.results(fly_chunk, task, missing, together=TOGETHER, compiles=True)
+        for flights, chunk in flown:
             if kept is not None:
-                kept.write(*span, chunk)
-            chunks[span] = tally.counted(chunk)
-
-    if executor is not None:
-        finish(executor, missing, cancels=True)
-    else:
-        finish(InProcess(), missing[:1])  # compiles what all processes share
-        with processes(min(cores, max(len(missing) - 1, 1)), not engine.startswith("jax")) as pool:
-            finish(pool, missing[1:])
-    return _joined(task, [chunks[span] for span in spans])
+                kept.write(flights, chunk)
+            chunks[flights] = tally.counted(chunk)
+    return _joined(task, [chunks[flights] for flights in spans])
 
 
 class _Tally:
@@ -121,34 +109,7 @@ class _Tally:
         return chunk
 
 
-def _in_parallel(
-    executor: Executor, task: SweepTask, spans: Sequence[Span], ahead: int, cancels: bool
-) -> Iterator[tuple[Span, Chunk]]:
-    """Chunks as they are finished, in any order.
-
-    Args:
-        executor: what flies.
-        task: what is flown.
-        spans: numbers of the flights, first and behind the last.
-        ahead: chunks that are submitted before they are needed.
-        cancels: True for an executor that goes on when the sweep does not.
-    """
-    waiting = iter(spans)
-    pending: dict[Future[Chunk], Span] = {}
-    try:
-        while True:
-            for span in islice(waiting, ahead - len(pending)):
-                pending[executor.submit(fly_chunk, task, *span)] = span
-            if not pending:
-                return
-            for future in wait(pending, return_when=FIRST_COMPLETED).done:
-                yield pending.pop(future), future.result()
-    finally:
-        for future in pending if cancels else ():
-            future.cancel()
-
-
-def _joined(task: SweepTask, chunks: Sequence[Chunk]) -> Sweep:
+def _joined(task: FlightTask, chunks: Sequence[Chunk]) -> Sweep:
     """All flights as one."""
     sampled = [chunk for chunk in chunks if len(chunk.times)]
     return Sweep(

@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import Any
 
 import numpy as np
 
 from aerobat.planning import Planner
-from aerobat.planning.miqp.formulation import ASSUMED_THRUST_TO_WEIGHT
+from aerobat.planning.task import max_specific_thrust
 from aerobat.problem.problem import DERIVATIVES, Problem
 from aerobat.problem.stage import Stage
+from aerobat.studies.lens import lens
 from aerobat.studies.why.eased_stages import at_any_time, eased, with_half_the_thrust
 from aerobat.vehicle import Vehicle
 
@@ -35,9 +35,7 @@ class Request:
     @property
     def max_specific_thrust(self) -> float:
         """The vehicle's, by which stages ask, or what is assumed without one [m/s²]."""
-        if self.vehicle is None:
-            return ASSUMED_THRUST_TO_WEIGHT * self.problem.environment.gravity
-        return self.vehicle.max_specific_thrust
+        return max_specific_thrust(self.problem, self.vehicle)
 
 
 @dataclass(frozen=True)
@@ -59,35 +57,23 @@ def _of_limits(task: Request) -> Iterator[Change]:
             key = "limits.lower and limits.upper" if derivative == 0 else f"limits.{name}"
             yield Change(f"without {key}", partial(_without_limit, derivative))
     if np.isfinite(task.problem.limits.max_tilt):
-        yield Change("without limits.max_tilt", _without_tilt_limit)
+        yield Change("without limits.max_tilt", partial(_with, "limits.max_tilt", np.inf))
     if task.problem.environment.ground is not None:
-        yield Change("without environment.ground", _without_ground)
+        yield Change("without environment.ground", partial(_with, "environment.ground", None))
+
+
+def _with(name: str, value: float | None, task: Request) -> Request:
+    """The request with a field at a value."""
+    return lens(name, task).set(task, value)
 
 
 def _without_limit(derivative: int, task: Request) -> Request:
-    return _with_problem(task, limits=task.problem.limits.without(derivative))
-
-
-def _without_tilt_limit(task: Request) -> Request:
-    return _with_problem(task, limits=replace(task.problem.limits, max_tilt=np.inf))
-
-
-def _without_ground(task: Request) -> Request:
-    return _with_problem(task, environment=replace(task.problem.environment, ground=None))
-
-
-def _with_problem(task: Request, **changed: Any) -> Request:
-    return replace(task, problem=replace(task.problem, **changed))
+    return replace(task, problem=replace(task.problem, limits=task.problem.limits.without(derivative)))
 
 
 def _of_reserve(task: Request) -> Iterator[Change]:
     if task.reserve > 0.0:
-        yield Change("without reserve", _without_reserve)
-
-
-def _without_reserve(task: Request) -> Request:
-    planner: Any = task.planner
-    return replace(task, planner=replace(planner, reserve=0.0))
+        yield Change("without reserve", partial(_with, "planner.reserve", 0.0))
 
 
 def _of_vehicle(task: Request) -> Iterator[Change]:
@@ -96,28 +82,17 @@ def _of_vehicle(task: Request) -> Iterator[Change]:
         return
     yield Change(f"with {STRONGER:g} times the max_thrust", _with_stronger_rotors)
     if (vehicle.min_thrusts > 0.0).any():
-        yield Change("with min_thrust 0", partial(_with_rotors, {"min_thrust": 0.0}))
+        yield Change("with min_thrust 0", partial(_with, "vehicle.rotor_defaults.min_thrust", 0.0))
     if vehicle.lags.any():
-        yield Change("with rotors without lag", partial(_with_rotors, {"lag": 0.0}))
+        yield Change("with rotors without lag", partial(_with, "vehicle.rotor_defaults.lag", 0.0))
     if np.isfinite(vehicle.max_body_rate):
-        yield Change("without max_body_rate", _without_rate_limit)
+        yield Change("without max_body_rate", partial(_with, "vehicle.max_body_rate", np.inf))
 
 
 def _with_stronger_rotors(task: Request) -> Request:
     assert task.vehicle is not None
     rotors = (replace(rotor, max_thrust=STRONGER * rotor.max_thrust) for rotor in task.vehicle.rotors)
     return replace(task, vehicle=replace(task.vehicle, rotors=tuple(rotors)))
-
-
-def _with_rotors(changed: Mapping[str, Any], task: Request) -> Request:
-    assert task.vehicle is not None
-    rotors = (replace(rotor, **changed) for rotor in task.vehicle.rotors)
-    return replace(task, vehicle=replace(task.vehicle, rotors=tuple(rotors)))
-
-
-def _without_rate_limit(task: Request) -> Request:
-    assert task.vehicle is not None
-    return replace(task, vehicle=replace(task.vehicle, max_body_rate=np.inf))
 
 
 def _of_stages(task: Request) -> Iterator[Change]:

@@ -26,7 +26,7 @@ class Overtaken(Exception):
 
 
 @dataclass(frozen=True)
-class Verdict:
+class LiveVerdict:
     """An answer in words."""
 
     word: str
@@ -38,7 +38,7 @@ class Verdict:
 class Answer:
     """The verdict on a setting, and what there is to see of it; nothing where there is no plan."""
 
-    verdict: Verdict
+    verdict: LiveVerdict
     scene: Scene | None = None
 
     def record(self) -> dict[str, Any]:
@@ -62,9 +62,9 @@ class Replanner:
             planned = self.plan(setting, is_overtaken)
             return judged(planned, flown(planned, setting))
         except Infeasible as error:
-            return Answer(Verdict("Infeasible", _capitalized(error.sentence), False))
+            return Answer(LiveVerdict("Infeasible", _capitalized(error.sentence), False))
         except AerobatError as error:
-            return Answer(Verdict("Refused", _capitalized(str(error)), False))
+            return Answer(LiveVerdict("Refused", _capitalized(str(error)), False))
 
     def plan(self, setting: Setting, is_overtaken: Callable[[], bool] = lambda: False) -> Plan:
         """The setting's plan, however it is flown."""
@@ -101,10 +101,10 @@ def judged(plan: Plan, flight: Flight) -> Answer:
     many = len(scene.tracks) > 1
     if failed:
         word = f"{len(failed)} of {len(scene.tracks)} flights fail" if many else "Planned, but fails"
-        return Answer(Verdict(word, failed[0], False), scene)
+        return Answer(LiveVerdict(word, failed[0], False), scene)
     flown = f"; {scene.facts[0]}" if many else ""
     word = "Feasible" if plan.certified else "Not proven"
-    return Answer(Verdict(word, f"{plan.duration:.2f} s, {proof}{flown}", plan.certified), scene)
+    return Answer(LiveVerdict(word, f"{plan.duration:.2f} s, {proof}{flown}", plan.certified), scene)
 
 
 def _planned(setting: Setting, is_overtaken: Callable[[], bool]) -> Plan:

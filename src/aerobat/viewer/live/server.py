@@ -18,7 +18,7 @@ from urllib.parse import urlsplit
 
 from aerobat.errors import SpecError
 from aerobat.viewer.live.desk import Desk
-from aerobat.viewer.live.replan import Answer, Verdict
+from aerobat.viewer.live.replan import Answer, LiveVerdict
 
 HOST = "127.0.0.1"
 MAX_CONNECTIONS = 64  # at a time, each with a thread: half of the files that the smallest shells let be open
@@ -29,7 +29,7 @@ MAX_QUESTION = 100_000  # bytes: a few numbers for each gate
 MAX_NAME = 100  # letters of a page's name for itself
 JSON = "application/json"
 HTML = "text/html; charset=utf-8"
-BROKEN = Verdict("Broken", "Aerobat failed at this, which is its fault; the terminal says where.", False)
+BROKEN = LiveVerdict("Broken", "Aerobat failed at this, which is its fault; the terminal says where.", False)
 
 
 class LiveServer(ThreadingHTTPServer):

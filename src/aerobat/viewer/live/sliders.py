@@ -16,8 +16,9 @@ from aerobat.arrays import Array
 from aerobat.environment import Dispersion
 from aerobat.errors import SpecError
 from aerobat.planning import Plan, Planner
-from aerobat.problem import Gate, Problem
+from aerobat.problem import Problem
 from aerobat.so3 import UP
+from aerobat.studies.lens import lens
 from aerobat.vehicle import Vehicle
 
 LEAST_REACH = 0.5  # [m] to either side, by which a gate can be moved
@@ -39,9 +40,6 @@ class Setting:
     dispersion: float = 0.0  # times the conditions; at 0 it is flown as planned
 
 
-Change = Callable[[Setting, float], Setting]
-
-
 @dataclass(frozen=True)
 class Slider:
     """One number of a setting, and its range."""
@@ -54,12 +52,16 @@ class Slider:
     high: float
     step: float
     value: float
-    change: Change  # raises SpecError for a value that makes no sense
     axis: tuple[float, ...] | None = None  # of a gate's turn, (3,)
+    turn: Callable[[Setting, float], Setting] | None = None  # instead of the field that the key names
+
+    def moved(self, setting: Setting, value: float) -> Setting:
+        """The setting with the slider elsewhere. Raises SpecError for a value that makes no sense."""
+        return lens(self.key, setting).set(setting, value) if self.turn is None else self.turn(setting, value)
 
     def record(self) -> dict[str, Any]:
         """Plain data for the page."""
-        return {field.name: getattr(self, field.name) for field in fields(self) if field.name != "change"}
+        return {field.name: getattr(self, field.name) for field in fields(self) if field.name != "turn"}
 
 
 def sliders_of(setting: Setting, plan: Plan) -> tuple[Slider, ...]:
@@ -84,7 +86,7 @@ def moved(setting: Setting, sliders: Sequence[Slider], values: Mapping[str, floa
         slider = known.get(key)
         if slider is None or not slider.low <= value <= slider.high:
             raise SpecError(f"{key}: there is no slider that stands at {value}; load the page anew")
-        setting = slider.change(setting, value)
+        setting = slider.moved(setting, value)
     return setting
 
 
@@ -97,8 +99,7 @@ def _gate_sliders(problem: Problem, k: int) -> Iterator[Slider]:
     for i, axis in enumerate("xyz"):
         value = float(gate.position[i])
         low, high = max(value - reach, float(lower[i])), min(value + reach, float(upper[i]))
-        change = partial(_with_gate, k, partial(_at, i))
-        yield Slider(f"gates[{k}].{axis}", gate.name, axis, "m", low, high, step, value, change)
+        yield Slider(f"gates[{k}].position.{axis}", gate.name, axis, "m", low, high, step, value)
     yield _tilt_slider(problem, k)
 
 
@@ -111,17 +112,26 @@ def _tilt_slider(problem: Problem, k: int) -> Slider:
         axis = turn_axis
         tilt = degrees(np.arctan2(gate.up @ np.cross(axis, UP), gate.up @ UP)) % 360.0
     tilt = round(tilt, 6)
-    change = partial(_with_gate, k, lambda gate, value: _turned(gate, axis, radians(value - tilt)))
     low, high = (-180.0, 180.0) if turn_axis is None else (0.0, 360.0)
-    return Slider(
-        f"gates[{k}].tilt", gate.name, "tilt", "°", low, high, 1.0, tilt, change, tuple(axis.tolist())
-    )
+    key, turn = f"gates[{k}].tilt", partial(_with_turned, k, axis, tilt)
+    return Slider(key, gate.name, "tilt", "°", low, high, 1.0, tilt, tuple(axis.tolist()), turn)
 
 
-def _turned(gate: Gate, axis: Array, angle: float) -> Gate:
-    """The gate turned about an axis through its centre [rad]."""
-    turn = so3.about_axis(axis, np.asarray(angle))
-    return replace(gate, normal=so3.rotate(turn, gate.normal), up=so3.rotate(turn, gate.up))
+def _with_turned(k: int, axis: Array, stands: float, setting: Setting, tilt: float) -> Setting:
+    """The setting with gate k turned about an axis through its centre.
+
+    Args:
+        k: Which gate.
+        axis: Of the turn.
+        stands: The tilt that the gate has [deg].
+        setting: As it was.
+        tilt: That the gate shall have [deg].
+    """
+    turn = so3.about_axis(axis, np.asarray(radians(tilt - stands)))
+    gates = list(setting.problem.gates)
+    normal, up = (so3.rotate(turn, side) for side in (gates[k].normal, gates[k].up))
+    gates[k] = replace(gates[k], normal=normal, up=up)
+    return replace(setting, problem=replace(setting.problem, gates=tuple(gates)))
 
 
 def _reach(problem: Problem) -> float:
@@ -136,20 +146,6 @@ def _round_step(length: float) -> float:
     return max(factor * decade for factor in (1.0, 2.0, 5.0) if factor * decade <= length * (1 + 1e-9))
 
 
-def _at(axis: int, gate: Gate, value: float) -> Gate:
-    """The gate elsewhere along an axis."""
-    position = gate.position.copy()
-    position[axis] = value
-    return replace(gate, position=position)
-
-
-def _with_gate(k: int, change: Callable[[Gate, float], Gate], setting: Setting, value: float) -> Setting:
-    """The setting with gate k changed."""
-    gates = list(setting.problem.gates)
-    gates[k] = change(gates[k], value)
-    return replace(setting, problem=replace(setting.problem, gates=tuple(gates)))
-
-
 def _thrust_sliders(setting: Setting) -> Iterator[Slider]:
     """The paper's ε: the maneuver's least specific thrusts, whichever it has."""
     maneuver, top = setting.problem.maneuver, setting.vehicle.max_specific_thrust
@@ -159,45 +155,23 @@ def _thrust_sliders(setting: Setting) -> Iterator[Slider]:
             value = round(THRUST_FRACTION * top if asked is None else float(asked), 2)
             words = name.removeprefix("min_").removesuffix("thrust").replace("_", " ").strip()
             shown = f"ε {words}".strip()
-            change = partial(_with_min_thrust, name)
             high = float(np.ceil(1.2 * max(top, value)))
-            yield Slider(f"maneuver.{name}", "maneuver", shown, "m/s²", 0.5, high, 0.5, value, change)
-
-
-def _with_min_thrust(name: str, setting: Setting, value: float) -> Setting:
-    maneuver: Any = setting.problem.maneuver
-    changed = replace(maneuver, **{name: value})
-    return replace(setting, problem=replace(setting.problem, maneuver=changed))
+            yield Slider(f"maneuver.{name}", "maneuver", shown, "m/s²", 0.5, high, 0.5, value)
 
 
 def _order_slider(setting: Setting, plan: Plan) -> Iterator[Slider]:
     """The derivative that is the input, of planners that have one."""
     if plan.order is not None and hasattr(setting.planner, "order"):
         low, high = min(ORDERS[0], plan.order), max(ORDERS[-1], plan.order)
-        yield Slider("planner.order", "maneuver", "order", "", low, high, 1, plan.order, _with_order)
-
-
-def _with_order(setting: Setting, value: float) -> Setting:
-    planner: Any = setting.planner
-    return replace(setting, planner=replace(planner, order=round(value)))
+        yield Slider("planner.order", "maneuver", "order", "", low, high, 1, plan.order)
 
 
 def _vehicle_slider(setting: Setting) -> Slider:
     value = round(setting.vehicle.thrust_to_weight, 2)
     low, high = min(THRUST_TO_WEIGHT[0], value), max(THRUST_TO_WEIGHT[1], float(np.ceil(1.5 * value)))
-    return Slider(
-        "vehicle.thrust_to_weight", "vehicle", "thrust-to-weight", "", low, high, 0.05, value, _with_thrust
-    )
-
-
-def _with_thrust(setting: Setting, value: float) -> Setting:
-    return replace(setting, vehicle=setting.vehicle.with_thrust_to_weight(value))
+    return Slider("vehicle.thrust_to_weight", "vehicle", "thrust-to-weight", "", low, high, 0.05, value)
 
 
 def _dispersion_slider(setting: Setting) -> Slider:
     unit = f"× {setting.conditions.name}"
-    return Slider("dispersion", "flight", "dispersion", unit, 0.0, MAX_DISPERSION, 0.1, 0.0, _with_dispersion)
-
-
-def _with_dispersion(setting: Setting, value: float) -> Setting:
-    return replace(setting, dispersion=value)
+    return Slider("dispersion", "flight", "dispersion", unit, 0.0, MAX_DISPERSION, 0.1, 0.0)

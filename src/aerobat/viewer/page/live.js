@@ -87,7 +87,7 @@ class Live {
       const { value, axis } = this.sliders.get(`gates[${k}].tilt`);
       const angle = (((at("tilt") ?? value) - value) * Math.PI) / 180;
       const [normal, up] = [gate.normal, gate.up].map((v) => vector(v).applyAxisAngle(vector(axis), angle).toArray());
-      return { ...gate, normal, up, position: AXES.map((name, i) => at(name) ?? gate.position[i]) };
+      return { ...gate, normal, up, position: AXES.map((name, i) => at(`position.${name}`) ?? gate.position[i]) };
     });
     this.player.world?.placeGates(gates);
     this.player.stale = true;

@@ -95,8 +95,8 @@ class Plot {
     });
     const digits = this.high >= 100 ? 0 : this.high >= 10 || (this.legend && this.high > 1) ? 1 : this.high >= 1 ? 2 : this.legend ? 3 : 4;
     if (!this.legend) this.readout.textContent = `${now[0].toFixed(digits)} ${this.unit}`;
-    else if (lines.length > 4) this.readout.textContent = `${Math.min(...now).toFixed(digits)} to ${Math.max(...now).toFixed(digits)} N`;
-    else this.readout.innerHTML = lines.map((line, k) => `<i style="background:${line.colour}"></i>${now[k].toFixed(digits)}`).join("");
+    else if (lines.length > 4) this.readout.textContent = `${lines.length} rotors: ${Math.min(...now).toFixed(digits)} to ${Math.max(...now).toFixed(digits)} N`;
+    else this.readout.innerHTML = lines.map((line, k) => `<i style="background:${line.colour}">${k}</i>${now[k].toFixed(digits)}`).join("");
   }
 }
 

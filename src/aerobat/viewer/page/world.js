@@ -1,6 +1,8 @@
 // The scene: ground, gates, planned path, ghosts, and the vehicles on their paths.
 
 const DRAWN = 0.14; // of the scene's size, that vehicles are drawn with where they would be too small to see
+const END_IN_SCENE = 0.007; // of the scene's size, the radius of the balls at start and end
+const END_IN_VEHICLE = 0.05; // of the vehicle's span as it is drawn, at most: a vehicle there is seen
 const ENLARGEMENTS = [1, 1.5, 2, 3, 4, 5, 6, 8, 10, 15, 20, 30, 50, 100];
 
 class World {
@@ -77,17 +79,16 @@ class World {
       const isGate = HEADER.stages.some((stage) => stage.name === name && stage.gate !== null);
       if (name) this.label(name, position, isGate ? "gate" : "");
     }
+    this.ends = [];
     this.addEnd(planned.slice(0, 3), COLOUR.blue, "start");
     this.addEnd(planned.slice(-3), COLOUR.ink, "end");
   }
 
   addEnd(position, colour, name) {
-    const ball = new THREE.Mesh(
-      new THREE.SphereGeometry(0.007 * this.bounds.size, 20, 14),
-      new THREE.MeshLambertMaterial({ color: colour }),
-    );
+    const ball = new THREE.Mesh(new THREE.SphereGeometry(1, 20, 14), new THREE.MeshLambertMaterial({ color: colour }));
     ball.position.set(...position);
     this.scene.add(ball);
+    this.ends.push(ball);
     this.label(name, position);
   }
 
@@ -120,6 +121,8 @@ class World {
   // Draw all vehicles so many times their size.
   enlarge(scale) {
     for (const model of [this.vehicle, this.shadow, ...this.ghosts, ...(this.others ?? [])]) model.scale.setScalar(scale);
+    const radius = Math.min(END_IN_SCENE * this.bounds.size, END_IN_VEHICLE * SPAN * scale);
+    for (const ball of this.ends) ball.scale.setScalar(radius);
   }
 
   // Follow another flight.

@@ -11,7 +11,7 @@ import numpy as np
 
 from aerobat import so3
 from aerobat.arrays import Array
-from aerobat.flatness import force_balance, reference
+from aerobat.flatness import reference
 from aerobat.kernels.quaternions import conjugate, multiply
 from aerobat.optimization.nonlinear import components, import_casadi
 from aerobat.optimization.separable import ElementFunction
@@ -74,8 +74,7 @@ class End:
     @classmethod
     def of(cls, state: EndState, elements: Elements) -> End:
         """A problem's, drag counted."""
-        balance = force_balance(elements.problem.environment, elements.vehicle)
-        thrust = balance.specific_thrust(state.velocity, state.acceleration)
+        thrust = elements.task.balance.specific_thrust(state.velocity, state.acceleration)
         return cls(state.position, state.velocity, thrust, state.leaves_attitude_free, state.free_velocity)
 
     @property
@@ -94,12 +93,12 @@ class FixedEnds:
     @cached_property
     def start(self) -> End:
         """The end at which the motion begins."""
-        return End.of(self.elements.problem.start, self.elements)
+        return End.of(self.elements.task.problem.start, self.elements)
 
     @cached_property
     def goal(self) -> End:
         """The end at which the motion ends."""
-        return End.of(self.elements.problem.goal, self.elements)
+        return End.of(self.elements.task.problem.goal, self.elements)
 
     def fix(self, motion: CollocatedMotion, continuous: bool) -> None:
         """Write states, the start's attitude, thrusts, and with lag moments into a bound on all unknowns."""
@@ -110,7 +109,7 @@ class FixedEnds:
             if not end.free_attitude:
                 motion.states[RATES, node] = 0.0
         upright = so3.smallest_rotation(UP, self.start.thrust / np.linalg.norm(self.start.thrust))
-        heading = so3.about_axis(UP, np.array(self.elements.problem.heading))
+        heading = so3.about_axis(UP, np.array(self.elements.task.problem.heading))
         motion.states[ATTITUDE, 0] = so3.multiply(upright, heading)
         fixed = INPUTS if continuous else 1
         motion.starts[:fixed, 0] = self.start.inputs[:fixed]
@@ -169,8 +168,8 @@ class ClosedLap:
     def corrected(self, trajectory: Trajectory) -> ClosedLap:
         """The lap without the twist that errors of its attitudes' collocation add up to."""
         times = [0.0, trajectory.duration]
-        environment = self.elements.problem.environment
-        flown = reference(trajectory, self.elements.vehicle, times, environment=environment)
+        task = self.elements.task
+        flown = reference(trajectory, task.vehicle, times, environment=task.environment)
         first, last = flown.setpoint.q_world_body
         missed = float(so3.multiply(so3.conjugate(first), last)[3])
         return self if abs(missed) <= NEGLIGIBLE_TWIST else replace(self, twist=self.twist - missed)
@@ -201,7 +200,7 @@ class ClosedLap:
     @cached_property
     def _upright_start(self) -> ElementFunction:
         """The squared norm of a state's quaternion, and zero where it turns by the heading about its axis."""
-        ca, half = import_casadi(), self.elements.problem.heading / 2.0
+        ca, half = import_casadi(), self.elements.task.problem.heading / 2.0
         z = ca.SX.sym("z", STATES)
         q = z[ATTITUDE] * STATE_SCALE[ATTITUDE]
         turned = cos(half) * q[3] - sin(half) * q[0]

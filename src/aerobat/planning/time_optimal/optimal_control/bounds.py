@@ -11,12 +11,11 @@ import numpy as np
 from aerobat import so3
 from aerobat.arrays import Array
 from aerobat.flatness import reference
-from aerobat.limits import MEASURES, Limit, limits_along
+from aerobat.limits import MEASURES, Limit
 from aerobat.limits.quantity import BODY_RATE, SPECIFIC_THRUST, UPRIGHT, WRENCH, WRENCH_RATE
+from aerobat.planning.task import Task
 from aerobat.planning.time_optimal.optimal_control.collocation import BOUNDED_DERIVATIVES
-from aerobat.problem.problem import Problem
 from aerobat.trajectory import Trajectory
-from aerobat.vehicle import Vehicle
 
 # of each interval: where it is looked at, evenly spaced angles of Chebyshev's, at either end just within it
 ANGLES = np.linspace(1e-4, np.pi - 1e-4, 24)
@@ -43,23 +42,18 @@ class Bounds:
     The floor under the specific thrust is not among the M: it bounds an input.
     """
 
-    vehicle: Vehicle
-    problem: Problem
+    task: Task
     path: tuple[Limit, ...]
     driven: tuple[Limit, ...]  # by the inputs: rotors and whatever else is no magnitude
     rate: Limit | None
     floor: Limit  # under the specific thrust
 
     @classmethod
-    def of(cls, problem: Problem, vehicle: Vehicle) -> Bounds:
-        """Return a vehicle's, those of a problem's limits and of what its maneuver asks throughout."""
-        conditions = problem.stages(vehicle.max_specific_thrust).path_constraints
-        limits = limits_along(vehicle, problem.environment, problem.path_limits, conditions)
-        held = [limit for limit in limits if not limit.is_implied]
-        plain = [limit for limit in held if limit.quantity.magnitude is None]
+    def of(cls, task: Task) -> Bounds:
+        """Return a task's."""
+        held, plain = task.held, [limit for limit in task.held if limit.quantity.magnitude is None]
         return cls(
-            vehicle,
-            problem,
+            task,
             path=tuple(limit for limit in plain if limit.quantity.is_of_path),
             driven=tuple(limit for limit in plain if not limit.quantity.is_of_path),
             rate=next((limit for limit in held if limit.quantity.magnitude == BODY_RATE), None),
@@ -103,7 +97,8 @@ class Bounds:
             np.sum(limit.quantity.path[:BOUNDED_DERIVATIVES] * derivatives, axis=(-2, -1))
             for limit in self.path
         ]
-        flat = reference(trajectory, self.vehicle, times.ravel(), environment=self.problem.environment)
+        environment = self.task.environment
+        flat = reference(trajectory, self.task.vehicle, times.ravel(), environment=environment)
         measures = np.zeros((*times.shape, MEASURES))
         wrench = flat.setpoint.wrench
         measures[..., WRENCH.start] = wrench.thrust.reshape(times.shape)

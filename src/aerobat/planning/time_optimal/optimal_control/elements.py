@@ -11,13 +11,13 @@ from typing import Any
 import numpy as np
 
 from aerobat.arrays import Array
-from aerobat.flatness import force_balance
 from aerobat.kernels.quaternions import axes
 from aerobat.limits import Limit
 from aerobat.limits.body_in_gate import OpeningAhead, extent_of_attitude
 from aerobat.limits.path_condition import limit_of
 from aerobat.optimization.nonlinear import SymbolicOps, components, import_casadi
 from aerobat.optimization.separable import ElementFunction
+from aerobat.planning.task import Task
 from aerobat.planning.time_optimal.optimal_control.bounds import Bounds
 from aerobat.planning.time_optimal.optimal_control.collocation import STATE_SCALE, IntervalSide, Mesh
 from aerobat.planning.time_optimal.optimal_control.zero_yaw_rate_body import (
@@ -30,8 +30,6 @@ from aerobat.planning.time_optimal.optimal_control.zero_yaw_rate_body import (
     ZeroYawRateBody,
 )
 from aerobat.problem.condition import Condition, Quantity
-from aerobat.problem.problem import Problem
-from aerobat.vehicle import Vehicle
 
 BETWEEN = (0.25, 0.5, 0.75)  # of an interval: where bounds on the path are held too, beside its nodes
 RATE_SCALE = 10.0  # [rad/s] of body rates that have no bound
@@ -39,26 +37,25 @@ RATE_SCALE = 10.0  # [rad/s] of body rates that have no bound
 
 @dataclass(frozen=True, eq=False)
 class Elements:
-    """The functions of a vehicle's motion through a problem, in a plane if there is one."""
+    """The functions of motions that a task asks for, in a plane if there is one."""
 
-    problem: Problem
-    vehicle: Vehicle
+    task: Task
     plane: Array | None = None  # its normal, (3,); it holds the start
 
     @cached_property
     def body(self) -> ZeroYawRateBody:
         """The equations of motion."""
-        return ZeroYawRateBody(self.vehicle, self.problem.environment)
+        return ZeroYawRateBody(self.task.vehicle, self.task.environment)
 
     @cached_property
     def bounds(self) -> Bounds:
         """The bounds that hold all along the motion."""
-        return Bounds.of(self.problem, self.vehicle)
+        return Bounds.of(self.task)
 
     @property
     def continuous(self) -> bool:
         """True where the input cannot jump, for the rotors lag."""
-        return bool(self.vehicle.lags.any())
+        return bool(self.task.vehicle.lags.any())
 
     def mesh(self, intervals: tuple[int, ...]) -> Mesh:
         """The unknowns of so many equal intervals in each phase."""
@@ -67,7 +64,7 @@ class Elements:
     @property
     def input_scale(self) -> Array:
         """The size of the inputs [m/s², rad/s², rad/s²], (3,)."""
-        vehicle = self.vehicle
+        vehicle = self.task.vehicle
         spread = np.abs(vehicle.allocation[:INPUTS]) @ vehicle.thrust_ranges / 2
         return np.asarray(spread / [vehicle.mass, vehicle.inertia[0, 0], vehicle.inertia[1, 1]])
 
@@ -116,16 +113,15 @@ class Elements:
         rate = ca.sumsqr(node.state[RATES]) / self.rate_scale**2
         across = ca.SX.zeros(1)
         if self.plane is not None:
-            across = ca.dot(ca.DM(self.plane), node.state[POSITION] - ca.DM(self.problem.start.position))
+            across = ca.dot(ca.DM(self.plane), node.state[POSITION] - ca.DM(self.task.problem.start.position))
         return node.function(ca.vertcat(*path, rate, across))
 
     def at_stage(self, conditions: tuple[Condition, ...]) -> tuple[ElementFunction, Array, Array]:
         """Values of conditions at a node, and their bounds; drag is counted."""
         ca, node = import_casadi(), _Node(self)
-        balance = force_balance(self.problem.environment, self.vehicle)
         values, ends = [], []
         for condition in conditions:
-            limit = limit_of(condition, balance)
+            limit = limit_of(condition, self.task.balance)
             if is_of_direction(condition):
                 values.append(ca.dot(ca.DM(condition.direction), node.thrust_axis))
                 ends.append((condition.lower, condition.upper))
@@ -149,7 +145,7 @@ class Elements:
         z, opening = ca.SX.sym("z", STATES), ca.SX.sym("opening", parameters)
         state = z * STATE_SCALE
         position, velocity, attitude = (components(state[part]) for part in (POSITION, VELOCITY, ATTITUDE))
-        extent = extent_of_attitude(ops, self.vehicle.bounding_ellipsoid, axes(attitude))
+        extent = extent_of_attitude(ops, self.task.vehicle.bounding_ellipsoid, axes(attitude))
         values = OpeningAhead.of_parameters(components(opening)).room(ops, position, velocity, extent)
         return ElementFunction(ca.Function("room", [z, opening], [ca.vertcat(*values)]))
 

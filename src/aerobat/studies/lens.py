@@ -1,29 +1,32 @@
-"""Numbers of a problem and its vehicle by the names that their files use: found, and changed.
+"""Lenses: fields by the names that files use, looked up and changed in whatever a study varies.
 
-`limits.velocity`, `gate.tilt_deg`, `gates[1].position.z`, `maneuver.passage.speed`, `vehicle.mass`; the last
-part alone where no other field has it, as `speed`. Beside those there are `angle`, the tilt of a half-flip's
-gate [deg], and `vehicle.thrust_to_weight`, which spans the rotors' fields.
+`limits.velocity`, `gate.tilt_deg`, `gates[1].position.z`, `maneuver.passage.speed` are a problem's;
+`vehicle.mass`, `planner.reserve`, `conditions.gusts.mean_wind` begin with what they are of. The last part
+alone stands for a field where no other field has it, as `speed`. Beside those there are `angle`, the tilt of
+a half-flip's gate [deg], and `vehicle.thrust_to_weight`, which spans the rotors' fields.
 """
 
 from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, fields, is_dataclass
+from dataclasses import dataclass, fields, is_dataclass, replace
 from math import degrees, radians
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
 from aerobat.declaration import FieldError, from_table, shown, unknown_key, within_field
 from aerobat.declaration.sentences import closest
+from aerobat.environment import Dispersion
 from aerobat.errors import SpecError
+from aerobat.planning import Planner
 from aerobat.problem import Gate, Problem
-from aerobat.studies.feasibility.units import DEGREES, unit_of
+from aerobat.studies.units import DEGREES, unit_of
 from aerobat.vehicle import Vehicle
 
-VEHICLE = "vehicle"  # begins the names of the vehicle's fields
 GATE = "gate"  # in files, the only one of `gates`
+PROBLEM = "problem"  # whose fields need not be said to be its
 ANGLE = "angle"
 MAX_ANGLE = 90.0  # [deg] of a half-flip's gate
 THRUST_TO_WEIGHT = "thrust_to_weight"
@@ -33,74 +36,116 @@ FEW = 4  # names in a sentence
 _PART = re.compile(r"([^\W\d]\w*)((?:\[\d{1,6}\])*)")  # between the points of a name, as gates[0]
 
 Key = str | int
+Varied = TypeVar("Varied")
 
 
 @dataclass(frozen=True)
 class Scenario:
-    """A problem, and what shall fly it."""
+    """A problem, what shall fly it, and how that is planned and flown: what a study may vary."""
 
     problem: Problem
     vehicle: Vehicle
+    planner: Planner | None = None  # None for the one that suits the problem
+    conditions: Dispersion | None = None  # None for flights as planned
 
 
 @dataclass(frozen=True)
-class Field:
-    """A number of a scenario, by its name."""
+class Lens:
+    """A field of what a study varies, which is a dataclass of values, as `Scenario`."""
 
     name: str  # as it was given
-    keys: tuple[Key, ...]  # that lead to it from the problem or, behind "vehicle", from that
-
-    @classmethod
-    def of(cls, name: str, scenario: Scenario) -> Field:
-        """The field of a name. Raises SpecError, which names the nearest, where there is no such number."""
-        problem, keys = scenario.problem, _parsed(name)
-        if keys == (ANGLE,):
-            problem.maneuver.with_gate_tilt(problem.gates, 0.0)
-            return cls(name, keys)
-        if len(keys) == 1 and keys[0] not in (VEHICLE, *_names(problem)):
-            keys = _only(name, scenario)
-        if keys[0] == GATE and len(problem.gates) == 1:
-            keys = ("gates", 0, *keys[1:])
-        prefix = keys[:1] if keys[0] == VEHICLE else ()
-        with within_field(_joined(prefix)):
-            found = _found(scenario.vehicle if prefix else problem, keys[len(prefix) :])
-        return cls(name, (*prefix, *found))
+    keys: tuple[Key, ...]  # that lead to it from the outermost
 
     @property
     def place(self) -> str:
         """The whole name of the field."""
-        return _joined(self.keys)
+        return _joined(self.keys[self.keys[0] == PROBLEM :])
 
     @property
     def unit(self) -> str:
         """The unit of the field, empty where it has none."""
-        if self.keys == (ANGLE,):
+        if self._is_angle:
             return "°"
-        of_vehicle = self.keys[0] == VEHICLE
-        names = tuple(key for key in self.keys[of_vehicle:] if isinstance(key, str))
-        return unit_of(names, of_vehicle)
+        return unit_of(tuple(key for key in self.keys if isinstance(key, str)))
 
-    def changed(self, scenario: Scenario, value: float) -> Scenario:
-        """The scenario with this field at a value.
+    @property
+    def label(self) -> str:
+        """The name with the unit."""
+        return f"{self.name} [{self.unit}]" if self.unit else self.name
+
+    def get(self, whole: Any) -> Any:
+        """Return the field's value; a vector where one number stands for all of its entries."""
+        if self._is_angle:
+            return degrees(whole.problem.gates[0].angles[2])
+        value = whole
+        for key in self.keys:
+            value = _inner(value, key)
+        return value
+
+    def set(self, whole: Varied, value: Any) -> Varied:
+        """Return the whole with this field at a value.
 
         Raises FieldError: about `place` for a value that the field cannot take, about another one where the
         two contradict each other.
         """
-        if self.keys == (ANGLE,):
-            return Scenario(_tilted(scenario.problem, value), scenario.vehicle)
-        if self.keys[0] != VEHICLE:
-            return Scenario(_changed(scenario.problem, self.keys, value), scenario.vehicle)
-        with within_field(VEHICLE):
-            return Scenario(scenario.problem, _changed(scenario.vehicle, self.keys[1:], value))
+        if self._is_angle:
+            return _with(whole, PROBLEM, _tilted(_inner(whole, PROBLEM), value))  # type: ignore[no-any-return]
+        try:
+            return _changed(whole, self.keys, value)  # type: ignore[no-any-return]
+        except FieldError as error:
+            raise FieldError(error.field.removeprefix(f"{PROBLEM}."), error.complaint) from None
 
-    def require(self, scenario: Scenario, values: Sequence[float]) -> None:
-        """Refuse values that the field cannot take, whatever the others are. Raises SpecError."""
+    def require(self, whole: Any, values: Sequence[float]) -> None:
+        """Refuse a field that is no number, and values that it cannot take. Raises SpecError."""
+        if not self._is_angle:
+            with within_field(self.place):
+                _require_number(self.get(whole), len(self.keys) > 1 and self._takes_number(whole))
         for value in values:
             try:
-                self.changed(scenario, value)
+                self.set(whole, value)
             except FieldError as error:
                 if error.field in (self.place, re.sub(rf"(\[\d\]|{DEGREES})$", "", self.place)):
                     raise SpecError(f"{self.name} at {value:g}: {error}") from None
+
+    @property
+    def _is_angle(self) -> bool:
+        return self.keys == (ANGLE,)
+
+    def _takes_number(self, whole: Any) -> bool:
+        """True for a vector for which one number stands too, as for limits per axis."""
+        try:
+            self.set(whole, 1)
+        except FieldError:
+            return False
+        return isinstance(self.keys[-1], str)
+
+
+def lens(name: str, whole: Any) -> Lens:
+    """Return the lens on the field of a name.
+
+    Args:
+        name: As in files: limits.velocity, gates[0].width, vehicle.mass, conditions.gusts.mean_wind.
+        whole: What holds the field: a Scenario, or another dataclass of values.
+
+    Raises SpecError, which names the nearest, where there is no such field.
+    """
+    keys = _parsed(name)
+    problem: Problem | None = getattr(whole, PROBLEM, None)
+    if keys == (ANGLE,) and problem is not None:
+        problem.maneuver.with_gate_tilt(problem.gates, 0.0)
+        return Lens(name, keys)
+    roots = [field.name for field in fields(whole)]
+    if problem is not None:
+        if len(keys) == 1 and keys[0] not in (*roots, *_names(problem), GATE):
+            keys = _only(name, whole)
+        if keys[0] not in roots:
+            keys = (PROBLEM, *keys)
+        if keys[:2] == (PROBLEM, GATE) and len(problem.gates) == 1:
+            keys = (PROBLEM, "gates", 0, *keys[2:])
+    try:
+        return Lens(name, _found(whole, keys))
+    except FieldError as error:
+        raise FieldError(error.field.removeprefix(f"{PROBLEM}."), error.complaint) from None
 
 
 def _parsed(name: str) -> tuple[Key, ...]:
@@ -117,19 +162,20 @@ def _parsed(name: str) -> tuple[Key, ...]:
 
 
 def _joined(keys: Sequence[Key]) -> str:
+    """The keys as a dotted name."""
     return "".join(f"[{key}]" if isinstance(key, int) else f".{key}" for key in keys).removeprefix(".")
 
 
-def _only(name: str, scenario: Scenario) -> tuple[Key, ...]:
+def _only(name: str, whole: Any) -> tuple[Key, ...]:
     """The keys of the one field whose last part is a name. Raises SpecError where none or several have it."""
-    known = [*_leaves(scenario.problem, ()), *_leaves(scenario.vehicle, (VEHICLE,))]
+    known = list(_leaves(whole, ()))
     meant = [keys for keys in known if keys[-1] == name]
     if not meant:
         guess = closest(name, [ANGLE, *(str(keys[-1]) for keys in known)])
         remedy = f"did you mean {guess!r}?" if guess else "give one as limits.velocity or vehicle.mass"
         raise SpecError(f"no field named {shown(name)}; {remedy}")
     if len(meant) > 1:
-        names = " or ".join(map(_joined, meant[:FEW]))
+        names = " or ".join(Lens(name, keys).place for keys in meant[:FEW])
         more = f" or one of {len(meant) - FEW} more" if len(meant) > FEW else ""
         raise SpecError(f"{name} may be {names}{more}; give the whole name")
     return meant[0]
@@ -158,37 +204,31 @@ def _names(value: Any) -> list[str]:
 
 
 def _found(value: Any, keys: Sequence[Key]) -> tuple[Key, ...]:
-    """The keys that lead to a number, components by their numbers. Raises FieldError where there is none."""
+    """The keys that lead to a field, components by their numbers. Raises FieldError where there is none."""
     if not keys:
-        if value is None or (isinstance(value, int | float) and not isinstance(value, bool)):
-            return ()
-        whole = isinstance(value, np.ndarray) and value.ndim == 1
-        remedy = f"one of its numbers, as {AXES[0]} or [0]" if whole else "a number of it"
-        raise FieldError("", f": this is {shown(value)}, which cannot be varied; name {remedy}")
+        return ()
     key, rest = keys[0], keys[1:]
     if isinstance(value, tuple | np.ndarray):
         key = AXES.index(key) if isinstance(value, np.ndarray) and key in AXES else key
         if not isinstance(key, int) or key >= len(value):
             raise FieldError("", f"has no {_joined([key])}; give a number from [0] to [{len(value) - 1}]")
     elif not is_dataclass(value):
-        said = "is not given; give it first" if value is None else "has no fields of its own"
+        said = "is not given; give it first" if value is None else f"is {shown(value)}, it has no fields"
         raise FieldError("", said)
     elif key not in _names(value):
         raise unknown_key(_joined([key]), _names(value))
-    inner = _inner(value, key)
-    if isinstance(inner, np.ndarray) and not rest and isinstance(key, str) and _takes_number(value, key):
-        return (key,)
     with within_field(_joined([key])):
-        return key, *_found(inner, rest)
+        return key, *_found(_inner(value, key), rest)
 
 
-def _takes_number(value: Any, name: str) -> bool:
-    """True for a vector for which one number stands too, as for limits per axis."""
-    try:
-        _with(value, name, 1)
-    except FieldError:
-        return False
-    return True
+def _require_number(value: Any, takes_one: bool) -> None:
+    """Refuse a value that is no number, None, or a vector for which one number stands. Raises FieldError."""
+    is_vector = isinstance(value, np.ndarray) and value.ndim == 1
+    if (is_vector and takes_one) or value is None:
+        return
+    if not isinstance(value, int | float) or isinstance(value, bool):
+        remedy = f"one of its numbers, as {AXES[0]} or [0]" if is_vector else "a number of it"
+        raise FieldError("", f": this is {shown(value)}, which cannot be varied; name {remedy}")
 
 
 def _inner(value: Any, key: Key) -> Any:
@@ -206,16 +246,17 @@ def _inner(value: Any, key: Key) -> Any:
     return getattr(value, key)
 
 
-def _changed(value: Any, keys: Sequence[Key], number: float) -> Any:
-    """The value with the number at the end of keys at another. Raises FieldError."""
+def _changed(value: Any, keys: Sequence[Key], new: Any) -> Any:
+    """The value with the field at the end of keys at another. Raises FieldError."""
     if not keys:
-        return int(number) if float(number).is_integer() else number
+        is_whole = isinstance(new, float) and new.is_integer()
+        return int(new) if is_whole else new  # whole numbers are no floats in files
     key, rest = keys[0], keys[1:]
     with within_field(_joined([key])):
         if key == ALL_ROTORS:
-            key, inner = "rotors", tuple(_changed(rotor, rest, number) for rotor in value.rotors)
+            key, inner = "rotors", tuple(_changed(rotor, rest, new) for rotor in value.rotors)
         else:
-            inner = _changed(_inner(value, key), rest, number)
+            inner = _changed(_inner(value, key), rest, new)
     if isinstance(key, int):
         changed = [*value[:key], inner, *value[key + 1 :]]
         return np.array(changed) if isinstance(value, np.ndarray) else tuple(changed)
@@ -228,6 +269,9 @@ def _with(value: Any, name: str, inner: Any) -> Any:
         if inner <= 0:
             raise FieldError(name, f"must be positive, got {inner:g}")
         return value.with_thrust_to_weight(inner)
+    if not hasattr(value, "__checked_init__"):  # a plain dataclass, of values that are checked themselves
+        changes: dict[str, Any] = {name: inner}
+        return replace(value, **changes)
     table = {field.name: getattr(value, field.name) for field in fields(value)}
     if isinstance(value, Gate) and name in Gate.ANGLES:
         angles = {key: _inner(value, key) for key in Gate.ANGLES}

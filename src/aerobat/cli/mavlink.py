@@ -1,45 +1,39 @@
-"""`aerobat mavlink`: a plan flown on an autopilot."""
+"""Links over MAVLink: a plan flown on an autopilot, and the simulator as a vehicle that clients fly."""
 
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING
 
 import numpy as np
-from cyclopts import Parameter
 
 from aerobat.arrays import Array
 from aerobat.cli.exit_code import ExitCode
 from aerobat.cli.interrupts import REPORTED
-from aerobat.cli.link_options import MavlinkOptions
+from aerobat.cli.link_options import MavlinkOptions, MavlinkVehicleOptions
+from aerobat.cli.runs.saved_plans import named_vehicle
 from aerobat.cli.terminal import print_json, say
+from aerobat.environment import Environment
 from aerobat.errors import SpecError
 from aerobat.interchange import read_plan
 from aerobat.planning import Plan
-from aerobat.reporting.report_json import passage_facts, to_json
+from aerobat.reporting.plain_data import plain, to_json
 from aerobat.simulation.autopilot import recoveries
 
 if TYPE_CHECKING:
     from aerobat.links.report import LinkReport
 
+_RATE = 250.0  # [1/s] at which a simulated vehicle takes and sends messages
 CLEARANCE = 3.0  # [m] of a plan's lowest point over where the vehicle stands
 RECOVERED = 1.0  # [m] of the lowest point of a recovery from any instant of it, at the least
 
 
-def mavlink(
-    plan: Path, options: Annotated[MavlinkOptions, Parameter(name="*")] = MavlinkOptions()
-) -> ExitCode:
-    """Fly a plan on an autopilot over MAVLink: PX4, or `aerobat mavlink-vehicle`.
+def fly(plan: Path, options: MavlinkOptions) -> ExitCode:
+    """Fly a plan on an autopilot; the exit code tells if all went well.
 
-    Arms, takes off, goes to the plan's start, streams attitude, rates and thrust along the plan, holds where
-    it ends, and lands. Whatever goes wrong on the way, the vehicle is told to hover, then to land. Read
-    docs/vehicles.md before anything real is armed. Exits with 0 only if the plan was flown to its end,
-    through its gates, and the vehicle has landed.
-
-    Parameters
-    ----------
-    plan
-        A .plan file, or a run's folder.
+    Args:
+        plan: A .plan file, or a run's folder.
+        options: Of the command.
     """
     found = read_plan(plan)
     if not isinstance(found, Plan):
@@ -48,7 +42,7 @@ def mavlink(
     from aerobat.links.mavlink.autopilot_link import COMPONENT, SYSTEM
     from aerobat.links.mavlink.client import Client, ClientSettings, run
     from aerobat.links.mavlink.connection import connect
-    from aerobat.links.mission import MissionSettings, Phase, require_flyable
+    from aerobat.links.mission import Phase, require_flyable
 
     offset = _origin(found) if options.origin is None else np.array(options.origin)
     require_flyable(found, offset, options.vehicle)
@@ -58,11 +52,7 @@ def mavlink(
             found,
             connection,
             offset=offset,
-            mission=MissionSettings(
-                max_error=options.max_error,
-                max_silence=options.max_silence,
-                max_lateness=options.max_lateness,
-            ),
+            mission=options.mission,
             settings=ClientSettings(
                 options.rate, wait=options.wait, hover_thrust=options.hover_thrust, system=options.system
             ),
@@ -82,10 +72,41 @@ def mavlink(
     return ExitCode.WELL if report.is_success else ExitCode.NOT_WELL
 
 
+def simulate(vehicle: str, options: MavlinkVehicleOptions) -> None:
+    """Simulate a vehicle, until interrupted.
+
+    Args:
+        vehicle: Its name or file.
+        options: Of the command.
+    """
+    found = named_vehicle(vehicle)
+    from aerobat.links.autopilot.vehicle import SimulatedVehicle
+    from aerobat.links.clock import WallClock
+    from aerobat.links.mavlink.connection import LossyConnection, connect
+    from aerobat.links.mavlink.front_end import SYSTEM, FrontEnd
+
+    connection = connect(options.listen, listen=True, system=SYSTEM)
+    simulated = SimulatedVehicle(found, Environment())
+    clock = WallClock(options.speed)
+    if options.loss or options.delay:
+        connection = LossyConnection(
+            connection, clock, loss=options.loss, delay=options.delay, seed=options.seed
+        )
+    front_end = FrontEnd(simulated, connection, say)
+    say(f"{found.name} listens on {options.listen}")
+    end = float("inf") if options.seconds is None else options.seconds
+    try:
+        while clock.now() < end:
+            front_end.tick(clock.now())
+            clock.sleep_until(clock.now() + 1.0 / _RATE)
+    finally:
+        connection.close()
+
+
 def _print(report: LinkReport, in_json: bool) -> None:
     if in_json:
-        passages = [passage_facts(passage) for passage in report.passages]
-        print_json(to_json({**report.record(), "passages": passages}))
+        judged = {"success": report.is_success, "failures": report.failures}
+        print_json(to_json({**plain(report), **judged}))
     else:
         print(report)
 

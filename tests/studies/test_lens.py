@@ -17,8 +17,8 @@ import aerobat as ab
 from aerobat.declaration import from_table, to_table
 from aerobat.planning.assessment.contradiction import contradiction
 from aerobat.studies.feasibility import Axis
-from aerobat.studies.feasibility.fields import Field, Scenario
-from aerobat.studies.feasibility.units import UNITS
+from aerobat.studies.lens import Scenario, lens
+from aerobat.studies.units import OF, UNITS
 from places import ROOT
 
 NAMES = {  # of fields: the place of the same in a file's tables, and values that it takes
@@ -38,11 +38,19 @@ NAMES = {  # of fields: the place of the same in a file's tables, and values tha
     "vehicle.rotor_defaults.lag": (("vehicle", "rotor_defaults", "lag"), (0.0, 0.1)),
     "max_thrust": (("vehicle", "rotor_defaults", "max_thrust"), (5.0, 9.0)),
 }
+OTHERS = {  # of fields of what is no file's problem or vehicle: values that they take
+    "planner.reserve": (0.0, 0.4),
+    "planner.time_limit": (1.0, 30.0),
+    "conditions.mass": (0.0, 0.9),
+    "conditions.gusts.mean_wind": (0.0, 9.0),
+    "conditions.motion_capture.attitude_noise_deg": (0.0, 9.0),
+}
 
 
 @cache
 def scenario() -> Scenario:
-    return Scenario(ab.load_problem("half-flip"), ab.load_vehicle("agile-quad"))
+    conditions = ab.load_dispersion("lab")
+    return Scenario(ab.load_problem("half-flip"), ab.load_vehicle("agile-quad"), ab.Miqp(), conditions)
 
 
 def by_file(keys: tuple[Any, ...], value: float) -> Scenario:
@@ -56,41 +64,69 @@ def by_file(keys: tuple[Any, ...], value: float) -> Scenario:
             table[key] = [0.0, 0.0, 0.0] if key == "drag_body" else {}
         table = table[key]
     table[last] = value
-    return Scenario(from_table(ab.Problem, tables["problem"]), from_table(ab.Vehicle, tables["vehicle"]))
+    problem, vehicle = from_table(ab.Problem, tables["problem"]), from_table(ab.Vehicle, tables["vehicle"])
+    return replace(base, problem=problem, vehicle=vehicle)
 
 
 def test_units_are_those_that_the_page_on_files_tells() -> None:
-    page = (ROOT / "docs" / "files.md").read_text(encoding="utf-8").partition("## Conditions")[0]
-    rows = re.findall(r"^\| `(\w+)` \| .* \| (\S+) \| [^|]* \|$", page, re.MULTILINE)
-    told = {key: {unit for name, unit in rows if name == key} for key, _ in rows}
+    page = (ROOT / "docs" / "files.md").read_text(encoding="utf-8")
+    files, _, conditions = page.partition("## Conditions")
+    told, under = units_in(files), units_in(conditions)
     for key, unit in UNITS.items():
         assert told[key] == {unit}, key
+    for key, unit in OF["conditions"].items():
+        assert under[key] == {unit.replace("°", "deg") or "-"}, key
     for name in NAMES:
-        field = Field.of(name, scenario())
+        field = lens(name, scenario())
         key = str(next(key for key in reversed(field.keys) if isinstance(key, str)))
         assert field.unit.replace("°", "deg") in told[key]
-    assert Field.of("angle", scenario()).unit == "°"
-    assert Field.of("vehicle.rotor_defaults.min_thrust", scenario()).unit == "N"
-    assert Field.of("limits.upper[2]", scenario()).unit == "m"
+    units = {
+        "angle": "°",
+        "vehicle.rotor_defaults.min_thrust": "N",
+        "limits.upper[2]": "m",
+        "planner.order": "",
+    }
+    units |= {"planner.time_limit": "s", "conditions.mass": "", "conditions.imu.gyro_range_deg": "°/s"}
+    for name, unit in units.items():
+        assert lens(name, scenario()).unit == unit
+
+
+def units_in(page: str) -> dict[str, set[str]]:
+    """The units that tables of a page give, by the keys."""
+    rows = re.findall(r"^\| `(\w+)` \| .* \| (\S+) \| [^|]* \|$", page, re.MULTILINE)
+    return {key: {unit for name, unit in rows if name == key} for key, _ in rows}
 
 
 @given(name=st.sampled_from(sorted(NAMES)), data=st.data())
 def test_a_field_changes_what_its_files_key_does(name: str, data: st.DataObject) -> None:
     keys, (low, high) = NAMES[name]
     value = data.draw(st.one_of(st.floats(low, high), st.integers(int(np.ceil(low)), int(high))))
-    assert Field.of(name, scenario()).changed(scenario(), value) == by_file(keys, value)
+    assert lens(name, scenario()).set(scenario(), value) == by_file(keys, value)
+
+
+@given(name=st.sampled_from(sorted({**NAMES, **OTHERS})), data=st.data())
+def test_what_is_set_is_got_and_nothing_else_is_changed(name: str, data: st.DataObject) -> None:
+    low, high = OTHERS[name] if name in OTHERS else NAMES[name][1]
+    value, field = data.draw(st.floats(low, high)), lens(name, scenario())
+    changed = field.set(scenario(), value)
+    assert field.get(changed) == pytest.approx(value, abs=1e-9)
+    assert field.set(changed, field.get(scenario())) == field.set(scenario(), field.get(scenario()))
+    holder = name.partition(".")[0]
+    for other in {"problem", "vehicle", "planner", "conditions"} - {holder, "problem"}:
+        if holder in ("vehicle", "planner", "conditions"):
+            assert getattr(changed, other) == getattr(scenario(), other)
 
 
 @given(st.floats(-90.0, 90.0))
 def test_the_angle_is_the_tilt_of_a_half_flips_gate(angle: float) -> None:
-    gate = Field.of("angle", scenario()).changed(scenario(), angle).problem.gates[0]
+    gate = lens("angle", scenario()).set(scenario(), angle).problem.gates[0]
     assert degrees(gate.angles[2]) == pytest.approx(angle, abs=1e-9)
     assert (gate.position == scenario().problem.gates[0].position).all()
 
 
 @given(st.floats(0.5, 20.0))
 def test_the_thrust_to_weight_ratio_is_what_it_is_set_to_and_shared_as_before(ratio: float) -> None:
-    changed = Field.of("vehicle.thrust_to_weight", scenario()).changed(scenario(), ratio).vehicle
+    changed = lens("vehicle.thrust_to_weight", scenario()).set(scenario(), ratio).vehicle
     before = scenario().vehicle
     assert changed.thrust_to_weight == pytest.approx(ratio)
     shares = changed.max_thrusts / changed.max_thrusts.sum()
@@ -112,6 +148,7 @@ def test_the_thrust_to_weight_ratio_is_what_it_is_set_to_and_shared_as_before(ra
         ("goal.position", "goal.position: this is an array of the shape (3,), which cannot be varied"),
         ("name", "name: this is 'half-flip', which cannot be varied"),
         ("vehicle.body.centre.x", "vehicle.body is not given; give it first"),
+        ("planner.resreve", "planner is not given; give it first"),
         ("a..b", "'a..b' is no field's name"),
         ("", "'' is no field's name"),
     ],

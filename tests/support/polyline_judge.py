@@ -1,4 +1,4 @@
-"""Passages of a flight that was logged, straight between its rows."""
+"""A gate judged from the whole polyline of a flight at once: what the kernel finds tick by tick."""
 
 from __future__ import annotations
 
@@ -17,40 +17,17 @@ from aerobat.engines.numpy import ArrayOps
 from aerobat.engines.pytree import tree_map
 from aerobat.kernels.gates import progress
 from aerobat.kernels.gates.progress import GateProgress
-from aerobat.kernels.gates.section import BoundingEllipsoid, extent, gap, section
+from aerobat.kernels.gates.section import extent, gap, section
 from aerobat.kernels.gates.snapshot import Snapshot, between
 from aerobat.kernels.gates.swath import Swath, swept_between
-from aerobat.simulation.flight import Flight
-from aerobat.simulation.passages.passage import (
-    PASSAGE_DEPTH,
-    PASSAGE_WINDOW,
-    Passage,
-    passages,
-    plane_directions,
-)
+from aerobat.simulation.passages import PASSAGE_DEPTH, PASSAGE_WINDOW, bounding_ellipsoid, gate_places
 from aerobat.vehicle import Ellipsoid
 
 T = TypeVar("T")
 
 
-def flown_passages(
-    flight: Flight, planned: Sequence[PlannedPassage], body: Ellipsoid | None
-) -> list[Passage]:
-    """Passages of one flight, fields (1,).
-
-    Args:
-        flight: what was flown.
-        planned: what was to be passed.
-        body: what encloses its vehicle, for the clearance.
-    """
-    stop = flight.diverged_at
-    states = flight.states
-    parts = (states.position, states.velocity, states.q_world_body)
-    return [passages(each, gate_progress(each, flight.times, parts, body), stop) for each in planned]
-
-
 def gate_progress(
-    planned: PlannedPassage, times: Array, states: Sequence[Array], body: Ellipsoid | None = None
+    planned: PlannedPassage, times: Array, states: Sequence[Array], body: Ellipsoid
 ) -> GateProgress:
     """Progress at the end of a flight along a polyline of states; leaves (1,).
 
@@ -58,23 +35,20 @@ def gate_progress(
         planned: what was to be passed.
         times: of the states [s], (T,).
         states: positions, velocities and attitudes, (T, ·).
-        body: what encloses the vehicle, for what it sweeps of the plane.
+        body: what encloses the vehicle.
     """
     track = _Track(planned, times, states[0] - planned.gate.position, *states[1:])
     forward, backward = track.nearest(track.passages), track.nearest(track.crossings(-1))
     in_window = np.abs(times - planned.time) <= PASSAGE_WINDOW
     about = track.distance[in_window] if in_window.any() else track.distance[-1:]
-    before: GateProgress = tree_map(
-        lambda leaf: np.full(1, leaf), progress.init(len(planned.gate.opening.probes))
-    )
+    [place] = gate_places((planned,), bounding_ellipsoid(body))
+    before: GateProgress = tree_map(lambda leaf: np.full(1, leaf), progress.init(place))
     found = before._replace(max_distance=np.array([about.max()]), min_distance=np.array([about.min()]))
     if backward is not None:
         found = found._replace(backward=track.crossing(backward).time)
     if forward is None:
         return found
     found = found._replace(crossing=track.crossing(forward))
-    if body is None:
-        return found
     return found._replace(swath=found.swath._replace(crossing=track.swept(forward, body)))
 
 
@@ -127,8 +101,8 @@ class _Track:
     def swept(self, crossing: np.intp, body: Ellipsoid) -> Swath:
         """Return the swath that the body sweeps in the plane during the stay of a crossing, leaves (1,)."""
         gate = self.planned.gate
-        normal, directions = components(gate.normal), plane_directions(gate)
-        ellipsoid = BoundingEllipsoid(tuple(body.centre.tolist()), tuple(body.semi_axes.tolist()))
+        [(plane, ellipsoid)] = gate_places((self.planned,), bounding_ellipsoid(body))
+        normal, directions = plane.normal, plane.directions
         rows = self.rows
         gaps = gap(
             ArrayOps,

@@ -1,0 +1,156 @@
+"""`aerobat feasibility`: the least that a maneuver needs, or where there is a plan over values of fields."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from math import prod
+from pathlib import Path
+from typing import Annotated
+
+from cyclopts import Parameter
+
+from aerobat.cli.feasibility_options import FeasibilityOptions
+from aerobat.cli.options import OutputOptions
+from aerobat.cli.progress import Progress, showing
+from aerobat.cli.runs.folder import is_of_a_run, written
+from aerobat.cli.runs.record import FlightSettings, RunRecord
+from aerobat.cli.tasks import make_planner, read_task
+from aerobat.errors import SpecError
+from aerobat.interchange.tables import require_writable, write_table
+from aerobat.reporting.feasibility.facts import requirements
+from aerobat.reporting.feasibility.figure import map_figure
+from aerobat.reporting.page import png
+from aerobat.reporting.plain_data import to_json
+from aerobat.reporting.tables import table
+from aerobat.storage import require_replaceable
+from aerobat.studies.feasibility import (
+    Axis,
+    FeasibilityMap,
+    Requirement,
+    feasibility_map,
+    min_requirements,
+)
+from aerobat.studies.feasibility.probe import TIME_LIMIT
+
+NEED = "need.json"
+
+
+def feasibility(
+    problem: str, options: Annotated[FeasibilityOptions, Parameter(name="*")] = FeasibilityOptions()
+) -> None:
+    """Find the least thrust-to-weight ratio, ceiling and gates with a plan, or map feasibility over fields.
+
+    Without --over, the least of each quantity is found by bisection, the others as they are. The answer comes
+    with its plan, certified and flown, and with what is refused beside it, and why. Less still may be
+    feasible again. Writes the plans, need.json and run.toml, by default to out/PROBLEM-need. Exits with 3
+    where nothing suffices.
+
+    With --over, each cell is planned as `aerobat plan` would plan it. The cell says planned, with duration
+    and the limits that bind; not flyable, where the plan's own flight is not as it should be; no plan, where
+    none is found; refused at sight, where what is asked contradicts itself or the limits; or no answer.
+    Writes map.csv (a row a cell), map.json, map.png and run.toml, by default to out/PROBLEM-map-FIELDS. Exits
+    with 0 once all cells are done, whatever they say.
+
+    Each plan has --time-limit seconds, 30 unless given; what has none by then counts as refused.
+
+    Parameters
+    ----------
+    problem
+        A name that `aerobat show` lists, or a problem's TOML file.
+    """
+    options.require_one()
+    require_writable(f"map.{options.table}")
+    task, vehicle = read_task(problem, options)
+    limit = getattr(options, "time_limit", None)
+    record = RunRecord(
+        command="map" if options.over else "need",
+        problem=task,
+        vehicle=vehicle,
+        planner=make_planner(options, task, vehicle),
+        angle=options.angle,
+        flight=FlightSettings(table=options.table),
+        time_limit=TIME_LIMIT if limit is None else limit,
+        over=options.over,
+        of=options.least or None,
+        tolerance=options.tolerance,
+        plugins=tuple(map(str, options.plugins)),
+    )
+    require_replaceable(options.out or record.folder, is_of_a_run)  # before minutes of planning
+    if options.over:
+        finish_map(map_of(record, options.workers), record, options)
+    else:
+        finish_need(need_of(record, options.workers), record, options)
+
+
+def map_of(record: RunRecord, workers: str | None = None) -> FeasibilityMap:
+    """The map of a run, made anew.
+
+    Args:
+        record: What is planned, and how.
+        workers: Who plans.
+    """
+    axes = [Axis.parse(text) for text in record.over]
+    over = {axis.name: axis.values for axis in axes}
+    if len(over) < len(axes):
+        raise SpecError(f"--over names {axes[0].name} twice; give another field, or drop one")
+    with showing(Progress("cells", prod(len(axis.values) for axis in axes))) as progress:
+        return feasibility_map(
+            record.problem,
+            over,
+            record.vehicle,
+            record.planner,
+            time_limit=TIME_LIMIT if record.time_limit is None else record.time_limit,
+            workers=workers,
+            progress=progress.counting("planned"),
+        )
+
+
+def finish_map(found: FeasibilityMap, record: RunRecord, options: OutputOptions) -> None:
+    """Write a map, then show it."""
+    facts = to_json(found)
+    picture = png(map_figure(found))
+
+    def write(staging: Path) -> None:
+        write_table(found.table, staging / f"map.{record.flight.table}")
+        (staging / "map.json").write_text(facts + "\n", encoding="utf-8")
+        (staging / "map.png").write_bytes(picture)
+
+    written(record, options, write, facts, table(found))
+
+
+def need_of(record: RunRecord, workers: str | None = None) -> tuple[Requirement, ...]:
+    """The answers of a run, made anew.
+
+    Args:
+        record: What is planned, and how.
+        workers: Who plans.
+    """
+    with showing(Progress("plans tried")) as progress:
+
+        def note(quantity: str, value: float, planned: bool) -> None:
+            progress.step(f"{quantity} {value:.4g} {'planned' if planned else 'refused'}")
+
+        return min_requirements(
+            record.problem,
+            record.vehicle,
+            record.of,
+            record.planner,
+            tolerance=record.tolerance,
+            time_limit=TIME_LIMIT if record.time_limit is None else record.time_limit,
+            workers=workers,
+            progress=note,
+        )
+
+
+def finish_need(found: Sequence[Requirement], record: RunRecord, options: OutputOptions) -> None:
+    """Write what is needed, then show it."""
+    told = requirements(record.problem.name, record.vehicle.name, found)
+    facts = to_json(told)
+
+    def write(staging: Path) -> None:
+        (staging / NEED).write_text(facts + "\n", encoding="utf-8")
+        for each in found:
+            if each.plan is not None:
+                each.plan.save(staging / f"{record.problem.name}-{each.quantity}.plan")
+
+    written(record, options, write, facts, table(told))

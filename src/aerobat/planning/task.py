@@ -1,0 +1,98 @@
+"""A planning task: everything that is asked of a path, said once, for every planner and for the judge."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+from aerobat.certification import Envelope
+from aerobat.environment import Environment
+from aerobat.flatness import force_balance
+from aerobat.limits import Limit, limits_along
+from aerobat.planning.passages import PlacedStage, planned_passages, planned_waypoints
+from aerobat.problem.condition import ForceBalance
+from aerobat.problem.problem import Problem
+from aerobat.problem.stage import StageSequence
+from aerobat.vehicle import Vehicle
+
+# without a vehicle, stages that ask a fraction of its thrust assume what a hexarotor in the paper's class has
+ASSUMED_THRUST_TO_WEIGHT = 5.0
+
+
+@dataclass(frozen=True)
+class Task:
+    """Ends, stages in order, and limits that hold throughout, for one vehicle in one environment.
+
+    Ends, limits per axis and the environment are the problem's. The stages are what the problem asks of the
+    vehicle, or what a planner makes of that where it asks less for a start.
+    """
+
+    problem: Problem
+    vehicle_if_any: Vehicle | None
+    stages: StageSequence
+    reserve: float = 0.0  # of the vehicle's limits' ranges, kept from either end; proven of rotors
+
+    @classmethod
+    def of(cls, problem: Problem, vehicle: Vehicle | None = None, reserve: float = 0.0) -> Task:
+        """Return what a problem asks of a vehicle, or of none in particular.
+
+        Args:
+            problem: Its stages are made for the vehicle's thrust and size.
+            vehicle: What shall fly.
+            reserve: Kept for the controller.
+        """
+        body_radius = 0.0 if vehicle is None else vehicle.body_radius
+        stages = problem.stages(max_specific_thrust(problem, vehicle), body_radius)
+        return cls(problem, vehicle, stages, reserve)
+
+    @property
+    def vehicle(self) -> Vehicle:
+        """The vehicle of a task that has one."""
+        assert self.vehicle_if_any is not None, "only tasks with a vehicle are asked for it"
+        return self.vehicle_if_any
+
+    @property
+    def environment(self) -> Environment:
+        """Gravity, wind and ground."""
+        return self.problem.environment
+
+    @property
+    def without_reserve(self) -> Task:
+        """The same, every limit used in full."""
+        return replace(self, reserve=0.0) if self.reserve else self
+
+    @cached_property
+    def balance(self) -> ForceBalance:
+        """The balance of thrust, acceleration and drag."""
+        return force_balance(self.environment, self.vehicle_if_any)
+
+    @cached_property
+    def limits(self) -> tuple[Limit, ...]:
+        """Everything that must hold all along a path."""
+        limits, conditions = self.problem.path_limits, self.stages.path_constraints
+        return limits_along(self.vehicle_if_any, self.environment, limits, conditions)
+
+    @cached_property
+    def held(self) -> tuple[Limit, ...]:
+        """The limits that imply all others along a whole path: those that an optimizer holds."""
+        return tuple(limit for limit in self.limits if not limit.is_implied)
+
+    def envelope(self, placed: Sequence[PlacedStage] = ()) -> Envelope:
+        """Return what a certificate is about, gates and balls at placed stages among it."""
+        return Envelope(
+            limits=self.problem.path_limits,
+            conditions=self.stages.path_constraints,
+            passages=planned_passages(placed, self.problem),
+            waypoints=planned_waypoints(placed, self.problem),
+            start=self.problem.ends.get("start"),
+            goal=self.problem.ends.get("goal"),
+            closed=self.stages.closed,
+        )
+
+
+def max_specific_thrust(problem: Problem, vehicle: Vehicle | None) -> float:
+    """Return the thrust over mass [m/s²] that stages may ask: a vehicle's, or what is assumed without one."""
+    if vehicle is None:
+        return ASSUMED_THRUST_TO_WEIGHT * problem.environment.gravity
+    return vehicle.max_specific_thrust

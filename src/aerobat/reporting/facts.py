@@ -1,0 +1,131 @@
+"""Facts: a result told once, from which tables, JSON, data frames and notebooks' views follow.
+
+A kind of result has one function here or elsewhere, registered with `@facts.register`, and where it can be
+drawn one more, registered with `@picture.register`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, fields, is_dataclass
+from functools import singledispatch
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+from aerobat.errors import SpecError
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+REPORT, EXPLAIN = 0, 1  # levels: the lines of a run's report; all that there is to tell
+WARNING = "warning"  # the label of facts that a table tells last
+NONE = "–"  # in place of a number that there is not
+
+# the rooms of results, each with the module that tells them, imported when there is one to tell
+TOLD_IN = {
+    "aerobat.certification": "plans",
+    "aerobat.planning": "plans",
+    "aerobat.simulation.autopilot": "plans",
+    "aerobat.simulation": "flights",
+    "aerobat.evaluation": "flights",
+    "aerobat.vehicle": "vehicles",
+    "aerobat.studies.compare": "comparison",
+    "aerobat.studies.error_causes": "error_causes",
+    "aerobat.studies.feasibility": "feasibility.facts",
+    "aerobat.studies.inspection": "inspection",
+    "aerobat.studies.sweep": "sweeps.facts",
+    "aerobat.studies.tune": "sweeps.tuning",
+}
+
+
+@dataclass(frozen=True)
+class Fact:
+    """A fact of a result.
+
+    Without a key it is for people alone, without label and text for files alone. A text without a label is a
+    line of its own, above or below a table. A value may be a result, whose facts are told in its place, or a
+    sequence of results, rows of a table.
+    """
+
+    key: str  # in JSON and data frames, ending in its unit: "duration_s"
+    value: Any = None
+    label: str = ""  # in tables
+    text: str | None = None  # in tables; left out, value and unit
+    unit: str = ""
+    level: int = EXPLAIN
+    style: str = ""  # red: something is wrong
+
+    @property
+    def said(self) -> str:
+        """The fact in words."""
+        if self.text is not None:
+            return self.text
+        if self.value is None:
+            return NONE
+        if isinstance(self.value, bool):
+            return "yes" if self.value else "no"
+        number = f"{self.value:.4g}" if isinstance(self.value, float) else str(self.value)
+        return f"{number} {self.unit}".rstrip()
+
+
+class Facts(tuple[Fact, ...]):
+    """Facts that are told together: a result without a class of its own."""
+
+    __slots__ = ()
+
+
+class Columns(dict[str, Any]):
+    """A table by its columns, (rows,) each: for data frames, and too long for JSON."""
+
+
+@singledispatch
+def facts(result: object) -> Iterator[Fact]:
+    """Yield the facts of a result. Raises SpecError for what is none.
+
+    A dataclass that nobody tells has its fields for facts, for files alone.
+    """
+    told = _registered(facts, result)
+    if told is not None:
+        yield from told(result)
+    elif is_dataclass(result) and not isinstance(result, type):
+        yield from fields_of(result)
+    else:
+        raise SpecError(f"no facts are known of {type(result).__name__}; register a function that tells them")
+
+
+@facts.register
+def _(result: Facts) -> Iterator[Fact]:
+    yield from result
+
+
+@singledispatch
+def picture(result: object) -> Figure | None:
+    """The figure of a result; None of one that has none."""
+    drawn = _registered(picture, result)
+    return None if drawn is None else drawn(result)
+
+
+def fields_of(result: Any) -> Iterator[Fact]:
+    """Yield the fields of a dataclass, for files alone."""
+    yield from (Fact(field.name, getattr(result, field.name)) for field in fields(result))
+
+
+def said(label: str, text: str, level: int = EXPLAIN, style: str = "") -> Fact:
+    """A fact for people alone."""
+    return Fact("", None, label, text, level=level, style=style)
+
+
+def kept(**values: Any) -> Iterator[Fact]:
+    """Yield facts for files alone."""
+    yield from (Fact(key, value) for key, value in values.items())
+
+
+def _registered(told: Any, result: object) -> Any:
+    """The function for a result that its room's module registers; None where there is none."""
+    own = told.dispatch(object)
+    for cls in type(result).__mro__:
+        rooms = [room for room in TOLD_IN if f"{cls.__module__}.".startswith(f"{room}.")]
+        if rooms:
+            import_module(f"aerobat.reporting.{TOLD_IN[max(rooms, key=len)]}")
+    found = told.dispatch(type(result))
+    return None if found is own else found

@@ -1,0 +1,143 @@
+"""Facts of maps of what is feasible, and of what a problem needs."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from typing import TYPE_CHECKING
+
+from aerobat.reporting.facts import NONE, Columns, Fact, Facts, facts, kept, picture
+from aerobat.reporting.feasibility.legend import Kind, kinds_of, letter_of
+from aerobat.studies.feasibility import Cell, Feasibility, FeasibilityMap, Requirement
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+WIDE = 14  # values across: of more, letters alone fit
+
+
+@facts.register
+def _(found: FeasibilityMap) -> Iterator[Fact]:
+    """Tell each cell; of two fields, people read a grid with a letter for each kind, and a legend."""
+    title = f"{found.problem.name} · {found.vehicle.name}"
+    is_grid = len(found.axes) > 1
+    if is_grid:
+        down, across = found.axes
+        title += f" · duration [s] over {down.label} (down) and {across.label} (across)"
+    yield Fact("table", Columns(found.table))
+    yield Fact("", text=title)
+    yield from kept(problem=found.problem.name, vehicle=found.vehicle.name)
+    yield from kept(over={axis.name: axis.values for axis in found.axes})
+    yield from kept(units={axis.name: axis.unit for axis in found.axes})
+    yield from kept(counts={feasibility.value: count for feasibility, count in found.counts.items()})
+    yield Fact("cells", [_cell(found, cell) for cell in found.cells], "" if is_grid else "cells")
+    if is_grid:
+        yield Fact("", _grid(found), "grid")
+        yield from (Fact("", text=_legend(found, kind)) for kind in kinds_of(found).values())
+
+
+@picture.register(FeasibilityMap)
+def _(found: FeasibilityMap) -> Figure:
+    from aerobat.reporting.feasibility.figure import map_figure
+
+    return map_figure(found)
+
+
+def requirements(problem: str, vehicle: str, found: Iterable[Requirement]) -> Facts:
+    """The least that a problem needs of each quantity.
+
+    Args:
+        problem: Its name.
+        vehicle: The name of what flies it.
+        found: The answers.
+    """
+    each = (Fact(one.quantity, one, one.quantity) for one in found)
+    return Facts(
+        (
+            Fact("problem", problem, text=f"{problem} · {vehicle}"),
+            Fact("vehicle", vehicle),
+            Fact("requirements", Facts(each)),
+        )
+    )
+
+
+@facts.register
+def _(found: Requirement) -> Iterator[Fact]:
+    """Tell the least; None for a quantity of which none will do, and for no limit."""
+    refused = found.shown(found.refused)
+    least = f"none will do, {refused} neither"
+    if found.value is not None:
+        least = found.shown(found.value) + _sizes(found)
+    yield Fact("unit", found.unit)
+    yield Fact("least", found.value, "least", least)
+    if found.plan is not None:
+        proof = "" if found.plan.certificate is None else f", {found.plan.certificate.why}"
+        yield Fact("duration_s", found.plan.duration, "planned", f"{found.plan.duration:.3f} s{proof}")
+    beside = found.refusal if found.plan is None else f"at {refused} {found.feasibility}: {found.refusal}"
+    yield Fact("refused", found.refused, "refused" if found.plan is None else "beside it", beside)
+    yield from kept(feasibility=found.feasibility.value, refusal=found.refusal, trials=found.trials)
+
+
+def _sizes(found: Requirement) -> str:
+    """The openings of the gates of a plan, where those were made smaller."""
+    if found.quantity != "gate" or found.plan is None:
+        return ""
+    sizes = (
+        "{} {:.3g} x {:.3g} m".format(gate.name, *gate.opening.size) for gate in found.plan.problem.gates
+    )
+    return f" ({', '.join(sizes)})"
+
+
+def _cell(found: FeasibilityMap, cell: Cell) -> Facts:
+    """A cell; None where there is no plan."""
+    limits = ", ".join(cell.limits)
+    said = limits if cell.is_planned else f"{limits}: {cell.sentence}".removeprefix(": ")
+    reserve = NONE if cell.reserve is None else f"{100 * cell.reserve:.2g} %"
+    duration = None if cell.duration is None else f"{cell.duration:.3f} s"
+    values = (
+        Fact(axis.name, value, axis.label, f"{value:g}")
+        for axis, value in zip(found.axes, cell.values, strict=True)
+    )
+    return Facts(
+        (
+            *values,
+            Fact("feasibility", cell.feasibility.value, "feasibility", style=_style(cell)),
+            Fact("duration_s", cell.duration, "duration", duration),
+            Fact("limits", cell.limits),
+            Fact("reserve", cell.reserve, "reserve", reserve),
+            Fact("sentence", cell.sentence, "limits", said),
+        )
+    )
+
+
+def _grid(found: FeasibilityMap) -> list[Facts]:
+    """The rows of a grid for people: the durations and letters of its cells."""
+    down, across = found.axes
+    kinds, width = kinds_of(found), len(across.values)
+    rows = []
+    for i, value in enumerate(down.values):
+        cells = found.cells[i * width : (i + 1) * width]
+        row = [Fact("", value, down.label, f"{value:g}")]
+        for column, cell in zip(across.values, cells, strict=True):
+            letter = letter_of(cell, kinds)
+            duration = NONE if cell.duration is None else f"{cell.duration:.2f}"
+            text = letter if width > WIDE else f"{duration} {letter}"
+            row.append(Fact("", 0.0, f"{column:g}", text, style=_style(cell)))
+        rows.append(Facts(row))
+    return rows
+
+
+def _style(cell: Cell) -> str:
+    """Faint where there is no plan, red where one is not as it should be."""
+    if cell.feasibility is Feasibility.NOT_FLYABLE:
+        return "red"
+    return "" if cell.is_planned else "dim"
+
+
+def _legend(found: FeasibilityMap, kind: Kind) -> str:
+    """A letter's meaning, with its number of cells; of refusals the first one's sentence."""
+    cells = "1 cell" if kind.count == 1 else f"{kind.count} cells"
+    where = ", ".join(
+        f"{axis.name} {value:g}" for axis, value in zip(found.axes, kind.first.values, strict=True)
+    )
+    sentence = "" if kind.first.is_planned else f"; at {where}: {kind.first.sentence}"
+    return f"{kind.letter}  {kind.name} ({cells}){sentence}"

@@ -1,0 +1,209 @@
+"""Facts of flights: what a flight came to, its errors, its passages; the columns of flights and of scores."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from math import isinf, isnan
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from aerobat.arrays import AXES
+from aerobat.evaluation.passages import GOAL
+from aerobat.evaluation.score import ObserverScore, Score
+from aerobat.reporting.facts import REPORT, Columns, Fact, facts, fields_of, kept, picture, said
+from aerobat.reporting.plans import rough_length
+from aerobat.simulation import Flight
+from aerobat.simulation.outcome import digits, length
+from aerobat.simulation.passages import Passage, WaypointPassage
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+COMPONENTS = {3: AXES, 4: "wxyz"}  # of vectors and quaternions
+METRICS = (
+    "max_position_error_m",
+    "rms_position_error_m",
+    "max_attitude_error_deg",
+    "rms_attitude_error_deg",
+    "saturated_fraction",
+)
+# numbers of a score that its sentence is made of
+EVENTS = ("stop", "is_finite", "ground_time", "off_path_time", "contact", "contact_time", "path_radius_m")
+
+
+@picture.register(Flight)
+def _(flight: Flight) -> Figure:
+    from aerobat.reporting.figures import draw
+
+    return draw(flight)
+
+
+@facts.register
+def _(score: Score) -> Iterator[Fact]:
+    if score.is_batch:
+        yield Fact("", text=str(score))
+        yield Fact("flights", Columns(_flights_of(score)))
+        return
+    yield from (fact for fact in fields_of(score) if fact.key not in EVENTS)
+    yield from kept(outcome=score.outcome, sentence=score.sentence, laps=score.laps)
+    yield from _report(score)
+    for lap in score.laps:
+        split = "not flown" if isnan(lap.duration) else f"{lap.duration:.3f} s, until {lap.end:.3f} s"
+        yield said(f"lap {lap.lap}", split, level=REPORT)
+    yield said("outcome", score.sentence)
+    position = _pair(100 * score.max_position_error_m, 100 * score.rms_position_error_m, "cm")
+    yield said("position error", position)
+    attitude = _pair(score.max_attitude_error_deg, score.rms_attitude_error_deg, "°")
+    yield said("attitude error", attitude)
+    if score.observer is not None:
+        yield said("observer", _observer(score.observer))
+    several = bool(score.laps)
+    for passage in score.passages:
+        yield said(_of_lap(passage.gate, passage.lap, several), _passed(passage))
+    for waypoint in score.waypoints:
+        met = (
+            f"{length(waypoint.miss)} from it, {length(waypoint.radius)} allowed, "
+            f"at {waypoint.speed:.2f} m/s at {waypoint.time:.2f} s"
+        )
+        missed = "not reached" if isnan(waypoint.time) else met
+        yield said(_of_lap(waypoint.waypoint, waypoint.lap, several), missed)
+    if score.places or score.attitudes:
+        yield said("tolerance", _within_tolerance(score))
+    yield said("saturated", f"{100 * score.saturated_fraction:.1f} % of the time")
+
+
+@facts.register
+def _(passage: Passage) -> Iterator[Fact]:
+    for fact in fields_of(passage):  # an edge that is not known is None, as are numbers
+        yield Fact(fact.key, None if fact.value == "" else fact.value)
+
+
+@facts.register
+def _(flight: Flight) -> Iterator[Fact]:
+    yield Fact("", text=str(flight))
+    yield Fact("rows", Columns(_rows_of(flight)))
+
+
+def _report(score: Score) -> Iterator[Fact]:
+    """Yield what came of a flight in the lines of a report."""
+    if not score.outcome.is_success:
+        yield said("flight", score.sentence, level=REPORT, style="red")
+        return
+    gates = [passage for passage in score.passages if not isnan(passage.time)]
+    if gates:
+        name = gates[0].gate if len(gates) == 1 else f"{len(gates)} gates"
+        speeds = _span([passage.speed for passage in gates], "m/s")
+        clearances = [passage.clearance for passage in gates if not isnan(passage.clearance)]
+        clear = f", {rough_length(min(clearances))} clear of the frame" if clearances else ""
+        yield said(name, f"passed at {speeds}{clear}", level=REPORT)
+    if score.waypoints:
+        nearest = max(waypoint.miss for waypoint in score.waypoints)
+        reached = f"{len(score.waypoints)} reached within {rough_length(nearest)}"
+        yield said("waypoints", reached, level=REPORT)
+    within = f"on its path within {rough_length(score.max_position_error_m)}"
+    yield said("flight", within, level=REPORT)
+
+
+def _span(values: Sequence[float], unit: str) -> str:
+    """One value, or the least and the greatest of several."""
+    low, high = f"{min(values):.1f}", f"{max(values):.1f}"
+    return f"{low} {unit}" if low == high else f"{low} to {high} {unit}"
+
+
+def _within_tolerance(score: Score) -> str:
+    """How far at most a flight is off the goal and the stages that are kept to the problem's tolerance."""
+    told = []
+    if score.places:
+        miss, allowed = max((place.miss, place.radius) for place in score.places)
+        told.append(f"{length(miss)} of {length(allowed)} off {_names(score.places)}")
+    if score.attitudes:
+        angle, tolerance = max((each.angle_deg, each.tolerance_deg) for each in score.attitudes)
+        told.append(f"{angle:.2f}° of {tolerance:.3g}° off the attitudes of {len(score.attitudes)} stages")
+    times = [place.time for place in score.places] + [attitude.time for attitude in score.attitudes]
+    return "not all reached" if any(map(isnan, times)) else f"{', '.join(told)}, at most"
+
+
+def _names(places: Sequence[WaypointPassage]) -> str:
+    """What is to be come to beside gates and waypoints, in words."""
+    stages = len(places) - sum(place.waypoint == GOAL for place in places)
+    return GOAL if not stages else f"{stages} stages" + (f" and {GOAL}" if len(places) > stages else "")
+
+
+def _observer(found: ObserverScore) -> str:
+    """The filter's errors, and where it had to do without poses."""
+    errors = (
+        f"{length(found.rms_position_error_m)} and {digits(found.rms_attitude_error_deg)}° RMS off the truth"
+    )
+    if not found.coasted:
+        return errors
+    begin = found.until_s - found.longest_without_pose_s
+    return f"{errors}; no poses from {begin:.2f} to {found.until_s:.2f} s, the IMU alone"
+
+
+def _of_lap(name: str, lap: int, several: bool) -> str:
+    """The name of what is passed, with its lap where there are several."""
+    return f"{name}, lap {lap}" if several else name
+
+
+def _passed(passage: Passage) -> str:
+    """A gate's passage in words."""
+    if isnan(passage.time):
+        return "not passed"
+    clearance = "" if isnan(passage.clearance) else f", {_clearance(passage)}"
+    tolerance = passage.attitude_tolerance_deg
+    allowed = "" if isinf(tolerance) else f" of {tolerance:.3g}° allowed"
+    return (
+        f"{length(passage.miss)} off, {passage.attitude_error_deg:.2f}°{allowed}, "
+        f"at {passage.speed:.2f} m/s{clearance}"
+    )
+
+
+def _clearance(passage: Passage) -> str:
+    """The least clearance in words, with its edge and its instant."""
+    centimetres = 100 * passage.clearance
+    found = f"{-centimetres:.1f} cm into" if centimetres < 0.0 else f"{centimetres:.1f} cm clear of"
+    return f"{found} the {passage.closest_edge} edge at {passage.closest_time:.2f} s"
+
+
+def _pair(largest: float, rms: float, unit: str) -> str:
+    return f"{digits(largest)} {unit} at most, {digits(rms)} {unit} RMS"
+
+
+def _rows_of(flight: Flight) -> dict[str, Any]:
+    """The columns of a flight, or of a batch."""
+    if not flight.is_batch:
+        return dict(_columns(flight))
+    each = [dict(_columns(flight[k])) for k in range(len(flight.vehicles))]
+    numbers = [np.full(len(columns["time"]), k) for k, columns in enumerate(each)]
+    joined = {name: np.concatenate([columns[name] for columns in each]) for name in each[0]}
+    return {"vehicle": np.concatenate(numbers), **joined}
+
+
+def _columns(flight: Flight) -> Iterator[tuple[str, Any]]:
+    yield "time", flight.times
+    for one in flight.kinds:
+        values = flight.series[one.name]
+        if not one.over_time:
+            continue
+        if values.ndim == 1:
+            yield one.name, values
+        else:
+            names = COMPONENTS.get(values.shape[1]) if one.shape[0] > 0 else None
+            for k, column in enumerate(values.T):
+                yield f"{one.name}_{names[k] if names else k}", column
+
+
+def _flights_of(scores: Score) -> dict[str, Any]:
+    """The columns of many flights' scores."""
+    from aerobat.studies.sweep.flights import passage_names  # which takes long to import
+
+    columns: dict[str, Any] = {name: getattr(scores, name) for name in METRICS}
+    columns["outcome"] = [outcome.name.lower() for outcome in scores.outcomes]
+    for begin, passage in zip(passage_names(scores.passages), scores.passages, strict=True):
+        parts = {name: value for name, value in vars(passage).items() if name not in ("gate", "lap")}
+        columns |= {f"{begin}_{name}": value for name, value in parts.items()}
+    for waypoint in (*scores.waypoints, *scores.places):
+        begin = f"{waypoint.waypoint}_lap_{waypoint.lap}"
+        columns |= {f"{begin}_{name}": getattr(waypoint, name) for name in ("time", "miss", "speed")}
+    return columns

@@ -1,0 +1,276 @@
+"""Facts of plans: what was planned, its proof, its own flights, and its place beside what is possible."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from itertools import groupby
+from math import degrees, inf
+from typing import TYPE_CHECKING
+
+from aerobat.certification import Certificate, Finding, Side, Verdict
+from aerobat.planning import Assessment, Attempt, Flyability, Plan, Tube
+from aerobat.planning.flyability import FlownPassage
+from aerobat.planning.time_limit import best_by_limit
+from aerobat.reporting.facts import REPORT, WARNING, Fact, Facts, facts, fields_of, kept, picture, said
+from aerobat.simulation.autopilot import Recoveries
+from aerobat.simulation.outcome import length
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+SMALL = 1e-4  # [m]: smaller errors mean nothing in a simulation that knows the vehicle
+ENOUGH_MARGIN = 0.05  # of a rotor's thrust: with less, few real flights succeed
+SEVERAL_TIMES = 2.0  # times the shortest possible: no percentage beyond
+
+
+@picture.register(Plan)
+def _(plan: Plan) -> Figure:
+    from aerobat.reporting.figures import draw
+
+    return draw(plan)
+
+
+@facts.register
+def _(plan: Plan) -> Iterator[Fact]:
+    margin, certificate, found = plan.margin, plan.certificate, plan.assessment
+    yield said("", plan.problem.name + ("" if plan.vehicle is None else f" · {plan.vehicle.name}"))
+    order = "" if plan.order is None else f", order {plan.order}"
+    backend = f", {plan.backend}" if plan.backend else ""
+    pieces = "1 interval" if plan.intervals == 1 else f"{plan.intervals} intervals"
+    yield Fact("planner", plan.planner, "planner", f"{plan.planner}{order}, {pieces}{backend}")
+    yield from kept(order=plan.order, intervals=plan.intervals, dt_s=plan.dt)
+    beside = "" if found is None or found.poor else _beside_least(found)
+    yield Fact("duration_s", plan.duration, "duration", f"{plan.duration:.2f} s{beside}", level=REPORT)
+    yield Fact("rescue", plan.rescue, "rescue", level=REPORT)
+    dt = "" if plan.dt is None else f"dt {plan.dt:.4f} s "
+    yield said("search", f"{plan.duration:.3f} s, {dt}after {len(plan.attempts)} attempts")
+    sized = "the duration" if plan.cost == plan.duration else f"{plan.cost:.7g}"
+    cost = "" if plan.cost is None else f"{sized}, {_optimality(plan)}"
+    yield Fact("cost", plan.cost, "cost", cost)
+    yield from kept(attempts=plan.attempts, status=plan.status, bound=plan.bound, gap=plan.gap)
+    yield from kept(backend=plan.backend, starts_s=plan.starts, spread=plan.spread)
+    if plan.spread is not None:
+        coarse = f"{plan.starts[0]:.3f} to {plan.starts[-1]:.3f} s on a coarse mesh"
+        yield said("starts", f"{len(plan.starts)}, {coarse}, {100 * plan.spread:.2g} % apart")
+    solved = f"{plan.nodes}, solved in {1000 * plan.solve_time:.0f} ms"
+    yield Fact("nodes", plan.nodes, "nodes", solved)
+    yield Fact("solve_time_s", plan.solve_time)
+    label, when = "stages", [f"{stage.name} at {stage.time:.2f} s" for stage in plan.stages]
+    if plan.dt is not None:
+        label, when = "stage intervals", [f"{stage.name} {stage.interval}" for stage in plan.stages]
+    stages = [Facts(kept(name=s.name, interval=s.interval, time_s=s.time)) for s in plan.stages]
+    yield Fact("stages", stages, label, ", ".join(when))
+    yield Fact("lap_ends_s", plan.laps)
+    laps = ", ".join(f"{duration:.3f} s" for duration in plan.lap_times)
+    yield Fact("lap_times_s", plan.lap_times, "laps", laps)
+    yield Fact("min_rotor_thrust_n", margin and margin.min_thrust)
+    yield Fact("max_rotor_thrust_n", margin and margin.max_thrust)
+    yield Fact("rotor_margin_n", margin and margin.margin, "rotors", str(margin or ""))
+    yield Fact("bounded_moments", certificate and not certificate.discontinuities)
+    yield Fact("rotor_feasible", certificate and certificate.certified)
+    proof = ""
+    if certificate is not None:
+        yield _limiting(certificate)
+        proof = ("" if certificate.certified else "not certified: ") + certificate.why
+    yield Fact("certificate", certificate, "proof", proof)
+    yield Fact("flyability", plan.flyability)
+    yield from evidence(plan)
+    yield Fact("tube", plan.tube and Facts(_tube(plan.tube, plan.duration)))
+    if plan.wants_second_opinion:
+        text = "it may take longer than need be; --explain asks another planner"
+        yield said(WARNING, text, level=REPORT, style="red")
+
+
+def evidence(plan: Plan | None) -> Iterator[Fact]:
+    """Yield what is known of a plan beside its proof; None of no plan."""
+    yield Fact("recoveries", plan and plan.recoveries)
+    found = None if plan is None else plan.assessment
+    another = "" if plan is None or plan.planner == "free-knots" else ", --planner free-knots plans anew"
+    if plan is not None and found is not None and not found.poor:
+        suspicion = f"; suspicious: --explain asks for a second opinion{another}"
+        yield said("possible", found.sentence + (suspicion if plan.wants_second_opinion else ""))
+    yield Fact("assessment", found)
+
+
+@facts.register
+def _(attempt: Attempt) -> Iterator[Fact]:
+    yield from kept(dt_s=attempt.dt, duration_s=attempt.duration, feasible=attempt.feasible)
+    yield from kept(status=attempt.status, outcome=attempt.outcome, cost=attempt.cost, nodes=attempt.nodes)
+    yield from kept(solve_time_s=attempt.solve_time)
+
+
+@facts.register
+def _(found: Flyability) -> Iterator[Fact]:
+    if found.defects:
+        yield said("not flyable", str(found), level=REPORT, style="red")
+    else:
+        yield said("margin", _margin(found), level=REPORT)
+    yield from kept(flies=found.flies, error_m=found.error, disturbance_n=found.disturbance)
+    yield Fact("disturbed_fraction", found.disturbed_fraction)
+    yield Fact("disturbed_error_m", found.disturbed_error)
+    yield Fact("passages", found.passages)
+    yield Fact("sentence", str(found), "flyability")
+
+
+@facts.register
+def _(passage: FlownPassage) -> Iterator[Fact]:
+    error, tolerance = map(_in_degrees, (passage.attitude_error, passage.attitude_tolerance))
+    yield from kept(gate=passage.gate, attitude_error_deg=error, attitude_tolerance_deg=tolerance)
+    yield from kept(clearance_m=passage.clearance, failure=passage.failure or None)
+
+
+@facts.register
+def _(found: Recoveries) -> Iterator[Fact]:
+    yield from kept(reaction_s=found.reaction, ground_m=found.ground, times_s=found.times)
+    yield from kept(lowest_m=found.lowest, height_lost_m=found.height_lost, durations_s=found.durations)
+    yield from kept(no_return_s=[[span.start, span.end] for span in found.no_return])
+    yield Fact("sentence", str(found), "recovery")
+
+
+@facts.register
+def _(found: Assessment) -> Iterator[Fact]:
+    yield from kept(least_duration_s=found.least_duration, ratio=found.ratio, suspicious=found.suspicious)
+    yield from kept(poor=found.poor, second_opinion=found.opinion, lowest_m=found.lowest)
+    yield from kept(max_speed_m_s=found.max_speed, max_tilt_rad=found.max_tilt)
+    yield from kept(max_body_rate_rad_s=found.max_body_rate, warnings=found.warnings, sentence=str(found))
+    yield Fact("room_m", [found.room.lower, found.room.upper], "space", _reached(found), level=REPORT)
+    for warning in found.warnings:
+        yield said(WARNING, warning, level=REPORT, style="red")
+
+
+@facts.register
+def _(found: Certificate) -> Iterator[Fact]:
+    """Tell proven limits, one a row, and the largest values of quantities without a limit.
+
+    People read, of all rotors' thrusts and of all their commands, those nearest to either limit; a gate that
+    is passed as it is asked has one row.
+    """
+    yield Fact("", text="certificate")
+    yield from kept(certified=found.certified, margin_n=found.margin, findings=found.findings)
+    yield Fact("", _finding_rows(found.findings), "findings")
+    yield Fact("why", found.why, text=("" if found.certified else "not certified: ") + found.why)
+    yield from kept(undetermined=found.undetermined, discontinuities=found.discontinuities)
+    yield from kept(too_unequal=found.too_unequal)
+
+
+@facts.register
+def _(found: Finding) -> Iterator[Fact]:
+    yield from fields_of(found)
+    yield Fact("margin", found.margin)
+
+
+def _finding_rows(findings: Iterable[Finding]) -> list[Facts]:
+    """Findings for people: along the path, then a row a passage, or for all of it that is not as asked."""
+    along = _nearest_rotors(finding for finding in findings if finding.place is None)
+    rows = [_row(each) for each in along if each.limit is not None or each.side is Side.MAX]
+    placed = (finding for finding in findings if finding.place is not None)
+    for (place, time), group in groupby(placed, lambda finding: (finding.place, finding.time)):
+        passage = list(group)
+        wrong = [finding for finding in passage if finding.verdict is not Verdict.HOLDS]
+        reached = ", ".join(f"{each.quantity} {each.shown(each.value, 2)}" for each in passage)
+        well = _of_finding(str(place), reached, f"{time:.3f} s", "", "", Verdict.HOLDS.value)
+        rows += map(_row, wrong) if wrong else [well]
+    return rows
+
+
+def _nearest_rotors(findings: Iterable[Finding]) -> Iterable[Finding]:
+    """The findings, of all rotors' thrusts and commands those with the smallest margin on either side."""
+    nearest: dict[tuple[str, Side], Finding] = {}
+    for finding in findings:
+        key = finding.quantity, finding.side
+        known = nearest.setdefault(key, finding)
+        if (finding.margin or 0.0) < (known.margin or 0.0):
+            nearest[key] = finding
+    return nearest.values()
+
+
+def _row(finding: Finding) -> Facts:
+    return _of_finding(
+        finding.name if finding.place is None else f"{finding.place} {finding.name}",
+        f"{finding.side.value} {finding.shown(finding.value)}",
+        f"{finding.time:.3f} s",
+        "–" if finding.limit is None else finding.shown(finding.limit),
+        "" if finding.margin is None else finding.shown(finding.margin, 3),
+        "" if finding.limit is None else finding.verdict.value,
+    )
+
+
+def _of_finding(*texts: str) -> Facts:
+    names = ("quantity", "reaches", "at", "limit", "margin", "verdict")
+    return Facts(Fact("", text, name) for name, text in zip(names, texts, strict=True))
+
+
+def _limiting(found: Certificate) -> Fact:
+    """The quantity that is nearest to its limit, or the reason why a plan is not certified."""
+    worst = found.worst
+    if not found.certified or worst is None or worst.limit is None:
+        return said("not proven", found.why, level=REPORT, style="red")
+    allowed = f"{'at most' if worst.side is Side.MAX else 'at least'} {worst.shown(worst.limit, 2)}"
+    text = f"{worst.name}: {worst.shown(worst.value, 2)} at {worst.time:.2f} s, {allowed}"
+    return said("limited by", text, level=REPORT)
+
+
+def _beside_least(found: Assessment) -> str:
+    """How near a duration is to the proven lower bound."""
+    if found.ratio == inf:
+        return ""
+    if found.ratio > SEVERAL_TIMES:
+        return f", at most {found.ratio:.1f} times the shortest possible"
+    return f", at most {100.0 * (found.ratio - 1.0):.0f} % above the shortest possible"
+
+
+def _margin(found: Flyability) -> str:
+    """How much thrust a plan leaves to the controller."""
+    kept_fraction = found.disturbed_fraction
+    if not found.disturbance:
+        return "no thrust is left to the controller: too little for a real flight; try --reserve 0.1"
+    little = "" if kept_fraction >= ENOUGH_MARGIN else ": little for a real flight; try --reserve 0.1"
+    moved = f"a loss as large moves the vehicle {rough_length(found.disturbed_error)} off its path"
+    return f"{100.0 * kept_fraction:.2g} % of a rotor's thrust{little}; {moved}"
+
+
+def rough_length(metres: float) -> str:
+    """A length with the digits that mean something: in mm, in cm from a centimetre on, then in m."""
+    unit, size = ("m", 1.0) if metres >= 1.0 else ("cm", 1e-2) if metres >= 1e-2 else ("mm", 1e-3)
+    return f"{max(metres, SMALL) / size:.2g} {unit}"
+
+
+def _tube(tube: Tube, duration: float) -> Iterator[Fact]:
+    """The proof that flights pass, what it costs a plan of that duration [s], and their tube over time."""
+    price = tube.price(duration)
+    yield from kept(conditions=tube.conditions, seed=tube.seed, probability=tube.probability)
+    yield from kept(passed=tube.passed, flights=tube.flights, lower_bound=tube.lower_bound)
+    yield from kept(reserve=tube.reserve, plain_duration_s=tube.plain_duration, price_s=price)
+    yield from kept(level=tube.level, times_s=tube.times, position_error_m=tube.position_error)
+    yield from kept(attitude_error_deg=[degrees(angle) for angle in tube.attitude_error])
+    yield from kept(rotor_margin=tube.rotor_margin, sentence=str(tube))
+    texts = {
+        "passes": f"{tube.passed} of {tube.flights} fresh flights under {tube.conditions}: "
+        f"{100 * tube.lower_bound:.2f} % or more with 95 % confidence, {100 * tube.probability:g} % asked",
+        "price": f"{price:.3f} s or {100 * price / tube.plain_duration:.1f} %, beside "
+        f"{tube.plain_duration:.3f} s; reserve {tube.reserve:g}",
+        "tube": f"{100 * tube.level:g} % within {length(tube.max_position_error)} and "
+        f"{degrees(tube.max_attitude_error):.1f}°, commands {100 * tube.min_rotor_margin:.1f} % of the "
+        "rotors' range from their limits",
+    }
+    yield from (said(label, text, level=REPORT) for label, text in texts.items())
+
+
+def _reached(found: Assessment) -> str:
+    """The room that a path takes, its greatest speed, its tilt and its rate."""
+    angles = ((found.max_tilt, "° of tilt"), (found.max_body_rate, "°/s"))
+    turned = [f"{degrees(angle):.0f}{unit}" for angle, unit in angles if angle is not None]
+    return ", ".join([str(found.room), f"{found.max_speed:.0f} m/s", *turned])
+
+
+def _optimality(plan: Plan) -> str:
+    if plan.status == "time_limit" and plan.gap is None:
+        return best_by_limit(plan)
+    if plan.gap is None or plan.gap < 1e-6:
+        return plan.status
+    within = f"within {100 * plan.gap:.2g} % of the optimum"
+    return within if plan.status == "time_limit" else f"{plan.status}, {within}"
+
+
+def _in_degrees(angle: float | None) -> float | None:
+    return None if angle is None else degrees(angle)

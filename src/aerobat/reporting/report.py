@@ -1,0 +1,104 @@
+"""Facts of a run: its plan and its flight."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from aerobat.evaluation.score import Score
+from aerobat.planning import Plan
+from aerobat.reporting.facts import REPORT, Fact, Facts, facts, kept, said
+from aerobat.vehicle import implausibilities
+
+if TYPE_CHECKING:  # which takes long to import
+    from aerobat.studies.sweep import Sweep
+
+PAGES = {  # that explain the lines of a report, by their labels
+    "docs/theory.md": (
+        "planner",
+        "search",
+        "starts",
+        "cost",
+        "nodes",
+        "stages",
+        "laps",
+        "rotors",
+        "saturated",
+    ),
+    "docs/how-to/certificate.md": ("limited by", "not proven", "proof"),
+    "docs/theory.md#13-what-is-possible": ("duration", "possible"),
+    "docs/sweeps.md": ("margin", "flyability", "conditions", "tolerance", "tube"),
+    "docs/vehicles.md#the-way-back-from-every-instant": ("recovery",),
+    "docs/courses.md": ("gate", "gates", "waypoints", "lap times"),
+    "docs/how-to/inspect.md": ("flight", "position error", "attitude error"),
+    "docs/how-to/controllers.md": ("controller",),
+    "docs/how-to/plants.md": ("plant",),
+}
+ENOUGH = 0.95  # of flights under random conditions: with fewer that succeed, the verdict is that it fails
+
+
+@dataclass(frozen=True, eq=False)
+class Report:
+    """A run's plan and flight. Facts of the level REPORT decide whether it is flown."""
+
+    plan: Plan
+    score: Score | None = None  # of its flight, where it was flown
+    controller: str | None = None  # the name of what flew it
+    plant: str | None = None  # the name of the other simulator whose physics it flew in, if it was one
+    trials: Sweep | None = None  # flights under random conditions, where they were flown
+
+    @property
+    def is_reliable(self) -> bool:
+        """False if too few of the flights under random conditions succeed."""
+        return self.trials is None or self.trials.success.fraction >= ENOUGH
+
+    @property
+    def is_well(self) -> bool:
+        """True if the plan is certified and flies, its flight went well, and enough others succeed."""
+        flew_well = self.score is None or self.score.outcome.is_success
+        return self.plan.certified and self.plan.flies and flew_well and self.is_reliable
+
+
+@facts.register
+def _(report: Report) -> Iterator[Fact]:
+    plan, trials = report.plan, report.trials
+    name = None if plan.vehicle is None else plan.vehicle.name
+    yield Fact("", text=f"{plan.problem.name} · {name}: {_verdict(report)}", level=REPORT)
+    warnings = [] if plan.vehicle is None else implausibilities(plan.vehicle)
+    yield from kept(problem=plan.problem.name, vehicle=name, warnings=warnings)
+    yield Fact("plan", plan, "plan")
+    if report.score is not None:
+        flown_by = {"controller": report.controller, "plant": report.plant}
+        known = (Fact(key, value, key) for key, value in flown_by.items() if value is not None)
+        yield Fact("flight", Facts((*facts(report.score), *known)), "flight")
+    if trials is not None:
+        low, high = trials.success.interval
+        values = kept(
+            conditions=trials.conditions.name,
+            seed=trials.seed,
+            flights=len(trials),
+            succeeded=trials.success.count,
+            success_interval=[low, high],
+        )
+        of_all = f"{100.0 * low:.0f} to {100.0 * high:.0f} % of all, at 95 % confidence"
+        remedy = "" if report.is_reliable else f"; plan for more with --pass {ENOUGH:g}"
+        counted = f"{trials.success.count} of {len(trials)} flights succeed"
+        succeed = f"{trials.conditions.name}: {counted}, so {of_all}{remedy}"
+        style = "" if report.is_reliable else "red"
+        yield Fact("trials", Facts(values), "conditions", succeed, level=REPORT, style=style)
+    for page, labels in PAGES.items():
+        yield said("", f"{page}: {', '.join(labels)}")
+
+
+def _verdict(report: Report) -> str:
+    """The outcome of a run in a few words."""
+    if not report.plan.certified:
+        return "not certified"
+    if not report.plan.flies:
+        return "certified, but not flyable"
+    if report.score is not None and not report.score.outcome.is_success:
+        return "certified, but this flight fails"
+    if report.trials is not None and not report.is_reliable:
+        return f"certified, but too few flights succeed under '{report.trials.conditions.name}' conditions"
+    return "certified, and it flies"

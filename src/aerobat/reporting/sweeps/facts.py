@@ -1,0 +1,95 @@
+"""Facts of a sweep: shares of outcomes, quantiles of errors, passages of gates."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from itertools import starmap
+from math import isfinite
+from typing import TYPE_CHECKING
+
+from aerobat.evaluation.passages import criterion
+from aerobat.reporting.facts import Columns, Fact, Facts, facts, kept, picture
+from aerobat.reporting.sweeps.words import known_opening, outcome_name
+from aerobat.simulation import Outcome
+from aerobat.simulation.outcome import length
+from aerobat.studies.sweep import Share, Sweep
+from aerobat.studies.sweep.result import LEVELS
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+ERRORS = (  # columns of the table, and what people call them
+    ("max_position_error_m", "position, max"),
+    ("rms_position_error_m", "position, RMS"),
+    ("max_attitude_error_deg", "attitude, max"),
+    ("rms_attitude_error_deg", "attitude, RMS"),
+)
+PASSAGE = (("miss_m", "off its centre"), ("attitude_error_deg", "attitude"))
+WIDTHS = (0.01, 0.02, 0.05, 0.1)  # [m] off a gate's centre
+NEVER = "not passed"
+
+
+@facts.register
+def _(sweep: Sweep) -> Iterator[Fact]:
+    problem, vehicle, conditions = sweep.plan.problem, sweep.vehicle.name, sweep.conditions.name
+    yield Fact("table", Columns(sweep.table))
+    yield Fact("", text=f"{problem.name} · {vehicle} · {conditions}")
+    yield from kept(problem=problem.name, vehicle=vehicle, conditions=conditions, seed=sweep.seed)
+    yield Fact("flights", len(sweep), "flights", f"{len(sweep)}, seed {sweep.seed}")
+    yield Fact("went_well", sweep.success, "went well", str(sweep.success))
+    yield Fact("judged_by", criterion(problem), "judged by")
+    yield Fact("outcomes", Facts(starmap(_outcome, sweep.outcomes.items())))
+    yield Fact("errors", Facts(_quantiles(sweep, column, name) for column, name in ERRORS), "error")
+    passages = (Fact(name, Facts(_passage(sweep, name)), name) for name in sweep.passages)
+    yield Fact("passages", Facts(passages))
+
+
+@facts.register
+def _(share: Share) -> Iterator[Fact]:
+    low, high = share.interval
+    yield from kept(count=share.count, fraction=share.fraction, low=low, high=high)
+
+
+@picture.register(Sweep)
+def _(sweep: Sweep) -> Figure:
+    from aerobat.reporting.sweeps.figure import sweep_figure
+
+    return sweep_figure(sweep)
+
+
+def _outcome(outcome: Outcome, share: Share) -> Fact:
+    style = "" if outcome.is_success else "red"
+    text = f"{share.count}, {share}"
+    return Fact(outcome.name.lower(), share, outcome_name(outcome), text, style=style)
+
+
+def _passage(sweep: Sweep, name: str) -> Iterator[Fact]:
+    passed = sweep.passed(name)
+    yield Fact("passed", passed, "passed", str(passed))
+    for column, label in PASSAGE:
+        yield replace(_quantiles(sweep, f"{name}_{column}", label), key=column)
+    shares = {width: sweep.within(f"{name}_miss_m", width) for width in WIDTHS}
+    text = ", ".join(f"{length(width)} {shares[width]}" for width in WIDTHS[1:3])
+    rows = [Facts((Fact("miss_m", width), *facts(share))) for width, share in shares.items()]
+    yield Fact("within", rows, "within", text)
+    opening = known_opening(sweep, name)
+    sides = opening and [opening.width, opening.height]
+    yield Fact("smallest_opening_m", sides, "99 % pass" if opening else "", str(opening) if opening else None)
+
+
+def _quantiles(sweep: Sweep, column: str, label: str) -> Fact:
+    """Quantiles of a column in its unit; None where one falls on flights that did not pass."""
+    values = {level: sweep.quantile(column, level) for level in LEVELS}
+    texts = [
+        f"{_shown(value, column)} at {'most' if level == 1.0 else f'{100 * level:g} %'}"
+        for level, value in values.items()
+    ]
+    named = {f"{100 * level:g}%": value for level, value in values.items()}
+    return Fact(column, named, label, ", ".join(texts))
+
+
+def _shown(value: float, column: str) -> str:
+    if not isfinite(value):
+        return NEVER
+    return length(value) if column.endswith("_m") else f"{value:.2f}°"

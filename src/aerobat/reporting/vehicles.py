@@ -1,0 +1,123 @@
+"""Facts of vehicles, with what looks wrong about them, and of problems."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from math import tau
+
+import numpy as np
+
+from aerobat.control.parameters import hover_authority, max_bandwidth
+from aerobat.environment import Environment
+from aerobat.errors import SpecError
+from aerobat.problem import Problem
+from aerobat.reporting.facts import Fact, Facts, facts, said
+from aerobat.simulation.outcome import length
+from aerobat.states import STANDARD_GRAVITY
+from aerobat.vehicle import Rotor, Vehicle, implausibilities
+from aerobat.vehicle.fleet import Fleet
+
+MIN_THRUST_TO_WEIGHT = 1.5  # [-] with less, hardly any maneuver is left beside staying up
+MAX_HOVER = 0.7  # [-] of a rotor's thrust in a hover; with more, nothing is left to turn by
+MIN_BANDWIDTH = 5.0  # [rad/s] of the attitude loop: slower ones fall in the time in which they turn
+_NAMED = 1e-6  # [m] from an axis, where a rotor is neither to one side nor to the other
+
+
+@facts.register
+def _(vehicle: Vehicle) -> Iterator[Fact]:
+    yield Fact("name", vehicle.name, vehicle.name, " ".join(vehicle.description.split()) or "a vehicle")
+    moments = np.diag(vehicle.inertia).tolist()
+    told = ", ".join(f"{moment:.3g}" for moment in moments)
+    yield Fact("mass_kg", vehicle.mass, "mass", f"{vehicle.mass:.4g} kg, inertia {told} kg·m²")
+    yield Fact("inertia_kg_m2", moments)
+    places = ", ".join(map(_place, vehicle.rotors))
+    yield Fact("rotors", len(vehicle.rotors), "rotors", f"{len(vehicle.rotors)}: {places}")
+    each = f"up to {vehicle.max_thrusts.max():.4g} N each"
+    thrust = f"{vehicle.thrust_to_weight:.2f} times the weight, {each}"
+    yield Fact("thrust_to_weight", vehicle.thrust_to_weight, "thrust", thrust)
+    body = (2.0 * vehicle.bounding_ellipsoid.semi_axes).tolist()
+    yield Fact("body_m", body, "body", f"{' x '.join(map(length, body))} with its propellers")
+    lag = float(vehicle.lags.max())
+    yield Fact("lag_s", lag, "lag", f"{1e3 * lag:.3g} ms of the slowest rotor")
+    if not vehicle.dead_rotors:
+        hover = _hover(vehicle)
+        yield Fact("hover", hover, "hover", f"at {100 * hover:.0f} % of the most loaded rotor's thrust")
+        fleet, environment = Fleet.of([vehicle]), Environment()
+        turns = hover_authority(fleet, environment)[0]
+        roll, pitch, yaw = (f"{each:.3g}" for each in turns)
+        told = f"at up to {roll}, {pitch} and {yaw} rad/s² in roll, pitch and yaw from a hover"
+        yield Fact("turns_rad_s2", turns, "turns", told)
+        bandwidth = float(max_bandwidth(fleet, environment)[0])
+        told = f"up to {bandwidth:.3g} rad/s, {bandwidth / tau:.2g} Hz"
+        yield Fact("attitude_loop_rad_s", bandwidth, "attitude loop", told)
+    doubts = vehicle_doubts(vehicle)
+    yield from (said("looks wrong", doubt, style="red") for doubt in doubts)
+    yield Fact("doubts", doubts, "looks wrong", "" if doubts else "nothing")
+
+
+@facts.register
+def _(problem: Problem) -> Iterator[Fact]:
+    yield Fact("problem", problem.name, "problem")
+    yield Fact("description", problem.description, "what it is")
+
+
+def vehicle_row(vehicle: Vehicle) -> Facts:
+    """The facts by which a vehicle is chosen from many."""
+    return Facts(
+        (
+            Fact("vehicle", vehicle.name, "vehicle"),
+            Fact("mass_kg", vehicle.mass, "mass", f"{vehicle.mass:.3g} kg"),
+            Fact("rotors", len(vehicle.rotors), "rotors"),
+            Fact(
+                "thrust_to_weight",
+                vehicle.thrust_to_weight,
+                "thrust/weight",
+                f"{vehicle.thrust_to_weight:.2f}",
+            ),
+            Fact("description", vehicle.description, "what it is"),
+        )
+    )
+
+
+def vehicle_doubts(vehicle: Vehicle) -> tuple[str, ...]:
+    """Return a sentence for each value that is hardly meant, and for each that leaves little to fly by."""
+    return (*implausibilities(vehicle), *_weaknesses(vehicle))
+
+
+def _weaknesses(vehicle: Vehicle) -> Iterator[str]:
+    """What leaves a vehicle little or nothing to maneuver by."""
+    if vehicle.dead_rotors:
+        return
+    try:
+        vehicle.require_hover(STANDARD_GRAVITY)
+    except SpecError as error:
+        yield str(error)
+        return
+    if vehicle.thrust_to_weight < MIN_THRUST_TO_WEIGHT:
+        yield (
+            f"max_thrust adds up to {vehicle.thrust_to_weight:.2f} times the weight: little is left to "
+            "maneuver by; is it that of one rotor, in N?"
+        )
+    if _hover(vehicle) > MAX_HOVER:
+        yield f"a hover takes {100 * _hover(vehicle):.0f} % of a rotor's thrust: little is left to turn by"
+    bandwidth = float(max_bandwidth(Fleet.of([vehicle]), Environment())[0])
+    if not bandwidth >= MIN_BANDWIDTH:
+        yield (
+            f"the attitude loop has {bandwidth:.2g} rad/s at most: slow for flips; are inertia and "
+            "position_body those of this vehicle?"
+        )
+
+
+def _hover(vehicle: Vehicle) -> float:
+    """The largest part of a rotor's thrust that a level hover takes [-]."""
+    hover = vehicle.mass * STANDARD_GRAVITY * vehicle.mixer[:, 0]
+    return float((hover / vehicle.max_thrusts).max())
+
+
+def _place(rotor: Rotor) -> str:
+    """Where a rotor is, as seen by the vehicle, and how it spins."""
+    x, y, _ = rotor.position_body.tolist()
+    along = "front" if x > _NAMED else "back" if x < -_NAMED else ""
+    aside = "left" if y > _NAMED else "right" if y < -_NAMED else ""
+    turn = "counter-clockwise" if rotor.spin > 0 else "clockwise"
+    return f"{' '.join(filter(None, (along, aside))) or 'middle'} {turn}"

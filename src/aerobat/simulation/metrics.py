@@ -1,0 +1,168 @@
+"""Metrics of flights by one kernel: at every tick, as the loop's last component, or over a log's rows."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from math import inf
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from aerobat.arrays import Array
+from aerobat.certification import PlannedPassage, PlannedWaypoint
+from aerobat.engines.components import components
+from aerobat.engines.numpy import ArrayOps
+from aerobat.engines.pytree import Tree, tree_map
+from aerobat.environment import Environment
+from aerobat.kernels import running_metrics
+from aerobat.kernels.gates import approach, pointing, progress
+from aerobat.kernels.gates.section import BoundingEllipsoid
+from aerobat.kernels.ops import Ops
+from aerobat.kernels.running_metrics import (
+    Ground,
+    MetricsInput,
+    MetricsParameters,
+    RunningMetrics,
+    lowest_height,
+)
+from aerobat.simulation.components import rotor_commands
+from aerobat.simulation.flight import Flight
+from aerobat.simulation.loop import Signals
+from aerobat.simulation.outcome import DIVERGENCE_RADIUS, LANDING_DEPTH, LANDING_SPEED, TOUCHDOWN, Outcome
+from aerobat.simulation.passages import (
+    PlannedAttitude,
+    attitude_direction,
+    bounding_ellipsoid,
+    gate_places,
+    log_rows,
+    scan_log,
+    waypoint_target,
+)
+from aerobat.simulation.setup import FlightSetup, LoopPart
+from aerobat.vehicle import Ellipsoid
+
+
+class Criteria(NamedTuple):
+    """Criteria that a flight is judged by; passages and places are in the order of the stages."""
+
+    gates: tuple[PlannedPassage, ...] = ()
+    waypoints: tuple[PlannedWaypoint, ...] = ()
+    lap_begin: float = 0.0  # [s] when the first lap begins
+    places: tuple[PlannedWaypoint, ...] = ()  # of other stages that say where they are, and the goal
+    attitudes: tuple[PlannedAttitude, ...] = ()  # of other stages
+    path_radius: float = inf  # [m] by which the path may be left
+
+
+@dataclass(frozen=True)
+class MetricsMonitor:
+    """The loop's component that adds up a flight's metrics."""
+
+    period: int = 1
+    feedthrough: bool = True
+
+    def init(
+        self, ops: Ops, parameters: MetricsParameters, inputs: MetricsInput, signals: Signals
+    ) -> RunningMetrics:
+        """See `Component.init`."""
+        return running_metrics.init(parameters)
+
+    def step(
+        self,
+        ops: Ops,
+        parameters: MetricsParameters,
+        metrics: RunningMetrics,
+        inputs: MetricsInput,
+        signals: Signals,
+    ) -> RunningMetrics:
+        """See `Component.step`."""
+        motion, commands = signals.plant, rotor_commands(signals)
+        reference = (signals.reference.position, signals.reference.q_world_body)
+        actuation = (motion.thrusts, commands.thrusts, commands.saturated)
+        return running_metrics.step(ops, parameters, metrics, motion.body, reference, actuation, inputs)
+
+
+@dataclass(frozen=True, eq=False)
+class MetricsSource:
+    """The instants of ticks."""
+
+    times: Array
+    per_vehicle: bool = False
+
+    def chunk(self, begin: int, end: int) -> MetricsInput:
+        """See `Source.chunk`."""
+        return MetricsInput(self.times[begin:end])
+
+
+def metrics_row(signals: Signals) -> RunningMetrics:
+    """The metrics so far."""
+    return signals.of(RunningMetrics)
+
+
+def with_metrics(setup: FlightSetup, criteria: Criteria = Criteria()) -> FlightSetup:  # noqa: B008 - frozen
+    """The same flight with its metrics added up, and judged by criteria."""
+
+    def for_all(tree: Tree) -> Tree:
+        return tree_map(lambda leaf: np.full(len(setup.fleet), leaf), tree)
+
+    ellipsoid = BoundingEllipsoid(*map(components, (setup.fleet.body_centres, setup.fleet.semi_axes)))
+    parameters = MetricsParameters(
+        divergence_radius_sq=for_all(DIVERGENCE_RADIUS**2),
+        path_radius_sq=for_all(criteria.path_radius**2),
+        ground=for_all(_ground(setup.environment)),
+        ellipsoid=ellipsoid,
+        gates=for_all(tuple(plane for plane, _ in gate_places(criteria.gates, ellipsoid))),
+        waypoints=for_all(tuple(map(waypoint_target, (*criteria.waypoints, *criteria.places)))),
+        attitudes=for_all(tuple(map(attitude_direction, criteria.attitudes))),
+    )
+    metrics = LoopPart(MetricsMonitor(), parameters, MetricsSource(setup.times))
+    return replace(setup, parts=(*setup.parts, metrics))
+
+
+def metrics_of_log(flight: Flight, criteria: Criteria, body: Ellipsoid | None) -> RunningMetrics:
+    """Metrics of one flight that was logged, straight between its rows, leaves (1,).
+
+    Args:
+        flight: with its rows; it ends where it diverged.
+        criteria: what it is judged by.
+        body: what encloses its vehicle; without it the clearance is unknown.
+    """
+    times, states = flight.times, flight.states
+    rows = log_rows(times, states.position, states.velocity, states.q_world_body)
+    square, angle = flight.position_error**2, flight.attitude_error
+    lowest = lowest_height(ArrayOps, _ground(flight.environment), components(states.velocity))
+    targets = [waypoint_target(each) for each in (*criteria.waypoints, *criteria.places)]
+    numbers = RunningMetrics(
+        flying=float(flight.outcome is Outcome.COMPLETE),
+        is_finite=float(flight.outcome is not Outcome.STATE_NOT_FINITE),
+        stop=flight.series["ends"],
+        ground_time=_first(times, states.position[:, 2] < lowest),
+        off_path_time=_first(times, flight.position_error > criteria.path_radius),
+        ticks=float(len(times)),
+        max_square=square.max(),
+        sum_square=square.sum(),
+        max_angle=angle.max(),
+        sum_square_angle=np.sum(angle**2),
+        saturated=flight.saturated.sum(),
+        last=tree_map(lambda leaf: leaf[-1], rows),
+        gates=(),
+        waypoints=(),
+        attitudes=(),
+    )
+    metrics: RunningMetrics = tree_map(np.atleast_1d, numbers)
+    return metrics._replace(
+        gates=tuple(scan_log(progress, gate_places(criteria.gates, bounding_ellipsoid(body)), rows)),
+        waypoints=tuple(scan_log(approach, targets, rows)),
+        attitudes=tuple(scan_log(pointing, [attitude_direction(each) for each in criteria.attitudes], rows)),
+    )
+
+
+def _ground(environment: Environment) -> Ground:
+    """The ground of an environment as flights hit it."""
+    height = -inf if environment.ground is None else environment.ground
+    return Ground(height - TOUCHDOWN, height - LANDING_DEPTH, LANDING_SPEED**2)
+
+
+def _first(times: Array, happens: NDArray[np.bool_]) -> float:
+    """The first of the times at which something happens, infinite if it never does."""
+    return float(times[int(np.argmax(happens))]) if happens.any() else inf

@@ -1,0 +1,78 @@
+"""Flights of a study: of one plan and one seed, cut into chunks that any worker may fly."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields, is_dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from aerobat.control import ControlLaw, Controller
+from aerobat.engines import choose
+from aerobat.environment import Dispersion
+from aerobat.evaluation import Score, score_flights
+from aerobat.planning import Plan
+from aerobat.simulation import FlightConfig
+from aerobat.studies.workers import Pool
+from aerobat.vehicle import Vehicle
+
+CHUNK = 50  # flights that are flown, kept and resumed as one, whatever the batches and the workers
+TOGETHER = 10  # chunks at most that a worker is handed at once: a quarter of a second of flying
+
+
+@dataclass(frozen=True)
+class FlightTask:
+    """A plan that a study flies, and the settings of its flights."""
+
+    plan: Plan
+    vehicle: Vehicle  # that plan and controller know
+    conditions: Dispersion
+    seed: int
+    controller: Controller | ControlLaw
+    engine: str = "auto"
+    batch: int = CHUNK  # flights that are flown side by side
+
+    def config(self, flights: range) -> FlightConfig:
+        """Settings of some flights. An engine has its own rounding, so that one flies all, few or many."""
+        config = FlightConfig(
+            controller=self.controller, conditions=self.conditions, seed=self.seed, flights=flights
+        )
+        ticks = round(self.plan.duration * config.control_rate)
+        return replace(config, engine=choose(self.engine, CHUNK, ticks).name)
+
+
+def cut(flights: range, size: int = CHUNK) -> list[range]:
+    """Cut flights into ranges of one size, the last one perhaps smaller."""
+    return [flights[first : first + size] for first in range(0, len(flights), size)]
+
+
+def fly_scores(pool: Pool, tasks: tuple[FlightTask, ...], flights: range) -> list[Score]:
+    """Score the same flights of each task.
+
+    Args:
+        pool: What flies them.
+        tasks: What is flown.
+        flights: Their numbers.
+    """
+    parts = [(k, numbers) for k in range(len(tasks)) for numbers in cut(flights)]
+    found = dict(pool.results(_score_chunk, tasks, parts, together=TOGETHER, compiles=True))
+    return [_joined([found[k, numbers] for numbers in cut(flights)]) for k in range(len(tasks))]
+
+
+def _score_chunk(tasks: tuple[FlightTask, ...], part: tuple[int, range]) -> Score:
+    number, flights = part
+    task = tasks[number]
+    return score_flights(task.plan, task.vehicle, config=task.config(flights))
+
+
+def _joined(parts: list[Any]) -> Any:
+    """Scores of many flights from those of some: their arrays behind one another, whatever holds them."""
+    first = parts[0]
+    if isinstance(first, np.ndarray):
+        return np.concatenate(parts)
+    if isinstance(first, tuple):
+        return tuple(_joined(list(each)) for each in zip(*parts, strict=True))
+    if is_dataclass(first) and not isinstance(first, type):
+        names = [field.name for field in fields(first)]
+        return replace(first, **{name: _joined([getattr(part, name) for part in parts]) for name in names})
+    return first

@@ -1,0 +1,58 @@
+"""Units of the numbers that studies vary, by the last part of their names."""
+
+from __future__ import annotations
+
+from types import MappingProxyType
+
+DEGREES = "_deg"  # ends the names of angles in files
+
+# as the comments beside the fields say, and docs/files.md; what is not here has none, or none of its own
+UNITS = MappingProxyType(
+    {
+        "acceleration": "m/s²", "attitude_frequency": "rad/s", "attitude_integral_gain": "1/s³",
+        "attitude_tolerance": "rad", "centre": "m", "centre_of_mass": "m", "crackle": "m/s⁵",
+        "drag_body": "kg/s",
+        "duration": "s", "gravity": "m/s²", "ground": "m", "heading": "rad", "height": "m", "hold": "s",
+        "inertia": "kg·m²", "integral_gain": "1/s³", "jerk": "m/s³", "jerk_filter": "s", "lag": "s",
+        "lead": "m",
+        "lead_time_constant": "s", "margin": "m", "mass": "kg", "max_attitude_integral": "rad·s",
+        "max_body_rate": "rad/s", "max_feedback": "m/s²", "max_integral": "m·s", "max_thrust": "N",
+        "min_inverted_thrust": "m/s²", "min_lateral_thrust": "m/s²", "min_speed": "m/s",
+        "min_upright_thrust": "m/s²", "polygon": "m", "position": "m", "position_body": "m",
+        "position_gain": "1/s²", "radius": "m", "semi_axes": "m", "snap": "m/s⁴", "speed": "m/s",
+        "thrust": "m/s²", "time": "s", "tolerance": "rad", "torque_coefficient": "m", "velocity": "m/s",
+        "velocity_gain": "1/s", "width": "m", "wind": "m/s",
+    }
+)  # fmt: skip
+OF = MappingProxyType(  # where a name says another thing than elsewhere, by what holds it
+    {
+        "limits": {"lower": "m", "upper": "m"},
+        "problem": {"min_thrust": "m/s²"},
+        "vehicle": {"min_thrust": "N"},
+        "conditions": {
+            "accelerometer_bias": "m/s²", "accelerometer_bias_walk": "m/s³/√Hz",
+            "accelerometer_noise": "m/s²/√Hz", "accelerometer_range": "m/s²", "airspeed": "m/s",
+            "attitude_noise": "rad", "computation_delay": "s", "control_rate": "1/s", "drag": "1/s",
+            "endurance": "s", "gyro_bias": "rad/s", "gyro_bias_walk": "rad/s²/√Hz",
+            "gyro_noise": "rad/s/√Hz", "gyro_range": "rad/s", "gyro_range_deg": "°/s", "inertia": "",
+            "intensity": "m/s", "lag": "", "latency": "s", "length": "m", "mass": "", "mean_wind": "m/s",
+            "outlier_size": "m", "point": "m", "position_noise": "m", "rate": "1/s", "rotation": "rad",
+            "start": "s", "start_attitude": "rad", "start_position": "m", "start_velocity": "m/s",
+            "translation": "m", "warp": "m", "warp_depth": "m",
+        },
+        "planner": {"time_limit": "s"},
+    }
+)  # fmt: skip
+
+
+def unit_of(names: tuple[str, ...]) -> str:
+    """The unit of a number, empty where it has none.
+
+    Args:
+        names: the keys that lead to it, from the problem, the vehicle and so on, without those of lists.
+    """
+    holder = "limits" if names[1:2] == ("limits",) else names[0]
+    own = OF.get(holder, {})
+    if names[-1].endswith(DEGREES) and names[-1] not in own:
+        return "°"
+    return own.get(names[-1], UNITS.get(names[-1], ""))
