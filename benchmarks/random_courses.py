@@ -24,7 +24,7 @@ import aerobat as ab
 from aerobat.arrays import Array
 from aerobat.errors import SpecError
 from aerobat.planning import Plan
-from aerobat.planning.planners import planner_class, planner_options
+from aerobat.planning.planners import command_settings, planner_class
 from aerobat.problem import Gate, Line, PassGate
 from aerobat.vehicle import Vehicle
 from random_problems import Case, random_vehicle, write_case
@@ -136,8 +136,7 @@ def planned(problem: ab.Problem, vehicle: ab.Vehicle, planner: str | None = None
     if planner is None:
         return ab.plan(problem, vehicle=vehicle)
     cls = planner_class(planner)
-    options = {o.name: o.command_default for o in planner_options(cls) if o.command_default is not None}
-    return ab.plan(problem, cls(**options), vehicle)
+    return ab.plan(problem, cls(**command_settings(cls, problem, vehicle)), vehicle)
 
 
 def main() -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import signal
+import sys
 from collections.abc import Generator, Iterator
 
 import pytest
@@ -12,8 +13,11 @@ from _pytest.runner import runtestprotocol
 from hypothesis import settings
 
 import budget
+from aerobat.control.law import CONTROL_LAWS
+from aerobat.declaration.registry import imported_plugins
 from aerobat.planning.planners import PLANNERS
 from aerobat.problem.maneuvers.maneuver import MANEUVERS
+from aerobat.simulation.plants.plant import PLANTS
 from suites import FAST, FULL, GROUPS, missing, register_profiles
 
 # long work says nothing of its progress, but where a test asks for it: no test depends on the clock
@@ -109,10 +113,14 @@ def signals_are_heeded() -> Iterator[None]:
 
 @pytest.fixture(autouse=True)
 def registries_as_they_were() -> Iterator[None]:
-    """Planners and maneuvers that a test registers are its own: files share processes in any order."""
-    before = {registry: set(registry) for registry in (PLANNERS, MANEUVERS)}
+    """What a test registers, and plugins that it imports, are its own: files share processes in any order."""
+    before = {registry: set(registry) for registry in (PLANNERS, MANEUVERS, CONTROL_LAWS, PLANTS)}
+    plugins = set(imported_plugins())
     yield
     for registry, names in before.items():
         for name in set(registry) - names:
             if not registry._classes[name].__module__.startswith("aerobat."):
                 del registry._classes[name]
+    new = set(imported_plugins()) - plugins
+    for name in [name for name, module in sys.modules.items() if getattr(module, "__file__", None) in new]:
+        del sys.modules[name]

@@ -42,7 +42,7 @@ PLANTS.add("{name}", Mine)
 """
 LAW = """
 import aerobat as ab
-from aerobat.kernels.rigid_body import Wrench
+from aerobat.kernels.rigid_body import RotorWrench
 
 @ab.controller("{name}")
 class Mine(ab.ControlLaw):
@@ -54,7 +54,7 @@ class Mine(ab.ControlLaw):
     def step(self, ops, model, state, seen, elapsed):
         {step}
 """
-HOVER = "return state, Wrench(9.81 * model.airframe.mass_properties.mass, (0.0, 0.0, 0.0))"
+HOVER = "return state, RotorWrench(9.81 * model.airframe.mass_properties.mass, (0.0, 0.0, 0.0))"
 PROBLEM = """
 start.position = [0.0, 0.0, 1.0]
 goal.position = [1.0, 0.0, 1.0]
@@ -109,13 +109,20 @@ AT_IMPORT = {
     ),
 }
 # what stands in a law, and what is said of it beside its file and line
+OF_FOUR = "not the state and a RotorWrench of four numbers"
 IN_A_LAW = {
     ("step", 'raise ValueError("boom")'): "ValueError: boom",
-    ("step", "return None"): "step() returned None, not the state and a Wrench",
-    ("step", 'return state, Wrench("a", (0.0, 0.0, 0.0))'): "not the state and a Wrench of four numbers",
-    ("step", "return state, Wrench(1.0, (0.0, 0.0))"): "not the state and a Wrench of four numbers",
-    ("step", "return (state, 1.0), Wrench(1.0, (0.0, 0.0, 0.0))"): "of another shape than before",
-    ("step", "return state, Wrench(seen.height, (0.0, 0.0, 0.0))"): "AttributeError: 'Seen' object has no",
+    ("step", "return None"): "step() returned None, not the state and a RotorWrench",
+    (
+        "step",
+        'return state, RotorWrench("a", (0.0, 0.0, 0.0))',
+    ): OF_FOUR,
+    ("step", "return state, RotorWrench(1.0, (0.0, 0.0))"): OF_FOUR,
+    ("step", "return (state, 1.0), RotorWrench(1.0, (0.0, 0.0, 0.0))"): "of another shape than before",
+    (
+        "step",
+        "return state, RotorWrench(seen.height, (0.0, 0.0, 0.0))",
+    ): "AttributeError: 'Seen' object",
     ("step", "return seen.thrusts[9]"): "IndexError: tuple index out of range",
     ("init", 'raise KeyError("gain")'): "KeyError: 'gain'",
     ("init", 'return "none"'): "init() returned 'none', not a tree of tuples of numbers",
@@ -225,7 +232,7 @@ def test_wrong_values_of_a_planner_name_its_file_and_line(body: str, said: str, 
 
 
 def test_a_law_that_asks_for_no_number_is_flown_and_its_flight_told_to_have_failed(capsys) -> None:
-    step = "return state, Wrench(float('nan'), (0.0, 0.0, 0.0))"
+    step = "return state, RotorWrench(float('nan'), (0.0, 0.0, 0.0))"
     Path("mine.py").write_text(LAW.format(name="mine-nan", field="", init="return ()", step=step))
     shared_plan("line").save("line.plan")
     code, out, err = run(capsys, "fly", "line.plan", "--import", "mine.py", "--controller", "mine-nan")

@@ -182,7 +182,7 @@ def test_a_symmetric_vehicle_flies_the_same_plan_at_any_multiple_of_90_degrees_o
     heading: float, quad: Vehicle
 ) -> None:
     turned = plan(replace(load_problem("flip-roll"), heading=heading), vehicle=quad)
-    assert turned.duration == pytest.approx(shared_plan("flip-roll").duration, rel=1e-3)
+    assert turned.duration == pytest.approx(shared_plan("flip-roll").duration, rel=2e-3)
 
 
 def test_a_moving_start_and_goal_are_met(quad: Vehicle) -> None:

@@ -24,8 +24,8 @@ ORIGIN = np.array([0.0, 0.0, 3.0])
 
 
 def flip() -> ab.Plan:
-    """The flip in roll by the agile quadrotor, all its thrust in use."""
-    return shared_plan("flip-roll")
+    """The flip in roll by the agile quadrotor, with thrust left for what a link adds."""
+    return shared_plan("flip-roll", "agile-quad", ab.Miqp(reserve=0.2))
 
 
 @cache

@@ -31,16 +31,17 @@ def trial_flights(plan: Plan, record: RunRecord) -> Sweep | None:
     conditions = load_dispersion(USUAL_CONDITIONS) if flight.conditions is None else flight.conditions
     if flight.plant is not None or conditions == load_dispersion("none"):
         return None
-    controller = named_controller(flight.controller, plan.vehicle.controller)
     try:
-        with showing(Progress("flown", FLIGHTS)) as progress:
-            return sweep_plan(
-                plan,
-                conditions,
-                FLIGHTS,
-                flight.seed,
-                controller=controller,
-                progress=progress.counting("went well"),
-            )
+        plan.vehicle.require_hover(plan.problem.environment.gravity)
     except SpecError:
         return None
+    controller = named_controller(flight.controller, plan.vehicle.controller)
+    with showing(Progress("flown", FLIGHTS)) as progress:
+        return sweep_plan(
+            plan,
+            conditions,
+            FLIGHTS,
+            flight.seed,
+            controller=controller,
+            progress=progress.counting("went well"),
+        )

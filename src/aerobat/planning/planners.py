@@ -23,7 +23,7 @@ from aerobat.planning.courses import is_course, on_open_courses
 from aerobat.planning.holds import between_holds
 from aerobat.planning.passages import require_openings
 from aerobat.planning.recorder import Progress
-from aerobat.planning.result import Plan
+from aerobat.planning.result import FLYING_RESERVE, Plan, flying_reserve
 from aerobat.problem import Problem, as_problem
 from aerobat.vehicle import Vehicle, as_vehicle, vehicle_names
 
@@ -77,7 +77,7 @@ def plan(
         problem: What is planned, or its name.
         planner: How to plan, say `Miqp(order=5)`, or a registered name, whose defaults are taken; left out,
             the one that `suited_planner` names, as on the command line: where it keeps a reserve for the
-            controller, 3 %.
+            controller, 15 % for most vehicles.
         vehicle: What shall fly it, or its name, within its rotors' limits; by default agile-quad, as on the
             command line. With None the plan knows no limits but the problem's.
         progress: Called with every attempt as it ends.
@@ -135,27 +135,35 @@ def suited_planner(problem: Problem, vehicle: Vehicle | None) -> str:
 def planner_for(problem: Problem, vehicle: Vehicle | None) -> Planner:
     """The planner of that name, as the command line makes it without options: for plans that are flown."""
     cls = planner_class(suited_planner(problem, vehicle))
-    return cls(**command_settings(cls))
+    return cls(**command_settings(cls, problem, vehicle))
 
 
-def command_settings(cls: type[Planner]) -> dict[str, Any]:
-    """The fields that a planner has otherwise on the command line, whose plans are to be flown."""
-    return {o.name: o.command_default for o in planner_options(cls) if o.command_default is not None}
+def command_settings(cls: type[Planner], problem: Problem, vehicle: Vehicle | None) -> dict[str, Any]:
+    """Return the fields that a planner has otherwise on the command line, whose plans are to be flown.
+
+    Args:
+        cls: The planner's class.
+        problem: What is planned.
+        vehicle: What flies it, if it is known.
+    """
+    settings = {o.name: o.command_default for o in planner_options(cls) if o.command_default is not None}
+    if settings.get("reserve") == FLYING_RESERVE:
+        settings["reserve"] = flying_reserve(problem, vehicle)
+    return settings
 
 
 def planner_with_reserve(name: str, reserve: float, **others: Any) -> Planner:
-    """Return the planner as the command line makes it, asked to keep a reserve at least, if it can.
+    """Return a planner that is asked to keep a reserve, if it can.
 
     Args:
         name: Its registered name.
-        reserve: Of each rotor's range.
+        reserve: Of each limit's range; with 0 that of plans that are flown.
         **others: Of its fields.
     """
     cls: Any = planner_class(name)
-    settings = command_settings(cls) | others
     if "reserve" in (f.name for f in fields(cls)):
-        settings["reserve"] = max(reserve, settings.get("reserve", 0.0))
-    return cast(Planner, cls(**settings))
+        others["reserve"] = reserve or FLYING_RESERVE
+    return cast(Planner, cls(**others))
 
 
 def as_planner(planner: Planner | str) -> Planner:

@@ -44,8 +44,10 @@ def _(plan: Plan) -> Iterator[Fact]:
     yield Fact("rescue", plan.rescue, "rescue", level=REPORT)
     dt = "" if plan.dt is None else f"dt {plan.dt:.4f} s "
     yield said("search", f"{plan.duration:.3f} s, {dt}after {len(plan.attempts)} attempts")
-    sized = "the duration" if plan.cost == plan.duration else f"{plan.cost:.7g}"
-    cost = "" if plan.cost is None else f"{sized}, {_optimality(plan)}"
+    cost = ""
+    if plan.cost is not None:
+        sized = "the duration" if plan.cost == plan.duration else f"{plan.cost:.7g}"
+        cost = f"{sized}, {_optimality(plan)}"
     yield Fact("cost", plan.cost, "cost", cost)
     yield from kept(attempts=plan.attempts, status=plan.status, bound=plan.bound, gap=plan.gap)
     yield from kept(backend=plan.backend, starts_s=plan.starts, spread=plan.spread)
