@@ -62,8 +62,8 @@ class Miqp(Planner):
     reserve: Reserve = option(
         0.0,
         "The fraction of every limit of the vehicle that is kept from either of its ends for the controller; "
-        "with 0 a plan leaves it next to nothing. The default, 0.15 or at most half of what a hover takes, is "
-        "given up where no plan keeps it.",
+        "with 0 a plan leaves it next to nothing. The default, 0.15 or half of what a hover takes, is given "
+        "up where no plan keeps it.",
         command_default=FLYING_RESERVE,
     )
     rescue: bool = option(
