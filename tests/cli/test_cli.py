@@ -87,34 +87,35 @@ def test_help_tells_the_commands(capsys) -> None:
 
 
 def test_fly_writes_the_plan_the_flight_the_picture_and_the_report(capsys) -> None:
-    code, out, err = run(capsys, "fly", "flip-roll")
+    code, out, err = run(capsys, "fly", "half-flip")
     assert (code, err) == (0, "")
-    folder = Path("out/flip-roll")
-    written = ["flight.npz", "flip-roll.plan", "plan.csv", "report.json", "report.png", "run.toml"]
+    folder = Path("out/half-flip")
+    written = ["flight.npz", "half-flip.plan", "plan.csv", "report.json", "report.png", "run.toml"]
     assert sorted(p.name for p in folder.iterdir()) == written
     report = json.loads((folder / "report.json").read_text())
     assert report["plan"].keys() >= PLAN_KEYS
     assert report["flight"].keys() >= FLIGHT_KEYS
-    assert report["problem"] == "flip-roll"
+    assert report["problem"] == "half-flip"
     assert report["vehicle"] == "agile-quad"
     assert report["plan"]["rotor_feasible"] is True
     assert report["plan"]["certificate"]["certified"] is True
     assert read_csv(folder / "plan.csv").duration == pytest.approx(report["plan"]["duration_s"])
     assert load_flight(folder / "flight.npz").times[-1] == pytest.approx(report["plan"]["duration_s"])
     assert (folder / "report.png").read_bytes().startswith(b"\x89PNG")
-    assert "flip-roll · agile-quad: certified, and it flies" in out
+    assert "half-flip · agile-quad: certified, and it flies" in out
     for name in ("duration", "limited by", "margin", "space", "gate", "flight", "conditions"):
         assert re.search(rf"^ +{name} ", out, re.MULTILINE)
-    assert out.endswith("`aerobat sweep out/flip-roll` counts more flights\nwritten to out/flip-roll/\n")
+    assert out.endswith("`aerobat sweep out/half-flip` counts more flights\nwritten to out/half-flip/\n")
 
 
 def test_a_plan_that_few_flights_survive_is_not_well_unless_nothing_shall_vary(capsys, unpictured) -> None:
     """Without a reserve, disturbances move the vehicle off its path."""
-    code, out, _ = run(capsys, "fly", "line", "--reserve", "0")
+    shared_plan("line").save("line.plan")
+    code, out, _ = run(capsys, "fly", "line.plan")
     assert code == 1
     assert "line · agile-quad: certified, but too few flights succeed under 'lab' conditions" in out
     assert re.search(r"lab: \d+ of 100 flights succeed, .* --pass 0\.95", " ".join(out.split()))
-    code, out, _ = run(capsys, "fly", "line", "--reserve", "0", "--conditions", "none")
+    code, out, _ = run(capsys, "fly", "line.plan", "--conditions", "none")
     assert code == 0
     assert "of 100" not in out
 

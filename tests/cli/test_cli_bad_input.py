@@ -187,10 +187,6 @@ ARGUMENT_FAULTS = {
         ["plan", "line", "--paper", "--pass", "0.9", "--conditions", "lab"],
         "--paper",
     ),
-    "to pass by another law": (
-        ["fly", "line", "--pass", "0.9", "--conditions", "lab", "--controller", "paper"],
-        "--controller",
-    ),
     "to pass without a reserve": (
         ["plan", "line", "--pass", "0.9", "--conditions", "lab", "--planner", "min-snap"],
         "miqp",
