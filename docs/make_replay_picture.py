@@ -26,7 +26,7 @@ with tempfile.TemporaryDirectory() as folder, sync_playwright() as tools:
     window.screenshot(path=Path(__file__).with_name("replay.png"))
     with ab.view_live("half-flip", browser=False) as live:
         window.goto(live.address)
-        for key, value in {"gates[0].z": 4.2, "gates[0].tilt": -60.0}.items():
+        for key, value in {"gates[0].position.z": 4.2, "gates[0].tilt": -60.0}.items():
             window.evaluate("([key, value]) => live.move(key, value)", [key, value])
         while window.locator("#verdict.busy").count():
             window.wait_for_timeout(100)

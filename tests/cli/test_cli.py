@@ -110,7 +110,7 @@ def test_fly_writes_the_plan_the_flight_the_picture_and_the_report(capsys) -> No
 
 def test_a_plan_that_few_flights_survive_is_not_well_unless_nothing_shall_vary(capsys, unpictured) -> None:
     """Without a reserve, disturbances move the vehicle off its path."""
-    shared_plan("line").save("line.plan")
+    shared_plan("line", "agile-quad", ab.Miqp()).save("line.plan")
     code, out, _ = run(capsys, "fly", "line.plan")
     assert code == 1
     assert "line · agile-quad: certified, but too few flights succeed under 'lab' conditions" in out
