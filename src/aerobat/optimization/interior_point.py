@@ -57,7 +57,7 @@ _ITERATIONS_FLAT = 3  # over which the cost has to stand still
 _LARGE_MULTIPLIER = 100.0  # on average: larger ones make the dual error count less
 
 
-class Rows(Protocol):
+class ConstraintRows(Protocol):
     """The slopes C (q, n) of inequalities, whichever way they are kept."""
 
     def times(self, step: Array) -> Array:
@@ -82,7 +82,7 @@ class ConstrainedPoint(Protocol):
         """e, (p,)."""
 
     @property
-    def rows(self) -> Rows:
+    def rows(self) -> ConstraintRows:
         """The slopes of the inequalities."""
 
     @property

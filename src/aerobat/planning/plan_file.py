@@ -50,7 +50,7 @@ FRAMES = {
 
 
 @dataclass(frozen=True)
-class Facts:
+class PlanRecord:
     """Content of a document beside problem and vehicle, as Plan names it."""
 
     planner: str
@@ -74,7 +74,7 @@ class Facts:
 
 
 def write_plan_file(
-    path: PathName, problem: Problem, trajectory: Trajectory, vehicle: Vehicle | None, facts: Facts
+    path: PathName, problem: Problem, trajectory: Trajectory, vehicle: Vehicle | None, facts: PlanRecord
 ) -> None:
     """Write a plan whole or not at all.
 
@@ -125,7 +125,7 @@ def read_plan_file(path: PathName) -> tuple[Problem, Trajectory, Vehicle | None,
         if len(text) > MAX_EVIDENCE:
             raise SpecError(f"its document has {len(text)} bytes, more than {MAX_EVIDENCE}; save it again")
         document = json.loads(text)
-        facts: Facts = facts_adapter().validate_python(document["evidence"])
+        facts: PlanRecord = facts_adapter().validate_python(document["evidence"])
         vehicle = document["vehicle"]
         return (
             from_table(Problem, document["problem"]),
@@ -151,4 +151,4 @@ def facts_adapter() -> Any:
     """Read, write and describe what a document holds under `evidence`, a pydantic TypeAdapter."""
     from pydantic import TypeAdapter
 
-    return TypeAdapter(Facts)
+    return TypeAdapter(PlanRecord)

@@ -178,9 +178,9 @@ class Plan:
 
         Raises SpecError when the file cannot be written.
         """
-        from aerobat.planning.plan_file import Facts, write_plan_file
+        from aerobat.planning.plan_file import PlanRecord, write_plan_file
 
-        facts = Facts(**{field.name: getattr(self, field.name) for field in fields(Facts)})
+        facts = PlanRecord(**{field.name: getattr(self, field.name) for field in fields(PlanRecord)})
         write_plan_file(path, self.problem, self.trajectory, self.vehicle, facts)
 
     def __str__(self) -> str:

@@ -101,7 +101,7 @@ def compare(
     if not compared:
         raise SpecError("planners must be one planner or more; leave them out for all")
     begin = begin or (lambda name: None)
-    task = _Task(problem, vehicle, time_limit)
+    task = _ComparisonTask(problem, vehicle, time_limit)
     with pool(workers, executor, len(compared)) as planning:
         found = _entries(task, compared, progress, begin, planning)
     for i, (name, planner) in enumerate(compared):
@@ -119,7 +119,7 @@ def compare(
 
 
 @dataclass(frozen=True)
-class _Task:
+class _ComparisonTask:
     """What all planners plan."""
 
     problem: Problem
@@ -128,7 +128,7 @@ class _Task:
 
 
 def _entries(
-    task: _Task,
+    task: _ComparisonTask,
     planners: Sequence[tuple[str, Planner]],
     progress: Callable[[Attempt], None] | None,
     begin: Callable[[str], None],
@@ -153,7 +153,7 @@ def _entries(
 
 
 def _begun(
-    task: _Task,
+    task: _ComparisonTask,
     named: tuple[str, Planner],
     progress: Callable[[Attempt], None] | None,
     begin: Callable[[str], None],
@@ -163,7 +163,7 @@ def _begun(
 
 
 def _timed_entry(
-    task: _Task, named: tuple[str, Planner], progress: Callable[[Attempt], None] | None = None
+    task: _ComparisonTask, named: tuple[str, Planner], progress: Callable[[Attempt], None] | None = None
 ) -> Entry:
     with within_time(task.time_limit):
         return _entry(*named, task.problem, task.vehicle, progress)

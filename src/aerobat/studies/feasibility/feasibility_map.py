@@ -22,7 +22,7 @@ from aerobat.planning import Planner, as_planner
 from aerobat.problem import Problem, as_problem
 from aerobat.studies.feasibility.axis import MAX_CELLS, Axis
 from aerobat.studies.feasibility.binding import least_reserve
-from aerobat.studies.feasibility.probe import TIME_LIMIT, Feasibility, Task, probe
+from aerobat.studies.feasibility.probe import TIME_LIMIT, Feasibility, ProbedTask, probe
 from aerobat.studies.flights import FlightTask, fly_scores
 from aerobat.studies.lens import Lens, Scenario, lens
 from aerobat.studies.sweep.share import Share
@@ -137,7 +137,7 @@ def feasibility_map(
     scenario = Scenario(as_problem(problem), as_vehicle(vehicle), chosen, varied)
     axes = tuple(Axis.of(name, values) for name, values in over.items())
     fields = _fields(axes, scenario)
-    task = Task(scenario, fields, time_limit, range(flights), seed)
+    task = ProbedTask(scenario, fields, time_limit, range(flights), seed)
     places = list(product(*(axis.values for axis in axes)))
     cells: dict[tuple[float, ...], Cell] = {}
     with pool(workers, executor, len(places)) as planning:
@@ -165,7 +165,7 @@ def _fields(axes: Sequence[Axis], scenario: Scenario) -> tuple[Lens, ...]:
     return fields
 
 
-def _cell(task: Task, values: tuple[float, ...]) -> Cell:
+def _cell(task: ProbedTask, values: tuple[float, ...]) -> Cell:
     found = probe(task, values)
     plan, passed = found.plan, None
     if plan is not None and found.is_planned and task.scenario.conditions is not None:

@@ -16,7 +16,7 @@ from aerobat.declaration import NonNegative, by_value, validated
 from aerobat.errors import Infeasible
 from aerobat.planning import Plan, Planner, as_planner
 from aerobat.problem import Problem, as_problem
-from aerobat.studies.feasibility.probe import TIME_LIMIT, Feasibility, Probe, Task, probe
+from aerobat.studies.feasibility.probe import TIME_LIMIT, Feasibility, Probe, ProbedTask, probe
 from aerobat.studies.feasibility.quantities import NeededQuantity, named_quantities
 from aerobat.studies.lens import Scenario
 from aerobat.studies.workers import Pool, Workers, pool
@@ -99,7 +99,7 @@ def min_requirements(
     chosen = None if planner is None else as_planner(planner)
     scenario = Scenario(as_problem(problem), as_vehicle(vehicle), chosen)
     searches = [_Search(q, scenario, tolerance) for q in named_quantities(of, scenario.problem)]
-    tasks = tuple(Task(scenario, (search.quantity,), time_limit) for search in searches)
+    tasks = tuple(ProbedTask(scenario, (search.quantity,), time_limit) for search in searches)
     with pool(workers, executor, len(searches)) as planning:
         _search(planning, tasks, searches, progress)
     found = tuple(search.requirement for search in searches)
@@ -109,7 +109,7 @@ def min_requirements(
 
 
 def _search(
-    planning: Pool, tasks: tuple[Task, ...], searches: Sequence[_Search], tried: Tried | None
+    planning: Pool, tasks: tuple[ProbedTask, ...], searches: Sequence[_Search], tried: Tried | None
 ) -> None:
     """Run searches side by side, each of which has one plan made at a time.
 
@@ -128,7 +128,7 @@ def _search(
             parts.append((number, runs[number].send(found)))
 
 
-def _probe(tasks: tuple[Task, ...], part: tuple[int, float]) -> Probe:
+def _probe(tasks: tuple[ProbedTask, ...], part: tuple[int, float]) -> Probe:
     number, value = part
     return probe(tasks[number], (value,))
 

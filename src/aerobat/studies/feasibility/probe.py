@@ -50,7 +50,7 @@ class Variable(Protocol):
 
 
 @dataclass(frozen=True, eq=False)
-class Task:
+class ProbedTask:
     """A scenario of which something varies, and how each is planned."""
 
     scenario: Scenario
@@ -67,7 +67,7 @@ class Task:
         return scenario
 
 
-def probe(task: Task, values: Sequence[float]) -> Probe:
+def probe(task: ProbedTask, values: Sequence[float]) -> Probe:
     """The answer where the variables have these values."""
     try:
         scenario = task.varied(values)
@@ -80,7 +80,7 @@ def probe(task: Task, values: Sequence[float]) -> Probe:
         return Probe(Feasibility.REFUSED, str(error), error.limits)
 
 
-def _planned(scenario: Scenario, task: Task) -> Probe:
+def _planned(scenario: Scenario, task: ProbedTask) -> Probe:
     with within_time(task.time_limit):
         try:
             found = plan(scenario.problem, scenario.planner, scenario.vehicle)

@@ -96,7 +96,7 @@ def plan_to_pass(
     named_controller(controller)
     flown = range(flights)
     with pool(workers, executor, len(cut(range(max(flights, proving))))) as flying:
-        task = _Task(
+        task = _PassingTask(
             as_problem(problem),
             method,
             as_vehicle(vehicle),
@@ -126,7 +126,7 @@ def _require_enough(name: str, flights: int, probability: float) -> None:
 
 
 @dataclass(frozen=True, eq=False)
-class _Task:
+class _PassingTask:
     """What is planned, flown and asked."""
 
     problem: Problem
@@ -163,7 +163,7 @@ class _Task:
 class _Tightening:
     """The search for the smallest reserve that is enough."""
 
-    task: _Task
+    task: _PassingTask
     training: range
     proving: int
     tried: Callable[[Round], None]

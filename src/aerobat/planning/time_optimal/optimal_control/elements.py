@@ -108,7 +108,7 @@ class Elements:
     @cached_property
     def node(self) -> ElementFunction:
         """Path bounds that have one value, the squared body rate, and the distance from the plane."""
-        ca, node = import_casadi(), _Node(self)
+        ca, node = import_casadi(), _MeshNode(self)
         path = [_weighted(b, node.derivatives) for b in self.bounds.path if self.has_one_value(b)]
         rate = ca.sumsqr(node.state[RATES]) / self.rate_scale**2
         across = ca.SX.zeros(1)
@@ -118,7 +118,7 @@ class Elements:
 
     def at_stage(self, conditions: tuple[Condition, ...]) -> tuple[ElementFunction, Array, Array]:
         """Values of conditions at a node, and their bounds; drag is counted."""
-        ca, node = import_casadi(), _Node(self)
+        ca, node = import_casadi(), _MeshNode(self)
         values, ends = [], []
         for condition in conditions:
             limit = limit_of(condition, self.task.balance)
@@ -178,7 +178,7 @@ def is_of_direction(condition: Condition) -> bool:
     return on_thrust and {condition.lower, condition.upper} <= {-inf, 0.0, inf}
 
 
-class _Node:
+class _MeshNode:
     """A node in symbols: its scaled state and input, and what they mean."""
 
     def __init__(self, elements: Elements) -> None:
