@@ -27,12 +27,6 @@ from aerobat.arrays import Array
 from aerobat.optimization.deadline import out_of_time
 
 _BOUND_PUSH = 1e-2  # of the box's width: how far the start is moved from its edges
-# Steps from a start that misses constraints by more than this, in their sizes, mend what is missed as if
-# others had no end, and are cut to a fiftieth where those are met: all are felt from farther off then,
-_FAR = 0.05
-_FAR_SLACK = 0.3  # with slacks of such a part of what is missed,
-_FAR_BARRIER = 1e-3  # and a barrier parameter of such a part of it,
-_LARGEST_BARRIER = 1e-3  # up to this
 _NEARLY = 0.99  # of the way to where a slack or a multiplier vanishes: the longest step
 _BARRIER_SOLVED = 10.0  # times μ: an error of the barrier problem that lets μ fall,
 _BARRIER_FALL = 0.2  # to this fraction,
@@ -249,12 +243,8 @@ class _InteriorPoint:
         """The start within the box, with slacks and multipliers that fit the barrier."""
         push = _BOUND_PUSH * (self._upper - self._lower)
         x = np.clip(start, self._lower + push, self._upper - push)
-        point, least_slack = self._program.at(x), self._settings.least_slack
-        missed = float(point.inequalities.max(initial=0.0))
-        if _FAR < missed < np.inf:
-            least_slack = max(least_slack, _FAR_SLACK * missed)
-            self._barrier = max(self._barrier, min(_FAR_BARRIER * missed, _LARGEST_BARRIER))
-        barrier, least = self._barrier, np.full(len(point.inequalities), least_slack)
+        point, barrier = self._program.at(x), self._barrier
+        least = np.full(len(point.inequalities), self._settings.least_slack)
         if multipliers is not None:
             least = np.minimum(least, barrier / multipliers)
         slacks = np.maximum(-point.inequalities, least)

@@ -48,9 +48,6 @@ FINE = Settings(
 ROUGH_ROUNDS = 8  # at most
 FINE_ROUNDS = 10
 MORE_ROUNDS = 1  # of such fine rounds, from a path that is certified on
-FAR_BACKOFF = (
-    0.01  # of a limit's size: where so much was kept on the way, limits are left where they need not
-)
 ROUGH_SHARE = 0.5  # of the time that is left, so that there is some to certify what is found
 ROUGH_PLACES = 16  # of a segment: as many as a polynomial of degree 9 needs
 FINE_PLACES = 24
@@ -182,26 +179,24 @@ class Refinement:
     def finished(self, rough: RefinedPath) -> Judged[RefinedPath]:
         """The certified path near a rough one, or the last one that was tried.
 
-        Where the duration still falls, or much was kept from limits on the way, it goes on from the path that
-        is certified.
+        Where the duration still falls, it goes on from the path that is certified.
         """
-        judged, is_far = self._finished(rough)
+        judged = self._finished(rough)
         for _ in range(MORE_ROUNDS):
             solution = judged.solution
-            is_over = solution.status == CONVERGED and not is_far
-            if not judged.feasible or is_over or out_of_time():
+            if not judged.feasible or solution.status == CONVERGED or out_of_time():
                 break
-            again, is_far = self._finished(solution.source)
+            again = self._finished(solution.source)
             if not again.feasible or again.solution.duration >= solution.duration:
                 break
             judged = again
         return judged
 
-    def _finished(self, rough: RefinedPath) -> tuple[Judged[RefinedPath], bool]:
-        """The certified path near one, or the last one that was tried; True if it keeps far from limits."""
+    def _finished(self, rough: RefinedPath) -> Judged[RefinedPath]:
+        """The certified path near one, or the last one that was tried."""
         rounds = Rounds(self, rough.path, FINE, FINE_PLACES, LEAST_RADIUS, rough.multipliers)
         rounds.back_off(rough.excess)
-        return certified_solve(rounds, self.task, self.recorder, FINE_ROUNDS), rounds.is_far
+        return certified_solve(rounds, self.task, self.recorder, FINE_ROUNDS)
 
     def is_promising(self, path: RefinedPath) -> bool:
         """True of a path that meets its stages and exceeds limits by so little that rounds may mend it."""
@@ -330,11 +325,6 @@ class Rounds:
         """
         exceeded = np.clip(excess.nearby, 0.0, MAX_BACKOFF)
         self._backoff += factor * exceeded + more * (exceeded > 0.0)
-
-    @property
-    def is_far(self) -> bool:
-        """True where much is kept from some limit, beside the reserve."""
-        return float((self._backoff - self._refinement.limits.reserve).max()) > FAR_BACKOFF
 
     @property
     def _program(self) -> RefinementProgram:
