@@ -338,7 +338,7 @@ def test_nothing_heavy_is_imported_before_it_is_needed() -> None:
 @pytest.mark.process
 def test_the_main_job_needs_neither_pyplot_nor_casadi() -> None:
     probe = (
-        "import sys\nfrom aerobat.cli import main\nmain(['fly', 'line', '--json'])\n"
+        "import sys\nfrom aerobat.cli import main\nmain(['plan', 'line', '--json'])\n"
         "print([m for m in ('casadi', 'matplotlib.pyplot') if m in sys.modules], file=sys.stderr)"
     )
     done = subprocess.run([sys.executable, "-c", probe], capture_output=True, text=True, check=True)
@@ -347,14 +347,14 @@ def test_the_main_job_needs_neither_pyplot_nor_casadi() -> None:
 
 @pytest.mark.process
 def test_a_command_imports_what_it_needs() -> None:
-    """No other command, no study, no sensors; of maneuvers and of planners' workings its own."""
+    """To plan, no other command, no study, no sensors; of maneuvers and planners' workings its own."""
     others = [
         "cli.commands.sweep", "studies", "viewer", "links", "simulation.conditions",
         "interchange.robots.description", "problem.maneuvers.course", "problem.maneuvers.waypoints",
         "planning.time_optimal.race", "planning.time_optimal.collocated_program",
     ]  # fmt: skip
     probe = (
-        "import sys\nfrom aerobat.cli import main\nmain(['fly', 'line', '--json'])\n"
+        "import sys\nfrom aerobat.cli import main\nmain(['plan', 'line', '--json'])\n"
         f"print([m for m in {others} if 'aerobat.' + m in sys.modules], file=sys.stderr)"
     )
     done = subprocess.run([sys.executable, "-c", probe], capture_output=True, text=True, check=True)

@@ -158,7 +158,7 @@ from aerobat.cli import progress
 
 def interrupt(self, *arguments):
     os.kill(os.getpid(), signal.SIGINT)
-progress.MapProgress.record = progress.NeedProgress.record = interrupt
+progress.Progress.tell = interrupt
 cli.main(sys.argv[1:])
 """
 

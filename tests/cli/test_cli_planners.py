@@ -37,13 +37,13 @@ def test_a_planner_is_called_by_its_name(capsys) -> None:
 @pytest.mark.slow
 def test_the_plan_nearest_to_the_optimum_flies_the_papers_second_example(capsys) -> None:
     arguments = ["fly", "section-v", "--vehicle", "section-v", "--planner", "time-optimal", "--json"]
-    code, out, err = run(capsys, *arguments)
+    code, out, err = run(capsys, *arguments, "--conditions", "none")
     assert (code, err) == (0, "")
     report = json.loads(out)
     assert report["plan"]["planner"] == "time-optimal"
     assert report["flight"]["max_position_error_m"] < 0.02
     assert report["plan"]["certificate"]["certified"] is True
-    folder = "out/section-v-section-v-time-optimal"
+    folder = "out/section-v-section-v-time-optimal-none"
     assert read_trajectory(folder).duration == pytest.approx(report["plan"]["duration_s"])
 
 

@@ -213,7 +213,7 @@ def test_an_error_over_its_bound_gives_the_plan_up() -> None:
     """Of a vehicle with a drag that its plan knows nothing of."""
     own = flip().vehicle
     assert own is not None
-    sky = Sky(vehicle=replace(own, drag_body=np.full(3, 0.8)), mission=MissionSettings(max_error=0.3))
+    sky = Sky(vehicle=replace(own, drag_body=np.full(3, 0.8)), mission=MissionSettings(max_error=0.1))
     sky.run(lambda: sky.client.done)
     assert "off its path" in sky.client.report().aborted
     assert sky.client.stage is ClientStage.LANDED

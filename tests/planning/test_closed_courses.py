@@ -40,7 +40,7 @@ def planned(lagging: bool = True, course: str = "short") -> ab.Plan:
     problem = {"short": SHORT, "closed": CLOSED}[course]
     if lagging:
         return ab.plan(problem, ab.TimeOptimal(reserve=0.03), QUAD)
-    return ab.plan(problem, vehicle=with_lags(QUAD, 0.0))
+    return ab.plan(problem, ab.TimeOptimal(), with_lags(QUAD, 0.0))
 
 
 @cache

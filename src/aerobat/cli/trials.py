@@ -43,5 +43,6 @@ def trial_flights(plan: Plan, record: RunRecord) -> Sweep | None:
             FLIGHTS,
             flight.seed,
             controller=controller,
+            workers=1,  # a hundred flights are over before another process has begun
             progress=progress.counting("went well"),
         )

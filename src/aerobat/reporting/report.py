@@ -55,9 +55,9 @@ class Report:
 
     @property
     def is_well(self) -> bool:
-        """True if the plan is certified and flies, its flight went well, and enough others succeed."""
-        flew_well = self.score is None or self.score.outcome.is_success
-        return self.plan.certified and self.plan.flies and flew_well and self.is_reliable
+        """True if the plan is certified and flies, and where it was flown, it and enough others succeed."""
+        flew_well = self.score is None or (self.score.outcome.is_success and self.is_reliable)
+        return self.plan.certified and self.plan.flies and flew_well
 
 
 @facts.register
