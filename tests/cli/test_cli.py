@@ -349,7 +349,7 @@ def test_the_main_job_needs_neither_pyplot_nor_casadi() -> None:
 def test_a_command_imports_what_it_needs() -> None:
     """To plan, no other command, no study, no sensors; of maneuvers and planners' workings its own."""
     others = [
-        "cli.commands.sweep", "studies", "viewer", "links", "simulation.conditions",
+        "cli.commands.sweep", "studies.sweep", "viewer", "links", "simulation.conditions",
         "interchange.robots.description", "problem.maneuvers.course", "problem.maneuvers.waypoints",
         "planning.time_optimal.race", "planning.time_optimal.collocated_program",
     ]  # fmt: skip
