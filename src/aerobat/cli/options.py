@@ -151,22 +151,26 @@ def _with_planner_options(cls: Options) -> Options:
 def _field(flag: str, offers: dict[str, PlannerOption]) -> tuple[str, Any, Any]:
     first = next(iter(offers.values()))
     is_switch = first.type is bool
-    help = " ".join(_help(planner, option) for planner, option in offers.items())
-    parameter = Parameter(name=flag, group=planning, help=help, negative="", show_default=False)
+    parameter = Parameter(name=flag, group=planning, help=_help(offers), negative="", show_default=False)
     kind = bool if is_switch else first.type | None
     return option_name(flag), Annotated[kind, parameter], field(default=False if is_switch else None)
 
 
-def _help(planner: str, option: PlannerOption) -> str:
-    value = option.default if option.command_default is None else option.command_default
-    default = "" if option.type is bool or value is None else f" Default: {value}."
-    return f"{planner}: {option.help}{default}"
+def _help(offers: dict[str, PlannerOption]) -> str:
+    """The help of an option, said once for planners that mean the same by it."""
+    takers: dict[str, list[str]] = {}
+    for planner, option in offers.items():
+        value = option.default if option.command_default is None else option.command_default
+        default = "" if option.type is bool or value is None else f" Default: {value}."
+        takers.setdefault(f"{option.help}{default}", []).append(planner)
+    return " ".join(f"{', '.join(planners)}: {text}" for text, planners in takers.items())
 
 
 def _planners_help() -> str:
     summaries = ((name, getdoc(cls) or cls.__name__) for name, cls in registered_planners().items())
-    first = (f"{name}, {doc.splitlines()[0].rstrip('.')}" for name, doc in summaries)
-    return "The planner: " + "; ".join(first) + ". Default: miqp, of long courses time-optimal."
+    lines = ((name, doc.splitlines()[0].rstrip(".")) for name, doc in summaries)
+    first = (f"{name}, {line[0].lower()}{line[1:]}" for name, line in lines)
+    return "The planner: " + "; ".join(first) + ". Default: miqp, of long courses free-knots, of closed laps time-optimal."
 
 
 @_with_planner_options
