@@ -73,7 +73,8 @@ def test_the_default_suite_leaves_all_groups_out_and_a_group_is_run_when_it_is_a
 
 def test_the_full_suite_runs_all_groups(run, tmp_path: Path) -> None:
     for program in ("chromium", "gcc", "make"):  # no test that needs one is run
-        (tmp_path / program).touch(mode=0o755)
+        (tmp_path / program).write_text("#!/bin/sh\n")
+        (tmp_path / program).chmod(0o755)
     parts = dict.fromkeys(ROS_PYTHONS.values(), sys.executable) | {"PATH": str(tmp_path)}
     code, said = run(SAMPLE, "--full", "--collect-only", **parts)
     assert code == 0, said

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 import shutil
 from pathlib import Path
 
@@ -79,15 +78,3 @@ def test_commands_of_a_page_run_in_their_order(page: str, folder: Path, capsys) 
 
 def test_most_pages_that_show_commands_are_run() -> None:
     assert len(RUN) >= 12
-
-
-@pytest.mark.docs
-def test_the_report_that_the_readme_prints_is_that_of_its_command(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    ended, out, _ = run(capsys, "fly", "flip-roll")
-    assert ended == 0
-    text = (ROOT / "README.md").read_text(encoding="utf-8")
-    (shown,) = (block for block in re.findall(r"^```\n(.*?)^```$", text, re.M | re.S) if "·" in block)
-    assert [line.split() for line in shown.splitlines()] == [line.split() for line in out.splitlines()]

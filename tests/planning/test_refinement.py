@@ -9,6 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from aerobat.planning import Miqp
 from aerobat.planning.gate_clearance import bodies_in_gates
 from aerobat.planning.polynomial.knots import start_along_normals
 from aerobat.planning.recorder import Recorder
@@ -129,6 +130,7 @@ def test_a_path_that_begins_and_ends_at_a_limit_is_refined() -> None:
     grounded = replace(line, limits=replace(line.limits, lower=(-np.inf, -np.inf, 0.0)))
     assert grounded.start.position[2] == 0.0
     refinement = Refinement.of(Task.of(grounded, QUAD), Recorder(None))
-    found = refinement.refined(WarmStart.of(shared_plan("line"), refinement.task.stages), 8)
+    start = shared_plan("line", "agile-quad", Miqp(reserve=0.1))
+    found = refinement.refined(WarmStart.of(start, refinement.task.stages), 8)
     assert found.feasible
     assert found.solution.duration < 1.02 * 1.457

@@ -124,10 +124,7 @@ class Rescue:
         Where programs have solutions, but none that the vehicle can fly, that is a motion of the rigid body;
         where they have none, more intervals.
         """
-        usual = flying_reserve(self.problem, self.vehicle)
-        if self.asked.reserve == usual:  # which is kept where it can be
-            less = usual / 3.0
-            yield replace(self.asked, reserve=less, rescue=False), f"with a reserve of {less:g}"
+        if self.asked.reserve == flying_reserve(self.problem, self.vehicle):  # is kept where it can be
             yield replace(self.asked, reserve=0.0, rescue=False), "without a reserve"
         more = with_more_intervals(self.asked, self.problem, self.vehicle)
         if any(attempt.cost is not None for attempt in self.recorder.attempts):
