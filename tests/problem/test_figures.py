@@ -26,7 +26,7 @@ FIGURES = (
     ab.KnifeEdgePass(PLACE),
     ab.InvertedPass(PLACE),
 )
-SEARCHED = ("power-loop", "immelmann", "split-s", "matty-flip", "corkscrew")  # which take longer
+SEARCHED = ("barrel-roll", "power-loop", "immelmann", "split-s", "matty-flip", "corkscrew")
 PRESETS = tuple(
     pytest.param(figure.kind, marks=pytest.mark.slow) if figure.kind in SEARCHED else figure.kind
     for figure in FIGURES
