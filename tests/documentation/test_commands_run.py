@@ -57,14 +57,24 @@ def run_here(page: Path) -> list[str]:
 RUN = {str(page.relative_to(ROOT)): run_here(page) for page in PAGES if run_here(page)}
 
 
-@pytest.fixture
-def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+@pytest.fixture(scope="module")
+def checkout(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A folder as a reader's checkout is, where the README's first command has run."""
-    shutil.copytree(ROOT / "examples", tmp_path / "examples")
+    folder = tmp_path_factory.mktemp("checkout")
+    shutil.copytree(ROOT / "examples", folder / "examples")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.chdir(folder)
+        assert code("fly", "flip-roll") == 0
+        assert code("plan", "half-flip") == 0
+    shutil.copy(folder / "out" / "flip-roll" / "plan.csv", folder / "path.csv")
+    return folder
+
+
+@pytest.fixture
+def folder(checkout: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A checkout of the page's own."""
+    shutil.copytree(checkout, tmp_path, dirs_exist_ok=True)
     monkeypatch.chdir(tmp_path)
-    assert code("fly", "flip-roll") == 0
-    assert code("plan", "half-flip") == 0
-    shutil.copy("out/flip-roll/plan.csv", "path.csv")
     return tmp_path
 
 

@@ -9,6 +9,7 @@ from typing import Annotated
 from cyclopts import Group, Parameter, validators
 
 from aerobat.cli.options import POSITIVE, PlanningOptions, VehicleOptions, output
+from aerobat.cli.runs.record import USUAL_CONDITIONS
 from aerobat.cli.tasks import planned
 from aerobat.cli.terminal import open_in_browser, print_json
 from aerobat.environment import load_dispersion
@@ -76,7 +77,7 @@ def serve(source: Path | None, options: ViewOptions, serving: LiveOptions) -> No
             raise SpecError(
                 f"--{name} is for a page that is written, --live serves one; leave one of them out"
             )
-    conditions = load_dispersion(serving.conditions or "lab")
+    conditions = load_dispersion(serving.conditions or USUAL_CONDITIONS)
     choice = PlanningOptions(vehicle=options.vehicle, planner=serving.planner, plugins=options.plugins)
     plan, record = planned(PROBLEM if source is None else str(source), choice, "plan")
     with view_live(

@@ -10,6 +10,7 @@ from typing import Annotated, Any, TypeVar
 
 from cyclopts import Group, Parameter, validators
 
+from aerobat.cli.runs.record import USUAL_CONDITIONS
 from aerobat.interchange.columns import ALL
 from aerobat.planning import PlannerOption, planner_options, registered_planners
 
@@ -88,7 +89,7 @@ class FlightsOptions:
     flights: Annotated[int, how_many(1, 10**7)] = 1000
     """The number of flights, of each trial where there are several."""
 
-    conditions: Annotated[str, Parameter(group=flying)] = "lab"
+    conditions: Annotated[str, Parameter(group=flying)] = USUAL_CONDITIONS
     """The variation between flights, the disturbances and the sensors: none, lab, field, or a TOML file."""
 
     seed: Seed = 0

@@ -42,6 +42,7 @@ class Registry(Generic[T]):
     ) -> None:
         self._base = base
         self._noun = noun
+        self._one = f"{'an' if noun[0] in 'aeiou' else 'a'} {noun}"
         self._group = group
         self._modules = modules
         self._classes: dict[str, type[T]] = {}
@@ -50,9 +51,9 @@ class Registry(Generic[T]):
     def add(self, name: str, cls: type[T]) -> type[T]:
         """Declare `cls` and register it as `name`. Raises SpecError for what does not fit or is taken."""
         if not isinstance(cls, type):
-            raise SpecError(f"a {self._noun} is a class, got {shown(cls)}; write its name above a class")
+            raise SpecError(f"{self._one} is a class, got {shown(cls)}; write its name above a class")
         if not issubclass(cls, self._base):
-            raise SpecError(f"{cls.__name__} must inherit from {self._base.__name__} to be a {self._noun}")
+            raise SpecError(f"{cls.__name__} must inherit from {self._base.__name__} to be {self._one}")
         if isabstract(cls):
             wanting = " and ".join(sorted(vars(cls)["__abstractmethods__"]))
             raise SpecError(f"{cls.__name__} has no {wanting} and is no {self._noun} without; define it")
@@ -103,6 +104,20 @@ class Registry(Generic[T]):
             kinds = own if isinstance(kind, str) else known
             raise FieldError("kind", f"must be one of {kinds}, got {shown(kind)}")
         return from_table(self[kind], {key: each for key, each in value.items() if key != "kind"})
+
+    def instance(self, value: Any) -> T | None:
+        """Return what is one already, or one of that name with its defaults; None for None.
+
+        Raises FieldError for anything else.
+        """
+        if value is None or isinstance(value, self._base):
+            return value
+        if not isinstance(value, str):
+            raise FieldError("", f"must be {self._one} or the name of one, got {shown(value)}")
+        try:
+            return self[value]()
+        except SpecError as error:
+            raise FieldError("", f": {error}") from None
 
     def _import_own(self, name: str) -> None:
         if name in self._modules:

@@ -15,7 +15,7 @@ from aerobat import so3
 from aerobat.arrays import Array
 from aerobat.declaration import by_value, in_notebooks, short, shown, validated
 from aerobat.errors import OutOfRange, SpecError
-from aerobat.evaluation.passages import SampledPath, criteria_of
+from aerobat.evaluation.criteria import SampledPath, criteria_of
 from aerobat.kernels.running_metrics import RunningMetrics
 from aerobat.planning import Plan
 from aerobat.problem import Problem, as_problem

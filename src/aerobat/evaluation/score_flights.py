@@ -16,7 +16,7 @@ from aerobat.engines import logged_ticks
 from aerobat.engines.pytree import tree_map, tree_stack
 from aerobat.environment import Environment
 from aerobat.errors import SpecError
-from aerobat.evaluation.passages import SampledPath, criteria_of
+from aerobat.evaluation.criteria import SampledPath, criteria_of
 from aerobat.evaluation.score import Score, score_of
 from aerobat.kernels.running_metrics import RunningMetrics
 from aerobat.planning import Plan

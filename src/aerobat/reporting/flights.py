@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from aerobat.arrays import AXES
-from aerobat.evaluation.passages import GOAL
+from aerobat.evaluation.criteria import GOAL
 from aerobat.evaluation.score import ObserverScore, Score
 from aerobat.reporting.facts import REPORT, Columns, Fact, facts, fields_of, kept, picture, said
 from aerobat.reporting.plans import rough_length

@@ -12,8 +12,8 @@ from aerobat.control import ControlLaw, Controller, as_controller, named_control
 from aerobat.declaration import AS_IT_IS, FieldError, Seed, declared, shown
 from aerobat.environment import Dispersion, as_dispersion
 from aerobat.errors import SpecError
-from aerobat.simulation.flight_controller import Autopilot, as_autopilot
-from aerobat.simulation.plants import Plant, as_plant
+from aerobat.simulation.flight_controller import AUTOPILOTS, Autopilot
+from aerobat.simulation.plants import PLANTS, Plant
 from aerobat.states import BodyState
 from aerobat.vehicle import Vehicle
 
@@ -78,9 +78,9 @@ class FlightConfig:
     # floats, compiled, jax, jax-float32, or the fastest for so many ticks
     engine: str = "auto"
     # physics that others wrote in place of ours, or its name, mujoco or rotorpy: one vehicle a flight
-    plant: Annotated[Plant | None, PlainValidator(as_plant)] = None
+    plant: Annotated[Plant | None, PlainValidator(PLANTS.instance)] = None
     # a firmware that holds the rates in place of our model, or its name, betaflight: one vehicle a flight
-    autopilot: Annotated[Autopilot | None, PlainValidator(as_autopilot)] = None
+    autopilot: Annotated[Autopilot | None, PlainValidator(AUTOPILOTS.instance)] = None
     log_rate: LogRate | None = None  # [1/s] of the flight's rows, rate over a whole number; by default rate
 
     def __post_init__(self) -> None:

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from typing import Any, ClassVar, NamedTuple, Protocol
+from typing import ClassVar, NamedTuple, Protocol
 
-from aerobat.declaration import FieldError, Registry, shown
-from aerobat.errors import SpecError
+from aerobat.declaration import Registry
 from aerobat.kernels.ops import PerRotor, Quaternion, Vector
 from aerobat.kernels.rate_loop import RateSetpoint
 from aerobat.vehicle import Vehicle
@@ -70,15 +69,3 @@ AUTOPILOTS: Registry[Autopilot] = Registry(
     "aerobat.autopilots",
     {"betaflight": "aerobat.links.betaflight.autopilot"},
 )
-
-
-def as_autopilot(value: Any) -> Autopilot | None:
-    """The autopilot itself, or the one of that name; None for none. Raises FieldError for anything else."""
-    if value is None or isinstance(value, Autopilot):
-        return value
-    if not isinstance(value, str):
-        raise FieldError("", f"must be an autopilot or the name of one, got {shown(value)}")
-    try:
-        return AUTOPILOTS[value]()
-    except SpecError as error:
-        raise FieldError("", f": {error}") from None

@@ -21,7 +21,7 @@ from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, Future
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from importlib import import_module
 from multiprocessing.connection import Connection
 from typing import Annotated, Any, TypeVar
@@ -235,13 +235,14 @@ class _Shared:
     task: Any
 
     def __reduce__(self) -> tuple[Any, ...]:
-        packed = self.__dict__.get("_packed")
-        if packed is None:
-            packed = pickle.dumps(self.task)
-            if b"__main__" in packed and "cloudpickle" in sys.modules:  # no other machine has that script
-                packed = sys.modules["cloudpickle"].dumps(self.task)
-            object.__setattr__(self, "_packed", packed)
-        return _unpacked, (packed, imported_plugins(), _versions())
+        return _unpacked, (self._packed, imported_plugins(), _versions())
+
+    @cached_property
+    def _packed(self) -> bytes:
+        packed = pickle.dumps(self.task)
+        if b"__main__" in packed and "cloudpickle" in sys.modules:  # no other machine has that script
+            packed = sys.modules["cloudpickle"].dumps(self.task)
+        return packed
 
 
 @lru_cache(maxsize=1)

@@ -16,9 +16,9 @@ from aerobat.control import named_controller
 from aerobat.errors import SpecError
 from aerobat.evaluation import score
 from aerobat.planning import Plan, nominal_flight
-from aerobat.simulation.flight_controller import as_autopilot
+from aerobat.simulation.flight_controller import AUTOPILOTS
 from aerobat.simulation.fly import fly as simulate
-from aerobat.simulation.plants import as_plant
+from aerobat.simulation.plants import PLANTS
 
 
 def fly(
@@ -51,10 +51,10 @@ def fly(
 
 def _controller(flying: FlyingOptions) -> str:
     """The name of the controller asked for. Raises SpecError for names, or pairs, that cannot fly."""
-    as_plant(flying.plant)
+    PLANTS.instance(flying.plant)
     name = flying.controller or ("full" if flying.autopilot is None else "rates")
     law = named_controller(name)
-    autopilot = as_autopilot(flying.autopilot)
+    autopilot = AUTOPILOTS.instance(flying.autopilot)
     if autopilot is None:
         return name
     autopilot.require()
@@ -84,7 +84,7 @@ def flown(plan: Plan, settings: FlightSettings) -> Flown:
             autopilot=settings.autopilot,
         )
     judged = score(flight, plan, plan.vehicle)
-    autopilot = as_autopilot(settings.autopilot)
+    autopilot = AUTOPILOTS.instance(settings.autopilot)
     if autopilot is None:
         return Flown(flight, judged, settings.controller, settings.plant)
     by = f"{settings.controller} on {settings.autopilot}"

@@ -49,7 +49,6 @@ class Rates(ControlLaw):
     loop's PID. The inner loop is `kernels.rate_loop`, or a real flight controller's.
     """
 
-    TAKES_DISTURBANCES: ClassVar[bool] = True
     GIVES_RATES: ClassVar[bool] = True
 
     tilt_gain: NonNegative = 16.0  # [1/s] rate per angle of roll and pitch

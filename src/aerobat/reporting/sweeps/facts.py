@@ -8,7 +8,7 @@ from itertools import starmap
 from math import isfinite
 from typing import TYPE_CHECKING
 
-from aerobat.evaluation.passages import criterion
+from aerobat.evaluation.criteria import criterion
 from aerobat.reporting.facts import Columns, Fact, Facts, facts, kept, picture
 from aerobat.reporting.sweeps.words import known_opening, outcome_name
 from aerobat.simulation import Outcome

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
-from typing import Any, ClassVar, NamedTuple, Protocol
+from typing import ClassVar, NamedTuple, Protocol
 
-from aerobat.declaration import FieldError, Registry, shown
-from aerobat.errors import SpecError
+from aerobat.declaration import Registry
 from aerobat.kernels.motors import Airframe, VehicleState
 from aerobat.kernels.ops import PerRotor, Vector
 from aerobat.problem.gate import Gate
@@ -72,15 +71,3 @@ PLANTS: Registry[Plant] = Registry(
     "aerobat.plants",
     {"mujoco": f"{_ROOM}.mujoco", "rotorpy": f"{_ROOM}.rotorpy"},
 )
-
-
-def as_plant(value: Any) -> Plant | None:
-    """The plant itself, or the one of that name; None for our own. Raises FieldError for anything else."""
-    if value is None or isinstance(value, Plant):
-        return value
-    if not isinstance(value, str):
-        raise FieldError("", f"must be a plant or the name of one, got {shown(value)}")
-    try:
-        return PLANTS[value]()
-    except SpecError as error:
-        raise FieldError("", f": {error}") from None
