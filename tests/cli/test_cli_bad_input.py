@@ -153,6 +153,7 @@ ARGUMENT_FAULTS = {
     "unknown command": (["loop", "line"], "loop"),
     "no problem": (["fly"], "problem"),
     "unknown conditions": (["fly", "line", "--conditions", "lap"], "conditions"),
+    "conditions without a name": (["fly", "line", "--conditions", ""], "conditions"),
     "unknown controller": (["fly", "line", "--controller", "papr"], "did you mean 'paper'?"),
     "negative seed": (["fly", "line", "--seed", "-1"], "seed"),
     "negative time": (["plan", "line", "--time-limit", "-1"], "time_limit"),

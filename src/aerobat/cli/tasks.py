@@ -114,7 +114,9 @@ def flight_settings(
         plant: The name of the physics, None for the built-in.
         autopilot: The name of the firmware of the inner loop, None for our model.
     """
-    named = options.conditions or (None if options.probability is None else USUAL_CONDITIONS)
+    named = options.conditions
+    if named is None and options.probability is not None:
+        named = USUAL_CONDITIONS
     conditions = None if named is None else load_dispersion(named)
     if options.workers is not None and options.probability is None:
         raise SpecError("--workers fly for --pass; give that too, or leave --workers out")
