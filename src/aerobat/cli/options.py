@@ -169,8 +169,7 @@ def _help(offers: dict[str, PlannerOption]) -> str:
 
 def _planners_help() -> str:
     summaries = ((name, getdoc(cls) or cls.__name__) for name, cls in registered_planners().items())
-    lines = ((name, doc.splitlines()[0].rstrip(".")) for name, doc in summaries)
-    first = (f"{name}, {line[0].lower()}{line[1:]}" for name, line in lines)
+    first = (f"{name}, {doc.splitlines()[0].rstrip('.')}" for name, doc in summaries)
     default = "Default: miqp, of long courses free-knots, of closed laps time-optimal."
     return f"The planner: {'; '.join(first)}. {default}"
 
