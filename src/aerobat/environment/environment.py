@@ -1,13 +1,18 @@
-"""Gravity, wind and ground: what a problem is flown in, whichever the vehicle."""
+"""Gravity, wind, ground and obstacles: what a problem is flown in, whichever the vehicle."""
 
 from __future__ import annotations
 
 from dataclasses import field
+from functools import cached_property
+from typing import Annotated
 
 import numpy as np
+from pydantic import PlainValidator
 
 from aerobat.arrays import Array
 from aerobat.declaration import Finite, Gravity, Vector3, declared
+from aerobat.environment.obstacles.obstacle import OBSTACLES, Obstacle
+from aerobat.environment.obstacles.separation import Pieces
 from aerobat.so3 import UP
 from aerobat.states import STANDARD_GRAVITY
 
@@ -17,14 +22,20 @@ class Environment:
     """The world around the vehicle, ENU axes.
 
     Drag acts on the velocity relative to the wind. The ground bounds paths from below, without it nothing
-    does.
+    does. The whole body keeps clear of obstacles.
     """
 
     gravity: Gravity = STANDARD_GRAVITY  # [m/s²] along -z
     wind: Vector3 = field(default_factory=lambda: np.zeros(3))  # [m/s] velocity of the air
     ground: Finite | None = None  # [m] height z that no path goes below; left out, no ground
+    obstacles: tuple[Annotated[Obstacle, PlainValidator(OBSTACLES.read)], ...] = ()  # what stands in the way
 
     @property
     def weight(self) -> Array:
         """The specific thrust [m/s²] that holds a hover, g e3, (3,)."""
         return self.gravity * UP
+
+    @cached_property
+    def pieces(self) -> Pieces:
+        """The convex pieces of all obstacles."""
+        return Pieces(tuple(piece for obstacle in self.obstacles for piece in obstacle.pieces))

@@ -101,7 +101,7 @@ def score_over_time(
     if config.log_rate is not None:
         raise SpecError("log_rate: a scored flight keeps no rows; leave it out")
     if environment is None:
-        environment = (goal.problem if isinstance(goal, Plan) else goal).environment
+        environment = (goal.problem if isinstance(goal, Plan) else goal).surroundings
     if config.plant is not None:
         raise SpecError("plant: other simulators fly one vehicle at a time; take fly and score")
     setup = prepare(plan, vehicles, environment=environment, config=config)

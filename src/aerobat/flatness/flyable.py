@@ -35,7 +35,7 @@ def environment_of(flown: Flyable | Trajectory, environment: Environment | None)
         return environment
     if isinstance(flown, Trajectory):
         return Environment()
-    found: Environment = flown.problem.environment
+    found: Environment = flown.problem.surroundings
     return found
 
 

@@ -21,7 +21,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from math import hypot, sqrt
+from math import sqrt
 from typing import NamedTuple, TypeAlias
 
 import numpy as np
@@ -135,13 +135,12 @@ def extent_of_thrust(ops: Ops, body: Ellipsoid, thrust: Vector) -> Extent:
         body: The ellipsoid about the vehicle.
         thrust: Along its thrust axis, of any length.
     """
-    x, y, up = body.centre.tolist()
-    wide, high = float(body.semi_axes[:2].max()), float(body.semi_axes[2])
+    wide, high, up, aside = body.revolved
     size = ops.sqrt(dot(thrust, thrust))
 
     def extent(outward: Vector) -> Scalar:
         along = dot(thrust, outward) / size
         squared = along * along
-        return up * along + hypot(x, y) + ops.sqrt(wide**2 * (1.0 - squared) + high**2 * squared)
+        return up * along + aside + ops.sqrt(wide**2 * (1.0 - squared) + high**2 * squared)
 
     return extent

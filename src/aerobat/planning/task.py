@@ -54,8 +54,8 @@ class Task:
 
     @property
     def environment(self) -> Environment:
-        """Gravity, wind and ground."""
-        return self.problem.environment
+        """Gravity, wind, ground and obstacles, the walls of gates among them."""
+        return self.problem.surroundings
 
     @property
     def without_reserve(self) -> Task:

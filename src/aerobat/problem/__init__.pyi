@@ -30,6 +30,7 @@ from .maneuvers.maneuver import maneuver, registered_maneuvers
 from .problem import PAPER_LIMITS, Limits, Problem
 from .stage import Stage, StageSequence
 from .tolerance import Tolerance
+from .wall import Wall
 
 __all__ = [
     "PAPER_LIMITS",
@@ -65,6 +66,7 @@ __all__ = [
     "Stage",
     "StageSequence",
     "Tolerance",
+    "Wall",
     "Waypoint",
     "Waypoints",
     "as_problem",

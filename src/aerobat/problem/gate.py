@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 from math import degrees, radians
 from typing import Any, ClassVar, cast
@@ -29,9 +29,11 @@ from aerobat.declaration import (
     unknown_name,
     validated,
 )
+from aerobat.environment.obstacles import ConvexPiece, Obstacle
 from aerobat.errors import SpecError
 from aerobat.problem.condition import Condition, ConeAngle, Quantity, fixed
 from aerobat.problem.opening import Circle, Corners, OpeningShape, Polygon, Rectangle
+from aerobat.problem.wall import Wall
 
 DEFAULT_SIZE = (1.0, 0.6)  # [m] width and height of a rectangular opening
 TOUCHING = 1e-6  # [m] within which frames touch, and neither stands in the other's opening
@@ -59,6 +61,7 @@ class Gate:
     attitude_tolerance: ConeAngle = radians(5.0)  # [rad]
     radius: Positive | None = None  # [m] of a round opening, instead of width and height
     polygon: Corners | None = None  # [m] of any other convex opening, from `position`, instead of those
+    wall: Wall | None = None  # around the opening, an obstacle; `true` in a file for one of the usual size
 
     SHORTHANDS: ClassVar[Mapping[str, str]] = {
         "heading_deg": "[deg] direction of passage, from x toward y (0)",
@@ -94,6 +97,8 @@ class Gate:
     def expand(cls, table: dict[str, Any]) -> dict[str, Any]:
         """Replace the angles by `normal` and `up`, which are given instead of them or not at all."""
         table = in_radians(table, "attitude_tolerance")
+        if isinstance(table.get("wall"), bool):
+            table["wall"] = Wall() if table["wall"] else None
         if "diameter" in table:
             if "radius" in table:
                 raise FieldError("diameter", "stands beside radius; give one or the other")
@@ -151,6 +156,11 @@ class Gate:
         """The outer corners in the world [m] of a frame so thick, one beside each of `outline`, (K, 3)."""
         return self.position + self.opening.frame(thickness) @ self.plane_axes
 
+    @cached_property
+    def solid(self) -> Obstacle | None:
+        """The wall around the opening, as an obstacle; None where there is none."""
+        return None if self.wall is None else GateWall(self)
+
     def resized(self, across: float, up: float) -> Gate:
         """The same gate with another size, by parts of what it is, by the lesser where it has but one."""
         return replace(self, **self.opening.resized(across, up).fields)
@@ -180,6 +190,29 @@ class Gate:
         heading, elevation, _ = self.angles
         normal, up = _directions(heading, elevation, tilt)
         return replace(self, normal=normal, up=up)
+
+
+@dataclass(frozen=True)
+class GateWall(Obstacle):
+    """The wall of a gate: a piece beside each side of the polygon that planners take for its opening.
+
+    The pieces lie over one another, and leave the opening free.
+    """
+
+    gate: Gate
+
+    @property
+    def pieces(self) -> tuple[ConvexPiece, ...]:
+        """The parts of the wall that lie beyond each side."""
+        gate, wall = self.gate, self.gate.wall or Wall()
+        thick = wall.thickness / 2.0 * np.outer([-1.0, 1.0], gate.normal)
+        return tuple(
+            ConvexPiece(
+                (gate.position + part @ gate.plane_axes + thick[:, None]).reshape(-1, 3),
+                name=f"the wall of {gate.name}",
+            )
+            for part in wall.parts(gate.opening)
+        )
 
 
 @validated

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 from dataclasses import field, replace
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from itertools import permutations
 from typing import Annotated, Any, ClassVar
 
@@ -165,6 +165,7 @@ class Problem:
         sequence = self.stages(1.0)
         self._check_given_ends(sequence)
         self._check_within_limits()
+        self._check_clear_of_obstacles()
         self._check_stages(sequence)
         for i, condition in enumerate(sequence.path_constraints):
             self._check_ends(i, condition)
@@ -211,6 +212,16 @@ class Problem:
                 self._check_point(f"{end}.{quantity}", state.derivatives(3)[derivative], derivative)
         for i, gate in enumerate(self.gates):
             self._check_point(f"gates[{i}].position", gate.position, 0)
+
+    def _check_clear_of_obstacles(self) -> None:
+        """Refuse ends and gates whose middle lies in an obstacle."""
+        pieces = self.surroundings.pieces
+        places = {f"{end}.position": state.position for end, state in self.ends.items()}
+        places |= {f"gates[{i}].position": gate.position for i, gate in enumerate(self.gates)}
+        for field_name, place in places.items():
+            found = pieces.holding(place)
+            if found is not None:
+                raise FieldError(field_name, f": it lies in {found.name}, an obstacle; move one of them")
 
     def _check_stages(self, sequence: StageSequence) -> None:
         """Refuse stages at places outside the limits or under ground."""
@@ -288,6 +299,13 @@ class Problem:
         if ground is None:
             return self.limits
         return replace(self.limits, lower=np.maximum(self.limits.lower, [-np.inf, -np.inf, ground]))
+
+    @cached_property
+    def surroundings(self) -> Environment:
+        """The environment, with the walls of gates among its obstacles."""
+        walls = tuple(gate.solid for gate in self.gates if gate.solid is not None)
+        environment = self.environment
+        return replace(environment, obstacles=environment.obstacles + walls) if walls else environment
 
     @validated
     def stages(self, max_specific_thrust: Positive, body_radius: NonNegative = 0.0) -> StageSequence:

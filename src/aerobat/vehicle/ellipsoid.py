@@ -10,12 +10,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import field
-from math import cos, pi
-from typing import Annotated
+from math import cos, hypot, pi
+from typing import Annotated, NamedTuple
 
 import numpy as np
 from pydantic import AfterValidator
 
+from aerobat import so3
 from aerobat.arrays import Array
 from aerobat.declaration import FieldError, Vector3, declared
 from aerobat.vehicle.rotor import Rotor
@@ -44,10 +45,47 @@ class Ellipsoid:
     # [m] from the centre of mass; in a file, from where `centre_of_mass` is counted
     centre: Vector3 = field(default_factory=lambda: np.zeros(3))
 
+    def turned(self, q_world_body: Array) -> tuple[Array, Array]:
+        """Return where it is and how it lies in attitudes (..., 4).
+
+        Returns:
+            Its centre from the centre of mass [m], world, (..., 3), and L, with which its points are its
+            centre and L y, |y| ≤ 1 [m], (..., 3, 3).
+        """
+        return so3.rotate(q_world_body, self.centre), so3.axes(q_world_body) * self.semi_axes
+
+    @property
+    def revolved(self) -> Revolved:
+        """What encloses it however it is turned about its thrust axis."""
+        x, y, up = self.centre.tolist()
+        return Revolved(float(self.semi_axes[:2].max()), float(self.semi_axes[2]), up, hypot(x, y))
+
     def sticking_out(self, rotor: Rotor) -> float:
         """The scale [-] by which it would enclose a rotor with its propeller, about its centre."""
         with np.errstate(over="ignore"):  # of an ellipsoid as flat as none, infinite
             return float(np.linalg.norm((_rim(rotor) - self.centre) / self.semi_axes, axis=-1).max())
+
+
+class Revolved(NamedTuple):
+    """An ellipsoid of revolution about the thrust axis, with all that is within `aside` of it."""
+
+    wide: float  # [m] its semi-axis across the thrust axis
+    high: float  # [m] along it
+    up: float  # [m] its centre along the thrust axis from the centre of mass
+    aside: float  # [m]
+
+    @property
+    def reach(self) -> float:
+        """The farthest that it reaches from the centre of mass, in whichever direction, at most [m]."""
+        return max(self.wide, self.high) + abs(self.up) + self.aside
+
+    def turned(self, thrust_axes: Array) -> tuple[Array, Array]:
+        """Return its centre from the centre of mass [m] and L [m] for unit thrust axes (..., 3).
+
+        Its points are its centre and L y with |y| ≤ 1, and all within `aside` of these.
+        """
+        along = thrust_axes[..., :, None] * thrust_axes[..., None, :]
+        return self.up * thrust_axes, self.wide * np.eye(3) + (self.high - self.wide) * along
 
 
 def about_rotors(rotors: Sequence[Rotor]) -> Ellipsoid:

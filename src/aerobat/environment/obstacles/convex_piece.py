@@ -1,0 +1,50 @@
+"""A convex piece of an obstacle: the convex hull of points, rounded by an ellipsoid.
+
+A box is the hull of its corners, a sphere one point rounded by a ball, a capsule two points rounded by a
+ball, a cylinder two points rounded by a disc. What a piece is to others is its support h(n), the farthest
+that it reaches along a unit vector n: max over its points of n·v, and |Lᵀ n| of its rounding. A plane
+n·x = h(n) has the whole piece behind it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+
+from aerobat.arrays import Array
+
+
+def _not_rounded() -> Array:
+    return np.zeros((3, 3))
+
+
+@dataclass(frozen=True, eq=False)
+class ConvexPiece:
+    """The hull of points, each rounded by the ellipsoid of all L y with |y| ≤ 1, in the world."""
+
+    points: Array  # [m] (V, 3)
+    rounding: Array = field(default_factory=_not_rounded)  # L [m], (3, 3)
+    name: str = "obstacle"  # of what it is a piece of
+
+    def support(self, normals: Array) -> Array:
+        """Return how far it reaches [m] along unit vectors (..., 3), (...)."""
+        farthest = np.max(normals @ self.points.T, axis=-1)
+        return np.asarray(farthest + np.linalg.norm(normals @ self.rounding, axis=-1))
+
+    @cached_property
+    def box(self) -> tuple[Array, Array]:
+        """The lower and upper corner [m] of the box around it, along the world's axes, (3,) each."""
+        reach = np.linalg.norm(self.rounding, axis=1)
+        return self.points.min(axis=0) - reach, self.points.max(axis=0) + reach
+
+    @cached_property
+    def face_normals(self) -> Array:
+        """The outward normals of the hull's faces, (F, 3); none where its points do not span a solid."""
+        from scipy.spatial import ConvexHull, QhullError
+
+        try:
+            return np.unique(ConvexHull(self.points).equations[:, :3].round(12), axis=0)
+        except (QhullError, ValueError):
+            return np.zeros((0, 3))

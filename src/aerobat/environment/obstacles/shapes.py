@@ -1,0 +1,173 @@
+"""Obstacles of simple shapes: boxes, spheres, capsules, cylinders, half-spaces and convex polytopes."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from itertools import product
+from typing import Annotated, Any, ClassVar
+
+import numpy as np
+from pydantic import Field, PlainValidator
+
+from aerobat import so3
+from aerobat.arrays import Array
+from aerobat.declaration import (
+    Angle,
+    FieldError,
+    Label,
+    Positive,
+    UnitVector,
+    Vector3,
+    finite,
+    in_degrees,
+    in_radians,
+    shown,
+)
+from aerobat.environment.obstacles.convex_piece import ConvexPiece
+from aerobat.environment.obstacles.obstacle import Obstacle, obstacle
+
+FAR = 1000.0  # [m] a half-space is the box behind its plane that reaches so far
+CORNERS = np.array(list(product((-1.0, 1.0), repeat=3)))  # of a box of two by two by two
+
+
+def _size(value: Any) -> Array:
+    size = finite(value, 3)
+    if not (size > 0.0).all():
+        raise FieldError("", f"must be three positive numbers, got {shown(value)}")
+    return size
+
+
+def _points(value: Any) -> Array:
+    points = finite(value, len(value) if hasattr(value, "__len__") else 0, 3)
+    if len(points) < 4 or np.linalg.matrix_rank(points - points[0], 1e-9) < 3:
+        raise FieldError("", "must be four points or more that do not lie in one plane")
+    return points
+
+
+Size = Annotated[Array, PlainValidator(_size), Field(description="three positive numbers")]
+Points = Annotated[Array, PlainValidator(_points), Field(description="points of three numbers each")]
+ATTITUDE = {
+    "heading_deg": "[deg] `heading` in degrees",
+    "elevation_deg": "[deg] `elevation` in degrees",
+    "tilt_deg": "[deg] `tilt` in degrees",
+}
+
+
+@obstacle("box")
+class Box(Obstacle):
+    """A box, in any attitude."""
+
+    position: Vector3  # [m] its middle
+    size: Size  # [m] its length, width and height along its own axes
+    heading: Angle = 0.0  # [rad] of its length, from x toward y
+    elevation: Angle = 0.0  # [rad] climb of its length
+    tilt: Angle = 0.0  # [rad] roll about its length, right-handed
+    name: Label = "box"  # by which findings name it
+
+    SHORTHANDS: ClassVar[Mapping[str, str]] = ATTITUDE
+
+    @classmethod
+    def expand(cls, table: dict[str, Any]) -> dict[str, Any]:
+        """Replace the angles in degrees."""
+        for angle in ("heading", "elevation", "tilt"):
+            table = in_radians(table, angle)
+        return table
+
+    def abbreviate(self, table: dict[str, Any]) -> dict[str, Any]:
+        """Write the angles in degrees where those say exactly the same."""
+        for angle in ("heading", "elevation", "tilt"):
+            table = in_degrees(table, angle)
+        return table
+
+    @property
+    def axes(self) -> Array:
+        """Its length, width and height in the world, unit vectors as columns, (3, 3)."""
+        z, y, x = np.eye(3)[::-1]
+        climb = so3.multiply(so3.about_axis(y, -self.elevation), so3.about_axis(x, self.tilt))
+        return so3.axes(so3.multiply(so3.about_axis(z, self.heading), climb))
+
+    @property
+    def pieces(self) -> tuple[ConvexPiece, ...]:
+        """The hull of its corners."""
+        corners = self.position + (CORNERS * self.size / 2.0) @ self.axes.T
+        return (ConvexPiece(corners, name=self.name),)
+
+
+@obstacle("sphere")
+class Sphere(Obstacle):
+    """A ball."""
+
+    position: Vector3  # [m] its middle
+    radius: Positive  # [m]
+    name: Label = "sphere"  # by which findings name it
+
+    @property
+    def pieces(self) -> tuple[ConvexPiece, ...]:
+        """Its middle, rounded."""
+        return (ConvexPiece(self.position[None], self.radius * np.eye(3), self.name),)
+
+
+@obstacle("capsule")
+class Capsule(Obstacle):
+    """All points near a straight line between two points."""
+
+    start: Vector3  # [m] one end of the line
+    end: Vector3  # [m] the other
+    radius: Positive  # [m]
+    name: Label = "capsule"  # by which findings name it
+
+    @property
+    def pieces(self) -> tuple[ConvexPiece, ...]:
+        """The line, rounded."""
+        return (ConvexPiece(np.array([self.start, self.end]), self.radius * np.eye(3), self.name),)
+
+
+@obstacle("cylinder")
+class Cylinder(Obstacle):
+    """A cylinder between two points, flat at its ends: a trunk, a pillar, a pipe."""
+
+    start: Vector3  # [m] the middle of one end
+    end: Vector3  # [m] the middle of the other
+    radius: Positive  # [m]
+    name: Label = "cylinder"  # by which findings name it
+
+    def __post_init__(self) -> None:
+        """Check."""
+        if np.linalg.norm(self.end - self.start) < 1e-9:
+            raise FieldError("end", "must be another point than start")
+
+    @property
+    def pieces(self) -> tuple[ConvexPiece, ...]:
+        """Its axis, rounded by a disc."""
+        along = (self.end - self.start) / np.linalg.norm(self.end - self.start)
+        disc = self.radius * (np.eye(3) - np.outer(along, along))
+        return (ConvexPiece(np.array([self.start, self.end]), disc, self.name),)
+
+
+@obstacle("half-space")
+class HalfSpace(Obstacle):
+    """All that lies behind a plane: a ceiling, a slope, the wall of a hall."""
+
+    position: Vector3  # [m] a point of the plane
+    normal: UnitVector  # out of what is solid
+    name: Label = "half-space"  # by which findings name it
+
+    @property
+    def pieces(self) -> tuple[ConvexPiece, ...]:
+        """A box behind the plane, as large as anything that is flown in."""
+        turned = so3.axes(so3.smallest_rotation(so3.UP, self.normal))
+        corners = (CORNERS - so3.UP) * [FAR, FAR, FAR / 2.0] @ turned.T
+        return (ConvexPiece(self.position + corners, name=self.name),)
+
+
+@obstacle("polytope")
+class Polytope(Obstacle):
+    """The convex hull of points."""
+
+    points: Points  # [m] its corners, and any others in it
+    name: Label = "polytope"  # by which findings name it
+
+    @property
+    def pieces(self) -> tuple[ConvexPiece, ...]:
+        """Itself."""
+        return (ConvexPiece(self.points, name=self.name),)
