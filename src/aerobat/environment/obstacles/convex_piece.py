@@ -15,6 +15,8 @@ import numpy as np
 
 from aerobat.arrays import Array
 
+TINY = 1e-12  # [m] beside lengths that divide
+
 
 def _not_rounded() -> Array:
     return np.zeros((3, 3))
@@ -39,6 +41,29 @@ class ConvexPiece:
         reach = np.linalg.norm(self.rounding, axis=1)
         return self.points.min(axis=0) - reach, self.points.max(axis=0) + reach
 
+    def normals_toward(self, points: Array) -> Array:
+        """Return unit vectors from it to points (m, 3) [m], the best of planes between or near it, (m, k, 3).
+
+        The normals of its faces; of a straight line the directions from the nearest point of it, square to
+        it, and along it.
+        """
+        first = points - self.points[0]
+        if len(self.points) > 2 and len(self.face_normals):
+            return np.broadcast_to(self.face_normals, (len(points), *self.face_normals.shape))
+        if len(self.points) != 2:
+            return _units(points[:, None] - self.points)
+        along = self.points[1] - self.points[0]
+        length = max(float(along @ along), TINY)
+        nearest = first - np.clip(first @ along / length, 0.0, 1.0)[:, None] * along
+        square = first - (first @ along / length)[:, None] * along
+        ends = np.broadcast_to(along, first.shape)
+        return _units(np.stack([nearest, square, ends, -ends], axis=1))
+
+    def distances(self, points: Array) -> Array:
+        """Return lower bounds of the distances to points (m, 3) [m], exact beside faces, (m,)."""
+        normals = self.normals_toward(points)
+        return np.asarray((np.sum(normals * points[:, None], axis=-1) - self.support(normals)).max(axis=1))
+
     @cached_property
     def face_normals(self) -> Array:
         """The outward normals of the hull's faces, (F, 3); none where its points do not span a solid."""
@@ -48,3 +73,9 @@ class ConvexPiece:
             return np.unique(ConvexHull(self.points).equations[:, :3].round(12), axis=0)
         except (QhullError, ValueError):
             return np.zeros((0, 3))
+
+
+def _units(vectors: Array) -> Array:
+    """Vectors (..., 3) of length one; upward where they are none."""
+    length = np.linalg.norm(vectors, axis=-1, keepdims=True)
+    return np.where(length > TINY, vectors / np.maximum(length, TINY), [0.0, 0.0, 1.0])

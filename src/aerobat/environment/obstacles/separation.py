@@ -14,18 +14,18 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from math import inf
 
 import numpy as np
 
-from aerobat.arrays import Array, Indices
-from aerobat.environment.obstacles.convex_piece import ConvexPiece
+from aerobat.arrays import Array, Indices, Mask
+from aerobat.environment.obstacles.convex_piece import TINY, ConvexPiece
 
 SMOOTHINGS = 2.0 ** -np.arange(20)
 ROUNDEST = 0.1  # [m] τ at first: the last is a ten millionth of a metre
 STEPS = 3  # of Newton's method in a round
 LONGEST_STEP = 0.5  # [rad]
 HALVINGS = 4  # of a step that leads to less
-TINY = 1e-12  # [m] beside lengths that divide
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,42 +69,39 @@ class Pieces:
         inside = pieces[found.gaps < 0.0]
         return self.pieces[inside[0]] if len(inside) else None
 
-    def separated(self, pieces: Indices, centres: Array, shapes: Array) -> Separation:
+    def separated(
+        self, pieces: Indices, centres: Array, shapes: Array, exact_within: float = inf
+    ) -> Separation:
         """Separate bodies from pieces, pair by pair.
 
         Args:
             pieces: The number of each pair's piece, (m,).
             centres: Of each pair's body [m], (m, 3).
             shapes: L of each pair's body [m], (m, 3, 3).
+            exact_within: The gap [m] beyond which a plane between will do that is not the best.
         """
         if not len(pieces):
             return Separation(np.zeros((0, 3)), np.zeros(0), np.zeros(0))
+        normals = np.empty_like(centres)
+        for number in np.unique(pieces):
+            own = pieces == number
+            normals[own] = _best_of(self.pieces[number], centres[own], shapes[own])
         pairs = _Pairs(centres[:, None] - self._points[pieces], self._roundings[pieces], shapes)
-        normals = pairs.refined(self._first_normals(pieces, pairs))
+        near = pairs.gaps(normals[:, None])[:, 0] < exact_within
+        if near.any():
+            normals[near] = pairs[near].refined(normals[near])
         gaps = pairs.gaps(normals[:, None])[:, 0]
         return Separation(normals, np.sum(normals * centres, axis=-1) - pairs.extents(normals) - gaps, gaps)
 
-    def _first_normals(self, pieces: Indices, pairs: _Pairs) -> Array:
-        """The best of the normals of the hull's faces and of the directions from its points."""
-        offsets = pairs.offsets
-        candidates = np.concatenate(
-            [self._faces[pieces], offsets, offsets.mean(axis=1, keepdims=True)], axis=1
-        )
-        lengths = np.linalg.norm(candidates, axis=-1, keepdims=True)
-        candidates = np.where(lengths > TINY, candidates / np.maximum(lengths, TINY), [0.0, 0.0, 1.0])
-        best = np.argmax(pairs.gaps(candidates), axis=1)
-        return np.asarray(np.take_along_axis(candidates, best[:, None, None], axis=1)[:, 0])
+    def distances(self, points: Array) -> Array:
+        """Return lower bounds of the distances of points (m, 3) to all pieces [m], (m,)."""
+        found = [piece.distances(points) for piece in self.pieces]
+        return np.asarray(np.min(found, axis=0)) if found else np.full(len(points), inf)
 
     @cached_property
     def _points(self) -> Array:
         """The points of every piece, the first of them repeated where it has fewer than others, (P, V, 3)."""
         return _padded([piece.points for piece in self.pieces])
-
-    @cached_property
-    def _faces(self) -> Array:
-        """The normals of every piece's faces; upward where it has fewer than others, (P, F, 3)."""
-        normals = [np.concatenate([np.array([[0.0, 0.0, 1.0]]), x.face_normals]) for x in self.pieces]
-        return _padded(normals)
 
     @cached_property
     def _roundings(self) -> Array:
@@ -124,6 +121,9 @@ class _Pairs:
     offsets: Array  # c − v [m], (m, V, 3)
     roundings: Array  # L of the pieces [m], (m, 3, 3)
     shapes: Array  # L of the bodies [m], (m, 3, 3)
+
+    def __getitem__(self, rows: Mask) -> _Pairs:
+        return _Pairs(self.offsets[rows], self.roundings[rows], self.shapes[rows])
 
     def gaps(self, normals: Array) -> Array:
         """The gaps [m] across planes with these normals, (m, k, 3) -> (m, k)."""
@@ -193,6 +193,16 @@ class _Pairs:
             flat = square - touching[:, :, None] * touching[:, None]
             curvature = curvature - flat / reach[:, None, None]
         return self._value(normals, smoothing), gradient, curvature
+
+
+def _best_of(piece: ConvexPiece, centres: Array, shapes: Array) -> Array:
+    """Of the directions to bodies that a piece knows, those with the largest gap, (m, 3)."""
+    offsets = centres[:, None] - piece.points
+    length = np.maximum(np.linalg.norm(offsets, axis=-1, keepdims=True), TINY)
+    candidates = np.concatenate([piece.normals_toward(centres), offsets / length], axis=1)
+    roundings = np.broadcast_to(piece.rounding, (len(centres), 3, 3))
+    best = np.argmax(_Pairs(offsets, roundings, shapes).gaps(candidates), axis=1)
+    return np.asarray(np.take_along_axis(candidates, best[:, None, None], axis=1)[:, 0])
 
 
 def _times(matrices: Array, vectors: Array) -> Array:
