@@ -87,9 +87,14 @@ def cleared(
 
 
 def _body_in_gate(k: int, stages: Sequence[Stage], task: Task, bending: float) -> BodyInGate | None:
-    """The room in the gate that stage k crosses, in its direction; None where it crosses none."""
+    """The room in the gate that stage k crosses, in its direction; None where it crosses none.
+
+    A gate in a wall has none: its wall is an obstacle, which the body is clear of all along.
+    """
     name, problem = stages[k].gate, task.problem
-    if name is None or PlannedPassage.of(stages[k], problem.gate(name), 0.0).min_speed <= 0.0:
+    if name is None or problem.gate(name).wall is not None:
+        return None
+    if PlannedPassage.of(stages[k], problem.gate(name), 0.0).min_speed <= 0.0:
         return None
     reach = task.vehicle.body_radius + PASSAGE_DEPTH
     return BodyInGate(problem.gate(name), k, reach, bending * task.vehicle.max_specific_thrust)

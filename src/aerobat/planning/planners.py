@@ -123,13 +123,16 @@ def suited_planner(problem: Problem, vehicle: Vehicle | None) -> str:
     """The name of the planner to take where nobody names one.
 
     It is miqp, whose search is exact, but for long courses, which it cannot search in reasonable time: for a
-    vehicle those are free-knots'. Closed courses are time-optimal's alone.
+    vehicle those are free-knots', as are ways around obstacles through stages that say where they are.
+    Closed courses are time-optimal's alone.
     """
     if not problem.ends:
         return "time-optimal"
-    if vehicle is None or not is_course(problem.stages(vehicle.max_specific_thrust)):
+    if vehicle is None:
         return "miqp"
-    return "free-knots"
+    stages = problem.stages(vehicle.max_specific_thrust)
+    is_around = problem.surroundings.obstacles and all(stage.is_placed for stage in stages.stages)
+    return "free-knots" if is_around or is_course(stages) else "miqp"
 
 
 def planner_for(problem: Problem, vehicle: Vehicle | None) -> Planner:

@@ -24,6 +24,7 @@ from aerobat.vehicle import Vehicle
 # of every limit's range, kept from either end for the controller by planners that use all of it, where a
 # plan shall be flown: rotors without lag leave it nothing otherwise
 FLYING_RESERVE = 0.15
+FLYING_CLEARANCE = 0.1  # [m] from obstacles, of plans that are flown: what errors take under lab
 HOVER_SHARE = 0.5  # of a hover's thrust: with more kept at the lower end a vehicle cannot sink
 
 

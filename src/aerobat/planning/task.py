@@ -32,19 +32,23 @@ class Task:
     vehicle_if_any: Vehicle | None
     stages: StageSequence
     reserve: float = 0.0  # of the vehicle's limits' ranges, kept from either end; proven of rotors
+    clearance: float = 0.0  # [m] kept from obstacles
 
     @classmethod
-    def of(cls, problem: Problem, vehicle: Vehicle | None = None, reserve: float = 0.0) -> Task:
+    def of(
+        cls, problem: Problem, vehicle: Vehicle | None = None, reserve: float = 0.0, clearance: float = 0.0
+    ) -> Task:
         """Return what a problem asks of a vehicle, or of none in particular.
 
         Args:
             problem: Its stages are made for the vehicle's thrust and size.
             vehicle: What shall fly.
             reserve: Kept for the controller.
+            clearance: Kept from obstacles for it [m], no more than what the ends leave.
         """
         body_radius = 0.0 if vehicle is None else vehicle.body_radius
         stages = problem.stages(max_specific_thrust(problem, vehicle), body_radius)
-        return cls(problem, vehicle, stages, reserve)
+        return cls(problem, vehicle, stages, reserve, clearance)
 
     @property
     def vehicle(self) -> Vehicle:

@@ -72,14 +72,16 @@ class WarmStart:
         return np.array([*directions[1], 0.0])
 
 
-def flown_task(planner: str, problem: Problem, vehicle: Vehicle | None, reserve: float) -> Task:
+def flown_task(
+    planner: str, problem: Problem, vehicle: Vehicle | None, reserve: float, clearance: float = 0.0
+) -> Task:
     """The task for a vehicle whose attitude is determined at both ends.
 
     Raises SpecError where there is no vehicle, and for ends in free fall, whose attitude is open.
     """
     if vehicle is None:
         raise SpecError(f"the {planner} planner needs a vehicle: no limits, no least time; give --vehicle")
-    task = Task.of(problem, vehicle, reserve)
+    task = Task.of(problem, vehicle, reserve, clearance)
     for name, state in problem.ends.items():
         thrust = task.balance.specific_thrust(state.velocity, state.acceleration)
         if np.linalg.norm(thrust) < UNDETERMINED * problem.environment.gravity:

@@ -15,6 +15,7 @@ from pydantic import Field
 from aerobat.declaration import AS_IT_IS, NonNegative
 from aerobat.errors import Infeasible, Reason, limits_of
 from aerobat.optimization.deadline import out_of_time, within_time
+from aerobat.planning.around.fastest import fastest_around
 from aerobat.planning.assessment.assessment import SUSPICIOUS
 from aerobat.planning.assessment.lower_bound import least_duration
 from aerobat.planning.certified_solve import Judged
@@ -26,7 +27,7 @@ from aerobat.planning.polynomial.min_snap import MinSnap
 from aerobat.planning.recorder import Progress, Recorder
 from aerobat.planning.refinement.flown import FlownPath
 from aerobat.planning.refinement.refine import MAX_SEGMENTS, SEGMENTS, RefinedPath, Refinement, segments_for
-from aerobat.planning.result import FLYING_RESERVE, Plan
+from aerobat.planning.result import FLYING_CLEARANCE, FLYING_RESERVE, Plan
 from aerobat.planning.time_limit import TIME_LIMIT, stopped, too_short
 from aerobat.planning.warm_start import Reserve, WarmStart, flown_task
 from aerobat.problem.problem import Problem
@@ -61,6 +62,12 @@ class FreeKnots(Planner):
         "with 0 a plan of four segments or more leaves it next to nothing.",
         command_default=FLYING_RESERVE,
     )
+    clearance: NonNegative = option(  # [m]
+        0.0,
+        "The distance in metres that the body keeps from obstacles for the controller, less where a passage "
+        "is narrow.",
+        command_default=FLYING_CLEARANCE,
+    )
     time_limit: NonNegative | None = option(None, TIME_LIMIT)  # [s]
     COMPARED: ClassVar[tuple[dict[str, int], ...]] = ({"segments": 4}, {"segments": 8})
 
@@ -72,7 +79,7 @@ class FreeKnots(Planner):
         Raises SpecError without a vehicle and for input that makes no sense, Infeasible when nothing is
         certified.
         """
-        task, recorder = flown_task("free-knots", problem, vehicle, self.reserve), Recorder(progress)
+        task, recorder = flown_task("free-knots", problem, vehicle, self.reserve, self.clearance), Recorder(progress)
         refinement = Refinement.of(task, recorder, self.still_ends)
         with within_time(self.time_limit):
             found = self._fastest(refinement)
@@ -93,7 +100,9 @@ class FreeKnots(Planner):
         A plan is poor whose own flight does not pass a gate, or that is slow beside what is possible.
         """
         slow = SUSPICIOUS * least_duration(refinement.task.problem, refinement.task.vehicle)
-        best: _Found | None = None
+        best: _Found | None = self._around(refinement)
+        if best is not None:
+            return best.plan
         for plan, start in self._starts(refinement):
             own = None if plan is None else self._as_it_is(plan, refinement)
             refined = self._refined(refinement, start)
@@ -103,6 +112,14 @@ class FreeKnots(Planner):
             if best is not None and not best.lingers and best.duration <= slow:
                 break
         return None if best is None else best.plan
+
+    def _around(self, refinement: Refinement) -> _Found | None:
+        """The plan around obstacles; None where there are none, or no route leads to one."""
+        task = refinement.task
+        if self.start is not None or not len(task.environment.pieces):
+            return None
+        around = fastest_around(refinement, segments_for(task.stages, self.segments))
+        return None if around is None else _found(around.refinement, around.judged)
 
     def _as_it_is(self, start: Plan, refinement: Refinement) -> _Found | None:
         """The plan that is begun from, where it is certified and keeps the reserve."""
@@ -121,9 +138,7 @@ class FreeKnots(Planner):
         for own in refinement.with_and_without_rooms:
             judged = own.refined(start, segments)
             if judged.feasible:
-                flight, flown = FlownPath(own, judged).through_gates()
-                plan = _plan(flown.judged, refinement.recorder)
-                return _Found(flight.lingers, plan.duration, plan)
+                return _found(own, judged)
             if out_of_time():
                 break
         return None
@@ -150,6 +165,13 @@ class _Found(NamedTuple):
     lingers: bool  # whether its own flight does not pass a gate
     duration: float  # [s]
     plan: Plan
+
+
+def _found(refinement: Refinement, judged: Judged[RefinedPath]) -> _Found:
+    """What is certified, with more room in gates where its own flight wants it."""
+    flight, flown = FlownPath(refinement, judged).through_gates()
+    plan = _plan(flown.judged, refinement.recorder)
+    return _Found(flight.lingers, plan.duration, plan)
 
 
 def _plan(judged: Judged[RefinedPath], recorder: Recorder) -> Plan:

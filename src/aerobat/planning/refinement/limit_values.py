@@ -21,7 +21,9 @@ from aerobat.flatness.parallel_transport import frames
 from aerobat.flatness.references import UNDETERMINED, specific_thrust
 from aerobat.kernels.measures import InertiaAndDrag, measures
 from aerobat.kernels.unequal_drag import BodyMotion
-from aerobat.limits import MEASURES, Limit
+from aerobat.limits import MEASURES, Limit, clearance
+from aerobat.limits.clearance import Planes
+from aerobat.planning.refinement.clearance_values import MOVED, ClearanceValues
 from aerobat.planning.task import Task
 from aerobat.so3 import UP
 from aerobat.states import FlatState
@@ -38,17 +40,31 @@ class Frames:
     axes: Array  # (m, 3, 3)
     weight: Array  # gravity's reaction over mass in them [m/s²], (m, 3)
     up: Array  # (m, 3)
+    planes: Planes | None  # between body and obstacles, where there are any
 
 
 @dataclass(frozen=True, eq=False)
 class LimitValues:
-    """Constraints c ≤ 0 on a path's derivatives, each as a fraction of its limit's size."""
+    """Constraints c ≤ 0 on a path's derivatives, each as a fraction of its limit's size.
+
+    Those of held limits, then those of clearances from the obstacles that are nearest at a place.
+    """
 
     task: Task
 
     @cached_property
     def sides(self) -> tuple[tuple[Limit, float], ...]:
         """The limit of each constraint, with -1 for its lower end and 1 for its upper one."""
+        clear = (clearance.limit(self.task.clearance), -1.0)
+        return (*self._held, *([clear] * self.clearances.count))
+
+    @cached_property
+    def clearances(self) -> ClearanceValues:
+        """The constraints of clearances."""
+        return ClearanceValues(self.task)
+
+    @cached_property
+    def _held(self) -> tuple[tuple[Limit, float], ...]:
         return tuple(
             (limit, sign)
             for limit in self.task.held
@@ -59,6 +75,11 @@ class LimitValues:
     @cached_property
     def of_path(self) -> Mask:
         """The mask of the constraints that are linear in the path's derivatives, (c,)."""
+        return self.at_ends & (np.arange(len(self.sides)) < len(self._held))
+
+    @cached_property
+    def at_ends(self) -> Mask:
+        """The mask of the constraints that are decided at ends, whose path is fixed, (c,)."""
         return np.array([limit.quantity.is_of_path for limit, _ in self.sides], dtype=bool)
 
     @cached_property
@@ -69,7 +90,8 @@ class LimitValues:
     def frames(self, times: Array, derivatives: Array) -> Frames:
         """Body axes along a path's derivatives (m, 6, 3) at times (m,)."""
         axes = self._axes(times, derivatives)
-        return Frames(axes, self.task.environment.weight @ axes, UP @ axes)
+        planes = self.clearances.planes(derivatives) if self.clearances.count else None
+        return Frames(axes, self.task.environment.weight @ axes, UP @ axes, planes)
 
     def values(self, derivatives: Array, near: Frames) -> Array:
         """The constraints at derivatives (m, 6, 3), (m, c), infinite where thrust is against its frame."""
@@ -77,9 +99,12 @@ class LimitValues:
             moving = self._local(derivatives, near)
             found = self._functions[0]([*moving, *near.weight.T, *near.up.T])
             values = _columns(found, len(derivatives)) @ self._measured.T
-        values[:, self.of_path] = np.tensordot(derivatives, self._path[self.of_path], ([1, 2], [1, 2]))
+        values[:, self._linear] = np.tensordot(derivatives, self._path[self._linear], ([1, 2], [1, 2]))
         values -= self._bounds
-        return np.where(np.isnan(values), np.inf, values)
+        values = np.where(np.isnan(values), np.inf, values)
+        if near.planes is None:
+            return values
+        return np.concatenate([values, self.clearances.values(derivatives, near.planes)], axis=1)
 
     def slopes(self, derivatives: Array, near: Frames) -> Array:
         """The constraints' slopes by the derivatives, (m, c, 6, 3)."""
@@ -89,11 +114,13 @@ class LimitValues:
         count = len(derivatives)
         by_local = np.array([np.broadcast_to(each, (MOTION, count)).imag for each in found]) / COMPLEX_STEP
         weighted = np.tensordot(self._measured, by_local, 1).transpose(2, 0, 1)
-        slopes = np.zeros((count, len(self.sides), 6, 3))
+        slopes = np.zeros((count, len(self._held), 6, 3))
         local = weighted.reshape(count, -1, 5, 3)
         slopes[:, :, MOVING] = local @ np.swapaxes(near.axes, 1, 2)[:, None]
-        slopes[:, self.of_path] = self._path[self.of_path]
-        return slopes
+        slopes[:, self._linear] = self._path[self._linear]
+        if near.planes is None:
+            return slopes
+        return np.concatenate([slopes, self.clearances.slopes(derivatives, near.planes)], axis=1)
 
     def curvature(self, derivatives: Array, near: Frames, weights: Array) -> tuple[Array, Array]:
         """The weighted constraints' slopes (m, 6, 3), and second derivatives by velocity to crackle.
@@ -106,12 +133,13 @@ class LimitValues:
         Returns:
             The slopes (m, 6, 3), and the second derivatives (m, 15, 15).
         """
-        count, by_measure = len(derivatives), weights @ self._measured
+        count, weights, beside = len(derivatives), *np.split(weights, [len(self._held)], axis=1)
+        by_measure = weights @ self._measured
         moving = self._stepped(self._local(derivatives, near))
         with np.errstate(divide="ignore", invalid="ignore"):
             found = self._functions[1]([*moving, *near.weight.T, *near.up.T, *by_measure.T])
         gradients = np.array([np.broadcast_to(each, (MOTION, count)) for each in found])
-        slopes = np.tensordot(weights[:, self.of_path], self._path[self.of_path], 1)
+        slopes = np.tensordot(weights[:, self._linear], self._path[self._linear], 1)
         turned = gradients[:, 0].real.T.reshape(count, 5, 3) @ np.swapaxes(near.axes, 1, 2)
         slopes[:, MOVING] += turned
         second = (gradients.imag / COMPLEX_STEP).transpose(2, 1, 0).reshape(count, 5, 3, 5, 3)
@@ -119,7 +147,12 @@ class LimitValues:
         second = second.reshape(count, -1, 3) @ back.reshape(count, 3, 3)
         second = second.reshape(count, 5, 3, -1).swapaxes(2, 3)
         second = (second.reshape(count, -1, 3) @ back.reshape(count, 3, 3)).reshape(count, 5, MOTION, 3)
-        return slopes, second.swapaxes(2, 3).reshape(count, MOTION, MOTION)
+        second = second.swapaxes(2, 3).reshape(count, MOTION, MOTION)
+        if near.planes is not None:
+            more_slopes, bent = self.clearances.curvature(derivatives, near.planes, beside)
+            slopes += more_slopes
+            second[:, :MOVED, :MOVED] += bent
+        return slopes, second
 
     def _local(self, derivatives: Array, near: Frames) -> Array:
         """Airspeed, acceleration, jerk, snap and crackle in body axes, (15, m)."""
@@ -172,19 +205,24 @@ class LimitValues:
     @cached_property
     def _measured(self) -> Array:
         """Weights on the measures, (c, 11)."""
-        rows = [sign / limit.size * limit.quantity.measured for limit, sign in self.sides]
+        rows = [sign / limit.size * limit.quantity.measured for limit, sign in self._held]
         return np.array(rows).reshape(-1, MEASURES)
+
+    @cached_property
+    def _linear(self) -> Mask:
+        """The mask of the held limits that are linear in the path's derivatives."""
+        return self.of_path[: len(self._held)]
 
     @cached_property
     def _path(self) -> Array:
         """Weights on the path's derivatives, (c, 6, 3)."""
-        rows = [sign / limit.size * limit.quantity.path for limit, sign in self.sides]
+        rows = [sign / limit.size * limit.quantity.path for limit, sign in self._held]
         return np.array(rows).reshape(-1, 6, 3)
 
     @cached_property
     def _bounds(self) -> Array:
         """The ends that weighted values keep below, (c,)."""
-        return np.array([sign * limit.ends[int(sign > 0.0)] for limit, sign in self.sides])
+        return np.array([sign * limit.ends[int(sign > 0.0)] for limit, sign in self._held])
 
 
 def _columns(found: tuple[Array, ...], count: int) -> Array:

@@ -87,10 +87,15 @@ class RefinementProgram:
     def counts(self) -> Mask:
         """The mask of the constraints that count, (S, p, c).
 
-        Constraints of the path do not count at the very ends, which are fixed.
+        Constraints of the path do not count at the very ends, which are fixed, and planes only where there
+        are obstacles near.
         """
         counts = np.ones((self.spline.segments, len(self.fractions), len(self.limits.sides)), dtype=bool)
-        counts[0, 0, self.limits.of_path] = counts[-1, -1, self.limits.of_path] = False
+        counts[0, 0, self.limits.at_ends] = counts[-1, -1, self.limits.at_ends] = False
+        planes = self.near.planes
+        if planes is not None:
+            near = np.isfinite(planes.offsets).reshape(*counts.shape[:2], -1)
+            counts[..., -near.shape[-1] :] &= near
         return counts
 
     @cached_property

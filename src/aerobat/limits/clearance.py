@@ -1,0 +1,95 @@
+"""The clearance of the body from obstacles: what is left between both across planes that separate them.
+
+The plane between a body and a convex piece is held while a path is moved, as its normal n is found anew from
+round to round: what is left is n·p − e − h, with the position p, the piece's support h along n and the extent
+e of the body against n, in the attitude that its thrust gives it. Whichever plane is taken, the body is no
+nearer to the piece than that.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from math import inf
+from typing import NamedTuple
+
+import numpy as np
+
+from aerobat.arrays import Array
+from aerobat.environment.obstacles import Pieces
+from aerobat.kernels.ops import Ops, Scalar, Vector
+from aerobat.kernels.vectors import dot
+from aerobat.limits.body_in_gate import extent_of_thrust
+from aerobat.limits.limit import Limit
+from aerobat.limits.quantity import PathQuantity
+from aerobat.vehicle import Ellipsoid
+
+SIZE = 0.5  # [m] of which excesses are fractions: as a body is wide
+NEAREST = 4  # pieces at an instant, that count there (the four nearest are enough in forests)
+AWAY = 1.5  # [m] beyond which a piece does not count
+EXACT_WITHIN = 0.5  # [m] within which the best plane is sought
+
+
+def limit(margin: float) -> Limit:
+    """Return the limit that a path keeps such a clearance [m]; its quantity is known where planes are."""
+    fields = ("environment.obstacles", "environment.obstacles")
+    return Limit("clearance", "m", PathQuantity(), margin, inf, fields, size=SIZE)
+
+
+class Planes(NamedTuple):
+    """Planes between a body and the nearest pieces at m instants; far away where there are fewer pieces."""
+
+    normals: Array  # from the piece to the body, (m, NEAREST, 3)
+    offsets: Array  # [m] (m, NEAREST), −infinite for those that do not count
+
+
+@dataclass(frozen=True, eq=False)
+class Clearance:
+    """The clearance of a body from the pieces of a world."""
+
+    pieces: Pieces
+    body: Ellipsoid
+
+    def planes(self, positions: Array, thrust_axes: Array) -> Planes:
+        """Return the planes between body and pieces.
+
+        Args:
+            positions: Of the centre of mass [m], (m, 3).
+            thrust_axes: Unit vectors, (m, 3).
+        """
+        revolved = self.body.revolved
+        offset, shapes = revolved.turned(thrust_axes)
+        centres = positions + offset
+        bodies, numbers = self.pieces.near(centres, revolved.reach, AWAY)
+        found = self.pieces.separated(numbers, centres[bodies], shapes[bodies], EXACT_WITHIN)
+        order = np.lexsort((found.gaps, bodies))
+        bodies = bodies[order]
+        rank = np.arange(len(bodies)) - np.searchsorted(bodies, bodies)
+        kept = rank < NEAREST
+        rows, ranks, order = bodies[kept], rank[kept], order[kept]
+        normals = np.tile([0.0, 0.0, 1.0], (len(positions), NEAREST, 1))
+        offsets = np.full((len(positions), NEAREST), -inf)
+        normals[rows, ranks], offsets[rows, ranks] = found.normals[order], found.offsets[order]
+        return Planes(normals, offsets)
+
+    @cached_property
+    def reach(self) -> float:
+        """How far the body reaches, in whichever direction [m]."""
+        return self.body.revolved.reach
+
+
+def left_between(
+    ops: Ops, body: Ellipsoid, position: Vector, thrust: Vector, normal: Vector, offset: Scalar
+) -> Scalar:
+    """Return what is left between a body and a plane [m].
+
+    Args:
+        ops: The arithmetic.
+        body: The ellipsoid about the vehicle.
+        position: Of its centre of mass [m].
+        thrust: Along its thrust axis, of any length.
+        normal: Of the plane, toward the body.
+        offset: Of the plane along it [m].
+    """
+    against = (-1.0 * normal[0], -1.0 * normal[1], -1.0 * normal[2])
+    return dot(normal, position) - extent_of_thrust(ops, body, thrust)(against) - offset
