@@ -1,1 +1,1 @@
-"""Ways around obstacles: routes on a grid, on different sides, and the paths along them that begin refinement."""
+"""Ways around obstacles: routes on different sides of them, and the paths along them that are refined."""

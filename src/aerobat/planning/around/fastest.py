@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from itertools import islice
 from math import inf
 
 from aerobat.optimization.deadline import out_of_time
-from aerobat.planning.around.guesses import guesses
+from aerobat.planning.around.guesses import ROUTES, Guess, guesses
 from aerobat.planning.certified_solve import Judged
 from aerobat.planning.refinement.refine import MAX_SEGMENTS, RefinedPath, Refinement
-
-TRIED = 2  # paths that are refined finely, where the first is not certified
+from aerobat.planning.warm_start import WarmStart
 
 
 @dataclass(frozen=True, eq=False)
@@ -21,6 +22,19 @@ class Around:
     judged: Judged[RefinedPath]
 
 
+@dataclass(frozen=True, eq=False)
+class _Rough:
+    """A path along a route that further rounds may make a plan of."""
+
+    refinement: Refinement
+    path: RefinedPath
+
+    @property
+    def duration(self) -> float:
+        """Of the path [s]."""
+        return self.path.path.trajectory.duration
+
+
 def fastest_around(refinement: Refinement, segments: int) -> Around | None:
     """Return the fastest certified path that is found along routes around obstacles; None where none is.
 
@@ -28,22 +42,35 @@ def fastest_around(refinement: Refinement, segments: int) -> Around | None:
         refinement: Of a task with obstacles.
         segments: Of a path, at least.
     """
-    rough: list[tuple[Refinement, RefinedPath]] = []
-    known = inf
+    rough: list[_Rough] = []
+    tried = _refined_roughly(refinement, segments)
+    while batch := list(islice(tried, ROUTES)):
+        rough += filter(None, batch)
+        rough.sort(key=lambda each: each.duration)
+        while rough and not out_of_time():
+            best = rough.pop(0)
+            judged = best.refinement.finished(best.path)
+            if judged.feasible:
+                return Around(best.refinement, judged)
+    return None
+
+
+def _refined_roughly(refinement: Refinement, segments: int) -> Iterator[_Rough | None]:
+    """Yield the rough path of every guess, None where it is lost or far behind one before."""
+    shortest = inf
     for guess in guesses(refinement.task):
         own = replace(refinement, task=guess.task)
         count = min(max(segments, guess.path.trajectory.segments), MAX_SEGMENTS)
-        path = own.rough(guess.path, count, known)
-        if own.is_promising(path):
-            known = min(known, path.path.trajectory.duration)
-            rough.append((own, path))
-        if out_of_time():
-            break
-    rough.sort(key=lambda pair: pair[1].path.trajectory.duration)
-    for own, path in rough[:TRIED]:
-        judged = own.finished(path)
-        if judged.feasible:
-            return Around(own, judged)
-        if out_of_time():
-            break
-    return None
+        path = own.rough(_begun(refinement, guess, count), count, shortest)
+        found = _Rough(own, path) if own.is_promising(path) else None
+        shortest = min(shortest, inf if found is None else found.duration)
+        yield found
+
+
+def _begun(refinement: Refinement, guess: Guess, segments: int) -> WarmStart:
+    """The path of a guess, refined to pass walls on its side where it has to."""
+    if guess.turned is None:
+        return guess.path
+    begun = replace(guess.path, stages=guess.turned.stages.stages)
+    turned = Refinement.of(guess.turned, refinement.recorder, refinement.still_ends)
+    return replace(turned.rough(begun, segments).path, stages=guess.path.stages)

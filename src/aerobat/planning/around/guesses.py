@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
+from itertools import product
 from typing import NamedTuple
 
 import numpy as np
@@ -11,7 +12,7 @@ import numpy as np
 from aerobat.arrays import Array
 from aerobat.optimization.deadline import out_of_time
 from aerobat.planning.around.grid import Grid
-from aerobat.planning.around.routes import Leg, routes
+from aerobat.planning.around.routes import Leg, Route, routes
 from aerobat.planning.polynomial.knots import start_along_normals
 from aerobat.planning.task import Task
 from aerobat.planning.warm_start import WarmStart
@@ -24,6 +25,10 @@ BEFORE = 0.3  # [m] beyond the body's reach, from which on a gate in a wall is f
 CLOSEST = 0.5  # [m] from one corner of a route to the next
 SHARE = 0.5  # of the room that a narrow passage leaves to the body on its side, which is kept clear
 LEAST_CLEARANCE = 0.003  # [m] that is kept clear in the narrowest: what lies between places is within it
+PACES = (1.4, 1.8, 1.0)  # times the duration of a closed form, in turn: slits are reached from slow ones
+BOTH_WAYS = 0.5  # of an upright's height, below which the body may turn either way
+TOLERANCE = 0.1  # [rad] of a body on its side, at first
+LEAST_THRUST = 0.4  # of gravity, of a body on its side
 EFFORT = 4  # snap: of the derivatives of position whose squares are minimized
 
 
@@ -32,10 +37,13 @@ class Guess(NamedTuple):
 
     path: WarmStart
     task: Task
+    turned: (
+        Task | None
+    )  # that is refined first: without walls that the body passes on its side, but turned so
 
 
 def guesses(task: Task) -> Iterator[Guess]:
-    """Yield paths through a task's stages around obstacles, on different sides of them.
+    """Yield paths through a task's stages around obstacles, on different sides of them, at several paces.
 
     None where some stage does not say where it is, or there is no way: then only refinement moves a path off
     obstacles.
@@ -54,12 +62,26 @@ def guesses(task: Task) -> Iterator[Guess]:
     walls = [gate for gate in (_in_wall(task, stage) for stage in task.stages.stages) if gate is not None]
     narrowest = min([ends, *(gate.opening.inradius for gate in walls)])
     body = task.vehicle.bounding_ellipsoid.revolved
-    for route in routes(grid, legs, ROUTES):
-        room = min(narrowest, route.clearance) - min(body.wide, body.high)
-        clearance = min(task.clearance, max(SHARE * room, LEAST_CLEARANCE))
-        yield Guess(_along(task, route.legs), replace(task, clearance=clearance))
-        if out_of_time():
-            return
+    found = list(_different(routes(grid, legs, ROUTES)))
+    for turned, pace in product(_turned(task), PACES):
+        for route in found:
+            room = min(narrowest, route.clearance) - min(body.wide, body.high)
+            clearance = min(task.clearance, max(SHARE * room, LEAST_CLEARANCE))
+            path = _along(turned or task, route.legs).time_scaled(pace)
+            own = replace(task, clearance=clearance)
+            yield Guess(path, own, None if turned is None else replace(turned, clearance=clearance))
+            if out_of_time():
+                return
+
+
+def _different(found: Iterable[Route]) -> Iterator[Route]:
+    """Yield routes without those whose corners are those of one before."""
+    known: list[Array] = []
+    for route in found:
+        corners = np.concatenate(route.legs)
+        if not any(len(x) == len(corners) and np.abs(x - corners).max() < CLOSEST for x in known):
+            known.append(corners)
+            yield route
 
 
 def _places(task: Task) -> list[Leg] | None:
@@ -85,7 +107,7 @@ def _along(task: Task, route: Sequence[Array]) -> WarmStart:
         stages += [_corner(point) for point in _inner(leg)]
         if k < len(task.stages.stages):
             own.append(len(stages))
-            stages.append(_turned(task, task.stages.stages[k]))
+            stages.append(task.stages.stages[k])
     through = replace(task, stages=replace(task.stages, stages=tuple(stages)))
     path = start_along_normals(through, EFFORT)
     return WarmStart(path.trajectory, task.stages.stages, tuple(path.times[k] for k in own))
@@ -104,12 +126,35 @@ def _corner(point: Array) -> Stage:
     return Stage("corner", fixed(Quantity.POSITION, point))
 
 
-def _turned(task: Task, stage: Stage) -> Stage:
-    """The stage, with the attitude that its gate's wall leaves to the body: upright in the opening."""
-    gate = _in_wall(task, stage)
-    if gate is None or stage.attitude is not None or _fits_level(task, gate):
+def _turned(task: Task) -> tuple[Task | None, ...]:
+    """The task without the walls that the body passes on its side, but turned so, one way and the other.
+
+    None alone where it fits level.
+    """
+    gates = {gate.name: gate for gate in task.problem.gates if gate.wall and not _fits_level(task, gate)}
+    if not gates:
+        return (None,)
+    open_gates = tuple(
+        replace(gate, wall=None) if gate.name in gates else gate for gate in task.problem.gates
+    )
+    problem = replace(task.problem, gates=open_gates)
+    found = []
+    for sign in (1.0, -1.0):
+        stages = tuple(
+            stage if stage.gate not in gates else _on_its_side(task, stage, sign * gates[stage.gate].up)
+            for stage in task.stages.stages
+        )
+        found.append(replace(task, problem=problem, stages=replace(task.stages, stages=stages)))
+    steepest = min(gate.up[2] for gate in gates.values())
+    return tuple(found if steepest < BOTH_WAYS else found[:1])
+
+
+def _on_its_side(task: Task, stage: Stage, up: Array) -> Stage:
+    """The stage with its thrust along a direction, where it asks no attitude."""
+    if stage.attitude is not None:
         return stage
-    return replace(stage, attitude=Attitude(gate.up, task.environment.gravity))
+    attitude = Attitude(up, LEAST_THRUST * task.environment.gravity, TOLERANCE)
+    return replace(stage, attitude=attitude, conditions=(*stage.conditions, *attitude.conditions))
 
 
 def _fits_level(task: Task, gate: Gate) -> bool:

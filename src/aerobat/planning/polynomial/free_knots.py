@@ -79,7 +79,10 @@ class FreeKnots(Planner):
         Raises SpecError without a vehicle and for input that makes no sense, Infeasible when nothing is
         certified.
         """
-        task, recorder = flown_task("free-knots", problem, vehicle, self.reserve, self.clearance), Recorder(progress)
+        task, recorder = (
+            flown_task("free-knots", problem, vehicle, self.reserve, self.clearance),
+            Recorder(progress),
+        )
         refinement = Refinement.of(task, recorder, self.still_ends)
         with within_time(self.time_limit):
             found = self._fastest(refinement)

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -78,7 +79,7 @@ class ClearanceValues:
         given = self._given(derivatives, planes)
         second = np.empty((len(derivatives), MOVED, MOVED))
         for k in range(MOVED):
-            stepped = list(given)
+            stepped: list[Any] = list(given)
             stepped[3 + k] = given[3 + k] + 1j * COMPLEX_STEP
             with np.errstate(divide="ignore", invalid="ignore"):
                 found = self._functions[1](stepped)[3:]
